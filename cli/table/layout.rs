@@ -1,0 +1,125 @@
+//! What is known of a table before its rows are read.
+
+use super::dialect::Dialect;
+use super::error::{Error, Position, escaped, quoted, shortened};
+use super::record::Record;
+
+/// The file, its columns, and how its lines divide into fields.
+pub(super) struct Layout {
+    /// The file's name, for messages.
+    pub(super) file: String,
+    /// What separates fields.
+    pub(super) dialect: Dialect,
+    /// The columns' names; their number is the number of fields in each row.
+    pub(super) names: Vec<String>,
+}
+
+/// A row that [`Record`] has read, and where it came from.
+pub(super) struct Row<'a> {
+    /// Its fields.
+    pub(super) record: &'a Record,
+    /// Its text, from the start of its first line to the newline after the last.
+    pub(super) text: &'a [u8],
+    /// The number of its first line.
+    pub(super) line: u64,
+}
+
+impl Row<'_> {
+    /// Where the content of a field starts; the end of the row if there are not so many.
+    fn position_of(&self, field: usize, dialect: Dialect) -> Position {
+        let start = self.record.start_of(field, self.text);
+        let blanks = self.text[start..].iter().take_while(|&&byte| dialect.is_blank(byte)).count();
+        let offset = if self.record.len() > field { start + blanks } else { start };
+        Position::within(self.text, offset, self.line)
+    }
+}
+
+impl Layout {
+    /// The number of fields in each row.
+    pub(super) fn width(&self) -> usize {
+        self.names.len()
+    }
+
+    /// A column as messages call it.
+    pub(super) fn column(&self, index: usize) -> String {
+        match self.names.get(index) {
+            Some(name) if !name.is_empty() => format!("column '{}'", escaped(&shortened(name))),
+            _ => format!("column {}", index + 1),
+        }
+    }
+
+    /// An error at a field.
+    pub(super) fn fault(&self, row: &Row<'_>, field: usize, message: &str) -> Error {
+        let position = row.position_of(field, self.dialect);
+        Error::data(&self.file, position, format!("{}: {message}", self.column(field)))
+    }
+
+    /// An error at a field of the first row; a word there may be a unit.
+    pub(super) fn first_fault(&self, row: &Row<'_>, field: usize, message: &str) -> Error {
+        let content = self.dialect.trimmed(row.record.field(field));
+        if fast_float2::parse_partial::<f64, _>(content).is_ok() {
+            return self.fault(row, field, message);
+        }
+        let message = format!("{message}; if this row holds units, leave it out with --skip-rows");
+        self.fault(row, field, &message)
+    }
+
+    /// The error for a row with the wrong number of fields.
+    pub(super) fn ragged(&self, row: &Row<'_>) -> Error {
+        let (found, width) = (row.record.len(), self.width());
+        let first = self.names.first().map_or("", String::as_str);
+        let advice = if self.dialect.delimiter == b',' && found == 2 * width {
+            if width == 1 {
+                "if it has a decimal comma, say --decimal-comma"
+            } else {
+                "if it has decimal commas, separate its fields by semicolons and say --decimal-comma"
+            }
+        } else if first.starts_with(['#', '%', '/']) && width < found {
+            "if the first line is a comment, say --comment and its first character"
+        } else if found > width && row.record.field(found - 1).trim_ascii().is_empty() {
+            "take the delimiter at its end away, or name one column more"
+        } else if found > width {
+            "take a field away, or quote the one that holds a delimiter"
+        } else {
+            "add what is missing, if only the delimiters"
+        };
+        let message = format!(
+            "this row has {}, where {} {} named ({} separates them); {advice}",
+            counted(found, "field"),
+            counted(width, "column"),
+            if width == 1 { "is" } else { "are" },
+            quoted(&[self.dialect.delimiter]),
+        );
+        Error::data(&self.file, row.position_of(found.min(width), self.dialect), message)
+    }
+
+    /// The error for a text that ends inside quotes; the row is as much of it as there is.
+    pub(super) fn unclosed(&self, row: &Row<'_>) -> Error {
+        let position = row.position_of(row.record.len(), self.dialect);
+        Error::data(&self.file, position, "this quote is not closed before the end of the file; close it, or take it away")
+    }
+
+    /// The error for a row that is longer than `limit` bytes.
+    pub(super) fn too_long(&self, line: u64, limit: usize) -> Error {
+        let message = format!(
+            "this row is longer than {limit} bytes: either this is no text table, or a quote is not closed; name a text \
+             file, or close the quote"
+        );
+        Error::data(&self.file, Position { line, column: 1 }, message)
+    }
+
+    /// The error for a text that ends on `line` without a row of data.
+    pub(super) fn no_rows(&self, line: u64) -> Error {
+        let message = if self.names.is_empty() {
+            "there is no row, only blank lines and comments; record at least one row"
+        } else {
+            "there are no data rows below the header; record at least one"
+        };
+        Error::data(&self.file, Position { line, column: 1 }, message)
+    }
+}
+
+/// A number and the noun that goes with it.
+fn counted(count: usize, noun: &str) -> String {
+    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
+}

@@ -1,0 +1,263 @@
+//! Reading a log from its first byte to its last.
+
+use std::path::Path;
+
+use memchr::{memchr, memchr_iter, memrchr};
+
+use super::block::Block;
+use super::dialect::Dialect;
+use super::error::{Error, Position, quoted};
+use super::layout::{Layout, Row};
+use super::number::{NUL_BYTE, Numbers};
+use super::record::Record;
+use super::rows::{Plan, Rows, Workspace};
+use super::source::Source;
+use super::time::Clock;
+use super::{Options, Selection, Table};
+
+/// How much is held in memory and handled at a time, in bytes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sizes {
+    /// What is read at once.
+    pub(super) block: usize,
+    /// What one thread parses at once.
+    pub(super) piece: usize,
+    /// The longest row.
+    pub(super) row: usize,
+}
+
+/// The sizes for real files. Larger blocks fall out of the processor's cache before they are parsed.
+pub(super) const SIZES: Sizes = Sizes { block: 1 << 20, piece: 1 << 17, row: 1 << 24 };
+
+/// A log whose columns are known and whose rows are still to be read.
+pub(crate) struct Reader {
+    options: Options,
+    sizes: Sizes,
+    source: Source,
+    layout: Layout,
+    /// The errors to report if a column with such a name is used.
+    undecoded_names: Vec<(usize, Error)>,
+    /// The text at hand, and space for the text after it.
+    current: Block,
+    next: Block,
+    /// The first row; where it starts in the current block, its length, and its line.
+    record: Record,
+    position: usize,
+    length: usize,
+    line: u64,
+}
+
+impl Reader {
+    /// Opens a log, or standard input for `-`, and reads as far as its first row.
+    pub(crate) fn open(path: &Path, options: &Options) -> Result<Self, Error> {
+        options.check().map_err(|message| Error::data(&path.display().to_string(), None, message))?;
+        Self::start(Source::open(path, options.encoding)?, options, SIZES)
+    }
+
+    /// Reads a stream as far as its first row.
+    pub(super) fn start(mut source: Source, options: &Options, sizes: Sizes) -> Result<Self, Error> {
+        let file = source.name().to_owned();
+        let mut current = Block::default();
+        current.fill(&[], sizes.block, &mut source)?;
+        let text = current.text();
+        if text.is_empty() {
+            return Err(Error::data(&file, None, "the file is empty; record at least one row"));
+        }
+        if let Some(offset) = memchr(0, text) {
+            return Err(Error::data(&file, Position::within(text, offset, 1), NUL_BYTE));
+        }
+        let dialect = match options.delimiter {
+            Some(delimiter) => Dialect { delimiter, comment: options.comment },
+            None => Dialect::recognise(text, options.comment, options.decimal_comma),
+        };
+        let mut reader = Self {
+            options: options.clone(),
+            sizes,
+            source,
+            layout: Layout { file, dialect, names: Vec::new() },
+            undecoded_names: Vec::new(),
+            current,
+            next: Block::default(),
+            record: Record::new(dialect.delimiter),
+            position: 0,
+            length: 0,
+            line: 1,
+        };
+        reader.read_head()?;
+        Ok(reader)
+    }
+
+    /// Reads the names of the columns and stops at the first row.
+    fn read_head(&mut self) -> Result<(), Error> {
+        if self.options.header {
+            self.advance()?;
+            self.read_names();
+        }
+        for _ in 0..self.options.skip_rows {
+            self.advance()?;
+        }
+        self.advance()?;
+        if !self.options.header {
+            self.layout.names = (1..=self.record.len()).map(|number| number.to_string()).collect();
+        }
+        Ok(())
+    }
+
+    /// Takes the names from the row at hand.
+    fn read_names(&mut self) {
+        for index in 0..self.record.len() {
+            let name = self.layout.dialect.trimmed(self.record.field(index));
+            let text = String::from_utf8_lossy(name).into_owned();
+            // It is there as well if the name was decoded by a wrong encoding.
+            if text.contains(char::REPLACEMENT_CHARACTER) {
+                let message = format!(
+                    "its name {} is not UTF-8; name the file's encoding, as in --encoding windows-1252",
+                    quoted(name)
+                );
+                self.undecoded_names.push((index, self.layout.fault(&self.row(), index, &message)));
+            }
+            self.layout.names.push(text);
+        }
+    }
+
+    /// Goes on to the next row, which must exist.
+    fn advance(&mut self) -> Result<(), Error> {
+        let passed = &self.current.text()[self.position..self.position + self.length];
+        self.line += memchr_iter(b'\n', passed).count() as u64;
+        self.position += self.length;
+        loop {
+            let rest = &self.current.text()[self.position..];
+            if let Some(length) = self.layout.dialect.skipped_line(rest) {
+                self.position += length;
+                self.line += 1;
+            } else if let Some(length) = self.record.read(rest) {
+                self.length = length;
+                return Ok(());
+            } else if self.current.is_last() {
+                let row = Row { record: &self.record, text: rest, line: self.line };
+                return Err(if rest.is_empty() { self.layout.no_rows(self.line) } else { self.layout.unclosed(&row) });
+            } else if rest.len() > self.sizes.row {
+                return Err(self.layout.too_long(self.line, self.sizes.row));
+            } else {
+                let amount = self.sizes.block.max(self.current.carried());
+                self.next.fill(rest, amount, &mut self.source)?;
+                std::mem::swap(&mut self.current, &mut self.next);
+                self.position = 0;
+            }
+        }
+    }
+
+    /// The row at hand.
+    fn row(&self) -> Row<'_> {
+        let text = &self.current.text()[self.position..self.position + self.length];
+        Row { record: &self.record, text, line: self.line }
+    }
+
+    /// The names of the columns, as they are in the header; without one they are numbered from `1`.
+    pub(crate) fn names(&self) -> &[String] {
+        &self.layout.names
+    }
+
+    /// Reads the selected columns of all rows.
+    ///
+    /// `progress` is called once a block with the number of bytes read so far, and of how many if that is known. Both
+    /// count what is stored, before it is unpacked.
+    pub(crate) fn read(
+        self,
+        selection: &Selection,
+        progress: &mut dyn FnMut(u64, Option<u64>),
+    ) -> Result<Table, Error> {
+        let fields = self.fields(selection)?;
+        let numbers = Numbers::new(self.options.decimal_comma, &self.options.missing);
+        let (clock, start) = self.clock(selection, &numbers)?;
+        let Self { sizes, mut source, layout, mut current, mut next, record, mut position, line, .. } = self;
+        let plan = Plan { layout, numbers, clock, fields, time: selection.time };
+        let mut workspace = Workspace::new(record);
+        let mut rows = Rows::new(plan.fields.len(), line);
+        let mut parsed = 0;
+        loop {
+            let text = &current.text()[position..];
+            let (whole, tail) = text.split_at(memrchr(b'\n', text).map_or(0, |newline| newline + 1));
+            let rows_before = rows.count;
+            let (read, filled) = rayon::join(
+                || plan.read(whole, sizes.piece, &mut workspace, &mut rows),
+                || {
+                    if current.is_last() {
+                        return Ok(());
+                    }
+                    // A row that grows over many blocks is read again with each: so let them double.
+                    next.fill(tail, sizes.block.max(current.carried()), &mut source)
+                },
+            );
+            // What is wrong with this block comes before what is wrong with the next.
+            let taken = read?;
+            let left = &text[taken..];
+            if current.is_last() {
+                if !left.is_empty() {
+                    return Err(plan.layout.unclosed(&Row { record: &workspace.record, text: left, line: rows.line }));
+                }
+                progress(source.bytes_read(), source.total());
+                break;
+            }
+            if left.len() > sizes.row {
+                return Err(plan.layout.too_long(rows.line, sizes.row));
+            }
+            filled?;
+            next.prepend(&whole[taken..]);
+            progress(source.bytes_read(), source.total());
+            parsed += taken;
+            if let Some(total) = source.total() {
+                let parsed_share = parsed as f64 / (parsed + next.text().len()) as f64;
+                let blocks_left = total as f64 / (source.bytes_read() as f64 * parsed_share);
+                rows.expect((rows.count as f64 * blocks_left * 1.01) as usize, rows.count - rows_before);
+            }
+            std::mem::swap(&mut current, &mut next);
+            position = 0;
+        }
+        let slot = |index: &usize| plan.fields.binary_search(index).unwrap_or_default();
+        let mut take = |index| rows.columns.get_mut(slot(index)).map(std::mem::take).unwrap_or_default();
+        let missing = |index| rows.missing.get(slot(index)).copied().unwrap_or_default();
+        Ok(Table {
+            columns: selection.columns.iter().map(&mut take).collect(),
+            missing: selection.columns.iter().map(missing).collect(),
+            time: selection.time.as_ref().map(take),
+            start,
+            rows: rows.count,
+            lines: rows.lines,
+        })
+    }
+
+    /// The selected fields in ascending order, if the selection makes sense.
+    fn fields(&self, selection: &Selection) -> Result<Vec<usize>, Error> {
+        let mut fields: Vec<usize> = selection.columns.iter().copied().chain(selection.time).collect();
+        fields.sort_unstable();
+        let unusable = |message| Err(Error::data(&self.layout.file, None, message));
+        if let Some(twice) = fields.windows(2).find(|pair| pair[0] == pair[1]) {
+            return unusable(format!("{} is selected twice; select it once", self.layout.column(twice[0])));
+        }
+        if let Some(beyond) = fields.iter().find(|&&field| field >= self.layout.width()) {
+            let width = self.layout.width();
+            return unusable(format!("there is no column {}; select from the first {width}", beyond + 1));
+        }
+        match self.undecoded_names.iter().find(|(index, _)| fields.contains(index)) {
+            Some((_, error)) => Err(error.clone()),
+            None => Ok(fields),
+        }
+    }
+
+    /// Decides by the first row how times are written, and returns the first one if it is a date.
+    fn clock(&self, selection: &Selection, numbers: &Numbers) -> Result<(Clock, Option<String>), Error> {
+        let row = self.row();
+        match selection.time {
+            // A row of another width is refused when it is read.
+            Some(index) if row.record.len() == self.layout.width() => {
+                let field = self.layout.dialect.trimmed(row.record.field(index));
+                let clock = Clock::decide(field, self.options.time_format.as_deref(), numbers)
+                    .map_err(|message| self.layout.first_fault(&row, index, &message))?;
+                let is_date = matches!(clock, Clock::Calendar { .. });
+                Ok((clock, is_date.then(|| String::from_utf8_lossy(field).into_owned())))
+            }
+            _ => Ok((Clock::Seconds, None)),
+        }
+    }
+}

@@ -1,0 +1,275 @@
+//! From text to columns of numbers.
+//!
+//! Two readers share the work. The fast one takes the rows that it understands at first sight and stops in front of
+//! the first one that it does not: a row with a quote, or with a mistake. The careful one, built on [`Record`], knows
+//! all the rules and explains mistakes; it goes on from there to the end of the text.
+//!
+//! The fast one never gets past a quote, so every newline before the place where it stops ends a row. Therefore a text
+//! may be cut at newlines into pieces that are read at the same time: what counts is the pieces up to the first stop.
+//! Neither the table nor an error depends on where the cuts are, or on the number of threads.
+
+use memchr::{memchr, memchr_iter, memchr3};
+use rayon::prelude::*;
+
+use super::error::Error;
+use super::layout::{Layout, Row};
+use super::lines::Lines;
+use super::number::Numbers;
+use super::record::Record;
+use super::time::Clock;
+
+/// What to read from each row.
+pub(super) struct Plan {
+    /// The columns there are.
+    pub(super) layout: Layout,
+    /// How numbers are written.
+    pub(super) numbers: Numbers,
+    /// How times are written.
+    pub(super) clock: Clock,
+    /// The fields to read, in ascending order.
+    pub(super) fields: Vec<usize>,
+    /// The one of them that is the time.
+    pub(super) time: Option<usize>,
+}
+
+/// The rows of a table, or of a piece of it, by columns.
+#[derive(Default)]
+pub(super) struct Rows {
+    /// The values of each field in the plan.
+    pub(super) columns: Vec<Vec<f64>>,
+    /// How many of them are missing.
+    pub(super) missing: Vec<usize>,
+    /// The lines of the rows.
+    pub(super) lines: Lines,
+    /// The number of rows.
+    pub(super) count: usize,
+    /// The number of the line after the last one read.
+    pub(super) line: u64,
+}
+
+impl Rows {
+    /// No rows yet, with the next one on `line`.
+    pub(super) fn new(columns: usize, line: u64) -> Self {
+        Self { columns: vec![Vec::new(); columns], missing: vec![0; columns], line, ..Self::default() }
+    }
+
+    /// Adds a row that takes so many lines.
+    fn push(&mut self, values: &[f64], lines: u64) {
+        for ((column, missing), &value) in self.columns.iter_mut().zip(&mut self.missing).zip(values) {
+            column.push(value);
+            *missing += usize::from(value.is_nan());
+        }
+        self.lines.push(self.count, self.line);
+        self.count += 1;
+        self.line += lines;
+    }
+
+    /// Adds the rows of the piece that follows, whose lines count from zero.
+    fn append(&mut self, piece: &Self) {
+        for (column, values) in self.columns.iter_mut().zip(&piece.columns) {
+            column.extend_from_slice(values);
+        }
+        for (missing, more) in self.missing.iter_mut().zip(&piece.missing) {
+            *missing += more;
+        }
+        self.lines.append(&piece.lines, self.count, self.line);
+        self.count += piece.count;
+        self.line += piece.line;
+    }
+
+    /// Makes room for a total of rows if the next `more` rows may not fit.
+    ///
+    /// Growing by doubling would hold half as much again as the table needs.
+    pub(super) fn expect(&mut self, total: usize, more: usize) {
+        for column in &mut self.columns {
+            if column.capacity() - column.len() < 2 * more {
+                // Only an estimate: without the memory for it the table may still fit.
+                let _ = column.try_reserve_exact(total.saturating_sub(column.len()));
+            }
+        }
+    }
+
+    /// Forgets everything, keeping the memory.
+    fn clear(&mut self) {
+        self.columns.iter_mut().for_each(Vec::clear);
+        self.missing.fill(0);
+        self.lines.clear();
+        self.count = 0;
+        self.line = 0;
+    }
+}
+
+/// What reading a text takes besides the text, kept from one to the next.
+pub(super) struct Workspace {
+    /// For the careful reader.
+    pub(super) record: Record,
+    /// For the fast reader, one each.
+    pieces: Vec<Rows>,
+}
+
+impl Workspace {
+    /// Space for a plan's rows.
+    pub(super) fn new(record: Record) -> Self {
+        Self { record, pieces: Vec::new() }
+    }
+}
+
+impl Plan {
+    /// Reads the rows of a text that starts with a row and ends with a newline, in pieces of about `piece_size` bytes.
+    ///
+    /// Returns how much of the text was read: all of it, unless a quoted field goes on behind it.
+    pub(super) fn read(
+        &self,
+        text: &[u8],
+        piece_size: usize,
+        workspace: &mut Workspace,
+        rows: &mut Rows,
+    ) -> Result<usize, Error> {
+        let texts = pieces(text, piece_size);
+        let columns = self.fields.len();
+        workspace.pieces.resize_with(texts.len().max(workspace.pieces.len()), || Rows::new(columns, 0));
+        let read: Vec<usize> = texts
+            .par_iter()
+            .zip(&mut workspace.pieces)
+            .map(|(text, rows)| {
+                rows.clear();
+                self.read_fast(text, rows)
+            })
+            .collect();
+        let mut taken = 0;
+        for ((text, piece), read) in texts.iter().zip(&workspace.pieces).zip(read) {
+            rows.append(piece);
+            taken += read;
+            if read < text.len() {
+                break;
+            }
+        }
+        Ok(taken + self.read_carefully(&text[taken..], &mut workspace.record, rows)?)
+    }
+
+    /// Reads rows up to the first that needs care, and returns the length of their text.
+    fn read_fast(&self, text: &[u8], rows: &mut Rows) -> usize {
+        let mut values = vec![0.0; self.fields.len()];
+        let mut taken = 0;
+        while taken < text.len() {
+            let rest = &text[taken..];
+            if let Some(length) = self.layout.dialect.skipped_line(rest) {
+                rows.line += 1;
+                taken += length;
+            } else if let Some(length) = self.row(rest, &mut values) {
+                rows.push(&values, 1);
+                taken += length;
+            } else {
+                break;
+            }
+        }
+        taken
+    }
+
+    /// Reads the row at the front of a text and returns its length, unless it needs care.
+    fn row(&self, text: &[u8], values: &mut [f64]) -> Option<usize> {
+        let (mut taken, mut field) = (0, 0);
+        for (value, &wanted) in values.iter_mut().zip(&self.fields) {
+            taken += self.skip(text.get(taken..)?, field, wanted)?;
+            let length;
+            (*value, length) = self.value(text.get(taken..)?, wanted)?;
+            taken += length;
+            field = wanted + 1;
+        }
+        Some(taken + self.skip(text.get(taken..)?, field, self.layout.width())?)
+    }
+
+    /// The length of the fields from one index to before another.
+    fn skip(&self, text: &[u8], from: usize, to: usize) -> Option<usize> {
+        let mut skipped = 0;
+        for field in from..to {
+            skipped += self.field(&text[skipped..], field)?.len() + 1;
+        }
+        Some(skipped)
+    }
+
+    /// The field at the front of a text, if it ends as it must and without a quote.
+    fn field<'a>(&self, text: &'a [u8], index: usize) -> Option<&'a [u8]> {
+        let end = memchr3(self.layout.dialect.delimiter, b'\n', b'"', text)?;
+        (text[end] == self.end_of(index)).then(|| &text[..end])
+    }
+
+    /// The byte after a field.
+    fn end_of(&self, index: usize) -> u8 {
+        if index + 1 == self.layout.width() { b'\n' } else { self.layout.dialect.delimiter }
+    }
+
+    /// Reads the value at the front of a text, and returns it with the length of its field.
+    fn value(&self, text: &[u8], index: usize) -> Option<(f64, usize)> {
+        let dialect = self.layout.dialect;
+        let blanks = |text: &[u8]| text.iter().take_while(|&&byte| dialect.is_blank(byte)).count();
+        let is_time = self.time == Some(index);
+        // Most fields are plain numbers, whose end need not be searched for: it is where the number ends.
+        if !is_time || matches!(self.clock, Clock::Seconds) {
+            let start = blanks(text);
+            if let Some((value, length)) = self.numbers.prefix(&text[start..]) {
+                let end = start + length;
+                let end = end + blanks(&text[end..]);
+                if text.get(end) == Some(&self.end_of(index)) && !(is_time && value.is_nan()) {
+                    return Some((value, end + 1));
+                }
+            }
+        }
+        let field = self.field(text, index)?;
+        let value = self.content(dialect.trimmed(field), index).ok()?;
+        Some((value, field.len() + 1))
+    }
+
+    /// Reads the content of a field; an error is a message.
+    fn content(&self, content: &[u8], index: usize) -> Result<f64, String> {
+        if self.time == Some(index) {
+            self.clock.read(content, &self.numbers)
+        } else {
+            self.numbers.read(content)
+        }
+    }
+
+    /// Reads rows by all the rules, and returns the length of their text.
+    fn read_carefully(&self, text: &[u8], record: &mut Record, rows: &mut Rows) -> Result<usize, Error> {
+        let layout = &self.layout;
+        let mut values = vec![0.0; self.fields.len()];
+        let mut taken = 0;
+        while taken < text.len() {
+            let rest = &text[taken..];
+            if let Some(length) = layout.dialect.skipped_line(rest) {
+                rows.line += 1;
+                taken += length;
+                continue;
+            }
+            let Some(length) = record.read(rest) else { break };
+            let row = Row { record, text: &rest[..length], line: rows.line };
+            if record.len() != layout.width() {
+                return Err(layout.ragged(&row));
+            }
+            for (value, &index) in values.iter_mut().zip(&self.fields) {
+                *value = self.content(layout.dialect.trimmed(record.field(index)), index).map_err(|message| {
+                    if rows.count == 0 {
+                        layout.first_fault(&row, index, &message)
+                    } else {
+                        layout.fault(&row, index, &message)
+                    }
+                })?;
+            }
+            rows.push(&values, memchr_iter(b'\n', row.text).count() as u64);
+            taken += length;
+        }
+        Ok(taken)
+    }
+}
+
+/// Cuts a text behind newlines into pieces of `size` bytes or a little more.
+fn pieces(mut text: &[u8], size: usize) -> Vec<&[u8]> {
+    let mut pieces = Vec::with_capacity(text.len() / size + 1);
+    while !text.is_empty() {
+        let cut = text.get(size..).and_then(|rest| memchr(b'\n', rest)).map_or(text.len(), |newline| size + newline + 1);
+        let (piece, rest) = text.split_at(cut);
+        pieces.push(piece);
+        text = rest;
+    }
+    pieces
+}

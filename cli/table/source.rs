@@ -1,0 +1,140 @@
+//! Where the bytes come from: a file or standard input, unpacked and decoded to UTF-8.
+
+use std::fs::File;
+use std::io::{self, Cursor, Read};
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use encoding_rs::{Encoding, UTF_8};
+use encoding_rs_io::DecodeReaderBytesBuilder;
+use flate2::read::MultiGzDecoder;
+
+use super::error::Error;
+
+/// The first bytes of every gzip stream.
+const GZIP: [u8; 2] = [0x1f, 0x8b];
+
+/// A stream of text, and how much of its origin has been read.
+pub(super) struct Source {
+    name: String,
+    text: Box<dyn Read + Send>,
+    gzip: bool,
+    bytes_read: Arc<AtomicU64>,
+    total: Option<u64>,
+}
+
+impl Source {
+    /// Opens a file, or standard input for `-`.
+    ///
+    /// gzip is known by its first bytes and UTF-16 by its byte-order mark; a mark also overrules `encoding`.
+    /// Without either, the bytes are passed on as they are.
+    pub(super) fn open(path: &Path, encoding: Option<&'static Encoding>) -> Result<Self, Error> {
+        if path == Path::new("-") {
+            return Self::new("standard input", io::stdin(), None, encoding);
+        }
+        let name = path.display().to_string();
+        let opened = File::open(path).and_then(|file| {
+            let metadata = file.metadata()?;
+            Ok((file, metadata))
+        });
+        match opened {
+            Err(error) => Err(Error::io(&name, format!("cannot be opened: {error}; check the path and its permissions"))),
+            Ok((_, metadata)) if metadata.is_dir() => Err(Error::io(&name, "is a directory; name a file in it")),
+            Ok((file, metadata)) => {
+                let total = metadata.is_file().then_some(metadata.len());
+                Self::new(&name, file, total, encoding)
+            }
+        }
+    }
+
+    /// Unpacks and decodes a stream of `total` bytes.
+    pub(super) fn new(
+        name: &str,
+        origin: impl Read + Send + 'static,
+        total: Option<u64>,
+        encoding: Option<&'static Encoding>,
+    ) -> Result<Self, Error> {
+        let bytes_read = Arc::new(AtomicU64::new(0));
+        let mut origin = Counted { origin, bytes: Arc::clone(&bytes_read) };
+        let mut start = Vec::new();
+        let peeked = origin.by_ref().take(GZIP.len() as u64).read_to_end(&mut start);
+        let gzip = start == GZIP;
+        let origin = Cursor::new(start).chain(origin);
+        let unpacked: Box<dyn Read + Send> = if gzip {
+            Box::new(MultiGzDecoder::new(origin))
+        } else {
+            Box::new(origin)
+        };
+        // Decoding UTF-8 to UTF-8 would take time and hide what is wrong with it.
+        let encoding = encoding.filter(|&encoding| encoding != UTF_8);
+        let text = DecodeReaderBytesBuilder::new()
+            .encoding(encoding)
+            .utf8_passthru(encoding.is_none())
+            .strip_bom(true)
+            .bom_override(true)
+            .build(unpacked);
+        let source = Self { name: name.to_owned(), text: Box::new(text), gzip, bytes_read, total };
+        match peeked {
+            Ok(_) => Ok(source),
+            Err(error) => Err(source.failure(&error)),
+        }
+    }
+
+    /// The name that messages give it.
+    pub(super) fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The bytes read so far from the file or standard input, as they are stored there.
+    pub(super) fn bytes_read(&self) -> u64 {
+        self.bytes_read.load(Ordering::Relaxed)
+    }
+
+    /// The length of the file, as it is stored; nothing for a stream.
+    pub(super) fn total(&self) -> Option<u64> {
+        self.total
+    }
+
+    /// Fills `buffer` as far as the text reaches, and returns how far.
+    pub(super) fn fill(&mut self, buffer: &mut [u8]) -> Result<usize, Error> {
+        let mut filled = 0;
+        while filled < buffer.len() {
+            match self.text.read(&mut buffer[filled..]) {
+                Ok(0) => break,
+                Ok(count) => filled += count,
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) => return Err(self.failure(&error)),
+            }
+        }
+        Ok(filled)
+    }
+
+    /// Says what a failed read means.
+    fn failure(&self, error: &io::Error) -> Error {
+        let message = match error.kind() {
+            io::ErrorKind::UnexpectedEof if self.gzip => {
+                "the gzip stream ends too early: the file is truncated; copy or compress it again".to_owned()
+            }
+            io::ErrorKind::InvalidInput | io::ErrorKind::InvalidData if self.gzip => {
+                format!("the gzip stream is damaged ({error}); copy or compress it again")
+            }
+            _ => format!("cannot be read: {error}"),
+        };
+        Error::io(&self.name, message)
+    }
+}
+
+/// A stream that counts its bytes.
+struct Counted<R> {
+    origin: R,
+    bytes: Arc<AtomicU64>,
+}
+
+impl<R: Read> Read for Counted<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = self.origin.read(buffer)?;
+        self.bytes.fetch_add(count as u64, Ordering::Relaxed);
+        Ok(count)
+    }
+}

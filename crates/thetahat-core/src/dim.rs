@@ -1,0 +1,130 @@
+//! The number of parameters: in the type, or known only at run time.
+
+use core::fmt::Debug;
+
+use nalgebra::allocator::Allocator;
+use nalgebra::{ArrayStorage, Const, DefaultAllocator, Dim, OMatrix, OVector, Scalar};
+#[cfg(feature = "alloc")]
+use nalgebra::{Dyn, U1};
+
+use crate::Real;
+
+/// What a size does differently when it is a type and when it is a value.
+///
+/// The trait is public because [`Dimension`] names it, and out of reach because its module is private: that seals
+/// `Dimension`.
+pub trait Workspace: Dim {
+    /// What `with_scratch` keeps between calls: nothing for a static size, a buffer for a run-time size.
+    type Scratch<T: Real>: Clone + Debug;
+
+    /// The dimension of exactly `size`, or the only size this type has.
+    fn exactly(size: usize) -> Result<Self, usize>;
+    /// The smallest dimension of at least `size`, or the only size this type has.
+    fn at_least(size: usize) -> Result<Self, usize>;
+    /// A vector filled with `value`.
+    ///
+    /// (nalgebra's own constructors count the elements of an iterator and panic if they are too few.)
+    fn vector<V: Scalar + Copy>(self, value: V) -> OVector<V, Self>
+    where
+        DefaultAllocator: Allocator<Self>;
+    /// A square matrix filled with `value`.
+    fn square<V: Scalar + Copy>(self, value: V) -> OMatrix<V, Self, Self>
+    where
+        DefaultAllocator: Allocator<Self, Self>;
+    /// What this size keeps for [`with_scratch`](Workspace::with_scratch).
+    fn scratch<T: Real>(self) -> Self::Scratch<T>;
+    /// Calls `work` with as many scratch elements as the size says, of any value: on the stack, or from `kept`.
+    fn with_scratch<T: Real, A>(kept: &mut Self::Scratch<T>, work: impl FnOnce(&mut [T]) -> A) -> A;
+}
+
+impl<const N: usize> Workspace for Const<N> {
+    type Scratch<T: Real> = ();
+
+    fn exactly(size: usize) -> Result<Self, usize> {
+        (size == N).then_some(Const).ok_or(N)
+    }
+
+    fn at_least(size: usize) -> Result<Self, usize> {
+        (size <= N).then_some(Const).ok_or(N)
+    }
+
+    fn vector<V: Scalar + Copy>(self, value: V) -> OVector<V, Self> {
+        OVector::from_data(ArrayStorage([[value; N]]))
+    }
+
+    fn square<V: Scalar + Copy>(self, value: V) -> OMatrix<V, Self, Self> {
+        OMatrix::from_data(ArrayStorage([[value; N]; N]))
+    }
+
+    fn scratch<T: Real>(self) {}
+
+    fn with_scratch<T: Real, A>((): &mut (), work: impl FnOnce(&mut [T]) -> A) -> A {
+        work(&mut [T::zero(); N])
+    }
+}
+
+#[cfg(feature = "alloc")]
+impl Workspace for Dyn {
+    type Scratch<T: Real> = OVector<T, Dyn>;
+
+    fn exactly(size: usize) -> Result<Self, usize> {
+        Ok(Dyn(size))
+    }
+
+    fn at_least(size: usize) -> Result<Self, usize> {
+        Ok(Dyn(size))
+    }
+
+    fn vector<V: Scalar + Copy>(self, value: V) -> OVector<V, Self> {
+        OVector::from_element_generic(self, U1, value)
+    }
+
+    fn square<V: Scalar + Copy>(self, value: V) -> OMatrix<V, Self, Self> {
+        OMatrix::from_element_generic(self, self, value)
+    }
+
+    fn scratch<T: Real>(self) -> OVector<T, Dyn> {
+        self.vector(T::zero())
+    }
+
+    fn with_scratch<T: Real, A>(kept: &mut OVector<T, Dyn>, work: impl FnOnce(&mut [T]) -> A) -> A {
+        work(kept.as_mut_slice())
+    }
+}
+
+mod imply {
+    /// A bound on `T` that holds wherever `Self: Imply<T>` does: a `where` clause on another type is not implied by
+    /// a trait, but a bound on an associated type is.
+    pub trait Imply<T>: Is<T, Type = T> {}
+    pub trait Is<T> {
+        type Type;
+    }
+    impl<S, T> Is<T> for S {
+        type Type = T;
+    }
+    impl<S, T> Imply<T> for S {}
+}
+
+/// A size: nalgebra's `Const<N>`, or `Dyn` with the feature `alloc`.
+///
+/// It collapses nalgebra's allocator bounds into one name, so that a signature over any size reads
+/// `impl<T: Real, N: Dimension>`. The trait is sealed.
+///
+/// ```
+/// use thetahat_core::nalgebra::{Const, OVector};
+/// use thetahat_core::{Dimension, Real};
+///
+/// fn sum<T: Real, N: Dimension>(values: &OVector<T, N>) -> T {
+///     values.iter().fold(T::zero(), |sum, &value| sum + value)
+/// }
+/// assert_eq!(sum(&OVector::<f64, Const<3>>::new(1.0, 2.0, 4.0)), 7.0);
+/// ```
+pub trait Dimension:
+    Workspace + imply::Imply<DefaultAllocator, Type: Allocator<Self> + Allocator<Self, Self>>
+{
+}
+
+impl<const N: usize> Dimension for Const<N> {}
+
+#[cfg(feature = "alloc")]
+impl Dimension for Dyn {}

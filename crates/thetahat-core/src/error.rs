@@ -1,0 +1,177 @@
+//! What can be wrong with an argument.
+
+use core::fmt;
+
+/// What is wrong, and with which argument.
+///
+/// Whatever returns an error has left its receiver as it was.
+///
+/// ```
+/// use thetahat_core::Error;
+///
+/// let error = Error::NotFinite { argument: "output" };
+/// assert_eq!(error.to_string(), "output is NaN or infinite: leave this row out");
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Error {
+    /// A row of a regression holds NaN or infinity.
+    NotFinite {
+        /// The argument that does.
+        argument: &'static str,
+    },
+    /// A sample is infinite. (NaN is a missing sample, and no error.)
+    Infinite {
+        /// The argument that is.
+        argument: &'static str,
+    },
+    /// A finite number is so large that later sums could overflow.
+    TooLarge {
+        /// The argument that holds it.
+        argument: &'static str,
+    },
+    /// A number that must not be negative is.
+    Negative {
+        /// The argument that is.
+        argument: &'static str,
+    },
+    /// A vector or matrix has the wrong size.
+    Length {
+        /// The argument that has it.
+        argument: &'static str,
+        /// The size it should have.
+        expected: usize,
+        /// The size it has.
+        found: usize,
+    },
+    /// The orders make another number of parameters than the type holds.
+    Orders {
+        /// The number of parameters the orders make: na plus every nb.
+        needed: usize,
+        /// The number of parameters the type holds.
+        available: usize,
+    },
+    /// The delays need more stored samples than the type holds.
+    Delays {
+        /// The number of samples the delays need: the nk of every input that has coefficients, added up.
+        needed: usize,
+        /// The number of samples the type holds.
+        available: usize,
+    },
+    /// A triangular factor has a non-zero entry below its diagonal.
+    NotTriangular {
+        /// The row of the entry, from 0.
+        row: usize,
+        /// The column of the entry, from 0.
+        column: usize,
+    },
+    /// There are fewer rows than the result needs.
+    TooFewRows {
+        /// The number of rows it needs.
+        needed: usize,
+        /// The number of rows there are.
+        found: usize,
+    },
+    /// The number of rows no longer fits its counter.
+    TooManyRows,
+    /// The columns of the regression are linearly dependent.
+    RankDeficient {
+        /// The first column that depends on the others, from 0. [`LeastSquares::rank`](crate::LeastSquares::rank)
+        /// names them all.
+        column: usize,
+    },
+    /// A result does not fit the scalar type.
+    Overflow,
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Error::NotFinite { argument } => {
+                write!(formatter, "{argument} is NaN or infinite: leave this row out")
+            }
+            Error::Infinite { argument } => {
+                write!(formatter, "{argument} is infinite: if the sample is missing, pass NaN")
+            }
+            Error::TooLarge { argument } => {
+                write!(formatter, "{argument} is too large for sums without overflow: use a larger unit")
+            }
+            Error::Negative { argument } => {
+                write!(formatter, "{argument} is negative: it must be 0 or more")
+            }
+            Error::Length { argument, expected, found } => {
+                write!(formatter, "{argument} has size {found}: it must have size {expected}")
+            }
+            Error::Orders { needed, available } => write!(
+                formatter,
+                "the orders make {needed} parameters (na plus every nb), but the type holds {available}: \
+                 make the two equal"
+            ),
+            Error::Delays { needed, available } => write!(
+                formatter,
+                "the delays need {needed} stored samples (the nk of all inputs, added up), but the type holds \
+                 {available}: make room for {needed}"
+            ),
+            Error::NotTriangular { row, column } => {
+                write!(formatter, "the factor is not upper triangular: row {row}, column {column} must be 0")
+            }
+            Error::TooFewRows { needed, found } => {
+                write!(formatter, "there are {found} rows, but at least {needed} are needed: add more rows")
+            }
+            Error::TooManyRows => {
+                write!(formatter, "the number of rows no longer fits its counter: start again")
+            }
+            Error::RankDeficient { column } => write!(
+                formatter,
+                "column {column} of the regression depends on the others: remove it, or excite the system more"
+            ),
+            Error::Overflow => {
+                write!(formatter, "the result does not fit the scalar type: use other units, or f64")
+            }
+        }
+    }
+}
+
+impl core::error::Error for Error {}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use std::string::{String, ToString};
+
+    use super::Error;
+
+    #[test]
+    fn it_is_small_and_a_standard_error() {
+        assert!(size_of::<Error>() <= 5 * size_of::<usize>());
+        let error: &dyn core::error::Error = &Error::TooManyRows;
+        assert!(error.source().is_none());
+    }
+
+    #[test]
+    fn every_message_names_what_is_wrong_and_what_to_do() {
+        let argument = "output";
+        let (needed, available, found, expected) = (731, 732, 733, 734);
+        let (row, column) = (735, 736);
+        let cases: [(Error, &[&str]); 12] = [
+            (Error::NotFinite { argument }, &["output", "leave"]),
+            (Error::Infinite { argument }, &["output", "pass NaN"]),
+            (Error::TooLarge { argument }, &["output", "unit"]),
+            (Error::Negative { argument }, &["output", "0 or more"]),
+            (Error::Length { argument, expected, found }, &["output", "733", "734"]),
+            (Error::Orders { needed, available }, &["731", "732", "make the two equal"]),
+            (Error::Delays { needed, available }, &["731", "732", "make room"]),
+            (Error::NotTriangular { row, column }, &["735", "736", "must be 0"]),
+            (Error::TooFewRows { needed, found }, &["731", "733", "add more rows"]),
+            (Error::TooManyRows, &["start again"]),
+            (Error::RankDeficient { column }, &["736", "remove it"]),
+            (Error::Overflow, &["f64"]),
+        ];
+        for (error, parts) in cases {
+            let message: String = error.to_string();
+            for part in parts {
+                assert!(message.contains(part), "{message:?} lacks {part:?}");
+            }
+        }
+    }
+}

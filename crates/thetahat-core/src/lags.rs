@@ -1,0 +1,454 @@
+//! Tapped delay lines: recent inputs and outputs make the regressor of an ARX model.
+
+use nalgebra::{Const, OVector};
+
+use crate::{Dimension, Error, Real};
+
+/// The orders of one input of an ARX model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct InputOrders {
+    /// The number of coefficients. With 0 the input is read, and not used.
+    pub nb: usize,
+    /// The delay in samples, from the input to the first output it acts on. With 0 it acts at once.
+    pub nk: usize,
+}
+
+/// The orders of an ARX model: how many past outputs and inputs its next output depends on.
+///
+/// ```text
+/// y(k) + a_1 y(k-1) + … + a_na y(k-na)
+///     = Σ over the inputs:  b_0 u(k-nk) + b_1 u(k-nk-1) + … + b_(nb-1) u(k-nk-nb+1)  + e(k)
+/// ```
+///
+/// It borrows the list of inputs, so that it serves a constant and a value read at run time. The sizes that
+/// [`Lags`] needs are constant functions of it, so that they need not be counted by hand.
+///
+/// ```
+/// use thetahat_core::{ArxOrders, InputOrders};
+///
+/// const ORDERS: ArxOrders = ArxOrders {
+///     na: 2,
+///     inputs: &[InputOrders { nb: 2, nk: 1 }, InputOrders { nb: 1, nk: 3 }],
+/// };
+/// assert_eq!(ORDERS.parameters(), 5);
+/// assert_eq!(ORDERS.delays(), 4);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ArxOrders<'a> {
+    /// The number of past outputs.
+    pub na: usize,
+    /// The orders of each input, in the order in which samples are pushed. Empty for a time series without input.
+    pub inputs: &'a [InputOrders],
+}
+
+impl ArxOrders<'_> {
+    /// The number of parameters: na plus every nb.
+    pub const fn parameters(&self) -> usize {
+        let mut sum = self.na;
+        let mut inputs = self.inputs;
+        while let [first, rest @ ..] = inputs {
+            sum = sum.saturating_add(first.nb);
+            inputs = rest;
+        }
+        sum
+    }
+
+    /// The number of samples that are on their way: the nk of every input that has coefficients, added up.
+    pub const fn delays(&self) -> usize {
+        let mut sum: usize = 0;
+        let mut inputs = self.inputs;
+        while let [first, rest @ ..] = inputs {
+            if first.nb > 0 {
+                sum = sum.saturating_add(first.nk);
+            }
+            inputs = rest;
+        }
+        sum
+    }
+}
+
+/// The delay line of one input that has coefficients.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Line {
+    input: usize,
+    nb: usize,
+    nk: usize,
+}
+
+/// Tapped delay lines: recent inputs and outputs, arranged as the regressor of an ARX model.
+///
+/// ```text
+/// φ(k) = [ -y(k-1) … -y(k-na)   u1(k-nk1) … u1(k-nk1-nb1+1)   u2(k-nk2) … ]'
+/// ```
+///
+/// so that y(k) = φ(k)'θ + e(k) with θ = [a_1 … a_na  b1_0 … b1_(nb1-1)  b2_0 …]. See [`ArxOrders`].
+/// The outputs enter with a minus sign (Ljung, System Identification, 2nd ed., section 4.2).
+///
+/// Each sample takes three steps, in this order:
+///
+/// 1. [`push_inputs`](Lags::push_inputs): u(k);
+/// 2. [`regressor`](Lags::regressor): φ(k), if nothing in it is missing;
+/// 3. [`push_output`](Lags::push_output): y(k).
+///
+/// A missing sample is NaN: push it, and time goes on. Then there is no regressor while a missing sample sits in one of
+/// the taps; one that sits in none does no harm. At the start all earlier samples are missing.
+///
+/// # Sizes
+///
+/// `N` is the number of parameters, [`ArxOrders::parameters`]. `D` is the room for inputs on their way to the
+/// regressor, at least [`ArxOrders::delays`]. It is 1 unless you say otherwise, which is right for one input with
+/// nk = 1, and enough for nk = 0 or without input. Both are checked in [`new`](Lags::new). With the feature `alloc` both
+/// may be `Dyn`: then they follow from the orders, and `new` allocates, and fails as a `Vec` does if there is no memory.
+///
+/// Memory: N + D numbers, 3 N + 2 machine words. Plain data: a clone can be driven on with predicted outputs.
+///
+/// ```
+/// use thetahat_core::nalgebra::{Const, Vector3};
+/// use thetahat_core::{ArxOrders, Error, InputOrders, Lags};
+///
+/// // One input: y(k) depends on y(k-1), u(k-1) and u(k-2).
+/// let orders = ArxOrders { na: 1, inputs: &[InputOrders { nb: 2, nk: 1 }] };
+/// let mut lags: Lags<f64, Const<3>> = Lags::new(&orders)?;
+///
+/// for (u, y) in [(1.0, 10.0), (2.0, 20.0)] {
+///     lags.push_inputs(&[u])?;
+///     assert_eq!(lags.regressor(), None); // not filled yet
+///     lags.push_output(y)?;
+/// }
+/// lags.push_inputs(&[3.0])?;
+/// assert_eq!(lags.regressor(), Some(&Vector3::new(-20.0, 2.0, 1.0)));
+/// # Ok::<(), Error>(())
+/// ```
+///
+/// Two inputs, the second with a delay of 3. The sizes follow from the orders:
+///
+/// ```
+/// use thetahat_core::nalgebra::Const;
+/// use thetahat_core::{ArxOrders, Error, InputOrders, Lags};
+///
+/// const ORDERS: ArxOrders = ArxOrders {
+///     na: 2,
+///     inputs: &[InputOrders { nb: 2, nk: 1 }, InputOrders { nb: 1, nk: 3 }],
+/// };
+/// type Plant = Lags<f32, Const<{ ORDERS.parameters() }>, Const<{ ORDERS.delays() }>>;
+///
+/// let mut lags = Plant::new(&ORDERS)?;
+/// lags.push_inputs(&[0.5, -1.0])?;
+/// lags.push_output(0.0)?;
+/// # Ok::<(), Error>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Lags<T: Real, N: Dimension, D: Dimension = Const<1>> {
+    /// φ; NaN where a sample is missing.
+    regressor: OVector<T, N>,
+    /// The inputs on their way to φ, line after line, each line the newest first.
+    delayed: OVector<T, D>,
+    /// The lines in use, then some with nb = 0. There are at most N, as each has a coefficient: so the number of inputs
+    /// need not be one more size in the type.
+    lines: OVector<Line, N>,
+    na: usize,
+    inputs: usize,
+}
+
+impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
+    /// Empty delay lines: every earlier sample is missing.
+    ///
+    /// Errors: [`Error::Orders`] if the orders do not make exactly `N` parameters; [`Error::Delays`] if `D` is too
+    /// small for the delays.
+    ///
+    /// ```
+    /// use thetahat_core::nalgebra::Const;
+    /// use thetahat_core::{ArxOrders, Error, InputOrders, Lags};
+    ///
+    /// let orders = ArxOrders { na: 2, inputs: &[InputOrders { nb: 2, nk: 5 }] };
+    /// let error = Lags::<f32, Const<3>, Const<5>>::new(&orders).unwrap_err();
+    /// assert_eq!(error, Error::Orders { needed: 4, available: 3 });
+    /// let error = Lags::<f32, Const<4>, Const<1>>::new(&orders).unwrap_err();
+    /// assert_eq!(error, Error::Delays { needed: 5, available: 1 });
+    /// ```
+    pub fn new(orders: &ArxOrders<'_>) -> Result<Self, Error> {
+        let parameters = N::exactly(orders.parameters())
+            .map_err(|available| Error::Orders { needed: orders.parameters(), available })?;
+        let delays = D::at_least(orders.delays())
+            .map_err(|available| Error::Delays { needed: orders.delays(), available })?;
+        let unused = Line { input: 0, nb: 0, nk: 0 };
+        let mut lines = parameters.vector(unused);
+        let in_use = orders.inputs.iter().enumerate().filter(|(_, input)| input.nb > 0);
+        for (line, (input, &InputOrders { nb, nk })) in lines.as_mut_slice().iter_mut().zip(in_use) {
+            *line = Line { input, nb, nk };
+        }
+        Ok(Lags {
+            regressor: parameters.vector(T::NAN),
+            delayed: delays.vector(T::NAN),
+            lines,
+            na: orders.na,
+            inputs: orders.inputs.len(),
+        })
+    }
+
+    /// Step 1 of a sample: takes u(k), one number for each input, in the order of [`ArxOrders::inputs`]. NaN is a
+    /// missing sample. Without inputs the step may be left out.
+    ///
+    /// Moves every nb + nk by one place.
+    ///
+    /// Errors, after which nothing has changed: [`Error::Length`] if the number of inputs is not that of the orders;
+    /// [`Error::Infinite`].
+    pub fn push_inputs(&mut self, inputs: &[T]) -> Result<(), Error> {
+        if inputs.len() != self.inputs {
+            return Err(Error::Length { argument: "inputs", expected: self.inputs, found: inputs.len() });
+        }
+        if inputs.iter().any(is_infinite) {
+            return Err(Error::Infinite { argument: "inputs" });
+        }
+        let mut taps = self.regressor.as_mut_slice().iter_mut().skip(self.na);
+        let mut delayed = self.delayed.as_mut_slice().iter_mut();
+        for line in self.lines.as_slice() {
+            let newest = inputs.get(line.input).copied().unwrap_or(T::NAN);
+            let arriving = shift(delayed.by_ref().take(line.nk), newest);
+            shift(taps.by_ref().take(line.nb), arriving);
+        }
+        Ok(())
+    }
+
+    /// Step 2 of a sample: φ(k), or `None` while a sample in it is missing.
+    ///
+    /// It is φ(k) between [`push_inputs`](Lags::push_inputs) of u(k) and [`push_output`](Lags::push_output) of y(k).
+    pub fn regressor(&self) -> Option<&OVector<T, N>> {
+        let missing = self.regressor.as_slice().iter().any(|sample| !sample.is_finite());
+        (!missing).then_some(&self.regressor)
+    }
+
+    /// Step 3 of a sample: takes y(k). NaN is a missing sample.
+    ///
+    /// Moves na by one place.
+    ///
+    /// Errors, after which nothing has changed: [`Error::Infinite`].
+    pub fn push_output(&mut self, output: T) -> Result<(), Error> {
+        if is_infinite(&output) {
+            return Err(Error::Infinite { argument: "output" });
+        }
+        shift(self.regressor.as_mut_slice().iter_mut().take(self.na), -output);
+        Ok(())
+    }
+
+    /// Forgets all samples: an unknown number of them is missing here. The regressor comes back once it is filled with
+    /// new ones.
+    ///
+    /// ```
+    /// use thetahat_core::nalgebra::Const;
+    /// use thetahat_core::{ArxOrders, Error, Lags};
+    ///
+    /// let mut lags: Lags<f64, Const<1>> = Lags::new(&ArxOrders { na: 1, inputs: &[] })?;
+    /// lags.push_output(1.0)?;
+    /// assert!(lags.regressor().is_some());
+    /// lags.gap();
+    /// assert!(lags.regressor().is_none());
+    /// # Ok::<(), Error>(())
+    /// ```
+    pub fn gap(&mut self) {
+        self.regressor.fill(T::NAN);
+        self.delayed.fill(T::NAN);
+    }
+}
+
+/// Moves each sample one place on, the new one to the front; returns the one that falls out.
+fn shift<'a, T: Real>(line: impl Iterator<Item = &'a mut T>, new: T) -> T {
+    line.fold(new, |moving, place| core::mem::replace(place, moving))
+}
+
+fn is_infinite<T: Real>(sample: &T) -> bool {
+    sample.abs() == T::INFINITY
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use std::vec;
+    use std::vec::Vec;
+
+    use nalgebra::{Const, Vector2, Vector3};
+
+    use super::{ArxOrders, InputOrders, Lags};
+    use crate::noise::Noise;
+    use crate::{Dimension, Error, Real};
+
+    /// A sample that is missing one time in ten.
+    fn sample(noise: &mut Noise) -> f64 {
+        let value = noise.next();
+        if noise.next() < -0.8 { f64::NAN } else { value }
+    }
+
+    /// φ(k) by its definition, from the whole record: NaN before the start.
+    fn definition(orders: &ArxOrders<'_>, inputs: &[Vec<f64>], outputs: &[f64], k: usize) -> Vec<f64> {
+        let at = |signal: &[f64], lag: usize| {
+            let time = k.checked_sub(lag);
+            time.and_then(|time| signal.get(time).copied()).unwrap_or(f64::NAN)
+        };
+        let mut regressor: Vec<f64> = (1..=orders.na).map(|lag| -at(outputs, lag)).collect();
+        for (&InputOrders { nb, nk }, signal) in orders.inputs.iter().zip(inputs) {
+            regressor.extend((nk..nk + nb).map(|lag| at(signal, lag)));
+        }
+        regressor
+    }
+
+    fn check<N: Dimension, D: Dimension>(orders: &ArxOrders<'_>) {
+        let mut noise = Noise(1);
+        let mut inputs: Vec<Vec<f64>> = vec![vec![]; orders.inputs.len()];
+        let mut outputs = vec![];
+        let mut lags = Lags::<f64, N, D>::new(orders).unwrap();
+        let mut ready = 0;
+        for k in 0..300 {
+            if k == 150 {
+                lags.gap();
+                inputs.iter_mut().flatten().for_each(|u| *u = f64::NAN);
+                outputs.fill(f64::NAN);
+            }
+            let now: Vec<f64> = inputs.iter().map(|_| sample(&mut noise)).collect();
+            for (signal, &u) in inputs.iter_mut().zip(&now) {
+                signal.push(u);
+            }
+            lags.push_inputs(&now).unwrap();
+
+            let expected = definition(orders, &inputs, &outputs, k);
+            match lags.regressor() {
+                Some(regressor) => {
+                    ready += 1;
+                    assert_eq!(regressor.as_slice(), expected, "{orders:?} at {k}");
+                }
+                None => assert!(expected.iter().any(|s| s.is_nan()), "{orders:?} at {k}"),
+            }
+
+            // Bad samples in between change nothing.
+            let infinite = vec![f64::NEG_INFINITY; now.len()];
+            assert_eq!(lags.push_inputs(&infinite).is_ok(), now.is_empty());
+            assert!(lags.push_inputs(&vec![0.0; now.len() + 1]).is_err());
+            assert!(lags.push_output(f64::INFINITY).is_err());
+
+            let y = sample(&mut noise);
+            lags.push_output(y).unwrap();
+            outputs.push(y);
+        }
+        assert!(ready > 50, "{orders:?} {ready}");
+    }
+
+    const DELAYS: [usize; 4] = [0, 1, 2, 7];
+
+    fn one(nb: usize, nk: usize) -> InputOrders {
+        InputOrders { nb, nk }
+    }
+
+    #[test]
+    fn static_sizes_follow_the_definition() {
+        for nk in DELAYS {
+            let inputs = [one(2, nk)];
+            let orders = |na| ArxOrders { na, inputs: &inputs };
+            check::<Const<2>, Const<7>>(&orders(0));
+            check::<Const<4>, Const<7>>(&orders(2));
+        }
+        let two = [one(2, 1), one(1, 3)];
+        check::<Const<6>, Const<4>>(&ArxOrders { na: 3, inputs: &two });
+        let three = [one(1, 0), one(0, 5), one(2, 1)];
+        check::<Const<4>, Const<1>>(&ArxOrders { na: 1, inputs: &three });
+        // No stored samples at all.
+        check::<Const<3>, Const<0>>(&ArxOrders { na: 1, inputs: &[one(2, 0)] });
+        check::<Const<3>, Const<1>>(&ArxOrders { na: 3, inputs: &[] });
+        check::<Const<0>, Const<1>>(&ArxOrders { na: 0, inputs: &[] });
+    }
+
+    #[cfg(feature = "alloc")]
+    #[test]
+    fn every_combination_of_orders_follows_the_definition() {
+        use nalgebra::Dyn;
+
+        for na in 0..4 {
+            for nb in 0..4 {
+                for nk in DELAYS {
+                    let first = one(nb, nk);
+                    check::<Dyn, Dyn>(&ArxOrders { na, inputs: &[first] });
+                    for second in [one(0, 1), one(1, 0), one(2, 3)] {
+                        check::<Dyn, Dyn>(&ArxOrders { na, inputs: &[first, second] });
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_missing_sample_matters_only_in_a_tap() {
+        // y(k) depends on u(k-2) alone: u(1) is missed at k = 3 only.
+        let mut lags: Lags<f32, Const<1>, Const<2>> =
+            Lags::new(&ArxOrders { na: 0, inputs: &[one(1, 2), one(0, 1)] }).unwrap();
+        let mut ready = vec![];
+        for k in 0..6 {
+            let u = if k == 1 { f32::NAN } else { 1.0 };
+            lags.push_inputs(&[u, f32::NAN]).unwrap();
+            ready.push(lags.regressor().is_some());
+            lags.push_output(f32::NAN).unwrap();
+        }
+        assert_eq!(ready, [false, false, true, false, true, true]);
+    }
+
+    #[test]
+    fn bad_samples_are_named() {
+        let mut lags: Lags<f64, Const<2>> = Lags::new(&ArxOrders { na: 1, inputs: &[one(1, 1)] }).unwrap();
+        let length = |found| Error::Length { argument: "inputs", expected: 1, found };
+        assert_eq!(lags.push_inputs(&[]), Err(length(0)));
+        assert_eq!(lags.push_inputs(&[1.0, 2.0]), Err(length(2)));
+        let infinite = |argument| Error::Infinite { argument };
+        assert_eq!(lags.push_inputs(&[f64::INFINITY]), Err(infinite("inputs")));
+        assert_eq!(lags.push_output(f64::NEG_INFINITY), Err(infinite("output")));
+    }
+
+    #[test]
+    fn an_infinite_input_leaves_every_line_as_it_was() {
+        let mut lags: Lags<f64, Const<2>, Const<2>> =
+            Lags::new(&ArxOrders { na: 0, inputs: &[one(1, 1), one(1, 1)] }).unwrap();
+        lags.push_inputs(&[1.0, 2.0]).unwrap();
+        assert!(lags.push_inputs(&[3.0, f64::INFINITY]).is_err());
+        lags.push_inputs(&[4.0, 5.0]).unwrap();
+        assert_eq!(lags.regressor(), Some(&Vector2::new(1.0, 2.0)));
+    }
+
+    #[test]
+    fn orders_that_do_not_fit_are_an_error() {
+        fn error<N: Dimension, D: Dimension>(na: usize, inputs: &[InputOrders]) -> Option<Error> {
+            Lags::<f32, N, D>::new(&ArxOrders { na, inputs }).err()
+        }
+        let orders = |needed, available| Some(Error::Orders { needed, available });
+        let delays = |needed, available| Some(Error::Delays { needed, available });
+        type One = Const<1>;
+        type Three = Const<3>;
+        assert_eq!(error::<Three, One>(2, &[one(1, 1)]), None);
+        assert_eq!(error::<Three, One>(2, &[one(2, 1)]), orders(4, 3));
+        assert_eq!(error::<Three, One>(1, &[one(1, 1)]), orders(2, 3));
+        assert_eq!(error::<Three, One>(1, &[one(2, 2)]), delays(2, 1));
+        assert_eq!(error::<Three, One>(1, &[one(1, 1); 2]), delays(2, 1));
+        // An input without coefficients stores nothing.
+        assert_eq!(error::<Three, One>(2, &[one(0, 9), one(1, 1)]), None);
+        let most = usize::MAX;
+        assert_eq!(error::<Three, One>(1, &[one(most, 1)]), orders(most, 3));
+        assert_eq!(error::<Three, One>(2, &[one(1, most)]), delays(most, 1));
+    }
+
+    #[test]
+    fn a_clone_predicts_by_taking_its_own_predictions_for_outputs() {
+        // y(k) = 0.5 y(k-1) + u(k-1) + 0.25 u(k-2)
+        fn step<T: Real>(lags: &mut Lags<T, Const<3>>, theta: &Vector3<T>, u: T) -> T {
+            lags.push_inputs(&[u]).unwrap();
+            let y = lags.regressor().unwrap().dot(theta);
+            lags.push_output(y).unwrap();
+            y
+        }
+        let theta = Vector3::new(-0.5, 1.0, 0.25);
+        let mut lags: Lags<f64, Const<3>> = Lags::new(&ArxOrders { na: 1, inputs: &[one(2, 1)] }).unwrap();
+        for _ in 0..2 {
+            lags.push_inputs(&[0.0]).unwrap();
+            lags.push_output(0.0).unwrap();
+        }
+        let mut ahead = lags.clone();
+        let predicted = [1.0, 0.0, 0.0, 0.0].map(|u| step(&mut ahead, &theta, u));
+        assert_eq!(predicted, [0.0, 1.0, 0.75, 0.375]);
+        // The original has not moved.
+        assert_eq!(step(&mut lags, &theta, 0.0), 0.0);
+    }
+}

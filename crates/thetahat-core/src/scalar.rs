@@ -1,0 +1,61 @@
+//! The scalar type: `f32` or `f64`.
+
+use nalgebra::RealField;
+
+mod sealed {
+    pub trait Sealed {}
+    impl Sealed for f32 {}
+    impl Sealed for f64 {}
+}
+
+/// A real scalar: `f32` or `f64`.
+///
+/// It collapses the bounds this crate needs into one name. The trait is sealed: the limits below are what the
+/// promises about overflow rest on.
+///
+/// ```
+/// use thetahat_core::Real;
+///
+/// fn mean<T: Real>(values: &[T]) -> T {
+///     values.iter().fold(T::zero(), |sum, &value| sum + value) / T::from_count(values.len())
+/// }
+/// assert_eq!(mean(&[1.0_f32, 2.0, 6.0]), 3.0);
+/// ```
+pub trait Real: RealField + Copy + sealed::Sealed {
+    /// The distance from 1 to the next larger number.
+    const EPSILON: Self;
+    /// Not a number: a missing sample.
+    const NAN: Self;
+    /// Infinity: the condition number of a singular matrix.
+    const INFINITY: Self;
+    /// The largest entry that [`LeastSquares`](crate::LeastSquares) takes: the largest finite number divided by
+    /// 2^36, which is 5e27 in `f32` and 3e297 in `f64`.
+    ///
+    /// The norm of 2^64 such entries is a sixteenth of the largest finite number. So no number of rows overflows.
+    const LARGEST_ENTRY: Self;
+
+    /// The number nearest to `count`.
+    fn from_count(count: usize) -> Self;
+}
+
+impl Real for f32 {
+    const EPSILON: f32 = f32::EPSILON;
+    const NAN: f32 = f32::NAN;
+    const INFINITY: f32 = f32::INFINITY;
+    const LARGEST_ENTRY: f32 = f32::MAX / (1_u64 << 36) as f32;
+
+    fn from_count(count: usize) -> f32 {
+        count as f32
+    }
+}
+
+impl Real for f64 {
+    const EPSILON: f64 = f64::EPSILON;
+    const NAN: f64 = f64::NAN;
+    const INFINITY: f64 = f64::INFINITY;
+    const LARGEST_ENTRY: f64 = f64::MAX / (1_u64 << 36) as f64;
+
+    fn from_count(count: usize) -> f64 {
+        count as f64
+    }
+}

@@ -1,0 +1,10 @@
+//! Logs: channels on a common clock, cut into segments; and what is done to them before a fit.
+
+mod log;
+mod prepare;
+mod split;
+
+pub use log::{Channel, Interpolation, Log, Record};
+pub use prepare::{Detrend, Offset};
+pub use split::Rows;
+pub(crate) use split::checked;

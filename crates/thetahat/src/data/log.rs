@@ -1,0 +1,398 @@
+use std::ops::Range;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::Error;
+use crate::data::{Offset, Rows};
+
+/// A step longer than so many medians starts a new segment.
+const GAP: f64 = 1.5;
+/// Steps may differ from their median by this fraction.
+const JITTER: f64 = 0.1;
+/// Rows that resampling may give: beyond them a step was mistyped.
+const MOST_ROWS: f64 = 1e8;
+
+/// One named signal of a log. NaN means that the sample is missing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Channel {
+    /// The name, such as a CSV's column has.
+    pub name: String,
+    /// One value for each row, in the log's own units.
+    pub values: Vec<f64>,
+}
+
+/// Channels on a common, uniform clock.
+///
+/// Time is in seconds. Where the clock jumps, or a sample is missing, a new segment starts; no method of
+/// this crate reaches across the border of two segments.
+///
+/// ```
+/// use thetahat::{Channel, Log};
+///
+/// let u = Channel { name: "u".into(), values: vec![0.0, 1.0, 1.0] };
+/// let y = Channel { name: "y".into(), values: vec![0.0, 0.0, 0.5] };
+/// let log = Log::new(vec![u, y], 0.1)?;
+/// assert_eq!(log.rows(), 3);
+/// # Ok::<(), thetahat::Error>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Log {
+    channels: Vec<Channel>,
+    rows: usize,
+    sample_time: f64,
+    /// Seconds, one for each row, where the log came with a clock.
+    time: Option<Vec<f64>>,
+    /// 0-based rows before which the clock jumps.
+    jumps: Vec<usize>,
+}
+
+/// How a log that is not uniform is read between its samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Interpolation {
+    /// The last value holds until the next: what a digital output does.
+    Hold,
+    /// A straight line from one sample to the next.
+    Linear,
+}
+
+/// The signals of one experiment as estimators see them.
+///
+/// Every segment is a range of 0-based samples inside all of the signals, without a missing value.
+#[derive(Debug, Clone)]
+pub struct Record<'a> {
+    /// y(t), N values.
+    pub output: &'a [f64],
+    /// u_j(t), N values each.
+    pub inputs: Vec<&'a [f64]>,
+    /// Stretches of consecutive samples, in rising order, apart from each other.
+    pub segments: Vec<Range<usize>>,
+}
+
+impl<'a> Record<'a> {
+    /// A record of one segment without missing values.
+    ///
+    /// # Errors
+    /// [`Error::Data`] if lengths differ, there is no sample, or one is not finite.
+    pub fn new(output: &'a [f64], inputs: Vec<&'a [f64]>) -> Result<Self, Error> {
+        let length = output.len();
+        if length == 0 {
+            return Err(Error::data("the record has no samples"));
+        }
+        for (position, input) in inputs.iter().enumerate() {
+            if input.len() != length {
+                return Err(Error::data(format!(
+                    "input {} has {} samples, the output has {length}; they must be as many",
+                    position + 1,
+                    input.len()
+                )));
+            }
+        }
+        for signal in inputs.iter().chain([&output]) {
+            if let Some(position) = signal.iter().position(|value| !value.is_finite()) {
+                return Err(Error::data(format!(
+                    "sample {} is not finite; build a Log to mark missing samples",
+                    position + 1
+                )));
+            }
+        }
+        Ok(Self { output, inputs, segments: std::iter::once(0..length).collect() })
+    }
+}
+
+impl Log {
+    /// A log with one sample every `sample_time` seconds.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a sample time that is not positive; [`Error::Data`] if there are no rows, channels
+    /// differ in length, share a name, or hold an infinity.
+    pub fn new(channels: Vec<Channel>, sample_time: f64) -> Result<Self, Error> {
+        if !(sample_time.is_finite() && sample_time > 0.0) {
+            return Err(Error::argument(
+                "sample time",
+                format!("{sample_time} is not a positive number of seconds"),
+            ));
+        }
+        let rows = check(&channels)?;
+        Ok(Self { channels, rows, sample_time, time: None, jumps: Vec::new() })
+    }
+
+    /// A log with a clock: `time` in seconds, one value for each row. The sample time is the median step;
+    /// a step over 1.5 medians starts a new segment.
+    ///
+    /// # Errors
+    /// [`Error::Data`] as for [`Log::new`], if time is not finite, repeats or goes back, and if another step differs
+    /// from the median by more than 10 % (then [`Log::resampled`] helps).
+    pub fn with_time(channels: Vec<Channel>, time: Vec<f64>) -> Result<Self, Error> {
+        let rows = check(&channels)?;
+        let median = median_step(&time, rows)?;
+        let mut jumps = Vec::new();
+        for (position, step) in steps(&time).enumerate() {
+            if step > GAP * median {
+                jumps.push(position + 1);
+            } else if (step - median).abs() > JITTER * median {
+                return Err(Error::Data {
+                    channel: None,
+                    row: Some(position + 2),
+                    message: format!(
+                        "the time step is {step:.6} s where the median is {median:.6} s: more than {:.0} % off, \
+                         so the samples are not uniform; resample the log (--resample {median:.6}:linear)",
+                        100.0 * JITTER
+                    ),
+                });
+            }
+        }
+        Ok(Self { channels, rows, sample_time: median, time: Some(time), jumps })
+    }
+
+    /// A uniform log read off one with an irregular clock, every `step` seconds from its first sample on.
+    ///
+    /// A value is missing where a sample that it is read off is missing. Every interval between two
+    /// samples is bridged, however long.
+    ///
+    /// # Errors
+    /// As for [`Log::with_time`], but for uniformity; [`Error::Argument`] for a step that is not positive or
+    /// gives more than 10^8 rows.
+    pub fn resampled(
+        channels: Vec<Channel>,
+        time: &[f64],
+        step: f64,
+        interpolation: Interpolation,
+    ) -> Result<Self, Error> {
+        if !(step.is_finite() && step > 0.0) {
+            return Err(Error::argument("resample", format!("{step} is not a positive number of seconds")));
+        }
+        let rows = check(&channels)?;
+        median_step(time, rows)?;
+        let (Some(first), Some(last)) = (time.first(), time.last()) else {
+            return Err(Error::data("the log has no rows"));
+        };
+        // Half a millionth of a step, so that a last sample on the grid is not lost to rounding.
+        let count = ((last - first) / step + 5e-7).floor() + 1.0;
+        if count > MOST_ROWS {
+            return Err(Error::argument(
+                "resample",
+                format!("a step of {step} s would give {count:.0} rows; take a longer one"),
+            ));
+        }
+        let instants: Vec<f64> = (0..count as usize).map(|k| first + k as f64 * step).collect();
+        let channels = channels
+            .into_iter()
+            .map(|channel| {
+                let mut left = 0;
+                let values = instants
+                    .iter()
+                    .map(|&instant| {
+                        while time.get(left + 1).is_some_and(|&next| next <= instant + 5e-7 * step) {
+                            left += 1;
+                        }
+                        interpolation.read(time, &channel.values, left, instant)
+                    })
+                    .collect();
+                Channel { name: channel.name, values }
+            })
+            .collect();
+        Ok(Self {
+            channels,
+            rows: instants.len(),
+            sample_time: step,
+            time: Some(instants),
+            jumps: Vec::new(),
+        })
+    }
+
+    /// The number of rows, at least 1.
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Seconds from one row to the next.
+    pub fn sample_time(&self) -> f64 {
+        self.sample_time
+    }
+
+    /// The clock, in seconds, where the log came with one.
+    pub fn time(&self) -> Option<&[f64]> {
+        self.time.as_deref()
+    }
+
+    /// Seconds from the first row to a row (0-based).
+    pub(crate) fn elapsed(&self, row: usize) -> f64 {
+        match &self.time {
+            Some(time) => time[row] - time[0],
+            None => row as f64 * self.sample_time,
+        }
+    }
+
+    /// The channels in their order.
+    pub fn channels(&self) -> &[Channel] {
+        &self.channels
+    }
+
+    /// The channel of a name.
+    ///
+    /// # Errors
+    /// [`Error::Data`] that lists the channels there are.
+    pub fn channel(&self, name: &str) -> Result<&Channel, Error> {
+        self.channels.iter().find(|channel| channel.name == name).ok_or_else(|| {
+            let names: Vec<&str> = self.channels.iter().map(|channel| channel.name.as_str()).collect();
+            Error::in_channel(
+                name,
+                None,
+                format!("there is no channel '{name}'; there are: {}", names.join(", ")),
+            )
+        })
+    }
+
+    /// Whether the log has a channel of this name.
+    pub fn has(&self, name: &str) -> bool {
+        self.channels.iter().any(|channel| channel.name == name)
+    }
+
+    /// How often the clock jumps.
+    pub fn jumps(&self) -> usize {
+        self.jumps.len()
+    }
+
+    /// The stretches of consecutive rows inside `parts` in which none of the named channels misses a value
+    /// and the clock does not jump, as 0-based ranges.
+    ///
+    /// # Errors
+    /// [`Error::Data`] for a name that is not there.
+    pub(crate) fn segments(&self, names: &[&str], parts: &[Rows]) -> Result<Vec<Range<usize>>, Error> {
+        let channels: Vec<&[f64]> = names
+            .iter()
+            .map(|name| Ok(self.channel(name)?.values.as_slice()))
+            .collect::<Result<_, Error>>()?;
+        let mut segments = Vec::new();
+        for part in parts {
+            let part = part.positions();
+            let mut borders = vec![part.start];
+            borders
+                .extend(self.jumps.iter().copied().filter(|jump| part.contains(jump) && *jump > part.start));
+            borders.push(part.end);
+            for pair in borders.windows(2) {
+                let mut first = pair[0];
+                for row in pair[0]..pair[1] {
+                    if channels.iter().any(|values| values[row].is_nan()) {
+                        if first < row {
+                            segments.push(first..row);
+                        }
+                        first = row + 1;
+                    }
+                }
+                if first < pair[1] {
+                    segments.push(first..pair[1]);
+                }
+            }
+        }
+        Ok(segments)
+    }
+
+    /// The signals of some channels over some rows.
+    ///
+    /// # Errors
+    /// [`Error::Data`] for a name that is not there.
+    pub fn record(&self, inputs: &[String], output: &str, rows: &[Rows]) -> Result<Record<'_>, Error> {
+        let names: Vec<&str> = inputs.iter().map(String::as_str).chain([output]).collect();
+        let signal = |name: &String| Ok(self.channel(name)?.values.as_slice());
+        Ok(Record {
+            output: &self.channel(output)?.values,
+            inputs: inputs.iter().map(signal).collect::<Result<_, Error>>()?,
+            segments: self.segments(&names, rows)?,
+        })
+    }
+
+    /// The log with an offset taken from one of its channels, in place.
+    pub(crate) fn remove(&mut self, name: &str, offset: &Offset) {
+        let Some(position) = self.channels.iter().position(|channel| channel.name == name) else {
+            return;
+        };
+        let mut values = std::mem::take(&mut self.channels[position].values);
+        if offset.slope == 0.0 {
+            values.iter_mut().for_each(|value| *value -= offset.level);
+        } else {
+            for (row, value) in values.iter_mut().enumerate() {
+                *value -= offset.at(self.elapsed(row));
+            }
+        }
+        self.channels[position].values = values;
+    }
+}
+
+impl Interpolation {
+    /// The value at `instant`, which lies at or after sample `left` and before the next.
+    fn read(self, time: &[f64], values: &[f64], left: usize, instant: f64) -> f64 {
+        let value = values[left];
+        match (self, time.get(left + 1), values.get(left + 1)) {
+            (Self::Linear, Some(next_time), Some(next)) if instant > time[left] => {
+                let fraction = (instant - time[left]) / (next_time - time[left]);
+                value + fraction * (next - value)
+            }
+            _ => value,
+        }
+    }
+}
+
+/// Checks names, lengths and infinities; gives the number of rows.
+fn check(channels: &[Channel]) -> Result<usize, Error> {
+    let rows = channels.first().map_or(0, |channel| channel.values.len());
+    if rows == 0 {
+        return Err(Error::data("the log has no rows"));
+    }
+    for (position, channel) in channels.iter().enumerate() {
+        let name = channel.name.as_str();
+        if channels[..position].iter().any(|other| other.name == name) {
+            return Err(Error::in_channel(name, None, format!("two channels are called '{name}'")));
+        }
+        if channel.values.len() != rows {
+            let message =
+                format!("channel '{name}' has {} rows, the others have {rows}", channel.values.len());
+            return Err(Error::in_channel(name, None, message));
+        }
+        if let Some(row) = channel.values.iter().position(|value| value.is_infinite()) {
+            let message = format!("channel '{name}' is infinite in row {}", row + 1);
+            return Err(Error::in_channel(name, Some(row + 1), message));
+        }
+    }
+    Ok(rows)
+}
+
+fn steps(time: &[f64]) -> impl Iterator<Item = f64> {
+    time.windows(2).map(|pair| pair[1] - pair[0])
+}
+
+/// The median time step of a clock that runs forward.
+fn median_step(time: &[f64], rows: usize) -> Result<f64, Error> {
+    let at = |row: usize, message: String| Error::Data { channel: None, row: Some(row), message };
+    if time.len() != rows {
+        return Err(Error::data(format!("there are {} time stamps for {rows} rows", time.len())));
+    }
+    if let Some(row) = time.iter().position(|time| !time.is_finite()) {
+        return Err(at(row + 1, "the time is not a finite number".to_owned()));
+    }
+    if let Some(position) = steps(time).position(|step| step <= 0.0) {
+        let (before, after) = (time[position], time[position + 1]);
+        let verb = if after == before { "repeats" } else { "goes back" };
+        return Err(at(
+            position + 2,
+            format!(
+                "time {verb} (from {before} s to {after} s); sort the log by time and remove repeated rows"
+            ),
+        ));
+    }
+    let mut steps: Vec<f64> = steps(time).collect();
+    let middle = steps.len() / 2;
+    if steps.is_empty() {
+        return Err(Error::data("one row has no time step; the log needs at least two"));
+    }
+    let even = steps.len().is_multiple_of(2);
+    let (below, &mut median, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
+    if even {
+        // The median of an even number of steps is the mean of the middle two.
+        let other = below.iter().copied().fold(f64::MIN, f64::max);
+        return Ok(f64::midpoint(other, median));
+    }
+    Ok(median)
+}

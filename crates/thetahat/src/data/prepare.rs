@@ -1,0 +1,126 @@
+use std::fmt;
+use std::ops::Range;
+use std::str::FromStr;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::Error;
+use crate::data::Log;
+use crate::regression::sum;
+
+/// What is taken from each channel before a fit. A model speaks of deviations from it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Detrend {
+    /// Nothing.
+    None,
+    /// The mean over the estimation rows.
+    #[default]
+    Mean,
+    /// The least-squares line through the estimation rows.
+    Linear,
+    /// The mean of the first so many estimation rows: for a step test that begins at rest.
+    Start(usize),
+}
+
+impl fmt::Display for Detrend {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::None => f.write_str("none"),
+            Self::Mean => f.write_str("mean"),
+            Self::Linear => f.write_str("linear"),
+            Self::Start(count) => write!(f, "start:{count}"),
+        }
+    }
+}
+
+impl FromStr for Detrend {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        match (text, text.strip_prefix("start:").map(str::parse)) {
+            ("none", _) => Ok(Self::None),
+            ("mean", _) => Ok(Self::Mean),
+            ("linear", _) => Ok(Self::Linear),
+            (_, Some(Ok(count))) if count > 0 => Ok(Self::Start(count)),
+            _ => Err(Error::argument(
+                "detrend",
+                format!("'{text}' is none of none, mean, linear and start:K (K rows)"),
+            )),
+        }
+    }
+}
+
+/// What a channel's values are measured from: `level + slope * t`, t in seconds from the log's first row.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+pub struct Offset {
+    /// In the channel's own units.
+    pub level: f64,
+    /// In the channel's units per second.
+    pub slope: f64,
+}
+
+impl Offset {
+    /// The offset `t` seconds after the log's first row.
+    pub fn at(&self, t: f64) -> f64 {
+        self.level + self.slope * t
+    }
+
+    /// The offset of a channel over segments of rows (0-based).
+    ///
+    /// # Errors
+    /// [`Error::Data`] if there are fewer rows than `Start` asks for.
+    pub(crate) fn estimate(
+        detrend: Detrend,
+        log: &Log,
+        name: &str,
+        segments: &[Range<usize>],
+    ) -> Result<Self, Error> {
+        let values = &log.channel(name)?.values;
+        let mean = |rows: &[Range<usize>]| {
+            let count: usize = rows.iter().map(Range::len).sum();
+            // From the first value: the mean of a constant channel is then that constant, to the bit.
+            let base = rows.first().map_or(0.0, |rows| values[rows.start]);
+            base + sum(rows.iter().cloned().flatten().map(|row| values[row] - base)) / count.max(1) as f64
+        };
+        Ok(match detrend {
+            Detrend::None => Self::default(),
+            Detrend::Mean => Self { level: mean(segments), slope: 0.0 },
+            Detrend::Start(count) => Self { level: mean(&leading(segments, count)?), slope: 0.0 },
+            Detrend::Linear => {
+                let rows = || segments.iter().cloned().flatten();
+                let count = rows().count().max(1) as f64;
+                let middle = sum(rows().map(|row| log.elapsed(row))) / count;
+                let level = mean(segments);
+                let deviation = |row: usize| log.elapsed(row) - middle;
+                let spread = sum(rows().map(|row| deviation(row).powi(2)));
+                let slope = if spread > 0.0 {
+                    sum(rows().map(|row| deviation(row) * (values[row] - level))) / spread
+                } else {
+                    0.0
+                };
+                Self { level: level - slope * middle, slope }
+            }
+        })
+    }
+}
+
+/// The first `count` rows of the segments.
+fn leading(segments: &[Range<usize>], count: usize) -> Result<Vec<Range<usize>>, Error> {
+    let available: usize = segments.iter().map(Range::len).sum();
+    if count == 0 || count > available {
+        return Err(Error::data(format!(
+            "--detrend start:{count} needs {count} rows, at least 1; there are {available} without missing values"
+        )));
+    }
+    let mut left = count;
+    Ok(segments
+        .iter()
+        .map(|segment| {
+            let taken = left.min(segment.len());
+            left -= taken;
+            segment.start..segment.start + taken
+        })
+        .take_while(|rows| !rows.is_empty())
+        .collect())
+}

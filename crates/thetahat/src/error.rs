@@ -1,0 +1,63 @@
+use thiserror::Error;
+
+/// What went wrong, in which place, and what to do about it.
+///
+/// Rows are 1-based positions in the log. The command line adds the file and the line.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// An argument does not make sense, whatever the data.
+    #[error("{argument}: {message}")]
+    Argument {
+        /// The argument's name.
+        argument: String,
+        /// What is wrong with it and what to do.
+        message: String,
+    },
+    /// The log does not have what was asked of it.
+    #[error("{message}")]
+    Data {
+        /// The channel concerned, where there is one.
+        channel: Option<String>,
+        /// The 1-based row concerned, where there is one.
+        row: Option<usize>,
+        /// What is wrong and what to do.
+        message: String,
+    },
+    /// The data cannot determine the model.
+    #[error("{message}")]
+    Undetermined {
+        /// The parameters that the data leave open; empty when all of them are.
+        parameters: Vec<String>,
+        /// Why, and what to do.
+        message: String,
+    },
+    /// A stored report cannot be used.
+    #[error("{message}")]
+    Report {
+        /// What is wrong with it and what to do.
+        message: String,
+    },
+}
+
+impl Error {
+    pub(crate) fn argument(argument: &str, message: impl Into<String>) -> Self {
+        Self::Argument { argument: argument.to_owned(), message: message.into() }
+    }
+
+    pub(crate) fn data(message: impl Into<String>) -> Self {
+        Self::Data { channel: None, row: None, message: message.into() }
+    }
+
+    pub(crate) fn in_channel(channel: &str, row: Option<usize>, message: impl Into<String>) -> Self {
+        Self::Data { channel: Some(channel.to_owned()), row, message: message.into() }
+    }
+
+    pub(crate) fn undetermined(parameters: Vec<String>, message: impl Into<String>) -> Self {
+        Self::Undetermined { parameters, message: message.into() }
+    }
+
+    pub(crate) fn report(message: impl Into<String>) -> Self {
+        Self::Report { message: message.into() }
+    }
+}

@@ -1,0 +1,6 @@
+//! From a record and orders to parameters.
+
+mod arx;
+
+pub use crate::regression::Solver;
+pub use arx::{Estimate, arx, arx_factor};

@@ -1,0 +1,12 @@
+//! Linear regression on lagged signals: `lagged` states the problem and solves it, `gram` forms its Gram
+//! matrix from lagged products, `qr` folds its rows into a triangle where that is not exact enough.
+
+mod blocks;
+mod gram;
+mod kernel;
+mod lagged;
+mod qr;
+
+pub(crate) use kernel::{add_filtered, sum};
+pub(crate) use lagged::{Deficient, Lagged, Regression, Taps};
+pub use lagged::{Initial, Solver};

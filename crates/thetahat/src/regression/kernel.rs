@@ -1,0 +1,119 @@
+//! The inner loops. Each sum runs in eight fixed lanes without fused multiply-add, so that its bits
+//! are the same on every instruction set that the dispatcher may choose.
+
+use multiversion::multiversion;
+
+const LANES: usize = 8;
+/// How many neighbouring shifts one pass serves: eight accumulators fill the registers of AVX2.
+const SHIFTS: usize = 4;
+
+type Lanes = [f64; LANES];
+
+/// The eight lanes of a sum, added pairwise.
+fn fold(lanes: Lanes) -> f64 {
+    let [a, b, c, d, e, f, g, h] = lanes;
+    ((a + b) + (c + d)) + ((e + f) + (g + h))
+}
+
+/// `sum[l] += x[l] y[l]`.
+#[inline(always)]
+fn accumulate(sum: &mut Lanes, x: &Lanes, y: &Lanes) {
+    for lane in 0..LANES {
+        sum[lane] += x[lane] * y[lane];
+    }
+}
+
+/// `x'y`, both as long. 2 flops a sample.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+pub(super) fn product(x: &[f64], y: &[f64]) -> f64 {
+    let ((x, x_rest), (y, y_rest)) = (x.as_chunks(), y.as_chunks());
+    let mut sum = [0.0; LANES];
+    for (x, y) in x.iter().zip(y) {
+        accumulate(&mut sum, x, y);
+    }
+    for ((sum, x), y) in sum.iter_mut().zip(x_rest).zip(y_rest) {
+        *sum += x * y;
+    }
+    fold(sum)
+}
+
+/// `sum_t x[t] y[t + k]` for k = 0..4; `y` holds 3 values more than `x`. 8 flops a sample, each signal read once.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+fn four_products(x: &[f64], y: &[f64]) -> [f64; SHIFTS] {
+    let (chunks, rest) = x.as_chunks();
+    let mut sums = [[0.0; LANES]; SHIFTS];
+    // Four zipped lists of chunks: indexed forms of this loop were compiled to shuffles, three times slower.
+    let (y0, y1, y2, y3) =
+        (y[0..].as_chunks().0, y[1..].as_chunks().0, y[2..].as_chunks().0, y[3..].as_chunks().0);
+    for ((((x, y0), y1), y2), y3) in chunks.iter().zip(y0).zip(y1).zip(y2).zip(y3) {
+        accumulate(&mut sums[0], x, y0);
+        accumulate(&mut sums[1], x, y1);
+        accumulate(&mut sums[2], x, y2);
+        accumulate(&mut sums[3], x, y3);
+    }
+    let done = chunks.len() * LANES;
+    for (k, sum) in sums.iter_mut().enumerate() {
+        for ((sum, x), y) in sum.iter_mut().zip(rest).zip(&y[done + k..]) {
+            *sum += x * y;
+        }
+    }
+    sums.map(fold)
+}
+
+/// `target += weight x`, both as long. 2 flops a sample.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+pub(super) fn add_scaled(target: &mut [f64], weight: f64, x: &[f64]) {
+    for (target, x) in target.iter_mut().zip(x) {
+        *target += weight * x;
+    }
+}
+
+/// `target[t] += sum_k weights[k] x[t + k]` for k = 0..4; `x` holds 3 values more than `target`. 8 flops a sample.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+fn add_four_scaled(target: &mut [f64], weights: [f64; SHIFTS], x: &[f64]) {
+    let shifted = x[0..].iter().zip(&x[1..]).zip(&x[2..]).zip(&x[3..]);
+    for (target, (((x0, x1), x2), x3)) in target.iter_mut().zip(shifted) {
+        *target = (((*target + weights[0] * x0) + weights[1] * x1) + weights[2] * x2) + weights[3] * x3;
+    }
+}
+
+/// `into[k] = sum_t x[t] y[t + k]`; `y` holds as many values as `x` and `into` together, less one.
+pub(super) fn correlations(x: &[f64], y: &[f64], into: &mut [f64]) {
+    let (tiles, rest) = into.as_chunks_mut::<SHIFTS>();
+    let done = tiles.len() * SHIFTS;
+    for (tile, into) in tiles.iter_mut().enumerate() {
+        let first = tile * SHIFTS;
+        *into = four_products(x, &y[first..first + x.len() + SHIFTS - 1]);
+    }
+    for (k, into) in rest.iter_mut().enumerate() {
+        *into = product(x, &y[done + k..done + k + x.len()]);
+    }
+}
+
+/// `target[t] += sum_l weights[l] x(t - l)`: a filter of L + 1 weights. `x` begins L samples before `target` and ends
+/// with it.
+pub(crate) fn add_filtered(target: &mut [f64], weights: &[f64], x: &[f64]) {
+    // The largest lag stands first in x.
+    let (rest, tiles) = weights.as_rchunks::<SHIFTS>();
+    let length = target.len();
+    let mut first = 0;
+    for tile in tiles.iter().rev() {
+        let mut falling = *tile;
+        falling.reverse();
+        add_four_scaled(target, falling, &x[first..first + length + SHIFTS - 1]);
+        first += SHIFTS;
+    }
+    for weight in rest.iter().rev() {
+        add_scaled(target, *weight, &x[first..first + length]);
+        first += 1;
+    }
+}
+
+/// The sum of `values`, in eight lanes.
+pub(crate) fn sum(values: impl Iterator<Item = f64>) -> f64 {
+    let mut lanes = [0.0; LANES];
+    for (position, value) in values.enumerate() {
+        lanes[position % LANES] += value;
+    }
+    fold(lanes)
+}

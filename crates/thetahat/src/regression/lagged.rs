@@ -1,0 +1,345 @@
+//! Least squares on lagged signals without their regressor matrix.
+//!
+//! A row of the regressor matrix Phi holds lagged samples, `phi_c(t) = s_c x_c(t - l_c)`. Its Gram matrix comes
+//! from lagged products (see `gram`), its columns are scaled to unit norm, the normal equations are
+//! solved by Cholesky, and the solution is corrected with true residuals:
+//!
+//! ```text
+//! G = R' R,  R' R theta = Phi' y;   repeat  r = y - Phi theta,  R' R delta = Phi' r,  theta += delta.
+//! ```
+//!
+//! Source: Björck, Stability analysis of the method of seminormal equations for linear least squares
+//! problems, Linear Algebra and its Applications 88/89 (1987), section 3. The error stays below
+//! `4 eps (kappa + kappa^2 |r| / |theta|)`, the bound of Householder QR, where the corrections contract;
+//! elsewhere, and above a condition number of 5e6, the rows go through `qr`.
+//! Cost: O(N p) for the Gram matrix and for each correction, p^3 / 6 for the factor.
+
+use std::ops::{Range, RangeInclusive};
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use thetahat_core::LeastSquares;
+use thetahat_core::nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+use super::blocks::{blocks, sum_blocks};
+use super::gram::gram;
+use super::kernel::{add_filtered, correlations, product};
+use super::qr;
+
+/// Above this condition number the normal equations do not reach QR's accuracy.
+const MAXIMUM_CONDITION: f64 = 5e6;
+/// Up to this condition number one correction is enough.
+const ONE_CORRECTION: f64 = 1e5;
+/// While above the rounding floor, each correction must be this much smaller than the one before.
+const CONTRACTION: f64 = 0.02;
+const MAXIMUM_CORRECTIONS: usize = 10;
+/// Column norms of which products neither overflow nor lose digits.
+const SAFE_NORMS: RangeInclusive<f64> = 1e-140..=1e140;
+
+/// What stands for the samples before the first of a segment.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Initial {
+    /// Nothing: samples without a full regressor are left out.
+    #[default]
+    Drop,
+    /// Zeros: all samples count.
+    Zero,
+}
+
+/// Consecutive lags of one signal: `count` columns `sign * x(t - first - i)`.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Taps {
+    /// Which of the signals.
+    pub(crate) signal: usize,
+    /// The smallest lag.
+    pub(crate) first: usize,
+    /// How many lags.
+    pub(crate) count: usize,
+    /// The sign of the columns.
+    pub(crate) sign: f64,
+}
+
+impl Taps {
+    pub(super) fn last(&self) -> usize {
+        (self.first + self.count).saturating_sub(1)
+    }
+}
+
+/// The regression of `signals[0](t)` on lagged signals.
+#[derive(Debug)]
+pub(crate) struct Lagged<'a> {
+    signals: Vec<&'a [f64]>,
+    taps: Vec<Taps>,
+    segments: &'a [Range<usize>],
+    initial: Initial,
+    longest: usize,
+}
+
+/// How a least-squares problem was solved.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Solver {
+    /// Cholesky of the Gram matrix, corrected with true residuals.
+    NormalEquations,
+    /// Householder reflections on blocks of rows: where the regressors are nearly dependent.
+    Qr,
+}
+
+/// A solved regression.
+#[derive(Debug, Clone)]
+pub(crate) struct Regression {
+    /// theta-hat, p values.
+    pub(crate) parameters: DVector<f64>,
+    /// `sigma^2 (Phi' Phi)^-1`, p x p, with `sigma^2 = |y - Phi theta|^2 / (N - p)`.
+    pub(crate) covariance: DMatrix<f64>,
+    /// `|y - Phi theta|^2`.
+    pub(crate) sum_of_squares: f64,
+    /// The condition number of Phi, its columns scaled to unit norm.
+    pub(crate) condition: f64,
+    pub(crate) solver: Solver,
+}
+
+/// Columns that are combinations of the others, to rounding: there is no unique solution.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Deficient(pub(crate) Vec<usize>);
+
+impl<'a> Lagged<'a> {
+    /// `segments` are ranges of samples inside every signal; the target is `signals[0]`.
+    pub(crate) fn new(
+        signals: &[&'a [f64]],
+        taps: Vec<Taps>,
+        segments: &'a [Range<usize>],
+        initial: Initial,
+    ) -> Self {
+        let longest = taps.iter().filter(|taps| taps.count > 0).map(Taps::last).max().unwrap_or(0);
+        Self { signals: signals.to_vec(), taps, segments, initial, longest }
+    }
+
+    pub(super) fn taps(&self) -> &[Taps] {
+        &self.taps
+    }
+
+    pub(super) fn segments(&self) -> &[Range<usize>] {
+        self.segments
+    }
+
+    pub(super) fn longest(&self) -> usize {
+        self.longest
+    }
+
+    pub(super) fn signal(&self, signal: usize) -> &[f64] {
+        self.signals[signal]
+    }
+
+    /// Sample `row - lag` of a signal, zero before the segment's start.
+    pub(super) fn sample(&self, signal: usize, start: usize, row: usize, lag: usize) -> f64 {
+        if row < start + lag { 0.0 } else { self.signals[signal][row - lag] }
+    }
+
+    /// The signal, lag and sign of each column.
+    pub(super) fn columns(&self) -> impl Iterator<Item = (usize, usize, f64)> {
+        self.taps
+            .iter()
+            .flat_map(|taps| (0..taps.count).map(move |i| (taps.signal, taps.first + i, taps.sign)))
+    }
+
+    /// The samples of a segment that count.
+    pub(super) fn counted(&self, segment: &Range<usize>) -> Range<usize> {
+        match self.initial {
+            Initial::Drop => (segment.start + self.longest).min(segment.end)..segment.end,
+            Initial::Zero => segment.clone(),
+        }
+    }
+
+    /// The number of parameters p.
+    pub(crate) fn parameters(&self) -> usize {
+        self.taps.iter().map(|taps| taps.count).sum()
+    }
+
+    /// The number of rows N.
+    pub(crate) fn rows(&self) -> usize {
+        self.segments.iter().map(|segment| self.counted(segment).len()).sum()
+    }
+
+    /// Solves the regression, which must have more rows than parameters.
+    ///
+    /// # Errors
+    /// [`Deficient`] names the columns that depend on others.
+    pub(crate) fn solve(&self) -> Result<Regression, Deficient> {
+        if let Some(solved) = self.solve_normal_equations() {
+            return Ok(solved);
+        }
+        // Only what is not finite has no factor.
+        let nothing = |_| Deficient((0..self.parameters()).collect());
+        Regression::from_factor(&self.factor().map_err(nothing)?)
+    }
+
+    /// Corrected semi-normal equations; `None` where they are not exact enough.
+    fn solve_normal_equations(&self) -> Option<Regression> {
+        let (mut matrix, right) = gram(self);
+        let size = right.len();
+        let norms = matrix.diagonal().map(f64::sqrt);
+        if !norms.iter().all(|norm| SAFE_NORMS.contains(norm)) {
+            return None;
+        }
+        for (column, norm) in norms.iter().enumerate() {
+            matrix.column_mut(column).component_div_assign(&norms);
+            matrix.column_mut(column).unscale_mut(*norm);
+        }
+        let factor = Cholesky::new(matrix)?;
+        let triangle = factor.l().transpose();
+        let condition = condition(&triangle, self.rows())?;
+        if condition > MAXIMUM_CONDITION {
+            return None;
+        }
+
+        let mut scaled = factor.solve(&right.component_div(&norms));
+        let mut previous = f64::INFINITY;
+        for pass in 1..=MAXIMUM_CORRECTIONS {
+            let (sum_of_squares, gradient) = self.residuals(&scaled.component_div(&norms));
+            let gradient = gradient.component_div(&norms);
+            let correction = factor.solve(&gradient);
+            scaled += &correction;
+            let (step, length) = (correction.norm(), scaled.norm());
+            let residual = sum_of_squares.sqrt();
+            let floor = 4.0 * f64::EPSILON * (condition * length + condition * condition * residual);
+            if condition <= ONE_CORRECTION || step <= floor {
+                // |r - Phi delta|^2 = |r|^2 - delta' Phi' r, as R' R delta = Phi' r.
+                let sum_of_squares = (sum_of_squares - correction.dot(&gradient)).max(0.0);
+                let variance = sum_of_squares / (self.rows() - size) as f64;
+                let inverse = factor.solve(&DMatrix::identity(size, size));
+                return Some(Regression {
+                    parameters: scaled.component_div(&norms),
+                    covariance: DMatrix::from_fn(size, size, |i, j| {
+                        variance * (inverse[(i, j)] / norms[i] / norms[j])
+                    }),
+                    sum_of_squares,
+                    condition,
+                    solver: Solver::NormalEquations,
+                });
+            }
+            if !step.is_finite() || (pass > 1 && step > CONTRACTION * previous) {
+                return None;
+            }
+            previous = step;
+        }
+        None
+    }
+
+    /// `|r|^2` and `Phi' r` of the residuals `r = y - Phi theta`. 4 N p flops.
+    fn residuals(&self, parameters: &DVector<f64>) -> (f64, DVector<f64>) {
+        let size = parameters.len();
+        // The first L rows of a segment that has no past are taken one by one.
+        let mut edges = vec![0.0; size + 1];
+        let mut inner = Vec::new();
+        for segment in self.segments {
+            let rows = self.counted(segment);
+            let full = rows.start.max(segment.start + self.longest).min(rows.end);
+            for row in rows.start..full {
+                let regressor =
+                    || self.columns().map(|(x, lag, sign)| sign * self.sample(x, segment.start, row, lag));
+                let predicted: f64 = regressor().zip(parameters).map(|(phi, theta)| phi * theta).sum();
+                let residual = self.sample(0, segment.start, row, 0) - predicted;
+                edges[0] += residual * residual;
+                for (sum, phi) in edges.iter_mut().skip(1).zip(regressor()) {
+                    *sum += phi * residual;
+                }
+            }
+            inner.push(full..rows.end);
+        }
+        let sums = sum_blocks(&blocks(inner.into_iter()), size + 1, |rows, sums| {
+            let residuals = self.block_residuals(rows, parameters);
+            sums[0] = product(&residuals, &residuals);
+            let mut next = 1;
+            for taps in self.taps.iter().filter(|taps| taps.count > 0) {
+                let x = &self.signals[taps.signal][rows.start - taps.last()..rows.end - taps.first];
+                let into = &mut sums[next..next + taps.count];
+                correlations(&residuals, x, into);
+                // They come with the largest lag first.
+                into.reverse();
+                into.iter_mut().for_each(|value| *value *= taps.sign);
+                next += taps.count;
+            }
+        });
+        let sums: Vec<f64> = sums.iter().zip(edges).map(|(a, b)| a + b).collect();
+        (sums[0], DVector::from_column_slice(&sums[1..]))
+    }
+
+    /// The residuals of rows with a full regressor.
+    fn block_residuals(&self, rows: &Range<usize>, parameters: &DVector<f64>) -> Vec<f64> {
+        let mut residuals = self.signals[0][rows.clone()].to_vec();
+        let mut next = 0;
+        for taps in self.taps.iter().filter(|taps| taps.count > 0) {
+            let weights: Vec<f64> = parameters.as_slice()[next..next + taps.count]
+                .iter()
+                .map(|theta| -taps.sign * theta)
+                .collect();
+            next += taps.count;
+            let x = &self.signals[taps.signal][rows.start - taps.last()..rows.end - taps.first];
+            add_filtered(&mut residuals, &weights, x);
+        }
+        residuals
+    }
+
+    /// The triangular factor of the rows, in the signals' own units, as exact as Householder QR. 2 N p^2 flops.
+    ///
+    /// # Errors
+    /// If a sample is not finite.
+    pub(crate) fn factor(&self) -> Result<LeastSquares<f64, Dyn>, thetahat_core::Error> {
+        let mut folding = qr::Folding::new(self.parameters());
+        let scales: Vec<f64> = self.signals.iter().map(|signal| scale(signal, self.segments)).collect();
+        let target = [(0, 0, 1.0)];
+        let columns: Vec<(usize, usize, f64)> = self.columns().chain(target).collect();
+        for segment in self.segments {
+            let counted = self.counted(segment);
+            for first in counted.clone().step_by(qr::ROWS) {
+                let rows = first..(first + qr::ROWS).min(counted.end);
+                folding.fold(rows.len(), |column, values| {
+                    let (signal, lag, sign) = columns[column];
+                    for (value, row) in values.iter_mut().zip(rows.clone()) {
+                        *value = sign * scales[signal] * self.sample(signal, segment.start, row, lag);
+                    }
+                });
+            }
+        }
+        folding.finish(columns.iter().map(|&(signal, _, _)| scales[signal]))
+    }
+}
+
+impl Regression {
+    /// The solution that a triangular factor of more rows than columns holds.
+    pub(crate) fn from_factor(factor: &LeastSquares<f64, Dyn>) -> Result<Self, Deficient> {
+        let deficient = |_| Deficient(factor.rank().dependent().collect());
+        let solution = factor.solve().map_err(deficient)?;
+        let size = solution.parameters().len();
+        Ok(Self {
+            parameters: solution.parameters().clone(),
+            covariance: solution
+                .covariance()
+                .unwrap_or_else(|| DMatrix::from_element(size, size, f64::INFINITY)),
+            sum_of_squares: solution.residual_sum_of_squares(),
+            condition: factor.condition(),
+            solver: Solver::Qr,
+        })
+    }
+}
+
+/// A power of two that brings a signal near one where its squares could overflow or lose digits; else 1.
+fn scale(signal: &[f64], segments: &[Range<usize>]) -> f64 {
+    let largest = segments
+        .iter()
+        .flat_map(|segment| &signal[segment.clone()])
+        .fold(0.0_f64, |largest, value| largest.max(value.abs()));
+    if largest == 0.0 || (1e-100..=1e100).contains(&largest) {
+        return 1.0;
+    }
+    // 2^1000 at most: scales and their quotients stay finite.
+    (-largest.log2().round().clamp(-1000.0, 1000.0)).exp2()
+}
+
+/// The condition number of a triangular factor of which the columns have unit norm.
+fn condition(triangle: &DMatrix<f64>, rows: usize) -> Option<f64> {
+    let zeros = DVector::zeros(triangle.ncols());
+    LeastSquares::from_factor(triangle, &zeros, 0.0, rows).ok().map(|factor| factor.condition())
+}

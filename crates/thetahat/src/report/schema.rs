@@ -1,0 +1,143 @@
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::data::Rows;
+use crate::estimate::Solver;
+use crate::{Criteria, Error, Fit, Initial, Interpolation, Model};
+
+/// The schema that this version writes.
+const SCHEMA: &str = "thetahat.report/1";
+
+/// What a fit found: data provenance, the model, its figures. The JSON document `thetahat.report/1`.
+///
+/// Readers ignore fields that they do not know, and refuse another major version. The same input gives the same bytes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Report {
+    /// `thetahat.report/1`.
+    pub schema: String,
+    /// The program and version that wrote it.
+    pub generator: String,
+    /// What the model was fitted to.
+    pub data: Data,
+    /// The model.
+    pub model: Model,
+    /// How it was estimated.
+    pub estimation: Estimation,
+    /// How well it fits, one entry for each part of the log and horizon.
+    pub fit: Vec<Fit>,
+    /// What a careful reader should know, in plain words.
+    pub warnings: Vec<String>,
+}
+
+/// Where the data came from and what was done to them. Rows are 1-based and inclusive.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Data {
+    /// The log's file name as it was given.
+    pub file: String,
+    /// The number of rows, after resampling.
+    pub rows: usize,
+    /// The column that gave the time, if one did.
+    pub time: Option<String>,
+    /// Seconds from one row to the next.
+    pub sample_time: f64,
+    /// How an irregular log was made uniform, if it was.
+    pub resampled: Option<Resampling>,
+    /// How the offsets were found: `none`, `mean`, `linear` or `start:K`.
+    pub detrend: String,
+    /// The rows asked for to estimate on.
+    pub estimation: Vec<Rows>,
+    /// The rows asked for to validate on.
+    pub validation: Vec<Rows>,
+    /// The stretches of estimation rows without a gap.
+    pub segments: Vec<Rows>,
+    /// How many values each channel misses.
+    pub missing: Vec<Missing>,
+    /// How often the clock jumps.
+    pub time_gaps: usize,
+}
+
+/// How an irregular log was made uniform.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Resampling {
+    /// Seconds between the new rows.
+    pub step: f64,
+    /// How values between samples were read.
+    pub interpolation: Interpolation,
+    /// The number of rows before.
+    pub rows: usize,
+}
+
+/// How many values a channel misses.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Missing {
+    /// The channel.
+    pub channel: String,
+    /// The number of its rows without a value.
+    pub rows: usize,
+}
+
+/// How a model was estimated.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Estimation {
+    /// `least-squares`.
+    pub method: String,
+    /// How the least-squares problem was solved.
+    pub solver: Solver,
+    /// What stood for the samples before the first of a segment.
+    pub initial: Initial,
+    /// N, the samples that count.
+    pub samples: usize,
+    /// The mean of e^2 over these samples.
+    pub mse: f64,
+    /// FPE, AIC, AICc and MDL.
+    #[serde(flatten)]
+    pub criteria: Criteria,
+    /// The condition number of the regressors, scaled to unit norm.
+    pub condition: f64,
+}
+
+impl Report {
+    pub(super) fn schema_name() -> String {
+        SCHEMA.to_owned()
+    }
+
+    /// The document, indented, with a line break at its end.
+    ///
+    /// # Errors
+    /// [`Error::Report`] if it cannot be written as JSON.
+    pub fn to_json(&self) -> Result<String, Error> {
+        let mut text = serde_json::to_string_pretty(self)
+            .map_err(|error| Error::report(format!("the report cannot be written as JSON: {error}")))?;
+        text.push('\n');
+        Ok(text)
+    }
+
+    /// Reads a document back.
+    ///
+    /// # Errors
+    /// [`Error::Report`] with line and column if it is not JSON or a field is missing; if it has another major schema;
+    /// if the parts of the model do not fit together.
+    pub fn from_json(text: &str) -> Result<Self, Error> {
+        #[derive(Deserialize)]
+        struct Head {
+            schema: String,
+        }
+        let malformed =
+            |error: serde_json::Error| Error::report(format!("this is not a thetahat report: {error}"));
+        let head: Head = serde_json::from_str(text).map_err(malformed)?;
+        if head.schema != SCHEMA && !head.schema.starts_with(&format!("{SCHEMA}.")) {
+            let shown: String = head.schema.chars().take(60).flat_map(char::escape_debug).collect();
+            return Err(Error::report(format!(
+                "its schema is '{shown}', this version reads '{SCHEMA}'; fit the log again"
+            )));
+        }
+        let report: Self = serde_json::from_str(text).map_err(malformed)?;
+        report.model.check()?;
+        Ok(report)
+    }
+
+    /// The JSON Schema of the document.
+    pub fn json_schema() -> serde_json::Value {
+        schemars::schema_for!(Self).to_value()
+    }
+}

@@ -1,0 +1,5 @@
+//! Which of several models to believe.
+
+mod criteria;
+
+pub use criteria::Criteria;

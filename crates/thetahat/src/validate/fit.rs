@@ -1,0 +1,102 @@
+use std::fmt;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::data::{Record, Rows};
+use crate::regression::sum;
+use crate::respond::{Response, Start, predict, simulate};
+use crate::{Error, Model};
+
+/// How far ahead a response looks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum Horizon {
+    /// So many steps ahead of the last measured output.
+    Steps {
+        /// At least 1.
+        steps: usize,
+    },
+    /// Driven by the inputs alone.
+    FreeRun,
+}
+
+impl fmt::Display for Horizon {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Steps { steps: 1 } => f.write_str("1 step ahead"),
+            Self::Steps { steps } => write!(f, "{steps} steps ahead"),
+            Self::FreeRun => f.write_str("free run"),
+        }
+    }
+}
+
+/// What rows serve for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Part {
+    /// The model was fitted to them.
+    Estimation,
+    /// The fit did not see them.
+    Validation,
+}
+
+/// How close a model comes to measured outputs.
+///
+/// percent = 100 (1 - |y - y^| / |y - mean(y)|), rmse = |y - y^| / sqrt(N), over the N samples that the response covers.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Fit {
+    /// The rows looked at, 1-based and inclusive.
+    pub rows: Vec<Rows>,
+    /// What these rows served for; none for a log that the fit did not know.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub part: Option<Part>,
+    /// How far ahead the response looks.
+    pub horizon: Horizon,
+    /// What it starts from.
+    pub initial: Start,
+    /// N: samples without a start, or in a gap, do not count.
+    pub samples: usize,
+    /// 100 is perfect, 0 is as good as the mean; none where it is not defined: no samples, a constant output, a response
+    /// that overflows.
+    pub percent: Option<f64>,
+    /// Root mean square error in units of y; none where there are no samples or the response overflows.
+    pub rmse: Option<f64>,
+}
+
+impl Fit {
+    /// The response of a model to a record, and its fit.
+    ///
+    /// # Errors
+    /// As for [`predict`] and [`simulate`].
+    pub fn of(
+        model: &Model,
+        record: &Record<'_>,
+        rows: &[Rows],
+        part: Option<Part>,
+        horizon: Horizon,
+        initial: Start,
+    ) -> Result<(Self, Response), Error> {
+        let response = match horizon {
+            Horizon::Steps { steps } => predict(model, record, steps, initial)?,
+            Horizon::FreeRun => simulate(model, record, initial)?,
+        };
+        let counted = || response.counted.iter().cloned().flatten();
+        let samples = response.counted.iter().map(|rows| rows.len()).sum::<usize>();
+        let n = samples as f64;
+        let y = record.output;
+        let mean = sum(counted().map(|t| y[t])) / n;
+        let error = sum(counted().map(|t| (y[t] - response.values[t]).powi(2))).sqrt();
+        let spread = sum(counted().map(|t| (y[t] - mean).powi(2))).sqrt();
+        let fit = Self {
+            rows: rows.to_vec(),
+            part,
+            horizon,
+            initial,
+            samples,
+            percent: Some(100.0 * (1.0 - error / spread)).filter(|percent| percent.is_finite()),
+            rmse: Some(error / n.sqrt()).filter(|rmse| rmse.is_finite()),
+        };
+        Ok((fit, response))
+    }
+}

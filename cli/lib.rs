@@ -1,1 +1,38 @@
-//! x
+//! The command line of thetahat as a library: [`run`] is the whole program.
+//!
+//! `args` is syntax only; `job` resolves it, with every check that needs no data; `log` reads a log; `commands` has one
+//! file a verb. Only this crate opens files, prints, or knows about terminals.
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+mod readme {}
+
+mod args;
+mod commands;
+mod failure;
+mod job;
+mod log;
+mod output;
+mod table;
+
+use std::ffi::OsString;
+use std::process::ExitCode;
+
+use clap::Parser;
+
+/// Runs the program on its arguments, the program's name first, and gives its exit code: 0 done, 2 usage, 3 bad data,
+/// 4 the data cannot determine the model, 5 input/output.
+pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let arguments = match args::Arguments::try_parse_from(arguments) {
+        Ok(arguments) => arguments,
+        Err(error) => {
+            // Help and version come this way too, with code 0. Nobody is left to tell that printing failed.
+            let _ = error.print();
+            return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
+        }
+    };
+    match commands::dispatch(arguments) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => failure.report(),
+    }
+}

@@ -1,2 +1,5 @@
-//! x
-fn main(){}
+//! The command `thetahat`.
+
+fn main() -> std::process::ExitCode {
+    thetahat_cli::run(std::env::args_os())
+}

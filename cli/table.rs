@@ -1,14 +1,14 @@
 //! Logs in text tables (CSV), read into columns of numbers.
 //!
-//! [`Reader::open`] reads as far as the first row and knows the columns' names; [`Reader::read`] reads the columns that
-//! were selected. The file is never held in memory: it passes through two blocks of a mebibyte.
+//! [`Reader::open`] reads as far as the first row and knows the columns' names; [`Reader::read`] reads the
+//! columns that were selected. The file is never held in memory: it passes through two blocks of a mebibyte.
 //!
-//! What is understood: commas, semicolons or tabs, recognised by themselves; quotes as in RFC 4180; blank lines and
-//! comments; decimal commas; gzip; UTF-16 with a byte-order mark and other encodings by name; times as seconds, as
-//! ISO 8601 or in a given format.
+//! What is understood: commas, semicolons or tabs, recognised by themselves; quotes as in RFC 4180; blank
+//! lines and comments; decimal commas; gzip; UTF-16 with a byte-order mark and other encodings by name; times
+//! as seconds, as ISO 8601 or in a given format.
 //!
-//! What is not done here: the order of the times is not checked, names may repeat, and runs of blanks do not separate
-//! fields.
+//! What is not done here: the order of the times is not checked, names may repeat, and runs of blanks do not
+//! separate fields.
 
 mod block;
 mod dialect;
@@ -41,8 +41,8 @@ pub(crate) struct Options {
     pub(crate) skip_rows: usize,
     /// The first character of a line that is a comment.
     pub(crate) comment: Option<u8>,
-    /// Words that stand for a missing value, besides an empty field, `NaN`, `NA`, `N/A` and `null`. Case does not
-    /// matter, and a number stands for all ways to write it.
+    /// Words that stand for a missing value, besides an empty field, `NaN`, `NA`, `N/A` and `null`. Case does
+    /// not matter, and a number stands for all ways to write it.
     pub(crate) missing: Vec<String>,
     /// The encoding of the text, if it is neither UTF-8 nor marked as UTF-16.
     pub(crate) encoding: Option<&'static encoding_rs::Encoding>,
@@ -69,12 +69,14 @@ impl Options {
     /// Whether the options go together; if not, a message says which do not.
     pub(crate) fn check(&self) -> Result<(), String> {
         // These bytes are part of numbers, words, quotes and line ends.
-        let unusable = |byte: u8| !byte.is_ascii() || byte.is_ascii_alphanumeric() || b"+-.\"\r\n\0".contains(&byte);
+        let unusable =
+            |byte: u8| !byte.is_ascii() || byte.is_ascii_alphanumeric() || b"+-.\"\r\n\0".contains(&byte);
         let shown = |byte: u8| error::quoted(&[byte]);
         match (self.delimiter, self.comment) {
-            (Some(delimiter), _) if unusable(delimiter) => {
-                Err(format!("{} cannot be the delimiter; use a comma, a semicolon or a tab", shown(delimiter)))
-            }
+            (Some(delimiter), _) if unusable(delimiter) => Err(format!(
+                "{} cannot be the delimiter; use a comma, a semicolon or a tab",
+                shown(delimiter)
+            )),
             (_, Some(comment)) if unusable(comment) || comment.is_ascii_whitespace() => {
                 Err(format!("{} cannot start a comment; use # or %", shown(comment)))
             }
@@ -82,7 +84,8 @@ impl Options {
                 Err(format!("{} cannot both delimit fields and start a comment", shown(comment)))
             }
             (Some(b','), _) if self.decimal_comma => {
-                Err("a comma cannot be both the delimiter and the decimal comma; separate fields by ;".to_owned())
+                Err("a comma cannot be both the delimiter and the decimal comma; separate fields by ;"
+                    .to_owned())
             }
             _ => Ok(()),
         }
@@ -103,8 +106,6 @@ pub(crate) struct Selection {
 pub(crate) struct Table {
     /// The selected columns, in the selection's order; a missing value is NaN.
     pub(crate) columns: Vec<Vec<f64>>,
-    /// How many values of each column are missing.
-    pub(crate) missing: Vec<usize>,
     /// The times in seconds: as they are if they are numbers, and since the first one if they are dates.
     pub(crate) time: Option<Vec<f64>>,
     /// The first time as it is written, if it is a date.

@@ -8,7 +8,8 @@ use super::source::Source;
 /// Two blocks take turns: while the rows of one are parsed, the other is filled with what follows.
 #[derive(Default)]
 pub(super) struct Block {
-    /// Initialised memory, kept from one filling to the next: clearing it each time would cost as much as reading.
+    /// Initialised memory, kept from one filling to the next: clearing it each time would cost as much as
+    /// reading.
     memory: Vec<u8>,
     /// How much of the memory is text.
     length: usize,

@@ -4,8 +4,8 @@ use memchr::memchr;
 
 use super::record::Record;
 
-/// The delimiters that are recognised, in the order of preference between two that fit equally well: a comma may be
-/// a decimal comma or part of a text, a tab hardly ever is.
+/// The delimiters that are recognised, in the order of preference between two that fit equally well: a comma
+/// may be a decimal comma or part of a text, a tab hardly ever is.
 const DELIMITERS: [u8; 3] = [b'\t', b';', b','];
 
 /// How many rows are looked at to recognise the delimiter.

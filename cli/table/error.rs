@@ -46,20 +46,13 @@ impl Position {
 
 /// The number of characters in a text, taking bytes that are not UTF-8 for one each.
 fn count_characters(text: &[u8]) -> usize {
-    text.utf8_chunks()
-        .map(|chunk| chunk.valid().chars().count() + chunk.invalid().len())
-        .sum()
+    text.utf8_chunks().map(|chunk| chunk.valid().chars().count() + chunk.invalid().len()).sum()
 }
 
 impl Error {
     /// An error of the file system or of the stream.
     pub(super) fn io(file: &str, message: impl Into<String>) -> Self {
-        Self {
-            kind: ErrorKind::Io,
-            file: file.to_owned(),
-            position: None,
-            message: message.into(),
-        }
+        Self { kind: ErrorKind::Io, file: file.to_owned(), position: None, message: message.into() }
     }
 
     /// An error in what the log holds, or in how it was asked for.

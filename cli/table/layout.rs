@@ -2,6 +2,7 @@
 
 use super::dialect::Dialect;
 use super::error::{Error, Position, escaped, quoted, shortened};
+use super::number::starts_with_number;
 use super::record::Record;
 
 /// The file, its columns, and how its lines divide into fields.
@@ -57,7 +58,7 @@ impl Layout {
     /// An error at a field of the first row; a word there may be a unit.
     pub(super) fn first_fault(&self, row: &Row<'_>, field: usize, message: &str) -> Error {
         let content = self.dialect.trimmed(row.record.field(field));
-        if fast_float2::parse_partial::<f64, _>(content).is_ok() {
+        if starts_with_number(content) {
             return self.fault(row, field, message);
         }
         let message = format!("{message}; if this row holds units, leave it out with --skip-rows");
@@ -84,10 +85,10 @@ impl Layout {
             "add what is missing, if only the delimiters"
         };
         let message = format!(
-            "this row has {}, where {} {} named ({} separates them); {advice}",
+            "this row has {}, but there {} {} ({} separates them); {advice}",
             counted(found, "field"),
-            counted(width, "column"),
             if width == 1 { "is" } else { "are" },
+            counted(width, "column"),
             quoted(&[self.dialect.delimiter]),
         );
         Error::data(&self.file, row.position_of(found.min(width), self.dialect), message)
@@ -96,14 +97,18 @@ impl Layout {
     /// The error for a text that ends inside quotes; the row is as much of it as there is.
     pub(super) fn unclosed(&self, row: &Row<'_>) -> Error {
         let position = row.position_of(row.record.len(), self.dialect);
-        Error::data(&self.file, position, "this quote is not closed before the end of the file; close it, or take it away")
+        Error::data(
+            &self.file,
+            position,
+            "this quote is not closed before the end of the file; close it, or take it away",
+        )
     }
 
     /// The error for a row that is longer than `limit` bytes.
     pub(super) fn too_long(&self, line: u64, limit: usize) -> Error {
         let message = format!(
-            "this row is longer than {limit} bytes: either this is no text table, or a quote is not closed; name a text \
-             file, or close the quote"
+            "this row is longer than {limit} bytes: either this is no text table, or a quote is not closed; \
+             name a text file, or close the quote"
         );
         Error::data(&self.file, Position { line, column: 1 }, message)
     }

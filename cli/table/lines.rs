@@ -2,8 +2,9 @@
 
 /// A map from rows to lines.
 ///
-/// A row is counted from zero and a line from one; headers, blank lines, comments and quoted line breaks set them
-/// further apart. Only the rows at which the distance changes are stored, so a plain log costs one entry.
+/// A row is counted from zero and a line from one; headers, blank lines, comments and quoted line breaks set
+/// them further apart. Only the rows at which the distance changes are stored, so a plain log costs one
+/// entry.
 #[derive(Clone, Debug, Default, Eq, PartialEq)]
 pub(crate) struct Lines {
     /// Each run's first row, and by how much its lines are ahead of its rows.
@@ -18,7 +19,8 @@ impl Lines {
         row as u64 + ahead.map_or(1, |&(_, ahead)| ahead)
     }
 
-    /// Notes the line of the next row. Rows come in order, and each row is on a later line than the one before.
+    /// Notes the line of the next row. Rows come in order, and each row is on a later line than the one
+    /// before.
     pub(super) fn push(&mut self, row: usize, line: u64) {
         // A piece of a file counts its lines from zero too: they are never behind the rows.
         let ahead = line - row as u64;

@@ -31,11 +31,8 @@ impl Numbers {
             missing_words: missing.iter().map(|word| word.trim().to_owned()).collect(),
             missing_numbers: Vec::new(),
         };
-        numbers.missing_numbers = numbers
-            .missing_words
-            .iter()
-            .filter_map(|word| numbers.finite(word.as_bytes()))
-            .collect();
+        numbers.missing_numbers =
+            numbers.missing_words.iter().filter_map(|word| numbers.finite(word.as_bytes())).collect();
         numbers
     }
 
@@ -77,27 +74,47 @@ impl Numbers {
         value.filter(|value| value.is_finite())
     }
 
+    /// Whether a field is infinite, or would be a number with the other decimal sign.
+    pub(super) fn is_nearly(&self, field: &[u8]) -> bool {
+        parsed(field).is_some() || parsed_with_comma(field).is_some()
+    }
+
     /// Says why a field is no number, and what to do.
     fn refusal(&self, field: &[u8]) -> String {
         let shown = quoted(field);
         let missing = missing_advice(field);
-        let is_number = |field| parsed(field).is_some_and(f64::is_finite);
         if field.contains(&0) {
             format!("{shown} is not a number; there is {NUL_BYTE}")
         } else if std::str::from_utf8(field).is_err() {
-            format!("{shown} is neither a number nor UTF-8; correct it, or name its encoding, as in --encoding windows-1252")
+            format!(
+                "{shown} is neither a number nor UTF-8; correct it, or name the file's encoding, as in \
+                 --encoding windows-1252"
+            )
+        } else if field.starts_with(b"\"") {
+            format!("{shown} is not a number; take away the blanks in front of the quote, or the quote")
         } else if parsed(field).is_some_and(f64::is_infinite) {
             format!("{shown} is infinite; correct it, or {missing}")
-        } else if self.decimal_comma && is_number(field) {
-            format!("{shown} has a decimal point, yet --decimal-comma was given; correct it, or leave the option out")
+        } else if self.decimal_comma && parsed(field).is_some() {
+            format!(
+                "{shown} has a decimal point, yet --decimal-comma was given; correct it, or leave that option \
+                 out"
+            )
         } else if parsed_with_comma(field).is_some_and(f64::is_finite) {
             format!("{shown} is not a number; if it has a decimal comma, say --decimal-comma")
-        } else if field.split(u8::is_ascii_whitespace).filter(|part| is_number(part)).nth(1).is_some() {
-            format!("{shown} is not one number; put a delimiter in place of the blanks (--delimiter names it)")
+        } else if field.split(u8::is_ascii_whitespace).filter_map(|part| self.finite(part)).nth(1).is_some() {
+            format!(
+                "{shown} is not one number; say --delimiter ' ' if one blank separates two fields, and put one \
+                 in place of several"
+            )
         } else {
             format!("{shown} is not a number; correct it, or {missing}")
         }
     }
+}
+
+/// Whether a field starts with a number: a unit does not.
+pub(super) fn starts_with_number(field: &[u8]) -> bool {
+    fast_float2::parse_partial::<f64, _>(field).is_ok()
 }
 
 /// A decimal number that fills a field, infinity included.
@@ -166,8 +183,8 @@ mod tests {
     #[test]
     fn nothing_else_is_a_number() {
         for field in [
-            "abc", ".", "-", "+", "1e", "1e+", "e5", "1D5", "0x10", "1_000", "1,000", "1.2.3", "--1", "+-1", "1 2", "½",
-            "1f", "true", "#N/A", "1.5\r2", " 1",
+            "abc", ".", "-", "+", "1e", "1e+", "e5", "1D5", "0x10", "1_000", "1,000", "1.2.3", "--1", "+-1",
+            "1 2", "½", "1f", "true", "#N/A", "1.5\r2", " 1",
         ] {
             assert!(read(field).is_err_and(|message| message.contains("not")), "{field}");
         }
@@ -229,7 +246,7 @@ mod tests {
         ends(b"no data", "name it with --missing='no data' if");
         ends(b"it's", "declare it with --missing if");
         ends(&[b'x'; 99], "declare it with --missing if");
-        ends(b"1.5 2.5", "--delimiter");
+        ends(b"1.5  2.5", "--delimiter ' '");
         ends(b"\xb0C", "--encoding windows-1252");
         ends(b"1\x00", "NUL byte");
     }

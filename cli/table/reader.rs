@@ -26,7 +26,7 @@ pub(super) struct Sizes {
     pub(super) row: usize,
 }
 
-/// The sizes for real files. Larger blocks fall out of the processor's cache before they are parsed.
+/// The sizes for real files.
 pub(super) const SIZES: Sizes = Sizes { block: 1 << 20, piece: 1 << 17, row: 1 << 24 };
 
 /// A log whose columns are known and whose rows are still to be read.
@@ -135,7 +135,8 @@ impl Reader {
                 return Ok(());
             } else if self.current.is_last() {
                 let row = Row { record: &self.record, text: rest, line: self.line };
-                return Err(if rest.is_empty() { self.layout.no_rows(self.line) } else { self.layout.unclosed(&row) });
+                let empty = rest.is_empty();
+                return Err(if empty { self.layout.no_rows(self.line) } else { self.layout.unclosed(&row) });
             } else if rest.len() > self.sizes.row {
                 return Err(self.layout.too_long(self.line, self.sizes.row));
             } else {
@@ -160,8 +161,8 @@ impl Reader {
 
     /// Reads the selected columns of all rows.
     ///
-    /// `progress` is called once a block with the number of bytes read so far, and of how many if that is known. Both
-    /// count what is stored, before it is unpacked.
+    /// `progress` is called once a block with the number of bytes read so far, and of how many if that is
+    /// known. Both count what is stored, before it is unpacked.
     pub(crate) fn read(
         self,
         selection: &Selection,
@@ -194,10 +195,11 @@ impl Reader {
             let left = &text[taken..];
             if current.is_last() {
                 if !left.is_empty() {
-                    return Err(plan.layout.unclosed(&Row { record: &workspace.record, text: left, line: rows.line }));
+                    let row = Row { record: &workspace.record, text: left, line: rows.line };
+                    return Err(plan.layout.unclosed(&row));
                 }
                 progress(source.bytes_read(), source.total());
-                break;
+                return Ok(plan.table(rows, selection, start));
             }
             if left.len() > sizes.row {
                 return Err(plan.layout.too_long(rows.line, sizes.row));
@@ -206,25 +208,14 @@ impl Reader {
             next.prepend(&whole[taken..]);
             progress(source.bytes_read(), source.total());
             parsed += taken;
-            if let Some(total) = source.total() {
-                let parsed_share = parsed as f64 / (parsed + next.text().len()) as f64;
-                let blocks_left = total as f64 / (source.bytes_read() as f64 * parsed_share);
-                rows.expect((rows.count as f64 * blocks_left * 1.01) as usize, rows.count - rows_before);
+            if let Some(share) = source.share_read() {
+                // What is in the next block is read, but not parsed.
+                let share = share * parsed as f64 / (parsed + next.text().len()) as f64;
+                rows.make_room((rows.count as f64 / share * 1.01) as usize, rows.count - rows_before);
             }
             std::mem::swap(&mut current, &mut next);
             position = 0;
         }
-        let slot = |index: &usize| plan.fields.binary_search(index).unwrap_or_default();
-        let mut take = |index| rows.columns.get_mut(slot(index)).map(std::mem::take).unwrap_or_default();
-        let missing = |index| rows.missing.get(slot(index)).copied().unwrap_or_default();
-        Ok(Table {
-            columns: selection.columns.iter().map(&mut take).collect(),
-            missing: selection.columns.iter().map(missing).collect(),
-            time: selection.time.as_ref().map(take),
-            start,
-            rows: rows.count,
-            lines: rows.lines,
-        })
     }
 
     /// The selected fields in ascending order, if the selection makes sense.

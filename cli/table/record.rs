@@ -4,7 +4,8 @@ use csv_core::{ReadFieldResult, ReadRecordResult, Reader, ReaderBuilder, Termina
 
 /// The fields of one row, their quotes removed.
 ///
-/// This is the reader that knows all the rules; the fast one in [`super::rows`] takes the rows without quotes.
+/// This is the reader that knows all the rules; the fast one in [`super::rows`] takes the rows without
+/// quotes.
 pub(super) struct Record {
     delimiter: u8,
     reader: Reader,
@@ -71,7 +72,8 @@ impl Record {
         }
     }
 
-    /// Where a field starts in the text from which the row was read; the end of the line if there are not so many.
+    /// Where a field starts in the text from which the row was read; the end of the line if there are not so
+    /// many.
     pub(super) fn start_of(&self, index: usize, text: &[u8]) -> usize {
         let mut reader = reader(self.delimiter);
         let mut content = [0; 256];

@@ -1,12 +1,13 @@
 //! From text to columns of numbers.
 //!
-//! Two readers share the work. The fast one takes the rows that it understands at first sight and stops in front of
-//! the first one that it does not: a row with a quote, or with a mistake. The careful one, built on [`Record`], knows
-//! all the rules and explains mistakes; it goes on from there to the end of the text.
+//! Two readers share the work. The fast one takes the rows that it understands at first sight and stops in
+//! front of the first one that it does not: a row with a quote, or with a mistake. The careful one, built on
+//! [`Record`], knows all the rules and explains mistakes; it goes on from there to the end of the text.
 //!
-//! The fast one never gets past a quote, so every newline before the place where it stops ends a row. Therefore a text
-//! may be cut at newlines into pieces that are read at the same time: what counts is the pieces up to the first stop.
-//! Neither the table nor an error depends on where the cuts are, or on the number of threads.
+//! The fast one never gets past a quote, so every newline before the place where it stops ends a row.
+//! Therefore a text may be cut at newlines into pieces that are read at the same time: what counts is the
+//! pieces up to the first stop. Neither the table nor an error depends on where the cuts are, or on the
+//! number of threads.
 
 use memchr::{memchr, memchr_iter, memchr3};
 use rayon::prelude::*;
@@ -17,6 +18,7 @@ use super::lines::Lines;
 use super::number::Numbers;
 use super::record::Record;
 use super::time::Clock;
+use super::{Selection, Table};
 
 /// What to read from each row.
 pub(super) struct Plan {
@@ -37,8 +39,6 @@ pub(super) struct Plan {
 pub(super) struct Rows {
     /// The values of each field in the plan.
     pub(super) columns: Vec<Vec<f64>>,
-    /// How many of them are missing.
-    pub(super) missing: Vec<usize>,
     /// The lines of the rows.
     pub(super) lines: Lines,
     /// The number of rows.
@@ -50,14 +50,13 @@ pub(super) struct Rows {
 impl Rows {
     /// No rows yet, with the next one on `line`.
     pub(super) fn new(columns: usize, line: u64) -> Self {
-        Self { columns: vec![Vec::new(); columns], missing: vec![0; columns], line, ..Self::default() }
+        Self { columns: vec![Vec::new(); columns], line, ..Self::default() }
     }
 
     /// Adds a row that takes so many lines.
     fn push(&mut self, values: &[f64], lines: u64) {
-        for ((column, missing), &value) in self.columns.iter_mut().zip(&mut self.missing).zip(values) {
+        for (column, &value) in self.columns.iter_mut().zip(values) {
             column.push(value);
-            *missing += usize::from(value.is_nan());
         }
         self.lines.push(self.count, self.line);
         self.count += 1;
@@ -69,9 +68,6 @@ impl Rows {
         for (column, values) in self.columns.iter_mut().zip(&piece.columns) {
             column.extend_from_slice(values);
         }
-        for (missing, more) in self.missing.iter_mut().zip(&piece.missing) {
-            *missing += more;
-        }
         self.lines.append(&piece.lines, self.count, self.line);
         self.count += piece.count;
         self.line += piece.line;
@@ -80,7 +76,7 @@ impl Rows {
     /// Makes room for a total of rows if the next `more` rows may not fit.
     ///
     /// Growing by doubling would hold half as much again as the table needs.
-    pub(super) fn expect(&mut self, total: usize, more: usize) {
+    pub(super) fn make_room(&mut self, total: usize, more: usize) {
         for column in &mut self.columns {
             if column.capacity() - column.len() < 2 * more {
                 // Only an estimate: without the memory for it the table may still fit.
@@ -92,7 +88,6 @@ impl Rows {
     /// Forgets everything, keeping the memory.
     fn clear(&mut self) {
         self.columns.iter_mut().for_each(Vec::clear);
-        self.missing.fill(0);
         self.lines.clear();
         self.count = 0;
         self.line = 0;
@@ -115,7 +110,21 @@ impl Workspace {
 }
 
 impl Plan {
-    /// Reads the rows of a text that starts with a row and ends with a newline, in pieces of about `piece_size` bytes.
+    /// Makes a table of the rows, its columns in the order of the selection.
+    pub(super) fn table(&self, mut rows: Rows, selection: &Selection, start: Option<String>) -> Table {
+        let place = |field: &usize| self.fields.binary_search(field).unwrap_or_default();
+        let mut take = |field| rows.columns.get_mut(place(field)).map(std::mem::take).unwrap_or_default();
+        Table {
+            columns: selection.columns.iter().map(&mut take).collect(),
+            time: selection.time.as_ref().map(take),
+            start,
+            rows: rows.count,
+            lines: rows.lines,
+        }
+    }
+
+    /// Reads the rows of a text that starts with a row and ends with a newline, in pieces of about
+    /// `piece_size` bytes.
     ///
     /// Returns how much of the text was read: all of it, unless a quoted field goes on behind it.
     pub(super) fn read(
@@ -204,15 +213,15 @@ impl Plan {
         let dialect = self.layout.dialect;
         let blanks = |text: &[u8]| text.iter().take_while(|&&byte| dialect.is_blank(byte)).count();
         let is_time = self.time == Some(index);
+        let start = blanks(text);
         // Most fields are plain numbers, whose end need not be searched for: it is where the number ends.
-        if !is_time || matches!(self.clock, Clock::Seconds) {
-            let start = blanks(text);
-            if let Some((value, length)) = self.numbers.prefix(&text[start..]) {
-                let end = start + length;
-                let end = end + blanks(&text[end..]);
-                if text.get(end) == Some(&self.end_of(index)) && !(is_time && value.is_nan()) {
-                    return Some((value, end + 1));
-                }
+        if (!is_time || matches!(self.clock, Clock::Seconds))
+            && let Some((value, length)) = self.numbers.prefix(&text[start..])
+        {
+            let end = start + length;
+            let end = end + blanks(&text[end..]);
+            if text.get(end) == Some(&self.end_of(index)) && !(is_time && value.is_nan()) {
+                return Some((value, end + 1));
             }
         }
         let field = self.field(text, index)?;
@@ -247,13 +256,10 @@ impl Plan {
                 return Err(layout.ragged(&row));
             }
             for (value, &index) in values.iter_mut().zip(&self.fields) {
-                *value = self.content(layout.dialect.trimmed(record.field(index)), index).map_err(|message| {
-                    if rows.count == 0 {
-                        layout.first_fault(&row, index, &message)
-                    } else {
-                        layout.fault(&row, index, &message)
-                    }
-                })?;
+                let content = layout.dialect.trimmed(record.field(index));
+                let report = if rows.count == 0 { Layout::first_fault } else { Layout::fault };
+                *value =
+                    self.content(content, index).map_err(|message| report(layout, &row, index, &message))?;
             }
             rows.push(&values, memchr_iter(b'\n', row.text).count() as u64);
             taken += length;
@@ -266,7 +272,10 @@ impl Plan {
 fn pieces(mut text: &[u8], size: usize) -> Vec<&[u8]> {
     let mut pieces = Vec::with_capacity(text.len() / size + 1);
     while !text.is_empty() {
-        let cut = text.get(size..).and_then(|rest| memchr(b'\n', rest)).map_or(text.len(), |newline| size + newline + 1);
+        let cut = text
+            .get(size..)
+            .and_then(|rest| memchr(b'\n', rest))
+            .map_or(text.len(), |newline| size + newline + 1);
         let (piece, rest) = text.split_at(cut);
         pieces.push(piece);
         text = rest;

@@ -39,8 +39,13 @@ impl Source {
             Ok((file, metadata))
         });
         match opened {
-            Err(error) => Err(Error::io(&name, format!("cannot be opened: {error}; check the path and its permissions"))),
-            Ok((_, metadata)) if metadata.is_dir() => Err(Error::io(&name, "is a directory; name a file in it")),
+            Err(error) => Err(Error::io(
+                &name,
+                format!("cannot be opened: {error}; check the path and its permissions"),
+            )),
+            Ok((_, metadata)) if metadata.is_dir() => {
+                Err(Error::io(&name, "is a directory; name a file in it"))
+            }
             Ok((file, metadata)) => {
                 let total = metadata.is_file().then_some(metadata.len());
                 Self::new(&name, file, total, encoding)
@@ -61,11 +66,8 @@ impl Source {
         let peeked = origin.by_ref().take(GZIP.len() as u64).read_to_end(&mut start);
         let gzip = start == GZIP;
         let origin = Cursor::new(start).chain(origin);
-        let unpacked: Box<dyn Read + Send> = if gzip {
-            Box::new(MultiGzDecoder::new(origin))
-        } else {
-            Box::new(origin)
-        };
+        let unpacked: Box<dyn Read + Send> =
+            if gzip { Box::new(MultiGzDecoder::new(origin)) } else { Box::new(origin) };
         // Decoding UTF-8 to UTF-8 would take time and hide what is wrong with it.
         let encoding = encoding.filter(|&encoding| encoding != UTF_8);
         let text = DecodeReaderBytesBuilder::new()
@@ -94,6 +96,11 @@ impl Source {
     /// The length of the file, as it is stored; nothing for a stream.
     pub(super) fn total(&self) -> Option<u64> {
         self.total
+    }
+
+    /// The part of the file that has been read; nothing for a stream.
+    pub(super) fn share_read(&self) -> Option<f64> {
+        self.total.map(|total| self.bytes_read() as f64 / total as f64)
     }
 
     /// Fills `buffer` as far as the text reaches, and returns how far.

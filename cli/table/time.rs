@@ -25,15 +25,15 @@ pub(super) enum Clock {
 impl Clock {
     /// Decides by the first time how the others are written; an error is a message.
     pub(super) fn decide(field: &[u8], format: Option<&str>, numbers: &Numbers) -> Result<Self, String> {
-        let number = numbers.read(field);
         if numbers.is_missing(field) {
-            Err(MISSING.to_owned())
-        } else if format.is_none() && number.is_ok() {
-            Ok(Self::Seconds)
-        } else {
-            let first = instant(field, format)?;
-            Ok(Self::Calendar { format: format.map(str::to_owned), first })
+            return Err(MISSING.to_owned());
         }
+        let seconds = numbers.read(field);
+        if format.is_none() && (seconds.is_ok() || numbers.is_nearly(field)) {
+            return seconds.map(|_| Self::Seconds);
+        }
+        let first = instant(field, format)?;
+        Ok(Self::Calendar { format: format.map(str::to_owned), first })
     }
 
     /// Reads a whole field without blanks around it as seconds; an error is a message.
@@ -41,7 +41,10 @@ impl Clock {
         match self {
             _ if numbers.is_missing(field) => Err(MISSING.to_owned()),
             Self::Seconds => numbers.read(field).map_err(|message| match instant(field, None) {
-                Ok(_) => format!("{} is a date, but the first time is a number; write all times alike", quoted(field)),
+                Ok(_) => format!(
+                    "{} is a date, but the first time is a number; write all times alike",
+                    quoted(field)
+                ),
                 Err(_) => message,
             }),
             Self::Calendar { format, first } => {
@@ -61,7 +64,7 @@ fn instant(field: &[u8], format: Option<&str>) -> Result<Timestamp, String> {
     match format {
         Some(format) => formatted(field, format).map_err(|reason| {
             format!(
-                "{} does not follow --time-format {}: {}",
+                "{} does not follow --time-format {} ({}); correct one of them",
                 quoted(field),
                 quoted(format.as_bytes()),
                 escaped(&reason.to_string())
@@ -69,8 +72,8 @@ fn instant(field: &[u8], format: Option<&str>) -> Result<Timestamp, String> {
         }),
         None => iso(field).map_err(|reason| {
             format!(
-                "{} is not a date and time as in 2024-03-01T12:00:00.250Z ({}); correct it, or describe it, as in \
-                 --time-format '%d.%m.%Y %H:%M:%S%.f'",
+                "{} is not a date and time as in 2024-03-01T12:00:00.250Z ({}); correct it, or describe \
+                 it, as in --time-format '%d.%m.%Y %H:%M:%S%.f'",
                 quoted(field),
                 escaped(&reason.to_string())
             )
@@ -84,7 +87,9 @@ fn iso(field: &[u8]) -> Result<Timestamp, jiff::Error> {
     let offset = match (pieces.to_numeric_offset(), pieces.time_zone_annotation()) {
         (Some(offset), _) => offset,
         (None, None) => Offset::UTC,
-        (None, Some(_)) => return Err(jiff::Error::from_args(format_args!("a time zone needs its offset from UTC"))),
+        (None, Some(_)) => {
+            return Err(jiff::Error::from_args(format_args!("a time zone needs its offset from UTC")));
+        }
     };
     offset.to_timestamp(pieces.date().to_datetime(pieces.time().unwrap_or_default()))
 }
@@ -105,7 +110,9 @@ fn formatted(field: &[u8], format: &str) -> Result<Timestamp, jiff::Error> {
     let offset = match (parts.offset(), parts.iana_time_zone()) {
         (Some(offset), _) => offset,
         (None, None) => Offset::UTC,
-        (None, Some(_)) => return Err(jiff::Error::from_args(format_args!("a time zone needs its offset from UTC"))),
+        (None, Some(_)) => {
+            return Err(jiff::Error::from_args(format_args!("a time zone needs its offset from UTC")));
+        }
     };
     offset.to_timestamp(date.to_datetime(parts.to_time()?))
 }
@@ -158,14 +165,24 @@ mod tests {
 
     #[test]
     fn every_time_is_written_like_the_first() {
-        assert!(seconds("1", None, "2024-03-01").is_err_and(|message| message.contains("first time is a number")));
+        assert!(
+            seconds("1", None, "2024-03-01").is_err_and(|message| message.contains("first time is a number"))
+        );
         assert!(seconds("2024-03-01", None, "1").is_err_and(|message| message.contains("--time-format")));
-        assert!(seconds("2024-03-01", None, "2024-02-30").is_err_and(|message| message.contains("2024-02-30")));
+        assert!(
+            seconds("2024-03-01", None, "2024-02-30").is_err_and(|message| message.contains("2024-02-30"))
+        );
         assert!(seconds("12:00", None, "12:00").is_err_and(|message| message.contains("--time-format")));
-        assert!(seconds("1.3.24", Some("%Y"), "1").is_err_and(|message| message.contains("--time-format \"%Y\"")));
+        assert!(seconds("0,5", None, "").is_err_and(|message| message.contains("--decimal-comma")));
+        assert!(
+            seconds("1.3.24", Some("%Y"), "1").is_err_and(|message| message.contains("--time-format \"%Y\""))
+        );
         // Neither a weekday nor a zone says when.
         assert!(seconds("Mon 12:00", Some("%a %H:%M"), "").is_err());
-        assert!(seconds("2024-03-01T12:00[Europe/Paris]", None, "").is_err_and(|message| message.contains("offset")));
+        assert!(
+            seconds("2024-03-01T12:00[Europe/Paris]", None, "")
+                .is_err_and(|message| message.contains("offset"))
+        );
     }
 
     #[test]

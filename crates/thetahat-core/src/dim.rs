@@ -11,8 +11,8 @@ use crate::Real;
 
 /// What a size does differently when it is a type and when it is a value.
 ///
-/// The trait is public because [`Dimension`] names it, and out of reach because its module is private: that seals
-/// `Dimension`.
+/// The trait is public because [`Dimension`] names it, and out of reach because its module is private: that
+/// seals `Dimension`.
 pub trait Workspace: Dim {
     /// What `with_scratch` keeps between calls: nothing for a static size, a buffer for a run-time size.
     type Scratch<T: Real>: Clone + Debug;
@@ -33,7 +33,8 @@ pub trait Workspace: Dim {
         DefaultAllocator: Allocator<Self, Self>;
     /// What this size keeps for [`with_scratch`](Workspace::with_scratch).
     fn scratch<T: Real>(self) -> Self::Scratch<T>;
-    /// Calls `work` with as many scratch elements as the size says, of any value: on the stack, or from `kept`.
+    /// Calls `work` with as many scratch elements as the size says, of any value: on the stack, or from
+    /// `kept`.
     fn with_scratch<T: Real, A>(kept: &mut Self::Scratch<T>, work: impl FnOnce(&mut [T]) -> A) -> A;
 }
 
@@ -93,8 +94,8 @@ impl Workspace for Dyn {
 }
 
 mod imply {
-    /// A bound on `T` that holds wherever `Self: Imply<T>` does: a `where` clause on another type is not implied by
-    /// a trait, but a bound on an associated type is.
+    /// A bound on `T` that holds wherever `Self: Imply<T>` does: a `where` clause on another type is not
+    /// implied by a trait, but a bound on an associated type is.
     pub trait Imply<T>: Is<T, Type = T> {}
     pub trait Is<T> {
         type Type;

@@ -76,8 +76,8 @@ pub enum Error {
     TooManyRows,
     /// The columns of the regression are linearly dependent.
     RankDeficient {
-        /// The first column that depends on the others, from 0. [`LeastSquares::rank`](crate::LeastSquares::rank)
-        /// names them all.
+        /// The first column that depends on the others, from 0.
+        /// [`LeastSquares::rank`](crate::LeastSquares::rank) names them all.
         column: usize,
     },
     /// A result does not fit the scalar type.

@@ -37,7 +37,8 @@ pub struct InputOrders {
 pub struct ArxOrders<'a> {
     /// The number of past outputs.
     pub na: usize,
-    /// The orders of each input, in the order in which samples are pushed. Empty for a time series without input.
+    /// The orders of each input, in the order in which samples are pushed. Empty for a time series without
+    /// input.
     pub inputs: &'a [InputOrders],
 }
 
@@ -90,15 +91,16 @@ struct Line {
 /// 2. [`regressor`](Lags::regressor): φ(k), if nothing in it is missing;
 /// 3. [`push_output`](Lags::push_output): y(k).
 ///
-/// A missing sample is NaN: push it, and time goes on. Then there is no regressor while a missing sample sits in one of
-/// the taps; one that sits in none does no harm. At the start all earlier samples are missing.
+/// A missing sample is NaN: push it, and time goes on. Then there is no regressor while a missing sample sits
+/// in one of the taps; one that sits in none does no harm. At the start all earlier samples are missing.
 ///
 /// # Sizes
 ///
 /// `N` is the number of parameters, [`ArxOrders::parameters`]. `D` is the room for inputs on their way to the
-/// regressor, at least [`ArxOrders::delays`]. It is 1 unless you say otherwise, which is right for one input with
-/// nk = 1, and enough for nk = 0 or without input. Both are checked in [`new`](Lags::new). With the feature `alloc` both
-/// may be `Dyn`: then they follow from the orders, and `new` allocates, and fails as a `Vec` does if there is no memory.
+/// regressor, at least [`ArxOrders::delays`]. It is 1 unless you say otherwise, which is right for one input
+/// with nk = 1, and enough for nk = 0 or without input. Both are checked in [`new`](Lags::new). With the
+/// feature `alloc` both may be `Dyn`: then they follow from the orders, and `new` allocates, and fails as a
+/// `Vec` does if there is no memory.
 ///
 /// Memory: N + D numbers, 3 N + 2 machine words. Plain data: a clone can be driven on with predicted outputs.
 ///
@@ -143,8 +145,8 @@ pub struct Lags<T: Real, N: Dimension, D: Dimension = Const<1>> {
     regressor: OVector<T, N>,
     /// The inputs on their way to φ, line after line, each line the newest first.
     delayed: OVector<T, D>,
-    /// The lines in use, then some with nb = 0. There are at most N, as each has a coefficient: so the number of inputs
-    /// need not be one more size in the type.
+    /// The lines in use, then some with nb = 0. There are at most N, as each has a coefficient: so the number
+    /// of inputs need not be one more size in the type.
     lines: OVector<Line, N>,
     na: usize,
     inputs: usize,
@@ -153,8 +155,8 @@ pub struct Lags<T: Real, N: Dimension, D: Dimension = Const<1>> {
 impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
     /// Empty delay lines: every earlier sample is missing.
     ///
-    /// Errors: [`Error::Orders`] if the orders do not make exactly `N` parameters; [`Error::Delays`] if `D` is too
-    /// small for the delays.
+    /// Errors: [`Error::Orders`] if the orders do not make exactly `N` parameters; [`Error::Delays`] if `D`
+    /// is too small for the delays.
     ///
     /// ```
     /// use thetahat_core::nalgebra::Const;
@@ -186,13 +188,13 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
         })
     }
 
-    /// Step 1 of a sample: takes u(k), one number for each input, in the order of [`ArxOrders::inputs`]. NaN is a
-    /// missing sample. Without inputs the step may be left out.
+    /// Step 1 of a sample: takes u(k), one number for each input, in the order of [`ArxOrders::inputs`]. NaN
+    /// is a missing sample. Without inputs the step may be left out.
     ///
     /// Moves every nb + nk by one place.
     ///
-    /// Errors, after which nothing has changed: [`Error::Length`] if the number of inputs is not that of the orders;
-    /// [`Error::Infinite`].
+    /// Errors, after which nothing has changed: [`Error::Length`] if the number of inputs is not that of the
+    /// orders; [`Error::Infinite`].
     pub fn push_inputs(&mut self, inputs: &[T]) -> Result<(), Error> {
         if inputs.len() != self.inputs {
             return Err(Error::Length { argument: "inputs", expected: self.inputs, found: inputs.len() });
@@ -212,7 +214,8 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
 
     /// Step 2 of a sample: φ(k), or `None` while a sample in it is missing.
     ///
-    /// It is φ(k) between [`push_inputs`](Lags::push_inputs) of u(k) and [`push_output`](Lags::push_output) of y(k).
+    /// It is φ(k) between [`push_inputs`](Lags::push_inputs) of u(k) and [`push_output`](Lags::push_output)
+    /// of y(k). `N` comparisons.
     pub fn regressor(&self) -> Option<&OVector<T, N>> {
         let missing = self.regressor.as_slice().iter().any(|sample| !sample.is_finite());
         (!missing).then_some(&self.regressor)
@@ -231,8 +234,8 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
         Ok(())
     }
 
-    /// Forgets all samples: an unknown number of them is missing here. The regressor comes back once it is filled with
-    /// new ones.
+    /// Forgets all samples: an unknown number of them is missing here. The regressor comes back once it is
+    /// filled with new ones.
     ///
     /// ```
     /// use thetahat_core::nalgebra::Const;

@@ -1,10 +1,11 @@
 #![no_std]
 //! System identification for microcontrollers: regressors and least squares without a heap.
 //!
-//! - [`LeastSquares`]: linear least squares that takes one row at a time, keeps a triangular factor, merges with
-//!   others, and answers with parameters, their covariance, and which columns are at fault if there is no answer.
-//! - [`Lags`]: delay lines that turn inputs and outputs, as they are sampled, into the regressor of an ARX model. They
-//!   know of missing samples. [`ArxOrders`] says how long they are.
+//! - [`LeastSquares`]: linear least squares that takes one row at a time, keeps a triangular factor, merges
+//!   with others, and answers with parameters, their covariance, and which columns are at fault if there is
+//!   no answer.
+//! - [`Lags`]: delay lines that turn inputs and outputs, as they are sampled, into the regressor of an ARX
+//!   model. They know of missing samples. [`ArxOrders`] says how long they are.
 //!
 //! Both work with `f32` and `f64` ([`Real`]) and with sizes in the type, `Const<4>`, or at run time, `Dyn`
 //! ([`Dimension`]). Vectors and matrices are those of [nalgebra](mod@nalgebra), which this crate re-exports.
@@ -39,21 +40,22 @@
 //! # What it does not do
 //!
 //! - It does not read files, choose orders, or validate models: the crate `thetahat` does.
-//! - It does not panic. A release build links no panic for the static sizes; with `Dyn` only the allocator can fail.
-//! - It does not allocate, but for creating, cloning and evaluating what has size `Dyn`. Adding a row or a sample never
-//!   does.
+//! - It does not panic. A release build links no panic for the static sizes; with `Dyn` only the allocator
+//!   can fail.
+//! - It does not allocate, but for creating, cloning and evaluating what has size `Dyn`. Adding a row or a
+//!   sample never does.
 //! - It has no types but real scalars, no sparse matrices, and no multithreading.
 //! - It logs nothing.
 //!
 //! # Features
 //!
-//! - `alloc`: sizes known only at run time, nalgebra's `Dyn`, for callers with a heap, such as a batch program that
-//!   reads the orders from its user. Off by default, so that firmware needs no allocator.
+//! - `alloc`: sizes known only at run time, nalgebra's `Dyn`, for callers with a heap, such as a batch
+//!   program that reads the orders from its user. Off by default, so that firmware needs no allocator.
 //!
 //! # Missing and infinite numbers
 //!
-//! NaN in a delay line is a missing sample. Anywhere else NaN is an error, and infinity is an error everywhere.
-//! Whatever returns an [`Error`] has changed nothing.
+//! NaN in a delay line is a missing sample. Anywhere else NaN is an error, and infinity is an error
+//! everywhere. Whatever returns an [`Error`] has changed nothing.
 
 mod dim;
 mod error;

@@ -28,10 +28,11 @@ pub trait Real: RealField + Copy + sealed::Sealed {
     const NAN: Self;
     /// Infinity: the condition number of a singular matrix.
     const INFINITY: Self;
-    /// The largest entry that [`LeastSquares`](crate::LeastSquares) takes: the largest finite number divided by
-    /// 2^36, which is 5e27 in `f32` and 3e297 in `f64`.
+    /// The largest entry that [`LeastSquares`](crate::LeastSquares) takes: the largest finite number divided
+    /// by 2^36, which is 5e27 in `f32` and 3e297 in `f64`.
     ///
-    /// The norm of 2^64 such entries is a sixteenth of the largest finite number. So no number of rows overflows.
+    /// The norm of 2^64 such entries is a sixteenth of the largest finite number. So no number of rows
+    /// overflows.
     const LARGEST_ENTRY: Self;
 
     /// The number nearest to `count`.

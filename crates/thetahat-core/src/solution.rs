@@ -16,8 +16,8 @@ use crate::{Dimension, Real};
 /// cov θ̂ = σ̂² (R'R)⁻¹ = σ̂² R⁻¹ R⁻¹'         covariance
 /// ```
 ///
-/// The variance and what follows from it are estimates for residuals that are white and independent of φ. They are
-/// `None` if m = n: then the rows fix the parameters and say nothing of the residuals.
+/// The variance and what follows from it are estimates for residuals that are white and independent of φ.
+/// They are `None` if m = n: then the rows fix the parameters and say nothing of the residuals.
 ///
 /// Units: θ̂_j has the unit of y over that of φ_j.
 ///

@@ -1,13 +1,14 @@
 //! Kernels on an upper triangular factor R of n columns.
 //!
-//! R is a slice of n·n numbers, row after row, so that row i from its diagonal on is contiguous; what lies below the
-//! diagonal is neither read nor written. Every access is total (`get`, slice patterns), and the `else` branches that
-//! this leaves are never taken: with indexing instead, panics stay in the firmware at opt-level s.
+//! R is a slice of n·n numbers, row after row, so that row i from its diagonal on is contiguous; what lies
+//! below the diagonal is neither read nor written. Every access is total (`get`, slice patterns), and the
+//! `else` branches that this leaves are never taken: with indexing instead, or with `step_by`, panics stay in
+//! the firmware at opt-level z.
 
 use crate::Real;
 
-/// Steps of power and of inverse iteration. More gain nothing where singular values are well apart, and little
-/// where they are close, as then any of them will do.
+/// Steps of power and of inverse iteration. More gain nothing where singular values are well apart, and
+/// little where they are close, as then any of them will do.
 const ITERATIONS: usize = 20;
 
 /// Row `index` from its diagonal on: n - index numbers.
@@ -58,12 +59,13 @@ impl<T: Real> Sum<T> {
     }
 }
 
-/// A plane rotation [c s; -s c], 0 <= c <= 1 (Givens), held as s and t = s / (1 + c): the sine, and the tangent of half
-/// the angle.
+/// A plane rotation [c s; -s c], 0 <= c <= 1 (Givens), held as s and t = s / (1 + c): the sine, and the
+/// tangent of half the angle.
 ///
-/// Applied as it is written, (c a + s b, c b - s a), a long record goes wrong: after k rows c is about 1 - 1/(2 k), its
-/// rounding does not average out, and the relative error of R grows as k times epsilon (1.6 % after 10^6 rows in f32,
-/// measured). Rutishauser's form (1966), here as three shears, adds a small number to a, with as many flops:
+/// Applied as it is written, (c a + s b, c b - s a), a long record goes wrong: after k rows c is about 1 -
+/// 1/(2 k), its rounding does not average out, and the relative error of R grows as k times epsilon (1.6 %
+/// after 10^6 rows in f32, measured). Rutishauser's form (1966), here as three shears, adds a small number to
+/// a, with as many flops:
 ///
 /// w = b - t a,   a' = a + s w,   b' = w - t a'
 ///
@@ -76,8 +78,8 @@ struct Rotation<T> {
 impl<T: Real> Rotation<T> {
     /// The rotation that takes (a, b), b not 0, to (h, 0), where h = ±sqrt(a² + b²) has the sign of a.
     ///
-    /// s = b / h, t = b / (a + h), and h = a + b t. Only ratios are squared (Golub and Van Loan, algorithm 5.1.3), so
-    /// that nothing overflows that need not.
+    /// s = b / h, t = b / (a + h), and h = a + b t. Only ratios are squared (Golub and Van Loan, algorithm
+    /// 5.1.3), so that nothing overflows that need not.
     fn zeroing(a: T, b: T) -> Self {
         let (larger, smaller) = (a.abs().max(b.abs()), a.abs().min(b.abs()));
         let ratio = smaller / larger;
@@ -93,8 +95,8 @@ impl<T: Real> Rotation<T> {
     }
 }
 
-/// Rotates a row, whose entries before `first` are 0, and its output into R and Q'y; returns what is left of the
-/// output. The row is used up.
+/// Rotates a row, whose entries before `first` are 0, and its output into R and Q'y; returns what is left of
+/// the output. The row is used up.
 ///
 /// 5 (n - first)² flops, and for each entry a square root and three divisions.
 pub(crate) fn fold_row<T: Real>(
@@ -145,9 +147,8 @@ pub(crate) fn dot<T: Real>(a: &[T], b: &[T]) -> T {
 }
 
 /// The norm of column `index`.
-pub(crate) fn column_norm<T: Real>(triangle: &[T], size: usize, index: usize) -> T {
-    // `max` spares `step_by` its panic on a step of 0.
-    norm(triangle.iter().skip(index).step_by(size.max(1)).take(index + 1))
+fn column_norm<T: Real>(triangle: &[T], size: usize, index: usize) -> T {
+    norm((0..=index).filter_map(|row| triangle.get(row * size + index)))
 }
 
 /// x <- R x.
@@ -243,19 +244,22 @@ pub(crate) fn equilibrate<T: Real>(triangle: &mut [T], size: usize) {
         if norm.is_zero() {
             continue;
         }
-        for entry in triangle.iter_mut().skip(index).step_by(size.max(1)).take(index + 1) {
-            *entry /= norm;
+        for row in 0..=index {
+            if let Some(entry) = triangle.get_mut(row * size + index) {
+                *entry /= norm;
+            }
         }
     }
 }
 
 /// Marks a largest set of columns that are independent within `tolerance`, by triangularisation with column
-/// pivoting (Businger and Golub 1965, with modified Gram-Schmidt in the place of reflections). `columns` holds the
-/// n columns one after the other, each of unit norm or zero, and is used up.
+/// pivoting (Businger and Golub 1965, with modified Gram-Schmidt in the place of reflections). `columns`
+/// holds the n columns one after the other, each of unit norm or zero, and is used up.
 ///
-/// At each step the column with the largest remainder is taken and its direction removed from those left, until no
-/// remainder exceeds the tolerance. Of columns whose remainders are within one percent of the largest, the first is
-/// taken, so that of two equal columns the later one is called dependent, whatever the rounding. 4 n³ flops.
+/// At each step the column with the largest remainder is taken and its direction removed from those left,
+/// until no remainder exceeds the tolerance. Of columns whose remainders are within one percent of the
+/// largest, the first is taken, so that of two equal columns the later one is called dependent, whatever the
+/// rounding. About 5 n³ flops.
 pub(crate) fn mark_independent<T: Real>(
     columns: &mut [T],
     independent: &mut [bool],
@@ -291,7 +295,8 @@ pub(crate) fn mark_independent<T: Real>(
     }
 }
 
-/// The condition number of R, by power iteration on R'R and inverse iteration with the triangle. `x` is scratch.
+/// The condition number of R, by power iteration on R'R and inverse iteration with the triangle. `x` is
+/// scratch.
 pub(crate) fn condition<T: Real>(triangle: &[T], x: &mut [T]) -> T {
     let largest = growth(x, |x| multiply(triangle, x), |x| multiply_transposed(triangle, x));
     let inverse = growth(x, |x| solve_transposed(triangle, x), |x| solve(triangle, x));
@@ -299,11 +304,11 @@ pub(crate) fn condition<T: Real>(triangle: &[T], x: &mut [T]) -> T {
     if product.is_finite() { product.max(T::one()) } else { T::INFINITY }
 }
 
-/// By how much a matrix lengthens the vector it lengthens most, from below: power iteration with the matrix and its
-/// transpose. Infinity if that overflows.
+/// By how much a matrix lengthens the vector it lengthens most, from below: power iteration with the matrix
+/// and its transpose. Infinity if that overflows.
 fn growth<T: Real>(x: &mut [T], multiply: impl Fn(&mut [T]), multiply_transposed: impl Fn(&mut [T])) -> T {
-    // An irregular start (the fractional parts of the multiples of the golden ratio, less 1/2): a regular one may be
-    // orthogonal to the vector that is sought. That of (a, -a) is (1, -1).
+    // An irregular start (the fractional parts of the multiples of the golden ratio, less 1/2): a regular one
+    // may be orthogonal to the vector that is sought. That of (a, -a) is (1, -1).
     let golden = (T::from_count(5).sqrt() - T::one()) / T::from_count(2);
     let mut fraction = T::zero();
     for element in x.iter_mut() {
@@ -475,9 +480,12 @@ mod tests {
     }
 
     #[test]
-    fn condition_of_a_diagonal_is_the_ratio_of_its_ends() {
+    fn the_condition_is_the_ratio_of_the_singular_values() {
         let triangle = [8.0, 0.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0, 2.0];
         assert!((condition(&triangle, &mut [0.0; 3]) - 16.0_f64).abs() < 1e-12);
+        // Columns at an obtuse angle: (1, 1) is orthogonal to what is sought.
+        let obtuse = [1.0, -0.6, 0.0, 0.8];
+        assert!((condition(&obtuse, &mut [0.0; 2]) - 2.0_f64).abs() < 1e-12);
         let singular = [1.0, 1.0, 0.0, 0.0];
         assert_eq!(condition(&singular, &mut [0.0; 2]), f64::INFINITY);
         assert_eq!(condition::<f64>(&[], &mut []), 1.0);

@@ -3,4 +3,5 @@
 mod arx;
 
 pub use crate::regression::Solver;
+pub(crate) use arx::enough;
 pub use arx::{Estimate, arx, arx_factor};

@@ -12,7 +12,7 @@
 //! - [`Log`] holds channels on a common clock, [`Record`] the signals of one experiment.
 //! - [`arx`] gives an [`Estimate`] from a [`Record`]; [`arx_factor`] gives a triangular factor that merges with others.
 //! - [`predict`] and [`simulate`] say what a [`Model`] says; [`Fit`] says how close that is.
-//! - [`identify`] goes the whole way from a [`Log`] to a [`Report`], the JSON document.
+//! - [`identify`] goes the whole way from a [`Log`] to a [`Report`], the JSON document; [`apply`] takes a stored model to a log.
 //!
 //! Rows of a log are counted from 1 and ranges include both ends; sample positions inside a [`Record`] are counted from 0.
 //! The same input gives the same bits, whatever the number of threads.
@@ -34,7 +34,7 @@ pub use error::Error;
 pub use estimate::{Estimate, Solver, arx, arx_factor};
 pub use model::{Complex, Model, Orders, Parameter, Signal, Structure};
 pub use regression::Initial;
-pub use report::{Data, Estimation, Missing, Plan, Report, Resampling, Source, identify};
+pub use report::{Applied, Data, Estimation, Missing, Plan, Report, Resampling, Source, apply, identify};
 pub use respond::{Response, Start, predict, simulate};
 pub use select::Criteria;
 pub use thetahat_core;

@@ -7,6 +7,11 @@ mod kernel;
 mod lagged;
 mod qr;
 
+#[cfg(test)]
+pub(crate) mod noise;
+#[cfg(test)]
+mod tests;
+
 pub(crate) use kernel::{add_filtered, sum};
-pub(crate) use lagged::{Deficient, Lagged, Regression, Taps};
 pub use lagged::{Initial, Solver};
+pub(crate) use lagged::{Lagged, Regression, Taps, Unsolved};

@@ -1,7 +1,9 @@
 //! The document that a fit leaves behind, and the way there.
 
+mod apply;
 mod identify;
 mod schema;
 
+pub use apply::{Applied, apply};
 pub use identify::{Plan, Source, identify};
 pub use schema::{Data, Estimation, Missing, Report, Resampling};

@@ -2,11 +2,16 @@
 
 mod predict;
 mod simulate;
+#[cfg(test)]
+mod tests;
 
 use std::ops::Range;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+use crate::data::Record;
+use crate::{Error, Model};
 
 pub use predict::predict;
 pub use simulate::simulate;
@@ -17,10 +22,26 @@ pub use simulate::simulate;
 pub enum Start {
     /// Rest: all samples before the first of a segment are zero.
     Zero,
-    /// The first measured samples of each segment, as many as the model reaches back; they are not counted.
+    /// Measured samples, as many as the model reaches back: those directly before the segment where the log has them,
+    /// else the segment's first ones, which then do not count.
     Measured,
     /// The initial condition that fits the segment's output best in the least-squares sense.
     Estimated,
+}
+
+/// A record must have as many inputs as the model.
+fn check_inputs(model: &Model, record: &Record<'_>) -> Result<(), Error> {
+    let (expected, found) = (model.b.len(), record.inputs.len());
+    if found == expected {
+        return Ok(());
+    }
+    Err(Error::argument("inputs", format!("the model has {expected} inputs, the record {found}")))
+}
+
+/// For a start from measured samples: the first of them, and the samples that are then covered.
+fn from_measured(segment: &Range<usize>, past: usize, reach: usize) -> (usize, Range<usize>) {
+    let history = segment.start - past;
+    (history, (history + reach).clamp(segment.start, segment.end)..segment.end)
 }
 
 /// A response to a record.

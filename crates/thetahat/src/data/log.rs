@@ -68,6 +68,8 @@ pub struct Record<'a> {
     pub inputs: Vec<&'a [f64]>,
     /// Stretches of consecutive samples, in rising order, apart from each other.
     pub segments: Vec<Range<usize>>,
+    /// How many usable samples stand directly before each segment: the measured past that a response may start from.
+    pub past: Vec<usize>,
 }
 
 impl<'a> Record<'a> {
@@ -97,7 +99,7 @@ impl<'a> Record<'a> {
                 )));
             }
         }
-        Ok(Self { output, inputs, segments: std::iter::once(0..length).collect() })
+        Ok(Self { output, inputs, segments: std::iter::once(0..length).collect(), past: vec![0] })
     }
 }
 
@@ -296,12 +298,22 @@ impl Log {
     /// [`Error::Data`] for a name that is not there.
     pub fn record(&self, inputs: &[String], output: &str, rows: &[Rows]) -> Result<Record<'_>, Error> {
         let names: Vec<&str> = inputs.iter().map(String::as_str).chain([output]).collect();
-        let signal = |name: &String| Ok(self.channel(name)?.values.as_slice());
-        Ok(Record {
-            output: &self.channel(output)?.values,
-            inputs: inputs.iter().map(signal).collect::<Result<_, Error>>()?,
-            segments: self.segments(&names, rows)?,
-        })
+        let signal = |name: &str| Ok(self.channel(name)?.values.as_slice());
+        let segments = self.segments(&names, rows)?;
+        let signals: Vec<&[f64]> = names.iter().map(|name| signal(name)).collect::<Result<_, Error>>()?;
+        let usable = |row: usize| signals.iter().all(|values| !values[row].is_nan());
+        let past = segments.iter().map(|segment| {
+            // Back to the last jump of the clock before the segment, or to the log's first row.
+            let jumps = self.jumps.partition_point(|&jump| jump <= segment.start);
+            let first = if jumps == 0 { 0 } else { self.jumps[jumps - 1] };
+            (first..segment.start).rev().take_while(|&row| usable(row)).count()
+        });
+        let past = past.collect();
+        let (output, inputs) = match signals.split_last() {
+            Some((output, inputs)) => (*output, inputs.to_vec()),
+            None => return Err(Error::data("there is no output")),
+        };
+        Ok(Record { output, inputs, segments, past })
     }
 
     /// The log with an offset taken from one of its channels, in place.

@@ -2,7 +2,7 @@ use thetahat_core::LeastSquares;
 use thetahat_core::nalgebra::Dyn;
 
 use crate::data::Record;
-use crate::regression::{Deficient, Initial, Lagged, Regression, Solver, Taps};
+use crate::regression::{Initial, Lagged, Regression, Solver, Taps, Unsolved};
 use crate::{Criteria, Error, Orders};
 
 /// Estimated parameters and what is known about them.
@@ -65,25 +65,38 @@ impl Estimate {
     /// The estimate that a triangular factor holds, such as [`arx_factor`] gives or several of them merged.
     ///
     /// # Errors
-    /// As for [`arx`].
+    /// [`Error::Argument`] if the factor is not one of these orders; and as for [`arx`].
     pub fn from_factor(factor: &LeastSquares<f64, Dyn>, orders: &Orders) -> Result<Self, Error> {
+        let columns = factor.rotated_output().len();
+        if columns != orders.parameters() {
+            return Err(Error::argument(
+                "orders",
+                format!("they have {} parameters, the factor has {columns}", orders.parameters()),
+            ));
+        }
         enough(factor.rows(), orders)?;
-        let solved = Regression::from_factor(factor).map_err(|columns| deficient(columns, orders))?;
-        Ok(Self::new(solved, factor.rows()))
+        let solved = Regression::from_factor(factor).map_err(|why| unsolved(why, orders))?;
+        Self::new(solved, factor.rows())
     }
 
-    fn new(solved: Regression, samples: usize) -> Self {
+    fn new(solved: Regression, samples: usize) -> Result<Self, Error> {
         let parameters = solved.parameters.len();
-        let noise_variance = solved.sum_of_squares / (samples - parameters) as f64;
-        Self {
+        let sum_of_squares = solved.residual_norm * solved.residual_norm;
+        let noise_variance = sum_of_squares / (samples - parameters) as f64;
+        // Beyond the range of numbers a variance would be infinite, or zero: then the model seems to be certain.
+        let normal = noise_variance.is_normal() && solved.covariance.diagonal().iter().all(|v| v.is_normal());
+        if solved.residual_norm != 0.0 && !normal {
+            return Err(out_of_range());
+        }
+        Ok(Self {
             parameters: solved.parameters.iter().copied().collect(),
             covariance: solved.covariance.row_iter().map(|row| row.iter().copied().collect()).collect(),
             noise_variance,
             samples,
-            mse: solved.sum_of_squares / samples as f64,
+            mse: sum_of_squares / samples as f64,
             condition: solved.condition,
             solver: solved.solver,
-        }
+        })
     }
 }
 
@@ -97,7 +110,8 @@ impl Estimate {
 ///
 /// # Errors
 /// [`Error::Argument`] if the record does not have the orders' inputs; [`Error::Undetermined`] if there are not more
-/// samples than parameters, or columns depend on one another: the parameters concerned are named.
+/// samples than parameters, or columns depend on one another: the parameters concerned are named; [`Error::Data`] if
+/// squares of the signals leave the range of `f64` (beyond about 1e150, or below 1e-150).
 ///
 /// ```
 /// use thetahat::{Initial, Orders, Record, arx};
@@ -117,8 +131,8 @@ pub fn arx(record: &Record<'_>, orders: &Orders, initial: Initial) -> Result<Est
     let signals = signals(record, orders)?;
     let lagged = Lagged::new(&signals, taps(orders), &record.segments, initial);
     enough(lagged.rows(), orders)?;
-    let solved = lagged.solve().map_err(|columns| deficient(columns, orders))?;
-    Ok(Estimate::new(solved, lagged.rows()))
+    let solved = lagged.solve().map_err(|why| unsolved(why, orders))?;
+    Estimate::new(solved, lagged.rows())
 }
 
 /// The triangular factor of an ARX regression: factors of several logs or machines merge into one estimate.
@@ -170,7 +184,8 @@ fn taps(orders: &Orders) -> Vec<Taps> {
         .collect()
 }
 
-fn enough(samples: usize, orders: &Orders) -> Result<(), Error> {
+/// There must be more samples with a full regressor than parameters.
+pub(crate) fn enough(samples: usize, orders: &Orders) -> Result<(), Error> {
     let parameters = orders.parameters();
     if samples > parameters {
         return Ok(());
@@ -178,20 +193,25 @@ fn enough(samples: usize, orders: &Orders) -> Result<(), Error> {
     Err(Error::undetermined(
         orders.names(),
         format!(
-            "{samples} samples with a full regressor (it reaches {} samples back) cannot determine {parameters} \
-             parameters; give more rows or lower the orders",
+            "too few rows for the orders: {parameters} parameters need more samples than that, and {samples} have a full \
+             regressor (reaching back {}); give more rows or lower the orders",
             orders.reach()
         ),
     ))
 }
 
-fn deficient(Deficient(columns): Deficient, orders: &Orders) -> Error {
+fn unsolved(why: Unsolved, orders: &Orders) -> Error {
+    let Unsolved::Deficient(columns) = why else { return out_of_range() };
     let names = orders.names();
     let concerned: Vec<String> = columns.iter().filter_map(|&column| names.get(column).cloned()).collect();
     let message = format!(
-        "the data cannot tell {} from the other parameters: their regressors are combinations of the others; \
+        "the data cannot tell {} from the other parameters: their regressors are zero or combinations of the others; \
          excite the input more, or lower the orders",
         concerned.join(", ")
     );
     Error::undetermined(concerned, message)
+}
+
+fn out_of_range() -> Error {
+    Error::data("squares of the signals leave the range of numbers; scale the channels towards one")
 }

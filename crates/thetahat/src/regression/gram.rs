@@ -9,13 +9,14 @@
 //! All entries of two signals with the same d share one long sum, their common interior, and differ by
 //! at most L products at each end (L is the longest lag). The ends are added to the interior, never
 //! subtracted from a longer sum: subtraction loses digits when a signal grows.
-//! Cost for p lags: about 2 N p multiply-adds and one reading of the signals, instead of N p^2 / 2.
+//! Cost for p lags: about 2 N p multiply-adds and one reading of the signals, instead of N p^2 / 2, however short
+//! the segments are.
 
 use std::ops::Range;
 
 use thetahat_core::nalgebra::{DMatrix, DVector};
 
-use super::blocks::{self, sum_blocks};
+use super::blocks::{Stretch, blocks, sum_blocks};
 use super::kernel::correlations;
 use super::lagged::Lagged;
 
@@ -55,8 +56,8 @@ impl Diagonal<'_> {
     }
 }
 
-/// `Phi' Phi` and `Phi' y` of a regression. O(N p) time, O(p^2) memory.
-pub(super) fn gram(lagged: &Lagged<'_>) -> (DMatrix<f64>, DVector<f64>) {
+/// `Phi' Phi`, `Phi' y` and `y' y` of a regression. O(N p) time, O(p^2) memory.
+pub(super) fn gram(lagged: &Lagged<'_>) -> (DMatrix<f64>, DVector<f64>, f64) {
     let (spans, size) = spans(lagged);
     let diagonals = diagonals(&spans);
     let longest = lagged.longest();
@@ -64,17 +65,21 @@ pub(super) fn gram(lagged: &Lagged<'_>) -> (DMatrix<f64>, DVector<f64>) {
     let mut interiors = Vec::new();
     let mut entries = vec![0.0; size * size];
     for segment in lagged.segments() {
+        let start = segment.start;
         let rows = lagged.counted(segment);
+        if rows.is_empty() {
+            continue;
+        }
         // Inside every window: tau from t0, and L samples into the segment so that every partner
         // exists, up to t1 - L.
-        let interior = rows.start.max(segment.start + longest)..rows.end.saturating_sub(longest);
+        let interior = rows.start.max(start + longest)..rows.end.saturating_sub(longest);
         for diagonal in &diagonals {
-            add_ends(lagged, diagonal, segment.start, &rows, &interior, size, &mut entries);
+            add_ends(lagged, diagonal, start, &rows, &interior, size, &mut entries);
         }
-        interiors.push(interior);
+        interiors.push(Stretch { start, rows: interior });
     }
-    let shared = sum_blocks(&blocks::blocks(interiors.iter().cloned()), diagonals.len(), |block, sums| {
-        add_interior(lagged, &diagonals, block, sums);
+    let shared = sum_blocks(&blocks(interiors.into_iter()), diagonals.len(), |stretch, sums| {
+        add_interior(lagged, &diagonals, &stretch.rows, sums);
     });
     for (diagonal, shared) in diagonals.iter().zip(shared) {
         for lag in diagonal.lags() {
@@ -95,7 +100,7 @@ pub(super) fn gram(lagged: &Lagged<'_>) -> (DMatrix<f64>, DVector<f64>) {
         s * r * entry(a, b)
     });
     let right = DVector::from_iterator(columns.len(), columns.iter().map(|&(a, s)| s * entry(a, target)));
-    (matrix, right)
+    (matrix, right, entry(target, target))
 }
 
 /// One span for each signal in use (the target, lag 0, first) and the number of all lags.
@@ -136,8 +141,8 @@ fn diagonals(spans: &[Span]) -> Vec<Diagonal<'_>> {
     diagonals
 }
 
-/// Adds the products of the interior samples `block`, diagonal by diagonal.
-fn add_interior(lagged: &Lagged<'_>, diagonals: &[Diagonal<'_>], block: &Range<usize>, sums: &mut [f64]) {
+/// Adds the products of the interior samples `taus`, diagonal by diagonal.
+fn add_interior(lagged: &Lagged<'_>, diagonals: &[Diagonal<'_>], taus: &Range<usize>, sums: &mut [f64]) {
     let same = |a: &Diagonal<'_>, b: &Diagonal<'_>| {
         a.left.signal == b.left.signal && a.right.signal == b.right.signal
     };
@@ -146,15 +151,15 @@ fn add_interior(lagged: &Lagged<'_>, diagonals: &[Diagonal<'_>], block: &Range<u
         let (into, rest) = sums.split_at_mut(pair.len());
         sums = rest;
         let (Some(first), Some(last)) = (pair.first(), pair.last()) else { continue };
-        let x = &lagged.signal(first.left.signal)[block.clone()];
+        let x = &lagged.signal(first.left.signal)[taus.clone()];
         // z(tau - d) with d falling: the same stretch of the partner, one sample later each.
-        let from = block.start.saturating_add_signed(-first.difference);
-        let to = block.end.saturating_add_signed(-last.difference);
+        let from = taus.start.saturating_add_signed(-first.difference);
+        let to = taus.end.saturating_add_signed(-last.difference);
         correlations(x, &lagged.signal(first.right.signal)[from..to], into);
     }
 }
 
-/// Adds what a diagonal's entries have outside the interior of one segment.
+/// Adds what a diagonal's entries have outside the interior of one segment, of which the samples `rows` count.
 fn add_ends(
     lagged: &Lagged<'_>,
     diagonal: &Diagonal<'_>,
@@ -165,28 +170,35 @@ fn add_ends(
     entries: &mut [f64],
 ) {
     let product = |row: usize, lag: usize| diagonal.product(lagged, start, row, lag);
-    let lags = diagonal.lags();
-    if interior.is_empty() {
-        for lag in lags {
-            entries[diagonal.entry(lag, size)] += rows.clone().map(|row| product(row, lag)).sum::<f64>();
+    // A lag, or its partner, that is as long as the segment meets zeros only.
+    let length = rows.end - start;
+    let mut lags = diagonal.lags();
+    lags.end = lags.end.min(length).min(length.saturating_add_signed(-diagonal.difference));
+    while lags.start < lags.end {
+        // Lags of which the windows share a sample: all of them, or as many as there are rows.
+        let (low, high) = (lags.start, lags.end.min(lags.start + rows.len()) - 1);
+        lags.start = high + 1;
+        // Row t has tau = t - l. The windows part into a head, a body that they share, and a tail. Without an
+        // interior the body is empty and lies where the last window ends.
+        let (head_end, tail_start) = if interior.is_empty() {
+            (rows.end - (high - low), rows.end)
+        } else {
+            (interior.start + low, interior.end + high)
+        };
+        // The head grows by row t0 with each further lag, the tail by the last row with each lag less.
+        let mut head: f64 = (rows.start..head_end).map(|row| product(row, low)).sum();
+        for lag in low..=high {
+            entries[diagonal.entry(lag, size)] += head;
+            if lag < high {
+                head += product(rows.start, lag + 1);
+            }
         }
-        return;
-    }
-    // Row t has tau = t - l. The head, tau before the interior, grows by row t0 with each further lag;
-    // the tail, tau behind it, by the last row with each lag less.
-    let (low, high) = (lags.start, lags.end - 1);
-    let mut head: f64 = (rows.start..interior.start + low).map(|row| product(row, low)).sum();
-    for lag in lags.clone() {
-        entries[diagonal.entry(lag, size)] += head;
-        if lag < high {
-            head += product(rows.start, lag + 1);
-        }
-    }
-    let mut tail: f64 = (interior.end + high..rows.end).map(|row| product(row, high)).sum();
-    for lag in lags.rev() {
-        entries[diagonal.entry(lag, size)] += tail;
-        if lag > low {
-            tail += product(rows.end - 1, lag - 1);
+        let mut tail: f64 = (tail_start..rows.end).map(|row| product(row, high)).sum();
+        for lag in (low..=high).rev() {
+            entries[diagonal.entry(lag, size)] += tail;
+            if lag > low {
+                tail += product(rows.end - 1, lag - 1);
+            }
         }
     }
 }

@@ -77,16 +77,17 @@ fn add_four_scaled(target: &mut [f64], weights: [f64; SHIFTS], x: &[f64]) {
     }
 }
 
-/// `into[k] = sum_t x[t] y[t + k]`; `y` holds as many values as `x` and `into` together, less one.
+/// `into[k] += sum_t x[t] y[t + k]`; `y` holds as many values as `x` and `into` together, less one.
 pub(super) fn correlations(x: &[f64], y: &[f64], into: &mut [f64]) {
     let (tiles, rest) = into.as_chunks_mut::<SHIFTS>();
     let done = tiles.len() * SHIFTS;
     for (tile, into) in tiles.iter_mut().enumerate() {
         let first = tile * SHIFTS;
-        *into = four_products(x, &y[first..first + x.len() + SHIFTS - 1]);
+        let products = four_products(x, &y[first..first + x.len() + SHIFTS - 1]);
+        into.iter_mut().zip(products).for_each(|(sum, product)| *sum += product);
     }
     for (k, into) in rest.iter_mut().enumerate() {
-        *into = product(x, &y[done + k..done + k + x.len()]);
+        *into += product(x, &y[done + k..done + k + x.len()]);
     }
 }
 

@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 use thetahat_core::LeastSquares;
 use thetahat_core::nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use super::blocks::{blocks, sum_blocks};
+use super::blocks::{Stretch, blocks, sum_blocks};
 use super::gram::gram;
 use super::kernel::{add_filtered, correlations, product};
 use super::qr;
@@ -33,6 +33,8 @@ const ONE_CORRECTION: f64 = 1e5;
 /// While above the rounding floor, each correction must be this much smaller than the one before.
 const CONTRACTION: f64 = 0.02;
 const MAXIMUM_CORRECTIONS: usize = 10;
+/// What a difference of two sums keeps of them at least, to be exact to 13 digits.
+const CANCELLATION: f64 = 1e-3;
 /// Column norms of which products neither overflow nor lose digits.
 const SAFE_NORMS: RangeInclusive<f64> = 1e-140..=1e140;
 
@@ -93,16 +95,21 @@ pub(crate) struct Regression {
     pub(crate) parameters: DVector<f64>,
     /// `sigma^2 (Phi' Phi)^-1`, p x p, with `sigma^2 = |y - Phi theta|^2 / (N - p)`.
     pub(crate) covariance: DMatrix<f64>,
-    /// `|y - Phi theta|^2`.
-    pub(crate) sum_of_squares: f64,
+    /// `|y - Phi theta|`.
+    pub(crate) residual_norm: f64,
     /// The condition number of Phi, its columns scaled to unit norm.
     pub(crate) condition: f64,
     pub(crate) solver: Solver,
 }
 
-/// Columns that are combinations of the others, to rounding: there is no unique solution.
+/// Why a regression has no solution.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Deficient(pub(crate) Vec<usize>);
+pub(crate) enum Unsolved {
+    /// These columns are zero or combinations of the others, to rounding.
+    Deficient(Vec<usize>),
+    /// Samples or results leave the range of `f64`.
+    Range,
+}
 
 impl<'a> Lagged<'a> {
     /// `segments` are ranges of samples inside every signal; the target is `signals[0]`.
@@ -152,11 +159,6 @@ impl<'a> Lagged<'a> {
         }
     }
 
-    /// The number of parameters p.
-    pub(crate) fn parameters(&self) -> usize {
-        self.taps.iter().map(|taps| taps.count).sum()
-    }
-
     /// The number of rows N.
     pub(crate) fn rows(&self) -> usize {
         self.segments.iter().map(|segment| self.counted(segment).len()).sum()
@@ -165,22 +167,20 @@ impl<'a> Lagged<'a> {
     /// Solves the regression, which must have more rows than parameters.
     ///
     /// # Errors
-    /// [`Deficient`] names the columns that depend on others.
-    pub(crate) fn solve(&self) -> Result<Regression, Deficient> {
-        if let Some(solved) = self.solve_normal_equations() {
-            return Ok(solved);
+    /// [`Unsolved`] says which columns depend on others.
+    pub(crate) fn solve(&self) -> Result<Regression, Unsolved> {
+        match self.solve_normal_equations() {
+            Some(solved) => Ok(solved),
+            None => Regression::from_factor(&self.factor().map_err(|_| Unsolved::Range)?),
         }
-        // Only what is not finite has no factor.
-        let nothing = |_| Deficient((0..self.parameters()).collect());
-        Regression::from_factor(&self.factor().map_err(nothing)?)
     }
 
     /// Corrected semi-normal equations; `None` where they are not exact enough.
     fn solve_normal_equations(&self) -> Option<Regression> {
-        let (mut matrix, right) = gram(self);
+        let (mut matrix, right, square) = gram(self);
         let size = right.len();
         let norms = matrix.diagonal().map(f64::sqrt);
-        if !norms.iter().all(|norm| SAFE_NORMS.contains(norm)) {
+        if !norms.iter().chain([&square.sqrt()]).all(|norm| SAFE_NORMS.contains(norm)) {
             return None;
         }
         for (column, norm) in norms.iter().enumerate() {
@@ -204,9 +204,12 @@ impl<'a> Lagged<'a> {
             let (step, length) = (correction.norm(), scaled.norm());
             let residual = sum_of_squares.sqrt();
             let floor = 4.0 * f64::EPSILON * (condition * length + condition * condition * residual);
-            if condition <= ONE_CORRECTION || step <= floor {
-                // |r - Phi delta|^2 = |r|^2 - delta' Phi' r, as R' R delta = Phi' r.
-                let sum_of_squares = (sum_of_squares - correction.dot(&gradient)).max(0.0);
+            // |r - Phi delta|^2 = |r|^2 - delta' Phi' r, as R' R delta = Phi' r.
+            let corrected = sum_of_squares - correction.dot(&gradient);
+            // Where only rounding is left of it (data without noise), the residuals are computed once more.
+            let exact = pass > 1 || corrected >= CANCELLATION * sum_of_squares;
+            if (condition <= ONE_CORRECTION || step <= floor) && exact {
+                let sum_of_squares = corrected.max(0.0);
                 let variance = sum_of_squares / (self.rows() - size) as f64;
                 let inverse = factor.solve(&DMatrix::identity(size, size));
                 return Some(Regression {
@@ -214,7 +217,7 @@ impl<'a> Lagged<'a> {
                     covariance: DMatrix::from_fn(size, size, |i, j| {
                         variance * (inverse[(i, j)] / norms[i] / norms[j])
                     }),
-                    sum_of_squares,
+                    residual_norm: sum_of_squares.sqrt(),
                     condition,
                     solver: Solver::NormalEquations,
                 });
@@ -246,28 +249,32 @@ impl<'a> Lagged<'a> {
                     *sum += phi * residual;
                 }
             }
-            inner.push(full..rows.end);
+            inner.push(Stretch { start: segment.start, rows: full..rows.end });
         }
-        let sums = sum_blocks(&blocks(inner.into_iter()), size + 1, |rows, sums| {
-            let residuals = self.block_residuals(rows, parameters);
-            sums[0] = product(&residuals, &residuals);
+        let mut sums = sum_blocks(&blocks(inner.into_iter()), size + 1, |Stretch { rows, .. }, sums| {
+            let residuals = self.full_residuals(rows, parameters);
+            sums[0] += product(&residuals, &residuals);
             let mut next = 1;
             for taps in self.taps.iter().filter(|taps| taps.count > 0) {
                 let x = &self.signals[taps.signal][rows.start - taps.last()..rows.end - taps.first];
-                let into = &mut sums[next..next + taps.count];
-                correlations(&residuals, x, into);
-                // They come with the largest lag first.
-                into.reverse();
-                into.iter_mut().for_each(|value| *value *= taps.sign);
+                correlations(&residuals, x, &mut sums[next..next + taps.count]);
                 next += taps.count;
             }
         });
-        let sums: Vec<f64> = sums.iter().zip(edges).map(|(a, b)| a + b).collect();
+        let mut next = 1;
+        for taps in &self.taps {
+            // They come with the largest lag first.
+            let products = &mut sums[next..next + taps.count];
+            products.reverse();
+            products.iter_mut().for_each(|product| *product *= taps.sign);
+            next += taps.count;
+        }
+        sums.iter_mut().zip(edges).for_each(|(sum, edge)| *sum += edge);
         (sums[0], DVector::from_column_slice(&sums[1..]))
     }
 
     /// The residuals of rows with a full regressor.
-    fn block_residuals(&self, rows: &Range<usize>, parameters: &DVector<f64>) -> Vec<f64> {
+    fn full_residuals(&self, rows: &Range<usize>, parameters: &DVector<f64>) -> Vec<f64> {
         let mut residuals = self.signals[0][rows.clone()].to_vec();
         let mut next = 0;
         for taps in self.taps.iter().filter(|taps| taps.count > 0) {
@@ -285,40 +292,40 @@ impl<'a> Lagged<'a> {
     /// The triangular factor of the rows, in the signals' own units, as exact as Householder QR. 2 N p^2 flops.
     ///
     /// # Errors
-    /// If a sample is not finite.
+    /// If a sample is not finite, or too large for its squares to be summed without overflow.
     pub(crate) fn factor(&self) -> Result<LeastSquares<f64, Dyn>, thetahat_core::Error> {
-        let mut folding = qr::Folding::new(self.parameters());
         let scales: Vec<f64> = self.signals.iter().map(|signal| scale(signal, self.segments)).collect();
-        let target = [(0, 0, 1.0)];
-        let columns: Vec<(usize, usize, f64)> = self.columns().chain(target).collect();
-        for segment in self.segments {
-            let counted = self.counted(segment);
-            for first in counted.clone().step_by(qr::ROWS) {
-                let rows = first..(first + qr::ROWS).min(counted.end);
-                folding.fold(rows.len(), |column, values| {
-                    let (signal, lag, sign) = columns[column];
-                    for (value, row) in values.iter_mut().zip(rows.clone()) {
-                        *value = sign * scales[signal] * self.sample(signal, segment.start, row, lag);
-                    }
-                });
-            }
-        }
-        folding.finish(columns.iter().map(|&(signal, _, _)| scales[signal]))
+        let columns: Vec<(usize, usize, f64)> = self.columns().chain([(0, 0, 1.0)]).collect();
+        let stretches =
+            self.segments.iter().map(|segment| Stretch { start: segment.start, rows: self.counted(segment) });
+        qr::factor(
+            &blocks(stretches),
+            |stretch, row, column| {
+                let (signal, lag, sign) = columns[column];
+                sign * scales[signal] * self.sample(signal, stretch.start, row, lag)
+            },
+            &columns.iter().map(|&(signal, _, _)| scales[signal]).collect::<Vec<_>>(),
+        )
     }
 }
 
 impl Regression {
     /// The solution that a triangular factor of more rows than columns holds.
-    pub(crate) fn from_factor(factor: &LeastSquares<f64, Dyn>) -> Result<Self, Deficient> {
-        let deficient = |_| Deficient(factor.rank().dependent().collect());
-        let solution = factor.solve().map_err(deficient)?;
+    pub(crate) fn from_factor(factor: &LeastSquares<f64, Dyn>) -> Result<Self, Unsolved> {
+        let unsolved = |error| match error {
+            thetahat_core::Error::RankDeficient { .. } => {
+                Unsolved::Deficient(factor.rank().dependent().collect())
+            }
+            _ => Unsolved::Range,
+        };
+        let solution = factor.solve().map_err(unsolved)?;
         let size = solution.parameters().len();
         Ok(Self {
             parameters: solution.parameters().clone(),
             covariance: solution
                 .covariance()
                 .unwrap_or_else(|| DMatrix::from_element(size, size, f64::INFINITY)),
-            sum_of_squares: solution.residual_sum_of_squares(),
+            residual_norm: solution.residual_norm(),
             condition: factor.condition(),
             solver: Solver::Qr,
         })

@@ -2,7 +2,7 @@ use std::ops::Range;
 
 use super::schema::{Data, Estimation, Missing, Report, Resampling};
 use crate::data::{Detrend, Log, Offset, Record, Rows, checked};
-use crate::estimate::{Estimate, arx};
+use crate::estimate::{Estimate, arx, enough};
 use crate::respond::Start;
 use crate::validate::{Fit, Horizon, Part};
 use crate::{Error, Initial, Model, Orders, Signal};
@@ -19,6 +19,8 @@ pub struct Source {
     pub file: String,
     /// The column that gave the time.
     pub time: Option<String>,
+    /// The first time as it was written, where times were dates.
+    pub start: Option<String>,
     /// How the log was made uniform.
     pub resampled: Option<Resampling>,
 }
@@ -100,6 +102,8 @@ pub fn identify(mut log: Log, source: &Source, plan: &Plan) -> Result<Report, Er
             "no estimation row has a value in every channel; name other rows or channels",
         ));
     }
+    let reach = if plan.initial == Initial::Drop { plan.orders.reach() } else { 0 };
+    enough(segments.iter().map(|segment| segment.len().saturating_sub(reach)).sum(), &plan.orders)?;
     let missing = names.iter().map(|name| {
         let values = &log.channel(name)?.values;
         Ok(Missing {
@@ -123,6 +127,7 @@ pub fn identify(mut log: Log, source: &Source, plan: &Plan) -> Result<Report, Er
             file: source.file.clone(),
             rows: log.rows(),
             time: source.time.clone(),
+            start: source.start.clone(),
             sample_time: log.sample_time(),
             resampled: source.resampled.clone(),
             detrend: plan.detrend.to_string(),
@@ -238,12 +243,12 @@ fn warnings(report: &Report) -> Vec<String> {
     let mut warnings = Vec::new();
     for missing in data.missing.iter().filter(|missing| missing.rows > 0) {
         warnings.push(format!(
-            "channel '{}' misses {} of {} values; the log is cut there, nothing is interpolated",
+            "channel '{}' misses {} of {} values; the log is cut there",
             missing.channel, missing.rows, data.rows
         ));
     }
     if data.time_gaps > 0 {
-        warnings.push(format!("the clock jumps {} times; the log is cut there", data.time_gaps));
+        warnings.push(format!("jumps of the clock: {}; the log is cut there", data.time_gaps));
     }
     if data
         .validation

@@ -38,6 +38,8 @@ pub struct Data {
     pub rows: usize,
     /// The column that gave the time, if one did.
     pub time: Option<String>,
+    /// The first time as it was written, where times were dates.
+    pub start: Option<String>,
     /// Seconds from one row to the next.
     pub sample_time: f64,
     /// How an irregular log was made uniform, if it was.

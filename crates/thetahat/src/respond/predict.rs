@@ -1,4 +1,6 @@
-use super::{Response, Start, add_filtered};
+use std::ops::Range;
+
+use super::{Response, Start, add_filtered, check_inputs, from_measured};
 use crate::data::Record;
 use crate::model::polynomial::{inverse_series, product};
 use crate::{Error, Model};
@@ -24,22 +26,29 @@ pub fn predict(model: &Model, record: &Record<'_>, horizon: usize, start: Start)
     if horizon == 0 {
         return Err(Error::argument("horizon", "a prediction looks at least one step ahead"));
     }
-    if record.inputs.len() != model.b.len() {
-        return Err(Error::argument(
-            "inputs",
-            format!("the model has {} inputs, the record {}", model.b.len(), record.inputs.len()),
-        ));
-    }
+    check_inputs(model, record)?;
     if start == Start::Estimated {
         return Err(Error::argument(
             "initial",
             "predictions start from measured samples or from zero; only a free run estimates its start",
         ));
     }
+    // Farther than from before the first sample to the last there is nothing to look from.
+    let longest = record.segments.iter().zip(&record.past).map(|(segment, past)| past + segment.len()).max();
+    let horizon = horizon.min(longest.unwrap_or(0) + 1);
     let reach = model.orders.reach() + horizon - 1;
     let mut response = Response::empty(record.output.len());
-    let possible = |length: usize| start == Start::Zero || length > reach;
-    if !record.segments.iter().any(|segment| possible(segment.len())) {
+    let spans: Vec<(usize, Range<usize>)> = record
+        .segments
+        .iter()
+        .zip(&record.past)
+        .map(|(segment, past)| match start {
+            Start::Measured => from_measured(segment, *past, reach),
+            _ => (segment.start, segment.clone()),
+        })
+        .filter(|(_, counted)| !counted.is_empty())
+        .collect();
+    if spans.is_empty() {
         return Ok(response);
     }
     let quotient = inverse_series(&model.a, horizon);
@@ -50,17 +59,12 @@ pub fn predict(model: &Model, record: &Record<'_>, horizon: usize, start: Start)
         .map(|(power, value)| if power < horizon { 0.0 } else { -value })
         .collect();
     let inputs: Vec<Vec<f64>> = model.b.iter().map(|b| product(&quotient, b)).collect();
-    for segment in &record.segments {
-        if !possible(segment.len()) {
-            continue;
-        }
-        let skipped = if start == Start::Zero { 0 } else { reach };
-        let counted = segment.start + skipped..segment.end;
+    for (history, counted) in spans {
         let values = &mut response.values[counted.clone()];
         values.fill(0.0);
-        add_filtered(values, &counted, &past, record.output, segment.start);
+        add_filtered(values, &counted, &past, record.output, history);
         for (weights, u) in inputs.iter().zip(&record.inputs) {
-            add_filtered(values, &counted, weights, u, segment.start);
+            add_filtered(values, &counted, weights, u, history);
         }
         response.counted.push(counted);
     }

@@ -1,9 +1,9 @@
 use std::ops::Range;
 
-use super::{Response, Start, add_filtered};
+use super::{Response, Start, add_filtered, check_inputs, from_measured};
 use crate::data::Record;
 use crate::model::polynomial::inverse_series;
-use crate::regression::{Initial, Lagged, Taps};
+use crate::regression::{Initial, Lagged, Taps, Unsolved};
 use crate::{Error, Model};
 
 /// A free response has died away when it is below this fraction of its largest value.
@@ -11,8 +11,8 @@ const NEGLIGIBLE: f64 = 1e-20;
 
 /// The free run of a model: A(q) x(t) = sum_j B_j(q) u_j(t), driven by the inputs alone.
 ///
-/// [`Start::Zero`] takes zeros before each segment; [`Start::Measured`] takes the first measured outputs and inputs, as many
-/// as the model reaches back. [`Start::Estimated`] adds the free response c_0 h(t) + … + c_{n-1} h(t - n + 1), h being the
+/// [`Start::Zero`] takes zeros before each segment; [`Start::Measured`] takes measured outputs and inputs, as many as the model
+/// reaches back. [`Start::Estimated`] adds the free response c_0 h(t) + … + c_{n-1} h(t - n + 1), h being the
 /// impulse response of 1/A and n = max(na, nb + nk - 1), with the c of least squares: everything that unknown samples
 /// before the segment can do. Segments too short for a start are left out.
 ///
@@ -23,36 +23,29 @@ const NEGLIGIBLE: f64 = 1e-20;
 /// [`Error::Argument`] if the record does not have the model's inputs; [`Error::Undetermined`] if an initial condition
 /// cannot be told from the data, as for a model so unstable that h overflows.
 pub fn simulate(model: &Model, record: &Record<'_>, start: Start) -> Result<Response, Error> {
-    if record.inputs.len() != model.b.len() {
-        return Err(Error::argument(
-            "inputs",
-            format!("the model has {} inputs, the record {}", model.b.len(), record.inputs.len()),
-        ));
-    }
+    check_inputs(model, record)?;
     let reach = model.orders.reach();
     let mut response = Response::empty(record.output.len());
     let longest = record.segments.iter().map(Range::len).max().unwrap_or(0);
     let free = if start == Start::Estimated { free_response(&model.a, longest, reach) } else { Vec::new() };
-    for segment in &record.segments {
-        // An initial condition of n numbers needs more than n samples to be estimated from.
-        let counted = match start {
-            Start::Zero => segment.clone(),
-            Start::Measured => (segment.start + reach).min(segment.end)..segment.end,
+    for (segment, past) in record.segments.iter().zip(&record.past) {
+        let (history, counted) = match start {
+            Start::Zero => (segment.start, segment.clone()),
+            Start::Measured => from_measured(segment, *past, reach),
+            // An initial condition of n numbers needs more than n samples to be estimated from.
             Start::Estimated if segment.len() <= reach => continue,
-            Start::Estimated => segment.clone(),
+            Start::Estimated => (segment.start, segment.clone()),
         };
         if counted.is_empty() {
             continue;
         }
-        let values = &mut response.values[segment.clone()];
-        if start == Start::Measured {
-            values.fill(0.0);
-            run(model, record, segment, Some(reach), values);
-            values[..reach].fill(f64::NAN);
-        } else {
-            values.fill(0.0);
-            run(model, record, segment, None, values);
+        let values = &mut response.values[counted.clone()];
+        values.fill(0.0);
+        for (b, u) in model.b.iter().zip(&record.inputs) {
+            add_filtered(values, &counted, b, u, history);
         }
+        let before = if start == Start::Measured { &record.output[history..counted.start] } else { &[] };
+        feed_back(&model.a, before, values);
         if start == Start::Estimated {
             add_free_response(&free, reach, &record.output[segment.clone()], values)?;
         }
@@ -61,25 +54,19 @@ pub fn simulate(model: &Model, record: &Record<'_>, start: Start) -> Result<Resp
     Ok(response)
 }
 
-/// Runs the difference equation over one segment; `measured` samples are taken from the record instead.
-fn run(
-    model: &Model,
-    record: &Record<'_>,
-    segment: &Range<usize>,
-    measured: Option<usize>,
-    values: &mut [f64],
-) {
-    for (b, u) in model.b.iter().zip(&record.inputs) {
-        add_filtered(values, segment, b, u, segment.start);
+/// x(t) = w(t) - a1 x(t-1) - … in place: `values` holds w and becomes x; `before` holds the x before its first, if known.
+fn feed_back(a: &[f64], before: &[f64], values: &mut [f64]) {
+    let past: Vec<f64> = a[1..].iter().rev().copied().collect();
+    let order = past.len();
+    let start = order.min(values.len());
+    for t in 0..start {
+        let earlier = values[..t].iter().rev().chain(before.iter().rev());
+        let sum: f64 = a[1..].iter().zip(earlier).map(|(a, x)| a * x).sum();
+        values[t] -= sum;
     }
-    let known = measured.unwrap_or(0);
-    values[..known].copy_from_slice(&record.output[segment.start..segment.start + known]);
-    let past: Vec<f64> = model.a[1..].iter().rev().copied().collect();
-    for t in known..values.len() {
-        let reached = past.len().min(t);
-        let (before, now) = values.split_at_mut(t);
-        let sum: f64 =
-            past[past.len() - reached..].iter().zip(&before[t - reached..]).map(|(a, x)| a * x).sum();
+    for t in start..values.len() {
+        let (earlier, now) = values.split_at_mut(t);
+        let sum: f64 = past.iter().zip(&earlier[t - order..]).map(|(a, x)| a * x).sum();
         now[0] -= sum;
     }
 }
@@ -94,12 +81,15 @@ fn free_response(a: &[f64], length: usize, reach: usize) -> Vec<f64> {
         let known = response.len();
         response = inverse_series(a, piece.min(length));
         largest = response[known..].iter().fold(largest, |largest, h| largest.max(h.abs()));
+        if !largest.is_finite() {
+            return response;
+        }
         let quiet = response.iter().rev().take_while(|h| h.abs() <= NEGLIGIBLE * largest).count();
         if quiet > a.len() {
             response.truncate(response.len() - quiet);
             return response;
         }
-        if response.len() >= length || !largest.is_finite() {
+        if response.len() >= length {
             return response;
         }
         piece *= 4;
@@ -117,7 +107,6 @@ fn add_free_response(free: &[f64], count: usize, output: &[f64], values: &mut [f
     let mut basis = free[..free.len().min(length)].to_vec();
     basis.resize(length, 0.0);
     let whole = 0..length;
-    let taps = vec![Taps { signal: 1, first: 0, count, sign: 1.0 }];
     let unknown = || {
         Error::undetermined(
             Vec::new(),
@@ -128,8 +117,31 @@ fn add_free_response(free: &[f64], count: usize, output: &[f64], values: &mut [f
     if !basis.iter().chain(&target).all(|value| value.is_finite()) {
         return Err(unknown());
     }
-    let solved = Lagged::new(&[&target, &basis], taps, std::slice::from_ref(&whole), Initial::Zero).solve();
-    let solved = solved.map_err(|_| unknown())?;
-    add_filtered(&mut values[..length], &whole, solved.parameters.as_slice(), &basis, 0);
+    // Delays of a growing response differ by rounding only. Any of them serves: those that add nothing are left out.
+    let mut delays: Vec<usize> = (0..count).collect();
+    let mut weights = vec![0.0; count];
+    loop {
+        let taps = delays
+            .chunk_by(|a, b| a + 1 == *b)
+            .map(|run| Taps { signal: 1, first: run[0], count: run.len(), sign: 1.0 })
+            .collect();
+        let regression =
+            Lagged::new(&[&target, &basis], taps, std::slice::from_ref(&whole), Initial::Zero).solve();
+        match regression {
+            Ok(solved) => {
+                for (delay, weight) in delays.iter().zip(solved.parameters.iter()) {
+                    weights[*delay] = *weight;
+                }
+                break;
+            }
+            Err(Unsolved::Deficient(columns)) if columns.len() < delays.len() => {
+                for column in columns.iter().rev() {
+                    delays.remove(*column);
+                }
+            }
+            Err(_) => return Err(unknown()),
+        }
+    }
+    add_filtered(&mut values[..length], &whole, &weights, &basis, 0);
     Ok(())
 }

@@ -1,0 +1,32 @@
+.PHONY: demo test format lint docs rust bench
+
+# Fit the sample log that the program carries.
+demo:
+	cargo run --release -- demo
+
+# Everything that must pass. A tool that is missing is installed where that is possible; else its check is skipped by
+# name, or fails where CI=true.
+test: format lint docs rust
+
+format:
+	@$(call with,rustfmt,fmt,cargo fmt --all --check && cd benches/peers && cargo fmt --check)
+
+lint:
+	@$(call with,clippy,clippy,cargo clippy --locked --workspace --all-targets --all-features -- -D warnings)
+
+docs:
+	RUSTDOCFLAGS="-D warnings" cargo doc --locked --workspace --no-deps
+
+# thetahat-core once more on its own: there it has no heap.
+rust:
+	cargo test --locked -p thetahat-core
+	cargo test --locked --workspace
+
+# Our own benches, then the comparison with other packages. Not part of the tests.
+bench:
+	cargo bench --locked --bench arx
+	benches/peers/run
+
+# $(call with,COMPONENT,SUBCOMMAND,CHECK): runs the check if cargo has the subcommand or rustup can add the component.
+with = if cargo $(2) --version >/dev/null 2>&1 || rustup component add $(1) >/dev/null 2>&1; then $(3); \
+	elif [ "$$CI" = true ]; then echo "missing: $(1)" >&2; exit 1; else echo "skipped: $(1) is not installed"; fi

@@ -1,0 +1,41 @@
+//! What the program says of itself: the report's schema, shell completions, manual pages.
+
+use clap::CommandFactory;
+
+use crate::args::Arguments;
+use crate::failure::Failure;
+use crate::output;
+
+/// `thetahat schema`.
+pub(crate) fn schema() -> Result<(), Failure> {
+    output::print(&format!("{:#}\n", thetahat::Report::json_schema()))
+}
+
+/// `thetahat completions SHELL`.
+pub(crate) fn completions(shell: clap_complete::Shell) -> Result<(), Failure> {
+    let mut script = Vec::new();
+    clap_complete::generate(shell, &mut Arguments::command(), "thetahat", &mut script);
+    output::print(&String::from_utf8_lossy(&script))
+}
+
+/// `thetahat man [VERB]`.
+pub(crate) fn manual(verb: Option<&str>) -> Result<(), Failure> {
+    let mut command = Arguments::command();
+    command.build();
+    let page = match verb {
+        None => clap_mangen::Man::new(command),
+        Some(verb) => match command.find_subcommand(verb) {
+            Some(found) => clap_mangen::Man::new(found.clone().name(format!("thetahat-{verb}"))),
+            None => {
+                let verbs: Vec<&str> = command.get_subcommands().map(clap::Command::get_name).collect();
+                return Err(Failure::usage(format!(
+                    "there is no verb '{verb}'; there are: {}",
+                    verbs.join(", ")
+                )));
+            }
+        },
+    };
+    let mut text = Vec::new();
+    page.render(&mut text).map_err(|error| Failure::stdout(&error))?;
+    output::print(&String::from_utf8_lossy(&text))
+}

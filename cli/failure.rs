@@ -1,0 +1,85 @@
+//! Why the program ends without having done what was asked.
+
+use std::fmt::Display;
+use std::io;
+use std::path::Path;
+use std::process::ExitCode;
+
+use crate::output::harmless;
+use crate::table;
+
+/// One line for a person, and an exit code for a script.
+#[derive(Debug)]
+pub(crate) struct Failure {
+    kind: Kind,
+    message: String,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    /// Nobody reads the output any more: nothing to say.
+    Closed,
+    Usage,
+    Data,
+    Undetermined,
+    Io,
+}
+
+impl Failure {
+    /// The command line does not make sense.
+    pub(crate) fn usage(message: impl Into<String>) -> Self {
+        Self { kind: Kind::Usage, message: message.into() }
+    }
+
+    /// The log or the report does not hold what was asked of it.
+    pub(crate) fn data(message: impl Into<String>) -> Self {
+        Self { kind: Kind::Data, message: message.into() }
+    }
+
+    /// A file cannot be read or written.
+    pub(crate) fn io(path: &Path, what: impl Display, error: &io::Error) -> Self {
+        if error.kind() == io::ErrorKind::BrokenPipe {
+            return Self { kind: Kind::Closed, message: String::new() };
+        }
+        Self { kind: Kind::Io, message: format!("{}: {what}: {error}", path.display()) }
+    }
+
+    /// Standard output cannot be written.
+    pub(crate) fn stdout(error: &io::Error) -> Self {
+        Self::io(Path::new("standard output"), "cannot be written", error)
+    }
+
+    /// What the library says of a log, with the place it is about.
+    pub(crate) fn about(error: &thetahat::Error, place: impl FnOnce(Option<usize>) -> String) -> Self {
+        let (kind, row) = match error {
+            thetahat::Error::Argument { .. } => return Self::usage(error.to_string()),
+            thetahat::Error::Undetermined { .. } => (Kind::Undetermined, None),
+            thetahat::Error::Data { row, .. } => (Kind::Data, *row),
+            _ => (Kind::Data, None),
+        };
+        Self { kind, message: format!("{}: {error}", place(row)) }
+    }
+
+    /// Says it on standard error and gives the exit code.
+    pub(crate) fn report(&self) -> ExitCode {
+        let code = match self.kind {
+            Kind::Closed => return ExitCode::SUCCESS,
+            Kind::Usage => 2,
+            Kind::Data => 3,
+            Kind::Undetermined => 4,
+            Kind::Io => 5,
+        };
+        anstream::eprintln!("\x1b[1;31merror:\x1b[0m {}", harmless(&self.message));
+        ExitCode::from(code)
+    }
+}
+
+impl From<table::Error> for Failure {
+    fn from(error: table::Error) -> Self {
+        let kind = match error.kind() {
+            table::ErrorKind::Io => Kind::Io,
+            table::ErrorKind::Data => Kind::Data,
+        };
+        Self { kind, message: error.to_string() }
+    }
+}

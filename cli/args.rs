@@ -29,7 +29,7 @@ pub(crate) enum Command {
     #[command(after_help = "\
 Examples:
   thetahat fit log.csv --sample-time 0.08 --na 2 --nb 2 --nk 3 --report model.json
-  thetahat fit log.csv --time t -u heater -y temperature --estimate 1..500 --validate 501..1000 --na 2 --nb 2
+  thetahat fit log.csv --time t -u heater -y temperature --validate 501..1000 --na 2 --nb 2
   thetahat fit sunspots.csv -y count --na 2 --nb 0")]
     Fit(FitArguments),
     /// Predict a log some steps ahead with a fitted model
@@ -79,11 +79,6 @@ Example:
 
 #[derive(Debug, Args)]
 pub(crate) struct FitArguments {
-    #[command(flatten)]
-    pub(crate) log: LogArguments,
-    #[command(flatten)]
-    pub(crate) clock: ClockArguments,
-
     /// Input columns [default: u, u1, u2, …]
     #[arg(short = 'u', long, value_name = "NAME[,NAME…]", value_delimiter = ',', help_heading = "Channels")]
     pub(crate) input: Vec<String>,
@@ -125,27 +120,32 @@ pub(crate) struct FitArguments {
     /// What to print: a table for people, or the JSON report
     #[arg(long, value_enum, default_value = "table", help_heading = "Output")]
     pub(crate) format: FormatArgument,
+
+    #[command(flatten)]
+    pub(crate) clock: ClockArguments,
+    #[command(flatten)]
+    pub(crate) log: LogArguments,
 }
 
 #[derive(Debug, Args)]
 pub(crate) struct PredictArguments {
-    #[command(flatten)]
-    pub(crate) respond: RespondArguments,
     /// Steps ahead; inf for a free run, like simulate
-    #[arg(long, value_name = "K", default_value = "1")]
+    #[arg(long, value_name = "K", default_value = "1", allow_hyphen_values = true)]
     pub(crate) horizon: String,
     /// What the prediction starts from [default: measured; with --horizon inf as for simulate]
     #[arg(long, value_enum)]
     pub(crate) initial: Option<StartArgument>,
+    #[command(flatten)]
+    pub(crate) respond: RespondArguments,
 }
 
 #[derive(Debug, Args)]
 pub(crate) struct SimulateArguments {
-    #[command(flatten)]
-    pub(crate) respond: RespondArguments,
     /// What the run starts from [default: estimated; zero if the log has no output]
     #[arg(long, value_enum)]
     pub(crate) initial: Option<StartArgument>,
+    #[command(flatten)]
+    pub(crate) respond: RespondArguments,
 }
 
 /// What predict and simulate share.
@@ -154,10 +154,6 @@ pub(crate) struct RespondArguments {
     /// The report that fit wrote (- for standard input)
     #[arg(value_name = "REPORT")]
     pub(crate) report: PathBuf,
-    #[command(flatten)]
-    pub(crate) log: LogArguments,
-    #[command(flatten)]
-    pub(crate) clock: ClockArguments,
     /// Rows to respond to, 1-based and inclusive [default: all]
     #[arg(long, value_name = "A..B[,C..D]", value_delimiter = ',')]
     pub(crate) rows: Vec<String>,
@@ -167,6 +163,11 @@ pub(crate) struct RespondArguments {
     /// Write the CSV to a file instead of standard output
     #[arg(short = 'o', long, value_name = "FILE", default_value = "-", hide_default_value = true)]
     pub(crate) out: PathBuf,
+
+    #[command(flatten)]
+    pub(crate) clock: ClockArguments,
+    #[command(flatten)]
+    pub(crate) log: LogArguments,
 }
 
 #[derive(Debug, Args)]
@@ -221,10 +222,16 @@ pub(crate) struct ClockArguments {
     #[arg(long, value_name = "FORMAT", requires = "time", help_heading = "Clock")]
     pub(crate) time_format: Option<String>,
     /// Seconds from one row to the next [default: 1, so that times count rows]
-    #[arg(long, value_name = "SECONDS", help_heading = "Clock")]
+    #[arg(long, value_name = "SECONDS", allow_hyphen_values = true, help_heading = "Clock")]
     pub(crate) sample_time: Option<f64>,
     /// Make a log with an irregular clock uniform: a step in seconds, and how values between samples are read
-    #[arg(long, value_name = "STEP:hold|linear", requires = "time", help_heading = "Clock")]
+    #[arg(
+        long,
+        value_name = "STEP:hold|linear",
+        requires = "time",
+        allow_hyphen_values = true,
+        help_heading = "Clock"
+    )]
     pub(crate) resample: Option<String>,
 }
 
@@ -244,7 +251,7 @@ pub(crate) enum InitialArgument {
 pub(crate) enum StartArgument {
     /// Rest: zeros before the first sample
     Zero,
-    /// The first measured samples, which then do not count
+    /// Measured samples before the rows, or the first rows, which then do not count
     Measured,
     /// The initial condition that fits best
     Estimated,

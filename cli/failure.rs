@@ -5,8 +5,11 @@ use std::io;
 use std::path::Path;
 use std::process::ExitCode;
 
-use crate::output::harmless;
+use crate::output::{harmless, say};
 use crate::table;
+
+/// Arguments of the library that are options here.
+const OPTIONS: [&str; 4] = ["detrend", "initial", "offset", "resample"];
 
 /// One line for a person, and an exit code for a script.
 #[derive(Debug)]
@@ -41,7 +44,12 @@ impl Failure {
         if error.kind() == io::ErrorKind::BrokenPipe {
             return Self { kind: Kind::Closed, message: String::new() };
         }
-        Self { kind: Kind::Io, message: format!("{}: {what}: {error}", path.display()) }
+        let remedy = match error.kind() {
+            io::ErrorKind::StorageFull => "make room on the disk",
+            io::ErrorKind::IsADirectory => "name a file in it",
+            _ => "check the path and its permissions",
+        };
+        Self { kind: Kind::Io, message: format!("{}: {what}: {error}; {remedy}", path.display()) }
     }
 
     /// Standard output cannot be written.
@@ -52,6 +60,9 @@ impl Failure {
     /// What the library says of a log, with the place it is about.
     pub(crate) fn about(error: &thetahat::Error, place: impl FnOnce(Option<usize>) -> String) -> Self {
         let (kind, row) = match error {
+            thetahat::Error::Argument { argument, message } if OPTIONS.contains(&argument.as_str()) => {
+                return Self::usage(format!("--{argument}: {message}"));
+            }
             thetahat::Error::Argument { .. } => return Self::usage(error.to_string()),
             thetahat::Error::Undetermined { .. } => (Kind::Undetermined, None),
             thetahat::Error::Data { row, .. } => (Kind::Data, *row),
@@ -69,7 +80,7 @@ impl Failure {
             Kind::Undetermined => 4,
             Kind::Io => 5,
         };
-        anstream::eprintln!("\x1b[1;31merror:\x1b[0m {}", harmless(&self.message));
+        say(&format!("\x1b[1;31merror:\x1b[0m {}", harmless(&self.message)));
         ExitCode::from(code)
     }
 }

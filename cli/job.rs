@@ -114,6 +114,11 @@ impl FitJob {
                 InitialArgument::Zero => Initial::Zero,
             },
         };
+        for (position, (name, _)) in job.offsets.iter().enumerate() {
+            if job.offsets[..position].iter().any(|(other, _)| other == name) {
+                return Err(Failure::usage(format!("--offset: '{name}' has two; give one")));
+            }
+        }
         if let Some(inputs) = &job.inputs {
             job.orders(inputs.len())?;
         }

@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::io::{self, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::failure::Failure;
 
@@ -19,9 +19,14 @@ pub(crate) fn harmless(text: &str) -> String {
     harmless
 }
 
-/// Says something that the reader should know, on standard error.
+/// Says something that the reader should know.
 pub(crate) fn warn(message: &str) {
-    anstream::eprintln!("\x1b[1;33mwarning:\x1b[0m {}", harmless(message));
+    say(&format!("\x1b[1;33mwarning:\x1b[0m {}", harmless(message)));
+}
+
+/// Writes a line to standard error, in colour only on a terminal. Where that fails there is nobody left to tell.
+pub(crate) fn say(line: &str) {
+    let _ = writeln!(anstream::stderr().lock(), "{line}");
 }
 
 /// Writes to standard output.
@@ -35,14 +40,16 @@ pub(crate) fn print(text: &str) -> Result<(), Failure> {
 /// A file is written beside its place, brought to the disk, and moved there: a crash or a full disk leaves the old
 /// one or the new one. What is not a file (a device, a pipe) is written directly.
 pub(crate) fn write(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Failure> {
-    let failed = |error: io::Error| Failure::io(path, "cannot be written", &error);
+    let failed = |error: io::Error| Failure::io(path, "cannot be written", &plain(error));
     if path == Path::new("-") {
         let mut stdout = io::BufWriter::new(io::stdout().lock());
         return fill(&mut stdout).and_then(|()| stdout.flush()).map_err(|error| Failure::stdout(&error));
     }
-    // The file behind a link is replaced, not the link.
-    let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    let target = behind_links(path);
     let existing = fs::metadata(&target).ok();
+    if existing.as_ref().is_some_and(fs::Metadata::is_dir) {
+        return Err(failed(io::ErrorKind::IsADirectory.into()));
+    }
     if existing.as_ref().is_some_and(|metadata| !metadata.is_file()) {
         let mut file = io::BufWriter::new(fs::OpenOptions::new().write(true).open(&target).map_err(failed)?);
         return fill(&mut file).and_then(|()| file.flush()).map_err(failed);
@@ -53,17 +60,49 @@ pub(crate) fn write(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result
     };
     let mut builder = tempfile::Builder::new();
     builder.prefix(".thetahat-");
-    let permissions = existing.map(|metadata| metadata.permissions()).or_else(default_permissions);
-    if let Some(permissions) = permissions {
+    if let Some(permissions) = default_permissions() {
         builder.permissions(permissions);
     }
     let file = builder.tempfile_in(folder).map_err(failed)?;
     let mut buffered = io::BufWriter::new(file);
     fill(&mut buffered).map_err(failed)?;
     let file = buffered.into_inner().map_err(|error| failed(error.into_error()))?;
+    if let Some(existing) = existing {
+        file.as_file().set_permissions(existing.permissions()).map_err(failed)?;
+    }
     file.as_file().sync_all().map_err(failed)?;
     file.persist(&target).map_err(|error| failed(error.error))?;
     Ok(())
+}
+
+/// Refuses an output that would replace what was read.
+pub(crate) fn apart(output: &Path, read: &Path) -> Result<(), Failure> {
+    let same = |path: &Path| fs::canonicalize(path).ok().filter(|path| path.is_file());
+    match (same(output), same(read)) {
+        (Some(output), Some(read)) if output == read => Err(Failure::usage(format!(
+            "{} would be replaced by the output; name another file",
+            read.display()
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// The file behind a link, there already or not: it is replaced, not the link.
+fn behind_links(path: &Path) -> PathBuf {
+    let mut target = path.to_owned();
+    // As many links as the system itself would follow.
+    for _ in 0..40 {
+        match fs::read_link(&target) {
+            Ok(next) => target = target.parent().unwrap_or(Path::new("")).join(next),
+            Err(_) => break,
+        }
+    }
+    target
+}
+
+/// An error without the name that a temporary file had, which is nobody's business.
+fn plain(error: io::Error) -> io::Error {
+    if error.get_ref().is_some() { error.kind().into() } else { error }
 }
 
 /// What a new file may be used for: as with any other program, the user's mask decides.

@@ -12,7 +12,11 @@ use crate::log::{self, Loaded};
 use crate::output::{self, warn};
 
 pub(crate) fn fit(arguments: &FitArguments) -> Result<(), Failure> {
-    let report = identified(&FitJob::resolve(arguments)?)?;
+    let job = FitJob::resolve(arguments)?;
+    if let Some(path) = &arguments.report {
+        output::apart(path, &job.log.path)?;
+    }
+    let report = identified(&job)?;
     let json = report.to_json().map_err(|error| Failure::data(error.to_string()))?;
     let to_stdout = arguments.report.as_deref() == Some(Path::new("-"));
     if let Some(path) = &arguments.report {
@@ -53,7 +57,7 @@ pub(super) fn identified(job: &FitJob) -> Result<Report, Failure> {
 
 /// The input and output columns: the named ones, or those called u, u1, u2, … and y.
 fn channels(job: &FitJob, header: &[String]) -> Result<(Vec<String>, String), String> {
-    let there_are = || format!("there are: {}", header.join(", "));
+    let there_are = || format!("there are: {}", log::listed(header));
     let output = match &job.output {
         Some(name) => name.clone(),
         None if header.iter().any(|name| name == "y") => "y".to_owned(),

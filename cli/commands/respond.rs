@@ -1,17 +1,17 @@
 //! `thetahat predict` and `thetahat simulate`: what a stored model says of a log.
 
 use std::fs::File;
-use std::io::Read;
+use std::io::{self, Read, Write};
 use std::path::Path;
 
-use thetahat::{Detrend, Horizon, Model, Report, Start, apply};
+use thetahat::{Applied, Detrend, Horizon, Model, Report, Start, apply};
 
 use super::summary;
 use crate::args::{PredictArguments, RespondArguments, SimulateArguments};
 use crate::failure::Failure;
 use crate::job::{LogJob, parsed, rows};
 use crate::log::{self, Loaded};
-use crate::output::{self, warn};
+use crate::output::{self, say, warn};
 
 /// A report has this many bytes at most: beyond it the file is something else.
 const LARGEST_REPORT: u64 = 1 << 30;
@@ -45,6 +45,8 @@ fn respond(arguments: &RespondArguments, horizon: Horizon, initial: Option<Start
     if arguments.report == Path::new("-") && job.path == Path::new("-") {
         return Err(Failure::usage("the report and the log cannot both come from standard input"));
     }
+    output::apart(&arguments.out, &job.path)?;
+    output::apart(&arguments.out, &arguments.report)?;
     let model = stored(&arguments.report)?;
 
     let output = model.output.name.clone();
@@ -64,30 +66,34 @@ fn respond(arguments: &RespondArguments, horizon: Horizon, initial: Option<Start
     let applied = apply(&model, log, &asked, detrend, horizon, initial).map_err(Loaded::failure(&source))?;
 
     output::write(&arguments.out, |file| {
-        let mut csv = csv::Writer::from_writer(file);
-        csv.write_record([if time.is_some() { "time" } else { "row" }, "measured", "predicted"])?;
-        let present = |value: f64| Some(value).filter(|value| value.is_finite());
-        for range in &applied.rows {
-            for row in range.first()..=range.last() {
-                let position = row - 1;
-                let values = (
-                    applied.measured.as_ref().and_then(|measured| present(measured[position])),
-                    present(applied.predicted[position]),
-                );
-                match &time {
-                    Some(time) => csv.serialize((time[position], values.0, values.1))?,
-                    None => csv.serialize((row, values.0, values.1))?,
-                }
-            }
-        }
-        csv.flush()
+        rows_as_csv(file, &applied, time.as_deref()).map_err(|error| match error.into_kind() {
+            csv::ErrorKind::Io(error) => error,
+            other => io::Error::other(format!("{other:?}")),
+        })
     })?;
     match &applied.fit {
-        Some(fit) if fit.samples > 0 => anstream::eprintln!("{}", summary::figure(fit)),
+        Some(fit) if fit.samples > 0 => say(&summary::figure(fit)),
         Some(_) => warn("no row could be predicted: the stretches without a gap are too short"),
         None => {}
     }
     Ok(())
+}
+
+/// Time or row, measured, predicted; what is missing is empty.
+fn rows_as_csv(file: &mut dyn Write, applied: &Applied, time: Option<&[f64]>) -> Result<(), csv::Error> {
+    let mut csv = csv::Writer::from_writer(file);
+    csv.write_record([if time.is_some() { "time" } else { "row" }, "measured", "predicted"])?;
+    let present = |value: f64| Some(value).filter(|value| value.is_finite());
+    for row in applied.rows.iter().flat_map(|range| range.first()..=range.last()) {
+        let position = row - 1;
+        let measured = applied.measured.as_ref().and_then(|measured| present(measured[position]));
+        let predicted = present(applied.predicted[position]);
+        match time {
+            Some(time) => csv.serialize((time[position], measured, predicted))?,
+            None => csv.serialize((row, measured, predicted))?,
+        }
+    }
+    Ok(csv.flush()?)
 }
 
 /// The model of a stored report.
@@ -95,7 +101,7 @@ fn stored(path: &Path) -> Result<Model, Failure> {
     let failed = |error| Failure::io(path, "cannot be read", &error);
     let mut bytes = Vec::new();
     if path == Path::new("-") {
-        std::io::stdin().lock().take(LARGEST_REPORT).read_to_end(&mut bytes).map_err(failed)?;
+        io::stdin().lock().take(LARGEST_REPORT).read_to_end(&mut bytes).map_err(failed)?;
     } else {
         File::open(path).map_err(failed)?.take(LARGEST_REPORT).read_to_end(&mut bytes).map_err(failed)?;
     }

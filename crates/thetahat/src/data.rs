@@ -3,6 +3,8 @@
 mod log;
 mod prepare;
 mod split;
+#[cfg(test)]
+mod tests;
 
 pub use log::{Channel, Interpolation, Log, Record};
 pub use prepare::{Detrend, Offset};

@@ -1,6 +1,8 @@
 //! From a record and orders to parameters.
 
 mod arx;
+#[cfg(test)]
+mod tests;
 
 pub use crate::regression::Solver;
 pub(crate) use arx::enough;

@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
-use crate::data::{Offset, Rows};
+use crate::data::{Offset, Rows, checked};
 
 /// A step longer than so many medians starts a new segment.
 const GAP: f64 = 1.5;
@@ -170,8 +170,10 @@ impl Log {
         let (Some(first), Some(last)) = (time.first(), time.last()) else {
             return Err(Error::data("the log has no rows"));
         };
-        // Half a millionth of a step, so that a last sample on the grid is not lost to rounding.
-        let count = ((last - first) / step + 5e-7).floor() + 1.0;
+        // Samples on the grid are not missed by rounding: of decimal steps, and of large times (seconds since 1970
+        // have seven decimals).
+        let rounding = 5e-7 * step + 2.0 * f64::EPSILON * first.abs().max(last.abs());
+        let count = ((last - first + rounding) / step).floor() + 1.0;
         if count > MOST_ROWS {
             return Err(Error::argument(
                 "resample",
@@ -186,7 +188,7 @@ impl Log {
                 let values = instants
                     .iter()
                     .map(|&instant| {
-                        while time.get(left + 1).is_some_and(|&next| next <= instant + 5e-7 * step) {
+                        while time.get(left + 1).is_some_and(|&next| next <= instant + rounding) {
                             left += 1;
                         }
                         interpolation.read(time, &channel.values, left, instant)
@@ -295,18 +297,24 @@ impl Log {
     /// The signals of some channels over some rows.
     ///
     /// # Errors
-    /// [`Error::Data`] for a name that is not there.
+    /// [`Error::Data`] for a name or rows that are not there; [`Error::Argument`] for rows that overlap.
     pub fn record(&self, inputs: &[String], output: &str, rows: &[Rows]) -> Result<Record<'_>, Error> {
         let names: Vec<&str> = inputs.iter().map(String::as_str).chain([output]).collect();
         let signal = |name: &str| Ok(self.channel(name)?.values.as_slice());
-        let segments = self.segments(&names, rows)?;
+        let segments = self.segments(&names, &checked("rows", rows, self.rows)?)?;
         let signals: Vec<&[f64]> = names.iter().map(|name| signal(name)).collect::<Result<_, Error>>()?;
         let usable = |row: usize| signals.iter().all(|values| !values[row].is_nan());
+        // In one pass: the row behind the last missing sample before each segment.
+        let (mut first, mut seen) = (0, 0);
         let past = segments.iter().map(|segment| {
-            // Back to the last jump of the clock before the segment, or to the log's first row.
+            if let Some(missing) = (seen..segment.start).rev().find(|row| !usable(*row)) {
+                first = missing + 1;
+            }
+            seen = segment.start;
+            // Or that behind the last jump of the clock.
             let jumps = self.jumps.partition_point(|&jump| jump <= segment.start);
-            let first = if jumps == 0 { 0 } else { self.jumps[jumps - 1] };
-            (first..segment.start).rev().take_while(|&row| usable(row)).count()
+            let jump = if jumps == 0 { 0 } else { self.jumps[jumps - 1] };
+            segment.start - first.max(jump)
         });
         let past = past.collect();
         let (output, inputs) = match signals.split_last() {
@@ -400,11 +408,18 @@ fn median_step(time: &[f64], rows: usize) -> Result<f64, Error> {
         return Err(Error::data("one row has no time step; the log needs at least two"));
     }
     let even = steps.len().is_multiple_of(2);
-    let (below, &mut median, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
-    if even {
-        // The median of an even number of steps is the mean of the middle two.
-        let other = below.iter().copied().fold(f64::MIN, f64::max);
-        return Ok(f64::midpoint(other, median));
-    }
-    Ok(median)
+    let (below, &mut upper, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
+    // The median of an even number of steps is the mean of the middle two.
+    let lower = if even { below.iter().copied().fold(f64::MIN, f64::max) } else { upper };
+    let latest = time.iter().fold(0.0_f64, |latest, time| latest.max(time.abs()));
+    Ok(shortest(f64::midpoint(lower, upper), 2.0 * f64::EPSILON * latest))
+}
+
+/// The number of fewest digits within `tolerance`: differences of times such as 0.3 and 0.29 have rounding at their end,
+/// which is not the clock's.
+fn shortest(value: f64, tolerance: f64) -> f64 {
+    (0..17)
+        .filter_map(|digits| format!("{value:.digits$e}").parse().ok())
+        .find(|rounded: &f64| (rounded - value).abs() <= tolerance)
+        .unwrap_or(value)
 }

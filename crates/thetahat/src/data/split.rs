@@ -74,7 +74,9 @@ pub(crate) fn checked(argument: &str, ranges: &[Rows], rows: usize) -> Result<Ve
     sorted.sort_unstable();
     for range in &sorted {
         if range.last > rows {
-            return Err(Error::data(format!("{argument} {range}: the log has {rows} rows")));
+            return Err(Error::data(format!(
+                "{argument} {range}: the log has {rows} rows; name rows up to that"
+            )));
         }
     }
     for pair in sorted.windows(2) {

@@ -179,6 +179,9 @@ impl Model {
         let orders = &self.orders;
         let wrong =
             |what: &str| Err(Error::report(format!("model.{what}; the report was edited or damaged")));
+        if Orders::arx(orders.na, &orders.nb, &orders.nk).as_ref() != Ok(orders) {
+            return wrong("orders are not those of an ARX model");
+        }
         let inputs = orders.nb.len();
         if [orders.nk.len(), orders.nf.len(), self.inputs.len(), self.b.len(), self.f.len()] != [inputs; 5] {
             return wrong("orders, inputs, b and f do not have as many inputs as one another");
@@ -186,9 +189,18 @@ impl Model {
         if self.a.len() != orders.na + 1 || self.a.first() != Some(&1.0) {
             return wrong("a does not match its order, or does not begin with 1");
         }
-        let length = |j: usize| orders.nk[j].saturating_add(orders.nb[j]);
+        let length = |j: usize| orders.nk[j] + orders.nb[j];
         if (0..inputs).any(|j| self.b[j].len() != length(j)) {
             return wrong("b does not match its orders");
+        }
+        if (0..inputs).any(|j| self.b[j].iter().take(orders.nk[j]).any(|value| *value != 0.0)) {
+            return wrong("b does not begin with nk zeros");
+        }
+        let mut names: Vec<&str> =
+            self.inputs.iter().chain([&self.output]).map(|s| s.name.as_str()).collect();
+        names.sort_unstable();
+        if names.windows(2).any(|pair| pair[0] == pair[1]) {
+            return wrong("inputs and output share a name");
         }
         if !(self.sample_time.is_finite() && self.sample_time > 0.0) {
             return wrong("sample_time is not positive");
@@ -202,5 +214,71 @@ impl Model {
             return wrong("c, d and f of an ARX model are 1");
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::Record;
+    use crate::estimate::arx;
+    use crate::regression::noise::Noise;
+    use crate::{Initial, Offset};
+
+    /// The model fitted to data that ARX with these parameters made without noise.
+    fn fitted(a: &[f64], b: &[f64]) -> Model {
+        let mut noise = Noise(1);
+        let u = noise.take(100);
+        let mut y = vec![0.0; 100];
+        for t in 0..100 {
+            let past: f64 = (1..=t).zip(a).map(|(lag, a)| a * y[t - lag]).sum();
+            y[t] = (1..=t).zip(b).map(|(lag, b)| b * u[t - lag]).sum::<f64>() - past;
+        }
+        let orders = Orders::arx(a.len(), &[b.len()], &[1]).unwrap();
+        let estimate = arx(&Record::new(&y, vec![&u]).unwrap(), &orders, Initial::Drop).unwrap();
+        let signal = |name: &str| Signal { name: name.to_owned(), offset: Offset::default() };
+        Model::arx(&orders, &estimate, 0.5, vec![signal("u")], signal("y")).unwrap()
+    }
+
+    #[test]
+    fn poles_zeros_and_gains_are_those_of_the_polynomials() {
+        // (1 - 0.8 q^-1)(1 - 0.5 q^-1) and 2 q^-1 (1 + 3 q^-1).
+        let model = fitted(&[-1.3, 0.4], &[2.0, 6.0]);
+        let near = |found: f64, expected: f64| (found - expected).abs() < 1e-12;
+        assert_eq!((model.a.len(), model.b[0].len(), model.b[0][0]), (3, 3, 0.0));
+        assert!(near(model.poles[0].re, 0.8) && near(model.poles[1].re, 0.5) && model.stable);
+        assert!(model.zeros[0].len() == 1 && near(model.zeros[0][0].re, -3.0));
+        assert!(near(model.dc_gain[0].unwrap(), 80.0));
+        assert!(near(model.time_constants[0].unwrap(), -0.5 / 0.8_f64.ln()));
+    }
+
+    #[test]
+    fn an_integrator_has_no_gain_and_an_unstable_pole_no_time_constant() {
+        assert_eq!(fitted(&[-1.0], &[1.0]).dc_gain, [None]);
+        let unstable = fitted(&[-1.3], &[1.0]);
+        assert!(!unstable.stable && unstable.time_constants == [None]);
+    }
+
+    #[test]
+    fn a_damaged_model_is_refused() {
+        let good = fitted(&[-0.5], &[1.0, 2.0]);
+        assert!(good.check().is_ok());
+        let damages: [fn(&mut Model); 10] = [
+            |model| model.orders.na = usize::MAX,
+            |model| model.orders.nk = vec![usize::MAX],
+            |model| model.orders.nc = usize::MAX,
+            |model| model.orders.nb = vec![1, 1],
+            |model| model.a = vec![2.0, 0.5],
+            |model| model.b[0][1] = f64::NAN,
+            |model| model.f = vec![],
+            |model| model.b[0][0] = 1.0,
+            |model| model.output.name = "u".to_owned(),
+            |model| model.sample_time = 0.0,
+        ];
+        for damage in damages {
+            let mut model = good.clone();
+            damage(&mut model);
+            assert!(matches!(model.check(), Err(Error::Report { .. })));
+        }
     }
 }

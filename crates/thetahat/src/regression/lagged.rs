@@ -11,7 +11,8 @@
 //! Source: Björck, Stability analysis of the method of seminormal equations for linear least squares
 //! problems, Linear Algebra and its Applications 88/89 (1987), section 3. The error stays below
 //! `4 eps (kappa + kappa^2 |r| / |theta|)`, the bound of Householder QR, where the corrections contract;
-//! elsewhere, and above a condition number of 5e6, the rows go through `qr`.
+//! elsewhere, and above a condition number of 5e6, the rows go through `qr`. The covariance comes from R as it is:
+//! the relative error of the standard errors is up to eps kappa^2 / 2, 0.2 % at 5e6 (measured).
 //! Cost: O(N p) for the Gram matrix and for each correction, p^3 / 6 for the factor.
 
 use std::ops::{Range, RangeInclusive};
@@ -28,7 +29,7 @@ use super::qr;
 
 /// Above this condition number the normal equations do not reach QR's accuracy.
 const MAXIMUM_CONDITION: f64 = 5e6;
-/// Up to this condition number one correction is enough.
+/// Up to this condition number one correction is enough, unless the Gram matrix is a sum over very many segments.
 const ONE_CORRECTION: f64 = 1e5;
 /// While above the rounding floor, each correction must be this much smaller than the one before.
 const CONTRACTION: f64 = 0.02;
@@ -195,7 +196,7 @@ impl<'a> Lagged<'a> {
         }
 
         let mut scaled = factor.solve(&right.component_div(&norms));
-        let mut previous = f64::INFINITY;
+        let mut previous = scaled.norm();
         for pass in 1..=MAXIMUM_CORRECTIONS {
             let (sum_of_squares, gradient) = self.residuals(&scaled.component_div(&norms));
             let gradient = gradient.component_div(&norms);
@@ -203,12 +204,14 @@ impl<'a> Lagged<'a> {
             scaled += &correction;
             let (step, length) = (correction.norm(), scaled.norm());
             let residual = sum_of_squares.sqrt();
-            let floor = 4.0 * f64::EPSILON * (condition * length + condition * condition * residual);
+            let rounding = f64::EPSILON * (condition * length + condition * condition * residual);
             // |r - Phi delta|^2 = |r|^2 - delta' Phi' r, as R' R delta = Phi' r.
             let corrected = sum_of_squares - correction.dot(&gradient);
             // Where only rounding is left of it (data without noise), the residuals are computed once more.
             let exact = pass > 1 || corrected >= CANCELLATION * sum_of_squares;
-            if (condition <= ONE_CORRECTION || step <= floor) && exact {
+            // The next correction would be as much smaller than this one as this one is than the one before.
+            let settled = condition <= ONE_CORRECTION && step * (step / previous) <= rounding;
+            if (settled || step <= 4.0 * rounding) && exact {
                 let sum_of_squares = corrected.max(0.0);
                 let variance = sum_of_squares / (self.rows() - size) as f64;
                 let inverse = factor.solve(&DMatrix::identity(size, size));

@@ -27,6 +27,11 @@ fn taps(na: usize, inputs: &[(usize, usize)]) -> Vec<Taps> {
     std::iter::once(output).chain(inputs.iter().enumerate().map(input)).collect()
 }
 
+/// One segment.
+fn whole(length: usize) -> Vec<Range<usize>> {
+    std::iter::once(0..length).collect()
+}
+
 impl Case {
     fn lagged(&self) -> Lagged<'_> {
         let signals: Vec<&[f64]> = self.signals.iter().map(Vec::as_slice).collect();
@@ -96,8 +101,8 @@ impl Reference {
                 if c < size {
                     value = value / norms[c];
                 }
-                for k in 0..r {
-                    value = value - triangle[k][r] * triangle[k][c];
+                for row in &triangle[..r] {
+                    value = value - row[r] * row[c];
                 }
                 triangle[r][c] = if r == c { value.sqrt() } else { value / triangle[r][r] };
             }
@@ -207,7 +212,7 @@ fn the_gram_matrix_of_long_signals_is_that_of_the_rows() {
 fn no_digits_are_lost_when_signals_grow() {
     let mut noise = Noise(3);
     let signals = (0..2).map(|_| (0..900).map(|t| 1.05_f64.powi(t) * noise.next()).collect()).collect();
-    for segments in [vec![0..900], vec![0..30, 30..55, 60..900]] {
+    for segments in [whole(900), vec![0..30, 30..55, 60..900]] {
         let case = Case {
             signals: Clone::clone(&signals),
             taps: taps(6, &[(5, 3)]),
@@ -314,7 +319,7 @@ fn the_error_does_not_grow_with_the_rows() {
     let case = Case {
         signals: vec![y, u],
         taps: taps(0, &[(2, 1)]),
-        segments: vec![0..100_000],
+        segments: whole(100_000),
         initial: Initial::Drop,
     };
     let lagged = case.lagged();
@@ -331,7 +336,7 @@ fn a_factor_of_few_rows_is_one_to_go_on_from() {
         // The input begins with zeros: the first columns of the factor are empty.
         signals: vec![noise.take(length), [vec![0.0; 5], noise.take(length - 5)].concat()],
         taps: taps(2, &[(3, 1)]),
-        segments: std::iter::once(0..length).collect(),
+        segments: whole(length),
         initial: Initial::Drop,
     };
     for length in 5..14 {
@@ -392,7 +397,7 @@ fn dependent_columns_are_named() {
         let case = Case {
             signals: signals.into_iter().cloned().collect(),
             taps,
-            segments: std::iter::once(0..length).collect(),
+            segments: whole(length),
             initial: Initial::Drop,
         };
         case.lagged().solve().unwrap_err()

@@ -40,7 +40,7 @@ pub fn apply(
         )));
     }
     let all = vec![Rows::new(1, log.rows())?];
-    let rows = checked("rows", if rows.is_empty() { &all } else { rows }, log.rows())?;
+    let rows = checked("--rows", if rows.is_empty() { &all } else { rows }, log.rows())?;
     let names: Vec<String> = model.inputs.iter().map(|input| input.name.clone()).collect();
     let output = &model.output.name;
     let measured = log.has(output);

@@ -90,7 +90,10 @@ pub fn identify(mut log: Log, source: &Source, plan: &Plan) -> Result<Report, Er
         }
     }
     if let Some((name, _)) = plan.offsets.iter().find(|(name, _)| !names.contains(&name.as_str())) {
-        return Err(Error::argument("offset", format!("'{name}' is neither an input nor the output")));
+        return Err(Error::argument(
+            "offset",
+            format!("'{name}' is neither an input nor the output; name one of: {}", names.join(", ")),
+        ));
     }
     let all = vec![Rows::new(1, log.rows())?];
     let asked = if plan.estimate.is_empty() { &all } else { &plan.estimate };

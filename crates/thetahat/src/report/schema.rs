@@ -124,8 +124,9 @@ impl Report {
         struct Head {
             schema: String,
         }
-        let malformed =
-            |error: serde_json::Error| Error::report(format!("this is not a thetahat report: {error}"));
+        let malformed = |error: serde_json::Error| {
+            Error::report(format!("this is not a thetahat report: {error}; give a file that fit wrote"))
+        };
         let head: Head = serde_json::from_str(text).map_err(malformed)?;
         if head.schema != SCHEMA && !head.schema.starts_with(&format!("{SCHEMA}.")) {
             let shown: String = head.schema.chars().take(60).flat_map(char::escape_debug).collect();

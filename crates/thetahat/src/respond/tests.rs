@@ -196,6 +196,29 @@ fn an_estimated_start_makes_up_for_any_past() {
 }
 
 #[test]
+fn growing_and_silent_starts_are_estimated() {
+    let mut noise = Noise(5);
+    let u = signals(1, 1000, &mut noise);
+    // The delays of a growing response differ by rounding only, and still the output comes back.
+    for poles in [&[1.05][..], &[1.01, 1.01], &[1.0; 3], &[0.9999; 3]] {
+        let model = model(&with_poles(poles), &[(3, &[1.0, 0.5])]);
+        let y = output(&model, &views(&u));
+        let record = Record {
+            output: &y,
+            inputs: views(&u),
+            segments: std::iter::once(60..1000).collect(),
+            past: vec![0],
+        };
+        let response = simulate(&model, &record, Start::Estimated).unwrap();
+        assert!(difference(&response, &y) < 1e-9, "{poles:?} {:e}", difference(&response, &y));
+        // From rest there is nothing to estimate.
+        let record = Record::new(&y, views(&u)).unwrap();
+        let response = simulate(&model, &record, Start::Estimated).unwrap();
+        assert!(difference(&response, &y) < 1e-9, "{poles:?}");
+    }
+}
+
+#[test]
 fn an_estimated_start_is_the_best_there_is() {
     let mut noise = Noise(4);
     for model in models() {

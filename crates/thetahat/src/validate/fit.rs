@@ -100,3 +100,52 @@ impl Fit {
         Ok((fit, response))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::Offset;
+    use crate::estimate::arx;
+    use crate::regression::noise::Noise;
+    use crate::{Initial, Orders, Signal};
+
+    #[test]
+    fn figures_are_what_they_say() {
+        let mut noise = Noise(1);
+        let u = noise.take(200);
+        let mut y = vec![3.0];
+        (1..200).for_each(|t| y.push(0.7 * y[t - 1] + u[t - 1] + 0.2 * noise.next()));
+        let mut record = Record::new(&y, vec![&u]).unwrap();
+        let orders = Orders::arx(1, &[1], &[1]).unwrap();
+        let estimate = arx(&record, &orders, Initial::Drop).unwrap();
+        let signal = || Signal { name: String::new(), offset: Offset::default() };
+        let model = Model::arx(&orders, &estimate, 1.0, vec![signal()], signal()).unwrap();
+        let fit = |record: &Record<'_>, horizon, initial| {
+            Fit::of(&model, record, &[], None, horizon, initial).unwrap()
+        };
+
+        // One step ahead on the rows of the fit: its own residuals.
+        let (figures, _) = fit(&record, Horizon::Steps { steps: 1 }, Start::Measured);
+        assert_eq!(figures.samples, 199);
+        assert!((figures.rmse.unwrap() - estimate.mse().sqrt()).abs() < 1e-14);
+
+        record.segments = vec![10..12, 20..120];
+        record.past = vec![0, 0];
+        let (figures, response) = fit(&record, Horizon::FreeRun, Start::Zero);
+        let rows = || (10..12).chain(20..120);
+        let mean = rows().map(|t| y[t]).sum::<f64>() / 102.0;
+        let error = rows().map(|t| (y[t] - response.values[t]).powi(2)).sum::<f64>();
+        let spread = rows().map(|t| (y[t] - mean).powi(2)).sum::<f64>();
+        assert_eq!(figures.samples, 102);
+        assert!((figures.rmse.unwrap() - (error / 102.0).sqrt()).abs() < 1e-14);
+        assert!((figures.percent.unwrap() - 100.0 * (1.0 - (error / spread).sqrt())).abs() < 1e-11);
+
+        // No sample is far enough from a start; nothing to explain.
+        let (figures, _) = fit(&record, Horizon::Steps { steps: 300 }, Start::Measured);
+        assert_eq!((figures.samples, figures.percent, figures.rmse), (0, None, None));
+        let constant = [1.0; 10];
+        let (figures, _) =
+            fit(&Record::new(&constant, vec![&constant]).unwrap(), Horizon::FreeRun, Start::Zero);
+        assert_eq!((figures.samples, figures.percent), (10, None));
+    }
+}

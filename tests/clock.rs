@@ -1,0 +1,243 @@
+//! Where times come from: seconds, dates, a sample time; gaps, and logs made uniform.
+
+use serde_json::{Value, json};
+
+use crate::harness::{Answer, Folder, distance, number, parameters};
+use crate::signals::{Experiment, Random, csv};
+
+/// Quarters of a second are exact, however they are written and subtracted.
+const STEP: f64 = 0.25;
+
+fn uniform(rows: u32) -> Vec<f64> {
+    (0..rows).map(|row| 100.0 + STEP * f64::from(row)).collect()
+}
+
+/// The plain log with a column of times that are written in some way.
+fn written(time: impl Fn(f64) -> String) -> String {
+    let log = Experiment::new(200).csv();
+    let rows = log.lines().skip(1).zip(uniform(200)).map(|(row, at)| format!("{},{row}\n", time(at)));
+    format!("time,u,y\n{}", rows.collect::<String>())
+}
+
+/// Such as 01:40.25.
+fn minutes_and_seconds(time: f64) -> String {
+    format!("{:02}:{:05.2}", (time / 60.0).floor(), time % 60.0)
+}
+
+/// A report without what it says of the clock's writing.
+fn without_clock(mut report: Value) -> Value {
+    for field in ["file", "time", "start"] {
+        report["data"][field] = Value::Null;
+    }
+    report
+}
+
+#[test]
+fn a_column_of_seconds_gives_the_sample_time() {
+    let folder = Folder::with_log(written(|time| time.to_string()));
+    let report = folder.fit("log.csv --time time --na 2 --nb 2");
+    assert_eq!(number(&report, "/data/sample_time"), STEP);
+    assert_eq!(number(&report, "/model/sample_time"), STEP);
+    assert_eq!(report["data"]["time"], "time");
+    assert_eq!(report["data"]["start"], Value::Null);
+}
+
+#[test]
+fn dates_and_sample_times_say_the_same_as_seconds() {
+    let seconds = Folder::with_log(written(|time| time.to_string())).fit("log.csv --time time --na 2 --nb 2");
+    let expected = without_clock(seconds);
+    for (log, options, start) in [
+        (
+            written(|time| format!("2024-03-01T12:{}Z", minutes_and_seconds(time))),
+            "--time time",
+            json!("2024-03-01T12:01:40.00Z"),
+        ),
+        (
+            written(|time| format!("2024-02-29 23:{}+02:00", minutes_and_seconds(time))),
+            "--time time",
+            json!("2024-02-29 23:01:40.00+02:00"),
+        ),
+        (
+            written(|time| format!("01.03.2024 12:{}", minutes_and_seconds(time))),
+            "--time time --time-format '%d.%m.%Y %H:%M:%S%.f'",
+            json!("01.03.2024 12:01:40.00"),
+        ),
+        (
+            written(|time| format!("12:{}", minutes_and_seconds(time))),
+            "--time time --time-format %H:%M:%S%.f",
+            json!("12:01:40.00"),
+        ),
+        (written(|time| time.to_string()), "--sample-time 0.25", Value::Null),
+    ] {
+        let folder = Folder::with_log(log);
+        let report = folder.fit(&format!("log.csv {options} --na 2 --nb 2"));
+        assert_eq!(report["data"]["start"], start, "{options}");
+        assert_eq!(without_clock(report), expected, "{options}");
+    }
+}
+
+#[test]
+fn a_clock_in_hundredths_gives_a_sample_time_of_a_hundredth() {
+    let Experiment { u, y } = Experiment::new(200);
+    let times: Vec<f64> = (0..200).map(|row| f64::from(row) / 100.0).collect();
+    let report =
+        Folder::with_log(csv(&[("t", &times), ("u", &u), ("y", &y)])).fit("log.csv --time t --na 2 --nb 2");
+    // The median of steps that rounding makes differ.
+    assert!((number(&report, "/model/sample_time") / 0.01 - 1.0).abs() < 1e-12);
+}
+
+#[test]
+fn without_a_clock_rows_are_counted() {
+    let folder = Folder::with_log(Experiment::new(100).csv());
+    let report = folder.fit("log.csv --na 2 --nb 2 --report model.json");
+    assert_eq!(number(&report, "/model/sample_time"), 1.0);
+    let run = folder.done("predict model.json log.csv");
+    assert!(run.stdout.starts_with("row,measured,predicted\n1,"), "{}", run.stdout);
+}
+
+#[test]
+fn a_column_that_looks_like_a_clock_is_pointed_out() {
+    let folder = Folder::with_log(written(|time| time.to_string()));
+    let run = folder.done("fit log.csv --na 2 --nb 2");
+    assert_eq!(run.stderr.lines().count(), 1);
+    assert!(run.stderr.starts_with("warning: ") && run.stderr.contains("--time time"), "{}", run.stderr);
+    assert_eq!(folder.done("fit log.csv --sample-time 2 --na 2 --nb 2").stderr, "");
+}
+
+#[test]
+fn a_step_over_one_and_a_half_medians_starts_a_segment() {
+    let experiment = Experiment::new(200);
+    let late = |by: f64| -> Vec<f64> {
+        let late = |(row, time): (usize, f64)| if row < 120 { time } else { time + by };
+        uniform(200).into_iter().enumerate().map(late).collect()
+    };
+    let folder = Folder::with_log(experiment.timed(&late(0.51 * STEP)));
+    let run = folder.done("fit log.csv --time time --na 2 --nb 2 --format json --report gap.json");
+    assert!(run.stderr.starts_with("warning: ") && run.stderr.contains("clock"), "{}", run.stderr);
+    let report: Value = serde_json::from_str(&run.stdout).unwrap();
+    assert_eq!(report["data"]["segments"], json!([[1, 120], [121, 200]]));
+    assert_eq!(number(&report, "/data/time_gaps"), 1.0);
+    assert_eq!(number(&report, "/data/sample_time"), STEP);
+    assert_eq!(number(&report, "/estimation/samples"), 196.0);
+
+    // The same as a missing value there, but for the row that it takes.
+    let at = |signal: &[f64]| [&signal[..120], &[f64::NAN], &signal[120..]].concat();
+    folder.write("missing.csv", csv(&[("u", &at(&experiment.u)), ("y", &at(&experiment.y))]));
+    let missing = folder.fit("missing.csv --na 2 --nb 2");
+    assert!(distance(&parameters(&report), &parameters(&missing)) < 1e-12);
+
+    // A prediction does not reach across either.
+    let answer = Answer::read(&folder.done("predict gap.json log.csv --time time").stdout);
+    let without: Vec<usize> = (0..200).filter(|row| answer.predicted[*row].is_none()).collect();
+    assert_eq!(without, [0, 1, 120, 121]);
+}
+
+#[test]
+fn a_step_below_one_and_a_half_medians_is_jitter() {
+    let times: Vec<f64> =
+        uniform(200).iter().enumerate().map(|(row, t)| if row < 120 { *t } else { t + 0.12 }).collect();
+    let folder = Folder::with_log(Experiment::new(200).timed(&times));
+    let line = folder.refused("fit log.csv --time time --na 2 --nb 2", 3);
+    assert!(line.contains("log.csv:122") && line.contains("--resample"), "{line}");
+}
+
+#[test]
+fn jitter_of_a_tenth_is_fine() {
+    let mut random = Random::new(9);
+    let times: Vec<f64> = uniform(200).iter().map(|time| time + 0.04 * STEP * random.uniform()).collect();
+    let folder = Folder::with_log(Experiment::new(200).timed(&times));
+    let report = folder.fit("log.csv --time time --na 2 --nb 2");
+    assert!((number(&report, "/model/sample_time") - STEP).abs() < 0.02 * STEP);
+    assert_eq!(report["data"]["segments"], json!([[1, 200]]));
+}
+
+/// A log with an irregular clock, and what it is at every half second from its first sample on.
+fn irregular() -> (String, [[Vec<f64>; 2]; 2]) {
+    let mut random = Random::new(10);
+    let mut now = 3.0;
+    let mut samples = Vec::new();
+    for _ in 0..300 {
+        samples.push((now, random.uniform(), 10.0 + random.uniform()));
+        now += 0.5 * (1.0 + 0.9 * random.uniform());
+    }
+    let column = |of: fn(&(f64, f64, f64)) -> f64| samples.iter().map(of).collect::<Vec<f64>>();
+    let (t, u, y) = (column(|s| s.0), column(|s| s.1), column(|s| s.2));
+    let log = csv(&[("t", &t), ("u", &u), ("y", &y)]);
+
+    let instants = (0..).map(|k| 3.0 + 0.5 * f64::from(k)).take_while(|at| *at <= t[299]);
+    let places: Vec<(usize, f64)> =
+        instants.map(|at| (t.iter().rposition(|t| *t <= at).expect("the first is the start"), at)).collect();
+    let hold = |values: &[f64]| places.iter().map(|(left, _)| values[*left]).collect::<Vec<f64>>();
+    let linear = |values: &[f64]| {
+        let between = |(left, at): &(usize, f64)| match t.get(left + 1) {
+            Some(next) => {
+                let share = (at - t[*left]) / (next - t[*left]);
+                values[*left] + share * (values[left + 1] - values[*left])
+            }
+            None => values[*left],
+        };
+        places.iter().map(between).collect::<Vec<f64>>()
+    };
+    (log, [[hold(&u), hold(&y)], [linear(&u), linear(&y)]])
+}
+
+#[test]
+fn a_resampled_log_gives_the_fit_of_the_uniform_one() {
+    let (log, uniform) = irregular();
+    for (how, [u, y]) in ["hold", "linear"].into_iter().zip(uniform) {
+        let folder = Folder::with_log(&log);
+        folder.write("uniform.csv", csv(&[("u", &u), ("y", &y)]));
+        let options = "--na 2 --nb 2 --report model.json";
+        let expected = folder.fit(&format!("uniform.csv --sample-time 0.5 {options}"));
+        let report = folder.fit(&format!("log.csv --time t --resample 0.5:{how} {options}"));
+        assert!(distance(&parameters(&report), &parameters(&expected)) < 1e-9, "{how}");
+        assert_eq!(report["data"]["rows"], expected["data"]["rows"]);
+        assert_eq!(number(&report, "/data/sample_time"), 0.5);
+        let provenance = json!({"step": 0.5, "interpolation": how, "rows": 300});
+        assert_eq!(report["data"]["resampled"], provenance);
+
+        let run = folder.done(&format!("predict model.json log.csv --time t --resample 0.5:{how}"));
+        let answer = Answer::read(&run.stdout);
+        let measured: Vec<f64> = answer.measured.iter().flatten().copied().collect();
+        assert!(distance(&measured, &y) < 1e-12, "{how}");
+        assert_eq!(answer.time[..3], [3.0, 3.5, 4.0]);
+    }
+}
+
+#[test]
+fn an_irregular_log_is_refused_unless_it_is_resampled() {
+    let line = Folder::with_log(irregular().0).refused("fit log.csv --time t --na 2 --nb 2", 3);
+    assert!(line.contains("log.csv:") && line.contains("--resample"), "{line}");
+}
+
+#[test]
+fn a_missing_value_stays_missing_after_resampling() {
+    let mut experiment = Experiment::new(200);
+    experiment.y[80] = f64::NAN;
+    let folder = Folder::with_log(experiment.timed(&uniform(200)));
+    for (how, segments) in
+        [("hold", json!([[1, 160], [163, 399]])), ("linear", json!([[1, 159], [163, 399]]))]
+    {
+        let report = folder.fit(&format!("log.csv --time time --resample 0.125:{how} --na 1 --nb 1"));
+        assert_eq!(report["data"]["segments"], segments, "{how}");
+    }
+}
+
+#[test]
+fn predictions_carry_the_logs_own_times() {
+    let folder = Folder::with_log(written(|time| time.to_string()));
+    folder.done("fit log.csv --time time --na 2 --nb 2 --report model.json");
+    let run = folder.done("predict model.json log.csv --time time");
+    assert!(run.stdout.starts_with("time,measured,predicted\n"), "{}", run.stdout);
+    assert_eq!(Answer::read(&run.stdout).time, uniform(200));
+}
+
+#[test]
+fn options_of_the_clock_that_exclude_or_need_each_other() {
+    let folder = Folder::with_log(written(|time| time.to_string()));
+    for options in ["--time time --sample-time 1", "--resample 1:hold", "--time-format %s"] {
+        let run = folder.run(&format!("fit log.csv {options} --na 2 --nb 2"));
+        assert_eq!(run.code, 2, "{options}: {}", run.stderr);
+        assert!(run.stdout.is_empty() && run.stderr.starts_with("error: "), "{options}: {}", run.stderr);
+    }
+}

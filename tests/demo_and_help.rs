@@ -1,0 +1,159 @@
+//! What a first user meets: the demo, the help and its examples, manual pages and completions.
+
+use crate::harness::Folder;
+use crate::signals::{Experiment, csv};
+
+const VERBS: [&str; 7] = ["fit", "predict", "simulate", "demo", "schema", "completions", "man"];
+
+/// The examples of a help text, as far as the shell would pass them to the program.
+fn examples(help: &str) -> Vec<String> {
+    let joined = help.replace("\\\n", " ");
+    let lines = joined.lines().filter_map(|line| line.strip_prefix("  thetahat "));
+    lines.map(|line| line.split(['>', '|']).next().unwrap_or_default().trim().to_owned()).collect()
+}
+
+#[test]
+fn the_demo_writes_log_and_report_and_prints_what_fit_prints() {
+    let folder = Folder::new();
+    let demo = folder.done("demo");
+    assert_eq!(demo.stderr, "");
+    let (command, table) = demo.stdout.split_once("\n\n").unwrap();
+    let words = command.strip_prefix("thetahat ").unwrap();
+    let report = folder.read("thetahat-demo/dc_motor.json");
+    assert_eq!(folder.done(words).stdout, table);
+    assert_eq!(folder.read("thetahat-demo/dc_motor.json"), report);
+    assert!(report.starts_with('{') && folder.read("thetahat-demo/dc_motor.csv").starts_with("t,u,y\n"));
+    assert!(table.contains("\nstable\n"), "{table}");
+}
+
+#[test]
+fn the_demo_goes_to_the_folder_that_is_named_as_often_as_it_is_run() {
+    let folder = Folder::new();
+    let first = folder.done("demo some/where");
+    assert_eq!(folder.done("demo some/where").stdout, first.stdout);
+    assert!(folder.read("some/where/dc_motor.json").starts_with('{'));
+    assert_eq!(folder.names(), ["some"]);
+}
+
+#[test]
+fn a_demo_that_cannot_write_says_so() {
+    let folder = Folder::new();
+    folder.write("file", "");
+    for place in ["file", "file/below"] {
+        assert!(folder.refused(&format!("demo {place}"), 5).contains(place));
+    }
+}
+
+#[test]
+fn every_verb_has_examples_and_they_run() {
+    let Experiment { u, y } = Experiment::new(1000);
+    let times: Vec<f64> = (0..1000).map(|row| 0.08 * f64::from(row)).collect();
+    let folder =
+        Folder::with_log(csv(&[("t", &times), ("u", &u), ("y", &y), ("heater", &u), ("temperature", &y)]));
+    folder.write("sunspots.csv", csv(&[("count", &y)]));
+    for verb in VERBS {
+        let examples = examples(&folder.done(&format!("{verb} --help")).stdout);
+        assert!(!examples.is_empty(), "{verb}");
+        for example in examples {
+            assert!(example.starts_with(verb), "{example}");
+            folder.done(&format!("{example} --help"));
+            folder.done(&example);
+        }
+    }
+}
+
+#[test]
+fn help_lists_the_verbs_and_the_exit_codes() {
+    let help = Folder::new().done("--help").stdout;
+    for verb in VERBS {
+        assert!(help.contains(&format!("\n  {verb} ")), "{verb}");
+    }
+    for code in ["0  done", "2  usage", "3  bad data", "4  the data cannot", "5  input/output"] {
+        assert!(help.contains(&format!("\n  {code}")), "{code}");
+    }
+}
+
+#[test]
+fn help_of_fit_lists_its_options() {
+    let help = Folder::new().done("fit --help").stdout;
+    for option in [
+        "-u, --input",
+        "-y, --output",
+        "--time",
+        "--time-format",
+        "--sample-time",
+        "--resample",
+        "--estimate",
+        "--validate",
+        "--detrend",
+        "--offset",
+        "--model",
+        "--na",
+        "--nb",
+        "--nk",
+        "--initial",
+        "--report",
+        "--format",
+        "--delimiter",
+        "--decimal-comma",
+        "--no-header",
+        "--skip-rows",
+        "--comment",
+        "--missing",
+        "--encoding",
+    ] {
+        assert!(help.contains(&format!(" {option}")), "{option}");
+    }
+}
+
+#[test]
+fn without_a_verb_there_is_help_and_exit_code_2() {
+    let run = Folder::new().run("");
+    assert_eq!((run.code, run.stdout.as_str()), (2, ""));
+    assert!(run.stderr.contains("Usage: thetahat"), "{}", run.stderr);
+}
+
+#[test]
+fn command_lines_that_make_no_sense_are_exit_code_2() {
+    let folder = Folder::new();
+    for line in [
+        "dance",
+        "fit",
+        "fit log.csv",
+        "fit log.csv --na 2",
+        "fit log.csv --na two --nb 2",
+        "predict",
+        "man dance",
+    ] {
+        let run = folder.run(line);
+        assert_eq!((run.code, run.stdout.as_str()), (2, ""), "{line}");
+        assert!(run.stderr.starts_with("error: "), "{line}: {}", run.stderr);
+    }
+}
+
+#[test]
+fn it_knows_its_version() {
+    assert_eq!(Folder::new().done("--version").stdout, concat!("thetahat ", env!("CARGO_PKG_VERSION"), "\n"));
+}
+
+#[test]
+fn there_is_a_manual_page_for_the_program_and_every_verb() {
+    let folder = Folder::new();
+    let page = folder.done("man").stdout;
+    assert!(page.contains(".TH thetahat 1") && page.contains("Exit codes"), "{page}");
+    for verb in VERBS {
+        let page = folder.done(&format!("man {verb}")).stdout;
+        assert!(page.contains(&format!(".TH thetahat-{verb} 1")), "{verb}");
+        assert!(page.contains("Example"), "{verb}");
+    }
+}
+
+#[test]
+fn there_are_completions_for_every_shell() {
+    for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
+        let script = Folder::new().done(&format!("completions {shell}")).stdout;
+        for word in VERBS.into_iter().chain(["detrend", "horizon"]) {
+            assert!(script.contains(word), "{shell}: {word}");
+        }
+    }
+}

@@ -1,0 +1,232 @@
+//! Values that other programs found in public logs. The logs are beside the repository; without them these tests skip.
+
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use crate::harness::{Answer, Folder, number, numbers, parameters};
+use crate::signals::csv;
+
+/// What is in ../shared, if it is there.
+fn shared(name: &str) -> Option<PathBuf> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared").join(name);
+    if path.exists() {
+        return Some(path);
+    }
+    let thread = std::thread::current();
+    let line = format!("skipped: ../shared/data is not here ({})\n", thread.name().unwrap_or_default());
+    // Straight to standard error: the test runner keeps to itself what a test prints that passes.
+    let _ = std::io::stderr().write_all(line.as_bytes());
+    None
+}
+
+/// A folder with a public log in it, called log.csv.
+fn folder_with(log: &str) -> Option<Folder> {
+    Some(Folder::with_log(fs::read(shared("data")?.join(log)).ok()?))
+}
+
+/// The last digit of a number written with so many significant digits.
+fn last_digit(value: f64, digits: i32) -> f64 {
+    10_f64.powi(value.abs().log10().floor() as i32 + 1 - digits)
+}
+
+fn assert_parameters(report: &Value, expected: &[f64]) {
+    let found = parameters(report);
+    assert_eq!(found.len(), expected.len());
+    for (found, expected) in found.iter().zip(expected) {
+        assert!((found / expected - 1.0).abs() < 1e-5, "{found} {expected}");
+    }
+}
+
+fn assert_mse(report: &Value, expected: f64) {
+    let found = number(report, "/estimation/mse");
+    assert!((found / expected - 1.0).abs() < 1e-7, "{found} {expected}");
+}
+
+/// The figures that a report gives for a part and kind of horizon.
+fn figures<'a>(report: &'a Value, part: &str, kind: &str) -> &'a Value {
+    let fits = report["fit"].as_array().into_iter().flatten();
+    fits.into_iter().find(|fit| fit["part"] == part && fit["horizon"]["kind"] == kind).unwrap_or(&Value::Null)
+}
+
+#[test]
+fn every_arx_case_of_the_reference_file_is_reproduced() {
+    let Some(cases) = shared("reference_cases.json") else { return };
+    let Some(data) = shared("data") else { return };
+    let cases: Value = serde_json::from_slice(&fs::read(cases).unwrap()).unwrap();
+    let mut reproduced = 0;
+    for case in cases.as_array().unwrap().iter().filter(|case| case["model"] == "arx") {
+        let words = |key: &str| -> Vec<String> {
+            let values = case[key].as_array().unwrap().iter();
+            values.map(|value| value.as_str().map_or(value.to_string(), str::to_owned)).collect()
+        };
+        let (orders, rows) = (words("orders"), words("rows"));
+        let report = Folder::new().fit(&format!(
+            "{} -u {} -y {} --estimate {}..{} --na {} --nb {} --nk {}",
+            data.join(case["file"].as_str().unwrap()).with_extension("csv").display(),
+            words("inputs").join(","),
+            case["output"].as_str().unwrap(),
+            rows[0],
+            rows[1],
+            orders[0],
+            orders[1],
+            orders[5],
+        ));
+        assert_parameters(&report, &numbers(&case["theta"]));
+        for (position, expected) in numbers(&case["se"]).into_iter().enumerate() {
+            let found = number(&report, &format!("/model/parameters/{position}/standard_error"));
+            // The reference has four digits.
+            assert!((found - expected).abs() <= 0.5001 * last_digit(expected, 4), "{found} {expected}");
+        }
+        assert_mse(&report, case["mse"].as_f64().unwrap());
+        reproduced += 1;
+    }
+    assert!(reproduced >= 7, "{reproduced}");
+}
+
+#[test]
+fn hair_dryer_rows_1_to_300() {
+    let Some(folder) = folder_with("hair_dryer.csv") else { return };
+    let report = folder.fit("log.csv --sample-time 0.08 --estimate 1..300 --na 2 --nb 2 --nk 3");
+    assert_parameters(&report, &[-1.2737387, 0.3935461, 0.0666179, 0.0444819]);
+    for (position, expected) in [0.020906, 0.019096, 0.002138, 0.003317].into_iter().enumerate() {
+        let found = number(&report, &format!("/model/parameters/{position}/standard_error"));
+        assert!((found - expected).abs() < 5.1e-7, "{found} {expected}");
+    }
+    assert_mse(&report, 0.0016853093);
+    let one_step = figures(&report, "estimation", "steps");
+    assert_eq!(one_step["horizon"]["steps"], 1);
+    assert!((number(one_step, "/percent") - 95.119).abs() < 5.1e-4, "{one_step}");
+    assert_eq!(number(&report, "/model/sample_time"), 0.08);
+}
+
+#[test]
+fn hair_dryer_rows_1_to_500() {
+    let Some(folder) = folder_with("hair_dryer.csv") else { return };
+    let report =
+        folder.fit("log.csv --sample-time 0.08 --estimate 1..500 --validate 501..1000 --na 2 --nb 2 --nk 3");
+    assert_parameters(&report, &[-1.2765388, 0.3967106, 0.0651903, 0.0451792]);
+    assert_mse(&report, 0.0016865692);
+    assert_eq!(number(&report, "/estimation/samples"), 496.0);
+    assert!((number(&report, "/estimation/fpe") - 0.00171399).abs() < 5.1e-9);
+    let free_run = figures(&report, "validation", "free-run");
+    assert_eq!(free_run["initial"], "estimated");
+    assert!((number(free_run, "/percent") - 85.585).abs() < 5.1e-4, "{free_run}");
+}
+
+#[test]
+fn free_runs_of_the_hair_dryer_from_every_start_and_with_either_means() {
+    let Some(folder) = folder_with("hair_dryer.csv") else { return };
+    folder.done("fit log.csv --sample-time 0.08 --estimate 1..500 --na 2 --nb 2 --nk 3 --report model.json");
+    for (options, expected) in [
+        ("--initial zero", 84.733),
+        ("--initial estimated", 85.585),
+        ("--initial measured", 85.581),
+        ("--initial zero --detrend mean", 89.546),
+        ("--initial estimated --detrend mean", 91.221),
+        // The measured samples before the rows are the start.
+        ("--initial measured --detrend mean", 91.162),
+    ] {
+        let run = folder.done(&format!("simulate model.json log.csv --rows 501..1000 {options}"));
+        let answer = Answer::read(&run.stdout);
+        assert_eq!(answer.samples(), 500, "{options}");
+        assert!((answer.percent() - expected).abs() < 5.1e-4, "{options}: {}", answer.percent());
+        assert!(run.stderr.contains(&format!("fit {expected:.3} %")), "{options}: {}", run.stderr);
+    }
+}
+
+#[test]
+fn the_hair_dryer_has_a_delay_of_three_samples() {
+    let Some(folder) = folder_with("hair_dryer.csv") else { return };
+    let means = "--offset u=4.994 --offset y=4.84337228";
+    for (first, expected) in [
+        (12, [0.008790, 0.002801, 0.001670, 0.007196, 0.009917]),
+        (7, [0.008760, 0.002818, 0.001691, 0.007157, 0.009901]),
+    ] {
+        for (nk, expected) in (1..=5).zip(expected) {
+            // All on the same samples: a full regressor needs nk + 1 rows more.
+            let rows = first - (nk + 1);
+            let report =
+                folder.fit(&format!("log.csv --estimate {rows}..500 --na 2 --nb 2 --nk {nk} {means}"));
+            assert_eq!(number(&report, "/estimation/samples"), f64::from(501 - first));
+            let found = number(&report, "/estimation/mse");
+            assert!((found - expected).abs() < 5.1e-7, "nk {nk} from {first}: {found} {expected}");
+        }
+    }
+}
+
+#[test]
+fn heating_system_exchanger_and_ball_on_a_beam() {
+    let Some(data) = shared("data") else { return };
+    for (log, theta, mse) in [
+        ("heating_system.csv", [-1.5993449, 0.6135762, 0.0321431, 0.2334923], 0.086460568),
+        ("exchanger.csv", [-1.1297315, 0.1978665, -0.1320934, -0.3534605], 0.18273098),
+        ("ball_beam.csv", [-1.7156714, 0.7161686, -0.6405759, 0.6680734], 4.4838769e-06),
+    ] {
+        let report = Folder::new().fit(&format!("{} --na 2 --nb 2 --nk 1", data.join(log).display()));
+        assert_parameters(&report, &theta);
+        assert_mse(&report, mse);
+    }
+}
+
+#[test]
+fn cascaded_tanks_free_run_and_one_step() {
+    let Some(folder) = folder_with("cascaded_tanks_est.csv") else { return };
+    let validation = shared("data").unwrap().join("cascaded_tanks_val.csv");
+    folder.done("fit log.csv --sample-time 4 --estimate 1..700 --na 8 --nb 9 --nk 0 --report model.json");
+    let rmse = |line: &str| {
+        let run = folder.done(&format!("{line} --rows 9..1024 --initial measured"));
+        let answer = Answer::read(&run.stdout);
+        assert_eq!(answer.samples(), 1016, "{line}");
+        answer.rmse()
+    };
+    let free_run = rmse(&format!("simulate model.json {}", validation.display()));
+    assert!((free_run - 0.685015115).abs() < 1e-8, "{free_run}");
+    let one_step = rmse(&format!("predict model.json {} --horizon 1", validation.display()));
+    assert!((one_step - 0.053048125).abs() < 1e-8, "{one_step}");
+}
+
+#[test]
+fn coupled_drives_free_run() {
+    let Some(folder) = folder_with("ced_uniform.csv") else { return };
+    for (input, output, expected) in [("u11", "z11", 0.29147921870), ("u12", "z12", 0.33050455205)] {
+        folder.done(&format!(
+            "fit log.csv --sample-time 0.02 -u {input} -y {output} --estimate 1..200 --na 10 --nb 10 --nk 0 \
+             --report model.json"
+        ));
+        let run = folder.done("simulate model.json log.csv --rows 411..500 --initial measured");
+        let answer = Answer::read(&run.stdout);
+        assert_eq!(answer.samples(), 90);
+        assert!((answer.rmse() - expected).abs() < 1e-9, "{}", answer.rmse());
+    }
+}
+
+#[test]
+fn z_scored_tanks_give_the_same_predictions() {
+    let Some(folder) = folder_with("cascaded_tanks_est.csv") else { return };
+    let mut columns = [Vec::new(), Vec::new()];
+    for row in csv::Reader::from_reader(folder.read("log.csv").as_bytes()).deserialize() {
+        let row: [f64; 2] = row.unwrap();
+        columns.iter_mut().zip(row).for_each(|(column, value)| column.push(value));
+    }
+    let scores = columns.map(|column| {
+        let training = &column[..700];
+        let mean = training.iter().sum::<f64>() / 700.0;
+        let deviation = (training.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / 700.0).sqrt();
+        let scored: Vec<f64> = column.iter().map(|v| (v - mean) / deviation).collect();
+        (scored, mean, deviation)
+    });
+    folder.write("scored.csv", csv(&[("u", &scores[0].0), ("y", &scores[1].0)]));
+    let answer = |log: &str| {
+        folder.done(&format!("fit {log} --estimate 1..700 --na 8 --nb 9 --nk 0 --report model.json"));
+        let run = folder.done(&format!("simulate model.json {log} --rows 701..1024 --initial measured"));
+        Answer::read(&run.stdout).predicted
+    };
+    for (plain, scored) in answer("log.csv").into_iter().zip(answer("scored.csv")) {
+        let (plain, scored) = (plain.unwrap(), scores[1].1 + scores[1].2 * scored.unwrap());
+        // The condition number is 9e8: rounding the scores alone moves the predictions by 1e-9.
+        assert!((plain - scored).abs() < 1e-7, "{plain} {scored}");
+    }
+}

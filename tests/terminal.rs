@@ -1,0 +1,101 @@
+//! Colours and progress: on a terminal, and nowhere else.
+
+use crate::harness::{Folder, Run};
+
+const BAD: &str = "fit nowhere.csv --na 2 --nb 2";
+
+#[test]
+fn there_are_no_colours_in_a_pipe() {
+    let folder = Folder::new();
+    for line in [BAD, "fit", "--help", "fit --help", "demo"] {
+        let run = folder.run(line);
+        assert!(!run.stdout.contains('\u{1b}') && !run.stderr.contains('\u{1b}'), "{line}");
+    }
+}
+
+#[test]
+fn colours_can_be_asked_for_in_a_pipe() {
+    let folder = Folder::new();
+    let mut command = folder.command(BAD);
+    command.env("CLICOLOR_FORCE", "1");
+    let run = Run::of(command);
+    assert!(run.stderr.starts_with('\u{1b}') && run.stderr.contains("error:"), "{:?}", run.stderr);
+}
+
+#[cfg(unix)]
+mod unix {
+    use std::ffi::OsStr;
+    use std::fs::File;
+    use std::io::{Read, Write};
+    use std::os::unix::ffi::OsStrExt;
+    use std::process::{Command, Stdio};
+    use std::time::Duration;
+
+    use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+    use rustix::termios::{Winsize, tcsetwinsize};
+
+    use super::*;
+    use crate::signals::Experiment;
+
+    /// Runs the program with standard error on a terminal, and gives what that shows.
+    fn on_terminal(mut command: Command, feed: impl FnOnce(&mut dyn Write)) -> String {
+        let ours = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).expect("there is a pseudo-terminal");
+        grantpt(&ours).and_then(|()| unlockpt(&ours)).expect("it is ours");
+        let size = Winsize { ws_row: 24, ws_col: 80, ws_xpixel: 0, ws_ypixel: 0 };
+        tcsetwinsize(&ours, size).expect("it has a size");
+        let name = ptsname(&ours, Vec::new()).expect("it has a name");
+        let theirs = File::options().read(true).write(true).open(OsStr::from_bytes(name.as_bytes()));
+        command.env("TERM", "xterm").stdin(Stdio::piped()).stdout(Stdio::null());
+        command.stderr(theirs.expect("its other side opens"));
+        let mut child = command.spawn().expect("the program starts");
+        // With its other side: reading ends when nobody holds that any more.
+        drop(command);
+        feed(&mut child.stdin.take().expect("standard input is a pipe"));
+        let mut shown = Vec::new();
+        // Linux says with an error that the other side is closed.
+        let _ = File::from(ours).read_to_end(&mut shown);
+        child.wait().expect("the program ends");
+        String::from_utf8_lossy(&shown).into_owned()
+    }
+
+    #[test]
+    fn an_error_is_coloured_on_a_terminal() {
+        let folder = Folder::new();
+        let shown = on_terminal(folder.command(BAD), |_| {});
+        assert!(shown.starts_with('\u{1b}') && shown.contains("error:"), "{shown:?}");
+    }
+
+    #[test]
+    fn a_terminal_without_colours_is_respected() {
+        let folder = Folder::new();
+        let mut command = folder.command(BAD);
+        command.env("NO_COLOR", "1");
+        let shown = on_terminal(command, |_| {});
+        assert!(shown.starts_with("error:") && !shown.contains('\u{1b}'), "{shown:?}");
+    }
+
+    /// A log in two pieces of more than two mebibytes, the second of which comes more than a second later.
+    fn slowly(into: &mut dyn Write) {
+        let log = Experiment::new(1000).csv();
+        let piece = log.split_once('\n').map_or("", |(_, rows)| rows).repeat(80);
+        let mut write = |text: &str| into.write_all(text.as_bytes()).expect("the program reads on");
+        write("u,y\n");
+        write(&piece);
+        std::thread::sleep(Duration::from_millis(1200));
+        write(&piece);
+    }
+
+    #[test]
+    fn a_log_that_takes_a_second_shows_its_progress_on_a_terminal_only() {
+        let folder = Folder::new();
+        let line = "fit - --na 1 --nb 1";
+        let shown = on_terminal(folder.command(line), slowly);
+        assert!(shown.contains("reading"), "{shown:?}");
+
+        let mut child = folder.command(line);
+        let mut child =
+            child.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+        slowly(&mut child.stdin.take().unwrap());
+        assert_eq!(Run::from(child.wait_with_output().unwrap()).stderr, "");
+    }
+}

@@ -98,7 +98,10 @@ fn starts(rising: &[f64]) -> Vec<Complex<f64>> {
             let (count, radius) = (ends[1] - ends[0], (-slope(ends[0], ends[1])).exp2());
             // Turned from the real axis, so that no symmetry holds two roots together.
             let turn = 0.7 + TAU * edge as f64 / rising.len() as f64;
-            (0..count).map(move |k| Complex::from_polar(radius, turn + TAU * k as f64 / count as f64))
+            (0..count).map(move |k| {
+                let (sine, cosine) = (turn + TAU * k as f64 / count as f64).sin_cos();
+                Complex::new(radius * cosine, radius * sine)
+            })
         })
         .collect()
 }

@@ -9,11 +9,9 @@
 //!                      [R; B] <- (I - tau v v') [R; B]
 //! ```
 //!
-//! faer's blocked QR was tried first. Since 0.24 it treats a column as dependent when what the columns
-//! before it leave is below 16 m eps of its norm (m rows), and drops that rest: at m = 1024 that is 4e-12,
-//! which spoils the fourth digit at a condition number of 1e8. These reflections drop nothing, and their
-//! eight-lane sums give the same bits on every instruction set.
-
+//! These reflections drop nothing, and their eight-lane sums give the same bits on every instruction set. faer's QR
+//! (0.24) does neither: a column that those before it explain to 16 m eps of its norm (m rows; 4e-12 at m = 1024) is
+//! taken as dependent, the rest of it is dropped, and the factor is no longer triangular.
 //!
 //! Reflections are not compensated: each fold leaves an error of about eps / 4 in R, all of one sign. So rows are
 //! folded in blocks of 8192, and the blocks' factors are merged by [`LeastSquares`], which is compensated (folding

@@ -43,13 +43,15 @@ pub fn apply(
     let rows = checked("--rows", if rows.is_empty() { &all } else { rows }, log.rows())?;
     let names: Vec<String> = model.inputs.iter().map(|input| input.name.clone()).collect();
     let output = &model.output.name;
-    let measured = log.has(output);
-    if !measured && (horizon != Horizon::FreeRun || initial != Start::Zero) {
+    // A copy, as what is taken off and put back on again is no longer the same to the bit.
+    let measured = log.channel(output).ok().map(|channel| channel.values.clone());
+    let has_output = measured.is_some();
+    if !has_output && (horizon != Horizon::FreeRun || initial != Start::Zero) {
         return Err(Error::data(format!(
             "the log has no output '{output}': only a free run from zero can do without it"
         )));
     }
-    let used: Vec<&str> = names.iter().chain(measured.then_some(output)).map(String::as_str).collect();
+    let used: Vec<&str> = names.iter().chain(has_output.then_some(output)).map(String::as_str).collect();
     let segments = log.segments(&used, &rows)?;
     let mut level = model.output.offset;
     for signal in
@@ -67,7 +69,7 @@ pub fn apply(
     }
 
     let absent;
-    let record = if measured {
+    let record = if has_output {
         log.record(&names, output, &rows)?
     } else {
         absent = vec![0.0; log.rows()];
@@ -75,19 +77,15 @@ pub fn apply(
         let past = vec![0; segments.len()];
         Record { output: &absent, inputs: inputs.collect::<Result<_, Error>>()?, segments, past }
     };
-    let (fit, response) = if measured {
+    let (fit, response) = if has_output {
         let (fit, response) = Fit::of(model, &record, &rows, None, horizon, initial)?;
         (Some(fit), response)
     } else {
         (None, simulate(model, &record, initial)?)
     };
-    let restored = |values: &[f64]| -> Vec<f64> {
-        values.iter().enumerate().map(|(row, value)| value + level.at(log.elapsed(row))).collect()
-    };
-    Ok(Applied {
-        measured: measured.then(|| restored(record.output)),
-        predicted: restored(&response.values),
-        rows,
-        fit,
-    })
+    let mut predicted = response.values;
+    for (row, value) in predicted.iter_mut().enumerate() {
+        *value += level.at(log.elapsed(row));
+    }
+    Ok(Applied { measured, predicted, rows, fit })
 }

@@ -1,4 +1,4 @@
-//! The number of parameters: in the type, or known only at run time.
+//! Sizes: in the type, or known only at run time.
 
 use core::fmt::Debug;
 
@@ -31,11 +31,16 @@ pub trait Workspace: Dim {
     fn square<V: Scalar + Copy>(self, value: V) -> OMatrix<V, Self, Self>
     where
         DefaultAllocator: Allocator<Self, Self>;
-    /// What this size keeps for [`with_scratch`](Workspace::with_scratch).
-    fn scratch<T: Real>(self) -> Self::Scratch<T>;
-    /// Calls `work` with as many scratch elements as the size says, of any value: on the stack, or from
-    /// `kept`.
-    fn with_scratch<T: Real, A>(kept: &mut Self::Scratch<T>, work: impl FnOnce(&mut [T]) -> A) -> A;
+    /// What this size keeps for [`with_scratch`](Workspace::with_scratch) of `V` vectors and `S` square
+    /// matrices.
+    fn scratch<T: Real, const V: usize, const S: usize>(self) -> Self::Scratch<T>;
+    /// Calls `work` with `V` vectors and `S` square matrices of this size, of any content: on the stack, or
+    /// from `kept`.
+    fn with_scratch<T: Real, const V: usize, const S: usize, A>(
+        self,
+        kept: &mut Self::Scratch<T>,
+        work: impl FnOnce([&mut [T]; V], [&mut [T]; S]) -> A,
+    ) -> A;
 }
 
 impl<const N: usize> Workspace for Const<N> {
@@ -57,10 +62,19 @@ impl<const N: usize> Workspace for Const<N> {
         OMatrix::from_data(ArrayStorage([[value; N]; N]))
     }
 
-    fn scratch<T: Real>(self) {}
+    fn scratch<T: Real, const V: usize, const S: usize>(self) {}
 
-    fn with_scratch<T: Real, A>((): &mut (), work: impl FnOnce(&mut [T]) -> A) -> A {
-        work(&mut [T::zero(); N])
+    fn with_scratch<T: Real, const V: usize, const S: usize, A>(
+        self,
+        (): &mut (),
+        work: impl FnOnce([&mut [T]; V], [&mut [T]; S]) -> A,
+    ) -> A {
+        let mut vectors = [[T::zero(); N]; V];
+        let mut squares = [[[T::zero(); N]; N]; S];
+        work(
+            vectors.each_mut().map(|vector| vector.as_mut_slice()),
+            squares.each_mut().map(|square| square.as_flattened_mut()),
+        )
     }
 }
 
@@ -84,12 +98,24 @@ impl Workspace for Dyn {
         OMatrix::from_element_generic(self, self, value)
     }
 
-    fn scratch<T: Real>(self) -> OVector<T, Dyn> {
-        self.vector(T::zero())
+    fn scratch<T: Real, const V: usize, const S: usize>(self) -> OVector<T, Dyn> {
+        Dyn(self.value() * (V + S * self.value())).vector(T::zero())
     }
 
-    fn with_scratch<T: Real, A>(kept: &mut OVector<T, Dyn>, work: impl FnOnce(&mut [T]) -> A) -> A {
-        work(kept.as_mut_slice())
+    fn with_scratch<T: Real, const V: usize, const S: usize, A>(
+        self,
+        kept: &mut OVector<T, Dyn>,
+        work: impl FnOnce([&mut [T]; V], [&mut [T]; S]) -> A,
+    ) -> A {
+        let (size, mut rest) = (self.value(), kept.as_mut_slice());
+        let mut take = |length: usize| {
+            let (taken, left) = core::mem::take(&mut rest).split_at_mut_checked(length).unwrap_or_default();
+            rest = left;
+            taken
+        };
+        let vectors = core::array::from_fn(|_| take(size));
+        let squares = core::array::from_fn(|_| take(size * size));
+        work(vectors, squares)
     }
 }
 
@@ -109,23 +135,54 @@ mod imply {
 /// A size: nalgebra's `Const<N>`, or `Dyn` with the feature `alloc`.
 ///
 /// It collapses nalgebra's allocator bounds into one name, so that a signature over any size reads
-/// `impl<T: Real, N: Dimension>`. The trait is sealed.
+/// `impl<T: Real, N: Dimension>`. Where there are matrices of two sizes, `N: Dimension<M>` says that they can
+/// be N x M and M x N. The trait is sealed.
 ///
 /// ```
-/// use thetahat_core::nalgebra::{Const, OVector};
+/// use thetahat_core::nalgebra::{Const, OMatrix, OVector};
 /// use thetahat_core::{Dimension, Real};
 ///
 /// fn sum<T: Real, N: Dimension>(values: &OVector<T, N>) -> T {
 ///     values.iter().fold(T::zero(), |sum, &value| sum + value)
 /// }
 /// assert_eq!(sum(&OVector::<f64, Const<3>>::new(1.0, 2.0, 4.0)), 7.0);
+///
+/// fn total<T: Real, N: Dimension<M>, M: Dimension>(values: &OMatrix<T, N, M>) -> T {
+///     values.iter().fold(T::zero(), |sum, &value| sum + value)
+/// }
+/// assert_eq!(total(&OMatrix::<f64, Const<1>, Const<2>>::new(1.0, 2.0)), 3.0);
 /// ```
-pub trait Dimension:
-    Workspace + imply::Imply<DefaultAllocator, Type: Allocator<Self> + Allocator<Self, Self>>
+pub trait Dimension<C: Dim = Self>:
+    Workspace
+    + imply::Imply<
+        DefaultAllocator,
+        Type: Allocator<Self> + Allocator<Self, Self> + Allocator<Self, C> + Allocator<C, Self>,
+    >
 {
+    /// A matrix of this many rows, filled with `value`.
+    #[doc(hidden)]
+    fn rows_by<V: Scalar + Copy>(self, columns: C, value: V) -> OMatrix<V, Self, C>;
 }
 
-impl<const N: usize> Dimension for Const<N> {}
+impl<const N: usize, const C: usize> Dimension<Const<C>> for Const<N> {
+    fn rows_by<V: Scalar + Copy>(self, _columns: Const<C>, value: V) -> OMatrix<V, Self, Const<C>> {
+        OMatrix::from_data(ArrayStorage([[value; N]; C]))
+    }
+}
 
 #[cfg(feature = "alloc")]
-impl Dimension for Dyn {}
+impl<const N: usize> Dimension<Dyn> for Const<N> {
+    fn rows_by<V: Scalar + Copy>(self, columns: Dyn, value: V) -> OMatrix<V, Self, Dyn> {
+        OMatrix::from_element_generic(self, columns, value)
+    }
+}
+
+#[cfg(feature = "alloc")]
+impl<C: Dim> Dimension<C> for Dyn
+where
+    DefaultAllocator: Allocator<Dyn, C> + Allocator<C, Dyn>,
+{
+    fn rows_by<V: Scalar + Copy>(self, columns: C, value: V) -> OMatrix<V, Self, C> {
+        OMatrix::from_element_generic(self, columns, value)
+    }
+}

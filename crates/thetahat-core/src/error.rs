@@ -2,6 +2,8 @@
 
 use core::fmt;
 
+use crate::Real;
+
 /// What is wrong, and with which argument.
 ///
 /// Whatever returns an error has left its receiver as it was.
@@ -10,7 +12,7 @@ use core::fmt;
 /// use thetahat_core::Error;
 ///
 /// let error = Error::NotFinite { argument: "output" };
-/// assert_eq!(error.to_string(), "output is NaN or infinite: leave this row out");
+/// assert_eq!(error.to_string(), "output is NaN or infinite: leave this sample out");
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
@@ -58,6 +60,32 @@ pub enum Error {
         /// The number of samples the type holds.
         available: usize,
     },
+    /// A covariance is not symmetric.
+    NotSymmetric {
+        /// The row of an entry that differs from its mirror image, from 0.
+        row: usize,
+        /// The column of that entry, from 0.
+        column: usize,
+    },
+    /// A covariance has a negative variance, or correlations that no random vector can have.
+    NotPositive {
+        /// The argument that has.
+        argument: &'static str,
+        /// The element, from 0, whose variance is negative once the elements after it are known.
+        index: usize,
+    },
+    /// A number lies outside its range.
+    OutOfRange {
+        /// The argument that does.
+        argument: &'static str,
+        /// The range it must lie in.
+        range: &'static str,
+    },
+    /// An innovation has no variance: the measurement and what it measures are both known exactly.
+    NoVariance {
+        /// The element of the measurement, from 0.
+        index: usize,
+    },
     /// A triangular factor has a non-zero entry below its diagonal.
     NotTriangular {
         /// The row of the entry, from 0.
@@ -88,7 +116,7 @@ impl fmt::Display for Error {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
             Error::NotFinite { argument } => {
-                write!(formatter, "{argument} is NaN or infinite: leave this row out")
+                write!(formatter, "{argument} is NaN or infinite: leave this sample out")
             }
             Error::Infinite { argument } => {
                 write!(formatter, "{argument} is infinite: if the sample is missing, pass NaN")
@@ -111,6 +139,23 @@ impl fmt::Display for Error {
                 formatter,
                 "the delays need {needed} stored samples (the nk of all inputs, added up), but the type holds \
                  {available}: make room for {needed}"
+            ),
+            Error::NotSymmetric { row, column } => write!(
+                formatter,
+                "the covariance is not symmetric: entries {row}, {column} and {column}, {row} must be equal"
+            ),
+            Error::NotPositive { argument, index } => write!(
+                formatter,
+                "{argument} is not positive semidefinite: the variance of element {index}, given those after it, \
+                 is negative"
+            ),
+            Error::OutOfRange { argument, range } => {
+                write!(formatter, "{argument} is out of range: it must be {range}")
+            }
+            Error::NoVariance { index } => write!(
+                formatter,
+                "element {index} of the measurement is known exactly before it is measured: give it a noise \
+                 variance above 0"
             ),
             Error::NotTriangular { row, column } => {
                 write!(formatter, "the factor is not upper triangular: row {row}, column {column} must be 0")
@@ -174,4 +219,24 @@ mod tests {
             }
         }
     }
+}
+
+/// That an argument has the size it must have, which a type guarantees but for `Dyn`.
+pub(crate) fn check_length(argument: &'static str, expected: usize, found: usize) -> Result<(), Error> {
+    if found == expected { Ok(()) } else { Err(Error::Length { argument, expected, found }) }
+}
+
+/// That no entry is NaN or infinite.
+pub(crate) fn check_finite<T: Real>(argument: &'static str, entries: &[T]) -> Result<(), Error> {
+    if entries.iter().all(T::is_finite) { Ok(()) } else { Err(Error::NotFinite { argument }) }
+}
+
+/// That an argument has its size and is finite.
+pub(crate) fn check_entries<T: Real>(
+    argument: &'static str,
+    entries: &[T],
+    expected: usize,
+) -> Result<(), Error> {
+    check_length(argument, expected, entries.len())?;
+    check_finite(argument, entries)
 }

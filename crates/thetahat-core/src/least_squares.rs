@@ -2,6 +2,7 @@
 
 use nalgebra::{Const, OMatrix, OVector};
 
+use crate::error::{check_finite, check_length};
 use crate::triangle::{
     Sum, column, column_mut, condition, equilibrate, fold_row, invert, mark_independent, norm, solve,
 };
@@ -89,7 +90,7 @@ impl<T: Real, N: Dimension> LeastSquares<T, N> {
             residual_norm: Sum::new(T::zero()),
             rows: 0,
             uncompensated_rows: 0,
-            scratch: size.scratch(),
+            scratch: size.scratch::<T, 1, 0>(),
         }
     }
 
@@ -177,12 +178,13 @@ impl<T: Real, N: Dimension> LeastSquares<T, N> {
     /// [`Real::LARGEST_ENTRY`], so that nothing that is accepted can overflow later; [`Error::Length`] (only
     /// with `Dyn`); [`Error::TooManyRows`].
     pub fn add(&mut self, regressor: &OVector<T, N>, output: T) -> Result<(), Error> {
-        check_length("regressor", self.rotated_output.len(), regressor.len())?;
+        let size = self.size();
+        check_length("regressor", size.value(), regressor.len())?;
         check_row("regressor", regressor.as_slice())?;
         check_row("output", &[output])?;
         let rows = self.rows.checked_add(1).ok_or(Error::TooManyRows)?;
         let (factor, rotated) = (self.factor_rows.as_mut_slice(), self.rotated_output.as_mut_slice());
-        let rest = N::with_scratch(&mut self.scratch, |row| {
+        let rest = size.with_scratch(&mut self.scratch, |[row], []| {
             for (entry, &given) in row.iter_mut().zip(regressor.as_slice()) {
                 *entry = given;
             }
@@ -213,15 +215,15 @@ impl<T: Real, N: Dimension> LeastSquares<T, N> {
     /// # Ok::<(), Error>(())
     /// ```
     pub fn merge(&mut self, other: &Self) -> Result<(), Error> {
-        let size = self.rotated_output.len();
-        check_length("other", size, other.rotated_output.len())?;
+        let size = self.size();
+        check_length("other", size.value(), other.rotated_output.len())?;
         let rows = self.rows.checked_add(other.rows).ok_or(Error::TooManyRows)?;
         let (factor, rotated) = (self.factor_rows.as_mut_slice(), self.rotated_output.as_mut_slice());
         let residual_norm = &mut self.residual_norm;
         residual_norm.lengthen(other.residual_norm.value);
-        N::with_scratch(&mut self.scratch, |row| {
+        size.with_scratch(&mut self.scratch, |[row], []| {
             for (index, output) in other.rotated_output.as_slice().iter().enumerate() {
-                copy_values(column(other.factor_rows.as_slice(), size, index), row);
+                copy_values(column(other.factor_rows.as_slice(), size.value(), index), row);
                 residual_norm.lengthen(fold_row(factor, rotated, row, index, output.value));
             }
         });
@@ -386,14 +388,6 @@ impl<T: Real, N: Dimension> LeastSquares<T, N> {
     fn size(&self) -> N {
         self.rotated_output.shape_generic().0
     }
-}
-
-fn check_length(argument: &'static str, expected: usize, found: usize) -> Result<(), Error> {
-    if found == expected { Ok(()) } else { Err(Error::Length { argument, expected, found }) }
-}
-
-fn check_finite<T: Real>(argument: &'static str, entries: &[T]) -> Result<(), Error> {
-    if entries.iter().all(T::is_finite) { Ok(()) } else { Err(Error::NotFinite { argument }) }
 }
 
 fn check_size<T: Real>(argument: &'static str, size: T, limit: T) -> Result<(), Error> {

@@ -57,21 +57,30 @@
 //! NaN in a delay line is a missing sample. Anywhere else NaN is an error, and infinity is an error
 //! everywhere. Whatever returns an [`Error`] has changed nothing.
 
+mod covariance;
 mod dim;
 mod error;
+mod innovation;
+mod kalman;
 mod lags;
 mod least_squares;
 #[cfg(test)]
 mod noise;
 mod scalar;
 mod solution;
+mod state_space;
 mod triangle;
+mod ud;
 
 pub use nalgebra;
 
+pub use covariance::Covariance;
 pub use dim::Dimension;
 pub use error::Error;
+pub use innovation::{Action, Innovation};
+pub use kalman::KalmanFilter;
 pub use lags::{ArxOrders, InputOrders, Lags};
 pub use least_squares::{LeastSquares, Rank};
 pub use scalar::Real;
 pub use solution::Solution;
+pub use state_space::{LinearObservation, LinearTransition, Observation, Transition};

@@ -24,6 +24,8 @@ mod sealed {
 pub trait Real: RealField + Copy + sealed::Sealed {
     /// The distance from 1 to the next larger number.
     const EPSILON: Self;
+    /// The smallest positive number of full precision. Its reciprocal is finite.
+    const MIN_POSITIVE: Self;
     /// Not a number: a missing sample.
     const NAN: Self;
     /// Infinity: the condition number of a singular matrix.
@@ -41,6 +43,7 @@ pub trait Real: RealField + Copy + sealed::Sealed {
 
 impl Real for f32 {
     const EPSILON: f32 = f32::EPSILON;
+    const MIN_POSITIVE: f32 = f32::MIN_POSITIVE;
     const NAN: f32 = f32::NAN;
     const INFINITY: f32 = f32::INFINITY;
     const LARGEST_ENTRY: f32 = f32::MAX / (1_u64 << 36) as f32;
@@ -52,6 +55,7 @@ impl Real for f32 {
 
 impl Real for f64 {
     const EPSILON: f64 = f64::EPSILON;
+    const MIN_POSITIVE: f64 = f64::MIN_POSITIVE;
     const NAN: f64 = f64::NAN;
     const INFINITY: f64 = f64::INFINITY;
     const LARGEST_ENTRY: f64 = f64::MAX / (1_u64 << 36) as f64;

@@ -1,0 +1,372 @@
+//! Kernels on a factored covariance P = U D U', U unit upper triangular, D diagonal and not negative.
+//!
+//! Both live in one square, column after column: D on the diagonal, U above it; what lies below is neither
+//! read nor written. D stays not negative by construction, in single precision too, where P itself, updated
+//! as P - K H P or in Joseph's form, becomes indefinite (Bierman 1977, chapters V and VI).
+//!
+//! Every access is total (`get`), and the `else` branches that this leaves are never taken.
+
+use crate::Real;
+use crate::triangle::{column, column_mut};
+
+/// Element `index`, which exists.
+fn at<T: Real>(values: &[T], index: usize) -> T {
+    values.get(index).copied().unwrap_or(T::zero())
+}
+
+/// D_jj.
+pub(crate) fn variance<T: Real>(factor: &[T], size: usize, index: usize) -> T {
+    at(factor, index * size + index)
+}
+
+/// U_ij, i < j.
+pub(crate) fn entry<T: Real>(factor: &[T], size: usize, row: usize, index: usize) -> T {
+    at(factor, index * size + row)
+}
+
+/// Whether U is the identity.
+pub(crate) fn is_diagonal<T: Real>(factor: &[T], size: usize) -> bool {
+    (1..size).all(|index| above(factor, size, index).iter().all(T::is_zero))
+}
+
+/// The column of U above its diagonal.
+fn above<T: Real>(factor: &[T], size: usize, index: usize) -> &[T] {
+    factor.get(index * size..index * size + index).unwrap_or_default()
+}
+
+/// Σ a_i b_i over the shorter of the two.
+pub(crate) fn dot<T: Real>(a: &[T], b: &[T]) -> T {
+    a.iter().zip(b).fold(T::zero(), |sum, (&a, &b)| sum + a * b)
+}
+
+/// y <- y + factor x, over the shorter of the two.
+pub(crate) fn add_multiple<T: Real>(y: &mut [T], factor: T, x: &[T]) {
+    for (y, &x) in y.iter_mut().zip(x) {
+        *y += factor * x;
+    }
+}
+
+pub(crate) fn copy<T: Copy>(from: &[T], into: &mut [T]) {
+    for (to, &from) in into.iter_mut().zip(from) {
+        *to = from;
+    }
+}
+
+/// Phase one of the update by a scalar measurement y = h'x + v, var v = `noise`: writes
+///
+/// ```text
+/// f = U'h,   v = D f
+/// ```
+///
+/// and returns the innovation variance h'P h + `noise`. Nothing of the filter changes, so that a sample that
+/// is not finite can still be refused: it always shows in the returned variance, or in the innovation.
+///
+/// n²/2 + 3 n/2 multiply-adds.
+#[inline(always)]
+pub(crate) fn project<T: Real>(factor: &[T], row: &[T], f: &mut [T], v: &mut [T], noise: T) -> T {
+    let size = row.len();
+    let mut variance = noise;
+    for (index, ((f, v), &h)) in f.iter_mut().zip(v).zip(row).enumerate() {
+        let entries = column(factor, size, index);
+        *f = h + dot(entries.get(..index).unwrap_or_default(), row);
+        *v = at(entries, index) * *f;
+        variance += *f * *v;
+    }
+    variance
+}
+
+/// Phase two: P <- P - P h h'P / (h'P h + `noise`). Takes the f and v of phase one; v becomes b, the gain
+/// times the innovation variance, so that x <- x + b e / (h'P h + `noise`).
+///
+/// ```text
+/// a_0 = noise;   a_j = a_(j-1) + f_j v_j,   d_j <- d_j a_(j-1) / a_j
+/// p = -f_j / a_(j-1);   for i < j:   t = U_ij,   U_ij <- t + b_i p,   b_i <- b_i + t v_j;   b_j = v_j
+/// ```
+///
+/// While a_j is 0 (an exact measurement of what is known) nothing is learnt. Where only a_(j-1) is 0, all b_i
+/// are 0, so that p does not matter.
+///
+/// n² + 4 n multiply-adds, n divisions.
+///
+/// Source: Bierman, Factorization Methods for Discrete Sequential Estimation, 1977, section V.3.
+#[inline(always)]
+pub(crate) fn update<T: Real>(factor: &mut [T], f: &[T], v: &mut [T], noise: T) {
+    let size = f.len();
+    let (mut before, mut inverse) = (noise, reciprocal(noise));
+    for (index, &f) in f.iter().enumerate() {
+        let Some((b, [gain, ..])) = v.split_at_mut_checked(index) else {
+            return;
+        };
+        let Some((entries, [diagonal, ..])) = column_mut(factor, size, index).split_at_mut_checked(index)
+        else {
+            return;
+        };
+        let after = before + f * *gain;
+        let p = -f * inverse;
+        inverse = reciprocal(after);
+        if after > before {
+            *diagonal *= before * inverse;
+        }
+        for (entry, b) in entries.iter_mut().zip(b) {
+            let given = *entry;
+            *entry = given + *b * p;
+            *b += given * *gain;
+        }
+        before = after;
+    }
+}
+
+/// 1 / x, or 0 where that would not be finite.
+#[inline(always)]
+fn reciprocal<T: Real>(x: T) -> T {
+    if x >= T::MIN_POSITIVE { T::one() / x } else { T::zero() }
+}
+
+/// P <- P + `weight` v v', `weight` not negative. `v` is used up. n² to 2 n² multiply-adds, n divisions.
+///
+/// ```text
+/// for j = n … 1:   d_j' = d_j + c v_j²,   s = c v_j / d_j';
+///                  for i < j:   v_i' = v_i - v_j U_ij,   U_ij <- U_ij + s v_i',
+///                               or, the same, U_ij <- U_ij d_j / d_j' + s v_i;   c <- c d_j / d_j'
+/// ```
+///
+/// The second form serves where d_j grows much: the first would add and subtract the old U_ij, which may be
+/// large if d_j was small. So no row of the result is off by more than rounding in that row.
+///
+/// Source: Agee and Turner, Triangular decomposition of a positive definite matrix plus a symmetric dyad with
+/// applications to Kalman filtering, 1972; Gill, Golub, Murray and Saunders, Methods for modifying matrix
+/// factorizations, 1974, method C1 (the two forms).
+pub(crate) fn add_dyad<T: Real>(factor: &mut [T], v: &mut [T], mut weight: T) {
+    let size = v.len();
+    for index in (0..size).rev() {
+        let Some((v, [pivot, ..])) = v.split_at_mut_checked(index) else {
+            return;
+        };
+        let Some((entries, [diagonal, ..])) = column_mut(factor, size, index).split_at_mut_checked(index)
+        else {
+            return;
+        };
+        let after = *diagonal + weight * *pivot * *pivot;
+        if after < T::MIN_POSITIVE {
+            continue;
+        }
+        let inverse = reciprocal(after);
+        let (scale, kept) = (weight * *pivot * inverse, *diagonal * inverse);
+        if kept < nalgebra::convert(0.25) {
+            for (entry, v) in entries.iter_mut().zip(v) {
+                let given = *v;
+                *v -= *pivot * *entry;
+                *entry = kept * *entry + scale * given;
+            }
+        } else {
+            for (entry, v) in entries.iter_mut().zip(v) {
+                *v -= *pivot * *entry;
+                *entry += scale * *v;
+            }
+        }
+        weight *= kept;
+        *diagonal = after;
+    }
+}
+
+/// Writes column `index` of A U into `target`: A has as many rows as `target`, U is `size` x `size`.
+#[inline(always)]
+pub(crate) fn multiply_column<T: Real>(
+    matrix: &[T],
+    factor: &[T],
+    target: &mut [T],
+    size: usize,
+    index: usize,
+) {
+    let rows = target.len();
+    copy(column(matrix, rows, index), target);
+    for (i, &entry) in above(factor, size, index).iter().enumerate() {
+        add_multiple(target, entry, column(matrix, rows, i));
+    }
+}
+
+/// Writes F U into `columns`: n³/2 multiply-adds.
+#[inline(always)]
+pub(crate) fn multiply<T: Real>(matrix: &[T], factor: &[T], columns: &mut [T], size: usize) {
+    for index in 0..size {
+        multiply_column(matrix, factor, column_mut(columns, size, index), size, index);
+    }
+}
+
+/// P_jj = Σ over k >= j of D_k U_jk².
+pub(crate) fn diagonal<T: Real>(factor: &[T], size: usize, index: usize) -> T {
+    (index + 1..size).fold(variance(factor, size, index), |sum, k| {
+        let entry = at(column(factor, size, k), index);
+        sum + variance(factor, size, k) * entry * entry
+    })
+}
+
+/// Writes P into `matrix`, which holds zeros: n³/3 multiply-adds.
+pub(crate) fn expand<T: Real>(factor: &[T], matrix: &mut [T], size: usize) {
+    for k in 0..size {
+        let (entries, weight) = (above(factor, size, k), variance(factor, size, k));
+        for index in 0..=k {
+            let entry = if index == k { T::one() } else { at(entries, index) };
+            let target = upper_mut(matrix, size, index);
+            add_multiple(target, weight * entry, entries);
+            if let (true, Some(diagonal)) = (index == k, target.last_mut()) {
+                *diagonal += weight;
+            }
+        }
+    }
+    for index in 0..size {
+        for row in 0..index {
+            let entry = at(column(matrix, size, index), row);
+            if let Some(mirrored) = column_mut(matrix, size, row).get_mut(index) {
+                *mirrored = entry;
+            }
+        }
+    }
+}
+
+/// Whether U and D are finite.
+pub(crate) fn is_finite<T: Real>(factor: &[T], size: usize) -> bool {
+    (0..size).all(|index| upper(factor, size, index).iter().all(T::is_finite))
+}
+
+/// The time update P <- F P F' + Q. Takes the product F U in `columns`, n x n, and Q both as a matrix (upper
+/// half) and factored. On entry `factor` is that of the old P, on return that of the new one. `columns` and
+/// `work`, n x n each, are used up. False if the new P is not finite: then `factor` has not changed.
+///
+/// First F U D U'F' + Q is formed and factored, which is quick. It goes wrong where a pivot cancels; so where
+/// one falls below a thousandth of its variance, the columns of F U are added to the factor of Q one by one,
+/// and nothing is subtracted from a variance. (Without that check definiteness is lost at the first step after
+/// a bad prior. The usual cure, Thornton's Gram-Schmidt orthogonalisation, takes twice the work.)
+///
+/// 2/3 n³ multiply-adds and n divisions; the second way n³ and n² more.
+#[inline(always)]
+pub(crate) fn propagate<T: Real>(
+    factor: &mut [T],
+    columns: &mut [T],
+    noise_matrix: &[T],
+    noise_factor: &[T],
+    work: &mut [T],
+    size: usize,
+) -> bool {
+    copy(noise_matrix, work);
+    for index in 0..size {
+        let entries = column(columns, size, index);
+        let weight = variance(factor, size, index);
+        for (j, &entry) in entries.iter().enumerate() {
+            add_multiple(upper_mut(work, size, j), weight * entry, entries);
+        }
+    }
+    if decompose(work, size, nalgebra::convert(1e-3)) {
+        copy(work, factor);
+        return true;
+    }
+    add_columns(factor, columns, noise_factor, work, size)
+}
+
+/// P <- Q + Σ D_k (F U)_k (F U)_k', for [`propagate`].
+#[cold]
+#[inline(never)]
+fn add_columns<T: Real>(
+    factor: &mut [T],
+    columns: &mut [T],
+    noise_factor: &[T],
+    work: &mut [T],
+    size: usize,
+) -> bool {
+    copy(noise_factor, work);
+    for index in 0..size {
+        add_dyad(work, column_mut(columns, size, index), variance(factor, size, index));
+    }
+    let finite = is_finite(work, size);
+    if finite {
+        copy(work, factor);
+    }
+    finite
+}
+
+/// The column of U above its diagonal.
+#[inline(always)]
+fn above_mut<T>(factor: &mut [T], size: usize, index: usize) -> &mut [T] {
+    factor.get_mut(index * size..index * size + index).unwrap_or_default()
+}
+
+/// Column `index` of an upper half, the diagonal included.
+#[inline(always)]
+fn upper<T>(matrix: &[T], size: usize, index: usize) -> &[T] {
+    matrix.get(index * size..=index * size + index).unwrap_or_default()
+}
+
+/// Column `index` of an upper half, the diagonal included.
+#[inline(always)]
+fn upper_mut<T>(matrix: &mut [T], size: usize, index: usize) -> &mut [T] {
+    matrix.get_mut(index * size..=index * size + index).unwrap_or_default()
+}
+
+/// Factors the symmetric matrix whose upper half is in `matrix`, in place. False as soon as a pivot is not
+/// above `least` times its diagonal entry, or that is not finite: `matrix` is then of no use.
+///
+/// n³/6 multiply-adds, n divisions.
+///
+/// Source: Bierman 1977, section III.3 (the Cholesky decomposition without square roots, upper triangular).
+#[inline(always)]
+pub(crate) fn decompose<T: Real>(matrix: &mut [T], size: usize, least: T) -> bool {
+    (0..size).rev().all(|index| {
+        let given = variance(matrix, size, index);
+        eliminate(matrix, size, index);
+        let pivot = variance(matrix, size, index);
+        let accepted = pivot > least * given && pivot >= T::MIN_POSITIVE && pivot < T::INFINITY;
+        scale_column(matrix, size, index, reciprocal(pivot));
+        accepted
+    })
+}
+
+/// Subtracts from column `index` of an upper half what the columns after it, already factored, explain.
+#[inline(always)]
+fn eliminate<T: Real>(matrix: &mut [T], size: usize, index: usize) {
+    let Some((rest, done)) = matrix.split_at_mut_checked((index + 1) * size) else {
+        return;
+    };
+    let current = upper_mut(rest, size, index);
+    for k in 0..size - 1 - index {
+        let entries = column(done, size, k);
+        add_multiple(current, -(at(entries, index) * at(entries, index + 1 + k)), entries);
+    }
+}
+
+/// Multiplies column `index` above its diagonal.
+#[inline(always)]
+fn scale_column<T: Real>(matrix: &mut [T], size: usize, index: usize, factor: T) {
+    for entry in above_mut(matrix, size, index) {
+        *entry *= factor;
+    }
+}
+
+/// Factors the symmetric matrix whose upper half is in `matrix`, in place, where it may be singular: a pivot
+/// that is nothing but rounding, `rounding` times its diagonal entry, becomes 0, and U's column with it. The
+/// error is the first index, from the last on, at which the matrix is not positive semidefinite.
+pub(crate) fn decompose_singular<T: Real>(matrix: &mut [T], size: usize, rounding: T) -> Result<(), usize> {
+    for index in (0..size).rev() {
+        let given = variance(matrix, size, index);
+        eliminate(matrix, size, index);
+        let pivot = variance(matrix, size, index);
+        if given < T::zero() || pivot < -(rounding * given) {
+            return Err(index);
+        }
+        if pivot > rounding * given && pivot >= T::MIN_POSITIVE {
+            scale_column(matrix, size, index, reciprocal(pivot));
+            continue;
+        }
+        // Nothing may be left of this column but rounding, as |P_ij|² <= P_ii · pivot.
+        for row in 0..index {
+            let limit = variance(matrix, size, row).max(T::zero()).sqrt() * given.sqrt() * rounding.sqrt();
+            if at(column(matrix, size, index), row).abs() > limit {
+                return Err(index);
+            }
+        }
+        scale_column(matrix, size, index, T::zero());
+        if let Some(diagonal) = upper_mut(matrix, size, index).last_mut() {
+            *diagonal = T::zero();
+        }
+    }
+    Ok(())
+}

@@ -1,4 +1,4 @@
-.PHONY: demo test format lint docs rust bench
+.PHONY: demo test format lint docs rust embedded soak bench
 
 # Fit the sample log that the program carries.
 demo:
@@ -6,13 +6,15 @@ demo:
 
 # Everything that must pass. A tool that is missing is installed where that is possible; else its check is skipped by
 # name, or fails where CI=true.
-test: format lint docs rust
+test: format lint docs rust embedded
 
 format:
-	@$(call with,rustfmt,fmt,cargo fmt --all --check && cd benches/peers && cargo fmt --check)
+	@$(call with,rustfmt,fmt,cargo fmt --all --check && for d in benches/peers tests/embedded; do (cd $$d && cargo fmt --check) || exit 1; done)
 
 lint:
 	@$(call with,clippy,clippy,cargo clippy --locked --workspace --all-targets --all-features -- -D warnings)
+
+	@cd tests/embedded && $(call with,clippy,clippy,cargo clippy --locked --lib --bin check --tests -- -D warnings)
 
 docs:
 	RUSTDOCFLAGS="-D warnings" cargo doc --locked --workspace --no-deps
@@ -22,9 +24,19 @@ rust:
 	cargo test --locked -p thetahat-core
 	cargo test --locked --workspace
 
+# The long runs of the online estimators in single precision, 10^6 steps each; `make soak` takes 10^8.
+	cargo test --locked --release -p thetahat-core --test soak
+
+# The firmware in an emulator: the host's bits, no panic, and what a step costs.
+embedded:
+	tests/embedded/run
+
+soak:
+	SOAK_STEPS=100000000 cargo test --locked --release -p thetahat-core --test soak -- --nocapture
+
 # Our own benches, then the comparison with other packages. Not part of the tests.
 bench:
-	cargo bench --locked --bench arx
+	cargo bench --locked --bench arx --bench online
 	benches/peers/run
 
 # $(call with,COMPONENT,SUBCOMMAND,CHECK): runs the check if cargo has the subcommand or rustup can add the component.

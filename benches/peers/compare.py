@@ -42,9 +42,10 @@ def main():
     print_versions(thetahat)
     # First, while this process is small: a child's peak memory begins with that of its parent.
     commands = compare_commands(thetahat, folder)
-    small = compare_estimates(peers, folder, (4, 4, 1), rounds=15, required=(6, 20))
-    large = compare_estimates(peers, folder, (30, 30, 1), rounds=5, required=(10, 50))
-    print_table(small + large + commands)
+    small = compare_estimates(peers, folder, (4, 4, 1), rounds=12, required=(6, 20))
+    large = compare_estimates(peers, folder, (30, 30, 1), rounds=4, required=(10, 50))
+    header = ["work", "peer", "thetahat", "peer's", "ratio", "required", "verdict"]
+    print_table([header, *small, *large, *commands])
 
 
 def print_versions(thetahat):
@@ -136,21 +137,24 @@ def compare_estimates(peers, folder, orders, rounds, required):
         "lstsq": lambda: numpy.linalg.lstsq(numpy.stack(columns()).T, y[first:], rcond=None)[0],
     }
     seconds, parameters = defaultdict(list), {}
-    one_thread = {**os.environ, "RAYON_NUM_THREADS": "1"}
-    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True, "bufsize": 1}
-    with subprocess.Popen([peers, "serve", folder], env=one_thread, **pipes) as server:
+    with start(peers, "serve", folder) as server:
+
+        def request(method):
+            return [float(word) for word in ask(server, method, *orders).split()]
+
+        def measure(solve):
+            begin = time.perf_counter()
+            values = solve().tolist()
+            return [time.perf_counter() - begin, *values]
+
+        turns = [(method, request, method) for method in ("arx", "factor", "faer")]
+        turns += [(method, measure, solve) for method, solve in theirs.items()]
         for _ in range(rounds):
-            for method in ("arx", "factor", "faer"):
-                print(method, *orders, file=server.stdin)
-                answer = server.stdout.readline()
-                if not answer:
-                    sys.exit(f"{peers} gave no answer to {method} {orders}")
-                duration, *parameters[method] = map(float, answer.split())
-                seconds[method].append(duration)
-            for method, solve in theirs.items():
-                begin = time.perf_counter()
-                parameters[method] = solve().tolist()
-                seconds[method].append(time.perf_counter() - begin)
+            for method, how, what in turns:
+                # Twice: the turn before has filled the caches with other data.
+                for _ in range(2):
+                    duration, *parameters[method] = how(what)
+                    seconds[method].append(duration)
     for method, values in parameters.items():
         check(method, values, parameters["arx"])
     best = {method: min(values) for method, values in seconds.items()}
@@ -162,6 +166,22 @@ def compare_estimates(peers, folder, orders, rounds, required):
         timing(f"{work} by QR", "NumPy, lstsq", best["factor"], best["lstsq"], None),
         timing(f"{work} by QR", "faer, QR", best["factor"], best["faer"], None),
     ]
+
+
+def start(*command):
+    """A program that answers each line with a line, on one thread."""
+    one_thread = {**os.environ, "RAYON_NUM_THREADS": "1"}
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True, "bufsize": 1}
+    return subprocess.Popen(command, env=one_thread, **pipes)
+
+
+def ask(server, *words):
+    """The program's answer to a line."""
+    print(*words, file=server.stdin)
+    answer = server.stdout.readline()
+    if not answer:
+        sys.exit(f"{server.args[0]} gave no answer to {' '.join(map(str, words))}")
+    return answer
 
 
 def check(name, theirs, ours):
@@ -183,11 +203,10 @@ def verdict(met):
 
 
 def print_table(rows):
-    """The rows as a Markdown table."""
-    rows = [["work", "peer", "thetahat", "peer's", "ratio", "required", "verdict"], *rows]
+    """Rows as a Markdown table, the first as its header."""
     widths = [max(map(len, column)) for column in zip(*rows)]
-    rows.insert(1, ["-" * width for width in widths])
-    for row in rows:
+    header, *rows = rows
+    for row in [header, ["-" * width for width in widths], *rows]:
         print("|", " | ".join(cell.ljust(width) for cell, width in zip(row, widths)), "|")
 
 

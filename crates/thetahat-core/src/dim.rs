@@ -1,5 +1,9 @@
 //! Sizes: in the type, or known only at run time.
 
+#[cfg(feature = "alloc")]
+use alloc::vec;
+#[cfg(feature = "alloc")]
+use alloc::vec::Vec;
 use core::fmt::Debug;
 
 use nalgebra::allocator::Allocator;
@@ -15,7 +19,7 @@ use crate::Real;
 /// seals `Dimension`.
 pub trait Workspace: Dim {
     /// What `with_scratch` keeps between calls: nothing for a static size, a buffer for a run-time size.
-    type Scratch<T: Real>: Clone + Debug;
+    type Scratch<T: Real>: Clone + Debug + Default;
 
     /// The dimension of exactly `size`, or the only size this type has.
     fn exactly(size: usize) -> Result<Self, usize>;
@@ -35,7 +39,7 @@ pub trait Workspace: Dim {
     /// matrices.
     fn scratch<T: Real, const V: usize, const S: usize>(self) -> Self::Scratch<T>;
     /// Calls `work` with `V` vectors and `S` square matrices of this size, of any content: on the stack, or
-    /// from `kept`.
+    /// from `kept`. What is too short, as after reading a snapshot, grows first.
     fn with_scratch<T: Real, const V: usize, const S: usize, A>(
         self,
         kept: &mut Self::Scratch<T>,
@@ -80,7 +84,7 @@ impl<const N: usize> Workspace for Const<N> {
 
 #[cfg(feature = "alloc")]
 impl Workspace for Dyn {
-    type Scratch<T: Real> = OVector<T, Dyn>;
+    type Scratch<T: Real> = Vec<T>;
 
     fn exactly(size: usize) -> Result<Self, usize> {
         Ok(Dyn(size))
@@ -98,16 +102,20 @@ impl Workspace for Dyn {
         OMatrix::from_element_generic(self, self, value)
     }
 
-    fn scratch<T: Real, const V: usize, const S: usize>(self) -> OVector<T, Dyn> {
-        Dyn(self.value() * (V + S * self.value())).vector(T::zero())
+    fn scratch<T: Real, const V: usize, const S: usize>(self) -> Vec<T> {
+        vec![T::zero(); self.value() * (V + S * self.value())]
     }
 
     fn with_scratch<T: Real, const V: usize, const S: usize, A>(
         self,
-        kept: &mut OVector<T, Dyn>,
+        kept: &mut Vec<T>,
         work: impl FnOnce([&mut [T]; V], [&mut [T]; S]) -> A,
     ) -> A {
-        let (size, mut rest) = (self.value(), kept.as_mut_slice());
+        let size = self.value();
+        if kept.len() < size * (V + S * size) {
+            *kept = self.scratch::<T, V, S>();
+        }
+        let mut rest = kept.as_mut_slice();
         let mut take = |length: usize| {
             let (taken, left) = core::mem::take(&mut rest).split_at_mut_checked(length).unwrap_or_default();
             rest = left;

@@ -48,7 +48,7 @@ pub enum Error {
     },
     /// The orders make another number of parameters than the type holds.
     Orders {
-        /// The number of parameters the orders make: na plus every nb.
+        /// The number of parameters the orders make: na plus every nb, plus nc.
         needed: usize,
         /// The number of parameters the type holds.
         available: usize,
@@ -71,7 +71,7 @@ pub enum Error {
     NotPositive {
         /// The argument that has.
         argument: &'static str,
-        /// The element, from 0, whose variance is negative once the elements after it are known.
+        /// The element, from 0, whose variance is negative once others are known.
         index: usize,
     },
     /// A number lies outside its range.
@@ -108,6 +108,18 @@ pub enum Error {
         /// [`LeastSquares::rank`](crate::LeastSquares::rank) names them all.
         column: usize,
     },
+    /// Some states cannot be told from the outputs, so that an observer cannot place their poles.
+    NotObservable {
+        /// The number of states that can be.
+        rank: usize,
+        /// The number of states there are.
+        states: usize,
+    },
+    /// An iteration did not settle within the steps it was given.
+    NotConverged {
+        /// That number of steps.
+        steps: usize,
+    },
     /// A result does not fit the scalar type.
     Overflow,
 }
@@ -132,7 +144,7 @@ impl fmt::Display for Error {
             }
             Error::Orders { needed, available } => write!(
                 formatter,
-                "the orders make {needed} parameters (na plus every nb), but the type holds {available}: \
+                "the orders make {needed} parameters (na plus every nb, plus nc), but the type holds {available}: \
                  make the two equal"
             ),
             Error::Delays { needed, available } => write!(
@@ -146,8 +158,8 @@ impl fmt::Display for Error {
             ),
             Error::NotPositive { argument, index } => write!(
                 formatter,
-                "{argument} is not positive semidefinite: the variance of element {index}, given those after it, \
-                 is negative"
+                "{argument} is not positive semidefinite: the variance of element {index}, given others, is \
+                 negative"
             ),
             Error::OutOfRange { argument, range } => {
                 write!(formatter, "{argument} is out of range: it must be {range}")
@@ -170,6 +182,15 @@ impl fmt::Display for Error {
                 formatter,
                 "column {column} of the regression depends on the others: remove it, or excite the system more"
             ),
+            Error::NotObservable { rank, states } => write!(
+                formatter,
+                "only {rank} of the {states} states can be told from the outputs: measure something else, or \
+                 leave states out of the model"
+            ),
+            Error::NotConverged { steps } => write!(
+                formatter,
+                "not settled after {steps} steps: allow more, or check that all that is unstable is measured"
+            ),
             Error::Overflow => {
                 write!(formatter, "the result does not fit the scalar type: use other units, or f64")
             }
@@ -178,6 +199,26 @@ impl fmt::Display for Error {
 }
 
 impl core::error::Error for Error {}
+
+/// That an argument has the size it must have, which a type guarantees but for `Dyn`.
+pub(crate) fn check_length(argument: &'static str, expected: usize, found: usize) -> Result<(), Error> {
+    if found == expected { Ok(()) } else { Err(Error::Length { argument, expected, found }) }
+}
+
+/// That no entry is NaN or infinite.
+pub(crate) fn check_finite<T: Real>(argument: &'static str, entries: &[T]) -> Result<(), Error> {
+    if entries.iter().all(T::is_finite) { Ok(()) } else { Err(Error::NotFinite { argument }) }
+}
+
+/// That an argument has its size and is finite.
+pub(crate) fn check_entries<T: Real>(
+    argument: &'static str,
+    entries: &[T],
+    expected: usize,
+) -> Result<(), Error> {
+    check_length(argument, expected, entries.len())?;
+    check_finite(argument, entries)
+}
 
 #[cfg(test)]
 mod tests {
@@ -198,7 +239,7 @@ mod tests {
         let argument = "output";
         let (needed, available, found, expected) = (731, 732, 733, 734);
         let (row, column) = (735, 736);
-        let cases: [(Error, &[&str]); 12] = [
+        let cases: [(Error, &[&str]); 18] = [
             (Error::NotFinite { argument }, &["output", "leave"]),
             (Error::Infinite { argument }, &["output", "pass NaN"]),
             (Error::TooLarge { argument }, &["output", "unit"]),
@@ -210,6 +251,12 @@ mod tests {
             (Error::TooFewRows { needed, found }, &["731", "733", "add more rows"]),
             (Error::TooManyRows, &["start again"]),
             (Error::RankDeficient { column }, &["736", "remove it"]),
+            (Error::NotSymmetric { row, column }, &["735, 736", "736, 735", "equal"]),
+            (Error::NotPositive { argument, index: row }, &["output", "735", "negative"]),
+            (Error::OutOfRange { argument, range: "above 0" }, &["output", "must be above 0"]),
+            (Error::NoVariance { index: row }, &["735", "noise variance above 0"]),
+            (Error::NotObservable { rank: row, states: column }, &["735", "736", "measure"]),
+            (Error::NotConverged { steps: needed }, &["731", "allow more"]),
             (Error::Overflow, &["f64"]),
         ];
         for (error, parts) in cases {
@@ -219,24 +266,4 @@ mod tests {
             }
         }
     }
-}
-
-/// That an argument has the size it must have, which a type guarantees but for `Dyn`.
-pub(crate) fn check_length(argument: &'static str, expected: usize, found: usize) -> Result<(), Error> {
-    if found == expected { Ok(()) } else { Err(Error::Length { argument, expected, found }) }
-}
-
-/// That no entry is NaN or infinite.
-pub(crate) fn check_finite<T: Real>(argument: &'static str, entries: &[T]) -> Result<(), Error> {
-    if entries.iter().all(T::is_finite) { Ok(()) } else { Err(Error::NotFinite { argument }) }
-}
-
-/// That an argument has its size and is finite.
-pub(crate) fn check_entries<T: Real>(
-    argument: &'static str,
-    entries: &[T],
-    expected: usize,
-) -> Result<(), Error> {
-    check_length(argument, expected, entries.len())?;
-    check_finite(argument, entries)
 }

@@ -2,7 +2,8 @@
 
 use nalgebra::{Const, OVector};
 
-use crate::{Dimension, Error, Real};
+use crate::error::check_length;
+use crate::{Dimension, Error, Real, ud};
 
 /// The orders of one input of an ARX model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -169,13 +170,21 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
     /// assert_eq!(error, Error::Delays { needed: 5, available: 1 });
     /// ```
     pub fn new(orders: &ArxOrders<'_>) -> Result<Self, Error> {
-        let parameters = N::exactly(orders.parameters())
-            .map_err(|available| Error::Orders { needed: orders.parameters(), available })?;
+        Self::with_residuals(orders, 0)
+    }
+
+    /// The same with one more line after those of the inputs, for `residuals` past residuals. To
+    /// [`push`](Lags::push) it is the input whose index is the number of inputs.
+    pub(crate) fn with_residuals(orders: &ArxOrders<'_>, residuals: usize) -> Result<Self, Error> {
+        let needed = orders.parameters().saturating_add(residuals);
+        let parameters = N::exactly(needed).map_err(|available| Error::Orders { needed, available })?;
         let delays = D::at_least(orders.delays())
             .map_err(|available| Error::Delays { needed: orders.delays(), available })?;
         let unused = Line { input: 0, nb: 0, nk: 0 };
         let mut lines = parameters.vector(unused);
-        let in_use = orders.inputs.iter().enumerate().filter(|(_, input)| input.nb > 0);
+        let residuals = InputOrders { nb: residuals, nk: 0 };
+        let inputs = orders.inputs.iter().chain([&residuals]).enumerate();
+        let in_use = inputs.filter(|(_, input)| input.nb > 0);
         for (line, (input, &InputOrders { nb, nk })) in lines.as_mut_slice().iter_mut().zip(in_use) {
             *line = Line { input, nb, nk };
         }
@@ -196,20 +205,38 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
     /// Errors, after which nothing has changed: [`Error::Length`] if the number of inputs is not that of the
     /// orders; [`Error::Infinite`].
     pub fn push_inputs(&mut self, inputs: &[T]) -> Result<(), Error> {
-        if inputs.len() != self.inputs {
-            return Err(Error::Length { argument: "inputs", expected: self.inputs, found: inputs.len() });
-        }
-        if inputs.iter().any(is_infinite) {
-            return Err(Error::Infinite { argument: "inputs" });
-        }
+        self.check_inputs(inputs)?;
+        self.push(|input| inputs.get(input).copied().unwrap_or(T::NAN));
+        Ok(())
+    }
+
+    /// What [`push_inputs`](Lags::push_inputs) checks.
+    pub(crate) fn check_inputs(&self, inputs: &[T]) -> Result<(), Error> {
+        check_length("inputs", self.inputs, inputs.len())?;
+        if inputs.iter().any(is_infinite) { Err(Error::Infinite { argument: "inputs" }) } else { Ok(()) }
+    }
+
+    /// Step 1 of a sample, unchecked: `newest` tells u(k) of an input.
+    pub(crate) fn push(&mut self, newest: impl Fn(usize) -> T) {
         let mut taps = self.regressor.as_mut_slice().iter_mut().skip(self.na);
         let mut delayed = self.delayed.as_mut_slice().iter_mut();
         for line in self.lines.as_slice() {
-            let newest = inputs.get(line.input).copied().unwrap_or(T::NAN);
-            let arriving = shift(delayed.by_ref().take(line.nk), newest);
+            let arriving = shift(delayed.by_ref().take(line.nk), newest(line.input));
             shift(taps.by_ref().take(line.nb), arriving);
         }
-        Ok(())
+    }
+
+    /// Writes what φ will be once these inputs are pushed, missing samples as NaN.
+    pub(crate) fn peek(&self, newest: impl Fn(usize) -> T, regressor: &mut [T]) {
+        ud::copy(self.regressor.as_slice(), regressor);
+        let mut taps = regressor.iter_mut().skip(self.na);
+        let mut delayed = self.delayed.as_slice();
+        for line in self.lines.as_slice() {
+            let (mine, others) = delayed.split_at_checked(line.nk).unwrap_or_default();
+            let arriving = mine.last().copied().unwrap_or_else(|| newest(line.input));
+            shift(taps.by_ref().take(line.nb), arriving);
+            delayed = others;
+        }
     }
 
     /// Step 2 of a sample: φ(k), or `None` while a sample in it is missing.
@@ -234,6 +261,53 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
         Ok(())
     }
 
+    /// The typical magnitude of each element of φ, given that of the output and of each input.
+    pub(crate) fn scales(&self, output: T, input: impl Fn(usize) -> T) -> OVector<T, N> {
+        let mut scales = self.regressor.shape_generic().0.vector(output);
+        let mut taps = scales.as_mut_slice().iter_mut().skip(self.na);
+        for line in self.lines.as_slice() {
+            taps.by_ref().take(line.nb).for_each(|scale| *scale = input(line.input));
+        }
+        scales
+    }
+
+    /// Takes the last `count` elements of φ for 0.
+    pub(crate) fn clear_last(&mut self, count: usize) {
+        self.regressor.as_mut_slice().iter_mut().rev().take(count).for_each(|tap| *tap = T::zero());
+    }
+
+    /// The number of inputs.
+    pub(crate) fn inputs(&self) -> usize {
+        self.inputs
+    }
+
+    /// The coefficients of A(q), the leading 1 included, among parameters in the order of φ.
+    pub(crate) fn output_coefficients<'a>(
+        &self,
+        parameters: &'a [T],
+    ) -> impl Iterator<Item = T> + Clone + use<'a, T, N, D> {
+        core::iter::once(T::one()).chain(parameters.iter().take(self.na).copied())
+    }
+
+    /// The coefficients of B(q) of an input, its nk leading zeros included; `None` if there is no such input.
+    pub(crate) fn input_coefficients<'a>(
+        &self,
+        parameters: &'a [T],
+        input: usize,
+    ) -> Option<impl Iterator<Item = T> + Clone + use<'a, T, N, D>> {
+        if input >= self.inputs {
+            return None;
+        }
+        let mut start = self.na;
+        for line in self.lines.as_slice() {
+            if line.input == input && line.nb > 0 {
+                return Some(coefficients(parameters, start, line.nb, line.nk));
+            }
+            start += line.nb;
+        }
+        Some(coefficients(parameters, start, 0, 0))
+    }
+
     /// Forgets all samples: an unknown number of them is missing here. The regressor comes back once it is
     /// filled with new ones.
     ///
@@ -254,12 +328,22 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
     }
 }
 
+/// `zeros` zeros, then `count` parameters from `start` on.
+fn coefficients<T: Real>(
+    parameters: &[T],
+    start: usize,
+    count: usize,
+    zeros: usize,
+) -> impl Iterator<Item = T> + Clone + use<'_, T> {
+    core::iter::repeat_n(T::zero(), zeros).chain(parameters.iter().skip(start).take(count).copied())
+}
+
 /// Moves each sample one place on, the new one to the front; returns the one that falls out.
 fn shift<'a, T: Real>(line: impl Iterator<Item = &'a mut T>, new: T) -> T {
     line.fold(new, |moving, place| core::mem::replace(place, moving))
 }
 
-fn is_infinite<T: Real>(sample: &T) -> bool {
+pub(crate) fn is_infinite<T: Real>(sample: &T) -> bool {
     sample.abs() == T::INFINITY
 }
 

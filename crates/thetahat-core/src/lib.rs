@@ -51,36 +51,87 @@
 //!
 //! - `alloc`: sizes known only at run time, nalgebra's `Dyn`, for callers with a heap, such as a batch
 //!   program that reads the orders from its user. Off by default, so that firmware needs no allocator.
+//! - `autodiff`: models that are written as one function, with exact Jacobians from dual numbers. Off by default,
+//!   as linear models and Jacobians by hand need none.
+//!
+//! # Notation
+//!
+//! That of Ljung, System Identification: A(q) y(k) = B(q)/F(q) u(k-nk) + C(q)/D(q) e(k), with A, C, D, F monic in
+//! q⁻¹. In state space x(k+1) = F x + G u + Γ w and y = H x + D u + v, with w ~ (0, Q), v ~ (0, R), cov(w, v) = S.
+//! Some course notes write other letters:
+//!
+//! | | here | there |
+//! |---|---|---|
+//! | numerator of the noise model | C | D |
+//! | denominator of the noise model | D | C |
+//! | degree of B(q) | nb - 1 | m |
+//! | forgetting factor | λ | μ |
+//! | input matrix | G | W |
+//! | output matrix | H | G |
+//! | gain of the filter | K | H(k) |
 //!
 //! # Missing and infinite numbers
 //!
 //! NaN in a delay line is a missing sample. Anywhere else NaN is an error, and infinity is an error
 //! everywhere. Whatever returns an [`Error`] has changed nothing.
 
+#[cfg(feature = "alloc")]
+extern crate alloc;
+
+mod armax;
+mod arx;
+mod augmented;
 mod covariance;
+#[cfg(feature = "autodiff")]
+mod differentiated;
 mod dim;
+#[cfg(feature = "autodiff")]
+mod dual;
+mod ekf;
 mod error;
+mod forgetting;
 mod innovation;
 mod kalman;
 mod lags;
 mod least_squares;
+mod luenberger;
 #[cfg(test)]
 mod noise;
+mod rls;
 mod scalar;
+mod schedule;
+#[cfg(feature = "alloc")]
+mod smoother;
 mod solution;
 mod state_space;
+#[cfg(test)]
+mod textbook;
 mod triangle;
 mod ud;
 
 pub use nalgebra;
 
+pub use armax::{ArmaxMethod, ArmaxOrders, RecursiveArmax};
+pub use arx::RecursiveArx;
+pub use augmented::{Augmented, ParametricObservation, ParametricTransition, WithoutParameters};
 pub use covariance::Covariance;
+#[cfg(feature = "autodiff")]
+pub use differentiated::{Differentiated, ObservationFunction, TransitionFunction};
 pub use dim::Dimension;
+#[cfg(feature = "autodiff")]
+pub use dual::{Dual, Number};
+pub use ekf::ExtendedKalmanFilter;
 pub use error::Error;
+pub use forgetting::{Forgetting, Start};
 pub use innovation::{Action, Innovation};
 pub use kalman::KalmanFilter;
 pub use lags::{ArxOrders, InputOrders, Lags};
 pub use least_squares::{LeastSquares, Rank};
+pub use luenberger::LuenbergerObserver;
+pub use rls::RecursiveLeastSquares;
 pub use scalar::Real;
+pub use schedule::{GainSchedule, SteadyState};
+#[cfg(feature = "alloc")]
+pub use smoother::{Smoothed, Smoother};
 pub use solution::Solution;
 pub use state_space::{LinearObservation, LinearTransition, Observation, Transition};

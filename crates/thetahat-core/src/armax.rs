@@ -1,0 +1,379 @@
+//! A recursive ARMAX estimator: extended least squares, and the prediction error method.
+
+use nalgebra::{Const, OMatrix, OVector};
+
+use crate::arx::{check_output, predict_ahead};
+use crate::error::check_length;
+use crate::rls::is_small;
+use crate::triangle::{column, column_mut};
+use crate::ud::{add_multiple, copy, dot};
+use crate::{
+    Action, ArxOrders, Covariance, Dimension, Error, Forgetting, Innovation, InputOrders, Lags, Real,
+    RecursiveLeastSquares,
+};
+
+/// How often a step is halved before it is left out.
+const HALVINGS: usize = 10;
+
+/// The orders of an ARMAX model: those of an [ARX model](ArxOrders), and the order of its noise.
+///
+/// ```
+/// use thetahat_core::{ArmaxOrders, InputOrders};
+///
+/// const ORDERS: ArmaxOrders =
+///     ArmaxOrders { na: 2, inputs: &[InputOrders { nb: 2, nk: 3 }], nc: 1 };
+/// assert_eq!(ORDERS.parameters(), 5);
+/// assert_eq!(ORDERS.delays(), 3);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ArmaxOrders<'a> {
+    /// The number of past outputs.
+    pub na: usize,
+    /// The orders of each input, in the order in which samples are given. Empty for ARMA.
+    pub inputs: &'a [InputOrders],
+    /// The number of past residuals.
+    pub nc: usize,
+}
+
+impl<'a> ArmaxOrders<'a> {
+    /// The number of parameters: na plus every nb plus nc.
+    pub const fn parameters(&self) -> usize {
+        self.plant().parameters().saturating_add(self.nc)
+    }
+
+    /// The number of samples that are on their way: the nk of every input that has coefficients, added up.
+    pub const fn delays(&self) -> usize {
+        self.plant().delays()
+    }
+
+    const fn plant(&self) -> ArxOrders<'a> {
+        ArxOrders { na: self.na, inputs: self.inputs }
+    }
+}
+
+/// Along which gradient a [`RecursiveArmax`] corrects.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ArmaxMethod {
+    /// ψ = φ: the residuals are taken for measured. Quick to converge, but not always to the truth: it does if
+    /// 1/C(q) - 1/2 is positive real, and may fail if not. Also called extended least squares, or recursive
+    /// pseudo-linear regression.
+    ExtendedLeastSquares,
+    /// ψ = φ/C(q), the gradient of the prediction: converges to a minimum of the prediction error. As the first
+    /// residuals are poor and C is not known yet, it may be slow at the start. nc n multiply-adds and moves more.
+    PredictionError,
+}
+
+/// An ARMAX model, estimated while the plant runs.
+///
+/// ```text
+/// A(q) y(k) = Σ over the inputs B_i(q) u_i(k) + C(q) e(k),       C(q) = 1 + c_1 q⁻¹ + … + c_nc q⁻ⁿᶜ
+/// ```
+///
+/// with A and B as in [`RecursiveArx`](crate::RecursiveArx). Where the disturbance is not white, it finds the plant
+/// without bias, and predicts the disturbance too. The regressor holds past residuals beside the signals,
+///
+/// ```text
+/// φ(k) = [ -y(k-1) … -y(k-na)   u_1(k-nk_1) …   ε(k-1) … ε(k-nc) ]'
+/// θ    = [ a_1 … a_na           b_0 …           c_1 … c_nc ]'
+///
+/// e = y - φ'θ̂                                  the innovation
+/// ψ = φ, or ψ(k) = φ(k) - c_1 ψ(k-1) - … - c_nc ψ(k-nc)
+/// θ̂ <- θ̂ + P ψ e/(λ + ψ'P ψ),                  P as in RecursiveLeastSquares, with ψ
+/// ε(k) = y - φ'θ̂                               the residual, with the new θ̂
+/// ```
+///
+/// [`ArmaxMethod`] says which ψ is for what. Everything said of forgetting and bounds at [`RecursiveLeastSquares`]
+/// holds here; the start is the standard one.
+///
+/// C stays stable, with its zeros inside the radius 1 - 1/1024, so that what 1/C(q) filters is forgotten after some
+/// thousand samples: a step that would lead out is halved until it does not, at most ten times, and else left out.
+/// [`Action::Projected`] tells.
+///
+/// A missing sample is NaN, as in `RecursiveArx`. Residuals that are not known, at the start and of missing samples,
+/// count as 0.
+///
+/// # Sizes
+///
+/// `N` is the number of parameters, [`ArmaxOrders::parameters`], and `D` the room for inputs on their way, at least
+/// [`ArmaxOrders::delays`]. Memory: that of `RecursiveArx`, and n² + 1 numbers for past gradients.
+///
+/// Source: Ljung and Söderström, Theory and Practice of Recursive Identification, 1983, sections 3.7.2 (gradients),
+/// 5.5 (residuals) and 6.6 (projection); Ljung, System Identification, 2nd ed., sections 11.4 to 11.6; Jury, Theory and
+/// Application of the z-Transform Method, 1964, chapter 3 (the Schur-Cohn recursion).
+///
+/// ```
+/// use thetahat_core::nalgebra::Const;
+/// use thetahat_core::{ArmaxMethod, ArmaxOrders, Error, Forgetting, InputOrders, RecursiveArmax};
+///
+/// // y(k) = 0.8 y(k-1) + u(k-1) + e(k) + 0.6 e(k-1)
+/// let orders = ArmaxOrders { na: 1, inputs: &[InputOrders { nb: 1, nk: 1 }], nc: 1 };
+/// // Outputs are about 2, inputs 1, the noise 0.5.
+/// let mut plant: RecursiveArmax<f64, Const<3>> =
+///     RecursiveArmax::new(&orders, ArmaxMethod::PredictionError, 2.0, &[1.0], 0.5, Forgetting::None)?;
+///
+/// let (mut y, mut u, mut before, mut seed) = (0.0, 0.0, 0.0, 1_u32);
+/// for k in 0..4000 {
+///     seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+///     let e = f64::from(seed) / f64::from(u32::MAX) - 0.5;
+///     y = 0.8 * y + u + e + 0.6 * before;
+///     u = if k % 13 < 5 { 1.0 } else { -1.0 };
+///     before = e;
+///     plant.update(&[u], y)?;
+/// }
+/// assert!((plant.a().nth(1).unwrap() + 0.8).abs() < 0.01);
+/// assert!((plant.b(0).unwrap().nth(1).unwrap() - 1.0).abs() < 0.05);
+/// assert!((plant.c().nth(1).unwrap() - 0.6).abs() < 0.05);
+/// # Ok::<(), Error>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct RecursiveArmax<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension = Const<1>> {
+    /// φ; the residuals are one more input.
+    lags: Lags<T, N, D>,
+    estimator: RecursiveLeastSquares<T, N>,
+    /// ψ(k-1) … ψ(k-nc), a column each. There are at most n, as each has a parameter.
+    gradients: OMatrix<T, N, N>,
+    /// ε(k-1), on its way to φ.
+    residual: T,
+    nc: usize,
+    method: ArmaxMethod,
+    scratch: N::Scratch<T>,
+}
+
+impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T, N, D> {
+    /// An estimator that knows nothing yet, and has seen no sample.
+    ///
+    /// The scales are the typical magnitudes of the output, of each input, and of the noise e: what is left once
+    /// the output is predicted. See [Scales](RecursiveLeastSquares#scales).
+    ///
+    /// Errors: [`Error::Orders`] if the orders do not make exactly `N` parameters; [`Error::Delays`] if `D` is too
+    /// small for the delays; [`Error::Length`] if there is not one scale for each input; those of
+    /// [`RecursiveLeastSquares::new`].
+    pub fn new(
+        orders: &ArmaxOrders<'_>,
+        method: ArmaxMethod,
+        output_scale: T,
+        input_scales: &[T],
+        noise_scale: T,
+        forgetting: Forgetting<T>,
+    ) -> Result<Self, Error> {
+        let mut lags: Lags<T, N, D> = Lags::with_residuals(&orders.plant(), orders.nc)?;
+        check_length("input_scales", orders.inputs.len(), input_scales.len())?;
+        let scales =
+            lags.scales(output_scale, |input| input_scales.get(input).copied().unwrap_or(noise_scale));
+        let estimator = RecursiveLeastSquares::new(&scales, forgetting)?;
+        lags.clear_last(orders.nc);
+        let size = scales.shape_generic().0;
+        Ok(RecursiveArmax {
+            lags,
+            estimator,
+            gradients: size.square(T::zero()),
+            residual: T::zero(),
+            nc: orders.nc,
+            method,
+            scratch: size.scratch::<T, 3, 0>(),
+        })
+    }
+
+    /// The same with these parameters to start from. See [`RecursiveLeastSquares::with_parameters`], whose errors
+    /// it has.
+    ///
+    /// Errors: also [`Error::OutOfRange`] if C is not stable.
+    pub fn with_parameters(mut self, parameters: OVector<T, N>) -> Result<Self, Error> {
+        self.estimator = self.estimator.with_parameters(parameters)?;
+        let mut c = self.gradients.shape_generic().0.vector(T::zero());
+        let c = c.as_mut_slice().get_mut(..self.nc).unwrap_or_default();
+        copy(last(self.estimator.parameters().as_slice(), self.nc), c);
+        if is_stable(c) {
+            Ok(self)
+        } else {
+            Err(Error::OutOfRange { argument: "parameters", range: "such that C(q) is stable" })
+        }
+    }
+
+    /// The same with this P to start from. See [`RecursiveLeastSquares::with_covariance`], whose errors it has.
+    pub fn with_covariance(self, covariance: Covariance<T, N>) -> Result<Self, Error> {
+        Ok(RecursiveArmax { estimator: self.estimator.with_covariance(covariance)?, ..self })
+    }
+
+    /// The same with a dead zone. See [`RecursiveLeastSquares::with_dead_zone`], whose errors it has.
+    pub fn with_dead_zone(self, width: T) -> Result<Self, Error> {
+        Ok(RecursiveArmax { estimator: self.estimator.with_dead_zone(width)?, ..self })
+    }
+
+    /// One sample: u(k), one number for each input, and y(k). NaN is a missing sample.
+    ///
+    /// The innovation is that of [`RecursiveLeastSquares::update`]. Its action is
+    /// [`NotReady`](Action::NotReady) while a missing sample sits in a tap, or the lines are not filled yet, and
+    /// [`Projected`](Action::Projected) if the step was shortened to keep C stable.
+    ///
+    /// Errors, after which nothing has changed, time included: as for [`RecursiveArx::update`](crate::RecursiveArx::update).
+    ///
+    /// 1.5 n² + (9 + nc) n multiply-adds, n divisions, and moves of (2 + nc) n + 2 D numbers; each halving nc²/2 more.
+    pub fn update(&mut self, inputs: &[T], output: T) -> Result<Innovation<T>, Error> {
+        self.lags.check_inputs(inputs)?;
+        check_output(output)?;
+        let RecursiveArmax { lags, estimator, gradients, residual, nc, method, scratch } = self;
+        let (nc, known) = (*nc, *residual);
+        let newest = |input: usize| match inputs.get(input) {
+            Some(&sample) => sample,
+            None => known,
+        };
+        let size = gradients.shape_generic().0;
+        let innovation = size.with_scratch(scratch, |[regressor, gradient, work], []| {
+            let mut innovation =
+                Innovation { error: T::NAN, variance: T::NAN, nis: T::zero(), action: Action::NotReady };
+            lags.peek(newest, regressor);
+            if !regressor.iter().all(T::is_finite) {
+                estimator.advance();
+                gradients.fill(T::zero());
+                *residual = T::zero();
+                return Ok(innovation);
+            }
+            copy(regressor, gradient);
+            if *method == ArmaxMethod::PredictionError {
+                let c = last(estimator.parameters().as_slice(), nc).iter();
+                for (index, &c) in c.enumerate() {
+                    add_multiple(gradient, -c, column(gradients.as_slice(), size.value(), index));
+                }
+            }
+            // While C changes, what it filters may grow, although every single C is stable. Then start anew.
+            let grown = !is_small(gradient);
+            if grown {
+                copy(regressor, gradient);
+            }
+            if output.is_finite() {
+                let error = output - dot(regressor, estimator.parameters().as_slice());
+                let mut variance = [T::NAN];
+                let (nis, action) =
+                    estimator.correct(gradient, &[error], &mut variance, |parameters, direction, step| {
+                        move_stably(parameters, direction, step, work.get_mut(..nc).unwrap_or_default())
+                    })?;
+                let [variance] = variance;
+                innovation = Innovation { error, variance, nis, action };
+                *residual = output - dot(regressor, estimator.parameters().as_slice());
+            } else {
+                innovation.action = Action::Missing;
+                estimator.advance();
+                *residual = T::zero();
+            }
+            if grown {
+                gradients.fill(T::zero());
+            }
+            // Each column one place on, the new one to the front; the oldest one falls out.
+            for index in 0..nc {
+                let past = column_mut(gradients.as_mut_slice(), size.value(), index);
+                past.iter_mut().zip(&mut *gradient).for_each(|(past, moving)| core::mem::swap(past, moving));
+            }
+            Ok(innovation)
+        })?;
+        lags.push(newest);
+        lags.push_output(output)?;
+        Ok(innovation)
+    }
+
+    /// The outputs to come, ŷ(k+1), ŷ(k+2), …, as many as `outputs` holds, after
+    /// [`update`](RecursiveArmax::update) of sample k.
+    ///
+    /// As [`RecursiveArx::predict`](crate::RecursiveArx::predict), whose arguments and errors it has. Residuals that
+    /// are known enter by C(q); those to come are expected to be 0.
+    pub fn predict(&self, future_inputs: &[T], outputs: &mut [T]) -> Result<(), Error> {
+        let parameters = self.estimator.parameters().as_slice();
+        predict_ahead(
+            self.lags.clone(),
+            self.lags.inputs(),
+            parameters,
+            self.residual,
+            future_inputs,
+            outputs,
+        )
+    }
+
+    /// A(q): 1, a_1 … a_na.
+    pub fn a(&self) -> impl Iterator<Item = T> + Clone + '_ {
+        self.lags.output_coefficients(self.estimator.parameters().as_slice())
+    }
+
+    /// B(q) of an input, counted from 0, so that the i-th number multiplies q⁻ⁱ: nk zeros, then b_0 … b_(nb-1). Empty
+    /// if the input has no coefficients; `None` if there is no such input.
+    pub fn b(&self, input: usize) -> Option<impl Iterator<Item = T> + Clone + '_> {
+        self.lags.input_coefficients(self.estimator.parameters().as_slice(), input)
+    }
+
+    /// C(q): 1, c_1 … c_nc.
+    pub fn c(&self) -> impl Iterator<Item = T> + Clone + '_ {
+        core::iter::once(T::one())
+            .chain(last(self.estimator.parameters().as_slice(), self.nc).iter().copied())
+    }
+
+    /// Tells that an unknown number of samples is missing here. See [`Lags::gap`].
+    pub fn gap(&mut self) {
+        self.lags.gap();
+        self.lags.clear_last(self.nc);
+        self.gradients.fill(T::zero());
+        self.residual = T::zero();
+    }
+
+    /// Turns adaptation off, or on again. See [`RecursiveLeastSquares::set_adaptation`]. Samples are still taken in,
+    /// so that predictions go on.
+    pub fn set_adaptation(&mut self, on: bool) {
+        self.estimator.set_adaptation(on);
+    }
+
+    /// The least squares estimator: parameters, covariance, noise variance, excitation.
+    pub fn estimator(&self) -> &RecursiveLeastSquares<T, N> {
+        &self.estimator
+    }
+}
+
+/// The last `count` numbers.
+fn last<T>(values: &[T], count: usize) -> &[T] {
+    values.get(values.len().saturating_sub(count)..).unwrap_or_default()
+}
+
+/// Adds `step` times `direction` to the parameters, or half of it, a quarter, …, so that C, the last of them, stays
+/// stable; nothing if that does not help. `work` has the size of C. Returns whether the step was shortened.
+fn move_stably<T: Real>(parameters: &mut [T], direction: &[T], mut step: T, work: &mut [T]) -> bool {
+    for halvings in 0..=HALVINGS {
+        copy(last(parameters, work.len()), work);
+        add_multiple(work, step, last(direction, work.len()));
+        if is_stable(work) {
+            add_multiple(parameters, step, direction);
+            return halvings > 0;
+        }
+        step /= T::from_count(2);
+    }
+    true
+}
+
+/// Whether all zeros of 1 + c_1 q⁻¹ + … lie inside the radius 1 - 1/1024, by the Schur-Cohn recursion on c_i/radiusⁱ.
+/// Uses up `c`. nc²/2 multiply-adds.
+///
+/// ```text
+/// k = c_m,   |k| < 1,   c_i <- (c_i - k c_(m-i))/(1 - k²)           m = nc … 1
+/// ```
+fn is_stable<T: Real>(mut c: &mut [T]) -> bool {
+    let growth = T::from_count(1024) / T::from_count(1023);
+    c.iter_mut().fold(growth, |power, c| {
+        *c *= power;
+        power * growth
+    });
+    while let [lower @ .., k] = c {
+        let k = *k;
+        let rest = T::one() - k * k;
+        if !(rest > T::zero() && rest.is_finite()) {
+            return false;
+        }
+        let mut ends = lower.iter_mut();
+        while let Some(first) = ends.next() {
+            match ends.next_back() {
+                Some(last) => (*first, *last) = ((*first - k * *last) / rest, (*last - k * *first) / rest),
+                None => *first /= T::one() + k,
+            }
+        }
+        c = lower;
+    }
+    true
+}
+
+#[cfg(test)]
+mod tests;

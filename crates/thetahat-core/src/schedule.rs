@@ -1,0 +1,227 @@
+//! Gains of the Kalman filter, computed before there are data.
+
+use nalgebra::{OMatrix, OVector};
+
+use crate::error::check_length;
+use crate::state_space::add_product;
+use crate::triangle::{column, column_mut};
+use crate::{Covariance, Dimension, Error, KalmanFilter, LinearObservation, LinearTransition, Real, ud};
+
+/// The gains of a Kalman filter, computed ahead: where the model is known, they do not depend on the data.
+///
+/// ```text
+/// predict:   P <- F P F' + Q
+/// correct:   K = P H' (H P H' + R)⁻¹,     P <- P - K H P,     for use as x̂ <- x̂ + K (y - H x̂ - D u)
+/// ```
+///
+/// It is stepped as [`KalmanFilter`] is, with the same models and the same arithmetic, and without a measurement.
+/// So the models may vary in time, and sensors may differ. [`steady_state`](GainSchedule::steady_state) goes on to
+/// where nothing changes any more.
+///
+/// Units: K_ij has the unit of state i over that of output j. Memory: as [`KalmanFilter`].
+///
+/// Source: Anderson and Moore, Optimal Filtering, 1979, sections 3.1 and 4.4.
+///
+/// ```
+/// use thetahat_core::nalgebra::{Const, Vector1};
+/// use thetahat_core::{Covariance, Error, GainSchedule, LinearObservation, LinearTransition};
+///
+/// // A constant, measured again and again with the same variance: the gains are those of a mean.
+/// let constant = LinearTransition::new(Vector1::new(1.0), Covariance::zero(Const::<1>))?;
+/// let noise: Covariance<f64, Const<1>> = Covariance::from_diagonal(&Vector1::new(3.0))?;
+/// let sensor = LinearObservation::new(Vector1::new(1.0), noise)?;
+/// let mut schedule = GainSchedule::new(Covariance::from_diagonal(&Vector1::new(1e9))?);
+/// for k in 1..10 {
+///     schedule.predict(&constant)?;
+///     let gain = schedule.correct(&sensor)?;
+///     assert!((gain[0] - 1.0 / f64::from(k)).abs() < 1e-8);
+/// }
+/// # Ok::<(), Error>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct GainSchedule<T: Real, N: Dimension> {
+    /// Its state stays 0.
+    filter: KalmanFilter<T, N>,
+}
+
+/// What a Kalman filter comes to when its model does not change in time.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct SteadyState<T: Real, N: Dimension + Dimension<M>, M: Dimension> {
+    /// P before a measurement.
+    pub predicted: Covariance<T, N>,
+    /// P after it.
+    pub filtered: Covariance<T, N>,
+    /// K, n x m: x̂ <- x̂ + K (y - H x̂ - D u).
+    pub gain: OMatrix<T, N, M>,
+    /// F K, n x m: x̂(k+1) = F x̂(k) + G u(k) + F K (y(k) - H x̂(k) - D u(k)), in predictor form, as the
+    /// [`LuenbergerObserver`](crate::LuenbergerObserver) has it.
+    pub predictor_gain: OMatrix<T, N, M>,
+    /// How many samples it took.
+    pub steps: usize,
+}
+
+impl<T: Real, N: Dimension> GainSchedule<T, N> {
+    /// A schedule that starts from this covariance of the state.
+    pub fn new(covariance: Covariance<T, N>) -> Self {
+        let state = covariance.size().vector(T::zero());
+        GainSchedule { filter: KalmanFilter::started(state, covariance) }
+    }
+
+    /// P now.
+    pub fn covariance(&self) -> &Covariance<T, N> {
+        self.filter.covariance()
+    }
+
+    /// The time update.
+    ///
+    /// Errors, after which nothing has changed, and cost: as of [`KalmanFilter::predict`].
+    pub fn predict<U: Dimension>(&mut self, transition: &LinearTransition<T, N, U>) -> Result<(), Error>
+    where
+        N: Dimension<U>,
+    {
+        let state = self.filter.state().clone();
+        check_length("transition", state.len(), transition.state_matrix().ncols())?;
+        self.filter.propagate(
+            state,
+            transition.state_matrix(),
+            transition.noise_matrix(),
+            LinearTransition::noise(transition),
+        )
+    }
+
+    /// The measurement update: K, n x m.
+    ///
+    /// Errors, after which nothing has changed: as of [`KalmanFilter::correct`]. m times its cost, and n² m.
+    pub fn correct<M: Dimension + Dimension<U> + Dimension<N>, U: Dimension>(
+        &mut self,
+        observation: &LinearObservation<T, N, M, U>,
+    ) -> Result<OMatrix<T, N, M>, Error>
+    where
+        N: Dimension<M>,
+    {
+        let noise = LinearObservation::noise(observation);
+        let (n, m) = (self.filter.state().len(), noise.size());
+        let mut gain = self.covariance().size().rows_by(m, T::zero());
+        let mut corrected = self.clone();
+        for index in 0..m.value() {
+            let mut unit = m.vector(T::zero());
+            if let Some(error) = unit.as_mut_slice().get_mut(index) {
+                *error = T::one();
+            }
+            corrected.clone_from(self);
+            corrected.absorb(observation, unit)?;
+            ud::copy(corrected.filter.state().as_slice(), column_mut(gain.as_mut_slice(), n, index));
+        }
+        let state = self.filter.state().clone();
+        self.filter = KalmanFilter::started(state, corrected.filter.covariance().clone());
+        Ok(gain)
+    }
+
+    /// Goes on, sample after sample, until P does not change any more but for rounding, and tells what the filter
+    /// is then: the fixed point of the discrete Riccati equation
+    ///
+    /// ```text
+    /// P = F (P - P H' (H P H' + R)⁻¹ H P) F' + Q
+    /// ```
+    ///
+    /// There is one, whatever the start, if all that is unstable is measured and all that is not stable is driven
+    /// by noise. (If something is not driven, a start with P = 0 would stay there: start with a P that is positive
+    /// definite. What is stable and not driven becomes known exactly, in many steps.) Its error is that of the filter:
+    /// some roundings, and more where the filter forgets slowly.
+    ///
+    /// Errors: [`Error::NotConverged`] after `maximum_steps` samples; [`Error::Overflow`]; those of
+    /// [`predict`](GainSchedule::predict) and [`correct`](GainSchedule::correct). Each step costs one of each and
+    /// n³/3.
+    ///
+    /// ```
+    /// use thetahat_core::nalgebra::{Const, Matrix2, RowVector2, Vector1, Vector2};
+    /// use thetahat_core::{Covariance, Error, GainSchedule, LinearObservation, LinearTransition};
+    ///
+    /// // The alpha-beta filter: a random acceleration of variance 1, a position measured with variance 1.
+    /// let one: Covariance<f64, Const<1>> = Covariance::from_diagonal(&Vector1::new(1.0))?;
+    /// let noise = one.transformed(&Vector2::new(0.5, 1.0))?;
+    /// let motion = LinearTransition::new(Matrix2::new(1.0, 1.0, 0.0, 1.0), noise)?;
+    /// let sensor = LinearObservation::new(RowVector2::new(1.0, 0.0), one)?;
+    /// let start = Covariance::from_diagonal(&Vector2::new(1.0, 1.0))?;
+    ///
+    /// let steady = GainSchedule::new(start).steady_state(&motion, &sensor, 1000)?;
+    /// assert!((steady.gain - Vector2::new(0.75, 0.5)).amax() < 1e-14);
+    /// assert!((steady.predictor_gain - Vector2::new(1.25, 0.5)).amax() < 1e-14);
+    /// # Ok::<(), Error>(())
+    /// ```
+    pub fn steady_state<M: Dimension + Dimension<U> + Dimension<N>, U: Dimension>(
+        mut self,
+        transition: &LinearTransition<T, N, U>,
+        observation: &LinearObservation<T, N, M, U>,
+        maximum_steps: usize,
+    ) -> Result<SteadyState<T, N, M>, Error>
+    where
+        N: Dimension<U> + Dimension<M>,
+    {
+        let (size, outputs) = (self.covariance().size(), LinearObservation::noise(observation).size());
+        self.predict(transition)?;
+        let mut matrix = self.covariance().matrix();
+        let (mut last_change, mut least_change, mut least_at) = (T::INFINITY, T::INFINITY, 0);
+        for steps in 1..=maximum_steps {
+            self.absorb(observation, outputs.vector(T::zero()))?;
+            self.predict(transition)?;
+            let next = self.covariance().matrix();
+            let change = relative_change(matrix.as_slice(), next.as_slice(), size.value());
+            if change < least_change {
+                (least_change, least_at) = (change, steps);
+            }
+            // No longer shrinking at the level of rounding; or, where rounding is amplified, not for as long as it
+            // has been shrinking.
+            let settled = change <= Covariance::<T, N>::rounding(size.value()) && change >= last_change;
+            let stays = least_change <= T::EPSILON.sqrt() && steps > 2 * least_at + 8;
+            if settled || stays {
+                let predicted = self.covariance().clone();
+                let gain = self.correct(observation)?;
+                let mut predictor_gain = size.rows_by(outputs, T::zero());
+                for index in 0..outputs.value() {
+                    let target = column_mut(predictor_gain.as_mut_slice(), size.value(), index);
+                    let gain = column(gain.as_slice(), size.value(), index);
+                    add_product(transition.state_matrix().as_slice(), gain, target);
+                }
+                let filtered = self.covariance().clone();
+                return Ok(SteadyState { predicted, filtered, gain, predictor_gain, steps });
+            }
+            (matrix, last_change) = (next, change);
+        }
+        Err(Error::NotConverged { steps: maximum_steps })
+    }
+
+    /// The measurement update, with these errors of the measurement.
+    fn absorb<M: Dimension + Dimension<U> + Dimension<N>, U: Dimension>(
+        &mut self,
+        observation: &LinearObservation<T, N, M, U>,
+        error: OVector<T, M>,
+    ) -> Result<(), Error>
+    where
+        N: Dimension<M>,
+    {
+        let rows = observation.output_rows();
+        check_length("observation", self.filter.state().len(), rows.nrows())?;
+        self.filter.absorb(rows.clone(), error, LinearObservation::noise(observation), |_, _, _, _| ())?;
+        Ok(())
+    }
+}
+
+/// The largest change of a covariance matrix, beside the variances of the two elements.
+fn relative_change<T: Real>(old: &[T], new: &[T], size: usize) -> T {
+    let variance = |index| ud::variance(old, size, index).max(ud::variance(new, size, index));
+    let mut largest = T::zero();
+    for index in 0..size {
+        for (row, (&old, &new)) in column(old, size, index).iter().zip(column(new, size, index)).enumerate() {
+            let change = (new - old).abs();
+            if change > T::zero() {
+                largest = largest.max(change / variance(row).sqrt() / variance(index).sqrt());
+            }
+        }
+    }
+    largest
+}
+
+#[cfg(test)]
+mod tests;

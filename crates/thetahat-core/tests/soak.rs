@@ -1,0 +1,284 @@
+//! Long runs of the online estimators in single precision, beside the same in double precision.
+//!
+//! `SOAK_STEPS` says how many steps each takes: 10^6 if it is not said, 10^8 in `make soak`. Run it in release:
+//! `cargo test --release -p thetahat-core --test soak`.
+//!
+//! The log holds what wears estimators out: long silences, held inputs, regressors of scales from 10^-3 to 10^3, and
+//! parameters that switch.
+
+use thetahat_core::nalgebra::{self, Const, Matrix3, RowVector3, SVector, Vector1, Vector3, Vector4};
+use thetahat_core::{
+    Covariance, Forgetting, KalmanFilter, LinearObservation, LinearTransition, Real, RecursiveLeastSquares,
+};
+
+/// How many steps each run takes.
+fn steps() -> u64 {
+    std::env::var("SOAK_STEPS")
+        .map_or(1_000_000, |text| text.parse().expect("SOAK_STEPS is a number of steps"))
+}
+
+/// SplitMix64 (Steele, Lea and Flood 2014), uniform in -1 … 1.
+struct Noise(u64);
+
+impl Noise {
+    fn next(&mut self) -> f32 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut bits = self.0;
+        bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        (bits >> 40) as f32 / (1_u64 << 23) as f32 - 1.0
+    }
+}
+
+const SCALES: [f32; 4] = [1e-3, 1.0, 30.0, 1e3];
+
+/// The deviation of the noise in the output.
+const NOISE: f32 = 0.1;
+
+/// A log of a plant with four parameters, of which the scaled values are 1, -2, 0.5 and 3, or the opposite.
+struct Plant {
+    noise: Noise,
+    held: [f32; 4],
+}
+
+/// What the input does.
+#[derive(Clone, Copy, PartialEq, Debug)]
+enum Input {
+    Rich,
+    Silent,
+    Held,
+}
+
+/// A period of the log: rich, silent, rich, held. In the middle of each rich part the parameters switch.
+const PERIOD: u64 = 40_000;
+
+fn input(step: u64) -> Input {
+    match step % PERIOD {
+        10_000..20_000 => Input::Silent,
+        30_000.. => Input::Held,
+        _ => Input::Rich,
+    }
+}
+
+/// The parameters in units of 1/scale.
+fn truth(step: u64) -> [f32; 4] {
+    let sign = if (step + 15_000) / 20_000 % 2 == 0 { 1.0 } else { -1.0 };
+    [1.0, -2.0, 0.5, 3.0].map(|value| sign * value)
+}
+
+impl Plant {
+    fn sample(&mut self, step: u64) -> ([f32; 4], f32) {
+        let scaled = match input(step) {
+            Input::Silent => [0.0; 4],
+            Input::Held => self.held,
+            Input::Rich => {
+                self.held = [0; 4].map(|_| self.noise.next());
+                self.held
+            }
+        };
+        let clean: f32 = scaled.iter().zip(truth(step)).map(|(scaled, truth)| scaled * truth).sum();
+        let regressor = [0, 1, 2, 3].map(|index: usize| scaled[index] * SCALES[index]);
+        (regressor, clean + NOISE * 3.0_f32.sqrt() * self.noise.next())
+    }
+}
+
+/// What a run found.
+#[derive(Debug, Default)]
+struct Findings {
+    /// The largest distance of the `f32` parameters from the `f64` ones after rich input, in units of 1/scale.
+    rounding: f64,
+    /// The same of the `f64` ones from the truth.
+    error: f64,
+    /// The most samples it took to come within 0.5 of the truth after the parameters switched.
+    acquisition: u64,
+    /// The largest P_jj / p_j.
+    variance: f64,
+}
+
+fn estimator<T: Real>(forgetting: Forgetting<T>, dead_zone: T) -> RecursiveLeastSquares<T, Const<4>> {
+    let scales = Vector4::from(SCALES).map(|scale| nalgebra::convert(f64::from(scale)));
+    RecursiveLeastSquares::new(&scales, forgetting).unwrap().with_dead_zone(dead_zone).unwrap()
+}
+
+/// The distance of scaled parameters from others.
+fn distance(parameters: [f64; 4], others: [f64; 4]) -> f64 {
+    parameters.iter().zip(others).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
+/// Runs both precisions over the same log. At every step all numbers must be finite and no variance negative.
+fn run(name: &str, single: Forgetting<f32>, double: Forgetting<f64>, dead_zone: f32, steps: u64) -> Findings {
+    let mut single = estimator(single, dead_zone);
+    let mut double = estimator(double, f64::from(dead_zone));
+    let mut plant = Plant { noise: Noise(7), held: [0.0; 4] };
+    let mut findings = Findings::default();
+    let mut acquiring = None;
+    for step in 0..steps {
+        let (regressor, output) = plant.sample(step);
+        let innovation = single.update(&Vector4::from(regressor), output).unwrap();
+        double.update(&Vector4::from(regressor).cast(), f64::from(output)).unwrap();
+        assert!(innovation.error.is_finite(), "{name} at {step}");
+
+        let scaled = |parameters: [f64; 4]| {
+            [0, 1, 2, 3].map(|index: usize| parameters[index] * f64::from(SCALES[index]))
+        };
+        let now = scaled((*single.parameters()).cast::<f64>().into());
+        assert!(now.iter().all(|value| value.is_finite()), "{name} at {step}: {now:?}");
+        if step % 1000 == 999 || step < 1000 {
+            let variances = single.covariance().variances();
+            assert!(variances.iter().all(|variance| *variance > 0.0), "{name} at {step}: {variances:?}");
+            for (variance, scale) in variances.iter().zip(SCALES) {
+                let relative = f64::from(*variance) * f64::from(scale).powi(2) / 100.0;
+                findings.variance = findings.variance.max(relative);
+            }
+        }
+        if step % 20_000 == 5_000 {
+            acquiring = Some(step);
+        }
+        let truth = truth(step).map(f64::from);
+        if let Some(since) = acquiring
+            && distance(now, truth) < 0.5
+        {
+            findings.acquisition = findings.acquisition.max(step - since);
+            acquiring = None;
+        }
+        if step % 20_000 == 9_999 {
+            let reference = scaled((*double.parameters()).into());
+            findings.rounding = findings.rounding.max(distance(now, reference));
+            findings.error = findings.error.max(distance(reference, truth));
+            assert!(acquiring.is_none(), "{name} at {step}: {now:?} has not come near {truth:?}");
+        }
+    }
+    println!("{name}, {steps} steps: {findings:?}");
+    findings
+}
+
+/// Every bounded policy stays bounded, follows, and agrees with double precision.
+fn soak(name: &str, single: Forgetting<f32>, double: Forgetting<f64>, dead_zone: f32, rounding: f64) {
+    let findings = run(name, single, double, dead_zone, steps());
+    assert!(findings.rounding < rounding, "{name}: {findings:?}");
+    assert!(findings.error < 0.5, "{name}: {findings:?}");
+    // n samples pass before a variance has its turn at the cap: up to (1 + 1/n)^n.
+    assert!(findings.variance < 2.72, "{name}: {findings:?}");
+}
+
+#[test]
+fn exponential() {
+    let forgetting = (Forgetting::Exponential { factor: 0.99 }, Forgetting::Exponential { factor: 0.99 });
+    soak("exponential", forgetting.0, forgetting.1, 0.0, 1e-3);
+}
+
+#[test]
+fn exponential_with_a_dead_zone() {
+    let forgetting = (Forgetting::Exponential { factor: 0.99 }, Forgetting::Exponential { factor: 0.99 });
+    soak("dead zone", forgetting.0, forgetting.1, 0.05, 1e-3);
+}
+
+#[test]
+fn directional() {
+    let forgetting = (Forgetting::Directional { factor: 0.99 }, Forgetting::Directional { factor: 0.99 });
+    soak("directional", forgetting.0, forgetting.1, 0.0, 1e-3);
+}
+
+#[test]
+fn random_walk() {
+    let forgetting = (Forgetting::RandomWalk { variance: 1e-3 }, Forgetting::RandomWalk { variance: 1e-3 });
+    soak("random walk", forgetting.0, forgetting.1, 0.0, 1e-3);
+}
+
+#[test]
+fn variable() {
+    let single = Forgetting::Variable { factor: 0.99, minimum: 0.85, noise_variance: NOISE * NOISE };
+    let double =
+        Forgetting::Variable { factor: 0.99, minimum: 0.85, noise_variance: f64::from(NOISE * NOISE) };
+    soak("variable", single, double, 0.0, 1e-3);
+}
+
+/// Without forgetting the estimate converges and single precision does not: after enough samples the rounding
+/// exceeds what is left of the noise. The doc of `Forgetting::None` states that horizon.
+#[test]
+fn without_forgetting_the_horizon_is_finite() {
+    let mut single = estimator::<f32>(Forgetting::None, 0.0);
+    let mut double = estimator::<f64>(Forgetting::None, 0.0);
+    let mut plant = Plant { noise: Noise(7), held: [0.0; 4] };
+    let (mut horizon, mut largest) = (None, 0.0_f64);
+    for step in 0..steps() {
+        // Always rich, never another plant.
+        let (regressor, output) = plant.sample(step % 10_000);
+        single.update(&Vector4::from(regressor), output).unwrap();
+        double.update(&Vector4::from(regressor).cast(), f64::from(output)).unwrap();
+        if step % 1000 == 999 {
+            let variances = single.covariance().variances();
+            assert!(variances.iter().all(|variance| *variance > 0.0), "at {step}: {variances:?}");
+            let deviations = double.parameter_covariance().unwrap().variances().map(f64::sqrt);
+            let difference = (*single.parameters()).cast::<f64>() - double.parameters();
+            let relative = difference.component_div(&deviations).amax();
+            largest = largest.max(relative);
+            if relative > 1.0 && horizon.is_none() {
+                horizon = Some(step);
+            }
+        }
+    }
+    println!(
+        "no forgetting: rounding exceeds one standard error at {horizon:?}, {largest:.1e} of it at most"
+    );
+    assert!(horizon.is_none_or(|step| step > 200_000), "{horizon:?}");
+}
+
+/// A filter of three states, driven and measured hard: a prior of 10^8, an accurate sensor and a coarse one,
+/// silences, an observation that is almost another one.
+fn filter<T: Real>()
+-> (KalmanFilter<T, Const<3>>, LinearTransition<T, Const<3>>, [LinearObservation<T, Const<3>, Const<1>>; 3]) {
+    let number = |value: f64| nalgebra::convert(value);
+    let cast = |value: Vector3<f64>| value.map(number);
+    let step: f64 = 0.1;
+    let motion = Matrix3::new(1.0, step, step * step / 2.0, 0.0, 1.0, step, 0.0, 0.0, 0.98);
+    let jerk: Covariance<T, Const<1>> = Covariance::from_diagonal(&Vector1::new(number(1e-4))).unwrap();
+    let noise = jerk.transformed(&cast(Vector3::new(step.powi(3) / 6.0, step.powi(2) / 2.0, step))).unwrap();
+    let sensor = |row: RowVector3<f64>, variance: f64| {
+        let noise = Covariance::from_diagonal(&Vector1::new(number(variance))).unwrap();
+        LinearObservation::new(row.map(number), noise).unwrap()
+    };
+    let prior = Covariance::from_diagonal(&cast(Vector3::new(1e8, 1e8, 1e8))).unwrap();
+    (
+        KalmanFilter::new(SVector::from_element(T::zero()), prior).unwrap(),
+        LinearTransition::new(motion.map(number), noise).unwrap(),
+        [
+            sensor(RowVector3::new(1.0, 0.0, 0.0), 1e-6),
+            sensor(RowVector3::new(1.0, 0.01, 0.0), 1e-6),
+            sensor(RowVector3::new(0.0, 1.0, 0.0), 1e2),
+        ],
+    )
+}
+
+#[test]
+fn kalman_filter() {
+    let (mut single, motion, sensors) = filter::<f32>();
+    let (mut double, double_motion, double_sensors) = filter::<f64>();
+    let mut noise = Noise(3);
+    let mut largest = 0.0_f64;
+    for step in 0..steps() {
+        single.predict(&motion, &SVector::zeros()).unwrap();
+        double.predict(&double_motion, &SVector::zeros()).unwrap();
+        // The plant rests at 0; a silence of 1,000 samples in each 10,000.
+        if step % 10_000 < 9_000 {
+            for (index, (sensor, double_sensor)) in sensors.iter().zip(&double_sensors).enumerate() {
+                let deviation = [1e-3, 1e-3, 10.0][index] * 3.0_f32.sqrt();
+                let y = Vector1::new(deviation * noise.next());
+                let innovation = single.correct(sensor, &SVector::zeros(), &y).unwrap();
+                assert!(innovation.nis.is_finite() && innovation.variance[0] > 0.0, "at {step}");
+                double.correct(double_sensor, &SVector::zeros(), &y.cast()).unwrap();
+            }
+        }
+        if step % 1_000 == 999 {
+            let variances = single.covariance().variances();
+            assert!(variances.iter().all(|variance| *variance > 0.0), "at {step}: {variances:?}");
+            let deviations = double.covariance().variances().map(f64::sqrt);
+            let difference = (*single.state()).cast::<f64>() - double.state();
+            largest = largest.max(difference.component_div(&deviations).amax());
+            let ratios = variances.cast::<f64>().map(f64::sqrt).component_div(&deviations);
+            assert!((ratios - Vector3::repeat(1.0)).amax() < 0.01, "at {step}: {ratios}");
+        }
+    }
+    println!("Kalman filter: f32 and f64 differ by {largest:.1e} standard deviations at most");
+    assert!(largest < 0.05, "{largest}");
+}

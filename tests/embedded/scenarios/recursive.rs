@@ -1,0 +1,87 @@
+//! Recursive least squares, alone and fed by delay lines.
+
+use thetahat_core::nalgebra::{Const, SVector};
+use thetahat_core::{
+    Action, ArxOrders, Error, Forgetting, InputOrders, Innovation, RecursiveArx, RecursiveLeastSquares,
+};
+
+use crate::record::{Sample, regressor, sample};
+use crate::{Case, Scenario};
+
+const FORGETTING: Forgetting<f32> = Forgetting::Exponential { factor: 0.98 };
+const INPUTS: &[InputOrders] = &[InputOrders { nb: 2, nk: 1 }];
+
+/// Recursive least squares with N parameters, exponential forgetting and its cap.
+pub(crate) struct Recursive<const N: usize>(RecursiveLeastSquares<f32, Const<N>>);
+
+impl<const N: usize> Scenario for Recursive<N> {
+    const NAME: &'static str = match N {
+        4 => "RecursiveLeastSquares, n = 4",
+        8 => "RecursiveLeastSquares, n = 8",
+        _ => "RecursiveLeastSquares, n = 16",
+    };
+    const DETOUR: bool = true;
+    type Input = (SVector<f32, N>, f32);
+    type Output = Innovation<f32>;
+
+    fn start(_: Case) -> Result<Self, Error> {
+        RecursiveLeastSquares::new(&SVector::repeat(1.0), FORGETTING).map(Recursive)
+    }
+
+    fn input(case: Case, k: usize) -> Self::Input {
+        (regressor(case, k), sample(case, k, 0).y)
+    }
+
+    #[inline(never)]
+    fn step(&mut self, (regressor, output): &Self::Input) -> Result<Innovation<f32>, Error> {
+        self.0.update(regressor, *output)
+    }
+
+    fn numbers(&self, innovation: &Innovation<f32>, number: &mut impl FnMut(f32)) {
+        recursive_numbers(&self.0, innovation, number);
+    }
+}
+
+/// An ARX(2, 2) model, one sample in.
+pub(crate) struct Arx(RecursiveArx<f32, Const<4>>);
+
+impl Scenario for Arx {
+    const NAME: &'static str = "RecursiveArx, ARX(2, 2)";
+    const DETOUR: bool = true;
+    type Input = Sample;
+    type Output = Innovation<f32>;
+
+    fn start(_: Case) -> Result<Self, Error> {
+        RecursiveArx::new(&ArxOrders { na: 2, inputs: INPUTS }, 1.0, &[1.0], FORGETTING).map(Arx)
+    }
+
+    fn input(case: Case, k: usize) -> Sample {
+        sample(case, k, 0)
+    }
+
+    #[inline(never)]
+    fn step(&mut self, sample: &Sample) -> Result<Innovation<f32>, Error> {
+        self.0.update(&[sample.u], sample.y)
+    }
+
+    fn numbers(&self, innovation: &Innovation<f32>, number: &mut impl FnMut(f32)) {
+        recursive_numbers(self.0.estimator(), innovation, number);
+        let mut ahead = [0.0; 3];
+        if self.0.predict(&[1.0, 0.0, 0.0], &mut ahead).is_ok() {
+            ahead.into_iter().for_each(number);
+        }
+    }
+}
+
+fn recursive_numbers<const N: usize>(
+    estimator: &RecursiveLeastSquares<f32, Const<N>>,
+    innovation: &Innovation<f32>,
+    mut number: &mut impl FnMut(f32),
+) {
+    [innovation.error, innovation.variance, innovation.nis].into_iter().for_each(&mut number);
+    number(if innovation.action == Action::Capped { 1.0 } else { 0.0 });
+    number(estimator.excitation());
+    number(estimator.noise_variance().unwrap_or(f32::NAN));
+    estimator.parameters().iter().copied().for_each(&mut number);
+    estimator.covariance().matrix().iter().copied().for_each(number);
+}

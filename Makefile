@@ -22,7 +22,7 @@ docs:
 # thetahat-core once more on its own: there it has no heap.
 rust:
 	cargo test --locked -p thetahat-core
-	cargo test --locked --workspace
+	cargo test --locked --workspace --all-features
 
 # The long runs of the online estimators in single precision, 10^6 steps each; `make soak` takes 10^8.
 	cargo test --locked --release -p thetahat-core --test soak

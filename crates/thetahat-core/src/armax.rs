@@ -53,6 +53,7 @@ impl<'a> ArmaxOrders<'a> {
 
 /// Along which gradient a [`RecursiveArmax`] corrects.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum ArmaxMethod {
     /// ψ = φ: the residuals are taken for measured. Quick to converge, but not always to the truth: it does if
     /// 1/C(q) - 1/2 is positive real, and may fail if not. Also called extended least squares, or recursive
@@ -126,16 +127,21 @@ pub enum ArmaxMethod {
 /// # Ok::<(), Error>(())
 /// ```
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub struct RecursiveArmax<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension = Const<1>> {
     /// φ; the residuals are one more input.
     lags: Lags<T, N, D>,
     estimator: RecursiveLeastSquares<T, N>,
     /// ψ(k-1) … ψ(k-nc), a column each. There are at most n, as each has a parameter.
+    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::square"))]
     gradients: OMatrix<T, N, N>,
     /// ε(k-1), on its way to φ.
+    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::number"))]
     residual: T,
     nc: usize,
     method: ArmaxMethod,
+    #[cfg_attr(feature = "serde", serde(skip))]
     scratch: N::Scratch<T>,
 }
 

@@ -60,9 +60,12 @@ use crate::{
 /// # Ok::<(), Error>(())
 /// ```
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub struct RecursiveArx<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension = Const<1>> {
     lags: Lags<T, N, D>,
     estimator: RecursiveLeastSquares<T, N>,
+    #[cfg_attr(feature = "serde", serde(skip))]
     scratch: N::Scratch<T>,
 }
 

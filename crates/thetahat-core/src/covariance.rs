@@ -34,9 +34,36 @@ use crate::{Dimension, Error, Real, ud};
 /// # Ok::<(), Error>(())
 /// ```
 #[derive(Clone)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = "", into = "Factor<T, N>", try_from = "Factor<T, N>"))]
 pub struct Covariance<T: Real, N: Dimension> {
     /// D on the diagonal, U above it. What lies below is anything: the kernels write there.
     factor: OMatrix<T, N, N>,
+}
+
+/// A covariance as it is written: what lies below the diagonal is 0, and what is read is checked.
+#[cfg(feature = "serde")]
+#[derive(serde::Serialize, serde::Deserialize)]
+#[serde(bound = "")]
+struct Factor<T: Real, N: Dimension> {
+    #[serde(with = "crate::snapshot::square")]
+    factor: OMatrix<T, N, N>,
+}
+
+#[cfg(feature = "serde")]
+impl<T: Real, N: Dimension> From<Covariance<T, N>> for Factor<T, N> {
+    fn from(covariance: Covariance<T, N>) -> Self {
+        Factor { factor: covariance.factor() }
+    }
+}
+
+#[cfg(feature = "serde")]
+impl<T: Real, N: Dimension> TryFrom<Factor<T, N>> for Covariance<T, N> {
+    type Error = Error;
+
+    fn try_from(Factor { factor }: Factor<T, N>) -> Result<Self, Error> {
+        Covariance::from_factor(factor)
+    }
 }
 
 /// Equal to the bit: the same factors.

@@ -83,6 +83,8 @@ use crate::{Action, Covariance, Dimension, Error, Innovation, KalmanFilter, Obse
 /// # Ok::<(), Error>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub struct ExtendedKalmanFilter<T: Real, N: Dimension> {
     linear: KalmanFilter<T, N>,
     iterations: usize,

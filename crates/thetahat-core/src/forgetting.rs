@@ -43,10 +43,12 @@ use crate::{Error, Real};
 /// the variances grow in missing samples too.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Forgetting<T> {
     /// Nothing is forgotten: all samples weigh the same.
     ///
-    /// P shrinks as 1/k. In `f32` that works for a finite time only: rounding is not forgotten either.
+    /// P shrinks as 1/k. In `f32` that works for a finite time only: rounding is not forgotten either. With four
+    /// parameters it exceeds one standard error after 9·10^7 samples (measured by `make soak`).
     None,
     /// A sample k samples old weighs λ^k (Ljung and Söderström, Theory and Practice of Recursive Identification,
     /// 1983, section 2.6).
@@ -176,6 +178,7 @@ fn check_factor(fits: bool) -> Result<(), Error> {
 /// full rank: then the prior is taken out, in 3 n³ multiply-adds, and what is left is the least squares solution
 /// of all samples so far. From there on the [`Forgetting`] policy rules.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Start {
     /// With the prior, which stays in. With forgetting it fades.
     Standard,
@@ -192,6 +195,7 @@ pub enum Start {
 
 /// Where a start stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) enum Phase {
     /// The start is over: the forgetting policy rules.
     Running,

@@ -6,6 +6,7 @@ use nalgebra::OVector;
 /// What an estimator did with a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Action {
     /// The estimate was corrected.
     Updated,
@@ -21,8 +22,7 @@ pub enum Action {
     Collecting,
     /// Adaptation is off: the innovation is computed, nothing was corrected.
     Frozen,
-    /// The sample tells too little: the innovation lies in the dead zone, or the regressor below its
-    /// threshold. Nothing was corrected.
+    /// The innovation lies in the dead zone: nothing was corrected.
     Skipped,
     /// The normalised innovation squared is above the gate: the measurement was not used.
     Gated,
@@ -43,13 +43,15 @@ pub enum Action {
 ///
 /// `E` is the type of a measurement: a number, or a vector.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Innovation<T, E = T> {
     /// The measurement less its prediction, in the unit of the measurement. NaN where it is missing.
     pub error: E,
-    /// The variance of each element, given those before it in the same measurement. (So the product of all
-    /// is the determinant of S; for one element it is S.) NaN where the element is missing.
+    /// The variance of each element, given those after it in the same measurement. (So the product of all
+    /// is the determinant of S; for one element it is S.) NaN where the element is missing, or where a recursive
+    /// least squares estimator does not know the variance of its noise yet.
     pub variance: E,
-    /// The normalised innovation squared. 0 if nothing was measured.
+    /// The normalised innovation squared. 0 if nothing was measured, or the variance is not known.
     pub nis: T,
     /// What was done with the sample.
     pub action: Action,

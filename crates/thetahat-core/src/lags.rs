@@ -71,10 +71,10 @@ impl ArxOrders<'_> {
 
 /// The delay line of one input that has coefficients.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Line {
-    input: usize,
-    nb: usize,
-    nk: usize,
+pub(crate) struct Line {
+    pub(crate) input: usize,
+    pub(crate) nb: usize,
+    pub(crate) nk: usize,
 }
 
 /// Tapped delay lines: recent inputs and outputs, arranged as the regressor of an ARX model.
@@ -141,13 +141,18 @@ struct Line {
 /// # Ok::<(), Error>(())
 /// ```
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub struct Lags<T: Real, N: Dimension, D: Dimension = Const<1>> {
     /// φ; NaN where a sample is missing.
+    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::vector"))]
     regressor: OVector<T, N>,
     /// The inputs on their way to φ, line after line, each line the newest first.
+    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::vector"))]
     delayed: OVector<T, D>,
     /// The lines in use, then some with nb = 0. There are at most N, as each has a coefficient: so the number
     /// of inputs need not be one more size in the type.
+    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::vector"))]
     lines: OVector<Line, N>,
     na: usize,
     inputs: usize,

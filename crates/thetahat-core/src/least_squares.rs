@@ -55,14 +55,20 @@ use crate::{Dimension, Error, Real, Solution};
 /// # Ok::<(), Error>(())
 /// ```
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub struct LeastSquares<T: Real, N: Dimension> {
     /// R, transposed: column i is row i of R, so that a rotation runs over contiguous numbers.
+    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::square"))]
     factor_rows: OMatrix<Sum<T>, N, N>,
+    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::vector"))]
     rotated_output: OVector<Sum<T>, N>,
+    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::number"))]
     residual_norm: Sum<T>,
     rows: usize,
     /// Those of the rows that came by `from_factor`: `rank` expects more rounding of them.
     uncompensated_rows: usize,
+    #[cfg_attr(feature = "serde", serde(skip))]
     scratch: N::Scratch<T>,
 }
 

@@ -1,13 +1,27 @@
 #![no_std]
-//! System identification for microcontrollers: regressors and least squares without a heap.
+//! System identification for controllers: estimators that are called once a sample for years, in single precision,
+//! without a heap and without a panic.
 //!
-//! - [`LeastSquares`]: linear least squares that takes one row at a time, keeps a triangular factor, merges
-//!   with others, and answers with parameters, their covariance, and which columns are at fault if there is
-//!   no answer.
-//! - [`Lags`]: delay lines that turn inputs and outputs, as they are sampled, into the regressor of an ARX
-//!   model. They know of missing samples. [`ArxOrders`] says how long they are.
+//! | parameters of a model | |
+//! |---|---|
+//! | [`RecursiveArx`], [`RecursiveArmax`] | from inputs and outputs, sample by sample; predict some samples ahead |
+//! | [`RecursiveLeastSquares`] | from any regressors; [`Forgetting`] policies that stay bounded, three ways to [`Start`] |
+//! | [`LeastSquares`] | all rows at once: merges with others, says which columns are at fault |
+//! | [`Lags`], [`ArxOrders`] | delay lines that make regressors of samples, and know of missing ones |
 //!
-//! Both work with `f32` and `f64` ([`Real`]) and with sizes in the type, `Const<4>`, or at run time, `Dyn`
+//! | state of a model | |
+//! |---|---|
+//! | [`KalmanFilter`] | for [`LinearTransition`] and [`LinearObservation`]; any number of sensors |
+//! | [`ExtendedKalmanFilter`] | for any [`Transition`] and [`Observation`]; [`Augmented`] makes unknown parameters states |
+//! | [`LuenbergerObserver`] | a fixed gain, placed poles, or the gain of a [`SteadyState`] |
+//! | [`GainSchedule`] | gains and covariances ahead of the data |
+//! | `Smoother` | the states given the whole record (feature `alloc`) |
+//! | `Differentiated` | exact Jacobians of one generic function (feature `autodiff`) |
+//!
+//! Each sample returns an [`Innovation`]: what was not predicted, how surprising it is, and the [`Action`] that was
+//! taken. A [`Covariance`] is kept factored, so that it never becomes indefinite.
+//!
+//! All work with `f32` and `f64` ([`Real`]) and with sizes in the type, `Const<4>`, or at run time, `Dyn`
 //! ([`Dimension`]). Vectors and matrices are those of [nalgebra](mod@nalgebra), which this crate re-exports.
 //!
 //! # An example
@@ -16,34 +30,27 @@
 //!
 //! ```
 //! use thetahat_core::nalgebra::{Const, Vector2};
-//! use thetahat_core::{ArxOrders, Error, InputOrders, Lags, LeastSquares};
+//! use thetahat_core::{ArxOrders, Error, Forgetting, InputOrders, RecursiveArx};
 //!
 //! let orders = ArxOrders { na: 1, inputs: &[InputOrders { nb: 1, nk: 1 }] };
-//! let mut lags: Lags<f32, Const<2>> = Lags::new(&orders)?;
-//! let mut problem = LeastSquares::<f32, Const<2>>::new();
-//!
+//! let mut plant: RecursiveArx<f32, Const<2>> = RecursiveArx::new(&orders, 1.0, &[1.0], Forgetting::default())?;
 //! let mut y = 0.0;
-//! for k in 0..50 {
+//! for k in 0..200 {
 //!     let u = if k % 7 < 3 { 1.0 } else { -1.0 };
-//!     lags.push_inputs(&[u])?;
-//!     if let Some(regressor) = lags.regressor() {
-//!         problem.add(regressor, y)?;
-//!     }
-//!     lags.push_output(y)?;
+//!     plant.update(&[u], y)?;
 //!     y = 0.8 * y + 0.5 * u;
 //! }
-//! let solution = problem.solve()?;
-//! assert!((solution.parameters() - Vector2::new(-0.8, 0.5)).amax() < 1e-5);
+//! assert!((plant.estimator().parameters() - Vector2::new(-0.8, 0.5)).amax() < 1e-4);
 //! # Ok::<(), Error>(())
 //! ```
 //!
 //! # What it does not do
 //!
 //! - It does not read files, choose orders, or validate models: the crate `thetahat` does.
-//! - It does not panic. A release build links no panic for the static sizes; with `Dyn` only the allocator
-//!   can fail.
-//! - It does not allocate, but for creating, cloning and evaluating what has size `Dyn`. Adding a row or a
-//!   sample never does.
+//! - It does not panic. A release build links no panic for the static sizes; with `Dyn` only the allocator can fail.
+//! - It does not allocate with static sizes. With `Dyn`, least squares allocates when it is created, cloned or
+//!   evaluated, and never for a row or a sample; filters allocate in a step too, for what has the size of the
+//!   measurement.
 //! - It has no types but real scalars, no sparse matrices, and no multithreading.
 //! - It logs nothing.
 //!
@@ -51,6 +58,7 @@
 //!
 //! - `alloc`: sizes known only at run time, nalgebra's `Dyn`, for callers with a heap, such as a batch
 //!   program that reads the orders from its user. Off by default, so that firmware needs no allocator.
+//! - `serde`: snapshots that can be written and read back. Off by default, as a clone is a snapshot too.
 //! - `autodiff`: models that are written as one function, with exact Jacobians from dual numbers. Off by default,
 //!   as linear models and Jacobians by hand need none.
 //!
@@ -72,8 +80,14 @@
 //!
 //! # Missing and infinite numbers
 //!
-//! NaN in a delay line is a missing sample. Anywhere else NaN is an error, and infinity is an error
-//! everywhere. Whatever returns an [`Error`] has changed nothing.
+//! NaN is a missing sample: in a delay line, in an output, in an element of a measurement. Time goes on, nothing is
+//! corrected by it, and the [`Action`] says so. Anywhere else NaN is an error, and infinity is an error everywhere.
+//! Whatever returns an [`Error`] has changed nothing.
+//!
+//! # Snapshots
+//!
+//! Every estimator is plain data: a clone is a snapshot. With the feature `serde` it can be written and read back,
+//! and goes on to the bit as if nothing had happened.
 
 #[cfg(feature = "alloc")]
 extern crate alloc;
@@ -102,6 +116,8 @@ mod scalar;
 mod schedule;
 #[cfg(feature = "alloc")]
 mod smoother;
+#[cfg(feature = "serde")]
+mod snapshot;
 mod solution;
 mod state_space;
 #[cfg(test)]

@@ -53,8 +53,12 @@ use crate::{Action, Dimension, Error, Innovation, Observation, Real, Transition,
 /// # Ok::<(), Error>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
-pub struct LuenbergerObserver<T: Real, N: Dimension<M>, M: Dimension> {
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
+pub struct LuenbergerObserver<T: Real, N: Dimension + Dimension<M>, M: Dimension> {
+    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::vector"))]
     state: OVector<T, N>,
+    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::matrix"))]
     gain: OMatrix<T, N, M>,
 }
 

@@ -88,10 +88,14 @@ use crate::{Action, Covariance, Dimension, Error, Innovation, Real, Solution, ud
 /// # Ok::<(), Error>(())
 /// ```
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub struct RecursiveLeastSquares<T: Real, N: Dimension + Dimension<M>, M: Dimension = Const<1>> {
+    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::matrix"))]
     parameters: OMatrix<T, N, M>,
     covariance: Covariance<T, N>,
     /// p_j: the prior variances, and the largest that the cap leaves.
+    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::vector"))]
     bounds: OVector<T, N>,
     residuals: Residuals<T, M>,
     forgetting: Forgetting<T>,
@@ -100,6 +104,7 @@ pub struct RecursiveLeastSquares<T: Real, N: Dimension + Dimension<M>, M: Dimens
     turn: usize,
     phase: Phase,
     adapting: bool,
+    #[cfg_attr(feature = "serde", serde(skip))]
     scratch: N::Scratch<T>,
 }
 
@@ -632,8 +637,9 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
         let size = self.covariance.size();
         let (factor, bounds) = (self.covariance.as_mut_slice(), self.bounds.as_slice());
         size.with_scratch(&mut self.scratch, |[z, w], []| {
+            // P grows by at most a factor of 1/μ <= n + 1. Once it has, nothing may fail.
             let spread = ud::project(factor, gradient, z, w, T::zero());
-            check_small(gradient, errors, spread)?;
+            check_small(gradient, errors, spread * T::from_count(gradient.len() + 2))?;
             let energy = gradient.iter().zip(bounds).fold(T::zero(), |sum, (&phi, &p)| sum + phi * p * phi);
             if energy < T::one() {
                 return Ok(());
@@ -713,8 +719,11 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
 
 /// What the residuals tell of the noise: their weighted mean squares, and the sums of the weights.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 struct Residuals<T: Real, M: Dimension> {
     /// v.
+    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::vector"))]
     mean_squares: OVector<T, M>,
     /// W.
     weights: T,

@@ -3,7 +3,12 @@
 use nalgebra::RealField;
 
 mod sealed {
+    /// What [`Real`](super::Real) promises beside its own methods.
+    #[cfg(not(feature = "serde"))]
     pub trait Sealed {}
+    /// What [`Real`](super::Real) promises beside its own methods.
+    #[cfg(feature = "serde")]
+    pub trait Sealed: serde::Serialize + serde::de::DeserializeOwned {}
     impl Sealed for f32 {}
     impl Sealed for f64 {}
 }

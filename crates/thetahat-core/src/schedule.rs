@@ -39,6 +39,8 @@ use crate::{Covariance, Dimension, Error, KalmanFilter, LinearObservation, Linea
 /// # Ok::<(), Error>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub struct GainSchedule<T: Real, N: Dimension> {
     /// Its state stays 0.
     filter: KalmanFilter<T, N>,

@@ -104,11 +104,16 @@ pub trait Observation<
 /// # Ok::<(), Error>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub struct LinearTransition<T: Real, N: Dimension + Dimension<U>, U: Dimension = Const<0>> {
+    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::square"))]
     state_matrix: OMatrix<T, N, N>,
+    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::matrix"))]
     input_matrix: OMatrix<T, N, U>,
     noise: Covariance<T, N>,
     /// Q as a matrix: the time update needs it beside its factor.
+    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::square"))]
     noise_matrix: OMatrix<T, N, N>,
 }
 
@@ -201,6 +206,8 @@ impl<T: Real, N: Dimension + Dimension<U>, U: Dimension> Transition<T, N, U> for
 /// # Ok::<(), Error>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub struct LinearObservation<
     T: Real,
     N: Dimension + Dimension<M>,
@@ -208,7 +215,9 @@ pub struct LinearObservation<
     U: Dimension = Const<0>,
 > {
     /// H', so that each row of H is contiguous.
+    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::matrix"))]
     output_rows: OMatrix<T, N, M>,
+    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::matrix"))]
     input_matrix: OMatrix<T, M, U>,
     noise: Covariance<T, M>,
 }

@@ -97,7 +97,10 @@ struct Findings {
 
 fn estimator<T: Real>(forgetting: Forgetting<T>, dead_zone: T) -> RecursiveLeastSquares<T, Const<4>> {
     let scales = Vector4::from(SCALES).map(|scale| nalgebra::convert(f64::from(scale)));
-    RecursiveLeastSquares::new(&scales, forgetting).unwrap().with_dead_zone(dead_zone).unwrap()
+    RecursiveLeastSquares::new(&scales, forgetting)
+        .expect("finite numbers")
+        .with_dead_zone(dead_zone)
+        .expect("finite numbers")
 }
 
 /// The distance of scaled parameters from others.
@@ -114,8 +117,8 @@ fn run(name: &str, single: Forgetting<f32>, double: Forgetting<f64>, dead_zone: 
     let mut acquiring = None;
     for step in 0..steps {
         let (regressor, output) = plant.sample(step);
-        let innovation = single.update(&Vector4::from(regressor), output).unwrap();
-        double.update(&Vector4::from(regressor).cast(), f64::from(output)).unwrap();
+        let innovation = single.update(&Vector4::from(regressor), output).expect("finite numbers");
+        double.update(&Vector4::from(regressor).cast(), f64::from(output)).expect("finite numbers");
         assert!(innovation.error.is_finite(), "{name} at {step}");
 
         let scaled = |parameters: [f64; 4]| {
@@ -232,16 +235,19 @@ fn filter<T: Real>()
     let cast = |value: Vector3<f64>| value.map(number);
     let step: f64 = 0.1;
     let motion = Matrix3::new(1.0, step, step * step / 2.0, 0.0, 1.0, step, 0.0, 0.0, 0.98);
-    let jerk: Covariance<T, Const<1>> = Covariance::from_diagonal(&Vector1::new(number(1e-4))).unwrap();
-    let noise = jerk.transformed(&cast(Vector3::new(step.powi(3) / 6.0, step.powi(2) / 2.0, step))).unwrap();
+    let jerk: Covariance<T, Const<1>> =
+        Covariance::from_diagonal(&Vector1::new(number(1e-4))).expect("finite numbers");
+    let noise = jerk
+        .transformed(&cast(Vector3::new(step.powi(3) / 6.0, step.powi(2) / 2.0, step)))
+        .expect("finite numbers");
     let sensor = |row: RowVector3<f64>, variance: f64| {
-        let noise = Covariance::from_diagonal(&Vector1::new(number(variance))).unwrap();
-        LinearObservation::new(row.map(number), noise).unwrap()
+        let noise = Covariance::from_diagonal(&Vector1::new(number(variance))).expect("finite numbers");
+        LinearObservation::new(row.map(number), noise).expect("finite numbers")
     };
-    let prior = Covariance::from_diagonal(&cast(Vector3::new(1e8, 1e8, 1e8))).unwrap();
+    let prior = Covariance::from_diagonal(&cast(Vector3::new(1e8, 1e8, 1e8))).expect("finite numbers");
     (
-        KalmanFilter::new(SVector::from_element(T::zero()), prior).unwrap(),
-        LinearTransition::new(motion.map(number), noise).unwrap(),
+        KalmanFilter::new(SVector::from_element(T::zero()), prior).expect("finite numbers"),
+        LinearTransition::new(motion.map(number), noise).expect("finite numbers"),
         [
             sensor(RowVector3::new(1.0, 0.0, 0.0), 1e-6),
             sensor(RowVector3::new(1.0, 0.01, 0.0), 1e-6),

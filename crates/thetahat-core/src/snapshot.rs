@@ -1,0 +1,286 @@
+//! How numbers, vectors and matrices are written and read, for the feature `serde`.
+//!
+//! A snapshot is exact: what is read back is what was written, to the bit. In text, where a format may have neither
+//! NaN nor infinity (JSON has not), these are the words "NaN", "inf" and "-inf".
+//!
+//! nalgebra's own implementations would ask for bounds that [`Dimension`] hides; the functions here ask for none.
+
+use core::fmt;
+use core::marker::PhantomData;
+
+use nalgebra::{OMatrix, OVector, Scalar};
+use serde::de::{DeserializeSeed, Error, SeqAccess, Unexpected, Visitor};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+use crate::lags::Line;
+use crate::triangle::Sum;
+use crate::{Dimension, Real};
+
+/// What stands in a vector or matrix.
+pub(crate) trait Entry: Scalar + Copy {
+    /// What stands there until it is read.
+    const BLANK: Self;
+    fn write<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error>;
+    fn read<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error>;
+}
+
+impl<T: Real> Entry for T {
+    const BLANK: T = T::NAN;
+
+    fn write<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        if self.is_finite() || !serializer.is_human_readable() {
+            self.serialize(serializer)
+        } else if self.abs() == T::INFINITY {
+            serializer.serialize_str(if *self > T::zero() { "inf" } else { "-inf" })
+        } else {
+            serializer.serialize_str("NaN")
+        }
+    }
+
+    fn read<'de, D: Deserializer<'de>>(deserializer: D) -> Result<T, D::Error> {
+        if deserializer.is_human_readable() {
+            deserializer.deserialize_any(Number(PhantomData))
+        } else {
+            T::deserialize(deserializer)
+        }
+    }
+}
+
+/// Reads a number, or the word for one.
+struct Number<T>(PhantomData<T>);
+
+impl Entry for Line {
+    const BLANK: Line = Line { input: 0, nb: 0, nk: 0 };
+
+    fn write<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        (self.input, self.nb, self.nk).serialize(serializer)
+    }
+
+    fn read<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Line, D::Error> {
+        let (input, nb, nk) = Deserialize::deserialize(deserializer)?;
+        Ok(Line { input, nb, nk })
+    }
+}
+
+impl<T: Real> Entry for Sum<T> {
+    const BLANK: Sum<T> = Sum { value: T::NAN, carry: T::NAN };
+
+    fn write<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        (Written(&self.value), Written(&self.carry)).serialize(serializer)
+    }
+
+    fn read<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Sum<T>, D::Error> {
+        let (Read(value), Read(carry)) = Deserialize::deserialize(deserializer)?;
+        Ok(Sum { value, carry })
+    }
+}
+
+impl<T: Real> Visitor<'_> for Number<T> {
+    type Value = T;
+
+    fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str("a number, \"NaN\", \"inf\" or \"-inf\"")
+    }
+
+    /// What was written from an `f32` is one, so that this is exact.
+    fn visit_f64<E: Error>(self, value: f64) -> Result<T, E> {
+        Ok(nalgebra::convert(value))
+    }
+
+    fn visit_i64<E: Error>(self, value: i64) -> Result<T, E> {
+        self.visit_f64(value as f64)
+    }
+
+    fn visit_u64<E: Error>(self, value: u64) -> Result<T, E> {
+        self.visit_f64(value as f64)
+    }
+
+    fn visit_str<E: Error>(self, word: &str) -> Result<T, E> {
+        match word {
+            "NaN" => Ok(T::NAN),
+            "inf" => Ok(T::INFINITY),
+            "-inf" => Ok(-T::INFINITY),
+            _ => Err(E::invalid_value(Unexpected::Str(word), &self)),
+        }
+    }
+}
+
+/// Writes one entry.
+struct Written<'a, E>(&'a E);
+
+impl<E: Entry> Serialize for Written<'_, E> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.0.write(serializer)
+    }
+}
+
+/// Reads one entry.
+struct Read<E>(E);
+
+impl<'de, E: Entry> Deserialize<'de> for Read<E> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        E::read(deserializer).map(Read)
+    }
+}
+
+/// Writes the sizes and the entries, column by column.
+fn write<E: Entry, S: Serializer>(
+    rows: usize,
+    columns: usize,
+    entries: &[E],
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    struct All<'a, E>(&'a [E]);
+
+    impl<E: Entry> Serialize for All<'_, E> {
+        fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+            serializer.collect_seq(self.0.iter().map(Written))
+        }
+    }
+
+    (rows, columns, All(entries)).serialize(serializer)
+}
+
+/// The most entries that are read: a snapshot that claims more is not one.
+const MOST_ENTRIES: usize = 1 << 24;
+
+/// Reads what [`write`] writes, into the matrix that `make` makes for the sizes.
+struct Matrix<M, E> {
+    make: fn(usize, usize) -> Option<M>,
+    entries: fn(&mut M) -> &mut [E],
+}
+
+impl<'de, M, E: Entry> Visitor<'de> for Matrix<M, E> {
+    type Value = M;
+
+    fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str("the rows, the columns and the entries of a matrix of the size of this type")
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut parts: A) -> Result<M, A::Error> {
+        let wrong = |index| A::Error::invalid_length(index, &self);
+        let rows = parts.next_element::<usize>()?.ok_or_else(|| wrong(0))?;
+        let columns = parts.next_element::<usize>()?.ok_or_else(|| wrong(1))?;
+        let count = rows.checked_mul(columns).filter(|&count| count <= MOST_ENTRIES);
+        let mut matrix = count.and_then(|_| (self.make)(rows, columns)).ok_or_else(|| wrong(rows))?;
+        parts.next_element_seed(Entries((self.entries)(&mut matrix)))?.ok_or_else(|| wrong(2))?;
+        Ok(matrix)
+    }
+}
+
+/// Reads exactly as many entries as there are places.
+struct Entries<'a, E>(&'a mut [E]);
+
+impl<'de, E: Entry> DeserializeSeed<'de> for Entries<'_, E> {
+    type Value = ();
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<(), D::Error> {
+        deserializer.deserialize_seq(self)
+    }
+}
+
+impl<'de, E: Entry> Visitor<'de> for Entries<'_, E> {
+    type Value = ();
+
+    fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "{} entries", self.0.len())
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut entries: A) -> Result<(), A::Error> {
+        let expected = self.0.len();
+        let wrong = |count| A::Error::invalid_length(count, &"as many entries as rows times columns");
+        for (index, place) in self.0.iter_mut().enumerate() {
+            let Read(entry) = entries.next_element()?.ok_or_else(|| wrong(index))?;
+            *place = entry;
+        }
+        match entries.next_element::<Read<E>>()? {
+            None => Ok(()),
+            Some(_) => Err(wrong(expected + 1)),
+        }
+    }
+}
+
+/// For `#[serde(with)]` on a number that may be NaN or infinite.
+pub(crate) mod number {
+    use super::{Deserializer, Entry, Serializer};
+
+    pub(crate) fn serialize<E: Entry, S: Serializer>(entry: &E, serializer: S) -> Result<S::Ok, S::Error> {
+        entry.write(serializer)
+    }
+
+    pub(crate) fn deserialize<'de, E: Entry, D: Deserializer<'de>>(deserializer: D) -> Result<E, D::Error> {
+        E::read(deserializer)
+    }
+}
+
+/// For `#[serde(with)]` on a vector.
+pub(crate) mod vector {
+    use super::{Deserializer, Dimension, Entry, Matrix, OVector, Serializer, write};
+
+    pub(crate) fn serialize<E: Entry, N: Dimension, S: Serializer>(
+        vector: &OVector<E, N>,
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        write(vector.len(), 1, vector.as_slice(), serializer)
+    }
+
+    pub(crate) fn deserialize<'de, E: Entry, N: Dimension, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<OVector<E, N>, D::Error> {
+        let visitor = Matrix {
+            make: |rows, columns| {
+                let size = if columns == 1 { N::exactly(rows).ok() } else { None };
+                size.map(|size| size.vector(E::BLANK))
+            },
+            entries: |vector: &mut OVector<E, N>| vector.as_mut_slice(),
+        };
+        deserializer.deserialize_tuple(3, visitor)
+    }
+}
+
+/// For `#[serde(with)]` on a square matrix.
+pub(crate) mod square {
+    use super::{Deserializer, Dimension, Entry, Matrix, OMatrix, Serializer, write};
+
+    pub(crate) fn serialize<E: Entry, N: Dimension, S: Serializer>(
+        matrix: &OMatrix<E, N, N>,
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        write(matrix.nrows(), matrix.ncols(), matrix.as_slice(), serializer)
+    }
+
+    pub(crate) fn deserialize<'de, E: Entry, N: Dimension, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<OMatrix<E, N, N>, D::Error> {
+        let visitor = Matrix {
+            make: |rows, columns| {
+                let size = if rows == columns { N::exactly(rows).ok() } else { None };
+                size.map(|size| size.square(E::BLANK))
+            },
+            entries: |matrix: &mut OMatrix<E, N, N>| matrix.as_mut_slice(),
+        };
+        deserializer.deserialize_tuple(3, visitor)
+    }
+}
+
+/// For `#[serde(with)]` on any other matrix.
+pub(crate) mod matrix {
+    use super::{Deserializer, Dimension, Entry, Matrix, OMatrix, Serializer, write};
+
+    pub(crate) fn serialize<E: Entry, R: Dimension<C>, C: Dimension, S: Serializer>(
+        matrix: &OMatrix<E, R, C>,
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        write(matrix.nrows(), matrix.ncols(), matrix.as_slice(), serializer)
+    }
+
+    pub(crate) fn deserialize<'de, E: Entry, R: Dimension<C>, C: Dimension, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<OMatrix<E, R, C>, D::Error> {
+        let visitor = Matrix {
+            make: |rows, columns| Some(R::exactly(rows).ok()?.rows_by(C::exactly(columns).ok()?, E::BLANK)),
+            entries: |matrix: &mut OMatrix<E, R, C>| matrix.as_mut_slice(),
+        };
+        deserializer.deserialize_tuple(3, visitor)
+    }
+}

@@ -1,0 +1,186 @@
+//! What is written and read back goes on as if nothing had happened: every estimator, in text and in binary.
+
+use std::fmt::Debug;
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use thetahat_core::nalgebra::{Const, DVector, Dyn, Matrix2, RowVector2, SVector, Vector1, Vector2, Vector3};
+use thetahat_core::{
+    ArmaxMethod, ArmaxOrders, ArxOrders, Covariance, ExtendedKalmanFilter, Forgetting, InputOrders,
+    KalmanFilter, Lags, LeastSquares, LinearObservation, LinearTransition, LuenbergerObserver,
+    RecursiveArmax, RecursiveArx, RecursiveLeastSquares, Start,
+};
+
+const INPUTS: &[InputOrders] = &[InputOrders { nb: 1, nk: 2 }];
+
+/// Some number between -1 and 1.
+fn value(k: usize) -> f64 {
+    (k as f64 * 0.7548776662466927).fract() * 2.0 - 1.0
+}
+
+/// Writes and reads in both kinds of format.
+fn copies<E: Serialize + DeserializeOwned + Debug>(estimator: &E) -> [E; 2] {
+    let text = serde_json::to_string(estimator).expect("text");
+    let mut bytes = vec![];
+    ciborium::into_writer(estimator, &mut bytes).expect("bytes");
+    let from_text: E = serde_json::from_str(&text).expect("what was written");
+    let from_bytes: E = ciborium::from_reader(&bytes[..]).expect("what was written");
+    for copy in [&from_text, &from_bytes] {
+        assert_eq!(serde_json::to_string(copy).expect("text"), text);
+    }
+    [from_text, from_bytes]
+}
+
+/// Steps an estimator, takes copies of it in the middle, and steps on: the answers must be the same to the bit.
+fn check<E: Serialize + DeserializeOwned + Debug, A: Debug>(
+    mut estimator: E,
+    mut step: impl FnMut(&mut E, usize) -> A,
+) {
+    for k in 0..40 {
+        // At the start, in the middle, and with a missing sample in the delay lines.
+        if [0, 1, 7, 20].contains(&k) {
+            for mut copy in copies(&estimator) {
+                let [mut original, _] = copies(&estimator);
+                for later in k..k + 30 {
+                    let answers = (step(&mut original, later), step(&mut copy, later));
+                    assert_eq!(format!("{:?}", answers.0), format!("{:?}", answers.1));
+                }
+            }
+        }
+        step(&mut estimator, k);
+    }
+}
+
+/// A missing output at k = 6 and 19.
+fn output(k: usize) -> f64 {
+    if k == 6 || k == 19 { f64::NAN } else { 3.0 * value(5 * k + 2) }
+}
+
+#[test]
+fn recursive_least_squares() {
+    let phi = |k| Vector3::new(value(k), value(3 * k), 1.0);
+    for start in [Start::Standard, Start::Exact, Start::Mixed { blend: 9 }] {
+        for forgetting in [
+            Forgetting::None,
+            Forgetting::Exponential { factor: 0.9 },
+            Forgetting::Directional { factor: 0.9 },
+            Forgetting::RandomWalk { variance: 0.01 },
+            Forgetting::Variable { factor: 0.95, minimum: 0.8, noise_variance: 0.1 },
+        ] {
+            let estimator = RecursiveLeastSquares::<f64, Const<3>>::new(&Vector3::repeat(1.0), forgetting)
+                .unwrap()
+                .with_start(start)
+                .unwrap();
+            check(estimator, |estimator, k| {
+                (estimator.update(&phi(k), output(k)), *estimator.parameters(), estimator.noise_variance())
+            });
+        }
+    }
+    let dynamic =
+        RecursiveLeastSquares::<f64, Dyn>::new(&DVector::repeat(3, 1.0), Forgetting::default()).unwrap();
+    check(dynamic, |estimator, k| {
+        let phi = DVector::from_column_slice(phi(k).as_slice());
+        (estimator.update(&phi, output(k)), estimator.parameters().clone())
+    });
+}
+
+#[test]
+fn recursive_arx_and_armax() {
+    let orders = ArxOrders { na: 1, inputs: INPUTS };
+    let arx: RecursiveArx<f32, Const<2>, Const<2>> =
+        RecursiveArx::new(&orders, 1.0, &[1.0], Forgetting::default()).unwrap();
+    check(arx, |arx, k| (arx.update(&[value(k) as f32], output(k) as f32), *arx.estimator().parameters()));
+    for method in [ArmaxMethod::ExtendedLeastSquares, ArmaxMethod::PredictionError] {
+        let orders = ArmaxOrders { na: 1, inputs: INPUTS, nc: 1 };
+        let armax: RecursiveArmax<f64, Const<3>, Const<2>> =
+            RecursiveArmax::new(&orders, method, 1.0, &[1.0], 0.1, Forgetting::default()).unwrap();
+        check(armax, |armax, k| (armax.update(&[value(k)], output(k)), *armax.estimator().parameters()));
+    }
+}
+
+fn model() -> (LinearTransition<f64, Const<2>>, LinearObservation<f64, Const<2>, Const<1>>) {
+    let noise = Covariance::from_diagonal(&Vector2::new(0.0, 0.1)).expect("a model");
+    let sensor = Covariance::from_diagonal(&Vector1::new(0.3)).expect("a model");
+    (
+        LinearTransition::new(Matrix2::new(1.0, 0.1, 0.0, 0.9), noise).expect("a model"),
+        LinearObservation::new(RowVector2::new(1.0, 0.2), sensor).expect("a model"),
+    )
+}
+
+#[test]
+fn filters_and_observers() {
+    let (transition, observation) = model();
+    let none = SVector::zeros();
+    let prior = Covariance::new(&Matrix2::new(4.0, 1.0, 1.0, 2.0)).unwrap();
+    let filter = KalmanFilter::new(Vector2::new(0.5, -1.0), prior).unwrap();
+    let gated = filter.clone().with_gate(9.0).unwrap();
+    for filter in [filter, gated] {
+        let extended = ExtendedKalmanFilter::from(filter.clone()).with_iterations(2).unwrap();
+        check(filter, |filter, k| {
+            filter.predict(&transition, &none).unwrap();
+            let innovation = filter.correct(&observation, &none, &Vector1::new(output(k)));
+            (innovation, *filter.state(), filter.covariance().matrix())
+        });
+        check(extended, |filter, k| {
+            filter.predict(&transition, &none).unwrap();
+            (filter.correct(&observation, &none, &Vector1::new(output(k))), *filter.state())
+        });
+    }
+    let observer: LuenbergerObserver<f64, Const<2>, Const<1>> =
+        LuenbergerObserver::new(Vector2::zeros(), Vector2::new(0.3, 0.1)).unwrap();
+    check(observer, |observer, k| {
+        (observer.update(&transition, &observation, &none, &Vector1::new(output(k))), *observer.state())
+    });
+}
+
+#[test]
+fn linear_models() {
+    let (transition, observation) = model();
+    for copy in copies(&transition) {
+        assert_eq!(copy, transition);
+    }
+    for copy in copies(&observation) {
+        assert_eq!(copy, observation);
+    }
+}
+
+#[test]
+fn least_squares_and_delay_lines() {
+    check(LeastSquares::<f32, Const<2>>::new(), |problem, k| {
+        let added = problem.add(&Vector2::new(value(k) as f32, 1.0), value(2 * k) as f32);
+        (added, problem.solve())
+    });
+    let lags: Lags<f64, Dyn, Dyn> = Lags::new(&ArxOrders { na: 2, inputs: INPUTS }).unwrap();
+    check(lags, |lags, k| {
+        lags.push_inputs(&[value(k)]).unwrap();
+        let regressor = lags.regressor().cloned();
+        lags.push_output(output(k)).unwrap();
+        regressor
+    });
+}
+
+#[test]
+fn what_is_not_a_snapshot_is_refused() {
+    let covariance: Covariance<f64, Const<2>> = Covariance::from_diagonal(&Vector2::new(1.0, 2.0)).unwrap();
+    let text = serde_json::to_string(&covariance).unwrap();
+    assert_eq!(text, r#"{"factor":[2,2,[1.0,0.0,0.0,2.0]]}"#);
+    let read =
+        |text: &str| serde_json::from_str::<Covariance<f64, Const<2>>>(text).map_err(|e| e.to_string());
+    assert!(read(&text).is_ok());
+    for bad in [
+        r#"{"factor":[2,2,[1.0,0.0,0.0]]}"#,
+        r#"{"factor":[2,2,[1.0,0.0,0.0,2.0,3.0]]}"#,
+        r#"{"factor":[3,3,[1,0,0,0,1,0,0,0,1]]}"#,
+        r#"{"factor":[2,2,[1.0,0.0,0.0,"many"]]}"#,
+        r#"{"factor":[2,2,[-1.0,0.0,0.0,2.0]]}"#,
+        r#"{"factor":[2,2,["NaN",0.0,0.0,2.0]]}"#,
+        r#"{"factor":[2,2,[1.0,0.5,0.0,2.0]]}"#,
+        r#"{"factor":[2,2]}"#,
+        r#"{"factor":[]}"#,
+        r#"{}"#,
+    ] {
+        assert!(read(bad).is_err(), "{bad}");
+    }
+    let huge = r#"{"factor":[4000000000,4000000000,[]]}"#;
+    assert!(serde_json::from_str::<Covariance<f64, Dyn>>(huge).is_err());
+}

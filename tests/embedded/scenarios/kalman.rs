@@ -1,9 +1,9 @@
 //! The Kalman filters: one step is a time update and a measurement update.
 
-use thetahat_core::nalgebra::{Const, Matrix3, RowVector3, SMatrix, SVector, Vector1, Vector3};
+use thetahat_core::nalgebra::{Complex, Const, Matrix3, RowVector3, SMatrix, SVector, Vector1, Vector3};
 use thetahat_core::{
     Action, Covariance, Error, ExtendedKalmanFilter, Innovation, KalmanFilter, LinearObservation,
-    LinearTransition, Observation, Transition,
+    LinearTransition, LuenbergerObserver, Observation, Transition,
 };
 
 use crate::record::{Sample, sample};
@@ -152,6 +152,42 @@ impl Scenario for Extended {
 
     fn numbers(&self, innovation: &Self::Output, number: &mut impl FnMut(f32)) {
         filter_numbers(innovation, self.filter.state(), self.filter.covariance(), number);
+    }
+}
+
+/// An observer of two states with one output and a fixed gain.
+pub(crate) struct Observer {
+    observer: LuenbergerObserver<f32, Const<2>, Const<1>>,
+    transition: LinearTransition<f32, Const<2>>,
+    observation: LinearObservation<f32, Const<2>, Const<1>>,
+}
+
+impl Scenario for Observer {
+    const NAME: &'static str = "LuenbergerObserver, 2 x 1";
+    type Input = Vector1<f32>;
+    type Output = Innovation<f32, Vector1<f32>>;
+
+    fn start(_: Case) -> Result<Self, Error> {
+        let transition = LinearTransition::new(matrix::<2, 2>(0.5, 0.3), Covariance::zero(Const))?;
+        let observation = LinearObservation::new(matrix::<1, 2>(1.0, 0.1), Covariance::zero(Const))?;
+        let mut observer = LuenbergerObserver::new(SVector::zeros(), SVector::zeros())?;
+        let (none, poles) = (SVector::zeros(), SVector::repeat(Complex::new(0.2, 0.0)));
+        observer.place(&transition, &observation, &none, &Vector1::repeat(1.0), &poles)?;
+        Ok(Observer { observer, transition, observation })
+    }
+
+    fn input(case: Case, k: usize) -> Vector1<f32> {
+        Vector1::new(sample(case, k, 0).y)
+    }
+
+    #[inline(never)]
+    fn step(&mut self, measurement: &Vector1<f32>) -> Result<Self::Output, Error> {
+        self.observer.update(&self.transition, &self.observation, &SVector::zeros(), measurement)
+    }
+
+    fn numbers(&self, innovation: &Self::Output, mut number: &mut impl FnMut(f32)) {
+        number(innovation.error.x);
+        self.observer.gain().iter().chain(self.observer.state()).copied().for_each(&mut number);
     }
 }
 

@@ -68,10 +68,12 @@ pub fn visit_all(visitor: &mut impl Visitor) {
     visitor.visit::<recursive::Recursive<8>>();
     visitor.visit::<recursive::Recursive<16>>();
     visitor.visit::<recursive::Arx>();
+    visitor.visit::<recursive::Armax>();
     visitor.visit::<kalman::Kalman<2, 1>>();
     visitor.visit::<kalman::Kalman<4, 2>>();
     visitor.visit::<kalman::Kalman<6, 3>>();
     visitor.visit::<kalman::Extended>();
+    visitor.visit::<kalman::Observer>();
 }
 
 /// Plays both cases of one scenario: `step` gets the case, the number of the step, the scenario and what its

@@ -2,7 +2,8 @@
 
 use thetahat_core::nalgebra::{Const, SVector};
 use thetahat_core::{
-    Action, ArxOrders, Error, Forgetting, InputOrders, Innovation, RecursiveArx, RecursiveLeastSquares,
+    Action, ArmaxMethod, ArmaxOrders, ArxOrders, Error, Forgetting, Innovation, InputOrders, RecursiveArmax,
+    RecursiveArx, RecursiveLeastSquares,
 };
 
 use crate::record::{Sample, regressor, sample};
@@ -53,6 +54,38 @@ impl Scenario for Arx {
 
     fn start(_: Case) -> Result<Self, Error> {
         RecursiveArx::new(&ArxOrders { na: 2, inputs: INPUTS }, 1.0, &[1.0], FORGETTING).map(Arx)
+    }
+
+    fn input(case: Case, k: usize) -> Sample {
+        sample(case, k, 0)
+    }
+
+    #[inline(never)]
+    fn step(&mut self, sample: &Sample) -> Result<Innovation<f32>, Error> {
+        self.0.update(&[sample.u], sample.y)
+    }
+
+    fn numbers(&self, innovation: &Innovation<f32>, number: &mut impl FnMut(f32)) {
+        recursive_numbers(self.0.estimator(), innovation, number);
+        let mut ahead = [0.0; 3];
+        if self.0.predict(&[1.0, 0.0, 0.0], &mut ahead).is_ok() {
+            ahead.into_iter().for_each(number);
+        }
+    }
+}
+
+/// An ARMAX(2, 2, 1) model by recursive prediction error, one sample in.
+pub(crate) struct Armax(RecursiveArmax<f32, Const<5>>);
+
+impl Scenario for Armax {
+    const NAME: &'static str = "RecursiveArmax, (2, 2, 1)";
+    const DETOUR: bool = true;
+    type Input = Sample;
+    type Output = Innovation<f32>;
+
+    fn start(_: Case) -> Result<Self, Error> {
+        let orders = ArmaxOrders { na: 2, inputs: INPUTS, nc: 1 };
+        RecursiveArmax::new(&orders, ArmaxMethod::PredictionError, 1.0, &[1.0], 0.1, FORGETTING).map(Armax)
     }
 
     fn input(case: Case, k: usize) -> Sample {

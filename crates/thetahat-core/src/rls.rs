@@ -546,18 +546,15 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
             // The divisions for the innovation come first: they go on beside those of the update.
             let (total, growth) = (noise + spread, T::one() / noise);
             let nis = residuals.normalise(errors, variances, n, total * growth);
-            let weight = if noise < T::one() { noise } else { weight };
+            let inverse = ud::update_by_rows(factor, f, v, noise, growth);
             // A sample that fixes parameters tells of the prior as well as of the noise. While the start takes the
             // prior out, it does so from the residuals too.
             let fixing = running && total * growth > T::from_count(11);
-            residuals.count(errors, if fixing { T::INFINITY } else { total * growth }, weight);
-            ud::update(factor, f, v, noise);
+            let weight = if noise < T::one() { noise } else { weight };
+            residuals.count(errors, if fixing { T::zero() } else { noise * inverse }, weight);
             let mut restrained = false;
             for (index, &error) in errors.iter().enumerate() {
-                restrained |= move_by(column_mut(parameters.as_mut_slice(), n, index), v, error / total);
-            }
-            if noise < T::one() {
-                scale_variances(factor, n, growth);
+                restrained |= move_by(column_mut(parameters.as_mut_slice(), n, index), v, error * inverse);
             }
             Ok((nis, if restrained { Action::Projected } else { Action::Updated }))
         })?;
@@ -737,13 +734,13 @@ impl<T: Real, M: Dimension> Residuals<T, M> {
         Residuals { mean_squares, weights: T::zero(), squared_weights: T::zero() }
     }
 
-    /// Counts the innovations of a sample; `relative` is 1 + φ'P⁻φ, and earlier samples lose weight by `factor`.
+    /// Counts the innovations of a sample; `share` is 1/(1 + φ'P⁻φ), and earlier samples lose weight by `factor`.
     #[inline(always)]
-    fn count(&mut self, errors: &[T], relative: T, factor: T) {
+    fn count(&mut self, errors: &[T], share: T, factor: T) {
         self.weights = factor * self.weights + T::one();
         self.squared_weights = factor * factor * self.squared_weights + T::one();
         for (mean, &error) in self.mean_squares.as_mut_slice().iter_mut().zip(errors) {
-            *mean += (error / relative * error - *mean) / self.weights;
+            *mean += (error * share * error - *mean) / self.weights;
         }
     }
 

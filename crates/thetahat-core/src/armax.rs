@@ -60,7 +60,8 @@ pub enum ArmaxMethod {
     /// pseudo-linear regression.
     ExtendedLeastSquares,
     /// ψ = φ/C(q), the gradient of the prediction: converges to a minimum of the prediction error. As the first
-    /// residuals are poor and C is not known yet, it may be slow at the start. nc n multiply-adds and moves more.
+    /// residuals are poor and C is not known yet, it may be slow at the start, above all where nothing is forgotten:
+    /// with λ = 0.999 it recovers sooner than with none. nc n multiply-adds and moves more.
     PredictionError,
 }
 

@@ -368,7 +368,7 @@ impl<T: Real, N: Dimension> KalmanFilter<T, N> {
                 if !(nis.is_finite() && variance.is_finite()) {
                     return Err(Error::TooLarge { argument: "measurement" });
                 }
-                ud::update(work, f, v, noise);
+                ud::update(work, f, v, noise, T::one());
                 add_multiple(step, gain, v);
                 record(row, v, *variance, rest);
                 action = Action::Updated;

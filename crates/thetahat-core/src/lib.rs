@@ -80,7 +80,7 @@
 //!
 //! # Missing and infinite numbers
 //!
-//! NaN is a missing sample: in a delay line, in an output, in an element of a measurement. Time goes on, nothing is
+//! NaN is a missing sample: in a delay line, a regressor, an output, an element of a measurement. Time goes on, nothing is
 //! corrected by it, and the [`Action`] says so. Anywhere else NaN is an error, and infinity is an error everywhere.
 //! Whatever returns an [`Error`] has changed nothing.
 //!

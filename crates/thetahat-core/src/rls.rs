@@ -546,7 +546,7 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
             // The divisions for the innovation come first: they go on beside those of the update.
             let (total, growth) = (noise + spread, T::one() / noise);
             let nis = residuals.normalise(errors, variances, n, total * growth);
-            let inverse = ud::update_by_rows(factor, f, v, noise, growth);
+            let inverse = ud::update(factor, f, v, noise, growth);
             // A sample that fixes parameters tells of the prior as well as of the noise. While the start takes the
             // prior out, it does so from the residuals too.
             let fixing = running && total * growth > T::from_count(11);
@@ -617,7 +617,7 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
         let factor = self.covariance.as_mut_slice();
         size.with_scratch(&mut self.scratch, |[f, v], []| {
             measure_one(factor, turn, f, v);
-            ud::update(factor, f, v, noise);
+            ud::update(factor, f, v, noise, T::one());
         });
     }
 

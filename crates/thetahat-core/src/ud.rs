@@ -94,87 +94,88 @@ pub(crate) fn project<T: Real>(factor: &[T], row: &[T], f: &mut [T], v: &mut [T]
     variance
 }
 
-/// Phase two: P <- P - P h h'P / (h'P h + `noise`). Takes the f and v of phase one; v becomes b, the gain
-/// times the innovation variance, so that x <- x + b e / (h'P h + `noise`).
+/// Phase two: P <- `growth` (P - P h h'P / (h'P h + `noise`)); returns 1 / (h'P h + `noise`). Takes the f and v of
+/// phase one; v becomes b, the gain times the innovation variance, so that x <- x + b e / (h'P h + `noise`). f is used
+/// up.
 ///
 /// ```text
-/// a_0 = noise;   a_j = a_(j-1) + f_j v_j,   d_j <- d_j a_(j-1) / a_j
-/// p = -f_j / a_(j-1);   for i < j:   t = U_ij,   U_ij <- t + b_i p,   b_i <- b_i + t v_j;   b_j = v_j
+/// a_0 = noise;   a_j = a_(j-1) + f_j v_j,   d_j <- d_j a_(j-1) / a_j,   p_j = -f_j / a_(j-1)
+/// for i < j:   t = U_ij,   U_ij <- t + b_i p_j,   b_i <- b_i + t v_j;   b_j = v_j
 /// ```
 ///
-/// While a_j is 0 (an exact measurement of what is known) nothing is learnt. Where only a_(j-1) is 0, all b_i
-/// are 0, so that p does not matter.
+/// While a_j is 0 (an exact measurement of what is known) nothing is learnt. Where only a_(j-1) is 0, all b_i are 0, so
+/// that p_j does not matter.
 ///
-/// n² + 4 n multiply-adds, n divisions. From nine columns on two are taken at once, so that b is read and written
-/// half as often: that is a tenth quicker there, and slower below, where b fits the registers.
+/// Row by row: the b of four rows stay in registers, where column by column each is loaded and stored n times. That
+/// takes three quarters of the time from eight states on (measured).
+///
+/// n² + 5 n multiply-adds, n divisions.
 ///
 /// Source: Bierman, Factorization Methods for Discrete Sequential Estimation, 1977, section V.3.
 #[inline(always)]
-pub(crate) fn update<T: Real>(factor: &mut [T], f: &[T], v: &mut [T], noise: T) {
+pub(crate) fn update<T: Real>(factor: &mut [T], f: &mut [T], v: &mut [T], noise: T, growth: T) -> T {
+    const ROWS: usize = 4;
     let size = f.len();
-    let mut pivots = Pivots { before: noise, inverse: reciprocal(noise) };
-    let pairs = if size > 8 { size / 2 } else { 0 };
-    for first in (0..pairs).map(|pair| 2 * pair) {
-        let Some((b, [gain, next_gain, ..])) = v.split_at_mut_checked(first) else {
-            return;
-        };
-        let columns = factor.get_mut(first * size..).unwrap_or_default();
-        let Some((column, next_column)) = columns.split_at_mut_checked(size) else {
-            return;
-        };
-        let (Some((entries, [pivot, ..])), Some((next_entries, [last_entry, next_pivot, ..]))) =
-            (column.split_at_mut_checked(first), next_column.split_at_mut_checked(first))
-        else {
-            return;
-        };
-        let p = pivots.next(at(f, first), *gain, pivot);
-        let next_p = pivots.next(at(f, first + 1), *next_gain, next_pivot);
-        for ((entry, next_entry), b) in entries.iter_mut().zip(next_entries).zip(b) {
-            exchange(entry, b, p, *gain);
-            exchange(next_entry, b, next_p, *next_gain);
+    let (mut before, mut inverse) = (noise, reciprocal(noise));
+    // D, and f becomes p.
+    for (index, (f, &gain)) in f.iter_mut().zip(&*v).enumerate() {
+        let after = before + *f * gain;
+        *f = -*f * inverse;
+        inverse = reciprocal(after);
+        if let Some(diagonal) = column_mut(factor, size, index).get_mut(index) {
+            *diagonal *= growth;
+            if after > before {
+                *diagonal *= before * inverse;
+            }
         }
-        exchange(last_entry, gain, next_p, *next_gain);
+        before = after;
     }
-    for index in 2 * pairs..size {
-        let Some((b, [gain, ..])) = v.split_at_mut_checked(index) else {
-            return;
-        };
-        let Some((entries, [pivot, ..])) = column_mut(factor, size, index).split_at_mut_checked(index) else {
-            return;
-        };
-        let p = pivots.next(at(f, index), *gain, pivot);
-        for (entry, b) in entries.iter_mut().zip(b) {
-            exchange(entry, b, p, *gain);
-        }
+    let whole = size - size % ROWS;
+    for first in (0..size / ROWS).map(|block| block * ROWS) {
+        update_rows::<T, ROWS>(factor, f, v, first);
     }
+    for first in whole..size {
+        update_rows::<T, 1>(factor, f, v, first);
+    }
+    inverse
 }
 
-/// U_ij <- t + b_i p and b_i <- b_i + t v_j, where t is the old U_ij.
+/// The entries of U in `ROWS` rows from `first` on, and their b, for [`update`]. What v holds for the rows
+/// after them is still v.
 #[inline(always)]
-fn exchange<T: Real>(entry: &mut T, b: &mut T, p: T, v: T) {
-    let given = *entry;
-    *entry = given + *b * p;
-    *b += given * v;
-}
-
-/// a_j and 1/a_j of [`update`].
-struct Pivots<T> {
-    before: T,
-    inverse: T,
-}
-
-impl<T: Real> Pivots<T> {
-    /// Goes on to the next j: d_j <- d_j a_(j-1) / a_j. Returns p = -f_j / a_(j-1).
-    #[inline(always)]
-    fn next(&mut self, f: T, v: T, pivot: &mut T) -> T {
-        let after = self.before + f * v;
-        let p = -f * self.inverse;
-        self.inverse = reciprocal(after);
-        if after > self.before {
-            *pivot *= self.before * self.inverse;
+fn update_rows<T: Real, const ROWS: usize>(factor: &mut [T], p: &[T], v: &mut [T], first: usize) {
+    let size = p.len();
+    let mut b = [T::zero(); ROWS];
+    for (k, b) in b.iter_mut().enumerate() {
+        *b = at(v, first + k);
+    }
+    // The corner above the diagonal, then whole columns of the rows.
+    for index in first + 1..first + ROWS {
+        let (p, gain) = (at(p, index), at(v, index));
+        if let Some(entries) = column_mut(factor, size, index).get_mut(first..index) {
+            exchange(entries, &mut b, p, gain);
         }
-        self.before = after;
-        p
+    }
+    for index in first + ROWS..size {
+        let (p, gain) = (at(p, index), at(v, index));
+        let entries =
+            column_mut(factor, size, index).get_mut(first..).and_then(|rest| rest.first_chunk_mut::<ROWS>());
+        if let Some(entries) = entries {
+            exchange(entries, &mut b, p, gain);
+        }
+    }
+    if let Some(target) = v.get_mut(first..).and_then(|rest| rest.first_chunk_mut::<ROWS>()) {
+        *target = b;
+    }
+}
+
+/// U_ij <- t + b_i p_j, b_i <- b_i + t v_j, where t is the old U_ij, for some rows i of one column j.
+#[inline(always)]
+fn exchange<T: Real>(entries: &mut [T], b: &mut [T], p: T, v: T) {
+    for (entry, b) in entries.iter_mut().zip(b) {
+        let given = *entry;
+        *entry = given + *b * p;
+        *b += given * v;
     }
 }
 
@@ -412,73 +413,6 @@ pub(crate) fn unit_column<T: Real>(factor: &[T], target: &mut [T], index: usize)
     copy(above(factor, target.len(), index), target);
     if let Some(diagonal) = target.get_mut(index) {
         *diagonal = T::one();
-    }
-}
-
-/// Phase two as [`update`] does it, then P <- `growth` P, for a positive `noise`; returns 1 / (h'P h + `noise`). Row by
-/// row: the b of four rows stay in registers, where column by column each is loaded and stored n times. That takes
-/// three quarters of the time from eight states on (measured). v becomes b, f is used up.
-///
-/// n² + 5 n multiply-adds, n divisions.
-#[inline(always)]
-pub(crate) fn update_by_rows<T: Real>(factor: &mut [T], f: &mut [T], v: &mut [T], noise: T, growth: T) -> T {
-    const ROWS: usize = 4;
-    let size = f.len();
-    let (mut before, mut inverse) = (noise, reciprocal(noise));
-    // D, and f becomes p.
-    for (index, (f, &gain)) in f.iter_mut().zip(&*v).enumerate() {
-        let after = before + *f * gain;
-        *f = -*f * inverse;
-        inverse = reciprocal(after);
-        if let Some(diagonal) = column_mut(factor, size, index).get_mut(index) {
-            *diagonal *= before * growth * inverse;
-        }
-        before = after;
-    }
-    let whole = size - size % ROWS;
-    for first in (0..size / ROWS).map(|block| block * ROWS) {
-        update_rows::<T, ROWS>(factor, f, v, first);
-    }
-    for first in whole..size {
-        update_rows::<T, 1>(factor, f, v, first);
-    }
-    inverse
-}
-
-/// The entries of U in `ROWS` rows from `first` on, and their b, for [`update_by_rows`]. What v holds for the rows
-/// after them is still v.
-#[inline(always)]
-fn update_rows<T: Real, const ROWS: usize>(factor: &mut [T], p: &[T], v: &mut [T], first: usize) {
-    let size = p.len();
-    let mut b = [T::zero(); ROWS];
-    for (k, b) in b.iter_mut().enumerate() {
-        *b = at(v, first + k);
-    }
-    // The corner above the diagonal, then whole columns of the rows.
-    for index in first + 1..first + ROWS {
-        let (p, gain) = (at(p, index), at(v, index));
-        if let Some(entries) = column_mut(factor, size, index).get_mut(first..index) {
-            for (entry, b) in entries.iter_mut().zip(&mut b) {
-                let given = *entry;
-                *entry = given + *b * p;
-                *b += given * gain;
-            }
-        }
-    }
-    for index in first + ROWS..size {
-        let (p, gain) = (at(p, index), at(v, index));
-        let entries =
-            column_mut(factor, size, index).get_mut(first..).and_then(|rest| rest.first_chunk_mut::<ROWS>());
-        if let Some(entries) = entries {
-            for (entry, b) in entries.iter_mut().zip(&mut b) {
-                let given = *entry;
-                *entry = given + *b * p;
-                *b += given * gain;
-            }
-        }
-    }
-    if let Some(target) = v.get_mut(first..).and_then(|rest| rest.first_chunk_mut::<ROWS>()) {
-        *target = b;
     }
 }
 

@@ -230,7 +230,7 @@ fn one_factor_is_one_memory() {
     let directional = variance(Forgetting::Directional { factor });
     let noise_variance = 0.01 / 3.0;
     let variable = variance(Forgetting::Variable { factor, minimum: 0.9, noise_variance });
-    // Measured: 1.00 and 0.99.
+    // Measured: 1.02 and 0.96.
     assert!((directional / exponential - 1.0).abs() < 0.1, "{}", directional / exponential);
     assert!((variable / exponential - 1.0).abs() < 0.1, "{}", variable / exponential);
 }
@@ -303,7 +303,7 @@ fn the_exact_start_is_accurate_in_single_precision() {
         (estimator.parameters().component_mul(&scales) - SVector::repeat(1.0)).amax()
     };
     let (standard, exact) = (error(Start::Standard), error(Start::Exact));
-    // Measured: 2e-2 and 2e-6.
+    // Measured: 6e-3 and 6e-8.
     assert!(standard > 1e-3, "{standard}");
     assert!(exact < 1e-5, "{exact}");
 }
@@ -873,28 +873,26 @@ fn bounded_policies_endure_in_single_precision() {
 
 #[test]
 fn switching_parameters_are_acquired_again() {
-    for policy in [0.99_f32].map(|factor| Forgetting::Exponential { factor }) {
-        let scales = Vector4::new(1e-4, 1.0, 1e4, 10.0_f32);
-        let mut estimator = RecursiveLeastSquares::new(&scales, policy).unwrap();
-        let mut noise = Noise(21);
-        let mut longest = 0;
-        for era in 0..20 {
-            let theta = scales.map(|scale| if era % 2 == 0 { 1.0 } else { -3.0 } / scale);
-            let mut since = 0;
-            for k in 0..3000 {
-                // Every third era begins with silence.
-                let silent = era % 3 == 0 && k < 1500;
-                let phi =
-                    if silent { Vector4::zeros() } else { scales.map(|scale| scale * noise.next() as f32) };
-                estimator.update(&phi, phi.dot(&theta) + 0.01 * noise.next() as f32).unwrap();
-                let away = (estimator.parameters() - theta).component_mul(&scales).amax();
-                if !silent && away > 0.02 {
-                    since = k - if era % 3 == 0 { 1499 } else { 0 };
-                }
+    let scales = Vector4::new(1e-4, 1.0, 1e4, 10.0_f32);
+    let mut estimator =
+        RecursiveLeastSquares::new(&scales, Forgetting::Exponential { factor: 0.99_f32 }).unwrap();
+    let (mut noise, mut longest) = (Noise(21), 0);
+    for era in 0..20 {
+        let theta = scales.map(|scale| if era % 2 == 0 { 1.0 } else { -3.0 } / scale);
+        // Every third era begins with silence.
+        let silence = if era % 3 == 0 { 1500 } else { 0 };
+        let mut last = 0;
+        for k in 0..3000 {
+            let silent = k < silence;
+            let phi = if silent { Vector4::zeros() } else { scales.map(|scale| scale * noise.next() as f32) };
+            estimator.update(&phi, phi.dot(&theta) + 0.01 * noise.next() as f32).unwrap();
+            let away = (estimator.parameters() - theta).component_mul(&scales).amax();
+            if !silent && away > 0.05 {
+                last = k - silence;
             }
-            longest = longest.max(since);
         }
-        // Measured: 640. An error of 4 falls to 0.02 as 0.99^k, in 530 samples.
-        assert!(longest < 700, "{longest}");
+        longest = longest.max(last);
     }
+    // An error of 4 falls to 0.05 as 0.99^k, in 436 samples.
+    assert!((400..500).contains(&longest), "{longest}");
 }

@@ -57,7 +57,7 @@ fn difference(a: &[f64], b: &[f64], n: usize) -> f64 {
 fn update_by<T: Real>(factor: &mut [T], row: &[T], noise: T) -> (T, Vec<T>) {
     let (mut f, mut v) = (vec![T::zero(); row.len()], vec![T::zero(); row.len()]);
     let variance = project(factor, row, &mut f, &mut v, noise);
-    update(factor, &f, &mut v, noise);
+    update(factor, &mut f, &mut v, noise, T::one());
     (variance, v)
 }
 

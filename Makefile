@@ -13,11 +13,10 @@ format:
 
 lint:
 	@$(call with,clippy,clippy,cargo clippy --locked --workspace --all-targets --all-features -- -D warnings)
-
 	@cd tests/embedded && $(call with,clippy,clippy,cargo clippy --locked --lib --bin check --tests -- -D warnings)
 
 docs:
-	RUSTDOCFLAGS="-D warnings" cargo doc --locked --workspace --no-deps
+	RUSTDOCFLAGS="-D warnings" cargo doc --locked --workspace --all-features --no-deps
 
 # thetahat-core once more on its own: there it has no heap.
 rust:

@@ -2,7 +2,7 @@
 
 use nalgebra::{Const, OMatrix, OVector};
 
-use crate::arx::{check_output, predict_ahead};
+use crate::arx::{check_samples, is_large, predict_ahead};
 use crate::error::check_length;
 use crate::rls::is_small;
 use crate::triangle::{column, column_mut};
@@ -210,15 +210,17 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
     /// One sample: u(k), one number for each input, and y(k). NaN is a missing sample.
     ///
     /// The innovation is that of [`RecursiveLeastSquares::update`]. Its action is
-    /// [`NotReady`](Action::NotReady) while a missing sample sits in a tap, or the lines are not filled yet, and
-    /// [`Projected`](Action::Projected) if the step was shortened to keep C stable.
+    /// [`NotReady`](Action::NotReady) while a missing sample sits in a tap, the lines are not filled yet, or numbers
+    /// that are accepted one by one would overflow together; and [`Projected`](Action::Projected) if the step was
+    /// shortened to keep C stable. (A variance may have been brought back to its bound in the same sample:
+    /// `Projected` comes before `Capped`.)
     ///
     /// Errors, after which nothing has changed, time included: as for [`RecursiveArx::update`](crate::RecursiveArx::update).
     ///
     /// 1.5 n² + (9 + nc) n multiply-adds, n divisions, and moves of (2 + nc) n + 2 D numbers; each halving nc²/2 more.
     pub fn update(&mut self, inputs: &[T], output: T) -> Result<Innovation<T>, Error> {
         self.lags.check_inputs(inputs)?;
-        check_output(output)?;
+        check_samples(inputs, output, self.gradients.ncols())?;
         let RecursiveArmax { lags, estimator, gradients, residual, nc, method, scratch } = self;
         let (nc, known) = (*nc, *residual);
         let newest = |input: usize| match inputs.get(input) {
@@ -234,7 +236,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
                 estimator.advance();
                 gradients.fill(T::zero());
                 *residual = T::zero();
-                return Ok(innovation);
+                return innovation;
             }
             copy(regressor, gradient);
             if *method == ArmaxMethod::PredictionError {
@@ -251,13 +253,22 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
             if output.is_finite() {
                 let error = output - dot(regressor, estimator.parameters().as_slice());
                 let mut variance = [T::NAN];
-                let (nis, action) =
+                let corrected =
                     estimator.correct(gradient, &[error], &mut variance, |parameters, direction, step| {
                         move_stably(parameters, direction, step, work.get_mut(..nc).unwrap_or_default())
-                    })?;
+                    });
+                // What is too large here is so by what came before: time must go on, or it would stay.
+                let Ok((nis, action)) = corrected else {
+                    estimator.advance();
+                    gradients.fill(T::zero());
+                    *residual = T::zero();
+                    return innovation;
+                };
                 let [variance] = variance;
                 innovation = Innovation { error, variance, nis, action };
-                *residual = output - dot(regressor, estimator.parameters().as_slice());
+                let left = output - dot(regressor, estimator.parameters().as_slice());
+                let usable = left.is_finite() && !is_large(left, size.value());
+                *residual = if usable { left } else { T::zero() };
             } else {
                 innovation.action = Action::Missing;
                 estimator.advance();
@@ -271,8 +282,8 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
                 let past = column_mut(gradients.as_mut_slice(), size.value(), index);
                 past.iter_mut().zip(&mut *gradient).for_each(|(past, moving)| core::mem::swap(past, moving));
             }
-            Ok(innovation)
-        })?;
+            innovation
+        });
         lags.push(newest);
         lags.push_output(output)?;
         Ok(innovation)

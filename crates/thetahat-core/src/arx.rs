@@ -109,7 +109,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
 
     /// The same with another start. See [`RecursiveLeastSquares::with_start`].
     ///
-    /// Errors: none that can occur here.
+    /// Errors: none that can occur.
     pub fn with_start(self, start: Start) -> Result<Self, Error> {
         Ok(RecursiveArx { estimator: self.estimator.with_start(start)?, ..self })
     }
@@ -138,27 +138,32 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
     /// One sample: u(k), one number for each input, and y(k). NaN is a missing sample.
     ///
     /// The innovation is that of [`RecursiveLeastSquares::update`]. Its action is
-    /// [`NotReady`](Action::NotReady) while a missing sample sits in a tap, or the lines are not filled yet.
+    /// [`NotReady`](Action::NotReady) while a missing sample sits in a tap, or the lines are not filled yet; and
+    /// where numbers that are accepted one by one would overflow together with P or the parameters: nothing is
+    /// corrected then, but time goes on, so that a large sample leaves the taps again.
     ///
     /// Errors, after which nothing has changed, time included: [`Error::Length`] if the number of inputs is not that
-    /// of the orders; [`Error::Infinite`]; [`Error::TooLarge`] for numbers whose products could overflow. If time
-    /// should go on, pass NaN instead.
+    /// of the orders; [`Error::Infinite`]; [`Error::TooLarge`] for a sample whose square times n exceeds
+    /// [`Real::LARGEST_ENTRY`] (7e13/√n in `f32`). If time should go on, pass NaN instead.
     ///
     /// 1.5 n² + 7 n multiply-adds, n divisions, and two moves of n + D numbers.
     pub fn update(&mut self, inputs: &[T], output: T) -> Result<Innovation<T>, Error> {
+        let size = self.estimator.covariance().size();
         self.lags.check_inputs(inputs)?;
-        check_output(output)?;
+        check_samples(inputs, output, size.value())?;
         let newest = |input: usize| inputs.get(input).copied().unwrap_or(T::NAN);
         let RecursiveArx { lags, estimator, scratch } = self;
-        let size = estimator.covariance().size();
         let innovation = size.with_scratch(scratch, |[regressor], []| {
             lags.peek(newest, regressor);
             if regressor.iter().all(T::is_finite) {
-                return estimator.take(regressor, output);
+                // What is too large here is so by what came before: time must go on, or it would stay.
+                if let Ok(innovation) = estimator.take(regressor, output) {
+                    return innovation;
+                }
             }
             estimator.advance();
-            Ok(Innovation { error: T::NAN, variance: T::NAN, nis: T::zero(), action: Action::NotReady })
-        })?;
+            Innovation { error: T::NAN, variance: T::NAN, nis: T::zero(), action: Action::NotReady }
+        });
         lags.push(newest);
         lags.push_output(output)?;
         Ok(innovation)
@@ -175,7 +180,8 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
     /// a step.
     ///
     /// Errors: [`Error::Length`] if the number of inputs is not that of the outputs times that of the inputs of the
-    /// model; [`Error::Infinite`]; [`Error::Overflow`] if an unstable model grows out of `T`.
+    /// model; [`Error::Infinite`]; both leave `outputs` as they were. [`Error::Overflow`] if an unstable model grows
+    /// out of `T`: the outputs before that are written, the others are NaN.
     pub fn predict(&self, future_inputs: &[T], outputs: &mut [T]) -> Result<(), Error> {
         let parameters = self.estimator.parameters().as_slice();
         predict_ahead(self.lags.clone(), self.lags.inputs(), parameters, T::zero(), future_inputs, outputs)
@@ -209,9 +215,20 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
     }
 }
 
-/// That a sample of the output is not infinite.
-pub(crate) fn check_output<T: Real>(output: T) -> Result<(), Error> {
-    if is_infinite(&output) { Err(Error::Infinite { argument: "output" }) } else { Ok(()) }
+/// That the output is not infinite, and that no sample is too large for a regressor of `size` such samples.
+pub(crate) fn check_samples<T: Real>(inputs: &[T], output: T, size: usize) -> Result<(), Error> {
+    if is_infinite(&output) {
+        return Err(Error::Infinite { argument: "output" });
+    }
+    if inputs.iter().any(|&sample| is_large(sample, size)) {
+        return Err(Error::TooLarge { argument: "inputs" });
+    }
+    if is_large(output, size) { Err(Error::TooLarge { argument: "output" }) } else { Ok(()) }
+}
+
+/// Whether a regressor of `size` such samples could be too large. NaN is not.
+pub(crate) fn is_large<T: Real>(sample: T, size: usize) -> bool {
+    sample * sample * T::from_count(size.max(1)) > T::LARGEST_ENTRY
 }
 
 /// Runs a model on from `lags`: its predictions become its outputs. The model has `inputs` inputs and may have one
@@ -228,17 +245,25 @@ pub(crate) fn predict_ahead<T: Real, N: Dimension, D: Dimension>(
     if future_inputs.iter().any(is_infinite) {
         return Err(Error::Infinite { argument: "future_inputs" });
     }
+    let mut grown = false;
     for (step, output) in outputs.iter_mut().enumerate() {
+        if grown {
+            *output = T::NAN;
+            continue;
+        }
         let now = future_inputs.get(step * inputs..).unwrap_or_default();
         lags.push(|input| if input < inputs { now.get(input).copied().unwrap_or(T::NAN) } else { residual });
         *output = match lags.regressor().map(|regressor| dot(regressor.as_slice(), parameters)) {
-            Some(predicted) if !predicted.is_finite() => return Err(Error::Overflow),
+            Some(predicted) if !predicted.is_finite() => {
+                grown = true;
+                T::NAN
+            }
             predicted => predicted.unwrap_or(T::NAN),
         };
         lags.push_output(*output)?;
         residual = T::zero();
     }
-    Ok(())
+    if grown { Err(Error::Overflow) } else { Ok(()) }
 }
 
 #[cfg(test)]

@@ -218,14 +218,12 @@ impl<A, T: Real, N: Dimension, X: Dimension, P: Dimension> Augmented<A, T, N, X,
     /// The model with this many states and parameters (`Const::<2>`, or `Dyn(2)` with the feature `alloc`), which
     /// do not change in time.
     ///
-    /// Errors: [`Error::Length`] if N is not their sum.
+    /// Errors: [`Error::Length`] if N is not their sum, or that is not a `usize`.
     pub fn new(model: A, states: X, parameters: P) -> Result<Self, Error> {
-        let sum = states.value() + parameters.value();
-        let size = N::exactly(sum).map_err(|found| Error::Length {
-            argument: "augmented state",
-            expected: sum,
-            found,
-        })?;
+        let length = |expected, found| Error::Length { argument: "augmented state", expected, found };
+        let sum = states.value().checked_add(parameters.value());
+        let sum = sum.ok_or_else(|| length(usize::MAX, states.value()))?;
+        let size = N::exactly(sum).map_err(|found| length(sum, found))?;
         Ok(Augmented { model, size, states, walk: Covariance::zero(parameters) })
     }
 

@@ -85,7 +85,7 @@ impl<T: Real, N: Dimension> Covariance<T, N> {
     /// Errors: [`Error::Length`] if it is not square (only with `Dyn`); [`Error::NotFinite`];
     /// [`Error::NotSymmetric`] if two entries that should be equal differ by more than rounding;
     /// [`Error::NotPositive`] if a variance, given other elements, is negative by more than rounding. A singular
-    /// matrix is none. 2.5 n³ multiply-adds.
+    /// matrix is none. What is below the smallest normal number may become 0. 2.5 n³ multiply-adds.
     ///
     /// Source: Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., 2002, section 10.3 (elimination
     /// with pivots from the diagonal).
@@ -235,7 +235,10 @@ impl<T: Real, N: Dimension> Covariance<T, N> {
                 ud::variance(self.as_slice(), n, index),
             );
         }
-        if ud::is_finite(factor.as_slice(), m) { Ok(Covariance { factor }) } else { Err(Error::Overflow) }
+        if !ud::has_finite_variances(factor.as_slice(), m) {
+            return Err(Error::Overflow);
+        }
+        Ok(Covariance { factor })
     }
 
     /// The covariance P + Q of the sum of two independent vectors. It stays factored. 1.5 n³ multiply-adds.
@@ -261,7 +264,7 @@ impl<T: Real, N: Dimension> Covariance<T, N> {
             ud::unit_column(other.as_slice(), column.as_mut_slice(), index);
             ud::add_dyad(sum.as_mut_slice(), column.as_mut_slice(), ud::variance(other.as_slice(), n, index));
         }
-        if ud::is_finite(sum.as_slice(), n) { Ok(sum) } else { Err(Error::Overflow) }
+        if ud::has_finite_variances(sum.as_slice(), n) { Ok(sum) } else { Err(Error::Overflow) }
     }
 
     /// P, symmetric to the bit, n x n. n³/6 multiply-adds.
@@ -381,7 +384,8 @@ impl<T: Real, N: Dimension> Covariance<T, N> {
         for (index, &given) in given.as_slice().iter().enumerate() {
             let most = rounding * (deviation(index) + deviation(index));
             let left = column(rest.as_slice(), n, index);
-            let off = left.iter().enumerate().any(|(row, entry)| entry.abs() > most * deviation(row));
+            let nothing = |row| (most * deviation(row)).max(T::MIN_POSITIVE);
+            let off = left.iter().enumerate().any(|(row, entry)| entry.abs() > nothing(row));
             if given < T::zero() || off {
                 return Err(Error::NotPositive { argument, index });
             }

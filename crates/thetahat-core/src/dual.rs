@@ -183,18 +183,23 @@ impl<T: Real, const D: usize> Dual<T, D> {
     /// Of a function with this value and slope at the number: f(a, a') = (f(a), f'(a) a').
     #[inline]
     fn chain(self, value: T, slope: T) -> Self {
-        let scaled = |derivative: T| if derivative.is_zero() { derivative } else { slope * derivative };
-        Dual { value, derivatives: self.derivatives.map(scaled) }
+        Dual { value, derivatives: self.derivatives.map(|derivative| scaled(slope, derivative)) }
     }
 
     /// With this value, and a times the derivatives here plus b times those there.
     #[inline]
     fn combine(mut self, value: T, a: T, other: &Self, b: T) -> Self {
         for (mine, &others) in self.derivatives.iter_mut().zip(&other.derivatives) {
-            *mine = a * *mine + b * others;
+            *mine = scaled(a, *mine) + scaled(b, others);
         }
         Dual { value, ..self }
     }
+}
+
+/// A slope times a derivative: 0 if that is 0, even if the slope is not finite.
+#[inline(always)]
+fn scaled<T: Real>(slope: T, derivative: T) -> T {
+    if derivative.is_zero() { derivative } else { slope * derivative }
 }
 
 impl<T: Real, const D: usize> From<T> for Dual<T, D> {
@@ -271,14 +276,15 @@ impl<T: Real, const D: usize> Sub<T> for Dual<T, D> {
 impl<T: Real, const D: usize> Mul<T> for Dual<T, D> {
     type Output = Self;
     fn mul(self, other: T) -> Self {
-        Dual { value: self.value * other, derivatives: self.derivatives.map(|derivative| derivative * other) }
+        self.chain(self.value * other, other)
     }
 }
 
 impl<T: Real, const D: usize> Div<T> for Dual<T, D> {
     type Output = Self;
     fn div(self, other: T) -> Self {
-        Dual { value: self.value / other, derivatives: self.derivatives.map(|derivative| derivative / other) }
+        let divided = |derivative: T| if derivative.is_zero() { derivative } else { derivative / other };
+        Dual { value: self.value / other, derivatives: self.derivatives.map(divided) }
     }
 }
 
@@ -363,8 +369,12 @@ impl<T: Real, const D: usize> Number<T> for Dual<T, D> {
         self.chain(Number::atan(self.value), T::one() / (T::one() + self.value * self.value))
     }
     fn atan2(self, x: Self) -> Self {
-        let squared = self.value * self.value + x.value * x.value;
-        self.combine(Number::atan2(self.value, x.value), x.value / squared, &x, -(self.value / squared))
+        // Only ratios are squared, so that nothing overflows or vanishes.
+        let largest = Number::abs(self.value).max(Number::abs(x.value));
+        let (sine, cosine) = (self.value / largest, x.value / largest);
+        let squared = sine * sine + cosine * cosine;
+        let (by_y, by_x) = (cosine / squared / largest, -(sine / squared / largest));
+        self.combine(Number::atan2(self.value, x.value), by_y, &x, by_x)
     }
     fn sinh(self) -> Self {
         self.chain(Number::sinh(self.value), Number::cosh(self.value))

@@ -16,7 +16,8 @@ pub enum Action {
     Projected,
     /// The measurement is missing (NaN): time went on, nothing was corrected.
     Missing,
-    /// The delay lines are not filled yet, at the start or after missing samples: nothing was corrected.
+    /// The delay lines are not filled yet, at the start or after missing samples, or hold numbers too large to be
+    /// absorbed: time went on, nothing was corrected.
     NotReady,
     /// Regressors are collected until they have full rank: there is no estimate yet.
     Collecting,

@@ -36,7 +36,8 @@ use crate::{
 /// [`gate`](KalmanFilter::gate) are a snapshot, and [`new`](KalmanFilter::new) and
 /// [`with_gate`](KalmanFilter::with_gate) restore it to the bit.
 ///
-/// Units: those of the model. Memory: n² + n + 1 numbers, and as many again on the stack in a step.
+/// Units: those of the model. Memory: n² + n + 1 numbers. On the stack, `predict` takes 2 n² + 3 n numbers more, and
+/// `correct` n² + 3 n + (n + 3) m, with m outputs; with `Dyn` 2 n² + 3 n of them are kept in the filter.
 ///
 /// Source: Kalman, A new approach to linear filtering and prediction problems, 1960; Bierman, Factorization
 /// Methods for Discrete Sequential Estimation, 1977, chapters V and VI.
@@ -378,7 +379,7 @@ impl<T: Real, N: Dimension> KalmanFilter<T, N> {
             }
             if action == Action::Updated {
                 add_multiple(step, T::one(), state);
-                if !step.iter().all(T::is_finite) {
+                if !(step.iter().all(T::is_finite) && ud::is_finite(work, n)) {
                     return Err(Error::TooLarge { argument: "measurement" });
                 }
                 ud::copy(step, state);

@@ -2,7 +2,7 @@
 
 use nalgebra::{Const, OMatrix, OVector};
 
-use crate::error::{check_entries, check_length};
+use crate::error::{check_entries, check_finite, check_length};
 use crate::forgetting::{Forgetting, Phase, Start};
 use crate::lags::is_infinite;
 use crate::triangle::{column, column_mut};
@@ -47,7 +47,7 @@ use crate::{Action, Covariance, Dimension, Error, Innovation, Real, Solution, ud
 /// unknown (`None`) until W²/W₂, the number of samples that count, exceeds n. A sample that tells more of the
 /// parameters than of the noise, φ'P⁻φ > 10, enters as 0, as it would without prior. (Where the noise is below a
 /// hundredth of the output, σ̂² starts too large all the same: the prior pulls at the first samples. The exact start
-/// has no such error.) With directional forgetting λ is the `factor`; the random walk does not forget residuals, and
+/// has no such error: where no prior is in, every sample counts, and without forgetting σ̂² is that of the batch.) With directional forgetting λ is the `factor`; the random walk does not forget residuals, and
 /// its P is the covariance, cov θ̂ = σ̂² P.
 ///
 /// # Several outputs
@@ -175,13 +175,15 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>> RecursiveLeastSquares<T, N> {
         let mut this = self.with_parameters(solution.parameters.clone())?.with_covariance(covariance)?;
         this.residuals.mean_squares.fill(mean_square);
         (this.residuals.weights, this.residuals.squared_weights) = (rows, rows);
+        this.phase = Phase::Free;
         Ok(this)
     }
 
     /// One sample: corrects the estimate by φ and y = φ'θ + e.
     ///
     /// NaN in either is a missing sample. The innovation is e with its variance σ̂² (1 + φ'P⁻φ), both from what was
-    /// known before this sample. Until σ̂² is known the variance is NaN, and `nis` is 0.
+    /// known before this sample. Until σ̂² is known the variance is NaN, and `nis` is 0; it is at most
+    /// [`Real::LARGEST_ENTRY`].
     ///
     /// [`Action`] tells what was done: `Updated`; `Capped`, updated and a variance brought back to its bound;
     /// `Collecting`, see [`Start::Exact`]; `Missing`; `Skipped`, in the dead zone; `Frozen`.
@@ -206,10 +208,11 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>> RecursiveLeastSquares<T, N> {
 
     /// φ'θ̂: the output this regressor predicts, in the unit of y. n multiply-adds.
     ///
-    /// Errors: [`Error::Length`] (only with `Dyn`).
+    /// Errors: [`Error::Length`] (only with `Dyn`); [`Error::NotFinite`] if the regressor holds NaN or infinity;
+    /// [`Error::Overflow`] if the prediction does not fit `T`.
     pub fn predict(&self, regressor: &OVector<T, N>) -> Result<T, Error> {
         check_length("regressor", self.bounds.len(), regressor.len())?;
-        Ok(dot(regressor.as_slice(), self.parameters.as_slice()))
+        self.prediction(regressor.as_slice(), 0)
     }
 
     /// σ̂²: the variance of the noise, in the unit of y²; `None` until enough samples are in. See
@@ -221,7 +224,8 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>> RecursiveLeastSquares<T, N> {
     /// The covariance of the parameters, n x n; `None` until the noise variance is known. See
     /// [How sure](RecursiveLeastSquares#how-sure).
     ///
-    /// It is right for parameters that have not changed within the memory, and for noise that is white.
+    /// It is right for parameters that have not changed within the memory, and for noise that is white. `None` too
+    /// where a variance does not fit `T`.
     pub fn parameter_covariance(&self) -> Option<Covariance<T, N>> {
         self.parameter_covariance_of(0)
     }
@@ -278,7 +282,10 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
         })
     }
 
-    /// The same with another start, from the prior of [`new`](RecursiveLeastSquares::new).
+    /// The same with another start, from the prior of [`new`](RecursiveLeastSquares::new): parameters, P and what is
+    /// known of the noise are as there.
+    ///
+    /// Errors: none that can occur.
     ///
     /// ```
     /// use thetahat_core::nalgebra::{Const, Vector2};
@@ -293,19 +300,27 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
     /// # Ok::<(), Error>(())
     /// ```
     pub fn with_start(mut self, start: Start) -> Result<Self, Error> {
-        self.covariance = Covariance::from_diagonal(&self.bounds)?;
-        self.parameters.fill(T::zero());
         self.phase = start.into();
+        let mut prior = self.bounds.clone();
+        prior.as_mut_slice().iter_mut().for_each(|variance| *variance *= self.width());
+        self.covariance = Covariance::from_diagonal(&prior)?;
+        self.parameters.fill(T::zero());
+        self.residuals.clear();
+        self.turn = 0;
         Ok(self)
     }
 
-    /// The same with these parameters, n x m, to start from: a warm start. The start is then [`Start::Standard`].
+    /// The same with these parameters, n x m, to start from: a warm start. The start is then [`Start::Standard`]; if
+    /// it still was collecting, P is that of [`new`](RecursiveLeastSquares::new).
     ///
     /// Errors: [`Error::Length`] (only with `Dyn`); [`Error::NotFinite`].
     pub fn with_parameters(mut self, parameters: OMatrix<T, N, M>) -> Result<Self, Error> {
         check_length("parameters", self.parameters.nrows(), parameters.nrows())?;
         check_entries("parameters", parameters.as_slice(), self.parameters.len())?;
         self.parameters = parameters;
+        if let Phase::Waiting { collecting: true, .. } = self.phase {
+            self.covariance = Covariance::from_diagonal(&self.bounds)?;
+        }
         self.phase = Phase::Running;
         Ok(self)
     }
@@ -313,7 +328,7 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
     /// The same with this P, n x n, to start from, in units of the noise variance: how sure the parameters of
     /// [`with_parameters`](RecursiveLeastSquares::with_parameters) are. The start is then [`Start::Standard`].
     ///
-    /// A variance of 0 holds a parameter at its value. One above the bound is brought back to it, if the policy
+    /// A variance of 0 holds a parameter at its value, with every policy. One above the bound is brought back to it, if the policy
     /// forgets.
     ///
     /// Errors: [`Error::Length`] (only with `Dyn`); [`Error::TooLarge`] if a variance exceeds what the largest
@@ -387,20 +402,21 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
 
     /// φ'θ̂_i for every output: what this regressor predicts. n m multiply-adds.
     ///
-    /// Errors: [`Error::Length`] (only with `Dyn`).
+    /// Errors: as for [`predict`](RecursiveLeastSquares::predict).
     pub fn predict_all(&self, regressor: &OVector<T, N>) -> Result<OVector<T, M>, Error> {
         check_length("regressor", self.bounds.len(), regressor.len())?;
         let mut predicted = self.parameters.shape_generic().1.vector(T::zero());
         for (index, predicted) in predicted.as_mut_slice().iter_mut().enumerate() {
-            *predicted = dot(regressor.as_slice(), self.of_output(index));
+            *predicted = self.prediction(regressor.as_slice(), index)?;
         }
         Ok(predicted)
     }
 
-    /// One sample without a measurement, which is what a NaN is. Only the random walk takes note of it.
+    /// One sample without a measurement, which is what a NaN is. Only the random walk takes note of it, once the
+    /// start is over and while adaptation is on; a variance that comes back to its bound here is not reported.
     pub fn advance(&mut self) {
         let Forgetting::RandomWalk { variance } = self.forgetting else { return };
-        if self.phase != Phase::Running || !self.adapting {
+        if !self.phase.is_running() || !self.adapting {
             return;
         }
         self.walk(variance);
@@ -447,8 +463,8 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
         Some(variances)
     }
 
-    /// The covariance of the parameters of one output, from 0, n x n; `None` until the noise variance is known, or
-    /// if there is no such output.
+    /// The covariance of the parameters of one output, from 0, n x n; `None` until the noise variance is known, if
+    /// a variance does not fit `T`, or if there is no such output.
     pub fn parameter_covariance_of(&self, output: usize) -> Option<Covariance<T, N>> {
         let n = self.bounds.len();
         let share = match self.forgetting {
@@ -458,12 +474,23 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
         let scale = self.residuals.variance(output, n)? * share;
         let mut covariance = self.covariance.clone();
         scale_variances(covariance.as_mut_slice(), n, scale);
-        Some(covariance)
+        let finite = (0..n).all(|index| ud::diagonal(covariance.as_slice(), n, index).is_finite());
+        finite.then_some(covariance)
     }
 
     /// The forgetting policy.
     pub fn forgetting(&self) -> Forgetting<T> {
         self.forgetting
+    }
+
+    /// φ'θ̂ of one output. A number that is not finite always shows in it.
+    fn prediction(&self, regressor: &[T], output: usize) -> Result<T, Error> {
+        let predicted = dot(regressor, self.of_output(output));
+        if predicted.is_finite() {
+            return Ok(predicted);
+        }
+        check_finite("regressor", regressor)?;
+        Err(Error::Overflow)
     }
 
     fn of_output(&self, index: usize) -> &[T] {
@@ -511,12 +538,13 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
     ) -> Result<(T, Action), Error> {
         let size = self.covariance.size();
         let n = size.value();
-        let policy = if self.phase == Phase::Running { self.forgetting } else { Forgetting::None };
+        let running = self.phase.is_running();
+        let policy = if running { self.forgetting } else { Forgetting::None };
         let resting = !self.adapting || self.is_in_dead_zone(errors);
         if let (Forgetting::Directional { factor }, false) = (policy, resting) {
             self.forget_along(gradient, errors, factor)?;
         }
-        let (adapting, weight, running) = (self.adapting, policy.factor(), self.phase == Phase::Running);
+        let (adapting, weight, with_prior) = (self.adapting, policy.factor(), self.phase == Phase::Running);
         let RecursiveLeastSquares { parameters, covariance, residuals, .. } = self;
         let factor = covariance.as_mut_slice();
         // Only what is needed in each step is in here: what a function out of line is given cannot stay in registers.
@@ -547,10 +575,10 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
             let (total, growth) = (noise + spread, T::one() / noise);
             let nis = residuals.normalise(errors, variances, n, total * growth);
             let inverse = ud::update(factor, f, v, noise, growth);
-            // A sample that fixes parameters tells of the prior as well as of the noise. While the start takes the
-            // prior out, it does so from the residuals too.
-            let fixing = running && total * growth > T::from_count(11);
-            let weight = if noise < T::one() { noise } else { weight };
+            // A sample that fixes parameters tells of the prior as well as of the noise. A start that takes the prior
+            // out does so from the residuals too: then every sample counts.
+            let fixing = with_prior && total * growth > T::from_count(11);
+            let weight = if let Forgetting::Variable { .. } = policy { noise } else { weight };
             residuals.count(errors, if fixing { T::zero() } else { noise * inverse }, weight);
             let mut restrained = false;
             for (index, &error) in errors.iter().enumerate() {
@@ -580,11 +608,15 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
         Ok((nis, action))
     }
 
-    /// P_jj <- P_jj + n `variance` / scale_j², for the parameter whose turn it is.
+    /// P_jj <- P_jj + n `variance` / scale_j², for the parameter whose turn it is, unless it is held.
     #[inline(never)]
     fn walk(&mut self, variance: T) {
         let growth = variance * T::from_count(self.bounds.len()) / T::from_count(100);
         let (factor, bounds, turn) = (self.covariance.as_mut_slice(), self.bounds.as_slice(), self.turn);
+        // A parameter that is held stays.
+        if ud::diagonal(factor, bounds.len(), turn).is_zero() {
+            return;
+        }
         self.bounds.shape_generic().0.with_scratch(&mut self.scratch, |[unit], []| {
             unit.fill(T::zero());
             if let (Some(entry), Some(&bound)) = (unit.get_mut(turn), bounds.get(turn)) {
@@ -613,6 +645,10 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
     #[cold]
     #[inline(never)]
     fn bring_back(&mut self, noise: T) {
+        // This is a prior again.
+        if self.phase == Phase::Free {
+            self.phase = Phase::Running;
+        }
         let (size, turn) = (self.covariance.size(), self.turn);
         let factor = self.covariance.as_mut_slice();
         size.with_scratch(&mut self.scratch, |[f, v], []| {
@@ -628,7 +664,8 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
     /// ```
     ///
     /// That is the formula of the source for regressors and parameters in units of their scales; in other units
-    /// another direction would be forgotten. Fails where the sample could not be absorbed.
+    /// another direction would be forgotten. What is held, D_j = 0, has no part in w, w'P⁻¹w and n. Fails where the
+    /// sample could not be absorbed.
     #[inline(never)]
     fn forget_along(&mut self, gradient: &[T], errors: &[T], lambda: T) -> Result<(), Error> {
         let size = self.covariance.size();
@@ -637,25 +674,39 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
             // P grows by at most a factor of 1/μ <= n + 1. Once it has, nothing may fail.
             let spread = ud::project(factor, gradient, z, w, T::zero());
             check_small(gradient, errors, spread * T::from_count(gradient.len() + 2))?;
-            let energy = gradient.iter().zip(bounds).fold(T::zero(), |sum, (&phi, &p)| sum + phi * p * phi);
+            let n = gradient.len();
+            let (mut energy, mut free) = (T::zero(), 0);
+            for (index, (&phi, &p)) in gradient.iter().zip(bounds).enumerate() {
+                if !ud::variance(factor, n, index).is_zero() {
+                    energy += phi * p * phi;
+                    free += 1;
+                }
+            }
             if energy < T::one() {
                 return Ok(());
             }
             // 100 w, and z = U⁻¹w, so that w'P⁻¹w = Σ z²/d.
-            for (((w, z), &phi), &bound) in w.iter_mut().zip(z.iter_mut()).zip(gradient).zip(bounds) {
-                *w = phi * bound;
+            for (index, ((w, z), (&phi, &p))) in
+                w.iter_mut().zip(z.iter_mut()).zip(gradient.iter().zip(bounds)).enumerate()
+            {
+                *w = if ud::variance(factor, n, index).is_zero() { T::zero() } else { phi * p };
                 *z = *w;
             }
-            let n = gradient.len();
             let mut information = T::zero();
             for index in (0..n).rev() {
                 let Some((above, [z, ..])) = z.split_at_mut_checked(index) else { return Ok(()) };
                 add_multiple(above, -*z, column(factor, n, index));
-                if !z.is_zero() {
-                    information += *z / ud::variance(factor, n, index) * *z;
+                let variance = ud::variance(factor, n, index);
+                if variance.is_zero() {
+                    // Held is a combination of parameters: what w has of it goes. 0 where one is held by itself.
+                    let Some((above, [w, ..])) = w.split_at_mut_checked(index) else { return Ok(()) };
+                    add_multiple(above, -*z, column(factor, n, index));
+                    *w -= *z;
+                } else if !z.is_zero() {
+                    information += *z / variance * *z;
                 }
             }
-            let lost = T::from_count(n) * (T::one() - lambda);
+            let lost = T::from_count(free) * (T::one() - lambda);
             let weight = lost / (T::one() - lost) / information;
             if weight > T::zero() && weight.is_finite() {
                 ud::add_dyad(factor, w, weight);
@@ -671,19 +722,21 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
     /// ```
     ///
     /// Σ P_jj/p_j <= 1/2 says that P⁻¹ is at least twice the information of the prior. So q >= p_j/2 in every step.
+    /// Here p_j is that of the start, see [`width`](RecursiveLeastSquares::width).
     #[cold]
     #[inline(never)]
     fn remove_prior(&mut self) {
+        let width = self.width();
         let RecursiveLeastSquares { parameters, covariance, bounds, residuals, phase, .. } = self;
         let size = covariance.size();
         let (n, factor) = (size.value(), covariance.as_mut_slice());
         let (left, total) = match *phase {
-            Phase::Running => return,
+            Phase::Running | Phase::Free => return,
             Phase::Blending { left, total } => (left, total.max(1)),
             Phase::Waiting { blend, .. } => {
                 let known = bounds.as_slice().iter().enumerate();
                 let sum = known.fold(T::zero(), |sum, (index, &p)| sum + ud::diagonal(factor, n, index) / p);
-                if sum > nalgebra::convert(0.5) {
+                if sum > width / T::from_count(2) {
                     return;
                 }
                 (blend.max(1), blend.max(1))
@@ -693,7 +746,7 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
             for (index, &bound) in bounds.as_slice().iter().enumerate() {
                 covariance_column(factor, index, gain);
                 let variance = gain.get(index).copied().unwrap_or(T::zero());
-                let rest = bound * T::from_count(usize::from(total)) - variance;
+                let rest = bound * width * T::from_count(usize::from(total)) - variance;
                 if rest <= T::zero() {
                     continue;
                 }
@@ -706,7 +759,16 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
                 ud::add_dyad(factor, gain, T::one() / rest);
             }
         });
-        *phase = if left > 1 { Phase::Blending { left: left - 1, total } } else { Phase::Running };
+        *phase = if left > 1 { Phase::Blending { left: left - 1, total } } else { Phase::Free };
+    }
+
+    /// By how much the variances of the prior that an exact start takes out are above p_j. With forgetting it cannot
+    /// be more than 1: an estimate that is less sure than the cap lets it be would be held where it is.
+    fn width(&self) -> T {
+        match (self.phase, self.forgetting) {
+            (Phase::Waiting { collecting: true, .. }, Forgetting::None) => T::from_count(10_000),
+            _ => T::one(),
+        }
     }
 
     fn is_in_dead_zone(&self, errors: &[T]) -> bool {
@@ -732,6 +794,12 @@ impl<T: Real, M: Dimension> Residuals<T, M> {
     fn new(outputs: M) -> Self {
         let mean_squares = outputs.vector(T::zero());
         Residuals { mean_squares, weights: T::zero(), squared_weights: T::zero() }
+    }
+
+    /// Forgets them.
+    fn clear(&mut self) {
+        self.mean_squares.fill(T::zero());
+        (self.weights, self.squared_weights) = (T::zero(), T::zero());
     }
 
     /// Counts the innovations of a sample; `share` is 1/(1 + φ'P⁻φ), and earlier samples lose weight by `factor`.
@@ -788,10 +856,11 @@ pub(crate) fn is_small<T: Real>(values: &[T]) -> bool {
     dot(values, values) <= T::LARGEST_ENTRY
 }
 
-/// That a sample can be absorbed without overflow, given φ'P φ.
+/// That a sample can be absorbed without overflow, given φ'P φ. Forgetting makes at most twice that of it, as λ is
+/// 1/2 or more.
 #[inline(always)]
 fn check_small<T: Real>(gradient: &[T], errors: &[T], spread: T) -> Result<(), Error> {
-    if !(spread.is_finite() && is_small(gradient)) {
+    if !((spread * T::from_count(4)).is_finite() && is_small(gradient)) {
         return Err(Error::TooLarge { argument: "regressor" });
     }
     if !is_small(errors) {

@@ -144,7 +144,7 @@ fn write<E: Entry, S: Serializer>(
 /// The most entries that are read: a snapshot that claims more is not one.
 const MOST_ENTRIES: usize = 1 << 24;
 
-/// Reads what [`write`] writes, into the matrix that `make` makes for the sizes.
+/// Reads what [`write()`] writes, into the matrix that `make` makes for the sizes.
 struct Matrix<M, E> {
     make: fn(usize, usize) -> Option<M>,
     entries: fn(&mut M) -> &mut [E],

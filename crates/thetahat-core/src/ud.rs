@@ -104,7 +104,7 @@ pub(crate) fn project<T: Real>(factor: &[T], row: &[T], f: &mut [T], v: &mut [T]
 /// ```
 ///
 /// While a_j is 0 (an exact measurement of what is known) nothing is learnt. Where only a_(j-1) is 0, all b_i are 0, so
-/// that p_j does not matter.
+/// that p_j does not matter. What is next to 0 counts as 0, see [`clear_negligible`].
 ///
 /// Row by row: the b of four rows stay in registers, where column by column each is loaded and stored n times. That
 /// takes three quarters of the time from eight states on (measured).
@@ -116,12 +116,14 @@ pub(crate) fn project<T: Real>(factor: &[T], row: &[T], f: &mut [T], v: &mut [T]
 pub(crate) fn update<T: Real>(factor: &mut [T], f: &mut [T], v: &mut [T], noise: T, growth: T) -> T {
     const ROWS: usize = 4;
     let size = f.len();
-    let (mut before, mut inverse) = (noise, reciprocal(noise));
+    let least =
+        if noise < nalgebra::convert(1e-12) { clear_negligible(f, v, noise) } else { T::MIN_POSITIVE };
+    let (mut before, mut inverse) = (noise, reciprocal(noise, least));
     // D, and f becomes p.
     for (index, (f, &gain)) in f.iter_mut().zip(&*v).enumerate() {
         let after = before + *f * gain;
         *f = -*f * inverse;
-        inverse = reciprocal(after);
+        inverse = reciprocal(after, least);
         if let Some(diagonal) = column_mut(factor, size, index).get_mut(index) {
             *diagonal *= growth;
             if after > before {
@@ -138,6 +140,32 @@ pub(crate) fn update<T: Real>(factor: &mut [T], f: &mut [T], v: &mut [T], noise:
         update_rows::<T, 1>(factor, f, v, first);
     }
     inverse
+}
+
+/// For [`update`] with little noise: returns the least a_j that it can use, and clears f_j and v_j as long as a_j is
+/// below it. Then all b_i are 0 at the first a_j that is not, so that p_j does not matter there.
+///
+/// That is MIN_POSITIVE max(1, f²). Below it, p_j may overflow, or d_j of a large f_j vanish beside a large U_ij,
+/// and the variance of element i with them. What is cleared changes no variance by more than MIN_POSITIVE.
+#[inline(never)]
+fn clear_negligible<T: Real>(f: &mut [T], v: &mut [T], noise: T) -> T {
+    let mut largest = T::one();
+    for (f, v) in f.iter_mut().zip(&*v) {
+        if v.is_zero() {
+            *f = T::zero();
+        }
+        largest = largest.max(f.abs());
+    }
+    let least = T::MIN_POSITIVE * largest * largest;
+    let mut sum = noise;
+    for (f, v) in f.iter_mut().zip(v) {
+        sum += *f * *v;
+        if sum >= least {
+            break;
+        }
+        (*f, *v) = (T::zero(), T::zero());
+    }
+    least
 }
 
 /// The entries of U in `ROWS` rows from `first` on, and their b, for [`update`]. What v holds for the rows
@@ -179,10 +207,10 @@ fn exchange<T: Real>(entries: &mut [T], b: &mut [T], p: T, v: T) {
     }
 }
 
-/// 1 / x, or 0 where that would not be finite.
+/// 1 / x, or 0 below `least`, which is at least MIN_POSITIVE.
 #[inline(always)]
-fn reciprocal<T: Real>(x: T) -> T {
-    if x >= T::MIN_POSITIVE { T::one() / x } else { T::zero() }
+fn reciprocal<T: Real>(x: T, least: T) -> T {
+    if x >= least { T::one() / x } else { T::zero() }
 }
 
 /// P <- P + `weight` v v', `weight` not negative. `v` is used up. n² to 2 n² multiply-adds, n divisions.
@@ -214,7 +242,7 @@ pub(crate) fn add_dyad<T: Real>(factor: &mut [T], v: &mut [T], mut weight: T) {
         if after < T::MIN_POSITIVE {
             continue;
         }
-        let inverse = reciprocal(after);
+        let inverse = reciprocal(after, T::MIN_POSITIVE);
         let (scale, kept) = (weight * *pivot * inverse, *diagonal * inverse);
         if kept < nalgebra::convert(0.25) {
             for (entry, v) in entries.iter_mut().zip(v) {
@@ -280,13 +308,19 @@ pub(crate) fn expand<T: Real>(factor: &[T], matrix: &mut [T], size: usize) {
     }
 }
 
+/// Whether U, D and the variances, the diagonal of P, are finite.
+#[inline(never)]
+pub(crate) fn has_finite_variances<T: Real>(factor: &[T], size: usize) -> bool {
+    is_finite(factor, size) && (0..size).all(|index| diagonal(factor, size, index).is_finite())
+}
+
 /// Whether U and D are finite.
 pub(crate) fn is_finite<T: Real>(factor: &[T], size: usize) -> bool {
     (0..size).all(|index| upper(factor, size, index).iter().all(T::is_finite))
 }
 
 /// The time update P <- F P F' + Q, the quick way: F U D U'F' + Q is formed and factored. False, with `factor`
-/// unchanged, if a pivot falls below a thousandth of its variance, or P is not finite: what cancels there would
+/// unchanged, if a pivot falls below a thousandth of its variance, or P is next to overflow: what cancels there would
 /// cost definiteness, at the first step after a bad prior. Then [`propagate_by_columns`] does it.
 ///
 /// `columns` and `work`, n x n each, `sum` and `given`, n each, are scratch. Each column is added up in `sum`,
@@ -304,7 +338,30 @@ pub(crate) fn propagate<T: Real>(
         multiply_column(state_matrix, factor, sum, size, index);
         copy(sum, column_mut(columns, size, index));
     }
-    for index in 0..size {
+    // Of the left half of P the upper half will do.
+    let half = (size.div_ceil(4) * 2).min(size);
+    let upper_half = sum.get_mut(..half).unwrap_or_default();
+    propagate_columns(factor, noise_matrix, columns, work, upper_half, size, 0..half);
+    propagate_columns(factor, noise_matrix, columns, work, sum, size, half..size);
+    let accepted = decompose(work, given, size, nalgebra::convert(1e-3));
+    if accepted {
+        copy(work, factor);
+    }
+    accepted
+}
+
+/// Of `propagate`: as many entries of the columns `range` of Q + Σ D_k (F U)_k (F U)_k' as `sum` has.
+#[inline(always)]
+fn propagate_columns<T: Real>(
+    factor: &[T],
+    noise_matrix: &[T],
+    columns: &[T],
+    work: &mut [T],
+    sum: &mut [T],
+    size: usize,
+    range: core::ops::Range<usize>,
+) {
+    for index in range {
         copy(column(noise_matrix, size, index), sum);
         for k in 0..size {
             let entries = column(columns, size, k);
@@ -312,11 +369,6 @@ pub(crate) fn propagate<T: Real>(
         }
         copy(sum, column_mut(work, size, index));
     }
-    let accepted = decompose(work, given, size, nalgebra::convert(1e-3));
-    if accepted {
-        copy(work, factor);
-    }
-    accepted
 }
 
 /// The time update P <- F P F' + Q = Q + Σ D_k (F U)_k (F U)_k', the safe way: the columns of F U are added to
@@ -340,7 +392,7 @@ pub(crate) fn propagate_by_columns<T: Real>(
         multiply_column(state_matrix, factor, product, size, index);
         add_dyad(work, product, variance(factor, size, index));
     }
-    let finite = is_finite(work, size);
+    let finite = has_finite_variances(work, size);
     if finite {
         copy(work, factor);
     }
@@ -366,7 +418,7 @@ fn upper_mut<T>(matrix: &mut [T], size: usize, index: usize) -> &mut [T] {
 }
 
 /// Factors the symmetric matrix whose upper half is in `matrix`, in place. False as soon as a pivot is not
-/// above `least` times its diagonal entry, or that is not finite: `matrix` is then of no use. `given` has room
+/// above `least` times its diagonal entry, or that is next to overflow: `matrix` is then of no use. `given` has room
 /// for the diagonal.
 ///
 /// ```text
@@ -383,8 +435,8 @@ pub(crate) fn decompose<T: Real>(matrix: &mut [T], given: &mut [T], size: usize,
     }
     for done in 0..size {
         let index = size - 1 - done;
-        let pivot = variance(matrix, size, index);
-        if !(pivot > least * at(given, index) && pivot >= T::MIN_POSITIVE && pivot < T::INFINITY) {
+        let (pivot, given) = (variance(matrix, size, index), at(given, index));
+        if !(pivot > least * given && pivot >= T::MIN_POSITIVE && given + given < T::INFINITY) {
             return false;
         }
         let inverse = T::one() / pivot;

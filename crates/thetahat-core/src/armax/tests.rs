@@ -7,6 +7,7 @@ use std::vec::Vec;
 use nalgebra::{Const, SVector, Vector4};
 
 use super::{is_stable, move_stably};
+use crate::arx::is_large;
 use crate::arx::tests::{Plant, inputs_at, stable_polynomial};
 use crate::noise::Noise;
 use crate::{
@@ -334,22 +335,62 @@ fn a_refused_sample_changes_nothing() {
         let mut armax: RecursiveArmax<f32, Const<4>> =
             RecursiveArmax::new(&orders, method, 1.0, &[1.0, 1.0], 0.5, Forgetting::default()).unwrap();
         let mut noise = Noise(6);
-        for k in 0..100 {
+        for _ in 0..100 {
             let before = debug(&armax);
             let length = |argument, expected, found| Err(Error::Length { argument, expected, found });
             assert_eq!(armax.update(&[1.0], 1.0).map(|_| ()), length("inputs", 2, 1));
             assert_eq!(armax.update(&[1.0, f32::INFINITY], 1.0), Err(Error::Infinite { argument: "inputs" }));
             assert_eq!(armax.update(&[1.0, 1.0], f32::INFINITY), Err(Error::Infinite { argument: "output" }));
-            if k > 1 {
-                assert_eq!(armax.update(&[1.0, 1e20], 1.0), Err(Error::TooLarge { argument: "regressor" }));
-                assert_eq!(armax.update(&[1.0, 1.0], 1e20), Err(Error::TooLarge { argument: "output" }));
-            }
+            assert_eq!(armax.update(&[1.0, 1e14], 1.0), Err(Error::TooLarge { argument: "inputs" }));
+            assert_eq!(armax.update(&[1e20, 1.0], 1.0), Err(Error::TooLarge { argument: "inputs" }));
+            assert_eq!(armax.update(&[1.0, 1.0], -1e14), Err(Error::TooLarge { argument: "output" }));
             assert_eq!(armax.predict(&[0.0; 3], &mut [0.0; 2]), length("future_inputs", 4, 3));
             assert_eq!(debug(&armax), before);
             let mut sample = || noise.next() as f32;
             armax.update(&[sample(), sample()], sample()).unwrap();
         }
     }
+}
+
+#[test]
+fn no_sample_that_is_accepted_holds_time() {
+    let orders = ArmaxOrders { na: 1, inputs: &[one(2, 1)], nc: 2 };
+    for method in METHODS {
+        for scale in [1.0, 1e-9_f32] {
+            for (large_inputs, large_outputs) in [(3e13, 0.0), (0.0, 3e13), (3e13, -3e13)] {
+                let mut armax: RecursiveArmax<f32, Const<5>> =
+                    RecursiveArmax::new(&orders, method, 1.0, &[scale], 0.5, Forgetting::default()).unwrap();
+                let mut noise = Noise(9);
+                for k in 0..200 {
+                    let burst = k % 40 > 35;
+                    let (u, y) = (scale * noise.next() as f32, noise.next() as f32);
+                    let (u, y) = if burst { (u + large_inputs, y + large_outputs) } else { (u, y) };
+                    // Always accepted, so that time never stands still.
+                    armax.update(&[u], y).unwrap();
+                    let finite = |entries: &[f32]| entries.iter().all(|entry| entry.is_finite());
+                    assert!(finite(armax.estimator().parameters().as_slice()));
+                    assert!(finite(armax.gradients.as_slice()) && finite(&[armax.residual]));
+                    assert!(!is_large(armax.residual, 5));
+                }
+            }
+        }
+    }
+    let mut armax: RecursiveArmax<f32, Const<5>> =
+        RecursiveArmax::new(&orders, METHODS[0], 1.0, &[1.0], 0.5, Forgetting::default()).unwrap();
+    for k in 0..20 {
+        armax.update(&[(k % 3) as f32], (k % 5) as f32).unwrap();
+    }
+    let mut armax = armax.with_parameters([0.0, 1e8, 0.0, 0.0, 0.0].into()).unwrap();
+    let actions = [3e13, 1.0, 1.0, 1.0].map(|u| armax.update(&[u], 0.5).unwrap().action);
+    assert_eq!(actions[1], Action::NotReady);
+
+    // An innovation that is accepted, but a residual that is too large for a tap.
+    let mut armax = armax.with_parameters([0.0, 1.0, 0.0, 0.0, 0.0].into()).unwrap();
+    armax.set_adaptation(false);
+    armax.update(&[-3e13], 0.5).unwrap();
+    let innovation = armax.update(&[1.0], 3e13).unwrap();
+    assert_eq!((innovation.action, innovation.error), (Action::Frozen, 6e13));
+    assert_eq!(armax.residual, 0.0);
 }
 
 #[test]

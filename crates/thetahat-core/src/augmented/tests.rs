@@ -237,4 +237,11 @@ mod dynamic {
         }
         assert_eq!(filter.predict(&model, &none), Ok(()));
     }
+
+    #[test]
+    fn sizes_that_overflow_are_an_error() {
+        let result: Result<Augmented<_, f64, Dyn, _, _>, _> = Augmented::new((), Dyn(usize::MAX), Dyn(1));
+        let error = Error::Length { argument: "augmented state", expected: usize::MAX, found: usize::MAX };
+        assert_eq!(result.unwrap_err(), error);
+    }
 }

@@ -202,3 +202,18 @@ fn it_prints_its_factors() {
     let covariance = Of::new(&Matrix2::new(4.0, 1.0, 1.0, 2.0)).unwrap();
     assert_eq!(format!("{covariance:?}"), "Covariance { factor: [[3.5, 0.0], [0.5, 2.0]] }");
 }
+
+#[test]
+fn variances_below_the_normal_numbers_are_covariances() {
+    for tiny in [1e-39_f32, 1e-45, f32::MIN_POSITIVE] {
+        let found = Covariance::<f32, Const<1>>::new(&nalgebra::Matrix1::new(tiny)).unwrap();
+        assert!((found.matrix()[0] - tiny).abs() < f32::MIN_POSITIVE);
+        let given = Matrix2::new(tiny, 0.0, 0.0, 1.0);
+        let found = Covariance::<f32, Const<2>>::new(&given).unwrap();
+        assert!((found.matrix() - given).amax() < f32::MIN_POSITIVE);
+    }
+    assert!(Covariance::<f32, Const<1>>::new(&nalgebra::Matrix1::new(-1e-39)).is_err());
+    assert!(Of::new(&(Matrix2::identity() * 1e-310)).is_ok());
+    let large = Of::from_diagonal(&Vector2::new(1e308, 1e308)).unwrap();
+    assert_eq!(large.transformed(&Matrix2::new(1.0, 1.0, 1.0, -1.0)), Err(Error::Overflow));
+}

@@ -174,3 +174,25 @@ fn constants_have_no_derivative_where_a_function_has_none() {
     assert_eq!(x.powi(0).derivatives, [0.0, 0.0]);
     assert_eq!(x.powi(1).derivatives, [1.0, 0.0]);
 }
+
+#[test]
+fn constants_stay_constant_beside_what_has_no_derivative() {
+    let [y, _] = Dual::variables([0.0, 1.0]);
+    let zero = Dual::<f64, 2>::from(0.0);
+    for constant in [zero.atan2(zero), zero / zero, zero / 0.0, zero * f64::INFINITY, zero * (zero / 0.0)] {
+        assert_eq!(constant.derivatives, [0.0, 0.0]);
+    }
+    for found in [y.atan2(zero), Dual::from(1.0) / y, y / 0.0, y * f64::INFINITY, y / zero] {
+        assert!(!found.derivatives[0].is_finite());
+        assert_eq!(found.derivatives[1], 0.0);
+    }
+}
+
+#[test]
+fn the_angle_of_a_large_or_small_point() {
+    for scale in [1e19_f32, 1.0, 1e-23, 1e-36, 5e37] {
+        let [y, x] = Dual::variables([3.0 * scale, 4.0 * scale]);
+        let [by_y, by_x] = y.atan2(x).derivatives;
+        assert!((by_y * scale - 0.16).abs() < 1e-7 && (by_x * scale + 0.12).abs() < 1e-7, "{scale:e}");
+    }
+}

@@ -192,3 +192,25 @@ fn sizes_at_run_time_give_the_same_bits() {
     let error = GainSchedule::new(prior).correct(&other.unwrap()).unwrap_err();
     assert_eq!(error, Error::Length { argument: "observation", expected: 2, found: 3 });
 }
+
+/// The relative error of P before a measurement, for a random walk with variance q measured with variance 1.
+fn error_of_a_random_walk<T: Real + Into<f64>>(q: f64) -> f64 {
+    let noise = Covariance::from_diagonal(&Vector1::new(nalgebra::convert(q))).unwrap();
+    let walk = LinearTransition::new(Vector1::new(T::one()), noise).unwrap();
+    let sensor = LinearObservation::new(Vector1::new(T::one()), unit()).unwrap();
+    let steady = GainSchedule::new(unit::<T, 1>()).steady_state(&walk, &sensor, 1_000_000).unwrap();
+    let found: f64 = steady.predicted.variances()[0].into();
+    let exact = 0.5 * (q + (q * q + 4.0 * q).sqrt());
+    println!("{q:e}: {:e} after {}", found / exact - 1.0, steady.steps);
+    (found / exact - 1.0).abs()
+}
+
+#[test]
+fn it_does_not_settle_early_where_the_filter_is_slow() {
+    for (q, single, double) in
+        [(1e-2, 1e-6, 1e-14), (1e-4, 1e-5, 1e-13), (1e-6, 1e-4, 1e-12), (1e-8, 1e-3, 1e-11)]
+    {
+        assert!(error_of_a_random_walk::<f32>(q) < single);
+        assert!(error_of_a_random_walk::<f64>(q) < double);
+    }
+}

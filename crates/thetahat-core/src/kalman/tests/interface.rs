@@ -276,3 +276,54 @@ fn a_linear_model_answers_with_its_parts() {
     let bad = nalgebra::Matrix4x2::from_element(f64::INFINITY);
     assert_eq!(sensor.with_input(bad).unwrap_err(), not_finite("input_matrix"));
 }
+
+#[test]
+fn a_measurement_with_next_to_no_noise_leaves_no_nan() {
+    fn check<T: Real + Into<f64>>(h: [f64; 2], r: f64, expected: [f64; 2]) {
+        let unit = Covariance::from_diagonal(&Vector2::from_element(T::one())).unwrap();
+        let mut filter = KalmanFilter::new(Vector2::zeros(), unit).unwrap();
+        let noise = Covariance::<T, Const<1>>::from_diagonal(&Vector1::new(nalgebra::convert(r))).unwrap();
+        let row = nalgebra::RowVector2::new(nalgebra::convert(h[0]), nalgebra::convert(h[1]));
+        let sensor = LinearObservation::new(row, noise).unwrap();
+        let none = SVector::<T, 0>::zeros();
+        let innovation = filter.correct(&sensor, &none, &Vector1::new(T::one())).unwrap();
+        assert_eq!(innovation.action, Action::Updated);
+        assert!(filter.covariance().matrix().iter().all(T::is_finite));
+        let found = filter.covariance().variances().map(Into::into);
+        for (found, expected) in found.iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-6, "{h:?} {r:e} {found:?}");
+        }
+        let state: f64 = filter.state()[1].into();
+        assert!((state * h[1] - expected[0]).abs() < 1e-6, "{h:?} {r:e} {state:e}");
+    }
+    // What is not measured, or but for 1e-20 or 1e-26 of the variance, stays as it was.
+    for h in [[0.0, 100.0], [0.0, 1e10], [1e-20, 1.0], [1e-13, 1e10], [0.01, 1e12]] {
+        for r in [0.0, 1e-38, 1.2e-37, 1e-30, 1e-20] {
+            check::<f64>(h, r, [1.0, 0.0]);
+            check::<f64>(h, 1e-305, [1.0, 0.0]);
+            check::<f32>(h, r, [1.0, 0.0]);
+        }
+    }
+    check::<f32>([0.0, 1e18], 1e-19, [1.0, 0.0]);
+    check::<f64>([0.0, 1e150], 1e-305, [1.0, 0.0]);
+}
+
+#[test]
+fn an_infinite_variance_is_an_overflow() {
+    // D = (1, 1.3e38) and U_01 = 1.7: they are finite, but 1.7² 1.3e38 is not.
+    let covariance = Covariance::from_diagonal(&Vector2::new(1.0_f32, 1.3e38)).unwrap();
+    let transition = Matrix2::new(1.0, 1.7, 0.0, 1.0);
+    assert_eq!(covariance.transformed(&transition), Err(Error::Overflow));
+    let model = LinearTransition::new(transition, Covariance::zero(Const)).unwrap();
+    let mut filter = KalmanFilter::new(Vector2::zeros(), covariance).unwrap();
+    let before = filter.clone();
+    assert_eq!(filter.predict(&model, &SVector::<f32, 0>::zeros()), Err(Error::Overflow));
+    assert_eq!(filter, before);
+    // What just fits is kept: 1.5e38 + 1.5e38.
+    let unit = Covariance::from_diagonal(&Vector1::new(1.5e38_f32)).unwrap();
+    let model = LinearTransition::new(Vector1::new(1.0), unit.clone()).unwrap();
+    let mut filter = KalmanFilter::new(Vector1::new(0.0), unit).unwrap();
+    filter.predict(&model, &SVector::<f32, 0>::zeros()).unwrap();
+    assert_eq!(filter.covariance().variances()[0], 3e38);
+    assert_eq!(filter.predict(&model, &SVector::<f32, 0>::zeros()), Err(Error::Overflow));
+}

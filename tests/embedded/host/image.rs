@@ -82,7 +82,8 @@ impl Image {
 
     /// The number of functions with this last name.
     pub(crate) fn functions_named(&self, name: &str) -> usize {
-        let mangled = format!("{}{name}", name.len());
+        // What follows the last name is a hash of 17 characters.
+        let mangled = format!("{}{name}17h", name.len());
         self.symbols.iter().filter(|symbol| symbol.contains(&mangled)).count()
     }
 }

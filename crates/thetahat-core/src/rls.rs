@@ -191,7 +191,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>> RecursiveLeastSquares<T, N> {
     /// known before this sample. Until σ̂² is known the variance is NaN, and `nis` is 0; it is at most
     /// [`Real::LARGEST_ENTRY`].
     ///
-    /// [`Action`] tells what was done: `Updated`; `Capped`, updated and a variance brought back to its bound;
+    /// [`Action`](crate::Action) tells what was done: `Updated`; `Capped`, updated and a variance brought back to its bound;
     /// `Collecting`, see [`Start::Exact`]; `Missing`; `Skipped`, in the dead zone; `Frozen`.
     ///
     /// Errors, after which nothing has changed: [`Error::Infinite`]; [`Error::TooLarge`] for numbers whose products
@@ -355,7 +355,7 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
     }
 
     /// The same with a dead zone: an innovation of at most this size, in the unit of y, corrects nothing, and makes
-    /// nothing forgotten; [`Action::Skipped`] tells. With several outputs all must be that small. The noise
+    /// nothing forgotten; [`Action::Skipped`](crate::Action::Skipped) tells. With several outputs all must be that small. The noise
     /// variance still counts them.
     ///
     /// For noise that is bounded rather than white, such as that of a coarse converter. 0 is no dead zone.
@@ -372,7 +372,7 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
     }
 
     /// Turns adaptation off, or on again. While it is off innovations are computed and nothing changes:
-    /// [`Action::Frozen`].
+    /// [`Action::Frozen`](crate::Action::Frozen).
     pub fn set_adaptation(&mut self, on: bool) {
         self.adapting = on;
     }

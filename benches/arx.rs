@@ -57,7 +57,7 @@ fn responses(criterion: &mut Criterion, input: &[f64], output: &[f64]) -> Result
     let record = Record::new(output, vec![input])?;
     let estimate = arx(&record, &orders, Initial::Drop)?;
     let signal = |name: &str| Signal { name: name.to_owned(), offset: Offset::default() };
-    let model = Model::arx(&orders, &estimate, 1.0, vec![signal("u")], signal("y"))?;
+    let model = Model::new(&orders, &estimate, 1.0, vec![signal("u")], signal("y"))?;
 
     let mut group = criterion.benchmark_group("respond");
     group.throughput(Throughput::Elements(SAMPLES as u64));

@@ -10,7 +10,8 @@ Exit codes:
   2  usage: the command line does not make sense
   3  bad data: the log or the report does not hold what was asked of it
   4  the data cannot determine the model
-  5  input/output: a file cannot be read or written";
+  5  input/output: a file cannot be read or written
+  130  interrupted (Ctrl-C); nothing is left half written";
 
 /// Identifies dynamic systems from logged data.
 #[derive(Debug, Parser)]
@@ -23,21 +24,29 @@ pub(crate) struct Arguments {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Fit a model to a log
+    /// Fit a model to one or several logs
     ///
-    /// Fits A(q) y(t) = B(q) u(t - nk) + e(t) by least squares, prints a table and writes a JSON report.
+    /// Fits A(q) y(t) = B(q)/F(q) u(t - nk) + C(q)/D(q) e(t): by least squares where that is linear in the parameters, else by
+    /// a search for the least sum of squared prediction errors. Prints a table and writes a JSON report. Several logs are
+    /// several experiments with one plant: their rows are counted through, and nothing reaches from one into the next.
     #[command(after_help = "\
 Examples:
   thetahat fit log.csv --sample-time 0.08 --na 2 --nb 2 --nk 3 --report model.json
   thetahat fit log.csv --time t -u heater -y temperature --validate 501..1000 --na 2 --nb 2
-  thetahat fit sunspots.csv -y count --na 2 --nb 0")]
-    Fit(FitArguments),
+  thetahat fit log.csv --model bj --nb 2 --nc 1 --nd 1 --nf 2 --starts 5
+  thetahat fit monday.csv tuesday.csv --model oe --nb 2 --nf 2 --report model.json
+  thetahat fit sunspots.csv -y count --model arma --na 2 --nc 1
+  thetahat fit log.csv --na 2 --nb 2 --norm 1 --bound a1=-1.9..0 --dc-gain 1..20")]
+    Fit(Box<FitArguments>),
     /// Predict a log some steps ahead with a fitted model
     ///
-    /// Writes CSV: time or row, measured, predicted, in the log's own units. The fit figures go to standard error.
+    /// Writes CSV: time or row, measured, predicted and the standard deviation of its error, in the log's own units. The fit
+    /// figures go to standard error. Rows at the end that have inputs but no output are forecast, each as many steps ahead as
+    /// it lies behind the last measured one; a series without inputs is forecast beyond the end of the log.
     #[command(after_help = "\
-Example:
-  thetahat predict model.json log.csv --horizon 5 > predicted.csv")]
+Examples:
+  thetahat predict model.json log.csv --horizon 5 > predicted.csv
+  thetahat predict model.json log.csv --rows 900..1000 --horizon 20 -o forecast.csv")]
     Predict(PredictArguments),
     /// Simulate a fitted model on a log's inputs (free run)
     ///
@@ -47,6 +56,14 @@ Example:
 Example:
   thetahat simulate model.json log.csv --rows 501..1000 > simulated.csv")]
     Simulate(SimulateArguments),
+    /// The frequency response of a fitted model
+    ///
+    /// Writes CSV with a row for each input and frequency, and for the noise (input "noise"): input, frequency [rad/s],
+    /// magnitude [units of the output per unit of the input] and its standard error, phase [degrees] and its standard error.
+    #[command(after_help = "\
+Example:
+  thetahat bode model.json --frequencies 0.01..3 --points 200 > bode.csv")]
+    Bode(BodeArguments),
     /// Fit a sample log of a DC motor, carried inside the program
     ///
     /// Writes the log and the report of its fit into a folder and prints the table.
@@ -79,13 +96,17 @@ Example:
 
 #[derive(Debug, Args)]
 pub(crate) struct FitArguments {
+    /// The logs: CSV files, gzip-compressed or not (- for standard input)
+    #[arg(value_name = "LOG", required = true)]
+    pub(crate) logs: Vec<PathBuf>,
+
     /// Input columns [default: u, u1, u2, …]
     #[arg(short = 'u', long, value_name = "NAME[,NAME…]", value_delimiter = ',', help_heading = "Channels")]
     pub(crate) input: Vec<String>,
     /// Output column [default: y]
     #[arg(short = 'y', long, value_name = "NAME", help_heading = "Channels")]
     pub(crate) output: Option<String>,
-    /// Rows to estimate on, 1-based and inclusive [default: all]
+    /// Rows to estimate on, 1-based and inclusive, counted through all logs [default: all]
     #[arg(long, value_name = "A..B[,C..D]", value_delimiter = ',', help_heading = "Channels")]
     pub(crate) estimate: Vec<String>,
     /// Rows to validate on
@@ -98,21 +119,12 @@ pub(crate) struct FitArguments {
     #[arg(long, value_name = "NAME=VALUE", help_heading = "Channels")]
     pub(crate) offset: Vec<String>,
 
-    /// The model structure
-    #[arg(long, value_enum, default_value = "arx", help_heading = "Model")]
-    pub(crate) model: ModelArgument,
-    /// Past outputs in the model: coefficients of A
-    #[arg(long, value_name = "N", help_heading = "Model")]
-    pub(crate) na: usize,
-    /// Inputs in the model: coefficients of B, one value for each input or one for all; 0 gives AR
-    #[arg(long, value_name = "N[,N…]", value_delimiter = ',', required = true, help_heading = "Model")]
-    pub(crate) nb: Vec<usize>,
-    /// Samples from input to first effect, one value for each input or one for all; 0: the input acts at once
-    #[arg(long, value_name = "N[,N…]", value_delimiter = ',', default_value = "1", help_heading = "Model")]
-    pub(crate) nk: Vec<usize>,
-    /// Samples without a full regressor: left out, or completed with zeros
-    #[arg(long, value_enum, default_value = "drop", help_heading = "Model")]
-    pub(crate) initial: InitialArgument,
+    #[command(flatten)]
+    pub(crate) model: ModelArguments,
+    #[command(flatten)]
+    pub(crate) search: SearchArguments,
+    #[command(flatten)]
+    pub(crate) criterion: CriterionArguments,
 
     /// Write the JSON report to a file (- for standard output, instead of the table)
     #[arg(long, value_name = "FILE", help_heading = "Output")]
@@ -127,12 +139,92 @@ pub(crate) struct FitArguments {
     pub(crate) log: LogArguments,
 }
 
+/// Which model, and what its estimate starts from.
+#[derive(Debug, Args)]
+pub(crate) struct ModelArguments {
+    /// The model structure
+    #[arg(long, value_enum, default_value = "arx", help_heading = "Model")]
+    pub(crate) model: ModelArgument,
+    /// Coefficients of A: past outputs
+    #[arg(long, value_name = "N", help_heading = "Model")]
+    pub(crate) na: Option<usize>,
+    /// Coefficients of B: inputs; one value for each input or one for all, 0 for a model without inputs
+    #[arg(long, value_name = "N[,N…]", value_delimiter = ',', help_heading = "Model")]
+    pub(crate) nb: Vec<usize>,
+    /// Coefficients of C: past disturbances
+    #[arg(long, value_name = "N", help_heading = "Model")]
+    pub(crate) nc: Option<usize>,
+    /// Coefficients of D, the denominator of the noise
+    #[arg(long, value_name = "N", help_heading = "Model")]
+    pub(crate) nd: Option<usize>,
+    /// Coefficients of F, the denominator from an input alone; one value for each input or one for all
+    #[arg(long, value_name = "N[,N…]", value_delimiter = ',', help_heading = "Model")]
+    pub(crate) nf: Vec<usize>,
+    /// Samples from input to first effect, one value for each input or one for all; 0: the input acts at once [default: 1]
+    #[arg(long, value_name = "N[,N…]", value_delimiter = ',', help_heading = "Model")]
+    pub(crate) nk: Vec<usize>,
+    /// How to estimate
+    #[arg(long, value_enum, default_value = "pem", help_heading = "Model")]
+    pub(crate) method: MethodArgument,
+    /// What stands before the first sample of a stretch
+    #[arg(long, value_enum, default_value = "auto", help_heading = "Model")]
+    pub(crate) initial: InitialArgument,
+}
+
+/// How to search, where the model is not linear in its parameters.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Search (models with C, D or F)")]
+pub(crate) struct SearchArguments {
+    /// How steps are chosen [default: lm]
+    #[arg(long, value_enum, value_name = "HOW")]
+    pub(crate) search: Option<SearchArgument>,
+    /// Iterations at most, from each start [default: 100]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub(crate) max_iterations: Option<u32>,
+    /// Stop where the next step would lower the cost by less than this fraction [default: 1e-8]
+    #[arg(long, value_name = "FRACTION", allow_hyphen_values = true)]
+    pub(crate) tolerance: Option<f64>,
+    /// Step length of the gradient search: C1, or C1/(C2 + l) in iteration l [default: 1]
+    #[arg(long, value_name = "C1[,C2]", allow_hyphen_values = true)]
+    pub(crate) step: Option<String>,
+    /// Search from so many further starts [default: 0]
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(..=10_000))]
+    pub(crate) starts: Option<u32>,
+    /// Which random starts [default: 0]
+    #[arg(long, value_name = "S", requires = "starts")]
+    pub(crate) seed: Option<u64>,
+    /// Begin no iteration after so long
+    #[arg(long, value_name = "SECONDS", allow_hyphen_values = true)]
+    pub(crate) time_limit: Option<f64>,
+}
+
+/// What to make small and what to respect, where the model is linear in its parameters.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Criterion (models without C, D and F)")]
+pub(crate) struct CriterionArguments {
+    /// What to make small [default: 2]
+    #[arg(long, value_enum)]
+    pub(crate) norm: Option<NormArgument>,
+    /// Keep a parameter in a range, either end of which may be left out, or at a value (a1=0.5)
+    #[arg(long, value_name = "NAME=LOW..HIGH")]
+    pub(crate) bound: Vec<String>,
+    /// Keep the static gain from an input in a range, or at a value
+    #[arg(long, value_name = "[INPUT=]G|LOW..HIGH", allow_hyphen_values = true)]
+    pub(crate) dc_gain: Vec<String>,
+    /// Keep parameters small: weighs like so many more samples in which the output is 0 [default: 0]
+    #[arg(long, value_name = "SAMPLES", allow_hyphen_values = true)]
+    pub(crate) ridge: Option<f64>,
+    /// Let no error exceed this, in units of the output, and find the box of all parameters that keep to it
+    #[arg(long, value_name = "E", allow_hyphen_values = true)]
+    pub(crate) noise_bound: Option<f64>,
+}
+
 #[derive(Debug, Args)]
 pub(crate) struct PredictArguments {
     /// Steps ahead; inf for a free run, like simulate
     #[arg(long, value_name = "K", default_value = "1", allow_hyphen_values = true)]
     pub(crate) horizon: String,
-    /// What the prediction starts from [default: measured; with --horizon inf as for simulate]
+    /// What the prediction starts from [default: what the model needs: measured samples, or an estimate]
     #[arg(long, value_enum)]
     pub(crate) initial: Option<StartArgument>,
     #[command(flatten)]
@@ -148,12 +240,31 @@ pub(crate) struct SimulateArguments {
     pub(crate) respond: RespondArguments,
 }
 
+#[derive(Debug, Args)]
+pub(crate) struct BodeArguments {
+    /// The report that fit wrote (- for standard input)
+    #[arg(value_name = "REPORT")]
+    pub(crate) report: PathBuf,
+    /// Frequencies in radians per second [default: from a thousandth of half the sampling frequency to half of it]
+    #[arg(long, value_name = "LOW..HIGH", allow_hyphen_values = true)]
+    pub(crate) frequencies: Option<String>,
+    /// How many frequencies, each the same factor above the one before
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(2..=1_000_000))]
+    pub(crate) points: u32,
+    /// Write the CSV to a file instead of standard output
+    #[arg(short = 'o', long, value_name = "FILE", default_value = "-", hide_default_value = true)]
+    pub(crate) out: PathBuf,
+}
+
 /// What predict and simulate share.
 #[derive(Debug, Args)]
 pub(crate) struct RespondArguments {
     /// The report that fit wrote (- for standard input)
     #[arg(value_name = "REPORT")]
     pub(crate) report: PathBuf,
+    /// The log: a CSV file, gzip-compressed or not (- for standard input)
+    #[arg(value_name = "LOG")]
+    pub(crate) path: PathBuf,
     /// Rows to respond to, 1-based and inclusive [default: all]
     #[arg(long, value_name = "A..B[,C..D]", value_delimiter = ',')]
     pub(crate) rows: Vec<String>,
@@ -177,12 +288,9 @@ pub(crate) struct DemoArguments {
     pub(crate) folder: PathBuf,
 }
 
-/// Where a log is and how it is written.
+/// How a log is written.
 #[derive(Debug, Args)]
 pub(crate) struct LogArguments {
-    /// The log: a CSV file, gzip-compressed or not (- for standard input)
-    #[arg(value_name = "LOG")]
-    pub(crate) log: PathBuf,
     /// What separates fields: a character, or tab [default: recognised among comma, semicolon and tab]
     #[arg(long, value_name = "CHAR", help_heading = "Log format")]
     pub(crate) delimiter: Option<String>,
@@ -235,16 +343,69 @@ pub(crate) struct ClockArguments {
     pub(crate) resample: Option<String>,
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum ModelArgument {
     /// A y = B u + e
     Arx,
+    /// A y = B u + C e
+    Armax,
+    /// A y = C e: a time series
+    Arma,
+    /// A y = e: a time series
+    Ar,
+    /// Output error: y = B/F u + e
+    Oe,
+    /// Box and Jenkins: y = B/F u + C/D e
+    Bj,
+    /// A y = B/F u + C/D e, with any of them
+    Pem,
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum InitialArgument {
+    /// drop without F; with F estimate where it is worth its parameters, else zero
+    Auto,
+    /// Nothing: samples without a full regressor are left out (models without F)
     Drop,
+    /// Zeros
     Zero,
+    /// What fits best, found with the parameters
+    Estimate,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum MethodArgument {
+    /// Least squared prediction errors: in one step where that is least squares, else by a search
+    Pem,
+    /// Instrumental variables in four stages: A and B of an arx model, whatever the noise
+    Iv,
+    /// Refined instrumental variables: B and F of an oe model, whatever the noise
+    Sriv,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum NormArgument {
+    /// The sum of squared errors
+    #[value(name = "2")]
+    Two,
+    /// The sum of absolute errors, which wild samples do not rule
+    #[value(name = "1")]
+    One,
+    /// The largest absolute error
+    #[value(name = "inf")]
+    Infinity,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum SearchArgument {
+    /// Levenberg and Marquardt
+    Lm,
+    /// Gauss and Newton, the step halved until the cost falls
+    GaussNewton,
+    /// Newton and Raphson with the full Hessian
+    Newton,
+    /// Steepest descent
+    Gradient,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]

@@ -5,11 +5,33 @@ use std::io;
 use std::path::Path;
 use std::process::ExitCode;
 
+use crate::interrupt;
 use crate::output::{harmless, say};
 use crate::table;
 
-/// Arguments of the library that are options here.
-const OPTIONS: [&str; 4] = ["detrend", "initial", "offset", "resample"];
+/// The option that an argument of the library is here, if it is one.
+fn option_of(argument: &str) -> Option<&str> {
+    const SAME: [&str; 13] = [
+        "dc-gain",
+        "detrend",
+        "frequencies",
+        "horizon",
+        "initial",
+        "method",
+        "nf",
+        "noise-bound",
+        "offset",
+        "resample",
+        "ridge",
+        "step",
+        "tolerance",
+    ];
+    match argument {
+        // One at a time.
+        "bounds" => Some("bound"),
+        same => SAME.contains(&same).then_some(same),
+    }
+}
 
 /// One line for a person, and an exit code for a script.
 #[derive(Debug)]
@@ -22,6 +44,8 @@ pub(crate) struct Failure {
 enum Kind {
     /// Nobody reads the output any more: nothing to say.
     Closed,
+    /// Ctrl-C.
+    Interrupted,
     Usage,
     Data,
     Undetermined,
@@ -32,6 +56,21 @@ impl Failure {
     /// The command line does not make sense.
     pub(crate) fn usage(message: impl Into<String>) -> Self {
         Self { kind: Kind::Usage, message: message.into() }
+    }
+
+    /// What the library says of an argument.
+    pub(crate) fn option(error: &thetahat::Error) -> Self {
+        if let thetahat::Error::Argument { argument, message } = error
+            && let Some(option) = option_of(argument)
+        {
+            return Self::usage(format!("--{option}: {message}"));
+        }
+        Self::usage(error.to_string())
+    }
+
+    /// Ctrl-C.
+    pub(crate) fn interrupted() -> Self {
+        Self { kind: Kind::Interrupted, message: String::new() }
     }
 
     /// The log or the report does not hold what was asked of it.
@@ -60,10 +99,8 @@ impl Failure {
     /// What the library says of a log, with the place it is about.
     pub(crate) fn about(error: &thetahat::Error, place: impl FnOnce(Option<usize>) -> String) -> Self {
         let (kind, row) = match error {
-            thetahat::Error::Argument { argument, message } if OPTIONS.contains(&argument.as_str()) => {
-                return Self::usage(format!("--{argument}: {message}"));
-            }
-            thetahat::Error::Argument { .. } => return Self::usage(error.to_string()),
+            thetahat::Error::Argument { .. } => return Self::option(error),
+            thetahat::Error::Interrupted => return Self::interrupted(),
             thetahat::Error::Undetermined { .. } => (Kind::Undetermined, None),
             thetahat::Error::Data { row, .. } => (Kind::Data, *row),
             _ => (Kind::Data, None),
@@ -75,6 +112,10 @@ impl Failure {
     pub(crate) fn report(&self) -> ExitCode {
         let code = match self.kind {
             Kind::Closed => return ExitCode::SUCCESS,
+            Kind::Interrupted => {
+                say(interrupt::message(interrupt::has_written()));
+                return ExitCode::from(interrupt::EXIT_CODE);
+            }
             Kind::Usage => 2,
             Kind::Data => 3,
             Kind::Undetermined => 4,

@@ -1,18 +1,23 @@
 //! What a command line means: everything resolved and checked that needs no data.
 
-use std::path::PathBuf;
+mod fit;
+mod method;
+mod orders;
+mod search;
+
 use std::str::FromStr;
 
-use thetahat::{Detrend, Initial, Interpolation, Orders, Rows, Start};
+use thetahat::{Interpolation, Rows, Start};
 
-use crate::args::{ClockArguments, FitArguments, InitialArgument, LogArguments, StartArgument};
+use crate::args::{ClockArguments, LogArguments, StartArgument};
 use crate::failure::Failure;
 use crate::table;
 
-/// A log to read.
+pub(crate) use fit::FitJob;
+
+/// How to read a log.
 #[derive(Debug)]
 pub(crate) struct LogJob {
-    pub(crate) path: PathBuf,
     pub(crate) options: table::Options,
     pub(crate) clock: Clock,
 }
@@ -26,24 +31,6 @@ pub(crate) enum Clock {
     Fixed(f64),
     /// Not given.
     Unknown,
-}
-
-/// A model to fit.
-#[derive(Debug)]
-pub(crate) struct FitJob {
-    pub(crate) log: LogJob,
-    /// Named inputs; none: those called u, u1, u2, …
-    pub(crate) inputs: Option<Vec<String>>,
-    /// The named output; none: y.
-    pub(crate) output: Option<String>,
-    pub(crate) estimate: Vec<Rows>,
-    pub(crate) validate: Vec<Rows>,
-    pub(crate) detrend: Detrend,
-    pub(crate) offsets: Vec<(String, f64)>,
-    pub(crate) na: usize,
-    pub(crate) nb: Vec<usize>,
-    pub(crate) nk: Vec<usize>,
-    pub(crate) initial: Initial,
 }
 
 impl LogJob {
@@ -66,87 +53,19 @@ impl LogJob {
             time_format: clock.time_format.clone(),
         };
         options.check().map_err(Failure::usage)?;
-        let positive = |argument: &str, value: f64| {
-            if value.is_finite() && value > 0.0 {
-                return Ok(value);
-            }
-            Err(Failure::usage(format!("{argument} {value}: not a positive number of seconds")))
-        };
+        let seconds = |argument, value| positive(argument, value, "number of seconds");
         let clock = match (&clock.time, clock.sample_time) {
             (Some(name), _) => {
                 let resample = clock.resample.as_deref().map(resampling).transpose()?;
                 if let Some((step, _)) = resample {
-                    positive("--resample", step)?;
+                    seconds("--resample", step)?;
                 }
                 Clock::Column { name: name.clone(), resample }
             }
-            (None, Some(seconds)) => Clock::Fixed(positive("--sample-time", seconds)?),
+            (None, Some(step)) => Clock::Fixed(seconds("--sample-time", step)?),
             (None, None) => Clock::Unknown,
         };
-        Ok(Self { path: log.log.clone(), options, clock })
-    }
-}
-
-impl FitJob {
-    pub(crate) fn resolve(arguments: &FitArguments) -> Result<Self, Failure> {
-        let inputs = (!arguments.input.is_empty()).then(|| arguments.input.clone());
-        let offsets = arguments.offset.iter().map(|text| {
-            text.rsplit_once('=')
-                .and_then(|(name, value)| Some((name.to_owned(), value.trim().parse::<f64>().ok()?)))
-                .filter(|(_, value)| value.is_finite())
-                .ok_or_else(|| {
-                    Failure::usage(format!("--offset {text}: write it as NAME=VALUE, such as u=4.5"))
-                })
-        });
-        let job = Self {
-            log: LogJob::resolve(&arguments.log, &arguments.clock)?,
-            inputs,
-            output: arguments.output.clone(),
-            estimate: rows("--estimate", &arguments.estimate)?,
-            validate: rows("--validate", &arguments.validate)?,
-            detrend: parsed("--detrend", &arguments.detrend)?,
-            offsets: offsets.collect::<Result<_, _>>()?,
-            na: arguments.na,
-            nb: arguments.nb.clone(),
-            nk: arguments.nk.clone(),
-            initial: match arguments.initial {
-                InitialArgument::Drop => Initial::Drop,
-                InitialArgument::Zero => Initial::Zero,
-            },
-        };
-        for (position, (name, _)) in job.offsets.iter().enumerate() {
-            if job.offsets[..position].iter().any(|(other, _)| other == name) {
-                return Err(Failure::usage(format!("--offset: '{name}' has two; give one")));
-            }
-        }
-        if let Some(inputs) = &job.inputs {
-            job.orders(inputs.len())?;
-        }
-        if job.is_autoregression() && job.inputs.is_some() {
-            return Err(Failure::usage(
-                "--nb 0 makes a model without inputs; leave out --input, or give orders above 0",
-            ));
-        }
-        Ok(job)
-    }
-
-    /// Whether the model has no inputs at all.
-    pub(crate) fn is_autoregression(&self) -> bool {
-        self.nb.iter().all(|&nb| nb == 0)
-    }
-
-    /// The orders for so many inputs: one value stands for all of them.
-    pub(crate) fn orders(&self, inputs: usize) -> Result<Orders, Failure> {
-        let each = |argument: &str, values: &[usize]| match values {
-            [one] => Ok(vec![*one; inputs]),
-            several if several.len() == inputs => Ok(several.to_vec()),
-            several => Err(Failure::usage(format!(
-                "{argument} has {} values for {inputs} inputs; give one for each, or one for all",
-                several.len()
-            ))),
-        };
-        let inputs = (each("--nb", &self.nb)?, each("--nk", &self.nk)?);
-        Orders::arx(self.na, &inputs.0, &inputs.1).map_err(|error| Failure::usage(error.to_string()))
+        Ok(Self { options, clock })
     }
 }
 
@@ -158,6 +77,14 @@ impl From<StartArgument> for Start {
             StartArgument::Estimated => Self::Estimated,
         }
     }
+}
+
+/// A number that must be positive.
+fn positive(argument: &str, value: f64, what: &str) -> Result<f64, Failure> {
+    if value.is_finite() && value > 0.0 {
+        return Ok(value);
+    }
+    Err(Failure::usage(format!("{argument} {value}: not a positive {what}; give one above 0")))
 }
 
 /// Ranges of rows.

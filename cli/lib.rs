@@ -10,9 +10,11 @@ mod readme {}
 mod args;
 mod commands;
 mod failure;
+mod interrupt;
 mod job;
 mod log;
 mod output;
+mod progress;
 mod table;
 
 use std::ffi::OsString;
@@ -21,7 +23,7 @@ use std::process::ExitCode;
 use clap::Parser;
 
 /// Runs the program on its arguments, the program's name first, and gives its exit code: 0 done, 2 usage, 3 bad data,
-/// 4 the data cannot determine the model, 5 input/output.
+/// 4 the data cannot determine the model, 5 input/output, 130 interrupted.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let arguments = match args::Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments,
@@ -31,6 +33,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
             return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
         }
     };
+    interrupt::listen();
     match commands::dispatch(arguments) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => failure.report(),

@@ -1,30 +1,42 @@
 //! From a text table to a log: which columns, which clock, and on which line an error is.
 
-use std::io::IsTerminal;
-use std::time::{Duration, Instant};
+use std::path::Path;
 
-use indicatif::{ProgressBar, ProgressStyle};
-use thetahat::{Channel, Error, Log, Resampling, Source};
+use thetahat::{Channel, Error, Log, Resampling, Rows, Source};
 
 use crate::failure::Failure;
 use crate::job::{Clock, LogJob};
 use crate::output::warn;
+use crate::progress::Reading;
 use crate::table::{Reader, Selection};
 
-/// A reading that takes longer shows its progress on a terminal.
-const PATIENCE: Duration = Duration::from_secs(1);
-
-/// A log and where it came from.
+/// A log and where it came from, its rows counted from 1.
 #[derive(Debug)]
 pub(crate) struct Loaded {
     pub(crate) log: Log,
     pub(crate) source: Source,
 }
 
-impl Loaded {
-    /// What the library says of this log.
-    pub(crate) fn failure(source: &Source) -> impl Fn(Error) -> Failure {
-        move |error| Failure::about(&error, |_| source.file.clone())
+/// What the library says of some logs, with the file that has the row or, without a row, all of them.
+pub(crate) fn failure(sources: &[Source]) -> impl Fn(Error) -> Failure {
+    const MOST: usize = 6;
+    move |error| {
+        Failure::about(&error, |row| {
+            let has = |source: &&Source| {
+                row.is_some_and(|row| (source.rows.first()..=source.rows.last()).contains(&row))
+            };
+            let files = |sources: &[Source]| {
+                let files: Vec<&str> = sources.iter().map(|source| source.file.as_str()).collect();
+                files.join(", ")
+            };
+            match (sources.iter().find(has), sources.get(..MOST)) {
+                (Some(source), _) => source.file.clone(),
+                (None, Some(first)) if sources.len() > MOST => {
+                    format!("{}, … ({} logs)", files(first), sources.len())
+                }
+                _ => files(sources),
+            }
+        })
     }
 }
 
@@ -32,18 +44,21 @@ impl Loaded {
 ///
 /// Without a clock of its own the log gets `sample_time`, or one row a second if there is none.
 pub(crate) fn load(
+    path: &Path,
     job: &LogJob,
     sample_time: Option<f64>,
-    choose: impl FnOnce(&[String]) -> Result<Vec<String>, String>,
+    choose: impl FnOnce(&[String]) -> Result<Vec<String>, Failure>,
 ) -> Result<Loaded, Failure> {
-    let reader = Reader::open(&job.path, &job.options)?;
-    let file = job.path.display().to_string();
+    let reader = Reader::open(path, &job.options)?;
+    let file = path.display().to_string();
     let bad = |message: String| Failure::data(format!("{file}: {message}"));
     let header = reader.names().to_vec();
     if job.options.header && header.iter().all(|name| name.trim().parse::<f64>().is_ok()) {
-        warn("the names of all columns are numbers; if the first row is data, read it with --no-header");
+        warn(&format!(
+            "{file}: the names of all columns are numbers; if the first row is data, read it with --no-header"
+        ));
     }
-    let names = choose(&header).map_err(bad)?;
+    let names = choose(&header)?;
     let time = match &job.clock {
         Clock::Column { name, .. } => Some(find(name, &header).map_err(bad)?),
         Clock::Fixed(_) => None,
@@ -51,7 +66,7 @@ pub(crate) fn load(
             if let Some(name) =
                 header.iter().find(|name| ["t", "time"].contains(&name.to_lowercase().as_str()))
             {
-                warn(&format!("column '{name}' looks like a clock; --time {name} would use it"));
+                warn(&format!("{file}: column '{name}' looks like a clock; --time {name} would use it"));
             }
             None
         }
@@ -67,18 +82,17 @@ pub(crate) fn load(
         }
     }
 
-    let mut progress = Progress::default();
+    let progress = Reading::new();
     let table = reader.read(&Selection { columns, time }, &mut |read, total| progress.update(read, total))?;
-    progress.finish();
+    drop(progress);
 
     let channels =
         names.into_iter().zip(table.columns).map(|(name, values)| Channel { name, values }).collect();
     let clock = if let Clock::Column { name, .. } = &job.clock { Some(name.clone()) } else { None };
-    let mut source = Source { file: file.clone(), time: clock, start: table.start, resampled: None };
+    let mut resampled = None;
     let log = match (&job.clock, table.time) {
         (Clock::Column { resample: Some((step, interpolation)), .. }, Some(time)) => {
-            source.resampled =
-                Some(Resampling { step: *step, interpolation: *interpolation, rows: table.rows });
+            resampled = Some(Resampling { step: *step, interpolation: *interpolation, rows: table.rows });
             Log::resampled(channels, &time, *step, *interpolation)
         }
         (_, Some(time)) => Log::with_time(channels, time),
@@ -92,6 +106,8 @@ pub(crate) fn load(
             None => file.clone(),
         })
     })?;
+    let rows = Rows::new(1, log.rows()).map_err(|error| bad(error.to_string()))?;
+    let source = Source { file, rows, time: clock, start: table.start, resampled };
     Ok(Loaded { log, source })
 }
 
@@ -118,38 +134,5 @@ fn brief(name: &str) -> String {
     match name.char_indices().nth(LONGEST) {
         Some((end, _)) => format!("{}…", &name[..end]),
         None => name.to_owned(),
-    }
-}
-
-/// A bar on a terminal, for those who wait.
-#[derive(Default)]
-struct Progress {
-    began: Option<Instant>,
-    bar: Option<ProgressBar>,
-}
-
-impl Progress {
-    fn update(&mut self, read: u64, total: Option<u64>) {
-        let began = *self.began.get_or_insert_with(Instant::now);
-        if self.bar.is_none() && began.elapsed() > PATIENCE && std::io::stderr().is_terminal() {
-            let bar = total.map_or_else(ProgressBar::new_spinner, ProgressBar::new);
-            let style = if total.is_some() {
-                "reading {wide_bar} {bytes}/{total_bytes} {eta}"
-            } else {
-                "reading {spinner} {bytes}"
-            };
-            self.bar = Some(bar.with_style(
-                ProgressStyle::with_template(style).unwrap_or_else(|_| ProgressStyle::default_bar()),
-            ));
-        }
-        if let Some(bar) = &self.bar {
-            bar.set_position(read);
-        }
-    }
-
-    fn finish(&self) {
-        if let Some(bar) = &self.bar {
-            bar.finish_and_clear();
-        }
     }
 }

@@ -5,6 +5,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use crate::failure::Failure;
+use crate::interrupt;
 
 /// Text without control characters: names come from files, and could hold anything.
 pub(crate) fn harmless(text: &str) -> String {
@@ -31,17 +32,19 @@ pub(crate) fn say(line: &str) {
 
 /// Writes to standard output.
 pub(crate) fn print(text: &str) -> Result<(), Failure> {
+    interrupt::writing();
     let mut stdout = io::stdout().lock();
     stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()).map_err(|error| Failure::stdout(&error))
 }
 
 /// Writes a file, or standard output for `-`.
 ///
-/// A file is written beside its place, brought to the disk, and moved there: a crash or a full disk leaves the old
-/// one or the new one. What is not a file (a device, a pipe) is written directly.
+/// A file is written beside its place, brought to the disk, and moved there: a crash, a full disk or Ctrl-C leaves the
+/// old one or the new one. What is not a file (a device, a pipe) is written directly.
 pub(crate) fn write(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Failure> {
     let failed = |error: io::Error| Failure::io(path, "cannot be written", &plain(error));
     if path == Path::new("-") {
+        interrupt::writing();
         let mut stdout = io::BufWriter::new(io::stdout().lock());
         return fill(&mut stdout).and_then(|()| stdout.flush()).map_err(|error| Failure::stdout(&error));
     }
@@ -51,6 +54,7 @@ pub(crate) fn write(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result
         return Err(failed(io::ErrorKind::IsADirectory.into()));
     }
     if existing.as_ref().is_some_and(|metadata| !metadata.is_file()) {
+        interrupt::writing();
         let mut file = io::BufWriter::new(fs::OpenOptions::new().write(true).open(&target).map_err(failed)?);
         return fill(&mut file).and_then(|()| file.flush()).map_err(failed);
     }
@@ -63,7 +67,7 @@ pub(crate) fn write(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result
     if let Some(permissions) = default_permissions() {
         builder.permissions(permissions);
     }
-    let file = builder.tempfile_in(folder).map_err(failed)?;
+    let file = interrupt::begin(|| builder.tempfile_in(folder)).map_err(failed)?;
     let mut buffered = io::BufWriter::new(file);
     fill(&mut buffered).map_err(failed)?;
     let file = buffered.into_inner().map_err(|error| failed(error.into_error()))?;
@@ -71,8 +75,23 @@ pub(crate) fn write(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result
         file.as_file().set_permissions(existing.permissions()).map_err(failed)?;
     }
     file.as_file().sync_all().map_err(failed)?;
-    file.persist(&target).map_err(|error| failed(error.error))?;
+    interrupt::finish(|| file.persist(&target).map_err(|error| error.error)).map_err(failed)?;
     Ok(())
+}
+
+/// Writes a table as CSV, like [`write`].
+pub(crate) fn write_csv(
+    path: &Path,
+    rows: impl FnOnce(&mut csv::Writer<&mut dyn Write>) -> Result<(), csv::Error>,
+) -> Result<(), Failure> {
+    write(path, |file| {
+        let mut csv = csv::Writer::from_writer(file);
+        rows(&mut csv).map_err(|error| match error.into_kind() {
+            csv::ErrorKind::Io(error) => error,
+            other => io::Error::other(format!("{other:?}")),
+        })?;
+        csv.flush()
+    })
 }
 
 /// Refuses an output that would replace what was read.

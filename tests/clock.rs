@@ -27,7 +27,7 @@ fn minutes_and_seconds(time: f64) -> String {
 /// A report without what it says of the clock's writing.
 fn without_clock(mut report: Value) -> Value {
     for field in ["file", "time", "start"] {
-        report["data"][field] = Value::Null;
+        report["data"]["logs"][0][field] = Value::Null;
     }
     report
 }
@@ -38,8 +38,8 @@ fn a_column_of_seconds_gives_the_sample_time() {
     let report = folder.fit("log.csv --time time --na 2 --nb 2");
     assert_eq!(number(&report, "/data/sample_time"), STEP);
     assert_eq!(number(&report, "/model/sample_time"), STEP);
-    assert_eq!(report["data"]["time"], "time");
-    assert_eq!(report["data"]["start"], Value::Null);
+    assert_eq!(report["data"]["logs"][0]["time"], "time");
+    assert_eq!(report["data"]["logs"][0]["start"], Value::Null);
 }
 
 #[test]
@@ -71,7 +71,7 @@ fn dates_and_sample_times_say_the_same_as_seconds() {
     ] {
         let folder = Folder::with_log(log);
         let report = folder.fit(&format!("log.csv {options} --na 2 --nb 2"));
-        assert_eq!(report["data"]["start"], start, "{options}");
+        assert_eq!(report["data"]["logs"][0]["start"], start, "{options}");
         assert_eq!(without_clock(report), expected, "{options}");
     }
 }
@@ -92,7 +92,7 @@ fn without_a_clock_rows_are_counted() {
     let report = folder.fit("log.csv --na 2 --nb 2 --report model.json");
     assert_eq!(number(&report, "/model/sample_time"), 1.0);
     let run = folder.done("predict model.json log.csv");
-    assert!(run.stdout.starts_with("row,measured,predicted\n1,"), "{}", run.stdout);
+    assert!(run.stdout.starts_with("row,measured,predicted,standard_deviation\n1,"), "{}", run.stdout);
 }
 
 #[test]
@@ -194,7 +194,7 @@ fn a_resampled_log_gives_the_fit_of_the_uniform_one() {
         assert_eq!(report["data"]["rows"], expected["data"]["rows"]);
         assert_eq!(number(&report, "/data/sample_time"), 0.5);
         let provenance = json!({"step": 0.5, "interpolation": how, "rows": 300});
-        assert_eq!(report["data"]["resampled"], provenance);
+        assert_eq!(report["data"]["logs"][0]["resampled"], provenance);
 
         let run = folder.done(&format!("predict model.json log.csv --time t --resample 0.5:{how}"));
         let answer = Answer::read(&run.stdout);
@@ -228,7 +228,7 @@ fn predictions_carry_the_logs_own_times() {
     let folder = Folder::with_log(written(|time| time.to_string()));
     folder.done("fit log.csv --time time --na 2 --nb 2 --report model.json");
     let run = folder.done("predict model.json log.csv --time time");
-    assert!(run.stdout.starts_with("time,measured,predicted\n"), "{}", run.stdout);
+    assert!(run.stdout.starts_with("time,measured,predicted,standard_deviation\n"), "{}", run.stdout);
     assert_eq!(Answer::read(&run.stdout).time, uniform(200));
 }
 

@@ -3,7 +3,7 @@
 use crate::harness::Folder;
 use crate::signals::{Experiment, csv};
 
-const VERBS: [&str; 7] = ["fit", "predict", "simulate", "demo", "schema", "completions", "man"];
+const VERBS: [&str; 8] = ["fit", "predict", "simulate", "bode", "demo", "schema", "completions", "man"];
 
 /// The examples of a help text, as far as the shell would pass them to the program.
 fn examples(help: &str) -> Vec<String> {
@@ -51,6 +51,9 @@ fn every_verb_has_examples_and_they_run() {
     let folder =
         Folder::with_log(csv(&[("t", &times), ("u", &u), ("y", &y), ("heater", &u), ("temperature", &y)]));
     folder.write("sunspots.csv", csv(&[("count", &y)]));
+    for day in ["monday.csv", "tuesday.csv"] {
+        folder.write(day, csv(&[("u", &u), ("y", &y)]));
+    }
     for verb in VERBS {
         let examples = examples(&folder.done(&format!("{verb} --help")).stdout);
         assert!(!examples.is_empty(), "{verb}");
@@ -68,7 +71,9 @@ fn help_lists_the_verbs_and_the_exit_codes() {
     for verb in VERBS {
         assert!(help.contains(&format!("\n  {verb} ")), "{verb}");
     }
-    for code in ["0  done", "2  usage", "3  bad data", "4  the data cannot", "5  input/output"] {
+    for code in
+        ["0  done", "2  usage", "3  bad data", "4  the data cannot", "5  input/output", "130  interrupted"]
+    {
         assert!(help.contains(&format!("\n  {code}")), "{code}");
     }
 }
@@ -90,8 +95,24 @@ fn help_of_fit_lists_its_options() {
         "--model",
         "--na",
         "--nb",
+        "--nc",
+        "--nd",
+        "--nf",
         "--nk",
+        "--method",
         "--initial",
+        "--search",
+        "--max-iterations",
+        "--tolerance",
+        "--step",
+        "--starts",
+        "--seed",
+        "--time-limit",
+        "--norm",
+        "--bound",
+        "--dc-gain",
+        "--ridge",
+        "--noise-bound",
         "--report",
         "--format",
         "--delimiter",

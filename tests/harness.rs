@@ -142,20 +142,25 @@ fn words(line: &str) -> Vec<&str> {
 
 /// What predict and simulate write: one entry for each row.
 pub(crate) struct Answer {
+    /// Time or row.
     pub(crate) time: Vec<f64>,
     pub(crate) measured: Vec<Option<f64>>,
     pub(crate) predicted: Vec<Option<f64>>,
+    /// What simulate does not write is empty.
+    pub(crate) deviation: Vec<Option<f64>>,
 }
 
 impl Answer {
     /// Reads the CSV.
     pub(crate) fn read(csv: &str) -> Self {
-        let mut answer = Self { time: Vec::new(), measured: Vec::new(), predicted: Vec::new() };
+        let mut answer =
+            Self { time: Vec::new(), measured: Vec::new(), predicted: Vec::new(), deviation: Vec::new() };
         for row in csv::Reader::from_reader(csv.as_bytes()).deserialize() {
-            let (time, measured, predicted) = row.expect("three columns of numbers");
-            answer.time.push(time);
-            answer.measured.push(measured);
-            answer.predicted.push(predicted);
+            let row: Vec<Option<f64>> = row.expect("columns of numbers");
+            answer.time.push(row[0].expect("every row has a time or a number"));
+            answer.measured.push(row[1]);
+            answer.predicted.push(row[2]);
+            answer.deviation.push(row.get(3).copied().flatten());
         }
         answer
     }

@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use crate::harness::{Answer, Folder, Run, distance, names, number, numbers, parameters};
-use crate::signals::{Experiment, Random, csv, plain_log, response};
+use crate::signals::{Experiment, Random, csv, response};
 
 /// The least-squares solution of rows [phi, y], by the normal equations, and the inverse of their matrix.
 fn least_squares(rows: &[Vec<f64>]) -> (Vec<f64>, Vec<Vec<f64>>) {
@@ -155,16 +155,6 @@ fn no_regressor_reaches_across_a_gap() {
     assert!(distance(&parameters(&report), &least_squares(&rows).0) < 1e-9);
     assert_eq!(number(&report, "/estimation/samples"), 114.0);
     assert_eq!(number(&report, "/data/missing/1/rows"), 2.0);
-}
-
-#[test]
-fn two_logs_on_the_command_line_are_refused() {
-    let folder = Folder::with_log(plain_log());
-    folder.write("more.csv", plain_log());
-    let run = folder.run("fit log.csv more.csv --na 2 --nb 2 --report model.json");
-    assert_eq!(run.code, 2);
-    assert!(run.stderr.starts_with("error: ") && run.stderr.contains("more.csv"), "{}", run.stderr);
-    assert_eq!(folder.names(), ["log.csv", "more.csv"]);
 }
 
 #[test]

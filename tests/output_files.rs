@@ -218,7 +218,7 @@ fn a_reader_that_had_enough_is_no_error() {
         .unwrap();
     let mut first = String::new();
     BufReader::new(child.stdout.take().unwrap()).read_line(&mut first).unwrap();
-    assert_eq!(first, "row,measured,predicted\n");
+    assert_eq!(first, "row,measured,predicted,standard_deviation\n");
     let run = Run::from(child.wait_with_output().unwrap());
     assert_eq!((run.code, run.stderr.as_str()), (0, ""));
 }

@@ -22,7 +22,7 @@ fn all(values: &[Option<f64>]) -> Vec<f64> {
 #[test]
 fn there_is_a_line_for_each_row() {
     let run = folder().done("predict model.json log.csv");
-    assert_eq!(run.stdout.lines().next(), Some("row,measured,predicted"));
+    assert_eq!(run.stdout.lines().next(), Some("row,measured,predicted,standard_deviation"));
     assert_eq!(Answer::read(&run.stdout).time, (1..=200).map(f64::from).collect::<Vec<f64>>());
 }
 
@@ -172,7 +172,7 @@ fn missing_values_are_empty_fields_and_cut_the_answer() {
     let folder = Folder::with_log(experiment.csv());
     folder.done("fit log.csv --na 2 --nb 2 --report model.json");
     let run = folder.done("predict model.json log.csv");
-    assert!(run.stdout.contains("\n51,,\n"), "{}", run.stdout);
+    assert!(run.stdout.contains("\n51,,,\n"), "{}", run.stdout);
     let answer = Answer::read(&run.stdout);
     let without: Vec<usize> = (0..100).filter(|row| answer.predicted[*row].is_none()).collect();
     assert_eq!(without, [0, 1, 50, 51, 52]);

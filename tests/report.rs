@@ -103,7 +103,10 @@ fn it_says_where_the_data_came_from() {
     let folder = Folder::with_log(plain_log());
     let data = &folder
         .fit("log.csv --sample-time 0.5 --estimate 11..100,121..150 --validate 151..200 --na 2 --nb 2")["data"];
-    assert_eq!(data["file"], "log.csv");
+    assert_eq!(
+        data["logs"],
+        json!([{"file": "log.csv", "rows": [1, 200], "time": null, "start": null, "resampled": null}])
+    );
     assert_eq!(data["rows"], 200);
     assert_eq!(data["sample_time"], 0.5);
     assert_eq!(data["detrend"], "mean");
@@ -166,14 +169,14 @@ fn poles_zeros_gain_and_time_constants_follow_from_the_polynomials() {
     for (position, pole) in poles.iter().enumerate() {
         assert!(relative_size(&a, pole) < 1e-10, "{pole}");
         let modulus = number(pole, "/re").hypot(number(pole, "/im"));
-        let time_constant = number(model, &format!("/time_constants/{position}"));
+        let time_constant = number(model, &format!("/time_constants/{position}/value"));
         assert!((time_constant / (-0.5 / modulus.ln()) - 1.0).abs() < 1e-12);
     }
     let zeros = model["zeros"][0].as_array().unwrap();
     assert_eq!(zeros.len(), 2);
     assert!(zeros.iter().all(|zero| relative_size(&b, zero) < 1e-10), "{zeros:?}");
     let gain = b.iter().sum::<f64>() / a.iter().sum::<f64>();
-    assert!((number(model, "/dc_gain/0") / gain - 1.0).abs() < 1e-12);
+    assert!((number(model, "/dc_gain/0/value") / gain - 1.0).abs() < 1e-12);
     assert_eq!(model["stable"], true);
 }
 
@@ -244,6 +247,32 @@ fn the_schema_refuses_what_is_no_report() {
 /// What is wrong with a value by a schema (JSON Schema 2020-12, the keywords that ours uses; any other is a fault).
 /// A property that the schema does not name is a fault too.
 fn faults(root: &Value, schema: &Value, value: &Value, place: &str) -> Vec<String> {
+    let mut found = mismatches(root, schema, value, place);
+    let known = properties(root, schema, value);
+    let names = value.as_object().into_iter().flatten().map(|(name, _)| name);
+    found.extend(
+        names.filter(|name| !known.contains(name)).map(|name| format!("{place}: unknown property {name}")),
+    );
+    found
+}
+
+/// The schemas that say more of the same value.
+fn branches<'a>(root: &'a Value, schema: &'a Value) -> Vec<&'a Value> {
+    let target = schema["$ref"].as_str().and_then(|path| root.pointer(path.trim_start_matches('#')));
+    let several = ["oneOf", "anyOf"].map(|keyword| schema[keyword].as_array().into_iter().flatten());
+    target.into_iter().chain(several.into_iter().flatten()).collect()
+}
+
+/// The properties that a schema names, with those of its branches that the value agrees with.
+fn properties<'a>(root: &'a Value, schema: &'a Value, value: &Value) -> Vec<&'a String> {
+    let own = schema["properties"].as_object().into_iter().flatten().map(|(name, _)| name);
+    let fitting =
+        branches(root, schema).into_iter().filter(|branch| mismatches(root, branch, value, "").is_empty());
+    own.chain(fitting.flat_map(|branch| properties(root, branch, value))).collect()
+}
+
+/// The faults but for unknown properties of the value itself, which another part of the schema may know.
+fn mismatches(root: &Value, schema: &Value, value: &Value, place: &str) -> Vec<String> {
     let mut found = Vec::new();
     let mut demand = |holds: bool, keyword: &str| {
         if !holds {
@@ -262,17 +291,19 @@ fn faults(root: &Value, schema: &Value, value: &Value, place: &str) -> Vec<Strin
     };
     let agreeing = |schemas: &Value| {
         let schemas = schemas.as_array().into_iter().flatten();
-        schemas.filter(|schema| faults(root, schema, value, place).is_empty()).count()
+        schemas.filter(|schema| mismatches(root, schema, value, place).is_empty()).count()
     };
-    let items = value.as_array().map_or(&[][..], Vec::as_slice);
+    let items = value.as_array();
+    let count = |value: &Value| value.as_u64().unwrap_or(u64::MAX);
     let mut parts: Vec<(&Value, &Value, String)> = Vec::new();
+    let mut same: Vec<&Value> = Vec::new();
     for (keyword, rule) in schema.as_object().into_iter().flatten() {
         match keyword.as_str() {
-            "$schema" | "$defs" | "title" | "description" | "format" => {}
+            "$schema" | "$defs" | "title" | "description" | "format" | "default" => {}
             "$ref" => {
                 let target = rule.as_str().and_then(|path| root.pointer(path.trim_start_matches('#')));
                 demand(target.is_some(), keyword);
-                parts.extend(target.map(|target| (target, value, place.to_owned())));
+                same.extend(target);
             }
             "type" => {
                 demand(rule.as_array().map_or(of_type(rule), |names| names.iter().any(of_type)), keyword)
@@ -281,21 +312,21 @@ fn faults(root: &Value, schema: &Value, value: &Value, place: &str) -> Vec<Strin
             "enum" => demand(rule.as_array().is_some_and(|values| values.contains(value)), keyword),
             "anyOf" => demand(agreeing(rule) > 0, keyword),
             "oneOf" => demand(agreeing(rule) == 1, keyword),
-            "minimum" => demand(value.as_f64() >= rule.as_f64(), keyword),
-            "minItems" => demand(items.len() as u64 >= rule.as_u64().unwrap_or(u64::MAX), keyword),
-            "maxItems" => demand(items.len() as u64 <= rule.as_u64().unwrap_or(0), keyword),
+            // Of what is no number or no array these say nothing.
+            "minimum" => demand(!value.is_number() || value.as_f64() >= rule.as_f64(), keyword),
+            "minItems" => demand(items.is_none_or(|items| items.len() as u64 >= count(rule)), keyword),
+            "maxItems" => demand(items.is_none_or(|items| items.len() as u64 <= count(rule)), keyword),
             "required" => {
                 let has = |name: &Value| name.as_str().is_some_and(|name| value.get(name).is_some());
                 demand(rule.as_array().is_some_and(|names| names.iter().all(has)), keyword);
             }
             "properties" => {
                 for (name, value) in value.as_object().into_iter().flatten() {
-                    demand(rule.get(name).is_some(), &format!("unknown property {name}"));
                     parts.extend(rule.get(name).map(|rule| (rule, value, format!("{place}/{name}"))));
                 }
             }
             "items" | "prefixItems" => {
-                for (position, value) in items.iter().enumerate() {
+                for (position, value) in items.into_iter().flatten().enumerate() {
                     let rule = if keyword == "items" { Some(rule) } else { rule.get(position) };
                     parts.extend(rule.map(|rule| (rule, value, format!("{place}/{position}"))));
                 }
@@ -303,6 +334,7 @@ fn faults(root: &Value, schema: &Value, value: &Value, place: &str) -> Vec<Strin
             _ => demand(false, &format!("unknown keyword {keyword}")),
         }
     }
+    found.extend(same.into_iter().flat_map(|schema| mismatches(root, schema, value, place)));
     found.extend(parts.into_iter().flat_map(|(schema, value, place)| faults(root, schema, value, &place)));
     found
 }

@@ -50,6 +50,50 @@ pub(crate) fn response(a: &[f64], inputs: &[(&[f64], &[f64])], e: &[f64]) -> Vec
     y
 }
 
+/// The polynomials of A(q) y(t) = sum_j B_j(q)/F_j(q) u_j(t) + C(q)/D(q) e(t), from q^0 on; all but B are monic.
+#[derive(Clone)]
+pub(crate) struct Polynomials {
+    pub(crate) a: Vec<f64>,
+    pub(crate) b: Vec<Vec<f64>>,
+    pub(crate) c: Vec<f64>,
+    pub(crate) d: Vec<f64>,
+    pub(crate) f: Vec<Vec<f64>>,
+}
+
+impl Polynomials {
+    /// With one input. What is empty is 1.
+    pub(crate) fn new(a: &[f64], b: &[f64], c: &[f64], d: &[f64], f: &[f64]) -> Self {
+        let monic = |behind: &[f64]| [&[1.0], behind].concat();
+        Self { a: monic(a), b: vec![b.to_vec()], c: monic(c), d: monic(d), f: vec![monic(f)] }
+    }
+
+    /// sum_j B_j/F_j u_j.
+    fn driven(&self, inputs: &[&[f64]]) -> Vec<f64> {
+        let mut sum = vec![0.0; inputs[0].len()];
+        for ((b, f), u) in self.b.iter().zip(&self.f).zip(inputs) {
+            let x = response(f, &[(b, u)], &vec![0.0; u.len()]);
+            sum.iter_mut().zip(x).for_each(|(sum, x)| *sum += x);
+        }
+        sum
+    }
+
+    /// y, from rest.
+    pub(crate) fn outputs(&self, inputs: &[&[f64]], e: &[f64]) -> Vec<f64> {
+        let silence = vec![0.0; e.len()];
+        let noise = response(&self.d, &[(&self.c, e)], &silence);
+        let sum: Vec<f64> = self.driven(inputs).iter().zip(noise).map(|(x, v)| x + v).collect();
+        response(&self.a, &[], &sum)
+    }
+
+    /// The e that gives this y, with zeros before the first sample: D/C (A y - sum_j B_j/F_j u_j).
+    pub(crate) fn errors(&self, inputs: &[&[f64]], y: &[f64]) -> Vec<f64> {
+        let silence = vec![0.0; y.len()];
+        let weighted = response(&[1.0], &[(&self.a, y)], &silence);
+        let w: Vec<f64> = weighted.iter().zip(self.driven(inputs)).map(|(w, x)| w - x).collect();
+        response(&self.c, &[(&self.d, &w)], &silence)
+    }
+}
+
 /// An experiment on a stable system with one input, na = nb = 2, nk = 1, around u = 5 and y = 20, with noise.
 pub(crate) struct Experiment {
     pub(crate) u: Vec<f64>,

@@ -28,9 +28,10 @@ mod unix {
     use std::fs::File;
     use std::io::{Read, Write};
     use std::os::unix::ffi::OsStrExt;
-    use std::process::{Command, Stdio};
+    use std::process::{Child, Command, Stdio};
     use std::time::Duration;
 
+    use rustix::process::{Pid, Signal, kill_process};
     use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
     use rustix::termios::{Winsize, tcsetwinsize};
 
@@ -38,7 +39,7 @@ mod unix {
     use crate::signals::Experiment;
 
     /// Runs the program with standard error on a terminal, and gives what that shows.
-    fn on_terminal(mut command: Command, feed: impl FnOnce(&mut dyn Write)) -> String {
+    fn on_terminal(mut command: Command, feed: impl FnOnce(&mut Child)) -> String {
         let ours = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).expect("there is a pseudo-terminal");
         grantpt(&ours).and_then(|()| unlockpt(&ours)).expect("it is ours");
         let size = Winsize { ws_row: 24, ws_col: 80, ws_xpixel: 0, ws_ypixel: 0 };
@@ -50,7 +51,7 @@ mod unix {
         let mut child = command.spawn().expect("the program starts");
         // With its other side: reading ends when nobody holds that any more.
         drop(command);
-        feed(&mut child.stdin.take().expect("standard input is a pipe"));
+        feed(&mut child);
         let mut shown = Vec::new();
         // Linux says with an error that the other side is closed.
         let _ = File::from(ours).read_to_end(&mut shown);
@@ -75,7 +76,8 @@ mod unix {
     }
 
     /// A log in two pieces of more than two mebibytes, the second of which comes more than a second later.
-    fn slowly(into: &mut dyn Write) {
+    fn slowly(child: &mut Child) {
+        let mut into = child.stdin.take().expect("standard input is a pipe");
         let log = Experiment::new(1000).csv();
         let piece = log.split_once('\n').map_or("", |(_, rows)| rows).repeat(80);
         let mut write = |text: &str| into.write_all(text.as_bytes()).expect("the program reads on");
@@ -95,7 +97,41 @@ mod unix {
         let mut child = folder.command(line);
         let mut child =
             child.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
-        slowly(&mut child.stdin.take().unwrap());
+        slowly(&mut child);
         assert_eq!(Run::from(child.wait_with_output().unwrap()).stderr, "");
+    }
+
+    #[test]
+    fn a_search_that_takes_a_second_shows_its_progress_on_a_terminal_only() {
+        let folder = Folder::with_log(Experiment::new(200).csv());
+        let line = "fit log.csv --model oe --nb 2 --nf 2 --search gradient --step 1e-3 --max-iterations 1000000 \
+                    --tolerance 1e-300 --time-limit 2";
+        let shown = on_terminal(folder.command(line), |_| {});
+        assert!(
+            shown.contains("searching") && shown.contains("iteration") && shown.contains("cost"),
+            "{shown:?}"
+        );
+        // The bar is cleared before anything is said.
+        let last = shown.rfind("searching").unwrap_or_default();
+        assert!(shown[last..].contains("\u{1b}[2K") && shown[last..].contains("warning:"), "{shown:?}");
+
+        let run = folder.run(line);
+        assert!(!run.stderr.contains("searching"), "{}", run.stderr);
+    }
+
+    #[test]
+    fn ctrl_c_clears_the_bar_and_leaves_one_line() {
+        let folder = Folder::with_log(Experiment::new(200).csv());
+        let line = "fit log.csv --model oe --nb 2 --nf 2 --search gradient --step 1e-3 --max-iterations 1000000 \
+                    --tolerance 1e-300 --report model.json";
+        let shown = on_terminal(folder.command(line), |child| {
+            // Patience is a second.
+            std::thread::sleep(Duration::from_millis(1500));
+            kill_process(Pid::from_child(child), Signal::INT).expect("the program runs");
+        });
+        let last = shown.rfind("searching").unwrap_or_default();
+        assert!(last > 0 && shown[last..].contains("\u{1b}[2K"), "{shown:?}");
+        assert!(shown.ends_with("interrupted; nothing was written\r\n"), "{shown:?}");
+        assert_eq!(folder.names(), ["log.csv"]);
     }
 }

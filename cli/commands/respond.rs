@@ -1,20 +1,16 @@
 //! `thetahat predict` and `thetahat simulate`: what a stored model says of a log.
 
-use std::fs::File;
-use std::io::{self, Read, Write};
+use std::io::Write;
 use std::path::Path;
 
-use thetahat::{Applied, Detrend, Horizon, Model, Report, Start, apply};
+use thetahat::{Applied, Detrend, Horizon, Log, Start, apply};
 
-use super::summary;
+use super::{stored, summary};
 use crate::args::{PredictArguments, RespondArguments, SimulateArguments};
 use crate::failure::Failure;
 use crate::job::{LogJob, parsed, rows};
 use crate::log::{self, Loaded};
 use crate::output::{self, say, warn};
-
-/// A report has this many bytes at most: beyond it the file is something else.
-const LARGEST_REPORT: u64 = 1 << 30;
 
 pub(crate) fn predict(arguments: &PredictArguments) -> Result<(), Failure> {
     let horizon = match arguments.horizon.as_str() {
@@ -42,71 +38,80 @@ fn respond(arguments: &RespondArguments, horizon: Horizon, initial: Option<Start
         "model" => None,
         text => Some(parsed("--detrend", text)?),
     };
-    if arguments.report == Path::new("-") && job.path == Path::new("-") {
+    if arguments.report == Path::new("-") && arguments.path == Path::new("-") {
         return Err(Failure::usage("the report and the log cannot both come from standard input"));
     }
-    output::apart(&arguments.out, &job.path)?;
+    output::apart(&arguments.out, &arguments.path)?;
     output::apart(&arguments.out, &arguments.report)?;
-    let model = stored(&arguments.report)?;
+    let model = stored::model(&arguments.report)?;
 
     let output = model.output.name.clone();
     let mut measured = true;
-    let Loaded { log, source } = log::load(&job, Some(model.sample_time), |header| {
+    let Loaded { log, source } = log::load(&arguments.path, &job, Some(model.sample_time), |header| {
         measured = header.contains(&output);
         let inputs = model.inputs.iter().map(|input| input.name.clone());
         Ok(inputs.chain(measured.then(|| output.clone())).collect())
     })?;
-    let initial = initial.unwrap_or(match (horizon, measured) {
-        (Horizon::Steps { .. }, _) => Start::Measured,
-        (Horizon::FreeRun, true) => Start::Estimated,
-        (Horizon::FreeRun, false) => Start::Zero,
-    });
-    // The clock survives the log, which is used up.
-    let time: Option<Vec<f64>> = log.time().map(<[f64]>::to_vec);
-    let applied = apply(&model, log, &asked, detrend, horizon, initial).map_err(Loaded::failure(&source))?;
+    let initial =
+        initial.unwrap_or_else(|| if measured { Start::natural(&model, horizon) } else { Start::Zero });
+    let clock = RowClock::of(&log);
+    let applied = apply(&model, log, &asked, detrend, horizon, initial).map_err(log::failure(&[source]))?;
 
-    output::write(&arguments.out, |file| {
-        rows_as_csv(file, &applied, time.as_deref()).map_err(|error| match error.into_kind() {
-            csv::ErrorKind::Io(error) => error,
-            other => io::Error::other(format!("{other:?}")),
-        })
-    })?;
+    output::write_csv(&arguments.out, |csv| rows_as_csv(csv, &applied, &clock))?;
     match &applied.fit {
-        Some(fit) if fit.samples > 0 => say(&summary::figure(fit)),
-        Some(_) => warn("no row could be predicted: the stretches without a gap are too short"),
+        Some(_) if !applied.predicted.iter().any(|value| value.is_finite()) => {
+            warn("no row could be predicted: the stretches without a gap are too short")
+        }
+        Some(fit) => say(&summary::figure(fit)),
         None => {}
     }
     Ok(())
 }
 
-/// Time or row, measured, predicted; what is missing is empty.
-fn rows_as_csv(file: &mut dyn Write, applied: &Applied, time: Option<&[f64]>) -> Result<(), csv::Error> {
-    let mut csv = csv::Writer::from_writer(file);
-    csv.write_record([if time.is_some() { "time" } else { "row" }, "measured", "predicted"])?;
-    let present = |value: f64| Some(value).filter(|value| value.is_finite());
-    for row in applied.rows.iter().flat_map(|range| range.first()..=range.last()) {
-        let position = row - 1;
-        let measured = applied.measured.as_ref().and_then(|measured| present(measured[position]));
-        let predicted = present(applied.predicted[position]);
-        match time {
-            Some(time) => csv.serialize((time[position], measured, predicted))?,
-            None => csv.serialize((row, measured, predicted))?,
-        }
-    }
-    Ok(csv.flush()?)
+/// What the rows of an answer are called. It survives the log, which is used up.
+struct RowClock {
+    time: Option<Vec<f64>>,
+    rows: usize,
+    sample_time: f64,
 }
 
-/// The model of a stored report.
-fn stored(path: &Path) -> Result<Model, Failure> {
-    let failed = |error| Failure::io(path, "cannot be read", &error);
-    let mut bytes = Vec::new();
-    if path == Path::new("-") {
-        io::stdin().lock().take(LARGEST_REPORT).read_to_end(&mut bytes).map_err(failed)?;
-    } else {
-        File::open(path).map_err(failed)?.take(LARGEST_REPORT).read_to_end(&mut bytes).map_err(failed)?;
+impl RowClock {
+    fn of(log: &Log) -> Self {
+        Self { time: log.time().map(<[f64]>::to_vec), rows: log.rows(), sample_time: log.sample_time() }
     }
-    let bad = |message: String| Failure::data(format!("{}: {message}", path.display()));
-    let text = String::from_utf8(bytes)
-        .map_err(|_| bad("this is not a thetahat report: not UTF-8 text".to_owned()))?;
-    Ok(Report::from_json(&text).map_err(|error| bad(error.to_string()))?.model)
+
+    /// The time of a row (0-based), where there are times; those behind the end of the log go on in its own step.
+    fn at(&self, position: usize) -> Option<f64> {
+        let beyond = (position + 1).saturating_sub(self.rows) as f64 * self.sample_time;
+        self.time.as_ref().map(|time| time[position.min(self.rows - 1)] + beyond)
+    }
+}
+
+/// Time or row, measured, predicted, and the deviation where there is one; what is missing is empty.
+fn rows_as_csv(
+    csv: &mut csv::Writer<&mut dyn Write>,
+    applied: &Applied,
+    clock: &RowClock,
+) -> Result<(), csv::Error> {
+    let name = if clock.time.is_some() { "time" } else { "row" };
+    let deviations = applied.standard_deviations.as_deref();
+    csv.write_record(
+        [name, "measured", "predicted"].into_iter().chain(deviations.map(|_| "standard_deviation")),
+    )?;
+    let value = |values: Option<&[f64]>, position: usize| {
+        values.and_then(|values| values.get(position).copied()).filter(|value| value.is_finite())
+    };
+    let asked = applied.rows.iter().flat_map(|range| range.first() - 1..range.last());
+    for position in asked.chain(clock.rows..clock.rows + applied.beyond) {
+        let measured = value(applied.measured.as_deref(), position);
+        let predicted = value(Some(&applied.predicted), position);
+        let deviation = deviations.map(|deviations| value(Some(deviations), position));
+        match (clock.at(position), deviation) {
+            (Some(time), Some(deviation)) => csv.serialize((time, measured, predicted, deviation))?,
+            (Some(time), None) => csv.serialize((time, measured, predicted))?,
+            (None, Some(deviation)) => csv.serialize((position + 1, measured, predicted, deviation))?,
+            (None, None) => csv.serialize((position + 1, measured, predicted))?,
+        }
+    }
+    Ok(())
 }

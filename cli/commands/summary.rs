@@ -1,105 +1,245 @@
 //! A report as a table for people.
 
-use std::fmt::Write;
+mod text;
 
-use comfy_table::{CellAlignment, Table, presets};
-use thetahat::{Complex, Fit, Part, Report, Rows, Signal, Start};
+use thetahat::{
+    Algorithm, CriterionOutcome, Estimation, Fit, Initial, Model, Norm, Orders, Part, Procedure, Quantity,
+    Report, Root, Rows, SearchOutcome, Signal, Solver, Start, Stopped, Structure,
+};
 
 use crate::output::harmless;
+use text::{Text, columns, number, or_dash, short, uncertainty};
 
 /// The report's main figures.
 pub(crate) fn table(report: &Report) -> String {
     let model = &report.model;
-    let mut text = String::new();
-    let signal = |role: &str, signal: &Signal| {
-        let trend = match signal.offset.slope {
-            0.0 => String::new(),
-            slope => format!(" + {} a second", short(slope)),
-        };
-        format!("{role} {} (offset {}{trend})", harmless(&signal.name), short(signal.offset.level))
-    };
-    line(
-        &mut text,
-        &format!("ARX: A(q) y(t) = B(q) u(t) + e(t), sample time {} s", short(model.sample_time)),
-    );
+    let mut text = Text::default();
+    text.line(&format!("{}, sample time {} s", formula(model), short(model.sample_time)));
     let signals = model.inputs.iter().map(|input| signal("input", input));
     let signals: Vec<String> = signals.chain([signal("output", &model.output)]).collect();
-    line(&mut text, &signals.join(", "));
-    line(&mut text, "");
+    text.line(&signals.join(", "));
+    text.line("");
 
-    let mut parameters = plain(&["parameter", "value", "standard error"]);
+    let mut parameters = columns(&["parameter", "value", "standard error"]);
     for parameter in &model.parameters {
         parameters.add_row([
             parameter.name.clone(),
             number(parameter.value),
-            format!("{:.2e}", parameter.standard_error),
+            or_dash(parameter.standard_error, uncertainty),
         ]);
     }
-    right_aligned(&mut text, parameters, &[1, 2]);
+    text.table(parameters, &[1, 2]);
+    estimation(&mut text, &report.estimation, model);
+    text.line("");
+    dynamics(&mut text, model);
+    text.line("");
+    fits(&mut text, &report.fit);
+    text.finish()
+}
 
-    let estimation = &report.estimation;
-    let or_none = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| format!("{value:.4}"));
-    line(
-        &mut text,
-        &format!(
-            "{} samples, noise variance {}, condition number {:.3e}",
-            estimation.samples,
-            number(model.noise_variance),
-            estimation.condition
-        ),
+/// The model's equation, without what it does not have.
+fn formula(model: &Model) -> String {
+    let orders = &model.orders;
+    let several = orders.inputs() > 1;
+    let of = |letter: char| if several { format!("{letter}_j(q)") } else { format!("{letter}(q)") };
+    let mut right = Vec::new();
+    if orders.nb.iter().any(|&nb| nb > 0) {
+        let divided =
+            if orders.nf.iter().any(|&nf| nf > 0) { format!("/{}", of('F')) } else { String::new() };
+        let (sum, input) = if several { ("sum_j ", "u_j(t)") } else { ("", "u(t)") };
+        right.push(format!("{sum}{}{divided} {input}", of('B')));
+    }
+    let Orders { na, nc, nd, .. } = *orders;
+    right.push(
+        match (nc > 0, nd > 0) {
+            (false, false) => "e(t)",
+            (true, false) => "C(q) e(t)",
+            (false, true) => "1/D(q) e(t)",
+            (true, true) => "C(q)/D(q) e(t)",
+        }
+        .to_owned(),
     );
+    let name = match model.structure {
+        Structure::Ar => "AR",
+        Structure::Arma => "ARMA",
+        Structure::Arx => "ARX",
+        Structure::Armax => "ARMAX",
+        Structure::Oe => "Output error",
+        Structure::Bj => "Box-Jenkins",
+        Structure::Pem => "General model",
+    };
+    format!("{name}: {} = {}", if na > 0 { "A(q) y(t)" } else { "y(t)" }, right.join(" + "))
+}
+
+fn signal(role: &str, signal: &Signal) -> String {
+    let trend = match signal.offset.slope {
+        0.0 => String::new(),
+        slope => format!(" + {} a second", short(slope)),
+    };
+    format!("{role} {} (offset {}{trend})", harmless(&signal.name), short(signal.offset.level))
+}
+
+/// How the parameters were found, and how well they are determined.
+fn estimation(text: &mut Text, estimation: &Estimation, model: &Model) {
+    text.line(&format!(
+        "{} samples, noise variance {}, condition number {}",
+        estimation.samples,
+        number(model.noise_variance),
+        or_dash(estimation.condition, |condition| format!("{condition:.3e}"))
+    ));
     let criteria = &estimation.criteria;
-    line(
-        &mut text,
-        &format!(
-            "FPE {}, AIC {}, AICc {}, MDL {}",
-            number(criteria.fpe),
-            or_none(criteria.aic),
-            or_none(criteria.aicc),
-            or_none(criteria.mdl)
-        ),
-    );
-    line(&mut text, "");
+    let four = |value: f64| format!("{value:.4}");
+    text.line(&format!(
+        "FPE {}, AIC {}, AICc {}, MDL {}",
+        number(criteria.fpe),
+        or_dash(criteria.aic, four),
+        or_dash(criteria.aicc, four),
+        or_dash(criteria.mdl, four)
+    ));
+    match &estimation.procedure {
+        Procedure::LeastSquares { solver } => {
+            let solver = match solver {
+                Solver::NormalEquations => "normal equations",
+                Solver::Qr => "QR",
+            };
+            text.line(&format!("least squares ({solver}), {}", initial(estimation.initial, 0)));
+        }
+        Procedure::InstrumentalVariables { .. } => {
+            text.line(&format!("instrumental variables in four stages, {}", initial(estimation.initial, 0)));
+        }
+        Procedure::RefinedInstrumentalVariables { iterations, stopped: why, initial_conditions, .. } => {
+            text.line(&format!(
+                "refined instrumental variables, {}, {}, {}",
+                counted(*iterations),
+                stopped(*why),
+                initial(estimation.initial, *initial_conditions)
+            ));
+        }
+        Procedure::Constrained(outcome) => criterion(text, outcome, model, estimation.initial),
+        Procedure::PredictionError(search) => {
+            text.line(&format!(
+                "prediction error, {}, {}",
+                outcome(search),
+                initial(estimation.initial, search.initial_conditions)
+            ));
+        }
+    }
+}
 
-    let mut poles = plain(&["pole", "time constant [s]"]);
+/// What stood for the samples before the first.
+fn initial(initial: Initial, conditions: usize) -> String {
+    match initial {
+        Initial::Zero => "zeros before the first sample".to_owned(),
+        Initial::Estimate if conditions > 0 => format!("{conditions} initial conditions estimated"),
+        _ => "samples without a full past left out".to_owned(),
+    }
+}
+
+/// How a search went, in a few words.
+fn outcome(search: &SearchOutcome) -> String {
+    let algorithm = match search.algorithm {
+        Algorithm::LevenbergMarquardt => "lm",
+        Algorithm::GaussNewton => "gauss-newton",
+        Algorithm::Newton => "newton",
+        Algorithm::Gradient => "gradient",
+    };
+    let border = if search.stability_bound { " at the border of stability" } else { "" };
+    let (iterations, stopped) = (counted(search.iterations), stopped(search.stopped));
+    format!("{iterations} ({algorithm}) from {}, {stopped}{border}", search.start)
+}
+
+fn counted(iterations: usize) -> String {
+    format!("{iterations} iteration{}", if iterations == 1 { "" } else { "s" })
+}
+
+fn stopped(stopped: Stopped) -> &'static str {
+    match stopped {
+        Stopped::Converged => "converged",
+        Stopped::NoDescent => "stopped where no step lowers the cost",
+        Stopped::MaxIterations => "stopped at the most iterations",
+        Stopped::TimeLimit => "stopped by the time limit",
+    }
+}
+
+/// What was made small and respected, and the box of all that respects it.
+fn criterion(text: &mut Text, outcome: &CriterionOutcome, model: &Model, start: Initial) {
+    let norm = match outcome.norm {
+        Norm::Two => "sum of squared errors",
+        Norm::One => "sum of absolute errors",
+        Norm::Infinity => "largest absolute error",
+    };
+    let ridge = if outcome.ridge > 0.0 { format!(", ridge {}", short(outcome.ridge)) } else { String::new() };
+    text.line(&format!("criterion: {norm} {}{ridge}, {}", number(outcome.objective), initial(start, 0)));
+    if !outcome.active.is_empty() {
+        text.line(&format!("at a bound: {}", outcome.active.join(", ")));
+    }
+    if let (Some(bound), Some(ranges)) = (outcome.noise_bound, &outcome.box_) {
+        text.line("");
+        let mut table = columns(&["parameter", "least", "largest"]);
+        for (parameter, [least, largest]) in model.parameters.iter().zip(ranges) {
+            table.add_row([parameter.name.clone(), number(*least), number(*largest)]);
+        }
+        text.line(&format!("all parameters with no error above {}:", short(bound)));
+        text.table(table, &[1, 2]);
+    }
+}
+
+/// Roots, gains and time constants.
+fn dynamics(text: &mut Text, model: &Model) {
+    let mut roots = columns(&["root", "value", "standard error", "time constant [s]"]);
+    let mut count = 0;
+    let mut add = |role: &str, root: &Root, time: Option<String>| {
+        // What one letter says elsewhere.
+        let row = [
+            format!("{role} of {}", root.polynomial.to_uppercase()),
+            text::complex(root),
+            text::spread(root),
+        ];
+        roots.add_row(row.into_iter().chain([time.unwrap_or_default()]));
+        count += 1;
+    };
     for (pole, time) in model.poles.iter().zip(&model.time_constants) {
-        poles.add_row([complex(pole), time.map_or_else(|| "-".to_owned(), number)]);
+        add("pole", pole, Some(or_dash(*time, quantity)));
     }
-    if !model.poles.is_empty() {
-        right_aligned(&mut text, poles, &[1]);
+    model.zeros.iter().flatten().for_each(|zero| add("zero", zero, None));
+    model.noise_poles.iter().for_each(|pole| add("noise pole", pole, None));
+    model.noise_zeros.iter().for_each(|zero| add("noise zero", zero, None));
+    if count > 0 {
+        text.table(roots, &[1, 2, 3]);
     }
-    for ((input, zeros), gain) in model.inputs.iter().zip(&model.zeros).zip(&model.dc_gain) {
-        let zeros: Vec<String> = zeros.iter().map(complex).collect();
-        let zeros =
-            if zeros.is_empty() { "no zeros".to_owned() } else { format!("zeros {}", zeros.join(", ")) };
-        let gain = gain.map_or_else(|| "none (integrator)".to_owned(), number);
-        line(&mut text, &format!("from {}: DC gain {gain}, {zeros}", harmless(&input.name)));
+    for (input, gain) in model.inputs.iter().zip(&model.dc_gain) {
+        let gain = gain.map_or_else(|| "none (integrator)".to_owned(), quantity);
+        text.line(&format!("from {}: DC gain {gain}", harmless(&input.name)));
     }
-    line(&mut text, if model.stable { "stable" } else { "unstable" });
-    line(&mut text, "");
+    text.line(if model.stable { "stable" } else { "unstable" });
+}
 
-    let mut fits = plain(&["part", "rows", "horizon", "initial", "samples", "fit [%]", "RMSE"]);
-    for fit in &report.fit {
+/// A figure and its standard error.
+fn quantity(quantity: Quantity) -> String {
+    let error =
+        quantity.standard_error.map_or_else(String::new, |error| format!(" ± {}", uncertainty(error)));
+    format!("{}{error}", number(quantity.value))
+}
+
+fn fits(text: &mut Text, fits: &[Fit]) {
+    let mut table = columns(&["part", "rows", "horizon", "initial", "samples", "fit [%]", "RMSE"]);
+    for fit in fits {
         let part = match fit.part {
             Some(Part::Estimation) => "estimation",
             Some(Part::Validation) => "validation",
             None => "",
         };
-        fits.add_row([
+        table.add_row([
             part.to_owned(),
             rows(&fit.rows),
             fit.horizon.to_string(),
             start(fit.initial).to_owned(),
             fit.samples.to_string(),
-            fit.percent.map_or_else(|| "-".to_owned(), |percent| format!("{percent:.3}")),
-            fit.rmse.map_or_else(|| "-".to_owned(), number),
+            or_dash(fit.percent, |percent| format!("{percent:.3}")),
+            or_dash(fit.rmse, number),
         ]);
     }
-    right_aligned(&mut text, fits, &[4, 5, 6]);
-    // One line break at the end.
-    text.truncate(text.trim_end().len());
-    text.push('\n');
-    text
+    text.table(table, &[4, 5, 6]);
 }
 
 /// One line that says how close a response is.
@@ -115,43 +255,6 @@ pub(crate) fn figure(fit: &Fit) -> String {
     )
 }
 
-fn line(text: &mut String, content: &str) {
-    text.push_str(content);
-    text.push('\n');
-}
-
-/// Six significant digits.
-fn number(value: f64) -> String {
-    let size = value.abs();
-    if value == 0.0 {
-        return "0".to_owned();
-    }
-    if !(1e-4..1e6).contains(&size) {
-        return format!("{value:.5e}");
-    }
-    let decimals = (5 - size.log10().floor() as i32).clamp(0, 9) as usize;
-    format!("{value:.decimals$}")
-}
-
-/// The same without zeros at the end.
-fn short(value: f64) -> String {
-    let text = number(value);
-    if text.contains('.') && !text.contains('e') {
-        return text.trim_end_matches('0').trim_end_matches('.').to_owned();
-    }
-    text
-}
-
-fn complex(value: &Complex) -> String {
-    let mut text = number(value.re);
-    if value.im != 0.0 {
-        let sign = if value.im < 0.0 { '-' } else { '+' };
-        // Writing to a string cannot fail.
-        let _ = write!(text, " {sign} {}i", number(value.im.abs()));
-    }
-    text
-}
-
 fn rows(rows: &[Rows]) -> String {
     let shown: Vec<String> = rows.iter().map(Rows::to_string).collect();
     shown.join(",")
@@ -163,25 +266,4 @@ fn start(start: Start) -> &'static str {
         Start::Measured => "measured",
         Start::Estimated => "estimated",
     }
-}
-
-fn plain(header: &[&str]) -> Table {
-    let mut table = Table::new();
-    table.load_style(presets::NOTHING).set_header(header.iter().copied());
-    table
-}
-
-/// Appends a table, numbers to the right, and an empty line.
-fn right_aligned(text: &mut String, mut table: Table, columns: &[usize]) {
-    for (position, column) in table.column_iter_mut().enumerate() {
-        // Two blanks between columns, none before the first.
-        column.set_padding((0, 2));
-        if columns.contains(&position) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
-    }
-    for shown in table.lines() {
-        line(text, shown.trim_end());
-    }
-    line(text, "");
 }

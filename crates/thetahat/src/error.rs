@@ -32,6 +32,9 @@ pub enum Error {
         /// Why, and what to do.
         message: String,
     },
+    /// Whoever watched the search ended it.
+    #[error("interrupted")]
+    Interrupted,
     /// A stored report cannot be used.
     #[error("{message}")]
     Report {

@@ -1,9 +1,245 @@
 //! From a record and orders to parameters.
 
 mod arx;
+mod criterion;
+mod instrumental;
+mod normal;
+mod optimize;
+mod prediction_error;
+mod predictor;
+mod restart;
+mod start;
 #[cfg(test)]
 mod tests;
+mod uncertainty;
 
+use std::ops::ControlFlow;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::data::Record;
 pub use crate::regression::Solver;
+use crate::{Criteria, Error, Orders};
 pub(crate) use arx::enough;
-pub use arx::{Estimate, arx, arx_factor};
+pub use arx::{arx, arx_factor};
+pub use criterion::{Bound, Criterion, CriterionOutcome, GainBound, Norm};
+pub use optimize::{Algorithm, Monitor, Progress, Search, SearchOutcome, StartOutcome, Step, Stopped};
+
+/// What stands for the samples before the first of a segment.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Initial {
+    /// [`Initial::Drop`] where no F is estimated; else [`Initial::Estimate`] if it is worth its parameters, that is if
+    /// N ln(V_zero/V_estimate) > n ln N for n initial conditions, and [`Initial::Zero`] if not.
+    #[default]
+    Auto,
+    /// Nothing: samples without a full regressor are left out, and e = 0 there. For models without F.
+    Drop,
+    /// Zeros: all samples count.
+    Zero,
+    /// Free responses of 1/F, found with the parameters; the other polynomials begin as for [`Initial::Drop`]. For models
+    /// without F it is the same as that: samples that nothing is known of can explain the first outputs fully.
+    Estimate,
+}
+
+/// How an estimate was found.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "method", rename_all = "kebab-case")]
+pub enum Procedure {
+    /// In one step, as the predictor is linear in the parameters.
+    LeastSquares {
+        /// How the least-squares problem was solved.
+        solver: Solver,
+    },
+    /// By instrumental variables in four stages: A and B, whatever the colour of the noise.
+    InstrumentalVariables {
+        /// The order of the autoregression that the signals of the last stage are filtered by.
+        filter_order: usize,
+        /// The order of the autoregression of the residuals that the covariance rests on.
+        residual_order: usize,
+    },
+    /// By refined instrumental variables: B and F, whatever the colour of the noise.
+    RefinedInstrumentalVariables {
+        /// Iterations done, from the best start.
+        iterations: usize,
+        /// Why they stopped.
+        stopped: Stopped,
+        /// The initial conditions that were estimated.
+        initial_conditions: usize,
+        /// The order of the autoregression of the residuals that the covariance rests on.
+        residual_order: usize,
+    },
+    /// By a search for the least sum of squared prediction errors.
+    PredictionError(SearchOutcome),
+    /// By convex optimization.
+    Constrained(CriterionOutcome),
+}
+
+/// How to estimate.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Method {
+    /// The least sum of squared prediction errors: in one step where they are linear in the parameters, else by a search.
+    PredictionError(Search),
+    /// Instrumental variables in four stages, for ARX models: consistent in noise of any colour (Söderström and Stoica 1983).
+    InstrumentalVariables,
+    /// Refined instrumental variables, for models of output error (Young 1976).
+    RefinedInstrumentalVariables,
+    /// Another norm of the errors, or bounds on what the parameters may be, for models that are linear in their parameters.
+    Constrained(Criterion),
+}
+
+impl Default for Method {
+    fn default() -> Self {
+        Self::PredictionError(Search::default())
+    }
+}
+
+/// Fits A(q) y(t) = sum_j B_j(q)/F_j(q) u_j(t - nk_j) + C(q)/D(q) e(t) to a record.
+///
+/// The structure follows from the orders. Bounds on static gains call the inputs `u1`, `u2`, ….
+///
+/// # Errors
+/// [`Error::Argument`] if the record does not have the orders' inputs, or the method or initial condition is not for this
+/// structure; [`Error::Undetermined`] if there are too few samples or the data cannot determine the parameters;
+/// [`Error::Data`] if squares of the signals leave the range of `f64`.
+///
+/// ```
+/// use thetahat::{Initial, Method, Orders, Record, estimate};
+///
+/// // x(t) = 0.8 x(t-1) + u(t-1) from rest, seen with a small disturbance.
+/// let u: Vec<f64> = (0..200_u32).map(|t| f64::from(t * t % 11) - 5.0).collect();
+/// let mut x = vec![0.0];
+/// for t in 1..u.len() {
+///     x.push(0.8 * x[t - 1] + u[t - 1]);
+/// }
+/// let y: Vec<f64> = x.iter().zip(0_u32..).map(|(x, t)| x + 0.01 * f64::from(t * 7 % 13)).collect();
+/// let orders = Orders::oe(&[1], &[1], &[1])?;
+/// let record = Record::new(&y, vec![&u])?;
+/// let found = estimate(&record, &orders, &Method::default(), Initial::Zero)?;
+/// assert!((found.parameters()[0] - 1.0).abs() < 0.01); // b1
+/// assert!((found.parameters()[1] + 0.8).abs() < 0.01); // f1
+/// # Ok::<(), thetahat::Error>(())
+/// ```
+pub fn estimate(
+    record: &Record<'_>,
+    orders: &Orders,
+    method: &Method,
+    initial: Initial,
+) -> Result<Estimate, Error> {
+    estimate_monitored(record, orders, method, initial, &|_| ControlFlow::Continue(()))
+}
+
+/// [`estimate`] that tells `monitor` of each iteration of a search, on the thread that does it. The monitor may end it.
+///
+/// # Errors
+/// As for [`estimate`]; [`Error::Interrupted`] if the monitor says so.
+pub fn estimate_monitored(
+    record: &Record<'_>,
+    orders: &Orders,
+    method: &Method,
+    initial: Initial,
+    monitor: Monitor<'_>,
+) -> Result<Estimate, Error> {
+    let inputs: Vec<String> = (1..=orders.inputs()).map(|number| format!("u{number}")).collect();
+    estimate_of_channels(record, &inputs, orders, method, initial, monitor)
+}
+
+/// The same with the inputs' names, which bounds on their static gains use.
+pub(crate) fn estimate_of_channels(
+    record: &Record<'_>,
+    inputs: &[String],
+    orders: &Orders,
+    method: &Method,
+    initial: Initial,
+    monitor: Monitor<'_>,
+) -> Result<Estimate, Error> {
+    match method {
+        Method::PredictionError(search) => {
+            prediction_error::prediction_error(record, orders, initial, search, monitor)
+        }
+        Method::InstrumentalVariables => instrumental::instrumental_variables(record, orders, initial),
+        Method::RefinedInstrumentalVariables => {
+            instrumental::refined_instrumental_variables(record, orders, initial)
+        }
+        Method::Constrained(demands) => {
+            let (initial, presample) = arx::resolved(initial);
+            let found = criterion::constrained(record, inputs, orders, presample, demands)?;
+            let unknown = (found.samples - found.parameters.len()) as f64;
+            Ok(Estimate {
+                parameters: found.parameters,
+                covariance: found.covariance,
+                noise_variance: found.sum_of_squares / unknown,
+                samples: found.samples,
+                mse: found.sum_of_squares / found.samples as f64,
+                condition: Some(found.condition),
+                initial,
+                procedure: Procedure::Constrained(found.outcome),
+            })
+        }
+    }
+}
+
+/// Estimated parameters and what is known about them.
+///
+/// With prediction errors e(t, theta) over N samples, p parameters and n initial conditions: theta-hat minimises
+/// sum e^2, sigma^2 = sum e^2 / (N - p - n), cov = sigma^2 (sum psi psi')^-1 with psi = -de/dtheta, the initial conditions
+/// taken out (Ljung, System Identification, 2nd ed. 1999, sections 7.3 and 9.3).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Estimate {
+    parameters: Vec<f64>,
+    covariance: Option<Vec<Vec<f64>>>,
+    noise_variance: f64,
+    samples: usize,
+    mse: f64,
+    condition: Option<f64>,
+    initial: Initial,
+    procedure: Procedure,
+}
+
+impl Estimate {
+    /// theta-hat, in the order of [`Orders::names`](crate::Orders::names).
+    pub fn parameters(&self) -> &[f64] {
+        &self.parameters
+    }
+
+    /// The covariance matrix of theta-hat, row by row; none where no theory gives one.
+    pub fn covariance(&self) -> Option<&[Vec<f64>]> {
+        self.covariance.as_deref()
+    }
+
+    /// sigma^2, in the units of y squared.
+    pub fn noise_variance(&self) -> f64 {
+        self.noise_variance
+    }
+
+    /// N, the samples that count.
+    pub fn samples(&self) -> usize {
+        self.samples
+    }
+
+    /// The mean of e^2 over these samples.
+    pub fn mse(&self) -> f64 {
+        self.mse
+    }
+
+    /// The condition number of psi, its columns scaled to unit norm; none where they are dependent.
+    pub fn condition(&self) -> Option<f64> {
+        self.condition
+    }
+
+    /// What stood for the samples before the first: never [`Initial::Auto`].
+    pub fn initial(&self) -> Initial {
+        self.initial
+    }
+
+    /// How it was found.
+    pub fn procedure(&self) -> &Procedure {
+        &self.procedure
+    }
+
+    /// FPE, AIC, AICc and MDL.
+    pub fn criteria(&self) -> Criteria {
+        Criteria::new(self.mse, self.parameters.len(), self.samples)
+    }
+}

@@ -7,11 +7,14 @@
 //! ```
 //!
 //! with A, C, D, F monic in q^-1 and e white (Ljung, System Identification: Theory for the User, 2nd ed. 1999).
-//! This version fits ARX models, those with C = D = F = 1.
+//! [`Orders`] say how many coefficients each has, and with that the [`Structure`]: ARX, ARMAX, output error, Box-Jenkins, AR,
+//! ARMA or any other.
 //!
-//! - [`Log`] holds channels on a common clock, [`Record`] the signals of one experiment.
-//! - [`arx`] gives an [`Estimate`] from a [`Record`]; [`arx_factor`] gives a triangular factor that merges with others.
-//! - [`predict`] and [`simulate`] say what a [`Model`] says; [`Fit`] says how close that is.
+//! - [`Log`] holds channels on a common clock, [`Record`] the signals that an estimate sees.
+//! - [`estimate`] gives an [`Estimate`] from a [`Record`], [`Orders`] and a [`Method`]. [`arx`] is its short form for models
+//!   that are linear in their parameters; [`arx_factor`] gives a triangular factor that merges with others.
+//! - [`predict`], [`simulate`] and [`forecast`] say what a [`Model`] says, [`frequency_response`] what it is to each
+//!   frequency; [`Fit`] says how close that is.
 //! - [`identify`] goes the whole way from a [`Log`] to a [`Report`], the JSON document; [`apply`] takes a stored model to a log.
 //!
 //! Rows of a log are counted from 1 and ranges include both ends; sample positions inside a [`Record`] are counted from 0.
@@ -31,11 +34,19 @@ mod validate;
 
 pub use data::{Channel, Detrend, Interpolation, Log, Offset, Record, Rows};
 pub use error::Error;
-pub use estimate::{Estimate, Solver, arx, arx_factor};
-pub use model::{Complex, Model, Orders, Parameter, Signal, Structure};
-pub use regression::Initial;
-pub use report::{Applied, Data, Estimation, Missing, Plan, Report, Resampling, Source, apply, identify};
-pub use respond::{Response, Start, predict, simulate};
+pub use estimate::{
+    Algorithm, Bound, Criterion, CriterionOutcome, Estimate, GainBound, Initial, Method, Monitor, Norm,
+    Procedure, Progress, Search, SearchOutcome, Solver, StartOutcome, Step, Stopped, arx, arx_factor,
+    estimate, estimate_monitored,
+};
+pub use model::{Model, Orders, Parameter, Quantity, Root, Signal, Structure};
+pub use report::{
+    Applied, Data, Estimation, Missing, Plan, Report, Resampling, Source, apply, identify, identify_monitored,
+};
+pub use respond::{
+    Forecast, FrequencyPoint, FrequencyResponse, Response, Start, forecast, frequency_response,
+    logarithmic_frequencies, predict, prediction_deviation, simulate,
+};
 pub use select::Criteria;
 pub use thetahat_core;
 pub use validate::{Fit, Horizon, Part};

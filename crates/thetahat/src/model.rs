@@ -1,8 +1,11 @@
 //! What a model is: its orders, its polynomials, and the document that a fit stores.
 
+mod dynamics;
 mod fitted;
 mod orders;
 pub(crate) mod polynomial;
 
-pub use fitted::{Complex, Model, Parameter, Signal, Structure};
-pub use orders::Orders;
+pub(crate) use dynamics::{Block, Blocks, Gradient, cancel, covariance, near_cancellation};
+pub use dynamics::{Quantity, Root};
+pub use fitted::{Model, Parameter, Signal};
+pub use orders::{Orders, Structure};

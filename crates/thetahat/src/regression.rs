@@ -2,6 +2,8 @@
 //! matrix from lagged products, `qr` folds its rows into a triangle where that is not exact enough.
 
 mod blocks;
+pub(crate) mod convex;
+mod filter;
 mod gram;
 mod kernel;
 mod lagged;
@@ -12,6 +14,9 @@ pub(crate) mod noise;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use kernel::{add_filtered, sum};
-pub use lagged::{Initial, Solver};
-pub(crate) use lagged::{Lagged, Regression, Taps, Unsolved};
+pub(crate) use filter::{add_filtered, divide, divide_from, divide_together};
+pub(crate) use gram::{Interior, Products};
+pub(crate) use kernel::{sum, sum_of_squares};
+pub use lagged::Solver;
+pub(crate) use lagged::{Lagged, Presample, Regression, Taps, Unsolved, condition};
+pub(crate) use qr::factor_rows;

@@ -5,5 +5,5 @@ mod identify;
 mod schema;
 
 pub use apply::{Applied, apply};
-pub use identify::{Plan, Source, identify};
-pub use schema::{Data, Estimation, Missing, Report, Resampling};
+pub use identify::{Plan, identify, identify_monitored};
+pub use schema::{Data, Estimation, Missing, Report, Resampling, Source};

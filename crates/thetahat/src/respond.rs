@@ -1,5 +1,9 @@
-//! What a model says: driven by its inputs alone, or by what was measured.
+//! What a model says: driven by its inputs alone, or by what was measured, and what it is to each frequency.
 
+mod forecast;
+mod free_response;
+mod frequency;
+mod innovations;
 mod predict;
 mod simulate;
 #[cfg(test)]
@@ -13,19 +17,30 @@ use serde::{Deserialize, Serialize};
 use crate::data::Record;
 use crate::{Error, Model};
 
-pub use predict::predict;
+pub(crate) use forecast::forecast_if_possible;
+pub use forecast::{Forecast, forecast};
+pub use frequency::{FrequencyPoint, FrequencyResponse, frequency_response, logarithmic_frequencies};
+pub(crate) use predict::{check_steps, deviations, longest};
+pub use predict::{predict, prediction_deviation};
 pub use simulate::simulate;
 
 /// What a response starts from.
+///
+/// In the first r = max(na, nb + nk - 1 of the inputs without F) + nd samples of a stretch, A, B and D reach back to
+/// samples that are not there. Unless these are taken as zero, e is, and the r samples do not count.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Start {
-    /// Rest: all samples before the first of a segment are zero.
+    /// Rest: all samples before the first of a segment are zero, and all of the segment count.
     Zero,
-    /// Measured samples, as many as the model reaches back: those directly before the segment where the log has them,
-    /// else the segment's first ones, which then do not count.
+    /// Measured samples: those directly before the segment where the log has them, else the segment's first ones. The
+    /// first r of all these do not count. They are all that ARX models need. C and F begin there from rest: samples
+    /// before the segment warm them up, and without such samples their first outputs are wrong where they were not at
+    /// rest.
     Measured,
-    /// The initial condition that fits the segment's output best in the least-squares sense.
+    /// The initial condition that fits best in the least-squares sense, found from the segment alone: the segment's
+    /// output in a free run, of which all samples count; the one-step predictions otherwise, and there the first r do
+    /// not count.
     Estimated,
 }
 
@@ -38,10 +53,11 @@ fn check_inputs(model: &Model, record: &Record<'_>) -> Result<(), Error> {
     Err(Error::argument("inputs", format!("the model has {expected} inputs, the record {found}")))
 }
 
-/// For a start from measured samples: the first of them, and the samples that are then covered.
-fn from_measured(segment: &Range<usize>, past: usize, reach: usize) -> (usize, Range<usize>) {
-    let history = segment.start - past;
-    (history, (history + reach).clamp(segment.start, segment.end)..segment.end)
+/// Where to look from for a start from measured samples, so that a response `ahead` steps ahead begins with the segment.
+fn history(model: &Model, segment: &Range<usize>, past: usize, ahead: usize) -> usize {
+    let forgets = model.c.len() == 1 && model.f.iter().all(|f| f.len() == 1);
+    let wanted = if forgets { model.orders.conditioned() + ahead } else { usize::MAX };
+    segment.start - past.min(wanted)
 }
 
 /// A response to a record.
@@ -56,20 +72,5 @@ pub struct Response {
 impl Response {
     fn empty(samples: usize) -> Self {
         Self { values: vec![f64::NAN; samples], counted: Vec::new() }
-    }
-}
-
-/// Adds `sum_l weights[l] x(t - l)` to `target`, which stands for the samples `rows`; before sample `start` x is zero.
-fn add_filtered(target: &mut [f64], rows: &Range<usize>, weights: &[f64], x: &[f64], start: usize) {
-    let reach = weights.len().saturating_sub(1);
-    let full = (start + reach).clamp(rows.start, rows.end);
-    let (head, tail) = target.split_at_mut(full - rows.start);
-    for (row, value) in (rows.start..full).zip(head) {
-        let known = (row + 1).saturating_sub(start).min(weights.len());
-        let past = x[row + 1 - known..=row].iter().rev();
-        *value += weights.iter().zip(past).map(|(weight, x)| weight * x).sum::<f64>();
-    }
-    if full < rows.end && !weights.is_empty() {
-        crate::regression::add_filtered(tail, weights, &x[full - reach..rows.end]);
     }
 }

@@ -45,6 +45,8 @@ pub struct Log {
     time: Option<Vec<f64>>,
     /// 0-based rows before which the clock jumps.
     jumps: Vec<usize>,
+    /// Those of them at which another log begins.
+    borders: Vec<usize>,
 }
 
 /// How a log that is not uniform is read between its samples.
@@ -117,7 +119,7 @@ impl Log {
             ));
         }
         let rows = check(&channels)?;
-        Ok(Self { channels, rows, sample_time, time: None, jumps: Vec::new() })
+        Ok(Self { channels, rows, sample_time, time: None, jumps: Vec::new(), borders: Vec::new() })
     }
 
     /// A log with a clock: `time` in seconds, one value for each row. The sample time is the median step;
@@ -145,7 +147,7 @@ impl Log {
                 });
             }
         }
-        Ok(Self { channels, rows, sample_time: median, time: Some(time), jumps })
+        Ok(Self { channels, rows, sample_time: median, time: Some(time), jumps, borders: Vec::new() })
     }
 
     /// A uniform log read off one with an irregular clock, every `step` seconds from its first sample on.
@@ -203,7 +205,54 @@ impl Log {
             sample_time: step,
             time: Some(instants),
             jumps: Vec::new(),
+            borders: Vec::new(),
         })
+    }
+
+    /// Several logs as one: experiments with the same plant, one after the other. Rows are counted through all of them, and
+    /// no segment reaches from one to the next.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] if there is no log; [`Error::Data`] if one misses a channel that the first has, or its sample
+    /// time differs from the first's by more than 1 %.
+    pub fn join(logs: Vec<Self>) -> Result<Self, Error> {
+        let mut logs = logs.into_iter();
+        let mut joined =
+            logs.next().ok_or_else(|| Error::argument("logs", "there is none; give at least one"))?;
+        for (position, mut log) in logs.enumerate() {
+            let number = position + 2;
+            if (log.sample_time / joined.sample_time - 1.0).abs() > 0.01 {
+                return Err(Error::data(format!(
+                    "log {number} has a sample time of {} s, the first one of {} s; resample one of them",
+                    log.sample_time, joined.sample_time
+                )));
+            }
+            for channel in &mut joined.channels {
+                let own = log.channels.iter_mut().find(|own| own.name == channel.name).ok_or_else(|| {
+                    let message =
+                        format!("log {number} has no channel '{}', which the first one has", channel.name);
+                    Error::in_channel(&channel.name, None, message)
+                })?;
+                channel.values.append(&mut own.values);
+            }
+            joined.jumps.push(joined.rows);
+            joined.jumps.extend(log.jumps.iter().map(|jump| jump + joined.rows));
+            joined.borders.push(joined.rows);
+            joined.time = match (joined.time, log.time) {
+                (Some(mut time), Some(mut more)) => {
+                    time.append(&mut more);
+                    Some(time)
+                }
+                _ => None,
+            };
+            joined.rows += log.rows;
+        }
+        Ok(joined)
+    }
+
+    /// Whether it is several logs as one, which have no common clock.
+    pub(crate) fn is_joined(&self) -> bool {
+        !self.borders.is_empty()
     }
 
     /// The number of rows, at least 1.
@@ -254,9 +303,9 @@ impl Log {
         self.channels.iter().any(|channel| channel.name == name)
     }
 
-    /// How often the clock jumps.
+    /// How often the clock jumps, not counting where another log begins.
     pub fn jumps(&self) -> usize {
-        self.jumps.len()
+        self.jumps.len() - self.borders.len()
     }
 
     /// The stretches of consecutive rows inside `parts` in which none of the named channels misses a value

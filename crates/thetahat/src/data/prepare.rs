@@ -69,7 +69,7 @@ impl Offset {
     /// The offset of a channel over segments of rows (0-based).
     ///
     /// # Errors
-    /// [`Error::Data`] if there are fewer rows than `Start` asks for.
+    /// [`Error::Data`] if there are fewer rows than `Start` asks for; [`Error::Argument`] for a line through several logs.
     pub(crate) fn estimate(
         detrend: Detrend,
         log: &Log,
@@ -87,6 +87,12 @@ impl Offset {
             Detrend::None => Self::default(),
             Detrend::Mean => Self { level: mean(segments), slope: 0.0 },
             Detrend::Start(count) => Self { level: mean(&leading(segments, count)?), slope: 0.0 },
+            Detrend::Linear if log.is_joined() => {
+                return Err(Error::argument(
+                    "detrend",
+                    "several logs have no common clock for a line; use mean, start:K or none",
+                ));
+            }
             Detrend::Linear => {
                 let rows = || segments.iter().cloned().flatten();
                 let count = rows().count().max(1) as f64;

@@ -1,67 +1,12 @@
 use thetahat_core::LeastSquares;
-use thetahat_core::nalgebra::Dyn;
+use thetahat_core::nalgebra::{DMatrix, Dyn};
 
 use crate::data::Record;
-use crate::regression::{Initial, Lagged, Regression, Solver, Taps, Unsolved};
-use crate::{Criteria, Error, Orders};
-
-/// Estimated parameters and what is known about them.
-///
-/// With the regression y = Phi theta + e over N samples and p parameters:
-/// theta-hat minimises |y - Phi theta|^2, sigma^2 = |y - Phi theta-hat|^2 / (N - p), cov = sigma^2 (Phi' Phi)^-1
-/// (Ljung, System Identification, 2nd ed. 1999, sections 7.3 and 9.3).
-#[derive(Debug, Clone, PartialEq)]
-pub struct Estimate {
-    parameters: Vec<f64>,
-    covariance: Vec<Vec<f64>>,
-    noise_variance: f64,
-    samples: usize,
-    mse: f64,
-    condition: f64,
-    solver: Solver,
-}
+use crate::estimate::{Estimate, Initial, Procedure};
+use crate::regression::{Lagged, Presample, Regression, Taps, Unsolved};
+use crate::{Error, Orders};
 
 impl Estimate {
-    /// theta-hat, in the order of [`Orders::names`].
-    pub fn parameters(&self) -> &[f64] {
-        &self.parameters
-    }
-
-    /// The covariance matrix of theta-hat, row by row.
-    pub fn covariance(&self) -> &[Vec<f64>] {
-        &self.covariance
-    }
-
-    /// sigma^2, in the units of y squared.
-    pub fn noise_variance(&self) -> f64 {
-        self.noise_variance
-    }
-
-    /// N, the samples that count.
-    pub fn samples(&self) -> usize {
-        self.samples
-    }
-
-    /// The mean of e^2 over these samples.
-    pub fn mse(&self) -> f64 {
-        self.mse
-    }
-
-    /// The condition number of Phi, its columns scaled to unit norm.
-    pub fn condition(&self) -> f64 {
-        self.condition
-    }
-
-    /// How the regression was solved.
-    pub fn solver(&self) -> Solver {
-        self.solver
-    }
-
-    /// FPE, AIC, AICc and MDL.
-    pub fn criteria(&self) -> Criteria {
-        Criteria::new(self.mse, self.parameters.len(), self.samples)
-    }
-
     /// The estimate that a triangular factor holds, such as [`arx_factor`] gives or several of them merged.
     ///
     /// # Errors
@@ -76,10 +21,10 @@ impl Estimate {
         }
         enough(factor.rows(), orders)?;
         let solved = Regression::from_factor(factor).map_err(|why| unsolved(why, orders))?;
-        Self::new(solved, factor.rows())
+        Self::of_regression(solved, factor.rows(), Initial::Drop)
     }
 
-    fn new(solved: Regression, samples: usize) -> Result<Self, Error> {
+    fn of_regression(solved: Regression, samples: usize, initial: Initial) -> Result<Self, Error> {
         let parameters = solved.parameters.len();
         let sum_of_squares = solved.residual_norm * solved.residual_norm;
         let noise_variance = sum_of_squares / (samples - parameters) as f64;
@@ -90,12 +35,13 @@ impl Estimate {
         }
         Ok(Self {
             parameters: solved.parameters.iter().copied().collect(),
-            covariance: solved.covariance.row_iter().map(|row| row.iter().copied().collect()).collect(),
+            covariance: Some(rows(&solved.covariance)),
             noise_variance,
             samples,
             mse: sum_of_squares / samples as f64,
-            condition: solved.condition,
-            solver: solved.solver,
+            condition: Some(solved.condition),
+            initial,
+            procedure: Procedure::LeastSquares { solver: solved.solver },
         })
     }
 }
@@ -128,11 +74,13 @@ impl Estimate {
 /// # Ok::<(), thetahat::Error>(())
 /// ```
 pub fn arx(record: &Record<'_>, orders: &Orders, initial: Initial) -> Result<Estimate, Error> {
+    linear(orders)?;
     let signals = signals(record, orders)?;
-    let lagged = Lagged::new(&signals, taps(orders), &record.segments, initial);
+    let (initial, presample) = resolved(initial);
+    let lagged = Lagged::new(&signals, taps(orders), &record.segments, presample);
     enough(lagged.rows(), orders)?;
     let solved = lagged.solve().map_err(|why| unsolved(why, orders))?;
-    Estimate::new(solved, lagged.rows())
+    Estimate::of_regression(solved, lagged.rows(), initial)
 }
 
 /// The triangular factor of an ARX regression: factors of several logs or machines merge into one estimate.
@@ -158,14 +106,39 @@ pub fn arx_factor(
     orders: &Orders,
     initial: Initial,
 ) -> Result<LeastSquares<f64, Dyn>, Error> {
+    linear(orders)?;
     let signals = signals(record, orders)?;
-    Lagged::new(&signals, taps(orders), &record.segments, initial)
+    Lagged::new(&signals, taps(orders), &record.segments, resolved(initial).1)
         .factor()
         .map_err(|error| Error::data(format!("the record cannot be factored: {error}")))
 }
 
+/// Least squares needs a predictor that is linear in the parameters.
+pub(super) fn linear(orders: &Orders) -> Result<(), Error> {
+    if orders.is_linear() {
+        return Ok(());
+    }
+    Err(Error::argument(
+        "orders",
+        "a model with C, D or F is not linear in its parameters; it needs a search",
+    ))
+}
+
+/// What an initial condition means for a model without F.
+pub(super) fn resolved(initial: Initial) -> (Initial, Presample) {
+    match initial {
+        Initial::Zero => (Initial::Zero, Presample::Zero),
+        Initial::Auto | Initial::Drop | Initial::Estimate => (Initial::Drop, Presample::Drop),
+    }
+}
+
+/// A matrix, row by row.
+pub(super) fn rows(matrix: &DMatrix<f64>) -> Vec<Vec<f64>> {
+    matrix.row_iter().map(|row| row.iter().copied().collect()).collect()
+}
+
 /// The output and the inputs, checked against the orders.
-fn signals<'a>(record: &Record<'a>, orders: &Orders) -> Result<Vec<&'a [f64]>, Error> {
+pub(super) fn signals<'a>(record: &Record<'a>, orders: &Orders) -> Result<Vec<&'a [f64]>, Error> {
     if record.inputs.len() != orders.inputs() {
         return Err(Error::argument(
             "orders",
@@ -176,7 +149,7 @@ fn signals<'a>(record: &Record<'a>, orders: &Orders) -> Result<Vec<&'a [f64]>, E
 }
 
 /// phi(t) = [-y(t-1) … -y(t-na), u1(t-nk1) … u1(t-nk1-nb1+1), …].
-fn taps(orders: &Orders) -> Vec<Taps> {
+pub(super) fn taps(orders: &Orders) -> Vec<Taps> {
     let output = Taps { signal: 0, first: 1, count: orders.na, sign: -1.0 };
     let inputs = orders.nb.iter().zip(&orders.nk).enumerate();
     std::iter::once(output)
@@ -200,7 +173,7 @@ pub(crate) fn enough(samples: usize, orders: &Orders) -> Result<(), Error> {
     ))
 }
 
-fn unsolved(why: Unsolved, orders: &Orders) -> Error {
+pub(super) fn unsolved(why: Unsolved, orders: &Orders) -> Error {
     let Unsolved::Deficient(columns) = why else { return out_of_range() };
     let names = orders.names();
     let concerned: Vec<String> = columns.iter().filter_map(|&column| names.get(column).cloned()).collect();
@@ -212,6 +185,6 @@ fn unsolved(why: Unsolved, orders: &Orders) -> Error {
     Error::undetermined(concerned, message)
 }
 
-fn out_of_range() -> Error {
+pub(super) fn out_of_range() -> Error {
     Error::data("squares of the signals leave the range of numbers; scale the channels towards one")
 }

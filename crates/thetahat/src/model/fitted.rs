@@ -1,22 +1,13 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use thetahat_core::nalgebra::{self, ComplexField};
 
-use super::polynomial;
+use super::dynamics::{self, Quantity, Root};
 use crate::data::Offset;
 use crate::estimate::Estimate;
-use crate::{Error, Orders};
-
-/// The model structures, special cases of A y = B/F u + C/D e.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum Structure {
-    /// A(q) y(t) = sum_j B_j(q) u_j(t) + e(t).
-    Arx,
-}
+use crate::{Error, Orders, Structure};
 
 /// A channel as a model sees it: its name, and what its values are measured from.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct Signal {
     /// The channel's name in the log.
     pub name: String,
@@ -31,23 +22,8 @@ pub struct Parameter {
     pub name: String,
     /// The estimate.
     pub value: f64,
-    /// The square root of its variance.
-    pub standard_error: f64,
-}
-
-/// A complex number.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Complex {
-    /// Real part.
-    pub re: f64,
-    /// Imaginary part.
-    pub im: f64,
-}
-
-impl From<nalgebra::Complex<f64>> for Complex {
-    fn from(value: nalgebra::Complex<f64>) -> Self {
-        Self { re: value.re, im: value.im }
-    }
+    /// The square root of its variance; none where no theory gives one.
+    pub standard_error: Option<f64>,
 }
 
 /// An estimated model: A(q) y(t) = sum_j B_j(q)/F_j(q) u_j(t) + C(q)/D(q) e(t), var e = `noise_variance`.
@@ -80,54 +56,77 @@ pub struct Model {
     pub noise_variance: f64,
     /// The coefficients with their standard errors, in the order of `covariance`.
     pub parameters: Vec<Parameter>,
-    /// The covariance matrix of the parameters, row by row.
-    pub covariance: Vec<Vec<f64>>,
-    /// The roots of A in the z plane, largest first.
-    pub poles: Vec<Complex>,
+    /// The covariance matrix of the parameters, row by row; none where no theory gives one.
+    pub covariance: Option<Vec<Vec<f64>>>,
+    /// The roots of A, then of each F, in the z plane, the largest of each polynomial first.
+    pub poles: Vec<Root>,
     /// The finite roots of B in the z plane, for each input.
-    pub zeros: Vec<Vec<Complex>>,
-    /// B(1)/A(1) for each input, in units of y per unit of u; none at an integrator.
-    pub dc_gain: Vec<Option<f64>>,
+    pub zeros: Vec<Vec<Root>>,
+    /// The roots of D: what the noise has beside the roots of A.
+    pub noise_poles: Vec<Root>,
+    /// The roots of C.
+    pub noise_zeros: Vec<Root>,
+    /// B(1)/(A(1) F(1)) for each input, in units of y per unit of u; none at an integrator.
+    pub dc_gain: Vec<Option<Quantity>>,
     /// Whether all poles lie inside the unit circle.
     pub stable: bool,
     /// -T/ln|p| in seconds for each pole p, T being the sample time; none for |p| >= 1.
-    pub time_constants: Vec<Option<f64>>,
+    pub time_constants: Vec<Option<Quantity>>,
 }
 
 impl Model {
-    /// The ARX model of an estimate.
+    /// The model of an estimate.
     ///
     /// # Errors
     /// [`Error::Data`] if a coefficient or the variance overflows, or roots do not converge.
-    pub fn arx(
+    pub fn new(
         orders: &Orders,
         estimate: &Estimate,
         sample_time: f64,
         inputs: Vec<Signal>,
         output: Signal,
     ) -> Result<Self, Error> {
-        let parameters: Vec<Parameter> = orders
-            .names()
-            .into_iter()
-            .zip(estimate.parameters())
-            .zip(estimate.covariance().iter().enumerate())
-            .map(|((name, &value), (position, row))| Parameter {
+        let model = Self::from_parameters(
+            orders,
+            estimate.parameters(),
+            estimate.covariance(),
+            estimate.noise_variance(),
+            sample_time,
+        )?;
+        if !estimate.criteria().fpe.is_finite() {
+            return Err(Error::data("the noise variance overflows; scale the output towards one"));
+        }
+        Ok(Self { inputs, output, ..model })
+    }
+
+    /// The model of some parameters, in the order of [`Orders::names`]. Its signals have no names and no offsets.
+    pub(crate) fn from_parameters(
+        orders: &Orders,
+        values: &[f64],
+        covariance: Option<&[Vec<f64>]>,
+        noise_variance: f64,
+        sample_time: f64,
+    ) -> Result<Self, Error> {
+        let variance = |position: usize| covariance.map(|rows| rows[position][position]);
+        let named = orders.names().into_iter().zip(values).enumerate();
+        let parameters: Vec<Parameter> = named
+            .map(|(position, (name, &value))| Parameter {
                 name,
                 value,
-                standard_error: row[position].sqrt(),
+                standard_error: variance(position).map(f64::sqrt),
             })
             .collect();
-        let unusable = parameters.iter().find(|p| !(p.value.is_finite() && p.standard_error.is_finite()));
-        if let Some(parameter) = unusable {
+        let usable = |p: &Parameter| p.value.is_finite() && p.standard_error.is_none_or(f64::is_finite);
+        if let Some(parameter) = parameters.iter().find(|parameter| !usable(parameter)) {
             return Err(Error::data(format!(
                 "parameter {} overflows ({}); scale the channels towards one",
                 parameter.name, parameter.value
             )));
         }
-        if !(estimate.noise_variance().is_finite() && estimate.criteria().fpe.is_finite()) {
+        if !noise_variance.is_finite() {
             return Err(Error::data("the noise variance overflows; scale the output towards one"));
         }
-        let mut values = estimate.parameters().iter().copied();
+        let mut values = values.iter().copied();
         let monic = |values: &mut dyn Iterator<Item = f64>, count| -> Vec<f64> {
             std::iter::once(1.0).chain(values.take(count)).collect()
         };
@@ -136,42 +135,33 @@ impl Model {
         let b: Vec<Vec<f64>> = delays
             .map(|(&nb, &nk)| std::iter::repeat_n(0.0, nk).chain(values.by_ref().take(nb)).collect())
             .collect();
-        let roots = |polynomial: &[f64]| {
-            polynomial::roots(polynomial)
-                .ok_or_else(|| Error::data("the roots of a polynomial do not converge; lower the orders"))
-        };
-        let poles = roots(&a)?;
-        let zeros = b.iter().map(|b| Ok(roots(b)?.into_iter().map(Complex::from).collect()));
-        let at_one: f64 = a.iter().sum();
-        let size: f64 = a.iter().map(|a| a.abs()).sum();
-        // Below this A(1) is rounding: an integrator has no gain at frequency zero.
-        let integrates = at_one.abs() <= 16.0 * f64::EPSILON * size;
-        let gain = |b: &Vec<f64>| {
-            Some(b.iter().sum::<f64>() / at_one).filter(|gain| gain.is_finite() && !integrates)
-        };
-        Ok(Self {
-            structure: Structure::Arx,
+        let c = monic(&mut values, orders.nc);
+        let d = monic(&mut values, orders.nd);
+        let f: Vec<Vec<f64>> = orders.nf.iter().map(|&nf| monic(&mut values, nf)).collect();
+        let mut model = Self {
+            structure: orders.structure(),
             orders: orders.clone(),
             sample_time,
-            inputs,
-            output,
-            c: vec![1.0],
-            d: vec![1.0],
-            f: vec![vec![1.0]; b.len()],
-            noise_variance: estimate.noise_variance(),
-            parameters,
-            covariance: estimate.covariance().to_vec(),
-            zeros: zeros.collect::<Result<_, Error>>()?,
-            dc_gain: b.iter().map(gain).collect(),
-            stable: poles.iter().all(|pole| pole.modulus() < 1.0),
-            time_constants: poles
-                .iter()
-                .map(|pole| (pole.modulus() < 1.0).then(|| -sample_time / pole.modulus().ln()))
-                .collect(),
-            poles: poles.into_iter().map(Complex::from).collect(),
+            inputs: vec![Signal::default(); orders.inputs()],
+            output: Signal::default(),
             a,
             b,
-        })
+            c,
+            d,
+            f,
+            noise_variance,
+            parameters,
+            covariance: covariance.map(<[_]>::to_vec),
+            poles: Vec::new(),
+            zeros: Vec::new(),
+            noise_poles: Vec::new(),
+            noise_zeros: Vec::new(),
+            dc_gain: Vec::new(),
+            stable: true,
+            time_constants: Vec::new(),
+        };
+        dynamics::describe(&mut model)?;
+        Ok(model)
     }
 
     /// Checks a model that was read: that its parts fit together, so that it can be computed with.
@@ -179,15 +169,20 @@ impl Model {
         let orders = &self.orders;
         let wrong =
             |what: &str| Err(Error::report(format!("model.{what}; the report was edited or damaged")));
-        if Orders::arx(orders.na, &orders.nb, &orders.nk).as_ref() != Ok(orders) {
-            return wrong("orders are not those of an ARX model");
+        let (nb, nf, nk) = (&orders.nb, &orders.nf, &orders.nk);
+        if Orders::new(orders.na, nb, orders.nc, orders.nd, nf, nk).as_ref() != Ok(orders)
+            || orders.structure() != self.structure
+        {
+            return wrong("orders are not those of the structure");
         }
         let inputs = orders.nb.len();
         if [orders.nk.len(), orders.nf.len(), self.inputs.len(), self.b.len(), self.f.len()] != [inputs; 5] {
             return wrong("orders, inputs, b and f do not have as many inputs as one another");
         }
-        if self.a.len() != orders.na + 1 || self.a.first() != Some(&1.0) {
-            return wrong("a does not match its order, or does not begin with 1");
+        let monic = |p: &[f64], order: usize| p.len() == order + 1 && p[0] == 1.0;
+        let plain = [(&self.a, orders.na), (&self.c, orders.nc), (&self.d, orders.nd)];
+        if !plain.into_iter().chain(self.f.iter().zip(nf.iter().copied())).all(|(p, order)| monic(p, order)) {
+            return wrong("a, c, d or f does not match its order, or does not begin with 1");
         }
         let length = |j: usize| orders.nk[j] + orders.nb[j];
         if (0..inputs).any(|j| self.b[j].len() != length(j)) {
@@ -206,12 +201,17 @@ impl Model {
             return wrong("sample_time is not positive");
         }
         let offsets = self.inputs.iter().chain([&self.output]).flat_map(|s| [s.offset.level, s.offset.slope]);
-        if !self.a.iter().chain(self.b.iter().flatten()).copied().chain(offsets).all(f64::is_finite) {
-            return wrong("a, b or an offset is not finite");
+        let values = [&self.a, &self.c, &self.d].into_iter().chain(&self.b).chain(&self.f).flatten().copied();
+        if !values.chain(offsets).all(f64::is_finite) {
+            return wrong("a, b, c, d, f or an offset is not finite");
         }
-        let plain = |p: &[f64]| p == [1.0];
-        if !(plain(&self.c) && plain(&self.d) && self.f.iter().all(|f| plain(f))) {
-            return wrong("c, d and f of an ARX model are 1");
+        if !(self.noise_variance.is_finite() && self.noise_variance >= 0.0) {
+            return wrong("noise_variance is not a variance");
+        }
+        let count = orders.parameters();
+        let square = |rows: &Vec<Vec<f64>>| rows.len() == count && rows.iter().all(|row| row.len() == count);
+        if !self.covariance.as_ref().is_none_or(square) {
+            return wrong("covariance does not have a row and a column for each parameter");
         }
         Ok(())
     }
@@ -237,7 +237,7 @@ mod tests {
         let orders = Orders::arx(a.len(), &[b.len()], &[1]).unwrap();
         let estimate = arx(&Record::new(&y, vec![&u]).unwrap(), &orders, Initial::Drop).unwrap();
         let signal = |name: &str| Signal { name: name.to_owned(), offset: Offset::default() };
-        Model::arx(&orders, &estimate, 0.5, vec![signal("u")], signal("y")).unwrap()
+        Model::new(&orders, &estimate, 0.5, vec![signal("u")], signal("y")).unwrap()
     }
 
     #[test]
@@ -248,8 +248,8 @@ mod tests {
         assert_eq!((model.a.len(), model.b[0].len(), model.b[0][0]), (3, 3, 0.0));
         assert!(near(model.poles[0].re, 0.8) && near(model.poles[1].re, 0.5) && model.stable);
         assert!(model.zeros[0].len() == 1 && near(model.zeros[0][0].re, -3.0));
-        assert!(near(model.dc_gain[0].unwrap(), 80.0));
-        assert!(near(model.time_constants[0].unwrap(), -0.5 / 0.8_f64.ln()));
+        assert!(near(model.dc_gain[0].unwrap().value, 80.0));
+        assert!(near(model.time_constants[0].unwrap().value, -0.5 / 0.8_f64.ln()));
     }
 
     #[test]
@@ -263,7 +263,7 @@ mod tests {
     fn a_damaged_model_is_refused() {
         let good = fitted(&[-0.5], &[1.0, 2.0]);
         assert!(good.check().is_ok());
-        let damages: [fn(&mut Model); 10] = [
+        let damages: [fn(&mut Model); 13] = [
             |model| model.orders.na = usize::MAX,
             |model| model.orders.nk = vec![usize::MAX],
             |model| model.orders.nc = usize::MAX,
@@ -274,6 +274,9 @@ mod tests {
             |model| model.b[0][0] = 1.0,
             |model| model.output.name = "u".to_owned(),
             |model| model.sample_time = 0.0,
+            |model| model.noise_variance = -1.0,
+            |model| model.covariance = Some(vec![]),
+            |model| model.covariance.iter_mut().flatten().for_each(|row| row.truncate(2)),
         ];
         for damage in damages {
             let mut model = good.clone();

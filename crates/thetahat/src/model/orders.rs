@@ -34,33 +34,122 @@ pub struct Orders {
     pub nk: Vec<usize>,
 }
 
+/// The model structures, special cases of A y = B/F u + C/D e. The orders say which one a model has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Structure {
+    /// Autoregression: A(q) y(t) = e(t).
+    Ar,
+    /// Autoregression and moving average: A(q) y(t) = C(q) e(t).
+    Arma,
+    /// A(q) y(t) = sum_j B_j(q) u_j(t) + e(t).
+    Arx,
+    /// A(q) y(t) = sum_j B_j(q) u_j(t) + C(q) e(t).
+    Armax,
+    /// Output error: y(t) = sum_j B_j(q)/F_j(q) u_j(t) + e(t).
+    Oe,
+    /// Box and Jenkins: y(t) = sum_j B_j(q)/F_j(q) u_j(t) + C(q)/D(q) e(t).
+    Bj,
+    /// Any other combination.
+    Pem,
+}
+
 impl Orders {
-    /// The orders of an ARX model, A(q) y(t) = sum_j B_j(q) u_j(t - nk_j) + e(t).
+    /// The orders of an ARX model, A(q) y(t) = sum_j B_j(q) u_j(t - nk_j) + e(t). Without inputs: of an AR model.
     ///
     /// # Errors
-    /// [`Error::Argument`] if nb and nk differ in length, all orders are 0, or one is above 1000.
+    /// As for [`Orders::new`].
     pub fn arx(na: usize, nb: &[usize], nk: &[usize]) -> Result<Self, Error> {
-        if nb.len() != nk.len() {
-            return Err(Error::argument(
-                "nk",
-                format!(
-                    "there are {} values for {} inputs; give one for each, or one for all",
-                    nk.len(),
-                    nb.len()
-                ),
-            ));
+        Self::new(na, nb, 0, 0, &vec![0; nb.len()], nk)
+    }
+
+    /// The orders of an ARMAX model, A(q) y(t) = sum_j B_j(q) u_j(t - nk_j) + C(q) e(t). Without inputs: of an ARMA model.
+    ///
+    /// # Errors
+    /// As for [`Orders::new`].
+    pub fn armax(na: usize, nb: &[usize], nc: usize, nk: &[usize]) -> Result<Self, Error> {
+        Self::new(na, nb, nc, 0, &vec![0; nb.len()], nk)
+    }
+
+    /// The orders of an output-error model, y(t) = sum_j B_j(q)/F_j(q) u_j(t - nk_j) + e(t).
+    ///
+    /// # Errors
+    /// As for [`Orders::new`].
+    pub fn oe(nb: &[usize], nf: &[usize], nk: &[usize]) -> Result<Self, Error> {
+        Self::new(0, nb, 0, 0, nf, nk)
+    }
+
+    /// The orders of a Box-Jenkins model, y(t) = sum_j B_j(q)/F_j(q) u_j(t - nk_j) + C(q)/D(q) e(t).
+    ///
+    /// # Errors
+    /// As for [`Orders::new`].
+    pub fn bj(nb: &[usize], nc: usize, nd: usize, nf: &[usize], nk: &[usize]) -> Result<Self, Error> {
+        Self::new(0, nb, nc, nd, nf, nk)
+    }
+
+    /// The orders of A(q) y(t) = sum_j B_j(q)/F_j(q) u_j(t - nk_j) + C(q)/D(q) e(t), in the order of the letters.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] if nb, nf and nk differ in length, all orders are 0, one is above 1000, or F is given for an
+    /// input that has no B.
+    pub fn new(
+        na: usize,
+        nb: &[usize],
+        nc: usize,
+        nd: usize,
+        nf: &[usize],
+        nk: &[usize],
+    ) -> Result<Self, Error> {
+        for (name, values) in [("nk", nk), ("nf", nf)] {
+            if values.len() != nb.len() {
+                return Err(Error::argument(
+                    name,
+                    format!(
+                        "there are {} values for {} inputs; give one for each, or one for all",
+                        values.len(),
+                        nb.len()
+                    ),
+                ));
+            }
         }
-        let largest = nb.iter().chain(nk).copied().fold(na, usize::max);
+        let every = nb.iter().chain(nk).chain(nf).chain([&na, &nc, &nd]).copied();
+        let largest = every.max().unwrap_or(0);
         if largest > LARGEST {
             return Err(Error::argument(
                 "orders",
                 format!("{largest} is above {LARGEST}, the largest order"),
             ));
         }
-        if na == 0 && nb.iter().all(|&nb| nb == 0) {
-            return Err(Error::argument("orders", "na and nb are all 0: the model has no parameters"));
+        if let Some(input) = nb.iter().zip(nf).position(|(&nb, &nf)| nb == 0 && nf > 0) {
+            return Err(Error::argument(
+                "nf",
+                format!("input {} has F without B: give it an nb above 0, or nf 0", input + 1),
+            ));
         }
-        Ok(Self { na, nb: nb.to_vec(), nc: 0, nd: 0, nf: vec![0; nb.len()], nk: nk.to_vec() })
+        let orders = Self { na, nb: nb.to_vec(), nc, nd, nf: nf.to_vec(), nk: nk.to_vec() };
+        if orders.parameters() == 0 {
+            return Err(Error::argument("orders", "all orders are 0: the model has no parameters"));
+        }
+        Ok(orders)
+    }
+
+    /// Which structure these orders make. A Box-Jenkins model without C and D is one of output error, and so on.
+    pub fn structure(&self) -> Structure {
+        let (input, filtered) = (self.nb.iter().any(|&nb| nb > 0), self.nf.iter().any(|&nf| nf > 0));
+        match (input, filtered, self.na > 0, self.nc > 0, self.nd > 0) {
+            (false, _, _, false, false) => Structure::Ar,
+            (false, _, _, true, false) => Structure::Arma,
+            (true, false, _, false, false) => Structure::Arx,
+            (true, false, _, true, false) => Structure::Armax,
+            (true, true, false, false, false) => Structure::Oe,
+            (true, _, false, _, _) => Structure::Bj,
+            _ => Structure::Pem,
+        }
+    }
+
+    /// Whether the predictor is linear in the parameters: C = D = F = 1.
+    pub fn is_linear(&self) -> bool {
+        self.nc == 0 && self.nd == 0 && self.nf.iter().all(|&nf| nf == 0)
     }
 
     /// The number of inputs.
@@ -75,13 +164,26 @@ impl Orders {
 
     /// How many past samples a full ARX regressor reaches back: max(na, nb + nk - 1).
     pub fn reach(&self) -> usize {
-        self.inputs_reach().max(self.na)
+        (0..self.inputs()).map(|input| self.input_reach(input)).fold(self.na, usize::max)
     }
 
-    /// How many past samples of the inputs matter: max(nb + nk - 1) over the inputs with nb > 0.
-    pub(crate) fn inputs_reach(&self) -> usize {
-        let reach = |(&nb, &nk): (&usize, &usize)| if nb == 0 { 0 } else { nb + nk - 1 };
-        self.nb.iter().zip(&self.nk).map(reach).max().unwrap_or(0)
+    /// How many past samples of an input B reaches back: nb + nk - 1, or 0 without B.
+    pub(crate) fn input_reach(&self, input: usize) -> usize {
+        if self.nb[input] == 0 { 0 } else { self.nb[input] + self.nk[input] - 1 }
+    }
+
+    /// How many first samples of a segment have no e where nothing before it is known and no free response of 1/F makes
+    /// up for it: max(na, nb + nk - 1 of the inputs without F), and nd more. For ARX this is the reach.
+    pub(crate) fn conditioned(&self) -> usize {
+        let direct = (0..self.inputs()).filter(|&input| self.nf[input] == 0);
+        direct.map(|input| self.input_reach(input)).fold(self.na, usize::max) + self.nd
+    }
+
+    /// The number of free responses of 1/F for an input: what unknown samples before a segment do to B/F u is, from sample
+    /// nb + nk - 1 on, a combination of nf of them. Before that earlier inputs are taken to be zero, the mean: one more
+    /// unknown for each would cost more than it explains.
+    pub(crate) fn free_responses(&self, input: usize) -> usize {
+        self.nf[input]
     }
 
     /// The parameters' names in their order: a, b of each input, c, d, f of each input.
@@ -114,6 +216,8 @@ mod tests {
     fn names_carry_the_power_and_the_input() {
         let orders = Orders::arx(1, &[2, 1], &[0, 4]).unwrap();
         assert_eq!(orders.names(), ["a1", "b1_0", "b1_1", "b2_4"]);
+        let general = Orders::new(1, &[1], 2, 1, &[2], &[3]).unwrap();
+        assert_eq!(general.names(), ["a1", "b3", "c1", "c2", "d1", "f1", "f2"]);
         assert_eq!(orders.parameters(), 4);
         assert_eq!(orders.reach(), 4);
     }
@@ -125,5 +229,24 @@ mod tests {
         assert!(Orders::arx(1, &[1], &[]).is_err());
         assert!(Orders::arx(1001, &[1], &[1]).is_err());
         assert!(Orders::arx(2, &[], &[]).is_ok());
+        assert!(Orders::oe(&[0], &[2], &[1]).is_err());
+        assert!(Orders::oe(&[1], &[2, 2], &[1]).is_err());
+        assert!(Orders::bj(&[1], 1001, 0, &[1], &[1]).is_err());
+    }
+
+    #[test]
+    fn orders_say_which_structure_they_make() {
+        let of = |na, nb: &[usize], nc, nd, nf: &[usize]| {
+            Orders::new(na, nb, nc, nd, nf, &vec![1; nb.len()]).unwrap().structure()
+        };
+        assert_eq!(of(2, &[], 0, 0, &[]), Structure::Ar);
+        assert_eq!(of(2, &[], 1, 0, &[]), Structure::Arma);
+        assert_eq!(of(0, &[2], 0, 0, &[0]), Structure::Arx);
+        assert_eq!(of(1, &[2], 1, 0, &[0]), Structure::Armax);
+        assert_eq!(of(0, &[2, 1], 0, 0, &[0, 1]), Structure::Oe);
+        assert_eq!(of(0, &[2], 0, 1, &[1]), Structure::Bj);
+        assert_eq!(of(1, &[2], 0, 1, &[0]), Structure::Pem);
+        assert_eq!(of(1, &[2], 0, 0, &[1]), Structure::Pem);
+        assert_eq!(of(1, &[], 1, 1, &[]), Structure::Pem);
     }
 }

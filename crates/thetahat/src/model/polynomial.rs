@@ -191,6 +191,33 @@ fn in_pairs(rising: &[f64], mut roots: Vec<Complex<f64>>) -> Vec<Complex<f64>> {
     paired
 }
 
+/// Whether all roots of a monic polynomial lie inside the unit circle, by the step-down recursion
+///
+/// ```text
+/// k_n = p_n,   p_i <- (p_i - k_n p_{n-i}) / (1 - k_n^2),   |k_n| < 1 for n, n-1, …, 1
+/// ```
+///
+/// (Schur and Cohn; Kay, Modern Spectral Estimation, 1988, section 6.3). `scratch` is overwritten. O(n^2).
+pub(crate) fn is_stable(monic: &[f64], scratch: &mut Vec<f64>) -> bool {
+    scratch.clear();
+    scratch.extend_from_slice(monic.get(1..).unwrap_or(&[]));
+    while let Some(reflection) = scratch.pop() {
+        let rest = 1.0 - reflection * reflection;
+        // A NaN is not stable.
+        if rest.is_nan() || rest <= 0.0 {
+            return false;
+        }
+        let count = scratch.len();
+        for low in 0..count.div_ceil(2) {
+            let high = count - 1 - low;
+            let (a, b) = (scratch[low], scratch[high]);
+            scratch[low] = (a - reflection * b) / rest;
+            scratch[high] = (b - reflection * a) / rest;
+        }
+    }
+    true
+}
+
 /// The product of two polynomials.
 pub(crate) fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
     let mut product = vec![0.0; (a.len() + b.len()).saturating_sub(1)];
@@ -203,6 +230,7 @@ pub(crate) fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
 }
 
 /// The first `length` coefficients of the series 1 / A, A monic.
+#[cfg(test)]
 pub(crate) fn inverse_series(a: &[f64], length: usize) -> Vec<f64> {
     let mut series: Vec<f64> = Vec::with_capacity(length);
     for t in 0..length {

@@ -50,28 +50,33 @@ pub(super) fn map_blocks<T: Send>(blocks: &[Vec<Stretch>], of: impl Fn(&[Stretch
     }
 }
 
-/// The sum over all stretches of the `size` values that `add` adds for each of them.
+/// The sum over all stretches of the `size` values that `add` adds for each of them: the first of `sums`, which has room
+/// for as many for each block, at least one.
 pub(super) fn sum_blocks(
     blocks: &[Vec<Stretch>],
     size: usize,
+    sums: &mut [f64],
     add: impl Fn(&Stretch, &mut [f64]) + Sync,
-) -> Vec<f64> {
-    let mut sums = map_blocks(blocks, |block| {
-        let mut sums = vec![0.0; size];
-        for stretch in block {
-            add(stretch, &mut sums);
-        }
-        sums
-    });
-    // A tree of sums: neighbours first, then neighbours of neighbours.
-    while sums.len() > 1 {
-        sums = sums
-            .chunks(2)
-            .map(|pair| match pair {
-                [a, b] => a.iter().zip(b).map(|(a, b)| a + b).collect(),
-                _ => pair.concat(),
-            })
-            .collect();
+) {
+    sums.fill(0.0);
+    if size == 0 {
+        return;
     }
-    sums.pop().unwrap_or_else(|| vec![0.0; size])
+    let of = |(block, sums): (&Vec<Stretch>, &mut [f64])| block.iter().for_each(|stretch| add(stretch, sums));
+    if blocks.len() < PARALLEL_FROM {
+        blocks.iter().zip(sums.chunks_mut(size)).for_each(of);
+    } else {
+        blocks.par_iter().zip(sums.par_chunks_mut(size)).for_each(of);
+    }
+    // A tree of sums: neighbours first, then neighbours of neighbours.
+    let mut apart = 1;
+    while apart < blocks.len() {
+        for pair in sums.chunks_mut(2 * apart * size) {
+            if pair.len() > apart * size {
+                let (left, right) = pair.split_at_mut(apart * size);
+                left[..size].iter_mut().zip(&right[..size]).for_each(|(left, right)| *left += right);
+            }
+        }
+        apart *= 2;
+    }
 }

@@ -18,9 +18,10 @@ use thetahat_core::nalgebra::{DMatrix, DVector};
 
 use super::blocks::{Stretch, blocks, sum_blocks};
 use super::kernel::correlations;
-use super::lagged::Lagged;
+use super::lagged::{Lagged, Taps};
 
 /// The lags `low..=high` of one signal; they stand at `offset` in the list of all lags.
+#[derive(Debug, Clone, Copy)]
 struct Span {
     signal: usize,
     low: usize,
@@ -29,13 +30,14 @@ struct Span {
 }
 
 /// The entries of two signals whose lags differ by d.
-struct Diagonal<'s> {
-    left: &'s Span,
-    right: &'s Span,
+#[derive(Debug, Clone, Copy)]
+struct Diagonal {
+    left: Span,
+    right: Span,
     difference: isize,
 }
 
-impl Diagonal<'_> {
+impl Diagonal {
     /// The lags of the left signal on this diagonal.
     fn lags(&self) -> Range<usize> {
         let low = self.left.low.max(self.right.low.saturating_add_signed(-self.difference));
@@ -44,9 +46,9 @@ impl Diagonal<'_> {
     }
 
     /// `x(row - lag) z(row - lag - d)`, zero before the segment's start.
-    fn product(&self, lagged: &Lagged<'_>, start: usize, row: usize, lag: usize) -> f64 {
-        lagged.sample(self.left.signal, start, row, lag)
-            * lagged.sample(self.right.signal, start, row, lag.saturating_add_signed(self.difference))
+    fn product<S: AsRef<[f64]>>(&self, signals: &[S], start: usize, row: usize, lag: usize) -> f64 {
+        sample(signals, self.left.signal, start, row, lag)
+            * sample(signals, self.right.signal, start, row, lag.saturating_add_signed(self.difference))
     }
 
     fn entry(&self, lag: usize, size: usize) -> usize {
@@ -56,45 +58,118 @@ impl Diagonal<'_> {
     }
 }
 
+/// Sample `row - lag` of a signal, zero before the segment's start.
+pub(super) fn sample<S: AsRef<[f64]>>(
+    signals: &[S],
+    signal: usize,
+    start: usize,
+    row: usize,
+    lag: usize,
+) -> f64 {
+    if row < start + lag { 0.0 } else { signals[signal].as_ref()[row - lag] }
+}
+
+/// Which products of lagged signals there are: those of all lags of the taps, and of the target `signals[0](t)`.
+///
+/// A plan, made once; sums over it take no memory of their own.
+#[derive(Debug)]
+pub(crate) struct Products {
+    spans: Vec<Span>,
+    diagonals: Vec<Diagonal>,
+    size: usize,
+    longest: usize,
+}
+
+/// The interior of some segments, and room for the sums over it.
+#[derive(Debug)]
+pub(crate) struct Interior {
+    blocks: Vec<Vec<Stretch>>,
+    sums: Vec<f64>,
+}
+
+impl Products {
+    pub(crate) fn new(taps: &[Taps]) -> Self {
+        let used = || taps.iter().filter(|taps| taps.count > 0);
+        let (spans, size) = spans(used());
+        let diagonals = diagonals(&spans);
+        Self { spans, diagonals, size, longest: used().map(Taps::last).max().unwrap_or(0) }
+    }
+
+    /// The number of lags, the target's among them: products have this many rows and columns.
+    pub(crate) fn size(&self) -> usize {
+        self.size
+    }
+
+    /// Where a lagged signal stands. Of two, the product is at `min * size + max`.
+    pub(crate) fn position(&self, signal: usize, lag: usize) -> usize {
+        let span = self.spans.iter().find(|span| span.signal == signal);
+        span.map_or(0, |span| span.offset + lag - span.low)
+    }
+
+    /// Inside every window: tau from t0, and L samples into the segment so that every partner exists, up to t1 - L.
+    fn inside(&self, start: usize, rows: &Range<usize>) -> Range<usize> {
+        rows.start.max(start + self.longest)..rows.end.saturating_sub(self.longest)
+    }
+
+    /// The interior of segments, each given by its first sample and the samples that count.
+    pub(crate) fn interior(&self, segments: impl Iterator<Item = (usize, Range<usize>)>) -> Interior {
+        let stretches = segments.map(|(start, rows)| Stretch { start, rows: self.inside(start, &rows) });
+        let blocks = blocks(stretches);
+        Interior { sums: vec![0.0; blocks.len().max(1) * self.diagonals.len()], blocks }
+    }
+
+    /// Adds the products of interiors to `entries`.
+    pub(crate) fn add_interior<S: AsRef<[f64]> + Sync>(
+        &self,
+        signals: &[S],
+        interior: &mut Interior,
+        entries: &mut [f64],
+    ) {
+        let count = self.diagonals.len();
+        sum_blocks(&interior.blocks, count, &mut interior.sums, |stretch, sums| {
+            add_stretch(signals, &self.diagonals, &stretch.rows, sums);
+        });
+        for (diagonal, shared) in self.diagonals.iter().zip(&interior.sums) {
+            for lag in diagonal.lags() {
+                entries[diagonal.entry(lag, self.size)] += shared;
+            }
+        }
+    }
+
+    /// Adds the products outside the interior of one segment to `entries`.
+    pub(crate) fn add_ends<S: AsRef<[f64]>>(
+        &self,
+        signals: &[S],
+        start: usize,
+        rows: &Range<usize>,
+        entries: &mut [f64],
+    ) {
+        if rows.is_empty() {
+            return;
+        }
+        let interior = self.inside(start, rows);
+        for diagonal in &self.diagonals {
+            add_diagonal_ends(signals, diagonal, start, rows, &interior, self.size, entries);
+        }
+    }
+}
+
 /// `Phi' Phi`, `Phi' y` and `y' y` of a regression. O(N p) time, O(p^2) memory.
 pub(super) fn gram(lagged: &Lagged<'_>) -> (DMatrix<f64>, DVector<f64>, f64) {
-    let (spans, size) = spans(lagged);
-    let diagonals = diagonals(&spans);
-    let longest = lagged.longest();
-
-    let mut interiors = Vec::new();
+    let products = Products::new(lagged.taps());
+    let size = products.size();
+    let segments = || lagged.segments().iter().map(|segment| (segment.start, lagged.counted(segment)));
     let mut entries = vec![0.0; size * size];
-    for segment in lagged.segments() {
-        let start = segment.start;
-        let rows = lagged.counted(segment);
-        if rows.is_empty() {
-            continue;
-        }
-        // Inside every window: tau from t0, and L samples into the segment so that every partner
-        // exists, up to t1 - L.
-        let interior = rows.start.max(start + longest)..rows.end.saturating_sub(longest);
-        for diagonal in &diagonals {
-            add_ends(lagged, diagonal, start, &rows, &interior, size, &mut entries);
-        }
-        interiors.push(Stretch { start, rows: interior });
+    for (start, rows) in segments() {
+        products.add_ends(lagged.signals(), start, &rows, &mut entries);
     }
-    let shared = sum_blocks(&blocks(interiors.into_iter()), diagonals.len(), |stretch, sums| {
-        add_interior(lagged, &diagonals, &stretch.rows, sums);
-    });
-    for (diagonal, shared) in diagonals.iter().zip(shared) {
-        for lag in diagonal.lags() {
-            entries[diagonal.entry(lag, size)] += shared;
-        }
-    }
+    let mut interior = products.interior(segments().filter(|(_, rows)| !rows.is_empty()));
+    products.add_interior(lagged.signals(), &mut interior, &mut entries);
 
-    let position = |signal: usize, lag: usize| {
-        let span = spans.iter().find(|span| span.signal == signal);
-        span.map_or(0, |span| span.offset + lag - span.low)
-    };
     let columns: Vec<(usize, f64)> =
-        lagged.columns().map(|(signal, lag, sign)| (position(signal, lag), sign)).collect();
+        lagged.columns().map(|(signal, lag, sign)| (products.position(signal, lag), sign)).collect();
     let entry = |a: usize, b: usize| entries[a.min(b) * size + a.max(b)];
-    let target = position(0, 0);
+    let target = products.position(0, 0);
     let matrix = DMatrix::from_fn(columns.len(), columns.len(), |row, column| {
         let ((a, s), (b, r)) = (columns[row], columns[column]);
         s * r * entry(a, b)
@@ -104,9 +179,9 @@ pub(super) fn gram(lagged: &Lagged<'_>) -> (DMatrix<f64>, DVector<f64>, f64) {
 }
 
 /// One span for each signal in use (the target, lag 0, first) and the number of all lags.
-fn spans(lagged: &Lagged<'_>) -> (Vec<Span>, usize) {
+fn spans<'t>(used: impl Iterator<Item = &'t Taps>) -> (Vec<Span>, usize) {
     let mut spans = vec![Span { signal: 0, low: 0, high: 0, offset: 0 }];
-    for taps in lagged.taps().iter().filter(|taps| taps.count > 0) {
+    for taps in used {
         match spans.iter_mut().find(|span| span.signal == taps.signal) {
             Some(span) => {
                 span.low = span.low.min(taps.first);
@@ -124,7 +199,7 @@ fn spans(lagged: &Lagged<'_>) -> (Vec<Span>, usize) {
 }
 
 /// All diagonals, those of two signals beside one another with d falling.
-fn diagonals(spans: &[Span]) -> Vec<Diagonal<'_>> {
+fn diagonals(spans: &[Span]) -> Vec<Diagonal> {
     let mut diagonals = Vec::new();
     for (position, left) in spans.iter().enumerate() {
         for right in &spans[position..] {
@@ -132,8 +207,8 @@ fn diagonals(spans: &[Span]) -> Vec<Diagonal<'_>> {
             let smallest =
                 if left.signal == right.signal { 0 } else { right.low as isize - left.high as isize };
             diagonals.extend((smallest..=largest).rev().map(|difference| Diagonal {
-                left,
-                right,
+                left: *left,
+                right: *right,
                 difference,
             }));
         }
@@ -142,34 +217,38 @@ fn diagonals(spans: &[Span]) -> Vec<Diagonal<'_>> {
 }
 
 /// Adds the products of the interior samples `taus`, diagonal by diagonal.
-fn add_interior(lagged: &Lagged<'_>, diagonals: &[Diagonal<'_>], taus: &Range<usize>, sums: &mut [f64]) {
-    let same = |a: &Diagonal<'_>, b: &Diagonal<'_>| {
-        a.left.signal == b.left.signal && a.right.signal == b.right.signal
-    };
+fn add_stretch<S: AsRef<[f64]>>(
+    signals: &[S],
+    diagonals: &[Diagonal],
+    taus: &Range<usize>,
+    sums: &mut [f64],
+) {
+    let same =
+        |a: &Diagonal, b: &Diagonal| a.left.signal == b.left.signal && a.right.signal == b.right.signal;
     let mut sums = sums;
     for pair in diagonals.chunk_by(same) {
         let (into, rest) = sums.split_at_mut(pair.len());
         sums = rest;
         let (Some(first), Some(last)) = (pair.first(), pair.last()) else { continue };
-        let x = &lagged.signal(first.left.signal)[taus.clone()];
+        let x = &signals[first.left.signal].as_ref()[taus.clone()];
         // z(tau - d) with d falling: the same stretch of the partner, one sample later each.
         let from = taus.start.saturating_add_signed(-first.difference);
         let to = taus.end.saturating_add_signed(-last.difference);
-        correlations(x, &lagged.signal(first.right.signal)[from..to], into);
+        correlations(x, &signals[first.right.signal].as_ref()[from..to], into);
     }
 }
 
 /// Adds what a diagonal's entries have outside the interior of one segment, of which the samples `rows` count.
-fn add_ends(
-    lagged: &Lagged<'_>,
-    diagonal: &Diagonal<'_>,
+fn add_diagonal_ends<S: AsRef<[f64]>>(
+    signals: &[S],
+    diagonal: &Diagonal,
     start: usize,
     rows: &Range<usize>,
     interior: &Range<usize>,
     size: usize,
     entries: &mut [f64],
 ) {
-    let product = |row: usize, lag: usize| diagonal.product(lagged, start, row, lag);
+    let product = |row: usize, lag: usize| diagonal.product(signals, start, row, lag);
     // A lag, or its partner, that is as long as the segment meets zeros only.
     let length = rows.end - start;
     let mut lags = diagonal.lags();

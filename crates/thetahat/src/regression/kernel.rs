@@ -37,6 +37,11 @@ pub(super) fn product(x: &[f64], y: &[f64]) -> f64 {
     fold(sum)
 }
 
+/// `x'x`.
+pub(crate) fn sum_of_squares(x: &[f64]) -> f64 {
+    product(x, x)
+}
+
 /// `sum_t x[t] y[t + k]` for k = 0..4; `y` holds 3 values more than `x`. 8 flops a sample, each signal read once.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
 fn four_products(x: &[f64], y: &[f64]) -> [f64; SHIFTS] {

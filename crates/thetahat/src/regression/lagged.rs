@@ -40,11 +40,9 @@ const CANCELLATION: f64 = 1e-3;
 const SAFE_NORMS: RangeInclusive<f64> = 1e-140..=1e140;
 
 /// What stands for the samples before the first of a segment.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum Initial {
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Presample {
     /// Nothing: samples without a full regressor are left out.
-    #[default]
     Drop,
     /// Zeros: all samples count.
     Zero,
@@ -75,7 +73,7 @@ pub(crate) struct Lagged<'a> {
     signals: Vec<&'a [f64]>,
     taps: Vec<Taps>,
     segments: &'a [Range<usize>],
-    initial: Initial,
+    initial: Presample,
     longest: usize,
 }
 
@@ -118,7 +116,7 @@ impl<'a> Lagged<'a> {
         signals: &[&'a [f64]],
         taps: Vec<Taps>,
         segments: &'a [Range<usize>],
-        initial: Initial,
+        initial: Presample,
     ) -> Self {
         let longest = taps.iter().filter(|taps| taps.count > 0).map(Taps::last).max().unwrap_or(0);
         Self { signals: signals.to_vec(), taps, segments, initial, longest }
@@ -132,17 +130,13 @@ impl<'a> Lagged<'a> {
         self.segments
     }
 
-    pub(super) fn longest(&self) -> usize {
-        self.longest
-    }
-
-    pub(super) fn signal(&self, signal: usize) -> &[f64] {
-        self.signals[signal]
+    pub(super) fn signals(&self) -> &[&[f64]] {
+        &self.signals
     }
 
     /// Sample `row - lag` of a signal, zero before the segment's start.
     pub(super) fn sample(&self, signal: usize, start: usize, row: usize, lag: usize) -> f64 {
-        if row < start + lag { 0.0 } else { self.signals[signal][row - lag] }
+        super::gram::sample(&self.signals, signal, start, row, lag)
     }
 
     /// The signal, lag and sign of each column.
@@ -155,14 +149,21 @@ impl<'a> Lagged<'a> {
     /// The samples of a segment that count.
     pub(super) fn counted(&self, segment: &Range<usize>) -> Range<usize> {
         match self.initial {
-            Initial::Drop => (segment.start + self.longest).min(segment.end)..segment.end,
-            Initial::Zero => segment.clone(),
+            Presample::Drop => (segment.start + self.longest).min(segment.end)..segment.end,
+            Presample::Zero => segment.clone(),
         }
     }
 
     /// The number of rows N.
     pub(crate) fn rows(&self) -> usize {
         self.segments.iter().map(|segment| self.counted(segment).len()).sum()
+    }
+
+    /// The normal equations Phi' Phi theta = Phi' y, and y' y. O(N p).
+    ///
+    /// With the instruments among the columns, the block Z' Phi of an instrumental-variable system is a part of Phi' Phi.
+    pub(crate) fn normal_equations(&self) -> (DMatrix<f64>, DVector<f64>, f64) {
+        gram(self)
     }
 
     /// Solves the regression, which must have more rows than parameters.
@@ -254,7 +255,9 @@ impl<'a> Lagged<'a> {
             }
             inner.push(Stretch { start: segment.start, rows: full..rows.end });
         }
-        let mut sums = sum_blocks(&blocks(inner.into_iter()), size + 1, |Stretch { rows, .. }, sums| {
+        let blocks = blocks(inner.into_iter());
+        let mut sums = vec![0.0; blocks.len().max(1) * (size + 1)];
+        sum_blocks(&blocks, size + 1, &mut sums, |Stretch { rows, .. }, sums| {
             let residuals = self.full_residuals(rows, parameters);
             sums[0] += product(&residuals, &residuals);
             let mut next = 1;
@@ -273,7 +276,7 @@ impl<'a> Lagged<'a> {
             next += taps.count;
         }
         sums.iter_mut().zip(edges).for_each(|(sum, edge)| *sum += edge);
-        (sums[0], DVector::from_column_slice(&sums[1..]))
+        (sums[0], DVector::from_column_slice(&sums[1..=size]))
     }
 
     /// The residuals of rows with a full regressor.
@@ -349,7 +352,7 @@ fn scale(signal: &[f64], segments: &[Range<usize>]) -> f64 {
 }
 
 /// The condition number of a triangular factor of which the columns have unit norm.
-fn condition(triangle: &DMatrix<f64>, rows: usize) -> Option<f64> {
+pub(crate) fn condition(triangle: &DMatrix<f64>, rows: usize) -> Option<f64> {
     let zeros = DVector::zeros(triangle.ncols());
     LeastSquares::from_factor(triangle, &zeros, 0.0, rows).ok().map(|factor| factor.condition())
 }

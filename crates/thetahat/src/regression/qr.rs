@@ -17,10 +17,12 @@
 //! folded in blocks of 8192, and the blocks' factors are merged by [`LeastSquares`], which is compensated (folding
 //! 10^6 rows into one triangle cost five times the error bound at condition number 1).
 
+use std::ops::Range;
+
 use thetahat_core::nalgebra::{DMatrix, DVector, Dyn};
 use thetahat_core::{Error, LeastSquares};
 
-use super::blocks::{Stretch, map_blocks};
+use super::blocks::{Stretch, blocks, map_blocks};
 use super::kernel::{add_scaled, product};
 
 /// Rows folded at once: with some ten columns they stay in the first-level cache.
@@ -42,6 +44,16 @@ pub(super) fn factor(
         }
     }
     Ok(whole)
+}
+
+/// The same for consecutive rows and columns of any meaning.
+pub(crate) fn factor_rows(
+    rows: Range<usize>,
+    entry: impl Fn(usize, usize) -> f64 + Sync,
+    columns: usize,
+) -> Result<LeastSquares<f64, Dyn>, Error> {
+    let stretch = Stretch { start: rows.start, rows };
+    factor(&blocks(std::iter::once(stretch)), |_, row, column| entry(row, column), &vec![1.0; columns])
 }
 
 /// The factor of one block.

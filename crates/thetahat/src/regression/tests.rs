@@ -8,7 +8,7 @@ use thetahat_core::nalgebra::{DMatrix, DVector};
 
 use super::gram::gram;
 use super::noise::Noise;
-use super::{Initial, Lagged, Regression, Solver, Taps, Unsolved};
+use super::{Lagged, Presample, Regression, Solver, Taps, Unsolved};
 use crate::model::polynomial::product;
 use double::Double;
 
@@ -17,7 +17,7 @@ struct Case {
     signals: Vec<Vec<f64>>,
     taps: Vec<Taps>,
     segments: Vec<Range<usize>>,
-    initial: Initial,
+    initial: Presample,
 }
 
 /// phi of ARX(na, nb, nk).
@@ -49,7 +49,7 @@ impl Case {
                 _ => 0.0,
             };
             for row in segment.clone() {
-                if self.initial == Initial::Drop && row < segment.start + reach {
+                if self.initial == Presample::Drop && row < segment.start + reach {
                     continue;
                 }
                 let mut values: Vec<f64> = used()
@@ -184,7 +184,7 @@ fn the_gram_matrix_of_any_segments_is_that_of_the_rows() {
             (0, vec![(1, 0)]),
             (9, vec![(9, 1)]),
         ] {
-            for initial in [Initial::Drop, Initial::Zero] {
+            for initial in [Presample::Drop, Presample::Zero] {
                 let signals = (0..=inputs.len()).map(|_| noise.take(end)).collect();
                 let case = Case { signals, taps: taps(na, &inputs), segments: segments.clone(), initial };
                 assert!(gram_error(&case) < 1e-15, "{lengths:?} {na} {inputs:?} {initial:?}");
@@ -202,7 +202,7 @@ fn the_gram_matrix_of_long_signals_is_that_of_the_rows() {
             signals: vec![noise.take(length), noise.take(length)],
             taps: taps(2, &[(3, 7)]),
             segments: vec![0..cut, cut..length],
-            initial: Initial::Drop,
+            initial: Presample::Drop,
         };
         assert!(gram_error(&case) < 1e-15, "{length} {cut}");
     }
@@ -217,7 +217,7 @@ fn no_digits_are_lost_when_signals_grow() {
             signals: Clone::clone(&signals),
             taps: taps(6, &[(5, 3)]),
             segments,
-            initial: Initial::Zero,
+            initial: Presample::Zero,
         };
         assert!(gram_error(&case) < 1e-15);
     }
@@ -242,7 +242,7 @@ fn hard_cases(residual: f64, noise: &mut Noise) -> Vec<Case> {
     let mut cases = Vec::new();
     let mut add = |signals: Vec<Vec<f64>>, taps| {
         let segments = vec![0..100, 103..length];
-        cases.push(Case { signals, taps, segments, initial: Initial::Drop });
+        cases.push(Case { signals, taps, segments, initial: Presample::Drop });
     };
     // Orthogonal regressors.
     let u = noise.take(length);
@@ -320,7 +320,7 @@ fn the_error_does_not_grow_with_the_rows() {
         signals: vec![y, u],
         taps: taps(0, &[(2, 1)]),
         segments: whole(100_000),
-        initial: Initial::Drop,
+        initial: Presample::Drop,
     };
     let lagged = case.lagged();
     for solved in [lagged.solve().unwrap(), Regression::from_factor(&lagged.factor().unwrap()).unwrap()] {
@@ -337,7 +337,7 @@ fn a_factor_of_few_rows_is_one_to_go_on_from() {
         signals: vec![noise.take(length), [vec![0.0; 5], noise.take(length - 5)].concat()],
         taps: taps(2, &[(3, 1)]),
         segments: whole(length),
-        initial: Initial::Drop,
+        initial: Presample::Drop,
     };
     for length in 5..14 {
         let case = case(length, &mut noise);
@@ -364,7 +364,7 @@ fn threads_do_not_change_a_bit() {
         signals: vec![y, u],
         taps: taps(2, &[(2, 1)]),
         segments: vec![0..70_001, 70_002..length],
-        initial: Initial::Drop,
+        initial: Presample::Drop,
     };
     let results: Vec<_> = [1, 3]
         .into_iter()
@@ -398,7 +398,7 @@ fn dependent_columns_are_named() {
             signals: signals.into_iter().cloned().collect(),
             taps,
             segments: whole(length),
-            initial: Initial::Drop,
+            initial: Presample::Drop,
         };
         case.lagged().solve().unwrap_err()
     };

@@ -1,8 +1,11 @@
-use std::ops::Range;
+use std::ops::{ControlFlow, Range};
 
-use super::schema::{Data, Estimation, Missing, Report, Resampling};
+use super::schema::{Data, Estimation, Missing, Report, Source};
 use crate::data::{Detrend, Log, Offset, Record, Rows, checked};
-use crate::estimate::{Estimate, arx, enough};
+use crate::estimate::{
+    Estimate, Method, Monitor, Procedure, SearchOutcome, Stopped, enough, estimate_of_channels,
+};
+use crate::model::{cancel, near_cancellation};
 use crate::respond::Start;
 use crate::validate::{Fit, Horizon, Part};
 use crate::{Error, Initial, Model, Orders, Signal};
@@ -11,19 +14,8 @@ use crate::{Error, Initial, Model, Orders, Signal};
 const ROUNDING: f64 = 1e-13;
 /// Condition numbers above this one are worth a word.
 const ILL_CONDITIONED: f64 = 1e6;
-
-/// Where a log came from, for the report.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Source {
-    /// The file name.
-    pub file: String,
-    /// The column that gave the time.
-    pub time: Option<String>,
-    /// The first time as it was written, where times were dates.
-    pub start: Option<String>,
-    /// How the log was made uniform.
-    pub resampled: Option<Resampling>,
-}
+/// Below this fit, in percent, a model explains little.
+const POOR: f64 = 50.0;
 
 /// What to fit, and to which part of a log.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,8 +32,10 @@ pub struct Plan {
     pub detrend: Detrend,
     /// Channels whose offset is set by hand.
     pub offsets: Vec<(String, f64)>,
-    /// The orders of the ARX model.
+    /// The orders, which say the structure too.
     pub orders: Orders,
+    /// How to estimate.
+    pub method: Method,
     /// What stands for the samples before a segment.
     pub initial: Initial,
 }
@@ -55,7 +49,7 @@ pub struct Plan {
 /// cannot determine the parameters, which are named.
 ///
 /// ```
-/// use thetahat::{Channel, Detrend, Initial, Log, Orders, Plan, Source, identify};
+/// use thetahat::{Channel, Detrend, Initial, Log, Method, Orders, Plan, identify};
 ///
 /// let u: Vec<f64> = (0..200).map(|t| f64::from(t * t % 7)).collect();
 /// let mut y = vec![20.0];
@@ -72,13 +66,27 @@ pub struct Plan {
 ///     detrend: Detrend::Mean,
 ///     offsets: vec![],
 ///     orders: Orders::arx(1, &[1], &[1])?,
-///     initial: Initial::Drop,
+///     method: Method::default(),
+///     initial: Initial::Auto,
 /// };
-/// let report = identify(log, &Source::default(), &plan)?;
+/// let report = identify(log, &[], &plan)?;
 /// assert!(report.model.stable);
 /// # Ok::<(), thetahat::Error>(())
 /// ```
-pub fn identify(mut log: Log, source: &Source, plan: &Plan) -> Result<Report, Error> {
+pub fn identify(log: Log, sources: &[Source], plan: &Plan) -> Result<Report, Error> {
+    identify_monitored(log, sources, plan, &|_| ControlFlow::Continue(()))
+}
+
+/// [`identify`] that tells `monitor` of each iteration of a search. The monitor may end it.
+///
+/// # Errors
+/// As for [`identify`]; [`Error::Interrupted`] if the monitor says so.
+pub fn identify_monitored(
+    mut log: Log,
+    sources: &[Source],
+    plan: &Plan,
+    monitor: Monitor<'_>,
+) -> Result<Report, Error> {
     let names: Vec<&str> = plan.inputs.iter().chain([&plan.output]).map(String::as_str).collect();
     for (position, name) in names.iter().enumerate() {
         log.channel(name)?;
@@ -105,8 +113,8 @@ pub fn identify(mut log: Log, source: &Source, plan: &Plan) -> Result<Report, Er
             "no estimation row has a value in every channel; name other rows or channels",
         ));
     }
-    let reach = if plan.initial == Initial::Drop { plan.orders.reach() } else { 0 };
-    enough(segments.iter().map(|segment| segment.len().saturating_sub(reach)).sum(), &plan.orders)?;
+    let left_out = if plan.initial == Initial::Zero { 0 } else { plan.orders.conditioned() };
+    enough(segments.iter().map(|segment| segment.len().saturating_sub(left_out)).sum(), &plan.orders)?;
     let missing = names.iter().map(|name| {
         let values = &log.channel(name)?.values;
         Ok(Missing {
@@ -120,19 +128,17 @@ pub fn identify(mut log: Log, source: &Source, plan: &Plan) -> Result<Report, Er
     let signals: Vec<Signal> = signals.collect::<Result<_, Error>>()?;
     let (output, inputs) = signals.split_last().ok_or_else(|| Error::data("there is no output"))?;
     let record = log.record(&plan.inputs, &plan.output, &estimation)?;
-    let estimate = arx(&record, &plan.orders, plan.initial)?;
-    let model = Model::arx(&plan.orders, &estimate, log.sample_time(), inputs.to_vec(), output.clone())?;
+    let estimate =
+        estimate_of_channels(&record, &plan.inputs, &plan.orders, &plan.method, plan.initial, monitor)?;
+    let model = Model::new(&plan.orders, &estimate, log.sample_time(), inputs.to_vec(), output.clone())?;
 
     let mut report = Report {
         schema: Report::schema_name(),
         generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
         data: Data {
-            file: source.file.clone(),
+            logs: sources.to_vec(),
             rows: log.rows(),
-            time: source.time.clone(),
-            start: source.start.clone(),
             sample_time: log.sample_time(),
-            resampled: source.resampled.clone(),
             detrend: plan.detrend.to_string(),
             estimation: estimation.clone(),
             validation: validation.clone(),
@@ -140,18 +146,32 @@ pub fn identify(mut log: Log, source: &Source, plan: &Plan) -> Result<Report, Er
             missing,
             time_gaps: log.jumps(),
         },
-        estimation: estimation_of(&estimate, plan.initial),
+        estimation: estimation_of(&estimate),
         fit: Vec::new(),
         warnings: Vec::new(),
         model,
     };
     report.warnings = warnings(&report);
-    judge(&mut report, &record, &estimation, Part::Estimation, plan.initial);
+    judge(&mut report, &record, &estimation, Part::Estimation, estimate.initial());
     if !validation.is_empty() {
         let record = log.record(&plan.inputs, &plan.output, &validation)?;
-        judge(&mut report, &record, &validation, Part::Validation, plan.initial);
+        judge(&mut report, &record, &validation, Part::Validation, estimate.initial());
     }
+    report.warnings.extend(unstable_plant(&report));
     Ok(report)
+}
+
+/// A word on a plant that seems to be unstable, where F, which must be stable, explains little.
+fn unstable_plant(report: &Report) -> Option<String> {
+    let Procedure::PredictionError(search) = &report.estimation.procedure else { return None };
+    let pole = search.unstable_pole?;
+    let explained = report.fit.first()?.percent?;
+    (explained < POOR).then(|| {
+        format!(
+            "the plant seems to be unstable: least squares finds a pole of modulus {pole:.4}; F must be stable and \
+             explains {explained:.1} % only; an unstable plant needs A (arx or armax)"
+        )
+    })
 }
 
 /// Takes a channel's offset from it, in place.
@@ -185,21 +205,19 @@ fn deviations(log: &mut Log, name: &str, plan: &Plan, segments: &[Range<usize>])
     Ok(Signal { name: name.to_owned(), offset })
 }
 
-/// The parameters that a channel's past multiplies; for the output all of them.
+/// The parameters that a channel determines: those of an input's B and F; for the output all of them.
 fn parameters_of(input: Option<usize>, orders: &Orders) -> Vec<String> {
-    let mut names = orders.names();
-    if let Some(input) = input {
-        let first = orders.na + orders.nb[..input].iter().sum::<usize>();
-        names = names.drain(first..first + orders.nb[input]).collect();
-    }
-    names
+    let names = orders.names();
+    let Some(input) = input else { return names };
+    let b = orders.na + orders.nb[..input].iter().sum::<usize>();
+    let f = names.len() - orders.nf[input..].iter().sum::<usize>();
+    [&names[b..b + orders.nb[input]], &names[f..f + orders.nf[input]]].concat()
 }
 
-fn estimation_of(estimate: &Estimate, initial: Initial) -> Estimation {
+fn estimation_of(estimate: &Estimate) -> Estimation {
     Estimation {
-        method: "least-squares".to_owned(),
-        solver: estimate.solver(),
-        initial,
+        procedure: estimate.procedure().clone(),
+        initial: estimate.initial(),
         samples: estimate.samples(),
         mse: estimate.mse(),
         criteria: estimate.criteria(),
@@ -210,8 +228,9 @@ fn estimation_of(estimate: &Estimate, initial: Initial) -> Estimation {
 /// Adds the figures of one part of the log: one step ahead, and driven by the inputs alone where there are any.
 fn judge(report: &mut Report, record: &Record<'_>, rows: &[Rows], part: Part, initial: Initial) {
     let first = match initial {
-        Initial::Drop => Start::Measured,
         Initial::Zero => Start::Zero,
+        Initial::Estimate => Start::Estimated,
+        Initial::Auto | Initial::Drop => Start::Measured,
     };
     let mut looks = vec![(Horizon::Steps { steps: 1 }, first)];
     if report.model.orders.nb.iter().any(|&nb| nb > 0) {
@@ -261,17 +280,55 @@ fn warnings(report: &Report) -> Vec<String> {
         warnings.push("validation rows overlap estimation rows: their figures flatter the model".to_owned());
     }
     if !model.stable {
-        let largest = model.poles.first().map_or(0.0, |pole| pole.re.hypot(pole.im));
+        let largest = model.poles.iter().map(|pole| pole.re.hypot(pole.im)).fold(0.0, f64::max);
         warnings.push(format!(
             "the model is unstable (largest pole {largest:.6}): its free run grows without bound"
         ));
     }
-    if report.estimation.condition > ILL_CONDITIONED {
+    if let Procedure::PredictionError(search) = &report.estimation.procedure {
+        warnings.extend(search_warnings(search));
+    }
+    if let Some((pole, zero)) = near_cancellation(model) {
         warnings.push(format!(
-            "the regressors are nearly dependent (condition number {:.1e}): parameters are uncertain; lower the orders \
-             or sample more slowly",
-            report.estimation.condition
+            "{}: within their uncertainty they are one; lower both orders by one, unless they are known",
+            cancel(&pole, &zero)
         ));
+    }
+    if let Some(condition) = report.estimation.condition.filter(|condition| *condition > ILL_CONDITIONED) {
+        warnings.push(format!(
+            "the regressors are nearly dependent (condition number {condition:.1e}): parameters are uncertain; lower the orders \
+             or sample more slowly"
+        ));
+    }
+    warnings
+}
+
+/// What is worth a word of a search.
+fn search_warnings(search: &SearchOutcome) -> Vec<String> {
+    let mut warnings = Vec::new();
+    let iterations = search.iterations;
+    match search.stopped {
+        Stopped::Converged => {}
+        Stopped::MaxIterations => warnings.push(format!(
+            "no convergence in {iterations} iterations: the parameters are not those of least cost; allow more \
+             (--max-iterations), or lower the orders"
+        )),
+        Stopped::TimeLimit => warnings.push(format!(
+            "no convergence: the time was used up after {iterations} iterations; allow more (--time-limit)"
+        )),
+        Stopped::NoDescent if !search.stability_bound => warnings.push(format!(
+            "the search stopped after {iterations} iterations where no step lowers the cost (gradient {:.1e}): the cost is \
+             flat or rough there; lower the orders",
+            search.gradient_norm
+        )),
+        Stopped::NoDescent => {}
+    }
+    if search.stability_bound {
+        warnings.push(
+            "the search ended at the border of stability: C or F has a root on the unit circle; the data want an \
+             unstable or overdifferenced model, so use arx or armax for an unstable plant, or lower nc or nf"
+                .to_owned(),
+        );
     }
     warnings
 }

@@ -2,8 +2,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::data::Rows;
-use crate::estimate::Solver;
-use crate::{Criteria, Error, Fit, Initial, Interpolation, Model};
+use crate::{Criteria, Error, Fit, Initial, Interpolation, Model, Procedure};
 
 /// The schema that this version writes.
 const SCHEMA: &str = "thetahat.report/1";
@@ -32,18 +31,12 @@ pub struct Report {
 /// Where the data came from and what was done to them. Rows are 1-based and inclusive.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Data {
-    /// The log's file name as it was given.
-    pub file: String,
-    /// The number of rows, after resampling.
+    /// The logs in their order, with the rows that each has among all of them. A log is a segment of its own at least.
+    pub logs: Vec<Source>,
+    /// The number of rows of all logs, after resampling.
     pub rows: usize,
-    /// The column that gave the time, if one did.
-    pub time: Option<String>,
-    /// The first time as it was written, where times were dates.
-    pub start: Option<String>,
     /// Seconds from one row to the next.
     pub sample_time: f64,
-    /// How an irregular log was made uniform, if it was.
-    pub resampled: Option<Resampling>,
     /// How the offsets were found: `none`, `mean`, `linear` or `start:K`.
     pub detrend: String,
     /// The rows asked for to estimate on.
@@ -56,6 +49,21 @@ pub struct Data {
     pub missing: Vec<Missing>,
     /// How often the clock jumps.
     pub time_gaps: usize,
+}
+
+/// Where a log came from.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Source {
+    /// The file name as it was given.
+    pub file: String,
+    /// Its rows, counted through all logs.
+    pub rows: Rows,
+    /// The column that gave the time, if one did.
+    pub time: Option<String>,
+    /// The first time as it was written, where times were dates.
+    pub start: Option<String>,
+    /// How the log was made uniform, if it was irregular.
+    pub resampled: Option<Resampling>,
 }
 
 /// How an irregular log was made uniform.
@@ -81,10 +89,9 @@ pub struct Missing {
 /// How a model was estimated.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Estimation {
-    /// `least-squares`.
-    pub method: String,
-    /// How the least-squares problem was solved.
-    pub solver: Solver,
+    /// How the estimate was found.
+    #[serde(flatten)]
+    pub procedure: Procedure,
     /// What stood for the samples before the first of a segment.
     pub initial: Initial,
     /// N, the samples that count.
@@ -94,8 +101,8 @@ pub struct Estimation {
     /// FPE, AIC, AICc and MDL.
     #[serde(flatten)]
     pub criteria: Criteria,
-    /// The condition number of the regressors, scaled to unit norm.
-    pub condition: f64,
+    /// The condition number of the regressors, scaled to unit norm; for a search that of psi. None where they are dependent.
+    pub condition: Option<f64>,
 }
 
 impl Report {

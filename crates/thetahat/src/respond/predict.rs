@@ -1,72 +1,175 @@
 use std::ops::Range;
 
-use super::{Response, Start, add_filtered, check_inputs, from_measured};
+use super::free_response::until_negligible;
+use super::innovations::innovations;
+use super::{Response, Start, check_inputs};
 use crate::data::Record;
-use crate::model::polynomial::{inverse_series, product};
+use crate::regression::{add_filtered, divide};
 use crate::{Error, Model};
+
+/// Steps that a prediction or a forecast may look ahead: beyond them a number was mistyped.
+pub(super) const MOST_STEPS: usize = 1_000_000;
 
 /// The k-step prediction of a model: y(t) from the outputs up to t - k and the inputs up to t.
 ///
-/// For A y = B u + e, with the division 1 = A E + q^-k F, E of k terms:
+/// With the innovations e(t) = (D/C) [A y - sum_j (B_j/F_j) u_j] and the impulse response h of C/(A D):
 ///
 /// ```text
-/// y^(t | t-k) = sum_j (E B_j)(q) u_j(t) + F(q) y(t - k)
+/// y^(t | t-k) = y(t) - sum_{i<k} h_i e(t-i)
 /// ```
 ///
-/// which equals running the difference equation k steps from measured samples (Ljung, System Identification, 2nd
+/// which is what the equation gives that runs k steps from what was known, with e = 0 (Ljung, System Identification, 2nd
 /// ed. 1999, section 3.2; Åström, Introduction to Stochastic Control Theory, 1970, chapter 6).
-/// [`Start::Measured`] leaves out the samples that do not have all of them; [`Start::Zero`] takes zeros before each segment.
 ///
-/// Signals are deviations from the model's offsets. Cost: O(N (na + nb + k)).
+/// [`Start::Zero`] takes zeros before each segment, and every sample has a prediction. [`Start::Measured`] and
+/// [`Start::Estimated`] leave out the samples without an output k steps before them to look from: the first r + k - 1
+/// of those they look at (for r see [`Start`]). What unknown inputs have done to B/F u is nothing to the first two; the
+/// last estimates it from the one-step errors, whatever k is, as estimates with
+/// [`Initial::Estimate`](crate::Initial::Estimate) do. It leaves out segments with no more samples than there are numbers
+/// to estimate.
+///
+/// Signals are deviations from the model's offsets. Cost: O(N (na + nb + nc + nd + nf + k)), the k up to where h has died
+/// away; for n initial conditions to be estimated O(N n^2) more, up to where their responses have.
 ///
 /// # Errors
-/// [`Error::Argument`] if `horizon` is 0, the record does not have the model's inputs, or the start is
-/// [`Start::Estimated`], which a prediction of an ARX model does not need.
+/// [`Error::Argument`] if `horizon` is 0, the record does not have the model's inputs, or [`Start::Estimated`] is
+/// asked of a model without C, D and F, which has nothing to estimate; [`Error::Undetermined`] if an initial
+/// condition cannot be told from the data, as for a model so unstable that its responses overflow.
+///
+/// ```
+/// use thetahat::{Initial, Model, Orders, Record, Signal, Start, arx, predict};
+///
+/// let u: Vec<f64> = (0..100_u32).map(|t| f64::from(t * t % 7)).collect();
+/// let mut y = vec![1.0];
+/// for t in 1..u.len() {
+///     y.push(0.8 * y[t - 1] + 0.5 * u[t - 1]);
+/// }
+/// let record = Record::new(&y, vec![&u])?;
+/// let orders = Orders::arx(1, &[1], &[1])?;
+/// let estimate = arx(&record, &orders, Initial::Drop)?;
+/// let model = Model::new(&orders, &estimate, 1.0, vec![Signal::default()], Signal::default())?;
+/// // Two steps ahead: from y(48), and from the inputs that are known by then.
+/// let response = predict(&model, &record, 2, Start::Measured)?;
+/// let expected = 0.8 * (0.8 * y[48] + 0.5 * u[48]) + 0.5 * u[49];
+/// assert!((response.values[50] - expected).abs() < 1e-9);
+/// // The first two samples have no output two steps before them.
+/// assert_eq!(response.counted, [2..100]);
+/// # Ok::<(), thetahat::Error>(())
+/// ```
 pub fn predict(model: &Model, record: &Record<'_>, horizon: usize, start: Start) -> Result<Response, Error> {
     if horizon == 0 {
-        return Err(Error::argument("horizon", "a prediction looks at least one step ahead"));
+        return Err(no_step());
     }
     check_inputs(model, record)?;
-    if start == Start::Estimated {
+    check_start(model, start)?;
+    // Farther than from before the first sample to the last there is nothing to look from.
+    let horizon = horizon.min(longest(record) + 1);
+    let response = disturbance_response(model, horizon);
+    let weights: Vec<f64> = response.iter().map(|h| -h).collect();
+    let mut predicted = Response::empty(record.output.len());
+    for found in innovations(model, record, horizon, start)? {
+        let counted = found.counted;
+        let values = &mut predicted.values[counted.clone()];
+        values.copy_from_slice(&record.output[counted.clone()]);
+        let rows = counted.start - found.rows.start..counted.end - found.rows.start;
+        add_filtered(values, &rows, &weights, &found.errors, 0);
+        predicted.counted.push(counted);
+    }
+    Ok(predicted)
+}
+
+/// The standard deviation of the error of a k-step prediction, in units of y: sigma sqrt(sum_{i<k} h_i^2), with h the
+/// impulse response of C/(A D) and sigma^2 the variance of e.
+///
+/// It is that of a true model that started long ago: the uncertainty of the parameters and of the initial condition comes
+/// on top. Infinite where h overflows. Cost: O(k (na + nc + nd)), up to where h has died away.
+///
+/// # Errors
+/// [`Error::Argument`] if `horizon` is 0 or above 10^6.
+///
+/// ```
+/// use thetahat::{Initial, Model, Orders, Record, Signal, arx, prediction_deviation};
+///
+/// let mut y: Vec<f64> = vec![0.0, 1.0];
+/// for t in 2..100 {
+///     y.push(0.8 * y[t - 1] + f64::from(t as u32 * 7 % 11) - 5.0);
+/// }
+/// let orders = Orders::arx(1, &[], &[])?;
+/// let estimate = arx(&Record::new(&y, vec![])?, &orders, Initial::Drop)?;
+/// let model = Model::new(&orders, &estimate, 1.0, vec![], Signal::default())?;
+/// // A = 1 + a q^-1: h = 1, -a, a^2, …
+/// let (sigma, a) = (model.noise_variance.sqrt(), model.a[1]);
+/// assert!((prediction_deviation(&model, 1)? - sigma).abs() < 1e-14);
+/// assert!((prediction_deviation(&model, 2)? - sigma * (1.0 + a * a).sqrt()).abs() < 1e-14);
+/// # Ok::<(), thetahat::Error>(())
+/// ```
+pub fn prediction_deviation(model: &Model, horizon: usize) -> Result<f64, Error> {
+    if horizon == 0 {
+        return Err(no_step());
+    }
+    check_steps("horizon", horizon)?;
+    let response = disturbance_response(model, horizon);
+    Ok(model.noise_variance.sqrt() * accumulated(&response, 1).last().copied().unwrap_or(0.0))
+}
+
+/// The standard deviations of predictions 1 … `steps` steps ahead.
+pub(crate) fn deviations(model: &Model, steps: usize) -> Vec<f64> {
+    let sigma = model.noise_variance.sqrt();
+    let mut deviations = accumulated(&disturbance_response(model, steps), steps);
+    deviations.iter_mut().for_each(|deviation| *deviation *= sigma);
+    deviations
+}
+
+/// sqrt(sum_{i<k} h_i^2) for k = 1, 2, …, at least `length` of them.
+fn accumulated(response: &[f64], length: usize) -> Vec<f64> {
+    let mut size = 0.0_f64;
+    let mut sizes: Vec<f64> = Vec::with_capacity(length);
+    for h in response {
+        // Squares would overflow sooner.
+        size = size.hypot(*h);
+        sizes.push(size);
+    }
+    sizes.resize(length.max(sizes.len()), size);
+    sizes
+}
+
+/// The impulse response h of C/(A D), `length` samples at most: what e does to y.
+fn disturbance_response(model: &Model, length: usize) -> Vec<f64> {
+    let order = model.orders.na + model.orders.nc + model.orders.nd;
+    until_negligible(length, order, |length| {
+        let mut response = vec![0.0; length];
+        response.iter_mut().zip(&model.c).for_each(|(h, c)| *h = *c);
+        divide(&model.a, &mut response);
+        divide(&model.d, &mut response);
+        response
+    })
+}
+
+/// The longest stretch of samples that a response may look at.
+pub(crate) fn longest(record: &Record<'_>) -> usize {
+    let lengths =
+        record.segments.iter().map(Range::len).zip(&record.past).map(|(length, past)| length + past);
+    lengths.max().unwrap_or(0)
+}
+
+pub(super) fn check_start(model: &Model, start: Start) -> Result<(), Error> {
+    if start == Start::Estimated && model.orders.is_linear() {
         return Err(Error::argument(
             "initial",
-            "predictions start from measured samples or from zero; only a free run estimates its start",
+            "a model without C, D and F predicts from measured samples or from zero; only its free run estimates a \
+             start",
         ));
     }
-    // Farther than from before the first sample to the last there is nothing to look from.
-    let longest = record.segments.iter().zip(&record.past).map(|(segment, past)| past + segment.len()).max();
-    let horizon = horizon.min(longest.unwrap_or(0) + 1);
-    let reach = model.orders.reach() + horizon - 1;
-    let mut response = Response::empty(record.output.len());
-    let spans: Vec<(usize, Range<usize>)> = record
-        .segments
-        .iter()
-        .zip(&record.past)
-        .map(|(segment, past)| match start {
-            Start::Measured => from_measured(segment, *past, reach),
-            _ => (segment.start, segment.clone()),
-        })
-        .filter(|(_, counted)| !counted.is_empty())
-        .collect();
-    if spans.is_empty() {
-        return Ok(response);
+    Ok(())
+}
+
+pub(crate) fn check_steps(argument: &str, steps: usize) -> Result<(), Error> {
+    if steps > MOST_STEPS {
+        return Err(Error::argument(argument, format!("{steps} steps are more than {MOST_STEPS}, the most")));
     }
-    let quotient = inverse_series(&model.a, horizon);
-    // A E = 1 - q^-k F: what stands behind the first k terms is -F.
-    let past: Vec<f64> = product(&model.a, &quotient)
-        .iter()
-        .enumerate()
-        .map(|(power, value)| if power < horizon { 0.0 } else { -value })
-        .collect();
-    let inputs: Vec<Vec<f64>> = model.b.iter().map(|b| product(&quotient, b)).collect();
-    for (history, counted) in spans {
-        let values = &mut response.values[counted.clone()];
-        values.fill(0.0);
-        add_filtered(values, &counted, &past, record.output, history);
-        for (weights, u) in inputs.iter().zip(&record.inputs) {
-            add_filtered(values, &counted, weights, u, history);
-        }
-        response.counted.push(counted);
-    }
-    Ok(response)
+    Ok(())
+}
+
+fn no_step() -> Error {
+    Error::argument("horizon", "a prediction looks at least one step ahead")
 }

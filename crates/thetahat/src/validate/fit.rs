@@ -64,6 +64,20 @@ pub struct Fit {
     pub rmse: Option<f64>,
 }
 
+impl Start {
+    /// What a response to measured data had better start from. Free runs, and predictions with C, D or F, of which
+    /// the filters have a memory: [`Start::Estimated`]. Other predictions, which need no more than a few measured
+    /// samples: [`Start::Measured`].
+    ///
+    /// A log without the output leaves only [`Start::Zero`].
+    pub fn natural(model: &Model, horizon: Horizon) -> Self {
+        match horizon {
+            Horizon::Steps { .. } if model.orders.is_linear() => Self::Measured,
+            Horizon::Steps { .. } | Horizon::FreeRun => Self::Estimated,
+        }
+    }
+}
+
 impl Fit {
     /// The response of a model to a record, and its fit.
     ///
@@ -119,7 +133,7 @@ mod tests {
         let orders = Orders::arx(1, &[1], &[1]).unwrap();
         let estimate = arx(&record, &orders, Initial::Drop).unwrap();
         let signal = || Signal { name: String::new(), offset: Offset::default() };
-        let model = Model::arx(&orders, &estimate, 1.0, vec![signal()], signal()).unwrap();
+        let model = Model::new(&orders, &estimate, 1.0, vec![signal()], signal()).unwrap();
         let fit = |record: &Record<'_>, horizon, initial| {
             Fit::of(&model, record, &[], None, horizon, initial).unwrap()
         };
@@ -139,6 +153,18 @@ mod tests {
         assert_eq!(figures.samples, 102);
         assert!((figures.rmse.unwrap() - (error / 102.0).sqrt()).abs() < 1e-14);
         assert!((figures.percent.unwrap() - 100.0 * (1.0 - (error / spread).sqrt())).abs() < 1e-11);
+
+        // What starts naturally counts as much as it can.
+        assert_eq!(Start::natural(&model, Horizon::Steps { steps: 3 }), Start::Measured);
+        assert_eq!(Start::natural(&model, Horizon::FreeRun), Start::Estimated);
+        let orders = Orders::armax(1, &[1], 1, &[1]).unwrap();
+        let armax = Model::from_parameters(&orders, &[-0.5, 1.0, 0.5], None, 1.0, 1.0).unwrap();
+        let start = Start::natural(&armax, Horizon::Steps { steps: 1 });
+        assert_eq!(start, Start::Estimated);
+        assert_eq!(
+            Fit::of(&armax, &record, &[], None, Horizon::Steps { steps: 1 }, start).unwrap().0.samples,
+            100
+        );
 
         // No sample is far enough from a start; nothing to explain.
         let (figures, _) = fit(&record, Horizon::Steps { steps: 300 }, Start::Measured);

@@ -1,0 +1,55 @@
+//! `thetahat bode`: what a stored model is to each frequency.
+
+use std::f64::consts::PI;
+
+use thetahat::{Quantity, frequency_response, logarithmic_frequencies};
+
+use super::stored;
+use crate::args::BodeArguments;
+use crate::failure::Failure;
+use crate::output;
+
+pub(crate) fn bode(arguments: &BodeArguments) -> Result<(), Failure> {
+    let asked = arguments.frequencies.as_deref().map(range).transpose()?;
+    output::apart(&arguments.out, &arguments.report)?;
+    let model = stored::model(&arguments.report)?;
+    let nyquist = PI / model.sample_time;
+    let (low, high) = asked.unwrap_or((nyquist / 1000.0, nyquist));
+    // The ends first: an error then says them as they were given.
+    let responses = frequency_response(&model, &[low, high])
+        .and_then(|_| logarithmic_frequencies(low, high, arguments.points as usize))
+        .and_then(|frequencies| frequency_response(&model, &frequencies))
+        .map_err(|error| Failure::option(&error))?;
+    output::write_csv(&arguments.out, |csv| {
+        csv.write_record([
+            "input",
+            "frequency",
+            "magnitude",
+            "magnitude_standard_error",
+            "phase",
+            "phase_standard_error",
+        ])?;
+        for response in &responses {
+            let name = response.input.as_deref().unwrap_or("noise");
+            for point in &response.points {
+                let degrees = |radians: f64| radians.to_degrees();
+                let Quantity { value: magnitude, standard_error } = point.magnitude;
+                let (phase, turn) = (degrees(point.phase.value), point.phase.standard_error.map(degrees));
+                csv.serialize((name, point.frequency, magnitude, standard_error, phase, turn))?;
+            }
+        }
+        Ok(())
+    })
+}
+
+/// LOW..HIGH.
+fn range(text: &str) -> Result<(f64, f64), Failure> {
+    text.split_once("..")
+        .and_then(|(low, high)| Some((low.trim().parse::<f64>().ok()?, high.trim().parse::<f64>().ok()?)))
+        .filter(|(low, high)| *low > 0.0 && low < high && high.is_finite())
+        .ok_or_else(|| {
+            Failure::usage(format!(
+                "--frequencies {text}: write it as LOW..HIGH in radians per second, both above 0, such as 0.01..3"
+            ))
+        })
+}

@@ -1,0 +1,27 @@
+//! What `fit` wrote, read back.
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::Path;
+
+use thetahat::{Model, Report};
+
+use crate::failure::Failure;
+
+/// A report has this many bytes at most: beyond it the file is something else.
+const LARGEST_REPORT: u64 = 1 << 30;
+
+/// The model of a stored report.
+pub(super) fn model(path: &Path) -> Result<Model, Failure> {
+    let failed = |error| Failure::io(path, "cannot be read", &error);
+    let mut bytes = Vec::new();
+    if path == Path::new("-") {
+        io::stdin().lock().take(LARGEST_REPORT).read_to_end(&mut bytes).map_err(failed)?;
+    } else {
+        File::open(path).map_err(failed)?.take(LARGEST_REPORT).read_to_end(&mut bytes).map_err(failed)?;
+    }
+    let bad = |message: String| Failure::data(format!("{}: {message}", path.display()));
+    let text = String::from_utf8(bytes)
+        .map_err(|_| bad("this is not a thetahat report: not UTF-8 text".to_owned()))?;
+    Ok(Report::from_json(&text).map_err(|error| bad(error.to_string()))?.model)
+}

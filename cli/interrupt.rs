@@ -1,0 +1,121 @@
+//! Ctrl-C: the program ends, and no file is left half written.
+//!
+//! A search that asks for it ends by itself at its next iteration. At any other time, and on the second Ctrl-C, the program
+//! ends at once, without the file that it was writing.
+
+use std::fs;
+use std::io;
+use std::path::PathBuf;
+use std::process;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use indicatif::ProgressBar;
+use tempfile::NamedTempFile;
+use thetahat::Error;
+
+use crate::failure::Failure;
+use crate::output::say;
+
+/// What a shell gives for a program that SIGINT ended.
+pub(crate) const EXIT_CODE: u8 = 130;
+
+static STATE: Mutex<State> = Mutex::new(State::new());
+
+/// What the handler, which runs on a thread of its own, must know.
+#[derive(Debug)]
+struct State {
+    /// Whether a search is under way that looks at `asked`, and whether it was asked to end.
+    searching: bool,
+    asked: bool,
+    /// The file that is being written, under its passing name.
+    unfinished: Option<PathBuf>,
+    /// Whether something is written already.
+    written: bool,
+    /// What stands on the terminal.
+    bar: Option<ProgressBar>,
+}
+
+impl State {
+    const fn new() -> Self {
+        Self { searching: false, asked: false, unfinished: None, written: false, bar: None }
+    }
+}
+
+fn state() -> MutexGuard<'static, State> {
+    STATE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Begins to listen. Where Ctrl-C is ignored, as of a job in the background of a script, it stays so.
+pub(crate) fn listen() {
+    *state() = State::new();
+    // The handler of an earlier run in this process serves as well.
+    let _ = ctrlc::try_set_handler(|| {
+        let mut state = state();
+        if state.searching && !state.asked {
+            state.asked = true;
+            return;
+        }
+        if let Some(bar) = &state.bar {
+            bar.finish_and_clear();
+        }
+        if let Some(path) = &state.unfinished {
+            // What is gone already need not be removed.
+            let _ = fs::remove_file(path);
+        }
+        say(message(state.written));
+        // The state is still locked: the file cannot be finished now.
+        process::exit(EXIT_CODE.into());
+    });
+}
+
+/// The line for a program that was interrupted.
+pub(crate) fn message(written: bool) -> &'static str {
+    if written { "interrupted" } else { "interrupted; nothing was written" }
+}
+
+/// Whether something was written.
+pub(crate) fn has_written() -> bool {
+    state().written
+}
+
+/// Notes that output begins that cannot be taken back.
+pub(crate) fn writing() {
+    state().written = true;
+}
+
+/// Makes the file that is removed if the program is interrupted before [`finish`].
+pub(crate) fn begin(make: impl FnOnce() -> io::Result<NamedTempFile>) -> io::Result<NamedTempFile> {
+    let mut state = state();
+    let file = make()?;
+    state.unfinished = Some(file.path().to_owned());
+    Ok(file)
+}
+
+/// Moves the file to its place.
+pub(crate) fn finish<T>(moving: impl FnOnce() -> Result<T, io::Error>) -> Result<T, io::Error> {
+    let mut state = state();
+    state.unfinished = None;
+    let moved = moving()?;
+    state.written = true;
+    Ok(moved)
+}
+
+/// Notes what to clear from the terminal.
+pub(crate) fn shows(bar: Option<ProgressBar>) {
+    state().bar = bar;
+}
+
+/// Whether the search that asks this has to end. From now on it has a chance to.
+pub(crate) fn asked() -> bool {
+    let mut state = state();
+    state.searching = true;
+    state.asked
+}
+
+/// Runs an estimation that may look at [`asked`].
+pub(crate) fn during<T>(estimation: impl FnOnce() -> Result<T, Error>) -> Result<Result<T, Error>, Failure> {
+    let result = estimation();
+    let mut state = state();
+    state.searching = false;
+    if state.asked { Err(Failure::interrupted()) } else { Ok(result) }
+}

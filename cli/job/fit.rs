@@ -1,0 +1,92 @@
+use std::path::{Path, PathBuf};
+
+use thetahat::{Detrend, Initial, Method, Rows};
+
+use super::orders::OrderJob;
+use super::{LogJob, method, parsed, rows};
+use crate::args::{FitArguments, InitialArgument};
+use crate::failure::Failure;
+
+/// A model to fit.
+#[derive(Debug)]
+pub(crate) struct FitJob {
+    /// The logs, at least one.
+    pub(crate) paths: Vec<PathBuf>,
+    /// How all of them are read.
+    pub(crate) log: LogJob,
+    /// Named inputs; none: those called u, u1, u2, …
+    pub(crate) inputs: Option<Vec<String>>,
+    /// The named output; none: y.
+    pub(crate) output: Option<String>,
+    pub(crate) estimate: Vec<Rows>,
+    pub(crate) validate: Vec<Rows>,
+    pub(crate) detrend: Detrend,
+    pub(crate) offsets: Vec<(String, f64)>,
+    pub(crate) orders: OrderJob,
+    pub(crate) method: Method,
+    pub(crate) initial: Initial,
+}
+
+impl FitJob {
+    pub(crate) fn resolve(arguments: &FitArguments) -> Result<Self, Failure> {
+        let orders = OrderJob::resolve(&arguments.model)?;
+        let job = Self {
+            paths: arguments.logs.clone(),
+            log: LogJob::resolve(&arguments.log, &arguments.clock)?,
+            inputs: (!arguments.input.is_empty()).then(|| arguments.input.clone()),
+            output: arguments.output.clone(),
+            estimate: rows("--estimate", &arguments.estimate)?,
+            validate: rows("--validate", &arguments.validate)?,
+            detrend: parsed("--detrend", &arguments.detrend)?,
+            offsets: offsets(&arguments.offset)?,
+            method: method::method(arguments, &orders)?,
+            initial: initial(arguments.model.initial, &orders)?,
+            orders,
+        };
+        if job.paths.iter().filter(|path| *path == Path::new("-")).count() > 1 {
+            return Err(Failure::usage("only one of the logs can come from standard input (-)"));
+        }
+        if let Some(inputs) = &job.inputs {
+            if !job.orders.has_inputs() {
+                return Err(Failure::usage(
+                    "the orders make a model without inputs; leave out --input, or give an --nb above 0",
+                ));
+            }
+            job.orders.of(inputs.len())?;
+        }
+        Ok(job)
+    }
+}
+
+/// Offsets set by hand, one for a channel.
+fn offsets(texts: &[String]) -> Result<Vec<(String, f64)>, Failure> {
+    let mut offsets: Vec<(String, f64)> = Vec::new();
+    for text in texts {
+        let (name, value) = text
+            .rsplit_once('=')
+            .and_then(|(name, value)| Some((name.to_owned(), value.trim().parse::<f64>().ok()?)))
+            .filter(|(_, value)| value.is_finite())
+            .ok_or_else(|| {
+                Failure::usage(format!("--offset {text}: write it as NAME=VALUE, such as u=4.5"))
+            })?;
+        if offsets.iter().any(|(other, _)| *other == name) {
+            return Err(Failure::usage(format!("--offset: '{name}' has two; give one")));
+        }
+        offsets.push((name, value));
+    }
+    Ok(offsets)
+}
+
+fn initial(argument: InitialArgument, orders: &OrderJob) -> Result<Initial, Failure> {
+    Ok(match argument {
+        InitialArgument::Drop if orders.is_filtered() => {
+            return Err(Failure::usage(
+                "--initial drop is for models without F, whose errors depend on few samples; use zero, estimate or auto",
+            ));
+        }
+        InitialArgument::Auto => Initial::Auto,
+        InitialArgument::Drop => Initial::Drop,
+        InitialArgument::Zero => Initial::Zero,
+        InitialArgument::Estimate => Initial::Estimate,
+    })
+}

@@ -1,0 +1,217 @@
+//! Searches against one another, and what they say when something is wrong.
+
+use super::*;
+use crate::estimate::{Procedure, Step};
+use crate::regression::noise::Noise;
+
+/// The response of numerator/denominator from rest.
+fn filtered(numerator: &[f64], denominator: &[f64], signal: &[f64]) -> Vec<f64> {
+    let mut response: Vec<f64> = Vec::new();
+    for t in 0..signal.len() {
+        let driven: f64 = (0..numerator.len().min(t + 1)).map(|i| numerator[i] * signal[t - i]).sum();
+        let past: f64 = (1..denominator.len().min(t + 1)).map(|i| denominator[i] * response[t - i]).sum();
+        response.push(driven - past);
+    }
+    response
+}
+
+/// A Box-Jenkins plant: its input and its output.
+fn box_jenkins(length: usize, noise: &mut Noise) -> (Vec<f64>, Vec<f64>) {
+    let (u, e) = (noise.take(length), noise.take(length));
+    let x = filtered(&[0.0, 1.0, 0.5], &[1.0, -1.5, 0.7], &u);
+    let v = filtered(&[1.0, 0.5], &[1.0, -0.8], &e);
+    let y = x.iter().zip(&v).map(|(x, v)| x + 0.3 * v).collect();
+    (u, y)
+}
+
+fn found(record: &Record<'_>, orders: &Orders, initial: Initial, search: &Search) -> Result<Estimate, Error> {
+    prediction_error(record, orders, initial, search, &|_| std::ops::ControlFlow::Continue(()))
+}
+
+fn outcome(estimate: &Estimate) -> &SearchOutcome {
+    match estimate.procedure() {
+        Procedure::PredictionError(outcome) => outcome,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn all_algorithms_reach_the_same_minimum() {
+    let mut noise = Noise(1);
+    let (u, y) = box_jenkins(1000, &mut noise);
+    let record = Record::new(&y, vec![&u]).unwrap();
+    for orders in [
+        Orders::armax(2, &[2], 2, &[1]).unwrap(),
+        Orders::oe(&[2], &[2], &[1]).unwrap(),
+        Orders::bj(&[2], 1, 1, &[2], &[1]).unwrap(),
+        Orders::new(1, &[2], 1, 1, &[1], &[1]).unwrap(),
+    ] {
+        let tight = Search { tolerance: 1e-13, ..Search::default() };
+        let best = found(&record, &orders, Initial::Auto, &tight).unwrap();
+        assert_eq!(outcome(&best).stopped, Stopped::Converged);
+        assert!(outcome(&best).gradient_norm < 1e-5);
+        assert!(outcome(&best).costs.windows(2).all(|pair| pair[1] < pair[0]));
+        for algorithm in [Algorithm::GaussNewton, Algorithm::Newton, Algorithm::Gradient] {
+            let slow = algorithm == Algorithm::Gradient;
+            let search = Search {
+                algorithm,
+                max_iterations: 3000,
+                tolerance: if slow { 1e-9 } else { 1e-13 },
+                step: Step { c1: 1.0, c2: None },
+                ..Search::default()
+            };
+            let other = found(&record, &orders, Initial::Auto, &search).unwrap();
+            let excess = other.mse() / best.mse() - 1.0;
+            assert!(excess.abs() < 1e-8, "{algorithm:?} {:?} {excess:e}", orders.structure());
+        }
+    }
+}
+
+#[test]
+fn a_falling_step_of_steepest_descent_is_c1_over_c2_and_the_iteration() {
+    let mut noise = Noise(2);
+    let (u, y) = box_jenkins(500, &mut noise);
+    let record = Record::new(&y, vec![&u]).unwrap();
+    let orders = Orders::oe(&[2], &[2], &[1]).unwrap();
+    let step = Step { c1: 2.0, c2: Some(4.0) };
+    let search = Search { algorithm: Algorithm::Gradient, max_iterations: 5, step, ..Search::default() };
+    let estimate = found(&record, &orders, Initial::Zero, &search).unwrap();
+    assert_eq!(outcome(&estimate).step, Some(step));
+    assert!(outcome(&estimate).iterations <= 5);
+}
+
+#[test]
+fn the_report_says_why_a_search_stopped() {
+    let mut noise = Noise(3);
+    let (u, y) = box_jenkins(500, &mut noise);
+    let record = Record::new(&y, vec![&u]).unwrap();
+    let orders = Orders::bj(&[2], 1, 1, &[2], &[1]).unwrap();
+    let none = Search { max_iterations: 0, tolerance: 1e-14, ..Search::default() };
+    let estimate = found(&record, &orders, Initial::Zero, &none).unwrap();
+    assert_eq!((outcome(&estimate).stopped, outcome(&estimate).iterations), (Stopped::MaxIterations, 0));
+    let no_time =
+        Search { time_limit: Some(std::time::Duration::ZERO), tolerance: 1e-14, ..Search::default() };
+    let estimate = found(&record, &orders, Initial::Zero, &no_time).unwrap();
+    assert_eq!(outcome(&estimate).stopped, Stopped::TimeLimit);
+    let stop = |_| std::ops::ControlFlow::Break(());
+    let interrupted = prediction_error(&record, &orders, Initial::Auto, &Search::default(), &stop);
+    assert_eq!(interrupted.unwrap_err(), Error::Interrupted);
+}
+
+#[test]
+fn more_starts_never_end_at_a_higher_cost_and_the_same_seed_gives_the_same_bits() {
+    let mut noise = Noise(4);
+    let (u, y) = box_jenkins(400, &mut noise);
+    let record = Record::new(&y, vec![&u]).unwrap();
+    let orders = Orders::bj(&[3], 2, 2, &[3], &[1]).unwrap();
+    let one = found(&record, &orders, Initial::Estimate, &Search::default()).unwrap();
+    let several = Search { starts: 12, seed: 5, ..Search::default() };
+    let many = found(&record, &orders, Initial::Estimate, &several).unwrap();
+    assert!(many.mse() <= one.mse() * (1.0 + 1e-7));
+    assert!(outcome(&many).starts.len() >= 13);
+    assert_eq!(many, found(&record, &orders, Initial::Estimate, &several).unwrap());
+}
+
+#[test]
+fn initial_conditions_are_estimated_where_they_are_worth_it() {
+    let mut noise = Noise(5);
+    let u = noise.take(1500);
+    // Slow, so that the start is seen for long.
+    let x = filtered(&[0.0, 0.02], &[1.0, -1.98, 0.9801], &u);
+    let y: Vec<f64> = x.iter().map(|x| x + 0.05 * noise.next()).collect();
+    let orders = Orders::oe(&[1], &[2], &[1]).unwrap();
+    let fit = |from: usize, initial| {
+        let record = Record::new(&y[from..], vec![&u[from..]]).unwrap();
+        found(&record, &orders, initial, &Search::default()).unwrap()
+    };
+    assert_eq!(fit(0, Initial::Auto).initial(), Initial::Zero);
+    assert_eq!(fit(0, Initial::Auto).mse(), fit(0, Initial::Zero).mse());
+    let moving = fit(700, Initial::Auto);
+    assert_eq!((moving.initial(), outcome(&moving).initial_conditions), (Initial::Estimate, 2));
+    assert!((moving.mse() / fit(700, Initial::Estimate).mse() - 1.0).abs() < 1e-7);
+    assert!(fit(700, Initial::Zero).mse() > 2.0 * moving.mse());
+    let record = Record::new(&y, vec![&u]).unwrap();
+    assert!(found(&record, &orders, Initial::Drop, &Search::default()).is_err());
+}
+
+#[test]
+fn segments_of_one_experiment_give_the_model_of_the_whole() {
+    let mut noise = Noise(6);
+    let (u, y) = box_jenkins(4000, &mut noise);
+    let record = Record::new(&y, vec![&u]).unwrap();
+    let mut cut = record.clone();
+    cut.segments = vec![0..1000, 1001..1004, 1010..2500, 2510..4000];
+    cut.past = vec![0; 4];
+    for orders in [Orders::armax(2, &[2], 1, &[1]).unwrap(), Orders::bj(&[2], 1, 1, &[2], &[1]).unwrap()] {
+        let whole = found(&record, &orders, Initial::Auto, &Search::default()).unwrap();
+        let parts = found(&cut, &orders, Initial::Auto, &Search::default()).unwrap();
+        let covariance = whole.covariance().unwrap();
+        for (index, (a, b)) in whole.parameters().iter().zip(parts.parameters()).enumerate() {
+            assert!((a - b).abs() < 0.5 * covariance[index][index].sqrt(), "{a} {b}");
+        }
+    }
+}
+
+#[test]
+fn units_change_nothing_but_the_gain() {
+    let mut noise = Noise(7);
+    let (u, y) = box_jenkins(800, &mut noise);
+    let orders = Orders::bj(&[2], 1, 1, &[2], &[1]).unwrap();
+    let tight = Search { tolerance: 1e-13, ..Search::default() };
+    let fit = |y_size: f64, u_size: f64| {
+        let (y, u): (Vec<f64>, Vec<f64>) =
+            (y.iter().map(|y| y * y_size).collect(), u.iter().map(|u| u * u_size).collect());
+        found(&Record::new(&y, vec![&u]).unwrap(), &orders, Initial::Auto, &tight)
+    };
+    let unit = fit(1.0, 1.0).unwrap();
+    for (y_size, u_size) in [(1e30, 1.0), (1.0, 1e-30), (1e-60, 1e60), (1e100, 1e100)] {
+        let scaled = fit(y_size, u_size).unwrap();
+        for (index, (a, b)) in unit.parameters().iter().zip(scaled.parameters()).enumerate() {
+            let b = if index < 2 { b * u_size / y_size } else { *b };
+            assert!((a - b).abs() < 1e-5 * a.abs(), "{index}: {a} {b}, {y_size} {u_size}");
+        }
+    }
+    for size in [1e200, 1e-200, 1e300] {
+        assert!(fit(size, 1.0).is_err(), "{size}");
+        let _ = fit(1.0, size);
+    }
+}
+
+#[test]
+fn what_cannot_be_estimated_is_refused_in_words() {
+    let mut noise = Noise(8);
+    let (u, y) = box_jenkins(300, &mut noise);
+    let zero = vec![0.0; 300];
+    let orders = [
+        Orders::armax(2, &[2], 2, &[1]).unwrap(),
+        Orders::oe(&[2], &[2], &[1]).unwrap(),
+        Orders::bj(&[2], 2, 2, &[2], &[1]).unwrap(),
+    ];
+    for orders in &orders {
+        for initial in [Initial::Zero, Initial::Estimate, Initial::Auto] {
+            let fit = |y: &[f64], u: &[f64]| {
+                let record = Record::new(y, vec![u]).unwrap();
+                found(&record, orders, initial, &Search::default())
+            };
+            for length in [1, 2, 3, 4] {
+                let refused = fit(&y[..length], &u[..length]).unwrap_err();
+                assert!(matches!(refused, Error::Undetermined { .. }), "{length}: {refused}");
+            }
+            for (y, u) in [(&zero, &u), (&y, &zero), (&zero, &zero)] {
+                assert!(fit(y, u).is_err());
+            }
+            let none = Record::new(&y, vec![]).unwrap();
+            assert!(matches!(found(&none, orders, initial, &Search::default()), Err(Error::Argument { .. })));
+        }
+    }
+    let record = Record::new(&y, vec![&u]).unwrap();
+    for search in [
+        Search { tolerance: 0.0, ..Search::default() },
+        Search { tolerance: f64::NAN, ..Search::default() },
+        Search { step: Step { c1: -1.0, c2: None }, ..Search::default() },
+        Search { guess: Some(vec![1.0]), ..Search::default() },
+    ] {
+        let refused = found(&record, &orders[0], Initial::Auto, &search).unwrap_err();
+        assert!(matches!(refused, Error::Argument { .. }), "{refused}");
+    }
+}

@@ -1,0 +1,251 @@
+//! The recipes for each structure, put together from those for the plant and those for the noise.
+
+use std::ops::Range;
+
+use super::Candidate;
+use super::noise::{Equation, Mixed, behind};
+use super::output_error::{OutputError, Start};
+use super::plant::{Equations, Group, Input, Limits, Plant, Point, divided, energy, multiplied};
+use crate::Orders;
+
+/// Rounds of least squares with filtered signals.
+pub(super) const ROUNDS: usize = 3;
+const ITERATIONS: Limits = Limits { iterations: 20, tolerance: 1e-3 };
+/// Below this fraction of sum y^2, a plant's errors are rounding.
+const EXACT: f64 = 1e-20;
+
+/// The coefficients without leading ones, those of b and f for each input.
+#[derive(Debug, Clone)]
+pub(super) struct Polynomials {
+    pub(super) a: Vec<f64>,
+    pub(super) b: Vec<Vec<f64>>,
+    pub(super) c: Vec<f64>,
+    pub(super) d: Vec<f64>,
+    pub(super) f: Vec<Vec<f64>>,
+}
+
+impl Polynomials {
+    pub(super) fn candidate(self, name: &'static str, unstable_pole: Option<f64>) -> Candidate {
+        let parts = [vec![self.a], self.b, vec![self.c, self.d], self.f];
+        Candidate { name, parameters: parts.concat().concat(), unstable_pole }
+    }
+}
+
+/// All starts for a structure.
+pub(super) fn starts(
+    output: &[f64],
+    inputs: &[&[f64]],
+    segments: &[Range<usize>],
+    orders: &Orders,
+) -> Vec<Candidate> {
+    let data = Data { output, inputs, segments, orders };
+    let driven = orders.nb.iter().any(|&nb| nb > 0);
+    let filtered = orders.nf.iter().any(|&nf| nf > 0);
+    match (driven, filtered, orders.na > 0, orders.nd > 0) {
+        (false, _, false, _) => data.noise().into_iter().collect(),
+        (_, false, _, false) => data.armax().into_iter().collect(),
+        (_, false, true, true) => data.ararmax(),
+        (_, _, false, _) => data.box_jenkins(&data.output_error().starts()),
+        (_, true, true, _) => data.general(),
+    }
+}
+
+/// A record and what is asked of it.
+#[derive(Clone, Copy)]
+pub(super) struct Data<'a> {
+    pub(super) output: &'a [f64],
+    pub(super) inputs: &'a [&'a [f64]],
+    pub(super) segments: &'a [Range<usize>],
+    pub(super) orders: &'a Orders,
+}
+
+impl<'a> Data<'a> {
+    pub(super) fn equation(&self) -> Equation<'a> {
+        let inputs = self.inputs.iter().enumerate();
+        let input = |(j, signal): (usize, &&'a [f64])| Input {
+            signal,
+            first: self.orders.nk[j],
+            count: self.orders.nb[j],
+        };
+        Equation {
+            output: self.output,
+            order: self.orders.na,
+            inputs: inputs.map(input).collect(),
+            segments: self.segments,
+        }
+    }
+
+    pub(super) fn unit_f(&self) -> Vec<Vec<f64>> {
+        self.orders.nf.iter().map(|&nf| vec![0.0; nf]).collect()
+    }
+
+    /// y = C/D e.
+    fn noise(&self) -> Option<Candidate> {
+        let Mixed { a: d, c, .. } = self.noise_of(self.output, self.segments)?;
+        let b = vec![Vec::new(); self.inputs.len()];
+        let found =
+            Polynomials { a: Vec::new(), b, c: c[1..].to_vec(), d: d[1..].to_vec(), f: self.unit_f() };
+        Some(found.candidate("hannan-rissanen", None))
+    }
+
+    /// C and D, the latter as a, of D v = C e.
+    pub(super) fn noise_of(&self, v: &[f64], segments: &[Range<usize>]) -> Option<Mixed> {
+        Equation { output: v, order: self.orders.nd, inputs: Vec::new(), segments }
+            .hannan_rissanen(self.orders.nc)
+    }
+
+    /// A y = B u + C e, and without inputs A y = C e.
+    fn armax(&self) -> Option<Candidate> {
+        let Mixed { a, b, c } = self.equation().hannan_rissanen(self.orders.nc)?;
+        let found = Polynomials {
+            a: a[1..].to_vec(),
+            b,
+            c: c[1..].to_vec(),
+            d: vec![0.0; self.orders.nd],
+            f: self.unit_f(),
+        };
+        Some(found.candidate("hannan-rissanen", None))
+    }
+
+    /// A y = B u + C/D e by A and B that are consistent in noise of any colour, each improved by generalised least squares:
+    /// C and D from w = A y - B u, then A and B by least squares on y and u filtered by D/C (Clarke 1967).
+    fn ararmax(&self) -> Vec<Candidate> {
+        let equation = self.equation();
+        let orders = self.orders;
+        let by_regression = equation.hannan_rissanen(orders.nc + orders.nd);
+        let starts = [("hannan-rissanen", by_regression), ("refined-instruments", self.by_instruments())];
+        let refined = starts.into_iter().filter_map(|(name, start)| {
+            let (_, plant, noise) = self.generalised(&equation, start?)?;
+            let found = Polynomials {
+                a: plant.a[1..].to_vec(),
+                b: plant.b,
+                c: noise.c[1..].to_vec(),
+                d: noise.a[1..].to_vec(),
+                f: self.unit_f(),
+            };
+            Some(found.candidate(name, None))
+        });
+        refined.collect()
+    }
+
+    /// A and B as the plant B/A of an output-error model.
+    fn by_instruments(&self) -> Option<Mixed> {
+        let inputs = self.equation().inputs;
+        if inputs.iter().all(|input| input.count == 0) {
+            return None;
+        }
+        let group = Group { order: self.orders.na, free: self.orders.reach(), inputs };
+        let plant = Plant { output: self.output, groups: vec![group], segments: self.segments };
+        let first = plant.iterate(&plant.unit(), Equations::SteiglitzMcBride, None, ITERATIONS)?;
+        let best = plant.iterate(&first.denominators, Equations::RefinedInstruments, None, ITERATIONS)?;
+        let mut point = Point::new(&plant);
+        point.move_to(&best.denominators, None)?;
+        let a = best.denominators.into_iter().next()?;
+        (!point.undetermined()).then(|| Mixed { a, b: point.numerators, c: vec![1.0] })
+    }
+
+    /// Rounds of generalised least squares; the plant and the noise with the lowest sum of squared errors.
+    pub(super) fn generalised(&self, equation: &Equation<'_>, start: Mixed) -> Option<(f64, Mixed, Mixed)> {
+        let reach = self.orders.reach();
+        let later = behind(self.segments, reach);
+        let mut plant = start;
+        let mut best: Option<(f64, Mixed, Mixed)> = None;
+        for _ in 0..ROUNDS {
+            let w = equation.errors(&plant, reach);
+            let Some(noise) = self.noise_of(&w, &later) else { break };
+            let cost = energy(&self.whitened(&noise, &w, &later), &later);
+            if best.as_ref().is_some_and(|(lowest, ..)| cost >= *lowest) {
+                break;
+            }
+            let output = self.whitened(&noise, equation.output, self.segments);
+            let inputs: Vec<Vec<f64>> = equation
+                .inputs
+                .iter()
+                .map(|input| self.whitened(&noise, input.signal, self.segments))
+                .collect();
+            best = Some((cost, plant, noise));
+            let filtered = Equation {
+                output: &output,
+                order: equation.order,
+                inputs: equation
+                    .inputs
+                    .iter()
+                    .zip(&inputs)
+                    .map(|(input, signal)| Input { signal, ..input.clone() })
+                    .collect(),
+                segments: &later,
+            };
+            let Some(next) = filtered.least_squares() else { break };
+            plant = next;
+        }
+        best
+    }
+
+    /// (D/C) x from rest in each segment.
+    pub(super) fn whitened(&self, noise: &Mixed, signal: &[f64], segments: &[Range<usize>]) -> Vec<f64> {
+        let mut whitened = Vec::new();
+        divided(&mut whitened, &multiplied(&noise.a, signal, segments), &noise.c, segments);
+        whitened
+    }
+
+    /// (D/C) u_j.
+    pub(super) fn whitened_inputs(&self, noise: &Mixed) -> Vec<Vec<f64>> {
+        self.inputs.iter().map(|input| self.whitened(noise, input, self.segments)).collect()
+    }
+
+    /// y = B/F u + C/D e: F whatever the noise, C and D from y - x; then F, B and the noise once more with all signals
+    /// filtered by D/C (Young 1976; Young and Jakeman, Int. J. Control 29, 1979).
+    pub(super) fn box_jenkins(&self, starts: &[Start]) -> Vec<Candidate> {
+        let candidate = |name, start: &Start| {
+            let noise = self.noise_behind(start);
+            (start.candidate(name, noise.as_ref(), self.orders), noise)
+        };
+        let mut candidates = Vec::new();
+        for (position, start) in starts.iter().enumerate() {
+            let (found, noise) = candidate(start.name, start);
+            candidates.push(found);
+            // The recipe that leads.
+            let (0, Some(noise)) = (position, noise) else { continue };
+            let output = self.whitened(&noise, self.output, self.segments);
+            let inputs = self.whitened_inputs(&noise);
+            let inputs: Vec<&[f64]> = inputs.iter().map(Vec::as_slice).collect();
+            let whitened = OutputError::new(&output, &inputs, self.segments, self.orders);
+            let refined = whitened.refined("filtered-refined-instruments", start).and_then(|refined| {
+                // What the refined F leaves of y itself.
+                let of_output = self.output_error().at(refined.name, &refined.f, refined.unstable_pole)?;
+                Some(Start { b: refined.b, ..of_output })
+            });
+            candidates.extend(refined.map(|refined| candidate(refined.name, &refined).0));
+        }
+        candidates
+    }
+
+    /// y = B/F u + v.
+    pub(super) fn output_error(&self) -> OutputError<'a> {
+        OutputError::new(self.output, self.inputs, self.segments, self.orders)
+    }
+
+    /// The noise model of what a plant leaves, where there is no A; none where that is rounding, or white by the orders.
+    pub(super) fn noise_behind(&self, start: &Start) -> Option<Mixed> {
+        if self.orders.nc + self.orders.nd == 0 {
+            return None;
+        }
+        // Inputs without F have no free response to make up for unknown samples before a segment.
+        let segments = behind(self.segments, self.orders.conditioned() - self.orders.nd);
+        let left = energy(&start.errors, &segments);
+        let exact = left <= EXACT * energy(self.output, self.segments);
+        if exact { None } else { self.noise_of(&start.errors, &segments) }
+    }
+}
+
+impl Start {
+    /// With C and D, for a model of these orders without A.
+    pub(super) fn candidate(&self, name: &'static str, noise: Option<&Mixed>, orders: &Orders) -> Candidate {
+        let (c, d) = noise.map_or_else(
+            || (vec![0.0; orders.nc], vec![0.0; orders.nd]),
+            |noise| (noise.c[1..].to_vec(), noise.a[1..].to_vec()),
+        );
+        Polynomials { a: vec![0.0; orders.na], b: self.b.clone(), c, d, f: self.f.clone() }
+            .candidate(name, self.unstable_pole)
+    }
+}

@@ -1,0 +1,56 @@
+//! Iterations of a search take no memory: more of them allocate no more.
+
+use allocation_counter::measure;
+use thetahat::{Algorithm, Initial, Method, Orders, Procedure, Record, Search, estimate};
+
+/// A signal that looks random, and is the same everywhere.
+fn signal(length: usize, mut state: u32) -> Vec<f64> {
+    let mut next = || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        f64::from(state >> 8) / f64::from(1_u32 << 23) - 1.0
+    };
+    (0..length).map(|_| next()).collect()
+}
+
+#[test]
+fn iterations_take_no_memory() {
+    let (u, e) = (signal(2000, 1), signal(2000, 2));
+    let mut y = vec![0.0; 2000];
+    for t in 2..2000 {
+        y[t] = 1.5 * y[t - 1] - 0.7 * y[t - 2] + u[t - 1] + e[t] + 0.6 * e[t - 1];
+    }
+    let record = Record::new(&y, vec![&u]).unwrap();
+    for orders in [
+        Orders::armax(2, &[1], 1, &[1]).unwrap(),
+        Orders::oe(&[2], &[2], &[1]).unwrap(),
+        Orders::bj(&[2], 1, 2, &[2], &[1]).unwrap(),
+        Orders::new(1, &[2], 1, 1, &[1], &[1]).unwrap(),
+    ] {
+        for algorithm in
+            [Algorithm::LevenbergMarquardt, Algorithm::GaussNewton, Algorithm::Newton, Algorithm::Gradient]
+        {
+            // A guess far from the minimum, and a tolerance that is never met.
+            let fit = |max_iterations| {
+                let guess = vec![0.1; orders.parameters()];
+                let search = Search {
+                    algorithm,
+                    max_iterations,
+                    tolerance: 1e-300,
+                    guess: Some(guess),
+                    ..Search::default()
+                };
+                let mut iterations = 0;
+                let counted = measure(|| {
+                    let method = Method::PredictionError(search);
+                    let found = estimate(&record, &orders, &method, Initial::Zero).unwrap();
+                    let Procedure::PredictionError(outcome) = found.procedure() else { panic!("a search") };
+                    iterations = outcome.iterations;
+                });
+                (iterations, counted.count_total)
+            };
+            let ((few, before), (many, after)) = (fit(1), fit(4));
+            assert!(many > few, "{algorithm:?} {:?}", orders.structure());
+            assert_eq!(after, before, "{algorithm:?} {:?}", orders.structure());
+        }
+    }
+}

@@ -1,0 +1,126 @@
+//! Ctrl-C: exit code 130, and no file is left half written.
+#![cfg(unix)]
+
+use std::io::{Read, Write};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use rustix::process::{Pid, Signal, kill_process};
+
+use crate::harness::{Folder, Run};
+use crate::signals::{Experiment, csv, plain_log};
+
+/// A search that goes on for minutes.
+const ENDLESS: &str = "--model bj --nb 2 --nc 2 --nd 2 --nf 2 --search gradient --step 1e-3 --max-iterations 1000000 \
+                       --tolerance 1e-300";
+const NOTHING: &str = "interrupted; nothing was written\n";
+
+fn started(mut command: Command) -> Child {
+    command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the program starts")
+}
+
+fn press(child: &Child) {
+    kill_process(Pid::from_child(child), Signal::INT).expect("the program runs");
+}
+
+fn ended(child: Child) -> Run {
+    Run::from(child.wait_with_output().expect("the program ends"))
+}
+
+/// Until something holds, but not for ever.
+fn wait_until(mut holds: impl FnMut() -> bool) {
+    let began = Instant::now();
+    while !holds() {
+        assert!(began.elapsed() < Duration::from_secs(60), "this takes too long");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+#[test]
+fn a_search_ends_without_a_report() {
+    let folder = Folder::with_log(plain_log());
+    folder.write("old.json", "old");
+    for report in ["new.json", "old.json", "-"] {
+        let child = started(folder.command(&format!("fit log.csv {ENDLESS} --report {report}")));
+        // Long enough to be in the search.
+        std::thread::sleep(Duration::from_millis(700));
+        press(&child);
+        let run = ended(child);
+        assert_eq!((run.code, run.stdout.as_str(), run.stderr.as_str()), (130, "", NOTHING));
+        assert_eq!(folder.names(), ["log.csv", "old.json"]);
+        assert_eq!(folder.read("old.json"), "old");
+    }
+}
+
+#[test]
+fn searches_from_many_starts_end_together() {
+    let folder = Folder::with_log(plain_log());
+    let child = started(folder.command(&format!("fit log.csv {ENDLESS} --starts 8")));
+    std::thread::sleep(Duration::from_millis(700));
+    press(&child);
+    assert_eq!(ended(child).stderr, NOTHING);
+}
+
+#[test]
+fn reading_ends_at_once() {
+    let folder = Folder::new();
+    let mut command = folder.command("fit - --na 2 --nb 2 --report model.json");
+    command.stdin(Stdio::piped());
+    let mut child = started(command);
+    let mut input = child.stdin.take().expect("standard input is a pipe");
+    input.write_all(b"u,y\n1,2\n").expect("the program reads");
+    std::thread::sleep(Duration::from_millis(300));
+    press(&child);
+    let run = ended(child);
+    assert_eq!((run.code, run.stderr.as_str()), (130, NOTHING));
+    assert!(folder.names().is_empty());
+    drop(input);
+}
+
+#[test]
+fn a_file_that_is_being_written_goes() {
+    let folder = Folder::with_log(plain_log());
+    folder.done("fit log.csv --na 2 --nb 2 --report model.json");
+    let Experiment { u, y } = Experiment::new(150_000);
+    folder.write("long.csv", csv(&[("u", &u), ("y", &y)]));
+    folder.write("old.csv", "old");
+    for out in ["new.csv", "old.csv"] {
+        let before = folder.names();
+        let child = started(folder.command(&format!("predict model.json long.csv -o {out}")));
+        wait_until(|| folder.names().len() > before.len());
+        press(&child);
+        let run = ended(child);
+        assert_eq!((run.code, run.stderr.as_str()), (130, NOTHING));
+        assert_eq!(folder.names(), before);
+        assert_eq!(folder.read("old.csv"), "old");
+    }
+}
+
+#[test]
+fn what_goes_to_standard_output_may_be_cut_and_the_line_does_not_deny_it() {
+    let folder = Folder::with_log(Experiment::new(20_000).csv());
+    folder.done("fit log.csv --na 2 --nb 2 --report model.json");
+    // More than a pipe holds, so that it waits for a reader.
+    let mut child = started(folder.command("predict model.json log.csv"));
+    let mut first = [0; 10];
+    child.stdout.as_mut().expect("it is a pipe").read_exact(&mut first).expect("there is a first line");
+    press(&child);
+    let run = ended(child);
+    assert_eq!((run.code, run.stderr.as_str()), (130, "interrupted\n"));
+}
+
+#[test]
+fn a_job_that_ignores_interrupts_goes_on() {
+    let folder = Folder::with_log(plain_log());
+    let inner = folder.command(
+        "fit log.csv --model bj --nb 2 --nc 2 --nd 2 --nf 2 --search gradient --step 1e-3 --max-iterations 1000000 \
+         --tolerance 1e-300 --time-limit 2",
+    );
+    let mut command = Command::new("sh");
+    command.arg("-c").arg("trap '' INT; exec \"$0\" \"$@\"").arg(inner.get_program()).args(inner.get_args());
+    command.current_dir(folder.path(""));
+    let child = started(command);
+    std::thread::sleep(Duration::from_millis(700));
+    press(&child);
+    assert_eq!(ended(child).code, 0);
+}

@@ -1,4 +1,4 @@
-.PHONY: demo test format lint docs rust embedded soak bench
+.PHONY: demo test format lint docs rust embedded soak monte-carlo bench
 
 # Fit the sample log that the program carries.
 demo:
@@ -26,12 +26,19 @@ rust:
 # The long runs of the online estimators in single precision, 10^6 steps each; `make soak` takes 10^8.
 	cargo test --locked --release -p thetahat-core --test soak
 
+# Simulated logs by the score: do intervals cover the truth, are hard cases found? `make monte-carlo` takes 200 and 100 of
+# each kind.
+	cargo test --locked --release -p thetahat --test monte_carlo
+
 # The firmware in an emulator: the host's bits, no panic, and what a step costs.
 embedded:
 	tests/embedded/run
 
 soak:
 	SOAK_STEPS=100000000 cargo test --locked --release -p thetahat-core --test soak -- --nocapture
+
+monte-carlo:
+	MONTE_CARLO=200 cargo test --locked --release -p thetahat --test monte_carlo -- --nocapture
 
 # Our own benches, then the comparison with other packages. Not part of the tests.
 bench:

@@ -25,7 +25,7 @@ const NOTHING_LEFT: f64 = 1e-28;
 /// From so many samples on, starts see stretches of the record only.
 const LONG: usize = 1 << 18;
 const STRETCHES: usize = 16;
-const STRETCH: usize = 1 << 13;
+const STRETCH: usize = 1 << 12;
 /// Above this condition number the Gram matrix does not give the covariance to a thousandth.
 const MAXIMUM_CONDITION: f64 = 5e6;
 
@@ -101,8 +101,9 @@ impl Job<'_> {
         predictor: &mut Predictor<'_>,
     ) -> Result<Beginning, Error> {
         if let Some(thin) = thinned(record) {
-            let mut small = Predictor::new(&thin, orders, begin);
-            let near = self.ranked(&thin, orders, begin, &mut small).and_then(|beginning| {
+            // In the middle of a log nothing is at rest.
+            let mut small = Predictor::new(&thin, orders, Begin::Unknown);
+            let near = self.ranked(&thin, orders, Begin::Unknown, &mut small).and_then(|beginning| {
                 Ok(self.search_from(&mut small, &beginning)?.map(|found| (found, beginning)))
             });
             match near {

@@ -44,6 +44,10 @@ use crate::regression::{
 
 /// The fraction of a free response, squared, below which what is left of it is rounding.
 const UNSEEN: f64 = 1e-22;
+/// The fraction of its largest value below which a response has died away.
+const NEGLIGIBLE: f64 = 1e-20;
+/// Samples of a response that are computed at first.
+const FIRST_PIECE: usize = 256;
 /// Samples from which threads pay for themselves.
 const PARALLEL_FROM: usize = 1 << 15;
 
@@ -183,7 +187,7 @@ impl Layout {
             })
         });
         let used = |signal: &usize| taps.iter().any(|taps| taps.signal == *signal && taps.count > 0);
-        let all = || std::iter::once(output).chain(own.iter().chain(&responses).chain(&frees).copied());
+        let all = || std::iter::once(output).chain(own.iter().chain(&responses).copied());
         let filtered = all().chain([error, disturbance]).filter(used).collect();
         Self {
             filtered,
@@ -214,9 +218,11 @@ struct Section<'a> {
     inputs: Vec<&'a [f64]>,
     /// The filtered signals, e first.
     signals: Vec<Vec<f64>>,
+    /// From which sample on each is zero: responses to impulses die away.
+    supports: Vec<usize>,
     /// x_j of the inputs with F.
     responses: Vec<Vec<f64>>,
-    /// w.
+    /// w, where there is D.
     disturbance: Vec<f64>,
     scratch: Vec<f64>,
     /// What the mask cuts off each signal, r values each.
@@ -256,8 +262,9 @@ impl<'a> Section<'a> {
             output: &record.output[segment.clone()],
             inputs: record.inputs.iter().map(|input| &input[segment.clone()]).collect(),
             signals: (0..layout.signals).map(|signal| room(used(signal))).collect(),
+            supports: vec![usize::MAX; layout.signals],
             responses: layout.orders.nf.iter().map(|&nf| room(nf > 0)).collect(),
-            disturbance: vec![0.0; length],
+            disturbance: room(layout.orders.nd > 0),
             scratch: room(layout.orders.nd > 0),
             heads: vec![0.0; layout.signals * layout.masked],
             interior: layout.products.interior(std::iter::once((layout.masked, rows))),
@@ -278,16 +285,21 @@ impl<'a> Section<'a> {
     /// The errors of polynomials and of the trial weights, and their sum of squares.
     fn evaluate(&mut self, layout: &Layout, polynomials: &Polynomials, negative: &[Vec<f64>]) {
         let all = 0..self.output.len();
+        let (error, _) = self.signals.split_at_mut(1);
+        let error = &mut error[0];
+        // Without D, w is made where e will be.
+        let has_noise_denominator = layout.orders.nd > 0;
+        let w = if has_noise_denominator { &mut self.disturbance } else { &mut *error };
         if layout.orders.na == 0 {
-            self.disturbance.copy_from_slice(self.output);
+            w.copy_from_slice(self.output);
         } else {
-            self.disturbance.fill(0.0);
-            add_filtered(&mut self.disturbance, &all, &polynomials.a, self.output, 0);
+            w.fill(0.0);
+            add_filtered(w, &all, &polynomials.a, self.output, 0);
         }
         let mut free = self.trial.as_slice();
         for (j, u) in self.inputs.iter().enumerate() {
             if layout.orders.nf[j] == 0 {
-                delayed(&mut self.disturbance, layout.orders.nk[j], &negative[j], u);
+                delayed(w, layout.orders.nk[j], &negative[j], u);
                 continue;
             }
             let x = &mut self.responses[j];
@@ -298,10 +310,11 @@ impl<'a> Section<'a> {
             free = rest;
             x.iter_mut().zip(weights).for_each(|(x, weight)| *x += weight);
             divide(&polynomials.f[j], x);
-            self.disturbance.iter_mut().zip(&*x).for_each(|(w, x)| *w -= x);
+            w.iter_mut().zip(&*x).for_each(|(w, x)| *w -= x);
         }
-        let error = &mut self.signals[0];
-        multiply(error, &polynomials.d, &self.disturbance);
+        if has_noise_denominator {
+            multiply(error, &polynomials.d, &self.disturbance);
+        }
         let (head, tail) = error.split_at_mut(layout.masked);
         head.fill(0.0);
         divide(&polynomials.c, tail);
@@ -319,26 +332,11 @@ impl<'a> Section<'a> {
                 self.signals[layout.inputs[j]].copy_from_slice(self.inputs[j]);
             }
             if orders.nf[j] > 0 {
-                let three = [layout.inputs[j], layout.responses[j], layout.frees[j]];
-                if let Ok([u, x, free]) = self.signals.get_disjoint_mut(three) {
+                let two = [layout.inputs[j], layout.responses[j]];
+                if let Ok([u, x]) = self.signals.get_disjoint_mut(two) {
                     x.copy_from_slice(&self.responses[j]);
-                    impulse(free, 0);
-                    if free.is_empty() {
-                        divide_together(&polynomials.f[j], [u, x]);
-                    } else {
-                        divide_together(&polynomials.f[j], [u, x, free]);
-                    }
+                    divide_together(&polynomials.f[j], [u, x]);
                 }
-            }
-        }
-        if layout.free > 0 {
-            let gain = polynomials.d.iter().map(|d| d.abs()).sum::<f64>();
-            let sizes = (0..orders.inputs()).flat_map(|j| {
-                let size = sum_of_squares(&self.signals[layout.frees[j]]);
-                std::iter::repeat_n(size, orders.free_responses(j))
-            });
-            for (floor, size) in self.free_floors.iter_mut().zip(sizes) {
-                *floor = UNSEEN * gain * gain * size;
             }
         }
         if orders.nc > 0 {
@@ -357,15 +355,69 @@ impl<'a> Section<'a> {
             self.heads[signal * layout.masked..][..layout.masked].copy_from_slice(head);
             head.fill(0.0);
         }
-        if !self.signals[layout.impulse].is_empty() {
-            impulse(&mut self.signals[layout.impulse], layout.masked);
-        }
         if orders.nc > 0 {
             divide_all(&polynomials.c, &mut self.signals, &layout.filtered, layout.masked);
-            divide(&polynomials.c, &mut self.signals[layout.impulse]);
+        }
+        if layout.free > 0 {
+            let gain = polynomials.d.iter().map(|d| d.abs()).sum::<f64>();
+            let mut next = 0;
+            for j in (0..orders.inputs()).filter(|&j| orders.nf[j] > 0) {
+                let size = self.respond(layout, polynomials, layout.frees[j], Some(j));
+                let own = next..next + orders.free_responses(j);
+                next = own.end;
+                self.free_floors[own].fill(UNSEEN * gain * gain * size);
+            }
+        }
+        if !self.signals[layout.impulse].is_empty() {
+            self.respond(layout, polynomials, layout.impulse, None);
         }
         self.add_up(layout);
         self.eliminate(layout);
+    }
+
+    /// The response of (D/(C F_j)) to an impulse at the first sample, or of 1/C to one at the first that counts, until it has
+    /// died away. Gives the sum of squares of what 1/F_j alone makes of it.
+    fn respond(
+        &mut self,
+        layout: &Layout,
+        polynomials: &Polynomials,
+        signal: usize,
+        input: Option<usize>,
+    ) -> f64 {
+        let (values, masked) = (&mut self.signals[signal], layout.masked);
+        let orders = &layout.orders;
+        let memory = 1 + orders.nc + orders.nd + input.map_or(0, |input| orders.nf[input]);
+        let mut known = (FIRST_PIECE + masked + 2 * memory).min(values.len());
+        let size = loop {
+            let piece = &mut values[..known];
+            piece.fill(0.0);
+            piece[if input.is_some() { 0 } else { masked }] = 1.0;
+            let mut size = 1.0;
+            if let Some(input) = input {
+                divide(&polynomials.f[input], piece);
+                size = sum_of_squares(piece);
+                if orders.nd > 0 {
+                    multiply(&mut self.scratch[..known], &polynomials.d, piece);
+                    piece.copy_from_slice(&self.scratch[..known]);
+                }
+                let (head, _) = piece.split_at_mut(masked);
+                self.heads[signal * masked..][..masked].copy_from_slice(head);
+                head.fill(0.0);
+            }
+            divide(&polynomials.c, &mut piece[masked..]);
+            let largest =
+                |values: &[f64]| values.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
+            let quiet = largest(&piece[known.saturating_sub(memory)..]) <= NEGLIGIBLE * largest(piece);
+            if quiet || known == values.len() {
+                break size;
+            }
+            known = (4 * known).min(values.len());
+        };
+        // What an earlier response left behind this one.
+        let before = self.supports[signal].min(values.len()).max(known);
+        values[known..before].fill(0.0);
+        self.supports[signal] = known;
+        size
     }
 
     /// The Gram matrix of the columns and psi'e.
@@ -373,7 +425,7 @@ impl<'a> Section<'a> {
         let (products, masked) = (&layout.products, layout.masked);
         self.entries.fill(0.0);
         products.add_ends(&self.signals, masked, &(masked..self.output.len()), &mut self.entries);
-        products.add_interior(&self.signals, &mut self.interior, &mut self.entries);
+        products.add_interior(&self.signals, &self.supports, &mut self.interior, &mut self.entries);
         let size = products.size();
         let entry = |a: &Column, b: &Column| {
             let (low, high) = (a.position.min(b.position), a.position.max(b.position));
@@ -508,14 +560,6 @@ fn multiply(target: &mut [f64], monic: &[f64], values: &[f64]) {
     } else {
         target.fill(0.0);
         add_filtered(target, &(0..target.len()), monic, values, 0);
-    }
-}
-
-/// 1 at one sample, 0 elsewhere.
-fn impulse(values: &mut [f64], at: usize) {
-    values.fill(0.0);
-    if let Some(value) = values.get_mut(at) {
-        *value = 1.0;
     }
 }
 

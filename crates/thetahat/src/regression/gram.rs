@@ -118,16 +118,17 @@ impl Products {
         Interior { sums: vec![0.0; blocks.len().max(1) * self.diagonals.len()], blocks }
     }
 
-    /// Adds the products of interiors to `entries`.
+    /// Adds the products of interiors to `entries`. From sample `supports[s]` on signal s is known to be zero.
     pub(crate) fn add_interior<S: AsRef<[f64]> + Sync>(
         &self,
         signals: &[S],
+        supports: &[usize],
         interior: &mut Interior,
         entries: &mut [f64],
     ) {
         let count = self.diagonals.len();
         sum_blocks(&interior.blocks, count, &mut interior.sums, |stretch, sums| {
-            add_stretch(signals, &self.diagonals, &stretch.rows, sums);
+            add_stretch(signals, supports, &self.diagonals, &stretch.rows, sums);
         });
         for (diagonal, shared) in self.diagonals.iter().zip(&interior.sums) {
             for lag in diagonal.lags() {
@@ -164,7 +165,8 @@ pub(super) fn gram(lagged: &Lagged<'_>) -> (DMatrix<f64>, DVector<f64>, f64) {
         products.add_ends(lagged.signals(), start, &rows, &mut entries);
     }
     let mut interior = products.interior(segments().filter(|(_, rows)| !rows.is_empty()));
-    products.add_interior(lagged.signals(), &mut interior, &mut entries);
+    let supports = vec![usize::MAX; lagged.signals().len()];
+    products.add_interior(lagged.signals(), &supports, &mut interior, &mut entries);
 
     let columns: Vec<(usize, f64)> =
         lagged.columns().map(|(signal, lag, sign)| (products.position(signal, lag), sign)).collect();
@@ -219,6 +221,7 @@ fn diagonals(spans: &[Span]) -> Vec<Diagonal> {
 /// Adds the products of the interior samples `taus`, diagonal by diagonal.
 fn add_stretch<S: AsRef<[f64]>>(
     signals: &[S],
+    supports: &[usize],
     diagonals: &[Diagonal],
     taus: &Range<usize>,
     sums: &mut [f64],
@@ -234,6 +237,9 @@ fn add_stretch<S: AsRef<[f64]>>(
         // z(tau - d) with d falling: the same stretch of the partner, one sample later each.
         let from = taus.start.saturating_add_signed(-first.difference);
         let to = taus.end.saturating_add_signed(-last.difference);
+        if taus.start >= supports[first.left.signal] || from >= supports[first.right.signal] {
+            continue;
+        }
         correlations(x, &signals[first.right.signal].as_ref()[from..to], into);
     }
 }

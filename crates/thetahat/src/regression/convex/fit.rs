@@ -279,12 +279,8 @@ impl<'a> Fitting<'a> {
             _ => {}
         }
         let bound = bound.map(|(bound, _)| bound);
-        let mut unit =
-            root_mean_square(&residuals).max(self.samples.rounding(&central.parameters)).max(least_unit);
-        if norm == Norm::Two {
-            // The optimum is between these parameters and those of least squares.
-            unit = unit.max(self.way(&central.parameters).norm());
-        }
+        let rounding = self.samples.rounding(&central.parameters);
+        let unit = root_mean_square(&residuals).max(rounding).max(least_unit);
         let unit = if unit > 0.0 { unit } else { 1.0 };
         let frame = Frame { base: central.parameters, unit, residuals };
         let mut working = self.first(&frame, norm);
@@ -599,9 +595,12 @@ impl<'a> Fitting<'a> {
     fn add_goal(&self, program: &mut Program, frame: &Frame, working: &Working, norm: Norm) {
         let (size, count) = (self.sizes.len(), self.samples.count() as f64);
         if norm == Norm::Two {
-            // The factor holds the ridge, and rows that the limits keep constant.
-            program.hessian.fill_with_identity();
-            program.gradient.copy_from(&(self.way(&frame.base) / frame.unit));
+            // The factor holds the ridge, and rows that the limits keep constant. With a bound on |e| the optimum may be
+            // far from least squares, compared with how far w can go: then its value is scaled to that.
+            let way = self.way(&frame.base) / frame.unit;
+            let scale = way.norm().max(1.0);
+            program.hessian.fill_diagonal(1.0 / scale);
+            program.gradient.copy_from(&(way / scale));
             return;
         }
         if norm == Norm::Infinity {

@@ -30,6 +30,8 @@ const FIRST_DAMPING: f64 = 1e-8;
 const SMALLEST_DAMPING: f64 = 1e-12;
 /// With a damping beyond this, or after so many halvings, no step is long enough to matter.
 const LARGEST_DAMPING: f64 = 1e12;
+/// The last step is taken if it foretells more than this fraction of the tolerance.
+const WORTH_TAKING: f64 = 0.01;
 const HALVINGS: usize = 40;
 const MOST_ITERATIONS: usize = 10_000;
 /// The first perturbation of a Hessian that is not positive definite, beside a diagonal near 1.
@@ -412,6 +414,21 @@ pub(super) fn search(
         gradient_norm = (room.right.iter().map(|value| value * value).sum::<f64>() / cost).sqrt();
         if cost <= smallest || foretold <= search.tolerance * cost {
             gradient_norm = if cost <= smallest { 0.0 } else { gradient_norm };
+            if cost > smallest && foretold > WORTH_TAKING * search.tolerance * cost {
+                // The step is there: where convergence is slow, it is a good part of the way that is left.
+                room.apply(&parameters, 1.0);
+                predictor.try_free(&room.moved);
+                match predictor.evaluate(&room.trial) {
+                    Ok(value) if value < cost => {
+                        parameters.copy_from_slice(&room.trial);
+                        costs.push(value);
+                    }
+                    _ => {
+                        predictor.keep_free();
+                        let _ = predictor.evaluate(&parameters);
+                    }
+                }
+            }
             break Stopped::Converged;
         }
         if iteration >= search.max_iterations {

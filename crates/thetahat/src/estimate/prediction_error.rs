@@ -24,7 +24,7 @@ use crate::{Error, Model, Orders, Structure};
 const NOTHING_LEFT: f64 = 1e-28;
 /// From so many samples on, starts see stretches of the record only.
 const LONG: usize = 1 << 18;
-const STRETCHES: usize = 16;
+const STRETCHES: usize = 8;
 const STRETCH: usize = 1 << 12;
 /// Above this condition number the Gram matrix does not give the covariance to a thousandth.
 const MAXIMUM_CONDITION: f64 = 5e6;

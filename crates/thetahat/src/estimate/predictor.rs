@@ -284,18 +284,12 @@ impl<'a> Section<'a> {
 
     /// The errors of polynomials and of the trial weights, and their sum of squares.
     fn evaluate(&mut self, layout: &Layout, polynomials: &Polynomials, negative: &[Vec<f64>]) {
-        let all = 0..self.output.len();
         let (error, _) = self.signals.split_at_mut(1);
         let error = &mut error[0];
         // Without D, w is made where e will be.
         let has_noise_denominator = layout.orders.nd > 0;
         let w = if has_noise_denominator { &mut self.disturbance } else { &mut *error };
-        if layout.orders.na == 0 {
-            w.copy_from_slice(self.output);
-        } else {
-            w.fill(0.0);
-            add_filtered(w, &all, &polynomials.a, self.output, 0);
-        }
+        multiply(w, &polynomials.a, self.output);
         let mut free = self.trial.as_slice();
         for (j, u) in self.inputs.iter().enumerate() {
             if layout.orders.nf[j] == 0 {
@@ -553,14 +547,10 @@ fn divide_all(monic: &[f64], signals: &mut [Vec<f64>], which: &[usize], from: us
     }
 }
 
-/// `target = D values`.
+/// `target = P values` for a monic P.
 fn multiply(target: &mut [f64], monic: &[f64], values: &[f64]) {
-    if monic.len() == 1 {
-        target.copy_from_slice(values);
-    } else {
-        target.fill(0.0);
-        add_filtered(target, &(0..target.len()), monic, values, 0);
-    }
+    target.copy_from_slice(values);
+    delayed(target, 1, &monic[1..], values);
 }
 
 /// The prediction errors of a record as a function of the parameters. Memory is taken when it is made; nothing that it

@@ -82,6 +82,14 @@ fn add_four_scaled(target: &mut [f64], weights: [f64; SHIFTS], x: &[f64]) {
     }
 }
 
+/// The same for two weights: one pass over the target where there would be two.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+fn add_two_scaled(target: &mut [f64], weights: [f64; 2], x: &[f64]) {
+    for (target, (x0, x1)) in target.iter_mut().zip(x[0..].iter().zip(&x[1..])) {
+        *target = (*target + weights[0] * x0) + weights[1] * x1;
+    }
+}
+
 /// `into[k] += sum_t x[t] y[t + k]`; `y` holds as many values as `x` and `into` together, less one.
 pub(super) fn correlations(x: &[f64], y: &[f64], into: &mut [f64]) {
     let (tiles, rest) = into.as_chunks_mut::<SHIFTS>();
@@ -109,9 +117,13 @@ pub(crate) fn add_filtered(target: &mut [f64], weights: &[f64], x: &[f64]) {
         add_four_scaled(target, falling, &x[first..first + length + SHIFTS - 1]);
         first += SHIFTS;
     }
-    for weight in rest.iter().rev() {
+    let (single, pairs) = rest.as_rchunks::<2>();
+    for pair in pairs.iter().rev() {
+        add_two_scaled(target, [pair[1], pair[0]], &x[first..first + length + 1]);
+        first += 2;
+    }
+    for weight in single {
         add_scaled(target, *weight, &x[first..first + length]);
-        first += 1;
     }
 }
 

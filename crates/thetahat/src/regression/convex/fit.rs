@@ -30,6 +30,8 @@ use super::samples::{Samples, largest, smallest};
 use super::{Failure, Norm, Program, Row, Subspace};
 use crate::regression::{Lagged, Unsolved};
 
+/// A parameter whose spread is this fraction of what it was without limits is held by them.
+const HELD: f64 = 1e-12;
 /// RMS of which products neither overflow nor lose digits.
 const SAFE_SIZES: RangeInclusive<f64> = 1e-140..=1e140;
 /// Rounds until the program holds all samples that it needs, at most. Each adds some.
@@ -366,7 +368,13 @@ impl<'a> Fitting<'a> {
             .map(|&index| Row { coefficients: self.directions[index].0.clone(), right: 0.0 })
             .collect();
         let held = Subspace::new(rows.iter(), size);
-        let free = &self.spread * held.complement() / (self.samples.count() as f64).sqrt();
+        let mut free = &self.spread * held.complement() / (self.samples.count() as f64).sqrt();
+        for (mut free, spread) in free.row_iter_mut().zip(self.spread.row_iter()) {
+            // What a limit holds does not vary, not even by rounding.
+            if free.norm() * (self.samples.count() as f64).sqrt() <= HELD * spread.norm() {
+                free.fill(0.0);
+            }
+        }
         if self.ridge == 0.0 {
             return (&free * free.transpose(), free.ncols() as f64);
         }

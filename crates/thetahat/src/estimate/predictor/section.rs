@@ -1,0 +1,357 @@
+//! One segment of a record: its filtered signals and its part of the normal equations.
+
+use std::ops::Range;
+
+use super::{Column, Layout, Polynomials};
+use crate::data::Record;
+use crate::estimate::normal;
+use crate::regression::{Interior, add_filtered, divide, divide_together, sum_of_squares};
+
+/// The fraction of a free response, squared, below which what is left of it is rounding.
+const UNSEEN: f64 = 1e-22;
+/// The fraction of its largest value below which a response has died away.
+const NEGLIGIBLE: f64 = 1e-20;
+/// Samples of a response that are computed at first.
+const FIRST_PIECE: usize = 256;
+
+/// One segment: its signals, and its part of the normal equations.
+#[derive(Debug)]
+pub(super) struct Section<'a> {
+    pub(super) output: &'a [f64],
+    pub(super) inputs: Vec<&'a [f64]>,
+    /// The filtered signals, e first.
+    pub(super) signals: Vec<Vec<f64>>,
+    /// From which sample on each is zero: responses to impulses die away.
+    pub(super) supports: Vec<usize>,
+    /// x_j of the inputs with F.
+    pub(super) responses: Vec<Vec<f64>>,
+    /// w, where there is D.
+    pub(super) disturbance: Vec<f64>,
+    pub(super) scratch: Vec<f64>,
+    /// What the mask cuts off each signal, r values each.
+    pub(super) heads: Vec<f64>,
+    pub(super) interior: Interior,
+    pub(super) entries: Vec<f64>,
+    /// The Gram matrix of the parameters' and free responses' columns, row by row, and psi'e.
+    pub(super) gram: Vec<f64>,
+    pub(super) right: Vec<f64>,
+    pub(super) corrections: Vec<f64>,
+    /// The weights of the free responses, and those of a trial.
+    pub(super) free: Vec<f64>,
+    pub(super) trial: Vec<f64>,
+    /// The factor of the free responses' block, and the step to their optimum: for no change of parameters first, then for
+    /// each parameter.
+    pub(super) free_factor: Vec<f64>,
+    pub(super) free_steps: Vec<f64>,
+    /// For each free response, the sum of squares below which what D, C and the mask leave of it is rounding.
+    pub(super) free_floors: Vec<f64>,
+    pub(super) cost: f64,
+    /// By how much the free responses alone can lower the cost.
+    pub(super) free_gain: f64,
+}
+
+impl<'a> Section<'a> {
+    pub(super) fn new(record: &Record<'a>, segment: &Range<usize>, layout: &Layout) -> Self {
+        let length = segment.len();
+        let used = |signal: usize| {
+            signal == 0 || layout.taps.iter().any(|taps| taps.signal == signal && taps.count > 0)
+        };
+        let room = |used: bool| if used { vec![0.0; length] } else { Vec::new() };
+        let (parameters, free) = (layout.parameters, layout.free);
+        let columns = parameters + free;
+        let size = layout.products.size();
+        let rows = layout.masked..length;
+        Self {
+            output: &record.output[segment.clone()],
+            inputs: record.inputs.iter().map(|input| &input[segment.clone()]).collect(),
+            signals: (0..layout.signals).map(|signal| room(used(signal))).collect(),
+            supports: vec![usize::MAX; layout.signals],
+            responses: layout.orders.nf.iter().map(|&nf| room(nf > 0)).collect(),
+            disturbance: room(layout.orders.nd > 0),
+            scratch: room(layout.orders.nd > 0),
+            heads: vec![0.0; layout.signals * layout.masked],
+            interior: layout.products.interior(std::iter::once((layout.masked, rows))),
+            entries: vec![0.0; size * size],
+            gram: vec![0.0; columns * columns],
+            right: vec![0.0; columns],
+            corrections: vec![0.0; columns * (layout.columns.len() - columns)],
+            free: vec![0.0; free],
+            trial: vec![0.0; free],
+            free_factor: vec![0.0; free * free],
+            free_steps: vec![0.0; free * (parameters + 1)],
+            free_floors: vec![0.0; free],
+            cost: 0.0,
+            free_gain: 0.0,
+        }
+    }
+
+    /// The errors of polynomials and of the trial weights, and their sum of squares.
+    pub(super) fn evaluate(&mut self, layout: &Layout, polynomials: &Polynomials, negative: &[Vec<f64>]) {
+        let (error, _) = self.signals.split_at_mut(1);
+        let error = &mut error[0];
+        // Without D, w is made where e will be.
+        let has_noise_denominator = layout.orders.nd > 0;
+        let w = if has_noise_denominator { &mut self.disturbance } else { &mut *error };
+        multiply(w, &polynomials.a, self.output);
+        let mut free = self.trial.as_slice();
+        for (j, u) in self.inputs.iter().enumerate() {
+            if layout.orders.nf[j] == 0 {
+                delayed(w, layout.orders.nk[j], &negative[j], u);
+                continue;
+            }
+            let x = &mut self.responses[j];
+            x.fill(0.0);
+            delayed(x, layout.orders.nk[j], &polynomials.b[j], u);
+            let own = if layout.free > 0 { layout.orders.free_responses(j) } else { 0 };
+            let (weights, rest) = free.split_at(own);
+            free = rest;
+            x.iter_mut().zip(weights).for_each(|(x, weight)| *x += weight);
+            divide(&polynomials.f[j], x);
+            w.iter_mut().zip(&*x).for_each(|(w, x)| *w -= x);
+        }
+        if has_noise_denominator {
+            multiply(error, &polynomials.d, &self.disturbance);
+        }
+        let (head, tail) = error.split_at_mut(layout.masked);
+        head.fill(0.0);
+        divide(&polynomials.c, tail);
+        self.cost = sum_of_squares(tail);
+    }
+
+    /// psi's signals, their Gram matrix and psi'e, at what was evaluated last.
+    pub(super) fn linearize(&mut self, layout: &Layout, polynomials: &Polynomials) {
+        let orders = &layout.orders;
+        if orders.na > 0 {
+            self.signals[layout.output].copy_from_slice(self.output);
+        }
+        for j in 0..orders.inputs() {
+            if orders.nb[j] > 0 {
+                self.signals[layout.inputs[j]].copy_from_slice(self.inputs[j]);
+            }
+            if orders.nf[j] > 0 {
+                let two = [layout.inputs[j], layout.responses[j]];
+                if let Ok([u, x]) = self.signals.get_disjoint_mut(two) {
+                    x.copy_from_slice(&self.responses[j]);
+                    divide_together(&polynomials.f[j], [u, x]);
+                }
+            }
+        }
+        if orders.nc > 0 {
+            let (error, others) = self.signals.split_at_mut(1);
+            others[layout.error - 1].copy_from_slice(&error[0]);
+        }
+        if orders.nd > 0 {
+            for &signal in &layout.with_noise_denominator {
+                multiply(&mut self.scratch, &polynomials.d, &self.signals[signal]);
+                std::mem::swap(&mut self.scratch, &mut self.signals[signal]);
+            }
+            self.signals[layout.disturbance].copy_from_slice(&self.disturbance);
+        }
+        for &signal in &layout.filtered {
+            let head = &mut self.signals[signal][..layout.masked];
+            self.heads[signal * layout.masked..][..layout.masked].copy_from_slice(head);
+            head.fill(0.0);
+        }
+        if orders.nc > 0 {
+            divide_all(&polynomials.c, &mut self.signals, &layout.filtered, layout.masked);
+        }
+        if layout.free > 0 {
+            let gain = polynomials.d.iter().map(|d| d.abs()).sum::<f64>();
+            let mut next = 0;
+            for j in (0..orders.inputs()).filter(|&j| orders.nf[j] > 0) {
+                let size = self.respond(layout, polynomials, layout.frees[j], Some(j));
+                let own = next..next + orders.free_responses(j);
+                next = own.end;
+                self.free_floors[own].fill(UNSEEN * gain * gain * size);
+            }
+        }
+        if !self.signals[layout.impulse].is_empty() {
+            self.respond(layout, polynomials, layout.impulse, None);
+        }
+        self.add_up(layout);
+        self.eliminate(layout);
+    }
+
+    /// The response of (D/(C F_j)) to an impulse at the first sample, or of 1/C to one at the first that counts, until it has
+    /// died away. Gives the sum of squares of what 1/F_j alone makes of it.
+    fn respond(
+        &mut self,
+        layout: &Layout,
+        polynomials: &Polynomials,
+        signal: usize,
+        input: Option<usize>,
+    ) -> f64 {
+        let (values, masked) = (&mut self.signals[signal], layout.masked);
+        let orders = &layout.orders;
+        let memory = 1 + orders.nc + orders.nd + input.map_or(0, |input| orders.nf[input]);
+        let mut known = (FIRST_PIECE + masked + 2 * memory).min(values.len());
+        let size = loop {
+            let piece = &mut values[..known];
+            piece.fill(0.0);
+            piece[if input.is_some() { 0 } else { masked }] = 1.0;
+            let mut size = 1.0;
+            if let Some(input) = input {
+                divide(&polynomials.f[input], piece);
+                size = sum_of_squares(piece);
+                if orders.nd > 0 {
+                    multiply(&mut self.scratch[..known], &polynomials.d, piece);
+                    piece.copy_from_slice(&self.scratch[..known]);
+                }
+                let (head, _) = piece.split_at_mut(masked);
+                self.heads[signal * masked..][..masked].copy_from_slice(head);
+                head.fill(0.0);
+            }
+            divide(&polynomials.c, &mut piece[masked..]);
+            let largest =
+                |values: &[f64]| values.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
+            let quiet = largest(&piece[known.saturating_sub(memory)..]) <= NEGLIGIBLE * largest(piece);
+            if quiet || known == values.len() {
+                break size;
+            }
+            known = (4 * known).min(values.len());
+        };
+        // What an earlier response left behind this one.
+        let before = self.supports[signal].min(values.len()).max(known);
+        values[known..before].fill(0.0);
+        self.supports[signal] = known;
+        size
+    }
+
+    /// The Gram matrix of the columns and psi'e.
+    fn add_up(&mut self, layout: &Layout) {
+        let (products, masked) = (&layout.products, layout.masked);
+        self.entries.fill(0.0);
+        products.add_ends(&self.signals, masked, &(masked..self.output.len()), &mut self.entries);
+        products.add_interior(&self.signals, &self.supports, &mut self.interior, &mut self.entries);
+        let size = products.size();
+        let entry = |a: &Column, b: &Column| {
+            let (low, high) = (a.position.min(b.position), a.position.max(b.position));
+            a.sign * b.sign * self.entries[low * size + high]
+        };
+        let error = Column { signal: 0, position: products.position(0, 0), lag: 0, sign: 1.0 };
+        let count = self.right.len();
+        let (columns, shifts) = layout.columns.split_at(count);
+        for (row, column) in columns.iter().enumerate() {
+            self.right[row] = entry(column, &error);
+            for (place, other) in self.gram[row * count..][..=row].iter_mut().zip(columns) {
+                *place = entry(column, other);
+            }
+        }
+        if masked > 0 {
+            let width = shifts.len();
+            for (weights, column) in self.corrections.chunks_exact_mut(width).zip(columns) {
+                let head = &self.heads[column.signal * masked..][..masked];
+                for (k, weight) in weights.iter_mut().enumerate() {
+                    // z(r + k - i), zero before the segment.
+                    let from = (masked + k).checked_sub(column.lag).filter(|_| k < column.lag);
+                    *weight = from.map_or(0.0, |from| column.sign * head[from]);
+                }
+            }
+            for row in 0..count {
+                let weights = &self.corrections[row * width..][..width];
+                let with_error =
+                    shifts.iter().zip(weights).map(|(shift, weight)| weight * entry(shift, &error));
+                self.right[row] += with_error.sum::<f64>();
+                for column in 0..=row {
+                    let others = &self.corrections[column * width..][..width];
+                    let mut more = 0.0;
+                    for (k, shift) in shifts.iter().enumerate() {
+                        let squares =
+                            shifts.iter().zip(others).map(|(other, weight)| weight * entry(shift, other));
+                        more += weights[k] * (entry(shift, &columns[column]) + squares.sum::<f64>())
+                            + others[k] * entry(shift, &columns[row]);
+                    }
+                    self.gram[row * count + column] += more;
+                }
+            }
+        }
+        for row in 0..count {
+            for column in 0..row {
+                self.gram[column * count + row] = self.gram[row * count + column];
+            }
+        }
+    }
+
+    /// Prepares the step of the free responses that is best for any change of the parameters.
+    fn eliminate(&mut self, layout: &Layout) {
+        let (parameters, free) = (layout.parameters, layout.free);
+        let count = parameters + free;
+        for row in 0..free {
+            let from = &self.gram[(parameters + row) * count + parameters..][..free];
+            let to = &mut self.free_factor[row * free..][..free];
+            to.copy_from_slice(from);
+            if to[row] <= self.free_floors[row] {
+                // A dependent column: its weight stays.
+                to[row] = 0.0;
+            }
+        }
+        normal::factor(&mut self.free_factor, free);
+        for (which, steps) in self.free_steps.chunks_exact_mut(free.max(1)).enumerate() {
+            if which == 0 {
+                steps.copy_from_slice(&self.right[parameters..]);
+            } else {
+                steps.copy_from_slice(&self.gram[(which - 1) * count + parameters..][..free]);
+            }
+            normal::solve(&self.free_factor, free, steps);
+        }
+        let best = &self.free_steps[..free];
+        self.free_gain = best.iter().zip(&self.right[parameters..]).map(|(step, right)| step * right).sum();
+    }
+
+    /// Adds the part of the normal equations that is left without the free responses.
+    pub(super) fn add_normal(&self, layout: &Layout, matrix: &mut [f64], right: &mut [f64]) {
+        let (parameters, free) = (layout.parameters, layout.free);
+        let count = parameters + free;
+        for row in 0..parameters {
+            let cross = &self.gram[row * count + parameters..][..free];
+            let taken =
+                |steps: &[f64]| steps.iter().zip(cross).map(|(step, cross)| step * cross).sum::<f64>();
+            right[row] += self.right[row] - taken(&self.free_steps[..free]);
+            for column in 0..parameters {
+                matrix[row * parameters + column] +=
+                    self.gram[row * count + column] - taken(&self.free_steps[(column + 1) * free..][..free]);
+            }
+        }
+    }
+
+    /// Sets the trial weights to those that are best for a step of the parameters.
+    pub(super) fn try_free(&mut self, step: &[f64]) {
+        let free = self.free.len();
+        for (index, trial) in self.trial.iter_mut().enumerate() {
+            let moved: f64 =
+                step.iter().enumerate().map(|(k, step)| step * self.free_steps[(k + 1) * free + index]).sum();
+            *trial = self.free[index] + self.free_steps[index] - moved;
+        }
+    }
+}
+
+/// `target(t) += sum_i weights[i] u(t - delay - i)`.
+fn delayed(target: &mut [f64], delay: usize, weights: &[f64], u: &[f64]) {
+    let from = delay.min(target.len());
+    let target = &mut target[from..];
+    add_filtered(target, &(0..target.len()), weights, &u[..u.len() - from], 0);
+}
+
+/// Divides some of the signals from one sample on, four at a time.
+fn divide_all(monic: &[f64], signals: &mut [Vec<f64>], which: &[usize], from: usize) {
+    fn some<const K: usize>(monic: &[f64], signals: &mut [Vec<f64>], which: [usize; K], from: usize) {
+        if let Ok(some) = signals.get_disjoint_mut(which) {
+            divide_together(monic, some.map(|values| &mut values[from..]));
+        }
+    }
+    for group in which.chunks(4) {
+        match *group {
+            [a, b, c, d] => some(monic, signals, [a, b, c, d], from),
+            [a, b, c] => some(monic, signals, [a, b, c], from),
+            [a, b] => some(monic, signals, [a, b], from),
+            [a] => some(monic, signals, [a], from),
+            _ => {}
+        }
+    }
+}
+
+/// `target = P values` for a monic P.
+fn multiply(target: &mut [f64], monic: &[f64], values: &[f64]) {
+    target.copy_from_slice(values);
+    delayed(target, 1, &monic[1..], values);
+}

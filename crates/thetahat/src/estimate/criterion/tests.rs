@@ -87,6 +87,18 @@ fn random_demands(noise: &mut Noise, orders: &Orders) -> Criterion {
 const ALL: [Norm; 3] = [Norm::One, Norm::Two, Norm::Infinity];
 
 #[test]
+fn what_a_bound_holds_has_no_spread() {
+    let mut noise = Noise(31);
+    let (y, u) = data(400, &mut noise, 0.1, even);
+    let held = criterion(Norm::Two, &["a1=-0.6..0"], &[]);
+    let found = fit(&y, &u, &orders(2, 2), &held).unwrap();
+    let covariance = found.covariance.unwrap();
+    assert_eq!(found.parameters[0], -0.6);
+    assert_eq!(covariance[0], [0.0; 4]);
+    assert!((1..4).all(|index| covariance[index][index] > 0.0));
+}
+
+#[test]
 fn sums_and_largest_errors_equal_those_of_linear_programs() {
     let mut noise = Noise(1);
     let (mut fitted, mut refused) = (0, 0);

@@ -1,4 +1,4 @@
-.PHONY: demo test format lint docs rust embedded soak monte-carlo bench
+.PHONY: demo test format lint docs rust chromium embedded soak monte-carlo bench
 
 # Fit the sample log that the program carries.
 demo:
@@ -19,16 +19,21 @@ docs:
 	RUSTDOCFLAGS="-D warnings" cargo doc --locked --workspace --all-features --no-deps
 
 # thetahat-core once more on its own: there it has no heap.
-rust:
+rust: chromium
 	cargo test --locked -p thetahat-core
 	cargo test --locked --workspace --all-features
 
 # The long runs of the online estimators in single precision, 10^6 steps each; `make soak` takes 10^8.
 	cargo test --locked --release -p thetahat-core --test soak
 
-# Simulated logs by the score: do intervals cover the truth, are hard cases found? `make monte-carlo` takes 200 and 100 of
-# each kind.
-	cargo test --locked --release -p thetahat --test monte_carlo
+# Simulated logs by the score: do intervals cover the truth, are hard cases found, are true orders chosen, do tests keep
+# their level? `make monte-carlo` takes 100, 200 or 2000 of each kind.
+	cargo test --locked --release -p thetahat --test monte_carlo --test residual_tests
+
+# Opens the pages of --html; where it is not there and cannot be installed, its tests are skipped by name.
+chromium:
+	@command -v chromium >/dev/null || { [ "$$(id -u)" = 0 ] && apt-get update -q && \
+	apt-get install -y -q --no-install-recommends chromium fonts-dejavu-core; } >/dev/null 2>&1 || true
 
 # The firmware in an emulator: the host's bits, no panic, and what a step costs.
 embedded:
@@ -39,6 +44,7 @@ soak:
 
 monte-carlo:
 	MONTE_CARLO=200 cargo test --locked --release -p thetahat --test monte_carlo -- --nocapture
+	MONTE_CARLO=2000 cargo test --locked --release -p thetahat --test residual_tests -- --nocapture
 
 # Our own benches, then the comparison with other packages. Not part of the tests.
 bench:

@@ -11,6 +11,7 @@ Exit codes:
   3  bad data: the log or the report does not hold what was asked of it
   4  the data cannot determine the model
   5  input/output: a file cannot be read or written
+  6  the model does not meet what --require asks
   130  interrupted (Ctrl-C); nothing is left half written";
 
 /// Identifies dynamic systems from logged data.
@@ -27,10 +28,13 @@ pub(crate) enum Command {
     /// Fit a model to one or several logs
     ///
     /// Fits A(q) y(t) = B(q)/F(q) u(t - nk) + C(q)/D(q) e(t): by least squares where that is linear in the parameters, else by
-    /// a search for the least sum of squared prediction errors. Prints a table and writes a JSON report. Several logs are
-    /// several experiments with one plant: their rows are counted through, and nothing reaches from one into the next.
+    /// a search for the least sum of squared prediction errors. Without orders, delay, structure and orders are chosen from the
+    /// data; orders may also be ranges. Prints a table and writes a JSON report. Several logs are several experiments with one
+    /// plant: their rows are counted through, and nothing reaches from one into the next.
     #[command(after_help = "\
 Examples:
+  thetahat fit log.csv --sample-time 0.08
+  thetahat fit log.csv --na 1..10 --nb 1..10 --nk 0..5 --split 60/20/20 --select validation
   thetahat fit log.csv --sample-time 0.08 --na 2 --nb 2 --nk 3 --report model.json
   thetahat fit log.csv --time t -u heater -y temperature --validate 501..1000 --na 2 --nb 2
   thetahat fit log.csv --model bj --nb 2 --nc 1 --nd 1 --nf 2 --starts 5
@@ -38,6 +42,17 @@ Examples:
   thetahat fit sunspots.csv -y count --model arma --na 2 --nc 1
   thetahat fit log.csv --na 2 --nb 2 --norm 1 --bound a1=-1.9..0 --dc-gain 1..20")]
     Fit(Box<FitArguments>),
+    /// Look at a log before any fit
+    ///
+    /// Says of each channel its range, mean and trend, missing and repeated values, rounding, saturation and outliers; of the
+    /// clock its step and jitter; of each input how much it excites, its delay and whether it follows the output. Ends
+    /// with warnings and the line of thetahat fit that goes with the log. Without -u and -y it looks at all columns of
+    /// numbers.
+    #[command(after_help = "\
+Examples:
+  thetahat inspect log.csv --sample-time 0.08
+  thetahat inspect log.csv --time t -u heater -y temperature --format json -o inspection.json")]
+    Inspect(Box<InspectArguments>),
     /// Predict a log some steps ahead with a fitted model
     ///
     /// Writes CSV: time or row, measured, predicted and the standard deviation of its error, in the log's own units. The fit
@@ -56,6 +71,25 @@ Examples:
 Example:
   thetahat simulate model.json log.csv --rows 501..1000 > simulated.csv")]
     Simulate(SimulateArguments),
+    /// Say how a fitted model does on a log, and whether anything is left in its residuals
+    ///
+    /// Fits 1 step ahead, some steps ahead and in a free run; whiteness of the residuals by Ljung and Box's test and by
+    /// Anderson's; their independence of past inputs, and a word on feedback; the noise beside the model's own; how often its
+    /// prediction intervals hold. With --require it is a gate: exit code 6 if the model does not meet it.
+    #[command(after_help = "\
+Examples:
+  thetahat validate model.json log.csv --rows 501..1000
+  thetahat validate model.json log.csv --require 'independent,stable,fit>=50,fit@5>=50'
+  thetahat validate model.json log.csv --format json --horizon 1,10 --lags 40 > validation.json")]
+    Validate(ValidateArguments),
+    /// Put several fitted models side by side on a log
+    ///
+    /// The figures of validate, a column for each model, and the alpha at which each stops passing Anderson's test of
+    /// whiteness.
+    #[command(after_help = "\
+Example:
+  thetahat compare model.json model.json log.csv --rows 501..1000")]
+    Compare(CompareArguments),
     /// The frequency response of a fitted model
     ///
     /// Writes CSV with a row for each input and frequency, and for the noise (input "noise"): input, frequency [rad/s],
@@ -71,11 +105,15 @@ Example:
 Example:
   thetahat demo")]
     Demo(DemoArguments),
-    /// Print the JSON Schema of reports
+    /// Print the JSON Schema of a document
     #[command(after_help = "\
 Example:
   thetahat schema > thetahat.report.schema.json")]
-    Schema,
+    Schema {
+        /// The document: what fit, validate, compare or inspect writes
+        #[arg(value_enum, default_value = "report")]
+        document: DocumentArgument,
+    },
     /// Print shell completions
     #[command(after_help = "\
 Example:
@@ -122,10 +160,15 @@ pub(crate) struct FitArguments {
     #[command(flatten)]
     pub(crate) model: ModelArguments,
     #[command(flatten)]
+    pub(crate) choice: ChoiceArguments,
+    #[command(flatten)]
     pub(crate) search: SearchArguments,
     #[command(flatten)]
     pub(crate) criterion: CriterionArguments,
 
+    /// Write a page with charts to a file: one file of HTML that needs nothing else (- for standard output)
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    pub(crate) html: Option<PathBuf>,
     /// Write the JSON report to a file (- for standard output, instead of the table)
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub(crate) report: Option<PathBuf>,
@@ -139,36 +182,89 @@ pub(crate) struct FitArguments {
     pub(crate) log: LogArguments,
 }
 
+#[derive(Debug, Args)]
+pub(crate) struct InspectArguments {
+    /// The log: a CSV file, gzip-compressed or not (- for standard input)
+    #[arg(value_name = "LOG")]
+    pub(crate) path: PathBuf,
+
+    /// Input columns [default: u, u1, u2, …, if they are there]
+    #[arg(short = 'u', long, value_name = "NAME[,NAME…]", value_delimiter = ',', help_heading = "Channels")]
+    pub(crate) input: Vec<String>,
+    /// Output column [default: y, if it is there]
+    #[arg(short = 'y', long, value_name = "NAME", help_heading = "Channels")]
+    pub(crate) output: Option<String>,
+
+    /// What to write: a table for people, or the JSON document
+    #[arg(long, value_enum, default_value = "table", help_heading = "Output")]
+    pub(crate) format: FormatArgument,
+    /// Write it to a file instead of standard output
+    #[arg(
+        short = 'o',
+        long,
+        value_name = "FILE",
+        default_value = "-",
+        hide_default_value = true,
+        help_heading = "Output"
+    )]
+    pub(crate) out: PathBuf,
+    /// Write a page with charts to a file too
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    pub(crate) html: Option<PathBuf>,
+
+    #[command(flatten)]
+    pub(crate) clock: ClockArguments,
+    #[command(flatten)]
+    pub(crate) log: LogArguments,
+}
+
 /// Which model, and what its estimate starts from.
 #[derive(Debug, Args)]
 pub(crate) struct ModelArguments {
-    /// The model structure
-    #[arg(long, value_enum, default_value = "arx", help_heading = "Model")]
-    pub(crate) model: ModelArgument,
+    /// The model structure [default: arx; without orders the data choose]
+    #[arg(long, value_enum, help_heading = "Model")]
+    pub(crate) model: Option<ModelArgument>,
     /// Coefficients of A: past outputs
-    #[arg(long, value_name = "N", help_heading = "Model")]
-    pub(crate) na: Option<usize>,
+    #[arg(long, value_name = "N|A..B", help_heading = "Model")]
+    pub(crate) na: Option<String>,
     /// Coefficients of B: inputs; one value for each input or one for all, 0 for a model without inputs
-    #[arg(long, value_name = "N[,N…]", value_delimiter = ',', help_heading = "Model")]
-    pub(crate) nb: Vec<usize>,
+    #[arg(long, value_name = "N|A..B[,…]", value_delimiter = ',', help_heading = "Model")]
+    pub(crate) nb: Vec<String>,
     /// Coefficients of C: past disturbances
-    #[arg(long, value_name = "N", help_heading = "Model")]
-    pub(crate) nc: Option<usize>,
+    #[arg(long, value_name = "N|A..B", help_heading = "Model")]
+    pub(crate) nc: Option<String>,
     /// Coefficients of D, the denominator of the noise
-    #[arg(long, value_name = "N", help_heading = "Model")]
-    pub(crate) nd: Option<usize>,
+    #[arg(long, value_name = "N|A..B", help_heading = "Model")]
+    pub(crate) nd: Option<String>,
     /// Coefficients of F, the denominator from an input alone; one value for each input or one for all
-    #[arg(long, value_name = "N[,N…]", value_delimiter = ',', help_heading = "Model")]
-    pub(crate) nf: Vec<usize>,
-    /// Samples from input to first effect, one value for each input or one for all; 0: the input acts at once [default: 1]
-    #[arg(long, value_name = "N[,N…]", value_delimiter = ',', help_heading = "Model")]
-    pub(crate) nk: Vec<usize>,
+    #[arg(long, value_name = "N|A..B[,…]", value_delimiter = ',', help_heading = "Model")]
+    pub(crate) nf: Vec<String>,
+    /// Samples from input to first effect, one value for each input or one for all; 0: the input acts at once [default: 1;
+    /// without orders the data choose]
+    #[arg(long, value_name = "N|A..B[,…]", value_delimiter = ',', help_heading = "Model")]
+    pub(crate) nk: Vec<String>,
     /// How to estimate
     #[arg(long, value_enum, default_value = "pem", help_heading = "Model")]
     pub(crate) method: MethodArgument,
     /// What stands before the first sample of a stretch
     #[arg(long, value_enum, default_value = "auto", help_heading = "Model")]
     pub(crate) initial: InitialArgument,
+}
+
+/// How to choose, where orders are ranges or are not given.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Choice (orders that are ranges, or not given)")]
+pub(crate) struct ChoiceArguments {
+    /// Which models of the ranges are tried [default: all]
+    #[arg(long, value_enum)]
+    pub(crate) path: Option<PathArgument>,
+    /// What makes one model better than another [default: mdl]
+    #[arg(long, value_enum, value_name = "CRITERION")]
+    pub(crate) select: Option<SelectArgument>,
+    /// Cut the rows in time order into parts: models are fitted to the first and compared, the chosen one is fitted again to
+    /// the first two and judged on the third; 0 for a part that is not wanted
+    #[arg(long, value_name = "E/V/T", conflicts_with = "validate", allow_hyphen_values = true)]
+    pub(crate) split: Option<String>,
 }
 
 /// How to search, where the model is not linear in its parameters.
@@ -238,6 +334,90 @@ pub(crate) struct SimulateArguments {
     pub(crate) initial: Option<StartArgument>,
     #[command(flatten)]
     pub(crate) respond: RespondArguments,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ValidateArguments {
+    /// The report that fit wrote (- for standard input)
+    #[arg(value_name = "REPORT")]
+    pub(crate) report: PathBuf,
+    /// The log: a CSV file, gzip-compressed or not (- for standard input)
+    #[arg(value_name = "LOG")]
+    pub(crate) path: PathBuf,
+    /// What the model must be or do: white, independent, stable, fit>=P (percent, free run), fit@K>=P (K steps ahead),
+    /// coverage>=P (of the 95 % intervals); exit code 6 if it does not
+    #[arg(long, value_name = "WHAT[,WHAT…]", value_delimiter = ',', help_heading = "Tests")]
+    pub(crate) require: Vec<String>,
+    #[command(flatten)]
+    pub(crate) look: LookArguments,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct CompareArguments {
+    /// The reports that fit wrote (- for standard input)
+    #[arg(value_name = "REPORT", required = true, num_args = 1..)]
+    pub(crate) reports: Vec<PathBuf>,
+    /// The log: a CSV file, gzip-compressed or not (- for standard input)
+    #[arg(value_name = "LOG", required = true)]
+    pub(crate) path: PathBuf,
+    #[command(flatten)]
+    pub(crate) look: LookArguments,
+}
+
+/// What validate and compare share.
+#[derive(Debug, Args)]
+pub(crate) struct LookArguments {
+    /// Rows to look at, 1-based and inclusive [default: all]
+    #[arg(long, value_name = "A..B[,C..D]", value_delimiter = ',')]
+    pub(crate) rows: Vec<String>,
+    /// Offsets: the model's own, or none, mean, linear, start:K of the rows looked at
+    #[arg(long, default_value = "model", value_name = "WHAT")]
+    pub(crate) detrend: String,
+    /// How many steps ahead to look besides 1
+    #[arg(
+        long,
+        value_name = "K[,K…]",
+        default_value = "5",
+        value_delimiter = ',',
+        allow_hyphen_values = true
+    )]
+    pub(crate) horizon: Vec<String>,
+    /// Lags of the tests of residuals; short logs have fewer
+    #[arg(long, value_name = "L", default_value_t = 25, help_heading = "Tests")]
+    pub(crate) lags: usize,
+    /// Reject where less than this chance is left
+    #[arg(
+        long,
+        value_name = "LEVEL",
+        default_value_t = 0.05,
+        allow_hyphen_values = true,
+        help_heading = "Tests"
+    )]
+    pub(crate) alpha: f64,
+    /// The levels of Anderson's test
+    #[arg(
+        long,
+        value_name = "LEVEL[,LEVEL…]",
+        value_delimiter = ',',
+        default_value = "0.01,0.02,0.05,0.1,0.2",
+        allow_hyphen_values = true,
+        help_heading = "Tests"
+    )]
+    pub(crate) alphas: Vec<f64>,
+    /// What to print: a table for people, or the JSON document
+    #[arg(long, value_enum, default_value = "table", help_heading = "Output")]
+    pub(crate) format: FormatArgument,
+    /// Write the JSON document to a file (- for standard output, instead of the table)
+    #[arg(short = 'o', long, value_name = "FILE", help_heading = "Output")]
+    pub(crate) out: Option<PathBuf>,
+    /// Write a page with charts to a file
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    pub(crate) html: Option<PathBuf>,
+
+    #[command(flatten)]
+    pub(crate) clock: ClockArguments,
+    #[command(flatten)]
+    pub(crate) log: LogArguments,
 }
 
 #[derive(Debug, Args)]
@@ -344,6 +524,18 @@ pub(crate) struct ClockArguments {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum DocumentArgument {
+    /// What fit writes
+    Report,
+    /// What validate writes
+    Validation,
+    /// What compare writes
+    Comparison,
+    /// What inspect writes
+    Inspection,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum ModelArgument {
     /// A y = B u + e
     Arx,
@@ -359,6 +551,30 @@ pub(crate) enum ModelArgument {
     Bj,
     /// A y = B/F u + C/D e, with any of them
     Pem,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum PathArgument {
+    /// Every combination of orders
+    All,
+    /// One order up at a time, each in its turn
+    Alternate,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum SelectArgument {
+    /// Rissanen's minimum description length
+    Mdl,
+    /// Akaike's information criterion
+    Aic,
+    /// The same, corrected for few samples
+    Aicc,
+    /// Akaike's final prediction error
+    Fpe,
+    /// The smallest model within 1 % of the least cost on the validation rows
+    Validation,
+    /// The same by cross-validation over five blocks in time
+    Cv,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -1,24 +1,31 @@
 //! One file a verb.
 
 mod bode;
+mod compare;
 mod demo;
 mod fit;
 mod help;
+mod inspect;
 mod respond;
 mod stored;
 mod summary;
+mod validate;
 
 use crate::args::{Arguments, Command};
 use crate::failure::Failure;
 
-pub(crate) fn dispatch(arguments: Arguments) -> Result<(), Failure> {
+/// `line` is the command line as it was typed.
+pub(crate) fn dispatch(arguments: Arguments, line: &str) -> Result<(), Failure> {
     match arguments.command {
-        Command::Fit(arguments) => fit::fit(&arguments),
+        Command::Fit(arguments) => fit::fit(&arguments, line),
+        Command::Inspect(arguments) => inspect::inspect(&arguments, line),
         Command::Predict(arguments) => respond::predict(&arguments),
         Command::Simulate(arguments) => respond::simulate(&arguments),
+        Command::Validate(arguments) => validate::validate(&arguments, line),
+        Command::Compare(arguments) => compare::compare(&arguments, line),
         Command::Bode(arguments) => bode::bode(&arguments),
         Command::Demo(arguments) => demo::demo(&arguments),
-        Command::Schema => help::schema(),
+        Command::Schema { document } => help::schema(document),
         Command::Completions { shell } => help::completions(shell),
         Command::Man { verb } => help::manual(verb.as_deref()),
     }

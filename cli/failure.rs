@@ -11,18 +11,24 @@ use crate::table;
 
 /// The option that an argument of the library is here, if it is one.
 fn option_of(argument: &str) -> Option<&str> {
-    const SAME: [&str; 13] = [
+    const SAME: [&str; 19] = [
+        "alpha",
+        "alphas",
         "dc-gain",
         "detrend",
         "frequencies",
         "horizon",
         "initial",
+        "lags",
         "method",
         "nf",
         "noise-bound",
         "offset",
+        "require",
         "resample",
         "ridge",
+        "select",
+        "split",
         "step",
         "tolerance",
     ];
@@ -50,6 +56,7 @@ enum Kind {
     Data,
     Undetermined,
     Io,
+    Unmet,
 }
 
 impl Failure {
@@ -76,6 +83,11 @@ impl Failure {
     /// The log or the report does not hold what was asked of it.
     pub(crate) fn data(message: impl Into<String>) -> Self {
         Self { kind: Kind::Data, message: message.into() }
+    }
+
+    /// A model does not meet what was asked of it.
+    pub(crate) fn unmet(message: impl Into<String>) -> Self {
+        Self { kind: Kind::Unmet, message: message.into() }
     }
 
     /// A file cannot be read or written.
@@ -108,6 +120,11 @@ impl Failure {
         Self { kind, message: format!("{}: {error}", place(row)) }
     }
 
+    /// The same, with the file that it is about in front.
+    pub(crate) fn of(self, path: &Path) -> Self {
+        Self { message: format!("{}: {}", path.display(), self.message), ..self }
+    }
+
     /// Says it on standard error and gives the exit code.
     pub(crate) fn report(&self) -> ExitCode {
         let code = match self.kind {
@@ -120,6 +137,7 @@ impl Failure {
             Kind::Data => 3,
             Kind::Undetermined => 4,
             Kind::Io => 5,
+            Kind::Unmet => 6,
         };
         say(&format!("\x1b[1;31merror:\x1b[0m {}", harmless(&self.message)));
         ExitCode::from(code)

@@ -1,9 +1,11 @@
 //! What a command line means: everything resolved and checked that needs no data.
 
 mod fit;
+mod inspect;
 mod method;
 mod orders;
 mod search;
+mod validate;
 
 use std::str::FromStr;
 
@@ -14,6 +16,8 @@ use crate::failure::Failure;
 use crate::table;
 
 pub(crate) use fit::FitJob;
+pub(crate) use inspect::InspectJob;
+pub(crate) use validate::LookJob;
 
 /// How to read a log.
 #[derive(Debug)]

@@ -15,6 +15,7 @@ mod job;
 mod log;
 mod output;
 mod progress;
+mod shell;
 mod table;
 
 use std::ffi::OsString;
@@ -23,9 +24,10 @@ use std::process::ExitCode;
 use clap::Parser;
 
 /// Runs the program on its arguments, the program's name first, and gives its exit code: 0 done, 2 usage, 3 bad data,
-/// 4 the data cannot determine the model, 5 input/output, 130 interrupted.
+/// 4 the data cannot determine the model, 5 input/output, 6 a model does not meet what was required, 130 interrupted.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
-    let arguments = match args::Arguments::try_parse_from(arguments) {
+    let words: Vec<OsString> = arguments.into_iter().collect();
+    let arguments = match args::Arguments::try_parse_from(&words) {
         Ok(arguments) => arguments,
         Err(error) => {
             // Help and version come this way too, with code 0. Nobody is left to tell that printing failed.
@@ -34,7 +36,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         }
     };
     interrupt::listen();
-    match commands::dispatch(arguments) {
+    match commands::dispatch(arguments, &shell::line(&words)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => failure.report(),
     }

@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use thetahat::{Channel, Error, Log, Resampling, Rows, Source};
+use thetahat::{Channel, Error, Log, Recording, Resampling, Rows, Source, Times};
 
 use crate::failure::Failure;
 use crate::job::{Clock, LogJob};
 use crate::output::warn;
 use crate::progress::Reading;
-use crate::table::{Reader, Selection};
+use crate::table::{Lines, Reader, Selection, Table};
 
 /// A log and where it came from, its rows counted from 1.
 #[derive(Debug)]
@@ -49,16 +49,87 @@ pub(crate) fn load(
     sample_time: Option<f64>,
     choose: impl FnOnce(&[String]) -> Result<Vec<String>, Failure>,
 ) -> Result<Loaded, Failure> {
+    let Columns { channels, table, mut source, words } = columns(path, job, |reader| choose(reader.names()))?;
+    words.iter().for_each(|word| warn(word));
+    let file = source.file.clone();
+    let log = match (&job.clock, table.time) {
+        (Clock::Column { resample: Some((step, interpolation)), .. }, Some(time)) => {
+            source.resampled =
+                Some(Resampling { step: *step, interpolation: *interpolation, rows: table.rows });
+            Log::resampled(channels, &time, *step, *interpolation)
+        }
+        (_, Some(time)) => Log::with_time(channels, time),
+        (Clock::Fixed(seconds), None) => Log::new(channels, *seconds),
+        (_, None) => Log::new(channels, sample_time.unwrap_or(1.0)),
+    };
+    let log = log.map_err(at_line(&file, &table.lines))?;
+    source.rows = Rows::new(1, log.rows()).map_err(at_line(&file, &table.lines))?;
+    Ok(Loaded { log, source })
+}
+
+/// A log as it was recorded, its clock irregular or not.
+#[derive(Debug)]
+pub(crate) struct Recorded {
+    pub(crate) recording: Recording,
+    pub(crate) source: Source,
+    /// The line on which each row is.
+    pub(crate) lines: Lines,
+    /// What the reader should know, in plain words.
+    pub(crate) words: Vec<String>,
+}
+
+/// Reads the columns of a log that `choose` names as they are, one row a second without a clock.
+pub(crate) fn record(
+    path: &Path,
+    job: &LogJob,
+    choose: impl FnOnce(&Reader) -> Result<Vec<String>, Failure>,
+) -> Result<Recorded, Failure> {
+    let Columns { channels, table, source, words } = columns(path, job, choose)?;
+    let times = match (&job.clock, table.time) {
+        (_, Some(time)) => Times::Measured(time),
+        (Clock::Fixed(seconds), None) => Times::Uniform(*seconds),
+        (_, None) => Times::Uniform(1.0),
+    };
+    Ok(Recorded { recording: Recording { channels, times }, source, lines: table.lines, words })
+}
+
+/// What the library says of the rows of one log, with the line.
+pub(crate) fn at_line(file: &str, lines: &Lines) -> impl Fn(Error) -> Failure {
+    move |error| {
+        Failure::about(&error, |row| match row {
+            // The library counts rows from 1, the table from 0.
+            Some(row) => format!("{file}:{}", lines.of(row - 1)),
+            None => file.to_owned(),
+        })
+    }
+}
+
+/// Columns as they stand in a file; the rest of the table has their times.
+struct Columns {
+    channels: Vec<Channel>,
+    table: Table,
+    /// Where they came from, the rows as they stand there.
+    source: Source,
+    /// What the reader should know, in plain words.
+    words: Vec<String>,
+}
+
+fn columns(
+    path: &Path,
+    job: &LogJob,
+    choose: impl FnOnce(&Reader) -> Result<Vec<String>, Failure>,
+) -> Result<Columns, Failure> {
     let reader = Reader::open(path, &job.options)?;
     let file = path.display().to_string();
     let bad = |message: String| Failure::data(format!("{file}: {message}"));
     let header = reader.names().to_vec();
+    let mut words = Vec::new();
     if job.options.header && header.iter().all(|name| name.trim().parse::<f64>().is_ok()) {
-        warn(&format!(
+        words.push(format!(
             "{file}: the names of all columns are numbers; if the first row is data, read it with --no-header"
         ));
     }
-    let names = choose(&header)?;
+    let names = choose(&reader)?;
     let time = match &job.clock {
         Clock::Column { name, .. } => Some(find(name, &header).map_err(bad)?),
         Clock::Fixed(_) => None,
@@ -66,7 +137,7 @@ pub(crate) fn load(
             if let Some(name) =
                 header.iter().find(|name| ["t", "time"].contains(&name.to_lowercase().as_str()))
             {
-                warn(&format!("{file}: column '{name}' looks like a clock; --time {name} would use it"));
+                words.push(format!("{file}: column '{name}' looks like a clock; --time {name} would use it"));
             }
             None
         }
@@ -83,32 +154,16 @@ pub(crate) fn load(
     }
 
     let progress = Reading::new();
-    let table = reader.read(&Selection { columns, time }, &mut |read, total| progress.update(read, total))?;
+    let mut table =
+        reader.read(&Selection { columns, time }, &mut |read, total| progress.update(read, total))?;
     drop(progress);
 
-    let channels =
-        names.into_iter().zip(table.columns).map(|(name, values)| Channel { name, values }).collect();
+    let values = std::mem::take(&mut table.columns);
+    let channels = names.into_iter().zip(values).map(|(name, values)| Channel { name, values }).collect();
     let clock = if let Clock::Column { name, .. } = &job.clock { Some(name.clone()) } else { None };
-    let mut resampled = None;
-    let log = match (&job.clock, table.time) {
-        (Clock::Column { resample: Some((step, interpolation)), .. }, Some(time)) => {
-            resampled = Some(Resampling { step: *step, interpolation: *interpolation, rows: table.rows });
-            Log::resampled(channels, &time, *step, *interpolation)
-        }
-        (_, Some(time)) => Log::with_time(channels, time),
-        (Clock::Fixed(seconds), None) => Log::new(channels, *seconds),
-        (_, None) => Log::new(channels, sample_time.unwrap_or(1.0)),
-    };
-    let log = log.map_err(|error| {
-        Failure::about(&error, |row| match row {
-            // The library counts rows from 1, the table from 0.
-            Some(row) => format!("{file}:{}", table.lines.of(row - 1)),
-            None => file.clone(),
-        })
-    })?;
-    let rows = Rows::new(1, log.rows()).map_err(|error| bad(error.to_string()))?;
-    let source = Source { file, rows, time: clock, start: table.start, resampled };
-    Ok(Loaded { log, source })
+    let rows = Rows::new(1, table.rows).map_err(|error| bad(error.to_string()))?;
+    let source = Source { file, rows, time: clock, start: table.start.take(), resampled: None };
+    Ok(Columns { channels, table, source, words })
 }
 
 /// The one column of a name.
@@ -129,7 +184,7 @@ pub(crate) fn listed(header: &[String]) -> String {
     format!("{}{more}", names.join(", "))
 }
 
-fn brief(name: &str) -> String {
+pub(crate) fn brief(name: &str) -> String {
     const LONGEST: usize = 24;
     match name.char_indices().nth(LONGEST) {
         Some((end, _)) => format!("{}…", &name[..end]),

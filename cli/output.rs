@@ -94,6 +94,12 @@ pub(crate) fn write_csv(
     })
 }
 
+/// Writes a page, like [`write`].
+pub(crate) fn page(path: &Path, page: &Result<String, thetahat::Error>) -> Result<(), Failure> {
+    let page = page.as_ref().map_err(|error| Failure::data(error.to_string()))?;
+    write(path, |file| file.write_all(page.as_bytes()))
+}
+
 /// Refuses an output that would replace what was read.
 pub(crate) fn apart(output: &Path, read: &Path) -> Result<(), Failure> {
     let same = |path: &Path| fs::canonicalize(path).ok().filter(|path| path.is_file());

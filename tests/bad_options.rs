@@ -23,10 +23,10 @@ fn orders_that_a_model_needs() {
         ("--na 2", &["--model arx needs --nb"]),
         ("--model armax --na 2 --nb 2", &["--model armax needs --nc"]),
         ("--model arma --nc 1", &["--model arma needs --na"]),
-        ("--model ar", &["--model ar needs --na"]),
         ("--model oe --nb 2", &["--model oe needs --nf"]),
         ("--model bj --nb 2 --nf 2", &["--model bj needs --nc, --nd"]),
-        ("--model pem", &["no parameters"]),
+        ("--model pem", &["--model pem needs orders", "--na --nb --nc --nd --nf"]),
+        ("--model pem --na 0", &["no parameters"]),
     ]);
 }
 

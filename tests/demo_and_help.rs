@@ -3,13 +3,26 @@
 use crate::harness::Folder;
 use crate::signals::{Experiment, csv};
 
-const VERBS: [&str; 8] = ["fit", "predict", "simulate", "bode", "demo", "schema", "completions", "man"];
+const VERBS: [&str; 11] = [
+    "fit",
+    "inspect",
+    "predict",
+    "simulate",
+    "validate",
+    "compare",
+    "bode",
+    "demo",
+    "schema",
+    "completions",
+    "man",
+];
 
 /// The examples of a help text, as far as the shell would pass them to the program.
 fn examples(help: &str) -> Vec<String> {
     let joined = help.replace("\\\n", " ");
     let lines = joined.lines().filter_map(|line| line.strip_prefix("  thetahat "));
-    lines.map(|line| line.split(['>', '|']).next().unwrap_or_default().trim().to_owned()).collect()
+    let upto = |line: &str, end: &str| line.split(end).next().unwrap_or_default().to_owned();
+    lines.map(|line| upto(&upto(line, " > "), " | ").trim().to_owned()).collect()
 }
 
 #[test]
@@ -71,9 +84,15 @@ fn help_lists_the_verbs_and_the_exit_codes() {
     for verb in VERBS {
         assert!(help.contains(&format!("\n  {verb} ")), "{verb}");
     }
-    for code in
-        ["0  done", "2  usage", "3  bad data", "4  the data cannot", "5  input/output", "130  interrupted"]
-    {
+    for code in [
+        "0  done",
+        "2  usage",
+        "3  bad data",
+        "4  the data cannot",
+        "5  input/output",
+        "6  the model does not meet",
+        "130  interrupted",
+    ] {
         assert!(help.contains(&format!("\n  {code}")), "{code}");
     }
 }
@@ -140,7 +159,7 @@ fn command_lines_that_make_no_sense_are_exit_code_2() {
     for line in [
         "dance",
         "fit",
-        "fit log.csv",
+        "fit log.csv --na 2",
         "fit log.csv --na 2",
         "fit log.csv --na two --nb 2",
         "predict",

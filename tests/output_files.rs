@@ -194,7 +194,7 @@ mod linux {
         folder.done(&format!("{FIT} --report model.json"));
         for (line, code) in [
             ("fit bad.csv --na 2 --nb 2", 3),
-            ("fit bad.csv", 2),
+            ("fit bad.csv --na 2", 2),
             ("fit log.csv --na 2 --nb 2 --validate 1..50", 0),
             ("predict model.json log.csv", 0),
         ] {

@@ -104,7 +104,7 @@ mod unix {
     #[test]
     fn a_search_that_takes_a_second_shows_its_progress_on_a_terminal_only() {
         let folder = Folder::with_log(Experiment::new(200).csv());
-        let line = "fit log.csv --model oe --nb 2 --nf 2 --search gradient --step 1e-3 --max-iterations 1000000 \
+        let line = "fit log.csv --model oe --nb 2 --nf 2 --search gradient --step 1e-6 --max-iterations 1000000 \
                     --tolerance 1e-300 --time-limit 2";
         let shown = on_terminal(folder.command(line), |_| {});
         assert!(
@@ -122,7 +122,7 @@ mod unix {
     #[test]
     fn ctrl_c_clears_the_bar_and_leaves_one_line() {
         let folder = Folder::with_log(Experiment::new(200).csv());
-        let line = "fit log.csv --model oe --nb 2 --nf 2 --search gradient --step 1e-3 --max-iterations 1000000 \
+        let line = "fit log.csv --model oe --nb 2 --nf 2 --search gradient --step 1e-6 --max-iterations 1000000 \
                     --tolerance 1e-300 --report model.json";
         let shown = on_terminal(folder.command(line), |child| {
             // Patience is a second.

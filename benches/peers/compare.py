@@ -44,8 +44,9 @@ def main():
     commands = compare_commands(thetahat, folder)
     small = compare_estimates(peers, folder, (4, 4, 1), rounds=12, required=(6, 20))
     large = compare_estimates(peers, folder, (30, 30, 1), rounds=4, required=(10, 50))
+    grid = compare_grid(peers, folder, (10, 10, 5), rounds=20, required=(2, 200))
     header = ["work", "peer", "thetahat", "peer's", "ratio", "required", "verdict"]
-    print_table([header, *small, *large, *commands])
+    print_table([header, *small, *large, *grid, *commands])
 
 
 def print_versions(thetahat):
@@ -165,6 +166,79 @@ def compare_estimates(peers, folder, orders, rounds, required):
         timing(work, "NumPy, lstsq", best["arx"], best["lstsq"], required[1]),
         timing(f"{work} by QR", "NumPy, lstsq", best["factor"], best["lstsq"], None),
         timing(f"{work} by QR", "faer, QR", best["factor"], best["faer"], None),
+    ]
+
+
+def compare_grid(peers, folder, orders, rounds, required):
+    """All ARX models up to some orders on common samples, and the best by MDL: ours from one Gram matrix, then fitted."""
+    import numpy
+
+    samples = 100_000
+    u, y = (numpy.fromfile(os.path.join(folder, name))[:samples] for name in ("u.f64", "y.f64"))
+    first = max(orders[0], orders[1] + orders[2] - 1)
+    target = y[first:]
+    count = len(target)
+    models = [
+        (na, nb, nk)
+        for na in range(1, orders[0] + 1)
+        for nb in range(1, orders[1] + 1)
+        for nk in range(1, orders[2] + 1)
+    ]
+
+    def regressors(na, nb, nk):
+        columns = numpy.empty((na + nb, count))
+        for lag in range(1, na + 1):
+            columns[lag - 1] = -y[first - lag : samples - lag]
+        for lag in range(nk, nk + nb):
+            columns[na + lag - nk] = u[first - lag : samples - lag]
+        return columns.T
+
+    def normal(phi):
+        return numpy.linalg.solve(phi.T @ phi, phi.T @ target)
+
+    def lstsq(phi):
+        return numpy.linalg.lstsq(phi, target, rcond=None)[0]
+
+    def loop(solve):
+        best = None
+        for model in models:
+            phi = regressors(*model)
+            errors = target - phi @ solve(phi)
+            mse = errors @ errors / count
+            mdl = len(phi.T) * numpy.log(count) / count + numpy.log(mse)
+            if best is None or mdl < best[0]:
+                best = mdl, [*model, mse]
+        return best[1]
+
+    seconds = defaultdict(list)
+    with start(peers, "serve", folder) as server:
+        for _ in range(rounds):
+            for method in ("grid", "largest"):
+                duration, *answer = map(float, ask(server, method, *orders).split())
+                seconds[method].append(duration)
+                if method == "grid":
+                    ours = answer
+        for name, solve in (("normal", normal), ("lstsq", lstsq)):
+            begin = time.perf_counter()
+            theirs = loop(solve)
+            seconds[name].append(time.perf_counter() - begin)
+            check(name, theirs, ours)
+        server.stdin.close()
+    best = {method: min(values) for method, values in seconds.items()}
+    work = f"{len(models)} models and a fit"
+    ratio = best["grid"] / best["largest"]
+    return [
+        timing(work, "NumPy loop, normal equations", best["grid"], best["normal"], required[1]),
+        timing(work, "NumPy loop, lstsq", best["grid"], best["lstsq"], required[1]),
+        [
+            work,
+            "our fit of the largest",
+            f"{best['grid'] * 1e3:.2f} ms",
+            f"{best['largest'] * 1e3:.2f} ms",
+            f"{ratio:.2f} fits",
+            f"at most {required[0]}",
+            verdict(ratio <= required[0]),
+        ],
     ]
 
 

@@ -28,7 +28,7 @@ pub(crate) fn demo(arguments: &DemoArguments) -> Result<(), Failure> {
     let Command::Fit(fit) = parsed.command else {
         return Err(Failure::usage("the demo is a fit"));
     };
-    let found = fit::identified(&FitJob::resolve(&fit)?)?;
+    let found = fit::fitted(&FitJob::resolve(&fit)?)?;
     let json = found.to_json().map_err(|error| Failure::data(error.to_string()))?;
     output::write(&report, |file| file.write_all(json.as_bytes()))?;
     for warning in &found.warnings {

@@ -3,7 +3,9 @@
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use thetahat::{Log, Plan, Report, Rows, Source, identify_monitored};
+use thetahat::{
+    Log, Plan, Report, Rows, Source, Validated, ValidationPlan, fit_page, identify_monitored, validate,
+};
 
 use super::summary;
 use crate::args::{FitArguments, FormatArgument};
@@ -14,37 +16,71 @@ use crate::log::{self, Loaded};
 use crate::output::{self, warn};
 use crate::progress::Searching;
 
-pub(crate) fn fit(arguments: &FitArguments) -> Result<(), Failure> {
+pub(crate) fn fit(arguments: &FitArguments, line: &str) -> Result<(), Failure> {
     let job = FitJob::resolve(arguments)?;
-    if let Some(report) = &arguments.report {
-        job.paths.iter().try_for_each(|path| output::apart(report, path))?;
+    let outputs = [&arguments.report, &arguments.html];
+    for output in outputs.into_iter().flatten() {
+        job.paths.iter().try_for_each(|path| output::apart(output, path))?;
     }
-    let report = identified(&job)?;
+    if arguments.html.is_some() && arguments.html == arguments.report {
+        return Err(Failure::usage("--report and --html name the same file; name two"));
+    }
+    let logs = experiments(&job)?;
+    let kept = arguments.html.is_some().then(|| logs.log.clone());
+    let (report, sources) = identified(&job, logs)?;
     let json = report.to_json().map_err(|error| Failure::data(error.to_string()))?;
-    let to_stdout = arguments.report.as_deref() == Some(Path::new("-"));
+    let page = kept.map(|log| page(&report, log, &sources, line)).transpose()?;
     if let Some(path) = &arguments.report {
         output::write(path, |file| file.write_all(json.as_bytes()))?;
+    }
+    if let (Some(path), Some(page)) = (&arguments.html, page) {
+        output::page(path, &page)?;
     }
     for warning in &report.warnings {
         warn(warning);
     }
     match arguments.format {
         // Standard output holds one document.
-        _ if to_stdout => Ok(()),
+        _ if outputs.into_iter().flatten().any(|path| path == Path::new("-")) => Ok(()),
         FormatArgument::Json => output::print(&json),
         FormatArgument::Table => output::print(&summary::table(&report)),
     }
 }
 
+/// The page of a fit, with a look at each part of the log.
+fn page(
+    report: &Report,
+    log: Log,
+    sources: &[Source],
+    line: &str,
+) -> Result<Result<String, thetahat::Error>, Failure> {
+    let data = &report.data;
+    let test = data.split.as_ref().map_or(&[][..], |parts| &parts.test);
+    let parts = [&data.estimation[..], &data.validation, test].into_iter().filter(|rows| !rows.is_empty());
+    let look = |rows: &[Rows]| {
+        let plan = ValidationPlan { rows: rows.to_vec(), ..ValidationPlan::default() };
+        validate(report, None, log.clone(), sources, &plan).map_err(log::failure(sources))
+    };
+    let looks: Vec<Validated> = parts.map(look).collect::<Result<_, _>>()?;
+    Ok(fit_page(report, &looks, line))
+}
+
 /// Reads the logs and fits the model.
-pub(super) fn identified(job: &FitJob) -> Result<Report, Failure> {
-    let (log, sources, channels) = experiments(job)?;
+pub(super) fn fitted(job: &FitJob) -> Result<Report, Failure> {
+    Ok(identified(job, experiments(job)?)?.0)
+}
+
+/// Fits the model.
+fn identified(job: &FitJob, experiments: Experiments) -> Result<(Report, Vec<Source>), Failure> {
+    let Experiments { log, sources, channels } = experiments;
     let plan = Plan {
-        orders: job.orders.of(channels.inputs.len())?,
+        choice: job.orders.of(channels.inputs.len())?,
+        select: job.select,
         inputs: channels.inputs,
         output: channels.output,
         estimate: job.estimate.clone(),
         validate: job.validate.clone(),
+        split: job.split,
         detrend: job.detrend,
         offsets: job.offsets.clone(),
         method: job.method.clone(),
@@ -57,7 +93,14 @@ pub(super) fn identified(job: &FitJob) -> Result<Report, Failure> {
     };
     let found = interrupt::during(|| identify_monitored(log, &sources, &plan, &monitor));
     drop(progress);
-    found?.map_err(log::failure(&sources))
+    Ok((found?.map_err(log::failure(&sources))?, sources))
+}
+
+/// All logs as one, where they came from, and the columns that the model is about.
+struct Experiments {
+    log: Log,
+    sources: Vec<Source>,
+    channels: Channels,
 }
 
 /// The columns that the model is about.
@@ -68,7 +111,7 @@ struct Channels {
 }
 
 /// Reads all logs, one behind the other.
-fn experiments(job: &FitJob) -> Result<(Log, Vec<Source>, Channels), Failure> {
+fn experiments(job: &FitJob) -> Result<Experiments, Failure> {
     let mut channels: Option<Channels> = None;
     let (mut logs, mut sources) = (Vec::new(), Vec::<Source>::new());
     for path in &job.paths {
@@ -92,7 +135,7 @@ fn experiments(job: &FitJob) -> Result<(Log, Vec<Source>, Channels), Failure> {
         sources.push(source);
     }
     let log = Log::join(logs).map_err(log::failure(&sources))?;
-    Ok((log, sources, channels.unwrap_or_default()))
+    Ok(Experiments { log, sources, channels: channels.unwrap_or_default() })
 }
 
 impl Channels {
@@ -112,23 +155,29 @@ impl Channels {
         if let Some(inputs) = &job.inputs {
             return Ok(Self { inputs: inputs.clone(), output });
         }
-        let mut inputs: Vec<(Option<u32>, String)> = header
-            .iter()
-            .filter_map(|name| {
-                let number = name.strip_prefix('u')?;
-                let number = if number.is_empty() { None } else { Some(plain_number(number)?) };
-                Some((number, name.clone()))
-            })
-            .collect();
-        inputs.sort();
+        let inputs = usual_inputs(header);
         if inputs.is_empty() {
             return Err(format!(
                 "no column is called u, u1, u2, …; name the inputs with --input, or give --nb 0 for a model without; {}",
                 there_are()
             ));
         }
-        Ok(Self { inputs: inputs.into_iter().map(|(_, name)| name).collect(), output })
+        Ok(Self { inputs, output })
     }
+}
+
+/// The columns called u, u1, u2, … in this order.
+pub(super) fn usual_inputs(header: &[String]) -> Vec<String> {
+    let mut inputs: Vec<(Option<u32>, String)> = header
+        .iter()
+        .filter_map(|name| {
+            let number = name.strip_prefix('u')?;
+            let number = if number.is_empty() { None } else { Some(plain_number(number)?) };
+            Some((number, name.clone()))
+        })
+        .collect();
+    inputs.sort();
+    inputs.into_iter().map(|(_, name)| name).collect()
 }
 
 /// 1, 2, …: digits without a leading zero.

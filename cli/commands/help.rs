@@ -1,14 +1,21 @@
 //! What the program says of itself: the report's schema, shell completions, manual pages.
 
 use clap::CommandFactory;
+use thetahat::{Comparison, Inspection, Report, Validation};
 
-use crate::args::Arguments;
+use crate::args::{Arguments, DocumentArgument};
 use crate::failure::Failure;
 use crate::output;
 
-/// `thetahat schema`.
-pub(crate) fn schema() -> Result<(), Failure> {
-    output::print(&format!("{:#}\n", thetahat::Report::json_schema()))
+/// `thetahat schema [DOCUMENT]`.
+pub(crate) fn schema(document: DocumentArgument) -> Result<(), Failure> {
+    let schema = match document {
+        DocumentArgument::Report => Report::json_schema(),
+        DocumentArgument::Validation => Validation::json_schema(),
+        DocumentArgument::Comparison => Comparison::json_schema(),
+        DocumentArgument::Inspection => Inspection::json_schema(),
+    };
+    output::print(&format!("{schema:#}\n"))
 }
 
 /// `thetahat completions SHELL`.

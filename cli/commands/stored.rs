@@ -13,6 +13,11 @@ const LARGEST_REPORT: u64 = 1 << 30;
 
 /// The model of a stored report.
 pub(super) fn model(path: &Path) -> Result<Model, Failure> {
+    Ok(report(path)?.model)
+}
+
+/// A stored report.
+pub(super) fn report(path: &Path) -> Result<Report, Failure> {
     let failed = |error| Failure::io(path, "cannot be read", &error);
     let mut bytes = Vec::new();
     if path == Path::new("-") {
@@ -23,5 +28,5 @@ pub(super) fn model(path: &Path) -> Result<Model, Failure> {
     let bad = |message: String| Failure::data(format!("{}: {message}", path.display()));
     let text = String::from_utf8(bytes)
         .map_err(|_| bad("this is not a thetahat report: not UTF-8 text".to_owned()))?;
-    Ok(Report::from_json(&text).map_err(|error| bad(error.to_string()))?.model)
+    Report::from_json(&text).map_err(|error| bad(error.to_string()))
 }

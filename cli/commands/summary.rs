@@ -1,6 +1,9 @@
 //! A report as a table for people.
 
+mod inspection;
+mod selection;
 mod text;
+mod validation;
 
 use thetahat::{
     Algorithm, CriterionOutcome, Estimation, Fit, Initial, Model, Norm, Orders, Part, Procedure, Quantity,
@@ -8,12 +11,15 @@ use thetahat::{
 };
 
 use crate::output::harmless;
+pub(crate) use inspection::inspection;
 use text::{Text, columns, number, or_dash, short, uncertainty};
+pub(crate) use validation::{comparison, validation};
 
 /// The report's main figures.
 pub(crate) fn table(report: &Report) -> String {
     let model = &report.model;
     let mut text = Text::default();
+    selection::selection(&mut text, report);
     text.line(&format!("{}, sample time {} s", formula(model), short(model.sample_time)));
     let signals = model.inputs.iter().map(|input| signal("input", input));
     let signals: Vec<String> = signals.chain([signal("output", &model.output)]).collect();
@@ -227,6 +233,7 @@ fn fits(text: &mut Text, fits: &[Fit]) {
         let part = match fit.part {
             Some(Part::Estimation) => "estimation",
             Some(Part::Validation) => "validation",
+            Some(Part::Test) => "test",
             None => "",
         };
         table.add_row([

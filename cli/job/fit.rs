@@ -1,10 +1,10 @@
 use std::path::{Path, PathBuf};
 
-use thetahat::{Detrend, Initial, Method, Rows};
+use thetahat::{Detrend, Initial, Method, Rows, Select, Split};
 
 use super::orders::OrderJob;
 use super::{LogJob, method, parsed, rows};
-use crate::args::{FitArguments, InitialArgument};
+use crate::args::{FitArguments, InitialArgument, SelectArgument};
 use crate::failure::Failure;
 
 /// A model to fit.
@@ -20,16 +20,18 @@ pub(crate) struct FitJob {
     pub(crate) output: Option<String>,
     pub(crate) estimate: Vec<Rows>,
     pub(crate) validate: Vec<Rows>,
+    pub(crate) split: Option<Split>,
     pub(crate) detrend: Detrend,
     pub(crate) offsets: Vec<(String, f64)>,
     pub(crate) orders: OrderJob,
+    pub(crate) select: Select,
     pub(crate) method: Method,
     pub(crate) initial: Initial,
 }
 
 impl FitJob {
     pub(crate) fn resolve(arguments: &FitArguments) -> Result<Self, Failure> {
-        let orders = OrderJob::resolve(&arguments.model)?;
+        let orders = OrderJob::resolve(&arguments.model, arguments.choice.path)?;
         let job = Self {
             paths: arguments.logs.clone(),
             log: LogJob::resolve(&arguments.log, &arguments.clock)?,
@@ -39,10 +41,18 @@ impl FitJob {
             validate: rows("--validate", &arguments.validate)?,
             detrend: parsed("--detrend", &arguments.detrend)?,
             offsets: offsets(&arguments.offset)?,
+            split: arguments.choice.split.as_deref().map(|text| parsed("--split", text)).transpose()?,
+            select: select(arguments.choice.select, &orders)?,
             method: method::method(arguments, &orders)?,
             initial: initial(arguments.model.initial, &orders)?,
             orders,
         };
+        let validates = !job.validate.is_empty() || job.split.is_some_and(|split| split.validates());
+        if job.select == Select::Validation && !validates {
+            return Err(Failure::usage(
+                "--select validation needs rows for it: give --split 60/20/20, or --estimate and --validate",
+            ));
+        }
         if job.paths.iter().filter(|path| *path == Path::new("-")).count() > 1 {
             return Err(Failure::usage("only one of the logs can come from standard input (-)"));
         }
@@ -75,6 +85,22 @@ fn offsets(texts: &[String]) -> Result<Vec<(String, f64)>, Failure> {
         offsets.push((name, value));
     }
     Ok(offsets)
+}
+
+fn select(argument: Option<SelectArgument>, orders: &OrderJob) -> Result<Select, Failure> {
+    if argument.is_some() && !orders.is_choice() {
+        return Err(Failure::usage(
+            "--select chooses among several models, and the orders say one; give ranges such as --na 1..10, or no orders",
+        ));
+    }
+    Ok(match argument {
+        None | Some(SelectArgument::Mdl) => Select::Mdl,
+        Some(SelectArgument::Aic) => Select::Aic,
+        Some(SelectArgument::Aicc) => Select::Aicc,
+        Some(SelectArgument::Fpe) => Select::Fpe,
+        Some(SelectArgument::Validation) => Select::Validation,
+        Some(SelectArgument::Cv) => Select::Cv,
+    })
 }
 
 fn initial(argument: InitialArgument, orders: &OrderJob) -> Result<Initial, Failure> {

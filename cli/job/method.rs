@@ -10,6 +10,12 @@ pub(super) fn method(arguments: &FitArguments, orders: &OrderJob) -> Result<Meth
     let FitArguments { search: of_search, criterion: of_criterion, .. } = arguments;
     let method = arguments.model.method;
     let refused = |option: &str, why: &str| Err(Failure::usage(format!("{option} {why}, so leave it out")));
+    let alone = (method != MethodArgument::Pem).then_some("--method").or(given(of_criterion));
+    if let Some(option) = alone.filter(|_| orders.is_choice()) {
+        return Err(Failure::usage(format!(
+            "{option} is for one model, and there is a choice among several; give each order one value"
+        )));
+    }
     match (search::given(of_search), given(of_criterion)) {
         (Some(option), _) if method != MethodArgument::Pem => refused(option, "is for --method pem"),
         (_, Some(option)) if method != MethodArgument::Pem => refused(option, "is for --method pem"),

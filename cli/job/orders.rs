@@ -1,17 +1,16 @@
-use thetahat::Orders;
+use thetahat::{Automatic, Choice, Grid, OrderRange, Orders, Path, Structure};
 
-use crate::args::{ModelArgument, ModelArguments};
+use super::parsed;
+use crate::args::{ModelArgument, ModelArguments, PathArgument};
 use crate::failure::Failure;
 
-/// The orders of a model as they were given: one value for each input, or one for all.
+/// The orders of a model as they were given: values or ranges, one for each input or one for all; or none.
 #[derive(Debug)]
-pub(crate) struct OrderJob {
-    na: usize,
-    nb: Vec<usize>,
-    nc: usize,
-    nd: usize,
-    nf: Vec<usize>,
-    nk: Vec<usize>,
+pub(crate) enum OrderJob {
+    /// Values or ranges.
+    Given(Grid),
+    /// The data choose.
+    Open { structure: Option<Structure>, inputs: bool, nk: Vec<usize> },
 }
 
 impl ModelArgument {
@@ -27,12 +26,29 @@ impl ModelArgument {
             Self::Pem => ("pem", &["--na", "--nb", "--nc", "--nd", "--nf"]),
         }
     }
+
+    /// The structure of which orders are chosen.
+    fn structure(self) -> Result<Structure, Failure> {
+        match self {
+            Self::Arx => Ok(Structure::Arx),
+            Self::Armax => Ok(Structure::Armax),
+            Self::Arma => Ok(Structure::Arma),
+            Self::Ar => Ok(Structure::Ar),
+            Self::Oe => Ok(Structure::Oe),
+            Self::Bj => Ok(Structure::Bj),
+            Self::Pem => Err(Failure::usage(
+                "--model pem needs orders: it is any of the others; give --na --nb --nc --nd --nf, or no --model for a choice \
+                 among the others",
+            )),
+        }
+    }
 }
 
 impl OrderJob {
-    pub(super) fn resolve(arguments: &ModelArguments) -> Result<Self, Failure> {
+    pub(super) fn resolve(arguments: &ModelArguments, path: Option<PathArgument>) -> Result<Self, Failure> {
         let ModelArguments { na, nb, nc, nd, nf, nk, model, .. } = arguments;
-        let (name, has) = model.shape();
+        let (na, nc, nd) = (one("--na", na.as_ref())?, one("--nc", nc.as_ref())?, one("--nd", nd.as_ref())?);
+        let (nb, nf, nk) = (each("--nb", nb)?, each("--nf", nf)?, each("--nk", nk)?);
         let given = [
             ("--na", na.is_some()),
             ("--nb", !nb.is_empty()),
@@ -40,13 +56,40 @@ impl OrderJob {
             ("--nd", nd.is_some()),
             ("--nf", !nf.is_empty()),
         ];
+        let no_inputs = !nb.is_empty() && nb.iter().all(|nb| nb.last() == 0);
+        let only_no_inputs = no_inputs && given.iter().filter(|(_, given)| *given).count() == 1;
+        let open = given.iter().all(|(_, given)| !given) || (model.is_none() && only_no_inputs);
+        let (name, has) = model.unwrap_or(ModelArgument::Arx).shape();
+        let takes_inputs = has.contains(&"--nb");
+        if !nk.is_empty() && !takes_inputs {
+            return Err(Failure::usage(format!(
+                "--model {name} does not take --nk, as it has no inputs; give {}",
+                has.join(" ")
+            )));
+        }
+        if open {
+            if path.is_some() {
+                return Err(Failure::usage(
+                    "--path is for orders that are ranges; give some, such as --na 1..10 --nb 1..10",
+                ));
+            }
+            let single = |nk: &OrderRange| {
+                nk.single().ok_or_else(|| {
+                    Failure::usage(format!(
+                        "--nk {nk}: a range of delays needs orders beside it; give --na and --nb too, or leave --nk out"
+                    ))
+                })
+            };
+            return Ok(Self::Open {
+                structure: model.map(ModelArgument::structure).transpose()?,
+                inputs: takes_inputs && !no_inputs,
+                nk: nk.iter().map(single).collect::<Result<_, _>>()?,
+            });
+        }
         let wrong =
             |what: String| Err(Failure::usage(format!("--model {name} {what}; give {}", has.join(" "))));
         if let Some((order, _)) = given.iter().find(|(order, given)| *given && !has.contains(order)) {
             return wrong(format!("does not take {order}"));
-        }
-        if !nk.is_empty() && !has.contains(&"--nb") {
-            return wrong("does not take --nk, as it has no inputs".to_owned());
         }
         // Of a general model, what is not given is not there.
         let missing: Vec<&str> = given
@@ -54,62 +97,127 @@ impl OrderJob {
             .filter(|(order, given)| !given && has.contains(order))
             .map(|(order, _)| *order)
             .collect();
-        if *model != ModelArgument::Pem && !missing.is_empty() {
+        if *model != Some(ModelArgument::Pem) && !missing.is_empty() {
             return wrong(format!("needs {}", missing.join(", ")));
         }
-        let job = Self {
-            na: na.unwrap_or(0),
-            nb: nb.clone(),
-            nc: nc.unwrap_or(0),
-            nd: nd.unwrap_or(0),
-            nf: if nf.is_empty() { vec![0] } else { nf.clone() },
-            nk: if nk.is_empty() { vec![1] } else { nk.clone() },
+        let or = |ranges: Vec<OrderRange>, default: usize| {
+            if ranges.is_empty() { vec![OrderRange::from(default)] } else { ranges }
         };
-        if !job.has_inputs() {
-            if job.is_filtered() {
-                return Err(Failure::usage(
-                    "--nf: F is the denominator from an input, and there is none; give an --nb above 0",
-                ));
-            }
-            job.of(0)?;
+        // What can be said before the log says how many inputs there are.
+        let inputs = nb.len().max(nf.len()).max(nk.len());
+        let job = Self::Given(Grid {
+            na: na.unwrap_or(0.into()),
+            // As many as there are inputs; of a model that has none, none.
+            nb,
+            nc: nc.unwrap_or(0.into()),
+            nd: nd.unwrap_or(0.into()),
+            nf: or(nf, 0),
+            nk: or(nk, 1),
+            path: match path {
+                None | Some(PathArgument::All) => Path::All,
+                Some(PathArgument::Alternate) => Path::Alternate,
+            },
+        });
+        if path.is_some() && !job.is_choice() {
+            return Err(Failure::usage(
+                "--path is for orders that are ranges; give some, such as --na 1..10 --nb 1..10",
+            ));
+        }
+        if !job.has_inputs() && job.is_filtered() {
+            return Err(Failure::usage(
+                "--nf: F is the denominator from an input, and there is none; give an --nb above 0",
+            ));
+        }
+        if job.is_choice() || !job.has_inputs() {
+            job.of(if job.has_inputs() { inputs } else { 0 })?;
         }
         Ok(job)
     }
 
     /// Whether the model has inputs at all.
     pub(crate) fn has_inputs(&self) -> bool {
-        self.nb.iter().any(|&nb| nb > 0)
+        match self {
+            Self::Given(grid) => grid.nb.iter().any(|nb| nb.last() > 0),
+            Self::Open { inputs, .. } => *inputs,
+        }
     }
 
-    /// Whether there is an F.
+    /// Whether there is a choice among several models.
+    pub(crate) fn is_choice(&self) -> bool {
+        match self {
+            Self::Given(grid) => {
+                let alone = [grid.na, grid.nc, grid.nd];
+                let mut ranges = alone.iter().chain(&grid.nb).chain(&grid.nf).chain(&grid.nk);
+                ranges.any(|range| range.single().is_none())
+            }
+            Self::Open { .. } => true,
+        }
+    }
+
+    /// Whether there is an F for sure.
     pub(crate) fn is_filtered(&self) -> bool {
-        self.nf.iter().any(|&nf| nf > 0)
+        matches!(self, Self::Given(grid) if grid.nf.iter().any(|nf| nf.first() > 0))
     }
 
     /// Whether there are B and F, and nothing else.
     pub(crate) fn is_output_error(&self) -> bool {
-        self.is_filtered() && self.na + self.nc + self.nd == 0
+        let alone = |grid: &Grid| [grid.na, grid.nc, grid.nd].iter().all(|range| range.last() == 0);
+        matches!(self, Self::Given(grid) if self.is_filtered() && alone(grid))
     }
 
     /// Whether the predictor is linear in the parameters: C = D = F = 1.
     pub(crate) fn is_linear(&self) -> bool {
-        self.nc == 0 && self.nd == 0 && !self.is_filtered()
+        match self {
+            Self::Given(grid) => grid.nf.iter().chain([&grid.nc, &grid.nd]).all(|range| range.last() == 0),
+            Self::Open { .. } => false,
+        }
     }
 
-    /// The orders for so many inputs: one value stands for all of them.
-    pub(crate) fn of(&self, inputs: usize) -> Result<Orders, Failure> {
-        let each = |argument: &str, values: &[usize]| match values {
-            [one] => Ok(vec![*one; inputs]),
-            several if several.len() == inputs || inputs == 0 => {
-                Ok(several.iter().copied().take(inputs).collect())
+    /// The choice for so many inputs: one value stands for all of them.
+    pub(crate) fn of(&self, inputs: usize) -> Result<Choice, Failure> {
+        let lengths = |argument: &str, count: usize| {
+            if count <= 1 || count == inputs || inputs == 0 {
+                return Ok(());
             }
-            several => Err(Failure::usage(format!(
-                "{argument} has {} values for {inputs} input{}; give one for each, or one for all",
-                several.len(),
+            Err(Failure::usage(format!(
+                "{argument} has {count} values for {inputs} input{}; give one for each, or one for all",
                 if inputs == 1 { "" } else { "s" }
-            ))),
+            )))
         };
-        let (nb, nf, nk) = (each("--nb", &self.nb)?, each("--nf", &self.nf)?, each("--nk", &self.nk)?);
-        Orders::new(self.na, &nb, self.nc, self.nd, &nf, &nk).map_err(|error| Failure::option(&error))
+        let failed = |error| Failure::option(&error);
+        let grid = match self {
+            Self::Open { structure, nk, .. } => {
+                lengths("--nk", nk.len())?;
+                let each = match nk[..] {
+                    [] => None,
+                    [one] => Some(vec![one; inputs]),
+                    _ => Some(nk.clone()),
+                };
+                return Ok(Choice::Automatic(Automatic { structure: *structure, nk: each }));
+            }
+            Self::Given(grid) => grid,
+        };
+        lengths("--nb", grid.nb.len())?;
+        lengths("--nf", grid.nf.len())?;
+        lengths("--nk", grid.nk.len())?;
+        if self.is_choice() {
+            grid.orders(inputs).map_err(failed)?;
+            return Ok(Choice::Grid(grid.clone()));
+        }
+        let each = |ranges: &[OrderRange]| -> Vec<usize> {
+            (0..inputs).filter_map(|input| Some(ranges.get(input).or(ranges.first())?.first())).collect()
+        };
+        let (nb, nf, nk) = (each(&grid.nb), each(&grid.nf), each(&grid.nk));
+        let orders =
+            Orders::new(grid.na.first(), &nb, grid.nc.first(), grid.nd.first(), &nf, &nk).map_err(failed)?;
+        Ok(Choice::Known(orders))
     }
+}
+
+fn one(argument: &str, text: Option<&String>) -> Result<Option<OrderRange>, Failure> {
+    text.map(|text| parsed(argument, text)).transpose()
+}
+
+fn each(argument: &str, texts: &[String]) -> Result<Vec<OrderRange>, Failure> {
+    texts.iter().map(|text| parsed(argument, text)).collect()
 }

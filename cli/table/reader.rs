@@ -26,6 +26,9 @@ pub(super) struct Sizes {
     pub(super) row: usize,
 }
 
+/// So many rows say whether a column holds numbers.
+const LOOKED_AT: usize = 1000;
+
 /// The sizes for real files.
 pub(super) const SIZES: Sizes = Sizes { block: 1 << 20, piece: 1 << 17, row: 1 << 24 };
 
@@ -157,6 +160,41 @@ impl Reader {
     /// The names of the columns, as they are in the header; without one they are numbered from `1`.
     pub(crate) fn names(&self) -> &[String] {
         &self.layout.names
+    }
+
+    /// The columns that hold something else than numbers, as far as the first rows show it: not one of their values there
+    /// is a number, and not all are missing.
+    pub(crate) fn words(&self) -> Vec<bool> {
+        let numbers = Numbers::new(self.options.decimal_comma, &self.options.missing);
+        let dialect = self.layout.dialect;
+        let mut text = &self.current.text()[self.position..];
+        let mut record = Record::new(dialect.delimiter);
+        let (mut numeric, mut other) = (vec![false; self.layout.width()], vec![false; self.layout.width()]);
+        let mut rows = 0;
+        while rows < LOOKED_AT {
+            if let Some(length) = dialect.skipped_line(text) {
+                text = &text[length..];
+            } else if let Some(length) = record.read(text) {
+                text = &text[length..];
+                rows += 1;
+                for (column, (numeric, other)) in numeric.iter_mut().zip(&mut other).enumerate() {
+                    if column < record.len() {
+                        let field = dialect.trimmed(record.field(column));
+                        let number = numbers.read(field).is_ok() || numbers.is_nearly(field);
+                        *numeric |= number && !numbers.is_missing(field);
+                        *other |= !number;
+                    }
+                }
+            } else {
+                break;
+            }
+        }
+        numeric.into_iter().zip(other).map(|(numeric, other)| other && !numeric).collect()
+    }
+
+    /// The columns of which the name is not UTF-8 and cannot be shown.
+    pub(crate) fn nameless(&self) -> impl Iterator<Item = usize> {
+        self.undecoded_names.iter().map(|(column, _)| *column)
     }
 
     /// Reads the selected columns of all rows.

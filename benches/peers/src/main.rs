@@ -2,7 +2,9 @@
 //!
 //! `thetahat-peers write FOLDER` writes the signals: `u.f64` and `y.f64` (raw numbers) and `log.csv`.
 //! `thetahat-peers serve FOLDER` reads them, then answers each line `METHOD NA NB NK` on standard input with one
-//! line: the seconds that the method took, and the parameters.
+//! line: the seconds that the method took, and the parameters. `grid NA NB NK` compares all models up to these orders on the
+//! first tenth of the signals, then fits the chosen one: the answer holds its orders and mean square error instead.
+//! `largest` fits the largest of them to the same samples.
 
 #[path = "../../signals.rs"]
 mod signals;
@@ -15,7 +17,10 @@ use std::time::Instant;
 
 use faer::Mat;
 use faer::prelude::SolveLstsq;
-use thetahat::{Estimate, Initial, Orders, Record, arx, arx_factor};
+use thetahat::{
+    Choice, Estimate, Grid, Initial, OrderRange, Orders, Path as Walk, Record, Select, arx, arx_factor,
+    choose_orders,
+};
 
 /// Rows of the log.
 const SAMPLES: usize = 1_000_000;
@@ -68,10 +73,13 @@ fn serve(folder: &Path) -> Result<()> {
         let words: Vec<&str> = request.split_whitespace().collect();
         let [method, na, nb, nk] = words[..] else { return Err(format!("'{request}' is no request").into()) };
         let (na, nb, nk) = (na.parse()?, nb.parse()?, nk.parse()?);
+        let part = ..output.len() / 10;
         let begin = Instant::now();
         let parameters = match method {
             "arx" => gram(&input, &output, &Orders::arx(na, &[nb], &[nk])?)?,
             "factor" => factor(&input, &output, &Orders::arx(na, &[nb], &[nk])?)?,
+            "grid" => grid(&input[part], &output[part], [na, nb, nk])?,
+            "largest" => gram(&input[part], &output[part], &Orders::arx(na, &[nb], &[nk])?)?,
             "faer" => faer_qr(&input, &output, [na, nb, nk]),
             _ => return Err(format!("there is no method '{method}'").into()),
         };
@@ -85,6 +93,26 @@ fn serve(folder: &Path) -> Result<()> {
 /// The estimate through the Gram matrix.
 fn gram(input: &[f64], output: &[f64], orders: &Orders) -> Result<Vec<f64>> {
     Ok(arx(&Record::new(output, vec![input])?, orders, Initial::Drop)?.parameters().to_vec())
+}
+
+/// The best of all models with 1 to `na`, 1 to `nb`, 1 to `nk`, fitted: its orders, and its mean square error on the samples
+/// that all of them have.
+fn grid(input: &[f64], output: &[f64], [na, nb, nk]: [usize; 3]) -> Result<Vec<f64>> {
+    let up_to = |last| OrderRange::new(1, last);
+    let grid = Grid {
+        na: up_to(na)?,
+        nb: vec![up_to(nb)?],
+        nc: 0.into(),
+        nd: 0.into(),
+        nf: vec![0.into()],
+        nk: vec![up_to(nk)?],
+        path: Walk::All,
+    };
+    let record = Record::new(output, vec![input])?;
+    let chosen = choose_orders(&record, None, &Choice::Grid(grid), Select::Mdl)?.chosen;
+    arx(&record, &chosen.orders, Initial::Drop)?;
+    let orders = [chosen.orders.na, chosen.orders.nb[0], chosen.orders.nk[0]];
+    Ok(orders.iter().map(|&order| order as f64).chain([chosen.mse]).collect())
 }
 
 /// The estimate through a triangular factor.

@@ -7,6 +7,7 @@ mod split;
 mod tests;
 
 pub use log::{Channel, Interpolation, Log, Record};
+pub(crate) use log::{GAP, JITTER, check, shortest};
 pub use prepare::{Detrend, Offset};
-pub use split::Rows;
-pub(crate) use split::checked;
+pub use split::{Rows, Split};
+pub(crate) use split::{between, checked};

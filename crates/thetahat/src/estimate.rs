@@ -1,6 +1,7 @@
 //! From a record and orders to parameters.
 
 mod arx;
+mod common;
 mod criterion;
 mod instrumental;
 mod normal;
@@ -23,8 +24,11 @@ pub use crate::regression::Solver;
 use crate::{Criteria, Error, Orders};
 pub(crate) use arx::enough;
 pub use arx::{arx, arx_factor};
+pub(crate) use common::{Common, Point, Window, extended};
 pub use criterion::{Bound, Criterion, CriterionOutcome, GainBound, Norm};
 pub use optimize::{Algorithm, Monitor, Progress, Search, SearchOutcome, StartOutcome, Step, Stopped};
+pub(crate) use prediction_error::{drop_is_not_for_f, stretches};
+pub(crate) use uncertainty::{Autoregression, autoregression, backward_filtered_products};
 
 /// What stands for the samples before the first of a segment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]

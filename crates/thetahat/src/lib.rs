@@ -15,7 +15,11 @@
 //!   that are linear in their parameters; [`arx_factor`] gives a triangular factor that merges with others.
 //! - [`predict`], [`simulate`] and [`forecast`] say what a [`Model`] says, [`frequency_response`] what it is to each
 //!   frequency; [`Fit`] says how close that is.
+//! - [`inspect`] says what a log is worth before any fit.
 //! - [`identify`] goes the whole way from a [`Log`] to a [`Report`], the JSON document; [`apply`] takes a stored model to a log.
+//! - [`validate()`] says how a stored model does on a log and what is left of it, [`compare`] puts several side by side, a
+//!   [`Requirement`] makes a gate of it.
+//! - With the feature `html`, `fit_page` and its like make pages with charts of them.
 //!
 //! Rows of a log are counted from 1 and ranges include both ends; sample positions inside a [`Record`] are counted from 0.
 //! The same input gives the same bits, whatever the number of threads.
@@ -25,6 +29,7 @@
 mod data;
 mod error;
 mod estimate;
+mod inspect;
 mod model;
 mod regression;
 mod report;
@@ -32,21 +37,32 @@ mod respond;
 mod select;
 mod validate;
 
-pub use data::{Channel, Detrend, Interpolation, Log, Offset, Record, Rows};
+pub use data::{Channel, Detrend, Interpolation, Log, Offset, Record, Rows, Split};
 pub use error::Error;
 pub use estimate::{
     Algorithm, Bound, Criterion, CriterionOutcome, Estimate, GainBound, Initial, Method, Monitor, Norm,
     Procedure, Progress, Search, SearchOutcome, Solver, StartOutcome, Step, Stopped, arx, arx_factor,
     estimate, estimate_monitored,
 };
+pub use inspect::{
+    ChannelQuality, Clock, DelayEstimate, Excitation, Feedback, Inspection, InspectionPlan, Recording,
+    Saturation, SpectrumPoint, Times, inspect,
+};
 pub use model::{Model, Orders, Parameter, Quantity, Root, Signal, Structure};
 pub use report::{
-    Applied, Data, Estimation, Missing, Plan, Report, Resampling, Source, apply, identify, identify_monitored,
+    Applied, Comparison, Coverage, Data, Estimation, Missing, NoiseLevel, Parts, Plan, Report, Requirement,
+    Resampling, Seen, Signals, Source, Validated, Validation, ValidationPlan, apply, compare, identify,
+    identify_monitored, validate,
 };
+#[cfg(feature = "html")]
+pub use report::{comparison_page, fit_page, inspection_page, validation_page};
 pub use respond::{
-    Forecast, FrequencyPoint, FrequencyResponse, Response, Start, forecast, frequency_response,
-    logarithmic_frequencies, predict, prediction_deviation, simulate,
+    Forecast, FrequencyPoint, FrequencyResponse, Response, Start, StepResponse, forecast, frequency_response,
+    logarithmic_frequencies, predict, prediction_deviation, simulate, step_response,
 };
-pub use select::Criteria;
+pub use select::{
+    Automatic, Choice, Criteria, Delay, Grid, OrderRange, Path, Scan, Scored, Select, Selection,
+    choose_orders,
+};
 pub use thetahat_core;
-pub use validate::{Fit, Horizon, Part};
+pub use validate::{Anderson, AndersonLevel, Fit, Horizon, Independence, Part, Residuals, Test};

@@ -8,4 +8,5 @@ pub(crate) mod polynomial;
 pub(crate) use dynamics::{Block, Blocks, Gradient, cancel, covariance, near_cancellation};
 pub use dynamics::{Quantity, Root};
 pub use fitted::{Model, Parameter, Signal};
+pub(crate) use orders::LARGEST;
 pub use orders::{Orders, Structure};

@@ -16,7 +16,7 @@ mod tests;
 
 pub(crate) use filter::{add_filtered, divide, divide_from, divide_together};
 pub(crate) use gram::{Interior, Products};
-pub(crate) use kernel::{sum, sum_of_squares};
+pub(crate) use kernel::{product, sum, sum_of_squares};
 pub use lagged::Solver;
-pub(crate) use lagged::{Lagged, Presample, Regression, Taps, Unsolved, condition};
+pub(crate) use lagged::{Lagged, Presample, Regression, SAFE_NORMS, Taps, Unsolved, condition};
 pub(crate) use qr::factor_rows;

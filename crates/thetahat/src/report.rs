@@ -1,9 +1,20 @@
 //! The document that a fit leaves behind, and the way there.
 
 mod apply;
+#[cfg(feature = "html")]
+mod html;
 mod identify;
+mod requirement;
 mod schema;
+mod validation;
+mod warnings;
 
 pub use apply::{Applied, apply};
+#[cfg(feature = "html")]
+pub use html::{comparison_page, fit_page, inspection_page, validation_page};
 pub use identify::{Plan, identify, identify_monitored};
-pub use schema::{Data, Estimation, Missing, Report, Resampling, Source};
+pub use requirement::Requirement;
+pub use schema::{Data, Estimation, Missing, Parts, Report, Resampling, Source};
+pub use validation::{
+    Comparison, Coverage, NoiseLevel, Seen, Signals, Validated, Validation, ValidationPlan, compare, validate,
+};

@@ -6,6 +6,7 @@ mod frequency;
 mod innovations;
 mod predict;
 mod simulate;
+mod step;
 #[cfg(test)]
 mod tests;
 
@@ -20,9 +21,11 @@ use crate::{Error, Model};
 pub(crate) use forecast::forecast_if_possible;
 pub use forecast::{Forecast, forecast};
 pub use frequency::{FrequencyPoint, FrequencyResponse, frequency_response, logarithmic_frequencies};
+pub(crate) use innovations::{Innovations, innovations};
 pub(crate) use predict::{check_steps, deviations, longest};
 pub use predict::{predict, prediction_deviation};
 pub use simulate::simulate;
+pub use step::{StepResponse, step_response};
 
 /// What a response starts from.
 ///

@@ -7,9 +7,9 @@ use crate::Error;
 use crate::data::{Offset, Rows, checked};
 
 /// A step longer than so many medians starts a new segment.
-const GAP: f64 = 1.5;
+pub(crate) const GAP: f64 = 1.5;
 /// Steps may differ from their median by this fraction.
-const JITTER: f64 = 0.1;
+pub(crate) const JITTER: f64 = 0.1;
 /// Rows that resampling may give: beyond them a step was mistyped.
 const MOST_ROWS: f64 = 1e8;
 
@@ -405,7 +405,7 @@ impl Interpolation {
 }
 
 /// Checks names, lengths and infinities; gives the number of rows.
-fn check(channels: &[Channel]) -> Result<usize, Error> {
+pub(crate) fn check(channels: &[Channel]) -> Result<usize, Error> {
     let rows = channels.first().map_or(0, |channel| channel.values.len());
     if rows == 0 {
         return Err(Error::data("the log has no rows"));
@@ -466,7 +466,7 @@ fn median_step(time: &[f64], rows: usize) -> Result<f64, Error> {
 
 /// The number of fewest digits within `tolerance`: differences of times such as 0.3 and 0.29 have rounding at their end,
 /// which is not the clock's.
-fn shortest(value: f64, tolerance: f64) -> f64 {
+pub(crate) fn shortest(value: f64, tolerance: f64) -> f64 {
     (0..17)
         .filter_map(|digits| format!("{value:.digits$e}").parse().ok())
         .find(|rounded: &f64| (rounded - value).abs() <= tolerance)

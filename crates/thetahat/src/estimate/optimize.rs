@@ -112,6 +112,11 @@ impl Search {
                 ),
             ));
         }
+        self.check_numbers()
+    }
+
+    /// The same for what does not depend on the orders.
+    pub(super) fn check_numbers(&self) -> Result<(), Error> {
         let positive = |name: &str, value: f64| {
             if value.is_finite() && value > 0.0 {
                 return Ok(());

@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::time::Instant;
 
 use rayon::prelude::*;
-use thetahat_core::nalgebra::{Cholesky, DMatrix};
+use thetahat_core::nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::arx::{arx, out_of_range, rows, signals};
 use super::optimize::{
@@ -21,7 +21,7 @@ use crate::regression::{condition, sum_of_squares};
 use crate::{Error, Model, Orders, Structure};
 
 /// A sum of squared errors below this fraction of the output's is rounding.
-const NOTHING_LEFT: f64 = 1e-28;
+pub(super) const NOTHING_LEFT: f64 = 1e-28;
 /// From so many samples on, starts see stretches of the record only.
 const LONG: usize = 1 << 18;
 const STRETCHES: usize = 8;
@@ -29,14 +29,18 @@ const STRETCH: usize = 1 << 12;
 /// Above this condition number the Gram matrix does not give the covariance to a thousandth.
 const MAXIMUM_CONDITION: f64 = 5e6;
 
+pub(crate) fn drop_is_not_for_f() -> Error {
+    Error::argument(
+        "initial",
+        "drop is for models without F, whose errors depend on few samples; use zero, estimate or auto",
+    )
+}
+
 /// How the initial conditions are treated.
 fn begins(orders: &Orders, initial: Initial) -> Result<(Begin, bool), Error> {
     let filtered = orders.nf.iter().any(|&nf| nf > 0);
     match initial {
-        Initial::Drop if filtered => Err(Error::argument(
-            "initial",
-            "drop is for models without F, whose errors depend on few samples; use zero, estimate or auto",
-        )),
+        Initial::Drop if filtered => Err(drop_is_not_for_f()),
         Initial::Zero => Ok((Begin::Zero, false)),
         Initial::Drop | Initial::Estimate => Ok((Begin::Unknown, false)),
         Initial::Auto => Ok((Begin::Unknown, filtered)),
@@ -363,60 +367,71 @@ fn uncertainty(predictor: &Predictor<'_>, orders: &Orders, noise_variance: f64) 
     Some(Uncertainty { covariance: rows(&inverse), condition })
 }
 
+/// Whether the errors tell the parameters apart, where the predictor stands.
+pub(super) fn is_determined(predictor: &Predictor<'_>) -> bool {
+    inverse(predictor).is_some()
+}
+
 /// G^-1, and the condition number of psi. By Cholesky of the Gram matrix, or by QR where that is not exact enough.
 fn inverse(predictor: &Predictor<'_>) -> Option<(DMatrix<f64>, f64)> {
     let size = predictor.right.len();
     let matrix = DMatrix::from_row_slice(size, size, &predictor.matrix);
     let scales = matrix.diagonal().map(f64::sqrt);
-    let scaled = |mut inverse: DMatrix<f64>| {
-        for (mut column, scale) in inverse.column_iter_mut().zip(&scales) {
-            column.component_div_assign(&scales);
+    let scaled = |mut inverse: DMatrix<f64>, scales: &DVector<f64>| {
+        for (mut column, scale) in inverse.column_iter_mut().zip(scales) {
+            column.component_div_assign(scales);
             column.unscale_mut(*scale);
         }
         inverse
     };
     let unit = DMatrix::from_fn(size, size, |i, j| matrix[(i, j)] / scales[i] / scales[j]);
-    if let Some(factor) = Cholesky::new(unit)
+    // What the free responses leave of a column may be nothing but rounding, and its square negative.
+    if scales.iter().all(|scale| *scale > 0.0)
+        && let Some(factor) = Cholesky::new(unit)
         && let Some(condition) = condition(&factor.l().transpose(), predictor.samples())
         && condition <= MAXIMUM_CONDITION
     {
-        return Some((scaled(factor.inverse()), condition));
+        return Some((scaled(factor.inverse(), &scales), condition));
     }
     let factor = predictor.factor().ok().filter(|factor| factor.rank().is_full())?;
     let mut triangle = factor.factor();
+    let scales = DVector::from_iterator(size, triangle.column_iter().map(|column| column.norm()));
     for (mut column, scale) in triangle.column_iter_mut().zip(&scales) {
         column.unscale_mut(*scale);
     }
     let inverse = triangle.solve_upper_triangular(&DMatrix::identity(size, size))?;
-    Some((scaled(&inverse * inverse.transpose()), factor.condition()))
+    Some((scaled(&inverse * inverse.transpose(), &scales), factor.condition()))
 }
 
 /// Stretches of a long record, spread evenly over its samples; none for a record that is not long.
 fn thinned<'a>(record: &Record<'a>) -> Option<Record<'a>> {
     let total: usize = record.segments.iter().map(Range::len).sum();
-    if total < LONG {
-        return None;
-    }
-    let mut segments = Vec::with_capacity(STRETCHES);
+    if total < LONG { None } else { stretches(record, STRETCHES, STRETCH) }
+}
+
+/// So many stretches of at most so many samples, spread evenly over a record; none if of short segments less than half
+/// of that would be left.
+pub(crate) fn stretches<'a>(record: &Record<'a>, count: usize, length: usize) -> Option<Record<'a>> {
+    let total: usize = record.segments.iter().map(Range::len).sum();
+    let mut segments = Vec::with_capacity(count);
     let (mut before, mut rest) = (0, record.segments.iter().peekable());
-    for position in (0..STRETCHES).map(|k| k * (total / STRETCHES)) {
+    for position in (0..count).map(|k| k * (total / count)) {
         while let Some(segment) = rest.next_if(|segment| before + segment.len() <= position) {
             before += segment.len();
         }
         if let Some(segment) = rest.peek() {
             let start = segment.start + position - before;
-            segments.push(start..segment.end.min(start + STRETCH));
+            segments.push(start..segment.end.min(start + length));
         }
     }
     let kept: usize = segments.iter().map(Range::len).sum();
-    // Of very many short segments too little would be left.
     let (output, inputs) = (record.output, record.inputs.clone());
     let past = vec![0; segments.len()];
-    (2 * kept > STRETCHES * STRETCH).then_some(Record { output, inputs, segments, past })
+    (2 * kept > count * length).then_some(Record { output, inputs, segments, past })
 }
 
 /// The sum of squares of the output over all segments.
-fn energy(record: &Record<'_>) -> f64 {
+pub(super) fn energy(record: &Record<'_>) -> f64 {
     record.segments.iter().map(|segment| sum_of_squares(&record.output[segment.clone()])).sum()
 }
 

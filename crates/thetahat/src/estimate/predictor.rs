@@ -18,7 +18,7 @@
 //! A segment starts with samples that nothing is known of. What they do to x_j is a combination of free responses
 //! q^-i (1/F_j) delta, i = 0, 1, …, with weights that are estimated too, apart for each segment: they enter e linearly and are
 //! eliminated from the normal equations. For the other polynomials v = D w is set to zero in the first r samples, which
-//! do not count. Then psi is a shifted copy only up to what the mask cuts off. With z the signal before the mask and g the impulse
+//! do not count; nor need some after them, while what 1/C makes of that dies away. Then psi is a shifted copy only up to what the mask cuts off. With z the signal before the mask and g the impulse
 //! response of 1/C from sample r on,
 //!
 //! ```text
@@ -35,7 +35,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 use thetahat_core::LeastSquares;
-use thetahat_core::nalgebra::{DMatrix, Dyn};
+use thetahat_core::nalgebra::{Cholesky, DMatrix, Dyn};
 
 use super::uncertainty::backward_filtered_products;
 use crate::Orders;
@@ -112,8 +112,12 @@ struct Layout {
     products: Products,
     parameters: usize,
     free: usize,
-    /// r, the first samples that do not count.
+    /// r, the first samples in which e = 0.
     masked: usize,
+    /// The first sample that counts, r or later.
+    counted: usize,
+    /// Whether there are free responses that begin before it, beside the mask.
+    faded: bool,
     output: usize,
     inputs: Vec<usize>,
     error: usize,
@@ -145,10 +149,10 @@ pub(super) enum Begin {
 }
 
 impl Layout {
-    fn new(orders: &Orders, begin: Begin) -> Self {
+    fn new(orders: &Orders, begin: Begin, silent: usize, counted: usize) -> Self {
         let inputs = orders.inputs();
         let unknown = begin == Begin::Unknown;
-        let masked = if unknown { orders.conditioned() } else { 0 };
+        let masked = if unknown { silent.max(orders.conditioned()) } else { 0 };
         let free = |input: usize| if unknown { orders.free_responses(input) } else { 0 };
         let mut signals = 1;
         let mut next = || {
@@ -195,6 +199,8 @@ impl Layout {
             taps,
             products,
             masked,
+            counted: counted.max(masked),
+            faded: counted > masked && (0..inputs).any(|input| free(input) > 0),
             output,
             inputs: own,
             error,
@@ -226,14 +232,25 @@ pub(super) struct Predictor<'a> {
 impl<'a> Predictor<'a> {
     /// Segments without a sample that counts, or with no more than the free responses need, are left out.
     pub(super) fn new(record: &Record<'a>, orders: &Orders, begin: Begin) -> Self {
-        let layout = Layout::new(orders, begin);
-        let needed = layout.masked.max(layout.free);
+        Self::counting(record, orders, begin, 0, 0)
+    }
+
+    /// The same with e = 0 in so many first samples of each segment, or more; and so many of them, or more, do not count.
+    pub(super) fn counting(
+        record: &Record<'a>,
+        orders: &Orders,
+        begin: Begin,
+        silent: usize,
+        counted: usize,
+    ) -> Self {
+        let layout = Layout::new(orders, begin, silent, counted);
+        let needed = layout.counted.max(layout.free);
         let usable = record.segments.iter().filter(|segment| segment.len() > needed);
         let sections: Vec<Section<'a>> =
             usable.clone().map(|segment| Section::new(record, segment, &layout)).collect();
         let parameters = layout.parameters;
         Self {
-            samples: usable.map(|segment| segment.len() - layout.masked).sum(),
+            samples: usable.map(|segment| segment.len() - layout.counted).sum(),
             polynomials: Polynomials::new(orders, &vec![0.0; parameters]),
             negative: orders.nb.iter().map(|&nb| vec![0.0; nb]).collect(),
             stability: Vec::with_capacity(orders.nf.iter().copied().fold(orders.nc, usize::max)),
@@ -254,6 +271,20 @@ impl<'a> Predictor<'a> {
         self.layout.free * self.sections.len()
     }
 
+    /// ln det(I + `ratio` G) of the free responses' part G of the Gram matrix, at the current point, over all segments.
+    pub(super) fn free_information(&self, ratio: f64) -> f64 {
+        let (parameters, free) = (self.layout.parameters, self.layout.free);
+        let of = |section: &Section<'_>| {
+            let entry =
+                |i: usize, j: usize| section.gram[(parameters + i) * (parameters + free) + parameters + j];
+            let one = DMatrix::identity(free, free);
+            let matrix = one + ratio * DMatrix::from_fn(free, free, entry);
+            Cholesky::new(matrix)
+                .map_or(f64::INFINITY, |factor| 2.0 * factor.l().diagonal().map(f64::ln).sum())
+        };
+        self.sections.iter().map(of).sum()
+    }
+
     /// Forgets the weights of the free responses.
     pub(super) fn restart(&mut self) {
         for section in &mut self.sections {
@@ -264,16 +295,17 @@ impl<'a> Predictor<'a> {
 
     /// The sum of squared errors at these parameters and the trial weights; none where C or F is unstable, or the sum
     /// overflows.
+    ///
+    /// Where samples after the mask do not count, at the weights that are best.
     pub(super) fn evaluate(&mut self, parameters: &[f64]) -> Result<f64, Unusable> {
-        self.polynomials.set(parameters);
-        if !self.polynomials.are_stable(&mut self.stability) {
-            return Err(Unusable::Unstable);
-        }
-        for (negative, b) in self.negative.iter_mut().zip(&self.polynomials.b) {
-            negative.iter_mut().zip(b).for_each(|(negative, b)| *negative = -b);
-        }
+        self.set(parameters)?;
         let (layout, polynomials, negative) = (&self.layout, &self.polynomials, &self.negative);
-        let each = |section: &mut Section<'_>| section.evaluate(layout, polynomials, negative);
+        let each = |section: &mut Section<'_>| {
+            if layout.faded {
+                section.project(layout, polynomials, negative);
+            }
+            section.evaluate(layout, polynomials, negative);
+        };
         if self.sections.len() > 1 && self.samples >= PARALLEL_FROM {
             self.sections.par_iter_mut().for_each(each);
         } else {
@@ -281,6 +313,17 @@ impl<'a> Predictor<'a> {
         }
         let cost: f64 = self.sections.iter().map(|section| section.cost).sum();
         if cost.is_finite() { Ok(cost) } else { Err(Unusable::Overflow) }
+    }
+
+    fn set(&mut self, parameters: &[f64]) -> Result<(), Unusable> {
+        self.polynomials.set(parameters);
+        if !self.polynomials.are_stable(&mut self.stability) {
+            return Err(Unusable::Unstable);
+        }
+        for (negative, b) in self.negative.iter_mut().zip(&self.polynomials.b) {
+            negative.iter_mut().zip(b).for_each(|(negative, b)| *negative = -b);
+        }
+        Ok(())
     }
 
     /// Takes what was evaluated last as the current point, and forms the normal equations there. Gives by how much the
@@ -309,7 +352,7 @@ impl<'a> Predictor<'a> {
         let mut residuals = Vec::with_capacity(self.samples);
         let segments = self.sections.iter().map(|section| {
             let first = residuals.len();
-            residuals.extend_from_slice(&section.signals[0][self.layout.masked..]);
+            residuals.extend_from_slice(&section.signals[0][self.layout.counted..]);
             first..residuals.len()
         });
         let segments = segments.collect();
@@ -363,7 +406,7 @@ impl<'a> Predictor<'a> {
                     shifts.iter().zip(weights).map(|(shift, weight)| weight * at(shift.signal, shift.lag));
                 sign * at(*signal, *lag) + corrections.sum::<f64>()
             };
-            let rows = layout.masked..section.output.len();
+            let rows = layout.counted..section.output.len();
             let own = factor_rows(rows.clone(), entry, count + 1)?;
             let triangle = own.factor().view((free, free), (parameters, parameters)).into_owned();
             let rotated = own.rotated_output().rows(free, parameters).into_owned();

@@ -28,11 +28,11 @@ const ROUNDING: f64 = 1e-14;
 
 /// v = e/A.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Autoregression {
+pub(crate) struct Autoregression {
     /// A, monic and stable.
-    pub(super) monic: Vec<f64>,
+    pub(crate) monic: Vec<f64>,
     /// The variance of e.
-    pub(super) variance: f64,
+    pub(crate) variance: f64,
 }
 
 impl Autoregression {
@@ -45,7 +45,7 @@ impl Autoregression {
 /// The autoregression of order 0 … 10 with the least MDL = k ln(N)/N + ln(sum e^2/N), all orders on the same samples.
 ///
 /// `taken` degrees of freedom were used by what left the residuals: sigma^2 = sum e^2/(N - k - taken). O(N).
-pub(super) fn autoregression(residuals: &[f64], segments: &[Range<usize>], taken: usize) -> Autoregression {
+pub(crate) fn autoregression(residuals: &[f64], segments: &[Range<usize>], taken: usize) -> Autoregression {
     let samples: usize = segments.iter().map(Range::len).sum();
     let lagged = |count| {
         let taps = vec![Taps { signal: 0, first: 1, count, sign: -1.0 }];
@@ -89,7 +89,7 @@ pub(super) fn autoregression(residuals: &[f64], segments: &[Range<usize>], taken
 ///
 /// The columns of psi are `sign * s(t - lag)`, zero before the first sample of the segment. Blocks of rows from the
 /// end backwards: O(N (n p + p^2)) time, no memory for N rows.
-pub(super) fn backward_filtered_products(
+pub(crate) fn backward_filtered_products(
     signals: &[&[f64]],
     taps: &[Taps],
     segment: &Range<usize>,

@@ -1,10 +1,12 @@
+use std::fmt;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
 
 /// No order may be larger: beyond it a number was mistyped.
-const LARGEST: usize = 1000;
+pub(crate) const LARGEST: usize = 1000;
 
 /// The orders of A(q) y(t) = sum_j B_j(q)/F_j(q) u_j(t - nk_j) + C(q)/D(q) e(t).
 ///
@@ -208,6 +210,35 @@ impl Orders {
     }
 }
 
+/// As the field writes them: `ARX(2, 2, 3)` is ARX(na, nb, nk), and so on with ARMAX(na, nb, nc, nk), OE(nb, nf, nk), BJ(nb, nc,
+/// nd, nf, nk), AR(na), ARMA(na, nc) and PEM(na, nb, nc, nd, nf, nk). Several inputs stand in brackets where they differ.
+///
+/// ```
+/// assert_eq!(thetahat::Orders::oe(&[2], &[1], &[3])?.to_string(), "OE(2, 1, 3)");
+/// # Ok::<(), thetahat::Error>(())
+/// ```
+impl fmt::Display for Orders {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let one = |order: &usize| order.to_string();
+        let each = |orders: &[usize]| match orders {
+            [first, rest @ ..] if rest.iter().all(|order| order == first) => first.to_string(),
+            _ => format!("[{}]", orders.iter().map(one).collect::<Vec<_>>().join(" ")),
+        };
+        let (na, nc, nd) = (one(&self.na), one(&self.nc), one(&self.nd));
+        let (nb, nf, nk) = (each(&self.nb), each(&self.nf), each(&self.nk));
+        let (name, orders) = match self.structure() {
+            Structure::Ar => ("AR", vec![na]),
+            Structure::Arma => ("ARMA", vec![na, nc]),
+            Structure::Arx => ("ARX", vec![na, nb, nk]),
+            Structure::Armax => ("ARMAX", vec![na, nb, nc, nk]),
+            Structure::Oe => ("OE", vec![nb, nf, nk]),
+            Structure::Bj => ("BJ", vec![nb, nc, nd, nf, nk]),
+            Structure::Pem => ("PEM", vec![na, nb, nc, nd, nf, nk]),
+        };
+        write!(f, "{name}({})", orders.join(", "))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -248,5 +279,16 @@ mod tests {
         assert_eq!(of(1, &[2], 0, 1, &[0]), Structure::Pem);
         assert_eq!(of(1, &[2], 0, 0, &[1]), Structure::Pem);
         assert_eq!(of(1, &[], 1, 1, &[]), Structure::Pem);
+    }
+
+    #[test]
+    fn orders_are_written_as_the_field_does() {
+        let written = |orders: Result<Orders, Error>| orders.unwrap().to_string();
+        assert_eq!(written(Orders::arx(3, &[], &[])), "AR(3)");
+        assert_eq!(written(Orders::armax(2, &[], 1, &[])), "ARMA(2, 1)");
+        assert_eq!(written(Orders::arx(2, &[1, 1], &[3, 4])), "ARX(2, 1, [3 4])");
+        assert_eq!(written(Orders::armax(2, &[3], 1, &[0])), "ARMAX(2, 3, 1, 0)");
+        assert_eq!(written(Orders::bj(&[1], 2, 3, &[4], &[5])), "BJ(1, 2, 3, 4, 5)");
+        assert_eq!(written(Orders::new(1, &[2], 3, 4, &[5], &[6])), "PEM(1, 2, 3, 4, 5, 6)");
     }
 }

@@ -25,7 +25,7 @@ fn accumulate(sum: &mut Lanes, x: &Lanes, y: &Lanes) {
 
 /// `x'y`, both as long. 2 flops a sample.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
-pub(super) fn product(x: &[f64], y: &[f64]) -> f64 {
+pub(crate) fn product(x: &[f64], y: &[f64]) -> f64 {
     let ((x, x_rest), (y, y_rest)) = (x.as_chunks(), y.as_chunks());
     let mut sum = [0.0; LANES];
     for (x, y) in x.iter().zip(y) {

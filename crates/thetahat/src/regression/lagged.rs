@@ -37,7 +37,7 @@ const MAXIMUM_CORRECTIONS: usize = 10;
 /// What a difference of two sums keeps of them at least, to be exact to 13 digits.
 const CANCELLATION: f64 = 1e-3;
 /// Column norms of which products neither overflow nor lose digits.
-const SAFE_NORMS: RangeInclusive<f64> = 1e-140..=1e140;
+pub(crate) const SAFE_NORMS: RangeInclusive<f64> = 1e-140..=1e140;
 
 /// What stands for the samples before the first of a segment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -120,6 +120,12 @@ impl<'a> Lagged<'a> {
     ) -> Self {
         let longest = taps.iter().filter(|taps| taps.count > 0).map(Taps::last).max().unwrap_or(0);
         Self { signals: signals.to_vec(), taps, segments, initial, longest }
+    }
+
+    /// Leaves out so many first samples of each segment, those with a full regressor too; all samples count still where
+    /// zeros stand before a segment.
+    pub(crate) fn behind(self, first: usize) -> Self {
+        Self { longest: self.longest.max(first), ..self }
     }
 
     pub(super) fn taps(&self) -> &[Taps] {

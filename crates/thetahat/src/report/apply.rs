@@ -45,13 +45,7 @@ pub fn apply(
     horizon: Horizon,
     initial: Start,
 ) -> Result<Applied, Error> {
-    if (log.sample_time() / model.sample_time - 1.0).abs() > 0.01 {
-        return Err(Error::data(format!(
-            "the log's sample time is {} s, the model's {} s; resample the log, or fit a model to it",
-            log.sample_time(),
-            model.sample_time
-        )));
-    }
+    check_sample_time(model, &log)?;
     let all = vec![Rows::new(1, log.rows())?];
     let rows = checked("--rows", if rows.is_empty() { &all } else { rows }, log.rows())?;
     let names: Vec<String> = model.inputs.iter().map(|input| input.name.clone()).collect();
@@ -119,6 +113,18 @@ pub fn apply(
     }
     let beyond = predicted.len() - log.rows();
     Ok(Applied { measured, predicted, standard_deviations, beyond, rows, fit })
+}
+
+/// The log must have the model's sample time.
+pub(super) fn check_sample_time(model: &Model, log: &Log) -> Result<(), Error> {
+    if (log.sample_time() / model.sample_time - 1.0).abs() > 0.01 {
+        return Err(Error::data(format!(
+            "the log's sample time is {} s, the model's {} s; resample the log, or fit a model to it",
+            log.sample_time(),
+            model.sample_time
+        )));
+    }
+    Ok(())
 }
 
 /// The standard deviations of predictions: from zero, the first samples of a segment look fewer steps ahead.

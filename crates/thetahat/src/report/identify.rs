@@ -1,21 +1,16 @@
 use std::ops::{ControlFlow, Range};
 
-use super::schema::{Data, Estimation, Missing, Report, Source};
-use crate::data::{Detrend, Log, Offset, Record, Rows, checked};
-use crate::estimate::{
-    Estimate, Method, Monitor, Procedure, SearchOutcome, Stopped, enough, estimate_of_channels,
-};
-use crate::model::{cancel, near_cancellation};
+use super::schema::{Data, Estimation, Missing, Parts, Report, Source};
+use super::warnings::{at_the_border, unstable_plant, warnings};
+use crate::data::{Detrend, Log, Offset, Record, Rows, Split, between, checked};
+use crate::estimate::{Estimate, Method, Monitor, enough, estimate_of_channels};
 use crate::respond::Start;
+use crate::select::{self, Choice, Found, Select, Task};
 use crate::validate::{Fit, Horizon, Part};
 use crate::{Error, Initial, Model, Orders, Signal};
 
 /// Below this fraction of a channel's size, what detrending leaves is rounding.
 const ROUNDING: f64 = 1e-13;
-/// Condition numbers above this one are worth a word.
-const ILL_CONDITIONED: f64 = 1e6;
-/// Below this fit, in percent, a model explains little.
-const POOR: f64 = 50.0;
 
 /// What to fit, and to which part of a log.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,16 +23,40 @@ pub struct Plan {
     pub estimate: Vec<Rows>,
     /// Rows to validate on.
     pub validate: Vec<Rows>,
+    /// Cuts the rows to estimate on into parts: models are fitted to the first one and compared, the chosen one is fitted again
+    /// to the first two, and judged on the third. None: all rows to estimate on serve for the fit.
+    pub split: Option<Split>,
     /// What is taken from each channel.
     pub detrend: Detrend,
     /// Channels whose offset is set by hand.
     pub offsets: Vec<(String, f64)>,
-    /// The orders, which say the structure too.
-    pub orders: Orders,
+    /// The orders, which say the structure too; or among which to choose.
+    pub choice: Choice,
+    /// What makes one model better than another, where there is a choice.
+    pub select: Select,
     /// How to estimate.
     pub method: Method,
     /// What stands for the samples before a segment.
     pub initial: Initial,
+}
+
+impl Plan {
+    /// All rows, means removed, the default method; further settings as fields: `Plan { validate, ..Plan::new(…) }`.
+    pub fn new(inputs: &[&str], output: &str, choice: impl Into<Choice>) -> Self {
+        Self {
+            inputs: inputs.iter().map(|input| (*input).to_owned()).collect(),
+            output: output.to_owned(),
+            estimate: Vec::new(),
+            validate: Vec::new(),
+            split: None,
+            detrend: Detrend::Mean,
+            offsets: Vec::new(),
+            choice: choice.into(),
+            select: Select::default(),
+            method: Method::default(),
+            initial: Initial::default(),
+        }
+    }
 }
 
 /// Fits a model to a log and reports on it: the whole way from data to figures.
@@ -49,7 +68,7 @@ pub struct Plan {
 /// cannot determine the parameters, which are named.
 ///
 /// ```
-/// use thetahat::{Channel, Detrend, Initial, Log, Method, Orders, Plan, identify};
+/// use thetahat::{Channel, Log, Orders, Plan, identify};
 ///
 /// let u: Vec<f64> = (0..200).map(|t| f64::from(t * t % 7)).collect();
 /// let mut y = vec![20.0];
@@ -59,15 +78,9 @@ pub struct Plan {
 /// let channel = |name: &str, values| Channel { name: name.into(), values };
 /// let log = Log::new(vec![channel("u", u), channel("y", y)], 0.1)?;
 /// let plan = Plan {
-///     inputs: vec!["u".into()],
-///     output: "y".into(),
 ///     estimate: vec!["1..150".parse()?],
 ///     validate: vec!["151..200".parse()?],
-///     detrend: Detrend::Mean,
-///     offsets: vec![],
-///     orders: Orders::arx(1, &[1], &[1])?,
-///     method: Method::default(),
-///     initial: Initial::Auto,
+///     ..Plan::new(&["u"], "y", Orders::arx(1, &[1], &[1])?)
 /// };
 /// let report = identify(log, &[], &plan)?;
 /// assert!(report.model.stable);
@@ -103,18 +116,17 @@ pub fn identify_monitored(
             format!("'{name}' is neither an input nor the output; name one of: {}", names.join(", ")),
         ));
     }
-    let all = vec![Rows::new(1, log.rows())?];
-    let asked = if plan.estimate.is_empty() { &all } else { &plan.estimate };
-    let estimation = checked("--estimate", asked, log.rows())?;
-    let validation = checked("--validate", &plan.validate, log.rows())?;
+    let Shares { estimation, validation, parts } = Shares::of(plan, log.rows())?;
     let segments = log.segments(&names, &estimation)?;
     if segments.is_empty() {
         return Err(Error::data(
             "no estimation row has a value in every channel; name other rows or channels",
         ));
     }
-    let left_out = if plan.initial == Initial::Zero { 0 } else { plan.orders.conditioned() };
-    enough(segments.iter().map(|segment| segment.len().saturating_sub(left_out)).sum(), &plan.orders)?;
+    if let Choice::Known(orders) = &plan.choice {
+        let left_out = if plan.initial == Initial::Zero { 0 } else { orders.conditioned() };
+        enough(segments.iter().map(|segment| segment.len().saturating_sub(left_out)).sum(), orders)?;
+    }
     let missing = names.iter().map(|name| {
         let values = &log.channel(name)?.values;
         Ok(Missing {
@@ -127,10 +139,22 @@ pub fn identify_monitored(
     let signals = names.iter().map(|name| deviations(&mut log, name, plan, &segments));
     let signals: Vec<Signal> = signals.collect::<Result<_, Error>>()?;
     let (output, inputs) = signals.split_last().ok_or_else(|| Error::data("there is no output"))?;
+    let mut method = plan.method.clone();
+    let (selection, orders) = match &plan.choice {
+        Choice::Known(orders) => (None, orders.clone()),
+        Choice::Grid(_) | Choice::Automatic(_) => {
+            let Found { selection, guess } =
+                selected(&log, plan, &estimation, &validation, parts.as_ref(), monitor)?;
+            if let Method::PredictionError(search) = &mut method {
+                search.guess = guess;
+            }
+            let orders = selection.chosen.orders.clone();
+            (Some(selection), orders)
+        }
+    };
     let record = log.record(&plan.inputs, &plan.output, &estimation)?;
-    let estimate =
-        estimate_of_channels(&record, &plan.inputs, &plan.orders, &plan.method, plan.initial, monitor)?;
-    let model = Model::new(&plan.orders, &estimate, log.sample_time(), inputs.to_vec(), output.clone())?;
+    let estimate = estimate_of_channels(&record, &plan.inputs, &orders, &method, plan.initial, monitor)?;
+    let model = Model::new(&orders, &estimate, log.sample_time(), inputs.to_vec(), output.clone())?;
 
     let mut report = Report {
         schema: Report::schema_name(),
@@ -142,10 +166,12 @@ pub fn identify_monitored(
             detrend: plan.detrend.to_string(),
             estimation: estimation.clone(),
             validation: validation.clone(),
+            split: parts,
             segments: segments.iter().map(Rows::from_positions).collect(),
             missing,
             time_gaps: log.jumps(),
         },
+        selection,
         estimation: estimation_of(&estimate),
         fit: Vec::new(),
         warnings: Vec::new(),
@@ -157,21 +183,77 @@ pub fn identify_monitored(
         let record = log.record(&plan.inputs, &plan.output, &validation)?;
         judge(&mut report, &record, &validation, Part::Validation, estimate.initial());
     }
+    let test = report.data.split.as_ref().map_or_else(Vec::new, |parts| parts.test.clone());
+    if !test.is_empty() {
+        let record = log.record(&plan.inputs, &plan.output, &test)?;
+        judge(&mut report, &record, &test, Part::Test, estimate.initial());
+    }
+    if let Choice::Grid(grid) = &plan.choice {
+        report.warnings.extend(at_the_border(&report.model.orders, grid));
+    }
     report.warnings.extend(unstable_plant(&report));
     Ok(report)
 }
 
-/// A word on a plant that seems to be unstable, where F, which must be stable, explains little.
-fn unstable_plant(report: &Report) -> Option<String> {
-    let Procedure::PredictionError(search) = &report.estimation.procedure else { return None };
-    let pole = search.unstable_pole?;
-    let explained = report.fit.first()?.percent?;
-    (explained < POOR).then(|| {
-        format!(
-            "the plant seems to be unstable: least squares finds a pole of modulus {pole:.4}; F must be stable and \
-             explains {explained:.1} % only; an unstable plant needs A (arx or armax)"
-        )
-    })
+/// What rows serve for.
+struct Shares {
+    /// For the fit.
+    estimation: Vec<Rows>,
+    /// For figures.
+    validation: Vec<Rows>,
+    parts: Option<Parts>,
+}
+
+impl Shares {
+    fn of(plan: &Plan, rows: usize) -> Result<Self, Error> {
+        let all = vec![Rows::new(1, rows)?];
+        let asked = if plan.estimate.is_empty() { &all } else { &plan.estimate };
+        let estimation = checked("--estimate", asked, rows)?;
+        let validation = checked("--validate", &plan.validate, rows)?;
+        let Some(split) = plan.split else { return Ok(Self { estimation, validation, parts: None }) };
+        if !validation.is_empty() {
+            return Err(Error::argument(
+                "split",
+                "it has a validation part of its own; leave out one of --split and --validate",
+            ));
+        }
+        let [first, second, test] = split.cut(&estimation)?;
+        let count = |part: &[Rows]| part.iter().map(Rows::len).sum::<usize>();
+        let fitted = between(&estimation, 0, count(&first) + count(&second));
+        let parts = Parts { estimation: first, validation: second, test };
+        Ok(Self { estimation: fitted, validation, parts: Some(parts) })
+    }
+}
+
+/// The choice among several models.
+fn selected(
+    log: &Log,
+    plan: &Plan,
+    estimation: &[Rows],
+    validation: &[Rows],
+    parts: Option<&Parts>,
+    monitor: Monitor<'_>,
+) -> Result<Found, Error> {
+    let Method::PredictionError(search) = &plan.method else {
+        return Err(Error::argument(
+            "method",
+            "a choice among models compares prediction errors; give the orders for another method or criterion",
+        ));
+    };
+    let (fitted, unseen) = parts
+        .map_or((estimation, validation), |parts| (parts.estimation.as_slice(), parts.validation.as_slice()));
+    let record = |rows| log.record(&plan.inputs, &plan.output, rows);
+    let unseen = if unseen.is_empty() { None } else { Some(record(unseen)?) };
+    let task = Task {
+        estimation: &record(fitted)?,
+        validation: unseen.as_ref(),
+        inputs: &plan.inputs,
+        select: plan.select,
+        initial: plan.initial,
+        search,
+        monitor,
+    };
+    select::choose(&task, &plan.choice)
 }
 
 /// Takes a channel's offset from it, in place.
@@ -188,17 +270,19 @@ fn deviations(log: &mut Log, name: &str, plan: &Plan, segments: &[Range<usize>])
     let before = largest(log)?;
     log.remove(name, &offset);
     let position = plan.inputs.iter().position(|input| input == name);
-    let used = position.is_none_or(|input| plan.orders.nb.get(input).is_some_and(|&nb| nb > 0));
-    if used && largest(log)? <= ROUNDING * before {
+    let known = if let Choice::Known(orders) = &plan.choice { Some(orders) } else { None };
+    let used = |input: usize| known.is_none_or(|orders| orders.nb.get(input).is_some_and(|&nb| nb > 0));
+    if position.is_none_or(used) && largest(log)? <= ROUNDING * before {
         let role = if position.is_some() { "input" } else { "output" };
         let what = if plan.detrend == Detrend::Linear { "is a straight line" } else { "is constant" };
-        let concerned = parameters_of(position, &plan.orders);
+        let concerned = known.map_or_else(Vec::new, |orders| parameters_of(position, orders));
+        let parameters =
+            if concerned.is_empty() { "parameters of a model".to_owned() } else { concerned.join(", ") };
         return Err(Error::undetermined(
-            concerned.clone(),
+            concerned,
             format!(
-                "{role} '{name}' {what} over the estimation rows: it cannot determine {}; name rows in which it \
-                 changes, or leave it out",
-                concerned.join(", ")
+                "{role} '{name}' {what} over the estimation rows: it cannot determine {parameters}; name rows in which it \
+                 changes, or leave it out"
             ),
         ));
     }
@@ -227,7 +311,9 @@ fn estimation_of(estimate: &Estimate) -> Estimation {
 
 /// Adds the figures of one part of the log: one step ahead, and driven by the inputs alone where there are any.
 fn judge(report: &mut Report, record: &Record<'_>, rows: &[Rows], part: Part, initial: Initial) {
+    // What the estimate started from; other rows begin in the middle of a run.
     let first = match initial {
+        _ if part != Part::Estimation => Start::natural(&report.model, Horizon::Steps { steps: 1 }),
         Initial::Zero => Start::Zero,
         Initial::Estimate => Start::Estimated,
         Initial::Auto | Initial::Drop => Start::Measured,
@@ -240,6 +326,7 @@ fn judge(report: &mut Report, record: &Record<'_>, rows: &[Rows], part: Part, in
         let name = match part {
             Part::Estimation => "estimation",
             Part::Validation => "validation",
+            Part::Test => "test",
         };
         match Fit::of(&report.model, record, rows, Some(part), horizon, start) {
             Ok((fit, _)) => {
@@ -258,77 +345,4 @@ fn judge(report: &mut Report, record: &Record<'_>, rows: &[Rows], part: Part, in
             }
         }
     }
-}
-
-fn warnings(report: &Report) -> Vec<String> {
-    let (data, model) = (&report.data, &report.model);
-    let mut warnings = Vec::new();
-    for missing in data.missing.iter().filter(|missing| missing.rows > 0) {
-        warnings.push(format!(
-            "channel '{}' misses {} of {} values; the log is cut there",
-            missing.channel, missing.rows, data.rows
-        ));
-    }
-    if data.time_gaps > 0 {
-        warnings.push(format!("jumps of the clock: {}; the log is cut there", data.time_gaps));
-    }
-    if data
-        .validation
-        .iter()
-        .any(|v| data.estimation.iter().any(|e| v.first() <= e.last() && e.first() <= v.last()))
-    {
-        warnings.push("validation rows overlap estimation rows: their figures flatter the model".to_owned());
-    }
-    if !model.stable {
-        let largest = model.poles.iter().map(|pole| pole.re.hypot(pole.im)).fold(0.0, f64::max);
-        warnings.push(format!(
-            "the model is unstable (largest pole {largest:.6}): its free run grows without bound"
-        ));
-    }
-    if let Procedure::PredictionError(search) = &report.estimation.procedure {
-        warnings.extend(search_warnings(search));
-    }
-    if let Some((pole, zero)) = near_cancellation(model) {
-        warnings.push(format!(
-            "{}: within their uncertainty they are one; lower both orders by one, unless they are known",
-            cancel(&pole, &zero)
-        ));
-    }
-    if let Some(condition) = report.estimation.condition.filter(|condition| *condition > ILL_CONDITIONED) {
-        warnings.push(format!(
-            "the regressors are nearly dependent (condition number {condition:.1e}): parameters are uncertain; lower the orders \
-             or sample more slowly"
-        ));
-    }
-    warnings
-}
-
-/// What is worth a word of a search.
-fn search_warnings(search: &SearchOutcome) -> Vec<String> {
-    let mut warnings = Vec::new();
-    let iterations = search.iterations;
-    match search.stopped {
-        Stopped::Converged => {}
-        Stopped::MaxIterations => warnings.push(format!(
-            "no convergence in {iterations} iterations: the parameters are not those of least cost; allow more \
-             (--max-iterations), or lower the orders"
-        )),
-        Stopped::TimeLimit => warnings.push(format!(
-            "no convergence: the time was used up after {iterations} iterations; allow more (--time-limit)"
-        )),
-        Stopped::NoDescent if !search.stability_bound => warnings.push(format!(
-            "the search stopped after {iterations} iterations where no step lowers the cost (gradient {:.1e}): the cost is \
-             flat or rough there; lower the orders",
-            search.gradient_norm
-        )),
-        Stopped::NoDescent => {}
-    }
-    if search.stability_bound {
-        warnings.push(
-            "the search ended at the border of stability: C or F has a root on the unit circle; the data want an \
-             unstable or overdifferenced model, so use arx or armax for an unstable plant, or lower nc or nf"
-                .to_owned(),
-        );
-    }
-    warnings
 }

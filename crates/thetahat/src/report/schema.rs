@@ -2,7 +2,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::data::Rows;
-use crate::{Criteria, Error, Fit, Initial, Interpolation, Model, Procedure};
+use crate::{Criteria, Error, Fit, Initial, Interpolation, Model, Procedure, Selection};
 
 /// The schema that this version writes.
 const SCHEMA: &str = "thetahat.report/1";
@@ -18,6 +18,9 @@ pub struct Report {
     pub generator: String,
     /// What the model was fitted to.
     pub data: Data,
+    /// How the model was chosen among others, if it was.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub selection: Option<Selection>,
     /// The model.
     pub model: Model,
     /// How it was estimated.
@@ -43,12 +46,26 @@ pub struct Data {
     pub estimation: Vec<Rows>,
     /// The rows asked for to validate on.
     pub validation: Vec<Rows>,
+    /// How the rows were cut in time order, if they were.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub split: Option<Parts>,
     /// The stretches of estimation rows without a gap.
     pub segments: Vec<Rows>,
     /// How many values each channel misses.
     pub missing: Vec<Missing>,
     /// How often the clock jumps.
     pub time_gaps: usize,
+}
+
+/// The parts that rows were cut into, in time order, and what each served for.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Parts {
+    /// Models were fitted to these, to compare them. The chosen one was fitted again, to these and the validation part.
+    pub estimation: Vec<Rows>,
+    /// Models were compared on these, where validation was asked for.
+    pub validation: Vec<Rows>,
+    /// Untouched until the end: the honest figures.
+    pub test: Vec<Rows>,
 }
 
 /// Where a log came from.

@@ -32,7 +32,7 @@ pub(crate) struct Innovations {
     /// What x starts from.
     pub(super) impulses: Impulses,
     /// w, one value for each of `rows`.
-    pub(super) disturbance: Vec<f64>,
+    pub(crate) disturbance: Vec<f64>,
     /// e, one value for each of `rows`; zero where it is not known.
     pub(crate) errors: Vec<f64>,
 }

@@ -3,6 +3,7 @@
 mod forecast;
 mod frequency;
 mod general;
+mod step;
 
 use std::ops::Range;
 

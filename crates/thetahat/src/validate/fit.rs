@@ -39,6 +39,8 @@ pub enum Part {
     Estimation,
     /// The fit did not see them.
     Validation,
+    /// Neither the fit nor the choice of the model saw them.
+    Test,
 }
 
 /// How close a model comes to measured outputs.

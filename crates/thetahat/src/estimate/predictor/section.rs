@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::{Column, Layout, Polynomials};
 use crate::data::Record;
 use crate::estimate::normal;
-use crate::regression::{Interior, add_filtered, divide, divide_together, sum_of_squares};
+use crate::regression::{Interior, add_filtered, divide, divide_together, product, sum_of_squares};
 
 /// The fraction of a free response, squared, below which what is left of it is rounding.
 const UNSEEN: f64 = 1e-22;
@@ -45,6 +45,9 @@ pub(super) struct Section<'a> {
     pub(super) free_steps: Vec<f64>,
     /// For each free response, the sum of squares below which what D, C and the mask leave of it is rounding.
     pub(super) free_floors: Vec<f64>,
+    /// Free responses that begin before the samples that count, and how far each is known; what follows is nothing.
+    faded: Vec<f64>,
+    faded_lengths: Vec<usize>,
     pub(super) cost: f64,
     /// By how much the free responses alone can lower the cost.
     pub(super) free_gain: f64,
@@ -60,7 +63,7 @@ impl<'a> Section<'a> {
         let (parameters, free) = (layout.parameters, layout.free);
         let columns = parameters + free;
         let size = layout.products.size();
-        let rows = layout.masked..length;
+        let rows = layout.counted..length;
         Self {
             output: &record.output[segment.clone()],
             inputs: record.inputs.iter().map(|input| &input[segment.clone()]).collect(),
@@ -80,9 +83,64 @@ impl<'a> Section<'a> {
             free_factor: vec![0.0; free * free],
             free_steps: vec![0.0; free * (parameters + 1)],
             free_floors: vec![0.0; free],
+            faded: if layout.faded { vec![0.0; free * length] } else { Vec::new() },
+            faded_lengths: vec![0; free],
             cost: 0.0,
             free_gain: 0.0,
         }
+    }
+
+    /// Sets the trial weights to those that are best for the polynomials.
+    ///
+    /// For free responses that begin before the samples that count: a small change of F changes a faded response many times
+    /// over, which no step of the weights to first order follows.
+    pub(super) fn project(&mut self, layout: &Layout, polynomials: &Polynomials, negative: &[Vec<f64>]) {
+        self.trial.fill(0.0);
+        self.evaluate(layout, polynomials, negative);
+        let free = layout.free;
+        let length = self.output.len();
+        let gain: f64 = polynomials.d.iter().map(|d| d.abs()).sum();
+        let mut own = 0;
+        for (j, &order) in layout.orders.nf.iter().enumerate() {
+            for delay in 0..layout.orders.free_responses(j) {
+                let memory = 1 + order + layout.orders.nc + layout.orders.nd;
+                let column = &mut self.faded[own * length..][..length];
+                let mut known = (FIRST_PIECE + layout.counted + 2 * memory).min(length);
+                let size = loop {
+                    let piece = &mut column[..known];
+                    piece.fill(0.0);
+                    piece[delay] = 1.0;
+                    divide(&polynomials.f[j], piece);
+                    let size = sum_of_squares(piece);
+                    if layout.orders.nd > 0 {
+                        multiply(&mut self.scratch[..known], &polynomials.d, piece);
+                        piece.copy_from_slice(&self.scratch[..known]);
+                    }
+                    piece[..layout.masked].fill(0.0);
+                    divide(&polynomials.c, &mut piece[layout.masked..]);
+                    if known == length || is_quiet(piece, memory) {
+                        break size;
+                    }
+                    known = (4 * known).min(length);
+                };
+                self.faded_lengths[own] = known;
+                self.free_floors[own] = UNSEEN * gain * gain * size;
+                own += 1;
+            }
+        }
+        let counted = |column: usize, known: usize| &self.faded[column * length..][layout.counted..known];
+        for row in 0..free {
+            let known = self.faded_lengths[row];
+            self.trial[row] = product(counted(row, known), &self.signals[0][layout.counted..known]);
+            for column in 0..=row {
+                let known = known.min(self.faded_lengths[column]);
+                let value = product(counted(row, known), counted(column, known));
+                let seen = row != column || value > self.free_floors[row];
+                self.free_factor[row * free + column] = if seen { value } else { 0.0 };
+            }
+        }
+        normal::factor(&mut self.free_factor, free);
+        normal::solve(&self.free_factor, free, &mut self.trial);
     }
 
     /// The errors of polynomials and of the trial weights, and their sum of squares.
@@ -115,7 +173,7 @@ impl<'a> Section<'a> {
         let (head, tail) = error.split_at_mut(layout.masked);
         head.fill(0.0);
         divide(&polynomials.c, tail);
-        self.cost = sum_of_squares(tail);
+        self.cost = sum_of_squares(&tail[layout.counted - layout.masked..]);
     }
 
     /// psi's signals, their Gram matrix and psi'e, at what was evaluated last.
@@ -202,9 +260,7 @@ impl<'a> Section<'a> {
                 head.fill(0.0);
             }
             divide(&polynomials.c, &mut piece[masked..]);
-            let largest =
-                |values: &[f64]| values.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
-            let quiet = largest(&piece[known.saturating_sub(memory)..]) <= NEGLIGIBLE * largest(piece);
+            let quiet = is_quiet(piece, memory);
             if quiet || known == values.len() {
                 break size;
             }
@@ -221,7 +277,7 @@ impl<'a> Section<'a> {
     fn add_up(&mut self, layout: &Layout) {
         let (products, masked) = (&layout.products, layout.masked);
         self.entries.fill(0.0);
-        products.add_ends(&self.signals, masked, &(masked..self.output.len()), &mut self.entries);
+        products.add_ends(&self.signals, masked, &(layout.counted..self.output.len()), &mut self.entries);
         products.add_interior(&self.signals, &self.supports, &mut self.interior, &mut self.entries);
         let size = products.size();
         let entry = |a: &Column, b: &Column| {
@@ -323,6 +379,12 @@ impl<'a> Section<'a> {
             *trial = self.free[index] + self.free_steps[index] - moved;
         }
     }
+}
+
+/// Whether the last values of a response are nothing beside the others.
+fn is_quiet(values: &[f64], memory: usize) -> bool {
+    let largest = |values: &[f64]| values.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
+    largest(&values[values.len().saturating_sub(memory)..]) <= NEGLIGIBLE * largest(values)
 }
 
 /// `target(t) += sum_i weights[i] u(t - delay - i)`.

@@ -39,6 +39,15 @@ fn record<'a>(output: &'a [f64], inputs: &'a [Vec<f64>]) -> Record<'a> {
     Record { output, inputs: inputs.iter().map(Vec::as_slice).collect(), past: vec![0; 3], segments }
 }
 
+/// Beginnings of segments, and in how many first samples e = 0, and how many do not count, whatever the model.
+const BEGINNINGS: [(Begin, usize, usize); 5] = [
+    (Begin::Zero, 0, 0),
+    (Begin::Zero, 0, 9),
+    (Begin::Unknown, 0, 0),
+    (Begin::Unknown, 0, 9),
+    (Begin::Unknown, 7, 9),
+];
+
 /// All errors that count, segment by segment, of parameters followed by the free responses' weights of each segment.
 fn errors(predictor: &mut Predictor<'_>, unknowns: &[f64]) -> Vec<f64> {
     let (parameters, mut weights) = unknowns.split_at(predictor.layout.parameters);
@@ -47,8 +56,10 @@ fn errors(predictor: &mut Predictor<'_>, unknowns: &[f64]) -> Vec<f64> {
         section.trial.copy_from_slice(own);
         weights = rest;
     }
-    predictor.evaluate(parameters).unwrap();
-    predictor.sections.iter().flat_map(|section| section.signals[0].clone()).collect()
+    predictor.set(parameters).unwrap();
+    let Predictor { layout, polynomials, negative, sections, .. } = &mut *predictor;
+    sections.iter_mut().for_each(|section| section.evaluate(layout, polynomials, negative));
+    predictor.residuals().0
 }
 
 #[test]
@@ -59,15 +70,15 @@ fn errors_are_those_of_the_difference_equations() {
         let u: Vec<Vec<f64>> = (0..orders.inputs()).map(|_| noise.take(140)).collect();
         let y = noise.take(140);
         let record = record(&y, &u);
-        for begin in [Begin::Zero, Begin::Unknown] {
-            let mut predictor = Predictor::new(&record, &orders, begin);
+        for (begin, silent, counted) in BEGINNINGS {
+            let mut predictor = Predictor::counting(&record, &orders, begin, silent, counted);
             let unknowns = predictor.layout.parameters + predictor.initial_conditions();
             let weights = noise.take(unknowns - parameters.len());
             let found = errors(&mut predictor, &[parameters.clone(), weights.clone()].concat());
             let Polynomials { a, b, c, d, f } = Polynomials::new(&orders, &parameters);
-            let masked = predictor.layout.masked;
+            let Layout { masked, counted, free, .. } = predictor.layout;
             let (mut expected, mut weights) = (Vec::new(), weights.as_slice());
-            for segment in record.segments.iter().filter(|s| s.len() > masked.max(predictor.layout.free)) {
+            for segment in record.segments.iter().filter(|s| s.len() > counted.max(free)) {
                 // Before the segment everything is zero.
                 let at = |x: &[f64], t: usize, lag: usize| if t < lag { 0.0 } else { x[t - lag] };
                 let past =
@@ -96,7 +107,7 @@ fn errors_are_those_of_the_difference_equations() {
                     let error = value + past(&d, &w, t) - past(&c, &e, t);
                     e.push(if t < masked { 0.0 } else { error });
                 }
-                expected.extend(e);
+                expected.extend_from_slice(&e[counted..]);
             }
             assert_eq!(found.len(), expected.len());
             let size = expected.iter().fold(0.0_f64, |size, e| size.max(e.abs()));
@@ -113,8 +124,8 @@ fn gradients_and_gram_matrices_are_those_of_central_differences() {
         let u: Vec<Vec<f64>> = (0..orders.inputs()).map(|_| noise.take(140)).collect();
         let y = noise.take(140);
         let record = record(&y, &u);
-        for begin in [Begin::Zero, Begin::Unknown] {
-            let mut predictor = Predictor::new(&record, &orders, begin);
+        for (begin, silent, counted) in BEGINNINGS {
+            let mut predictor = Predictor::counting(&record, &orders, begin, silent, counted);
             let free = predictor.initial_conditions();
             let unknowns = [parameters.clone(), noise.take(free)].concat();
             let step = 1e-5;
@@ -140,24 +151,26 @@ fn gradients_and_gram_matrices_are_those_of_central_differences() {
                 if index < count { index } else { index + section * own }
             };
             let all = count + own;
-            let lengths: Vec<usize> = predictor.sections.iter().map(|section| section.output.len()).collect();
+            let counted = predictor.layout.counted;
+            let lengths = predictor.sections.iter().map(|section| section.output.len() - counted);
+            let lengths: Vec<usize> = lengths.collect();
             let mut from = 0;
             for (number, section) in predictor.sections.iter().enumerate() {
                 let rows = from..from + lengths[number];
                 from = rows.end;
                 for i in 0..all {
                     let left = &psi[place(number, i)][rows.clone()];
-                    let size = norm(left) * norm(&e[rows.clone()]);
+                    let length = norm(&e[rows.clone()]);
+                    // Differences have rounding of some 1e-10.
+                    let size = norm(left).max(1e-3) * length;
                     let right = dot(left, &e[rows.clone()]);
-                    assert!(
-                        (section.right[i] - right).abs() <= 1e-6 * size.max(1e-3),
-                        "{orders:?} {begin:?} {i}"
-                    );
+                    assert!((section.right[i] - right).abs() <= 1e-6 * size, "{orders:?} {begin:?} {i}");
                     for j in 0..all {
                         let other = &psi[place(number, j)][rows.clone()];
                         let difference = section.gram[i * all + j] - dot(left, other);
-                        let size = (norm(left) * norm(other)).max(1e-3);
-                        assert!(difference.abs() <= 1e-6 * size, "{orders:?} {begin:?} {i} {j}");
+                        let rounding = 1e-3 * norm(left).max(norm(other)).max(1.0);
+                        let size = (norm(left) * norm(other)).max(rounding);
+                        assert!(difference.abs() <= 1e-6 * size, "{orders:?} {begin:?} {counted} {i} {j}");
                     }
                 }
             }
@@ -185,5 +198,32 @@ fn taking_out_the_free_responses_leaves_the_normal_equations_of_their_best_weigh
         let section = &mut predictor.sections[1];
         section.trial.iter_mut().for_each(|weight| *weight += 0.1 * noise.next());
         assert!(predictor.evaluate(&parameters).unwrap() > best);
+    }
+}
+
+#[test]
+fn weights_of_responses_that_have_faded_are_the_best() {
+    let mut noise = Noise(4);
+    let orders = Orders::bj(&[2], 1, 1, &[2], &[1]).unwrap();
+    let u = [noise.take(140)];
+    let y = noise.take(140);
+    let record = record(&y, &u);
+    let mut predictor = Predictor::counting(&record, &orders, Begin::Unknown, 3, 8);
+    // Poles of modulus 0.7, and of 1e-6: of the latter there is nothing to see.
+    for f in [[-1.2, 0.5], [0.0, -1e-12]] {
+        let parameters = [0.5, -0.2, 0.3, -0.4, f[0], f[1]];
+        let best = predictor.evaluate(&parameters).unwrap();
+        let weights: Vec<f64> = predictor.sections.iter().flat_map(|section| section.trial.clone()).collect();
+        let cost = |errors: Vec<f64>| errors.iter().map(|e| e * e).sum::<f64>();
+        let again = cost(errors(&mut predictor, &[&parameters[..], &weights].concat()));
+        assert!((again - best).abs() <= 1e-12 * best);
+        assert!(predictor.linearize() < 1e-10 * best);
+        let seen = f[0] != 0.0;
+        assert!(weights.iter().all(|weight| (*weight != 0.0) == seen), "{weights:?}");
+        for index in 0..weights.len() {
+            let mut moved = [&parameters[..], &weights].concat();
+            moved[parameters.len() + index] += 0.1;
+            assert!(!seen || cost(errors(&mut predictor, &moved)) > best);
+        }
     }
 }

@@ -1,0 +1,34 @@
+//! `thetahat compare`: several stored models side by side on a log.
+
+use thetahat::{Report, Validated, compare as compared, comparison_page};
+
+use super::validate::{loaded, one, print};
+use super::{stored, summary};
+use crate::args::CompareArguments;
+use crate::failure::Failure;
+use crate::job::LookJob;
+use crate::log::Loaded;
+use crate::output::{self, warn};
+
+pub(crate) fn compare(arguments: &CompareArguments, line: &str) -> Result<(), Failure> {
+    let look = &arguments.look;
+    let read: Vec<_> = arguments.reports.iter().chain([&arguments.path]).collect();
+    let job = LookJob::resolve(look, &read)?;
+    let reports: Vec<Report> =
+        arguments.reports.iter().map(|path| stored::report(path)).collect::<Result<_, _>>()?;
+    let Loaded { log, source } = loaded(&arguments.path, &job, &reports.iter().collect::<Vec<_>>())?;
+    let each = arguments.reports.iter().zip(&reports).map(|(path, report)| {
+        let loaded = Loaded { log: log.clone(), source: source.clone() };
+        one(path, report, loaded, &job.plan).map_err(|failure| failure.of(path))
+    });
+    let found: Vec<Validated> = each.collect::<Result<_, _>>()?;
+    let comparison = compared(&found).map_err(|error| Failure::option(&error))?;
+    let json = comparison.to_json().map_err(|error| Failure::data(error.to_string()))?;
+    if let Some(path) = &look.html {
+        output::page(path, &comparison_page(&reports, &found, line))?;
+    }
+    for (path, model) in arguments.reports.iter().zip(&comparison.models) {
+        model.warnings.iter().for_each(|warning| warn(&format!("{}: {warning}", path.display())));
+    }
+    print(look, &json, || summary::comparison(&comparison))
+}

@@ -1,0 +1,125 @@
+//! `thetahat inspect`: what a log is worth, before any fit.
+
+use thetahat::{Inspection, InspectionPlan, Recording, Times, inspection_page};
+
+use super::fit::usual_inputs;
+use super::summary;
+use crate::args::{FormatArgument, InspectArguments};
+use crate::failure::Failure;
+use crate::job::{Clock, InspectJob};
+use crate::log::{self, Recorded};
+use crate::output;
+use crate::table::Reader;
+
+pub(crate) fn inspect(arguments: &InspectArguments, line: &str) -> Result<(), Failure> {
+    let job = InspectJob::resolve(arguments)?;
+    output::apart(&arguments.out, &arguments.path)?;
+    if let Some(page) = &arguments.html {
+        output::apart(page, &arguments.path)?;
+        output::apart(page, &arguments.out)?;
+    }
+    let (inspection, recording) = inspected(&job, arguments)?;
+    if let (Some(path), Some(Recording { channels, times })) = (&arguments.html, recording) {
+        let time = match times {
+            Times::Measured(time) => time,
+            Times::Uniform(step) => (0..inspection.rows).map(|row| row as f64 * step).collect(),
+        };
+        let signals: Vec<(String, Vec<f64>)> =
+            channels.into_iter().map(|channel| (channel.name, channel.values)).collect();
+        output::page(path, &inspection_page(&inspection, &signals, &time, line))?;
+    }
+    let text = match arguments.format {
+        FormatArgument::Json => inspection.to_json().map_err(|error| Failure::data(error.to_string()))?,
+        FormatArgument::Table => summary::inspection(&inspection),
+    };
+    output::write(&arguments.out, |file| file.write_all(text.as_bytes()))
+}
+
+/// Reads the log and looks at it. What was read is there for a page, if one was asked for.
+fn inspected(
+    job: &InspectJob,
+    arguments: &InspectArguments,
+) -> Result<(Inspection, Option<Recording>), Failure> {
+    let mut chosen = Chosen::default();
+    let Recorded { recording, source, lines, words } = log::record(&job.path, &job.log, |reader| {
+        chosen = Chosen::new(job, reader)
+            .map_err(|message| Failure::data(format!("{}: {message}", job.path.display())))?;
+        Ok(chosen.columns.clone())
+    })?;
+    let resample = match &job.log.clock {
+        Clock::Column { resample, .. } => *resample,
+        Clock::Fixed(_) | Clock::Unknown => None,
+    };
+    let plan = InspectionPlan { inputs: chosen.inputs, output: chosen.output, resample };
+    let kept = arguments.html.is_some().then(|| recording.clone());
+    let mut inspection =
+        thetahat::inspect(recording, &source, &plan).map_err(log::at_line(&source.file, &lines))?;
+    inspection.warnings.splice(0..0, words.into_iter().chain(chosen.words));
+    inspection.command = job.command(arguments, &inspection);
+    Ok((inspection, kept))
+}
+
+/// Which columns are looked at, and what they are.
+#[derive(Debug, Default)]
+struct Chosen {
+    columns: Vec<String>,
+    inputs: Vec<String>,
+    output: Option<String>,
+    /// What was left out, in plain words.
+    words: Vec<String>,
+}
+
+impl Chosen {
+    /// The named columns; without names all that hold numbers. Their roles are those that a fit would give them.
+    fn new(job: &InspectJob, reader: &Reader) -> Result<Self, String> {
+        let mut chosen = Self::default();
+        let readable = chosen.readable(job, reader);
+        let usual = |name: &str| readable.iter().find(|other| *other == name).cloned();
+        chosen.output = job.output.clone().or_else(|| usual("y"));
+        chosen.inputs = job.inputs.clone().unwrap_or_else(|| usual_inputs(&readable));
+        // Whoever names an input y means it.
+        if job.output.is_none() {
+            chosen.output.take_if(|output| chosen.inputs.contains(output));
+        }
+        if job.inputs.is_none() {
+            chosen.inputs.retain(|input| chosen.output.as_ref() != Some(input));
+        }
+        chosen.columns = if job.is_named() {
+            chosen.words.clear();
+            chosen.inputs.iter().chain(&chosen.output).cloned().collect()
+        } else {
+            readable
+        };
+        if chosen.columns.is_empty() {
+            return Err(format!("no column holds numbers; there are: {}", log::listed(reader.names())));
+        }
+        Ok(chosen)
+    }
+
+    /// The columns but the clock that can be read; says which cannot.
+    fn readable(&mut self, job: &InspectJob, reader: &Reader) -> Vec<String> {
+        let names = reader.names();
+        let is_time = |name: &str| matches!(&job.log.clock, Clock::Column { name: time, .. } if time == name);
+        let nameless: Vec<usize> = reader.nameless().collect();
+        let mut readable: Vec<String> = Vec::new();
+        for ((column, name), holds_words) in names.iter().enumerate().zip(reader.words()) {
+            if is_time(name) {
+                continue;
+            }
+            let why = if nameless.contains(&column) {
+                "its name is not UTF-8; name the file's encoding (--encoding)"
+            } else if names[..column].contains(name) {
+                "another one has the same name; rename one of them"
+            } else if holds_words {
+                "it holds no numbers"
+            } else {
+                readable.push(name.clone());
+                continue;
+            };
+            self.words.push(format!("column {} ('{}') is left out: {why}", column + 1, log::brief(name)));
+        }
+        // A name that stands twice cannot be read at all.
+        readable.retain(|name| names.iter().filter(|other| *other == name).count() == 1);
+        readable
+    }
+}

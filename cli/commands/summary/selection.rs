@@ -1,0 +1,68 @@
+//! How a model was chosen, for people.
+
+use thetahat::{Report, Scored, Select, Selection};
+
+use super::text::{Text, columns, number, or_dash};
+
+/// So many of the best are shown; the report has more.
+const SHOWN: usize = 8;
+
+/// The parts that the rows were cut into, what was done, and the best models.
+pub(super) fn selection(text: &mut Text, report: &Report) {
+    if let Some(parts) = &report.data.split {
+        let named =
+            [("estimation", &parts.estimation), ("validation", &parts.validation), ("test", &parts.test)];
+        let named = named.iter().filter(|(_, rows)| !rows.is_empty());
+        let named: Vec<String> = named.map(|(name, rows)| format!("{name} {}", super::rows(rows))).collect();
+        text.line(&format!("split: {}; the model is fitted to all but the test part", named.join(", ")));
+        text.line("");
+    }
+    let Some(selection) = &report.selection else { return };
+    selection.steps.iter().for_each(|step| text.line(step));
+    text.line("");
+    let unseen = selection.best.iter().any(|scored| scored.unseen.is_some());
+    let score = score(selection);
+    let mut names = vec!["", "model", "parameters", "MSE"];
+    let mut right = vec![2, 3];
+    for name in unseen.then_some("MSE on unseen").into_iter().chain(score) {
+        right.push(names.len());
+        names.push(name);
+    }
+    let mut table = columns(&names);
+    // The smallest model within a percent of the least may stand far behind it.
+    let chosen = std::iter::once(&selection.chosen);
+    let others = selection.best.iter().filter(|scored| scored.orders != selection.chosen.orders);
+    for (position, scored) in chosen.chain(others).take(SHOWN).enumerate() {
+        let role = match &selection.least {
+            _ if position == 0 => "chosen",
+            Some(least) if least.orders == scored.orders => "least",
+            _ if selection.second.as_ref().is_some_and(|second| second.orders == scored.orders) => "second",
+            _ => "",
+        };
+        let mut row = vec![
+            role.to_owned(),
+            scored.orders.to_string(),
+            scored.parameters.to_string(),
+            number(scored.mse),
+        ];
+        row.extend(unseen.then(|| or_dash(scored.unseen, number)));
+        row.extend(score.map(|_| criterion(selection.select, scored)));
+        table.add_row(row);
+    }
+    text.table(table, &right);
+}
+
+/// The name of a score that has no column of its own.
+fn score(selection: &Selection) -> Option<&'static str> {
+    match selection.select {
+        Select::Mdl => Some("MDL"),
+        Select::Aic => Some("AIC"),
+        Select::Aicc => Some("AICc"),
+        Select::Fpe => Some("FPE"),
+        Select::Validation | Select::Cv => None,
+    }
+}
+
+fn criterion(select: Select, scored: &Scored) -> String {
+    or_dash(scored.score, |score| if select == Select::Fpe { number(score) } else { format!("{score:.4}") })
+}

@@ -1,0 +1,231 @@
+//! Validations and comparisons as tables for people.
+
+use thetahat::{Comparison, Coverage, Horizon, Independence, Requirement, Seen, Test, Validation};
+
+use super::text::{Text, columns, number, or_dash, short};
+use super::{fits, rows};
+use crate::output::harmless;
+
+/// The level of the intervals of which a comparison says the coverage.
+const LEVEL: f64 = 0.95;
+
+/// How a model does on a log, and what was required of it.
+pub(crate) fn validation(found: &Validation, requirements: &[Requirement], alpha: f64) -> String {
+    let mut text = Text::default();
+    let files: Vec<String> = found.logs.iter().map(|log| harmless(&log.file)).collect();
+    text.line(&format!(
+        "{}, {}, on {} rows {}: {}",
+        or_dash(found.report.as_deref(), harmless),
+        found.orders,
+        files.join(", "),
+        rows(&found.rows),
+        seen(found.seen)
+    ));
+    text.line(stable(found.stable));
+    text.line("");
+    fits(&mut text, &found.fit);
+    let noise = &found.noise;
+    text.line(&format!(
+        "errors one step ahead: mean square {}, expected {}, ratio {}",
+        or_dash(noise.mse, number),
+        number(noise.model),
+        or_dash(noise.ratio, ratio)
+    ));
+    text.line("");
+    coverage(&mut text, &found.coverage);
+    residuals(&mut text, found, alpha);
+    if !requirements.is_empty() {
+        let mut table = columns(&["required", ""]);
+        for requirement in requirements {
+            let met = requirement.unmet(found, alpha).is_none();
+            table.add_row([requirement.to_string(), if met { "met" } else { "not met" }.to_owned()]);
+        }
+        text.table(table, &[]);
+    }
+    text.finish()
+}
+
+/// Several models, a column for each.
+pub(crate) fn comparison(comparison: &Comparison) -> String {
+    let models = &comparison.models;
+    let mut text = Text::default();
+    if let Some(first) = models.first() {
+        let files: Vec<String> = first.logs.iter().map(|log| harmless(&log.file)).collect();
+        text.line(&format!("{} rows {}", files.join(", "), rows(&first.rows)));
+        text.line("");
+    }
+    let names = models.iter().map(|model| or_dash(model.report.as_deref(), harmless));
+    let header: Vec<String> = std::iter::once(String::new()).chain(names).collect();
+    let mut table = columns(&header.iter().map(String::as_str).collect::<Vec<_>>());
+    let mut row = |what: &str, of: &dyn Fn(&Validation) -> String| {
+        table.add_row(std::iter::once(what.to_owned()).chain(models.iter().map(of)));
+    };
+    row("orders", &|model| model.orders.to_string());
+    row("parameters", &|model| model.orders.parameters().to_string());
+    row("stable", &|model| yes(model.stable));
+    row("fitted to these rows", &|model| {
+        match model.seen {
+            Seen::No => "no",
+            Seen::Partly => "partly",
+            Seen::Yes => "yes",
+        }
+        .to_owned()
+    });
+    let mut horizons: Vec<Horizon> = Vec::new();
+    for horizon in models.iter().flat_map(|model| model.fit.iter().map(|fit| fit.horizon)) {
+        if !horizons.contains(&horizon) {
+            horizons.push(horizon);
+        }
+    }
+    // A free run comes last, also where the first model has none.
+    horizons.sort_by_key(|horizon| match horizon {
+        Horizon::Steps { steps } => *steps,
+        Horizon::FreeRun => usize::MAX,
+    });
+    for horizon in horizons {
+        row(&format!("fit [%], {horizon}"), &|model| {
+            let fit = model.fit.iter().find(|fit| fit.horizon == horizon);
+            or_dash(fit.and_then(|fit| fit.percent), |percent| format!("{percent:.3}"))
+        });
+    }
+    row("mean square error", &|model| or_dash(model.noise.mse, number));
+    row("  of that expected", &|model| or_dash(model.noise.ratio, ratio));
+    let p = |p: Option<f64>| or_dash(p, chance);
+    row("Ljung-Box p-value", &|model| {
+        p(model.residuals.as_ref().and_then(|residuals| residuals.ljung_box.p_value))
+    });
+    row("Anderson: stops at alpha", &|model| {
+        or_dash(model.residuals.as_ref(), |found| stops(found.anderson.stops_at))
+    });
+    let mut inputs: Vec<&str> = Vec::new();
+    for test in models.iter().filter_map(|model| model.residuals.as_ref()).flat_map(|r| &r.independence) {
+        if !inputs.contains(&test.input.as_str()) {
+            inputs.push(&test.input);
+        }
+    }
+    for input in inputs {
+        row(&format!("independence p-value, {}", harmless(input)), &|model| {
+            let tests = model.residuals.iter().flat_map(|residuals| &residuals.independence);
+            p(tests.filter(|test| test.input == input).find_map(|test| test.past.p_value))
+        });
+    }
+    row("95 % intervals hold [%]", &|model| {
+        let one = model.coverage.iter().find(|one| one.steps == 1 && one.level == LEVEL);
+        or_dash(one.and_then(|one| one.actual), percent)
+    });
+    text.table(table, &(1..=models.len()).collect::<Vec<_>>());
+    let silent: Vec<String> = models
+        .iter()
+        .filter(|model| !model.white_expected)
+        .map(|model| or_dash(model.report.as_deref(), harmless))
+        .collect();
+    if !silent.is_empty() {
+        text.line(&format!(
+            "need not be white (output error, instrumental variables): {}",
+            silent.join(", ")
+        ));
+    }
+    text.finish()
+}
+
+fn seen(seen: Seen) -> &'static str {
+    match seen {
+        Seen::No => "fresh, the fit did not see them",
+        Seen::Partly => "the model was fitted to some of them",
+        Seen::Yes => "the model was fitted to them",
+    }
+}
+
+fn stable(stable: bool) -> &'static str {
+    if stable { "stable" } else { "unstable" }
+}
+
+fn yes(value: bool) -> String {
+    if value { "yes" } else { "no" }.to_owned()
+}
+
+fn ratio(value: f64) -> String {
+    if (0.001..1000.0).contains(&value) { format!("{value:.3}") } else { format!("{value:.2e}") }
+}
+
+fn percent(fraction: f64) -> String {
+    format!("{:.2}", 100.0 * fraction)
+}
+
+fn chance(p: f64) -> String {
+    if p == 0.0 || p >= 1e-4 { format!("{p:.4}") } else { format!("{p:.1e}") }
+}
+
+fn stops(alpha: Option<f64>) -> String {
+    alpha.map_or_else(|| "none up to 0.5".to_owned(), |alpha| format!("{alpha:.3}"))
+}
+
+/// One line for each horizon, the levels side by side.
+fn coverage(text: &mut Text, coverage: &[Coverage]) {
+    let mut levels: Vec<f64> = Vec::new();
+    for one in coverage {
+        if !levels.contains(&one.level) {
+            levels.push(one.level);
+        }
+    }
+    let header: Vec<String> = std::iter::once("outputs in their intervals [%]".to_owned())
+        .chain(levels.iter().map(|level| format!("{} %", short(100.0 * level))))
+        .collect();
+    let mut table = columns(&header.iter().map(String::as_str).collect::<Vec<_>>());
+    for ahead in coverage.chunk_by(|a, b| a.steps == b.steps) {
+        let Some(first) = ahead.first() else { continue };
+        let horizon = Horizon::Steps { steps: first.steps }.to_string();
+        let each = ahead.iter().map(|one| or_dash(one.actual, percent));
+        table.add_row(std::iter::once(horizon).chain(each));
+    }
+    text.table(table, &(1..=levels.len()).collect::<Vec<_>>());
+}
+
+/// The tests of what is left.
+fn residuals(text: &mut Text, found: &Validation, alpha: f64) {
+    let Some(residuals) = &found.residuals else {
+        text.line("residuals: not tested");
+        text.line("");
+        return;
+    };
+    let fitted = match residuals.fitted {
+        0 => "fresh".to_owned(),
+        count => format!("{count} parameters fitted to them"),
+    };
+    let asked = if found.white_expected { "" } else { ", which need not be white" };
+    text.line(&format!("residuals: {} samples, {fitted}{asked}", residuals.samples));
+    let mut table =
+        columns(&["test", "lags", "statistic", "degrees", "p-value", &format!("at {}", short(alpha))]);
+    let mut add = |what: String, test: &Test, verdict: [&str; 2]| {
+        let word = or_dash(test.p_value, |p| verdict[usize::from(p < alpha)].to_owned());
+        table.add_row([
+            what,
+            test.lags.to_string(),
+            format!("{:.2}", test.statistic),
+            short(test.degrees),
+            or_dash(test.p_value, chance),
+            word,
+        ]);
+    };
+    add("white (Ljung-Box)".to_owned(), &residuals.ljung_box, ["white", "not white"]);
+    for Independence { input, past, feedback, .. } in &residuals.independence {
+        let input = harmless(input);
+        add(format!("independent of past {input}"), past, ["independent", "dependent"]);
+        add(format!("no feedback to {input}"), feedback, ["none seen", "feedback"]);
+    }
+    text.table(table, &[1, 2, 3, 4]);
+    let anderson = &residuals.anderson;
+    let mut table = columns(&["Anderson: alpha", "outside", "of", "verdict", "p-value"]);
+    for level in &anderson.levels {
+        table.add_row([
+            short(level.alpha),
+            level.outside.to_string(),
+            anderson.lags.to_string(),
+            if level.white { "white" } else { "not white" }.to_owned(),
+            chance(level.p_value),
+        ]);
+    }
+    text.table(table, &[1, 2, 4]);
+    text.line(&format!("Anderson stops passing at alpha {}", stops(anderson.stops_at)));
+    text.line("");
+}

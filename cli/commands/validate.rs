@@ -1,0 +1,79 @@
+//! `thetahat validate`: how a stored model does on a log, and whether it is good enough.
+
+use std::path::Path;
+
+use thetahat::{Report, Validated, ValidationPlan, validate as validated, validation_page};
+
+use super::{stored, summary};
+use crate::args::{FormatArgument, LookArguments, ValidateArguments};
+use crate::failure::Failure;
+use crate::job::LookJob;
+use crate::log::{self, Loaded};
+use crate::output::{self, warn};
+
+pub(crate) fn validate(arguments: &ValidateArguments, line: &str) -> Result<(), Failure> {
+    let look = &arguments.look;
+    let mut job = LookJob::resolve(look, &[&arguments.report, &arguments.path])?;
+    let requirements = job.requirements(&arguments.require)?;
+    let report = stored::report(&arguments.report)?;
+    let refused = |error| Failure::option(&error);
+    requirements.iter().try_for_each(|requirement| requirement.check(&report)).map_err(refused)?;
+
+    let loaded = loaded(&arguments.path, &job, &[&report])?;
+    let found = one(&arguments.report, &report, loaded, &job.plan)?;
+    let validation = &found.validation;
+    let json = validation.to_json().map_err(|error| Failure::data(error.to_string()))?;
+    if let Some(path) = &look.html {
+        output::page(path, &validation_page(&report, &found, line))?;
+    }
+    for warning in &validation.warnings {
+        warn(warning);
+    }
+    print(look, &json, || summary::validation(validation, &requirements, job.plan.alpha))?;
+
+    let unmet = requirements.iter().filter_map(|requirement| requirement.unmet(validation, job.plan.alpha));
+    let unmet: Vec<String> = unmet.collect();
+    if unmet.is_empty() {
+        return Ok(());
+    }
+    Err(Failure::unmet(format!("{}: not met: {}", arguments.report.display(), unmet.join("; "))))
+}
+
+/// Reads the channels of some models from a log.
+pub(super) fn loaded(path: &Path, job: &LookJob, reports: &[&Report]) -> Result<Loaded, Failure> {
+    let mut names: Vec<String> = Vec::new();
+    for model in reports.iter().map(|report| &report.model) {
+        for signal in model.inputs.iter().chain([&model.output]) {
+            if !names.contains(&signal.name) {
+                names.push(signal.name.clone());
+            }
+        }
+    }
+    let sample_time = reports.first().map(|report| report.model.sample_time);
+    log::load(path, &job.log, sample_time, |_| Ok(names))
+}
+
+/// Validates one model.
+pub(super) fn one(
+    path: &Path,
+    report: &Report,
+    loaded: Loaded,
+    plan: &ValidationPlan,
+) -> Result<Validated, Failure> {
+    let name = path.display().to_string();
+    let sources = [loaded.source];
+    validated(report, Some(&name), loaded.log, &sources, plan).map_err(log::failure(&sources))
+}
+
+/// Writes the document, and prints it or the table.
+pub(super) fn print(look: &LookArguments, json: &str, table: impl FnOnce() -> String) -> Result<(), Failure> {
+    if let Some(path) = &look.out {
+        output::write(path, |file| file.write_all(json.as_bytes()))?;
+    }
+    match look.format {
+        // Standard output holds one document.
+        _ if [&look.out, &look.html].into_iter().flatten().any(|path| path == Path::new("-")) => Ok(()),
+        FormatArgument::Json => output::print(json),
+        FormatArgument::Table => output::print(&table()),
+    }
+}

@@ -1,0 +1,174 @@
+//! Fits of several models to the same samples, so that their costs can be compared.
+
+use std::ops::Range;
+use std::time::Instant;
+
+use super::optimize::{Monitor, Search, best_free, search};
+use super::prediction_error::{NOTHING_LEFT, energy, is_determined};
+use super::predictor::{Begin, Polynomials, Predictor};
+use super::start::candidates;
+use crate::data::Record;
+use crate::{Error, Orders};
+
+/// A step that raises the log-likelihood by less than this fraction of one is not done.
+const SETTLED: f64 = 0.02;
+
+/// Of one initial condition, where nothing of y is left to explain.
+const LARGEST_PRICE: f64 = 100.0;
+
+/// Where in a segment errors begin, and where they count: the same for all models.
+///
+/// In the first samples, as many as the longest model reaches back, e = 0; what 1/C makes of that fades before errors count.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Window {
+    /// How many samples the models reach back.
+    pub(crate) silent: usize,
+    /// The first sample that counts.
+    pub(crate) counted: usize,
+}
+
+/// The samples that all models are fitted to.
+///
+/// Before a segment everything is zero; or nothing is known of it, and 1/F starts from what fits best.
+#[derive(Clone)]
+pub(crate) struct Common<'a> {
+    record: &'a Record<'a>,
+    begin: Begin,
+    window: Window,
+    options: Search,
+    /// A sum of squares that is nothing.
+    smallest: f64,
+    deadline: Option<Instant>,
+    monitor: Monitor<'a>,
+}
+
+/// A model that was fitted.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Point {
+    /// theta-hat, in the order of [`Orders::names`].
+    pub(crate) parameters: Vec<f64>,
+    /// sum e^2.
+    pub(crate) cost: f64,
+    /// What the initial conditions of 1/F cost, in units of 2 ln(likelihood); zero without them.
+    pub(crate) initial: f64,
+}
+
+impl<'a> Common<'a> {
+    /// # Errors
+    /// [`Error::Argument`] for a setting of the search that makes no sense.
+    pub(crate) fn new(
+        record: &'a Record<'a>,
+        free: bool,
+        window: Window,
+        options: &Search,
+        monitor: Monitor<'a>,
+    ) -> Result<Self, Error> {
+        options.check_numbers()?;
+        let samples: usize = record.segments.iter().map(Range::len).sum();
+        let tolerance = options.tolerance.max(SETTLED / samples.max(1) as f64);
+        let options = Search { guess: None, starts: 0, tolerance, ..options.clone() };
+        let deadline = options.time_limit.and_then(|limit| Instant::now().checked_add(limit));
+        let smallest = NOTHING_LEFT * energy(record);
+        let begin = if free { Begin::Unknown } else { Begin::Zero };
+        Ok(Self { record, begin, window, options, smallest, deadline, monitor })
+    }
+
+    /// The same for other samples, with the time that is left.
+    pub(crate) fn on<'b>(&self, record: &'b Record<'b>) -> Common<'b>
+    where
+        'a: 'b,
+    {
+        Common { record, smallest: NOTHING_LEFT * energy(record), options: self.options.clone(), ..*self }
+    }
+
+    fn predictor(&self, orders: &Orders) -> Predictor<'a> {
+        Predictor::counting(self.record, orders, self.begin, self.window.silent, self.window.counted)
+    }
+
+    /// The least sum of squared errors that searches find: one from the best of `starts`, and with `recipes` one from the best
+    /// of the starts that the data give. None where the data do not determine the parameters.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`].
+    pub(crate) fn fit(
+        &self,
+        orders: &Orders,
+        starts: &[Vec<f64>],
+        recipes: bool,
+    ) -> Result<Option<Point>, Error> {
+        let mut predictor = self.predictor(orders);
+        if predictor.samples() <= orders.parameters() + predictor.initial_conditions() {
+            return Ok(None);
+        }
+        let own: Vec<Vec<f64>> = if recipes {
+            let candidates = candidates(self.record, orders).unwrap_or_default();
+            candidates.into_iter().map(|candidate| candidate.parameters).collect()
+        } else {
+            Vec::new()
+        };
+        let mut best: Option<(f64, Vec<f64>)> = None;
+        for starts in [starts, &own] {
+            let costs =
+                starts.iter().filter_map(|start| Some((best_free(&mut predictor, start).ok()?, start)));
+            let first = costs.min_by(|(one, _), (other, _)| one.total_cmp(other));
+            let Some((_, start)) = first else { continue };
+            let found =
+                search(&mut predictor, start, &self.options, self.smallest, self.deadline, self.monitor)?;
+            let Ok(found) = found else { continue };
+            if best.as_ref().is_none_or(|(cost, _)| found.cost() < *cost) {
+                best = Some((found.cost(), found.parameters));
+            }
+        }
+        let Some((cost, parameters)) = best else { return Ok(None) };
+        if best_free(&mut predictor, &parameters).is_err() {
+            return Ok(None);
+        }
+        predictor.linearize();
+        if cost > self.smallest && !is_determined(&predictor) {
+            return Ok(None);
+        }
+        Ok(Some(Point { parameters, cost, initial: self.price(&predictor, cost) }))
+    }
+
+    /// The price of n initial conditions w: what is known of them before is that they have the size of the output. So their
+    /// part in -2 ln(likelihood), integrated over them (Schwarz 1978, Annals of Statistics 6, without his limit of many
+    /// samples: what fades is not seen better the longer it lasts), is
+    ///
+    /// ```text
+    /// ln det(I + (mean y^2/sigma^2) sum h h'),  h = de/dw;
+    /// ```
+    ///
+    /// but at least 2 n, as AIC has it: they are fitted to noise too.
+    fn price(&self, predictor: &Predictor<'_>, cost: f64) -> f64 {
+        let count = predictor.initial_conditions();
+        if count == 0 {
+            return 0.0;
+        }
+        let total: usize = self.record.segments.iter().map(Range::len).sum();
+        let size = self.smallest / NOTHING_LEFT / total as f64;
+        let variance = cost.max(self.smallest) / predictor.samples() as f64;
+        let least = 2.0 * count as f64;
+        predictor.free_information(size / variance).max(least).min(LARGEST_PRICE * count as f64)
+    }
+
+    /// The mean of e^2 of given parameters on samples that they were not fitted to. Initial conditions are, and take as many
+    /// samples with them. None where C or F is unstable, the errors overflow, or too few samples count.
+    pub(crate) fn mean(&self, orders: &Orders, parameters: &[f64]) -> Option<f64> {
+        let mut predictor = self.predictor(orders);
+        let left =
+            predictor.samples().checked_sub(predictor.initial_conditions()).filter(|left| *left > 0)?;
+        Some(best_free(&mut predictor, parameters).ok()? / left as f64)
+    }
+}
+
+/// The parameters of a model with the same delays and orders that are not above the others', as parameters of the latter:
+/// the polynomials end with zeros.
+pub(crate) fn extended(from: &Orders, parameters: &[f64], to: &Orders) -> Vec<f64> {
+    let mut polynomials = Polynomials::new(from, parameters);
+    polynomials.a.resize(to.na + 1, 0.0);
+    polynomials.b.iter_mut().zip(&to.nb).for_each(|(b, &nb)| b.resize(nb, 0.0));
+    polynomials.c.resize(to.nc + 1, 0.0);
+    polynomials.d.resize(to.nd + 1, 0.0);
+    polynomials.f.iter_mut().zip(&to.nf).for_each(|(f, &nf)| f.resize(nf + 1, 0.0));
+    polynomials.parameters()
+}

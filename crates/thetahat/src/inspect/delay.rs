@@ -1,0 +1,81 @@
+//! The delay from an input to the output.
+
+use std::ops::Range;
+
+use statrs::distribution::{ContinuousCDF, Normal};
+
+use super::{DelayEstimate, samples, whitening};
+use crate::regression::{Lagged, Presample, Taps, sum_of_squares};
+
+/// The highest lag looked at.
+const HIGHEST: usize = 50;
+/// Samples for each lag looked at.
+const SAMPLES: usize = 10;
+/// How often data without a relation give a delay.
+const LEVEL: f64 = 0.01;
+/// Below this fraction of the square of a signal, what is left of it by its past is rounding.
+const ROUNDING: f64 = 1e-8;
+/// Half the width of the band that holds 95 % of a standard normal variable.
+const BAND: f64 = 1.959_963_984_540_054;
+
+/// The first lag at which the output follows the input, from the correlation of the prewhitened signals:
+///
+/// ```text
+/// a(t) = A_u(q) u(t),   b(t) = A_y(q) y(t),   r(k) = sum a(t - k) b(t) / sqrt(sum a^2 sum b^2)
+/// ```
+///
+/// with autoregressions A_u of the input and A_y of the output. Box and Jenkins (Time Series Analysis, 1976, section 11.2) filter
+/// both by A_u, which leaves b as slow as the output is and its correlations small; with a filter each
+/// (Haugh, JASA 71, 1976) b is the output's own innovation. Neither filter moves the first lag at which there is an effect, as
+/// both are monic in q^-1: b = A_y/A_u B/F a + noise, which begins at q^-nk.
+///
+/// As a is white, r(k) has the variance 1/N at lags before the delay, whatever the noise (Bartlett's formula: its sum over
+/// the products of both autocorrelations has one term left). nk is the first lag with |r(k)| beyond the band that
+/// white noise leaves at any of the M lags in 1 % of records (Bonferroni), and the confidence is 1 - M p(k).
+/// Another input that is correlated with this one can show in its place. O(N M).
+///
+/// The signals are deviations, zero outside of the segments.
+pub(super) fn delay(name: &str, input: &[f64], output: &[f64], segments: &[Range<usize>]) -> DelayEstimate {
+    let mut found = DelayEstimate {
+        input: name.to_owned(),
+        nk: None,
+        confidence: None,
+        correlation: Vec::new(),
+        band: 0.0,
+    };
+    let (of_input, of_output) =
+        (whitening::autoregression(input, segments), whitening::autoregression(output, segments));
+    let left_out = of_input.len().max(of_output.len()) - 1;
+    let kept = whitening::shortened(segments, left_out);
+    let count = samples(&kept);
+    let lags = HIGHEST.min(count / SAMPLES);
+    if lags == 0 {
+        return found;
+    }
+    let a = whitening::filtered(&of_input, input, &kept_with_past(&kept, of_input.len() - 1));
+    let b = whitening::filtered(&of_output, output, &kept_with_past(&kept, of_output.len() - 1));
+    let square =
+        |signal: &[f64]| -> f64 { kept.iter().map(|segment| sum_of_squares(&signal[segment.clone()])).sum() };
+    let size = square(&a).sqrt() * square(&b).sqrt();
+    // An input that its own past determines brings nothing new that could be found again.
+    let known = square(&a) <= ROUNDING * square(input) || square(&b) <= ROUNDING * square(output);
+    if known || !size.is_normal() {
+        return found;
+    }
+    let taps = vec![Taps { signal: 1, first: 0, count: lags + 1, sign: 1.0 }];
+    let (_, products, _) = Lagged::new(&[&b, &a], taps, &kept, Presample::Zero).normal_equations();
+    found.correlation = products.iter().map(|product| (product / size).clamp(-1.0, 1.0)).collect();
+    found.band = BAND / (count as f64).sqrt();
+    let looks = found.correlation.len() as f64;
+    let chance = |r: f64| looks * 2.0 * Normal::standard().sf((count as f64).sqrt() * r.abs());
+    if let Some((lag, &r)) = found.correlation.iter().enumerate().find(|(_, r)| chance(**r) < LEVEL) {
+        found.nk = Some(lag);
+        found.confidence = Some(1.0 - chance(r));
+    }
+    found
+}
+
+/// The segments with so many samples more at their beginnings.
+fn kept_with_past(kept: &[Range<usize>], past: usize) -> Vec<Range<usize>> {
+    kept.iter().map(|segment| segment.start - past..segment.end).collect()
+}

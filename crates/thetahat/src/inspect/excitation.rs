@@ -1,0 +1,102 @@
+//! How rich an input is.
+
+use std::ops::Range;
+
+use thetahat_core::nalgebra::DMatrix;
+
+use super::{Excitation, moments, samples, spectrum};
+use crate::Error;
+use crate::regression::{Lagged, Presample, Taps, sum, sum_of_squares};
+
+/// The highest order looked for.
+const HIGHEST: usize = 50;
+/// Samples for each order looked for.
+const SAMPLES: usize = 4;
+/// An eigenvalue below this fraction of the largest counts as zero.
+const TOLERANCE: f64 = 1e-6;
+
+/// Of the square of a signal, what is left by another one is rounding below this fraction.
+const SAME: f64 = 1e-20;
+
+/// The order of persistence of excitation (Ljung, System Identification, 2nd ed. 1999, section 13.2; Söderström and Stoica, System
+/// Identification, 1989, section 5.4): the rank of the covariance matrix of
+///
+/// ```text
+/// [u(t), u(t - 1), …, u(t - n + 1)],
+/// ```
+///
+/// each lag less its mean, n = 50, or less of a short log. The mean is removed, as a fit removes it: a constant has order 0, a sum of k
+/// sinusoids 2k, white noise n. Of a finite record the matrix is the sum over the samples that have all their lags, without
+/// zeros in place of others, so that a sinusoid has rank 2 to rounding.
+///
+/// Eigenvalues above 1e-6 of the largest count: below lies what rounding to three digits leaves (a direction excited at a
+/// thousandth of the amplitude of the strongest), above is all of a first-order process with a pole at 0.999 sampled as
+/// often as that. Nor is the order above the number of times that the input changes: each step of a
+/// step test is seen once, and to excite persistently is to do so over and over. O(N n + n^3).
+pub(super) fn excitation(
+    name: &str,
+    values: &[f64],
+    segments: &[Range<usize>],
+    sample_time: f64,
+) -> Result<Excitation, Error> {
+    let deviations = moments::deviations(values, segments);
+    let highest = highest(segments);
+    let pairs = || segments.iter().flat_map(|segment| values[segment.clone()].windows(2));
+    let changes = pairs().filter(|pair| pair[0] != pair[1]).count();
+    let present = || segments.iter().flat_map(|segment| values[segment.clone()].iter().copied());
+    let scale = moments::scale(present());
+    let unit = unit(&present().map(|value| scale * value).collect::<Vec<_>>()) / scale;
+    Ok(Excitation {
+        input: name.to_owned(),
+        order: rank(&deviations, segments, highest).min(changes),
+        highest,
+        changes: changes as f64 / pairs().count().max(1) as f64,
+        spectrum: spectrum::spectrum(&deviations, segments, unit, sample_time)?,
+        same_as: None,
+    })
+}
+
+/// Whether two signals are the same but for scale and offset, to rounding: their correlation is 1 or -1. O(N).
+pub(super) fn are_the_same(left: &[f64], right: &[f64], segments: &[Range<usize>]) -> bool {
+    let (left, right) = (moments::deviations(left, segments), moments::deviations(right, segments));
+    let (square, whole) = (sum_of_squares(&left), sum_of_squares(&right));
+    let scale = sum(left.iter().zip(&right).map(|(left, right)| left * right)) / square;
+    let rest = sum(left.iter().zip(&right).map(|(left, right)| (right - scale * left).powi(2)));
+    square > 0.0 && whole > 0.0 && rest <= SAME * whole
+}
+
+/// The highest order that so many samples tell of: of short segments not too much may be left out.
+fn highest(segments: &[Range<usize>]) -> usize {
+    let total = samples(segments);
+    let full = |order: usize| -> usize {
+        segments.iter().map(|segment| (segment.len() + 1).saturating_sub(order)).sum()
+    };
+    (1..=HIGHEST.min(total / SAMPLES)).rev().find(|&order| 2 * full(order) >= total).unwrap_or(0)
+}
+
+/// The largest deviation from the mean: the unit of [`moments::deviations`].
+fn unit(values: &[f64]) -> f64 {
+    let mean = moments::mean(values);
+    values.iter().fold(0.0, |largest: f64, value| largest.max((value - mean).abs()))
+}
+
+/// The rank of the covariance of so many lags.
+fn rank(deviations: &[f64], segments: &[Range<usize>], lags: usize) -> usize {
+    let ones = vec![1.0; deviations.len()];
+    let taps = vec![
+        Taps { signal: 0, first: 0, count: lags, sign: 1.0 },
+        Taps { signal: 1, first: 0, count: 1, sign: 1.0 },
+    ];
+    let lagged = Lagged::new(&[deviations, &ones], taps, segments, Presample::Drop);
+    let rows = lagged.rows();
+    if lags == 0 || rows == 0 {
+        return 0;
+    }
+    let (products, _, _) = lagged.normal_equations();
+    let covariance = DMatrix::from_fn(lags, lags, |i, j| {
+        (products[(i, j)] - products[(i, lags)] * products[(j, lags)] / rows as f64) / rows as f64
+    });
+    let eigenvalues = covariance.symmetric_eigenvalues();
+    let largest = eigenvalues.max();
+    eigenvalues.iter().filter(|value| **value > TOLERANCE * largest).count()
+}

@@ -1,0 +1,170 @@
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::{Error, Source};
+
+/// The schema that this version writes.
+const SCHEMA: &str = "thetahat.inspection/1";
+
+/// What a log is worth, before any fit. The JSON document `thetahat.inspection/1`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Inspection {
+    /// `thetahat.inspection/1`.
+    pub schema: String,
+    /// The program and version that wrote it.
+    pub generator: String,
+    /// Where the log came from.
+    pub log: Source,
+    /// The number of rows.
+    pub rows: usize,
+    /// The clock.
+    pub clock: Clock,
+    /// One entry for each channel.
+    pub channels: Vec<ChannelQuality>,
+    /// One entry for each input.
+    pub excitation: Vec<Excitation>,
+    /// One entry for each input.
+    pub delays: Vec<DelayEstimate>,
+    /// One entry for each input.
+    pub feedback: Vec<Feedback>,
+    /// The command that would fit a model to it; none without an output.
+    pub command: Option<String>,
+    /// What a careful reader should know, in plain words.
+    pub warnings: Vec<String>,
+}
+
+/// The clock of a log.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Clock {
+    /// The median step, in seconds.
+    pub sample_time: f64,
+    /// Whether the log has times of its own.
+    pub measured: bool,
+    /// The shortest and the longest step.
+    pub steps: (f64, f64),
+    /// The standard deviation of the steps that are no gaps, over the median.
+    pub jitter: f64,
+    /// Steps longer than 1.5 medians.
+    pub gaps: usize,
+    /// Whether the log has to be resampled before a fit.
+    pub irregular: bool,
+}
+
+/// The quality of one channel.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ChannelQuality {
+    /// The channel's name.
+    pub name: String,
+    /// `input`, `output` or none.
+    pub role: Option<String>,
+    /// Rows without a value.
+    pub missing: usize,
+    /// The smallest value; none if there is no value. The same holds for the others.
+    pub minimum: Option<f64>,
+    /// The largest value.
+    pub maximum: Option<f64>,
+    /// The mean.
+    pub mean: Option<f64>,
+    /// The standard deviation about the mean.
+    pub standard_deviation: Option<f64>,
+    /// The slope of the best straight line, per second.
+    pub trend: Option<f64>,
+    /// The fraction of the variance that the line explains.
+    pub trend_share: Option<f64>,
+    /// Rows that repeat the value before them.
+    pub repeated: usize,
+    /// The longest stretch of equal values, in rows.
+    pub longest_hold: usize,
+    /// The step of which all values are multiples, away from an offset, to rounding; none if there is none.
+    pub quantization: Option<f64>,
+    /// Stretches at the largest or the smallest value.
+    pub saturation: Option<Saturation>,
+    /// The first rows (1-based, 20 at most) of values far from their neighbours.
+    pub outliers: Vec<usize>,
+    /// How many such values there are.
+    pub outlier_count: usize,
+}
+
+/// How often a channel rests at its limits.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Saturation {
+    /// Rows at the smallest value, in stretches of several.
+    pub low: usize,
+    /// Rows at the largest value, in stretches of several.
+    pub high: usize,
+}
+
+/// How rich an input is.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Excitation {
+    /// The input channel.
+    pub input: String,
+    /// The order of persistence of excitation: so many parameters it can tell apart. No more than `highest`.
+    pub order: usize,
+    /// The highest order looked for.
+    pub highest: usize,
+    /// The fraction of samples at which it changes.
+    pub changes: f64,
+    /// Its power spectral density, the mean removed.
+    pub spectrum: Vec<SpectrumPoint>,
+    /// The first input before it that it equals, but for scale and offset: no fit can tell the two apart.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub same_as: Option<String>,
+}
+
+/// One point of a spectrum.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct SpectrumPoint {
+    /// Radians per second.
+    pub frequency: f64,
+    /// Units of the channel squared, per radian per second.
+    pub density: f64,
+}
+
+/// The delay from an input, from its prewhitened correlation with the output.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct DelayEstimate {
+    /// The input channel.
+    pub input: String,
+    /// The first lag at which the output follows the input; none if there is no such lag.
+    pub nk: Option<usize>,
+    /// How sure that is: one minus the probability that white noise has a correlation as large at any of the lags.
+    pub confidence: Option<f64>,
+    /// The correlation of the prewhitened signals at lags 0, 1, …
+    pub correlation: Vec<f64>,
+    /// Half the width of the 95 % band.
+    pub band: f64,
+}
+
+/// Whether an input follows the output.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Feedback {
+    /// The input channel.
+    pub input: String,
+    /// How often data without feedback look as much like it; none where it cannot be said.
+    pub p_value: Option<f64>,
+    /// Whether that is below 1 %.
+    pub found: bool,
+}
+
+impl Inspection {
+    pub(super) fn schema_name() -> String {
+        SCHEMA.to_owned()
+    }
+
+    /// The document, indented, with a line break at its end.
+    ///
+    /// # Errors
+    /// [`Error::Report`] if it cannot be written as JSON.
+    pub fn to_json(&self) -> Result<String, Error> {
+        let mut text = serde_json::to_string_pretty(self)
+            .map_err(|error| Error::report(format!("the inspection cannot be written as JSON: {error}")))?;
+        text.push('\n');
+        Ok(text)
+    }
+
+    /// The JSON Schema of the document.
+    pub fn json_schema() -> serde_json::Value {
+        schemars::schema_for!(Self).to_value()
+    }
+}

@@ -1,0 +1,198 @@
+//! What a careful reader should know, in plain words.
+
+use super::clock::Ticks;
+use super::{ChannelQuality, Inspection, InspectionPlan, Times};
+
+/// A trend that explains this much of an output is worth a word.
+const TREND: f64 = 0.25;
+/// A rounding step that is this fraction of the standard deviation is coarse.
+const COARSE: f64 = 0.25;
+/// An input that excites no more than this many orders limits the model.
+const POOR: usize = 10;
+/// An input that changes so few times is a step test.
+const FEW_CHANGES: f64 = 5.0;
+/// Rows that a sentence lists.
+const LISTED: usize = 5;
+/// Rows from which a fit has a chance.
+const FEW_ROWS: usize = 50;
+
+/// What is to be said of the rows as they are.
+pub(super) fn of_the_rows(
+    inspection: &Inspection,
+    ticks: &Ticks,
+    times: &Times,
+    plan: &InspectionPlan,
+) -> Vec<String> {
+    let mut words = clock(inspection, ticks, times, plan);
+    if inspection.rows < FEW_ROWS {
+        words.push(format!("the log has {} rows only: record more", inspection.rows));
+    }
+    for channel in &inspection.channels {
+        words.extend(of_channel(channel, inspection.rows));
+    }
+    words
+}
+
+fn clock(inspection: &Inspection, ticks: &Ticks, times: &Times, plan: &InspectionPlan) -> Vec<String> {
+    let clock = &inspection.clock;
+    let mut words = Vec::new();
+    if let Some(row) = ticks.first_backward {
+        let how = match times {
+            Times::Measured(time) if time[row - 1] == time[row - 2] => "repeats",
+            _ => "goes back",
+        };
+        words.push(format!(
+            "the time {how} at row {row} ({} such rows): sort the log by time and remove repeated rows",
+            ticks.backward
+        ));
+    } else if clock.irregular && plan.resample.is_none() {
+        words.push(format!(
+            "the clock is irregular (steps from {} s to {} s, median {} s): a fit needs --resample",
+            digits(clock.steps.0),
+            digits(clock.steps.1),
+            digits(clock.sample_time)
+        ));
+    }
+    if clock.gaps > 0 && !clock.irregular {
+        words.push(format!(
+            "the clock has {} gap{} (steps over 1.5 medians): a fit cuts the log there",
+            clock.gaps,
+            plural(clock.gaps)
+        ));
+    }
+    words
+}
+
+fn of_channel(channel: &ChannelQuality, rows: usize) -> Vec<String> {
+    let mut words = Vec::new();
+    let mut say = |text: String| words.push(format!("channel '{}' {text}", channel.name));
+    if channel.missing == rows {
+        say("has no values: leave it out".to_owned());
+    } else if channel.missing > 0 {
+        say(format!("misses {} of {rows} values: a fit cuts the log there", channel.missing));
+    }
+    if channel.minimum.is_some() && channel.minimum == channel.maximum {
+        say("is constant: it tells nothing".to_owned());
+    }
+    if channel.outlier_count > 0 {
+        let listed: Vec<String> = channel.outliers.iter().take(LISTED).map(ToString::to_string).collect();
+        let more = if channel.outlier_count > LISTED {
+            format!(", … ({} in all)", channel.outlier_count)
+        } else {
+            String::new()
+        };
+        say(format!(
+            "has values far from their neighbours at row{} {}{more}: where they are wrong, empty their fields, or fit with \
+             --norm 1",
+            plural(channel.outlier_count),
+            listed.join(", ")
+        ));
+    }
+    if let Some(saturation) = channel.saturation {
+        for (rows, which) in [(saturation.low, "smallest"), (saturation.high, "largest")] {
+            if rows > 0 {
+                say(format!(
+                    "rests at its {which} value in {rows} rows: if it is clipped there, a linear model does not hold on them"
+                ));
+            }
+        }
+    }
+    let coarse = channel.quantization.zip(channel.standard_deviation);
+    if let Some((step, _)) = coarse.filter(|(step, deviation)| *step > COARSE * deviation) {
+        say(format!(
+            "is rounded to multiples of {}, which is coarse for a standard deviation of {}: that rounding is noise",
+            digits(step),
+            digits(channel.standard_deviation.unwrap_or(0.0))
+        ));
+    }
+    let trend =
+        channel.trend_share.filter(|share| *share >= TREND && channel.role.as_deref() == Some("output"));
+    if let Some(share) = trend {
+        say(format!(
+            "has a trend that explains {:.0} % of it: if that is drift and no answer to an input, fit with --detrend linear",
+            100.0 * share
+        ));
+    }
+    words
+}
+
+/// What is to be said of inputs and output together.
+pub(super) fn of_the_dynamics(inspection: &Inspection, plan: &InspectionPlan) -> Vec<String> {
+    let mut words = Vec::new();
+    if let Some(resampled) = inspection.log.resampled.as_ref().filter(|_| plan.resample.is_none()) {
+        words.push(format!(
+            "excitation, delay and feedback are those of the log resampled every {0} s by straight lines \
+             (--resample {0}:linear)",
+            resampled.step
+        ));
+    }
+    for excitation in &inspection.excitation {
+        let name = &excitation.input;
+        let pairs = inspection.log.rows.len().saturating_sub(1) as f64;
+        let changes = excitation.changes * pairs;
+        if excitation.highest == 0 {
+            words.push(format!("input '{name}' has too few rows in a stretch to tell what it excites"));
+        } else if excitation.order == 0 {
+            words.push(format!(
+                "input '{name}' excites nothing: leave it out, or record a log in which it changes"
+            ));
+        } else if changes <= FEW_CHANGES {
+            words.push(format!(
+                "input '{name}' changes {changes:.0} time{} only: what a step shows is seen once and not averaged",
+                plural(changes.round() as usize)
+            ));
+        } else if excitation.order <= POOR.min(excitation.highest) && excitation.order < excitation.highest {
+            words.push(format!(
+                "input '{name}' excites order {0} only: a model can have {0} parameters from it at most",
+                excitation.order
+            ));
+        }
+    }
+    for (excitation, other) in inspection.excitation.iter().filter_map(|of| Some((of, of.same_as.as_ref()?)))
+    {
+        words.push(format!(
+            "inputs '{other}' and '{}' are the same but for scale and offset: no fit can tell them apart; leave one out",
+            excitation.input
+        ));
+    }
+    if plan.output.is_none() && !plan.inputs.is_empty() {
+        words.push("there is no output (y): name it with -y to learn of delay and feedback".to_owned());
+    }
+    if plan.inputs.is_empty() && plan.output.is_some() {
+        words.push("there is no input: only a time series model can be fitted".to_owned());
+    }
+    for delay in inspection.delays.iter().filter(|delay| delay.nk.is_none()) {
+        // Of an input that excites nothing that was said.
+        if inspection.excitation.iter().any(|of| of.input == delay.input && of.order > 0) {
+            words.push(format!(
+                "no delay from input '{}' stands out: what is new in it from row to row is little, or its effect is slow or \
+                 lost in noise",
+                delay.input
+            ));
+        }
+    }
+    for feedback in inspection.feedback.iter().filter(|feedback| feedback.found) {
+        words.push(format!(
+            "input '{}' follows the output: the log seems to be from a closed loop; fit a model with noise (arx, armax, bj), \
+             as oe and --method iv or sriv are biased there",
+            feedback.input
+        ));
+    }
+    for delay in inspection.delays.iter().filter(|delay| delay.nk == Some(0)) {
+        words.push(format!(
+            "the output follows input '{}' within the same row: it acts at once (--nk 0), its rows are shifted, or it is computed \
+             from the output",
+            delay.input
+        ));
+    }
+    words
+}
+
+fn plural(count: usize) -> &'static str {
+    if count == 1 { "" } else { "s" }
+}
+
+/// Four significant digits.
+fn digits(value: f64) -> f64 {
+    format!("{value:.3e}").parse().unwrap_or(value)
+}

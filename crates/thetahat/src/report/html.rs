@@ -1,0 +1,589 @@
+//! Reports as pages: one file of HTML that loads nothing, with charts that can be zoomed.
+//!
+//! Names of channels and files are shown as they are, whatever is in them: text is escaped by the template, data inside
+//! scripts by [`text::inside_script`], and text for the charting library, which reads some HTML itself, by
+//! [`text::plain`]. A content security policy forbids every request and every script but the page's own.
+
+mod charts;
+mod decimate;
+mod figure;
+mod page;
+mod tables;
+mod text;
+
+use std::ops::Range;
+
+use charts::{Marked, Shade, Stack};
+use page::{Block, Page, Section};
+
+use super::{Report, Validated, Validation};
+use crate::{Error, Fit, Inspection, Model, Part, Residuals, Rows, Source};
+
+/// The most points of a curve over time.
+const POINTS: usize = 4000;
+/// The most points of all such curves of a page, at about 20 bytes each.
+const ALL_POINTS: usize = 100_000;
+/// The rows that are shown one by one where the whole log is too dense for that.
+const DETAIL: usize = 1000;
+/// What is said of models whose residuals need not be white.
+const UNASKED: &str = "Not asked: models of output error and those by instrumental variables say nothing of the noise, so their \
+                       residuals are not asked to be white.";
+/// Inputs in the picture of the outputs; the others have one of their own.
+const INPUTS: usize = 5;
+
+/// The page of a fit: what the model is, how it was found, and how it does on each part of the log.
+///
+/// `validated` has one entry for each part: estimation, validation, test, as far as there are any, all on the whole log.
+/// `command` is shown as what made the page.
+///
+/// # Errors
+/// [`Error::Report`] if the page cannot be written.
+pub fn fit_page(report: &Report, validated: &[Validated], command: &str) -> Result<String, Error> {
+    let model = &report.model;
+    let title = format!("Fit of {}{}", model.output.name, of(&report.data.logs));
+    let mut page = Page::new(title, command, &report.generator)?;
+    page.lead = lead(model, &report.fit);
+    page.warnings = &report.warnings;
+    let parts: Vec<(String, &Validated)> =
+        validated.iter().map(|validated| (part_name(report, &validated.validation), validated)).collect();
+    page.sections =
+        vec![outputs(model, &parts, &shades(report), &report.fit, &report.data.logs), residuals(&parts)];
+    page.sections.extend(of_model(report));
+    if let Some(selection) = &report.selection {
+        let mut section = Section::new("Order search");
+        for step in &selection.steps {
+            section.text(step);
+        }
+        let failed = match selection.failed {
+            0 => String::new(),
+            failed => format!("Models that the data could not determine: {failed}."),
+        };
+        if !failed.is_empty() {
+            section.text(failed);
+        }
+        section.chart(charts::search(selection));
+        if !selection.delays.is_empty() {
+            section.chart(charts::delays(selection));
+        }
+        section.table(tables::best(selection));
+        page.sections.insert(2, section);
+    }
+    page.sections.push(provenance(report));
+    page.write()
+}
+
+/// The page of a validation: how a stored model does on a log.
+///
+/// # Errors
+/// [`Error::Report`] if the page cannot be written.
+pub fn validation_page(report: &Report, validated: &Validated, command: &str) -> Result<String, Error> {
+    let (model, validation) = (&report.model, &validated.validation);
+    let title = format!("Validation of {}{}", model_name(validation, 0), of(&validation.logs));
+    let mut page = Page::new(title, command, &validation.generator)?;
+    page.lead = lead(model, &validation.fit);
+    page.lead.push(match validation.seen {
+        super::Seen::No => "The model was not fitted to these rows.".to_owned(),
+        super::Seen::Partly => "The model was fitted to some of these rows.".to_owned(),
+        super::Seen::Yes => "The model was fitted to these rows: the figures flatter it.".to_owned(),
+    });
+    page.warnings = &validation.warnings;
+    let rows = match validation.rows.as_slice() {
+        [rows] => format!("rows {rows}"),
+        _ => "all rows looked at".to_owned(),
+    };
+    let parts = [(rows, validated)];
+    page.sections = vec![outputs(model, &parts, &[], &validation.fit, &validation.logs), residuals(&parts)];
+    page.sections.extend(of_model(report));
+    let mut section = Section::new("Data");
+    section.text("The log that the model was validated on, and what it was fitted to.");
+    section.table(tables::logs(&validation.logs));
+    section.table(tables::logs(&report.data.logs));
+    section.table(tables::data(report));
+    page.sections.push(section);
+    page.write()
+}
+
+/// The page of a comparison: several models on one log. `reports` and `validated` are in the same order.
+///
+/// # Errors
+/// [`Error::Report`] if the page cannot be written, or there are not as many of the one as of the other.
+pub fn comparison_page(reports: &[Report], validated: &[Validated], command: &str) -> Result<String, Error> {
+    if reports.len() != validated.len() {
+        return Err(Error::report(format!("{} models and {} validations", reports.len(), validated.len())));
+    }
+    let names = distinct(validated);
+    let generator = validated.first().map_or("thetahat", |validated| &validated.validation.generator);
+    let logs = validated.first().map_or(&[][..], |validated| &validated.validation.logs);
+    let mut page =
+        Page::new(format!("Comparison of {} models{}", names.len(), of(logs)), command, generator)?;
+    let named: Vec<(String, &Validated)> = names.iter().cloned().zip(validated).collect();
+    let models: Vec<(String, &Model)> =
+        names.iter().cloned().zip(reports.iter().map(|report| &report.model)).collect();
+    page.lead = models.iter().map(|(name, model)| format!("{name} is {}", headline(model))).collect();
+    let warnings: Vec<String> = named
+        .iter()
+        .flat_map(|(name, validated)| {
+            validated.validation.warnings.iter().map(move |warning| format!("{name}: {warning}"))
+        })
+        .collect();
+    page.warnings = &warnings;
+
+    let mut section = Section::new("Side by side");
+    section.table(tables::comparison(&named));
+    section.text("No longer white at alpha: the smallest alpha at which too many correlations of the residuals lie outside their \
+                  band. The larger, the better.");
+    if validated.iter().any(|validated| !validated.validation.white_expected) {
+        section.text(UNASKED);
+    }
+    page.sections.push(section);
+    page.sections.push(compared_outputs(reports, &named));
+
+    let mut section = Section::new("Residuals");
+    let all: Vec<(String, &Residuals)> = residuals_of(&named).collect();
+    section.chart(charts::compared_autocorrelations(&all));
+    let each = validations(&named);
+    section.table(tables::tests("model", &each));
+    section.table(tables::anderson("model", &each));
+    section.table(tables::noise("model", &each));
+    section.table(tables::coverage("model", &each));
+    page.sections.push(section);
+
+    let mut inputs: Vec<&str> = Vec::new();
+    for input in models.iter().flat_map(|(_, model)| &model.inputs) {
+        if !inputs.contains(&input.name.as_str()) {
+            inputs.push(&input.name);
+        }
+    }
+    page.sections.extend(responses(&models, &inputs));
+    let mut section = Section::new("Data");
+    section.table(tables::logs(logs));
+    page.sections.push(section);
+    page.write()
+}
+
+/// The page of an inspection: what a log is worth, before any fit.
+///
+/// `signals` are the channels with their names, one value for each row; `time` is in seconds, one value for each row.
+///
+/// # Errors
+/// [`Error::Report`] if the page cannot be written.
+pub fn inspection_page(
+    inspection: &Inspection,
+    signals: &[(String, Vec<f64>)],
+    time: &[f64],
+    command: &str,
+) -> Result<String, Error> {
+    let title = format!("Inspection{}", of(std::slice::from_ref(&inspection.log)));
+    let mut page = Page::new(title, command, &inspection.generator)?;
+    page.lead = vec![format!(
+        "{} rows of {} channels, {} s apart.",
+        inspection.rows,
+        inspection.channels.len(),
+        text::short(inspection.clock.sample_time)
+    )];
+    page.warnings = &inspection.warnings;
+
+    let mut section = Section::new("Channels");
+    // Steps of a clock without a rhythm are no gaps.
+    let step = if inspection.clock.irregular { f64::INFINITY } else { inspection.clock.sample_time };
+    let mut stack = Stack::new(time, step, points(signals.len()));
+    let mut first = true;
+    let circles = if inspection.channels.iter().any(|channel| !channel.outliers.is_empty()) {
+        " Circles: values far from their neighbours, the first of each channel."
+    } else {
+        ""
+    };
+    let words = &format!("One time axis: zooming one zooms all.{circles}");
+    for (position, (name, values)) in signals.iter().enumerate() {
+        if stack.is_full() {
+            let next = Stack::new(time, step, points(signals.len()));
+            section.chart(std::mem::replace(&mut stack, next).draw("Channels over time", words, &[]));
+            first = true;
+        }
+        stack.alone(name, values, position);
+        if let Some(channel) = inspection.channels.iter().find(|channel| channel.name == *name)
+            && !channel.outliers.is_empty()
+        {
+            stack.marks(&Marked { name: "outliers", rows: &channel.outliers }, values, first);
+            first = false;
+        }
+    }
+    if !stack.is_empty() {
+        section.chart(stack.draw("Channels over time", words, &[]));
+    }
+    section.table(tables::channels(inspection));
+    section.table(tables::clock(inspection));
+    page.sections.push(section);
+
+    if !inspection.excitation.is_empty() {
+        let mut section = Section::new("Excitation");
+        section.chart(charts::spectrum(&inspection.excitation));
+        section.table(tables::excitation(inspection));
+        page.sections.push(section);
+    }
+    if !inspection.delays.is_empty() {
+        let mut section = Section::new("Delay and feedback");
+        for delay in &inspection.delays {
+            section.chart(charts::prewhitened(delay));
+        }
+        section.table(tables::delays(inspection));
+        page.sections.push(section);
+    }
+    if let Some(suggested) = &inspection.command {
+        let mut section = Section::new("Suggested fit");
+        section.blocks.push(Block::Command(suggested.clone()));
+        page.sections.push(section);
+    }
+    let mut section = Section::new("Data");
+    section.table(tables::logs(std::slice::from_ref(&inspection.log)));
+    page.sections.push(section);
+    page.write()
+}
+
+/// The files of a title.
+fn of(logs: &[Source]) -> String {
+    match logs {
+        [] => String::new(),
+        [log] => format!(": {}", log.file),
+        [log, rest @ ..] => format!(": {} and {} more", log.file, rest.len()),
+    }
+}
+
+fn headline(model: &Model) -> String {
+    format!("{}: {}", model.orders, text::equation(model))
+}
+
+/// The model in a sentence, and how close it comes.
+fn lead(model: &Model, fits: &[Fit]) -> Vec<String> {
+    let stable = if model.stable { "stable" } else { "unstable" };
+    let mut lead = vec![
+        format!("{}.", headline(model)),
+        format!(
+            "Sample time {} s, {} parameters, {stable}.",
+            text::short(model.sample_time),
+            model.parameters.len()
+        ),
+    ];
+    let figure = |fit: &Fit| {
+        let on = fit.part.map_or_else(String::new, |part| format!(", {} rows", tables::part(part)));
+        Some(format!("{:.1} % ({}{on})", fit.percent?, fit.horizon))
+    };
+    let figures: Vec<String> = fits.iter().filter_map(figure).collect();
+    if !figures.is_empty() {
+        lead.push(format!("Fit: {}.", figures.join(", ")));
+    }
+    lead
+}
+
+/// What the rows of a validation served for.
+fn part_name(report: &Report, validation: &Validation) -> String {
+    let named = validation.fit.iter().find_map(|fit| fit.part);
+    let data = &report.data;
+    let part = named.or_else(|| match &data.split {
+        Some(split) if validation.rows == split.test => Some(Part::Test),
+        Some(split) if validation.rows == split.validation => Some(Part::Validation),
+        _ if validation.rows == data.estimation => Some(Part::Estimation),
+        _ if validation.rows == data.validation => Some(Part::Validation),
+        _ => None,
+    });
+    part.map_or_else(
+        || format!("rows {}", text::rows(&validation.rows)),
+        |part| tables::part(part).to_owned(),
+    )
+}
+
+/// The parts of the log, where there are several; else the logs, where there are several.
+fn shades(report: &Report) -> Vec<Shade> {
+    let data = &report.data;
+    let shade = |name: &str, rows: &[Rows]| Shade { name: name.to_owned(), rows: rows.to_vec() };
+    let all = match &data.split {
+        Some(split) => vec![
+            shade("estimation", &split.estimation),
+            shade("validation", &split.validation),
+            shade("test", &split.test),
+        ],
+        None => vec![shade("estimation", &data.estimation), shade("validation", &data.validation)],
+    };
+    let all: Vec<Shade> = all.into_iter().filter(|shade| !shade.rows.is_empty()).collect();
+    if all.len() > 1 {
+        return all;
+    }
+    match data.logs.as_slice() {
+        [] | [_] => Vec::new(),
+        logs => logs.iter().map(|log| shade(&log.file, &[log.rows])).collect(),
+    }
+}
+
+/// How many points a curve may have among so many.
+fn points(curves: usize) -> usize {
+    (ALL_POINTS / curves.max(1)).clamp(20, POINTS)
+}
+
+/// Times that put several logs one behind the other, each with a clock of its own, and a space between them.
+fn timeline(time: &[f64], logs: &[Source], sample_time: f64) -> Vec<f64> {
+    let mut shown = time.to_vec();
+    let space = sample_time * (2 + time.len() / 100) as f64;
+    for pair in logs.windows(2) {
+        let (first, last) = (pair[1].rows.first() - 1, pair[1].rows.last().min(time.len()));
+        let Some(shift) =
+            first.checked_sub(1).and_then(|before| Some(shown.get(before)? + space - time.get(first)?))
+        else {
+            continue;
+        };
+        shown[first..last.max(first)].iter_mut().for_each(|time| *time += shift);
+    }
+    shown
+}
+
+/// Measured, predicted and simulated output, what is left, and the inputs.
+fn outputs(
+    model: &Model,
+    parts: &[(String, &Validated)],
+    shades: &[Shade],
+    fits: &[Fit],
+    logs: &[Source],
+) -> Section {
+    let mut section = Section::new("Measured and modelled");
+    let Some((_, Validated { signals, .. })) = parts.first() else {
+        section.text("There are no signals to show.");
+        section.table(tables::fits(fits));
+        return section;
+    };
+    let predicted = merged(parts.iter().map(|(_, validated)| validated.signals.predicted.as_slice()));
+    let simulated = merged(parts.iter().filter_map(|(_, validated)| validated.signals.simulated.as_deref()));
+    let errors: Vec<f64> =
+        signals.measured.iter().zip(&predicted).map(|(y, predicted)| y - predicted).collect();
+    let there = |values: &[f64]| values.iter().any(|value| value.is_finite());
+    let rows = signals.time.len();
+    let time = timeline(&signals.time, logs, model.sample_time);
+    let (near, far) = signals.inputs.split_at(signals.inputs.len().min(INPUTS));
+    let stack = |shown: Range<usize>, points: usize| {
+        let part = |values: &[f64]| values.get(shown.clone()).map(<[f64]>::to_vec).unwrap_or_default();
+        let mut stack = Stack::new(&time[shown.clone()], model.sample_time, points);
+        stack.panel(&signals.output);
+        stack.measured("measured", &part(&signals.measured));
+        if there(&simulated) {
+            stack.curve("free run", &part(&simulated));
+        }
+        if there(&predicted) {
+            stack.curve("1 step ahead", &part(&predicted));
+            stack.alone("residual", &part(&errors), 4);
+        }
+        for (position, (name, values)) in near.iter().enumerate() {
+            stack.alone(name, &part(values), 2 + position);
+        }
+        stack
+    };
+    let points = points(4 + signals.inputs.len());
+    let words = "Measured output, the model's prediction one step ahead and its free run, driven by the inputs alone; below \
+                 them what the prediction leaves, and the inputs. One time axis: zooming one zooms all.";
+    let anew = if parts.len() > 1 { " Each part has a free run of its own." } else { "" };
+    let dense = if rows > points {
+        format!(" Of each {} rows the smallest and the largest value are shown.", rows.div_ceil(points / 2))
+    } else {
+        String::new()
+    };
+    let several =
+        if logs.len() > 1 { " The logs stand one behind the other, whenever they were made." } else { "" };
+    section.chart(stack(0..rows, points).draw(
+        "Output over time",
+        &format!("{words}{anew}{several}{dense}"),
+        shades,
+    ));
+    if rows > points {
+        // Of the rows that the fit knows least.
+        let last = parts
+            .last()
+            .and_then(|(_, validated)| validated.signals.predicted.iter().position(|y| y.is_finite()));
+        let start = last.unwrap_or(0).min(rows);
+        let shown = start..(start + DETAIL).min(rows);
+        let words = format!("The same, with each of the rows {} to {}.", shown.start + 1, shown.end);
+        section.chart(stack(shown, DETAIL).draw("Output in detail", &words, &[]));
+    }
+    for group in far.chunks(8) {
+        let mut stack = Stack::new(&time, model.sample_time, points);
+        for (position, (name, values)) in group.iter().enumerate() {
+            stack.alone(name, values, 2 + position);
+        }
+        section.chart(stack.draw("Further inputs", "The inputs that are not in the picture above.", shades));
+    }
+    section.table(tables::fits(fits));
+    section
+}
+
+/// One signal of several that are there at different rows.
+fn merged<'a>(signals: impl Iterator<Item = &'a [f64]>) -> Vec<f64> {
+    let mut merged: Vec<f64> = Vec::new();
+    for signal in signals {
+        if merged.len() < signal.len() {
+            merged.resize(signal.len(), f64::NAN);
+        }
+        for (merged, value) in merged.iter_mut().zip(signal) {
+            if !merged.is_finite() {
+                *merged = *value;
+            }
+        }
+    }
+    merged
+}
+
+/// What the models leave of each part.
+fn residuals(parts: &[(String, &Validated)]) -> Section {
+    let mut section = Section::new("Residuals");
+    let several = parts.len() > 1;
+    for (name, validated) in parts {
+        let on = |drawn: figure::Drawn| {
+            drawn.map(|mut chart| {
+                if several {
+                    chart.title.push_str(&format!(", {name} rows"));
+                }
+                chart
+            })
+        };
+        let Some(residuals) = &validated.validation.residuals else {
+            section.text(format!("There are no residuals to test ({name}): too few samples count."));
+            continue;
+        };
+        section.chart(on(charts::autocorrelation(residuals, validated.validation.white_expected)));
+        for independence in &residuals.independence {
+            section.chart(on(charts::cross_correlation(independence)));
+        }
+    }
+    let all = validations(parts);
+    if all.iter().any(|(_, validation)| !validation.white_expected) {
+        section.text(UNASKED);
+    }
+    section.table(tables::tests("rows", &all));
+    let levels = tables::anderson("rows", &all);
+    if !levels.rows.is_empty() {
+        section.text(
+            "Anderson calls residuals white if less than a fraction alpha of their correlations lies outside the band of that \
+             level. The p-value says how often as many of white residuals do.",
+        );
+    }
+    for (name, residuals) in residuals_of(parts) {
+        section.text(match residuals.anderson.stops_at {
+            Some(alpha) => {
+                format!("The smallest alpha at which too many do ({name}): {}.", text::short(alpha))
+            }
+            None => format!("At no alpha up to 0.5 too many do ({name})."),
+        });
+    }
+    section.table(levels);
+    section.table(tables::noise("rows", &all));
+    section.table(tables::coverage("rows", &all));
+    section
+}
+
+fn residuals_of<'a>(parts: &'a [(String, &'a Validated)]) -> impl Iterator<Item = (String, &'a Residuals)> {
+    parts
+        .iter()
+        .filter_map(|(name, validated)| Some((name.clone(), validated.validation.residuals.as_ref()?)))
+}
+
+fn validations<'a>(parts: &[(String, &'a Validated)]) -> Vec<(String, &'a Validation)> {
+    parts.iter().map(|(name, validated)| (name.clone(), &validated.validation)).collect()
+}
+
+/// What a model is: responses, roots, parameters.
+fn of_model(report: &Report) -> Vec<Section> {
+    let model = &report.model;
+    let inputs: Vec<&str> = model.inputs.iter().map(|input| input.name.as_str()).collect();
+    let mut sections = responses(&[("estimate".to_owned(), model)], &inputs);
+    let mut section = Section::new("Poles and zeros");
+    section.chart(charts::roots(model));
+    section.table(tables::roots(model));
+    sections.push(section);
+    let mut section = Section::new("Model");
+    section.table(tables::parameters(model));
+    section.table(tables::signals(model));
+    section.table(tables::estimation(&report.estimation, model));
+    sections.push(section);
+    sections
+}
+
+/// Bode plots and step responses.
+fn responses(models: &[(String, &Model)], inputs: &[&str]) -> Vec<Section> {
+    let mut frequency = Section::new("Frequency response");
+    let mut step = Section::new("Step response");
+    for input in inputs {
+        frequency.chart(charts::bode(models, Some(input)));
+        step.chart(charts::step(models, input));
+    }
+    frequency.chart(charts::bode(models, None));
+    if inputs.is_empty() {
+        step.text("Without inputs there is no step response.");
+    }
+    vec![frequency, step]
+}
+
+fn provenance(report: &Report) -> Section {
+    let mut section = Section::new("Data");
+    section.table(tables::logs(&report.data.logs));
+    section.table(tables::data(report));
+    section
+}
+
+/// The name of the file that a model comes from.
+fn model_name(validation: &Validation, position: usize) -> String {
+    validation.report.clone().unwrap_or_else(|| format!("model {}", position + 1))
+}
+
+/// A name for each model, no two the same.
+fn distinct(validated: &[Validated]) -> Vec<String> {
+    let names: Vec<String> = validated
+        .iter()
+        .enumerate()
+        .map(|(position, validated)| model_name(&validated.validation, position))
+        .collect();
+    let again = |position: usize| names.iter().filter(|name| **name == names[position]).count() > 1;
+    (0..names.len())
+        .map(|position| {
+            if again(position) {
+                format!("{} ({})", names[position], position + 1)
+            } else {
+                names[position].clone()
+            }
+        })
+        .collect()
+}
+
+/// The outputs of several models on one log.
+fn compared_outputs(reports: &[Report], models: &[(String, &Validated)]) -> Section {
+    let mut section = Section::new("Measured and modelled");
+    let Some((_, Validated { signals, .. })) = models.first() else { return section };
+    let sample_time = reports.first().map_or(1.0, |report| report.model.sample_time);
+    let points = points(2 * (models.len() + 1));
+    let stack = || Stack::new(&signals.time, sample_time, points);
+    let simulated: Vec<(String, &[f64])> = models
+        .iter()
+        .filter_map(|(name, validated)| Some((name.clone(), validated.signals.simulated.as_deref()?)))
+        .collect();
+    let predicted: Vec<(String, &[f64])> = models
+        .iter()
+        .map(|(name, validated)| (name.clone(), validated.signals.predicted.as_slice()))
+        .collect();
+    if simulated.is_empty() {
+        section.text("No model has inputs: there is no free run.");
+    } else {
+        let words = "Measured output, and what each model makes of the inputs alone.";
+        section.chart(charts::outputs(
+            "Free run",
+            words,
+            stack(),
+            &signals.output,
+            &signals.measured,
+            &simulated,
+        ));
+    }
+    let words = "Measured output, and what each model says of it one sample earlier.";
+    section.chart(charts::outputs(
+        "One step ahead",
+        words,
+        stack(),
+        &signals.output,
+        &signals.measured,
+        &predicted,
+    ));
+    section
+}

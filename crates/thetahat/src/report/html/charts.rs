@@ -1,0 +1,13 @@
+//! The charts, one function each. What cannot be drawn becomes a sentence.
+
+mod correlation;
+mod dynamics;
+mod search;
+mod signals;
+mod spectrum;
+
+pub(super) use correlation::{autocorrelation, compared_autocorrelations, cross_correlation, prewhitened};
+pub(super) use dynamics::{bode, roots, step};
+pub(super) use search::{delays, score, search};
+pub(super) use signals::{Marked, Shade, Stack, outputs};
+pub(super) use spectrum::spectrum;

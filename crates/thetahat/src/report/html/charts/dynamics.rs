@@ -1,0 +1,277 @@
+//! What models are to frequencies and steps, and their roots.
+
+use std::f64::consts::{PI, TAU};
+
+use plotly::common::{HoverInfo, Line, Marker, MarkerSymbol, Mode};
+use plotly::layout::{Axis, AxisConstrain, HoverMode};
+use plotly::{Scatter, Trace};
+
+use super::super::decimate::{Curve, rounded};
+use super::super::figure::{
+    COLOURS, Drawn, NEUTRAL, NORMAL_95, axis, band, chart, layout, line, logarithmic, look, plain_line,
+    positive_range, significant,
+};
+use super::super::text;
+use crate::{
+    FrequencyResponse, Model, Quantity, Root, frequency_response, logarithmic_frequencies, step_response,
+};
+
+/// Frequencies of a Bode plot.
+const FREQUENCIES: usize = 200;
+/// A step response is drawn with no more samples.
+const STEP_POINTS: usize = 400;
+/// 95 % of chi-square for two degrees of freedom.
+const CHI_SQUARE: f64 = 5.991_465;
+/// Roots farther out than this are named, not shown.
+const FARTHEST: f64 = 3.0;
+/// Points of an ellipse and of the unit circle.
+const ROUND: usize = 60;
+
+/// Magnitude and phase of several models from one input, or from the noise where that is none.
+pub(crate) fn bode(models: &[(String, &Model)], input: Option<&str>) -> Drawn {
+    let mut found: Vec<(usize, &String, FrequencyResponse)> = Vec::new();
+    let mut refused = Vec::new();
+    for (position, (name, model)) in models.iter().enumerate() {
+        match response(model, input) {
+            Ok(Some(response)) => found.push((position, name, response)),
+            Ok(None) => {}
+            Err(reason) => refused.push(reason),
+        }
+    }
+    let title = match input {
+        Some(input) => format!("Bode plot from {input}"),
+        None => "Bode plot of the noise model".to_owned(),
+    };
+    if found.is_empty() {
+        let reason = if refused.is_empty() { "no model has it".to_owned() } else { refused.join("; ") };
+        return Err(format!("{title}: none, {reason}."));
+    }
+
+    if input.is_none() && models.iter().all(|(_, model)| is_white(model)) {
+        return Err(format!("{title}: none, the noise is taken as white."));
+    }
+
+    let points = || found.iter().flat_map(|(_, _, response)| &response.points);
+    let (least, largest) = positive_range(points().map(|point| point.magnitude.value));
+    let (first, last) = positive_range(points().map(|point| point.frequency));
+    let single = models.len() == 1;
+    let mut traces: Vec<Box<dyn Trace>> = Vec::new();
+    let mut certain = true;
+    for (position, name, response) in &found {
+        let (colour, _) = look(*position);
+        let name = if single { "estimate".to_owned() } else { text::plain(name) };
+        let x: Vec<f64> = response.points.iter().map(|point| significant(point.frequency)).collect();
+        for (axis, turn) in [("y", false), ("y2", true)] {
+            let of =
+                |point: &crate::FrequencyPoint| if turn { degrees(point.phase) } else { point.magnitude };
+            let values: Vec<Quantity> = response.points.iter().map(of).collect();
+            // The logarithm of what is not above zero has no place.
+            let lowest = if turn { f64::NEG_INFINITY } else { least / 10.0 };
+            if let Some((low, high)) = interval(&values, lowest) {
+                certain = false;
+                let shown = band("95 % band", &x, &low, &high, colour).y_axis(axis);
+                traces.push(grouped(shown, &name, single).show_legend(single && !turn));
+            }
+            let y = values.iter().map(|value| significant(value.value)).collect();
+            let curve = line(&name, Curve { x: x.clone(), y }, *position);
+            traces.push(grouped(curve.y_axis(axis), &name, single).show_legend(!turn));
+        }
+    }
+    let layout = layout()
+        .x_axis(logarithmic("frequency [rad/s]", first, last).anchor("y2"))
+        .y_axis(logarithmic("magnitude", least, largest).domain(&[0.47, 1.0]))
+        .y_axis2(axis("phase [°]").domain(&[0.0, 0.43]));
+    let source = if input.is_some() { "unit of the input" } else { "unit of e" };
+    let mut words = format!(
+        "How much of a sine of each frequency arrives at the output, in units of the output for each {source}, and by how many \
+         degrees it is turned, up to half the sampling frequency."
+    );
+    words.push_str(if certain {
+        " The uncertainty is not known."
+    } else {
+        " Shaded: 95 % intervals, from the covariance of the parameters."
+    });
+    for reason in refused {
+        words.push_str(&format!(" Left out: {reason}."));
+    }
+    chart(title, words, 460, traces, layout)
+}
+
+/// Whether the model adds e to the output as it is.
+fn is_white(model: &Model) -> bool {
+    (model.orders.na, model.orders.nc, model.orders.nd) == (0, 0, 0)
+}
+
+/// The response from one source; none if the model does not have it.
+fn response(model: &Model, input: Option<&str>) -> Result<Option<FrequencyResponse>, String> {
+    let highest = PI / model.sample_time;
+    let roots = model.poles.iter().chain(&model.noise_poles).map(|root| 1.0 - root.re.hypot(root.im));
+    let slowest = roots.map(f64::abs).filter(|distance| *distance > 0.0).fold(1.0, f64::min);
+    let lowest = (slowest / model.sample_time / 10.0).clamp(highest / 1e6, highest / 1e3);
+    let said = |error: crate::Error| error.to_string();
+    let frequencies = logarithmic_frequencies(lowest, highest, FREQUENCIES).map_err(said)?;
+    let responses = frequency_response(model, &frequencies).map_err(said)?;
+    Ok(responses.into_iter().find(|response| response.input.as_deref() == input))
+}
+
+/// A curve that comes and goes with the others of its model, where there are several.
+fn grouped(curve: Box<Scatter<f64, f64>>, name: &str, single: bool) -> Box<Scatter<f64, f64>> {
+    if single { curve } else { curve.legend_group(name) }
+}
+
+fn degrees(radians: Quantity) -> Quantity {
+    Quantity {
+        value: radians.value.to_degrees(),
+        standard_error: radians.standard_error.map(f64::to_degrees),
+    }
+}
+
+/// The ends of the 95 % intervals, not below `lowest`; NaN where there is none. None if there is none at all.
+fn interval(values: &[Quantity], lowest: f64) -> Option<(Vec<f64>, Vec<f64>)> {
+    let end = |sign: f64| -> Vec<f64> {
+        let end = |value: &Quantity| {
+            value.standard_error.map_or(f64::NAN, |error| value.value + sign * NORMAL_95 * error)
+        };
+        values.iter().map(end).map(|end| if end < lowest { lowest } else { end }).collect()
+    };
+    let (low, high) = (end(-1.0), end(1.0));
+    high.iter().any(|end| end.is_finite()).then_some((low, high))
+}
+
+/// What a unit step of an input does in several models.
+pub(crate) fn step(models: &[(String, &Model)], input: &str) -> Drawn {
+    let single = models.len() == 1;
+    let mut traces: Vec<Box<dyn Trace>> = Vec::new();
+    let mut unstable = false;
+    let mut certain = true;
+    let title = format!("Step response from {input}");
+    for (position, (name, model)) in models.iter().enumerate() {
+        let Some(number) = model.inputs.iter().position(|signal| signal.name == input) else { continue };
+        let response =
+            step_response(model, number, None).map_err(|error| format!("{title}: none, {error}."))?;
+        unstable |= !model.stable;
+        let width = response.time.len().div_ceil(STEP_POINTS);
+        let thin = |values: &[f64]| -> Vec<f64> { values.iter().step_by(width.max(1)).copied().collect() };
+        let x = rounded(&thin(&response.time));
+        let name = if single { "estimate".to_owned() } else { text::plain(name) };
+        let (colour, _) = look(position);
+        if let Some((low, high)) = interval(&response.values, f64::NEG_INFINITY) {
+            certain = false;
+            let shown = band("95 % band", &x, &thin(&low), &thin(&high), colour);
+            traces.push(grouped(shown, &name, single).show_legend(single));
+        }
+        let values: Vec<f64> = response.values.iter().map(|value| value.value).collect();
+        let shape = if x.len() > 80 { Mode::Lines } else { Mode::LinesMarkers };
+        let curve = line(&name, Curve { x, y: rounded(&thin(&values)) }, position);
+        traces.push(grouped(curve.mode(shape).marker(Marker::new().size(4)), &name, single));
+    }
+    if traces.is_empty() {
+        return Err(format!("{title}: none, no model has this input."));
+    }
+    let mut words = "The output after a step of the input by one unit at time 0, from rest.".to_owned();
+    words.push_str(if certain { " The uncertainty is not known." } else { " Shaded: 95 % intervals." });
+    if unstable {
+        words.push_str(" An unstable model grows without bound: only its beginning is shown.");
+    }
+    let layout = layout().x_axis(axis("time [s]")).y_axis(axis("output per unit of input"));
+    chart(title, words, 340, traces, layout)
+}
+
+/// Poles and zeros in the z plane.
+pub(crate) fn roots(model: &Model) -> Drawn {
+    let groups: [(&str, Vec<&Root>, MarkerSymbol, usize); 4] = [
+        ("poles", model.poles.iter().collect(), MarkerSymbol::XThin, 0),
+        ("zeros", model.zeros.iter().flatten().collect(), MarkerSymbol::CircleOpen, 1),
+        ("noise poles", model.noise_poles.iter().collect(), MarkerSymbol::CrossThin, 2),
+        ("noise zeros", model.noise_zeros.iter().collect(), MarkerSymbol::DiamondOpen, 3),
+    ];
+    let all = || groups.iter().flat_map(|(_, roots, _, _)| roots.iter());
+    if all().next().is_none() {
+        return Err("The model has neither poles nor zeros.".to_owned());
+    }
+    let far = |root: &Root| root.re.hypot(root.im) > FARTHEST;
+    let reach =
+        all().filter(|root| !far(root)).map(|root| root.re.abs().max(root.im.abs())).fold(1.0, f64::max);
+
+    let circle = (0..=ROUND).map(|k| TAU * k as f64 / ROUND as f64).map(|angle| (angle.cos(), angle.sin()));
+    let (x, y): (Vec<f64>, Vec<f64>) = circle.map(|(x, y)| (significant(x), significant(y))).unzip();
+    let circle = plain_line("unit circle", Curve { x, y }, NEUTRAL).hover_info(HoverInfo::Skip);
+    let mut traces: Vec<Box<dyn Trace>> = vec![circle];
+    let mut certain = true;
+    for (name, roots, symbol, position) in &groups {
+        if roots.is_empty() {
+            continue;
+        }
+        let colour = COLOURS[*position];
+        let outlines: Vec<(f64, f64)> = roots.iter().flat_map(|root| outline(root)).collect();
+        if !outlines.is_empty() {
+            certain = false;
+            let (x, y) = outlines.into_iter().map(|(x, y)| (significant(x), significant(y))).unzip();
+            let trace =
+                plain_line("95 % region", Curve { x, y }, colour).line(Line::new().color(colour).width(1.2));
+            traces.push(trace.legend_group(*name).show_legend(false).hover_info(HoverInfo::Skip));
+        }
+        let (x, y): (Vec<f64>, Vec<f64>) =
+            roots.iter().map(|root| (significant(root.re), significant(root.im))).unzip();
+        let words = roots.iter().map(|root| {
+            let (modulus, angle) = (root.re.hypot(root.im), root.im.atan2(root.re).abs());
+            let frequency = angle / model.sample_time;
+            format!(
+                "{} of {}<br>modulus {}<br>angle {} rad, {} rad/s",
+                text::complex(root),
+                root.polynomial.to_uppercase(),
+                text::short(modulus),
+                text::three(angle),
+                text::three(frequency)
+            )
+        });
+        let marker = Marker::new()
+            .symbol(symbol.clone())
+            .size(11)
+            .color(colour)
+            .line(Line::new().color(colour).width(2.0));
+        let trace = Scatter::new(x, y).name(*name).mode(Mode::Markers).marker(marker).legend_group(*name);
+        traces.push(trace.text_array(words.collect::<Vec<_>>()).hover_info(HoverInfo::Text));
+    }
+    let reach = 1.12 * reach;
+    let range = |axis: Axis| axis.range(vec![-reach, reach]).constrain(AxisConstrain::Domain);
+    let layout = layout()
+        .x_axis(range(axis("real part")))
+        .y_axis(range(axis("imaginary part")).scale_anchor("x").scale_ratio(1.0))
+        .hover_mode(HoverMode::Closest);
+    let mut words =
+        "Poles inside the unit circle decay, outside they grow; the nearer to the circle, the more slowly."
+            .to_owned();
+    words.push_str(if certain {
+        " Their uncertainty is not known."
+    } else {
+        " Outlined: regions that hold the root in 95 of 100 cases, to first order; of real roots an interval. Roots too near to \
+         one another for that have none."
+    });
+    let away: Vec<String> = all().filter(|root| far(root)).map(|root| text::complex(root)).collect();
+    if !away.is_empty() {
+        words.push_str(&format!(" Outside of the picture: {}.", away.join(", ")));
+    }
+    chart("In the z plane", words, 520, traces, layout)
+}
+
+/// The border of a root's 95 % region, and a break of the line.
+///
+/// With the covariance matrix S = L L' of (re, im): z + sqrt(5.99) L (cos, sin). A real root has an interval.
+fn outline(root: &Root) -> Vec<(f64, f64)> {
+    let Some([[rr, ri], [_, ii]]) = root.covariance else { return Vec::new() };
+    let (re, im) = (root.re, root.im);
+    if im == 0.0 {
+        let half = NORMAL_95 * rr.max(0.0).sqrt();
+        return vec![(re - half, 0.0), (re + half, 0.0), (f64::NAN, f64::NAN)];
+    }
+    let first = rr.max(0.0).sqrt();
+    let across = if first > 0.0 { ri / first } else { 0.0 };
+    let second = (ii - across * across).max(0.0).sqrt();
+    let radius = CHI_SQUARE.sqrt();
+    let at = |k: usize| {
+        let (sine, cosine) = (TAU * k as f64 / ROUND as f64).sin_cos();
+        (re + radius * first * cosine, im + radius * (across * cosine + second * sine))
+    };
+    (0..=ROUND).map(at).chain([(f64::NAN, f64::NAN)]).collect()
+}

@@ -1,0 +1,86 @@
+//! How the orders were found.
+
+use plotly::common::{Line, Marker, MarkerSymbol, Mode};
+use plotly::layout::HoverMode;
+use plotly::{Scatter, Trace};
+
+use super::super::decimate::{Curve, rounded};
+use super::super::figure::{COLOURS, Drawn, axis, chart, layout, line, significant};
+use super::super::text;
+use crate::{Scored, Select, Selection};
+
+/// What models were chosen by.
+pub(crate) fn score(select: Select) -> &'static str {
+    match select {
+        Select::Mdl => "MDL",
+        Select::Aic => "AIC",
+        Select::Aicc => "AICc",
+        Select::Fpe => "FPE",
+        Select::Validation => "mean of e² on the validation rows",
+        Select::Cv => "mean of e² in cross-validation",
+    }
+}
+
+/// The best model of each size.
+pub(crate) fn search(selection: &Selection) -> Drawn {
+    let scored = |models: &[Scored]| -> Vec<(f64, f64, String)> {
+        let one = |model: &Scored| {
+            let score = model.score.filter(|score| score.is_finite())?;
+            Some((model.parameters as f64, significant(score), model.orders.to_string()))
+        };
+        models.iter().filter_map(one).collect()
+    };
+    let name = score(selection.select);
+    let sizes = scored(&selection.of_size);
+    if sizes.is_empty() {
+        return Err(format!("There is no picture of the search: no model has a finite {name}."));
+    }
+    let trace = |name: &str, points: Vec<(f64, f64, String)>| {
+        let mut said = Vec::new();
+        let (x, y): (Vec<f64>, Vec<f64>) = points
+            .into_iter()
+            .map(|(x, y, words)| {
+                said.push(format!("{words}<br>{x} parameters, {}", text::short(y)));
+                (x, y)
+            })
+            .unzip();
+        Scatter::new(x, y).name(name).text_array(said).hover_info(plotly::common::HoverInfo::Text)
+    };
+    let mut traces: Vec<Box<dyn Trace>> = vec![
+        trace("best of each size", sizes)
+            .mode(Mode::LinesMarkers)
+            .line(Line::new().color(COLOURS[0]).width(1.6))
+            .marker(Marker::new().color(COLOURS[0]).size(7)),
+    ];
+    let chosen = scored(std::slice::from_ref(&selection.chosen));
+    if !chosen.is_empty() {
+        let star = Marker::new().color(COLOURS[1]).size(16).symbol(MarkerSymbol::StarOpen);
+        traces.push(trace("chosen", chosen).mode(Mode::Markers).marker(star.line(Line::new().width(2.0))));
+    }
+    let layout = layout()
+        .x_axis(axis("number of parameters"))
+        .y_axis(axis(&format!("{name}, the smaller the better")))
+        .hover_mode(HoverMode::Closest);
+    let words = format!(
+        "The least {name} of the models with so many parameters, and the model that was chosen: {}.",
+        selection.chosen.orders
+    );
+    chart("The best of each size", words, 340, traces, layout)
+}
+
+/// What each delay costs.
+pub(crate) fn delays(selection: &Selection) -> Drawn {
+    let mut traces: Vec<Box<dyn Trace>> = Vec::new();
+    for (position, delay) in selection.delays.iter().enumerate() {
+        let scans = delay.mdl.iter().filter(|scan| scan.mdl.is_finite());
+        let (x, y): (Vec<f64>, Vec<f64>) = scans.map(|scan| (scan.nk as f64, scan.mdl)).unzip();
+        let curve = line(&text::plain(&delay.input), Curve { x, y: rounded(&y) }, position);
+        traces.push(curve.mode(Mode::LinesMarkers));
+    }
+    let found: Vec<String> =
+        selection.delays.iter().map(|delay| format!("{} {}", delay.input, delay.nk)).collect();
+    let words =
+        format!("MDL of models that differ in their delay alone. Found: {} samples.", found.join(", "));
+    let layout = layout().x_axis(axis("delay [samples]")).y_axis(axis("MDL"));
+    chart("Delay", words, 300, traces, layout)
+}

@@ -1,0 +1,218 @@
+//! Signals over time: one above the other on a common clock, so that they are zoomed together.
+
+use plotly::common::{Anchor, ExponentFormat, Font, Line, Marker, MarkerSymbol, Mode};
+use plotly::layout::{Annotation, Axis, Shape, ShapeLayer, ShapeLine, ShapeType};
+use plotly::{Layout, Scatter, Trace};
+
+use super::super::decimate::decimate;
+use super::super::figure::{
+    self, COLOURS, Drawn, NEUTRAL, axis, chart, layout, line, plain_line, significant,
+};
+use super::super::text;
+use crate::Rows;
+
+/// As many axes as the layout of the charting library has.
+const MOST_PANELS: usize = 8;
+/// More shaded stretches than these are no help.
+const MOST_SHADES: usize = 40;
+/// The height of a panel, of one that has several curves, and of what else a figure has, in pixels.
+const HEIGHTS: [usize; 3] = [130, 280, 90];
+/// What was measured.
+const MEASURED: &str = "rgba(128,128,128,0.6)";
+/// Parts of a panel's share that stay free between panels.
+const SPACE: f64 = 0.03;
+
+/// Rows to be told apart from the others.
+pub(crate) struct Shade {
+    pub(crate) name: String,
+    pub(crate) rows: Vec<Rows>,
+}
+
+/// Points to be told apart from the others, as 1-based rows.
+pub(crate) struct Marked<'a> {
+    pub(crate) name: &'static str,
+    pub(crate) rows: &'a [usize],
+}
+
+/// Panels above each other over one time axis.
+pub(crate) struct Stack<'a> {
+    time: &'a [f64],
+    /// A step of the clock above this one is a gap.
+    longest: f64,
+    /// The most points of a curve.
+    points: usize,
+    traces: Vec<Box<dyn Trace>>,
+    /// Their titles and heights.
+    panels: Vec<(String, usize)>,
+    curves: usize,
+}
+
+impl<'a> Stack<'a> {
+    pub(crate) fn new(time: &'a [f64], sample_time: f64, points: usize) -> Self {
+        Self { time, longest: 1.5 * sample_time, points, traces: vec![], panels: vec![], curves: 0 }
+    }
+
+    /// Whether no further panel fits.
+    pub(crate) fn is_full(&self) -> bool {
+        self.panels.len() == MOST_PANELS
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.panels.is_empty()
+    }
+
+    /// A further panel below the others, for several curves.
+    pub(crate) fn panel(&mut self, name: &str) {
+        self.panels.push((text::plain(name), HEIGHTS[1]));
+    }
+
+    /// What was measured.
+    pub(crate) fn measured(&mut self, name: &str, values: &[f64]) {
+        let curve = decimate(self.time, values, self.points, self.longest);
+        // Wide and faint: what lies on it leaves it in sight.
+        let wide = Line::new().color(MEASURED).width(4.0);
+        self.traces.push(plain_line(name, curve, NEUTRAL).line(wide).y_axis(self.axis()));
+    }
+
+    /// A signal in the next colour.
+    pub(crate) fn curve(&mut self, name: &str, values: &[f64]) {
+        let position = self.curves;
+        self.curves += 1;
+        self.coloured(name, values, position, true);
+    }
+
+    /// A signal in a further panel of its own.
+    pub(crate) fn alone(&mut self, name: &str, values: &[f64], position: usize) {
+        self.panels.push((text::brief(name), HEIGHTS[0]));
+        // Nothing else is there to be told apart from: no dashes.
+        self.coloured(name, values, position % COLOURS.len(), false);
+    }
+
+    fn coloured(&mut self, name: &str, values: &[f64], position: usize, legend: bool) {
+        let curve = decimate(self.time, values, self.points, self.longest);
+        let trace = line(&text::plain(name), curve, position).y_axis(self.axis()).show_legend(legend);
+        self.traces.push(trace);
+    }
+
+    /// Marks at some rows of a signal.
+    pub(crate) fn marks(&mut self, marked: &Marked<'_>, values: &[f64], legend: bool) {
+        let at = marked.rows.iter().filter_map(|row| row.checked_sub(1));
+        let points = at.filter_map(|row| Some((*self.time.get(row)?, *values.get(row)?)));
+        let points = points.filter(|(_, value)| value.is_finite());
+        let (x, y): (Vec<f64>, Vec<f64>) = points.map(|(x, y)| (significant(x), significant(y))).unzip();
+        if x.is_empty() {
+            return;
+        }
+        let trace = Scatter::new(x, y)
+            .name(marked.name)
+            .mode(Mode::Markers)
+            .marker(Marker::new().color(COLOURS[1]).size(10).symbol(MarkerSymbol::CircleOpen))
+            .legend_group(marked.name)
+            .show_legend(legend)
+            .y_axis(self.axis());
+        self.traces.push(trace);
+    }
+
+    fn axis(&self) -> String {
+        match self.panels.len() {
+            0 | 1 => "y".to_owned(),
+            number => format!("y{number}"),
+        }
+    }
+
+    /// The figure.
+    pub(crate) fn draw(self, title: &str, words: &str, shades: &[Shade]) -> Drawn {
+        let all: usize = self.panels.iter().map(|(_, height)| height).sum();
+        let mut layout = layout();
+        let mut top = 1.0;
+        for (position, (title, height)) in self.panels.iter().enumerate() {
+            let below = top - *height as f64 / all as f64;
+            let bottom = if position + 1 == self.panels.len() { 0.0 } else { below + SPACE };
+            let own = axis(title).domain(&[bottom.max(0.0), top.max(bottom)]);
+            layout = with_y_axis(layout, position, own);
+            top = below;
+        }
+        let anchor = self.axis();
+        layout = layout.x_axis(axis("time [s]").anchor(&anchor).exponent_format(ExponentFormat::None));
+        let (shapes, labels) = self.shades(shades);
+        layout = layout.shapes(shapes).annotations(labels);
+        chart(title, words, all + HEIGHTS[2], self.traces, layout)
+    }
+
+    /// Areas behind the curves, with their names.
+    fn shades(&self, shades: &[Shade]) -> (Vec<Shape>, Vec<Annotation>) {
+        let stretches = shades
+            .iter()
+            .enumerate()
+            .flat_map(|(k, shade)| shade.rows.iter().map(move |rows| (k, shade, rows)));
+        let (mut shapes, mut labels) = (Vec::new(), Vec::new());
+        for (position, shade, rows) in stretches.take(MOST_SHADES) {
+            let (Some(first), Some(last)) = (self.time.get(rows.first() - 1), self.time.get(rows.last() - 1))
+            else {
+                continue;
+            };
+            let (first, last) = (significant(*first), significant(*last));
+            if !(first.is_finite() && last.is_finite()) {
+                continue;
+            }
+            let (colour, _) = figure::look(position);
+            shapes.push(
+                Shape::new()
+                    .shape_type(ShapeType::Rect)
+                    .layer(ShapeLayer::Below)
+                    .x_ref("x")
+                    .y_ref("paper")
+                    .x0(first)
+                    .x1(last)
+                    .y0(0.0)
+                    .y1(1.0)
+                    .fill_color(format!("{colour}14"))
+                    .line(ShapeLine::new().width(0.0)),
+            );
+            labels.push(
+                Annotation::new()
+                    .text(text::plain(&shade.name))
+                    .show_arrow(false)
+                    .x_ref("x")
+                    .y_ref("paper")
+                    .x(first)
+                    .y(1.0)
+                    .x_anchor(Anchor::Left)
+                    .y_anchor(Anchor::Top)
+                    .font(Font::new().size(11).color(NEUTRAL)),
+            );
+        }
+        (shapes, labels)
+    }
+}
+
+/// Measured and modelled outputs of several models.
+pub(crate) fn outputs(
+    title: &str,
+    words: &str,
+    stack: Stack<'_>,
+    output: &str,
+    measured: &[f64],
+    modelled: &[(String, &[f64])],
+) -> Drawn {
+    let mut stack = stack;
+    stack.panel(output);
+    stack.measured("measured", measured);
+    for (name, values) in modelled {
+        stack.curve(name, values);
+    }
+    stack.draw(title, words, &[])
+}
+
+fn with_y_axis(layout: Layout, position: usize, axis: Axis) -> Layout {
+    match position {
+        0 => layout.y_axis(axis),
+        1 => layout.y_axis2(axis),
+        2 => layout.y_axis3(axis),
+        3 => layout.y_axis4(axis),
+        4 => layout.y_axis5(axis),
+        5 => layout.y_axis6(axis),
+        6 => layout.y_axis7(axis),
+        _ => layout.y_axis8(axis),
+    }
+}

@@ -1,0 +1,479 @@
+//! The tables.
+
+use super::page::Table;
+use super::text::{chance, complex, number, or_dash, percent, quantity, rows, short, three};
+use crate::{
+    Estimation, Fit, Inspection, Model, Part, Procedure, Report, Root, Rows, Scored, Seen, Selection, Source,
+    Start, Stopped, Validated, Validation,
+};
+
+/// The models of a search that are listed.
+const BEST: usize = 20;
+/// Fewer channels than this stand beside each other, more below each other.
+const BESIDE: usize = 5;
+
+pub(super) fn parameters(model: &Model) -> Table {
+    let mut table = Table::new("Parameters", &["parameter", "value", "standard error"]);
+    for parameter in &model.parameters {
+        table.row([
+            parameter.name.clone(),
+            number(parameter.value),
+            or_dash(parameter.standard_error, three),
+        ]);
+    }
+    table
+}
+
+pub(super) fn fits(fits: &[Fit]) -> Table {
+    let parts = fits.iter().any(|fit| fit.part.is_some());
+    let head = ["part", "horizon", "start", "fit [%]", "RMSE", "samples", "rows"];
+    let mut table = Table::new("Fit", if parts { &head } else { &head[1..] });
+    for fit in fits {
+        let mut cells = if parts { vec![or_dash(fit.part, |own| part(own).to_owned())] } else { vec![] };
+        cells.extend([
+            fit.horizon.to_string(),
+            start(fit.initial).to_owned(),
+            or_dash(fit.percent, |percent| format!("{percent:.3}")),
+            or_dash(fit.rmse, number),
+            fit.samples.to_string(),
+            rows(&fit.rows),
+        ]);
+        table.row(cells);
+    }
+    table
+}
+
+/// Poles and zeros with their uncertainty.
+pub(super) fn roots(model: &Model) -> Table {
+    let mut table = Table::new("Roots", &["root", "value", "standard error", "modulus", "time constant [s]"]);
+    let mut add = |role: &str, root: &Root, time: Option<String>| {
+        let spread = root.covariance.map(|[[re, _], [_, im]]| {
+            let re_error = three(re.max(0.0).sqrt());
+            if root.im == 0.0 { re_error } else { format!("{re_error}, {}i", three(im.max(0.0).sqrt())) }
+        });
+        table.row([
+            format!("{role} of {}", root.polynomial.to_uppercase()),
+            complex(root),
+            spread.unwrap_or_else(|| "–".to_owned()),
+            number(root.re.hypot(root.im)),
+            time.unwrap_or_default(),
+        ]);
+    };
+    let times = model.time_constants.iter().copied().chain(std::iter::repeat(None));
+    for (pole, time) in model.poles.iter().zip(times) {
+        add("pole", pole, Some(or_dash(time, quantity)));
+    }
+    model.zeros.iter().flatten().for_each(|zero| add("zero", zero, None));
+    model.noise_poles.iter().for_each(|pole| add("noise pole", pole, None));
+    model.noise_zeros.iter().for_each(|zero| add("noise zero", zero, None));
+    table
+}
+
+/// The channels with their offsets and static gains.
+pub(super) fn signals(model: &Model) -> Table {
+    let mut table =
+        Table::new("Signals", &["channel", "role", "offset", "trend [1/s]", "static gain to the output"]);
+    let gains =
+        model.dc_gain.iter().map(|gain| gain.map_or_else(|| "none (integrator)".to_owned(), quantity));
+    let inputs = model.inputs.iter().zip(gains.chain(std::iter::repeat_with(String::new)));
+    for (role, signal, gain) in
+        inputs.map(|(signal, gain)| ("input", signal, gain)).chain([("output", &model.output, String::new())])
+    {
+        let offset = signal.offset;
+        table.row([signal.name.clone(), role.to_owned(), number(offset.level), short(offset.slope), gain]);
+    }
+    table
+}
+
+pub(super) fn estimation(estimation: &Estimation, model: &Model) -> Table {
+    let mut table = Table::new("Estimation", &["figure", "value"]);
+    let mut add = |name: &str, value: String| table.row([name.to_owned(), value]);
+    add("procedure", procedure(&estimation.procedure));
+    add("samples", estimation.samples.to_string());
+    add("mean of e²", number(estimation.mse));
+    add("noise variance", number(model.noise_variance));
+    add("condition number", or_dash(estimation.condition, |condition| format!("{condition:.3e}")));
+    let four = |value: f64| format!("{value:.4}");
+    let criteria = &estimation.criteria;
+    add("FPE", number(criteria.fpe));
+    add("AIC", or_dash(criteria.aic, four));
+    add("AICc", or_dash(criteria.aicc, four));
+    add("MDL", or_dash(criteria.mdl, four));
+    table
+}
+
+fn procedure(procedure: &Procedure) -> String {
+    let stopped = |stopped: &Stopped| match stopped {
+        Stopped::Converged => "converged",
+        Stopped::NoDescent => "stopped where no step lowers the cost",
+        Stopped::MaxIterations => "stopped at the most iterations",
+        Stopped::TimeLimit => "stopped by the time limit",
+    };
+    match procedure {
+        Procedure::LeastSquares { .. } => "least squares".to_owned(),
+        Procedure::InstrumentalVariables { .. } => "instrumental variables".to_owned(),
+        Procedure::RefinedInstrumentalVariables { iterations, stopped: why, .. } => {
+            format!("refined instrumental variables, iterations: {iterations}, {}", stopped(why))
+        }
+        Procedure::PredictionError(search) => {
+            format!("prediction error, iterations: {}, {}", search.iterations, stopped(&search.stopped))
+        }
+        Procedure::Constrained(outcome) => format!("convex optimization, norm {}", outcome.norm),
+    }
+}
+
+/// The tests of what is left of several parts, or by several models: `who` says which.
+pub(super) fn tests(who: &str, parts: &[(String, &Validation)]) -> Table {
+    let mut table = Table::new(
+        "Tests of the residuals",
+        &["test", who, "lags", "statistic", "degrees of freedom", "p-value"],
+    );
+    for (name, validation) in parts {
+        let Some(residuals) = &validation.residuals else { continue };
+        let mut add = |label: String, test: &crate::Test| {
+            table.row([
+                label,
+                name.clone(),
+                test.lags.to_string(),
+                format!("{:.2}", test.statistic),
+                short(test.degrees),
+                or_dash(test.p_value, chance),
+            ]);
+        };
+        add(format!("white (Ljung-Box){}", asked(validation)), &residuals.ljung_box);
+        for independence in &residuals.independence {
+            add(format!("independent of past {}", independence.input), &independence.past);
+            add(format!("no feedback to {}", independence.input), &independence.feedback);
+        }
+    }
+    table
+}
+
+/// A word where residuals that are not white are no fault.
+fn asked(validation: &Validation) -> &'static str {
+    if validation.white_expected { "" } else { ", not asked" }
+}
+
+/// Anderson's test for each level.
+pub(super) fn anderson(who: &str, parts: &[(String, &Validation)]) -> Table {
+    let mut table = Table::new(
+        "Correlations outside of their band (Anderson)",
+        &["alpha", who, "band", "lags", "outside", "white", "p-value"],
+    );
+    for (name, validation) in parts {
+        let Some(residuals) = &validation.residuals else { continue };
+        for level in &residuals.anderson.levels {
+            table.row([
+                short(level.alpha),
+                name.clone(),
+                format!("± {}", three(level.band)),
+                residuals.anderson.lags.to_string(),
+                level.outside.to_string(),
+                format!("{}{}", yes(level.white), asked(validation)),
+                chance(level.p_value),
+            ]);
+        }
+    }
+    table
+}
+
+/// How often the output lies in its prediction intervals.
+pub(super) fn coverage(who: &str, parts: &[(String, &Validation)]) -> Table {
+    let all = || parts.iter().flat_map(|(_, validation)| &validation.coverage);
+    let mut levels: Vec<f64> = all().map(|one| one.level).collect();
+    levels.sort_by(f64::total_cmp);
+    levels.dedup();
+    let mut head = vec![who.to_owned(), "steps ahead".to_owned()];
+    head.extend(levels.iter().map(|level| format!("{} interval", percent(*level))));
+    head.push("samples".to_owned());
+    let head: Vec<&str> = head.iter().map(String::as_str).collect();
+    let mut table = Table::new("How often the output lies in its prediction intervals", &head);
+    for (name, validation) in parts {
+        let mut steps: Vec<usize> = validation.coverage.iter().map(|one| one.steps).collect();
+        steps.dedup();
+        for steps in steps {
+            let found: Vec<_> = validation.coverage.iter().filter(|one| one.steps == steps).collect();
+            let at = |level: &f64| found.iter().find(|one| one.level == *level).and_then(|one| one.actual);
+            let mut cells = vec![name.clone(), steps.to_string()];
+            cells.extend(levels.iter().map(|level| or_dash(at(level), percent)));
+            cells.push(or_dash(found.first(), |one| one.samples.to_string()));
+            table.row(cells);
+        }
+    }
+    table
+}
+
+/// The level of the errors beside that of the model.
+pub(super) fn noise(who: &str, parts: &[(String, &Validation)]) -> Table {
+    let head = [who, "mean of e²", "noise variance of the model", "ratio", "seen by the fit"];
+    let mut table = Table::new("Errors one step ahead", &head);
+    for (name, validation) in parts {
+        let noise = validation.noise;
+        table.row([
+            name.clone(),
+            or_dash(noise.mse, number),
+            number(noise.model),
+            or_dash(noise.ratio, three),
+            seen(validation.seen).to_owned(),
+        ]);
+    }
+    table
+}
+
+pub(super) fn logs(sources: &[Source]) -> Table {
+    let mut table = Table::new("Logs", &["file", "rows", "time column", "start", "resampled"]);
+    for source in sources {
+        let resampled = source
+            .resampled
+            .as_ref()
+            .map(|resampling| format!("to {} s, from {} rows", short(resampling.step), resampling.rows));
+        table.row([
+            source.file.clone(),
+            source.rows.to_string(),
+            or_dash(source.time.as_ref(), Clone::clone),
+            or_dash(source.start.as_ref(), Clone::clone),
+            resampled.unwrap_or_else(|| "no".to_owned()),
+        ]);
+    }
+    table
+}
+
+pub(super) fn data(report: &Report) -> Table {
+    let data = &report.data;
+    let mut table = Table::new("Data", &["figure", "value"]);
+    let mut add = |name: &str, value: String| table.row([name.to_owned(), value]);
+    let parts = |parts: &[Rows]| if parts.is_empty() { "none".to_owned() } else { rows(parts) };
+    add("rows", data.rows.to_string());
+    add("sample time", format!("{} s", short(data.sample_time)));
+    add("detrend", data.detrend.clone());
+    add("estimation rows", parts(&data.estimation));
+    add("validation rows", parts(&data.validation));
+    if let Some(split) = &data.split {
+        add("split: estimation", parts(&split.estimation));
+        add("split: validation", parts(&split.validation));
+        add("split: test", parts(&split.test));
+    }
+    add("stretches without a gap", rows(&data.segments));
+    add("jumps of the clock", data.time_gaps.to_string());
+    for missing in &data.missing {
+        add(&format!("missing in {}", missing.channel), missing.rows.to_string());
+    }
+    table
+}
+
+/// The best models of a search.
+pub(super) fn best(selection: &Selection) -> Table {
+    let score = super::charts::score(selection.select);
+    let unseen = selection.best.iter().any(|model| model.unseen.is_some());
+    let mut head = vec!["model", "parameters", score, "mean of e²"];
+    if unseen {
+        head.push("mean of e², unseen");
+    }
+    let best = &selection.best[..selection.best.len().min(BEST)];
+    let mut table = Table::new("The best models of the search", &head);
+    let row = |model: &Scored| {
+        let mut cells = vec![
+            model.orders.to_string(),
+            model.parameters.to_string(),
+            or_dash(model.score, number),
+            number(model.mse),
+        ];
+        if unseen {
+            cells.push(or_dash(model.unseen, number));
+        }
+        cells
+    };
+    best.iter().for_each(|model| table.row(row(model)));
+    table
+}
+
+/// Several models side by side.
+pub(super) fn comparison(models: &[(String, &Validated)]) -> Table {
+    let mut head: Vec<String> =
+        ["file", "model", "parameters", "stable", "seen by the fit"].map(str::to_owned).to_vec();
+    let mut horizons: Vec<String> = Vec::new();
+    let said = |fit: &Fit| format!("fit {} [%]", fit.horizon);
+    for fit in models.iter().flat_map(|(_, validated)| &validated.validation.fit) {
+        if !horizons.contains(&said(fit)) {
+            horizons.push(said(fit));
+        }
+    }
+    head.extend(horizons.iter().cloned());
+    let tests = [
+        "errors / noise",
+        "white, p-value",
+        "past inputs, p-value",
+        "feedback, p-value",
+        "no longer white at alpha",
+    ];
+    head.extend(tests.map(str::to_owned));
+    let head: Vec<&str> = head.iter().map(String::as_str).collect();
+    let mut table = Table::new("Figures", &head);
+    for (name, Validated { validation, .. }) in models {
+        let mut cells = vec![
+            name.clone(),
+            validation.orders.to_string(),
+            validation.orders.parameters().to_string(),
+            yes(validation.stable),
+            seen(validation.seen).to_owned(),
+        ];
+        cells.extend(horizons.iter().map(|horizon| {
+            let fit = validation.fit.iter().find(|fit| said(fit) == *horizon);
+            or_dash(fit.and_then(|fit| fit.percent), |percent| format!("{percent:.3}"))
+        }));
+        cells.push(or_dash(validation.noise.ratio, three));
+        let residuals = validation.residuals.as_ref();
+        let least = |of: fn(&crate::Independence) -> Option<f64>| {
+            let values = residuals?.independence.iter().filter_map(of);
+            values.reduce(f64::min)
+        };
+        let asked = asked(validation);
+        cells.push(or_dash(residuals.and_then(|residuals| residuals.ljung_box.p_value), |p| {
+            format!("{}{asked}", chance(p))
+        }));
+        cells.push(or_dash(least(|independence| independence.past.p_value), chance));
+        cells.push(or_dash(least(|independence| independence.feedback.p_value), chance));
+        cells.push(match residuals {
+            Some(residuals) => {
+                let stops = residuals.anderson.stops_at.map_or_else(|| "white at all".to_owned(), short);
+                format!("{stops}{asked}")
+            }
+            None => "–".to_owned(),
+        });
+        table.row(cells);
+    }
+    table.turned()
+}
+
+pub(super) fn clock(inspection: &Inspection) -> Table {
+    let clock = &inspection.clock;
+    let mut table = Table::new("Clock", &["figure", "value"]);
+    let mut add = |name: &str, value: String| table.row([name.to_owned(), value]);
+    add("rows", inspection.rows.to_string());
+    let source = if clock.measured { "" } else { " (the log has no times)" };
+    add("median step", format!("{} s{source}", short(clock.sample_time)));
+    add("shortest and longest step", format!("{} s, {} s", short(clock.steps.0), short(clock.steps.1)));
+    add("jitter", percent(clock.jitter));
+    add("gaps", clock.gaps.to_string());
+    add("has to be resampled", yes(clock.irregular));
+    table
+}
+
+pub(super) fn channels(inspection: &Inspection) -> Table {
+    let head = [
+        "channel",
+        "role",
+        "missing",
+        "smallest",
+        "largest",
+        "mean",
+        "standard deviation",
+        "trend [1/s]",
+        "trend's share",
+        "repeated",
+        "longest hold",
+        "quantization",
+        "at the smallest, largest",
+        "outliers",
+    ];
+    let mut table = Table::new("Quality", &head);
+    for channel in &inspection.channels {
+        let outliers = match (channel.outlier_count, channel.outliers.as_slice()) {
+            (0, _) => "0".to_owned(),
+            (count, rows) => {
+                let shown: Vec<String> = rows.iter().take(3).map(usize::to_string).collect();
+                let more = if shown.len() < count { ", …" } else { "" };
+                format!("{count} (rows {}{more})", shown.join(", "))
+            }
+        };
+        table.row([
+            channel.name.clone(),
+            channel.role.clone().unwrap_or_default(),
+            channel.missing.to_string(),
+            or_dash(channel.minimum, number),
+            or_dash(channel.maximum, number),
+            or_dash(channel.mean, number),
+            or_dash(channel.standard_deviation, number),
+            or_dash(channel.trend, three),
+            or_dash(channel.trend_share, percent),
+            channel.repeated.to_string(),
+            channel.longest_hold.to_string(),
+            channel.quantization.map_or_else(|| "none".to_owned(), short),
+            channel
+                .saturation
+                .map_or_else(|| "no".to_owned(), |rests| format!("{}, {}", rests.low, rests.high)),
+            outliers,
+        ]);
+    }
+    if inspection.channels.len() < BESIDE { table.turned() } else { table }
+}
+
+pub(super) fn excitation(inspection: &Inspection) -> Table {
+    let alike = inspection.excitation.iter().any(|input| input.same_as.is_some());
+    let head = ["input", "persistently exciting of order", "changes at", "the same but for scale and offset"];
+    let mut table = Table::new("Excitation", if alike { &head } else { &head[..3] });
+    for input in &inspection.excitation {
+        let most = if input.order == input.highest { " or more" } else { "" };
+        let mut cells = vec![
+            input.input.clone(),
+            format!("{}{most}", input.order),
+            format!("{} of samples", percent(input.changes)),
+        ];
+        if alike {
+            cells.push(input.same_as.clone().unwrap_or_default());
+        }
+        table.row(cells);
+    }
+    table
+}
+
+/// Delays and feedback.
+pub(super) fn delays(inspection: &Inspection) -> Table {
+    let mut table =
+        Table::new("Delay and feedback", &["input", "delay [samples]", "confidence", "feedback", "p-value"]);
+    for delay in &inspection.delays {
+        let feedback = inspection.feedback.iter().find(|feedback| feedback.input == delay.input);
+        table.row([
+            delay.input.clone(),
+            delay.nk.map_or_else(|| "none found".to_owned(), |nk| nk.to_string()),
+            or_dash(delay.confidence, confidence),
+            or_dash(feedback, |feedback| yes(feedback.found)),
+            or_dash(feedback.and_then(|feedback| feedback.p_value), chance),
+        ]);
+    }
+    table
+}
+
+/// Nothing is as sure as all digits rounded up would have it.
+fn confidence(fraction: f64) -> String {
+    if fraction > 0.9994 { "> 99.9 %".to_owned() } else { percent(fraction) }
+}
+
+/// The part's name.
+pub(super) fn part(part: Part) -> &'static str {
+    match part {
+        Part::Estimation => "estimation",
+        Part::Validation => "validation",
+        Part::Test => "test",
+    }
+}
+
+fn start(start: Start) -> &'static str {
+    match start {
+        Start::Zero => "from zero",
+        Start::Measured => "from measured",
+        Start::Estimated => "start estimated",
+    }
+}
+
+pub(super) fn seen(seen: Seen) -> &'static str {
+    match seen {
+        Seen::No => "no",
+        Seen::Partly => "partly",
+        Seen::Yes => "yes",
+    }
+}
+
+fn yes(answer: bool) -> String {
+    if answer { "yes" } else { "no" }.to_owned()
+}

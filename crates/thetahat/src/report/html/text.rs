@@ -1,0 +1,165 @@
+//! How numbers and names are written.
+
+use crate::{Model, Quantity, Root, Rows};
+
+/// A name in a chart takes no more room than so many characters, and less beside an axis.
+const LONGEST: [usize; 2] = [40, 15];
+
+/// Six significant digits.
+pub(super) fn number(value: f64) -> String {
+    let size = value.abs();
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    if !(1e-4..1e6).contains(&size) {
+        return format!("{value:.5e}");
+    }
+    let decimals = (5 - size.log10().floor() as i32).clamp(0, 9) as usize;
+    format!("{value:.decimals$}")
+}
+
+/// The same without zeros at the end.
+pub(super) fn short(value: f64) -> String {
+    let text = number(value);
+    if text.contains('.') && !text.contains('e') {
+        return text.trim_end_matches('0').trim_end_matches('.').to_owned();
+    }
+    text
+}
+
+/// Three digits: an uncertainty, or a probability.
+pub(super) fn three(value: f64) -> String {
+    if (1e-3..1e3).contains(&value.abs()) {
+        let decimals = (2 - value.abs().log10().floor() as i32).clamp(0, 5) as usize;
+        return format!("{value:.decimals$}");
+    }
+    if value == 0.0 { "0".to_owned() } else { format!("{value:.2e}") }
+}
+
+/// Percent of a whole, to three digits.
+pub(super) fn percent(fraction: f64) -> String {
+    let text = three(100.0 * fraction);
+    let plain = text.contains('.') && !text.contains('e');
+    format!("{} %", if plain { text.trim_end_matches('0').trim_end_matches('.') } else { &text })
+}
+
+/// A probability; below the smallest number it is said to be so.
+pub(super) fn chance(probability: f64) -> String {
+    if probability == 0.0 { "< 1e-300".to_owned() } else { three(probability) }
+}
+
+pub(super) fn or_dash<T>(value: Option<T>, shown: impl FnOnce(T) -> String) -> String {
+    value.map_or_else(|| "–".to_owned(), shown)
+}
+
+/// A figure and its standard error.
+pub(super) fn quantity(quantity: Quantity) -> String {
+    let error = quantity.standard_error.map_or_else(String::new, |error| format!(" ± {}", three(error)));
+    format!("{}{error}", number(quantity.value))
+}
+
+pub(super) fn complex(root: &Root) -> String {
+    if root.im == 0.0 {
+        return number(root.re);
+    }
+    let sign = if root.im < 0.0 { '-' } else { '+' };
+    format!("{} {sign} {}i", number(root.re), number(root.im.abs()))
+}
+
+pub(super) fn rows(rows: &[Rows]) -> String {
+    let shown: Vec<String> = rows.iter().take(20).map(Rows::to_string).collect();
+    let rest = rows.len() - shown.len();
+    let more = if rest > 0 { format!(" and {rest} more") } else { String::new() };
+    format!("{}{more}", shown.join(", "))
+}
+
+/// A name as charts show it: their library reads a subset of HTML, of which nothing may be left.
+pub(super) fn plain(name: &str) -> String {
+    cut(name, LONGEST[0])
+}
+
+/// The same where there is little room.
+pub(super) fn brief(name: &str) -> String {
+    cut(name, LONGEST[1])
+}
+
+fn cut(name: &str, longest: usize) -> String {
+    let mut shown: String = name.chars().take(longest).collect();
+    if shown.len() < name.len() {
+        shown.push('…');
+    }
+    shown.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}
+
+/// JSON that may stand inside a script element.
+pub(super) fn inside_script(json: &str) -> String {
+    let mut safe = String::with_capacity(json.len());
+    for character in json.chars() {
+        match character {
+            '<' | '>' | '&' | '\u{2028}' | '\u{2029}' => {
+                safe.push_str(&format!("\\u{:04x}", u32::from(character)));
+            }
+            other => safe.push(other),
+        }
+    }
+    safe
+}
+
+/// The model's equation, without what it does not have.
+pub(super) fn equation(model: &Model) -> String {
+    let orders = &model.orders;
+    let several = orders.inputs() > 1;
+    let of = |letter: char| if several { format!("{letter}_j(q)") } else { format!("{letter}(q)") };
+    let mut right = Vec::new();
+    if orders.nb.iter().any(|&nb| nb > 0) {
+        let divided =
+            if orders.nf.iter().any(|&nf| nf > 0) { format!("/{}", of('F')) } else { String::new() };
+        let (sum, input) = if several { ("sum_j ", "u_j(t)") } else { ("", "u(t)") };
+        right.push(format!("{sum}{}{divided} {input}", of('B')));
+    }
+    right.push(
+        match (orders.nc > 0, orders.nd > 0) {
+            (false, false) => "e(t)",
+            (true, false) => "C(q) e(t)",
+            (false, true) => "1/D(q) e(t)",
+            (true, true) => "C(q)/D(q) e(t)",
+        }
+        .to_owned(),
+    );
+    format!("{} = {}", if orders.na > 0 { "A(q) y(t)" } else { "y(t)" }, right.join(" + "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_no_markup_in_charts() {
+        assert_eq!(plain("<b>x</b> & \"'"), "&lt;b&gt;x&lt;/b&gt; &amp; \"'");
+        assert_eq!(plain("🚀"), "🚀");
+        assert_eq!(plain(&"ä".repeat(41)), format!("{}…", "ä".repeat(40)));
+    }
+
+    #[test]
+    fn json_cannot_end_its_script() {
+        let text = "</script><!-- & \u{2028}\u{2029} 🚀";
+        let safe = inside_script(&serde_json::to_string(text).unwrap());
+        assert!(!safe.contains(['<', '>', '&', '\u{2028}', '\u{2029}']));
+        assert_eq!(serde_json::from_str::<String>(&safe).unwrap(), text);
+    }
+
+    #[test]
+    fn numbers_are_short() {
+        assert_eq!([number(0.0), number(0.1), number(-12.0)], ["0", "0.100000", "-12.0000"]);
+        assert_eq!([short(0.1), short(1e-7), short(250.0)], ["0.1", "1.00000e-7", "250"]);
+        assert_eq!(
+            [three(0.0), three(0.012_34), three(1.0), three(1e-9)],
+            ["0", "0.0123", "1.00", "1.00e-9"]
+        );
+        assert_eq!(
+            [percent(0.95), percent(0.518_148), percent(1.0), percent(0.0)],
+            ["95 %", "51.8 %", "100 %", "0 %"]
+        );
+        assert_eq!([chance(0.0), chance(0.05)], ["< 1e-300", "0.0500"]);
+    }
+}

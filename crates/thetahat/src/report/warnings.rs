@@ -1,0 +1,128 @@
+//! What a careful reader of a report should know, in plain words.
+
+use super::schema::Report;
+use crate::Orders;
+use crate::estimate::{Procedure, SearchOutcome, Stopped};
+use crate::model::{cancel, near_cancellation};
+use crate::select::{Grid, OrderRange};
+
+/// Condition numbers above this one are worth a word.
+const ILL_CONDITIONED: f64 = 1e6;
+/// Below this fit, in percent, a model explains little.
+const POOR: f64 = 50.0;
+
+/// What data, model and search call for.
+pub(super) fn warnings(report: &Report) -> Vec<String> {
+    let (data, model) = (&report.data, &report.model);
+    let mut warnings = Vec::new();
+    for missing in data.missing.iter().filter(|missing| missing.rows > 0) {
+        warnings.push(format!(
+            "channel '{}' misses {} of {} values; the log is cut there",
+            missing.channel, missing.rows, data.rows
+        ));
+    }
+    if data.time_gaps > 0 {
+        warnings.push(format!("jumps of the clock: {}; the log is cut there", data.time_gaps));
+    }
+    if data
+        .validation
+        .iter()
+        .any(|v| data.estimation.iter().any(|e| v.first() <= e.last() && e.first() <= v.last()))
+    {
+        warnings.push("validation rows overlap estimation rows: their figures flatter the model".to_owned());
+    }
+    if !model.stable {
+        let largest = model.poles.iter().map(|pole| pole.re.hypot(pole.im)).fold(0.0, f64::max);
+        warnings.push(format!(
+            "the model is unstable (largest pole {largest:.6}): its free run grows without bound"
+        ));
+    }
+    if let Procedure::PredictionError(search) = &report.estimation.procedure {
+        warnings.extend(search_warnings(search));
+    }
+    if let Some((pole, zero)) = near_cancellation(model) {
+        warnings.push(format!(
+            "{}: within their uncertainty they are one; lower both orders by one, unless they are known",
+            cancel(&pole, &zero)
+        ));
+    }
+    if let Some(condition) = report.estimation.condition.filter(|condition| *condition > ILL_CONDITIONED) {
+        warnings.push(format!(
+            "the regressors are nearly dependent (condition number {condition:.1e}): parameters are uncertain; lower the orders \
+             or sample more slowly"
+        ));
+    }
+    warnings
+}
+
+/// What is worth a word of a search.
+fn search_warnings(search: &SearchOutcome) -> Vec<String> {
+    let mut warnings = Vec::new();
+    let iterations = search.iterations;
+    match search.stopped {
+        Stopped::Converged => {}
+        Stopped::MaxIterations => warnings.push(format!(
+            "no convergence in {iterations} iterations: the parameters are not those of least cost; allow more \
+             (--max-iterations), or lower the orders"
+        )),
+        Stopped::TimeLimit => warnings.push(format!(
+            "no convergence: the time was used up after {iterations} iterations; allow more (--time-limit)"
+        )),
+        Stopped::NoDescent if !search.stability_bound => warnings.push(format!(
+            "the search stopped after {iterations} iterations where no step lowers the cost (gradient {:.1e}): the cost is \
+             flat or rough there; lower the orders",
+            search.gradient_norm
+        )),
+        Stopped::NoDescent => {}
+    }
+    if search.stability_bound {
+        warnings.push(
+            "the search ended at the border of stability: C or F has a root on the unit circle; the data want an \
+             unstable or overdifferenced model, so use arx or armax for an unstable plant, or lower nc or nf"
+                .to_owned(),
+        );
+    }
+    warnings
+}
+
+/// A word on a plant that seems to be unstable, where F, which must be stable, explains little.
+pub(super) fn unstable_plant(report: &Report) -> Option<String> {
+    let Procedure::PredictionError(search) = &report.estimation.procedure else { return None };
+    let pole = search.unstable_pole?;
+    let explained = report.fit.first()?.percent?;
+    (explained < POOR).then(|| {
+        format!(
+            "the plant seems to be unstable: least squares finds a pole of modulus {pole:.4}; F must be stable and \
+             explains {explained:.1} % only; an unstable plant needs A (arx or armax)"
+        )
+    })
+}
+
+/// A word on orders that are the largest of their range: a larger one could be better.
+pub(super) fn at_the_border(orders: &Orders, grid: &Grid) -> Option<String> {
+    let of_inputs = |ranges: &[OrderRange], orders: &[usize]| {
+        let range = |input: usize| ranges.get(input).or(ranges.first());
+        let at = |(input, order): (usize, &usize)| {
+            range(input).is_some_and(|range| range.single().is_none() && range.last() == *order)
+        };
+        orders.iter().enumerate().any(at)
+    };
+    let names: Vec<&str> = [
+        ("na", of_inputs(&[grid.na], &[orders.na])),
+        ("nb", of_inputs(&grid.nb, &orders.nb)),
+        ("nc", of_inputs(&[grid.nc], &[orders.nc])),
+        ("nd", of_inputs(&[grid.nd], &[orders.nd])),
+        ("nf", of_inputs(&grid.nf, &orders.nf)),
+        ("nk", of_inputs(&grid.nk, &orders.nk)),
+    ]
+    .into_iter()
+    .filter_map(|(name, at)| at.then_some(name))
+    .collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "the chosen {} {} the largest allowed: a larger one may be better; widen the range",
+            names.join(", "),
+            if names.len() == 1 { "is" } else { "are" }
+        )
+    })
+}

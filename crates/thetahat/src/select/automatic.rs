@@ -1,0 +1,123 @@
+//! Delay, structure and orders where nothing was asked for.
+//!
+//! Delays come first (see `delay`); then all structures with these delays are compared.
+
+use super::compare::{compare, total};
+use super::delay;
+use super::ranking::ranked;
+use super::{Automatic, Found, Selection, Task};
+use crate::data::Record;
+use crate::estimate::Initial;
+use crate::{Error, Orders, Structure};
+
+/// The highest order of ARX and AR models, and of the others.
+const LONGEST: usize = 10;
+const HIGHEST: usize = 3;
+/// So many samples for each parameter at least.
+const SAMPLES: usize = 4;
+/// # Errors
+/// As for [`choose`](super::choose).
+pub(super) fn choose(task: &Task<'_>, automatic: &Automatic) -> Result<Found, Error> {
+    let inputs = task.estimation.inputs.len();
+    let structures = structures(task, automatic)?;
+    let driven = structures.iter().any(|structure| !matches!(structure, Structure::Ar | Structure::Arma));
+    let mut steps = Vec::new();
+    let (delays, nk) = match &automatic.nk {
+        Some(nk) if nk.len() == inputs => (Vec::new(), nk.clone()),
+        Some(nk) => {
+            return Err(Error::argument(
+                "nk",
+                format!("there are {} values for {inputs} inputs; give one for each", nk.len()),
+            ));
+        }
+        None if driven => delay::found(task, &mut steps)?,
+        None => (Vec::new(), vec![1; inputs]),
+    };
+    let models = candidates(task.estimation, &structures, &nk)?;
+    let outcome = compare(task, models)?;
+    let Found { mut selection, guess } = ranked(task, outcome, None)?;
+    steps.append(&mut selection.steps);
+    Ok(Found { selection: Selection { steps, delays, ..selection }, guess })
+}
+
+/// Which structures are tried.
+fn structures(task: &Task<'_>, automatic: &Automatic) -> Result<Vec<Structure>, Error> {
+    use Structure::{Ar, Arma, Armax, Arx, Bj, Oe, Pem};
+    let driven = !task.estimation.inputs.is_empty();
+    match automatic.structure {
+        Some(Pem) => Err(Error::argument(
+            "structure",
+            "pem has no orders of its own to try; give those of its polynomials, or ranges of them",
+        )),
+        Some(structure @ (Arx | Armax | Oe | Bj)) if !driven => Err(Error::argument(
+            "structure",
+            format!(
+                "{} needs an input; name one, or take ar or arma",
+                format!("{structure:?}").to_lowercase()
+            ),
+        )),
+        Some(structure) => Ok(vec![structure]),
+        None if !driven => Ok(vec![Ar, Arma]),
+        // Models with F take no dropped samples.
+        None if task.initial == Initial::Drop => Ok(vec![Arx, Armax]),
+        None => Ok(vec![Arx, Armax, Oe, Bj]),
+    }
+}
+
+/// Whether a record has enough samples for so many parameters, and does not lose more than half of them to the start of its
+/// segments.
+pub(super) fn are_enough(record: &Record<'_>, parameters: usize, masked: usize) -> bool {
+    let left = |segment: &std::ops::Range<usize>| segment.len().saturating_sub(masked);
+    let count: usize = record.segments.iter().map(left).sum();
+    count >= SAMPLES * parameters && 2 * count >= total(record)
+}
+
+/// The models of some structures with given delays, the smallest first.
+fn candidates(record: &Record<'_>, structures: &[Structure], nk: &[usize]) -> Result<Vec<Orders>, Error> {
+    let inputs = nk.len();
+    let mut models = Vec::new();
+    for structure in structures {
+        let most = if matches!(structure, Structure::Arx | Structure::Ar) { LONGEST } else { HIGHEST };
+        // All with one order.
+        let of = |order: usize| of_structure(*structure, [order; 4], nk);
+        let fits = |order: &usize| {
+            of(*order).is_ok_and(|orders| {
+                let masked = (0..inputs).map(|input| orders.input_reach(input)).fold(*order, usize::max);
+                are_enough(record, orders.parameters(), masked)
+            })
+        };
+        let highest = (2..=most).rev().find(fits).unwrap_or(1);
+        let each = |used: bool| if used { 1..=highest } else { 1..=1 };
+        let (third, fourth) = match structure {
+            Structure::Arx | Structure::Ar | Structure::Oe | Structure::Pem => (false, false),
+            Structure::Armax | Structure::Arma => (true, false),
+            Structure::Bj => (true, true),
+        };
+        let second = !matches!(structure, Structure::Ar | Structure::Arma);
+        for first in each(true) {
+            for second in each(second) {
+                for third in each(third) {
+                    for fourth in each(fourth) {
+                        models.push(of_structure(*structure, [first, second, third, fourth], nk)?);
+                    }
+                }
+            }
+        }
+    }
+    models.sort_by_key(Orders::parameters);
+    Ok(models)
+}
+
+/// The orders of a structure from those of its polynomials: those of A or F, of B, of C, and of D.
+fn of_structure(structure: Structure, orders: [usize; 4], nk: &[usize]) -> Result<Orders, Error> {
+    let [poles, zeros, nc, nd] = orders;
+    let (none, nb, nf) = (vec![0; nk.len()], vec![zeros; nk.len()], vec![poles; nk.len()]);
+    match structure {
+        Structure::Ar => Orders::new(poles, &none, 0, 0, &none, nk),
+        Structure::Arma => Orders::new(poles, &none, nc, 0, &none, nk),
+        Structure::Arx | Structure::Pem => Orders::new(poles, &nb, 0, 0, &none, nk),
+        Structure::Armax => Orders::new(poles, &nb, nc, 0, &none, nk),
+        Structure::Oe => Orders::new(0, &nb, 0, 0, &nf, nk),
+        Structure::Bj => Orders::new(0, &nb, nc, nd, &nf, nk),
+    }
+}

@@ -1,0 +1,169 @@
+use std::fmt;
+use std::str::FromStr;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::model::LARGEST;
+use crate::{Error, Orders, Structure};
+
+/// Which orders a model may have.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Choice {
+    /// These.
+    Known(Orders),
+    /// One of a grid's.
+    Grid(Grid),
+    /// Whatever the data say.
+    Automatic(Automatic),
+}
+
+impl From<Orders> for Choice {
+    fn from(orders: Orders) -> Self {
+        Self::Known(orders)
+    }
+}
+
+/// Ranges of orders: all models of a grid, or a path through it.
+///
+/// `nb`, `nf` and `nk` have one range for all inputs, which then have the same order, or one for each.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Grid {
+    /// Coefficients of A.
+    pub na: OrderRange,
+    /// Coefficients of B.
+    pub nb: Vec<OrderRange>,
+    /// Coefficients of C.
+    pub nc: OrderRange,
+    /// Coefficients of D.
+    pub nd: OrderRange,
+    /// Coefficients of F.
+    pub nf: Vec<OrderRange>,
+    /// Samples from an input's change to its first effect.
+    pub nk: Vec<OrderRange>,
+    /// Which of its models are tried.
+    pub path: Path,
+}
+
+/// Delay, structure and orders from the data: delays first, then the least MDL among ARX up to order 10, and ARMAX, output
+/// error and Box-Jenkins up to order 3, on common samples.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Automatic {
+    /// The structure, if it is known.
+    pub structure: Option<Structure>,
+    /// The delays, one for each input, if they are known.
+    pub nk: Option<Vec<usize>>,
+}
+
+/// Orders from a first to a last one, both included: what a person writes as `1..10`, or `2`.
+///
+/// ```
+/// use thetahat::OrderRange;
+///
+/// let range: OrderRange = "1..10".parse()?;
+/// assert_eq!((range.first(), range.last()), (1, 10));
+/// # Ok::<(), thetahat::Error>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct OrderRange {
+    first: usize,
+    last: usize,
+}
+
+/// Which models of a grid are tried.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Path {
+    /// All of them.
+    #[default]
+    All,
+    /// From the smallest on, one order up at a time, each in its turn (A, B, C, D, F), for each delay.
+    Alternate,
+}
+
+/// What makes one model better than another.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Select {
+    /// Rissanen's minimum description length.
+    #[default]
+    Mdl,
+    /// Akaike's information criterion.
+    Aic,
+    /// The same, corrected for few samples.
+    Aicc,
+    /// Akaike's final prediction error.
+    Fpe,
+    /// The mean of e^2 on the validation rows: the smallest model within 1 % of the least.
+    Validation,
+    /// Cross-validation: the mean of e^2 over five blocks in time, each predicted by a model of the others; the smallest
+    /// model within 1 % of the least.
+    Cv,
+}
+
+impl OrderRange {
+    /// From `first` to `last`.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] if `first` is above `last`.
+    pub fn new(first: usize, last: usize) -> Result<Self, Error> {
+        if first > last {
+            return Err(Error::argument(
+                "orders",
+                format!("{first}..{last}: the last order is below the first; write {last}..{first}"),
+            ));
+        }
+        Ok(Self { first, last })
+    }
+
+    /// The first order.
+    pub fn first(&self) -> usize {
+        self.first
+    }
+
+    /// The last order, included.
+    pub fn last(&self) -> usize {
+        self.last
+    }
+
+    /// The only order, if there is but one.
+    pub fn single(&self) -> Option<usize> {
+        (self.first == self.last).then_some(self.first)
+    }
+}
+
+impl From<usize> for OrderRange {
+    fn from(order: usize) -> Self {
+        Self { first: order, last: order }
+    }
+}
+
+impl fmt::Display for OrderRange {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.single() {
+            Some(order) => write!(f, "{order}"),
+            None => write!(f, "{}..{}", self.first, self.last),
+        }
+    }
+}
+
+impl FromStr for OrderRange {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        let wrong =
+            || Error::argument("orders", format!("'{text}' is not an order; write 2, or a range as 1..10"));
+        let number = |text: &str| {
+            let order = text.trim().parse().map_err(|_| wrong())?;
+            if order > LARGEST {
+                let message = format!("{order} is above {LARGEST}, the largest order");
+                return Err(Error::argument("orders", message));
+            }
+            Ok(order)
+        };
+        match text.split_once("..") {
+            Some((first, last)) => Self::new(number(first)?, number(last)?),
+            None => number(text).map(Self::from),
+        }
+    }
+}

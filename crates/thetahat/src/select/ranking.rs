@@ -1,0 +1,125 @@
+//! From models with their scores to a choice.
+
+use std::cmp::Ordering;
+
+use super::compare::Outcome;
+use super::{Found, Path, Scored, Select, Selection, Task};
+use crate::Error;
+use crate::estimate::{Method, estimate_of_channels};
+
+/// Models of a table.
+const BEST: usize = 50;
+/// The smallest model within this fraction of the least cost on unseen samples is taken.
+const CLOSE: f64 = 0.01;
+
+/// The choice among models that were compared; `path` is none where there was no grid.
+///
+/// # Errors
+/// What a fit of the smallest model says, if the data determine none.
+pub(super) fn ranked(task: &Task<'_>, outcome: Outcome, path: Option<Path>) -> Result<Found, Error> {
+    let Outcome { scored, failed, samples, remarks, smallest } = outcome;
+    let by_unseen = matches!(task.select, Select::Validation | Select::Cv);
+    let mut order: Vec<&Scored> = scored.iter().map(|(scored, _)| scored).collect();
+    order.sort_by(|a, b| better(a, b, by_unseen));
+    let (Some(&first), count) = (order.first(), scored.len()) else {
+        if let Some(orders) = smallest {
+            let method = Method::PredictionError(task.search.clone());
+            let Task { estimation, inputs, initial, monitor, .. } = *task;
+            estimate_of_channels(estimation, inputs, &orders, &method, initial, monitor)?;
+        }
+        return Err(Error::undetermined(
+            Vec::new(),
+            format!(
+                "the data determine none of the {failed} models on the {samples} samples that all of them have; give more \
+                 rows, excite the input more, or lower the orders"
+            ),
+        ));
+    };
+    let mut chosen = first;
+    if by_unseen {
+        let limit = first.unseen.map_or(f64::INFINITY, |least| least * (1.0 + CLOSE));
+        let close = order.iter().take_while(|model| model.unseen.is_some_and(|cost| cost <= limit));
+        // The best of equal size comes first.
+        chosen = close.min_by_key(|model| model.parameters).unwrap_or(&first);
+    }
+    let second = order.iter().find(|model| model.orders != chosen.orders);
+    let mut of_size: Vec<Scored> = Vec::new();
+    let mut by_size = order.clone();
+    by_size.sort_by_key(|model| model.parameters);
+    for model in by_size {
+        if of_size.last().is_none_or(|last| last.parameters < model.parameters) {
+            of_size.push(model.clone());
+        }
+    }
+    let mut steps = remarks;
+    steps.push(format!("Compared {} on {samples} common samples by {}.", models(count), named(task.select)));
+    if failed > 0 {
+        steps.push(format!("The data could not determine {} more.", models(failed)));
+    }
+    if by_unseen && first.orders != chosen.orders {
+        steps.push(format!("Least: {}.", described(first, task.select)));
+    }
+    let why = if by_unseen { ", the smallest within 1 % of the least" } else { "" };
+    steps.push(format!("Chosen: {}{why}.", described(chosen, task.select)));
+    if let Some(second) = second {
+        steps.push(format!("Second: {}.", described(second, task.select)));
+    }
+    let guess = scored.iter().find(|(scored, _)| scored.orders == chosen.orders);
+    let guess = guess.and_then(|(_, parameters)| parameters.clone());
+    let selection = Selection {
+        select: task.select,
+        path,
+        steps,
+        samples,
+        models: count,
+        failed,
+        delays: Vec::new(),
+        chosen: chosen.clone(),
+        second: second.copied().cloned(),
+        least: by_unseen.then(|| first.clone()),
+        best: order.iter().take(BEST).copied().cloned().collect(),
+        of_size,
+    };
+    Ok(Found { selection, guess })
+}
+
+/// Exact models first, the smallest of them first; then by score. Of equal ones the smaller, then the one that was made first.
+fn better(a: &Scored, b: &Scored, by_unseen: bool) -> Ordering {
+    let exact = |model: &Scored| if by_unseen { model.unseen == Some(0.0) } else { model.mse == 0.0 };
+    let score =
+        |model: &Scored| if exact(model) { f64::NEG_INFINITY } else { model.score.unwrap_or(f64::INFINITY) };
+    score(a).total_cmp(&score(b)).then(a.parameters.cmp(&b.parameters))
+}
+
+pub(super) fn models(count: usize) -> String {
+    if count == 1 { "1 model".to_owned() } else { format!("{count} models") }
+}
+
+fn named(select: Select) -> &'static str {
+    match select {
+        Select::Mdl => "MDL",
+        Select::Aic => "AIC",
+        Select::Aicc => "AICc",
+        Select::Fpe => "FPE",
+        Select::Validation => "the mean of e^2 on the validation rows",
+        Select::Cv => "cross-validation",
+    }
+}
+
+/// A model with its score.
+fn described(model: &Scored, select: Select) -> String {
+    let score = match model.score {
+        Some(score) => number(score),
+        None => "not defined: the model is exact".to_owned(),
+    };
+    let name = match select {
+        Select::Validation | Select::Cv => "mean of e^2",
+        _ => named(select),
+    };
+    format!("{} ({name} {score})", model.orders)
+}
+
+/// Five digits or more.
+pub(super) fn number(value: f64) -> String {
+    if (0.01..1e5).contains(&value.abs()) { format!("{value:.4}") } else { format!("{value:.4e}") }
+}

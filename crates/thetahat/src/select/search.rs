@@ -1,0 +1,144 @@
+//! Models that need a search, each from what its neighbours have found.
+//!
+//! A neighbour has one order less. Its parameters, and a zero, are parameters of the model with the same cost: so no model
+//! ends above a neighbour. (With two orders less, a pole and a zero that cancel would be added, and the gradient is
+//! zero there.) Models without such neighbours, and in the end the best ones, begin from the data as well.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use super::compare::Tried;
+use super::grid::key;
+use crate::estimate::{Common, Point, extended};
+use crate::{Error, Orders};
+
+/// So many of the best begin from the data as well.
+const BEST: usize = 5;
+/// How often the best are looked for.
+const ROUNDS: usize = 3;
+/// A cost that is above a neighbour's by more than this fraction is one of a worse minimum.
+const SAME: f64 = 1e-7;
+
+/// Models and their neighbours.
+pub(super) struct Family {
+    /// The neighbours of each model.
+    neighbours: Vec<Vec<usize>>,
+    /// The models that need a search, by how many steps they are away from one without such neighbours.
+    levels: Vec<Vec<usize>>,
+}
+
+impl Family {
+    /// Of models that are sorted by their number of parameters.
+    pub(super) fn new(models: &[Orders]) -> Self {
+        let places: BTreeMap<Vec<usize>, usize> = models.iter().map(key).zip(0..).collect();
+        let place = |orders: Orders| places.get(&key(&orders)).copied();
+        let neighbours: Vec<Vec<usize>> =
+            models.iter().map(|orders| smaller(orders).filter_map(place).collect()).collect();
+        let searched = |k: usize| !models[k].is_linear();
+        let mut levels: Vec<Vec<usize>> = Vec::new();
+        let mut of = vec![0; models.len()];
+        for k in (0..models.len()).filter(|&k| searched(k)) {
+            let before = neighbours[k].iter().filter(|&&other| searched(other)).map(|&other| of[other] + 1);
+            of[k] = before.max().unwrap_or(0);
+            levels.resize(levels.len().max(of[k] + 1), Vec::new());
+            levels[of[k]].push(k);
+        }
+        Self { neighbours, levels }
+    }
+
+    /// Fits all models, from what is there of them and their neighbours. `score` says which are the best.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`].
+    pub(super) fn fit(
+        &self,
+        common: &Common<'_>,
+        tried: &mut [Tried],
+        score: &(dyn Fn(&Point) -> f64 + Sync),
+    ) -> Result<(), Error> {
+        for (number, level) in self.levels.iter().enumerate() {
+            let fitted = level.par_iter().map(|&k| {
+                let starts = self.starts(k, tried);
+                common.fit(&tried[k].orders, &starts, number == 0 || starts.is_empty())
+            });
+            let fitted = fitted.collect::<Result<Vec<_>, Error>>()?;
+            level.iter().zip(fitted).for_each(|(&k, point)| tried[k].point = point);
+        }
+        let mut begun = vec![false; tried.len()];
+        self.levels.first().into_iter().flatten().for_each(|&k| begun[k] = true);
+        for _ in 0..ROUNDS {
+            let mut order: Vec<usize> = (0..tried.len()).collect();
+            let of = |k: usize| tried[k].point.as_ref().map_or(f64::INFINITY, score);
+            order.sort_by(|&a, &b| of(a).total_cmp(&of(b)));
+            order.truncate(BEST);
+            order.retain(|&k| !begun[k] && !tried[k].orders.is_linear());
+            if order.is_empty() {
+                break;
+            }
+            let again = order.par_iter().map(|&k| common.fit(&tried[k].orders, &[], true));
+            let again = again.collect::<Result<Vec<_>, Error>>()?;
+            for (&k, point) in order.iter().zip(again) {
+                begun[k] = true;
+                let lower = |point: &Point| {
+                    tried[k].point.as_ref().is_none_or(|before| point.cost < before.cost * (1.0 - SAME))
+                };
+                if point.as_ref().is_some_and(lower) {
+                    tried[k].point = point;
+                }
+            }
+            self.repair(common, tried)?;
+        }
+        Ok(())
+    }
+
+    /// Begins again where a neighbour's cost is lower.
+    fn repair(&self, common: &Common<'_>, tried: &mut [Tried]) -> Result<(), Error> {
+        for level in &self.levels {
+            let above = |&&k: &&usize| {
+                let Some(own) = &tried[k].point else { return false };
+                let costs = self.neighbours[k].iter().filter_map(|&n| Some(tried[n].point.as_ref()?.cost));
+                costs.into_iter().any(|cost| cost < own.cost * (1.0 - SAME))
+            };
+            let again: Vec<usize> = level.iter().filter(above).copied().collect();
+            let fitted =
+                again.par_iter().map(|&k| common.fit(&tried[k].orders, &self.starts(k, tried), false));
+            let fitted = fitted.collect::<Result<Vec<_>, Error>>()?;
+            // Where there is nothing but a neighbour with a pole and a zero that cancel, there is no such model.
+            again.into_iter().zip(fitted).for_each(|(k, point)| tried[k].point = point);
+        }
+        Ok(())
+    }
+
+    /// What a model may begin from: itself, as it was found under other conditions, and its neighbours.
+    fn starts(&self, k: usize, tried: &[Tried]) -> Vec<Vec<f64>> {
+        let own = tried[k].point.iter().map(|point| point.parameters.clone());
+        let others = self.neighbours[k].iter().filter_map(|&other| {
+            let Tried { orders, point } = &tried[other];
+            Some(extended(orders, &point.as_ref()?.parameters, &tried[k].orders))
+        });
+        own.chain(others).collect()
+    }
+}
+
+/// Orders with one step less: of one polynomial, or of the same polynomial of all inputs.
+fn smaller(orders: &Orders) -> impl Iterator<Item = Orders> {
+    let less = |values: &[usize]| -> Vec<Vec<usize>> {
+        let one = (0..values.len()).filter(|&j| values[j] > 0).map(|j| {
+            let mut less = values.to_vec();
+            less[j] -= 1;
+            less
+        });
+        let all = (values.len() > 1 && values.iter().all(|&value| value > 0))
+            .then(|| values.iter().map(|value| value - 1).collect());
+        one.chain(all).collect()
+    };
+    let of_one = |value: usize| value.checked_sub(1);
+    let mut found = Vec::new();
+    found.extend(of_one(orders.na).map(|na| Orders { na, ..orders.clone() }));
+    found.extend(less(&orders.nb).into_iter().map(|nb| Orders { nb, ..orders.clone() }));
+    found.extend(of_one(orders.nc).map(|nc| Orders { nc, ..orders.clone() }));
+    found.extend(of_one(orders.nd).map(|nd| Orders { nd, ..orders.clone() }));
+    found.extend(less(&orders.nf).into_iter().map(|nf| Orders { nf, ..orders.clone() }));
+    found.into_iter()
+}

@@ -1,0 +1,74 @@
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{Path, Select};
+use crate::{Orders, Structure};
+
+/// How a model was chosen among others.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Selection {
+    /// What made one better than another.
+    pub select: Select,
+    /// Which were tried; none: delay, structure and orders were left to the data.
+    pub path: Option<Path>,
+    /// What was done, in plain words, one sentence each.
+    pub steps: Vec<String>,
+    /// N, the samples that all models were compared on.
+    pub samples: usize,
+    /// How many models were compared.
+    pub models: usize,
+    /// How many more the data could not determine.
+    pub failed: usize,
+    /// The delay of each input, where it was left to the data.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub delays: Vec<Delay>,
+    /// The model that was chosen.
+    pub chosen: Scored,
+    /// The best of the others; none if there was one only.
+    pub second: Option<Scored>,
+    /// The least cost itself, where the smallest model close to it was chosen.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub least: Option<Scored>,
+    /// The best 50, the best first.
+    pub best: Vec<Scored>,
+    /// The best of each number of parameters, the smallest first.
+    pub of_size: Vec<Scored>,
+}
+
+/// A model and what speaks for it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Scored {
+    /// Which polynomials there are.
+    pub structure: Structure,
+    /// How long they are.
+    pub orders: Orders,
+    /// p.
+    pub parameters: usize,
+    /// The mean of e^2 over the common samples of the estimation rows.
+    pub mse: f64,
+    /// The mean of e^2 on samples that the model was not fitted to: with a validation part, or cross-validation.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unseen: Option<f64>,
+    /// What it was chosen by, the smaller the better: a criterion, or `unseen`. None where it is not defined.
+    pub score: Option<f64>,
+}
+
+/// The delay of an input, as it was found.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Delay {
+    /// The input channel.
+    pub input: String,
+    /// Samples from a change to its first effect.
+    pub nk: usize,
+    /// The MDL of models with a delay of 0, 1, … samples, or from 1 on.
+    pub mdl: Vec<Scan>,
+}
+
+/// What a delay costs.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Scan {
+    /// The delay.
+    pub nk: usize,
+    /// MDL of the model with that delay.
+    pub mdl: f64,
+}

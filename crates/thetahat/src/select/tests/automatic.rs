@@ -1,0 +1,142 @@
+use super::*;
+
+const F: [f64; 3] = [1.0, -1.5, 0.7];
+
+fn automatic(
+    record: &Record<'_>,
+    structure: Option<Structure>,
+    nk: Option<Vec<usize>>,
+) -> Result<Selection, Error> {
+    let choice = Choice::Automatic(Automatic { structure, nk });
+    chosen(record, None, &choice, Select::Mdl, Initial::Auto).map(|found| found.selection)
+}
+
+/// A plant B/F with a disturbance (C/D) e of a tenth of its output.
+fn plant(b: &[f64], c: &[f64], d: &[f64], seed: u64) -> (Vec<f64>, Vec<f64>) {
+    let mut noise = Noise(seed);
+    let (u, e) = (noise.take(600), noise.take(600));
+    let (x, v) = (filtered(b, &F, &u), filtered(c, d, &e));
+    let size = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
+    (sum(&x, &v, 0.1 * size(&x) / size(&v)), u)
+}
+
+#[test]
+fn delay_structure_and_orders_are_found() {
+    let b = [0.0, 0.0, 0.0, 1.0, 0.5];
+    for (c, d, truth) in [
+        (&[1.0][..], &F[..], Orders::arx(2, &[2], &[3])),
+        (&[1.0, -1.0, 0.5], &F, Orders::armax(2, &[2], 2, &[3])),
+        (&[1.0], &[1.0], Orders::oe(&[2], &[2], &[3])),
+    ] {
+        let (y, u) = plant(&b, c, d, 71);
+        let selection = automatic(&Record::new(&y, vec![&u]).unwrap(), None, None).unwrap();
+        assert_eq!(selection.chosen.orders, truth.unwrap(), "{:?}", selection.steps);
+        assert_eq!(selection.path, None);
+        let [delay] = &selection.delays[..] else { panic!("one input") };
+        assert_eq!((delay.nk, delay.input.as_str()), (3, "u1"));
+        let least = delay.mdl.iter().min_by(|a, b| a.mdl.total_cmp(&b.mdl)).unwrap();
+        assert_eq!((least.nk, delay.mdl[0].nk, delay.mdl.len()), (3, 1, 14));
+        assert!(selection.steps[0].starts_with("Delay of u1: 3 samples (MDL -"), "{:?}", selection.steps);
+        assert!(selection.steps.iter().any(|step| step.starts_with("Second: ")), "{:?}", selection.steps);
+        assert_eq!(selection.models + selection.failed, 100 + 27 + 9 + 81);
+    }
+}
+
+#[test]
+fn a_long_delay_is_found_and_an_input_without_effect_is_said_to_be_one() {
+    let mut b = vec![0.0; 31];
+    b[30] = 1.0;
+    let (y, u) = plant(&b, &[1.0], &F, 73);
+    let v = Noise(5).take(600);
+    let record = Record::new(&y, vec![&u, &v]).unwrap();
+    let selection = automatic(&record, Some(Structure::Arx), None).unwrap();
+    assert_eq!(selection.chosen.orders.nk, [30, 1], "{:?}", selection.steps);
+    assert!(selection.steps[1].starts_with("Delay of u2: no effect"), "{:?}", selection.steps);
+}
+
+#[test]
+fn an_input_that_acts_at_once_is_seen() {
+    let (y, u) = plant(&[1.0, 0.3], &[1.0], &F, 79);
+    let selection = automatic(&Record::new(&y, vec![&u]).unwrap(), Some(Structure::Arx), None).unwrap();
+    assert_eq!(selection.chosen.orders.nk, [0], "{:?}", selection.steps);
+    assert_eq!(selection.delays[0].mdl[0].nk, 0);
+}
+
+/// u(t) = K (r(t) - y(t)) explains y(t) at once, but does not act so.
+#[test]
+fn feedback_is_not_taken_for_an_effect_at_once() {
+    for (gain, held) in [(0.25, 1), (0.25, 300), (0.1, 20)] {
+        let mut noise = Noise(83);
+        let (mut y, mut u, mut x): (Vec<f64>, Vec<f64>, Vec<f64>) = Default::default();
+        let mut wanted = 0.0;
+        for t in 0..3000 {
+            let at = |x: &[f64], lag: usize| if t >= lag { x[t - lag] } else { 0.0 };
+            let now =
+                1.5 * at(&x, 1) - 0.7 * at(&x, 2) + 0.2 * at(&u, 1) + 0.1 * at(&u, 2) + 0.1 * noise.next();
+            x.push(now);
+            y.push(now);
+            if t % held == 0 {
+                wanted = noise.next();
+            }
+            u.push(gain * (wanted - now));
+        }
+        let selection = automatic(&Record::new(&y, vec![&u]).unwrap(), Some(Structure::Arx), None).unwrap();
+        assert!(selection.chosen.orders.nk[0] >= 1, "{gain} {held} {:?}", selection.steps);
+        assert!(
+            selection.steps.iter().any(|step| step.contains("feedback")),
+            "{gain} {held} {:?}",
+            selection.steps
+        );
+    }
+}
+
+#[test]
+fn what_is_known_is_kept() {
+    let (y, u) = plant(&[0.0, 1.0, 0.5], &[1.0], &F, 89);
+    let record = Record::new(&y, vec![&u]).unwrap();
+    let selection = automatic(&record, Some(Structure::Oe), Some(vec![2])).unwrap();
+    assert!(selection.best.iter().all(|model| model.structure == Structure::Oe && model.orders.nk == [2]));
+    assert_eq!((selection.models + selection.failed, selection.delays.len()), (9, 0));
+    let selection = automatic(&record, Some(Structure::Ar), None).unwrap();
+    assert!(selection.best.iter().all(|model| model.structure == Structure::Ar));
+    assert!(automatic(&record, None, Some(vec![1, 2])).is_err());
+    assert!(automatic(&record, Some(Structure::Pem), None).is_err());
+}
+
+#[test]
+fn time_series_have_ar_and_arma_models() {
+    let mut noise = Noise(97);
+    let e = noise.take(800);
+    for (c, truth) in [(&[1.0][..], Orders::arx(2, &[], &[])), (&[1.0, 0.9], Orders::armax(2, &[], 1, &[]))] {
+        let y = filtered(c, &F, &e);
+        let record = Record::new(&y, vec![]).unwrap();
+        let selection = automatic(&record, None, None).unwrap();
+        assert_eq!(selection.chosen.orders, truth.unwrap(), "{:?}", selection.steps);
+        assert_eq!(selection.models + selection.failed, 19);
+        assert!(automatic(&record, Some(Structure::Armax), None).is_err());
+    }
+}
+
+#[test]
+fn short_logs_have_fewer_models() {
+    let (y, u) = plant(&[0.0, 0.0, 1.0, 0.5], &[1.0], &F, 101);
+    for (rows, most) in [(60, 6), (25, 2), (8, 1)] {
+        let record = Record::new(&y[..rows], vec![&u[..rows]]).unwrap();
+        let selection = automatic(&record, Some(Structure::Arx), None).unwrap();
+        let largest = selection.best.iter().map(|model| model.orders.na).max();
+        assert_eq!(largest, Some(most), "{rows} rows: {:?}", selection.steps);
+        assert!(selection.best.iter().all(|model| model.mse.is_finite() && model.score.is_some()));
+        assert!(automatic(&record, None, None).is_ok(), "{rows} rows");
+    }
+    let nothing = Record::new(&y[..2], vec![&u[..2]]).unwrap();
+    assert!(matches!(automatic(&nothing, None, None), Err(Error::Undetermined { .. })));
+}
+
+#[test]
+fn data_without_noise_have_their_own_orders() {
+    let u = Noise(103).take(300);
+    let y = filtered(&[0.0, 0.0, 1.0, 0.5], &F, &u);
+    let selection = automatic(&Record::new(&y, vec![&u]).unwrap(), None, None).unwrap();
+    assert_eq!(selection.chosen.parameters, 4, "{:?}", selection.steps);
+    assert_eq!((selection.chosen.orders.nk[0], selection.chosen.mse), (2, 0.0));
+}

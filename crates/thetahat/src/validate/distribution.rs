@@ -1,0 +1,60 @@
+//! Tails and quantiles of the distributions that the tests use.
+
+use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
+use statrs::function::beta::checked_beta_reg;
+
+/// How often a chi-square number of so many degrees of freedom is as large; none for no degrees of freedom.
+pub(super) fn chi_square_tail(statistic: f64, degrees: f64) -> Option<f64> {
+    let distribution = ChiSquared::new(degrees).ok()?;
+    Some(distribution.sf(statistic.max(0.0))).filter(|p| p.is_finite())
+}
+
+/// How far from zero a standard normal number lies with probability 1 - `alpha`; `alpha` is in 0 … 1.
+pub(crate) fn two_sided(alpha: f64) -> f64 {
+    Normal::standard().inverse_cdf(1.0 - (alpha / 2.0).clamp(0.0, 0.5))
+}
+
+/// How often at least `count` of `of` events happen, each with probability `p` in 0 … 1: by the incomplete beta function
+/// (Abramowitz and Stegun 1964, 26.5.24).
+pub(super) fn binomial_tail(count: usize, of: usize, p: f64) -> f64 {
+    if count == 0 {
+        return 1.0;
+    }
+    if count > of {
+        return 0.0;
+    }
+    checked_beta_reg(count as f64, (of - count + 1) as f64, p).unwrap_or(f64::from(u8::from(p >= 1.0)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tails_and_quantiles_are_those_of_tables() {
+        // Abramowitz and Stegun 1964, tables 26.8 and 26.2.
+        assert!((chi_square_tail(37.6525, 25.0).unwrap() - 0.05).abs() < 1e-6);
+        assert!((chi_square_tail(3.841459, 1.0).unwrap() - 0.05).abs() < 1e-8);
+        assert_eq!(chi_square_tail(0.0, 3.0), Some(1.0));
+        assert_eq!(chi_square_tail(1.0, 0.0), None);
+        assert!(chi_square_tail(1e6, 25.0).unwrap() < 1e-300);
+        assert!((two_sided(0.05) - 1.959963985).abs() < 1e-9);
+        assert!((two_sided(0.01) - 2.575829304).abs() < 1e-9);
+        assert!((two_sided(1.0)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn binomial_tails_are_sums_of_their_terms() {
+        for (of, p) in [(1_usize, 0.3_f64), (7, 0.01), (25, 0.05), (100, 0.2)] {
+            // (of over k) p^k (1 - p)^(of - k), each from the one before.
+            let mut term = (1.0 - p).powi(of as i32);
+            let mut below = 0.0;
+            for count in 0..=of {
+                assert!((binomial_tail(count, of, p) - (1.0 - below)).abs() < 1e-12, "{count} of {of}, {p}");
+                below += term;
+                term *= (of - count) as f64 / (count + 1) as f64 * p / (1.0 - p);
+            }
+            assert_eq!(binomial_tail(of + 1, of, p), 0.0);
+        }
+    }
+}

@@ -1,0 +1,259 @@
+use std::fmt;
+use std::ops::Range;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use thetahat_core::nalgebra::{DMatrix, DVector};
+
+use super::distribution::two_sided;
+use super::independence::{Parameters, Setting, independence};
+use super::moments::{Moments, Traces, columns, pseudo_inverse};
+use super::whiteness::{Autocorrelation, anderson, anderson_lags, ljung_box, pairs, past_errors};
+use crate::Model;
+use crate::data::Record;
+use crate::estimate::autoregression;
+use crate::regression::{Taps, sum_of_squares};
+use crate::respond::Innovations;
+
+/// Fewer samples than this, and one for each parameter that was fitted to them, say nothing.
+const FEWEST: usize = 10;
+/// A lag has pairs for at least one in so many samples.
+const PAIRS: usize = 4;
+/// At least so many samples stand for each lag of the autocorrelation, and of an input: with fewer, Ljung and Box's test
+/// rejects too often.
+const SAMPLES_PER_LAG: usize = 10;
+const SAMPLES_PER_INPUT_LAG: usize = 5;
+/// How many more lags of an input are looked at than the plant has parameters.
+const MORE_LAGS: usize = 10;
+/// A sum of squared errors below this fraction of the output's is rounding.
+const NOTHING_LEFT: f64 = 1e-24;
+
+/// What is left of a log when a model has predicted it one step ahead: whether there is more to be had from it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Residuals {
+    /// N, the residuals that count.
+    pub samples: usize,
+    /// How many parameters the tests take as fitted to these samples: 0 on fresh data.
+    pub fitted: usize,
+    /// The autocorrelation at lags 0, 1, …, M; 1 at lag 0.
+    pub autocorrelation: Vec<f64>,
+    /// White residuals stay within plus or minus this at 95 of 100 lags.
+    pub band: f64,
+    /// Whether the first lags together are too large for white residuals.
+    pub ljung_box: Test,
+    /// How many lags are outside their band, for several levels.
+    pub anderson: Anderson,
+    /// Whether past inputs are still in the residuals, for each input with a B.
+    pub independence: Vec<Independence>,
+}
+
+/// A test of a hypothesis.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Test {
+    /// The lags that it looks at.
+    pub lags: usize,
+    /// The statistic.
+    pub statistic: f64,
+    /// The degrees of freedom of its chi-square distribution where the hypothesis holds.
+    pub degrees: f64,
+    /// How often it is as large where the hypothesis holds; none where it is not defined (constant residuals).
+    pub p_value: Option<f64>,
+}
+
+/// Anderson's test of whiteness: white residuals have about a fraction alpha of their correlations outside the band of
+/// that level.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Anderson {
+    /// How many lags are counted.
+    pub lags: usize,
+    /// One line for each alpha, in rising order.
+    pub levels: Vec<AndersonLevel>,
+    /// The smallest alpha of a fine scale (0.001, 0.002, …, 0.5) at which the plain verdict is no longer white; none if it
+    /// is white at all of them.
+    pub stops_at: Option<f64>,
+}
+
+/// Anderson's test at one level.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct AndersonLevel {
+    /// The level.
+    pub alpha: f64,
+    /// Half the width of the band.
+    pub band: f64,
+    /// The lags outside of it.
+    pub outside: usize,
+    /// The plain verdict: the fraction outside is below alpha.
+    pub white: bool,
+    /// How often as many are outside for white residuals, the count taken as binomial.
+    pub p_value: f64,
+}
+
+/// Whether the residuals depend on an input.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Independence {
+    /// The input channel.
+    pub input: String,
+    /// The correlation of e(t) and u(t - k) at lags k = -M, …, M.
+    pub correlation: Vec<f64>,
+    /// Half the width of the 95 % band of each of them.
+    pub band: Vec<f64>,
+    /// Past inputs, k = 1 … M: where they are in the residuals, the model lacks dynamics or delay.
+    pub past: Test,
+    /// Future inputs, k = -M … -1: where they follow the residuals, there is feedback. Bonferroni's bound over the lags.
+    pub feedback: Test,
+}
+
+/// What the parameters have to do with the samples that are looked at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Relation {
+    /// They were fitted to them, or to some of them.
+    Fitted,
+    /// The same, by instrumental variables.
+    Instrumental,
+    /// They come from other samples.
+    Fresh,
+}
+
+/// Why residuals cannot be tested.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Untestable {
+    /// There are too few.
+    Few {
+        /// N.
+        samples: usize,
+        /// As many are needed.
+        needed: usize,
+    },
+    /// They are zero up to rounding.
+    Nothing,
+    /// Their squares leave the range of numbers.
+    Range,
+}
+
+impl fmt::Display for Untestable {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Few { samples, needed } => {
+                write!(f, "{samples} samples count, and tests need {needed}; name more rows")
+            }
+            Self::Nothing => {
+                f.write_str("the model explains all but rounding, there is nothing left to test")
+            }
+            Self::Range => {
+                f.write_str("their squares leave the range of numbers; scale the channels towards one")
+            }
+        }
+    }
+}
+
+impl Residuals {
+    /// The tests of the innovations of a model over a record: `lags` of the autocorrelation, Anderson's test at `alphas`.
+    ///
+    /// There are lags up to a tenth of the samples, of inputs to a fifth, and as far as a quarter of the samples have
+    /// a partner. O(N (L + p)), and O(N (L + p)^2) where the residuals are coloured.
+    pub(crate) fn of(
+        model: &Model,
+        record: &Record<'_>,
+        innovations: &[Innovations],
+        relation: Relation,
+        lags: usize,
+        alphas: &[f64],
+    ) -> Result<Self, Untestable> {
+        let fitted = if relation == Relation::Fresh { 0 } else { model.orders.parameters() };
+        let traces = Traces::new(model, record, innovations, relation == Relation::Instrumental);
+        let counted = traces.counted();
+        let samples: usize = counted.iter().map(Range::len).sum();
+        let needed = FEWEST + fitted;
+        if samples < needed {
+            return Err(Untestable::Few { samples, needed });
+        }
+        let outputs: f64 = counted.iter().map(|rows| sum_of_squares(&record.output[rows.clone()])).sum();
+        let usable = |lag: &usize| PAIRS * pairs(&counted, *lag) >= samples;
+        let longest = (1..=samples / SAMPLES_PER_INPUT_LAG).take_while(usable).last().unwrap_or(1);
+        let lags = lags.min(samples / SAMPLES_PER_LAG).clamp(1, longest);
+        let correlation = Autocorrelation::new(traces.signal(Traces::ERROR), &counted, lags);
+        let square = correlation.square;
+        if !square.is_finite() {
+            return Err(Untestable::Range);
+        }
+        if square <= NOTHING_LEFT * outputs {
+            return Err(Untestable::Nothing);
+        }
+        if !square.is_normal() || !correlation.values.iter().all(|value| value.is_finite()) {
+            return Err(Untestable::Range);
+        }
+
+        let inputs = model.inputs.iter().enumerate().filter(|(input, _)| model.orders.nb[*input] > 0);
+        let inputs: Vec<(usize, &str, usize)> = inputs
+            .map(|(input, signal)| (input, signal.name.as_str(), past_lags(model, input, lags).min(longest)))
+            .collect();
+        let error = Taps { signal: Traces::ERROR, first: 1, count: lags, sign: 1.0 };
+        let mut taps = traces.psi.clone();
+        taps.push(error);
+        taps.extend(inputs.iter().map(|&(input, _, count)| Taps {
+            signal: Traces::input(input),
+            first: 1,
+            count,
+            sign: 1.0,
+        }));
+        let moments = Moments::new(&traces, &taps);
+        let psi = columns(&traces.psi);
+        let inverse = pseudo_inverse(&moments.matrix(&psi, &psi)).ok_or(Untestable::Range)?;
+        let parameters = match (relation, &model.covariance) {
+            (Relation::Fitted | Relation::Instrumental, _) => Parameters::Fitted,
+            (Relation::Fresh, None) => Parameters::Known(None),
+            (Relation::Fresh, Some(rows)) => {
+                Parameters::Known(Some(DMatrix::from_fn(rows.len(), rows.len(), |i, j| rows[i][j])))
+            }
+        };
+
+        let count = samples as f64;
+        let own = DMatrix::identity(lags, lags);
+        let (shift, covariance) = match &parameters {
+            Parameters::Fitted => {
+                let past = past_errors(model, lags);
+                let weights = &past * &inverse;
+                let covariance = own - &weights * past.transpose() * square;
+                (weights * moments.with_error(&psi), covariance)
+            }
+            Parameters::Known(Some(spread)) => {
+                let past = moments.matrix(&columns(&[error]), &psi) / square;
+                (DVector::zeros(lags), own + &past * spread * past.transpose() * count)
+            }
+            Parameters::Known(None) => (DVector::zeros(lags), own),
+        };
+        let ljung_box = ljung_box(&correlation, &shift, &covariance).ok_or(Untestable::Range)?;
+
+        let colour = autoregression(traces.signal(Traces::ERROR), &counted, fitted);
+        let setting = Setting {
+            traces: &traces,
+            moments: &moments,
+            psi: &psi,
+            inverse: &inverse,
+            colour: &colour,
+            samples: count,
+            square,
+            parameters,
+        };
+        let independence =
+            inputs.iter().map(|&(input, name, lags)| independence(&setting, name, input, lags));
+        let independence = independence.collect::<Option<Vec<_>>>().ok_or(Untestable::Range)?;
+        Ok(Self {
+            samples,
+            fitted,
+            autocorrelation: std::iter::once(1.0).chain(correlation.values.iter().copied()).collect(),
+            band: two_sided(0.05) / count.sqrt(),
+            ljung_box,
+            anderson: anderson(&correlation, &covariance, anderson_lags(samples, lags), alphas),
+            independence,
+        })
+    }
+}
+
+/// How many past lags of an input are looked at: as many as of the autocorrelation, and more than the plant has
+/// parameters behind its delay.
+fn past_lags(model: &Model, input: usize, lags: usize) -> usize {
+    let orders = &model.orders;
+    let plant = orders.na + orders.nb[input] + orders.nf[input];
+    lags.max(orders.nk[input] + plant + MORE_LAGS)
+}

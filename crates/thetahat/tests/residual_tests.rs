@@ -5,8 +5,7 @@
 use std::f64::consts::TAU;
 
 use thetahat::{
-    Channel, Detrend, Initial, Log, Method, Orders, Plan, Report, Residuals, Rows, Seen, ValidationPlan,
-    identify, validate,
+    Channel, Log, Method, Orders, Plan, Report, Residuals, Rows, Seen, ValidationPlan, identify, validate,
 };
 
 /// SplitMix64 (Steele, Lea and Flood 2014) and the polar form of Box and Muller.

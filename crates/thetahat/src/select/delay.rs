@@ -26,6 +26,8 @@ const CLEARLY: f64 = 3.0;
 /// What past residuals foretell of an input, as a fraction of what the present one has in common with it, where there may be
 /// feedback.
 const FEEDBACK: f64 = 0.02;
+/// What stands for the MDL of a model that leaves nothing, which is not defined.
+const EXACT_MODEL: f64 = -1e9;
 
 /// Long ARX models of one record, of which the B have some windows of lags.
 struct Long<'r> {
@@ -68,7 +70,7 @@ impl<'r> Long<'r> {
             let Some(fitted) = fitted else { return f64::INFINITY };
             let criteria = Criteria::new(fitted.cost / count as f64, orders.parameters(), count);
             // Of exact models the one that has the fewest parameters.
-            criteria.mdl.unwrap_or(f64::from(i32::MIN) + orders.parameters() as f64)
+            criteria.mdl.unwrap_or(EXACT_MODEL + orders.parameters() as f64)
         };
         Ok(fitted.into_iter().zip(&models).map(mdl).collect())
     }
@@ -195,6 +197,8 @@ pub(super) fn found(task: &Task<'_>, steps: &mut Vec<String>) -> Result<(Vec<Del
                 None => table.push(Scan { nk: window.start, mdl: *mdl }),
             }
         }
+        // What the data do not determine has no figure.
+        table.retain(|scan| scan.mdl.is_finite());
         table.sort_by_key(|scan| scan.nk);
         let nk = if windows[input].is_empty() { 1 } else { windows[input].start };
         let mdl = |nk: usize| table.iter().find(|scan| scan.nk == nk).map_or(f64::INFINITY, |scan| scan.mdl);
@@ -204,10 +208,10 @@ pub(super) fn found(task: &Task<'_>, steps: &mut Vec<String>) -> Result<(Vec<Del
             let others = table.iter().filter(|other| other.nk != nk);
             let second = others.min_by(|a, b| a.mdl.total_cmp(&b.mdl));
             let against = second
-                .map(|second| format!(" against {} for {}", number(second.mdl), second.nk))
+                .map(|second| format!(" against {} for {}", shown(second.mdl), second.nk))
                 .unwrap_or_default();
             let samples = if nk == 1 { "sample" } else { "samples" };
-            steps.push(format!("Delay of {name}: {nk} {samples} (MDL {}{against}).", number(mdl(nk))));
+            steps.push(format!("Delay of {name}: {nk} {samples} (MDL {}{against}).", shown(mdl(nk))));
         }
         delays.push(Delay { input: name.clone(), nk, mdl: table });
     }
@@ -244,4 +248,9 @@ fn may_be_feedback(long: &Long<'_>, windows: &Windows, input: usize) -> Result<b
     };
     let (Some(now), Some(past)) = (explained(&without, 0), explained(&with, 1)) else { return Ok(true) };
     Ok(past > FEEDBACK * now)
+}
+
+/// An MDL, as far as it is defined.
+fn shown(mdl: f64) -> String {
+    if mdl < EXACT_MODEL / 2.0 { "not defined: the model is exact".to_owned() } else { number(mdl) }
 }

@@ -3,44 +3,14 @@
 //!
 //! `make monte-carlo` does the full numbers; `make test` fewer. `MONTE_CARLO` is the number of runs of each kind.
 
-use std::f64::consts::TAU;
+#[path = "monte_carlo/simulated.rs"]
+mod simulated;
 
 use thetahat::{
     Automatic, Choice, Initial, Method, Orders, Procedure, Record, Search, Select, choose_orders, estimate,
 };
 
-/// SplitMix64 (Steele, Lea and Flood 2014) and the polar form of Box and Muller.
-struct Random(u64);
-
-impl Random {
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut bits = self.0;
-        bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        bits ^= bits >> 31;
-        ((bits >> 11) as f64 + 0.5) / (1_u64 << 53) as f64
-    }
-
-    fn normal(&mut self) -> f64 {
-        (-2.0 * self.uniform().ln()).sqrt() * (TAU * self.uniform()).cos()
-    }
-
-    fn normals(&mut self, count: usize) -> Vec<f64> {
-        (0..count).map(|_| self.normal()).collect()
-    }
-}
-
-/// numerator/denominator applied to a signal from rest.
-fn filtered(numerator: &[f64], denominator: &[f64], signal: &[f64]) -> Vec<f64> {
-    let mut response: Vec<f64> = Vec::with_capacity(signal.len());
-    for t in 0..signal.len() {
-        let driven: f64 = (0..numerator.len().min(t + 1)).map(|i| numerator[i] * signal[t - i]).sum();
-        let past: f64 = (1..denominator.len().min(t + 1)).map(|i| denominator[i] * response[t - i]).sum();
-        response.push(driven - past);
-    }
-    response
-}
+use simulated::{BEFORE, Random, filtered};
 
 fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
     let mut product = vec![0.0; a.len() + b.len() - 1];
@@ -54,9 +24,6 @@ fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
 fn runs(fewer: usize) -> usize {
     std::env::var("MONTE_CARLO").ok().and_then(|text| text.parse().ok()).unwrap_or(fewer)
 }
-
-/// A plant that runs before the log begins, so that it is not at rest.
-const BEFORE: usize = 300;
 
 /// How often the 95 % interval of each parameter covers the truth; `noise` makes the disturbance of white noise.
 fn assert_coverage(orders: &Orders, truth: &[f64], plant: [&[f64]; 2], noise: [&[f64]; 2], size: f64) {

@@ -12,7 +12,7 @@ format:
 	@$(call with,rustfmt,fmt,cargo fmt --all --check && for d in benches/peers tests/embedded; do (cd $$d && cargo fmt --check) || exit 1; done)
 
 lint:
-	@$(call with,clippy,clippy,cargo clippy --locked --workspace --all-targets --all-features -- -D warnings)
+	@$(call with,clippy,clippy,cargo clippy --locked --workspace --all-targets --all-features -- -D warnings && cargo clippy --locked -p thetahat --test monte_carlo --test residual_tests -- -D warnings)
 	@cd tests/embedded && $(call with,clippy,clippy,cargo clippy --locked --lib --bin check --tests -- -D warnings)
 
 docs:

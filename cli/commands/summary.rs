@@ -6,8 +6,8 @@ mod text;
 mod validation;
 
 use thetahat::{
-    Algorithm, CriterionOutcome, Estimation, Fit, Initial, Model, Norm, Orders, Part, Procedure, Quantity,
-    Report, Root, Rows, SearchOutcome, Signal, Solver, Start, Stopped, Structure,
+    Algorithm, CriterionOutcome, Estimation, Fit, Initial, Model, Norm, Part, Procedure, Quantity, Report,
+    Root, Rows, SearchOutcome, Signal, Solver, Start, Stopped, Structure,
 };
 
 use crate::output::harmless;
@@ -43,28 +43,8 @@ pub(crate) fn table(report: &Report) -> String {
     text.finish()
 }
 
-/// The model's equation, without what it does not have.
+/// The model's structure and equation.
 fn formula(model: &Model) -> String {
-    let orders = &model.orders;
-    let several = orders.inputs() > 1;
-    let of = |letter: char| if several { format!("{letter}_j(q)") } else { format!("{letter}(q)") };
-    let mut right = Vec::new();
-    if orders.nb.iter().any(|&nb| nb > 0) {
-        let divided =
-            if orders.nf.iter().any(|&nf| nf > 0) { format!("/{}", of('F')) } else { String::new() };
-        let (sum, input) = if several { ("sum_j ", "u_j(t)") } else { ("", "u(t)") };
-        right.push(format!("{sum}{}{divided} {input}", of('B')));
-    }
-    let Orders { na, nc, nd, .. } = *orders;
-    right.push(
-        match (nc > 0, nd > 0) {
-            (false, false) => "e(t)",
-            (true, false) => "C(q) e(t)",
-            (false, true) => "1/D(q) e(t)",
-            (true, true) => "C(q)/D(q) e(t)",
-        }
-        .to_owned(),
-    );
     let name = match model.structure {
         Structure::Ar => "AR",
         Structure::Arma => "ARMA",
@@ -74,7 +54,7 @@ fn formula(model: &Model) -> String {
         Structure::Bj => "Box-Jenkins",
         Structure::Pem => "General model",
     };
-    format!("{name}: {} = {}", if na > 0 { "A(q) y(t)" } else { "y(t)" }, right.join(" + "))
+    format!("{name}: {}", model.orders.equation())
 }
 
 fn signal(role: &str, signal: &Signal) -> String {

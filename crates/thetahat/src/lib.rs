@@ -49,6 +49,7 @@ pub use inspect::{
     Saturation, SpectrumPoint, Times, inspect,
 };
 pub use model::{Model, Orders, Parameter, Quantity, Root, Signal, Structure};
+pub use report::figures;
 pub use report::{
     Applied, Comparison, Coverage, Data, Estimation, Missing, NoiseLevel, Parts, Plan, Report, Requirement,
     Resampling, Seen, Signals, Source, Validated, Validation, ValidationPlan, apply, compare, identify,

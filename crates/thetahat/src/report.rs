@@ -1,6 +1,7 @@
 //! The document that a fit leaves behind, and the way there.
 
 mod apply;
+pub mod figures;
 #[cfg(feature = "html")]
 mod html;
 mod identify;

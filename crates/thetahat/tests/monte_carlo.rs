@@ -35,9 +35,9 @@ fn assert_coverage(orders: &Orders, truth: &[f64], plant: [&[f64]; 2], noise: [&
         let e: Vec<f64> = random.normals(BEFORE + samples).iter().map(|e| size * e).collect();
         let (x, v) = (filtered(plant[0], plant[1], &u), filtered(noise[0], noise[1], &e));
         let y: Vec<f64> = x.iter().zip(&v).map(|(x, v)| x + v).collect();
-        let record = Record::new(&y[BEFORE..], vec![&u[BEFORE..]]).unwrap();
-        let found = estimate(&record, orders, &Method::default(), Initial::Auto).unwrap();
-        let covariance = found.covariance().unwrap();
+        let record = Record::new(&y[BEFORE..], vec![&u[BEFORE..]]).expect("the case is sound");
+        let found = estimate(&record, orders, &Method::default(), Initial::Auto).expect("the case is sound");
+        let covariance = found.covariance().expect("the case is sound");
         for (index, covered) in covered.iter_mut().enumerate() {
             let half = 1.959964 * covariance[index][index].sqrt();
             *covered += usize::from((found.parameters()[index] - truth[index]).abs() <= half);
@@ -59,7 +59,7 @@ const F: [f64; 3] = [1.0, -1.5, 0.7];
 fn intervals_of_armax_cover_the_truth() {
     let c = [1.0, 0.6, 0.3];
     assert_coverage(
-        &Orders::armax(2, &[2], 2, &[1]).unwrap(),
+        &Orders::armax(2, &[2], 2, &[1]).expect("the case is sound"),
         &[-1.5, 0.7, 1.0, 0.5, 0.6, 0.3],
         [&[0.0, 1.0, 0.5], &F],
         [&c, &F],
@@ -70,7 +70,7 @@ fn intervals_of_armax_cover_the_truth() {
 #[test]
 fn intervals_of_box_jenkins_cover_the_truth() {
     assert_coverage(
-        &Orders::bj(&[2], 1, 2, &[2], &[1]).unwrap(),
+        &Orders::bj(&[2], 1, 2, &[2], &[1]).expect("the case is sound"),
         &[1.0, 0.5, 0.7, -0.9, 0.5, -1.5, 0.7],
         [&[0.0, 1.0, 0.5], &F],
         [&[1.0, 0.7], &[1.0, -0.9, 0.5]],
@@ -81,7 +81,7 @@ fn intervals_of_box_jenkins_cover_the_truth() {
 #[test]
 fn intervals_of_output_error_cover_the_truth_in_coloured_noise() {
     assert_coverage(
-        &Orders::oe(&[2], &[2], &[1]).unwrap(),
+        &Orders::oe(&[2], &[2], &[1]).expect("the case is sound"),
         &[1.0, 0.5, -1.5, 0.7],
         [&[0.0, 1.0, 0.5], &F],
         [&[1.0], &[1.0, -0.8]],
@@ -103,7 +103,7 @@ fn assert_found(angles: &[f64]) {
         b.iter_mut().zip(others).for_each(|(b, p)| *b += angle.sin() * p);
     }
     let order = f.len() - 1;
-    let orders = Orders::oe(&[order], &[order], &[1]).unwrap();
+    let orders = Orders::oe(&[order], &[order], &[1]).expect("the case is sound");
     let truth = [&b[..], &f[1..]].concat();
     let numerator = [&[0.0], &b[..]].concat();
     let mut found = 0;
@@ -115,14 +115,15 @@ fn assert_found(angles: &[f64]) {
         let power = x[before..].iter().map(|x| x * x).sum::<f64>() / samples as f64;
         let size = (power / 10.0).sqrt();
         let y: Vec<f64> = x.iter().map(|x| x + size * random.normal()).collect();
-        let record = Record::new(&y[before..], vec![&u[before..]]).unwrap();
+        let record = Record::new(&y[before..], vec![&u[before..]]).expect("the case is sound");
         let fit = |search: Search| {
-            estimate(&record, &orders, &Method::PredictionError(search), Initial::Auto).unwrap()
+            estimate(&record, &orders, &Method::PredictionError(search), Initial::Auto)
+                .expect("the case is sound")
         };
         let default = fit(Search::default());
         // Every start there is, the truth among them.
         let best = fit(Search { guess: Some(truth.clone()), starts: 5, ..Search::default() });
-        let Procedure::PredictionError(search) = default.procedure() else { panic!("a search") };
+        let Procedure::PredictionError(search) = default.procedure() else { unreachable!("the default method searches") };
         let close = default.mse() <= best.mse() * (1.0 + 1e-5);
         if close && search.iterations <= 20 {
             found += 1;
@@ -207,11 +208,12 @@ fn assert_chosen(truth: &Orders, noise: impl Fn(&mut Random, &[f64], &[f64]) -> 
         let share = 0.1 * size(&x) / size(&v);
         let y: Vec<f64> = x.iter().zip(&v).map(|(x, v)| x + share * v).collect();
         let (log, fresh) = (BEFORE..BEFORE + samples, BEFORE + samples..u.len());
-        let record = Record::new(&y[log.clone()], vec![&u[log]]).unwrap();
-        let found =
-            choose_orders(&record, None, &Choice::Automatic(Automatic::default()), Select::Mdl).unwrap();
+        let record = Record::new(&y[log.clone()], vec![&u[log]]).expect("the case is sound");
+        let found = choose_orders(&record, None, &Choice::Automatic(Automatic::default()), Select::Mdl)
+            .expect("the case is sound");
         let fit = |orders: &Orders| {
-            let estimate = estimate(&record, orders, &Method::default(), Initial::Auto).unwrap();
+            let estimate =
+                estimate(&record, orders, &Method::default(), Initial::Auto).expect("the case is sound");
             percent(&y[fresh.clone()], &free_run(orders, estimate.parameters(), &u)[fresh.clone()])
         };
         let loss = fit(truth) - fit(&found.chosen.orders);
@@ -231,12 +233,12 @@ fn assert_chosen(truth: &Orders, noise: impl Fn(&mut Random, &[f64], &[f64]) -> 
 
 #[test]
 fn arx_is_chosen() {
-    assert_chosen(&Orders::arx(2, &[2], &[1]).unwrap(), |_, f, e| filtered(&[1.0], f, e));
+    assert_chosen(&Orders::arx(2, &[2], &[1]).expect("the case is sound"), |_, f, e| filtered(&[1.0], f, e));
 }
 
 #[test]
 fn armax_is_chosen() {
-    assert_chosen(&Orders::armax(2, &[2], 2, &[1]).unwrap(), |random, f, e| {
+    assert_chosen(&Orders::armax(2, &[2], 2, &[1]).expect("the case is sound"), |random, f, e| {
         let (modulus, angle) = (0.5 + 0.4 * random.uniform(), 0.3 + 2.5 * random.uniform());
         filtered(&[1.0, -2.0 * modulus * angle.cos(), modulus * modulus], f, e)
     });
@@ -244,5 +246,5 @@ fn armax_is_chosen() {
 
 #[test]
 fn output_error_is_chosen() {
-    assert_chosen(&Orders::oe(&[2], &[2], &[1]).unwrap(), |_, _, e| e.to_vec());
+    assert_chosen(&Orders::oe(&[2], &[2], &[1]).expect("the case is sound"), |_, _, e| e.to_vec());
 }

@@ -41,9 +41,10 @@ impl Rates {
     /// Counts one more of all runs.
     fn count(&mut self, residuals: &Residuals) {
         let each = 100.0 / runs() as f64;
-        let low = |p: Option<f64>| if p.unwrap() < LEVEL { each } else { 0.0 };
+        let low = |p: Option<f64>| if p.expect("the case is sound") < LEVEL { each } else { 0.0 };
         self.ljung_box += low(residuals.ljung_box.p_value);
-        let level = residuals.anderson.levels.iter().find(|level| level.alpha == LEVEL).unwrap();
+        let level =
+            residuals.anderson.levels.iter().find(|level| level.alpha == LEVEL).expect("the case is sound");
         self.binomial += low(Some(level.p_value));
         self.plain += if level.white { 0.0 } else { each };
         for independence in &residuals.independence {
@@ -68,24 +69,24 @@ fn runs() -> usize {
 fn log(u: Option<&[f64]>, y: &[f64]) -> Log {
     let channel = |name: &str, values: &[f64]| Channel { name: name.into(), values: values.to_vec() };
     Log::new([Some(channel("y", y)), u.map(|u| channel("u", u))].into_iter().flatten().collect(), 1.0)
-        .unwrap()
+        .expect("the case is sound")
 }
 
 fn fitted(log: &Log, orders: &Orders, method: &Method) -> Report {
     let plan = Plan {
-        estimate: vec![Rows::new(1, ROWS).unwrap()],
+        estimate: vec![Rows::new(1, ROWS).expect("the case is sound")],
         method: method.clone(),
         ..Plan::new(&["u"][..orders.inputs()], "y", orders.clone())
     };
-    identify(log.clone(), &[], &plan).unwrap()
+    identify(log.clone(), &[], &plan).expect("the case is sound")
 }
 
 fn residuals(report: &Report, log: &Log, rows: [usize; 2], seen: Seen) -> Residuals {
-    let rows = vec![Rows::new(rows[0], rows[1]).unwrap()];
+    let rows = vec![Rows::new(rows[0], rows[1]).expect("the case is sound")];
     let plan = ValidationPlan { rows, ..ValidationPlan::default() };
-    let found = validate(report, None, log.clone(), &[], &plan).unwrap().validation;
+    let found = validate(report, None, log.clone(), &[], &plan).expect("the case is sound").validation;
     assert_eq!(found.seen, seen);
-    found.residuals.unwrap()
+    found.residuals.expect("the case is sound")
 }
 
 /// What is rejected on the rows of the fit, and on fresh ones.
@@ -137,7 +138,7 @@ const SLOW: &[f64] = &[1.0, -0.9];
 
 #[test]
 fn arx() {
-    let orders = Orders::arx(2, &[2], &[1]).unwrap();
+    let orders = Orders::arx(2, &[2], &[1]).expect("the case is sound");
     for (name, colour) in [("ARX", ONE), ("ARX, slow input", SLOW)] {
         let method = Method::default();
         let kind = Kind { name, orders: orders.clone(), method, plant: [B, F], noise: [ONE, F], colour };
@@ -147,7 +148,7 @@ fn arx() {
 
 #[test]
 fn armax() {
-    let orders = Orders::armax(2, &[2], 2, &[1]).unwrap();
+    let orders = Orders::armax(2, &[2], 2, &[1]).expect("the case is sound");
     let noise = [&[1.0, 0.6, 0.3], F];
     let method = Method::default();
     assert_levels(&Kind { name: "ARMAX", orders, method, plant: [B, F], noise, colour: ONE }, true);
@@ -155,7 +156,7 @@ fn armax() {
 
 #[test]
 fn output_error() {
-    let orders = Orders::oe(&[2], &[2], &[1]).unwrap();
+    let orders = Orders::oe(&[2], &[2], &[1]).expect("the case is sound");
     let coloured: [&[f64]; 2] = [ONE, &[1.0, -0.8]];
     for (name, method, noise, colour) in [
         ("OE", Method::default(), [ONE, ONE], ONE),
@@ -171,7 +172,7 @@ fn output_error() {
 
 #[test]
 fn instrumental_variables() {
-    let orders = Orders::arx(2, &[2], &[1]).unwrap();
+    let orders = Orders::arx(2, &[2], &[1]).expect("the case is sound");
     let noise: [&[f64]; 2] = [ONE, &[1.0, -0.8]];
     let method = Method::InstrumentalVariables;
     assert_levels(&Kind { name: "IV", orders, method, plant: [B, F], noise, colour: ONE }, false);
@@ -179,7 +180,7 @@ fn instrumental_variables() {
 
 #[test]
 fn box_jenkins() {
-    let orders = Orders::bj(&[2], 1, 2, &[2], &[1]).unwrap();
+    let orders = Orders::bj(&[2], 1, 2, &[2], &[1]).expect("the case is sound");
     let noise: [&[f64]; 2] = [&[1.0, 0.7], &[1.0, -0.9, 0.5]];
     let method = Method::default();
     assert_levels(&Kind { name: "Box-Jenkins", orders, method, plant: [B, F], noise, colour: ONE }, true);
@@ -187,8 +188,8 @@ fn box_jenkins() {
 
 #[test]
 fn time_series() {
-    let ar = Orders::arx(2, &[], &[]).unwrap();
-    let arma = Orders::new(2, &[], 1, 0, &[], &[]).unwrap();
+    let ar = Orders::arx(2, &[], &[]).expect("the case is sound");
+    let arma = Orders::new(2, &[], 1, 0, &[], &[]).expect("the case is sound");
     for (name, orders, c) in [("AR", ar, ONE), ("ARMA", arma, &[1.0, 0.5][..])] {
         let method = Method::default();
         assert_levels(&Kind { name, orders, method, plant: [&[0.0], ONE], noise: [c, F], colour: ONE }, true);
@@ -198,13 +199,13 @@ fn time_series() {
 #[test]
 fn plants_of_too_low_an_order_are_rejected() {
     let method = Method::default;
-    let orders = Orders::arx(1, &[1], &[1]).unwrap();
+    let orders = Orders::arx(1, &[1], &[1]).expect("the case is sound");
     let kind =
         Kind { name: "ARX(1, 1)", orders, method: method(), plant: [B, F], noise: [ONE, F], colour: ONE };
     for rates in rates(&kind) {
         assert!(rates.ljung_box > 95.0 && rates.past > 95.0, "{rates:?}");
     }
-    let orders = Orders::oe(&[1], &[1], &[1]).unwrap();
+    let orders = Orders::oe(&[1], &[1], &[1]).expect("the case is sound");
     let kind =
         Kind { name: "OE(1, 1)", orders, method: method(), plant: [B, F], noise: [ONE, ONE], colour: ONE };
     for rates in rates(&kind) {
@@ -215,7 +216,7 @@ fn plants_of_too_low_an_order_are_rejected() {
 /// u(t) = r(t) - 0.1 y(t - 1), in noise of twice the size.
 #[test]
 fn feedback_is_seen_and_does_no_harm() {
-    let orders = Orders::arx(2, &[2], &[1]).unwrap();
+    let orders = Orders::arx(2, &[2], &[1]).expect("the case is sound");
     let mut rates = Rates::default();
     for seed in 0..runs() as u64 {
         let mut random = Random(5 + 7919 * seed);

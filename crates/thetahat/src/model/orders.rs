@@ -149,6 +149,34 @@ impl Orders {
         }
     }
 
+    /// The equation of these orders, without what they do not have.
+    ///
+    /// ```
+    /// assert_eq!(thetahat::Orders::arx(2, &[2], &[1])?.equation(), "A(q) y(t) = B(q) u(t) + e(t)");
+    /// # Ok::<(), thetahat::Error>(())
+    /// ```
+    pub fn equation(&self) -> String {
+        let several = self.inputs() > 1;
+        let of = |letter: char| if several { format!("{letter}_j(q)") } else { format!("{letter}(q)") };
+        let mut right = Vec::new();
+        if self.nb.iter().any(|&nb| nb > 0) {
+            let divided =
+                if self.nf.iter().any(|&nf| nf > 0) { format!("/{}", of('F')) } else { String::new() };
+            let (sum, input) = if several { ("sum_j ", "u_j(t)") } else { ("", "u(t)") };
+            right.push(format!("{sum}{}{divided} {input}", of('B')));
+        }
+        right.push(
+            match (self.nc > 0, self.nd > 0) {
+                (false, false) => "e(t)",
+                (true, false) => "C(q) e(t)",
+                (false, true) => "1/D(q) e(t)",
+                (true, true) => "C(q)/D(q) e(t)",
+            }
+            .to_owned(),
+        );
+        format!("{} = {}", if self.na > 0 { "A(q) y(t)" } else { "y(t)" }, right.join(" + "))
+    }
+
     /// Whether the predictor is linear in the parameters: C = D = F = 1.
     pub fn is_linear(&self) -> bool {
         self.nc == 0 && self.nd == 0 && self.nf.iter().all(|&nf| nf == 0)

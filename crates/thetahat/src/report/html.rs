@@ -250,7 +250,7 @@ fn of(logs: &[Source]) -> String {
 }
 
 fn headline(model: &Model) -> String {
-    format!("{}: {}", model.orders, text::equation(model))
+    format!("{}: {}", model.orders, model.orders.equation())
 }
 
 /// The model in a sentence, and how close it comes.

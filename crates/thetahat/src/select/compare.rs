@@ -23,10 +23,10 @@ pub(super) struct Outcome {
     /// Those that the data determine, and of each that was searched for its parameters.
     pub(super) scored: Vec<(Scored, Option<Vec<f64>>)>,
     pub(super) failed: usize,
-    /// N.
-    pub(super) samples: usize,
     /// The smallest model of all.
     pub(super) smallest: Option<Orders>,
+    /// N.
+    pub(super) samples: usize,
     /// What there is to say of the samples, in sentences.
     pub(super) remarks: Vec<String>,
 }
@@ -95,10 +95,12 @@ pub(super) fn compare(task: &Task<'_>, models: Vec<Orders>) -> Result<Outcome, E
     let samples = Samples::new(record, task.initial, &models)?;
     let count = samples.count(record);
     let with_unseen = matches!(task.select, Select::Validation | Select::Cv);
-    let mut tried = fit_linear(record, &samples, &models, searched || with_unseen)?;
-    let energy: f64 =
-        record.segments.iter().map(|segment| sum_of_squares(&record.output[segment.clone()])).sum();
-    let exact = |cost: f64| if cost <= EXACT * energy { 0.0 } else { cost };
+    let smallest = models.first().cloned();
+    let mut tried: Vec<Tried> = models.into_iter().map(|orders| Tried { orders, point: None }).collect();
+    fit_linear(record, &samples, &mut tried, searched || with_unseen)?;
+    // Those of linear models are zero already where they are rounding.
+    let nothing = if searched { EXACT * energy(record) } else { 0.0 };
+    let exact = |cost: f64| if cost <= nothing { 0.0 } else { cost };
     if searched {
         let free = task.initial != Initial::Zero;
         let common = Common::new(record, free, samples.window, task.search, task.monitor)?;
@@ -107,31 +109,27 @@ pub(super) fn compare(task: &Task<'_>, models: Vec<Orders>) -> Result<Outcome, E
             let score = score(Select::Mdl, mse, size, point.initial, count, None);
             score.unwrap_or(f64::NEG_INFINITY)
         };
-        Family::new(&models).fit(&common, &mut tried, &score)?;
+        Family::new(&tried).fit(&common, &mut tried, &score)?;
     }
     let looks = unseen::costs(task, record, &tried)?;
-    let scored = tried.iter().zip(looks).filter_map(|(model, unseen)| {
-        let point = model.point.as_ref()?;
-        let unseen = match (with_unseen, unseen) {
-            (true, None) => return None,
-            (_, unseen) => unseen,
-        };
-        let cost = exact(point.cost);
-        let mse = cost / count as f64;
-        let parameters = model.orders.parameters();
+    let models = tried.len();
+    let scored = tried.into_iter().zip(looks).filter_map(|(Tried { orders, point }, unseen)| {
+        let Point { parameters, cost, initial } = point?;
+        let unseen = if with_unseen { Some(unseen?) } else { None };
+        let (mse, size) = (exact(cost) / count as f64, orders.parameters());
         let scored = Scored {
-            structure: model.orders.structure(),
-            orders: model.orders.clone(),
-            parameters,
+            structure: orders.structure(),
+            parameters: size,
             mse,
             unseen,
-            score: score(task.select, mse, parameters, point.initial, count, unseen),
+            score: score(task.select, mse, size, initial, count, unseen),
+            orders,
         };
-        Some((scored, (!model.orders.is_linear()).then(|| point.parameters.clone())))
+        let guess = (!scored.orders.is_linear()).then_some(parameters);
+        Some((scored, guess))
     });
     let scored: Vec<(Scored, Option<Vec<f64>>)> = scored.collect();
-    let failed = models.len() - scored.len();
-    Ok(Outcome { scored, failed, samples: count, smallest: models.first().cloned(), remarks })
+    Ok(Outcome { failed: models - scored.len(), scored, samples: count, smallest, remarks })
 }
 
 /// What a model is chosen by.
@@ -156,30 +154,28 @@ fn score(
     }
 }
 
-/// The models that are linear in their parameters; the others are left open.
+/// Fits the models that are linear in their parameters.
 fn fit_linear(
     record: &Record<'_>,
     samples: &Samples,
-    models: &[Orders],
+    tried: &mut [Tried],
     with_parameters: bool,
-) -> Result<Vec<Tried>, Error> {
+) -> Result<(), Error> {
     let count = samples.count(record);
-    let linear: Vec<usize> =
-        (0..models.len()).filter(|&k| models[k].is_linear() && models[k].parameters() < count).collect();
-    let mut tried: Vec<Tried> =
-        models.iter().map(|orders| Tried { orders: orders.clone(), point: None }).collect();
+    let fits = |model: &&mut Tried| model.orders.is_linear() && model.orders.parameters() < count;
+    let mut linear: Vec<&mut Tried> = tried.iter_mut().filter(fits).collect();
     if linear.is_empty() {
-        return Ok(tried);
+        return Ok(());
     }
-    let own: Vec<&Orders> = linear.iter().map(|&k| &models[k]).collect();
-    let columns = Columns::new(own.iter().copied(), record.inputs.len());
+    let orders: Vec<&Orders> = linear.iter().map(|model| &model.orders).collect();
+    let columns = Columns::new(orders.iter().copied(), record.inputs.len());
     let rows = rows(record, &columns, samples)?;
-    let fitted = Scaled::new(&rows).fit(&columns, &own, with_parameters);
-    for (k, fitted) in linear.into_iter().zip(fitted) {
+    let fitted = Scaled::new(&rows).fit(&columns, &orders, with_parameters);
+    for (model, fitted) in linear.iter_mut().zip(fitted) {
         let point = |Fitted { cost, parameters }| Point { parameters, cost, initial: 0.0 };
-        tried[k].point = fitted.map(point);
+        model.point = fitted.map(point);
     }
-    Ok(tried)
+    Ok(())
 }
 
 /// The rows of a record, kept so that costs are exact.
@@ -194,4 +190,9 @@ pub(super) fn rows(record: &Record<'_>, columns: &Columns, samples: &Samples) ->
 /// All samples of a record.
 pub(super) fn total(record: &Record<'_>) -> usize {
     record.segments.iter().map(std::ops::Range::len).sum()
+}
+
+/// The sum of squares of the output.
+pub(super) fn energy(record: &Record<'_>) -> f64 {
+    record.segments.iter().map(|segment| sum_of_squares(&record.output[segment.clone()])).sum()
 }

@@ -26,6 +26,9 @@ impl Grid {
             each(name, ranges, inputs)?;
         }
         let ranges = self.turns(inputs);
+        // Of all orders the highest is checked, before they are counted.
+        let highest = ranges.iter().chain(&nk).map(OrderRange::last).max().unwrap_or(0);
+        Orders::arx(highest.max(1), &[], &[])?;
         let places = self.places(&ranges, &nk)?;
         let mut delays: Vec<Vec<usize>> = vec![Vec::new()];
         for range in &nk {
@@ -41,7 +44,7 @@ impl Grid {
         let mut seen = BTreeSet::new();
         for delays in &delays {
             for place in &places {
-                let Some(orders) = self.at(place, delays, &nk)? else { continue };
+                let Some(orders) = self.at(place, delays, &nk) else { continue };
                 if !twice || seen.insert(key(&orders)) {
                     models.push(orders);
                 }
@@ -121,7 +124,7 @@ impl Grid {
     }
 
     /// The model of a place; none where it is no model.
-    fn at(&self, place: &Place, delays: &[usize], nk: &[OrderRange]) -> Result<Option<Orders>, Error> {
+    fn at(&self, place: &Place, delays: &[usize], nk: &[OrderRange]) -> Option<Orders> {
         let inputs = delays.len();
         let (na, rest) = (place[0], &place[1..]);
         let of_inputs = |ranges: &[OrderRange], orders: &[usize]| match (inputs, ranges) {
@@ -135,12 +138,12 @@ impl Grid {
         let nf = of_inputs(&self.nf, &rest[ranges + 2..]);
         let filtered_nothing = nb.iter().zip(&nf).any(|(&nb, &nf)| nb == 0 && nf > 0);
         if filtered_nothing || na + nc + nd + nb.iter().sum::<usize>() == 0 {
-            return Ok(None);
+            return None;
         }
         let used = nb.iter().zip(delays.iter().zip(nk));
         let nk: Vec<usize> =
             used.map(|(&nb, (&own, range))| if nb > 0 { own } else { range.first() }).collect();
-        Orders::new(na, &nb, nc, nd, &nf, &nk).map(Some)
+        Some(Orders { na, nb, nc, nd, nf, nk })
     }
 }
 

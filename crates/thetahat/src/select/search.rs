@@ -30,12 +30,13 @@ pub(super) struct Family {
 
 impl Family {
     /// Of models that are sorted by their number of parameters.
-    pub(super) fn new(models: &[Orders]) -> Self {
-        let places: BTreeMap<Vec<usize>, usize> = models.iter().map(key).zip(0..).collect();
+    pub(super) fn new(models: &[Tried]) -> Self {
+        let places: BTreeMap<Vec<usize>, usize> =
+            models.iter().map(|model| key(&model.orders)).zip(0..).collect();
         let place = |orders: Orders| places.get(&key(&orders)).copied();
         let neighbours: Vec<Vec<usize>> =
-            models.iter().map(|orders| smaller(orders).filter_map(place).collect()).collect();
-        let searched = |k: usize| !models[k].is_linear();
+            models.iter().map(|model| smaller(&model.orders).filter_map(place).collect()).collect();
+        let searched = |k: usize| !models[k].orders.is_linear();
         let mut levels: Vec<Vec<usize>> = Vec::new();
         let mut of = vec![0; models.len()];
         for k in (0..models.len()).filter(|&k| searched(k)) {

@@ -4,12 +4,12 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::compare::{Samples, Tried, rows};
+use super::compare::{Samples, Tried, energy, rows};
 use super::linear::{Columns, Kept, Rows, Scaled};
 use super::{EXACT, Select, Task};
 use crate::data::Record;
 use crate::estimate::{Common, Point};
-use crate::regression::{Presample, sum_of_squares};
+use crate::regression::Presample;
 use crate::{Error, Orders};
 
 /// Blocks of a cross-validation.
@@ -32,10 +32,6 @@ pub(super) fn costs(
         (Select::Cv, _) => cross_validated(task, record, samples, tried),
         _ => Ok(vec![None; tried.len()]),
     }
-}
-
-fn energy(record: &Record<'_>) -> f64 {
-    record.segments.iter().map(|segment| sum_of_squares(&record.output[segment.clone()])).sum()
 }
 
 /// The linear models among those that have parameters, and all others.

@@ -3,7 +3,7 @@
 use thetahat_core::nalgebra::ComplexField;
 
 use super::Candidate;
-use super::mixed::{Data, Polynomials, ROUNDS, starts};
+use super::mixed::{Coefficients, Data, ROUNDS, starts};
 use super::noise::{Equation, Mixed, behind};
 use super::output_error::{OutputError, Start};
 use super::plant::{Input, divided, energy, multiplied};
@@ -57,7 +57,7 @@ impl Data<'_> {
             Some((cost, a, f, noise))
         });
         let (_, a, f, noise) = found.min_by(|(left, ..), (right, ..)| left.total_cmp(right))?;
-        let found = Polynomials {
+        let found = Coefficients {
             a: a[1..].to_vec(),
             b: start.b,
             c: noise.c[1..].to_vec(),
@@ -72,7 +72,7 @@ impl Data<'_> {
     fn in_turn(&self, first: &Start, without_a: &Orders) -> Option<Candidate> {
         let orders = self.orders;
         let mut start = first.clone();
-        let mut best: Option<(f64, Polynomials)> = None;
+        let mut best: Option<(f64, Coefficients)> = None;
         for _ in 0..ROUNDS {
             let by_f = |(input, f): (&&[f64], &Vec<f64>)| {
                 let mut filtered = Vec::new();
@@ -92,7 +92,7 @@ impl Data<'_> {
             let output = self.whitened(&noise, &output, self.segments);
             let inputs = self.whitened_inputs(&noise);
             let inputs: Vec<&[f64]> = inputs.iter().map(Vec::as_slice).collect();
-            let found = Polynomials {
+            let found = Coefficients {
                 a: plant.a[1..].to_vec(),
                 b: plant.b,
                 c: noise.c[1..].to_vec(),

@@ -14,9 +14,9 @@ const ITERATIONS: Limits = Limits { iterations: 20, tolerance: 1e-3 };
 /// Below this fraction of sum y^2, a plant's errors are rounding.
 const EXACT: f64 = 1e-20;
 
-/// The coefficients without leading ones, those of b and f for each input.
+/// Coefficients of the polynomials without leading ones, those of b and f for each input.
 #[derive(Debug, Clone)]
-pub(super) struct Polynomials {
+pub(super) struct Coefficients {
     pub(super) a: Vec<f64>,
     pub(super) b: Vec<Vec<f64>>,
     pub(super) c: Vec<f64>,
@@ -24,7 +24,7 @@ pub(super) struct Polynomials {
     pub(super) f: Vec<Vec<f64>>,
 }
 
-impl Polynomials {
+impl Coefficients {
     pub(super) fn candidate(self, name: &'static str, unstable_pole: Option<f64>) -> Candidate {
         let parts = [vec![self.a], self.b, vec![self.c, self.d], self.f];
         Candidate { name, parameters: parts.concat().concat(), unstable_pole }
@@ -84,7 +84,7 @@ impl<'a> Data<'a> {
         let Mixed { a: d, c, .. } = self.noise_of(self.output, self.segments)?;
         let b = vec![Vec::new(); self.inputs.len()];
         let found =
-            Polynomials { a: Vec::new(), b, c: c[1..].to_vec(), d: d[1..].to_vec(), f: self.unit_f() };
+            Coefficients { a: Vec::new(), b, c: c[1..].to_vec(), d: d[1..].to_vec(), f: self.unit_f() };
         Some(found.candidate("hannan-rissanen", None))
     }
 
@@ -97,7 +97,7 @@ impl<'a> Data<'a> {
     /// A y = B u + C e, and without inputs A y = C e.
     fn armax(&self) -> Option<Candidate> {
         let Mixed { a, b, c } = self.equation().hannan_rissanen(self.orders.nc)?;
-        let found = Polynomials {
+        let found = Coefficients {
             a: a[1..].to_vec(),
             b,
             c: c[1..].to_vec(),
@@ -116,7 +116,7 @@ impl<'a> Data<'a> {
         let starts = [("hannan-rissanen", by_regression), ("refined-instruments", self.by_instruments())];
         let refined = starts.into_iter().filter_map(|(name, start)| {
             let (_, plant, noise) = self.generalised(&equation, start?)?;
-            let found = Polynomials {
+            let found = Coefficients {
                 a: plant.a[1..].to_vec(),
                 b: plant.b,
                 c: noise.c[1..].to_vec(),
@@ -245,7 +245,7 @@ impl Start {
             || (vec![0.0; orders.nc], vec![0.0; orders.nd]),
             |noise| (noise.c[1..].to_vec(), noise.a[1..].to_vec()),
         );
-        Polynomials { a: vec![0.0; orders.na], b: self.b.clone(), c, d, f: self.f.clone() }
+        Coefficients { a: vec![0.0; orders.na], b: self.b.clone(), c, d, f: self.f.clone() }
             .candidate(name, self.unstable_pole)
     }
 }

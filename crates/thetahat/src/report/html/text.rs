@@ -1,31 +1,10 @@
 //! How numbers and names are written.
 
-use crate::{Model, Quantity, Root, Rows};
+pub(super) use crate::report::figures::{number, short};
+use crate::{Quantity, Root, Rows};
 
 /// A name in a chart takes no more room than so many characters, and less beside an axis.
 const LONGEST: [usize; 2] = [40, 15];
-
-/// Six significant digits.
-pub(super) fn number(value: f64) -> String {
-    let size = value.abs();
-    if value == 0.0 {
-        return "0".to_owned();
-    }
-    if !(1e-4..1e6).contains(&size) {
-        return format!("{value:.5e}");
-    }
-    let decimals = (5 - size.log10().floor() as i32).clamp(0, 9) as usize;
-    format!("{value:.decimals$}")
-}
-
-/// The same without zeros at the end.
-pub(super) fn short(value: f64) -> String {
-    let text = number(value);
-    if text.contains('.') && !text.contains('e') {
-        return text.trim_end_matches('0').trim_end_matches('.').to_owned();
-    }
-    text
-}
 
 /// Three digits: an uncertainty, or a probability.
 pub(super) fn three(value: f64) -> String {
@@ -103,30 +82,6 @@ pub(super) fn inside_script(json: &str) -> String {
         }
     }
     safe
-}
-
-/// The model's equation, without what it does not have.
-pub(super) fn equation(model: &Model) -> String {
-    let orders = &model.orders;
-    let several = orders.inputs() > 1;
-    let of = |letter: char| if several { format!("{letter}_j(q)") } else { format!("{letter}(q)") };
-    let mut right = Vec::new();
-    if orders.nb.iter().any(|&nb| nb > 0) {
-        let divided =
-            if orders.nf.iter().any(|&nf| nf > 0) { format!("/{}", of('F')) } else { String::new() };
-        let (sum, input) = if several { ("sum_j ", "u_j(t)") } else { ("", "u(t)") };
-        right.push(format!("{sum}{}{divided} {input}", of('B')));
-    }
-    right.push(
-        match (orders.nc > 0, orders.nd > 0) {
-            (false, false) => "e(t)",
-            (true, false) => "C(q) e(t)",
-            (false, true) => "1/D(q) e(t)",
-            (true, true) => "C(q)/D(q) e(t)",
-        }
-        .to_owned(),
-    );
-    format!("{} = {}", if orders.na > 0 { "A(q) y(t)" } else { "y(t)" }, right.join(" + "))
 }
 
 #[cfg(test)]

@@ -58,6 +58,7 @@ fn a_grid_of_too_many_models_is_refused_before_it_is_made() {
         grid(range(1, 999), &[range(1, 30)], &[0.into()], &[1.into()], Path::Alternate).orders(1).is_ok()
     );
     // An order that was mistyped.
+    assert!(grid(range(0, usize::MAX), &[large], &[large], &[large], Path::All).orders(1).is_err());
     assert!(grid(range(1, 2), &[1.into()], &[0.into()], &[2000.into()], Path::All).orders(1).is_err());
 }
 

@@ -123,7 +123,9 @@ fn assert_found(angles: &[f64]) {
         let default = fit(Search::default());
         // Every start there is, the truth among them.
         let best = fit(Search { guess: Some(truth.clone()), starts: 5, ..Search::default() });
-        let Procedure::PredictionError(search) = default.procedure() else { unreachable!("the default method searches") };
+        let Procedure::PredictionError(search) = default.procedure() else {
+            unreachable!("the default method searches")
+        };
         let close = default.mse() <= best.mse() * (1.0 + 1e-5);
         if close && search.iterations <= 20 {
             found += 1;

@@ -1,4 +1,4 @@
-.PHONY: demo test format lint docs rust chromium embedded soak monte-carlo bench
+.PHONY: demo test format lint docs rust chromium embedded python wheel soak monte-carlo bench
 
 # Fit the sample log that the program carries.
 demo:
@@ -6,10 +6,14 @@ demo:
 
 # Everything that must pass. A tool that is missing is installed where that is possible; else its check is skipped by
 # name, or fails where CI=true.
-test: format lint docs rust embedded
+test: format lint docs rust embedded python
 
 format:
 	@$(call with,rustfmt,fmt,cargo fmt --all --check && for d in benches/peers tests/embedded; do (cd $$d && cargo fmt --check) || exit 1; done)
+
+# They read the Python module too, and need no Python for that.
+lint docs: export PYO3_NO_PYTHON = 1
+lint docs: export PYO3_BUILD_EXTENSION_MODULE = 1
 
 lint:
 	@$(call with,clippy,clippy,cargo clippy --locked --workspace --all-targets --all-features -- -D warnings && cargo clippy --locked -p thetahat --test monte_carlo --test residual_tests -- -D warnings)
@@ -38,6 +42,14 @@ chromium:
 # The firmware in an emulator: the host's bits, no panic, and what a step costs.
 embedded:
 	tests/embedded/run
+
+# The Python package in an environment of its own: its tests, the examples in its documentation, its types.
+python:
+	py/tests/run
+
+# The wheel that users get, optimised, into target/wheels, and the same tests on it.
+wheel:
+	py/tests/run --release
 
 soak:
 	SOAK_STEPS=100000000 cargo test --locked --release -p thetahat-core --test soak -- --nocapture

@@ -2,14 +2,17 @@
 
 mod bode;
 mod compare;
-mod demo;
+pub(crate) mod demo;
 mod fit;
 mod help;
 mod inspect;
 mod respond;
 mod stored;
-mod summary;
+pub(crate) mod summary;
 mod validate;
+
+pub(crate) use fit::{Experiments, experiments};
+pub(crate) use inspect::inspected;
 
 use crate::args::{Arguments, Command};
 use crate::failure::Failure;

@@ -3,7 +3,6 @@
 use std::fmt::Display;
 use std::io;
 use std::path::Path;
-use std::process::ExitCode;
 
 use crate::interrupt;
 use crate::output::{harmless, say};
@@ -41,25 +40,42 @@ fn option_of(argument: &str) -> Option<&str> {
 
 /// One line for a person, and an exit code for a script.
 #[derive(Debug)]
-pub(crate) struct Failure {
+pub struct Failure {
     kind: Kind,
     message: String,
 }
 
+/// What kind of failure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
+#[non_exhaustive]
+pub enum Kind {
     /// Nobody reads the output any more: nothing to say.
     Closed,
     /// Ctrl-C.
     Interrupted,
+    /// The options do not make sense.
     Usage,
+    /// The log or the report does not hold what was asked of it.
     Data,
+    /// The data cannot determine the model.
     Undetermined,
+    /// A file cannot be read or written.
     Io,
+    /// A model does not meet what was asked of it.
     Unmet,
 }
 
 impl Failure {
+    /// What kind it is.
+    pub fn kind(&self) -> Kind {
+        self.kind
+    }
+
+    /// What is wrong and what to do, in one line.
+    pub fn message(&self) -> &str {
+        &self.message
+    }
+
     /// The command line does not make sense.
     pub(crate) fn usage(message: impl Into<String>) -> Self {
         Self { kind: Kind::Usage, message: message.into() }
@@ -126,12 +142,12 @@ impl Failure {
     }
 
     /// Says it on standard error and gives the exit code.
-    pub(crate) fn report(&self) -> ExitCode {
+    pub(crate) fn report(&self) -> u8 {
         let code = match self.kind {
-            Kind::Closed => return ExitCode::SUCCESS,
+            Kind::Closed => return 0,
             Kind::Interrupted => {
                 say(interrupt::message(interrupt::has_written()));
-                return ExitCode::from(interrupt::EXIT_CODE);
+                return interrupt::EXIT_CODE;
             }
             Kind::Usage => 2,
             Kind::Data => 3,
@@ -140,7 +156,7 @@ impl Failure {
             Kind::Unmet => 6,
         };
         say(&format!("\x1b[1;31merror:\x1b[0m {}", harmless(&self.message)));
-        ExitCode::from(code)
+        code
     }
 }
 

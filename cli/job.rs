@@ -24,6 +24,8 @@ pub(crate) use validate::LookJob;
 pub(crate) struct LogJob {
     pub(crate) options: table::Options,
     pub(crate) clock: Clock,
+    /// Whether to draw no progress.
+    pub(crate) quiet: bool,
 }
 
 /// Where a log's times come from.
@@ -69,7 +71,7 @@ impl LogJob {
             (None, Some(step)) => Clock::Fixed(seconds("--sample-time", step)?),
             (None, None) => Clock::Unknown,
         };
-        Ok(Self { options, clock })
+        Ok(Self { options, clock, quiet: false })
     }
 }
 

@@ -1,4 +1,5 @@
-//! The command line of thetahat as a library: [`run`] is the whole program.
+//! The command line of thetahat as a library: [`run`] is the whole program. A binding to another language has its stages,
+//! with the same options, and its tables.
 //!
 //! `args` is syntax only; `job` resolves it, with every check that needs no data; `log` reads a log; `commands` has one
 //! file a verb. Only this crate opens files, prints, or knows about terminals.
@@ -8,6 +9,7 @@
 mod readme {}
 
 mod args;
+mod binding;
 mod commands;
 mod failure;
 mod interrupt;
@@ -19,25 +21,29 @@ mod shell;
 mod table;
 
 use std::ffi::OsString;
-use std::process::ExitCode;
 
 use clap::Parser;
 
+pub use binding::{Opened, inspect, plan, read, validation_plan};
+pub use commands::demo::LOG as DEMO_LOG;
+pub use commands::summary::{comparison, inspection, table, validation};
+pub use failure::{Failure, Kind};
+
 /// Runs the program on its arguments, the program's name first, and gives its exit code: 0 done, 2 usage, 3 bad data,
 /// 4 the data cannot determine the model, 5 input/output, 6 a model does not meet what was required, 130 interrupted.
-pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let words: Vec<OsString> = arguments.into_iter().collect();
     let arguments = match args::Arguments::try_parse_from(&words) {
         Ok(arguments) => arguments,
         Err(error) => {
             // Help and version come this way too, with code 0. Nobody is left to tell that printing failed.
             let _ = error.print();
-            return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
+            return u8::try_from(error.exit_code()).unwrap_or(2);
         }
     };
     interrupt::listen();
     match commands::dispatch(arguments, &shell::line(&words)) {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) => 0,
         Err(failure) => failure.report(),
     }
 }

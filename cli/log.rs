@@ -6,7 +6,6 @@ use thetahat::{Channel, Error, Log, Recording, Resampling, Rows, Source, Times};
 
 use crate::failure::Failure;
 use crate::job::{Clock, LogJob};
-use crate::output::warn;
 use crate::progress::Reading;
 use crate::table::{Lines, Reader, Selection, Table};
 
@@ -15,6 +14,8 @@ use crate::table::{Lines, Reader, Selection, Table};
 pub(crate) struct Loaded {
     pub(crate) log: Log,
     pub(crate) source: Source,
+    /// What the reader should know, in plain words.
+    pub(crate) words: Vec<String>,
 }
 
 /// What the library says of some logs, with the file that has the row or, without a row, all of them.
@@ -50,7 +51,6 @@ pub(crate) fn load(
     choose: impl FnOnce(&[String]) -> Result<Vec<String>, Failure>,
 ) -> Result<Loaded, Failure> {
     let Columns { channels, table, mut source, words } = columns(path, job, |reader| choose(reader.names()))?;
-    words.iter().for_each(|word| warn(word));
     let file = source.file.clone();
     let log = match (&job.clock, table.time) {
         (Clock::Column { resample: Some((step, interpolation)), .. }, Some(time)) => {
@@ -64,7 +64,7 @@ pub(crate) fn load(
     };
     let log = log.map_err(at_line(&file, &table.lines))?;
     source.rows = Rows::new(1, log.rows()).map_err(at_line(&file, &table.lines))?;
-    Ok(Loaded { log, source })
+    Ok(Loaded { log, source, words })
 }
 
 /// A log as it was recorded, its clock irregular or not.
@@ -153,9 +153,9 @@ fn columns(
         }
     }
 
-    let progress = Reading::new();
-    let mut table =
-        reader.read(&Selection { columns, time }, &mut |read, total| progress.update(read, total))?;
+    let progress = (!job.quiet).then(Reading::new);
+    let mut update = |read, total| progress.iter().for_each(|progress| progress.update(read, total));
+    let mut table = reader.read(&Selection { columns, time }, &mut update)?;
     drop(progress);
 
     let values = std::mem::take(&mut table.columns);

@@ -16,9 +16,9 @@ pub(crate) fn compare(arguments: &CompareArguments, line: &str) -> Result<(), Fa
     let job = LookJob::resolve(look, &read)?;
     let reports: Vec<Report> =
         arguments.reports.iter().map(|path| stored::report(path)).collect::<Result<_, _>>()?;
-    let Loaded { log, source } = loaded(&arguments.path, &job, &reports.iter().collect::<Vec<_>>())?;
+    let Loaded { log, source, .. } = loaded(&arguments.path, &job, &reports.iter().collect::<Vec<_>>())?;
     let each = arguments.reports.iter().zip(&reports).map(|(path, report)| {
-        let loaded = Loaded { log: log.clone(), source: source.clone() };
+        let loaded = Loaded { log: log.clone(), source: source.clone(), words: Vec::new() };
         one(path, report, loaded, &job.plan).map_err(|failure| failure.of(path))
     });
     let found: Vec<Validated> = each.collect::<Result<_, _>>()?;

@@ -10,8 +10,8 @@ use crate::failure::Failure;
 use crate::job::FitJob;
 use crate::output::{self, warn};
 
-/// Made by the program beside it.
-const LOG: &str = include_str!("../demo/dc_motor.csv");
+/// A log of a DC motor: its columns are t, u and y. Made by the program beside it.
+pub const LOG: &str = include_str!("../demo/dc_motor.csv");
 const OPTIONS: [&str; 10] =
     ["--time", "t", "--estimate", "1..700", "--validate", "701..1000", "--na", "2", "--nb", "2"];
 

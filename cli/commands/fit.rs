@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use thetahat::{
-    Log, Plan, Report, Rows, Source, Validated, ValidationPlan, fit_page, identify_monitored, validate,
+    Log, Report, Rows, Source, Validated, ValidationPlan, fit_page, identify_monitored, validate,
 };
 
 use super::summary;
@@ -26,6 +26,7 @@ pub(crate) fn fit(arguments: &FitArguments, line: &str) -> Result<(), Failure> {
         return Err(Failure::usage("--report and --html name the same file; name two"));
     }
     let logs = experiments(&job)?;
+    logs.words.iter().for_each(|word| warn(word));
     let kept = arguments.html.is_some().then(|| logs.log.clone());
     let (report, sources) = identified(&job, logs)?;
     let json = report.to_json().map_err(|error| Failure::data(error.to_string()))?;
@@ -67,25 +68,15 @@ fn page(
 
 /// Reads the logs and fits the model.
 pub(super) fn fitted(job: &FitJob) -> Result<Report, Failure> {
-    Ok(identified(job, experiments(job)?)?.0)
+    let logs = experiments(job)?;
+    logs.words.iter().for_each(|word| warn(word));
+    Ok(identified(job, logs)?.0)
 }
 
 /// Fits the model.
 fn identified(job: &FitJob, experiments: Experiments) -> Result<(Report, Vec<Source>), Failure> {
-    let Experiments { log, sources, channels } = experiments;
-    let plan = Plan {
-        choice: job.orders.of(channels.inputs.len())?,
-        select: job.select,
-        inputs: channels.inputs,
-        output: channels.output,
-        estimate: job.estimate.clone(),
-        validate: job.validate.clone(),
-        split: job.split,
-        detrend: job.detrend,
-        offsets: job.offsets.clone(),
-        method: job.method.clone(),
-        initial: job.initial,
-    };
+    let Experiments { log, sources, channels, .. } = experiments;
+    let plan = job.plan(channels.inputs, channels.output)?;
     let progress = Searching::new();
     let monitor = |now| {
         progress.update(now);
@@ -97,26 +88,28 @@ fn identified(job: &FitJob, experiments: Experiments) -> Result<(Report, Vec<Sou
 }
 
 /// All logs as one, where they came from, and the columns that the model is about.
-struct Experiments {
-    log: Log,
-    sources: Vec<Source>,
-    channels: Channels,
+pub(crate) struct Experiments {
+    pub(crate) log: Log,
+    pub(crate) sources: Vec<Source>,
+    pub(crate) channels: Channels,
+    /// What the reader should know, in plain words.
+    pub(crate) words: Vec<String>,
 }
 
 /// The columns that the model is about.
 #[derive(Debug, Clone, Default, PartialEq)]
-struct Channels {
-    inputs: Vec<String>,
-    output: String,
+pub(crate) struct Channels {
+    pub(crate) inputs: Vec<String>,
+    pub(crate) output: String,
 }
 
 /// Reads all logs, one behind the other.
-fn experiments(job: &FitJob) -> Result<Experiments, Failure> {
+pub(crate) fn experiments(job: &FitJob) -> Result<Experiments, Failure> {
     let mut channels: Option<Channels> = None;
-    let (mut logs, mut sources) = (Vec::new(), Vec::<Source>::new());
+    let (mut logs, mut sources, mut words) = (Vec::new(), Vec::<Source>::new(), Vec::new());
     for path in &job.paths {
         let bad = |message: String| Failure::data(format!("{}: {message}", path.display()));
-        let Loaded { log, mut source } = log::load(path, &job.log, None, |header| {
+        let Loaded { log, mut source, words: own } = log::load(path, &job.log, None, |header| {
             let own = Channels::choose(job, header).map_err(bad)?;
             let first = channels.get_or_insert_with(|| own.clone());
             if own != *first {
@@ -132,10 +125,11 @@ fn experiments(job: &FitJob) -> Result<Experiments, Failure> {
         let before = sources.last().map_or(0, |source| source.rows.last());
         source.rows = Rows::new(before + 1, before + log.rows()).map_err(|error| bad(error.to_string()))?;
         logs.push(log);
+        words.extend(own);
         sources.push(source);
     }
     let log = Log::join(logs).map_err(log::failure(&sources))?;
-    Ok(Experiments { log, sources, channels: channels.unwrap_or_default() })
+    Ok(Experiments { log, sources, channels: channels.unwrap_or_default(), words })
 }
 
 impl Channels {

@@ -36,7 +36,7 @@ pub(crate) fn inspect(arguments: &InspectArguments, line: &str) -> Result<(), Fa
 }
 
 /// Reads the log and looks at it. What was read is there for a page, if one was asked for.
-fn inspected(
+pub(crate) fn inspected(
     job: &InspectJob,
     arguments: &InspectArguments,
 ) -> Result<(Inspection, Option<Recording>), Failure> {

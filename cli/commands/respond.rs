@@ -47,11 +47,13 @@ fn respond(arguments: &RespondArguments, horizon: Horizon, initial: Option<Start
 
     let output = model.output.name.clone();
     let mut measured = true;
-    let Loaded { log, source } = log::load(&arguments.path, &job, Some(model.sample_time), |header| {
-        measured = header.contains(&output);
-        let inputs = model.inputs.iter().map(|input| input.name.clone());
-        Ok(inputs.chain(measured.then(|| output.clone())).collect())
-    })?;
+    let Loaded { log, source, words } =
+        log::load(&arguments.path, &job, Some(model.sample_time), |header| {
+            measured = header.contains(&output);
+            let inputs = model.inputs.iter().map(|input| input.name.clone());
+            Ok(inputs.chain(measured.then(|| output.clone())).collect())
+        })?;
+    words.iter().for_each(|word| warn(word));
     let initial =
         initial.unwrap_or_else(|| if measured { Start::natural(&model, horizon) } else { Start::Zero });
     let clock = RowClock::of(&log);

@@ -11,12 +11,12 @@ use thetahat::{
 };
 
 use crate::output::harmless;
-pub(crate) use inspection::inspection;
+pub use inspection::inspection;
 use text::{Text, columns, number, or_dash, short, uncertainty};
-pub(crate) use validation::{comparison, validation};
+pub use validation::{comparison, validation};
 
 /// The report's main figures.
-pub(crate) fn table(report: &Report) -> String {
+pub fn table(report: &Report) -> String {
     let model = &report.model;
     let mut text = Text::default();
     selection::selection(&mut text, report);

@@ -50,7 +50,9 @@ pub(super) fn loaded(path: &Path, job: &LookJob, reports: &[&Report]) -> Result<
         }
     }
     let sample_time = reports.first().map(|report| report.model.sample_time);
-    log::load(path, &job.log, sample_time, |_| Ok(names))
+    let loaded = log::load(path, &job.log, sample_time, |_| Ok(names))?;
+    loaded.words.iter().for_each(|word| warn(word));
+    Ok(loaded)
 }
 
 /// Validates one model.

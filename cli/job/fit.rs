@@ -1,6 +1,6 @@
 use std::path::{Path, PathBuf};
 
-use thetahat::{Detrend, Initial, Method, Rows, Select, Split};
+use thetahat::{Detrend, Initial, Method, Plan, Rows, Select, Split};
 
 use super::orders::OrderJob;
 use super::{LogJob, method, parsed, rows};
@@ -65,6 +65,23 @@ impl FitJob {
             job.orders.of(inputs.len())?;
         }
         Ok(job)
+    }
+
+    /// The same for the channels of a log.
+    pub(crate) fn plan(&self, inputs: Vec<String>, output: String) -> Result<Plan, Failure> {
+        Ok(Plan {
+            choice: self.orders.of(inputs.len())?,
+            select: self.select,
+            inputs,
+            output,
+            estimate: self.estimate.clone(),
+            validate: self.validate.clone(),
+            split: self.split,
+            detrend: self.detrend,
+            offsets: self.offsets.clone(),
+            method: self.method.clone(),
+            initial: self.initial,
+        })
     }
 }
 

@@ -142,6 +142,11 @@ impl OrderJob {
         }
     }
 
+    /// Whether there are orders, values or ranges.
+    pub(crate) fn is_given(&self) -> bool {
+        matches!(self, Self::Given(_))
+    }
+
     /// Whether there is a choice among several models.
     pub(crate) fn is_choice(&self) -> bool {
         match self {

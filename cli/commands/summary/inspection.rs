@@ -6,7 +6,7 @@ use super::text::{Text, columns, number, or_dash, short};
 use crate::output::harmless;
 
 /// What was found, the warnings, and the line that would fit a model.
-pub(crate) fn inspection(inspection: &Inspection) -> String {
+pub fn inspection(inspection: &Inspection) -> String {
     let mut text = Text::default();
     text.line(&clock(inspection));
     text.line("");

@@ -10,7 +10,7 @@ use crate::output::harmless;
 const LEVEL: f64 = 0.95;
 
 /// How a model does on a log, and what was required of it.
-pub(crate) fn validation(found: &Validation, requirements: &[Requirement], alpha: f64) -> String {
+pub fn validation(found: &Validation, requirements: &[Requirement], alpha: f64) -> String {
     let mut text = Text::default();
     let files: Vec<String> = found.logs.iter().map(|log| harmless(&log.file)).collect();
     text.line(&format!(
@@ -46,7 +46,7 @@ pub(crate) fn validation(found: &Validation, requirements: &[Requirement], alpha
 }
 
 /// Several models, a column for each.
-pub(crate) fn comparison(comparison: &Comparison) -> String {
+pub fn comparison(comparison: &Comparison) -> String {
     let models = &comparison.models;
     let mut text = Text::default();
     if let Some(first) = models.first() {

@@ -15,6 +15,7 @@
 //!   that are linear in their parameters; [`arx_factor`] gives a triangular factor that merges with others.
 //! - [`predict`], [`simulate`] and [`forecast`] say what a [`Model`] says, [`frequency_response`] what it is to each
 //!   frequency; [`Fit`] says how close that is.
+//! - [`Model::state_space`] writes a model as a recursion of first order, for filters and controllers.
 //! - [`inspect`] says what a log is worth before any fit.
 //! - [`identify`] goes the whole way from a [`Log`] to a [`Report`], the JSON document; [`apply`] takes a stored model to a log.
 //! - [`validate()`] says how a stored model does on a log and what is left of it, [`compare`] puts several side by side, a
@@ -48,12 +49,12 @@ pub use inspect::{
     ChannelQuality, Clock, DelayEstimate, Excitation, Feedback, Inspection, InspectionPlan, Recording,
     Saturation, SpectrumPoint, Times, inspect,
 };
-pub use model::{Model, Orders, Parameter, Quantity, Root, Signal, Structure};
+pub use model::{Model, Orders, Parameter, Quantity, Root, Signal, StateSpace, Structure};
 pub use report::figures;
 pub use report::{
     Applied, Comparison, Coverage, Data, Estimation, Missing, NoiseLevel, Parts, Plan, Report, Requirement,
-    Resampling, Seen, Signals, Source, Validated, Validation, ValidationPlan, apply, compare, identify,
-    identify_monitored, validate,
+    Resampling, Seen, Signals, Source, Unjudged, Validated, Validation, ValidationPlan, apply, compare,
+    identify, identify_monitored, validate,
 };
 #[cfg(feature = "html")]
 pub use report::{comparison_page, fit_page, inspection_page, validation_page};

@@ -4,9 +4,11 @@ mod dynamics;
 mod fitted;
 mod orders;
 pub(crate) mod polynomial;
+mod state_space;
 
 pub(crate) use dynamics::{Block, Blocks, Gradient, cancel, covariance, near_cancellation};
 pub use dynamics::{Quantity, Root};
 pub use fitted::{Model, Parameter, Signal};
 pub(crate) use orders::LARGEST;
 pub use orders::{Orders, Structure};
+pub use state_space::StateSpace;

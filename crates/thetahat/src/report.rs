@@ -13,7 +13,7 @@ mod warnings;
 pub use apply::{Applied, apply};
 #[cfg(feature = "html")]
 pub use html::{comparison_page, fit_page, inspection_page, validation_page};
-pub use identify::{Plan, identify, identify_monitored};
+pub use identify::{Plan, Unjudged, identify, identify_monitored};
 pub use requirement::Requirement;
 pub use schema::{Data, Estimation, Missing, Parts, Report, Resampling, Source};
 pub use validation::{

@@ -250,6 +250,68 @@ impl Log {
         Ok(joined)
     }
 
+    /// Some rows of some channels, as a log of its own with the same sample time.
+    ///
+    /// # Errors
+    /// [`Error::Data`] for a channel or rows that are not there.
+    pub fn part(&self, names: &[&str], rows: Rows) -> Result<Self, Error> {
+        checked("rows", &[rows], self.rows)?;
+        let range = rows.positions();
+        let channels = names.iter().map(|name| {
+            let values = self.channel(name)?.values[range.clone()].to_vec();
+            Ok(Channel { name: (*name).to_owned(), values })
+        });
+        let channels = channels.collect::<Result<Vec<_>, Error>>()?;
+        let inside = |positions: &[usize]| -> Vec<usize> {
+            let inside =
+                positions.iter().filter(|position| range.contains(position) && **position > range.start);
+            inside.map(|position| position - range.start).collect()
+        };
+        Ok(Self {
+            rows: check(&channels)?,
+            channels,
+            sample_time: self.sample_time,
+            time: self.time.as_ref().map(|time| time[range.clone()].to_vec()),
+            jumps: inside(&self.jumps),
+            borders: inside(&self.borders),
+        })
+    }
+
+    /// A log that was taken apart to store it: by its channels, [sample time](Self::sample_time), [clock](Self::time),
+    /// [breaks](Self::breaks) and [borders](Self::borders).
+    ///
+    /// # Errors
+    /// As for [`Log::new`]; [`Error::Data`] if the clock does not go with the rows, or a break is no row of the log.
+    pub fn restored(
+        channels: Vec<Channel>,
+        sample_time: f64,
+        time: Option<Vec<f64>>,
+        breaks: Vec<usize>,
+        borders: Vec<usize>,
+    ) -> Result<Self, Error> {
+        let log = Self::new(channels, sample_time)?;
+        let finite = |time: &Vec<f64>| time.len() == log.rows && time.iter().all(|time| time.is_finite());
+        let rising = |positions: &[usize]| {
+            let inside = positions.iter().all(|position| (1..log.rows).contains(position));
+            inside && positions.is_sorted_by(|a, b| a < b)
+        };
+        let known = borders.iter().all(|border| breaks.binary_search(border).is_ok());
+        if !(time.iter().all(finite) && rising(&breaks) && rising(&borders) && known) {
+            return Err(Error::data("the parts of a stored log do not fit together; store it again"));
+        }
+        Ok(Self { time, jumps: breaks, borders, ..log })
+    }
+
+    /// The rows (0-based) before which no segment reaches back: where the clock jumps, or another log begins.
+    pub fn breaks(&self) -> &[usize] {
+        &self.jumps
+    }
+
+    /// Those of the breaks at which another log begins.
+    pub fn borders(&self) -> &[usize] {
+        &self.borders
+    }
+
     /// Whether it is several logs as one, which have no common clock.
     pub(crate) fn is_joined(&self) -> bool {
         !self.borders.is_empty()
@@ -318,6 +380,8 @@ impl Log {
             .iter()
             .map(|name| Ok(self.channel(name)?.values.as_slice()))
             .collect::<Result<_, Error>>()?;
+        // Those that miss nothing need not be looked through row by row.
+        let channels: Vec<&[f64]> = channels.into_iter().filter(|values| misses(values)).collect();
         let mut segments = Vec::new();
         for part in parts {
             let part = part.positions();
@@ -327,7 +391,8 @@ impl Log {
             borders.push(part.end);
             for pair in borders.windows(2) {
                 let mut first = pair[0];
-                for row in pair[0]..pair[1] {
+                let rows = if channels.is_empty() { pair[1]..pair[1] } else { pair[0]..pair[1] };
+                for row in rows {
                     if channels.iter().any(|values| values[row].is_nan()) {
                         if first < row {
                             segments.push(first..row);
@@ -426,6 +491,12 @@ pub(crate) fn check(channels: &[Channel]) -> Result<usize, Error> {
         }
     }
     Ok(rows)
+}
+
+/// Whether a value is missing.
+fn misses(values: &[f64]) -> bool {
+    // Whole blocks at once: without a way out in between they are compared side by side.
+    values.chunks(1024).any(|block| block.iter().fold(false, |missing, value| missing | value.is_nan()))
 }
 
 fn steps(time: &[f64]) -> impl Iterator<Item = f64> {

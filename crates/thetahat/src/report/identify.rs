@@ -5,7 +5,7 @@ use super::warnings::{at_the_border, unstable_plant, warnings};
 use crate::data::{Detrend, Log, Offset, Record, Rows, Split, between, checked};
 use crate::estimate::{Estimate, Method, Monitor, enough, estimate_of_channels};
 use crate::respond::Start;
-use crate::select::{self, Choice, Found, Select, Task};
+use crate::select::{self, Choice, Found, Grid, Select, Task};
 use crate::validate::{Fit, Horizon, Part};
 use crate::{Error, Initial, Model, Orders, Signal};
 
@@ -95,11 +95,79 @@ pub fn identify(log: Log, sources: &[Source], plan: &Plan) -> Result<Report, Err
 /// # Errors
 /// As for [`identify`]; [`Error::Interrupted`] if the monitor says so.
 pub fn identify_monitored(
-    mut log: Log,
+    log: Log,
     sources: &[Source],
     plan: &Plan,
     monitor: Monitor<'_>,
 ) -> Result<Report, Error> {
+    let (unjudged, log) = fit(log, sources, plan, monitor)?;
+    unjudged.judged_on(&log)
+}
+
+/// A fit before its figures: they take several times as long as least squares, and not everybody looks at them.
+#[derive(Debug, Clone)]
+pub struct Unjudged {
+    report: Report,
+    grid: Option<Grid>,
+}
+
+impl Unjudged {
+    /// [`identify_monitored`] up to the figures.
+    ///
+    /// # Errors
+    /// As for [`identify_monitored`].
+    pub fn new(log: Log, sources: &[Source], plan: &Plan, monitor: Monitor<'_>) -> Result<Self, Error> {
+        Ok(fit(log, sources, plan, monitor)?.0)
+    }
+
+    /// The report so far: without figures of how well the model fits, and what they give reason to warn of.
+    pub fn report(&self) -> &Report {
+        &self.report
+    }
+
+    /// The whole report, given the same log again.
+    ///
+    /// # Errors
+    /// [`Error::Data`] for channels or rows that are not there.
+    pub fn judged(self, mut log: Log) -> Result<Report, Error> {
+        let model = &self.report.model;
+        for signal in model.inputs.iter().chain([&model.output]) {
+            log.remove(&signal.name, &signal.offset);
+        }
+        self.judged_on(&log)
+    }
+
+    /// The same on deviations.
+    fn judged_on(self, log: &Log) -> Result<Report, Error> {
+        let Self { mut report, grid } = self;
+        let initial = report.estimation.initial;
+        let inputs: Vec<String> = report.model.inputs.iter().map(|input| input.name.clone()).collect();
+        let output = report.model.output.name.clone();
+        let test = report.data.split.as_ref().map_or_else(Vec::new, |parts| parts.test.clone());
+        let parts = [
+            (Part::Estimation, report.data.estimation.clone()),
+            (Part::Validation, report.data.validation.clone()),
+            (Part::Test, test),
+        ];
+        for (part, rows) in parts.into_iter().filter(|(_, rows)| !rows.is_empty()) {
+            let record = log.record(&inputs, &output, &rows)?;
+            judge(&mut report, &record, &rows, part, initial);
+        }
+        if let Some(grid) = grid {
+            report.warnings.extend(at_the_border(&report.model.orders, &grid));
+        }
+        report.warnings.extend(unstable_plant(&report));
+        Ok(report)
+    }
+}
+
+/// Fits the model; also gives the log as deviations.
+fn fit(
+    mut log: Log,
+    sources: &[Source],
+    plan: &Plan,
+    monitor: Monitor<'_>,
+) -> Result<(Unjudged, Log), Error> {
     let names: Vec<&str> = plan.inputs.iter().chain([&plan.output]).map(String::as_str).collect();
     for (position, name) in names.iter().enumerate() {
         log.channel(name)?;
@@ -178,21 +246,8 @@ pub fn identify_monitored(
         model,
     };
     report.warnings = warnings(&report);
-    judge(&mut report, &record, &estimation, Part::Estimation, estimate.initial());
-    if !validation.is_empty() {
-        let record = log.record(&plan.inputs, &plan.output, &validation)?;
-        judge(&mut report, &record, &validation, Part::Validation, estimate.initial());
-    }
-    let test = report.data.split.as_ref().map_or_else(Vec::new, |parts| parts.test.clone());
-    if !test.is_empty() {
-        let record = log.record(&plan.inputs, &plan.output, &test)?;
-        judge(&mut report, &record, &test, Part::Test, estimate.initial());
-    }
-    if let Choice::Grid(grid) = &plan.choice {
-        report.warnings.extend(at_the_border(&report.model.orders, grid));
-    }
-    report.warnings.extend(unstable_plant(&report));
-    Ok(report)
+    let grid = if let Choice::Grid(grid) = &plan.choice { Some(grid.clone()) } else { None };
+    Ok((Unjudged { report, grid }, log))
 }
 
 /// What rows serve for.
@@ -256,6 +311,19 @@ fn selected(
     select::choose(&task, &plan.choice)
 }
 
+/// The largest size of some values.
+fn largest(values: &[f64]) -> f64 {
+    const LANES: usize = 8;
+    let mut lanes = [0.0_f64; LANES];
+    let (whole, rest) = values.as_chunks::<LANES>();
+    for values in whole {
+        for (lane, value) in lanes.iter_mut().zip(values) {
+            *lane = if value.abs() > *lane { value.abs() } else { *lane };
+        }
+    }
+    lanes.iter().chain(rest).fold(0.0, |largest, value| value.abs().max(largest))
+}
+
 /// Takes a channel's offset from it, in place.
 fn deviations(log: &mut Log, name: &str, plan: &Plan, segments: &[Range<usize>]) -> Result<Signal, Error> {
     let by_hand = plan.offsets.iter().find(|(channel, _)| channel == name);
@@ -263,16 +331,16 @@ fn deviations(log: &mut Log, name: &str, plan: &Plan, segments: &[Range<usize>])
         Some(&(_, level)) => Offset { level, slope: 0.0 },
         None => Offset::estimate(plan.detrend, log, name, segments)?,
     };
-    let largest = |log: &Log| -> Result<f64, Error> {
+    let largest_of = |log: &Log| -> Result<f64, Error> {
         let values = &log.channel(name)?.values;
-        Ok(segments.iter().cloned().flatten().fold(0.0, |largest, row| values[row].abs().max(largest)))
+        Ok(segments.iter().map(|segment| largest(&values[segment.clone()])).fold(0.0, f64::max))
     };
-    let before = largest(log)?;
+    let before = largest_of(log)?;
     log.remove(name, &offset);
     let position = plan.inputs.iter().position(|input| input == name);
     let known = if let Choice::Known(orders) = &plan.choice { Some(orders) } else { None };
     let used = |input: usize| known.is_none_or(|orders| orders.nb.get(input).is_some_and(|&nb| nb > 0));
-    if position.is_none_or(used) && largest(log)? <= ROUNDING * before {
+    if position.is_none_or(used) && largest_of(log)? <= ROUNDING * before {
         let role = if position.is_some() { "input" } else { "output" };
         let what = if plan.detrend == Detrend::Linear { "is a straight line" } else { "is constant" };
         let concerned = known.map_or_else(Vec::new, |orders| parameters_of(position, orders));

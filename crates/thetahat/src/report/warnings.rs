@@ -41,10 +41,14 @@ pub(super) fn warnings(report: &Report) -> Vec<String> {
         warnings.extend(search_warnings(search));
     }
     if let Some((pole, zero)) = near_cancellation(model) {
-        warnings.push(format!(
-            "{}: within their uncertainty they are one; lower both orders by one, unless they are known",
-            cancel(&pole, &zero)
-        ));
+        // What A shares with C alone is in the plant all the same.
+        let plant_too = pole.polynomial == "a" && zero.polynomial == "c" && !model.inputs.is_empty();
+        let remedy = if plant_too {
+            "the noise does without this pole of the plant; try Box-Jenkins or output error"
+        } else {
+            "lower both orders by one, unless they are known"
+        };
+        warnings.push(format!("{}: within their uncertainty they are one; {remedy}", cancel(&pole, &zero)));
     }
     if let Some(condition) = report.estimation.condition.filter(|condition| *condition > ILL_CONDITIONED) {
         warnings.push(format!(

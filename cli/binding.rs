@@ -1,0 +1,105 @@
+//! The stages of the program for a binding to another language. Options are those of the command line and mean the same;
+//! nothing is printed, and nothing is drawn on a terminal.
+
+use std::ffi::OsString;
+
+use clap::Args;
+use thetahat::{Inspection, Log, Plan, Requirement, Source, ValidationPlan};
+
+use crate::args::{InspectArguments, ValidateArguments};
+use crate::commands::{Experiments, experiments, inspected};
+use crate::failure::Failure;
+use crate::job::{FitJob, InspectJob, LookJob};
+
+/// Logs that were read as one.
+#[derive(Debug)]
+pub struct Opened {
+    /// The channels, their rows counted through all logs.
+    pub log: Log,
+    /// Where they came from.
+    pub sources: Vec<Source>,
+    /// The input channels: those named, or those called u, u1, u2, …
+    pub inputs: Vec<String>,
+    /// The output channel: the one named, or y.
+    pub output: String,
+    /// What the reader should know, in plain words.
+    pub warnings: Vec<String>,
+}
+
+/// Reads the logs that `thetahat fit` would with these options.
+///
+/// # Errors
+/// A [`Failure`] as the program would report it.
+pub fn read(options: &[OsString]) -> Result<Opened, Failure> {
+    let mut job = FitJob::resolve(&arguments("fit", options)?)?;
+    job.log.quiet = true;
+    let Experiments { log, sources, channels, words } = experiments(&job)?;
+    Ok(Opened { log, sources, inputs: channels.inputs, output: channels.output, warnings: words })
+}
+
+/// The plan that `thetahat fit` makes of these options for a log with these channels. Orders without inputs leave those
+/// of the log out.
+///
+/// # Errors
+/// A [`Failure`] as the program would report it.
+pub fn plan(options: &[OsString], inputs: Vec<String>, output: String) -> Result<Plan, Failure> {
+    let log = OsString::from("log");
+    let words: Vec<OsString> = options.iter().cloned().chain([log]).collect();
+    let job = FitJob::resolve(&arguments("fit", &words)?)?;
+    let inputs = if job.orders.has_inputs() { inputs } else { Vec::new() };
+    if inputs.is_empty() && job.orders.has_inputs() && job.orders.is_given() {
+        return Err(Failure::usage("--nb: the log has no inputs; give it some, or orders of a time series"));
+    }
+    job.plan(inputs, output)
+}
+
+/// How `thetahat validate` looks at a log with these options, and what it requires.
+///
+/// # Errors
+/// A [`Failure`] as the program would report it.
+pub fn validation_plan(options: &[OsString]) -> Result<(ValidationPlan, Vec<Requirement>), Failure> {
+    let files = ["report", "log"].map(OsString::from);
+    let words: Vec<OsString> = options.iter().cloned().chain(files).collect();
+    let arguments: ValidateArguments = arguments("validate", &words)?;
+    let mut job = LookJob::resolve(&arguments.look, &[])?;
+    let requirements = job.requirements(&arguments.require)?;
+    Ok((job.plan, requirements))
+}
+
+/// What `thetahat inspect` says of a file with these options.
+///
+/// # Errors
+/// A [`Failure`] as the program would report it.
+pub fn inspect(options: &[OsString]) -> Result<Inspection, Failure> {
+    let arguments: InspectArguments = arguments("inspect", options)?;
+    let mut job = InspectJob::resolve(&arguments)?;
+    job.log.quiet = true;
+    Ok(inspected(&job, &arguments)?.0)
+}
+
+/// The arguments of a verb.
+fn arguments<T: Args>(verb: &'static str, words: &[OsString]) -> Result<T, Failure> {
+    let command = clap::Command::new(verb).no_binary_name(true).disable_help_flag(true);
+    let parsed = T::augment_args(command).try_get_matches_from(words);
+    parsed.and_then(|matches| T::from_arg_matches(&matches)).map_err(|error| {
+        use clap::error::{ContextKind, ContextValue};
+        let context = |kind| error.get(kind);
+        if let (
+            Some(ContextValue::String(option)),
+            Some(ContextValue::String(value)),
+            Some(ContextValue::Strings(known)),
+        ) = (
+            context(ContextKind::InvalidArg),
+            context(ContextKind::InvalidValue),
+            context(ContextKind::ValidValue),
+        ) {
+            let name = option.split(' ').next().unwrap_or_default();
+            return Failure::usage(format!("{name}: '{value}' is none of {}", known.join(", ")));
+        }
+        // The first paragraph says what is wrong; the others how to call the program.
+        let text = error.to_string();
+        let first = text.split("\n\n").next().unwrap_or_default();
+        let lines: Vec<&str> = first.trim_start_matches("error: ").lines().map(str::trim).collect();
+        Failure::usage(lines.join(" "))
+    })
+}

@@ -1,0 +1,318 @@
+use thetahat_core::nalgebra::DMatrix;
+
+use crate::Model;
+
+/// A model in innovations form, x of n states and u of m inputs:
+///
+/// ```text
+/// x(t+1) = F x(t) + G u(t) + K e(t)
+/// y(t)   = H x(t) + D u(t) + e(t),   var e = noise_variance
+/// ```
+///
+/// (Ljung, System Identification, 2nd ed. 1999, section 4.3). y and u are deviations from the model's offsets, so that the
+/// state at rest is zero. F and D here are matrices, not the polynomials of these letters. Made by [`Model::state_space`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct StateSpace {
+    /// F, n x n: what becomes of the state.
+    pub f: DMatrix<f64>,
+    /// G, n x m: what the inputs do to the state.
+    pub g: DMatrix<f64>,
+    /// H, 1 x n: the output of a state.
+    pub h: DMatrix<f64>,
+    /// D, 1 x m: what the inputs do to the output at once. Zero for an input with nk above 0.
+    pub d: DMatrix<f64>,
+    /// K, n x 1: what the innovation does to the state.
+    pub k: DMatrix<f64>,
+    /// The variance of e.
+    pub noise_variance: f64,
+    /// Seconds from one sample to the next.
+    pub sample_time: f64,
+}
+
+/// What drives a model, an input or e: its numerator, and the denominator that it has beside A, empty without one.
+type Source<'a> = (&'a [f64], &'a [f64]);
+
+impl Model {
+    /// The same model as a recursion of first order for a state.
+    ///
+    /// A quotient of polynomials of order n, v = N/P s, is a block of n states in observer canonical form:
+    ///
+    /// ```text
+    /// v(t)     = x_1(t) + n_0 s(t)
+    /// x_i(t+1) = x_{i+1}(t) - p_i x_1(t) + (n_i - p_i n_0) s(t),   i = 1 … n,   x_{n+1} = 0
+    /// ```
+    ///
+    /// One block with the denominator A is shared. B_j u_j where F_j is 1, and C e where D is 1, are numerators of it.
+    /// B_j/F_j u_j and C/D e of all others have blocks of their own, in series before it. The number of states is
+    ///
+    /// ```text
+    /// max(na, nb_j + nk_j - 1 of the inputs without F, nc if nd = 0)
+    ///     + sum max(nf_j, nb_j + nk_j - 1) over the inputs with F
+    ///     + max(nc, nd) if nd > 0
+    /// ```
+    ///
+    /// and the eigenvalues of F are the roots of A, of each F_j and of D; those that are left are 0. An input without B has
+    /// no state. Fewer states would do only where two blocks have an eigenvalue in common, which may be the 0 of a B that is
+    /// longer than its denominator, or where a numerator and a denominator have a root in common. For the form see Kailath,
+    /// Linear Systems, 1980, section 2.1.
+    ///
+    /// A Kalman filter takes it with w = K e and v = e: Q = K K' var e, S = K var e, R = var e. In the long run its gain is K
+    /// where all roots of C and of each F_j lie inside the unit circle.
+    ///
+    /// Cost: O(n (n + m)) to write the matrices.
+    ///
+    /// ```
+    /// use thetahat::{Initial, Model, Orders, Record, Signal, arx};
+    ///
+    /// let u: Vec<f64> = (0..100_u32).map(|t| f64::from(t * t % 7)).collect();
+    /// let mut y = vec![0.0, 0.0];
+    /// for t in 2..u.len() {
+    ///     y.push(0.8 * y[t - 1] + 0.5 * u[t - 1] + 0.3 * u[t - 2]);
+    /// }
+    /// let orders = Orders::arx(1, &[2], &[1])?;
+    /// let estimate = arx(&Record::new(&y, vec![&u])?, &orders, Initial::Drop)?;
+    /// let model = Model::new(&orders, &estimate, 1.0, vec![Signal::default()], Signal::default())?;
+    ///
+    /// let space = model.state_space();
+    /// // x_1(t+1) = 0.8 x_1(t) + x_2(t) + 0.5 u(t), x_2(t+1) = 0.3 u(t), y(t) = x_1(t).
+    /// assert_eq!((space.f.shape(), space.h[(0, 0)], space.h[(0, 1)]), ((2, 2), 1.0, 0.0));
+    /// assert!((space.f[(0, 0)] - 0.8).abs() < 1e-9 && space.f[(0, 1)] == 1.0);
+    /// assert!((space.g[(0, 0)] - 0.5).abs() < 1e-9 && (space.g[(1, 0)] - 0.3).abs() < 1e-9);
+    /// # Ok::<(), thetahat::Error>(())
+    /// ```
+    pub fn state_space(&self) -> StateSpace {
+        let none: &[f64] = &[];
+        let inputs = self.b.iter().enumerate().map(|(input, b)| {
+            // B without coefficients may still have the zeros of its delay.
+            let used = self.orders.nb.get(input).is_some_and(|&nb| nb > 0);
+            let f = self.f.get(input).map_or(none, Vec::as_slice);
+            if used { (b.as_slice(), f) } else { (none, none) }
+        });
+        let sources: Vec<Source<'_>> = inputs.chain([(self.c.as_slice(), self.d.as_slice())]).collect();
+        let alone = |source: &Source<'_>| order(source.1) > 0;
+        let shared = sources.iter().filter(|source| !alone(source)).map(|source| order(source.0));
+        let shared = shared.fold(order(&self.a), usize::max);
+        let own = |source: &Source<'_>| if alone(source) { order(source.0).max(order(source.1)) } else { 0 };
+        let states = shared + sources.iter().map(own).sum::<usize>();
+
+        let mut f = DMatrix::zeros(states, states);
+        let mut h = DMatrix::zeros(1, states);
+        // One column for each source, that of e last.
+        let mut gains = DMatrix::zeros(states, sources.len());
+        let mut direct = DMatrix::zeros(1, sources.len());
+        block(&mut f, &mut h, 0, shared, &self.a);
+        let mut first = shared;
+        for (column, source) in sources.iter().enumerate() {
+            let (numerator, denominator) = *source;
+            let now = coefficient(numerator, 0);
+            direct[(0, column)] = now;
+            if !alone(source) {
+                let enters = (1..=shared).map(|i| coefficient(numerator, i) - coefficient(&self.a, i) * now);
+                enters.enumerate().for_each(|(row, gain)| gains[(row, column)] = gain);
+                continue;
+            }
+            let size = own(source);
+            block(&mut f, &mut h, first, size, denominator);
+            for i in 1..=size {
+                gains[(first + i - 1, column)] =
+                    coefficient(numerator, i) - coefficient(denominator, i) * now;
+            }
+            // What comes out of it, x_first(t) + n_0 s(t), is a signal of the shared block with the numerator 1.
+            for i in 1..=shared {
+                f[(i - 1, first)] = -coefficient(&self.a, i);
+                gains[(i - 1, column)] = -coefficient(&self.a, i) * now;
+            }
+            first += size;
+        }
+        let inputs = self.b.len();
+        StateSpace {
+            f,
+            g: gains.columns(0, inputs).into_owned(),
+            h,
+            d: direct.columns(0, inputs).into_owned(),
+            k: gains.columns(inputs, 1).into_owned(),
+            noise_variance: self.noise_variance,
+            sample_time: self.sample_time,
+        }
+    }
+}
+
+/// Writes what a block does by itself: its states begin at `first`, and its first one is a part of the output.
+fn block(f: &mut DMatrix<f64>, h: &mut DMatrix<f64>, first: usize, size: usize, denominator: &[f64]) {
+    for i in 1..=size {
+        f[(first + i - 1, first)] = -coefficient(denominator, i);
+        if i < size {
+            f[(first + i - 1, first + i)] = 1.0;
+        }
+    }
+    if size > 0 {
+        h[(0, first)] = 1.0;
+    }
+}
+
+fn order(polynomial: &[f64]) -> usize {
+    polynomial.len().saturating_sub(1)
+}
+
+/// Zero behind the last.
+fn coefficient(polynomial: &[f64], power: usize) -> f64 {
+    polynomial.get(power).copied().unwrap_or(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use thetahat_core::nalgebra::{Complex, ComplexField};
+
+    use super::*;
+    use crate::Orders;
+    use crate::model::polynomial::{inverse_series, product};
+
+    const ONE: &[f64] = &[1.0];
+    const FAST: &[f64] = &[1.0, -0.2, -0.15];
+    const WAVE: &[f64] = &[1.0, -1.6, 0.95];
+
+    /// A y = sum_j B_j/F_j u_j + C/D e with var e = 0.25; an input is nk, the coefficients of B behind it, and F.
+    fn model(a: &[f64], inputs: &[(usize, &[f64], &[f64])], c: &[f64], d: &[f64]) -> Model {
+        let nb: Vec<usize> = inputs.iter().map(|(_, b, _)| b.len()).collect();
+        let nf: Vec<usize> = inputs.iter().map(|(_, _, f)| f.len() - 1).collect();
+        let nk: Vec<usize> = inputs.iter().map(|(nk, _, _)| *nk).collect();
+        let orders = Orders::new(a.len() - 1, &nb, c.len() - 1, d.len() - 1, &nf, &nk).unwrap();
+        let mut parameters = a[1..].to_vec();
+        inputs.iter().for_each(|(_, b, _)| parameters.extend_from_slice(b));
+        parameters.extend(c[1..].iter().chain(&d[1..]));
+        inputs.iter().for_each(|(_, _, f)| parameters.extend_from_slice(&f[1..]));
+        Model::from_parameters(&orders, &parameters, None, 0.25, 0.5).unwrap()
+    }
+
+    /// Models of all structures with the number of states that they need.
+    fn models() -> Vec<(Model, usize)> {
+        let integrator: &[f64] = &[1.0, -1.5, 0.5];
+        vec![
+            // AR, ARMA and a moving average.
+            (model(WAVE, &[], ONE, ONE), 2),
+            (model(FAST, &[], &[1.0, 0.4, -0.3, 0.2], ONE), 3),
+            (model(ONE, &[], &[1.0, -0.9], ONE), 1),
+            // ARX: A decides, then B and its delay, then nothing but a gain.
+            (model(WAVE, &[(1, &[1.0, 0.5], ONE)], ONE, ONE), 2),
+            (model(FAST, &[(0, &[0.3, 0.2, 0.1], ONE)], ONE, ONE), 2),
+            (model(FAST, &[(3, &[0.3, 0.2], ONE)], ONE, ONE), 4),
+            (model(WAVE, &[(2, &[1.0], ONE), (0, &[0.7, 0.1, 0.4, -0.2], ONE)], ONE, ONE), 3),
+            (model(ONE, &[(0, &[2.0], ONE)], ONE, ONE), 0),
+            (model(ONE, &[(1, &[2.0, 1.0], ONE), (0, &[3.0], ONE)], ONE, ONE), 2),
+            // ARMAX.
+            (model(FAST, &[(0, &[1.0], ONE)], &[1.0, -0.7, 0.1, 0.3], ONE), 3),
+            (model(integrator, &[(1, &[1.0], ONE), (2, &[0.5], ONE)], &[1.0, -0.7], ONE), 2),
+            // Output error.
+            (model(ONE, &[(3, &[0.3, 0.5, 1.0], WAVE)], ONE, ONE), 5),
+            (model(ONE, &[(0, &[0.3], WAVE), (1, &[1.0], FAST), (2, &[0.4, 0.2], ONE)], ONE, ONE), 7),
+            // Box and Jenkins.
+            (model(ONE, &[(2, &[0.7], WAVE), (0, &[1.0, 0.5], FAST)], &[1.0, -0.5], &[1.0, -0.9]), 5),
+            (model(ONE, &[(1, &[0.7], FAST)], &[1.0, -0.5, 0.2], &[1.0, -0.9]), 4),
+            (model(ONE, &[(0, &[0.7], FAST)], &[1.0, -0.5, 0.2], ONE), 4),
+            // ARARX, and all of it.
+            (model(WAVE, &[(1, &[0.7, 0.1], ONE)], ONE, &[1.0, 0.3]), 3),
+            (
+                model(
+                    &[1.0, -0.8],
+                    &[(0, &[0.7], WAVE), (2, &[1.0], ONE), (1, &[0.2], FAST)],
+                    &[1.0, 0.4],
+                    &[1.0, 0.6, 0.2],
+                ),
+                8,
+            ),
+            (model(WAVE, &[(0, &[0.7, 0.2], FAST)], &[1.0, 0.4, 0.1, 0.2], ONE), 5),
+            // Inputs without B.
+            (model(WAVE, &[(3, &[], ONE), (1, &[1.0], ONE)], ONE, ONE), 2),
+            (model(ONE, &[(1, &[1.0], FAST), (9, &[], ONE)], ONE, &[1.0, 0.5]), 3),
+        ]
+    }
+
+    /// N/P as a series.
+    fn quotient(numerator: &[f64], denominator: &[f64], length: usize) -> Vec<f64> {
+        let mut series = product(numerator, &inverse_series(denominator, length));
+        series.resize(length, 0.0);
+        series
+    }
+
+    /// Direct, H gain, H F gain, H F^2 gain, …
+    fn impulse_response(space: &StateSpace, gain: DMatrix<f64>, direct: f64, length: usize) -> Vec<f64> {
+        let mut state = gain;
+        let mut response = vec![direct];
+        while response.len() < length {
+            response.push((&space.h * &state)[(0, 0)]);
+            state = &space.f * state;
+        }
+        response
+    }
+
+    /// The largest difference as a fraction of the largest expected value, which is at least 1.
+    fn difference(found: &[f64], expected: &[f64]) -> f64 {
+        assert_eq!(found.len(), expected.len());
+        let largest = expected.iter().fold(1.0_f64, |largest, value| largest.max(value.abs()));
+        let apart = found.iter().zip(expected).map(|(found, expected)| (found - expected).abs());
+        apart.fold(0.0, f64::max) / largest
+    }
+
+    #[test]
+    fn its_impulse_responses_are_those_of_the_difference_equation() {
+        for (model, states) in models() {
+            let space = model.state_space();
+            let inputs = model.b.len();
+            assert_eq!(space.f.shape(), (states, states), "{:?}", model.orders);
+            assert_eq!((space.g.shape(), space.h.shape()), ((states, inputs), (1, states)));
+            assert_eq!((space.d.shape(), space.k.shape()), ((1, inputs), (states, 1)));
+            assert_eq!((space.noise_variance, space.sample_time), (0.25, 0.5));
+            for (input, (b, f)) in model.b.iter().zip(&model.f).enumerate() {
+                let gain = space.g.columns(input, 1).into_owned();
+                let found = impulse_response(&space, gain, space.d[(0, input)], 40);
+                let expected = quotient(b, &product(&model.a, f), 40);
+                assert!(difference(&found, &expected) < 1e-13, "{:?}", model.orders);
+            }
+            let found = impulse_response(&space, space.k.clone(), 1.0, 40);
+            let expected = quotient(&model.c, &product(&model.a, &model.d), 40);
+            assert!(difference(&found, &expected) < 1e-13, "{:?}", model.orders);
+        }
+    }
+
+    /// The coefficients of z^-n det(z I - F), by Faddeev and Leverrier.
+    fn characteristic(f: &DMatrix<f64>) -> Vec<f64> {
+        let size = f.nrows();
+        let mut polynomial = vec![1.0];
+        let mut power = DMatrix::zeros(size, size);
+        for k in 1..=size {
+            power = f * power + DMatrix::identity(size, size) * polynomial[k - 1];
+            polynomial.push(-(f * &power).trace() / k as f64);
+        }
+        polynomial
+    }
+
+    #[test]
+    fn its_characteristic_polynomial_is_the_product_of_the_denominators() {
+        for (model, states) in models() {
+            let denominators = model.f.iter().chain([&model.d]);
+            let mut expected = denominators.fold(model.a.clone(), |all, next| product(&all, next));
+            expected.resize(states + 1, 0.0);
+            let found = characteristic(&model.state_space().f);
+            assert!(difference(&found, &expected) < 1e-13, "{:?}", model.orders);
+        }
+    }
+
+    #[test]
+    fn its_eigenvalues_are_the_poles() {
+        let model = model(WAVE, &[(1, &[0.7], FAST)], ONE, &[1.0, -0.9]);
+        let poles = model.poles.iter().chain(&model.noise_poles);
+        let poles: Vec<Complex<f64>> = poles.map(|pole| Complex::new(pole.re, pole.im)).collect();
+        let found = model.state_space().f.complex_eigenvalues();
+        assert_eq!(found.len(), poles.len());
+        for pole in poles {
+            assert!(found.iter().any(|found| (found - pole).modulus() < 1e-12), "{pole}");
+        }
+    }
+
+    #[test]
+    fn an_input_without_b_does_nothing() {
+        let space = model(ONE, &[(1, &[1.0], FAST), (9, &[], ONE)], ONE, ONE).state_space();
+        assert!(space.g.column(1).iter().chain(space.d.column(1).iter()).all(|value| *value == 0.0));
+        assert_eq!(space.f.nrows(), 2);
+    }
+}

@@ -1,0 +1,93 @@
+"""System identification: models of dynamic systems from logged data.
+
+A log holds measured signals (`Log`, `read_csv`). A fit makes a model of it (`arx`, `armax`, `oe`, `bj`, `ar`, `arma`, `pem`,
+`iv`, `sriv`), `search` chooses one, `inspect` looks at a log before. A `Model` predicts, simulates, forecasts and is validated.
+`thetahat.plot` draws, and `thetahat.sklearn` fits into scikit-learn.
+
+Estimators that run with the process take a sample at a time, or a whole array: `RecursiveLeastSquares`, `RecursiveArx`,
+`RecursiveArmax`, `KalmanFilter`, `ExtendedKalmanFilter`, `LuenbergerObserver`.
+
+>>> import thetahat as th
+>>> log = th.dc_motor()
+>>> model = th.search(log[:700])
+>>> model
+Model(ARMAX(2, 2, 1, 1), 1-step fit 98.35 % on rows 1..700)
+"""
+
+from thetahat._fit import EstimationWarning, ar, arma, armax, arx, bj, iv, oe, pem, search, sriv
+from thetahat._judgement import Comparison, Inspection, Validation, compare, inspect
+from thetahat._log import Log, dc_motor, read_csv
+from thetahat._model import Model
+from thetahat._options import FitOptions, LookOptions, ReadOptions, SearchOptions
+from thetahat._responses import Forecast, FrequencyResponse, StateSpace, StepResponse
+from thetahat._thetahat import (
+    EstimationError,
+    ExtendedKalmanFilter,
+    FilterTrajectory,
+    Forgetting,
+    Innovation,
+    KalmanFilter,
+    LinearObservation,
+    LinearTransition,
+    LuenbergerObserver,
+    NonlinearObservation,
+    NonlinearTransition,
+    ObserverTrajectory,
+    RecursiveArmax,
+    RecursiveArx,
+    RecursiveLeastSquares,
+    RecursiveTrajectory,
+    SmoothedTrajectory,
+    SteadyState,
+    __version__,
+)
+
+__all__ = [
+    "Comparison",
+    "EstimationError",
+    "EstimationWarning",
+    "ExtendedKalmanFilter",
+    "FilterTrajectory",
+    "FitOptions",
+    "Forecast",
+    "Forgetting",
+    "FrequencyResponse",
+    "Innovation",
+    "Inspection",
+    "KalmanFilter",
+    "LinearObservation",
+    "LinearTransition",
+    "Log",
+    "LookOptions",
+    "LuenbergerObserver",
+    "Model",
+    "NonlinearObservation",
+    "NonlinearTransition",
+    "ObserverTrajectory",
+    "ReadOptions",
+    "RecursiveArmax",
+    "RecursiveArx",
+    "RecursiveLeastSquares",
+    "RecursiveTrajectory",
+    "SearchOptions",
+    "SmoothedTrajectory",
+    "StateSpace",
+    "SteadyState",
+    "StepResponse",
+    "Validation",
+    "__version__",
+    "ar",
+    "arma",
+    "armax",
+    "arx",
+    "bj",
+    "compare",
+    "dc_motor",
+    "inspect",
+    "iv",
+    "oe",
+    "pem",
+    "read_csv",
+    "search",
+    "sriv",
+]

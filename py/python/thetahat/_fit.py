@@ -1,0 +1,408 @@
+"""Fits: from a log to a model."""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from typing import Any
+
+from thetahat import _options, _thetahat
+from thetahat._log import Log
+from thetahat._model import Model
+from thetahat._options import FitOptions, Orders
+
+if sys.version_info >= (3, 11):
+    from typing import Unpack
+else:
+    from typing_extensions import Unpack
+
+
+class EstimationWarning(UserWarning):
+    """What a careful reader of a model should know."""
+
+
+def arx(log: Log, na: int, nb: Orders, nk: Orders = 1, **options: Unpack[FitOptions]) -> Model:
+    """Fit an ARX model, A(q) y(t) = B(q) u(t) + e(t), by least squares.
+
+    Parameters
+    ----------
+    log : Log
+        The data.
+    na : int
+        Coefficients of A: past outputs.
+    nb : int, or one for each input
+        Coefficients of B.
+    nk : int, or one for each input
+        Samples from input to first effect.
+    **options
+        What to fit to and how, see `thetahat.FitOptions`.
+
+    Returns
+    -------
+    Model
+
+    Raises
+    ------
+    EstimationError
+        If the data cannot determine the parameters, which are named.
+    ValueError
+        If an argument does not make sense, or the log has too few rows.
+
+    Warns
+    -----
+    EstimationWarning
+        For what a careful reader of the model should know.
+
+    Notes
+    -----
+    The normal equations are made of lagged products and corrected with true residuals; where they are not exact enough, QR
+    takes over. O(N (na + nb)) operations. Ljung, System Identification, 2nd ed. 1999, section 7.3.
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> model = th.arx(th.dc_motor(), na=2, nb=2, estimate="1..700")
+    >>> model.parameters.round(4)
+    array([-1.5407,  0.5765,  0.3601,  0.3174])
+    >>> model.parameter_names
+    ['a1', 'a2', 'b1', 'b2']
+    """
+    return _fit(log, "arx", {"na": na, "nb": nb, "nk": nk}, options)
+
+
+def armax(log: Log, na: int, nb: Orders, nc: int, nk: Orders = 1, **options: Unpack[FitOptions]) -> Model:
+    """Fit an ARMAX model, A(q) y(t) = B(q) u(t) + C(q) e(t), by prediction errors.
+
+    Parameters
+    ----------
+    log : Log
+        The data.
+    na, nb, nc : int
+        Coefficients of A, B and C; nb may be one for each input.
+    nk : int, or one for each input
+        Samples from input to first effect.
+    **options
+        What to fit to and how to search, see `thetahat.FitOptions`.
+
+    Returns
+    -------
+    Model
+
+    Raises
+    ------
+    EstimationError, ValueError
+        As for `arx`.
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> model = th.armax(th.dc_motor(), na=2, nb=2, nc=1)
+    >>> model.c.round(3)
+    array([ 1.  , -0.55])
+    """
+    return _fit(log, "armax", {"na": na, "nb": nb, "nc": nc, "nk": nk}, options)
+
+
+def oe(log: Log, nb: Orders, nf: Orders, nk: Orders = 1, **options: Unpack[FitOptions]) -> Model:
+    """Fit an output error model, y(t) = B(q)/F(q) u(t) + e(t), by prediction errors.
+
+    Standard errors hold for coloured noise too.
+
+    Parameters
+    ----------
+    log : Log
+        The data.
+    nb, nf : int, or one for each input
+        Coefficients of B and F.
+    nk : int, or one for each input
+        Samples from input to first effect.
+    **options
+        What to fit to and how to search, see `thetahat.FitOptions`.
+
+    Returns
+    -------
+    Model
+
+    Raises
+    ------
+    EstimationError, ValueError
+        As for `arx`.
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> th.oe(th.dc_motor(), nb=2, nf=2).structure
+    'oe'
+    """
+    return _fit(log, "oe", {"nb": nb, "nf": nf, "nk": nk}, options)
+
+
+def bj(log: Log, nb: Orders, nc: int, nd: int, nf: Orders, nk: Orders = 1, **options: Unpack[FitOptions]) -> Model:
+    """Fit a Box-Jenkins model, y(t) = B(q)/F(q) u(t) + C(q)/D(q) e(t), by prediction errors.
+
+    Parameters
+    ----------
+    log : Log
+        The data.
+    nb, nc, nd, nf : int
+        Coefficients of B, C, D and F; nb and nf may be one for each input.
+    nk : int, or one for each input
+        Samples from input to first effect.
+    **options
+        What to fit to and how to search, see `thetahat.FitOptions`.
+
+    Returns
+    -------
+    Model
+
+    Raises
+    ------
+    EstimationError, ValueError
+        As for `arx`.
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> model = th.bj(th.dc_motor(), nb=2, nc=0, nd=1, nf=2)
+    >>> abs(model.poles()).round(2)
+    array([0.89, 0.69])
+    """
+    return _fit(log, "bj", {"nb": nb, "nc": nc, "nd": nd, "nf": nf, "nk": nk}, options)
+
+
+def ar(log: Log, na: int, **options: Unpack[FitOptions]) -> Model:
+    """Fit an autoregressive model of a time series, A(q) y(t) = e(t); inputs of the log are left out.
+
+    Parameters
+    ----------
+    log : Log
+        The data.
+    na : int
+        Coefficients of A.
+    **options
+        What to fit to and how, see `thetahat.FitOptions`.
+
+    Returns
+    -------
+    Model
+
+    Raises
+    ------
+    EstimationError, ValueError
+        As for `arx`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import thetahat as th
+    >>> y = 0.9 ** np.arange(50) * np.cos(0.3 * np.arange(50))
+    >>> bool(np.isclose(th.ar(th.Log(y), na=2, detrend="none").a[1], -1.8 * np.cos(0.3)))
+    True
+    """
+    return _fit(log, "ar", {"na": na}, options)
+
+
+def arma(log: Log, na: int, nc: int, **options: Unpack[FitOptions]) -> Model:
+    """Fit an ARMA model of a time series, A(q) y(t) = C(q) e(t); inputs of the log are left out.
+
+    Parameters
+    ----------
+    log : Log
+        The data.
+    na, nc : int
+        Coefficients of A and C.
+    **options
+        What to fit to and how to search, see `thetahat.FitOptions`.
+
+    Returns
+    -------
+    Model
+
+    Raises
+    ------
+    EstimationError, ValueError
+        As for `arx`.
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> th.arma(th.dc_motor(), na=2, nc=1).orders["nc"]
+    1
+    """
+    return _fit(log, "arma", {"na": na, "nc": nc}, options)
+
+
+def pem(
+    log: Log,
+    na: int = 0,
+    nb: Orders | None = None,
+    nc: int = 0,
+    nd: int = 0,
+    nf: Orders | None = None,
+    nk: Orders | None = None,
+    **options: Unpack[FitOptions],
+) -> Model:
+    """Fit the general model, A(q) y(t) = B(q)/F(q) u(t) + C(q)/D(q) e(t), by prediction errors.
+
+    Parameters
+    ----------
+    log : Log
+        The data.
+    na, nb, nc, nd, nf : int
+        Coefficients of the polynomials; nb and nf may be one for each input.
+    nk : int, or one for each input
+        Samples from input to first effect: 1, unless said otherwise.
+    **options
+        What to fit to and how to search, see `thetahat.FitOptions`.
+
+    Returns
+    -------
+    Model
+
+    Raises
+    ------
+    EstimationError, ValueError
+        As for `arx`.
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> th.pem(th.dc_motor(), na=1, nb=2, nf=1, nd=1).structure
+    'pem'
+    """
+    return _fit(log, "pem", {"na": na, "nb": nb, "nc": nc, "nd": nd, "nf": nf, "nk": nk}, options)
+
+
+def iv(log: Log, na: int, nb: Orders, nk: Orders = 1, **options: Unpack[FitOptions]) -> Model:
+    """Fit A and B of an ARX model by instrumental variables in four stages: right about the plant whatever the noise.
+
+    Parameters
+    ----------
+    log : Log
+        The data.
+    na, nb, nk
+        As for `arx`.
+    **options
+        What to fit to, see `thetahat.FitOptions`.
+
+    Returns
+    -------
+    Model
+
+    Raises
+    ------
+    EstimationError, ValueError
+        As for `arx`.
+
+    Notes
+    -----
+    Ljung, System Identification, 2nd ed. 1999, section 15.3.
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> th.iv(th.dc_motor(), na=2, nb=2).method
+    'instrumental-variables'
+    """
+    return _fit(log, "arx", {"na": na, "nb": nb, "nk": nk}, options, "--method=iv")
+
+
+def sriv(log: Log, nb: Orders, nf: Orders, nk: Orders = 1, **options: Unpack[FitOptions]) -> Model:
+    """Fit B and F of an output error model by refined instrumental variables: right about the plant whatever the noise.
+
+    Parameters
+    ----------
+    log : Log
+        The data.
+    nb, nf, nk
+        As for `oe`.
+    **options
+        What to fit to, see `thetahat.FitOptions`.
+
+    Returns
+    -------
+    Model
+
+    Raises
+    ------
+    EstimationError, ValueError
+        As for `arx`.
+
+    Notes
+    -----
+    Young, Recursive Estimation and Time-Series Analysis, 2nd ed. 2011, chapter 7.
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> th.sriv(th.dc_motor(), nb=2, nf=2).method
+    'refined-instrumental-variables'
+    """
+    return _fit(log, "oe", {"nb": nb, "nf": nf, "nk": nk}, options, "--method=sriv")
+
+
+def search(
+    log: Log,
+    model: str | None = None,
+    *,
+    na: Orders | None = None,
+    nb: Orders | None = None,
+    nc: Orders | None = None,
+    nd: Orders | None = None,
+    nf: Orders | None = None,
+    nk: Orders | None = None,
+    select: str | None = None,
+    path: str | None = None,
+    **options: Unpack[FitOptions],
+) -> Model:
+    """Choose a model among many, all compared on the same samples.
+
+    Without orders the data choose delay, structure and orders. `Model.selection` holds what was compared.
+
+    Parameters
+    ----------
+    log : Log
+        The data.
+    model : {"arx", "armax", "oe", "bj", "ar", "arma", "pem"}, optional
+        The structure: ARX where orders are given, unless said otherwise.
+    na, nb, nc, nd, nf, nk : int or range
+        Orders, or those among which to choose: ``range(1, 9)`` is 1 to 8. nb, nf and nk may be one for each input.
+    select : {"mdl", "aic", "aicc", "fpe", "validation", "cv"}
+        What makes one model better than another: MDL, unless said otherwise.
+    path : {"all", "alternate"}
+        Which are tried: all of them, or one order up at a time.
+    **options
+        What to fit to and how to search, see `thetahat.FitOptions`.
+
+    Returns
+    -------
+    Model
+        The one that was chosen, fitted to all rows but those of a test part.
+
+    Raises
+    ------
+    EstimationError, ValueError
+        As for `arx`.
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> model = th.search(th.dc_motor(), model="oe", nb=range(1, 4), nf=range(1, 4), nk=range(1, 3))
+    >>> model.selection["models"]
+    18
+    """
+    orders = {"na": na, "nb": nb, "nc": nc, "nd": nd, "nf": nf, "nk": nk}
+    more = [f"--{name}={_options.text(name, value)}" for name, value in (("select", select), ("path", path)) if value]
+    return _fit(log, model, orders, options, *more)
+
+
+def _fit(log: Log, model: str | None, orders: dict[str, Any], options: Any, *more: str) -> Model:
+    if not isinstance(log, Log):
+        raise TypeError(f"log: expected a Log, found {type(log).__name__}; make one with thetahat.Log(y, u)")
+    words = [] if model is None else [f"--model={_options.text('model', model)}"]
+    words += [*_options.order_words(**orders), *_options.words(FitOptions, options), *more]
+    fitted = Model._of(_thetahat.fit(log._log, words))
+    # A choice among models is judged at once; of one fit the figures wait until somebody asks.
+    for warning in fitted.warnings if fitted._model.is_choice() else fitted._model.warnings():
+        warnings.warn(warning, EstimationWarning, stacklevel=3)
+    return fitted

@@ -1,0 +1,236 @@
+"""What is said of logs and models: inspections, validations, comparisons."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+from thetahat import _options, _thetahat
+from thetahat._log import Log
+from thetahat._options import LookOptions, ReadOptions
+
+if sys.version_info >= (3, 11):
+    from typing import Unpack
+else:
+    from typing_extensions import Unpack
+
+if TYPE_CHECKING:
+    from thetahat._model import Model
+
+
+class _Document:
+    """A document with the table that the command line prints of it."""
+
+    def __init__(self, text: str, table: str) -> None:
+        self._text = text
+        self._table = table
+
+    def to_json(self) -> str:
+        """The document, as the command line writes it."""
+        return self._text
+
+    def summary(self) -> str:
+        """The table that the command line prints."""
+        return self._table
+
+    @cached_property
+    def document(self) -> dict[str, Any]:
+        """The document as a dict: all that there is to know."""
+        document: dict[str, Any] = json.loads(self._text)
+        return document
+
+    @property
+    def warnings(self) -> list[str]:
+        """What a careful reader should know, in plain words."""
+        return list(self.document["warnings"])
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(self.summary())}</pre>"
+
+
+class Validation(_Document):
+    """How a model does on a log: the document of ``thetahat validate``.
+
+    Attributes
+    ----------
+    unmet : list of str
+        What was required and is not met, with the figures.
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> log = th.dc_motor()
+    >>> validation = th.arx(log[:700], na=2, nb=2).validate(log[700:])
+    >>> validation
+    Validation(1-step fit 98.12 %, free run 94.88 %, 300 rows)
+    >>> round(validation.fit(None), 2)
+    94.88
+    >>> validation.whiteness < 0.05
+    True
+    """
+
+    @classmethod
+    def _of(cls, validation: _thetahat.Validation) -> Validation:
+        made = cls(validation.to_json(), validation.table())
+        made.unmet = validation.unmet()
+        return made
+
+    unmet: list[str]
+
+    def fit(self, horizon: int | None = 1) -> float:
+        """The fit in percent so many steps ahead, or in a free run (None); NaN where there is none.
+
+        Raises
+        ------
+        ValueError
+            If the validation did not look so far ahead.
+        """
+        for fit in self.document["fit"]:
+            if fit["horizon"].get("steps") == horizon:
+                return float("nan" if fit["percent"] is None else fit["percent"])
+        if horizon is None:
+            raise ValueError("horizon: a model without inputs has no free run; give a number of steps")
+        raise ValueError(f"horizon: {horizon} was not looked at; validate with horizon={horizon}")
+
+    @property
+    def whiteness(self) -> float:
+        """The p-value of Ljung and Box's test that the residuals are white; NaN where they could not be tested."""
+        residuals = self.document["residuals"]
+        value = None if residuals is None else residuals["ljung_box"]["p_value"]
+        return float("nan" if value is None else value)
+
+    @property
+    def independence(self) -> dict[str, float]:
+        """The p-values that the residuals do not depend on past inputs, by input; NaN where they could not be tested."""
+        residuals = self.document["residuals"]
+        every = [] if residuals is None else residuals["independence"]
+        return {one["input"]: float("nan" if (p := _p_value(one)) is None else p) for one in every}
+
+    def __repr__(self) -> str:
+        rows = sum(last - first + 1 for first, last in self.document["rows"])
+        fits = {fit["horizon"].get("steps"): fit["percent"] for fit in self.document["fit"]}
+        shown = {1: "1-step fit", None: "free run"}
+        texts = [f"{name} {fits[steps]:.2f} %" for steps, name in shown.items() if fits.get(steps) is not None]
+        return f"Validation({', '.join([*texts, f'{rows} rows'])})"
+
+
+def _p_value(independence: Mapping[str, Any]) -> float | None:
+    value = independence.get("past", independence).get("p_value")
+    return None if value is None else float(value)
+
+
+class Comparison(_Document):
+    """Several models side by side on a log: the document of ``thetahat compare``."""
+
+    @property
+    def warnings(self) -> list[str]:
+        """What a careful reader should know, in plain words, with the model that it is about."""
+        models = self.document["models"]
+        return [f"{model['report']}: {warning}" for model in models for warning in model["warnings"]]
+
+    def __repr__(self) -> str:
+        return f"Comparison({', '.join(str(model['report']) for model in self.document['models'])})"
+
+
+class Inspection(_Document):
+    """What a log is worth before any fit: the document of ``thetahat inspect``.
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> inspection = th.inspect(th.dc_motor())
+    >>> inspection.delays
+    {'u': 1}
+    """
+
+    @property
+    def delays(self) -> dict[str, int | None]:
+        """The delay of each input in samples; None where none could be told."""
+        return {delay["input"]: delay["nk"] for delay in self.document["delays"]}
+
+    @property
+    def excitation(self) -> dict[str, int]:
+        """How many parameters each input can determine at most: its order of persistence."""
+        return {one["input"]: one["order"] for one in self.document["excitation"]}
+
+    @property
+    def command(self) -> str | None:
+        """The line of ``thetahat fit`` that goes with the file, if it was one."""
+        return self.document.get("command")
+
+    def __repr__(self) -> str:
+        count = len(self.warnings)
+        return f"Inspection({self.document['rows']} rows, {count} warning{'' if count == 1 else 's'})"
+
+
+def compare(models: Mapping[str, Model] | Sequence[Model], log: Log, **options: Unpack[LookOptions]) -> Comparison:
+    """Put several fitted models side by side on a log.
+
+    Parameters
+    ----------
+    models : dict of str to Model, or sequence of Model
+        The models, with the names that they have in the table.
+    log : Log
+        The data.
+    **options
+        What to look at, see `thetahat.LookOptions`.
+
+    Returns
+    -------
+    Comparison
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> log = th.dc_motor()
+    >>> models = {"arx": th.arx(log[:700], na=2, nb=2), "oe": th.oe(log[:700], nb=2, nf=2)}
+    >>> th.compare(models, log[700:])
+    Comparison(arx, oe)
+    """
+    named = dict(models) if isinstance(models, Mapping) else {f"model {k}": m for k, m in enumerate(models, 1)}
+    if not named:
+        raise ValueError("models: there is none; give at least one")
+    handles = [(_options.text("models", name), model._model) for name, model in named.items()]
+    return Comparison(*_thetahat.compare(handles, log._log, _options.words(LookOptions, options)))
+
+
+def inspect(
+    log: Log | str | os.PathLike[str],
+    *,
+    inputs: Sequence[str] | str | None = None,
+    output: str | None = None,
+    **options: Unpack[ReadOptions],
+) -> Inspection:
+    """Look at a log before any fit: its clock, the quality of its channels, excitation, delays and feedback.
+
+    Parameters
+    ----------
+    log : Log, or path
+        The data, or a CSV file, whose clock may be irregular.
+    inputs, output, **options
+        How a file is read, as for `read_csv`; without names all columns of numbers are looked at.
+
+    Returns
+    -------
+    Inspection
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> th.inspect(th.dc_motor())
+    Inspection(1000 rows, 0 warnings)
+    """
+    words = _options.words(ReadOptions, options)
+    if isinstance(log, Log):
+        if words or inputs is not None or output is not None:
+            raise TypeError("inputs, output and how to read are for files; a Log has its own")
+        return Inspection(*_thetahat.inspect(log._log))
+    words += [f"--input={name}" for name in ([inputs] if isinstance(inputs, str) else inputs or ())]
+    if output is not None:
+        words.append(f"--output={_options.text('output', output)}")
+    return Inspection(*_thetahat.inspect_file([*words, "--", _options.path_text(log)]))

@@ -1,0 +1,379 @@
+"""Logs: the measured signals that models are fitted to."""
+
+from __future__ import annotations
+
+import io
+import os
+import sys
+import warnings
+from collections.abc import Mapping, Sequence
+from typing import Any, Union, overload
+
+import numpy as np
+import numpy.typing as npt
+
+from thetahat import _options, _picture, _thetahat
+from thetahat._options import ReadOptions
+
+if sys.version_info >= (3, 11):
+    from typing import Unpack
+else:
+    from typing_extensions import Unpack
+
+Inputs = Union[npt.ArrayLike, Mapping[str, npt.ArrayLike], None]
+
+
+class Log:
+    """Inputs and an output on a common clock.
+
+    A log owns its data: arrays are copied once, here. NaN is a missing sample; it ends a stretch, and nothing reaches
+    across. Rows are counted as Python does: ``log[:500]`` is the log of the first 500, and ``log["u"]`` is a channel.
+
+    Parameters
+    ----------
+    y : array_like, shape (N,)
+        The measured output.
+    u : array_like, shape (N,) or (N, inputs), or dict of str to array_like, optional
+        The inputs, a column for each, or by name. Without them the log is a time series.
+    sample_time : float, optional
+        Seconds from one row to the next: 1, unless said otherwise.
+    time : array_like, shape (N,), optional
+        The clock instead: seconds, or datetime64. Steps may differ from their median by 10 %; one longer than 1.5 medians
+        is a gap.
+    resample : (float, {"linear", "hold"}), optional
+        Makes an irregular clock uniform: seconds between the new rows, and how to read between the old ones.
+    input_names : sequence of str, optional
+        The names of the inputs: ``u``, or ``u1``, ``u2``, …
+    output_name : str, default "y"
+        The name of the output.
+
+    Raises
+    ------
+    ValueError
+        If an array is empty, has another shape, or holds an infinity, or the clock is not uniform.
+    TypeError
+        If an array does not hold numbers.
+
+    See Also
+    --------
+    read_csv : A log from a file.
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> log = th.Log([0.0, 0.0, 0.5, 0.8], [0.0, 1.0, 1.0, 1.0], sample_time=0.1)
+    >>> log
+    Log(4 rows, inputs u, output y, sample time 0.1 s)
+    >>> log[:2].y
+    array([0., 0.])
+    """
+
+    __slots__ = ("_log",)
+    _log: _thetahat.Log
+
+    def __init__(
+        self,
+        y: npt.ArrayLike,
+        u: Inputs = None,
+        *,
+        sample_time: float | None = None,
+        time: npt.ArrayLike | None = None,
+        resample: tuple[float, str] | None = None,
+        input_names: Sequence[str] | None = None,
+        output_name: str = "y",
+    ) -> None:
+        channels = _inputs(u, input_names)
+        names = [name for name, _ in channels]
+        output = _options.text("output_name", output_name)
+        start = None
+        if time is not None:
+            time, start = _seconds(time)
+        self._log = _made([*channels, (output, y)], names, output, sample_time, time, resample, start)
+
+    @classmethod
+    def from_dataframe(
+        cls,
+        frame: Any,
+        *,
+        inputs: Sequence[str] | str = (),
+        output: str,
+        time: str | None = None,
+        sample_time: float | None = None,
+        resample: tuple[float, str] | None = None,
+    ) -> Log:
+        """A log of some columns of a data frame.
+
+        Parameters
+        ----------
+        frame : data frame
+            Of pandas, Polars, PyArrow, or any library with their interchange protocols. Missing values become NaN.
+        inputs : sequence of str, or str
+            The columns that are inputs; none for a time series.
+        output : str
+            The column that is the output.
+        time : str, optional
+            The column that holds the time: seconds, or dates.
+        sample_time, resample
+            As for `Log`.
+
+        Raises
+        ------
+        ValueError
+            If a column is not there, and as for `Log`.
+        TypeError
+            If a column does not hold numbers.
+
+        Examples
+        --------
+        >>> import pandas as pd
+        >>> import thetahat as th
+        >>> frame = pd.DataFrame({"heater": [0.0, 1.0, 1.0], "temperature": [20.0, 20.0, 20.5]})
+        >>> th.Log.from_dataframe(frame, inputs=["heater"], output="temperature", sample_time=2.0)
+        Log(3 rows, inputs heater, output temperature, sample time 2.0 s)
+        """
+        from thetahat import _frames
+
+        names = [inputs] if isinstance(inputs, str) else list(inputs)
+        columns = _frames.columns(frame, [*names, output])
+        clock, start = (None, None) if time is None else _frames.times(frame, time)
+        channels = [(name, columns[name]) for name in [*names, output]]
+        return cls._of(_made(channels, names, output, sample_time, clock, resample, start))
+
+    @classmethod
+    def join(cls, logs: Sequence[Log]) -> Log:
+        """Several experiments with one plant as one log: nothing reaches from one into the next.
+
+        Parameters
+        ----------
+        logs : sequence of Log
+            With the same channels and sample time.
+
+        Examples
+        --------
+        >>> import thetahat as th
+        >>> monday, tuesday = th.Log([1.0, 2.0]), th.Log([3.0, 4.0, 5.0])
+        >>> th.Log.join([monday, tuesday])
+        Log(5 rows, no inputs, output y, sample time 1.0 s)
+        """
+        return cls._of(_thetahat.Log.join([log._log for log in logs]))
+
+    @classmethod
+    def _of(cls, log: _thetahat.Log) -> Log:
+        made = object.__new__(cls)
+        made._log = log
+        return made
+
+    @property
+    def inputs(self) -> list[str]:
+        """The names of the inputs."""
+        return self._log.inputs
+
+    @property
+    def output(self) -> str:
+        """The name of the output."""
+        return self._log.output
+
+    @property
+    def sample_time(self) -> float:
+        """Seconds from one row to the next."""
+        return self._log.sample_time
+
+    @property
+    def y(self) -> npt.NDArray[np.float64]:
+        """The output, shape (N,); a copy."""
+        return self._log.values(self.output)
+
+    @property
+    def u(self) -> npt.NDArray[np.float64]:
+        """The inputs, shape (N, inputs); a copy."""
+        if not self.inputs:
+            return np.empty((len(self), 0))
+        return np.column_stack([self._log.values(name) for name in self.inputs])
+
+    @property
+    def time(self) -> npt.NDArray[np.float64]:
+        """Seconds, one for each row: those of the clock, or counted from 0 by the sample time."""
+        clock = self._log.time()
+        if clock is None:
+            clock = np.arange(len(self), dtype=np.float64) * self.sample_time
+        return clock
+
+    def __len__(self) -> int:
+        return self._log.rows
+
+    @overload
+    def __getitem__(self, rows: slice) -> Log: ...
+
+    @overload
+    def __getitem__(self, rows: str) -> npt.NDArray[np.float64]: ...
+
+    def __getitem__(self, rows: slice | str) -> Log | npt.NDArray[np.float64]:
+        if isinstance(rows, str):
+            return self._log.values(rows)
+        if not isinstance(rows, slice):
+            raise TypeError(f"a log is cut by a slice such as log[:500], found {rows!r}")
+        start, stop, step = rows.indices(len(self))
+        if step != 1:
+            raise ValueError(f"rows: a step of {step} leaves some out; give one of 1")
+        if stop <= start:
+            raise ValueError(f"rows: {start}:{stop} is empty; the log has {len(self)}")
+        return self._of(self._log.part(start + 1, stop))
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Log):
+            return NotImplemented
+        same = (self.inputs, self.output, self.sample_time) == (other.inputs, other.output, other.sample_time)
+        arrays = ((self.y, other.y), (self.u, other.u), (self.time, other.time))
+        return same and all(np.array_equal(mine, yours, equal_nan=True) for mine, yours in arrays)
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return (Log._of, (self._log,))
+
+    def __copy__(self) -> Log:
+        return self
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Log:
+        # Nothing can change a log.
+        return self
+
+    def __repr__(self) -> str:
+        inputs = f"inputs {', '.join(self.inputs)}" if self.inputs else "no inputs"
+        return f"Log({len(self)} rows, {inputs}, output {self.output}, sample time {self.sample_time} s)"
+
+    def _repr_html_(self) -> str:
+        names = [self.output, *self.inputs]
+        return _picture.rows(repr(self), [(name, [self._log.values(name)]) for name in names])
+
+
+def read_csv(
+    path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]],
+    *,
+    inputs: Sequence[str] | str | None = None,
+    output: str | None = None,
+    **options: Unpack[ReadOptions],
+) -> Log:
+    """Read a log from a CSV file, as the command line does.
+
+    Parameters
+    ----------
+    path : str or path, or a sequence of them
+        The file, gzip-compressed or not. Several files are several experiments with one plant.
+    inputs : sequence of str, or str, optional
+        The columns that are inputs: those called u, u1, u2, …, unless said otherwise. An empty one makes a time series.
+    output : str, optional
+        The column that is the output: y, unless said otherwise.
+    **options
+        How the file is read, see `thetahat.ReadOptions`: `time`, `sample_time`, `resample`, `time_format`, `delimiter`,
+        `decimal_comma`, `header`, `skip_rows`, `comment`, `missing`, `encoding`.
+
+    Returns
+    -------
+    Log
+
+    Raises
+    ------
+    OSError
+        If the file cannot be read.
+    ValueError
+        If it is no table, a column is not there, or a field is no number: with file, line and column.
+
+    Warns
+    -----
+    UserWarning
+        For what may be meant otherwise, such as a column that looks like a clock and is not named.
+
+    Examples
+    --------
+    >>> import tempfile, pathlib
+    >>> import thetahat as th
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder, "log.csv")
+    ...     _ = path.write_text("t,u,y\\n0,1,0\\n0.5,1,0.5\\n1,1,0.75\\n")
+    ...     log = th.read_csv(path, time="t")
+    >>> log
+    Log(3 rows, inputs u, output y, sample time 0.5 s)
+    """
+    paths = [path] if isinstance(path, (str, os.PathLike)) else list(path)
+    words = [f"--input={name}" for name in ([inputs] if isinstance(inputs, str) else inputs or ())]
+    if inputs is not None and not words:
+        words.append("--nb=0")
+        words.append("--na=1")
+    if output is not None:
+        words.append(f"--output={_options.text('output', output)}")
+    words += _options.words(ReadOptions, options)
+    for each in paths:
+        # Python has an error of its own for a file that is not there.
+        os.stat(each)
+    log, notes = _thetahat.Log.read([*words, "--", *map(_options.path_text, paths)])
+    for note in notes:
+        warnings.warn(note, stacklevel=2)
+    return Log._of(log)
+
+
+def dc_motor() -> Log:
+    """The log of a DC motor that comes with the package: 1000 rows, voltage in, speed out, 0.01 s apart.
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> th.dc_motor()
+    Log(1000 rows, inputs u, output y, sample time 0.01 s)
+    """
+    table = np.loadtxt(io.StringIO(_thetahat.DEMO_LOG), delimiter=",", skiprows=1)
+    return Log(table[:, 2], table[:, 1], time=table[:, 0])
+
+
+def _inputs(u: Inputs, names: Sequence[str] | None) -> list[tuple[str, Any]]:
+    """The inputs by name."""
+    if isinstance(u, Mapping):
+        if names is not None:
+            raise ValueError("input_names: the inputs have names already; leave it out")
+        return [(_options.text("u", name), values) for name, values in u.items()]
+    if u is None:
+        if names:
+            raise ValueError("input_names: there are no inputs; give u too")
+        return []
+    array = np.asarray(u)
+    if array.ndim not in (1, 2):
+        raise ValueError(f"u: expected shape (rows,) or (rows, inputs), found shape {array.shape}")
+    columns = [array] if array.ndim == 1 else [array[:, index] for index in range(array.shape[1])]
+    if not columns:
+        raise ValueError(f"u: expected at least one column, found shape {array.shape}")
+    if names is None:
+        names = ["u"] if len(columns) == 1 else [f"u{index + 1}" for index in range(len(columns))]
+    names = [names] if isinstance(names, str) else list(names)
+    if len(names) != len(columns):
+        raise ValueError(f"input_names: expected {len(columns)}, found {len(names)}")
+    return [(_options.text("input_names", name), column) for name, column in zip(names, columns)]
+
+
+def _made(
+    channels: Sequence[tuple[str, Any]],
+    inputs: Sequence[str],
+    output: str,
+    sample_time: float | None,
+    time: Any,
+    resample: tuple[float, str] | None,
+    start: str | None,
+) -> _thetahat.Log:
+    if time is not None and sample_time is not None:
+        raise ValueError("sample_time: the log has a clock; give one of time and sample_time")
+    if resample is not None and time is None:
+        raise ValueError("resample: it is for logs with a clock; give time too")
+    step = 1.0 if sample_time is None else float(_options.number("sample_time", sample_time))
+    clock = None if time is None else (time, resample, start)
+    return _thetahat.Log(channels, inputs, output, step, clock)
+
+
+def _seconds(time: npt.ArrayLike) -> tuple[Any, str | None]:
+    """Times in seconds, and the first one in words where they are dates."""
+    array = np.asarray(time)
+    if array.dtype.kind == "m":
+        return array / np.timedelta64(1, "s"), None
+    if array.dtype.kind != "M" or array.size == 0:
+        return time, None
+    if np.isnat(array).any():
+        raise ValueError("time: it holds NaT; leave these rows out")
+    return (array - array[0]) / np.timedelta64(1, "s"), str(array[0])

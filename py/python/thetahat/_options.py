@@ -1,0 +1,334 @@
+"""Keyword arguments as the options of the command line, whose words they share."""
+
+from __future__ import annotations
+
+import math
+import operator
+import os
+import sys
+from collections.abc import Mapping, Sequence
+from typing import Any, Optional, TypedDict, Union
+
+if sys.version_info >= (3, 11):
+    from typing import SupportsIndex
+else:
+    from typing_extensions import SupportsIndex
+
+Order = Union[int, range]
+"""An order, or the orders among which to choose: ``range(1, 9)`` is 1 to 8."""
+
+Orders = Union[Order, Sequence[Order]]
+"""An order for all inputs, or one for each."""
+
+Rows = Union[str, slice, range, Sequence[Union[str, slice, range]]]
+"""Rows of a log: a slice or a range as Python counts them, or ``"1..500"``, which counts from 1 and holds both ends."""
+
+Bound = Union[float, tuple[Optional[float], Optional[float]]]
+"""A value, or the lower and the upper end of a range, either of which may be None."""
+
+
+class SearchOptions(TypedDict, total=False):
+    """How to search where a model is not linear in its parameters.
+
+    Attributes
+    ----------
+    search : {"lm", "gauss-newton", "newton", "gradient"}
+        How steps are chosen: Levenberg and Marquardt's way, unless said otherwise.
+    max_iterations : int
+        Iterations at most, from each start: 100.
+    tolerance : float
+        Stop where the next step would lower the cost by less than this fraction: 1e-8.
+    step : float or (float, float)
+        Step length of the gradient search: c1, or c1/(c2 + l) in iteration l.
+    starts : int
+        Search from so many further starts.
+    seed : int
+        Which random starts.
+    time_limit : float
+        Begin no iteration after so many seconds.
+    """
+
+    search: str
+    max_iterations: int
+    tolerance: float
+    step: Union[float, tuple[float, float]]
+    starts: int
+    seed: int
+    time_limit: float
+
+
+class FitOptions(SearchOptions, total=False):
+    """What every fit can be told, beside the orders.
+
+    Attributes
+    ----------
+    estimate, validate : rows
+        The rows to fit to (all, unless said otherwise), and those to judge on: ``slice(0, 500)`` as Python counts, or
+        ``"1..500"``, which counts from 1 and holds both ends; or a list of these.
+    split : (float, float, float)
+        Cuts the rows in time order into parts to fit, to choose and to test, such as ``(60, 20, 20)``.
+    detrend : {"mean", "linear", "none", "start:K"}
+        What is taken from each channel before the fit and kept in the model.
+    offset : dict of str to float
+        Offsets of channels that are set by hand.
+    initial : {"auto", "drop", "zero", "estimate"}
+        What stands for the samples before the first of a stretch.
+    norm : {2, 1, "inf"}
+        What to make small, where the model is linear in its parameters: squared errors, absolute ones or the largest.
+    bound : dict of str to float or (float, float)
+        Ranges or values that parameters keep to, such as ``{"a1": (-1.9, 0)}``.
+    dc_gain : float, (float, float) or dict
+        A range or value of the static gain; of each input by its name.
+    ridge : float
+        Keeps parameters small: weighs like so many more samples in which the output is 0.
+    noise_bound : float
+        Let no error exceed this, in units of the output.
+    search, max_iterations, tolerance, step, starts, seed, time_limit
+        See `SearchOptions`.
+    """
+
+    estimate: Rows
+    validate: Rows
+    split: tuple[float, float, float]
+    detrend: str
+    offset: Mapping[str, float]
+    initial: str
+    norm: Union[int, float, str]
+    bound: Mapping[str, Bound]
+    dc_gain: Union[Bound, Mapping[str, Bound]]
+    ridge: float
+    noise_bound: float
+
+
+class LookOptions(TypedDict, total=False):
+    """How to look at a log with a model.
+
+    Attributes
+    ----------
+    rows : rows
+        The rows to look at; all, unless said otherwise.
+    detrend : {"model", "none", "mean", "linear", "start:K"}
+        The offsets: the model's own, or those of the rows looked at.
+    horizon : int or list of int
+        How many steps ahead to look besides 1.
+    lags : int
+        Lags of the tests of residuals.
+    alpha : float
+        Reject where less than this chance is left.
+    alphas : list of float
+        The levels of Anderson's test.
+    """
+
+    rows: Rows
+    detrend: str
+    horizon: Union[int, Sequence[int]]
+    lags: int
+    alpha: float
+    alphas: Sequence[float]
+
+
+class ReadOptions(TypedDict, total=False):
+    """How a file is read.
+
+    Attributes
+    ----------
+    time : str
+        The column that holds the times: seconds, or dates.
+    sample_time : float
+        Seconds from one row to the next, where no column holds the time.
+    resample : (float, {"linear", "hold"})
+        Make an irregular log uniform: seconds between the new rows, and how to read between the old ones.
+    time_format : str
+        How times are written, in strftime's notation.
+    delimiter, comment, encoding : str
+        The character between fields; the one that begins a comment; the file's encoding.
+    decimal_comma : bool
+        Whether numbers are written with a decimal comma.
+    header : bool
+        Whether the first row holds the names of the columns.
+    skip_rows : int
+        Lines to leave out before it.
+    missing : list of str
+        What stands for a missing value, besides nothing and NaN.
+    """
+
+    time: str
+    sample_time: float
+    resample: tuple[float, str]
+    time_format: str
+    delimiter: str
+    comment: str
+    encoding: str
+    decimal_comma: bool
+    header: bool
+    skip_rows: int
+    missing: Union[str, Sequence[str]]
+
+
+def words(allowed: type, options: Mapping[str, Any]) -> list[str]:
+    """The options of the command line that say the same.
+
+    Raises
+    ------
+    TypeError
+        For an option that there is not, or a value of a type that it cannot have.
+    ValueError
+        For a value that cannot be.
+    """
+    there_are = _keys(allowed)
+    found: list[str] = []
+    for name, value in options.items():
+        if name not in there_are:
+            raise TypeError(f"{name}: there is no such option; there are: {', '.join(sorted(there_are))}")
+        if value is None:
+            continue
+        found += [f"--{name.replace('_', '-')}={text}" for text in _texts(name, value)]
+    # What the command line says the other way round.
+    negations = {"--header=True": [], "--header=False": ["--no-header"], "--decimal-comma=True": ["--decimal-comma"]}
+    negations["--decimal-comma=False"] = []
+    return [word for text in found for word in negations.get(text, [text])]
+
+
+def order_words(**orders: Orders | None) -> list[str]:
+    """Orders as options: values or ranges, one for all inputs or one for each."""
+    found = []
+    for name, value in orders.items():
+        if value is None:
+            continue
+        if isinstance(value, (list, tuple)):
+            if name not in ("nb", "nf", "nk"):
+                raise TypeError(f"{name}: expected an int or a range such as range(1, 4), found {value!r}")
+            texts = [_order(name, one) for one in value]
+            if not texts:
+                raise ValueError(f"{name}: there is none; give one for each input")
+            found.append(f"--{name}={','.join(texts)}")
+        else:
+            found.append(f"--{name}={_order(name, value)}")
+    return found
+
+
+def _order(name: str, value: Any) -> str:
+    if isinstance(value, range):
+        return _span(name, value, 0)
+    count = integer(name, value)
+    if count < 0:
+        raise ValueError(f"{name}: {count} is below 0")
+    return str(count)
+
+
+def integer(name: str, value: Any) -> int:
+    """A whole number, of Python or NumPy."""
+    if isinstance(value, bool) or not isinstance(value, SupportsIndex):
+        raise TypeError(f"{name}: expected an int, found {value!r}")
+    return operator.index(value)
+
+
+def number(name: str, value: Any) -> str:
+    """A number that is one, written so that it is read back exactly."""
+    if isinstance(value, (bool, str, bytes)):
+        raise TypeError(f"{name}: expected a number, found {value!r}")
+    try:
+        found = float(value)
+    except (TypeError, ValueError):
+        raise TypeError(f"{name}: expected a number, found {value!r}") from None
+    if not math.isfinite(found):
+        raise ValueError(f"{name}: {found} is not a finite number")
+    return repr(found)
+
+
+def text(name: str, value: Any) -> str:
+    """A text."""
+    if not isinstance(value, str):
+        raise TypeError(f"{name}: expected a str, found {value!r}")
+    return value
+
+
+def path_text(path: str | os.PathLike[str]) -> str:
+    """A path as the command line takes it: a name that begins with a hyphen is no option and not standard input."""
+    name = os.fspath(path)
+    if not isinstance(name, str):
+        raise TypeError(f"path: expected a str or a path, found {path!r}")
+    return f"./{name}" if name.startswith("-") else name
+
+
+def _span(name: str, value: Any, first: int) -> str:
+    """What a slice or range holds, counted from ``first``, both ends included."""
+    start, stop = (0 if value.start is None else value.start), value.stop
+    if value.step not in (None, 1):
+        raise ValueError(f"{name}: a step of {value.step} leaves some out; give one of 1")
+    if stop is None or start < 0 or stop < 0:
+        raise ValueError(f"{name}: {value} needs a start and a stop that are not below 0")
+    if stop <= start:
+        raise ValueError(f"{name}: {value} is empty")
+    return f"{start + first}..{stop - 1 + first}"
+
+
+def _rows(name: str, value: Any) -> list[str]:
+    if isinstance(value, str):
+        return [value]
+    if isinstance(value, (slice, range)):
+        return [_span(name, value, 1)]
+    if isinstance(value, (list, tuple)):
+        return [one for part in value for one in _rows(name, part)]
+    raise TypeError(f"{name}: expected a slice, a range or a text such as '1..500', found {value!r}")
+
+
+def _bound(name: str, value: Any) -> str:
+    if isinstance(value, (tuple, list)):
+        if len(value) != 2:
+            raise ValueError(f"{name}: expected a value or a lower and an upper end, found {value!r}")
+
+        def end(limit: Any) -> str:
+            open_end = limit is None or (isinstance(limit, float) and math.isinf(limit))
+            return "" if open_end else number(name, limit)
+
+        return f"{end(value[0])}..{end(value[1])}"
+    return number(name, value)
+
+
+def _texts(name: str, value: Any) -> list[str]:
+    if name in ("estimate", "validate", "rows"):
+        return [",".join(_rows(name, value))]
+    if name in ("offset", "bound"):
+        if not isinstance(value, Mapping):
+            raise TypeError(f"{name}: expected a dict, found {value!r}")
+        return [f"{key}={number(name, of) if name == 'offset' else _bound(name, of)}" for key, of in value.items()]
+    if name == "dc_gain":
+        if isinstance(value, Mapping):
+            return [f"{key}={_bound(name, of)}" for key, of in value.items()]
+        return [_bound(name, value)]
+    if name == "split":
+        return [value if isinstance(value, str) else "/".join(_plain(number(name, part)) for part in value)]
+    if name == "norm":
+        return [{"1": "1", "2": "2", "inf": "inf", "1.0": "1", "2.0": "2"}.get(str(value), str(value))]
+    if name == "resample":
+        if isinstance(value, str) or len(value) != 2:
+            raise TypeError(f"{name}: expected (seconds, 'linear' or 'hold'), found {value!r}")
+        return [f"{number(name, value[0])}:{text(name, value[1])}"]
+    if name == "missing":
+        return [value] if isinstance(value, str) else [text(name, one) for one in value]
+    if name in ("header", "decimal_comma"):
+        if not isinstance(value, bool):
+            raise TypeError(f"{name}: expected True or False, found {value!r}")
+        return [str(value)]
+    if name in ("max_iterations", "starts", "seed", "lags", "skip_rows"):
+        return [str(integer(name, value))]
+    if name == "horizon":
+        every = value if isinstance(value, (list, tuple)) else [value]
+        return [",".join(str(integer(name, one)) for one in every)]
+    if name in ("alphas", "step"):
+        every = value if isinstance(value, (list, tuple)) else [value]
+        return [",".join(number(name, one) for one in every)]
+    if name in ("tolerance", "time_limit", "ridge", "noise_bound", "alpha", "sample_time"):
+        return [number(name, value)]
+    return [text(name, value)]
+
+
+def _plain(number: str) -> str:
+    return number[:-2] if number.endswith(".0") else number
+
+
+def _keys(allowed: type) -> set[str]:
+    return {key for base in allowed.__mro__ for key in getattr(base, "__annotations__", {})} | set(
+        getattr(allowed, "__annotations__", {})
+    )

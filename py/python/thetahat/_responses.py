@@ -1,0 +1,121 @@
+"""What models answer: forecasts, frequency and step responses, state space matrices."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from statistics import NormalDist
+from typing import Any, NamedTuple, Optional
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+
+class Forecast:
+    """What comes after the end of a log.
+
+    Attributes
+    ----------
+    time : ndarray, shape (steps,)
+        Seconds.
+    values : ndarray, shape (steps,)
+        The expected outputs, in the units of the log.
+    standard_deviations : ndarray, shape (steps,)
+        Those of their errors.
+    """
+
+    def __init__(self, time: Array, values: Array, standard_deviations: Array) -> None:
+        self.time = time
+        self.values = values
+        self.standard_deviations = standard_deviations
+
+    def interval(self, level: float = 0.95) -> tuple[Array, Array]:
+        """The lower and the upper ends of intervals that hold the output with this probability."""
+        if not 0 < level < 1:
+            raise ValueError(f"level: {level} is not between 0 and 1")
+        half = NormalDist().inv_cdf((1 + level) / 2) * self.standard_deviations
+        return self.values - half, self.values + half
+
+    def __repr__(self) -> str:
+        return f"Forecast({len(self.values)} steps from {self.time[0]:g} s)"
+
+
+class FrequencyResponse:
+    """The response of an output to its sources at some frequencies.
+
+    Attributes
+    ----------
+    frequencies : ndarray, shape (K,)
+        Radians per second.
+    sources : list of str
+        The inputs, then ``"noise"``: one for each row of what follows.
+    values : ndarray of complex, shape (sources, K)
+        Units of the output per unit of the source.
+    magnitude, phase : ndarray, shape (sources, K)
+        The phase is in radians and does not jump.
+    magnitude_errors, phase_errors : ndarray, shape (sources, K)
+        Standard errors; NaN where no theory gives one.
+    """
+
+    def __init__(self, sources: Sequence[tuple[Optional[str], Sequence[Array]]]) -> None:
+        self.sources = ["noise" if name is None else name for name, _ in sources]
+        columns = np.array([list(columns) for _, columns in sources])
+        self.frequencies: Array = columns[0, 0]
+        self.values: npt.NDArray[np.complex128] = columns[:, 1] + 1j * columns[:, 2]
+        self.magnitude: Array = columns[:, 3]
+        self.magnitude_errors: Array = columns[:, 4]
+        self.phase: Array = columns[:, 5]
+        self.phase_errors: Array = columns[:, 6]
+
+    def __repr__(self) -> str:
+        return f"FrequencyResponse({len(self.frequencies)} frequencies, {', '.join(self.sources)})"
+
+
+class StepResponse:
+    """The response of an output to a unit step, from rest.
+
+    Attributes
+    ----------
+    time : ndarray, shape (K,)
+        Seconds since the step.
+    values : ndarray, shape (K,)
+        Units of the output per unit of the input.
+    standard_errors : ndarray, shape (K,)
+        NaN where no theory gives one.
+    """
+
+    def __init__(self, time: Array, values: Array, standard_errors: Array) -> None:
+        self.time = time
+        self.values = values
+        self.standard_errors = standard_errors
+
+    def __repr__(self) -> str:
+        return f"StepResponse({len(self.time)} samples, {self.values[-1]:g} at the end)"
+
+
+class StateSpace(NamedTuple):
+    """The innovations form, x(t+1) = F x(t) + G u(t) + K e(t), y(t) = H x(t) + D u(t) + e(t)."""
+
+    F: Array
+    G: Array
+    H: Array
+    D: Array
+    K: Array
+    noise_variance: float
+    sample_time: float
+    inputs: list[str]
+    output: str
+
+    def to_scipy(self) -> Any:
+        """The response to the inputs as a discrete `scipy.signal.StateSpace`."""
+        from thetahat import _convert
+
+        return _convert.state_space_to_scipy(self.F, self.G, self.H, self.D, self.sample_time)
+
+    def to_control(self) -> Any:
+        """The response to the inputs as a `control.StateSpace`."""
+        from thetahat import _convert
+
+        matrices = (self.F, self.G, self.H, self.D)
+        return _convert.state_space_to_control(*matrices, self.sample_time, self.inputs, self.output)

@@ -1,0 +1,691 @@
+"""Pictures of logs, models and validations, drawn with matplotlib (``pip install thetahat[plot]``).
+
+Each function draws into the axes that it is given, or makes a figure, and returns the axes. None of them shows or saves a
+figure: ``ax.figure.savefig("fit.png")`` does, or ``matplotlib.pyplot.show()``. Bands are uncertainty: pointwise intervals
+that hold the truth with the probability ``level``; there is no band where no theory gives one.
+
+>>> import thetahat as th
+>>> from thetahat import plot
+>>> log = th.dc_motor()
+>>> model = th.armax(log[:700], na=2, nb=2, nc=1)
+>>> plot.fit(model, log[700:]).get_xlabel()
+'time [s]'
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import isfinite, log as ln
+from statistics import NormalDist
+from typing import Any, Union
+
+import numpy as np
+import numpy.typing as npt
+
+try:
+    from matplotlib import pyplot as plt
+except ImportError as error:
+    raise ImportError("thetahat.plot draws with matplotlib: pip install thetahat[plot]") from error
+
+from matplotlib.axes import Axes
+from matplotlib.patches import Circle, Ellipse
+from matplotlib.ticker import MaxNLocator
+
+from thetahat import _options
+from thetahat._judgement import Inspection, Validation
+from thetahat._log import Log
+from thetahat._model import Model
+from thetahat._responses import FrequencyResponse
+
+__all__ = ["bode", "fit", "inspection", "log", "poles_zeros", "residuals", "selection", "step"]
+
+Array = npt.NDArray[np.float64]
+
+Grid = npt.NDArray[Any]
+"""An array of matplotlib axes."""
+
+Models = Union[Model, Sequence[Model], Mapping[str, Model]]
+"""A model, several, or several by name."""
+
+Responses = Union[
+    Model, FrequencyResponse, Sequence[Union[Model, FrequencyResponse]], Mapping[str, Union[Model, FrequencyResponse]]
+]
+"""What has a frequency response, or several of them, or several by name."""
+
+_CRITERIA = {
+    "mdl": "MDL",
+    "aic": "AIC",
+    "aicc": "AICc",
+    "fpe": "FPE",
+    "validation": "mean of e² on the validation rows",
+    "cv": "mean of e² in cross-validation",
+}
+_LOGARITHMIC = ("mdl", "aic", "aicc")
+"""Criteria that are the logarithm of the cost and a penalty."""
+
+_FARTHEST = 3.0
+"""Roots farther out than this are named and not shown: they would make a dot of the unit circle."""
+
+
+def log(log: Log, axes: Any = None) -> Grid:
+    """The signals of a log over time: the output, and below it each input.
+
+    Parameters
+    ----------
+    log : Log
+        The data. Inputs are drawn as held from one sample to the next.
+    axes : array_like of Axes, shape (1 + inputs,), optional
+        Where to draw.
+
+    Returns
+    -------
+    ndarray of Axes, shape (1 + inputs,)
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> from thetahat import plot
+    >>> [ax.get_ylabel() for ax in plot.log(th.dc_motor())]
+    ['y', 'u']
+    """
+    _expect("log", log, Log)
+    signals = [(log.output, log.y, "default")]
+    signals += [(name, values, "steps-post") for name, values in zip(log.inputs, log.u.T)]
+    grid = _grid(axes, len(signals), 1)[:, 0]
+    for ax, (name, values, style) in zip(grid, signals):
+        time, values = _broken(log, values)
+        ax.plot(time, values, drawstyle=style, **_lone(values))
+        ax.set_ylabel(_shown(name))
+    grid[-1].set_xlabel("time [s]")
+    return grid
+
+
+def fit(
+    models: Models, log: Log, horizon: int | None = None, ax: Axes | None = None, *, level: float = 0.95
+) -> Axes:
+    """The measured output, and what models say of it.
+
+    The legend tells the fit of each, 100 (1 - ||y - yhat||/||y - mean(y)||), on the rows that are drawn.
+
+    Parameters
+    ----------
+    models : Model, or a sequence of them, or dict of str to Model
+        What to draw.
+    log : Log
+        The data, best those that the models were not fitted to.
+    horizon : int or None, default None
+        Steps ahead; None is a free run: the inputs alone drive the model.
+    ax : Axes, optional
+        Where to draw.
+    level : float, default 0.95
+        The probability with which the band holds the measured output. A free run has no band: nothing is known of how its
+        noise began.
+
+    Returns
+    -------
+    Axes
+
+    See Also
+    --------
+    thetahat.Model.predict : The values.
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> from thetahat import plot
+    >>> log = th.dc_motor()
+    >>> ax = plot.fit(th.arx(log[:700], na=2, nb=2), log[700:], horizon=5)
+    >>> [text.get_text() for text in ax.get_legend().get_texts()]
+    ['measured', 'ARX(2, 2, 1), 5 steps ahead: 95.86 %', '95 % band']
+    """
+    _expect("log", log, Log)
+    named = _named(models, (Model,))
+    # A channel of the log is found by its name, as a prediction finds it.
+    measured = {model.output: log[model.output] for _, model in named}
+    ax = _one(ax)
+    for name, values in measured.items():
+        time, values = _broken(log, values)
+        label = "measured" if len(measured) == 1 else _shown(f"measured {name}")
+        ax.plot(time, values, color="0.4", linewidth=1.0, label=label, **_lone(values))
+    far = "free run" if horizon is None else "1 step ahead" if horizon == 1 else f"{horizon} steps ahead"
+    bands = []
+    for name, model in named:
+        values = model.predict(log, horizon)
+        percent = _percent(measured[model.output], values)
+        time, drawn = _broken(log, values)
+        label = _shown(f"{name}, {far}" + (f": {percent:.2f} %" if isfinite(percent) else ""))
+        (line,) = ax.plot(time, drawn, linewidth=1.0, label=label, **_lone(drawn))
+        if horizon is not None:
+            low, high = (_broken(log, end)[1] for end in model.predict_interval(log, horizon, level))
+            bands.append(_band(ax, time, low, high, line.get_color()))
+    _label_one(bands, level)
+    ax.set_xlabel("time [s]")
+    ax.set_ylabel(_shown(", ".join(measured)))
+    # To find the best place takes long in a long log.
+    ax.legend(loc="best" if len(log) <= 20_000 else "upper right")
+    return ax
+
+
+def residuals(of: Validation | Model, log: Log | None = None, axes: Any = None) -> Grid:
+    """The correlation of the one-step errors with themselves and with each input.
+
+    White errors stay inside the band at 95 of 100 lags. Outside of it at positive lags of an input: past inputs are still in
+    the errors, so the model lacks dynamics or delay. At negative lags: the input follows the output, there is feedback.
+
+    Parameters
+    ----------
+    of : Validation or Model
+        What to draw.
+    log : Log, optional
+        The data to validate a model on.
+    axes : array_like of Axes, shape (1 + inputs,), optional
+        Where to draw.
+
+    Returns
+    -------
+    ndarray of Axes, shape (1 + inputs,)
+
+    Raises
+    ------
+    ValueError
+        If there were too few samples to test the residuals.
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> from thetahat import plot
+    >>> log = th.dc_motor()
+    >>> axes = plot.residuals(th.armax(log[:700], na=2, nb=2, nc=1), log[700:])
+    >>> [ax.get_title() for ax in axes]
+    ['residuals, white with p = 0.59', 'residuals and u, independent with p = 0.87']
+    """
+    if isinstance(of, Model):
+        if log is None:
+            raise TypeError("log: a model is validated on data; give a Log too")
+        of = of.validate(log)
+    elif log is not None:
+        raise TypeError("log: the validation has looked at its own; leave it out")
+    _expect("of", of, Validation)
+    tests = of.document["residuals"]
+    if tests is None:
+        raise ValueError("of: the residuals could not be tested; there are too few samples")
+    inputs = tests["independence"]
+    grid = _grid(axes, 1 + len(inputs), 1, sharex=False)[:, 0]
+
+    values = _array(tests["autocorrelation"])[1:]
+    _correlation(grid[0], np.arange(1, len(values) + 1), values, np.full(len(values), tests["band"]))
+    grid[0].set_title("residuals" + _p_value(", white with", of.whiteness))
+    grid[0].set_ylabel("autocorrelation")
+    for ax, test in zip(grid[1:], inputs):
+        values = _array(test["correlation"])
+        _correlation(ax, np.arange(len(values)) - len(values) // 2, values, _array(test["band"]))
+        name = test["input"]
+        ax.set_title(_shown(f"residuals and {name}" + _p_value(", independent with", of.independence[name])))
+        ax.set_ylabel("correlation")
+    return grid
+
+
+def bode(
+    models: Responses,
+    w: npt.ArrayLike | None = None,
+    axes: Any = None,
+    *,
+    sources: Sequence[str] | str | None = None,
+    level: float = 0.95,
+) -> Grid:
+    """Magnitude and phase over frequency.
+
+    Parameters
+    ----------
+    models : Model or FrequencyResponse, or a sequence of them, or dict of str to them
+        What to draw.
+    w : array_like, optional
+        Frequencies in radians per second, as for `thetahat.Model.frequency_response`.
+    axes : array_like of Axes, shape (2, sources), optional
+        Where to draw: the magnitudes, and below them the phases. Of one source, shape (2,) does too.
+    sources : str or sequence of str, optional
+        The inputs to draw the responses to, or ``"noise"``; all inputs, unless said otherwise, or the noise where there are
+        none.
+    level : float, default 0.95
+        The probability with which the bands hold the response at a frequency.
+
+    Returns
+    -------
+    ndarray of Axes, shape (2, sources)
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> from thetahat import plot
+    >>> log = th.dc_motor()
+    >>> models = {"arx": th.arx(log, na=2, nb=2), "oe": th.oe(log, nb=2, nf=2)}
+    >>> axes = plot.bode(models)
+    >>> axes.shape
+    (2, 1)
+    >>> axes[1, 0].get_xlabel()
+    'frequency [rad/s]'
+    """
+    found: list[tuple[str, FrequencyResponse]] = []
+    for name, one in _named(models, (Model, FrequencyResponse)):
+        if w is not None and not isinstance(one, Model):
+            raise TypeError("w: a FrequencyResponse has its own frequencies; leave it out")
+        found.append((name, one.frequency_response(w, points=300) if isinstance(one, Model) else one))
+    there_are = list(dict.fromkeys(source for _, response in found for source in response.sources))
+    inputs = list(dict.fromkeys(source for _, response in found for source in response.sources[:-1]))
+    wanted = [sources] if isinstance(sources, str) else list(inputs or there_are if sources is None else sources)
+    for source in wanted:
+        if source not in there_are:
+            raise ValueError(f"sources: there is no {source}; there are: {', '.join(there_are)}")
+    half = _quantile(level)
+    grid = _grid(axes, 2, len(wanted))
+    for column, source in enumerate(wanted):
+        above, below = grid[:, column]
+        bands = []
+        for name, response in found:
+            if source not in response.sources:
+                continue
+            row = response.sources.index(source)
+            x, magnitude, phase = response.frequencies, response.magnitude[row], np.degrees(response.phase[row])
+            (line,) = above.plot(x, magnitude, label=_shown(name), **_lone(magnitude))
+            below.plot(x, phase, label=_shown(name), color=line.get_color(), **_lone(phase))
+            spread = half * response.magnitude_errors[row]
+            # The logarithm of what is not above zero has no place.
+            lowest = np.min(magnitude[magnitude > 0], initial=np.inf) / 10
+            low = np.maximum(magnitude - spread, lowest)
+            bands.append(_band(above, x, low, magnitude + spread, line.get_color()))
+            spread = half * np.degrees(response.phase_errors[row])
+            _band(below, x, phase - spread, phase + spread, line.get_color())
+        _label_one(bands, level)
+        above.set_title(_shown(f"from {source}"))
+        above.set_xscale("log")
+        above.set_yscale("log")
+        below.set_xscale("log")
+        below.set_xlabel("frequency [rad/s]")
+        above.legend()
+    grid[0, 0].set_ylabel("magnitude")
+    grid[1, 0].set_ylabel("phase [°]")
+    return grid
+
+
+def step(
+    models: Models,
+    input: int | str = 0,
+    samples: int | None = None,
+    ax: Axes | None = None,
+    *,
+    level: float = 0.95,
+) -> Axes:
+    """The response of the output to a unit step of an input, from rest.
+
+    Parameters
+    ----------
+    models : Model, or a sequence of them, or dict of str to Model
+        What to draw.
+    input : int or str, default 0
+        Which input, by its place or name.
+    samples : int, optional
+        How many; until each has settled, unless said otherwise.
+    ax : Axes, optional
+        Where to draw.
+    level : float, default 0.95
+        The probability with which the band holds the response at a time.
+
+    Returns
+    -------
+    Axes
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> from thetahat import plot
+    >>> ax = plot.step(th.arx(th.dc_motor(), na=2, nb=2))
+    >>> ax.get_ylabel()
+    'y per unit of u'
+    """
+    half = _quantile(level)
+    found = []
+    for name, model in _named(models, (Model,)):
+        if isinstance(input, str) and input not in model.inputs:
+            raise ValueError(f"input: {name} has no input {input}; there are: {', '.join(model.inputs) or 'none'}")
+        index = model.inputs.index(input) if isinstance(input, str) else input
+        response = model.step_response(index, samples)
+        found.append((name, response, f"{model.output} per unit of {model.inputs[index]}"))
+    ax = _one(ax)
+    bands = []
+    for name, response, _ in found:
+        (line,) = ax.plot(response.time, response.values, label=_shown(name), **_lone(response.values))
+        spread = half * response.standard_errors
+        bands.append(
+            _band(ax, response.time, response.values - spread, response.values + spread, line.get_color())
+        )
+    _label_one(bands, level)
+    ax.set_xlabel("time since the step [s]")
+    ax.set_ylabel(_shown(", ".join(dict.fromkeys(unit for _, _, unit in found))))
+    ax.legend()
+    return ax
+
+
+def poles_zeros(model: Model, ax: Axes | None = None, *, level: float = 0.95) -> Axes:
+    """The poles and zeros of a model in the z plane, with the unit circle.
+
+    Poles inside the circle decay and outside they grow; the nearer to the circle, the more slowly. Complex roots have
+    ellipses and real ones intervals that hold the root with the probability ``level``, to first order.
+
+    Parameters
+    ----------
+    model : Model
+        What to draw.
+    ax : Axes, optional
+        Where to draw.
+    level : float, default 0.95
+        The probability.
+
+    Returns
+    -------
+    Axes
+
+    Notes
+    -----
+    A root with the covariance S of its real and imaginary part lies, with the probability p, where d' S^-1 d is below the
+    quantile of chi-square for two degrees of freedom, -2 ln(1 - p). Roots near to one another have no S: there the first
+    order does not hold.
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> from thetahat import plot
+    >>> ax = plot.poles_zeros(th.armax(th.dc_motor(), na=2, nb=2, nc=1))
+    >>> [text.get_text() for text in ax.get_legend().get_texts()]
+    ['poles', 'zeros from u', 'noise zeros']
+    """
+    _expect("model", model, Model)
+    half = _quantile(level)
+    own = model.document["model"]
+    groups = [("poles", own["poles"], "x")]
+    groups += [(f"zeros from {name}", roots, "o") for name, roots in zip(model.inputs, own["zeros"])]
+    groups += [("noise poles", own["noise_poles"], "+"), ("noise zeros", own["noise_zeros"], "D")]
+    ax = _one(ax)
+    ax.add_patch(Circle((0, 0), 1, fill=False, color="0.6", linewidth=0.8))
+    ax.axhline(0, color="0.85", linewidth=0.8, zorder=0)
+    ax.axvline(0, color="0.85", linewidth=0.8, zorder=0)
+    reach = 1.0
+    for name, roots, marker in groups:
+        if not roots:
+            continue
+        places = np.array([complex(root["re"], root["im"]) for root in roots])
+        near = np.abs(places) <= _FARTHEST
+        away = ", ".join(f"{place:.4g}" if place.imag else f"{place.real:.4g}" for place in places[~near])
+        label = f"{name}, outside of the picture: {away}" if away else name
+        (line,) = ax.plot(places.real, places.imag, marker, fillstyle="none", label=_shown(label))
+        reach = float(np.max([np.abs(places[near].real), np.abs(places[near].imag)], initial=reach))
+        for root in roots:
+            _region(ax, root, half, level, line.get_color())
+    ax.set_xlim(-1.15 * reach, 1.15 * reach)
+    ax.set_ylim(-1.15 * reach, 1.15 * reach)
+    ax.set_aspect("equal")
+    ax.set_xlabel("real part")
+    ax.set_ylabel("imaginary part")
+    if ax.get_legend_handles_labels()[0]:
+        ax.legend()
+    return ax
+
+
+def selection(model: Model, ax: Axes | None = None) -> Axes:
+    """How a model was chosen: cost and criterion of the best model of each size.
+
+    For MDL, AIC and AICc the cost is drawn as its logarithm: what lies between the two curves is the penalty. For the others
+    both are in squared units of the output.
+
+    Parameters
+    ----------
+    model : Model
+        A model of `thetahat.search`.
+    ax : Axes, optional
+        Where to draw.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ValueError
+        If the model was not chosen among others.
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> from thetahat import plot
+    >>> model = th.search(th.dc_motor()[:700])
+    >>> [text.get_text() for text in plot.selection(model).get_legend().get_texts()]
+    ['ln of the mean of e² in the fit', 'MDL', 'chosen: ARMAX(2, 2, 1, 1)']
+    """
+    _expect("model", model, Model)
+    found = model.selection
+    if found is None:
+        raise ValueError("model: it was not chosen among others; thetahat.search chooses")
+    by = found["select"]
+    logarithmic = by in _LOGARITHMIC
+    sizes = [one["parameters"] for one in found["of_size"]]
+    costs = _array([one["mse"] for one in found["of_size"]])
+    costs = np.where(costs > 0, costs, np.nan)
+    ax = _one(ax)
+    cost = "ln of the mean of e² in the fit" if logarithmic else "mean of e² in the fit"
+    ax.plot(sizes, np.log(costs) if logarithmic else costs, ".--", color="0.5", label=cost)
+    ax.plot(sizes, _array([one["score"] for one in found["of_size"]]), "o-", markersize=4, label=_CRITERIA[by])
+    chosen = found["chosen"]
+    least = found.get("least")
+    if least is not None and least != chosen:
+        ax.plot(least["parameters"], least["score"], "o", markersize=11, fillstyle="none", label="least")
+    ax.plot(
+        chosen["parameters"],
+        np.nan if chosen["score"] is None else chosen["score"],
+        "*",
+        markersize=14,
+        fillstyle="none",
+        label=f"chosen: {model.name}",
+    )
+    if not logarithmic:
+        ax.set_yscale("log")
+    ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+    ax.set_xlabel("number of parameters")
+    ax.set_ylabel(_CRITERIA[by] if logarithmic else "mean of e²")
+    ax.legend()
+    return ax
+
+
+def inspection(inspection: Inspection, axes: Any = None) -> Grid:
+    """What a log is worth: the spectrum of each input, and its correlation with the output, which shows the delay.
+
+    Parameters
+    ----------
+    inspection : Inspection
+        Of `thetahat.inspect`.
+    axes : array_like of Axes, shape (inputs, 2), optional
+        Where to draw.
+
+    Returns
+    -------
+    ndarray of Axes, shape (inputs, 2)
+
+    Raises
+    ------
+    ValueError
+        If the log has no inputs.
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> from thetahat import plot
+    >>> plot.inspection(th.inspect(th.dc_motor()))[0, 1].get_title()
+    'from u to y: a delay of 1 sample'
+    """
+    _expect("inspection", inspection, Inspection)
+    document = inspection.document
+    delays = {delay["input"]: delay for delay in document["delays"]}
+    if not document["excitation"]:
+        raise ValueError("inspection: the log has no inputs; there is nothing to draw")
+    output = next((channel["name"] for channel in document["channels"] if channel["role"] == "output"), "the output")
+    grid = _grid(axes, len(document["excitation"]), 2, sharex=False)
+    for (left, right), excitation in zip(grid, document["excitation"]):
+        name = excitation["input"]
+        # Frequency 0 has no place on a logarithmic axis.
+        points = [point for point in excitation["spectrum"] or () if point["frequency"] > 0 and point["density"]]
+        left.plot([point["frequency"] for point in points], [point["density"] for point in points])
+        left.set_xscale("log")
+        left.set_yscale("log")
+        left.set_xlabel("frequency [rad/s]")
+        left.set_ylabel("power density")
+        left.set_title(_shown(f"spectrum of {name}"))
+        title = f"from {name} to {output}"
+        delay = delays.get(name)
+        if delay is not None:
+            values = _array(delay["correlation"])
+            _correlation(right, np.arange(len(values)), values, np.full(len(values), delay["band"], dtype=np.float64))
+            nk = delay["nk"]
+            title += ": no delay found" if nk is None else f": a delay of {nk} sample{'' if nk == 1 else 's'}"
+        right.set_ylabel("prewhitened correlation")
+        right.set_title(_shown(title))
+    return grid
+
+
+def _expect(argument: str, value: object, kind: type) -> None:
+    if not isinstance(value, kind):
+        raise TypeError(f"{argument}: expected a {kind.__name__}, found {type(value).__name__}")
+
+
+def _named(models: Any, kinds: tuple[type, ...]) -> list[tuple[str, Any]]:
+    """What to draw, with names for a legend: those given, or what each is."""
+    if isinstance(models, kinds):
+        models = [models]
+    if isinstance(models, Mapping):
+        named = [(_options.text("models", name), one) for name, one in models.items()]
+    elif isinstance(models, Sequence) and not isinstance(models, str):
+        named = [(one.name if isinstance(one, Model) else "response", one) for one in models]
+        names = [name for name, _ in named]
+        if len(set(names)) < len(names):
+            named = [(f"{index}: {name}", one) for index, (name, one) in enumerate(named, 1)]
+    else:
+        raise TypeError(f"models: expected a Model, several or a dict of them, found {type(models).__name__}")
+    if not named:
+        raise ValueError("models: there is none; give at least one")
+    for _, one in named:
+        if not isinstance(one, kinds):
+            expected = " or ".join(kind.__name__ for kind in kinds)
+            raise TypeError(f"models: expected a {expected}, found {type(one).__name__}")
+    return named
+
+
+def _one(ax: Axes | None) -> Axes:
+    """The axes to draw into."""
+    if ax is None:
+        made: Axes = plt.subplots(layout="constrained")[1]
+        return made
+    _expect("ax", ax, Axes)
+    return ax
+
+
+def _grid(axes: Any, rows: int, columns: int, sharex: bool = True) -> Grid:
+    """Rows and columns of axes to draw into; of one column or row, or one alone, fewer dimensions do too."""
+    if axes is None:
+        size = (max(6.4, 4.8 * columns), max(4.8, 2.2 * rows))
+        made: Grid = plt.subplots(
+            rows, columns, squeeze=False, sharex="col" if sharex else False, figsize=size, layout="constrained"
+        )[1]
+        return made
+    given: Grid = np.asarray(axes, dtype=np.object_)
+    line = (max(rows, columns),)
+    if given.shape != (rows, columns) and not (1 in (rows, columns) and given.size == line[0] and given.ndim < 2):
+        expected = (rows, columns) if 1 not in (rows, columns) else line
+        raise ValueError(f"axes: expected shape {expected}, found {given.shape}")
+    for ax in given.flat:
+        _expect("axes", ax, Axes)
+    return given.reshape(rows, columns)
+
+
+def _band(ax: Axes, x: Array, low: Array, high: Array, colour: Any) -> Any:
+    """An area between two curves; None where none is known."""
+    if not np.isfinite(high - low).any():
+        return None
+    return ax.fill_between(x, low, high, color=colour, alpha=0.2, linewidth=0)
+
+
+def _label_one(bands: Sequence[Any], level: float) -> None:
+    """Puts the first band into the legend."""
+    for band in [band for band in bands if band is not None][:1]:
+        band.set_label(f"{100 * level:g} % band")
+
+
+def _correlation(ax: Axes, lags: npt.NDArray[np.int_], values: Array, half: Array) -> None:
+    """A correlation with its band."""
+    ax.axhline(0, color="0.6", linewidth=0.8)
+    # A value's band is as wide as its place.
+    edges = np.ravel(np.column_stack([lags - 0.5, lags + 0.5]))
+    wide = np.repeat(half, 2)
+    ax.fill_between(edges, -wide, wide, color="0.5", alpha=0.25, linewidth=0, label="95 % band")
+    ax.vlines(lags, 0, values)
+    ax.plot(lags, values, "o", markersize=3)
+    ax.set_xlabel("lag [samples]")
+    ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+    ax.legend()
+
+
+def _region(ax: Axes, root: Mapping[str, Any], half: float, level: float, colour: Any) -> None:
+    """Where a root lies with this probability: an ellipse, of a real root an interval."""
+    if root["covariance"] is None:
+        return
+    covariance = np.array(root["covariance"], dtype=np.float64)
+    if not np.isfinite(covariance).all():
+        return
+    if covariance[1, 1] == 0:
+        spread = half * float(np.sqrt(covariance[0, 0]))
+        ax.plot([root["re"] - spread, root["re"] + spread], [root["im"]] * 2, color=colour, linewidth=1.2)
+        return
+    variances, directions = np.linalg.eigh(covariance)
+    width, height = 2 * np.sqrt(-2 * ln(1 - level) * np.maximum(variances, 0))
+    angle = float(np.degrees(np.arctan2(directions[1, 0], directions[0, 0])))
+    ax.add_patch(Ellipse((root["re"], root["im"]), width, height, angle=angle, fill=False, color=colour))
+
+
+def _broken(log: Log, values: Array) -> tuple[Array, Array]:
+    """Time and values, with a break of the line where the clock jumps."""
+    time = log.time
+    steps = np.diff(time)
+    jumps = np.flatnonzero((steps > 1.5 * log.sample_time) | (steps < 0)) + 1
+    return np.insert(time, jumps, np.nan), np.insert(values, jumps, np.nan)
+
+
+def _lone(values: Array) -> dict[str, Any]:
+    """Dots for values that have no neighbour to draw a line to."""
+    there = np.concatenate([[False], np.isfinite(values), [False]])
+    lone = there[1:-1] & ~there[:-2] & ~there[2:]
+    return {"marker": ".", "markevery": lone} if lone.any() else {}
+
+
+def _percent(measured: Array, values: Array) -> float:
+    """The fit where both are there; NaN where there is none."""
+    both = np.isfinite(measured) & np.isfinite(values)
+    measured = measured[both]
+    spread = float(np.linalg.norm(measured - measured.mean())) if both.any() else 0.0
+    return 100 * (1 - float(np.linalg.norm(measured - values[both])) / spread) if spread > 0 else np.nan
+
+
+def _quantile(level: float) -> float:
+    """Standard deviations to either side of the middle."""
+    if not 0 < level < 1:
+        raise ValueError(f"level: {level} is not between 0 and 1")
+    return NormalDist().inv_cdf((1 + level) / 2)
+
+
+def _p_value(words: str, value: float) -> str:
+    return f"{words} p = {value:.2g}" if isfinite(value) else ""
+
+
+def _array(values: Sequence[float | None]) -> Array:
+    return np.array([np.nan if value is None else value for value in values], dtype=np.float64)
+
+
+def _shown(text: str) -> str:
+    """A text that matplotlib shows as it is: no formula between dollars, and no label left out for an underscore."""
+    text = text.replace("$", r"\$")
+    return f" {text}" if text.startswith("_") else text

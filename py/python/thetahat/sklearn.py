@@ -1,0 +1,264 @@
+"""ARX models as estimators of scikit-learn, for its pipelines, searches and scores.
+
+Rows are samples in the order of time, at equal distances. Whatever splits them has to keep that order and to leave no holes:
+`sklearn.model_selection.TimeSeriesSplit` does, shuffled folds do not.
+"""
+
+from __future__ import annotations
+
+import numbers
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+try:
+    from sklearn.base import BaseEstimator, RegressorMixin
+    from sklearn.metrics import r2_score
+    from sklearn.utils import check_array, check_consistent_length, column_or_1d
+    from sklearn.utils.validation import check_is_fitted, validate_data
+except ImportError as error:
+    message = (
+        f"thetahat.sklearn needs scikit-learn 1.6 or later, which cannot be imported ({error}): "
+        "pip install thetahat[sklearn]"
+    )
+    raise ImportError(message) from error
+
+from thetahat import Log, Model, arx
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["ARXRegressor"]
+
+
+# Without stubs of scikit-learn its classes are Any to mypy.
+class ARXRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
+    """An ARX model, A(q) y(t) = sum_j B_j(q) u_j(t - nk_j) + e(t), by least squares.
+
+    Parameters
+    ----------
+    na : int, default=2
+        Coefficients of A: how many past outputs there are.
+    nb : int or sequence of int, default=2
+        Coefficients of B, for all inputs or one for each.
+    nk : int or sequence of int, default=1
+        Samples from an input's change to its first effect, for all inputs or one for each.
+    horizon : int or None, default=None
+        How many samples ahead `predict` and `score` predict. None: the free run, which sees no outputs.
+    sample_time : float, default=1.0
+        Seconds from one sample to the next.
+
+    Attributes
+    ----------
+    model_ : thetahat.Model
+        The fitted model.
+    coef_ : ndarray of shape (n_parameters,)
+        Its parameters: a1, a2, ..., then those of B for each input.
+    n_features_in_ : int
+        The number of inputs.
+    feature_names_in_ : ndarray of shape (n_features_in_,)
+        The inputs' names, where X was a dataframe with names that are text.
+
+    Notes
+    -----
+    NaN in y means a sample that is missing.
+
+    With a horizon leave `scoring` of searches and cross-validation at its default, which is `score`: all others call `predict`
+    without the outputs. The `predict` of a pipeline hands them on: `pipeline.predict(X, y=y)`.
+
+    Of the checks in `sklearn.utils.estimator_checks` those that shuffle rows or leave some out fail, as time is in their order,
+    and so does the one that wants NaN in y refused.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from sklearn.model_selection import TimeSeriesSplit, cross_val_score
+    >>> from thetahat.sklearn import ARXRegressor
+    >>> u = np.random.default_rng(1).standard_normal((500, 1))
+    >>> y = np.zeros(500)
+    >>> for t in range(1, 500):
+    ...     y[t] = 0.5 * y[t - 1] + u[t - 1, 0]
+    >>> regressor = ARXRegressor(na=1, nb=1, horizon=1)
+    >>> scores = cross_val_score(regressor, u, y, cv=TimeSeriesSplit(3))
+    >>> bool(scores.min() > 0.99)
+    True
+    """
+
+    def __init__(
+        self,
+        na: int = 2,
+        nb: int | Sequence[int] = 2,
+        nk: int | Sequence[int] = 1,
+        *,
+        horizon: int | None = None,
+        sample_time: float = 1.0,
+    ) -> None:
+        self.na = na
+        self.nb = nb
+        self.nk = nk
+        self.horizon = horizon
+        self.sample_time = sample_time
+
+    def fit(self, X: ArrayLike, y: ArrayLike) -> ARXRegressor:
+        """Estimate the model.
+
+        Parameters
+        ----------
+        X : array_like of shape (n_samples, n_inputs)
+            The inputs in the order of time.
+        y : array_like of shape (n_samples,)
+            The output.
+
+        Returns
+        -------
+        ARXRegressor
+            This one, fitted.
+
+        Raises
+        ------
+        ValueError
+            If X or y does not have its shape, or a parameter is out of its range.
+        thetahat.EstimationError
+            If the data do not determine the model.
+        """
+        self._check_horizon()
+        inputs = self._inputs(X, reset=True)
+        log = self._log(inputs, self._output(y, inputs))
+        self.model_: Model = arx(log, na=self.na, nb=_orders(self.nb), nk=_orders(self.nk))
+        self.coef_: NDArray[np.float64] = np.asarray(self.model_.parameters, dtype=np.float64)
+        return self
+
+    def predict(self, X: ArrayLike, y: ArrayLike | None = None) -> NDArray[np.float64]:
+        """Predict the output.
+
+        Without a horizon this is the free run: the model is driven by the inputs alone and begins at rest, all deviations zero
+        before the first row. What the system did before is not known to it, so that it needs some rows to come close.
+
+        Parameters
+        ----------
+        X : array_like of shape (n_samples, n_inputs)
+            The inputs in the order of time.
+        y : array_like of shape (n_samples,), optional
+            The measured output, of which a prediction with a horizon sees what is that far back. Not read without a horizon.
+
+        Returns
+        -------
+        ndarray of shape (n_samples,)
+            With a horizon, NaN where too little is known to predict from, as in the first rows.
+
+        Raises
+        ------
+        ValueError
+            If there is a horizon and no y, or X does not have the inputs of the fit.
+        sklearn.exceptions.NotFittedError
+            If there is no model yet.
+        """
+        check_is_fitted(self)
+        self._check_horizon()
+        inputs = self._inputs(X, reset=False)
+        if self.horizon is None:
+            return np.asarray(self.model_.simulate(inputs, initial="zero"), dtype=np.float64)
+        if y is None:
+            message = (
+                f"y: a prediction {self.horizon} samples ahead starts from measured outputs; give predict(X, y), "
+                "or horizon=None for a free run, which needs none"
+            )
+            raise ValueError(message)
+        log = self._log(inputs, self._output(y, inputs))
+        return np.asarray(self.model_.predict(log, horizon=int(self.horizon)), dtype=np.float64)
+
+    def score(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> float:
+        """The coefficient of determination, R^2, of `predict(X, y)`.
+
+        Parameters
+        ----------
+        X : array_like of shape (n_samples, n_inputs)
+            The inputs in the order of time.
+        y : array_like of shape (n_samples,)
+            The measured output.
+        sample_weight : array_like of shape (n_samples,), optional
+            What each sample counts.
+
+        Returns
+        -------
+        float
+            1 - sum (y - y^)^2 / sum (y - mean y)^2 over the samples that have a prediction and a measured output.
+
+        Raises
+        ------
+        ValueError
+            As for `predict`, or if there are not two such samples.
+        """
+        predicted = self.predict(X, y)
+        measured = self._output(y, predicted)
+        known = ~(np.isnan(predicted) | np.isnan(measured))
+        if np.count_nonzero(known) < 2:
+            message = (
+                f"score: of {len(known)} samples {np.count_nonzero(known)} have a prediction and a measured output, "
+                "and R^2 needs two; give more rows"
+            )
+            raise ValueError(message)
+        weights = None if sample_weight is None else np.asarray(sample_weight)[known]
+        return float(r2_score(measured[known], predicted[known], sample_weight=weights))
+
+    def __sklearn_tags__(self) -> Any:
+        tags = super().__sklearn_tags__()
+        # Of rows without an order in time there is nothing to learn.
+        tags.regressor_tags.poor_score = True
+        return tags
+
+    def _check_horizon(self) -> None:
+        horizon = self.horizon
+        if horizon is not None and not (isinstance(horizon, numbers.Integral) and horizon >= 1):
+            message = f"horizon: expected a whole number of samples from 1 on, or None, found {horizon!r}"
+            raise ValueError(message)
+
+    def _inputs(self, X: ArrayLike, *, reset: bool) -> NDArray[np.float64]:
+        inputs: NDArray[np.float64] = validate_data(
+            self,
+            X,
+            reset=reset,
+            dtype=np.float64,
+            ensure_min_samples=2 if reset else 1,
+        )
+        return inputs
+
+    def _output(self, y: ArrayLike, beside: NDArray[np.float64]) -> NDArray[np.float64]:
+        if y is None:
+            message = "y: ARXRegressor requires y to be passed, but the target y is None"
+            raise ValueError(message)
+        checked = check_array(
+            y,
+            dtype=np.float64,
+            ensure_all_finite="allow-nan",
+            ensure_2d=False,
+            input_name="y",
+            estimator=self,
+        )
+        output: NDArray[np.float64] = column_or_1d(checked, warn=True)
+        check_consistent_length(beside, output)
+        return output
+
+    def _log(self, inputs: NDArray[np.float64], output: NDArray[np.float64]) -> Log:
+        names = getattr(self, "feature_names_in_", None)
+        taken = [] if names is None else [str(name) for name in names]
+        # No input may have the output's name.
+        output_name = "y"
+        while output_name in taken:
+            output_name += "_"
+        return Log(
+            output,
+            inputs,
+            sample_time=self.sample_time,
+            input_names=taken or None,
+            output_name=output_name,
+        )
+
+
+def _orders(orders: int | Sequence[int]) -> int | list[int]:
+    """One order for all inputs, or a list of one for each."""
+    if isinstance(orders, numbers.Integral):
+        return int(orders)
+    return [int(order) for order in orders]  # type: ignore[union-attr]

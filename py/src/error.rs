@@ -1,0 +1,88 @@
+//! The one map of errors: what the libraries say, as Python raises it.
+
+use std::fmt::Write;
+
+use pyo3::create_exception;
+use pyo3::exceptions::{PyException, PyKeyboardInterrupt, PyOSError, PyValueError};
+use pyo3::prelude::*;
+
+create_exception!(
+    thetahat,
+    EstimationError,
+    PyException,
+    "The data cannot determine what was asked of them.\n\n\
+     Attributes\n\
+     ----------\n\
+     parameters : list of str\n    \
+         The parameters that the data leave open; empty where all of them are."
+);
+
+/// What the batch library says.
+pub(crate) fn batch(py: Python<'_>, error: thetahat::Error) -> PyErr {
+    let message = in_python(&error.to_string());
+    match error {
+        thetahat::Error::Interrupted => PyKeyboardInterrupt::new_err(()),
+        thetahat::Error::Undetermined { parameters, .. } => undetermined(py, message, parameters),
+        _ => PyValueError::new_err(message),
+    }
+}
+
+/// What the steppers say.
+pub(crate) fn online(py: Python<'_>, error: thetahat_core::Error) -> PyErr {
+    stepper(py, error, error.to_string())
+}
+
+/// What they say of one row of a run, from 0.
+pub(crate) fn online_at(py: Python<'_>, row: usize, error: thetahat_core::Error) -> PyErr {
+    stepper(py, error, format!("row {row}: {error}"))
+}
+
+fn stepper(py: Python<'_>, error: thetahat_core::Error, message: String) -> PyErr {
+    use thetahat_core::Error;
+    match error {
+        Error::NoVariance { .. }
+        | Error::RankDeficient { .. }
+        | Error::NotObservable { .. }
+        | Error::NotConverged { .. }
+        | Error::Overflow => undetermined(py, message, Vec::new()),
+        _ => PyValueError::new_err(message),
+    }
+}
+
+/// What the program's own stages say.
+pub(crate) fn program(py: Python<'_>, failure: &thetahat_cli::Failure) -> PyErr {
+    let message = in_python(failure.message());
+    match failure.kind() {
+        thetahat_cli::Kind::Interrupted => PyKeyboardInterrupt::new_err(()),
+        thetahat_cli::Kind::Undetermined => undetermined(py, message, Vec::new()),
+        thetahat_cli::Kind::Io => PyOSError::new_err(message),
+        _ => PyValueError::new_err(message),
+    }
+}
+
+fn undetermined(py: Python<'_>, message: String, parameters: Vec<String>) -> PyErr {
+    let error = EstimationError::new_err(message);
+    match error.value(py).setattr("parameters", parameters) {
+        Ok(()) => error,
+        Err(other) => other,
+    }
+}
+
+/// A message that names options of the command line, with the keyword arguments that they are here: `--sample-time 0` is
+/// `sample_time 0`.
+fn in_python(message: &str) -> String {
+    let mut text = String::with_capacity(message.len());
+    let mut rest = message;
+    while let Some(start) = rest.find("--") {
+        let (before, option) = (&rest[..start], &rest[start + 2..]);
+        let length = option.bytes().take_while(|byte| byte.is_ascii_lowercase() || *byte == b'-').count();
+        text.push_str(before);
+        // A dash that is no option stays.
+        if length == 0 || !(before.is_empty() || before.ends_with([' ', '(', '\'', '"', '\n'])) {
+            text.push_str("--");
+        }
+        let _ = write!(text, "{}", option[..length].replace('-', "_"));
+        rest = &option[length..];
+    }
+    text + rest
+}

@@ -1,0 +1,124 @@
+//! Documents about logs and models: validations, comparisons, inspections.
+
+use std::ffi::OsString;
+
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use thetahat::{Inspection, InspectionPlan, Recording, Report, Requirement, Times, Validated};
+
+use crate::error;
+use crate::log::{Log, copy};
+use crate::model::Model;
+use crate::work::interruptible;
+
+/// How a model does on a log: the document that `thetahat validate` writes.
+#[pyclass(frozen, module = "thetahat._thetahat")]
+pub(crate) struct Validation {
+    found: Validated,
+    requirements: Vec<Requirement>,
+    alpha: f64,
+}
+
+/// Looks at a log with a model, with the options of `thetahat validate`.
+#[pyfunction]
+pub(crate) fn validate(
+    py: Python<'_>,
+    model: &Bound<'_, Model>,
+    log: &Bound<'_, Log>,
+    options: Vec<OsString>,
+) -> PyResult<Validation> {
+    let (plan, requirements) =
+        thetahat_cli::validation_plan(&options).map_err(|failure| error::program(py, &failure))?;
+    let (model, log) = (model.get(), log.get());
+    let report = model.report(py)?;
+    for requirement in &requirements {
+        requirement.check(report).map_err(|error| error::batch(py, error))?;
+    }
+    let found = interruptible(py, |_| {
+        thetahat::validate(report, None, copy(&log.log, &model.channels(log))?, &log.sources, &plan)
+    })?;
+    Ok(Validation { found, requirements, alpha: plan.alpha })
+}
+
+#[pymethods]
+impl Validation {
+    /// The document.
+    fn to_json(&self, py: Python<'_>) -> PyResult<String> {
+        self.found.validation.to_json().map_err(|error| error::batch(py, error))
+    }
+
+    /// The table that `thetahat validate` prints.
+    fn table(&self) -> String {
+        thetahat_cli::validation(&self.found.validation, &self.requirements, self.alpha)
+    }
+
+    /// What was required and is not met, in words with the figures.
+    fn unmet(&self) -> Vec<String> {
+        let validation = &self.found.validation;
+        self.requirements.iter().filter_map(|requirement| requirement.unmet(validation, self.alpha)).collect()
+    }
+
+    /// The page that `thetahat validate --html` writes.
+    fn page(&self, py: Python<'_>, model: &Bound<'_, Model>, command: &str) -> PyResult<String> {
+        let report = model.get().report(py)?;
+        thetahat::validation_page(report, &self.found, command).map_err(|error| error::batch(py, error))
+    }
+}
+
+/// Several models side by side on a log: the document that `thetahat compare` writes, and its table.
+#[pyfunction]
+pub(crate) fn compare(
+    py: Python<'_>,
+    models: Vec<(String, Bound<'_, Model>)>,
+    log: &Bound<'_, Log>,
+    options: Vec<OsString>,
+) -> PyResult<(String, String)> {
+    let (plan, _) =
+        thetahat_cli::validation_plan(&options).map_err(|failure| error::program(py, &failure))?;
+    let log = log.get();
+    let models = models.iter().map(|(name, model)| Ok((name.as_str(), model.get(), model.get().report(py)?)));
+    let models = models.collect::<PyResult<Vec<(&str, &Model, &Report)>>>()?;
+    let comparison = interruptible(py, |_| {
+        let each = models.iter().map(|(name, model, report)| {
+            let channels = copy(&log.log, &model.channels(log))?;
+            thetahat::validate(report, Some(name), channels, &log.sources, &plan)
+        });
+        let found: Vec<Validated> = each.collect::<Result<_, _>>()?;
+        thetahat::compare(&found)
+    })?;
+    let json = comparison.to_json().map_err(|error| error::batch(py, error))?;
+    Ok((json, thetahat_cli::comparison(&comparison)))
+}
+
+/// What a log is worth: the document that `thetahat inspect` writes, and its table.
+#[pyfunction]
+pub(crate) fn inspect(py: Python<'_>, log: &Bound<'_, Log>) -> PyResult<(String, String)> {
+    let log = log.get();
+    let Some(source) = log.sources.first() else {
+        return Err(PyValueError::new_err("log: it comes from nowhere; make another"));
+    };
+    let found = interruptible(py, |_| {
+        let times = match log.log.time() {
+            Some(time) => Times::Measured(time.to_vec()),
+            None => Times::Uniform(log.log.sample_time()),
+        };
+        let recording = Recording { channels: log.log.channels().to_vec(), times };
+        let plan =
+            InspectionPlan { inputs: log.inputs.clone(), output: Some(log.output.clone()), resample: None };
+        thetahat::inspect(recording, source, &plan)
+    })?;
+    written(py, &found)
+}
+
+/// The same of a file, with the options of `thetahat inspect`.
+#[pyfunction]
+pub(crate) fn inspect_file(py: Python<'_>, options: Vec<OsString>) -> PyResult<(String, String)> {
+    let found =
+        py.detach(|| thetahat_cli::inspect(&options)).map_err(|failure| error::program(py, &failure))?;
+    written(py, &found)
+}
+
+fn written(py: Python<'_>, found: &Inspection) -> PyResult<(String, String)> {
+    let json = found.to_json().map_err(|error| error::batch(py, error))?;
+    Ok((json, thetahat_cli::inspection(found)))
+}

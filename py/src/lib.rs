@@ -1,0 +1,39 @@
+//! The compiled module `thetahat._thetahat`: the engine behind the Python package `thetahat`.
+//!
+//! `log`, `model` and `judgement` are the batch half, `online` the steppers. `array` reads and makes NumPy arrays, `error` is
+//! the one map of errors, `work` runs what takes long.
+
+mod array;
+mod error;
+mod judgement;
+mod log;
+mod model;
+mod online;
+mod work;
+
+use std::ffi::OsString;
+
+use pyo3::prelude::*;
+
+#[pymodule]
+fn _thetahat(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add("DEMO_LOG", thetahat_cli::DEMO_LOG)?;
+    module.add("EstimationError", module.py().get_type::<error::EstimationError>())?;
+    module.add_class::<log::Log>()?;
+    module.add_class::<model::Model>()?;
+    module.add_class::<judgement::Validation>()?;
+    module.add_function(wrap_pyfunction!(model::fit, module)?)?;
+    module.add_function(wrap_pyfunction!(judgement::validate, module)?)?;
+    module.add_function(wrap_pyfunction!(judgement::compare, module)?)?;
+    module.add_function(wrap_pyfunction!(judgement::inspect, module)?)?;
+    module.add_function(wrap_pyfunction!(judgement::inspect_file, module)?)?;
+    online::register(module)?;
+    module.add_function(wrap_pyfunction!(run, module)?)
+}
+
+/// The command line: the exit code for these words, the program's name first.
+#[pyfunction]
+fn run(py: Python<'_>, words: Vec<OsString>) -> u8 {
+    py.detach(|| thetahat_cli::run(words))
+}

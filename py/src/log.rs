@@ -1,0 +1,210 @@
+//! Logs: the channels that models are fitted to.
+
+use std::ffi::OsString;
+use std::sync::Arc;
+
+use numpy::PyArray1;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyTuple;
+use thetahat::{Channel, Interpolation, Resampling, Rows, Source};
+
+use crate::array::vector;
+use crate::error;
+
+/// Channels on a common clock, where they came from, and which of them are inputs and output.
+#[pyclass(frozen, module = "thetahat._thetahat")]
+pub(crate) struct Log {
+    pub(crate) log: Arc<thetahat::Log>,
+    pub(crate) sources: Vec<Source>,
+    #[pyo3(get)]
+    pub(crate) inputs: Vec<String>,
+    #[pyo3(get)]
+    pub(crate) output: String,
+}
+
+/// Times, how to resample, and the first time as it was written.
+type Clock<'py> = (Bound<'py, PyAny>, Option<(f64, String)>, Option<String>);
+
+#[pymethods]
+impl Log {
+    /// Channels by name with a fixed sample time, or with a clock: the times, how to resample, (step, "hold" or "linear"), and
+    /// the first time as it was written.
+    #[new]
+    #[pyo3(signature = (channels, inputs, output, sample_time, clock=None))]
+    fn new(
+        py: Python<'_>,
+        channels: Vec<(String, Bound<'_, PyAny>)>,
+        inputs: Vec<String>,
+        output: String,
+        sample_time: f64,
+        clock: Option<Clock<'_>>,
+    ) -> PyResult<Self> {
+        let channels = read(channels)?;
+        let has_clock = clock.is_some();
+        let (time, resample, start) =
+            clock.map_or((None, None, None), |(time, resample, start)| (Some(time), resample, start));
+        let mut resampled = None;
+        let log = match (time, resample) {
+            (None, _) => thetahat::Log::new(channels, sample_time),
+            (Some(time), None) => {
+                thetahat::Log::with_time(channels, vector("time", &time, None)?.as_slice()?.to_vec())
+            }
+            (Some(time), Some((step, how))) => {
+                let time = vector("time", &time, None)?;
+                let interpolation = match how.as_str() {
+                    "hold" => Interpolation::Hold,
+                    "linear" => Interpolation::Linear,
+                    _ => {
+                        return Err(PyValueError::new_err(format!(
+                            "resample: '{how}' is neither 'hold' nor 'linear'"
+                        )));
+                    }
+                };
+                resampled = Some(Resampling { step, interpolation, rows: time.as_slice()?.len() });
+                thetahat::Log::resampled(channels, time.as_slice()?, step, interpolation)
+            }
+        };
+        let log = log.map_err(|error| error::batch(py, error))?;
+        let rows = Rows::new(1, log.rows()).map_err(|error| error::batch(py, error))?;
+        let clock = has_clock.then(|| "time".to_owned());
+        let source = Source { file: "memory".to_owned(), rows, time: clock, start, resampled };
+        Ok(Self { log: Arc::new(log), sources: vec![source], inputs, output })
+    }
+
+    /// Reads files with the options of `thetahat fit`; also what the reader should know.
+    #[staticmethod]
+    fn read(py: Python<'_>, options: Vec<OsString>) -> PyResult<(Self, Vec<String>)> {
+        let opened =
+            py.detach(|| thetahat_cli::read(&options)).map_err(|failure| error::program(py, &failure))?;
+        let thetahat_cli::Opened { log, sources, inputs, output, warnings } = opened;
+        Ok((Self { log: Arc::new(log), sources, inputs, output }, warnings))
+    }
+
+    /// Several experiments as one log.
+    #[staticmethod]
+    fn join(py: Python<'_>, logs: Vec<PyRef<'_, Self>>) -> PyResult<Self> {
+        let Some(first) = logs.first() else {
+            return Err(PyValueError::new_err("logs: there is none; give at least one"));
+        };
+        let (mut sources, mut before) = (Vec::new(), 0);
+        for log in &logs {
+            for source in &log.sources {
+                let rows = Rows::new(before + source.rows.first(), before + source.rows.last());
+                sources
+                    .push(Source { rows: rows.map_err(|error| error::batch(py, error))?, ..source.clone() });
+            }
+            before += log.log.rows();
+        }
+        let copies = logs.iter().map(|log| (*log.log).clone()).collect();
+        let log = thetahat::Log::join(copies).map_err(|error| error::batch(py, error))?;
+        Ok(Self { log: Arc::new(log), sources, inputs: first.inputs.clone(), output: first.output.clone() })
+    }
+
+    /// Some rows (1-based, inclusive) as a log of its own.
+    fn part(&self, py: Python<'_>, first: usize, last: usize) -> PyResult<Self> {
+        let rows = Rows::new(first, last).map_err(|error| error::batch(py, error))?;
+        let names: Vec<&str> = self.log.channels().iter().map(|channel| channel.name.as_str()).collect();
+        let log = self.log.part(&names, rows).map_err(|error| error::batch(py, error))?;
+        let mut sources = Vec::new();
+        for source in &self.sources {
+            let (begin, end) = (source.rows.first().max(first), source.rows.last().min(last));
+            if begin > end {
+                continue;
+            }
+            let own = |row: usize| row + 1 - source.rows.first();
+            let file = match (begin, end) == (source.rows.first(), source.rows.last()) {
+                true => source.file.clone(),
+                false => format!("{} (rows {}..{})", source.file, own(begin), own(end)),
+            };
+            let rows =
+                Rows::new(begin + 1 - first, end + 1 - first).map_err(|error| error::batch(py, error))?;
+            sources.push(Source { file, rows, ..source.clone() });
+        }
+        Ok(Self { log: Arc::new(log), sources, inputs: self.inputs.clone(), output: self.output.clone() })
+    }
+
+    #[getter]
+    fn rows(&self) -> usize {
+        self.log.rows()
+    }
+
+    #[getter]
+    fn sample_time(&self) -> f64 {
+        self.log.sample_time()
+    }
+
+    /// The clock in seconds, where the log has one.
+    fn time<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+        self.log.time().map(|time| PyArray1::from_slice(py, time))
+    }
+
+    /// The names of all channels.
+    #[getter]
+    fn names(&self) -> Vec<String> {
+        self.log.channels().iter().map(|channel| channel.name.clone()).collect()
+    }
+
+    /// The file names of the logs it was made of.
+    #[getter]
+    fn files(&self) -> Vec<String> {
+        self.sources.iter().map(|source| source.file.clone()).collect()
+    }
+
+    /// A channel.
+    fn values<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let channel = self.log.channel(name).map_err(|error| error::batch(py, error))?;
+        Ok(PyArray1::from_slice(py, &channel.values))
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
+        let (py, this) = (slf.py(), slf.get());
+        let channels: Vec<_> = this
+            .log
+            .channels()
+            .iter()
+            .map(|channel| (channel.name.clone(), PyArray1::from_slice(py, &channel.values)))
+            .collect();
+        let sources =
+            serde_json::to_string(&this.sources).map_err(|error| PyValueError::new_err(error.to_string()))?;
+        let parts = (
+            (channels, &this.inputs, &this.output, this.log.sample_time()),
+            (this.time(py), this.log.breaks(), this.log.borders(), sources),
+        );
+        let restore = slf.get_type().getattr("_restore")?;
+        Ok((restore, parts.into_pyobject(py)?))
+    }
+
+    /// Makes the log again of what `__reduce__` gave.
+    #[staticmethod]
+    #[allow(clippy::type_complexity, reason = "it mirrors __reduce__")]
+    fn _restore(
+        py: Python<'_>,
+        data: (Vec<(String, Bound<'_, PyAny>)>, Vec<String>, String, f64),
+        clock: (Option<Bound<'_, PyAny>>, Vec<usize>, Vec<usize>, String),
+    ) -> PyResult<Self> {
+        let (channels, inputs, output, sample_time) = data;
+        let (time, breaks, borders, sources) = clock;
+        let time =
+            time.map(|time| PyResult::Ok(vector("time", &time, None)?.as_slice()?.to_vec())).transpose()?;
+        let log = thetahat::Log::restored(read(channels)?, sample_time, time, breaks, borders);
+        let log = log.map_err(|error| error::batch(py, error))?;
+        let sources =
+            serde_json::from_str(&sources).map_err(|error| PyValueError::new_err(error.to_string()))?;
+        Ok(Self { log: Arc::new(log), sources, inputs, output })
+    }
+}
+
+/// A copy of some channels, for what uses them up.
+pub(crate) fn copy(log: &thetahat::Log, names: &[&str]) -> Result<thetahat::Log, thetahat::Error> {
+    log.part(names, Rows::new(1, log.rows())?)
+}
+
+/// Copies the channels: from then on the log owns its data.
+fn read(channels: Vec<(String, Bound<'_, PyAny>)>) -> PyResult<Vec<Channel>> {
+    let own = |(name, values): (String, Bound<'_, PyAny>)| {
+        let values = vector(&name, &values, None)?.as_slice()?.to_vec();
+        Ok(Channel { name, values })
+    };
+    channels.into_iter().map(own).collect()
+}

@@ -1,0 +1,353 @@
+//! Fitted models: the report of a fit, and what can be computed with it.
+
+use std::ffi::OsString;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+use numpy::{PyArray1, PyArray2, PyUntypedArrayMethods};
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::prelude::*;
+use thetahat::{
+    Channel, Horizon, Quantity, Report, Start, StateSpace, Unjudged, apply, frequency_response,
+    logarithmic_frequencies, step_response,
+};
+
+use crate::array::{from_matrix, matrix, vector};
+use crate::error;
+use crate::log::{Log, copy};
+use crate::work::interruptible;
+
+/// A fitted model: the document that `thetahat fit` writes.
+///
+/// Its figures are computed when somebody asks for the document: they take several times as long as least squares.
+#[pyclass(frozen, module = "thetahat._thetahat")]
+pub(crate) struct Model {
+    model: thetahat::Model,
+    report: OnceLock<Report>,
+    /// What the figures are computed of, as long as they are not.
+    unjudged: Mutex<Option<(Unjudged, Arc<thetahat::Log>)>>,
+}
+
+/// An array with one value for each row.
+type Column<'py> = Bound<'py, PyArray1<f64>>;
+
+/// Fits a model to a log with the options of `thetahat fit`.
+#[pyfunction]
+pub(crate) fn fit(py: Python<'_>, log: &Bound<'_, Log>, options: Vec<OsString>) -> PyResult<Model> {
+    let log = log.get();
+    let plan = thetahat_cli::plan(&options, log.inputs.clone(), log.output.clone())
+        .map_err(|failure| error::program(py, &failure))?;
+    let unjudged = interruptible(py, |monitor| {
+        let names: Vec<&str> = plan.inputs.iter().chain([&plan.output]).map(String::as_str).collect();
+        Unjudged::new(copy(&log.log, &names)?, &log.sources, &plan, monitor)
+    })?;
+    Ok(Model {
+        model: unjudged.report().model.clone(),
+        report: OnceLock::new(),
+        unjudged: Mutex::new(Some((unjudged, Arc::clone(&log.log)))),
+    })
+}
+
+#[pymethods]
+impl Model {
+    /// Reads the document back.
+    #[staticmethod]
+    fn from_json(py: Python<'_>, text: &str) -> PyResult<Self> {
+        let report = Report::from_json(text).map_err(|error| error::batch(py, error))?;
+        Ok(Self { model: report.model.clone(), report: report.into(), unjudged: Mutex::new(None) })
+    }
+
+    /// The document.
+    fn to_json(&self, py: Python<'_>) -> PyResult<String> {
+        self.report(py)?.to_json().map_err(|error| error::batch(py, error))
+    }
+
+    /// Structure and orders, such as ARX(2, 2, 1).
+    fn name(&self) -> String {
+        self.model.orders.to_string()
+    }
+
+    /// The table that `thetahat fit` prints.
+    fn table(&self, py: Python<'_>) -> PyResult<String> {
+        Ok(thetahat_cli::table(self.report(py)?))
+    }
+
+    /// Whether it was chosen among others.
+    fn is_choice(&self, py: Python<'_>) -> PyResult<bool> {
+        let known = self.unjudged.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        Ok(match known {
+            Some((unjudged, _)) => unjudged.report().selection.is_some(),
+            None => self.report(py)?.selection.is_some(),
+        })
+    }
+
+    /// What a careful reader should know, as far as it is known.
+    fn warnings(&self) -> Vec<String> {
+        let known = self.unjudged.lock().unwrap_or_else(PoisonError::into_inner);
+        let unjudged = known.as_ref().map(|(unjudged, _)| unjudged.report());
+        unjudged.or(self.report.get()).map_or_else(Vec::new, |report| report.warnings.clone())
+    }
+
+    /// The page that `thetahat fit --html` writes, with a look at a log if there is one.
+    fn page(&self, py: Python<'_>, log: Option<&Bound<'_, Log>>, command: &str) -> PyResult<String> {
+        let log = log.map(Bound::get);
+        let report = self.report(py)?;
+        interruptible(py, |_| {
+            let plan = thetahat::ValidationPlan::default();
+            let look = |log: &Log| {
+                thetahat::validate(report, None, copy(&log.log, &self.channels(log))?, &log.sources, &plan)
+            };
+            let looks: Vec<_> = log.map(look).transpose()?.into_iter().collect();
+            thetahat::fit_page(report, &looks, command)
+        })
+    }
+
+    /// The prediction of each row, its standard deviations if there are steps, and how many rows count.
+    #[pyo3(signature = (log, horizon, initial))]
+    fn predict<'py>(
+        &self,
+        py: Python<'py>,
+        log: &Bound<'py, Log>,
+        horizon: Option<usize>,
+        initial: Option<&str>,
+    ) -> PyResult<(Column<'py>, Option<Column<'py>>)> {
+        let horizon = horizon.map_or(Horizon::FreeRun, |steps| Horizon::Steps { steps });
+        let start = self.start(initial, horizon)?;
+        let log = log.get();
+        let applied = interruptible(py, |_| {
+            apply(&self.model, copy(&log.log, &self.channels(log))?, &[], None, horizon, start)
+        })?;
+        let rows = log.log.rows();
+        let column = |values: &[f64]| PyArray1::from_slice(py, &values[..rows.min(values.len())]);
+        Ok((column(&applied.predicted), applied.standard_deviations.as_deref().map(column)))
+    }
+
+    /// The free run from rest on inputs, one column for each.
+    fn simulate<'py>(&self, py: Python<'py>, inputs: &Bound<'py, PyAny>) -> PyResult<Column<'py>> {
+        if self.model.inputs.is_empty() {
+            return Err(PyValueError::new_err(
+                "u: the model has no inputs, so there is nothing to simulate; forecast it",
+            ));
+        }
+        let channels = self.inputs_of("u", inputs, None)?;
+        if let Some(channel) =
+            channels.iter().find(|channel| !channel.values.iter().all(|value| value.is_finite()))
+        {
+            return Err(PyValueError::new_err(format!("u: input '{}' holds NaN or infinity", channel.name)));
+        }
+        let model = &self.model;
+        let applied = interruptible(py, |_| {
+            let log = thetahat::Log::new(channels, model.sample_time)?;
+            apply(model, log, &[], None, Horizon::FreeRun, Start::Zero)
+        })?;
+        Ok(PyArray1::from_vec(py, applied.predicted))
+    }
+
+    /// What comes after the end of a log, and its standard deviations.
+    #[pyo3(signature = (log, steps, inputs, initial))]
+    fn forecast<'py>(
+        &self,
+        py: Python<'py>,
+        log: &Bound<'py, Log>,
+        steps: usize,
+        inputs: Option<&Bound<'py, PyAny>>,
+        initial: Option<&str>,
+    ) -> PyResult<(Column<'py>, Column<'py>)> {
+        const MOST: usize = 1_000_000;
+        if !(1..=MOST).contains(&steps) {
+            return Err(PyValueError::new_err(format!("steps: {steps} is outside 1..{MOST}")));
+        }
+        let model = &self.model;
+        let driven = model.orders.nb.iter().any(|&nb| nb > 0);
+        let future = match inputs {
+            Some(inputs) if driven => self.inputs_of("u", inputs, Some(steps))?,
+            None if driven => {
+                return Err(PyValueError::new_err(format!(
+                    "u: the model has inputs; give their values in the next {steps} samples, one column for each"
+                )));
+            }
+            Some(_) => return Err(PyValueError::new_err("u: the model has no inputs; leave it out")),
+            None => Vec::new(),
+        };
+        let horizon = Horizon::Steps { steps };
+        let start = self.start(initial, horizon)?;
+        let log = log.get();
+        let rows = log.log.rows();
+        let applied = interruptible(py, |_| {
+            let mut known = copy(&log.log, &self.channels(log))?;
+            if driven {
+                known = extended(&known, &future, steps)?;
+            }
+            apply(model, known, &[], None, horizon, start)
+        })?;
+        let end = rows + steps;
+        let ahead = applied.predicted.get(rows..end);
+        let deviations = applied.standard_deviations.as_deref().and_then(|values| values.get(rows..end));
+        match (ahead, deviations) {
+            (Some(ahead), Some(deviations)) if ahead.iter().all(|value| !value.is_nan()) => {
+                Ok((PyArray1::from_slice(py, ahead), PyArray1::from_slice(py, deviations)))
+            }
+            _ => Err(PyValueError::new_err(
+                "log: it ends in missing samples, or in a stretch too short to start from; give one that ends in more \
+                 samples",
+            )),
+        }
+    }
+
+    /// For each input and the noise: its name, frequencies, real and imaginary parts, and magnitude and phase with their
+    /// standard errors.
+    #[pyo3(signature = (frequencies, points))]
+    fn frequency_response<'py>(
+        &self,
+        py: Python<'py>,
+        frequencies: Option<&Bound<'py, PyAny>>,
+        points: usize,
+    ) -> PyResult<Vec<(Option<String>, [Column<'py>; 7])>> {
+        let model = &self.model;
+        let frequencies = match frequencies {
+            Some(frequencies) => vector("w", frequencies, None)?.as_slice()?.to_vec(),
+            None => {
+                let nyquist = std::f64::consts::PI / model.sample_time;
+                logarithmic_frequencies(nyquist / 1000.0, nyquist, points)
+                    .map_err(|error| error::batch(py, error))?
+            }
+        };
+        let responses =
+            py.detach(|| frequency_response(model, &frequencies)).map_err(|error| error::batch(py, error))?;
+        let columns = responses.into_iter().map(|response| {
+            let column = |of: &dyn Fn(&thetahat::FrequencyPoint) -> f64| {
+                PyArray1::from_vec(py, response.points.iter().map(of).collect())
+            };
+            let columns = [
+                column(&|point| point.frequency),
+                column(&|point| point.re),
+                column(&|point| point.im),
+                column(&|point| point.magnitude.value),
+                column(&|point| or_nan(&point.magnitude)),
+                column(&|point| point.phase.value),
+                column(&|point| or_nan(&point.phase)),
+            ];
+            (response.input.clone(), columns)
+        });
+        Ok(columns.collect())
+    }
+
+    /// The response to a unit step of an input: its times, values and their standard errors.
+    #[pyo3(signature = (input, samples))]
+    fn step_response<'py>(
+        &self,
+        py: Python<'py>,
+        input: usize,
+        samples: Option<usize>,
+    ) -> PyResult<[Column<'py>; 3]> {
+        let response = py
+            .detach(|| step_response(&self.model, input, samples))
+            .map_err(|error| error::batch(py, error))?;
+        let values = response.values.iter().map(|quantity| quantity.value).collect();
+        let errors = response.values.iter().map(or_nan).collect();
+        Ok([
+            PyArray1::from_vec(py, response.time),
+            PyArray1::from_vec(py, values),
+            PyArray1::from_vec(py, errors),
+        ])
+    }
+
+    /// F, G, H, D and K of the innovations form.
+    fn state_space<'py>(&self, py: Python<'py>) -> PyResult<[Bound<'py, PyArray2<f64>>; 5]> {
+        let StateSpace { f, g, h, d, k, .. } = self.model.state_space();
+        let array = |matrix| from_matrix(py, matrix);
+        Ok([array(&f)?, array(&g)?, array(&h)?, array(&d)?, array(&k)?])
+    }
+}
+
+impl Model {
+    /// The whole report.
+    pub(crate) fn report(&self, py: Python<'_>) -> PyResult<&Report> {
+        // The lock is not held while others compute: they may wait for the interpreter, and its owner for the lock.
+        let unjudged = self.unjudged.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        if let Some((unjudged, log)) = unjudged {
+            let report = interruptible(py, |_| {
+                let copied = copy(&log, &self.channels_of(&log))?;
+                unjudged.judged(copied)
+            })?;
+            // Whoever was faster found the same.
+            let _ = self.report.set(report);
+            *self.unjudged.lock().unwrap_or_else(PoisonError::into_inner) = None;
+        }
+        self.report.get().ok_or_else(|| PyRuntimeError::new_err("the model has no report"))
+    }
+
+    /// The channels of a log that the model is about; it may lack the output.
+    pub(crate) fn channels(&self, log: &Log) -> Vec<&str> {
+        self.channels_of(&log.log)
+    }
+
+    fn channels_of(&self, log: &thetahat::Log) -> Vec<&str> {
+        let inputs = self.model.inputs.iter().map(|input| input.name.as_str());
+        let output = Some(self.model.output.name.as_str()).filter(|output| log.has(output));
+        inputs.chain(output).collect()
+    }
+
+    fn start(&self, initial: Option<&str>, horizon: Horizon) -> PyResult<Start> {
+        match initial {
+            None => Ok(Start::natural(&self.model, horizon)),
+            Some("zero") => Ok(Start::Zero),
+            Some("measured") => Ok(Start::Measured),
+            Some("estimated") => Ok(Start::Estimated),
+            Some(other) => Err(PyValueError::new_err(format!(
+                "initial: '{other}' is none of 'zero', 'measured', 'estimated'"
+            ))),
+        }
+    }
+
+    /// The inputs in an array of one dimension, or with a column for each.
+    fn inputs_of(
+        &self,
+        argument: &str,
+        values: &Bound<'_, PyAny>,
+        rows: Option<usize>,
+    ) -> PyResult<Vec<Channel>> {
+        let names = self.model.inputs.iter().map(|input| input.name.clone());
+        let count = names.len();
+        let flat = count == 1
+            && values.getattr("ndim").and_then(|ndim| ndim.extract::<usize>()).map_or_else(
+                |_| matrix(argument, values, [rows, Some(count)]).is_err(),
+                |dimensions| dimensions == 1,
+            );
+        if flat {
+            let column = vector(argument, values, rows)?.as_slice()?.to_vec();
+            return Ok(names.map(|name| Channel { name, values: column.clone() }).collect());
+        }
+        let array = matrix(argument, values, [rows, Some(count)])?;
+        let (entries, rows) = (array.as_slice()?, array.shape()[0]);
+        let column = |index: usize| (0..rows).map(|row| entries[row * count + index]).collect();
+        Ok(names.enumerate().map(|(index, name)| Channel { name, values: column(index) }).collect())
+    }
+}
+
+/// A log that goes on with known inputs and no output.
+fn extended(log: &thetahat::Log, future: &[Channel], steps: usize) -> Result<thetahat::Log, thetahat::Error> {
+    let channels = log.channels().iter().map(|channel| {
+        let mut values = channel.values.clone();
+        match future.iter().find(|input| input.name == channel.name) {
+            Some(input) => values.extend_from_slice(&input.values),
+            None => values.resize(log.rows() + steps, f64::NAN),
+        }
+        Channel { name: channel.name.clone(), values }
+    });
+    let time = log.time().map(|time| {
+        let last = time[time.len() - 1];
+        let ahead = (1..=steps).map(|step| last + step as f64 * log.sample_time());
+        time.iter().copied().chain(ahead).collect()
+    });
+    thetahat::Log::restored(
+        channels.collect(),
+        log.sample_time(),
+        time,
+        log.breaks().to_vec(),
+        log.borders().to_vec(),
+    )
+}
+
+fn or_nan(quantity: &Quantity) -> f64 {
+    quantity.standard_error.unwrap_or(f64::NAN)
+}

@@ -1,0 +1,113 @@
+//! The steppers: recursive estimators, filters and observers, with sizes known at run time.
+//!
+//! A class holds a stepper of `thetahat_core` and does what that does, to the bit. `run` works on a copy of it, which
+//! takes its place when all rows went well.
+
+mod argument;
+mod armax;
+mod arx;
+mod callable;
+mod extended;
+mod forgetting;
+mod innovation;
+mod kalman;
+mod least_squares;
+mod luenberger;
+mod model;
+mod recursive;
+mod trajectory;
+mod used;
+
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyTuple};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+/// Adds all classes of this part.
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<forgetting::Forgetting>()?;
+    module.add_class::<innovation::Innovation>()?;
+    module.add_class::<least_squares::RecursiveLeastSquares>()?;
+    module.add_class::<arx::RecursiveArx>()?;
+    module.add_class::<armax::RecursiveArmax>()?;
+    module.add_class::<recursive::RecursiveTrajectory>()?;
+    module.add_class::<model::LinearTransition>()?;
+    module.add_class::<model::LinearObservation>()?;
+    module.add_class::<callable::NonlinearTransition>()?;
+    module.add_class::<callable::NonlinearObservation>()?;
+    module.add_class::<kalman::KalmanFilter>()?;
+    module.add_class::<extended::ExtendedKalmanFilter>()?;
+    module.add_class::<luenberger::LuenbergerObserver>()?;
+    module.add_class::<trajectory::FilterTrajectory>()?;
+    module.add_class::<trajectory::ObserverTrajectory>()?;
+    module.add_class::<trajectory::SmoothedTrajectory>()?;
+    module.add_class::<trajectory::SteadyState>()?;
+    module.add_function(wrap_pyfunction!(_restore, module)?)
+}
+
+/// Makes an object of this class again from what pickle kept of it.
+#[pyfunction]
+fn _restore<'py>(py: Python<'py>, class_name: &str, kept: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    let any = |object: Bound<'py, PyAny>| Ok(object);
+    match class_name {
+        "Forgetting" => any(Bound::new(py, forgetting::Forgetting { policy: read(kept)? })?.into_any()),
+        "Innovation" => any(Bound::new(py, innovation::Innovation::restore(kept)?)?.into_any()),
+        "RecursiveLeastSquares" => {
+            any(Bound::new(py, least_squares::RecursiveLeastSquares::of(read(kept)?))?.into_any())
+        }
+        "RecursiveArx" => any(Bound::new(py, arx::RecursiveArx::of(read(kept)?))?.into_any()),
+        "RecursiveArmax" => any(Bound::new(py, armax::RecursiveArmax::of(read(kept)?))?.into_any()),
+        "LinearTransition" => any(Bound::new(py, model::LinearTransition { model: read(kept)? })?.into_any()),
+        "LinearObservation" => {
+            any(Bound::new(py, model::LinearObservation { model: read(kept)? })?.into_any())
+        }
+        "KalmanFilter" => any(Bound::new(py, kalman::KalmanFilter { filter: read(kept)? })?.into_any()),
+        "ExtendedKalmanFilter" => {
+            any(Bound::new(py, extended::ExtendedKalmanFilter { filter: read(kept)? })?.into_any())
+        }
+        "LuenbergerObserver" => {
+            any(Bound::new(py, luenberger::LuenbergerObserver { observer: read(kept)? })?.into_any())
+        }
+        "RecursiveTrajectory" => {
+            any(Bound::new(py, recursive::RecursiveTrajectory::restore(kept)?)?.into_any())
+        }
+        "FilterTrajectory" => any(Bound::new(py, trajectory::FilterTrajectory::restore(kept)?)?.into_any()),
+        "ObserverTrajectory" => {
+            any(Bound::new(py, trajectory::ObserverTrajectory::restore(kept)?)?.into_any())
+        }
+        "SmoothedTrajectory" => {
+            any(Bound::new(py, trajectory::SmoothedTrajectory::restore(kept)?)?.into_any())
+        }
+        "SteadyState" => any(Bound::new(py, trajectory::SteadyState::restore(kept)?)?.into_any()),
+        _ => Err(PyValueError::new_err(format!("class_name: there is no class {class_name}"))),
+    }
+}
+
+/// What `__reduce__` returns.
+pub(crate) type Reduced<'py> = (Bound<'py, PyAny>, (&'static str, Bound<'py, PyAny>));
+
+/// A snapshot of a stepper, to the bit.
+fn snapshot<'py>(
+    py: Python<'py>,
+    class_name: &'static str,
+    stepper: &impl Serialize,
+) -> PyResult<Reduced<'py>> {
+    let bytes = serde_json::to_vec(stepper).map_err(|error| PyValueError::new_err(error.to_string()))?;
+    Ok((restore_function(py)?, (class_name, PyBytes::new(py, &bytes).into_any())))
+}
+
+/// The attributes of a result.
+fn attributes<'py>(class_name: &'static str, kept: Bound<'py, PyTuple>) -> PyResult<Reduced<'py>> {
+    Ok((restore_function(kept.py())?, (class_name, kept.into_any())))
+}
+
+fn restore_function(py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
+    py.import("thetahat._thetahat")?.getattr("_restore")
+}
+
+fn read<T: DeserializeOwned>(kept: &Bound<'_, PyAny>) -> PyResult<T> {
+    let bytes = kept.cast::<PyBytes>()?;
+    serde_json::from_slice(bytes.as_bytes())
+        .map_err(|error| PyValueError::new_err(format!("not a snapshot: {error}")))
+}

@@ -1,0 +1,379 @@
+//! The extended Kalman filter.
+
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+use thetahat_core::nalgebra::{DVector, Dyn};
+use thetahat_core::{
+    Covariance, Error, ExtendedKalmanFilter as Stepper, Innovation as Told, Observation, Transition,
+};
+
+use super::argument::{self, Whole, failed, failed_at};
+use super::innovation::{Innovation, list};
+use super::kalman::started;
+use super::trajectory::{
+    FilterTrajectory, Record, Sample, Samples, SmoothedTrajectory, Steps, measurement, returned, smooth,
+    smoothed,
+};
+use super::used::{Used, UsedObservation, UsedTransition};
+use super::{Reduced, snapshot};
+use crate::array;
+
+/// The extended Kalman filter: the Kalman filter of the linearised model.
+///
+/// The models are arguments of each step, linear or not. With linear ones it is the Kalman filter, to the bit.
+///
+/// Parameters
+/// ----------
+/// state : array_like, shape (n,)
+///     The estimate of the state to start from. For `run` it is that before the first measurement.
+/// covariance : array_like, shape (n, n)
+///     The covariance of its error.
+/// gate : float, default inf
+///     A measurement whose normalised innovation squared is above it is not used.
+/// iterations : int, default 1
+///     How often a correction linearises the observation, each time about its last result.
+///
+/// Notes
+/// -----
+/// ::
+///
+///     predict:  F = df/dx at x, u:       x <- f(x, u),       P <- F P F' + Q
+///     correct:  H = dh/dx at x, u:       e = y - h(x, u),    S = H P H' + R,    K = P H' S^-1
+///                                        x <- x + K e,       P <- P - K S K'
+///
+/// It is an approximation: P does not know of the error of the linearisation, so it may promise too much, and a bad
+/// start may never be forgotten. Watch ``nis``. A function of a model must not use the filter itself: that raises
+/// RuntimeError.
+///
+/// References
+/// ----------
+/// Jazwinski, Stochastic Processes and Filtering Theory, 1970, sections 8.3 and 8.6.
+///
+/// Examples
+/// --------
+/// >>> import numpy as np
+/// >>> from thetahat import ExtendedKalmanFilter, NonlinearObservation, NonlinearTransition
+/// >>> def swing(x, u):
+/// ...     return np.array([x[0] + 0.02 * x[1], x[1] - 0.2 * np.sin(x[0])])
+/// >>> pendulum = NonlinearTransition(swing, np.zeros((2, 2)))
+/// >>> sideways = NonlinearObservation(lambda x, u: np.sin(x[:1]), [[1e-4]])
+/// >>> truth = np.array([0.8, 0.0])
+/// >>> estimate = ExtendedKalmanFilter([0.5, 0.3], 0.1 * np.eye(2))
+/// >>> for _ in range(200):
+/// ...     truth = swing(truth, None)
+/// ...     estimate.predict(pendulum)
+/// ...     innovation = estimate.correct(sideways, float(np.sin(truth[0])))
+/// >>> bool(np.all(np.abs(estimate.state - truth) < 2e-3))
+/// True
+#[pyclass(module = "thetahat")]
+pub(crate) struct ExtendedKalmanFilter {
+    pub(crate) filter: Stepper<f64, Dyn>,
+}
+
+/// A filter with its models. `before` is called before a model is used.
+struct Extended<'a, T, O> {
+    filter: Stepper<f64, Dyn>,
+    transition: &'a T,
+    observation: &'a O,
+    before: fn(&T, &O, &Covariance<f64, Dyn>),
+}
+
+impl<T: Transition<f64, Dyn, Dyn>, O: Observation<f64, Dyn, Dyn, Dyn>> Steps for Extended<'_, T, O> {
+    fn state(&self) -> &DVector<f64> {
+        self.filter.state()
+    }
+
+    fn covariance(&self) -> &Covariance<f64, Dyn> {
+        self.filter.covariance()
+    }
+
+    fn correct(&mut self, sample: &Sample) -> Result<Told<f64, DVector<f64>>, Error> {
+        (self.before)(self.transition, self.observation, self.filter.covariance());
+        self.filter.correct(self.observation, &sample.inputs[1], &sample.measurement)
+    }
+
+    fn predict(&mut self, sample: &Sample) -> Result<(), Error> {
+        (self.before)(self.transition, self.observation, self.filter.covariance());
+        self.filter.predict(self.transition, &sample.inputs[0])
+    }
+}
+
+/// What a model's function said, or else the library.
+pub(crate) fn explained<T, O>(
+    py: Python<'_>,
+    transition: &Used<'_, '_, T>,
+    observation: &Used<'_, '_, O>,
+    (row, error): (usize, Error),
+) -> PyErr {
+    match transition.trouble().or_else(|| observation.trouble()) {
+        Some(trouble) => trouble.into_error(Some(row)),
+        None => failed_at(py, row, error),
+    }
+}
+
+/// The input of one step, for a model that wants so many, or any number.
+pub(crate) fn input(value: Option<&Bound<'_, PyAny>>, wanted: Option<usize>) -> PyResult<DVector<f64>> {
+    match (wanted, value) {
+        (Some(length), value) => argument::input(value, length),
+        (None, None) => Ok(DVector::zeros(0)),
+        (None, Some(value)) if argument::is_number(value) => argument::input(Some(value), 1),
+        (None, Some(value)) => {
+            let array = array::vector("input", value, None)?;
+            argument::input(Some(value), array.as_slice()?.len())
+        }
+    }
+}
+
+#[pymethods]
+impl ExtendedKalmanFilter {
+    #[new]
+    #[pyo3(signature = (state, covariance, *, gate = f64::INFINITY, iterations = Whole(1)))]
+    #[pyo3(text_signature = "(state, covariance, *, gate=1e999, iterations=1)")]
+    fn new(
+        py: Python<'_>,
+        state: &Bound<'_, PyAny>,
+        covariance: &Bound<'_, PyAny>,
+        gate: f64,
+        iterations: Whole,
+    ) -> PyResult<Self> {
+        let iterations = argument::count("iterations", iterations, 1, 1000)?;
+        let filter = Stepper::from(started(py, state, covariance, gate)?);
+        let filter = filter.with_iterations(iterations).map_err(|error| failed(py, error))?;
+        Ok(ExtendedKalmanFilter { filter })
+    }
+
+    /// Move the state on by one sample.
+    ///
+    /// Parameters
+    /// ----------
+    /// transition : LinearTransition or NonlinearTransition
+    ///     The model.
+    /// input : float or array_like, shape (inputs,), optional
+    ///     u(k). A function gets it as an array, which is empty without it.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     If a shape is wrong, or a function returns NaN or infinity. Nothing has changed then.
+    /// Exception
+    ///     Whatever a function raises.
+    #[pyo3(signature = (transition, input = None))]
+    fn predict(
+        &mut self,
+        py: Python<'_>,
+        transition: &Bound<'_, PyAny>,
+        input: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let model = UsedTransition::new(transition, self.filter.state().len())?;
+        let input = self::input(input, model.inputs())?;
+        model.linearise_within(self.filter.covariance());
+        self.filter.predict(&model, &input).map_err(|error| match model.trouble() {
+            Some(trouble) => trouble.into_error(None),
+            None => failed(py, error),
+        })
+    }
+
+    /// Correct the state by a measurement.
+    ///
+    /// Parameters
+    /// ----------
+    /// observation : LinearObservation or NonlinearObservation
+    ///     The model.
+    /// measurement : float or array_like, shape (m,)
+    ///     y(k). NaN is a missing element: it is skipped alone.
+    /// input : float or array_like, shape (inputs,), optional
+    ///     u(k). A function gets it as an array, which is empty without it.
+    ///
+    /// Returns
+    /// -------
+    /// Innovation
+    ///     With floats where the measurement is a float, else with arrays.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     If a shape is wrong, a number too large, or a function returns NaN or infinity. Nothing has changed then.
+    /// Exception
+    ///     Whatever a function raises.
+    #[pyo3(signature = (observation, measurement, input = None))]
+    fn correct(
+        &mut self,
+        py: Python<'_>,
+        observation: &Bound<'_, PyAny>,
+        measurement: &Bound<'_, PyAny>,
+        input: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Innovation> {
+        let outputs = if argument::is_number(measurement) { Some(1) } else { Some(measurement.len()?) };
+        let model = UsedObservation::new(observation, self.filter.state().len(), outputs)?;
+        let input = self::input(input, model.inputs())?;
+        let (measurement, single) = self::measurement(measurement, model.outputs())?;
+        model.linearise_within(self.filter.covariance());
+        let innovation =
+            self.filter.correct(&model, &input, &measurement).map_err(|error| match model.trouble() {
+                Some(trouble) => trouble.into_error(None),
+                None => failed(py, error),
+            })?;
+        Ok(returned(innovation, single))
+    }
+
+    /// Take many samples: at each one `correct`, then `predict`, to the bit.
+    ///
+    /// With linear models the interpreter lock is released meanwhile. Afterwards the filter has predicted the sample
+    /// after the last.
+    ///
+    /// Parameters
+    /// ----------
+    /// transition : LinearTransition or NonlinearTransition
+    ///     The model of the state.
+    /// observation : LinearObservation or NonlinearObservation
+    ///     The model of the measurements.
+    /// measurements : array_like, shape (N, m), or (N,) for m = 1
+    ///     NaN is a missing element.
+    /// inputs : array_like, shape (N, inputs), or (N,) for one input, optional
+    ///     They go to each function, and to each linear model that has an input.
+    ///
+    /// Returns
+    /// -------
+    /// FilterTrajectory
+    ///     States, covariances and innovations, row by row.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, EstimationError
+    ///     As for one step; the message names the row, from 0. Nothing has changed then.
+    /// Exception
+    ///     Whatever a function raises.
+    #[pyo3(signature = (transition, observation, measurements, inputs = None))]
+    fn run(
+        &mut self,
+        py: Python<'_>,
+        transition: &Bound<'_, PyAny>,
+        observation: &Bound<'_, PyAny>,
+        measurements: &Bound<'_, PyAny>,
+        inputs: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<FilterTrajectory> {
+        let n = self.filter.state().len();
+        let transition = UsedTransition::new(transition, n)?;
+        let observation = UsedObservation::new(observation, n, columns(measurements))?;
+        let m = observation.outputs();
+        let samples = Samples::new(measurements, m, inputs, [transition.inputs(), observation.inputs()])?;
+        let slices = samples.slices()?;
+        let mut record = Record::new(samples.rows, n, m)?;
+        let filter = self.filter.clone();
+        let filter = if let (Used::Linear(transition), Used::Linear(observation)) =
+            (&transition, &observation)
+        {
+            let mut stepped =
+                Extended { filter, transition: *transition, observation: *observation, before: |_, _, _| () };
+            py.detach(|| record.run(&mut stepped, &slices))
+                .map_err(|(row, error)| failed_at(py, row, error))?;
+            stepped.filter
+        } else {
+            let mut stepped = Extended {
+                filter,
+                transition: &transition,
+                observation: &observation,
+                before: |transition, observation, covariance| {
+                    transition.linearise_within(covariance);
+                    observation.linearise_within(covariance);
+                },
+            };
+            let taken = record.run(&mut stepped, &slices);
+            taken.map_err(|error| explained(py, &transition, &observation, error))?;
+            stepped.filter
+        };
+        let trajectory = record.finish(py, n, m)?;
+        self.filter = filter;
+        Ok(trajectory)
+    }
+
+    /// The states at all samples, given all measurements, earlier and later ones.
+    ///
+    /// It starts from where the filter stands, which is before the first measurement, and leaves the filter as it is.
+    /// It smooths with the linearisations that the filter makes on its way.
+    ///
+    /// Parameters
+    /// ----------
+    /// transition : LinearTransition or NonlinearTransition
+    ///     The model of the state.
+    /// observation : LinearObservation or NonlinearObservation
+    ///     The model of the measurements.
+    /// measurements : array_like, shape (N, m), or (N,) for m = 1
+    ///     NaN is a missing element.
+    /// inputs : array_like, shape (N, inputs), or (N,) for one input, optional
+    ///     They go to each function, and to each linear model that has an input.
+    ///
+    /// Returns
+    /// -------
+    /// SmoothedTrajectory
+    ///     States and covariances, row by row.
+    ///
+    /// References
+    /// ----------
+    /// Bryson and Frazier, Smoothing for linear and nonlinear dynamic systems, 1963.
+    #[pyo3(signature = (transition, observation, measurements, inputs = None))]
+    fn smooth(
+        &self,
+        py: Python<'_>,
+        transition: &Bound<'_, PyAny>,
+        observation: &Bound<'_, PyAny>,
+        measurements: &Bound<'_, PyAny>,
+        inputs: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<SmoothedTrajectory> {
+        let n = self.filter.state().len();
+        let transition = UsedTransition::new(transition, n)?;
+        let observation = UsedObservation::new(observation, n, columns(measurements))?;
+        let wanted = [transition.inputs(), observation.inputs()];
+        let samples = Samples::new(measurements, observation.outputs(), inputs, wanted)?;
+        let slices = samples.slices()?;
+        let before = |covariance: &Covariance<f64, Dyn>| {
+            transition.linearise_within(covariance);
+            observation.linearise_within(covariance);
+        };
+        let result = smooth(self.filter.clone(), &transition, &observation, &slices, before)
+            .map_err(|error| explained(py, &transition, &observation, error))?;
+        smoothed(py, result, samples.rows, n)
+    }
+
+    /// The estimate of the state, shape (n,).
+    #[getter]
+    fn state<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        argument::from_vector(py, self.filter.state())
+    }
+
+    /// The covariance of its error, shape (n, n), as far as the linearised model knows it.
+    #[getter]
+    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        array::from_matrix(py, &self.filter.covariance().matrix())
+    }
+
+    /// The gate on the normalised innovation squared: inf if there is none.
+    #[getter]
+    fn gate(&self) -> f64 {
+        self.filter.gate()
+    }
+
+    /// How often a correction linearises the observation.
+    #[getter]
+    fn iterations(&self) -> usize {
+        self.filter.iterations()
+    }
+
+    fn __repr__(&self) -> String {
+        let state = self.filter.state();
+        format!("ExtendedKalmanFilter(n={}, state={})", state.len(), list(state.as_slice()))
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py>> {
+        snapshot(py, "ExtendedKalmanFilter", &self.filter)
+    }
+}
+
+/// How many elements a measurement has in these rows.
+pub(crate) fn columns(measurements: &Bound<'_, PyAny>) -> Option<usize> {
+    match argument::dimensions(measurements) {
+        1 => Some(1),
+        2 => measurements.get_item(0).and_then(|first| first.len()).ok(),
+        _ => None,
+    }
+}

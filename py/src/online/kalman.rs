@@ -1,0 +1,474 @@
+//! The Kalman filter.
+
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+use thetahat_core::nalgebra::{DMatrix, DVector, Dyn};
+use thetahat_core::{
+    Action, Covariance, Error, GainSchedule, Innovation as Told, KalmanFilter as Stepper,
+    LinearObservation as Observed, LinearTransition as Moved,
+};
+
+use super::argument::{self, Whole, failed, failed_at};
+use super::innovation::{Innovation, list};
+use super::model::{LinearObservation, LinearTransition};
+use super::trajectory::{
+    FilterTrajectory, Record, Sample, Samples, SmoothedTrajectory, SteadyState, Steps, measurement, returned,
+    smooth, smoothed,
+};
+use super::used::check_states;
+use super::{Reduced, snapshot};
+use crate::array;
+
+/// The Kalman filter.
+///
+/// The models are arguments of each step: they may vary in time, and several sensors may correct one filter.
+///
+/// Parameters
+/// ----------
+/// state : array_like, shape (n,)
+///     The mean of the state to start from. For `run` it is that before the first measurement.
+/// covariance : array_like, shape (n, n)
+///     Its covariance.
+/// gate : float, default inf
+///     A measurement whose normalised innovation squared is above it is not used.
+///
+/// Raises
+/// ------
+/// ValueError
+///     If a shape is wrong, an entry not finite, or the covariance none.
+///
+/// Notes
+/// -----
+/// ::
+///
+///     predict:  x <- F x + G u,          P <- F P F' + Q
+///     correct:  e = y - H x - D u,       S = H P H' + R,     K = P H' S^-1
+///               x <- x + K e,            P <- P - K S K'
+///
+/// P is kept as factors U D U', which never become indefinite. An object is for one thread at a time: a call from
+/// another one raises RuntimeError.
+///
+/// References
+/// ----------
+/// Kalman, A new approach to linear filtering and prediction problems, 1960. Bierman, Factorization Methods for
+/// Discrete Sequential Estimation, 1977, chapters V and VI.
+///
+/// Examples
+/// --------
+/// >>> from thetahat import KalmanFilter, LinearObservation, LinearTransition
+/// >>> walk = LinearTransition([[1.0]], [[1469.1]])
+/// >>> level = LinearObservation([[1.0]], [[15099.0]])
+/// >>> river = KalmanFilter([0.0], [[1e7]])
+/// >>> river.correct(level, 1120.0).error
+/// 1120.0
+/// >>> river.state.round(6)
+/// array([1118.311462])
+/// >>> river.predict(walk)
+#[pyclass(module = "thetahat")]
+pub(crate) struct KalmanFilter {
+    pub(crate) filter: Stepper<f64, Dyn>,
+}
+
+/// The state, its covariance and the gate, as the arguments of a filter.
+pub(crate) fn started(
+    py: Python<'_>,
+    state: &Bound<'_, PyAny>,
+    covariance: &Bound<'_, PyAny>,
+    gate: f64,
+) -> PyResult<Stepper<f64, Dyn>> {
+    let state = array::finite_vector("state", state, None)?;
+    argument::check_size("state", state.len())?;
+    let covariance = argument::covariance("covariance", covariance, Some(state.len()))?;
+    Stepper::new(state, covariance)
+        .and_then(|filter| filter.with_gate(gate))
+        .map_err(|error| failed(py, error))
+}
+
+/// A filter with linear models.
+struct Linear<'a> {
+    filter: Stepper<f64, Dyn>,
+    transition: &'a Moved<f64, Dyn, Dyn>,
+    observation: &'a Observed<f64, Dyn, Dyn, Dyn>,
+    /// The cross-covariance, and the models with the same inputs.
+    correlated: Option<(DMatrix<f64>, Models)>,
+    gated: bool,
+}
+
+impl Steps for Linear<'_> {
+    fn state(&self) -> &DVector<f64> {
+        self.filter.state()
+    }
+
+    fn covariance(&self) -> &Covariance<f64, Dyn> {
+        self.filter.covariance()
+    }
+
+    fn correct(&mut self, sample: &Sample) -> Result<Told<f64, DVector<f64>>, Error> {
+        let innovation = self.filter.correct(self.observation, &sample.inputs[1], &sample.measurement)?;
+        self.gated = innovation.action == Action::Gated;
+        Ok(innovation)
+    }
+
+    fn predict(&mut self, sample: &Sample) -> Result<(), Error> {
+        let Sample { measurement, inputs: [input, other] } = sample;
+        match &self.correlated {
+            Some((cross, (transition, observation))) if !self.gated => {
+                let input = if input.is_empty() { other } else { input };
+                self.filter.predict_correlated(transition, observation, cross, input, measurement)
+            }
+            _ => self.filter.predict(self.transition, input),
+        }
+    }
+}
+
+/// A linear model of both parts.
+type Models = (Moved<f64, Dyn, Dyn>, Observed<f64, Dyn, Dyn, Dyn>);
+
+/// Both models with the inputs that one of them has: a model without gets zeros.
+fn with_same_inputs(
+    py: Python<'_>,
+    transition: &Moved<f64, Dyn, Dyn>,
+    observation: &Observed<f64, Dyn, Dyn, Dyn>,
+) -> PyResult<Models> {
+    let (n, moved) = transition.input_matrix().shape();
+    let (m, observed) = observation.input_matrix().shape();
+    let (mut transition, mut observation) = (transition.clone(), observation.clone());
+    if moved == 0 && observed > 0 {
+        transition = transition.with_input(DMatrix::zeros(n, observed)).map_err(|error| failed(py, error))?;
+    }
+    if observed == 0 && moved > 0 {
+        observation = observation.with_input(DMatrix::zeros(m, moved)).map_err(|error| failed(py, error))?;
+    }
+    Ok((transition, observation))
+}
+
+#[pymethods]
+impl KalmanFilter {
+    #[new]
+    #[pyo3(signature = (state, covariance, *, gate = f64::INFINITY))]
+    #[pyo3(text_signature = "(state, covariance, *, gate=1e999)")]
+    fn new(
+        py: Python<'_>,
+        state: &Bound<'_, PyAny>,
+        covariance: &Bound<'_, PyAny>,
+        gate: f64,
+    ) -> PyResult<Self> {
+        Ok(KalmanFilter { filter: started(py, state, covariance, gate)? })
+    }
+
+    /// Move the state on by one sample.
+    ///
+    /// Parameters
+    /// ----------
+    /// transition : LinearTransition
+    ///     The model.
+    /// input : float or array_like, shape (inputs,), optional
+    ///     u(k), if the model has an input.
+    #[pyo3(signature = (transition, input = None))]
+    fn predict(
+        &mut self,
+        py: Python<'_>,
+        transition: &Bound<'_, LinearTransition>,
+        input: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let model = self.transition(transition)?;
+        let input = argument::input(input, model.input_matrix().ncols())?;
+        self.filter.predict(model, &input).map_err(|error| failed(py, error))
+    }
+
+    /// Move the state on by one sample, where process noise and measurement noise are correlated.
+    ///
+    /// It comes after `correct` with the same input and measurement. If all of the measurement is missing, or
+    /// `correct` answered "gated", `predict` is the step.
+    ///
+    /// Parameters
+    /// ----------
+    /// transition : LinearTransition
+    ///     The model of the state.
+    /// observation : LinearObservation
+    ///     The model of the measurement.
+    /// cross_covariance : array_like, shape (n, m)
+    ///     S = cov(w(k), v(k)).
+    /// measurement : float or array_like, shape (m,)
+    ///     y(k). NaN is a missing element.
+    /// input : float or array_like, shape (inputs,), optional
+    ///     u(k), if a model has an input.
+    ///
+    /// Notes
+    /// -----
+    /// ::
+    ///
+    ///     x <- F x + G u + S R^-1 (y - H x - D u)
+    ///     P <- (F - S R^-1 H) P (F - S R^-1 H)' + Q - S R^-1 S'
+    ///
+    /// References
+    /// ----------
+    /// Anderson and Moore, Optimal Filtering, 1979, section 5.5.
+    #[pyo3(signature = (transition, observation, cross_covariance, measurement, input = None))]
+    fn predict_correlated(
+        &mut self,
+        py: Python<'_>,
+        transition: &Bound<'_, LinearTransition>,
+        observation: &Bound<'_, LinearObservation>,
+        cross_covariance: &Bound<'_, PyAny>,
+        measurement: &Bound<'_, PyAny>,
+        input: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let (transition, observation) =
+            with_same_inputs(py, self.transition(transition)?, self.observation(observation)?)?;
+        let (n, m) = (self.filter.state().len(), observation.input_matrix().nrows());
+        let cross = array::finite_matrix("cross_covariance", cross_covariance, [Some(n), Some(m)])?;
+        let input = argument::input(input, transition.input_matrix().ncols())?;
+        let (measurement, _) = self::measurement(measurement, m)?;
+        self.filter
+            .predict_correlated(&transition, &observation, &cross, &input, &measurement)
+            .map_err(|error| failed(py, error))
+    }
+
+    /// Correct the state by a measurement.
+    ///
+    /// Parameters
+    /// ----------
+    /// observation : LinearObservation
+    ///     The model.
+    /// measurement : float or array_like, shape (m,)
+    ///     y(k). NaN is a missing element: it is skipped alone.
+    /// input : float or array_like, shape (inputs,), optional
+    ///     u(k), if the model has an input.
+    ///
+    /// Returns
+    /// -------
+    /// Innovation
+    ///     With floats where the measurement is a float, else with arrays.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     If a shape is wrong, or a number infinite or too large. Nothing has changed then.
+    /// EstimationError
+    ///     If what is measured is known exactly, and measured without noise.
+    #[pyo3(signature = (observation, measurement, input = None))]
+    fn correct(
+        &mut self,
+        py: Python<'_>,
+        observation: &Bound<'_, LinearObservation>,
+        measurement: &Bound<'_, PyAny>,
+        input: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Innovation> {
+        let model = self.observation(observation)?;
+        let input = argument::input(input, model.input_matrix().ncols())?;
+        let (measurement, single) = self::measurement(measurement, model.input_matrix().nrows())?;
+        let innovation =
+            self.filter.correct(model, &input, &measurement).map_err(|error| failed(py, error))?;
+        Ok(returned(innovation, single))
+    }
+
+    /// Take many samples: at each one `correct`, then `predict`, to the bit.
+    ///
+    /// The interpreter lock is released meanwhile. Afterwards the filter has predicted the sample after the last.
+    ///
+    /// Parameters
+    /// ----------
+    /// transition : LinearTransition
+    ///     The model of the state.
+    /// observation : LinearObservation
+    ///     The model of the measurements.
+    /// measurements : array_like, shape (N, m), or (N,) for m = 1
+    ///     NaN is a missing element.
+    /// inputs : array_like, shape (N, inputs), or (N,) for one input, optional
+    ///     They go to each model that has an input.
+    /// cross_covariance : array_like, shape (n, m), optional
+    ///     With it `predict_correlated` takes the place of `predict`, but after a gated measurement.
+    ///
+    /// Returns
+    /// -------
+    /// FilterTrajectory
+    ///     States, covariances and innovations, row by row.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, EstimationError
+    ///     As for one step; the message names the row, from 0. Nothing has changed then.
+    #[pyo3(signature = (transition, observation, measurements, inputs = None, cross_covariance = None))]
+    fn run(
+        &mut self,
+        py: Python<'_>,
+        transition: &Bound<'_, LinearTransition>,
+        observation: &Bound<'_, LinearObservation>,
+        measurements: &Bound<'_, PyAny>,
+        inputs: Option<&Bound<'_, PyAny>>,
+        cross_covariance: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<FilterTrajectory> {
+        let (transition, observation) = (self.transition(transition)?, self.observation(observation)?);
+        let (n, m) = (self.filter.state().len(), observation.input_matrix().nrows());
+        let wanted = [transition.input_matrix().ncols(), observation.input_matrix().ncols()];
+        let samples = Samples::new(measurements, m, inputs, wanted.map(Some))?;
+        let slices = samples.slices()?;
+        let correlated = match cross_covariance {
+            Some(cross) => {
+                let cross = array::finite_matrix("cross_covariance", cross, [Some(n), Some(m)])?;
+                Some((cross, with_same_inputs(py, transition, observation)?))
+            }
+            None => None,
+        };
+        let mut record = Record::new(samples.rows, n, m)?;
+        let filter = self.filter.clone();
+        let mut stepped = Linear { filter, transition, observation, correlated, gated: false };
+        py.detach(|| record.run(&mut stepped, &slices)).map_err(|(row, error)| failed_at(py, row, error))?;
+        let filter = stepped.filter;
+        let trajectory = record.finish(py, n, m)?;
+        self.filter = filter;
+        Ok(trajectory)
+    }
+
+    /// The states at all samples, given all measurements, earlier and later ones.
+    ///
+    /// It starts from where the filter stands, which is before the first measurement, and leaves the filter as it is.
+    /// The interpreter lock is released meanwhile.
+    ///
+    /// Parameters
+    /// ----------
+    /// transition : LinearTransition
+    ///     The model of the state.
+    /// observation : LinearObservation
+    ///     The model of the measurements.
+    /// measurements : array_like, shape (N, m), or (N,) for m = 1
+    ///     NaN is a missing element.
+    /// inputs : array_like, shape (N, inputs), or (N,) for one input, optional
+    ///     They go to each model that has an input.
+    ///
+    /// Returns
+    /// -------
+    /// SmoothedTrajectory
+    ///     States and covariances, row by row.
+    ///
+    /// References
+    /// ----------
+    /// Bryson and Frazier, Smoothing for linear and nonlinear dynamic systems, 1963. Bierman, Fixed interval smoothing
+    /// with discrete measurements, 1973.
+    #[pyo3(signature = (transition, observation, measurements, inputs = None))]
+    fn smooth(
+        &self,
+        py: Python<'_>,
+        transition: &Bound<'_, LinearTransition>,
+        observation: &Bound<'_, LinearObservation>,
+        measurements: &Bound<'_, PyAny>,
+        inputs: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<SmoothedTrajectory> {
+        let (transition, observation) = (self.transition(transition)?, self.observation(observation)?);
+        let (n, m) = (self.filter.state().len(), observation.input_matrix().nrows());
+        let wanted = [transition.input_matrix().ncols(), observation.input_matrix().ncols()];
+        let samples = Samples::new(measurements, m, inputs, wanted.map(Some))?;
+        let slices = samples.slices()?;
+        let filter = self.filter.clone();
+        let result = py
+            .detach(|| smooth(filter.into(), transition, observation, &slices, |_| ()))
+            .map_err(|(row, error)| failed_at(py, row, error))?;
+        smoothed(py, result, samples.rows, n)
+    }
+
+    /// What the filter comes to if the models stay as they are: the solution of the Riccati equation.
+    ///
+    /// It goes on from the covariance of the filter, sample after sample, until nothing changes but by rounding, and
+    /// leaves the filter as it is.
+    ///
+    /// Parameters
+    /// ----------
+    /// transition : LinearTransition
+    ///     The model of the state.
+    /// observation : LinearObservation
+    ///     The model of the measurements.
+    /// maximum_steps : int, default 100000
+    ///     After how many samples it gives up, at most 10 million.
+    ///
+    /// Returns
+    /// -------
+    /// SteadyState
+    ///     Covariances and gains.
+    ///
+    /// Raises
+    /// ------
+    /// EstimationError
+    ///     If it has not settled after so many samples.
+    ///
+    /// Notes
+    /// -----
+    /// ::
+    ///
+    ///     P = F (P - P H' (H P H' + R)^-1 H P) F' + Q
+    ///
+    /// References
+    /// ----------
+    /// Anderson and Moore, Optimal Filtering, 1979, sections 3.1 and 4.4.
+    #[pyo3(signature = (transition, observation, maximum_steps = Whole(100_000)))]
+    #[pyo3(text_signature = "($self, transition, observation, maximum_steps=100000)")]
+    fn steady_state(
+        &self,
+        py: Python<'_>,
+        transition: &Bound<'_, LinearTransition>,
+        observation: &Bound<'_, LinearObservation>,
+        maximum_steps: Whole,
+    ) -> PyResult<SteadyState> {
+        let steps = argument::count("maximum_steps", maximum_steps, 1, 10_000_000)?;
+        let (transition, observation) =
+            with_same_inputs(py, self.transition(transition)?, self.observation(observation)?)?;
+        let schedule = GainSchedule::new(self.filter.covariance().clone());
+        let steady = py
+            .detach(|| schedule.steady_state(&transition, &observation, steps))
+            .map_err(|error| failed(py, error))?;
+        Ok(SteadyState {
+            predicted: array::from_matrix(py, &steady.predicted.matrix())?.unbind(),
+            filtered: array::from_matrix(py, &steady.filtered.matrix())?.unbind(),
+            gain: array::from_matrix(py, &steady.gain)?.unbind(),
+            predictor_gain: array::from_matrix(py, &steady.predictor_gain)?.unbind(),
+            steps: steady.steps,
+        })
+    }
+
+    /// The mean of the state, shape (n,).
+    #[getter]
+    fn state<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        argument::from_vector(py, self.filter.state())
+    }
+
+    /// The covariance of the state, shape (n, n).
+    #[getter]
+    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        array::from_matrix(py, &self.filter.covariance().matrix())
+    }
+
+    /// The gate on the normalised innovation squared: inf if there is none.
+    #[getter]
+    fn gate(&self) -> f64 {
+        self.filter.gate()
+    }
+
+    fn __repr__(&self) -> String {
+        let state = self.filter.state();
+        format!("KalmanFilter(n={}, state={})", state.len(), list(state.as_slice()))
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py>> {
+        snapshot(py, "KalmanFilter", &self.filter)
+    }
+}
+
+impl KalmanFilter {
+    fn transition<'a>(
+        &self,
+        transition: &'a Bound<'_, LinearTransition>,
+    ) -> PyResult<&'a Moved<f64, Dyn, Dyn>> {
+        let model = &transition.get().model;
+        check_states("transition", self.filter.state().len(), model.state_matrix().nrows())?;
+        Ok(model)
+    }
+
+    fn observation<'a>(
+        &self,
+        observation: &'a Bound<'_, LinearObservation>,
+    ) -> PyResult<&'a Observed<f64, Dyn, Dyn, Dyn>> {
+        let model = &observation.get().model;
+        check_states("observation", self.filter.state().len(), model.output_matrix().ncols())?;
+        Ok(model)
+    }
+}

@@ -1,0 +1,285 @@
+//! What the recursive estimators have in common: their properties, and what a run returns.
+
+use numpy::{PyArray1, PyArray2, PyUntypedArrayMethods};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use thetahat_core::nalgebra::{DMatrix, DVector, Dim, Dyn};
+use thetahat_core::{Action, Dimension, Error, Innovation, RecursiveLeastSquares, Start};
+
+use super::argument::{Whole, count, failed_at, room, shaped};
+use super::{Reduced, attributes, innovation};
+use crate::array;
+
+/// What a recursive estimator did in a run, row by row.
+///
+/// Attributes
+/// ----------
+/// parameters : ndarray, shape (N, n) or (N, n, outputs)
+///     The parameters after each row.
+/// standard_errors : ndarray, the shape of ``parameters``
+///     Their standard errors; NaN until the noise variance is known.
+/// errors, variances : ndarray, shape (N,) or (N, outputs)
+///     The innovations and their variances, from what was known before each row.
+/// nis : ndarray, shape (N,)
+///     The normalised innovations squared.
+/// actions : ndarray of str, shape (N,)
+///     What was done with each row, see `Innovation`. Each access makes a new array.
+#[pyclass(module = "thetahat", frozen)]
+pub(crate) struct RecursiveTrajectory {
+    #[pyo3(get)]
+    parameters: Py<PyAny>,
+    #[pyo3(get)]
+    standard_errors: Py<PyAny>,
+    #[pyo3(get)]
+    errors: Py<PyAny>,
+    #[pyo3(get)]
+    variances: Py<PyAny>,
+    #[pyo3(get)]
+    nis: Py<PyArray1<f64>>,
+    codes: Py<PyArray1<u8>>,
+}
+
+impl RecursiveTrajectory {
+    pub(crate) fn restore(kept: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let (parameters, standard_errors, errors, variances, nis, codes) = kept.extract()?;
+        Ok(RecursiveTrajectory { parameters, standard_errors, errors, variances, nis, codes })
+    }
+}
+
+#[pymethods]
+impl RecursiveTrajectory {
+    #[getter]
+    fn actions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        innovation::names(py, self.codes.bind(py))
+    }
+
+    fn __len__(&self, py: Python<'_>) -> usize {
+        self.nis.bind(py).len()
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        let shape = self.parameters.bind(py).getattr("shape")?;
+        Ok(format!("RecursiveTrajectory({} rows, parameters of shape {shape})", self.__len__(py)))
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py>> {
+        let kept =
+            (&self.parameters, &self.standard_errors, &self.errors, &self.variances, &self.nis, &self.codes);
+        attributes("RecursiveTrajectory", kept.into_pyobject(py)?)
+    }
+}
+
+/// The results of the rows so far.
+pub(crate) struct Record {
+    parameters: Vec<f64>,
+    standard_errors: Vec<f64>,
+    errors: Vec<f64>,
+    variances: Vec<f64>,
+    nis: Vec<f64>,
+    codes: Vec<u8>,
+}
+
+impl Record {
+    pub(crate) fn take(&mut self, innovation: &Innovation<f64>) {
+        self.errors.push(innovation.error);
+        self.variances.push(innovation.variance);
+        self.done(innovation.nis, innovation.action);
+    }
+
+    pub(crate) fn take_all(&mut self, innovation: &Innovation<f64, DVector<f64>>) {
+        self.errors.extend_from_slice(innovation.error.as_slice());
+        self.variances.extend_from_slice(innovation.variance.as_slice());
+        self.done(innovation.nis, innovation.action);
+    }
+
+    fn done(&mut self, nis: f64, action: Action) {
+        self.nis.push(nis);
+        self.codes.push(innovation::code(action));
+    }
+}
+
+/// The estimator that each class is built around.
+pub(crate) trait Around<M: Dim>: Clone + Send
+where
+    Dyn: Dimension<M>,
+    M: Dimension,
+{
+    fn estimator(&self) -> &RecursiveLeastSquares<f64, Dyn, M>;
+}
+
+/// Takes `rows` samples in a copy of the engine, which replaces it if none fails.
+pub(crate) fn run<E: Around<M>, M: Dimension>(
+    py: Python<'_>,
+    engine: &mut E,
+    rows: usize,
+    mut step: impl FnMut(&mut E, usize, &mut Record) -> Result<(), Error> + Send,
+) -> PyResult<RecursiveTrajectory>
+where
+    Dyn: Dimension<M>,
+{
+    let (n, outputs) = shape(engine.estimator());
+    let mut record = Record {
+        parameters: room(&[rows, n, outputs])?,
+        standard_errors: room(&[rows, n, outputs])?,
+        errors: room(&[rows, outputs])?,
+        variances: room(&[rows, outputs])?,
+        nis: room(&[rows])?,
+        codes: room(&[rows])?,
+    };
+    let mut stepped = engine.clone();
+    let taken = py.detach(|| {
+        for row in 0..rows {
+            step(&mut stepped, row, &mut record).map_err(|error| (row, error))?;
+            let estimator = stepped.estimator();
+            let parameters = estimator.parameters().as_slice();
+            if outputs == 1 {
+                record.parameters.extend_from_slice(parameters);
+            } else {
+                let transposed = (0..n).flat_map(|i| parameters.iter().skip(i).step_by(n).copied());
+                record.parameters.extend(transposed);
+            }
+            extend_by_standard_errors(estimator, &mut record.standard_errors);
+        }
+        Ok(())
+    });
+    taken.map_err(|(row, error)| failed_at(py, row, error))?;
+    *engine = stepped;
+    let (errors, variances) = if outputs == 1 {
+        (shaped(py, record.errors, [rows])?, shaped(py, record.variances, [rows])?)
+    } else {
+        (shaped(py, record.errors, [rows, outputs])?, shaped(py, record.variances, [rows, outputs])?)
+    };
+    let by_row = |entries| match outputs {
+        1 => shaped(py, entries, [rows, n]),
+        _ => shaped(py, entries, [rows, n, outputs]),
+    };
+    Ok(RecursiveTrajectory {
+        parameters: by_row(record.parameters)?.unbind(),
+        standard_errors: by_row(record.standard_errors)?.unbind(),
+        errors: errors.unbind(),
+        variances: variances.unbind(),
+        nis: PyArray1::from_vec(py, record.nis).unbind(),
+        codes: PyArray1::from_vec(py, record.codes).unbind(),
+    })
+}
+
+fn shape<M: Dimension>(estimator: &RecursiveLeastSquares<f64, Dyn, M>) -> (usize, usize)
+where
+    Dyn: Dimension<M>,
+{
+    estimator.parameters().shape()
+}
+
+/// The standard errors, row by row of the parameters: NaN where they are not known.
+fn extend_by_standard_errors<M: Dimension>(
+    estimator: &RecursiveLeastSquares<f64, Dyn, M>,
+    into: &mut Vec<f64>,
+) where
+    Dyn: Dimension<M>,
+{
+    let (n, outputs) = shape(estimator);
+    let start = into.len();
+    into.resize(start + n * outputs, f64::NAN);
+    for output in 0..outputs {
+        let Some(covariance) = estimator.parameter_covariance_of(output) else { continue };
+        let places = into.iter_mut().skip(start + output).step_by(outputs);
+        for (place, variance) in places.zip(covariance.variances().iter()) {
+            *place = variance.sqrt();
+        }
+    }
+}
+
+/// θ̂: a vector with one output, else a matrix.
+pub(crate) fn parameters<'py, M: Dimension>(
+    py: Python<'py>,
+    estimator: &RecursiveLeastSquares<f64, Dyn, M>,
+) -> PyResult<Bound<'py, PyAny>>
+where
+    Dyn: Dimension<M>,
+{
+    let (n, outputs) = shape(estimator);
+    let parameters = estimator.parameters().as_slice();
+    if outputs == 1 {
+        return Ok(PyArray1::from_slice(py, parameters).into_any());
+    }
+    Ok(array::from_matrix(py, &DMatrix::from_column_slice(n, outputs, parameters))?.into_any())
+}
+
+/// P.
+pub(crate) fn covariance<'py, M: Dimension>(
+    py: Python<'py>,
+    estimator: &RecursiveLeastSquares<f64, Dyn, M>,
+) -> PyResult<Bound<'py, PyArray2<f64>>>
+where
+    Dyn: Dimension<M>,
+{
+    array::from_matrix(py, &estimator.covariance().matrix())
+}
+
+/// The covariance of the parameters, one matrix for each output.
+pub(crate) fn parameter_covariance<'py, M: Dimension>(
+    py: Python<'py>,
+    estimator: &RecursiveLeastSquares<f64, Dyn, M>,
+) -> PyResult<Option<Bound<'py, PyAny>>>
+where
+    Dyn: Dimension<M>,
+{
+    let (n, outputs) = shape(estimator);
+    let mut entries = room(&[outputs, n, n])?;
+    for output in 0..outputs {
+        let Some(covariance) = estimator.parameter_covariance_of(output) else { return Ok(None) };
+        entries.extend_from_slice(covariance.matrix().as_slice());
+    }
+    let array = if outputs == 1 { shaped(py, entries, [n, n]) } else { shaped(py, entries, [outputs, n, n]) };
+    array.map(Some)
+}
+
+/// The square roots of its diagonal.
+pub(crate) fn standard_errors<'py, M: Dimension>(
+    py: Python<'py>,
+    estimator: &RecursiveLeastSquares<f64, Dyn, M>,
+) -> PyResult<Option<Bound<'py, PyAny>>>
+where
+    Dyn: Dimension<M>,
+{
+    let (n, outputs) = shape(estimator);
+    let mut entries = room(&[n, outputs])?;
+    extend_by_standard_errors(estimator, &mut entries);
+    if entries.iter().any(|entry| entry.is_nan()) {
+        return Ok(None);
+    }
+    let array = if outputs == 1 { shaped(py, entries, [n]) } else { shaped(py, entries, [n, outputs]) };
+    array.map(Some)
+}
+
+/// The start of this name.
+pub(crate) fn start(name: &str, blend: Option<Whole>, warm: bool) -> PyResult<Start> {
+    let blend = blend.map(|blend| count("blend", blend, 0, usize::from(u16::MAX))).transpose()?;
+    let blend = blend.map(|blend| u16::try_from(blend).unwrap_or(u16::MAX));
+    let start = match (name, blend) {
+        ("standard", None) => Start::Standard,
+        ("exact", None) => Start::Exact,
+        ("mixed", Some(blend)) => Start::Mixed { blend },
+        ("mixed", None) => {
+            return Err(PyValueError::new_err("blend: expected an int with start 'mixed', found None"));
+        }
+        ("standard" | "exact", Some(_)) => {
+            return Err(PyValueError::new_err("blend: expected None, as the start is not 'mixed'"));
+        }
+        _ => {
+            return Err(PyValueError::new_err(format!(
+                "start: expected 'standard', 'exact' or 'mixed', found '{name}'"
+            )));
+        }
+    };
+    if warm && start != Start::Standard {
+        let message = "start: expected 'standard', as parameters or a covariance are given";
+        return Err(PyValueError::new_err(message));
+    }
+    Ok(start)
+}
+
+/// The numbers of an iterator as an array.
+pub(crate) fn coefficients(py: Python<'_>, values: impl Iterator<Item = f64>) -> Bound<'_, PyArray1<f64>> {
+    PyArray1::from_iter(py, values)
+}

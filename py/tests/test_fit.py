@@ -1,0 +1,235 @@
+"""Fits: every structure, every option, and what they refuse."""
+
+from __future__ import annotations
+
+import copy
+import json
+import multiprocessing
+import pickle
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any, Callable
+
+import numpy as np
+import pytest
+
+import thetahat as th
+
+
+@pytest.fixture
+def log() -> th.Log:
+    """y = 1.5 y(t-1) - 0.7 y(t-2) + u1(t-1) + 0.5 u1(t-2) - u2(t-3) + e."""
+    random = np.random.default_rng(1)
+    u = random.choice([-1.0, 1.0], size=(2000, 2))
+    e = 0.1 * random.standard_normal(2000)
+    y = np.zeros(2000)
+    for t in range(3, 2000):
+        y[t] = 1.5 * y[t - 1] - 0.7 * y[t - 2] + u[t - 1, 0] + 0.5 * u[t - 2, 0] - u[t - 3, 1] + e[t]
+    return th.Log(y, u)
+
+
+FITS: dict[str, Callable[[th.Log], th.Model]] = {
+    "arx": lambda log: th.arx(log, 2, [2, 1], [1, 3]),
+    "armax": lambda log: th.armax(log, na=2, nb=[2, 1], nc=1, nk=[1, 3]),
+    "oe": lambda log: th.oe(log, nb=[2, 1], nf=2, nk=[1, 3]),
+    "bj": lambda log: th.bj(log, nb=[2, 1], nc=1, nd=1, nf=[2, 2], nk=(1, 3)),
+    "ar": lambda log: th.ar(log, na=4),
+    "arma": lambda log: th.arma(log, na=2, nc=1),
+    "pem": lambda log: th.pem(log, na=1, nb=[2, 1], nf=[1, 1], nd=1, nk=[1, 3]),
+    "iv": lambda log: th.iv(log, 2, [2, 1], [1, 3]),
+    "sriv": lambda log: th.sriv(log, [2, 1], 2, [1, 3]),
+}
+
+
+@pytest.mark.filterwarnings("ignore::thetahat.EstimationWarning")
+@pytest.mark.parametrize("name", FITS)
+def test_every_structure_fits(log: th.Log, name: str) -> None:
+    model = FITS[name](log)
+    assert model.structure == {"iv": "arx", "sriv": "oe"}.get(name, name)
+    assert len(model.parameters) == len(model.parameter_names) == len(model.standard_errors)
+    if name not in ("ar", "arma"):
+        poles = [0.75 + np.sqrt(0.7 - 0.75**2) * 1j, 0.75 - np.sqrt(0.7 - 0.75**2) * 1j]
+        near = np.abs(model.poles()[:, None] - np.array(poles)).min(axis=0)
+        assert name == "pem" or (near < 0.02).all()
+        assert model.inputs == ["u1", "u2"] and model.b[1][:3].tolist() == [0, 0, 0]
+    # The document is the model: it comes back whole, and so do copies.
+    again = th.Model.from_json(model.to_json())
+    assert again == model and hash(again) == hash(model)
+    assert pickle.loads(pickle.dumps(model)) == model == copy.deepcopy(model) == copy.copy(model)
+    assert np.array_equal(again.predict(log), model.predict(log), equal_nan=True)
+    assert repr(model).startswith("Model(") and "\n" not in repr(model)
+    assert "<pre>" in model._repr_html_()
+
+
+def test_one_order_serves_for_all_inputs(log: th.Log) -> None:
+    assert th.arx(log, 2, 3, 1) == th.arx(log, 2, [3, 3], [1, 1])
+
+
+def test_numpy_integers_are_orders(log: th.Log) -> None:
+    assert th.arx(log, np.int64(2), [np.int32(2), 2]) == th.arx(log, 2, 2)  # type: ignore[arg-type,list-item]
+
+
+def test_rows_are_named_as_python_counts_or_as_the_command_line(log: th.Log) -> None:
+    model = th.arx(log, 2, 2, estimate=slice(0, 700), validate=range(700, 2000))
+    assert model == th.arx(log, 2, 2, estimate="1..700", validate=["701..2000"])
+    assert [fit["part"] for fit in model.fits] == ["estimation"] * 2 + ["validation"] * 2
+    assert np.array_equal(model.parameters, th.arx(log[:700], 2, 2).parameters)
+    model = th.arx(log, 2, 2, split=(60, 20, 20))
+    assert model.document["data"]["split"]["test"] == [[1601, 2000]]
+
+
+def test_options_reach_the_engine(log: th.Log) -> None:
+    assert th.arx(log, 2, 2, detrend="none").offsets["y"] == (0.0, 0.0)
+    assert th.arx(log, 2, 2, offset={"u1": 0.25}).offsets["u1"] == (0.25, 0.0)
+    bounded = th.arx(log, 2, 2, bound={"a1": (-1.2, None), "b1_1": 0.9})
+    values = dict(zip(bounded.parameter_names, bounded.parameters))
+    assert abs(values["a1"] + 1.2) < 1e-6 and abs(values["b1_1"] - 0.9) < 1e-6
+    assert abs(th.arx(log, 2, 2, dc_gain={"u1": 5}).dc_gain(0)[0] - 5) < 1e-6
+    for norm in (1, "1", "inf", 2):
+        assert th.arx(log, 2, 2, norm=norm).stable
+    search = th.oe(log, 2, 2, search="gauss-newton", max_iterations=50, starts=2, seed=7, tolerance=1e-10)
+    assert search.document["estimation"]["algorithm"] == "gauss-newton"
+    assert th.oe(log, 2, 2, initial="zero").document["estimation"]["initial"] == "zero"
+    assert th.arx(log, 2, 2, ridge=10.0) != th.arx(log, 2, 2)
+
+
+def test_a_search_chooses(log: th.Log) -> None:
+    model = th.search(log, na=range(1, 4), nb=range(1, 4), nk=[range(1, 4), range(2, 5)], select="mdl")
+    assert model.orders == {"na": 2, "nb": [2, 2], "nc": 0, "nd": 0, "nf": [0, 0], "nk": model.orders["nk"]}
+    # With nb 2 a delay of 3 samples is one of 2 and a zero.
+    assert model.orders["nk"] in ([1, 2], [1, 3]) and model.selection is not None and model.selection["models"] == 81
+    assert th.arx(log, 2, 2).selection is None
+    alternate = th.search(log, na=range(1, 6), nb=range(1, 6), nk=[1, 3], path="alternate")
+    assert alternate.selection is not None and alternate.selection["models"] < 25
+    chosen = th.search(log[:700], split=(60, 20, 20), select="validation")
+    assert chosen.selection is not None and chosen.selection["second"] is not None
+
+
+BAD: list[tuple[Callable[[th.Log], Any], type[Exception], str]] = [
+    (lambda log: th.arx(log, -1, 2), ValueError, "na: -1 is below 0"),
+    (lambda log: th.arx(log, 2.0, 2), TypeError, "na: expected an int"),  # type: ignore[arg-type]
+    (lambda log: th.arx(log, True, 2), TypeError, "na: expected an int"),
+    (lambda log: th.arx(log, [2], 2), TypeError, "na: expected an int or a range"),  # type: ignore[arg-type]
+    (lambda log: th.arx(log, 2, []), ValueError, "nb: there is none"),
+    (lambda log: th.arx(log, 2, [1, 2, 3]), ValueError, "nb has 3 values for 2 inputs"),
+    (lambda log: th.arx(log, 10**9, 2), ValueError, "na: 1000000000 is above 1000"),
+    (lambda log: th.arx(log, 10**30, 2), ValueError, "na"),
+    (lambda log: th.arx(log[:50], 30, 2), th.EstimationError, "too few rows"),
+    (lambda log: th.arx(log, 0, 0), ValueError, "."),
+    (lambda log: th.arx(log, 2, 2, estimate="5..2"), ValueError, "estimate"),
+    (lambda log: th.arx(log, 2, 2, estimate=slice(0, 9999)), ValueError, "estimate"),
+    (lambda log: th.arx(log, 2, 2, estimate=slice(-5, None)), ValueError, "estimate"),
+    (lambda log: th.arx(log, 2, 2, estimate=slice(0, 10, 2)), ValueError, "estimate: a step of 2"),
+    (lambda log: th.arx(log, 2, 2, estimate=5), TypeError, "estimate: expected a slice"),  # type: ignore[arg-type]
+    (lambda log: th.arx(log, 2, 2, detrend="cubic"), ValueError, "detrend"),
+    (lambda log: th.arx(log, 2, 2, initial="cold"), ValueError, "initial"),
+    (lambda log: th.arx(log, 2, 2, norm=3), ValueError, "norm"),
+    (lambda log: th.arx(log, 2, 2, ridge=-1.0), ValueError, "ridge"),
+    (lambda log: th.arx(log, 2, 2, ridge=np.nan), ValueError, "ridge: nan is not a finite"),
+    (lambda log: th.arx(log, 2, 2, bound={"z9": 1.0}), ValueError, "z9"),
+    (lambda log: th.arx(log, 2, 2, bound=[1]), TypeError, "bound: expected a dict"),  # type: ignore[arg-type]
+    (lambda log: th.arx(log, 2, 2, offset={"w": 1.0}), ValueError, "w"),
+    (lambda log: th.arx(log, 2, 2, oofset={}), TypeError, "oofset: there is no such option"),  # type: ignore[call-arg]
+    (lambda log: th.oe(log, 2, 2, search="magic"), ValueError, "search"),
+    (lambda log: th.oe(log, 2, 2, max_iterations=0), ValueError, "max_iterations"),
+    (lambda log: th.oe(log, 2, 2, tolerance=-1.0), ValueError, "tolerance"),
+    (lambda log: th.oe(log, 2, 2, initial="drop"), ValueError, "initial drop"),
+    (lambda log: th.search(log, na=range(5, 2)), ValueError, "na: range.* is empty"),
+    (lambda log: th.search(log, na=range(1, 9, 3)), ValueError, "na: a step of 3"),
+    (lambda log: th.search(log, model="magic"), ValueError, "model"),
+    (lambda log: th.search(log, na=2, nb=2, select="mdl"), ValueError, "select"),
+    (lambda log: th.search(log, select="luck"), ValueError, "select"),
+    (lambda log: th.arx("log.csv", 2, 2), TypeError, "log: expected a Log, found str"),  # type: ignore[arg-type]
+    (lambda log: th.arx(th.Log(log.y), 2, 2), ValueError, "nb: the log has no inputs"),
+    (lambda log: th.Model(), TypeError, "models are made by fits"),
+    (lambda log: th.Model.from_json("{}"), ValueError, "not a thetahat report"),
+    (lambda log: th.Model.from_json(th.ar(log, 1).to_json()[:-40]), ValueError, "line"),
+    (lambda log: th.Model.from_json(3), TypeError, "text"),  # type: ignore[arg-type]
+]
+
+
+@pytest.mark.parametrize("case", range(len(BAD)))
+def test_what_makes_no_sense_is_refused_by_name(log: th.Log, case: int) -> None:
+    call, error, words = BAD[case]
+    with pytest.raises(error, match=words) as raised:
+        call(log)
+    assert "--" not in str(raised.value)
+    assert type(raised.value) is error
+
+
+def test_what_the_data_cannot_determine_is_named() -> None:
+    u = np.random.default_rng(0).standard_normal(100)
+    with pytest.raises(th.EstimationError) as raised:
+        th.arx(th.Log(np.roll(u, 1), np.column_stack([u, u])), 1, 1)
+    assert raised.value.parameters == ["b2_1"] and "b2_1" in str(raised.value)
+    with pytest.raises(th.EstimationError, match="constant"):
+        th.arx(th.Log(u, np.ones(100)), 1, 1)
+    with pytest.raises(th.EstimationError, match="too few rows"):
+        th.arx(th.Log([1.0], [1.0]), 1, 1)
+    with pytest.raises(ValueError, match="no estimation row"):
+        th.arx(th.Log(np.full(100, np.nan), u), 1, 1)
+
+
+def test_a_careful_reader_is_warned(log: th.Log) -> None:
+    y = log.y
+    y[100] = np.nan
+    with pytest.warns(th.EstimationWarning, match="channel 'y' misses 1 of 2000"):
+        model = th.arx(th.Log(y, log.u), 2, 2)
+    assert any("misses" in warning for warning in model.warnings)
+    assert model.document["data"]["segments"] == [[1, 100], [102, 2000]]
+
+
+def test_fits_at_once_give_the_same_bytes(log: th.Log) -> None:
+    fits: list[Callable[[], th.Model]] = [
+        lambda: th.oe(log, 2, 2),
+        lambda: th.bj(log, 2, 1, 1, 2),
+        lambda: th.search(log[:500], na=range(1, 5), nb=range(1, 4)),
+    ]
+    alone = [fit().to_json() for fit in fits]
+    with ThreadPoolExecutor(6) as threads:
+        together = list(threads.map(lambda index: fits[index % 3]().to_json(), range(18)))
+    assert together == alone * 6
+
+
+def test_threads_may_ask_one_model_at_once(log: th.Log) -> None:
+    model = th.arx(log, 2, 2)
+    with ThreadPoolExecutor(6) as threads:
+        documents = list(threads.map(lambda _: model.to_json(), range(12)))
+    assert len(set(documents)) == 1
+
+
+def _forked(log: th.Log) -> str:
+    return th.oe(log, 2, 2).to_json()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux forks")
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_a_forked_process_can_fit_too(log: th.Log) -> None:
+    here = _forked(log)
+    with multiprocessing.get_context("fork").Pool(2) as pool:
+        assert pool.map_async(_forked, [log, log]).get(timeout=60) == [here, here]
+
+
+def test_control_c_ends_a_search(tmp_path: Path) -> None:
+    script = tmp_path / "long.py"
+    script.write_text(
+        "import _thread, threading, time, numpy as np, thetahat as th\n"
+        "random = np.random.default_rng(0)\n"
+        "log = th.Log(random.standard_normal(4_000), random.standard_normal(4_000))\n"
+        "threading.Timer(1.0, _thread.interrupt_main).start()\n"
+        "began = time.monotonic()\n"
+        "try:\n"
+        "    th.bj(log, 4, 4, 4, 4, starts=10_000)\n"
+        "except KeyboardInterrupt:\n"
+        "    print('ended', time.monotonic() - began < 20)\n"
+    )
+    found = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, timeout=120, check=False)
+    assert found.stdout.strip() == "ended True", found.stderr
+
+
+def test_the_document_is_json_with_a_line_break(log: th.Log) -> None:
+    text = th.arx(log, 2, 2).to_json()
+    assert text.endswith("}\n") and json.loads(text)["schema"] == "thetahat.report/1"
+    assert json.loads(text)["data"]["logs"][0]["file"] == "memory"

@@ -1,0 +1,261 @@
+"""Columns of pandas, polars and pyarrow tables, each where it is installed."""
+
+from __future__ import annotations
+
+import datetime
+import decimal
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from thetahat import _frames
+
+NAN = float("nan")
+BEGIN = datetime.datetime(2024, 3, 1, 12, 0, 0, 250_000)
+LATER = datetime.datetime(2024, 3, 1, 12, 0, 1)
+
+
+def of_pandas(values: dict[str, list[Any]]) -> Any:
+    return pytest.importorskip("pandas").DataFrame(values)
+
+
+def of_polars(values: dict[str, list[Any]]) -> Any:
+    return pytest.importorskip("polars").DataFrame(values)
+
+
+def of_pyarrow(values: dict[str, list[Any]]) -> Any:
+    return pytest.importorskip("pyarrow").table(values)
+
+
+every = pytest.mark.parametrize("make", [of_pandas, of_polars, of_pyarrow])
+Make = Callable[[dict[str, list[Any]]], Any]
+
+
+def read(frame: Any, name: str = "x") -> Any:
+    values = _frames.columns(frame, [name])[name]
+    assert values.dtype == np.float64
+    assert values.flags.c_contiguous
+    assert values.ndim == 1
+    return values
+
+
+@every
+def test_numbers_become_float64_in_the_order_asked_for(make: Make) -> None:
+    frame = make({"a": [1, -2, 3], "b": [0.5, NAN, 2.5], "c": [True, False, True], "d": ["x", "y", "z"]})
+    values = _frames.columns(frame, ["c", "a", "b"])
+    assert list(values) == ["c", "a", "b"]
+    np.testing.assert_array_equal(values["a"], [1.0, -2.0, 3.0])
+    np.testing.assert_array_equal(values["b"], [0.5, NAN, 2.5])
+    np.testing.assert_array_equal(values["c"], [1.0, 0.0, 1.0])
+    assert all(array.dtype == np.float64 for array in values.values())
+    assert _frames.columns(frame, []) == {}
+
+
+@every
+def test_instants_become_seconds_since_the_first(make: Make) -> None:
+    frame = make({"t": [BEGIN, LATER, None, BEGIN], "x": [1.0, 2.0, 3.0, 4.0]})
+    seconds, first = _frames.times(frame, "t")
+    np.testing.assert_array_equal(seconds, [0.0, 0.75, NAN, 0.0])
+    assert first == "2024-03-01T12:00:00.25"
+    assert seconds.dtype == np.float64
+
+
+@every
+def test_numbers_are_seconds_already(make: Make) -> None:
+    seconds, first = _frames.times(make({"t": [10, 11, 12]}), "t")
+    np.testing.assert_array_equal(seconds, [10.0, 11.0, 12.0])
+    assert first is None
+
+
+@every
+def test_durations_are_seconds_already(make: Make) -> None:
+    seconds, first = _frames.times(make({"t": [LATER - BEGIN, BEGIN - BEGIN]}), "t")
+    np.testing.assert_array_equal(seconds, [0.75, 0.0])
+    assert first is None
+
+
+@every
+def test_a_time_that_begins_with_a_null_is_refused(make: Make) -> None:
+    with pytest.raises(ValueError, match="'t': the first row has no time"):
+        _frames.times(make({"t": [None, LATER]}), "t")
+
+
+@every
+def test_what_is_no_number_is_refused_with_its_type(make: Make) -> None:
+    frame = make({"label": ["a", "b"], "t": [BEGIN, LATER]})
+    with pytest.raises(TypeError, match=r"'label': expected numbers, found \w+"):
+        _frames.columns(frame, ["label"])
+    with pytest.raises(TypeError, match="'t': expected numbers, found .*(date|time)"):
+        _frames.columns(frame, ["t"])
+    with pytest.raises(TypeError, match="'label': expected numbers"):
+        _frames.times(frame, "label")
+
+
+@every
+def test_names_are_checked(make: Make) -> None:
+    frame = make({"a": [1.0], "b": [2.0]})
+    with pytest.raises(ValueError, match="no column 'c'; there are 'a', 'b'"):
+        _frames.columns(frame, ["a", "c"])
+    with pytest.raises(ValueError, match="no column 'c'"):
+        _frames.times(frame, "c")
+    with pytest.raises(ValueError, match="'a' is asked for twice"):
+        _frames.columns(frame, ["a", "b", "a"])
+
+
+@every
+def test_a_frame_has_rows(make: Make) -> None:
+    with pytest.raises(ValueError, match="no rows"):
+        _frames.columns(make({"a": []}), ["a"])
+
+
+@pytest.mark.parametrize("thing", [{"a": [1.0]}, [[1.0]], np.ones((2, 2)), None, "log.csv"])
+def test_what_is_no_frame_is_refused(thing: Any) -> None:
+    with pytest.raises(TypeError, match="expected a dataframe .* found "):
+        _frames.columns(thing, ["a"])
+
+
+def test_a_lazy_frame_is_to_be_collected() -> None:
+    polars = pytest.importorskip("polars")
+    with pytest.raises(TypeError, match="LazyFrame; collect"):
+        _frames.columns(polars.LazyFrame({"a": [1.0]}), ["a"])
+
+
+def test_types_of_pandas() -> None:
+    pandas = pytest.importorskip("pandas")
+    for dtype in "int8", "uint16", "int64", "float32", "Int64", "Float64", "UInt8":
+        np.testing.assert_array_equal(
+            read(pandas.DataFrame({"x": pandas.array([1, 2], dtype=dtype)})), [1.0, 2.0]
+        )
+    for dtype in "Int64", "Float64":
+        frame = pandas.DataFrame({"x": pandas.array([1, pandas.NA, 3], dtype=dtype)})
+        np.testing.assert_array_equal(read(frame), [1.0, NAN, 3.0])
+    frame = pandas.DataFrame({"x": pandas.array([True, pandas.NA, False], dtype="boolean")})
+    np.testing.assert_array_equal(read(frame), [1.0, NAN, 0.0])
+    frame = pandas.DataFrame({"c": pandas.Categorical(["a", "b"]), "o": [1, "a"], "z": [1j, 2j]})
+    for name, dtype in ("c", "category"), ("o", "object"), ("z", "complex128"):
+        with pytest.raises(TypeError, match=f"'{name}': expected numbers, found {dtype}"):
+            read(frame, name)
+
+
+def test_columns_of_a_block_of_pandas_are_contiguous() -> None:
+    pandas = pytest.importorskip("pandas")
+    frame = pandas.DataFrame(np.arange(6.0).reshape(3, 2), columns=["a", "x"])
+    np.testing.assert_array_equal(read(frame), [1.0, 3.0, 5.0])
+    # The index is no matter, nor its order.
+    np.testing.assert_array_equal(read(frame.iloc[::-1]), [5.0, 3.0, 1.0])
+
+
+def test_two_columns_of_pandas_with_one_name_are_refused() -> None:
+    pandas = pytest.importorskip("pandas")
+    frame = pandas.DataFrame([[1.0, 2.0]], columns=["a", "a"])
+    with pytest.raises(ValueError, match="two columns have"):
+        _frames.columns(frame, ["a"])
+
+
+@pytest.mark.parametrize("unit", ["s", "ms", "us", "ns"])
+def test_instants_of_pandas_in_any_unit_and_zone(unit: str) -> None:
+    pandas = pytest.importorskip("pandas")
+    instants = pandas.Series(pandas.to_datetime(["2024-03-31 00:30:00", "2024-03-31 03:30:00"]))
+    instants = instants.astype(f"datetime64[{unit}]")
+    seconds, first = _frames.times(pandas.DataFrame({"t": instants}), "t")
+    np.testing.assert_array_equal(seconds, [0.0, 3 * 3600.0])
+    assert first == "2024-03-31T00:30:00"
+    # Summer time begins between the two: one hour less goes by.
+    frame = pandas.DataFrame({"t": instants.dt.tz_localize("Europe/Berlin")})
+    seconds, first = _frames.times(frame, "t")
+    np.testing.assert_array_equal(seconds, [0.0, 2 * 3600.0])
+    assert first == "2024-03-30T23:30:00Z"
+
+
+def test_nanoseconds_are_kept() -> None:
+    pandas = pytest.importorskip("pandas")
+    instants = np.datetime64("2024-03-01T00:00:00", "ns") + np.array([0, 1, 1_000_000_001])
+    seconds, first = _frames.times(pandas.DataFrame({"t": instants}), "t")
+    np.testing.assert_array_equal(seconds, [0.0, 1e-9, 1.000000001])
+    assert first == "2024-03-01T00:00:00"
+
+
+def test_nulls_and_types_of_polars() -> None:
+    polars = pytest.importorskip("polars")
+    for dtype in "Int8", "UInt64", "Float32", "Float64", "Int64":
+        frame = polars.DataFrame({"x": [1, None, 3]}, schema={"x": getattr(polars, dtype)})
+        np.testing.assert_array_equal(read(frame), [1.0, NAN, 3.0])
+    frame = polars.DataFrame({"x": [True, None, False]})
+    np.testing.assert_array_equal(read(frame), [1.0, NAN, 0.0])
+    frame = polars.DataFrame({"x": [[1.0], [2.0]]})
+    with pytest.raises(TypeError, match="'x': expected numbers, found List"):
+        read(frame)
+
+
+def test_chunks_of_polars_are_one_column() -> None:
+    polars = pytest.importorskip("polars")
+    one, two = polars.DataFrame({"x": [1.0, None]}), polars.DataFrame({"x": [3.0]})
+    frame = polars.concat([one, two], rechunk=False)
+    assert frame.n_chunks() == 2
+    np.testing.assert_array_equal(read(frame), [1.0, NAN, 3.0])
+    np.testing.assert_array_equal(read(frame.slice(1)), [NAN, 3.0])
+
+
+@pytest.mark.parametrize("unit", ["ms", "us", "ns"])
+def test_instants_of_polars_in_any_unit_and_zone(unit: Any) -> None:
+    polars = pytest.importorskip("polars")
+    instants = polars.Series("t", [BEGIN, LATER]).cast(polars.Datetime(unit))
+    seconds, first = _frames.times(instants.to_frame(), "t")
+    np.testing.assert_array_equal(seconds, [0.0, 0.75])
+    assert first == "2024-03-01T12:00:00.25"
+    frame = instants.dt.replace_time_zone("Asia/Tokyo").to_frame()
+    seconds, first = _frames.times(frame, "t")
+    np.testing.assert_array_equal(seconds, [0.0, 0.75])
+    assert first == "2024-03-01T03:00:00.25Z"
+
+
+def test_dates_are_instants() -> None:
+    polars = pytest.importorskip("polars")
+    frame = polars.DataFrame({"t": [datetime.date(2024, 3, 1), None, datetime.date(2024, 3, 3)]})
+    seconds, first = _frames.times(frame, "t")
+    np.testing.assert_array_equal(seconds, [0.0, NAN, 2 * 86400.0])
+    assert first == "2024-03-01T00:00:00"
+
+
+def test_nulls_chunks_and_zones_of_pyarrow() -> None:
+    pyarrow = pytest.importorskip("pyarrow")
+    chunks = [pyarrow.array([1, None]), pyarrow.array([3])]
+    table = pyarrow.table({"x": pyarrow.chunked_array(chunks)})
+    np.testing.assert_array_equal(read(table), [1.0, NAN, 3.0])
+    table = pyarrow.table({"x": pyarrow.array([True, None, False])})
+    np.testing.assert_array_equal(read(table), [1.0, NAN, 0.0])
+    zoned = pyarrow.array([BEGIN, None, LATER], pyarrow.timestamp("us", tz="Asia/Tokyo"))
+    seconds, first = _frames.times(pyarrow.table({"t": zoned}), "t")
+    np.testing.assert_array_equal(seconds, [0.0, NAN, 0.75])
+    assert first == "2024-03-01T12:00:00.25Z"
+
+
+def test_types_of_pyarrow_in_pandas() -> None:
+    pandas = pytest.importorskip("pandas")
+    pyarrow = pytest.importorskip("pyarrow")
+    for dtype in "int64[pyarrow]", "double[pyarrow]", "bool[pyarrow]":
+        frame = pandas.DataFrame({"x": pandas.array([1, None, 0], dtype=dtype)})
+        np.testing.assert_array_equal(read(frame), [1.0, NAN, 0.0])
+    dates = pandas.array([datetime.date(2024, 3, 1), None], dtype=pandas.ArrowDtype(pyarrow.date32()))
+    seconds, first = _frames.times(pandas.DataFrame({"t": dates}), "t")
+    np.testing.assert_array_equal(seconds, [0.0, NAN])
+    assert first == "2024-03-01T00:00:00"
+    for zone, text in (None, "2024-03-01T12:00:00.25"), ("Asia/Tokyo", "2024-03-01T12:00:00.25Z"):
+        instants = pyarrow.array([BEGIN, LATER, None], pyarrow.timestamp("us", tz=zone))
+        instants = pandas.arrays.ArrowExtensionArray(instants)
+        seconds, first = _frames.times(pandas.DataFrame({"t": instants}), "t")
+        np.testing.assert_array_equal(seconds, [0.0, 0.75, NAN])
+        assert first == text
+
+
+@every
+def test_whole_numbers_above_two_to_the_53_are_rounded(make: Make) -> None:
+    np.testing.assert_array_equal(read(make({"x": [2**53 + 1, 1]})), [2.0**53, 1.0])
+
+
+def test_decimals_of_polars() -> None:
+    polars = pytest.importorskip("polars")
+    values = [decimal.Decimal("1.5"), None]
+    np.testing.assert_array_equal(read(polars.DataFrame({"x": values})), [1.5, NAN])

@@ -1,0 +1,193 @@
+"""Logs: what goes in comes out, and what cannot be is refused."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import polars as pl
+import pytest
+
+import thetahat as th
+
+Y = np.array([0.0, 1.0, 2.0, 3.0, 4.0])
+U = np.array([1.0, 0.0, 1.0, 0.0, 1.0])
+
+
+@pytest.mark.parametrize(
+    "u",
+    [
+        U,
+        list(U),
+        U.reshape(-1, 1),
+        np.column_stack([U, U])[:, 0],
+        U.astype(np.float32),
+        U.astype(int),
+        U.astype(bool),
+        U.astype(">f8"),
+        {"u": U},
+    ],
+    ids=["array", "list", "column", "strided", "float32", "int", "bool", "big-endian", "dict"],
+)
+def test_inputs_come_in_many_forms(u: Any) -> None:
+    log = th.Log(Y, u, sample_time=0.5)
+    assert log == th.Log(Y, U, sample_time=0.5)
+    assert log.inputs == ["u"] and log.u.shape == (5, 1)
+
+
+def test_a_log_owns_its_data() -> None:
+    y = Y.copy()
+    y.setflags(write=False)
+    log = th.Log(y, U)
+    y = Y.copy()
+    log = th.Log(y, U)
+    y[0] = 99.0
+    assert log.y[0] == 0.0
+    log.y[0] = 99.0
+    assert log.y[0] == 0.0
+
+
+def test_several_inputs_have_names() -> None:
+    both = np.column_stack([U, 2 * U])
+    assert th.Log(Y, both).inputs == ["u1", "u2"]
+    assert th.Log(Y, both, input_names=["heater", "fan"], output_name="room").inputs == ["heater", "fan"]
+    assert np.array_equal(th.Log(Y, {"a": U, "b": 2 * U}).u, both)
+    assert th.Log(Y).inputs == [] and th.Log(Y).u.shape == (5, 0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"y": []}, "y: expected at least one entry"),
+        ({"y": [[1.0, 2.0]]}, r"y: expected one dimension, found shape \(1, 2\)"),
+        ({"y": 3.0}, "y: expected one dimension"),
+        ({"y": Y, "u": U[:3]}, "channel 'y' has 5 rows, the others have 3"),
+        ({"y": Y, "u": np.ones((5, 2, 2))}, r"u: expected shape \(rows,\) or \(rows, inputs\)"),
+        ({"y": Y, "u": np.ones((5, 0))}, "u: expected at least one column"),
+        ({"y": [1.0, np.inf]}, "channel 'y' is infinite in row 2"),
+        ({"y": Y, "u": {"y": U}}, "two channels are called 'y'"),
+        ({"y": Y, "u": U, "input_names": ["a", "b"]}, "input_names: expected 1, found 2"),
+        ({"y": Y, "u": {"u": U}, "input_names": ["a"]}, "input_names"),
+        ({"y": Y, "input_names": ["a"]}, "input_names: there are no inputs"),
+        ({"y": Y, "sample_time": 0.0}, "sample time: 0 is not a positive"),
+        ({"y": Y, "sample_time": np.nan}, "sample_time: nan is not a finite number"),
+        ({"y": Y, "sample_time": 1.0, "time": Y}, "give one of time and sample_time"),
+        ({"y": Y, "resample": (1.0, "linear")}, "resample: it is for logs with a clock"),
+        ({"y": Y, "time": Y[:4]}, "there are 4 time stamps for 5 rows"),
+        ({"y": Y, "time": Y[::-1]}, "time goes back"),
+        ({"y": Y, "time": [0, 1, 2, 2.7, 4]}, "the samples are not uniform"),
+        ({"y": Y, "time": Y, "resample": (1.0, "cubic")}, "resample: 'cubic' is neither"),
+        ({"y": Y, "time": Y, "resample": (-1.0, "hold")}, "resample: -1 is not a positive"),
+        ({"y": [1.0], "time": [0.0]}, "one row has no time step"),
+        ({"y": [[1.0], [2.0, 3.0]]}, "y: "),
+    ],
+)
+def test_what_cannot_be_a_log_is_refused(arguments: dict[str, Any], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        th.Log(**arguments)
+
+
+@pytest.mark.parametrize("y", [["a", "b"], [1 + 2j, 3], [None, 1.0], np.array(["2020-01-01"], dtype="M8[D]")])
+def test_what_is_no_number_is_refused(y: Any) -> None:
+    with pytest.raises(TypeError, match="y: expected an array of numbers"):
+        th.Log(y)
+
+
+def test_slices_are_logs() -> None:
+    log = th.Log(Y, U, time=np.array([0.0, 0.1, 0.2, 0.5, 0.6]))
+    assert log[1:3] == th.Log(Y[1:3], U[1:3], time=[0.1, 0.2])
+    assert len(log[-2:]) == 2 and log[-2:].time[0] == 0.5 and log[3:].sample_time == log.sample_time
+    assert log[:] == log
+    for rows in (slice(3, 3), slice(9, 12), slice(None, None, 2)):
+        with pytest.raises(ValueError, match="rows"):
+            log[rows]
+    with pytest.raises(TypeError, match="slice"):
+        log[0]  # type: ignore[call-overload]
+
+
+def test_logs_join() -> None:
+    log = th.Log.join([th.Log(Y, U), th.Log(2 * Y, U)])
+    assert len(log) == 10 and np.array_equal(log[5:].y, 2 * Y)
+    with pytest.raises(ValueError, match="sample time"):
+        th.Log.join([th.Log(Y, U), th.Log(Y, U, sample_time=2.0)])
+    with pytest.raises(ValueError, match="no channel 'u'"):
+        th.Log.join([th.Log(Y, U), th.Log(Y)])
+    with pytest.raises(ValueError, match="at least one"):
+        th.Log.join([])
+
+
+@pytest.mark.parametrize(
+    "log",
+    [
+        th.Log(Y, U, sample_time=0.1),
+        th.Log([1.0, np.nan, 3.0]),
+        th.Log(Y, U, time=[0.0, 0.1, 0.2, 0.5, 0.6]),
+        th.Log(Y, U, time=[0.0, 0.1, 0.2, 0.5, 0.6], resample=(0.1, "linear")),
+        th.Log.join([th.Log(Y, U), th.Log(Y[:2], U[:2])]),
+    ],
+    ids=["plain", "missing", "gap", "resampled", "joined"],
+)
+def test_logs_pickle_and_copy(log: th.Log) -> None:
+    again = pickle.loads(pickle.dumps(log))
+    assert again == log and again.sample_time == log.sample_time
+    assert copy.copy(log) == log and copy.deepcopy(log) == log
+    # What segments and provenance it has shows in a report.
+    if len(log) > 4:
+        assert th.arx(again, 1, 1).to_json() == th.arx(log, 1, 1).to_json()
+
+
+def test_dates_are_a_clock() -> None:
+    time = np.array("2026-01-01T00:00:00", dtype="M8[s]") + np.arange(5) * np.timedelta64(2, "s")
+    log = th.Log(Y, U, time=time)
+    assert log.sample_time == 2.0 and log.time[0] == 0.0
+    assert th.arx(log, 1, 1).document["data"]["logs"][0]["start"] == "2026-01-01T00:00:00"
+    assert th.Log(Y, U, time=time - time[0]).sample_time == 2.0
+
+
+@pytest.mark.parametrize("library", [pd, pl], ids=["pandas", "polars"])
+def test_data_frames_are_logs(library: Any) -> None:
+    frame = library.DataFrame({"t": Y / 10, "heater": [1, 0, 1, 0, 1], "room": [0.0, 1.0, None, 3.0, 4.0], "note": list("abcde")})
+    log = th.Log.from_dataframe(frame, inputs=["heater"], output="room", time="t")
+    assert log == th.Log([0, 1, np.nan, 3, 4], {"heater": U}, time=Y / 10, output_name="room")
+    assert th.Log.from_dataframe(frame, output="room").inputs == []
+    with pytest.raises(ValueError, match="cooler"):
+        th.Log.from_dataframe(frame, inputs=["cooler"], output="room")
+    with pytest.raises(TypeError, match="note"):
+        th.Log.from_dataframe(frame, inputs=["note"], output="room")
+
+
+def test_files_are_read_as_on_the_command_line(tmp_path: Path) -> None:
+    path = tmp_path / "log; a.csv"
+    path.write_text("# made by hand\nzeit;ventil;druck\n0;1,5;2\n1;0;-\n2;1;4\n", encoding="utf-8")
+    log = th.read_csv(
+        path, inputs="ventil", output="druck", time="zeit", delimiter=";", decimal_comma=True, comment="#", missing="-"
+    )
+    assert log == th.Log([2, np.nan, 4], {"ventil": [1.5, 0, 1]}, time=[0, 1, 2], output_name="druck")
+    assert th.read_csv(str(path), inputs=[], output="druck", delimiter=";", comment="#", missing=["-"]).inputs == []
+    with pytest.raises(FileNotFoundError):
+        th.read_csv(tmp_path / "none.csv")
+    with pytest.raises(ValueError, match=r"log; a\.csv:4:5: column 'druck'.*missing='-'"):
+        th.read_csv(path, inputs="ventil", output="druck", delimiter=";", decimal_comma=True, comment="#")
+    with pytest.raises(ValueError, match="name the output with output"):
+        th.read_csv(path, delimiter=";", comment="#")
+    with pytest.raises(TypeError, match="delimeter: there is no such option"):
+        th.read_csv(path, delimeter=";")  # type: ignore[call-arg]
+
+
+def test_what_looks_like_a_clock_is_a_word_of_warning(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("t,u,y\n0,1,0\n1,0,1\n")
+    with pytest.warns(UserWarning, match="looks like a clock"):
+        th.read_csv(path)
+
+
+def test_a_log_shows_itself() -> None:
+    log = th.Log([1.0, np.nan, 3.0], {"<b>": [0, 1, 0]})
+    assert repr(log) == "Log(3 rows, inputs <b>, output y, sample time 1.0 s)"
+    page = log._repr_html_()
+    assert "<svg" in page and "&lt;b&gt;" in page and "nan" not in page
+    assert "<svg" in th.Log(np.full(2000, 5.0))._repr_html_()

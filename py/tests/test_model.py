@@ -1,0 +1,188 @@
+"""What models answer: identities between responses, and agreement with other programs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import control
+import numpy as np
+import pytest
+import scipy.signal
+import statsmodels.api as sm
+from statsmodels.stats.diagnostic import acorr_ljungbox
+
+import thetahat as th
+
+
+def test_residuals_are_those_of_the_fit(motor: th.Log) -> None:
+    for model in (th.arx(motor, 2, 2), th.armax(motor, 2, 2, 1), th.ar(motor, 3)):
+        residuals = model.residuals(motor)
+        counted = residuals[~np.isnan(residuals)]
+        assert abs(np.mean(counted[-900:] ** 2) / model.mse - 1) < 0.2
+    model = th.arx(motor, 2, 2)
+    residuals = model.residuals(motor)
+    assert np.isnan(residuals[:2]).all() and np.isclose(np.mean(residuals[2:] ** 2), model.mse, rtol=1e-10)
+
+
+def test_predictions_meet_the_free_run(motor: th.Log) -> None:
+    model = th.arx(motor, 2, 2)
+    assert np.array_equal(model.predict(motor, None, "zero"), model.simulate(motor))
+    assert np.array_equal(model.simulate(motor.u), model.simulate(motor))
+    assert np.allclose(model.simulate(motor.u[:, 0])[:700], model.simulate(motor[:700].u), atol=1e-12)
+    lower, upper = model.predict_interval(motor, 5)
+    values = model.predict(motor, 5)
+    assert np.allclose((lower + upper) / 2, values, equal_nan=True)
+    inside = (lower < motor.y) & (motor.y < upper)
+    assert inside[10:].mean() > 0.9
+
+
+def test_a_forecast_goes_on_where_the_log_ends(motor: th.Log) -> None:
+    model = th.armax(motor, 2, 2, 1)
+    ahead = model.forecast(motor[:900], 4, motor.u[900:904])
+    # The k-th value is the prediction k steps ahead of a log that goes on.
+    for k in range(1, 5):
+        assert np.isclose(ahead.values[k - 1], model.predict(motor[:904], k)[900 + k - 1], rtol=1e-9)
+    assert np.allclose(ahead.time, motor.time[900:904]) and (np.diff(ahead.standard_deviations) > 0).all()
+    lower, upper = ahead.interval()
+    assert (lower < ahead.values).all() and (ahead.values < upper).all()
+    series = th.ar(motor, 2)
+    assert series.forecast(motor, 3).values.shape == (3,)
+    assert repr(ahead) == "Forecast(4 steps from 9 s)"
+
+
+def test_responses_are_those_of_the_polynomials(motor: th.Log) -> None:
+    model = th.bj(motor, 2, 1, 1, 2)
+    w = np.array([0.5, 5.0, 50.0])
+    response = model.frequency_response(w)
+    z = np.exp(-1j * w * model.sample_time)
+    plant = np.polyval(model.b[0][::-1], z) / np.polyval(model.f[0][::-1], z)
+    noise = np.polyval(model.c[::-1], z) / np.polyval(model.d[::-1], z)
+    assert response.sources == ["u", "noise"]
+    assert np.allclose(response.values, [plant, noise]) and np.allclose(np.abs(response.values), response.magnitude)
+    assert np.allclose(np.exp(1j * response.phase), response.values / response.magnitude)
+    assert (response.magnitude_errors > 0).all() and model.frequency_response().frequencies.shape == (100,)
+    step = model.step_response()
+    assert np.isclose(step.values[-1], model.dc_gain()[0], rtol=0.02)
+    assert np.allclose(step.values, scipy.signal.dlsim(model.to_scipy(), np.ones(len(step.values)))[1][:, 0])
+
+
+def test_other_packages_simulate_the_same(motor: th.Log) -> None:
+    model = th.armax(motor, 2, 2, 1)
+    u = motor.u[:, 0] - model.offsets["u"][0]
+    free = model.simulate(motor) - model.offsets["y"][0]
+    for system in (model.to_control(), model.to_state_space().to_control()):
+        assert system.dt == 0.01 and system.input_labels == ["u"] and system.output_labels == ["y"]
+        assert np.allclose(control.forced_response(system, inputs=u).outputs, free, atol=1e-9)
+    for system in (model.to_scipy(), model.to_state_space().to_scipy()):
+        assert np.allclose(scipy.signal.dlsim(system, u)[1][:, 0], free, atol=1e-9)
+    poles = np.sort_complex(control.poles(model.to_control()))
+    assert np.allclose(poles, np.sort_complex(model.poles()))
+    assert np.allclose(control.zeros(model.to_control()), model.zeros())
+    magnitude = control.frequency_response(model.to_control(), omega=np.array([1.0, 5.0, 10.0])).magnitude
+    assert np.allclose(np.ravel(magnitude), model.frequency_response([1.0, 5.0, 10.0]).magnitude[0])
+
+
+def test_the_innovations_form_predicts_the_same(motor: th.Log) -> None:
+    model = th.armax(motor, 2, 2, 1)
+    form = model.to_state_space()
+    u, y = motor.u[:, 0] - model.offsets["u"][0], motor.y - model.offsets["y"][0]
+    x, predicted = np.zeros(len(form.F)), np.zeros(len(motor))
+    for t in range(len(motor)):
+        predicted[t] = (form.H @ x + form.D[:, 0] * u[t])[0]
+        x = form.F @ x + form.G[:, 0] * u[t] + form.K[:, 0] * (y[t] - predicted[t])
+    assert np.allclose(predicted + model.offsets["y"][0], model.predict(motor, 1, "zero"), atol=1e-9)
+    assert form.noise_variance == model.noise_variance
+
+
+def test_statsmodels_agrees(motor: th.Log) -> None:
+    y = motor.y - motor.y.mean()
+    theirs = sm.tsa.AutoReg(y, lags=3, trend="n").fit()
+    ours = th.ar(motor, 3)
+    assert np.allclose(-ours.parameters, theirs.params, rtol=1e-9)
+    assert np.allclose(ours.residuals(motor)[3:], theirs.resid, atol=1e-9)
+    # Of y = phi x + e by ordinary least squares: standard errors with N - p.
+    regressors = np.column_stack([y[2:-1], y[1:-2], y[:-3]])
+    assert np.allclose(ours.standard_errors, sm.OLS(y[3:], regressors).fit().bse, rtol=1e-9)
+    table = acorr_ljungbox(theirs.resid, lags=[25], model_df=3)
+    statistic = ours.validate(motor).document["residuals"]["ljung_box"]["statistic"]
+    assert statistic is not None and np.isclose(statistic, table["lb_stat"].iloc[0], rtol=0.05)
+
+
+def test_validations_say_what_was_required(motor: th.Log) -> None:
+    model = th.arx(motor[:700], 2, 2)
+    validation = model.validate(motor[700:], require=["white", "stable", "fit>=99", "fit@3>=1"], horizon=[2, 7])
+    assert [text.split(":")[0] for text in validation.unmet] == ["white", "fit>=99"]
+    assert {fit["horizon"].get("steps") for fit in validation.document["fit"]} == {1, 2, 3, 7, None}
+    assert validation.fit(7) < validation.fit(1) and validation.independence["u"] > 0.05
+    with pytest.raises(ValueError, match="horizon: 4 was not looked at"):
+        validation.fit(4)
+    assert model.validate(motor, rows=slice(700, 1000)).document["rows"] == [[701, 1000]]
+    for wrong in ({"require": "fast"}, {"lags": 0}, {"alpha": 2.0}, {"horizon": 0}, {"rows": "0..5"}):
+        with pytest.raises(ValueError, match=next(iter(wrong))):
+            model.validate(motor, **wrong)
+    with pytest.raises(ValueError, match="white"):
+        th.oe(motor, 2, 2).validate(motor, require="white")
+
+
+def test_models_stand_side_by_side(motor: th.Log) -> None:
+    models = {"a": th.arx(motor[:700], 2, 2), "b": th.oe(motor[:700], 2, 2)}
+    comparison = th.compare(models, motor[700:])
+    assert [model["report"] for model in comparison.document["models"]] == ["a", "b"]
+    assert "fit [%], free run" in comparison.summary()
+    assert repr(th.compare(list(models.values()), motor)) == "Comparison(model 1, model 2)"
+    with pytest.raises(ValueError, match="models: there is none"):
+        th.compare([], motor)
+
+
+def test_a_log_is_inspected(motor: th.Log) -> None:
+    inspection = th.inspect(motor)
+    assert inspection.delays == {"u": 1} and inspection.document["rows"] == 1000
+    assert "DC" in inspection.summary() or "delay" in inspection.summary()
+    with pytest.raises(TypeError, match="for files"):
+        th.inspect(motor, time="t")
+
+
+def test_pages_are_written_whole(motor: th.Log, tmp_path: Path) -> None:
+    path = tmp_path / "page.html"
+    model = th.arx(motor, 2, 2)
+    model.to_html(path, motor)
+    assert path.read_text(encoding="utf-8").rstrip().endswith("</html>")
+    with pytest.raises(FileNotFoundError):
+        model.to_html(tmp_path / "none" / "page.html")
+    assert [each.name for each in tmp_path.iterdir()] == ["page.html"]
+    path.write_text(model.to_json(), encoding="utf-8")
+    assert th.Model.read(path) == model
+
+
+def test_what_a_model_cannot_answer_is_refused(motor: th.Log) -> None:
+    model, series = th.arx(motor, 2, 2), th.ar(motor, 2)
+    other = th.Log(motor.y, {"v": motor.u[:, 0]}, sample_time=0.01)
+    cases = [
+        (lambda: model.predict(other), "no channel 'u'"),
+        (lambda: model.predict(th.Log(motor.y, motor.u, sample_time=0.02)), "sample time"),
+        (lambda: model.predict(motor, 0), "horizon: 0 is below 1"),
+        (lambda: model.predict(motor, 10**30), "horizon|int"),
+        (lambda: model.predict(motor, 1, "cold"), "initial: 'cold'"),
+        (lambda: model.simulate([]), "u: "),
+        (lambda: model.simulate(np.ones((5, 3))), r"u: expected shape \(any, 1\)"),
+        (lambda: model.simulate([1.0, np.nan]), "u: input 'u' holds NaN"),
+        (lambda: model.simulate(motor.u, "estimated"), "initial"),
+        (lambda: series.simulate([1.0]), "no inputs"),
+        (lambda: model.forecast(motor, 3), "u: the model has inputs"),
+        (lambda: model.forecast(motor, 3, [1.0]), "u: expected 3 entries"),
+        (lambda: model.forecast(motor, 0, [1.0]), "steps"),
+        (lambda: series.forecast(motor, 3, [1.0]), "u: the model has no inputs"),
+        (lambda: series.forecast(motor, 10**7), "steps"),
+        (lambda: model.frequency_response([-1.0]), "frequenc"),
+        (lambda: model.frequency_response([1e6]), "frequenc"),
+        (lambda: model.frequency_response([]), "w: expected at least one"),
+        (lambda: model.frequency_response(points=1), "points"),
+        (lambda: model.step_response(1), "input"),
+        (lambda: model.step_response(samples=0), "samples"),
+        (lambda: model.zeros(5), "input: there is no input 5"),
+        (lambda: model.confidence_interval(1.0), "level"),
+        (lambda: series.to_control(), "no inputs"),
+    ]
+    for call, words in cases:
+        with pytest.raises((ValueError, OverflowError), match=words):
+            call()  # type: ignore[no-untyped-call]

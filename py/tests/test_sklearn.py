@@ -1,0 +1,258 @@
+"""ARXRegressor in the hands of scikit-learn."""
+
+from __future__ import annotations
+
+import pickle
+import subprocess
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+pytest.importorskip("sklearn", minversion="1.6")
+
+from sklearn.base import clone
+from sklearn.exceptions import NotFittedError
+from sklearn.metrics import r2_score
+from sklearn.model_selection import GridSearchCV, TimeSeriesSplit, cross_val_score
+from sklearn.pipeline import Pipeline, make_pipeline
+from sklearn.preprocessing import StandardScaler
+from sklearn.utils.estimator_checks import check_estimator
+
+import thetahat
+from thetahat.sklearn import ARXRegressor
+
+# a1, a2, then b1 and b2 of the first input, b2 and b3 of the second.
+PARAMETERS = np.array([-1.2, 0.5, 1.0, 0.4, 0.3, -0.2])
+ORDERS: dict[str, Any] = {"na": 2, "nb": [2, 2], "nk": [1, 2]}
+
+
+def data(
+    count: int = 800, noise: float = 0.01, level: float = 0.0
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Inputs of mean zero and what y(t) - 1.2 y(t-1) + 0.5 y(t-2) = ... + e(t) makes of them from rest."""
+    random = np.random.default_rng(7)
+    u = random.standard_normal((count, 2))
+    e = noise * random.standard_normal(count)
+    y = np.zeros(count)
+    a1, a2, b11, b12, b22, b23 = PARAMETERS
+    for t in range(3, count):
+        driven = b11 * u[t - 1, 0] + b12 * u[t - 2, 0] + b22 * u[t - 2, 1] + b23 * u[t - 3, 1]
+        y[t] = -a1 * y[t - 1] - a2 * y[t - 2] + driven + e[t]
+    return u, y + level
+
+
+def test_it_finds_the_parameters() -> None:
+    u, y = data()
+    regressor = ARXRegressor(**ORDERS, sample_time=0.1)
+    assert regressor.fit(u, y) is regressor
+    np.testing.assert_allclose(regressor.coef_, PARAMETERS, atol=0.01)
+    np.testing.assert_array_equal(regressor.coef_, regressor.model_.parameters)
+    assert regressor.n_features_in_ == 2
+    assert not hasattr(regressor, "feature_names_in_")
+
+
+def test_one_order_serves_all_inputs() -> None:
+    u, y = data()
+    one = ARXRegressor(na=2, nb=3, nk=1).fit(u, y)
+    orders: dict[str, Any] = {"na": np.int64(2), "nb": np.array([3, 3]), "nk": (1, 1)}
+    each = ARXRegressor(**orders).fit(u, y)
+    np.testing.assert_array_equal(one.coef_, each.coef_)
+    assert len(one.coef_) == 8
+
+
+def test_without_a_horizon_it_runs_freely_from_rest() -> None:
+    u, y = data(level=5.0)
+    regressor = ARXRegressor(**ORDERS).fit(u, y)
+    free = regressor.predict(u)
+    np.testing.assert_array_equal(free, regressor.model_.simulate(u, initial="zero"))
+    # The outputs are not read.
+    np.testing.assert_array_equal(regressor.predict(u, np.zeros(len(y))), free)
+    assert free.shape == y.shape
+    assert np.isfinite(free).all()
+    np.testing.assert_allclose(free[50:], y[50:], atol=0.4)
+    assert regressor.score(u, y) == pytest.approx(r2_score(y, free))
+    assert regressor.score(u, y) > 0.95
+
+
+@pytest.mark.parametrize("horizon", [1, 4, np.int64(2)])
+def test_with_a_horizon_it_predicts_that_far(horizon: int) -> None:
+    u, y = data()
+    regressor = ARXRegressor(**ORDERS, horizon=horizon).fit(u, y)
+    predicted = regressor.predict(u, y)
+    log = thetahat.Log(y, u)
+    np.testing.assert_array_equal(predicted, regressor.model_.predict(log, horizon=int(horizon)))
+    known = ~np.isnan(predicted)
+    assert 700 < np.count_nonzero(known) < len(y)
+    assert regressor.score(u, y) == pytest.approx(r2_score(y[known], predicted[known]))
+    assert regressor.score(u, y) > 0.99
+
+
+def test_weights_count() -> None:
+    u, y = data(noise=0.5)
+    regressor = ARXRegressor(**ORDERS, horizon=1).fit(u, y)
+    predicted = regressor.predict(u, y)
+    weights = np.where(np.arange(len(y)) < 400, 0.0, 1.0)
+    expected = r2_score(y[400:], predicted[400:])
+    assert regressor.score(u, y, sample_weight=weights) == pytest.approx(expected)
+
+
+def test_a_horizon_needs_outputs() -> None:
+    u, y = data()
+    regressor = ARXRegressor(**ORDERS, horizon=3).fit(u, y)
+    with pytest.raises(ValueError, match=r"3 samples ahead .* give predict\(X, y\)"):
+        regressor.predict(u)
+
+
+@pytest.mark.parametrize("horizon", [0, -1, 1.5, float("inf"), "1"])
+def test_a_horizon_is_a_number_of_samples(horizon: Any) -> None:
+    with pytest.raises(ValueError, match="horizon: expected a whole number"):
+        ARXRegressor(horizon=horizon).fit(*data())
+
+
+def test_shapes_are_checked() -> None:
+    u, y = data()
+    regressor = ARXRegressor(**ORDERS)
+    with pytest.raises(NotFittedError):
+        regressor.predict(u)
+    with pytest.raises(ValueError, match="inconsistent numbers of samples"):
+        regressor.fit(u, y[1:])
+    with pytest.raises(ValueError, match="Expected 2D array"):
+        regressor.fit(u[:, 0], y)
+    with pytest.raises(ValueError, match="y: .*None"):
+        regressor.fit(u, None)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="infinity"):
+        regressor.fit(u, np.where(y > 1, np.inf, y))
+    regressor.fit(u, y)
+    with pytest.raises(ValueError, match="expecting 2 features"):
+        regressor.predict(u[:, :1])
+    with pytest.raises(ValueError, match="one for each"):
+        ARXRegressor(nb=[1, 2, 3]).fit(u, y)
+
+
+def test_too_few_samples_for_a_score_are_refused() -> None:
+    u, y = data()
+    regressor = ARXRegressor(**ORDERS, horizon=1).fit(u, y)
+    with pytest.raises(ValueError, match="R.2 needs two"):
+        regressor.score(u[:4], np.append(y[:3], np.nan))
+
+
+def test_clone_and_set_params_keep_what_was_given() -> None:
+    regressor = ARXRegressor(na=3, nb=[1, 2], nk=[0, 1], horizon=5, sample_time=0.2)
+    assert clone(regressor).get_params() == regressor.get_params()
+    assert regressor.get_params() == {"na": 3, "nb": [1, 2], "nk": [0, 1], "horizon": 5, "sample_time": 0.2}
+    assert regressor.set_params(na=1, horizon=None).na == 1
+    u, y = data()
+    fitted = ARXRegressor(**ORDERS).fit(u, y)
+    assert not hasattr(clone(fitted), "model_")
+
+
+def test_a_pickle_predicts_the_same() -> None:
+    u, y = data()
+    regressor = ARXRegressor(**ORDERS).fit(u, y)
+    again = pickle.loads(pickle.dumps(regressor))
+    np.testing.assert_array_equal(again.predict(u), regressor.predict(u))
+    np.testing.assert_array_equal(again.coef_, regressor.coef_)
+
+
+@pytest.mark.parametrize("horizon", [None, 1, 5])
+def test_scores_of_splits_in_time(horizon: int | None) -> None:
+    u, y = data()
+    scores = cross_val_score(
+        ARXRegressor(**ORDERS, horizon=horizon), u, y, cv=TimeSeriesSplit(4), error_score="raise"
+    )
+    assert scores.shape == (4,)
+    assert scores.min() > 0.9
+
+
+def test_a_search_finds_orders_that_serve() -> None:
+    u, y = data()
+    grid = {"na": [1, 2], "nb": [[1, 1], [2, 2]], "nk": [[1, 2], [3, 3]]}
+    search = GridSearchCV(ARXRegressor(horizon=1), grid, cv=TimeSeriesSplit(3), error_score="raise")
+    search.fit(u, y)
+    assert search.best_params_ == ORDERS
+    assert search.best_score_ > 0.99
+    assert search.score(u, y) > 0.99
+
+
+def test_a_search_of_free_runs_may_use_other_scores() -> None:
+    u, y = data()
+    search = GridSearchCV(
+        ARXRegressor(nb=[2, 2], nk=[1, 2]),
+        {"na": [0, 2]},
+        cv=TimeSeriesSplit(3),
+        scoring="neg_mean_squared_error",
+        error_score="raise",
+    )
+    assert search.fit(u, y).best_params_ == {"na": 2}
+
+
+def test_it_ends_a_pipeline() -> None:
+    u, y = data()
+    scale = np.array([100.0, 0.01])
+    plain = ARXRegressor(**ORDERS).fit(u, y)
+    pipeline = make_pipeline(StandardScaler(), ARXRegressor(**ORDERS))
+    assert isinstance(pipeline, Pipeline)
+    pipeline.fit(scale * u + 7.0, y)
+    np.testing.assert_allclose(pipeline.predict(scale * u + 7.0), plain.predict(u), atol=1e-6)
+    assert pipeline.score(scale * u + 7.0, y) == pytest.approx(plain.score(u, y), abs=1e-6)
+    grid = GridSearchCV(pipeline, {"arxregressor__na": [1, 2]}, cv=TimeSeriesSplit(3), error_score="raise")
+    assert grid.fit(u, y).best_params_ == {"arxregressor__na": 2}
+
+
+def test_a_pipeline_hands_outputs_on() -> None:
+    u, y = data()
+    pipeline = make_pipeline(StandardScaler(), ARXRegressor(**ORDERS, horizon=2)).fit(u, y)
+    predicted = pipeline.predict(u, y=y)
+    known = ~np.isnan(predicted)
+    assert pipeline.score(u, y) == pytest.approx(r2_score(y[known], predicted[known]))
+
+
+def test_it_keeps_the_conventions_of_scikit_learn_that_time_allows() -> None:
+    against = {
+        "check_methods_sample_order_invariance": "rows are in the order of time",
+        "check_methods_subset_invariance": "a row depends on those before it",
+        "check_supervised_y_no_nan": "NaN means a missing sample",
+        "check_regressors_no_decision_function": "its output is one of its inputs: past ones cannot be told apart",
+    }
+    check_estimator(ARXRegressor(na=1, nb=1), expected_failed_checks=against, on_skip=None)
+
+
+def test_a_frame_names_the_inputs() -> None:
+    pandas = pytest.importorskip("pandas")
+    u, y = data()
+    # An input may be called as the output would be.
+    frame = pandas.DataFrame(u, columns=["voltage", "y"])
+    regressor = ARXRegressor(**ORDERS).fit(frame, pandas.Series(y, name="speed"))
+    assert list(regressor.feature_names_in_) == ["voltage", "y"]
+    expected = ARXRegressor(**ORDERS).fit(u, y).predict(u)
+    np.testing.assert_allclose(regressor.predict(frame), expected, atol=1e-12)
+    with pytest.raises(ValueError, match="feature names"):
+        regressor.predict(frame.rename(columns={"voltage": "current"}))
+
+
+def test_polars_will_do() -> None:
+    polars = pytest.importorskip("polars")
+    u, y = data()
+    frame = polars.DataFrame(u, schema=["voltage", "load"])
+    regressor = ARXRegressor(**ORDERS).fit(frame, polars.Series(y))
+    assert list(regressor.feature_names_in_) == ["voltage", "load"]
+    expected = ARXRegressor(**ORDERS).fit(u, y).predict(u)
+    np.testing.assert_allclose(regressor.predict(frame), expected, atol=1e-12)
+
+
+def test_missing_samples_are_left_out() -> None:
+    u, y = data()
+    y[100:110] = np.nan
+    regressor = ARXRegressor(**ORDERS, horizon=1).fit(u, y)
+    np.testing.assert_allclose(regressor.coef_, PARAMETERS, atol=0.01)
+    assert regressor.score(u, y) > 0.99
+
+
+def test_without_scikit_learn_the_module_says_what_to_install() -> None:
+    code = "import sys; sys.modules['sklearn'] = None; import thetahat; import thetahat.sklearn"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "pip install thetahat[sklearn]" in done.stderr.splitlines()[-1]

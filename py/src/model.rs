@@ -61,6 +61,18 @@ impl Model {
         self.report(py)?.to_json().map_err(|error| error::batch(py, error))
     }
 
+    /// What is known without the figures: the parts `model` and `estimation` of the document.
+    fn parts(&self, py: Python<'_>) -> PyResult<(String, String)> {
+        let known = self.unjudged.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let report = match &known {
+            Some((unjudged, _)) => unjudged.report(),
+            None => self.report(py)?,
+        };
+        let malformed = |error: serde_json::Error| PyValueError::new_err(error.to_string());
+        let model = serde_json::to_string(&self.model).map_err(malformed)?;
+        Ok((model, serde_json::to_string(&report.estimation).map_err(malformed)?))
+    }
+
     /// Structure and orders, such as ARX(2, 2, 1).
     fn name(&self) -> String {
         self.model.orders.to_string()

@@ -120,10 +120,15 @@ class Model:
         document: dict[str, Any] = json.loads(self.to_json())
         return document
 
+    # The figures of the fit take longer than least squares: what does not need them does not wait for them.
+    @cached_property
+    def _parts(self) -> tuple[dict[str, Any], dict[str, Any]]:
+        model, estimation = self._model.parts()
+        return json.loads(model), json.loads(estimation)
+
     @property
     def _own(self) -> dict[str, Any]:
-        own: dict[str, Any] = self.document["model"]
-        return own
+        return self._parts[0]
 
     @property
     def name(self) -> str:
@@ -276,22 +281,22 @@ class Model:
     @property
     def method(self) -> str:
         """How the model was estimated."""
-        return str(self.document["estimation"]["method"])
+        return str(self._parts[1]["method"])
 
     @property
     def samples(self) -> int:
         """N, the samples that count in the fit."""
-        return int(self.document["estimation"]["samples"])
+        return int(self._parts[1]["samples"])
 
     @property
     def mse(self) -> float:
         """The mean of e^2 over these samples."""
-        return float(self.document["estimation"]["mse"])
+        return float(self._parts[1]["mse"])
 
     @property
     def criteria(self) -> dict[str, float]:
         """FPE, AIC, AICc and MDL; NaN where one is not defined."""
-        estimation = self.document["estimation"]
+        estimation = self._parts[1]
         names = ("fpe", "aic", "aicc", "mdl")
         return {name: float("nan" if estimation.get(name) is None else estimation[name]) for name in names}
 

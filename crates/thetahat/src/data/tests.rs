@@ -170,3 +170,48 @@ fn small_signals_on_large_offsets_keep_their_digits() {
     let constant = Offset::estimate(Detrend::Mean, &log, "c", &segments).unwrap();
     assert_eq!(constant.level, 0.1);
 }
+
+#[test]
+fn a_part_is_cut_where_the_log_is() {
+    let u = channel("u", &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
+    let y = channel("y", &[0.5, 1.5, NAN, 3.5, 4.5, 5.5]);
+    // The clock jumps before the fourth row.
+    let time = vec![0.0, 0.1, 0.2, 0.9, 1.0, 1.1];
+    let log = Log::with_time(vec![u.clone(), y.clone()], time).unwrap();
+    let joined = Log::join(vec![log.clone(), log.clone()]).unwrap();
+    assert_eq!((joined.breaks(), joined.borders()), (&[3, 6, 9][..], &[6][..]));
+
+    let all = log.part(&["u", "y"], rows("1..6")).unwrap();
+    assert_eq!((all.sample_time(), all.time(), all.breaks()), (log.sample_time(), log.time(), log.breaks()));
+    let part = joined.part(&["y"], rows("5..11")).unwrap();
+    let values = &part.channels()[0].values;
+    assert!(values[4].is_nan() && [&values[..4], &values[5..]].concat() == [4.5, 5.5, 0.5, 1.5, 3.5, 4.5]);
+    assert_eq!((part.rows(), part.breaks(), part.borders()), (7, &[2, 5][..], &[2][..]));
+    assert_eq!(part.sample_time(), log.sample_time());
+    // A jump that the part begins with is none.
+    assert!(log.part(&["u"], rows("4..6")).unwrap().breaks().is_empty());
+    assert!(log.part(&["w"], rows("1..2")).is_err() && log.part(&["u"], rows("1..7")).is_err());
+}
+
+#[test]
+fn a_stored_log_comes_back() {
+    let log = Log::with_time(vec![channel("y", &[1.0, 2.0, 3.0, 4.0])], vec![0.0, 0.1, 0.5, 0.6]).unwrap();
+    let joined = Log::join(vec![log.clone(), log]).unwrap();
+    let again = |breaks: &[usize], borders: &[usize], time: Option<Vec<f64>>| {
+        Log::restored(
+            joined.channels().to_vec(),
+            joined.sample_time(),
+            time,
+            breaks.to_vec(),
+            borders.to_vec(),
+        )
+    };
+    let time = joined.time().map(<[f64]>::to_vec);
+    assert_eq!(again(joined.breaks(), joined.borders(), time.clone()).unwrap(), joined);
+    for (breaks, borders) in
+        [(&[2, 8][..], &[][..]), (&[0], &[]), (&[4, 2], &[]), (&[2, 4], &[5]), (&[4, 4], &[4])]
+    {
+        assert!(again(breaks, borders, time.clone()).is_err(), "{breaks:?} {borders:?}");
+    }
+    assert!(again(&[], &[], Some(vec![0.0; 7])).is_err() && again(&[], &[], Some(vec![NAN; 8])).is_err());
+}

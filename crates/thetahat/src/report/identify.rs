@@ -414,3 +414,54 @@ fn judge(report: &mut Report, record: &Record<'_>, rows: &[Rows], part: Part, in
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::regression::noise::Noise;
+    use crate::{Channel, OrderRange, Path};
+
+    #[test]
+    fn figures_that_wait_are_the_same() {
+        let mut noise = Noise(5);
+        let (u, e) = (noise.take(400), noise.take(400));
+        let mut y = vec![20.0; 400];
+        for t in 1..400 {
+            y[t] = 20.0 + 0.8 * (y[t - 1] - 20.0) + 0.5 * u[t - 1] + 0.1 * e[t];
+        }
+        y[300] = f64::NAN;
+        let channel = |name: &str, values: &[f64]| Channel { name: name.into(), values: values.to_vec() };
+        let log = Log::new(vec![channel("u", &u), channel("y", &y)], 0.1).unwrap();
+        let one = OrderRange::new(1, 1).unwrap();
+        let grid = Grid {
+            na: OrderRange::new(1, 2).unwrap(),
+            nb: vec![one],
+            nc: 0.into(),
+            nd: 0.into(),
+            nf: vec![0.into()],
+            nk: vec![one],
+            path: Path::All,
+        };
+        let known = Plan::new(&["u"], "y", Orders::oe(&[1], &[1], &[1]).unwrap());
+        let plans = [
+            Plan { validate: vec!["301..400".parse().unwrap()], detrend: Detrend::Linear, ..known.clone() },
+            Plan { split: Some("60/20/20".parse().unwrap()), choice: Choice::Grid(grid), ..known },
+        ];
+        for plan in plans {
+            let whole = identify(log.clone(), &[], &plan).unwrap();
+            let unjudged = Unjudged::new(log.clone(), &[], &plan, &|_| ControlFlow::Continue(())).unwrap();
+            assert!(unjudged.report().fit.is_empty() && unjudged.report().model == whole.model);
+            assert_eq!(unjudged.judged(log.clone()).unwrap(), whole);
+        }
+    }
+
+    #[test]
+    fn the_largest_is_found_in_any_place() {
+        assert_eq!(largest(&[]), 0.0);
+        for place in 0..19 {
+            let mut values = [0.5; 19];
+            values[place] = -3.0;
+            assert_eq!(largest(&values), 3.0);
+        }
+    }
+}

@@ -1,0 +1,173 @@
+"""Does the same work with the Python module of thetahat and with other Python packages, by turns, and prints the ratios of
+their times.
+
+Usage: python_module.py, in an environment that has the module; `run` calls it. It fails on estimates that disagree, not on a
+ratio that is missed.
+"""
+
+import os
+import platform
+import timeit
+import warnings
+from importlib.metadata import version
+
+import numpy
+import padasip
+import thetahat
+from compare import check, print_table, processor, verdict
+from filterpy.kalman import KalmanFilter
+from scipy.signal import lfilter
+from sippy_unipi import system_identification
+
+PACKAGES = ["thetahat", "NumPy", "padasip", "filterpy", "sippy-unipi"]
+
+
+def main():
+    """All rows."""
+    warnings.simplefilter("ignore")
+    numpy.random.seed(0)
+    print(*(f"{name} {version(name)}" for name in PACKAGES), f"Python {platform.python_version()}", sep=", ")
+    print(f"{processor()}, {os.cpu_count()} processors", end="\n\n", flush=True)
+    rows = [["work", "peer", "thetahat", "peer's", "ratio", "required", "verdict"]]
+    rows += [recursive(), kalman(), *fits(), *calls()]
+    print_table(rows)
+
+
+def least(work, rounds):
+    """The least time of some rounds, in seconds, and the last result."""
+    best, result = float("inf"), None
+    for _ in range(rounds):
+        begin = timeit.default_timer()
+        result = work()
+        best = min(best, timeit.default_timer() - begin)
+    return best, result
+
+
+def by_turns(ours, theirs, rounds, seldom=1):
+    """The least times of both, theirs in every so many rounds, and the results."""
+    mine, yours = [], []
+    for turn in range(rounds):
+        mine.append(least(ours, 1))
+        if turn % seldom == 0:
+            yours.append(least(theirs, 1))
+    return min(time for time, _ in mine), min(time for time, _ in yours), mine[-1][1], yours[-1][1]
+
+
+def row(work, peer, ours, theirs, required):
+    """A row of the table."""
+    ratio = theirs / ours
+    cells = [f"at least {required}", verdict(ratio >= required)] if required else ["", ""]
+    return [work, peer, shown(ours), shown(theirs), f"{ratio:,.0f}", *cells]
+
+
+def shown(seconds):
+    """A time in a unit that suits it."""
+    for unit, size in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)):
+        if seconds >= size:
+            break
+    return f"{seconds / size:,.2f} {unit}"
+
+
+def recursive():
+    """Recursive least squares, a whole array at once."""
+    samples, size = 20_000, 8
+    regressors = numpy.random.standard_normal((samples, size))
+    theta = numpy.arange(1.0, size + 1)
+    outputs = regressors @ theta + 0.1 * numpy.random.standard_normal(samples)
+
+    def ours():
+        return thetahat.RecursiveLeastSquares(size, forgetting=0.99).run(regressors, outputs).parameters[-1]
+
+    def theirs():
+        peer = padasip.filters.FilterRLS(n=size, mu=0.99, w="zeros")
+        peer.run(outputs, regressors)
+        return peer.w
+
+    mine, yours, found, expected = by_turns(ours, theirs, 30, 10)
+    check("padasip", found, expected)
+    return row("recursive least squares, 8 parameters, 20,000 samples", "padasip FilterRLS", mine, yours, 100)
+
+
+def kalman():
+    """A Kalman filter of 4 states and 2 measurements, a whole array at once."""
+    samples, step = 20_000, 0.1
+    move = numpy.eye(4) + step * numpy.eye(4, k=2)
+    noise = 0.01 * numpy.eye(4)
+    look = numpy.eye(2, 4)
+    error = 0.5 * numpy.eye(2)
+    measured = numpy.cumsum(numpy.random.standard_normal((samples, 2)), axis=0)
+    transition = thetahat.LinearTransition(move, noise)
+    observation = thetahat.LinearObservation(look, error)
+
+    def ours():
+        return thetahat.KalmanFilter(numpy.zeros(4), numpy.eye(4)).run(transition, observation, measured).filtered_states[-1]
+
+    def theirs():
+        peer = KalmanFilter(dim_x=4, dim_z=2)
+        peer.F, peer.Q, peer.H, peer.R, peer.P = move, noise, look, error, numpy.eye(4)
+        state = None
+        for measurement in measured:
+            peer.update(measurement)
+            state = peer.x.copy()
+            peer.predict()
+        return numpy.ravel(state)
+
+    mine, yours, found, expected = by_turns(ours, theirs, 30, 10)
+    check("filterpy", found, expected)
+    return row("Kalman filter, 4 x 2, 20,000 samples", "filterpy", mine, yours, 150)
+
+
+def simulated(samples):
+    """A plant of second order with white noise in its equation."""
+    u = numpy.random.choice([-1.0, 1.0], samples)
+    noise = 0.1 * numpy.random.standard_normal(samples)
+    return u, lfilter([0, 1, 0.5], [1, -1.5, 0.7], u) + lfilter([1], [1, -1.5, 0.7], noise)
+
+
+def fits():
+    """Batch fits, from arrays to parameters."""
+    u, y = simulated(1_000_000)
+    log = thetahat.Log(y, u)
+
+    def normal():
+        inputs, outputs = u - u.mean(), y - y.mean()
+        columns = [signal[4 - lag : len(y) - lag] for signal in (-outputs, inputs) for lag in range(1, 5)]
+        return numpy.linalg.lstsq(numpy.column_stack(columns), outputs[4:], rcond=None)[0]
+
+    mine, yours, found, expected = by_turns(lambda: thetahat.arx(log, 4, 4).parameters, normal, 12, 3)
+    check("lstsq", found, expected)
+    yield row("ARX(4, 4, 1), N = 1,000,000", "numpy.linalg.lstsq with its matrix", mine, yours, 15)
+    both, again, *_ = by_turns(lambda: thetahat.arx(log, 4, 4).fits, normal, 6, 3)
+    yield row("the same with the figures of the fit", "the same", both, again, None)
+
+    u, y = simulated(100_000)
+    short = thetahat.Log(y, u)
+
+    def sippy():
+        return system_identification(y, u, "ARX", ARX_orders=[4, 4, 1], centering="MeanVal")
+
+    mine, yours, *_ = by_turns(lambda: thetahat.arx(short, 4, 4).parameters, sippy, 12, 6)
+    yield row("ARX(4, 4, 1), N = 100,000", "sippy-unipi", mine, yours, 50)
+
+    u, y = simulated(10_000)
+    small = thetahat.Log(y, u)
+
+    def iterative():
+        return system_identification(y, u, "ARMAX", ARMAX_orders=[2, 2, 2, 1], centering="MeanVal")
+
+    mine, yours, *_ = by_turns(lambda: thetahat.armax(small, 2, 2, 2).parameters, iterative, 12, 6)
+    yield row("ARMAX(2, 2, 2, 1), N = 10,000", "sippy-unipi, iterative least squares", mine, yours, 50)
+
+
+def calls():
+    """What one call costs, and of it NumPy's own part: making and reading an array."""
+    phi = numpy.ones(8)
+    estimator = thetahat.RecursiveLeastSquares(8)
+    single = min(timeit.repeat(lambda: estimator.update(phi, 1.0), number=100_000, repeat=5)) / 100_000
+    nothing = min(timeit.repeat(lambda: phi.sum(), number=100_000, repeat=5)) / 100_000
+    yield ["one update of 8 parameters from Python", "phi.sum() of NumPy", f"{single * 1e6:.2f} us", f"{nothing * 1e6:.2f} us",
+           "", "under 1 us", verdict(single < 1e-6)]  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()

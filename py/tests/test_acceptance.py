@@ -58,3 +58,24 @@ def test_every_reference_case(shared: Path) -> None:
         assert np.allclose(model.parameters, case["theta"], rtol=1e-5, atol=1e-9), case
         assert np.isclose(model.mse, case["mse"], rtol=1e-7), case
     assert len(cases) > 10 and bettered <= 1
+
+
+OTHERS = {
+    "heating_system": (2.0, (2, 2, 0, 0), [-1.5993449, 0.6135762, 0.0321431, 0.2334923], 0.086460568),
+    "exchanger": (1.0, (2, 2, 0, 0), [-1.1297315, 0.1978665, -0.1320934, -0.3534605], 0.18273098),
+    "ball_beam": (0.1, (2, 2, 0, 0), [-1.7156714, 0.7161686, -0.6405759, 0.6680734], 4.4838769e-06),
+    "gas_furnace": (9.0, (0, 3, 2, 1), [-0.5315176, -0.3798226, -0.5173056, -1.5286273, 0.6295391, -0.5491927], 0.056876983),
+}
+
+
+@pytest.mark.filterwarnings("ignore::thetahat.EstimationWarning")
+@pytest.mark.parametrize("name", OTHERS)
+def test_other_logs(shared: Path, name: str) -> None:
+    step, (na, nb, nd, nf), expected, mse = OTHERS[name]
+    log = th.read_csv(shared / "data" / f"{name}.csv", sample_time=step)
+    if nf == 0:
+        model = th.arx(log, na, nb)
+    else:
+        # Box and Jenkins' series J, with C = 1.
+        model = th.bj(log, nb, 0, nd, nf, 3, initial="zero", tolerance=1e-12)
+    assert np.allclose(model.parameters, expected, rtol=1e-5) and np.isclose(model.mse, mse, rtol=1e-7)

@@ -8,6 +8,8 @@ import multiprocessing
 import pickle
 import subprocess
 import sys
+import threading
+import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, Callable
@@ -191,6 +193,24 @@ def test_fits_at_once_give_the_same_bytes(log: th.Log) -> None:
     with ThreadPoolExecutor(6) as threads:
         together = list(threads.map(lambda index: fits[index % 3]().to_json(), range(18)))
     assert together == alone * 6
+
+
+def test_others_run_while_a_fit_does(log: th.Log) -> None:
+    counted, ended = 0, threading.Event()
+
+    def fit() -> None:
+        for _ in range(5):
+            th.oe(log, 6, 6)
+        ended.set()
+
+    thread = threading.Thread(target=fit)
+    thread.start()
+    while not ended.is_set():
+        counted += 1
+        time.sleep(0)
+    thread.join()
+    # With the interpreter lock held there would be a turn between two fits at most.
+    assert counted > 1000
 
 
 def test_threads_may_ask_one_model_at_once(log: th.Log) -> None:

@@ -1,5 +1,5 @@
-//! The command line of thetahat as a library: [`run`] is the whole program. A binding to another language has its stages,
-//! with the same options, and its tables.
+//! The command line of thetahat as a library: [`run`] is the whole program. A binding to another language calls the stages
+//! of the program with the same options, and gets the same tables.
 //!
 //! `args` is syntax only; `job` resolves it, with every check that needs no data; `log` reads a log; `commands` has one
 //! file a verb. Only this crate opens files, prints, or knows about terminals.

@@ -1,7 +1,5 @@
 //! The one map of errors: what the libraries say, as Python raises it.
 
-use std::fmt::Write;
-
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyKeyboardInterrupt, PyOSError, PyValueError};
 use pyo3::prelude::*;
@@ -70,7 +68,7 @@ fn undetermined(py: Python<'_>, message: String, parameters: Vec<String>) -> PyE
 
 /// A message that names options of the command line, with the keyword arguments that they are here: `--sample-time 0` is
 /// `sample_time 0`.
-fn in_python(message: &str) -> String {
+pub(crate) fn in_python(message: &str) -> String {
     let mut text = String::with_capacity(message.len());
     let mut rest = message;
     while let Some(start) = rest.find("--") {
@@ -81,7 +79,11 @@ fn in_python(message: &str) -> String {
         if length == 0 || !(before.is_empty() || before.ends_with([' ', '(', '\'', '"', '\n'])) {
             text.push_str("--");
         }
-        let _ = write!(text, "{}", option[..length].replace('-', "_"));
+        match &option[..length] {
+            "input" => text.push_str("inputs"),
+            "no-header" => text.push_str("header=False"),
+            other => text.push_str(&other.replace('-', "_")),
+        }
         rest = &option[length..];
     }
     text + rest

@@ -57,12 +57,6 @@ impl Validation {
         let validation = &self.found.validation;
         self.requirements.iter().filter_map(|requirement| requirement.unmet(validation, self.alpha)).collect()
     }
-
-    /// The page that `thetahat validate --html` writes.
-    fn page(&self, py: Python<'_>, model: &Bound<'_, Model>, command: &str) -> PyResult<String> {
-        let report = model.get().report(py)?;
-        thetahat::validation_page(report, &self.found, command).map_err(|error| error::batch(py, error))
-    }
 }
 
 /// Several models side by side on a log: the document that `thetahat compare` writes, and its table.

@@ -78,6 +78,7 @@ impl Log {
         let opened =
             py.detach(|| thetahat_cli::read(&options)).map_err(|failure| error::program(py, &failure))?;
         let thetahat_cli::Opened { log, sources, inputs, output, warnings } = opened;
+        let warnings = warnings.iter().map(|warning| error::in_python(warning)).collect();
         Ok((Self { log: Arc::new(log), sources, inputs, output }, warnings))
     }
 
@@ -139,16 +140,10 @@ impl Log {
         self.log.time().map(|time| PyArray1::from_slice(py, time))
     }
 
-    /// The names of all channels.
+    /// The rows (from 0) before which no segment reaches back.
     #[getter]
-    fn names(&self) -> Vec<String> {
-        self.log.channels().iter().map(|channel| channel.name.clone()).collect()
-    }
-
-    /// The file names of the logs it was made of.
-    #[getter]
-    fn files(&self) -> Vec<String> {
-        self.sources.iter().map(|source| source.file.clone()).collect()
+    fn breaks(&self) -> Vec<usize> {
+        self.log.breaks().to_vec()
     }
 
     /// A channel.

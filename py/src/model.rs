@@ -7,7 +7,7 @@ use numpy::{PyArray1, PyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use thetahat::{
-    Channel, Horizon, Quantity, Report, Start, StateSpace, Unjudged, apply, frequency_response,
+    Channel, Horizon, Procedure, Quantity, Report, Start, StateSpace, Unjudged, apply, frequency_response,
     logarithmic_frequencies, step_response,
 };
 
@@ -83,20 +83,18 @@ impl Model {
         Ok(thetahat_cli::table(self.report(py)?))
     }
 
-    /// Whether it was chosen among others.
-    fn is_choice(&self, py: Python<'_>) -> PyResult<bool> {
+    /// What to warn of after a fit. Of least squares alone the figures wait: nothing to warn of hangs on them but how close it is.
+    fn warnings(&self, py: Python<'_>) -> PyResult<Vec<String>> {
         let known = self.unjudged.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        Ok(match known {
-            Some((unjudged, _)) => unjudged.report().selection.is_some(),
-            None => self.report(py)?.selection.is_some(),
-        })
-    }
-
-    /// What a careful reader should know, as far as it is known.
-    fn warnings(&self) -> Vec<String> {
-        let known = self.unjudged.lock().unwrap_or_else(PoisonError::into_inner);
-        let unjudged = known.as_ref().map(|(unjudged, _)| unjudged.report());
-        unjudged.or(self.report.get()).map_or_else(Vec::new, |report| report.warnings.clone())
+        let waits = |report: &Report| {
+            report.selection.is_none()
+                && !matches!(report.estimation.procedure, Procedure::PredictionError(_))
+        };
+        let report = match &known {
+            Some((unjudged, _)) if waits(unjudged.report()) => unjudged.report(),
+            _ => self.report(py)?,
+        };
+        Ok(report.warnings.iter().map(|warning| error::in_python(warning)).collect())
     }
 
     /// The page that `thetahat fit --html` writes, with a look at a log if there is one.

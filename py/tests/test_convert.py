@@ -161,7 +161,7 @@ def test_a_time_series_has_no_transfer_function() -> None:
 def test_a_package_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in "scipy.signal", "control":
         monkeypatch.setitem(sys.modules, name, None)
-    with pytest.raises(ImportError, match=r"scipy\.signal.*pip install thetahat\[control\]"):
+    with pytest.raises(ImportError, match=r"scipy\.signal.*pip install thetahat\[scipy\]"):
         _convert.to_scipy([[1.0]], [[1.0]], 1.0)
     with pytest.raises(ImportError, match=r"control.*pip install thetahat\[control\]"):
         _convert.to_control([[1.0]], [[1.0]], 1.0, ["u"], "y")

@@ -89,8 +89,8 @@ def test_options_reach_the_engine(log: th.Log) -> None:
     values = dict(zip(bounded.parameter_names, bounded.parameters))
     assert abs(values["a1"] + 1.2) < 1e-6 and abs(values["b1_1"] - 0.9) < 1e-6
     assert abs(th.arx(log, 2, 2, dc_gain={"u1": 5}).dc_gain(0)[0] - 5) < 1e-6
-    for norm in (1, "1", "inf", 2):
-        assert th.arx(log, 2, 2, norm=norm).stable
+    for norm, said in ((1, "1"), ("1", "1"), ("inf", "inf"), (2, None), (2.0, None)):
+        assert th.arx(log, 2, 2, norm=norm).document["estimation"].get("norm") == said
     search = th.oe(log, 2, 2, search="gauss-newton", max_iterations=50, starts=2, seed=7, tolerance=1e-10)
     assert search.document["estimation"]["algorithm"] == "gauss-newton"
     assert th.oe(log, 2, 2, initial="zero").document["estimation"]["initial"] == "zero"
@@ -119,7 +119,7 @@ BAD: list[tuple[Callable[[th.Log], Any], type[Exception], str]] = [
     (lambda log: th.arx(log, 10**9, 2), ValueError, "na: 1000000000 is above 1000"),
     (lambda log: th.arx(log, 10**30, 2), ValueError, "na"),
     (lambda log: th.arx(log[:50], 30, 2), th.EstimationError, "too few rows"),
-    (lambda log: th.arx(log, 0, 0), ValueError, "."),
+    (lambda log: th.arx(log, 0, 0), ValueError, "orders"),
     (lambda log: th.arx(log, 2, 2, estimate="5..2"), ValueError, "estimate"),
     (lambda log: th.arx(log, 2, 2, estimate=slice(0, 9999)), ValueError, "estimate"),
     (lambda log: th.arx(log, 2, 2, estimate=slice(-5, None)), ValueError, "estimate"),
@@ -132,7 +132,7 @@ BAD: list[tuple[Callable[[th.Log], Any], type[Exception], str]] = [
     (lambda log: th.arx(log, 2, 2, ridge=np.nan), ValueError, "ridge: nan is not a finite"),
     (lambda log: th.arx(log, 2, 2, bound={"z9": 1.0}), ValueError, "z9"),
     (lambda log: th.arx(log, 2, 2, bound=[1]), TypeError, "bound: expected a dict"),  # type: ignore[arg-type]
-    (lambda log: th.arx(log, 2, 2, offset={"w": 1.0}), ValueError, "w"),
+    (lambda log: th.arx(log, 2, 2, offset={"w": 1.0}), ValueError, "offset: 'w' is neither"),
     (lambda log: th.arx(log, 2, 2, oofset={}), TypeError, "oofset: there is no such option"),  # type: ignore[call-arg]
     (lambda log: th.oe(log, 2, 2, search="magic"), ValueError, "search"),
     (lambda log: th.oe(log, 2, 2, max_iterations=0), ValueError, "max_iterations"),
@@ -145,6 +145,12 @@ BAD: list[tuple[Callable[[th.Log], Any], type[Exception], str]] = [
     (lambda log: th.search(log, select="luck"), ValueError, "select"),
     (lambda log: th.arx("log.csv", 2, 2), TypeError, "log: expected a Log, found str"),  # type: ignore[arg-type]
     (lambda log: th.arx(th.Log(log.y), 2, 2), ValueError, "nb: the log has no inputs"),
+    (lambda log: th.arx(log, 2, 2, split=5), TypeError, "split: expected three numbers"),  # type: ignore[arg-type]
+    (lambda log: th.search(log, select=""), ValueError, "select"),
+    (lambda log: th.compare(["a"], log), TypeError, "models: expected a Model"),  # type: ignore[list-item]
+    (lambda log: th.Log.join(["a"]), TypeError, "logs: expected a Log"),  # type: ignore[list-item]
+    (lambda log: th.inspect(5), TypeError, "path: expected a str or a path"),  # type: ignore[arg-type]
+    (lambda log: th.inspect("none.csv"), FileNotFoundError, "none.csv"),
     (lambda log: th.Model(), TypeError, "models are made by fits"),
     (lambda log: th.Model.from_json("{}"), ValueError, "not a thetahat report"),
     (lambda log: th.Model.from_json(th.ar(log, 1).to_json()[:-40]), ValueError, "line"),
@@ -181,6 +187,16 @@ def test_a_careful_reader_is_warned(log: th.Log) -> None:
         model = th.arx(th.Log(y, log.u), 2, 2)
     assert any("misses" in warning for warning in model.warnings)
     assert model.document["data"]["segments"] == [[1, 100], [102, 2000]]
+
+
+def test_an_unstable_plant_is_warned_of() -> None:
+    random = np.random.default_rng(3)
+    u = random.standard_normal(300)
+    y = np.zeros(300)
+    for t in range(1, 300):
+        y[t] = 1.02 * y[t - 1] + u[t - 1] + random.standard_normal()
+    with pytest.warns(th.EstimationWarning, match="unstable"):
+        th.oe(th.Log(y, u), 1, 1, detrend="none")
 
 
 def test_fits_at_once_give_the_same_bytes(log: th.Log) -> None:

@@ -105,6 +105,9 @@ def test_slices_are_logs() -> None:
     for rows in (slice(3, 3), slice(9, 12), slice(None, None, 2)):
         with pytest.raises(ValueError, match="rows"):
             log[rows]
+    assert "u" in log and "v" not in log and np.array_equal(log["y"], Y)
+    with pytest.raises(KeyError, match="there is no channel 'v'"):
+        log["v"]
     with pytest.raises(TypeError, match="slice"):
         log[0]  # type: ignore[call-overload]
 
@@ -112,6 +115,7 @@ def test_slices_are_logs() -> None:
 def test_logs_join() -> None:
     log = th.Log.join([th.Log(Y, U), th.Log(2 * Y, U)])
     assert len(log) == 10 and np.array_equal(log[5:].y, 2 * Y)
+    assert log != th.Log(log.y, log.u)
     with pytest.raises(ValueError, match="sample time"):
         th.Log.join([th.Log(Y, U), th.Log(Y, U, sample_time=2.0)])
     with pytest.raises(ValueError, match="no channel 'u'"):
@@ -181,8 +185,15 @@ def test_files_are_read_as_on_the_command_line(tmp_path: Path) -> None:
 def test_what_looks_like_a_clock_is_a_word_of_warning(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text("t,u,y\n0,1,0\n1,0,1\n")
-    with pytest.warns(UserWarning, match="looks like a clock"):
+    with pytest.warns(UserWarning, match="looks like a clock; time=t would use it"):
         th.read_csv(path)
+    path.write_text("0,1,2\n1,0,1\n2,0,3\n")
+    with pytest.warns(UserWarning, match="read it with header=False"):
+        th.read_csv(path, inputs="1", output="2")
+    with pytest.raises(ValueError, match="name the inputs with inputs"):
+        th.read_csv(path, output="0")
+    with pytest.raises(ValueError, match="holds a comma"):
+        th.read_csv(path, inputs="a,b")
 
 
 def test_a_log_shows_itself() -> None:

@@ -15,10 +15,9 @@ import thetahat as th
 
 
 def test_residuals_are_those_of_the_fit(motor: th.Log) -> None:
-    for model in (th.arx(motor, 2, 2), th.armax(motor, 2, 2, 1), th.ar(motor, 3)):
-        residuals = model.residuals(motor)
-        counted = residuals[~np.isnan(residuals)]
-        assert abs(np.mean(counted[-900:] ** 2) / model.mse - 1) < 0.2
+    armax = th.armax(motor, 2, 2, 1)
+    # The fit begins with zero innovations, the prediction with those that fit best.
+    assert abs(np.nanmean(armax.residuals(motor) ** 2) / armax.mse - 1) < 0.02
     model = th.arx(motor, 2, 2)
     residuals = model.residuals(motor)
     assert np.isnan(residuals[:2]).all() and np.isclose(np.mean(residuals[2:] ** 2), model.mse, rtol=1e-10)
@@ -26,7 +25,7 @@ def test_residuals_are_those_of_the_fit(motor: th.Log) -> None:
 
 def test_predictions_meet_the_free_run(motor: th.Log) -> None:
     model = th.arx(motor, 2, 2)
-    assert np.array_equal(model.predict(motor, None, "zero"), model.simulate(motor))
+    assert np.array_equal(model.predict(motor, None, initial="zero"), model.simulate(motor))
     assert np.array_equal(model.simulate(motor.u), model.simulate(motor))
     assert np.allclose(model.simulate(motor.u[:, 0])[:700], model.simulate(motor[:700].u), atol=1e-12)
     lower, upper = model.predict_interval(motor, 5)
@@ -90,7 +89,7 @@ def test_the_innovations_form_predicts_the_same(motor: th.Log) -> None:
     for t in range(len(motor)):
         predicted[t] = (form.H @ x + form.D[:, 0] * u[t])[0]
         x = form.F @ x + form.G[:, 0] * u[t] + form.K[:, 0] * (y[t] - predicted[t])
-    assert np.allclose(predicted + model.offsets["y"][0], model.predict(motor, 1, "zero"), atol=1e-9)
+    assert np.allclose(predicted + model.offsets["y"][0], model.predict(motor, 1, initial="zero"), atol=1e-9)
     assert form.noise_variance == model.noise_variance
 
 
@@ -137,7 +136,7 @@ def test_models_stand_side_by_side(motor: th.Log) -> None:
 def test_a_log_is_inspected(motor: th.Log) -> None:
     inspection = th.inspect(motor)
     assert inspection.delays == {"u": 1} and inspection.document["rows"] == 1000
-    assert "DC" in inspection.summary() or "delay" in inspection.summary()
+    assert inspection.excitation["u"] > 10
     with pytest.raises(TypeError, match="for files"):
         th.inspect(motor, time="t")
 
@@ -145,10 +144,10 @@ def test_a_log_is_inspected(motor: th.Log) -> None:
 def test_pages_are_written_whole(motor: th.Log, tmp_path: Path) -> None:
     path = tmp_path / "page.html"
     model = th.arx(motor, 2, 2)
-    model.to_html(path, motor)
+    model.write_html(path, motor)
     assert path.read_text(encoding="utf-8").rstrip().endswith("</html>")
     with pytest.raises(FileNotFoundError):
-        model.to_html(tmp_path / "none" / "page.html")
+        model.write_html(tmp_path / "none" / "page.html")
     assert [each.name for each in tmp_path.iterdir()] == ["page.html"]
     path.write_text(model.to_json(), encoding="utf-8")
     assert th.Model.read(path) == model
@@ -160,13 +159,13 @@ def test_what_a_model_cannot_answer_is_refused(motor: th.Log) -> None:
     cases = [
         (lambda: model.predict(other), "no channel 'u'"),
         (lambda: model.predict(th.Log(motor.y, motor.u, sample_time=0.02)), "sample time"),
-        (lambda: model.predict(motor, 0), "horizon: 0 is below 1"),
-        (lambda: model.predict(motor, 10**30), "horizon|int"),
-        (lambda: model.predict(motor, 1, "cold"), "initial: 'cold'"),
+        (lambda: model.predict(motor, 0), "horizon: 0 is outside"),
+        (lambda: model.predict(motor, 10**30), "horizon"),
+        (lambda: model.predict(motor, 1, initial="cold"), "initial: 'cold'"),
         (lambda: model.simulate([]), "u: "),
         (lambda: model.simulate(np.ones((5, 3))), r"u: expected shape \(any, 1\)"),
         (lambda: model.simulate([1.0, np.nan]), "u: input 'u' holds NaN"),
-        (lambda: model.simulate(motor.u, "estimated"), "initial"),
+        (lambda: model.simulate(motor.u, initial="estimated"), "initial"),
         (lambda: series.simulate([1.0]), "no inputs"),
         (lambda: model.forecast(motor, 3), "u: the model has inputs"),
         (lambda: model.forecast(motor, 3, [1.0]), "u: expected 3 entries"),
@@ -176,7 +175,7 @@ def test_what_a_model_cannot_answer_is_refused(motor: th.Log) -> None:
         (lambda: model.frequency_response([-1.0]), "frequenc"),
         (lambda: model.frequency_response([1e6]), "frequenc"),
         (lambda: model.frequency_response([]), "w: expected at least one"),
-        (lambda: model.frequency_response(points=1), "points"),
+        (lambda: model.frequency_response(points=0), "points"),
         (lambda: model.step_response(1), "input"),
         (lambda: model.step_response(samples=0), "samples"),
         (lambda: model.zeros(5), "input: there is no input 5"),
@@ -184,5 +183,5 @@ def test_what_a_model_cannot_answer_is_refused(motor: th.Log) -> None:
         (lambda: series.to_control(), "no inputs"),
     ]
     for call, words in cases:
-        with pytest.raises((ValueError, OverflowError), match=words):
+        with pytest.raises(ValueError, match=words):
             call()  # type: ignore[no-untyped-call]

@@ -18,7 +18,7 @@ from thetahat._fit import EstimationWarning, ar, arma, armax, arx, bj, iv, oe, p
 from thetahat._judgement import Comparison, Inspection, Validation, compare, inspect
 from thetahat._log import Log, dc_motor, read_csv
 from thetahat._model import Model
-from thetahat._options import FitOptions, LookOptions, ReadOptions, SearchOptions
+from thetahat._options import FitOptions, ReadOptions, ValidationOptions
 from thetahat._responses import Forecast, FrequencyResponse, StateSpace, StepResponse
 from thetahat._thetahat import (
     EstimationError,
@@ -58,7 +58,6 @@ __all__ = [
     "LinearObservation",
     "LinearTransition",
     "Log",
-    "LookOptions",
     "LuenbergerObserver",
     "Model",
     "NonlinearObservation",
@@ -69,12 +68,12 @@ __all__ = [
     "RecursiveArx",
     "RecursiveLeastSquares",
     "RecursiveTrajectory",
-    "SearchOptions",
     "SmoothedTrajectory",
     "StateSpace",
     "SteadyState",
     "StepResponse",
     "Validation",
+    "ValidationOptions",
     "__version__",
     "ar",
     "arma",

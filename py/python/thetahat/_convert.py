@@ -51,7 +51,7 @@ def to_scipy(numerators: Sequence[ArrayLike], denominators: Sequence[ArrayLike],
         If SciPy is not installed.
     """
     quotients = _quotients(numerators, denominators)
-    signal = _imported("scipy.signal")
+    signal = _imported("scipy.signal", "scipy")
     systems = []
     for numerator, denominator in quotients:
         with warnings.catch_warnings():
@@ -99,7 +99,7 @@ def to_control(
         If python-control is not installed.
     """
     quotients = _quotients(numerators, denominators)
-    control = _imported("control")
+    control = _imported("control", "control")
     return control.TransferFunction(
         [[numerator for numerator, _ in quotients]],
         [[denominator for _, denominator in quotients]],
@@ -132,7 +132,7 @@ def state_space_to_scipy(F: ArrayLike, G: ArrayLike, H: ArrayLike, D: ArrayLike,
         If SciPy is not installed.
     """
     matrices = _matrices(F, G, H, D)
-    return _imported("scipy.signal").StateSpace(*matrices, dt=sample_time)
+    return _imported("scipy.signal", "scipy").StateSpace(*matrices, dt=sample_time)
 
 
 def state_space_to_control(
@@ -170,7 +170,7 @@ def state_space_to_control(
         If python-control is not installed.
     """
     matrices = _matrices(F, G, H, D)
-    return _imported("control").StateSpace(
+    return _imported("control", "control").StateSpace(
         *matrices,
         sample_time,
         inputs=list(input_names),
@@ -213,15 +213,12 @@ def _matrices(F: ArrayLike, G: ArrayLike, H: ArrayLike, D: ArrayLike) -> tuple[N
     return matrices
 
 
-_NO_INPUTS = (
-    "the model has no inputs, so there is no transfer function from one; "
-    "for its noise use state_space, which has the innovation's gain K"
-)
+_NO_INPUTS = "the model has no inputs, so there is no response to one; its noise is in to_state_space(), as the gain K"
 
 
-def _imported(name: str) -> Any:
+def _imported(name: str, extra: str) -> Any:
     try:
         return import_module(name)
     except ImportError as error:
-        message = f"this needs {name}, which cannot be imported ({error}): pip install thetahat[control]"
+        message = f"this needs {name}, which cannot be imported ({error}): pip install thetahat[{extra}]"
         raise ImportError(message) from error

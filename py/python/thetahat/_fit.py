@@ -7,7 +7,7 @@ import warnings
 from typing import Any
 
 from thetahat import _options, _thetahat
-from thetahat._log import Log
+from thetahat._log import Log, handle
 from thetahat._model import Model
 from thetahat._options import FitOptions, Orders
 
@@ -18,7 +18,7 @@ else:
 
 
 class EstimationWarning(UserWarning):
-    """What a careful reader of a model should know."""
+    """What to know of a model before relying on it, such as missing samples or a search that did not converge."""
 
 
 def arx(log: Log, na: int, nb: Orders, nk: Orders = 1, **options: Unpack[FitOptions]) -> Model:
@@ -44,9 +44,9 @@ def arx(log: Log, na: int, nb: Orders, nk: Orders = 1, **options: Unpack[FitOpti
     Raises
     ------
     EstimationError
-        If the data cannot determine the parameters, which are named.
+        If the data cannot determine the parameters, which are named, or the log has too few rows for them.
     ValueError
-        If an argument does not make sense, or the log has too few rows.
+        If an argument does not make sense, or no row to fit to has a value in every channel.
 
     Warns
     -----
@@ -392,17 +392,15 @@ def search(
     18
     """
     orders = {"na": na, "nb": nb, "nc": nc, "nd": nd, "nf": nf, "nk": nk}
-    more = [f"--{name}={_options.text(name, value)}" for name, value in (("select", select), ("path", path)) if value]
+    more = [f"--{name}={_options.text(name, value)}" for name, value in (("select", select), ("path", path)) if value is not None]
     return _fit(log, model, orders, options, *more)
 
 
 def _fit(log: Log, model: str | None, orders: dict[str, Any], options: Any, *more: str) -> Model:
-    if not isinstance(log, Log):
-        raise TypeError(f"log: expected a Log, found {type(log).__name__}; make one with thetahat.Log(y, u)")
+    data = handle("log", log)
     words = [] if model is None else [f"--model={_options.text('model', model)}"]
     words += [*_options.order_words(**orders), *_options.words(FitOptions, options), *more]
-    fitted = Model._of(_thetahat.fit(log._log, words))
-    # A choice among models is judged at once; of one fit the figures wait until somebody asks.
-    for warning in fitted.warnings if fitted._model.is_choice() else fitted._model.warnings():
+    fitted = Model._of(_thetahat.fit(data, words))
+    for warning in fitted._model.warnings():
         warnings.warn(warning, EstimationWarning, stacklevel=3)
     return fitted

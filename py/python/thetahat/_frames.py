@@ -14,6 +14,8 @@ import numpy as np
 from narwhals.exceptions import DuplicateError
 from numpy.typing import NDArray
 
+from thetahat._log import instants
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -83,17 +85,10 @@ def times(frame: Any, name: str) -> tuple[NDArray[np.float64], str | None]:
         # Midnight. The dates of pandas with pyarrow would come as objects.
         column = column.cast(nw.Datetime("us"))
     # With a time zone these are in UTC.
-    instants = column.to_numpy()
-    first = instants[0]
-    if np.isnat(first):
-        message = f"column {name!r}: the first row has no time; drop the rows in front of the first time"
-        raise ValueError(message)
-    text = str(np.datetime_as_string(first))
-    if "." in text:
-        text = text.rstrip("0").rstrip(".")
+    seconds, text = instants(f"column {name!r}", column.to_numpy())
     if getattr(column.dtype, "time_zone", None) is not None:
         text += "Z"
-    return _contiguous((instants - first) / second), text
+    return seconds, text
 
 
 def _table(frame: Any) -> nw.DataFrame[Any]:

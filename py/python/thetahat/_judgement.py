@@ -11,8 +11,8 @@ from html import escape
 from typing import TYPE_CHECKING, Any
 
 from thetahat import _options, _thetahat
-from thetahat._log import Log
-from thetahat._options import LookOptions, ReadOptions
+from thetahat._log import Log, handle
+from thetahat._options import ValidationOptions, ReadOptions
 
 if sys.version_info >= (3, 11):
     from typing import Unpack
@@ -168,7 +168,7 @@ class Inspection(_Document):
         return f"Inspection({self.document['rows']} rows, {count} warning{'' if count == 1 else 's'})"
 
 
-def compare(models: Mapping[str, Model] | Sequence[Model], log: Log, **options: Unpack[LookOptions]) -> Comparison:
+def compare(models: Mapping[str, Model] | Sequence[Model], log: Log, **options: Unpack[ValidationOptions]) -> Comparison:
     """Put several fitted models side by side on a log.
 
     Parameters
@@ -178,7 +178,7 @@ def compare(models: Mapping[str, Model] | Sequence[Model], log: Log, **options: 
     log : Log
         The data.
     **options
-        What to look at, see `thetahat.LookOptions`.
+        What to validate on and how, see `thetahat.ValidationOptions`.
 
     Returns
     -------
@@ -195,8 +195,13 @@ def compare(models: Mapping[str, Model] | Sequence[Model], log: Log, **options: 
     named = dict(models) if isinstance(models, Mapping) else {f"model {k}": m for k, m in enumerate(models, 1)}
     if not named:
         raise ValueError("models: there is none; give at least one")
+    from thetahat._model import Model
+
+    for model in named.values():
+        if not isinstance(model, Model):
+            raise TypeError(f"models: expected a Model, found {type(model).__name__}")
     handles = [(_options.text("models", name), model._model) for name, model in named.items()]
-    return Comparison(*_thetahat.compare(handles, log._log, _options.words(LookOptions, options)))
+    return Comparison(*_thetahat.compare(handles, handle("log", log), _options.words(ValidationOptions, options)))
 
 
 def inspect(
@@ -230,7 +235,5 @@ def inspect(
         if words or inputs is not None or output is not None:
             raise TypeError("inputs, output and how to read are for files; a Log has its own")
         return Inspection(*_thetahat.inspect(log._log))
-    words += [f"--input={name}" for name in ([inputs] if isinstance(inputs, str) else inputs or ())]
-    if output is not None:
-        words.append(f"--output={_options.text('output', output)}")
+    words += _options.channels(inputs, output)
     return Inspection(*_thetahat.inspect_file([*words, "--", _options.path_text(log)]))

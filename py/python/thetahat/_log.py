@@ -155,7 +155,7 @@ class Log:
         >>> th.Log.join([monday, tuesday])
         Log(5 rows, no inputs, output y, sample time 1.0 s)
         """
-        return cls._of(_thetahat.Log.join([log._log for log in logs]))
+        return cls._of(_thetahat.Log.join([handle("logs", log) for log in logs]))
 
     @classmethod
     def _of(cls, log: _thetahat.Log) -> Log:
@@ -201,6 +201,11 @@ class Log:
     def __len__(self) -> int:
         return self._log.rows
 
+    def __contains__(self, name: object) -> bool:
+        return name == self.output or name in self.inputs
+
+    __iter__ = None
+
     @overload
     def __getitem__(self, rows: slice) -> Log: ...
 
@@ -209,6 +214,8 @@ class Log:
 
     def __getitem__(self, rows: slice | str) -> Log | npt.NDArray[np.float64]:
         if isinstance(rows, str):
+            if rows not in self:
+                raise KeyError(f"there is no channel '{rows}'; there are: {', '.join([*self.inputs, self.output])}")
             return self._log.values(rows)
         if not isinstance(rows, slice):
             raise TypeError(f"a log is cut by a slice such as log[:500], found {rows!r}")
@@ -222,9 +229,15 @@ class Log:
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Log):
             return NotImplemented
-        same = (self.inputs, self.output, self.sample_time) == (other.inputs, other.output, other.sample_time)
+        mine, yours = self._log, other._log
+        same = (mine.inputs, mine.output, mine.sample_time, mine.breaks) == (
+            yours.inputs,
+            yours.output,
+            yours.sample_time,
+            yours.breaks,
+        )
         arrays = ((self.y, other.y), (self.u, other.u), (self.time, other.time))
-        return same and all(np.array_equal(mine, yours, equal_nan=True) for mine, yours in arrays)
+        return same and all(np.array_equal(one, another, equal_nan=True) for one, another in arrays)
 
     __hash__ = None  # type: ignore[assignment]
 
@@ -245,6 +258,13 @@ class Log:
     def _repr_html_(self) -> str:
         names = [self.output, *self.inputs]
         return _picture.rows(repr(self), [(name, [self._log.values(name)]) for name in names])
+
+
+def handle(argument: str, log: Log) -> _thetahat.Log:
+    """The compiled log behind an argument."""
+    if not isinstance(log, Log):
+        raise TypeError(f"{argument}: expected a Log, found {type(log).__name__}; make one with thetahat.Log(y, u)")
+    return log._log
 
 
 def read_csv(
@@ -296,16 +316,10 @@ def read_csv(
     Log(3 rows, inputs u, output y, sample time 0.5 s)
     """
     paths = [path] if isinstance(path, (str, os.PathLike)) else list(path)
-    words = [f"--input={name}" for name in ([inputs] if isinstance(inputs, str) else inputs or ())]
-    if inputs is not None and not words:
-        words.append("--nb=0")
-        words.append("--na=1")
-    if output is not None:
-        words.append(f"--output={_options.text('output', output)}")
-    words += _options.words(ReadOptions, options)
-    for each in paths:
-        # Python has an error of its own for a file that is not there.
-        os.stat(each)
+    words = [*_options.channels(inputs, output), *_options.words(ReadOptions, options)]
+    if inputs is not None and not isinstance(inputs, str) and not inputs:
+        # The command line reads no inputs for a model without them.
+        words += ["--na=1", "--nb=0"]
     log, notes = _thetahat.Log.read([*words, "--", *map(_options.path_text, paths)])
     for note in notes:
         warnings.warn(note, stacklevel=2)
@@ -362,6 +376,8 @@ def _made(
         raise ValueError("sample_time: the log has a clock; give one of time and sample_time")
     if resample is not None and time is None:
         raise ValueError("resample: it is for logs with a clock; give time too")
+    if resample is not None:
+        resample = _options.resampling("resample", resample)
     step = 1.0 if sample_time is None else float(_options.number("sample_time", sample_time))
     clock = None if time is None else (time, resample, start)
     return _thetahat.Log(channels, inputs, output, step, clock)
@@ -374,6 +390,15 @@ def _seconds(time: npt.ArrayLike) -> tuple[Any, str | None]:
         return array / np.timedelta64(1, "s"), None
     if array.dtype.kind != "M" or array.size == 0:
         return time, None
-    if np.isnat(array).any():
-        raise ValueError("time: it holds NaT; leave these rows out")
-    return (array - array[0]) / np.timedelta64(1, "s"), str(array[0])
+    return instants("time", array)
+
+
+def instants(argument: str, times: npt.NDArray[np.datetime64]) -> tuple[npt.NDArray[np.float64], str]:
+    """Seconds since the first row, NaN for NaT, and the first instant as ISO 8601 writes it."""
+    first = times[0]
+    if np.isnat(first):
+        raise ValueError(f"{argument}: the first row has no time; drop the rows in front of the first time")
+    text = str(np.datetime_as_string(first))
+    if "." in text:
+        text = text.rstrip("0").rstrip(".")
+    return np.ascontiguousarray((times - first) / np.timedelta64(1, "s"), dtype=np.float64), text

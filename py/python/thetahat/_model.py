@@ -15,8 +15,8 @@ import numpy.typing as npt
 
 from thetahat import _files, _options, _picture, _thetahat
 from thetahat._judgement import Validation
-from thetahat._log import Log
-from thetahat._options import LookOptions
+from thetahat._log import Log, handle
+from thetahat._options import ValidationOptions
 from thetahat._responses import Forecast, FrequencyResponse, StateSpace, StepResponse
 
 if sys.version_info >= (3, 11):
@@ -91,7 +91,7 @@ class Model:
         """Write the document to a file, whole or not at all."""
         _files.write(path, self.to_json())
 
-    def to_html(self, path: str | os.PathLike[str], log: Log | None = None) -> None:
+    def write_html(self, path: str | os.PathLike[str], log: Log | None = None) -> None:
         """Write a page with charts, which loads nothing from elsewhere.
 
         Parameters
@@ -101,7 +101,7 @@ class Model:
         log : Log, optional
             Data to look at, such as those of the fit.
         """
-        _files.write(path, self._model.page(None if log is None else log._log, "thetahat.Model.to_html"))
+        _files.write(path, self._model.page(None if log is None else handle("log", log), "thetahat.Model.write_html"))
 
     def summary(self) -> str:
         """The table that ``thetahat fit`` prints.
@@ -129,6 +129,10 @@ class Model:
     @property
     def _own(self) -> dict[str, Any]:
         return self._parts[0]
+
+    @property
+    def _estimation(self) -> dict[str, Any]:
+        return self._parts[1]
 
     @property
     def name(self) -> str:
@@ -179,7 +183,7 @@ class Model:
                [ 0.28,  0.34]])
         """
         if not 0 < level < 1:
-            raise ValueError(f"level: {level} is not between 0 and 1")
+            raise ValueError(f"level: {level} is not between 0 and 1; give one such as 0.95")
         half = NormalDist().inv_cdf((1 + level) / 2) * self.standard_errors
         return np.column_stack([self.parameters - half, self.parameters + half])
 
@@ -281,22 +285,22 @@ class Model:
     @property
     def method(self) -> str:
         """How the model was estimated."""
-        return str(self._parts[1]["method"])
+        return str(self._estimation["method"])
 
     @property
     def samples(self) -> int:
         """N, the samples that count in the fit."""
-        return int(self._parts[1]["samples"])
+        return int(self._estimation["samples"])
 
     @property
     def mse(self) -> float:
         """The mean of e^2 over these samples."""
-        return float(self._parts[1]["mse"])
+        return float(self._estimation["mse"])
 
     @property
     def criteria(self) -> dict[str, float]:
         """FPE, AIC, AICc and MDL; NaN where one is not defined."""
-        estimation = self._parts[1]
+        estimation = self._estimation
         names = ("fpe", "aic", "aicc", "mdl")
         return {name: float("nan" if estimation.get(name) is None else estimation[name]) for name in names}
 
@@ -315,7 +319,7 @@ class Model:
         """What a careful reader should know, in plain words."""
         return list(self.document["warnings"])
 
-    def predict(self, log: Log, horizon: int | None = 1, initial: str | None = None) -> Array:
+    def predict(self, log: Log, horizon: int | None = 1, *, initial: str | None = None) -> Array:
         """The prediction of each row from what was known some steps before, in the units of the log.
 
         Parameters
@@ -332,6 +336,11 @@ class Model:
         ndarray, shape (N,)
             NaN where there is no prediction: in gaps, and before a start.
 
+        Raises
+        ------
+        ValueError
+            If a channel is not in the log, its sample time is not the model's, or an argument is out of its range.
+
         Examples
         --------
         >>> import thetahat as th
@@ -343,23 +352,34 @@ class Model:
         return self._predicted(log, horizon, initial)[0]
 
     def predict_interval(
-        self, log: Log, horizon: int = 1, level: float = 0.95, initial: str | None = None
+        self, log: Log, horizon: int = 1, *, level: float = 0.95, initial: str | None = None
     ) -> tuple[Array, Array]:
-        """The lower and the upper ends of intervals that hold the output with this probability, shape (N,) each."""
+        """Intervals that hold the output, as far as one knows some steps before.
+
+        Parameters
+        ----------
+        log, horizon, initial
+            As for `predict`; there are none in a free run.
+        level : float, default 0.95
+            The probability with which they hold it.
+
+        Returns
+        -------
+        lower, upper : ndarray, shape (N,)
+            NaN where there is no prediction.
+        """
         if not 0 < level < 1:
-            raise ValueError(f"level: {level} is not between 0 and 1")
+            raise ValueError(f"level: {level} is not between 0 and 1; give one such as 0.95")
         values, deviations = self._predicted(log, _options.integer("horizon", horizon), initial)
         half = NormalDist().inv_cdf((1 + level) / 2) * (np.nan if deviations is None else deviations)
         return values - half, values + half
 
     def _predicted(self, log: Log, horizon: int | None, initial: str | None) -> tuple[Array, Array | None]:
         if horizon is not None:
-            horizon = _options.integer("horizon", horizon)
-            if horizon < 1:
-                raise ValueError(f"horizon: {horizon} is below 1; a prediction looks at least one step ahead")
-        return self._model.predict(_log(log)._log, horizon, initial)
+            horizon = _options.count("horizon", horizon, 1_000_000)
+        return self._model.predict(handle("log", log), horizon, initial)
 
-    def simulate(self, u: npt.ArrayLike | Log, initial: str = "zero") -> Array:
+    def simulate(self, u: npt.ArrayLike | Log, *, initial: str = "zero") -> Array:
         """The free run on inputs, in the units of the log.
 
         Parameters
@@ -389,7 +409,7 @@ class Model:
         return self._model.simulate(u)
 
     def forecast(
-        self, log: Log, steps: int, u: npt.ArrayLike | None = None, initial: str | None = None
+        self, log: Log, steps: int, u: npt.ArrayLike | None = None, *, initial: str | None = None
     ) -> Forecast:
         """What comes after the end of a log.
 
@@ -408,6 +428,11 @@ class Model:
         -------
         Forecast
 
+        Raises
+        ------
+        ValueError
+            If a channel is not in the log, its sample time is not the model's, or an argument is out of its range.
+
         Examples
         --------
         >>> import thetahat as th
@@ -416,20 +441,37 @@ class Model:
         >>> model.forecast(log[:900], 3, log.u[900:903]).values.shape
         (3,)
         """
-        steps = _options.integer("steps", steps)
-        if steps < 1:
-            raise ValueError(f"steps: {steps} is below 1")
-        values, deviations = self._model.forecast(_log(log)._log, steps, u, initial)
+        steps = _options.count("steps", steps, 1_000_000)
+        values, deviations = self._model.forecast(handle("log", log), steps, u, initial)
         time = log.time[-1] + self.sample_time * np.arange(1, steps + 1)
         return Forecast(time, values, deviations)
 
-    def residuals(self, log: Log, horizon: int = 1, initial: str | None = None) -> Array:
-        """The measured output less its prediction, shape (N,); NaN where there is none."""
-        values = self.predict(log, _options.integer("horizon", horizon), initial)
-        return log._log.values(self.output) - values
+    def residuals(self, log: Log, horizon: int = 1, *, initial: str | None = None) -> Array:
+        """The measured output less its prediction.
+
+        Parameters
+        ----------
+        log, horizon, initial
+            As for `predict`.
+
+        Returns
+        -------
+        ndarray, shape (N,)
+            NaN where there is no prediction, or no measured output.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import thetahat as th
+        >>> model = th.arx(th.dc_motor(), na=2, nb=2)
+        >>> bool(np.isclose(np.nanmean(model.residuals(th.dc_motor()) ** 2), model.mse))
+        True
+        """
+        values = self.predict(log, horizon, initial=initial)
+        return log[self.output] - values
 
     def validate(
-        self, log: Log, require: str | Sequence[str] | None = None, **options: Unpack[LookOptions]
+        self, log: Log, require: str | Sequence[str] | None = None, **options: Unpack[ValidationOptions]
     ) -> Validation:
         """Say how the model does on a log: fits, tests of its residuals, coverage of its intervals.
 
@@ -441,11 +483,16 @@ class Model:
             What the model must be or do: ``white``, ``independent``, ``stable``, ``fit>=80``, ``fit@5>=80``,
             ``coverage>=90``. `Validation.unmet` says what it is not.
         **options
-            What to look at, see `thetahat.LookOptions`.
+            What to validate on and how, see `thetahat.ValidationOptions`.
 
         Returns
         -------
         Validation
+
+        Raises
+        ------
+        ValueError
+            If a channel is not in the log, its sample time is not the model's, or an argument is out of its range.
 
         Examples
         --------
@@ -455,9 +502,9 @@ class Model:
         >>> model.validate(log[700:], require=["white", "independent", "fit>=90"]).unmet
         []
         """
-        words = _options.words(LookOptions, options)
+        words = _options.words(ValidationOptions, options)
         words += [f"--require={one}" for one in ([require] if isinstance(require, str) else require or ())]
-        return Validation._of(_thetahat.validate(self._model, _log(log)._log, words))
+        return Validation._of(_thetahat.validate(self._model, handle("log", log), words))
 
     def frequency_response(self, w: npt.ArrayLike | None = None, *, points: int = 100) -> FrequencyResponse:
         """The response of the output to each input, and to the noise, at some frequencies.
@@ -481,9 +528,7 @@ class Model:
         >>> abs(response.values[0]).round(1)
         array([18.9, 18.9, 13.4])
         """
-        points = _options.integer("points", points)
-        if points < 2:
-            raise ValueError(f"points: {points} is below 2")
+        points = _options.count("points", points)
         return FrequencyResponse(self._model.frequency_response(w, points))
 
     def step_response(self, input: int | str = 0, samples: int | None = None) -> StepResponse:
@@ -509,9 +554,7 @@ class Model:
         """
         index = self._input(input)
         if samples is not None:
-            samples = _options.integer("samples", samples)
-            if not 1 <= samples <= 10_000_000:
-                raise ValueError(f"samples: {samples} is outside 1..10000000")
+            samples = _options.count("samples", samples)
         return StepResponse(*self._model.step_response(index, samples))
 
     def to_state_space(self) -> StateSpace:
@@ -582,12 +625,6 @@ class Model:
         steps = [(f"step of {name}", [self.step_response(index).values]) for index, name in enumerate(self.inputs)]
         table = _picture.rows(repr(self), steps)
         return f"{table}<pre>{escape(self.summary())}</pre>"
-
-
-def _log(log: Log) -> Log:
-    if not isinstance(log, Log):
-        raise TypeError(f"log: expected a Log, found {type(log).__name__}; make one with thetahat.Log(y, u)")
-    return log
 
 
 def _array(values: Sequence[float | None]) -> Array:

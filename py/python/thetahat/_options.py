@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import operator
 import os
-import sys
 from collections.abc import Mapping, Sequence
 from typing import Any, Optional, TypedDict, Union
 
-if sys.version_info >= (3, 11):
-    from typing import SupportsIndex
-else:
-    from typing_extensions import SupportsIndex
+import numpy as np
 
 Order = Union[int, range]
 """An order, or the orders among which to choose: ``range(1, 9)`` is 1 to 8."""
@@ -27,37 +24,7 @@ Bound = Union[float, tuple[Optional[float], Optional[float]]]
 """A value, or the lower and the upper end of a range, either of which may be None."""
 
 
-class SearchOptions(TypedDict, total=False):
-    """How to search where a model is not linear in its parameters.
-
-    Attributes
-    ----------
-    search : {"lm", "gauss-newton", "newton", "gradient"}
-        How steps are chosen: Levenberg and Marquardt's way, unless said otherwise.
-    max_iterations : int
-        Iterations at most, from each start: 100.
-    tolerance : float
-        Stop where the next step would lower the cost by less than this fraction: 1e-8.
-    step : float or (float, float)
-        Step length of the gradient search: c1, or c1/(c2 + l) in iteration l.
-    starts : int
-        Search from so many further starts.
-    seed : int
-        Which random starts.
-    time_limit : float
-        Begin no iteration after so many seconds.
-    """
-
-    search: str
-    max_iterations: int
-    tolerance: float
-    step: Union[float, tuple[float, float]]
-    starts: int
-    seed: int
-    time_limit: float
-
-
-class FitOptions(SearchOptions, total=False):
+class FitOptions(TypedDict, total=False):
     """What every fit can be told, beside the orders.
 
     Attributes
@@ -83,8 +50,21 @@ class FitOptions(SearchOptions, total=False):
         Keeps parameters small: weighs like so many more samples in which the output is 0.
     noise_bound : float
         Let no error exceed this, in units of the output.
-    search, max_iterations, tolerance, step, starts, seed, time_limit
-        See `SearchOptions`.
+    search : {"lm", "gauss-newton", "newton", "gradient"}
+        How steps are chosen: Levenberg and Marquardt's way, unless said otherwise. This and what follows is for models that
+        need a search: those with C, D or F.
+    max_iterations : int
+        Iterations at most, from each start: 100.
+    tolerance : float
+        Stop where the next step would lower the cost by less than this fraction: 1e-8.
+    step : float or (float, float)
+        Step length of the gradient search: c1, or c1/(c2 + l) in iteration l.
+    starts : int
+        Search from so many further starts.
+    seed : int
+        Which random starts.
+    time_limit : float
+        Begin no iteration after so many seconds.
     """
 
     estimate: Rows
@@ -98,10 +78,17 @@ class FitOptions(SearchOptions, total=False):
     dc_gain: Union[Bound, Mapping[str, Bound]]
     ridge: float
     noise_bound: float
+    search: str
+    max_iterations: int
+    tolerance: float
+    step: Union[float, tuple[float, float]]
+    starts: int
+    seed: int
+    time_limit: float
 
 
-class LookOptions(TypedDict, total=False):
-    """How to look at a log with a model.
+class ValidationOptions(TypedDict, total=False):
+    """How to validate a model on a log.
 
     Attributes
     ----------
@@ -175,18 +162,21 @@ def words(allowed: type, options: Mapping[str, Any]) -> list[str]:
     ValueError
         For a value that cannot be.
     """
-    there_are = _keys(allowed)
+    there_are = allowed.__annotations__
     found: list[str] = []
     for name, value in options.items():
         if name not in there_are:
             raise TypeError(f"{name}: there is no such option; there are: {', '.join(sorted(there_are))}")
         if value is None:
             continue
-        found += [f"--{name.replace('_', '-')}={text}" for text in _texts(name, value)]
-    # What the command line says the other way round.
-    negations = {"--header=True": [], "--header=False": ["--no-header"], "--decimal-comma=True": ["--decimal-comma"]}
-    negations["--decimal-comma=False"] = []
-    return [word for text in found for word in negations.get(text, [text])]
+        if name == "header":
+            # The command line says it the other way round.
+            found += [] if _flag(name, value) else ["--no-header"]
+        elif name == "decimal_comma":
+            found += ["--decimal-comma"] if _flag(name, value) else []
+        else:
+            found += [f"--{name.replace('_', '-')}={text}" for text in _texts(name, value)]
+    return found
 
 
 def order_words(**orders: Orders | None) -> list[str]:
@@ -195,6 +185,8 @@ def order_words(**orders: Orders | None) -> list[str]:
     for name, value in orders.items():
         if value is None:
             continue
+        if isinstance(value, np.ndarray):
+            value = value.tolist()
         if isinstance(value, (list, tuple)):
             if name not in ("nb", "nf", "nk"):
                 raise TypeError(f"{name}: expected an int or a range such as range(1, 4), found {value!r}")
@@ -218,13 +210,22 @@ def _order(name: str, value: Any) -> str:
 
 def integer(name: str, value: Any) -> int:
     """A whole number, of Python or NumPy."""
-    if isinstance(value, bool) or not isinstance(value, SupportsIndex):
-        raise TypeError(f"{name}: expected an int, found {value!r}")
-    return operator.index(value)
+    if not isinstance(value, bool):
+        with contextlib.suppress(TypeError):
+            return operator.index(value)
+    raise TypeError(f"{name}: expected an int, found {value!r}")
+
+
+def count(name: str, value: Any, most: int = 10_000_000) -> int:
+    """A whole number from 1 on."""
+    found = integer(name, value)
+    if not 1 <= found <= most:
+        raise ValueError(f"{name}: {found} is outside 1..{most}")
+    return found
 
 
 def number(name: str, value: Any) -> str:
-    """A number that is one, written so that it is read back exactly."""
+    """A finite number, written so that it is read back exactly."""
     if isinstance(value, (bool, str, bytes)):
         raise TypeError(f"{name}: expected a number, found {value!r}")
     try:
@@ -237,17 +238,44 @@ def number(name: str, value: Any) -> str:
 
 
 def text(name: str, value: Any) -> str:
-    """A text."""
+    """The value, if it is a str."""
     if not isinstance(value, str):
         raise TypeError(f"{name}: expected a str, found {value!r}")
     return value
 
 
+def resampling(name: str, value: Any) -> tuple[float, str]:
+    """The step in seconds, and how to read between rows."""
+    if not isinstance(value, (tuple, list)) or len(value) != 2:
+        raise TypeError(f"{name}: expected (seconds, 'linear' or 'hold'), found {value!r}")
+    return float(number(name, value[0])), text(name, value[1])
+
+
+def _flag(name: str, value: Any) -> bool:
+    if not isinstance(value, bool):
+        raise TypeError(f"{name}: expected True or False, found {value!r}")
+    return value
+
+
+def channels(inputs: Sequence[str] | str | None, output: str | None) -> list[str]:
+    """The channels of a file as options of the command line."""
+    found = []
+    for name in [inputs] if isinstance(inputs, str) else inputs or ():
+        if "," in text("inputs", name):
+            raise ValueError(f"inputs: '{name}' holds a comma; read the file with another package and give its data frame")
+        found.append(f"--input={name}")
+    return found if output is None else [*found, f"--output={text('output', output)}"]
+
+
 def path_text(path: str | os.PathLike[str]) -> str:
     """A path as the command line takes it: a name that begins with a hyphen is no option and not standard input."""
+    if not isinstance(path, (str, os.PathLike)):
+        raise TypeError(f"path: expected a str or a path, found {path!r}")
     name = os.fspath(path)
     if not isinstance(name, str):
         raise TypeError(f"path: expected a str or a path, found {path!r}")
+    # Python has an error of its own for a file that is not there.
+    os.stat(name)
     return f"./{name}" if name.startswith("-") else name
 
 
@@ -298,19 +326,18 @@ def _texts(name: str, value: Any) -> list[str]:
             return [f"{key}={_bound(name, of)}" for key, of in value.items()]
         return [_bound(name, value)]
     if name == "split":
-        return [value if isinstance(value, str) else "/".join(_plain(number(name, part)) for part in value)]
+        if isinstance(value, str):
+            return [value]
+        if not isinstance(value, Sequence):
+            raise TypeError(f"{name}: expected three numbers such as (60, 20, 20), found {value!r}")
+        return ["/".join(_plain(number(name, part)) for part in value)]
     if name == "norm":
-        return [{"1": "1", "2": "2", "inf": "inf", "1.0": "1", "2.0": "2"}.get(str(value), str(value))]
+        return [{"1.0": "1", "2.0": "2"}.get(str(value), str(value))]
     if name == "resample":
-        if isinstance(value, str) or len(value) != 2:
-            raise TypeError(f"{name}: expected (seconds, 'linear' or 'hold'), found {value!r}")
-        return [f"{number(name, value[0])}:{text(name, value[1])}"]
+        step, how = resampling(name, value)
+        return [f"{number(name, step)}:{how}"]
     if name == "missing":
         return [value] if isinstance(value, str) else [text(name, one) for one in value]
-    if name in ("header", "decimal_comma"):
-        if not isinstance(value, bool):
-            raise TypeError(f"{name}: expected True or False, found {value!r}")
-        return [str(value)]
     if name in ("max_iterations", "starts", "seed", "lags", "skip_rows"):
         return [str(integer(name, value))]
     if name == "horizon":
@@ -326,9 +353,3 @@ def _texts(name: str, value: Any) -> list[str]:
 
 def _plain(number: str) -> str:
     return number[:-2] if number.endswith(".0") else number
-
-
-def _keys(allowed: type) -> set[str]:
-    return {key for base in allowed.__mro__ for key in getattr(base, "__annotations__", {})} | set(
-        getattr(allowed, "__annotations__", {})
-    )

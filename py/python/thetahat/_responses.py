@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from statistics import NormalDist
-from typing import Any, NamedTuple, Optional
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -33,7 +33,7 @@ class Forecast:
     def interval(self, level: float = 0.95) -> tuple[Array, Array]:
         """The lower and the upper ends of intervals that hold the output with this probability."""
         if not 0 < level < 1:
-            raise ValueError(f"level: {level} is not between 0 and 1")
+            raise ValueError(f"level: {level} is not between 0 and 1; give one such as 0.95")
         half = NormalDist().inv_cdf((1 + level) / 2) * self.standard_deviations
         return self.values - half, self.values + half
 
@@ -58,7 +58,7 @@ class FrequencyResponse:
         Standard errors; NaN where no theory gives one.
     """
 
-    def __init__(self, sources: Sequence[tuple[Optional[str], Sequence[Array]]]) -> None:
+    def __init__(self, sources: Sequence[tuple[str | None, Sequence[Array]]]) -> None:
         self.sources = ["noise" if name is None else name for name, _ in sources]
         columns = np.array([list(columns) for _, columns in sources])
         self.frequencies: Array = columns[0, 0]
@@ -95,7 +95,30 @@ class StepResponse:
 
 
 class StateSpace(NamedTuple):
-    """The innovations form, x(t+1) = F x(t) + G u(t) + K e(t), y(t) = H x(t) + D u(t) + e(t)."""
+    """The innovations form, x(t+1) = F x(t) + G u(t) + K e(t), y(t) = H x(t) + D u(t) + e(t), in deviations from the offsets.
+
+    A Kalman filter takes it with Q = K K' var e, S = K var e and R = var e, of which K is the steady gain.
+
+    Attributes
+    ----------
+    F, G, H, D, K : ndarray, shapes (n, n), (n, inputs), (1, n), (1, inputs), (n, 1)
+        The matrices.
+    noise_variance : float
+        The variance of e.
+    sample_time : float
+        Seconds from one sample to the next.
+    inputs, output : list of str, str
+        The names of the channels.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import thetahat as th
+    >>> model = th.arx(th.dc_motor(), na=2, nb=2)
+    >>> form = model.to_state_space()
+    >>> bool(np.allclose(np.sort(np.linalg.eigvals(form.F)), np.sort(model.poles().real)))
+    True
+    """
 
     F: Array
     G: Array

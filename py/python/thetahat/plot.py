@@ -156,7 +156,7 @@ def fit(
         label = _shown(f"{name}, {far}" + (f": {percent:.2f} %" if isfinite(percent) else ""))
         (line,) = ax.plot(time, drawn, linewidth=1.0, label=label, **_lone(drawn))
         if horizon is not None:
-            low, high = (_broken(log, end)[1] for end in model.predict_interval(log, horizon, level))
+            low, high = (_broken(log, end)[1] for end in model.predict_interval(log, horizon, level=level))
             bands.append(_band(ax, time, low, high, line.get_color()))
     _label_one(bands, level)
     ax.set_xlabel("time [s]")

@@ -105,6 +105,20 @@ pub fn identify_monitored(
 }
 
 /// A fit before its figures: they take several times as long as least squares, and not everybody looks at them.
+///
+/// ```
+/// use std::ops::ControlFlow;
+/// use thetahat::{Channel, Log, Orders, Plan, Unjudged, identify};
+///
+/// let u: Vec<f64> = (0..200).map(|t| f64::from(t * t % 7)).collect();
+/// let y = [vec![0.0], u[..199].to_vec()].concat();
+/// let channel = |name: &str, values| Channel { name: name.into(), values };
+/// let log = Log::new(vec![channel("u", u), channel("y", y)], 0.1)?;
+/// let plan = Plan::new(&["u"], "y", Orders::arx(0, &[1], &[1])?);
+/// let unjudged = Unjudged::new(log.clone(), &[], &plan, &|_| ControlFlow::Continue(()))?;
+/// assert_eq!(unjudged.judged(log.clone())?, identify(log, &[], &plan)?);
+/// # Ok::<(), thetahat::Error>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Unjudged {
     report: Report,
@@ -125,7 +139,7 @@ impl Unjudged {
         &self.report
     }
 
-    /// The whole report, given the same log again.
+    /// The whole report, given the same log again: its values are not compared.
     ///
     /// # Errors
     /// [`Error::Data`] for channels or rows that are not there.

@@ -96,6 +96,20 @@ fn arguments<T: Args>(verb: &'static str, words: &[OsString]) -> Result<T, Failu
             let name = option.split(' ').next().unwrap_or_default();
             return Failure::usage(format!("{name}: '{value}' is none of {}", known.join(", ")));
         }
+        if let (Some(ContextValue::String(option)), Some(ContextValue::String(value)), Some(why)) = (
+            context(ContextKind::InvalidArg),
+            context(ContextKind::InvalidValue),
+            std::error::Error::source(&error),
+        ) {
+            let name = option.split(' ').next().unwrap_or_default();
+            return Failure::usage(format!("{name}: {value}: {why}"));
+        }
+        if let (clap::error::ErrorKind::MissingRequiredArgument, Some(ContextValue::Strings(missing))) =
+            (error.kind(), context(ContextKind::InvalidArg))
+        {
+            let names: Vec<&str> = missing.iter().filter_map(|name| name.split(' ').next()).collect();
+            return Failure::usage(format!("{} is needed with the other options", names.join(", ")));
+        }
         // The first paragraph says what is wrong; the others how to call the program.
         let text = error.to_string();
         let first = text.split("\n\n").next().unwrap_or_default();

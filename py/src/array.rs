@@ -1,7 +1,10 @@
 //! NumPy arrays in and out. Contiguous arrays of float64 are read where they are, others are converted once; shapes are
 //! checked and never guessed.
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{
+    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArray,
+    PyUntypedArrayMethods,
+};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -14,7 +17,7 @@ pub(crate) fn vector<'py>(
     length: Option<usize>,
 ) -> PyResult<PyReadonlyArray1<'py, f64>> {
     let array = match value.cast::<PyArray1<f64>>() {
-        Ok(array) if array.is_c_contiguous() => array.clone(),
+        Ok(array) if array.is_c_contiguous() && is_plain(value) => array.clone(),
         _ => converted(argument, value, "one dimension", 1)?.cast_into()?,
     };
     match length {
@@ -33,7 +36,7 @@ pub(crate) fn matrix<'py>(
     shape: [Option<usize>; 2],
 ) -> PyResult<PyReadonlyArray2<'py, f64>> {
     let array = match value.cast::<PyArray2<f64>>() {
-        Ok(array) if array.is_c_contiguous() => array.clone(),
+        Ok(array) if array.is_c_contiguous() && is_plain(value) => array.clone(),
         _ => converted(argument, value, "two dimensions", 2)?.cast_into()?,
     };
     let found = array.shape();
@@ -95,6 +98,11 @@ pub(crate) fn from_matrix<'py>(
     rows.reshape([matrix.nrows(), matrix.ncols()])
 }
 
+/// Whether it is an array of NumPy itself, and of no kind that is derived from it, such as a masked one.
+fn is_plain(value: &Bound<'_, PyAny>) -> bool {
+    value.get_type().is(value.py().get_type::<PyUntypedArray>())
+}
+
 /// Anything that holds real numbers as a contiguous array of float64.
 fn converted<'py>(
     argument: &str,
@@ -106,10 +114,17 @@ fn converted<'py>(
     let numpy = py.import("numpy")?;
     let not_numbers =
         |what: &str| PyTypeError::new_err(format!("{argument}: expected an array of numbers, found {what}"));
-    let array = numpy.call_method1("asarray", (value,)).map_err(|error| {
-        // Rows of different lengths, and whatever else NumPy cannot make an array of.
-        PyValueError::new_err(format!("{argument}: {}", error.value(py)))
-    })?;
+    // Rows of different lengths, and whatever else NumPy cannot make an array of.
+    let refused = |error: PyErr| PyValueError::new_err(format!("{argument}: {}", error.value(py)));
+    let masked = !is_plain(value) && value.hasattr("mask")?;
+    // What is masked is missing.
+    let filled = if masked {
+        let floats = value.call_method1("astype", ("float64",)).map_err(refused)?;
+        floats.call_method1("filled", (f64::NAN,)).map_err(refused)?
+    } else {
+        value.clone()
+    };
+    let array = numpy.call_method1("asarray", (filled,)).map_err(refused)?;
     let kind = array.getattr("dtype")?.getattr("kind")?;
     let kind: String = kind.extract()?;
     if !["b", "i", "u", "f"].contains(&kind.as_str()) {

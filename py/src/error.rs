@@ -76,7 +76,7 @@ pub(crate) fn in_python(message: &str) -> String {
         let length = option.bytes().take_while(|byte| byte.is_ascii_lowercase() || *byte == b'-').count();
         text.push_str(before);
         // A dash that is no option stays.
-        if length == 0 || !(before.is_empty() || before.ends_with([' ', '(', '\'', '"', '\n'])) {
+        if length == 0 || !(before.is_empty() || before.ends_with([' ', '(', '\n'])) {
             text.push_str("--");
         }
         match &option[..length] {

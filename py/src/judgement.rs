@@ -9,7 +9,7 @@ use thetahat::{Inspection, InspectionPlan, Recording, Report, Requirement, Times
 use crate::error;
 use crate::log::{Log, copy};
 use crate::model::Model;
-use crate::work::interruptible;
+use crate::work::{detached, interruptible};
 
 /// How a model does on a log: the document that `thetahat validate` writes.
 #[pyclass(frozen, module = "thetahat._thetahat")]
@@ -93,8 +93,9 @@ pub(crate) fn inspect(py: Python<'_>, log: &Bound<'_, Log>) -> PyResult<(String,
     };
     let found = interruptible(py, |_| {
         let times = match log.log.time() {
-            Some(time) => Times::Measured(time.to_vec()),
-            None => Times::Uniform(log.log.sample_time()),
+            Some(time) if log.log.borders().is_empty() => Times::Measured(time.to_vec()),
+            // Several logs have no common clock.
+            _ => Times::Uniform(log.log.sample_time()),
         };
         let recording = Recording { channels: log.log.channels().to_vec(), times };
         let plan =
@@ -108,7 +109,7 @@ pub(crate) fn inspect(py: Python<'_>, log: &Bound<'_, Log>) -> PyResult<(String,
 #[pyfunction]
 pub(crate) fn inspect_file(py: Python<'_>, options: Vec<OsString>) -> PyResult<(String, String)> {
     let found =
-        py.detach(|| thetahat_cli::inspect(&options)).map_err(|failure| error::program(py, &failure))?;
+        detached(py, || thetahat_cli::inspect(&options))?.map_err(|failure| error::program(py, &failure))?;
     written(py, &found)
 }
 

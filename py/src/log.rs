@@ -11,6 +11,7 @@ use thetahat::{Channel, Interpolation, Resampling, Rows, Source};
 
 use crate::array::vector;
 use crate::error;
+use crate::work::detached;
 
 /// Channels on a common clock, where they came from, and which of them are inputs and output.
 #[pyclass(frozen, module = "thetahat._thetahat")]
@@ -76,7 +77,7 @@ impl Log {
     #[staticmethod]
     fn read(py: Python<'_>, options: Vec<OsString>) -> PyResult<(Self, Vec<String>)> {
         let opened =
-            py.detach(|| thetahat_cli::read(&options)).map_err(|failure| error::program(py, &failure))?;
+            detached(py, || thetahat_cli::read(&options))?.map_err(|failure| error::program(py, &failure))?;
         let thetahat_cli::Opened { log, sources, inputs, output, warnings } = opened;
         let warnings = warnings.iter().map(|warning| error::in_python(warning)).collect();
         Ok((Self { log: Arc::new(log), sources, inputs, output }, warnings))
@@ -164,7 +165,7 @@ impl Log {
             serde_json::to_string(&this.sources).map_err(|error| PyValueError::new_err(error.to_string()))?;
         let parts = (
             (channels, &this.inputs, &this.output, this.log.sample_time()),
-            (this.time(py), this.log.breaks(), this.log.borders(), sources),
+            (this.time(py), this.log.breaks(), this.log.borders(), this.log.before(), sources),
         );
         let restore = slf.get_type().getattr("_restore")?;
         Ok((restore, parts.into_pyobject(py)?))
@@ -176,13 +177,13 @@ impl Log {
     fn _restore(
         py: Python<'_>,
         data: (Vec<(String, Bound<'_, PyAny>)>, Vec<String>, String, f64),
-        clock: (Option<Bound<'_, PyAny>>, Vec<usize>, Vec<usize>, String),
+        clock: (Option<Bound<'_, PyAny>>, Vec<usize>, Vec<usize>, f64, String),
     ) -> PyResult<Self> {
         let (channels, inputs, output, sample_time) = data;
-        let (time, breaks, borders, sources) = clock;
+        let (time, breaks, borders, before, sources) = clock;
         let time =
             time.map(|time| PyResult::Ok(vector("time", &time, None)?.as_slice()?.to_vec())).transpose()?;
-        let log = thetahat::Log::restored(read(channels)?, sample_time, time, breaks, borders);
+        let log = thetahat::Log::restored(read(channels)?, sample_time, time, breaks, borders, before);
         let log = log.map_err(|error| error::batch(py, error))?;
         let sources =
             serde_json::from_str(&sources).map_err(|error| PyValueError::new_err(error.to_string()))?;

@@ -355,6 +355,7 @@ fn extended(log: &thetahat::Log, future: &[Channel], steps: usize) -> Result<the
         time,
         log.breaks().to_vec(),
         log.borders().to_vec(),
+        log.before(),
     )
 }
 

@@ -15,6 +15,7 @@ mod least_squares;
 mod luenberger;
 mod model;
 mod recursive;
+mod results;
 mod trajectory;
 mod used;
 

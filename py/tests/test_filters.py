@@ -160,6 +160,46 @@ def test_steps_in_a_loop_and_run_give_the_same_bits() -> None:
     assert pickle.dumps(loop) == pickle.dumps(run)
 
 
+@pytest.mark.parametrize("n", range(1, 8))
+@pytest.mark.parametrize("m", range(1, 5))
+@pytest.mark.parametrize("correlated", [False, True])
+def test_every_size_gives_the_same_bits(n: int, m: int, correlated: bool) -> None:
+    """`run` has a type of its own for 1 to 6 states with 1 to 3 outputs."""
+    random = np.random.default_rng(10 * n + m)
+    transition = LinearTransition(
+        0.6 * random.standard_normal((n, n)) / math.sqrt(n), np.eye(n) + 0.1, random.standard_normal((n, 1))
+    )
+    root = random.standard_normal((m, m))
+    observation = LinearObservation(random.standard_normal((m, n)), root @ root.T + np.eye(m))
+    cross = 0.1 * random.standard_normal((n, m)) if correlated else None
+    inputs, measurements = random.standard_normal(60), random.standard_normal((60, m))
+    measurements[10, m - 1], measurements[20] = np.nan, np.nan
+    loop, run = (KalmanFilter(np.ones(n), np.eye(n), gate=12.0) for _ in range(2))
+    trajectory = run.run(transition, observation, measurements, inputs, cross)
+    likelihood = 0.0
+    for k, (y, u) in enumerate(zip(measurements, inputs.tolist())):
+        np.testing.assert_array_equal(trajectory.predicted_states[k], loop.state)
+        np.testing.assert_array_equal(trajectory.predicted_covariances[k], loop.covariance)
+        innovation = loop.correct(observation, y)
+        likelihood += innovation.log_likelihood
+        np.testing.assert_array_equal(trajectory.errors[k], innovation.error)
+        np.testing.assert_array_equal(trajectory.variances[k], innovation.variance)
+        assert (trajectory.nis[k], trajectory.actions[k]) == (innovation.nis, innovation.action)
+        np.testing.assert_array_equal(trajectory.filtered_states[k], loop.state)
+        np.testing.assert_array_equal(trajectory.filtered_covariances[k], loop.covariance)
+        if cross is None or innovation.action == "gated":
+            loop.predict(transition, u)
+        else:
+            loop.predict_correlated(transition, observation, cross, y, u)
+    assert trajectory.log_likelihood == likelihood
+    before = pickle.dumps(run)
+    assert pickle.dumps(loop) == before
+    measurements[7, 0] = np.inf
+    with pytest.raises(ValueError, match="^row 7: measurement is infinite"):
+        run.run(transition, observation, measurements, inputs, cross)
+    assert pickle.dumps(run) == before
+
+
 def test_a_linear_model_makes_the_extended_filter_a_kalman_filter() -> None:
     transition, observation, measurements, inputs = vehicle()
     linear = KalmanFilter(np.zeros(3), np.eye(3)).run(transition, observation, measurements, inputs)
@@ -421,3 +461,35 @@ def test_two_threads_run_two_filters_at_once() -> None:
     for thread in threads:
         thread.join()
     assert len({pickle.dumps(filter) for filter in filters}) == 1
+
+
+@pytest.mark.parametrize("where", ["predict", "correct", "run", "smooth"])
+def test_a_noise_function_that_fails_fails_the_call(where: str) -> None:
+    def fails(x: Any, u: Any) -> Any:
+        raise RuntimeError("boom")
+
+    move, look = (lambda x, u: x), (lambda x, u: x[:1])
+    transition = NonlinearTransition(move, fails if where != "correct" else np.eye(2))
+    observation = NonlinearObservation(look, fails if where == "correct" else np.eye(1))
+    kalman = ExtendedKalmanFilter([1.0, 2.0], np.eye(2))
+    calls: dict[str, Callable[[], Any]] = {
+        "predict": lambda: kalman.predict(transition),
+        "correct": lambda: kalman.correct(observation, 1.0),
+        "run": lambda: kalman.run(transition, observation, [1.0]),
+        "smooth": lambda: kalman.smooth(transition, observation, [1.0, 2.0]),
+    }
+    with pytest.raises(RuntimeError, match="boom"):
+        calls[where]()
+    assert kalman.state.tolist() == [1.0, 2.0] and kalman.covariance.tolist() == np.eye(2).tolist()
+    negative = NonlinearObservation(look, lambda x, u: [[-1.0]])
+    with pytest.raises(ValueError, match="observation noise"):
+        kalman.correct(negative, 1.0)
+
+
+def test_numbers_of_numpy_are_numbers() -> None:
+    level = LinearObservation([[1.0]], [[1.0]])
+    given, plain = KalmanFilter([0.0], [[1.0]]), KalmanFilter([0.0], [[1.0]])
+    given.correct(level, np.float32(1.5))
+    plain.correct(level, 1.5)
+    assert given.state == plain.state
+    given.correct(level, np.int64(2))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import json
 import multiprocessing
+import os
 import pickle
 import subprocess
 import sys
@@ -76,6 +77,7 @@ def test_numpy_integers_are_orders(log: th.Log) -> None:
 def test_rows_are_named_as_python_counts_or_as_the_command_line(log: th.Log) -> None:
     model = th.arx(log, 2, 2, estimate=slice(0, 700), validate=range(700, 2000))
     assert model == th.arx(log, 2, 2, estimate="1..700", validate=["701..2000"])
+    assert model == th.arx(log, 2, 2, estimate=slice(700), validate=slice(700, None))
     assert [fit["part"] for fit in model.fits] == ["estimation"] * 2 + ["validation"] * 2
     assert np.array_equal(model.parameters, th.arx(log[:700], 2, 2).parameters)
     model = th.arx(log, 2, 2, split=(60, 20, 20))
@@ -123,6 +125,7 @@ BAD: list[tuple[Callable[[th.Log], Any], type[Exception], str]] = [
     (lambda log: th.arx(log, 2, 2, estimate="5..2"), ValueError, "estimate"),
     (lambda log: th.arx(log, 2, 2, estimate=slice(0, 9999)), ValueError, "estimate"),
     (lambda log: th.arx(log, 2, 2, estimate=slice(-5, None)), ValueError, "estimate"),
+    (lambda log: th.arx(log, 2, 2, estimate=slice(5000, None)), ValueError, "estimate"),
     (lambda log: th.arx(log, 2, 2, estimate=slice(0, 10, 2)), ValueError, "estimate: a step of 2"),
     (lambda log: th.arx(log, 2, 2, estimate=5), TypeError, "estimate: expected a slice"),  # type: ignore[arg-type]
     (lambda log: th.arx(log, 2, 2, detrend="cubic"), ValueError, "detrend"),
@@ -151,6 +154,11 @@ BAD: list[tuple[Callable[[th.Log], Any], type[Exception], str]] = [
     (lambda log: th.Log.join(["a"]), TypeError, "logs: expected a Log"),  # type: ignore[list-item]
     (lambda log: th.inspect(5), TypeError, "path: expected a str or a path"),  # type: ignore[arg-type]
     (lambda log: th.inspect("none.csv"), FileNotFoundError, "none.csv"),
+    (lambda log: th.search(th.Log(log.y, np.random.default_rng(0).random((2000, 101)))), ValueError, "inputs: 101 are too many"),
+    (lambda log: th.oe(log, 2, 2, seed=-1, starts=1), ValueError, "seed: -1"),
+    (lambda log: th.oe(log, 2, 2, seed=1), ValueError, "starts is needed"),
+    (lambda log: th.read_csv([]), ValueError, "path: there is none"),
+    (lambda log: th.read_csv(open(os.devnull)), TypeError, "path: expected a str or a path, found TextIOWrapper"),  # type: ignore[arg-type]
     (lambda log: th.Model(), TypeError, "models are made by fits"),
     (lambda log: th.Model.from_json("{}"), ValueError, "not a thetahat report"),
     (lambda log: th.Model.from_json(th.ar(log, 1).to_json()[:-40]), ValueError, "line"),

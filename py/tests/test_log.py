@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import copy
+import multiprocessing
 import pickle
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -202,3 +204,39 @@ def test_a_log_shows_itself() -> None:
     page = log._repr_html_()
     assert "<svg" in page and "&lt;b&gt;" in page and "nan" not in page
     assert "<svg" in th.Log(np.full(2000, 5.0))._repr_html_()
+
+
+def test_what_is_masked_is_missing() -> None:
+    masked = np.ma.masked_array([1.0, 999.0, 3.0], [False, True, False])
+    log = th.Log(masked, np.ma.masked_array(np.column_stack([masked.data, U[:3]]), [[False, False], [True, False], [False, False]]))
+    assert np.array_equal(log.y, [1.0, np.nan, 3.0], equal_nan=True)
+    assert np.array_equal(log["u1"], log.y, equal_nan=True) and np.array_equal(log["u2"], U[:3])
+
+
+def test_a_line_goes_on_in_a_part_of_the_log() -> None:
+    random = np.random.default_rng(2)
+    u, e = random.standard_normal((2, 300))
+    y = np.zeros(300)
+    for t in range(1, 300):
+        y[t] = 0.7 * y[t - 1] + u[t - 1] + 0.01 * e[t]
+    for clock in ({"sample_time": 0.5}, {"time": 100 + 0.5 * np.arange(300)}):
+        log = th.Log(y + 0.3 * np.arange(300), u, **clock)  # type: ignore[arg-type]
+        model = th.arx(log[:200], 1, 1, detrend="linear")
+        assert np.allclose(model.predict(log[200:])[1:], model.predict(log)[201:], atol=1e-9)
+        assert model.validate(log[200:]).fit(1) > 95
+        again = pickle.loads(pickle.dumps(log[200:]))
+        assert np.array_equal(model.predict(again), model.predict(log[200:]), equal_nan=True)
+
+
+def _length(path: str) -> int:
+    return len(th.read_csv(path))
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux forks")
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_a_forked_process_reads_too(tmp_path: Path) -> None:
+    path = str(tmp_path / "log.csv")
+    Path(path).write_text("u,y\n" + "1,2\n" * 1000)
+    assert _length(path) == 1000
+    with multiprocessing.get_context("fork").Pool(2) as pool:
+        assert pool.map_async(_length, [path, path]).get(timeout=60) == [1000, 1000]

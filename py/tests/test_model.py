@@ -176,6 +176,7 @@ def test_what_a_model_cannot_answer_is_refused(motor: th.Log) -> None:
         (lambda: model.frequency_response([1e6]), "frequenc"),
         (lambda: model.frequency_response([]), "w: expected at least one"),
         (lambda: model.frequency_response(points=0), "points"),
+        (lambda: model.frequency_response(points=2**40), "points"),
         (lambda: model.step_response(1), "input"),
         (lambda: model.step_response(samples=0), "samples"),
         (lambda: model.zeros(5), "input: there is no input 5"),

@@ -6,7 +6,7 @@ import copy
 import pickle
 import threading
 import warnings
-from typing import Any, Callable
+from typing import Any, Callable, Literal
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ POLICIES: list[float | Forgetting | None] = [
     None,
     Forgetting.directional(0.97),
     Forgetting.random_walk(1e-4),
-    Forgetting.variable(0.99, 0.9, 0.01),
+    Forgetting.variable(0.99, 0.92, 0.01),
 ]
 
 
@@ -84,23 +84,53 @@ def test_exponential_forgetting_is_the_textbook_and_padasip() -> None:
     np.testing.assert_allclose(trajectory.parameters[:-1], weights[1:], rtol=1e-8, atol=1e-10)
 
 
+@pytest.mark.parametrize("n", range(1, 12))
 @pytest.mark.parametrize("forgetting", POLICIES)
-def test_update_in_a_loop_and_run_give_the_same_bits(forgetting: float | Forgetting | None) -> None:
-    phi, y, _ = regression()
-    y[50], phi[60, 1] = np.nan, np.nan
-    loop, run = (RecursiveLeastSquares(3, forgetting, scales=[1.0, 2.0, 0.5]) for _ in range(2))
+def test_update_in_a_loop_and_run_give_the_same_bits(forgetting: float | Forgetting | None, n: int) -> None:
+    """`run` has a type of its own for each of the sizes 1 to 10."""
+    phi, y, _ = regression(n=n)
+    y[50], phi[60, n // 2] = np.nan, np.nan
+    loop, run = (RecursiveLeastSquares(n, forgetting, scales=np.linspace(0.5, 2.0, n)) for _ in range(2))
     innovations, parameters, errors = [], [], []
     for row, output in zip(phi, y):
         innovations.append(loop.update(row, output))
         parameters.append(loop.parameters)
         known = loop.standard_errors
-        errors.append(np.full(3, np.nan) if known is None else known)
+        errors.append(np.full(n, np.nan) if known is None else known)
     trajectory = run.run(phi, y)
     same(trajectory, innovations)
     np.testing.assert_array_equal(trajectory.parameters, parameters)
     np.testing.assert_array_equal(trajectory.standard_errors, errors)
     assert innovations[50].action == innovations[60].action == "missing"
     assert state(loop) == state(run)
+
+
+@pytest.mark.parametrize("n", [1, 2, 8, 10, 11])
+@pytest.mark.parametrize("start", ["exact", "mixed"])
+def test_a_run_goes_on_from_any_state(start: Literal["exact", "mixed"], n: int) -> None:
+    phi, y, _ = regression(n=n)
+    blend = 5 if start == "mixed" else None
+    loop, runs = (RecursiveLeastSquares(n, 0.98, start=start, blend=blend, dead_zone=0.01) for _ in range(2))
+    for row, output in zip(phi, y):
+        loop.update(row, output)
+    for begin, end in ((0, 1), (1, n), (n, n + 3), (n + 3, 100), (100, 200)):
+        if begin < end:
+            runs.run(phi[begin:end], y[begin:end])
+    assert state(loop) == state(runs)
+    loop.adapting = runs.adapting = False
+    loop.update(phi[0], y[0])
+    assert runs.run(phi[:1], y[:1]).actions[0] == "frozen"
+    assert state(loop) == state(runs)
+
+
+def test_the_results_are_separate_arrays_that_can_be_written() -> None:
+    phi, y, _ = regression()
+    first, second = (RecursiveLeastSquares(3).run(phi, y) for _ in range(2))
+    for array in (first.parameters, first.standard_errors, first.errors, first.variances, first.nis):
+        assert array.flags.c_contiguous and array.flags.writeable and array.dtype == float
+    first.parameters[:] = 0.0
+    np.testing.assert_array_equal(first.errors, second.errors)
+    np.testing.assert_array_equal(first.standard_errors, second.standard_errors)
 
 
 def test_several_outputs_share_the_regressor() -> None:

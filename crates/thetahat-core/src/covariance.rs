@@ -4,6 +4,7 @@ use core::fmt;
 
 use nalgebra::{OMatrix, OVector};
 
+use crate::dim::filled;
 use crate::error::{check_finite, check_length};
 use crate::triangle::{column, column_mut};
 use crate::{Dimension, Error, Real, ud};
@@ -170,6 +171,27 @@ impl<T: Real, N: Dimension> Covariance<T, N> {
         factor
     }
 
+    /// The same to the bit, with its size in another type: `Const::<4>` for what `Dyn` held, or the other way round.
+    ///
+    /// Errors: [`Error::Length`] if it has another size.
+    ///
+    /// ```
+    /// # #[cfg(feature = "alloc")] {
+    /// use thetahat_core::Covariance;
+    /// use thetahat_core::nalgebra::{Const, DVector, Dyn};
+    ///
+    /// let covariance: Covariance<f64, Dyn> = Covariance::from_diagonal(&DVector::repeat(2, 3.0))?;
+    /// let fixed = covariance.to_size(Const::<2>)?;
+    /// assert_eq!(fixed.to_size(Dyn(2))?, covariance);
+    /// assert!(covariance.to_size(Const::<3>).is_err());
+    /// # }
+    /// # Ok::<(), thetahat_core::Error>(())
+    /// ```
+    pub fn to_size<K: Dimension>(&self, size: K) -> Result<Covariance<T, K>, Error> {
+        check_length("covariance", size.value(), self.size().value())?;
+        Ok(Covariance { factor: filled(size.square(T::zero()), self.as_slice()) })
+    }
+
     /// Independent elements, with these variances.
     ///
     /// Errors: [`Error::NotFinite`]; [`Error::Negative`].
@@ -275,13 +297,33 @@ impl<T: Real, N: Dimension> Covariance<T, N> {
         matrix
     }
 
+    /// Writes P, n² numbers, into `entries`: row by row and column by column are the same.
+    ///
+    /// Errors: [`Error::Length`] if there are not n² places.
+    ///
+    /// ```
+    /// use thetahat_core::nalgebra::{Const, Matrix2};
+    /// use thetahat_core::{Covariance, Error};
+    ///
+    /// let covariance: Covariance<f64, Const<2>> = Covariance::new(&Matrix2::new(4.0, 1.0, 1.0, 2.0))?;
+    /// let mut entries = [0.0; 4];
+    /// covariance.write_into(&mut entries)?;
+    /// assert_eq!(entries, [4.0, 1.0, 1.0, 2.0]);
+    /// # Ok::<(), Error>(())
+    /// ```
+    #[inline]
+    pub fn write_into(&self, entries: &mut [T]) -> Result<(), Error> {
+        let n = self.size().value();
+        check_length("entries", n * n, entries.len())?;
+        ud::expand(self.as_slice(), entries, n);
+        Ok(())
+    }
+
     /// The diagonal of P. n²/2 multiply-adds.
     pub fn variances(&self) -> OVector<T, N> {
         let size = self.factor.shape_generic().0;
         let mut variances = size.vector(T::zero());
-        for (index, variance) in variances.as_mut_slice().iter_mut().enumerate() {
-            *variance = ud::diagonal(self.as_slice(), size.value(), index);
-        }
+        ud::diagonals(self.as_slice(), T::one(), variances.as_mut_slice());
         variances
     }
 

@@ -11,7 +11,7 @@ use nalgebra::{ArrayStorage, Const, DefaultAllocator, Dim, OMatrix, OVector, Sca
 #[cfg(feature = "alloc")]
 use nalgebra::{Dyn, U1};
 
-use crate::Real;
+use crate::{Real, ud};
 
 /// What a size does differently when it is a type and when it is a value.
 ///
@@ -125,6 +125,15 @@ impl Workspace for Dyn {
         let squares = core::array::from_fn(|_| take(size * size));
         work(vectors, squares)
     }
+}
+
+/// This matrix with these entries, which are as many.
+pub(crate) fn filled<T: Real, R: Dim, C: Dim>(mut matrix: OMatrix<T, R, C>, entries: &[T]) -> OMatrix<T, R, C>
+where
+    DefaultAllocator: Allocator<R, C>,
+{
+    ud::copy(entries, matrix.as_mut_slice());
+    matrix
 }
 
 mod imply {

@@ -2,6 +2,7 @@
 
 use nalgebra::{OMatrix, OVector};
 
+use crate::dim::filled;
 use crate::error::{check_entries, check_length};
 use crate::triangle::{column, column_mut};
 use crate::ud::{add_multiple, dot};
@@ -113,6 +114,16 @@ impl<T: Real, N: Dimension> KalmanFilter<T, N> {
         } else {
             Err(Error::OutOfRange { argument: "gate", range: "above 0" })
         }
+    }
+
+    /// The same to the bit, with its size in another type, see [`Covariance::to_size`]. With `Const` a step needs no heap,
+    /// and is quicker.
+    ///
+    /// Errors: [`Error::Length`] if it has another size.
+    pub fn to_size<K: Dimension>(&self, size: K) -> Result<KalmanFilter<T, K>, Error> {
+        let covariance = self.covariance.to_size(size)?;
+        let state = filled(size.vector(T::zero()), self.state.as_slice());
+        Ok(KalmanFilter { gate: self.gate, ..KalmanFilter::started(state, covariance) })
     }
 
     /// The mean of the state, x̂.

@@ -2,6 +2,7 @@
 
 use nalgebra::{Const, Dim, OMatrix, OVector};
 
+use crate::dim::filled;
 use crate::error::{check_finite, check_length};
 use crate::triangle::column;
 use crate::ud::{add_multiple, dot};
@@ -149,6 +150,22 @@ impl<T: Real, N: Dimension + Dimension<U>, U: Dimension> LinearTransition<T, N, 
         Ok(LinearTransition { state_matrix, input_matrix, noise, noise_matrix })
     }
 
+    /// The same to the bit, with the number of states in another type, see [`Covariance::to_size`].
+    ///
+    /// Errors: [`Error::Length`] if it has another number of states.
+    pub fn to_size<K: Dimension + Dimension<U>>(
+        &self,
+        states: K,
+    ) -> Result<LinearTransition<T, K, U>, Error> {
+        let inputs = self.input_matrix.shape_generic().1;
+        Ok(LinearTransition {
+            noise: self.noise.to_size(states)?,
+            state_matrix: filled(states.square(T::zero()), self.state_matrix.as_slice()),
+            input_matrix: filled(states.rows_by(inputs, T::zero()), self.input_matrix.as_slice()),
+            noise_matrix: filled(states.square(T::zero()), self.noise_matrix.as_slice()),
+        })
+    }
+
     /// F, n x n.
     pub fn state_matrix(&self) -> &OMatrix<T, N, N> {
         &self.state_matrix
@@ -251,6 +268,23 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension + Dimension<U> + Dimensi
         let LinearObservation { output_rows, noise, .. } = self;
         check_shape("input_matrix", &input_matrix, noise.size(), input_matrix.shape_generic().1)?;
         Ok(LinearObservation { output_rows, input_matrix, noise })
+    }
+
+    /// The same to the bit, with the numbers of states and outputs in other types, see [`Covariance::to_size`].
+    ///
+    /// Errors: [`Error::Length`] if it has another number of either.
+    pub fn to_size<K: Dimension + Dimension<L>, L: Dimension + Dimension<U> + Dimension<K>>(
+        &self,
+        states: K,
+        outputs: L,
+    ) -> Result<LinearObservation<T, K, L, U>, Error> {
+        check_length("observation", states.value(), self.output_rows.nrows())?;
+        let inputs = self.input_matrix.shape_generic().1;
+        Ok(LinearObservation {
+            noise: self.noise.to_size(outputs)?,
+            output_rows: filled(states.rows_by(outputs, T::zero()), self.output_rows.as_slice()),
+            input_matrix: filled(outputs.rows_by(inputs, T::zero()), self.input_matrix.as_slice()),
+        })
     }
 
     /// H, m x n: a copy.

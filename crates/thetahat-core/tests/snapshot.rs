@@ -184,3 +184,52 @@ fn what_is_not_a_snapshot_is_refused() {
     let huge = r#"{"factor":[4000000000,4000000000,[]]}"#;
     assert!(serde_json::from_str::<Covariance<f64, Dyn>>(huge).is_err());
 }
+
+/// Everything there is to an estimator.
+fn text(estimator: &impl Serialize) -> String {
+    serde_json::to_string(estimator).expect("text")
+}
+
+#[test]
+fn a_size_of_another_type_keeps_every_bit() {
+    let phi = |k| Vector3::new(value(k), value(3 * k), 1.0);
+    for start in [Start::Standard, Start::Exact, Start::Mixed { blend: 9 }] {
+        let scales = DVector::repeat(3, 1.0);
+        let dynamic = RecursiveLeastSquares::<f64, Dyn>::new(&scales, Forgetting::default()).unwrap();
+        let mut dynamic = dynamic.with_start(start).unwrap().with_dead_zone(0.01).unwrap();
+        for k in 0..40 {
+            let mut fixed = dynamic.to_size(Const::<3>).unwrap();
+            assert_eq!(text(&fixed), text(&dynamic));
+            let answer = fixed.update(&phi(k), output(k));
+            let row = DVector::from_column_slice(phi(k).as_slice());
+            assert_eq!(format!("{answer:?}"), format!("{:?}", dynamic.update(&row, output(k))));
+            assert_eq!(text(&fixed), text(&dynamic));
+            assert_eq!(text(&fixed.to_size(Dyn(3)).unwrap()), text(&dynamic));
+            let covariance = dynamic.parameter_covariance();
+            let errors = covariance.map(|covariance| covariance.variances().map(f64::sqrt));
+            assert_eq!(dynamic.standard_errors(), errors);
+            assert_eq!(
+                fixed.standard_errors().map(|errors| errors.as_slice().to_vec()),
+                errors.map(|errors| errors.as_slice().to_vec())
+            );
+        }
+        assert!(dynamic.standard_errors().is_some() && dynamic.standard_errors_of(1).is_none());
+        assert!(dynamic.to_size(Const::<2>).is_err());
+        dynamic.set_adaptation(false);
+        assert_eq!(text(&dynamic.to_size(Const::<3>).unwrap()), text(&dynamic));
+    }
+
+    let (transition, observation) = model();
+    let prior = Covariance::new(&Matrix2::new(4.0, 1.0, 1.0, 2.0)).unwrap();
+    let filter = KalmanFilter::new(Vector2::new(0.5, -1.0), prior).unwrap().with_gate(9.0).unwrap();
+    assert_eq!(text(&filter.to_size(Dyn(2)).unwrap()), text(&filter));
+    assert_eq!(filter.to_size(Dyn(2)).unwrap().to_size(Const::<2>).unwrap(), filter);
+    assert_eq!(text(&transition.to_size(Dyn(2)).unwrap()), text(&transition));
+    assert_eq!(text(&observation.to_size(Dyn(2), Dyn(1)).unwrap()), text(&observation));
+    assert!(filter.to_size(Const::<3>).is_err() && transition.to_size(Dyn(1)).is_err());
+    assert!(observation.to_size(Dyn(3), Dyn(1)).is_err() && observation.to_size(Dyn(2), Dyn(2)).is_err());
+    let mut entries = [0.0; 5];
+    assert!(filter.covariance().write_into(&mut entries).is_err());
+    filter.covariance().write_into(&mut entries[..4]).unwrap();
+    assert_eq!(&entries[..4], filter.covariance().matrix().as_slice());
+}

@@ -399,7 +399,7 @@ def search(
 def _fit(log: Log, model: str | None, orders: dict[str, Any], options: Any, *more: str) -> Model:
     data = handle("log", log)
     words = [] if model is None else [f"--model={_options.text('model', model)}"]
-    words += [*_options.order_words(**orders), *_options.words(FitOptions, options), *more]
+    words += [*_options.order_words(**orders), *_options.words(FitOptions, options, len(log)), *more]
     fitted = Model._of(_thetahat.fit(data, words))
     for warning in fitted._model.warnings():
         warnings.warn(warning, EstimationWarning, stacklevel=3)

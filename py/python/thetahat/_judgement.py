@@ -47,7 +47,7 @@ class _Document:
     @property
     def warnings(self) -> list[str]:
         """What a careful reader should know, in plain words."""
-        return list(self.document["warnings"])
+        return [_thetahat.in_python(warning) for warning in self.document["warnings"]]
 
     def _repr_html_(self) -> str:
         return f"<pre>{escape(self.summary())}</pre>"
@@ -131,7 +131,7 @@ class Comparison(_Document):
     def warnings(self) -> list[str]:
         """What a careful reader should know, in plain words, with the model that it is about."""
         models = self.document["models"]
-        return [f"{model['report']}: {warning}" for model in models for warning in model["warnings"]]
+        return [f"{model['report']}: {_thetahat.in_python(text)}" for model in models for text in model["warnings"]]
 
     def __repr__(self) -> str:
         return f"Comparison({', '.join(str(model['report']) for model in self.document['models'])})"
@@ -201,7 +201,7 @@ def compare(models: Mapping[str, Model] | Sequence[Model], log: Log, **options: 
         if not isinstance(model, Model):
             raise TypeError(f"models: expected a Model, found {type(model).__name__}")
     handles = [(_options.text("models", name), model._model) for name, model in named.items()]
-    return Comparison(*_thetahat.compare(handles, handle("log", log), _options.words(ValidationOptions, options)))
+    return Comparison(*_thetahat.compare(handles, handle("log", log), _options.words(ValidationOptions, options, len(log))))
 
 
 def inspect(

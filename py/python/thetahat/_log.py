@@ -133,7 +133,8 @@ class Log:
         """
         from thetahat import _frames
 
-        names = [inputs] if isinstance(inputs, str) else list(inputs)
+        names = [_options.text("inputs", name) for name in ([inputs] if isinstance(inputs, str) else inputs)]
+        _options.text("output", output)
         columns = _frames.columns(frame, [*names, output])
         clock, start = (None, None) if time is None else _frames.times(frame, time)
         channels = [(name, columns[name]) for name in [*names, output]]
@@ -315,7 +316,9 @@ def read_csv(
     >>> log
     Log(3 rows, inputs u, output y, sample time 0.5 s)
     """
-    paths = [path] if isinstance(path, (str, os.PathLike)) else list(path)
+    paths: list[Any] = list(path) if isinstance(path, (list, tuple)) else [path]
+    if not paths:
+        raise ValueError("path: there is none; give at least one")
     words = [*_options.channels(inputs, output), *_options.words(ReadOptions, options)]
     if inputs is not None and not isinstance(inputs, str) and not inputs:
         # The command line reads no inputs for a model without them.
@@ -349,7 +352,7 @@ def _inputs(u: Inputs, names: Sequence[str] | None) -> list[tuple[str, Any]]:
         if names:
             raise ValueError("input_names: there are no inputs; give u too")
         return []
-    array = np.asarray(u)
+    array = u if isinstance(u, np.ma.MaskedArray) else np.asarray(u)
     if array.ndim not in (1, 2):
         raise ValueError(f"u: expected shape (rows,) or (rows, inputs), found shape {array.shape}")
     columns = [array] if array.ndim == 1 else [array[:, index] for index in range(array.shape[1])]

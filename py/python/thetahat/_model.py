@@ -317,7 +317,7 @@ class Model:
     @property
     def warnings(self) -> list[str]:
         """What a careful reader should know, in plain words."""
-        return list(self.document["warnings"])
+        return [_thetahat.in_python(warning) for warning in self.document["warnings"]]
 
     def predict(self, log: Log, horizon: int | None = 1, *, initial: str | None = None) -> Array:
         """The prediction of each row from what was known some steps before, in the units of the log.
@@ -502,7 +502,7 @@ class Model:
         >>> model.validate(log[700:], require=["white", "independent", "fit>=90"]).unmet
         []
         """
-        words = _options.words(ValidationOptions, options)
+        words = _options.words(ValidationOptions, options, len(log) if isinstance(log, Log) else None)
         words += [f"--require={one}" for one in ([require] if isinstance(require, str) else require or ())]
         return Validation._of(_thetahat.validate(self._model, handle("log", log), words))
 

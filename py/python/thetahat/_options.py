@@ -152,8 +152,8 @@ class ReadOptions(TypedDict, total=False):
     missing: Union[str, Sequence[str]]
 
 
-def words(allowed: type, options: Mapping[str, Any]) -> list[str]:
-    """The options of the command line that say the same.
+def words(allowed: type, options: Mapping[str, Any], rows: int | None = None) -> list[str]:
+    """The options of the command line that say the same; ``rows`` is where an open slice ends.
 
     Raises
     ------
@@ -175,7 +175,7 @@ def words(allowed: type, options: Mapping[str, Any]) -> list[str]:
         elif name == "decimal_comma":
             found += ["--decimal-comma"] if _flag(name, value) else []
         else:
-            found += [f"--{name.replace('_', '-')}={text}" for text in _texts(name, value)]
+            found += [f"--{name.replace('_', '-')}={text}" for text in _texts(name, value, rows)]
     return found
 
 
@@ -270,7 +270,7 @@ def channels(inputs: Sequence[str] | str | None, output: str | None) -> list[str
 def path_text(path: str | os.PathLike[str]) -> str:
     """A path as the command line takes it: a name that begins with a hyphen is no option and not standard input."""
     if not isinstance(path, (str, os.PathLike)):
-        raise TypeError(f"path: expected a str or a path, found {path!r}")
+        raise TypeError(f"path: expected a str or a path, found {type(path).__name__}")
     name = os.fspath(path)
     if not isinstance(name, str):
         raise TypeError(f"path: expected a str or a path, found {path!r}")
@@ -291,13 +291,15 @@ def _span(name: str, value: Any, first: int) -> str:
     return f"{start + first}..{stop - 1 + first}"
 
 
-def _rows(name: str, value: Any) -> list[str]:
+def _rows(name: str, value: Any, rows: int | None) -> list[str]:
     if isinstance(value, str):
         return [value]
+    if isinstance(value, slice) and value.stop is None:
+        value = slice(value.start, rows, value.step)
     if isinstance(value, (slice, range)):
         return [_span(name, value, 1)]
     if isinstance(value, (list, tuple)):
-        return [one for part in value for one in _rows(name, part)]
+        return [one for part in value for one in _rows(name, part, rows)]
     raise TypeError(f"{name}: expected a slice, a range or a text such as '1..500', found {value!r}")
 
 
@@ -314,9 +316,9 @@ def _bound(name: str, value: Any) -> str:
     return number(name, value)
 
 
-def _texts(name: str, value: Any) -> list[str]:
+def _texts(name: str, value: Any, rows: int | None) -> list[str]:
     if name in ("estimate", "validate", "rows"):
-        return [",".join(_rows(name, value))]
+        return [",".join(_rows(name, value, rows))]
     if name in ("offset", "bound"):
         if not isinstance(value, Mapping):
             raise TypeError(f"{name}: expected a dict, found {value!r}")

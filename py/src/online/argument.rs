@@ -113,11 +113,14 @@ pub(crate) fn sample(
     Ok(())
 }
 
-/// Whether it is a number, or an array of none of the dimensions.
+/// Whether it is a number, of Python or NumPy, or an array of no dimension.
 pub(crate) fn is_number(value: &Bound<'_, PyAny>) -> bool {
     match value.cast::<PyUntypedArray>() {
         Ok(array) => array.ndim() == 0,
-        Err(_) => value.is_instance_of::<PyFloat>() || value.is_instance_of::<PyInt>(),
+        Err(_) => {
+            let scalar = || value.getattr("ndim").is_ok_and(|ndim| ndim.eq(0).unwrap_or(false));
+            value.is_instance_of::<PyFloat>() || value.is_instance_of::<PyInt>() || scalar()
+        }
     }
 }
 
@@ -225,8 +228,12 @@ pub(crate) fn room<T>(counts: &[usize]) -> PyResult<Vec<T>> {
     let mut room = Vec::new();
     match total.map(|total| room.try_reserve_exact(total)) {
         Some(Ok(())) => Ok(room),
-        _ => Err(PyMemoryError::new_err("the results do not fit the memory: run fewer rows at a time")),
+        _ => Err(out_of_memory()),
     }
+}
+
+pub(crate) fn out_of_memory() -> PyErr {
+    PyMemoryError::new_err("the results do not fit the memory: run fewer rows at a time")
 }
 
 /// What the library says of an argument, by its name in Python.

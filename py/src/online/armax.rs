@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::{Const, Dyn};
 use thetahat_core::{
-    ArmaxMethod, ArmaxOrders, Error, RecursiveArmax as Stepper, RecursiveLeastSquares as LeastSquares,
+    ArmaxMethod, ArmaxOrders, RecursiveArmax as Stepper, RecursiveLeastSquares as LeastSquares,
 };
 
 use super::argument::{self, Rows, Whole, failed, room};
@@ -24,7 +24,7 @@ pub(crate) struct Engine {
     inputs: usize,
 }
 
-impl Around<Const<1>> for Engine {
+impl Around<Dyn, Const<1>> for Engine {
     fn estimator(&self) -> &LeastSquares<f64, Dyn> {
         self.stepper.estimator()
     }
@@ -216,11 +216,16 @@ impl RecursiveArmax {
         let (rows, columns) = (outputs.len(), self.engine.inputs);
         let inputs = Rows::new("u", u, Some(rows), columns)?;
         let inputs = inputs.as_slice()?;
-        recursive::run(py, &mut self.engine, rows, |engine, row, record| -> Result<(), Error> {
-            let output = outputs.get(row).copied().unwrap_or(f64::NAN);
-            record.take(&engine.stepper.update(argument::row(inputs, row, columns), output)?);
-            Ok(())
-        })
+        let (engine, shape) = (self.engine.clone(), [rows, self.estimator().parameters().len(), 1]);
+        let (engine, trajectory) = recursive::run(py, shape, |record| {
+            record.run(engine, rows, |engine, row, record| {
+                let output = outputs.get(row).copied().unwrap_or(f64::NAN);
+                record.take(&engine.stepper.update(argument::row(inputs, row, columns), output)?);
+                Ok(())
+            })
+        })?;
+        self.engine = engine;
+        Ok(trajectory)
     }
 
     /// Predict the outputs to come, y(k+1), y(k+2), ..., after `update` of sample k.

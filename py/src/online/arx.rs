@@ -5,9 +5,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::{Const, Dyn};
-use thetahat_core::{
-    ArxOrders, Error, InputOrders, RecursiveArx as Stepper, RecursiveLeastSquares as LeastSquares,
-};
+use thetahat_core::{ArxOrders, InputOrders, RecursiveArx as Stepper, RecursiveLeastSquares as LeastSquares};
 
 use super::argument::{self, LARGEST_SIZE, LONGEST_DELAY, Rows, Whole, count, failed, room};
 use super::forgetting::{Forgetting, Memory, STANDARD};
@@ -23,7 +21,7 @@ pub(crate) struct Engine {
     inputs: usize,
 }
 
-impl Around<Const<1>> for Engine {
+impl Around<Dyn, Const<1>> for Engine {
     fn estimator(&self) -> &LeastSquares<f64, Dyn> {
         self.stepper.estimator()
     }
@@ -273,11 +271,16 @@ impl RecursiveArx {
         let (rows, columns) = (outputs.len(), self.engine.inputs);
         let inputs = Rows::new("u", u, Some(rows), columns)?;
         let inputs = inputs.as_slice()?;
-        recursive::run(py, &mut self.engine, rows, |engine, row, record| -> Result<(), Error> {
-            let output = outputs.get(row).copied().unwrap_or(f64::NAN);
-            record.take(&engine.stepper.update(argument::row(inputs, row, columns), output)?);
-            Ok(())
-        })
+        let (engine, shape) = (self.engine.clone(), [rows, self.estimator().parameters().len(), 1]);
+        let (engine, trajectory) = recursive::run(py, shape, |record| {
+            record.run(engine, rows, |engine, row, record| {
+                let output = outputs.get(row).copied().unwrap_or(f64::NAN);
+                record.take(&engine.stepper.update(argument::row(inputs, row, columns), output)?);
+                Ok(())
+            })
+        })?;
+        self.engine = engine;
+        Ok(trajectory)
     }
 
     /// Predict the outputs to come, y(k+1), y(k+2), ..., after `update` of sample k.

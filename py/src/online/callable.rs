@@ -288,7 +288,7 @@ impl<'a, 'py> Called<'a, 'py> {
         self.trouble.take()
     }
 
-    fn is_well(&self) -> bool {
+    pub(crate) fn is_well(&self) -> bool {
         self.trouble.borrow().is_none()
     }
 

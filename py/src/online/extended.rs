@@ -11,7 +11,7 @@ use super::argument::{self, Whole, failed, failed_at};
 use super::innovation::{Innovation, list};
 use super::kalman::started;
 use super::trajectory::{
-    FilterTrajectory, Record, Sample, Samples, SmoothedTrajectory, Steps, measurement, returned, smooth,
+    FilterTrajectory, Sample, Samples, SmoothedTrajectory, Steps, measurement, recorded, returned, smooth,
     smoothed,
 };
 use super::used::{Used, UsedObservation, UsedTransition};
@@ -70,15 +70,26 @@ pub(crate) struct ExtendedKalmanFilter {
     pub(crate) filter: Stepper<f64, Dyn>,
 }
 
-/// A filter with its models. `before` is called before a model is used.
+/// A filter with its models. `before` is called before a model is used; `troubled` says whether a function went wrong.
 struct Extended<'a, T, O> {
     filter: Stepper<f64, Dyn>,
     transition: &'a T,
     observation: &'a O,
     before: fn(&T, &O, &Covariance<f64, Dyn>),
+    troubled: fn(&T, &O) -> bool,
 }
 
-impl<T: Transition<f64, Dyn, Dyn>, O: Observation<f64, Dyn, Dyn, Dyn>> Steps for Extended<'_, T, O> {
+impl<T, O> Extended<'_, T, O> {
+    /// What was answered, unless a function went wrong: a noise that it did not give does not show in the answer. The error
+    /// gives way to what the function said.
+    fn checked<A>(&self, answer: Result<A, Error>) -> Result<A, Error> {
+        if (self.troubled)(self.transition, self.observation) { Err(Error::Overflow) } else { answer }
+    }
+}
+
+impl<T: Transition<f64, Dyn, Dyn>, O: Observation<f64, Dyn, Dyn, Dyn>> Steps<Dyn, Dyn>
+    for Extended<'_, T, O>
+{
     fn state(&self) -> &DVector<f64> {
         self.filter.state()
     }
@@ -87,14 +98,16 @@ impl<T: Transition<f64, Dyn, Dyn>, O: Observation<f64, Dyn, Dyn, Dyn>> Steps for
         self.filter.covariance()
     }
 
-    fn correct(&mut self, sample: &Sample) -> Result<Told<f64, DVector<f64>>, Error> {
+    fn correct(&mut self, sample: &Sample<Dyn>) -> Result<Told<f64, DVector<f64>>, Error> {
         (self.before)(self.transition, self.observation, self.filter.covariance());
-        self.filter.correct(self.observation, &sample.inputs[1], &sample.measurement)
+        let corrected = self.filter.correct(self.observation, &sample.inputs[1], &sample.measurement);
+        self.checked(corrected)
     }
 
-    fn predict(&mut self, sample: &Sample) -> Result<(), Error> {
+    fn predict(&mut self, sample: &Sample<Dyn>) -> Result<(), Error> {
         (self.before)(self.transition, self.observation, self.filter.covariance());
-        self.filter.predict(self.transition, &sample.inputs[0])
+        let predicted = self.filter.predict(self.transition, &sample.inputs[0]);
+        self.checked(predicted)
     }
 }
 
@@ -167,10 +180,14 @@ impl ExtendedKalmanFilter {
         let model = UsedTransition::new(transition, self.filter.state().len())?;
         let input = self::input(input, model.inputs())?;
         model.linearise_within(self.filter.covariance());
-        self.filter.predict(&model, &input).map_err(|error| match model.trouble() {
-            Some(trouble) => trouble.into_error(None),
-            None => failed(py, error),
-        })
+        let mut filter = self.filter.clone();
+        let predicted = filter.predict(&model, &input);
+        if let Some(trouble) = model.trouble() {
+            return Err(trouble.into_error(None));
+        }
+        predicted.map_err(|error| failed(py, error))?;
+        self.filter = filter;
+        Ok(())
     }
 
     /// Correct the state by a measurement.
@@ -208,11 +225,13 @@ impl ExtendedKalmanFilter {
         let input = self::input(input, model.inputs())?;
         let (measurement, single) = self::measurement(measurement, model.outputs())?;
         model.linearise_within(self.filter.covariance());
-        let innovation =
-            self.filter.correct(&model, &input, &measurement).map_err(|error| match model.trouble() {
-                Some(trouble) => trouble.into_error(None),
-                None => failed(py, error),
-            })?;
+        let mut filter = self.filter.clone();
+        let corrected = filter.correct(&model, &input, &measurement);
+        if let Some(trouble) = model.trouble() {
+            return Err(trouble.into_error(None));
+        }
+        let innovation = corrected.map_err(|error| failed(py, error))?;
+        self.filter = filter;
         Ok(returned(innovation, single))
     }
 
@@ -258,17 +277,20 @@ impl ExtendedKalmanFilter {
         let m = observation.outputs();
         let samples = Samples::new(measurements, m, inputs, [transition.inputs(), observation.inputs()])?;
         let slices = samples.slices()?;
-        let mut record = Record::new(samples.rows, n, m)?;
         let filter = self.filter.clone();
-        let filter = if let (Used::Linear(transition), Used::Linear(observation)) =
-            (&transition, &observation)
-        {
-            let mut stepped =
-                Extended { filter, transition: *transition, observation: *observation, before: |_, _, _| () };
-            py.detach(|| record.run(&mut stepped, &slices))
-                .map_err(|(row, error)| failed_at(py, row, error))?;
-            stepped.filter
-        } else {
+        let (filter, trajectory) = recorded(py, [samples.rows, n, m], |record| {
+            if let (Used::Linear(transition), Used::Linear(observation)) = (&transition, &observation) {
+                let mut stepped = Extended {
+                    filter,
+                    transition: *transition,
+                    observation: *observation,
+                    before: |_, _, _| (),
+                    troubled: |_, _| false,
+                };
+                py.detach(|| record.run(&mut stepped, &slices, Dyn(m)))
+                    .map_err(|(row, error)| failed_at(py, row, error))?;
+                return Ok(stepped.filter);
+            }
             let mut stepped = Extended {
                 filter,
                 transition: &transition,
@@ -277,12 +299,12 @@ impl ExtendedKalmanFilter {
                     transition.linearise_within(covariance);
                     observation.linearise_within(covariance);
                 },
+                troubled: |transition, observation| transition.is_troubled() || observation.is_troubled(),
             };
-            let taken = record.run(&mut stepped, &slices);
+            let taken = record.run(&mut stepped, &slices, Dyn(m));
             taken.map_err(|error| explained(py, &transition, &observation, error))?;
-            stepped.filter
-        };
-        let trajectory = record.finish(py, n, m)?;
+            Ok(stepped.filter)
+        })?;
         self.filter = filter;
         Ok(trajectory)
     }
@@ -330,7 +352,8 @@ impl ExtendedKalmanFilter {
             transition.linearise_within(covariance);
             observation.linearise_within(covariance);
         };
-        let result = smooth(self.filter.clone(), &transition, &observation, &slices, before)
+        let troubled = || transition.is_troubled() || observation.is_troubled();
+        let result = smooth(self.filter.clone(), &transition, &observation, &slices, before, troubled)
             .map_err(|error| explained(py, &transition, &observation, error))?;
         smoothed(py, result, samples.rows, n)
     }

@@ -2,9 +2,9 @@
 
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use thetahat_core::nalgebra::{DMatrix, DVector, Dyn};
+use thetahat_core::nalgebra::{Const, DMatrix, Dyn, OMatrix, OVector};
 use thetahat_core::{
-    Action, Covariance, Error, GainSchedule, Innovation as Told, KalmanFilter as Stepper,
+    Action, Covariance, Dimension, Error, GainSchedule, Innovation as Told, KalmanFilter as Stepper,
     LinearObservation as Observed, LinearTransition as Moved,
 };
 
@@ -12,8 +12,8 @@ use super::argument::{self, Whole, failed, failed_at};
 use super::innovation::{Innovation, list};
 use super::model::{LinearObservation, LinearTransition};
 use super::trajectory::{
-    FilterTrajectory, Record, Sample, Samples, SmoothedTrajectory, SteadyState, Steps, measurement, returned,
-    smooth, smoothed,
+    FilterTrajectory, Record, Sample, Samples, Slices, SmoothedTrajectory, SteadyState, Steps, measurement,
+    recorded, returned, smooth, smoothed,
 };
 use super::used::check_states;
 use super::{Reduced, snapshot};
@@ -85,44 +85,115 @@ pub(crate) fn started(
 }
 
 /// A filter with linear models.
-struct Linear<'a> {
-    filter: Stepper<f64, Dyn>,
-    transition: &'a Moved<f64, Dyn, Dyn>,
-    observation: &'a Observed<f64, Dyn, Dyn, Dyn>,
-    /// The cross-covariance, and the models with the same inputs.
-    correlated: Option<(DMatrix<f64>, Models)>,
+struct Linear<N: Dimension + Dimension<M> + Dimension<Dyn>, M: Dimension + Dimension<N> + Dimension<Dyn>> {
+    filter: Stepper<f64, N>,
+    models: Models<N, M>,
+    correlated: Option<Correlated<N, M>>,
     gated: bool,
 }
 
-impl Steps for Linear<'_> {
-    fn state(&self) -> &DVector<f64> {
+impl<N: Dimension + Dimension<M> + Dimension<Dyn>, M: Dimension + Dimension<N> + Dimension<Dyn>> Steps<N, M>
+    for Linear<N, M>
+{
+    fn state(&self) -> &OVector<f64, N> {
         self.filter.state()
     }
 
-    fn covariance(&self) -> &Covariance<f64, Dyn> {
+    fn covariance(&self) -> &Covariance<f64, N> {
         self.filter.covariance()
     }
 
-    fn correct(&mut self, sample: &Sample) -> Result<Told<f64, DVector<f64>>, Error> {
-        let innovation = self.filter.correct(self.observation, &sample.inputs[1], &sample.measurement)?;
+    fn correct(&mut self, sample: &Sample<M>) -> Result<Told<f64, OVector<f64, M>>, Error> {
+        let innovation = self.filter.correct(&self.models.1, &sample.inputs[1], &sample.measurement)?;
         self.gated = innovation.action == Action::Gated;
         Ok(innovation)
     }
 
-    fn predict(&mut self, sample: &Sample) -> Result<(), Error> {
+    fn predict(&mut self, sample: &Sample<M>) -> Result<(), Error> {
         let Sample { measurement, inputs: [input, other] } = sample;
         match &self.correlated {
             Some((cross, (transition, observation))) if !self.gated => {
                 let input = if input.is_empty() { other } else { input };
                 self.filter.predict_correlated(transition, observation, cross, input, measurement)
             }
-            _ => self.filter.predict(self.transition, input),
+            _ => self.filter.predict(&self.models.0, input),
         }
     }
 }
 
 /// A linear model of both parts.
-type Models = (Moved<f64, Dyn, Dyn>, Observed<f64, Dyn, Dyn, Dyn>);
+type Models<N = Dyn, M = Dyn> = (Moved<f64, N, Dyn>, Observed<f64, N, M, Dyn>);
+
+/// A cross-covariance, and the models with the same inputs.
+type Correlated<N, M> = (OMatrix<f64, N, M>, Models<N, M>);
+
+impl Linear<Dyn, Dyn> {
+    /// Takes the samples, with usual sizes as types: that gives the same bits several times as fast.
+    fn run(
+        &self,
+        record: &mut Record<'_>,
+        samples: &Slices<'_>,
+    ) -> Result<Stepper<f64, Dyn>, (usize, Error)> {
+        match self.filter.state().len() {
+            1 => self.run_states::<1>(record, samples),
+            2 => self.run_states::<2>(record, samples),
+            3 => self.run_states::<3>(record, samples),
+            4 => self.run_states::<4>(record, samples),
+            5 => self.run_states::<5>(record, samples),
+            6 => self.run_states::<6>(record, samples),
+            n => self.run_sized(Dyn(n), Dyn(samples.outputs), record, samples),
+        }
+    }
+
+    fn run_states<const N: usize>(
+        &self,
+        record: &mut Record<'_>,
+        samples: &Slices<'_>,
+    ) -> Result<Stepper<f64, Dyn>, (usize, Error)> {
+        match samples.outputs {
+            1 => self.run_sized(Const::<N>, Const::<1>, record, samples),
+            2 => self.run_sized(Const::<N>, Const::<2>, record, samples),
+            3 => self.run_sized(Const::<N>, Const::<3>, record, samples),
+            m => self.run_sized(Dyn(N), Dyn(m), record, samples),
+        }
+    }
+
+    fn run_sized<N, M>(
+        &self,
+        states: N,
+        outputs: M,
+        record: &mut Record<'_>,
+        samples: &Slices<'_>,
+    ) -> Result<Stepper<f64, Dyn>, (usize, Error)>
+    where
+        N: Dimension + Dimension<M> + Dimension<Dyn>,
+        M: Dimension + Dimension<N> + Dimension<Dyn>,
+    {
+        // The sizes are those of the filter and its models, so that only a row can fail.
+        let mut sized = self.to_size(states, outputs).map_err(|error| (0, error))?;
+        record.run(&mut sized, samples, outputs)?;
+        sized.filter.to_size(Dyn(states.value())).map_err(|error| (0, error))
+    }
+
+    fn to_size<N, M>(&self, states: N, outputs: M) -> Result<Linear<N, M>, Error>
+    where
+        N: Dimension + Dimension<M> + Dimension<Dyn>,
+        M: Dimension + Dimension<N> + Dimension<Dyn>,
+    {
+        let models = |(transition, observation): &Models| -> Result<Models<N, M>, Error> {
+            Ok((transition.to_size(states)?, observation.to_size(states, outputs)?))
+        };
+        let correlated = match &self.correlated {
+            Some((cross, correlated)) => {
+                let cross = OMatrix::from_column_slice_generic(states, outputs, cross.as_slice());
+                Some((cross, models(correlated)?))
+            }
+            None => None,
+        };
+        let (filter, models) = (self.filter.to_size(states)?, models(&self.models)?);
+        Ok(Linear { filter, models, correlated, gated: self.gated })
+    }
+}
 
 /// Both models with the inputs that one of them has: a model without gets zeros.
 fn with_same_inputs(
@@ -311,12 +382,11 @@ impl KalmanFilter {
             }
             None => None,
         };
-        let mut record = Record::new(samples.rows, n, m)?;
-        let filter = self.filter.clone();
-        let mut stepped = Linear { filter, transition, observation, correlated, gated: false };
-        py.detach(|| record.run(&mut stepped, &slices)).map_err(|(row, error)| failed_at(py, row, error))?;
-        let filter = stepped.filter;
-        let trajectory = record.finish(py, n, m)?;
+        let models = (transition.clone(), observation.clone());
+        let linear = Linear { filter: self.filter.clone(), models, correlated, gated: false };
+        let (filter, trajectory) = recorded(py, [samples.rows, n, m], |record| {
+            py.detach(|| linear.run(record, &slices)).map_err(|(row, error)| failed_at(py, row, error))
+        })?;
         self.filter = filter;
         Ok(trajectory)
     }
@@ -362,7 +432,7 @@ impl KalmanFilter {
         let slices = samples.slices()?;
         let filter = self.filter.clone();
         let result = py
-            .detach(|| smooth(filter.into(), transition, observation, &slices, |_| ()))
+            .detach(|| smooth(filter.into(), transition, observation, &slices, |_| (), || false))
             .map_err(|(row, error)| failed_at(py, row, error))?;
         smoothed(py, result, samples.rows, n)
     }

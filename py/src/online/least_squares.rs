@@ -10,7 +10,7 @@ use thetahat_core::{Covariance, Dimension, Error, RecursiveLeastSquares as Stepp
 use super::argument::{self, Whole, failed};
 use super::forgetting::{Forgetting, Memory, STANDARD};
 use super::innovation::{Innovation, list};
-use super::recursive::{self, Around, RecursiveTrajectory};
+use super::recursive::{self, Around, Record, RecursiveTrajectory};
 use super::{Reduced, snapshot};
 use crate::array;
 
@@ -21,12 +21,8 @@ pub(crate) enum Engine {
     Many(Stepper<f64, Dyn, Dyn>),
 }
 
-impl<M: Dimension> Around<M> for Stepper<f64, Dyn, M>
-where
-    Dyn: Dimension<M>,
-    Stepper<f64, Dyn, M>: Clone + Send,
-{
-    fn estimator(&self) -> &Stepper<f64, Dyn, M> {
+impl<N: Dimension + Dimension<M>, M: Dimension> Around<N, M> for Stepper<f64, N, M> {
+    fn estimator(&self) -> &Stepper<f64, N, M> {
         self
     }
 }
@@ -122,6 +118,48 @@ where
         Some(covariance) => estimator.with_covariance(covariance),
         None => Ok(estimator),
     }
+}
+
+/// Takes many samples of one output, with a usual size as a type: that gives the same bits several times as fast.
+fn run_one(
+    estimator: &Stepper<f64, Dyn>,
+    regressors: &[f64],
+    outputs: &[f64],
+    record: &mut Record<'_>,
+) -> Result<Stepper<f64, Dyn>, (usize, Error)> {
+    match estimator.parameters().len() {
+        1 => run_sized(estimator, Const::<1>, regressors, outputs, record),
+        2 => run_sized(estimator, Const::<2>, regressors, outputs, record),
+        3 => run_sized(estimator, Const::<3>, regressors, outputs, record),
+        4 => run_sized(estimator, Const::<4>, regressors, outputs, record),
+        5 => run_sized(estimator, Const::<5>, regressors, outputs, record),
+        6 => run_sized(estimator, Const::<6>, regressors, outputs, record),
+        7 => run_sized(estimator, Const::<7>, regressors, outputs, record),
+        8 => run_sized(estimator, Const::<8>, regressors, outputs, record),
+        9 => run_sized(estimator, Const::<9>, regressors, outputs, record),
+        10 => run_sized(estimator, Const::<10>, regressors, outputs, record),
+        n => run_sized(estimator, Dyn(n), regressors, outputs, record),
+    }
+}
+
+fn run_sized<N: Dimension + Dimension<Const<1>>>(
+    estimator: &Stepper<f64, Dyn>,
+    size: N,
+    regressors: &[f64],
+    outputs: &[f64],
+    record: &mut Record<'_>,
+) -> Result<Stepper<f64, Dyn>, (usize, Error)> {
+    let n = size.value();
+    // The size is that of the estimator, so that only a row can fail.
+    let sized = estimator.to_size(size).map_err(|error| (0, error))?;
+    let mut regressor = sized.parameters().clone();
+    let sized = record.run(sized, outputs.len(), |estimator, row, record| {
+        regressor.as_mut_slice().copy_from_slice(argument::row(regressors, row, n));
+        let output = outputs.get(row).copied().unwrap_or(f64::NAN);
+        record.take(&estimator.update(&regressor, output)?);
+        Ok(())
+    })?;
+    sized.to_size(Dyn(n)).map_err(|error| (0, error))
 }
 
 #[pymethods]
@@ -251,29 +289,31 @@ impl RecursiveLeastSquares {
         let regressors = array::matrix("phi", phi, [None, Some(n)])?;
         let rows = regressors.shape()[0];
         let regressors = regressors.as_slice()?;
-        let mut regressor = DVector::zeros(n);
         match &mut self.engine {
             Engine::One(estimator) => {
                 let outputs = array::vector("y", y, Some(rows))?;
                 let outputs = outputs.as_slice()?;
-                recursive::run(py, estimator, rows, |estimator, row, record| {
-                    regressor.as_mut_slice().copy_from_slice(argument::row(regressors, row, n));
-                    let output = outputs.get(row).copied().unwrap_or(f64::NAN);
-                    record.take(&estimator.update(&regressor, output)?);
-                    Ok(())
-                })
+                let work = |record: &mut Record<'_>| run_one(estimator, regressors, outputs, record);
+                let (stepped, trajectory) = recursive::run(py, [rows, n, 1], work)?;
+                *estimator = stepped;
+                Ok(trajectory)
             }
             Engine::Many(estimator) => {
                 let m = estimator.parameters().ncols();
                 let outputs = array::matrix("y", y, [Some(rows), Some(m)])?;
                 let outputs = outputs.as_slice()?;
-                let mut output = DVector::zeros(m);
-                recursive::run(py, estimator, rows, |estimator, row, record| {
-                    regressor.as_mut_slice().copy_from_slice(argument::row(regressors, row, n));
-                    output.as_mut_slice().copy_from_slice(argument::row(outputs, row, m));
-                    record.take_all(&estimator.update_all(&regressor, &output)?);
-                    Ok(())
-                })
+                let (mut regressor, mut output) = (DVector::zeros(n), DVector::zeros(m));
+                let copy = estimator.clone();
+                let (stepped, trajectory) = recursive::run(py, [rows, n, m], |record| {
+                    record.run(copy, rows, |estimator, row, record| {
+                        regressor.as_mut_slice().copy_from_slice(argument::row(regressors, row, n));
+                        output.as_mut_slice().copy_from_slice(argument::row(outputs, row, m));
+                        record.take_all(&estimator.update_all(&regressor, &output)?);
+                        Ok(())
+                    })
+                })?;
+                *estimator = stepped;
+                Ok(trajectory)
             }
         }
     }

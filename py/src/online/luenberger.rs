@@ -265,7 +265,7 @@ impl Record {
         observation: &impl Observation<f64, Dyn, Dyn, Dyn>,
         samples: &Slices<'_>,
     ) -> Result<(), (usize, Error)> {
-        let mut sample = samples.sample();
+        let mut sample = samples.sample(Dyn(samples.outputs));
         for row in 0..samples.rows {
             samples.read(row, &mut sample);
             self.states.extend_from_slice(observer.state().as_slice());

@@ -3,10 +3,11 @@
 use numpy::{PyArray1, PyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use thetahat_core::nalgebra::{DMatrix, DVector, Dim, Dyn};
+use thetahat_core::nalgebra::{DMatrix, DVector, Dyn};
 use thetahat_core::{Action, Dimension, Error, Innovation, RecursiveLeastSquares, Start};
 
 use super::argument::{Whole, count, failed_at, room, shaped};
+use super::results::{Column, Results};
 use super::{Reduced, attributes, innovation};
 use crate::array;
 
@@ -70,97 +71,91 @@ impl RecursiveTrajectory {
 }
 
 /// The results of the rows so far.
-pub(crate) struct Record {
-    parameters: Vec<f64>,
-    standard_errors: Vec<f64>,
-    errors: Vec<f64>,
-    variances: Vec<f64>,
-    nis: Vec<f64>,
+pub(crate) struct Record<'a> {
+    parameters: Column<'a>,
+    standard_errors: Column<'a>,
+    errors: Column<'a>,
+    variances: Column<'a>,
+    nis: Column<'a>,
     codes: Vec<u8>,
 }
 
-impl Record {
+impl Record<'_> {
     pub(crate) fn take(&mut self, innovation: &Innovation<f64>) {
-        self.errors.push(innovation.error);
-        self.variances.push(innovation.variance);
+        self.errors.push(&[innovation.error]);
+        self.variances.push(&[innovation.variance]);
         self.done(innovation.nis, innovation.action);
     }
 
     pub(crate) fn take_all(&mut self, innovation: &Innovation<f64, DVector<f64>>) {
-        self.errors.extend_from_slice(innovation.error.as_slice());
-        self.variances.extend_from_slice(innovation.variance.as_slice());
+        self.errors.push(innovation.error.as_slice());
+        self.variances.push(innovation.variance.as_slice());
         self.done(innovation.nis, innovation.action);
     }
 
     fn done(&mut self, nis: f64, action: Action) {
-        self.nis.push(nis);
+        self.nis.push(&[nis]);
         self.codes.push(innovation::code(action));
     }
 }
 
-/// The estimator that each class is built around.
-pub(crate) trait Around<M: Dim>: Clone + Send
-where
-    Dyn: Dimension<M>,
-    M: Dimension,
-{
-    fn estimator(&self) -> &RecursiveLeastSquares<f64, Dyn, M>;
+/// The estimator that each class is built around, of N parameters and M outputs.
+pub(crate) trait Around<N: Dimension + Dimension<M>, M: Dimension> {
+    fn estimator(&self) -> &RecursiveLeastSquares<f64, N, M>;
 }
 
-/// Takes `rows` samples in a copy of the engine, which replaces it if none fails.
-pub(crate) fn run<E: Around<M>, M: Dimension>(
-    py: Python<'_>,
-    engine: &mut E,
-    rows: usize,
-    mut step: impl FnMut(&mut E, usize, &mut Record) -> Result<(), Error> + Send,
-) -> PyResult<RecursiveTrajectory>
-where
-    Dyn: Dimension<M>,
-{
-    let (n, outputs) = shape(engine.estimator());
-    let mut record = Record {
-        parameters: room(&[rows, n, outputs])?,
-        standard_errors: room(&[rows, n, outputs])?,
-        errors: room(&[rows, outputs])?,
-        variances: room(&[rows, outputs])?,
-        nis: room(&[rows])?,
-        codes: room(&[rows])?,
-    };
-    let mut stepped = engine.clone();
-    let taken = py.detach(|| {
+impl<'a> Record<'a> {
+    /// Takes samples, row after row, in this engine; returns it.
+    pub(crate) fn run<E: Around<N, M>, N: Dimension + Dimension<M>, M: Dimension>(
+        &mut self,
+        mut engine: E,
+        rows: usize,
+        mut step: impl FnMut(&mut E, usize, &mut Record<'a>) -> Result<(), Error>,
+    ) -> Result<E, (usize, Error)> {
         for row in 0..rows {
-            step(&mut stepped, row, &mut record).map_err(|error| (row, error))?;
-            let estimator = stepped.estimator();
+            step(&mut engine, row, self).map_err(|error| (row, error))?;
+            let estimator = engine.estimator();
+            let (n, outputs) = estimator.parameters().shape();
             let parameters = estimator.parameters().as_slice();
-            if outputs == 1 {
-                record.parameters.extend_from_slice(parameters);
-            } else {
-                let transposed = (0..n).flat_map(|i| parameters.iter().skip(i).step_by(n).copied());
-                record.parameters.extend(transposed);
+            if let (1, Some(errors)) = (outputs, estimator.standard_errors_of(0)) {
+                self.parameters.push(parameters);
+                self.standard_errors.push(errors.as_slice());
+                continue;
             }
-            extend_by_standard_errors(estimator, &mut record.standard_errors);
+            let errors: Vec<_> = (0..outputs).map(|output| estimator.standard_errors_of(output)).collect();
+            for i in 0..n {
+                for (parameter, errors) in parameters.iter().skip(i).step_by(n).zip(&errors) {
+                    let error = errors.as_ref().and_then(|errors| errors.as_slice().get(i));
+                    self.parameters.push(&[*parameter]);
+                    self.standard_errors.push(&[error.copied().unwrap_or(f64::NAN)]);
+                }
+            }
         }
-        Ok(())
-    });
-    taken.map_err(|(row, error)| failed_at(py, row, error))?;
-    *engine = stepped;
-    let (errors, variances) = if outputs == 1 {
-        (shaped(py, record.errors, [rows])?, shaped(py, record.variances, [rows])?)
-    } else {
-        (shaped(py, record.errors, [rows, outputs])?, shaped(py, record.variances, [rows, outputs])?)
+        Ok(engine)
+    }
+}
+
+/// Does the work of a run without the interpreter lock, and gives back what that returns beside the results.
+pub(crate) fn run<E: Send>(
+    py: Python<'_>,
+    [rows, n, outputs]: [usize; 3],
+    work: impl FnOnce(&mut Record<'_>) -> Result<E, (usize, Error)> + Send,
+) -> PyResult<(E, RecursiveTrajectory)> {
+    let (by_parameter, by_output) = match outputs {
+        1 => (vec![rows, n], vec![rows]),
+        _ => (vec![rows, n, outputs], vec![rows, outputs]),
     };
-    let by_row = |entries| match outputs {
-        1 => shaped(py, entries, [rows, n]),
-        _ => shaped(py, entries, [rows, n, outputs]),
-    };
-    Ok(RecursiveTrajectory {
-        parameters: by_row(record.parameters)?.unbind(),
-        standard_errors: by_row(record.standard_errors)?.unbind(),
-        errors: errors.unbind(),
-        variances: variances.unbind(),
-        nis: PyArray1::from_vec(py, record.nis).unbind(),
-        codes: PyArray1::from_vec(py, record.codes).unbind(),
-    })
+    let shapes = [by_parameter.clone(), by_parameter, by_output.clone(), by_output, vec![rows]];
+    let (results, codes) = (Results::new(py, shapes)?, room(&[rows])?);
+    let taken = results.write(|[parameters, standard_errors, errors, variances, nis]| {
+        let mut record = Record { parameters, standard_errors, errors, variances, nis, codes };
+        py.detach(|| work(&mut record)).map(|engine| (engine, record.codes))
+    })?;
+    let (engine, codes) = taken.map_err(|(row, error)| failed_at(py, row, error))?;
+    let [parameters, standard_errors, errors, variances, nis] = results.arrays()?.map(Bound::unbind);
+    let nis = nis.into_bound(py).cast_into()?.unbind();
+    let codes = PyArray1::from_vec(py, codes).unbind();
+    Ok((engine, RecursiveTrajectory { parameters, standard_errors, errors, variances, nis, codes }))
 }
 
 fn shape<M: Dimension>(estimator: &RecursiveLeastSquares<f64, Dyn, M>) -> (usize, usize)
@@ -168,25 +163,6 @@ where
     Dyn: Dimension<M>,
 {
     estimator.parameters().shape()
-}
-
-/// The standard errors, row by row of the parameters: NaN where they are not known.
-fn extend_by_standard_errors<M: Dimension>(
-    estimator: &RecursiveLeastSquares<f64, Dyn, M>,
-    into: &mut Vec<f64>,
-) where
-    Dyn: Dimension<M>,
-{
-    let (n, outputs) = shape(estimator);
-    let start = into.len();
-    into.resize(start + n * outputs, f64::NAN);
-    for output in 0..outputs {
-        let Some(covariance) = estimator.parameter_covariance_of(output) else { continue };
-        let places = into.iter_mut().skip(start + output).step_by(outputs);
-        for (place, variance) in places.zip(covariance.variances().iter()) {
-            *place = variance.sqrt();
-        }
-    }
 }
 
 /// θ̂: a vector with one output, else a matrix.
@@ -243,10 +219,12 @@ where
     Dyn: Dimension<M>,
 {
     let (n, outputs) = shape(estimator);
-    let mut entries = room(&[n, outputs])?;
-    extend_by_standard_errors(estimator, &mut entries);
-    if entries.iter().any(|entry| entry.is_nan()) {
-        return Ok(None);
+    let mut entries = vec![0.0; n * outputs];
+    for output in 0..outputs {
+        let Some(errors) = estimator.standard_errors_of(output) else { return Ok(None) };
+        for (entry, &error) in entries.iter_mut().skip(output).step_by(outputs).zip(errors.iter()) {
+            *entry = error;
+        }
     }
     let array = if outputs == 1 { shaped(py, entries, [n]) } else { shaped(py, entries, [n, outputs]) };
     array.map(Some)

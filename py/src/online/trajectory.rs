@@ -3,10 +3,13 @@
 use numpy::{PyArray1, PyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use thetahat_core::nalgebra::{DVector, Dyn};
-use thetahat_core::{Covariance, Error, ExtendedKalmanFilter, Innovation, Observation, Smoother, Transition};
+use thetahat_core::nalgebra::{Const, DVector, Dyn, OVector};
+use thetahat_core::{
+    Covariance, Dimension, Error, ExtendedKalmanFilter, Innovation, Observation, Smoother, Transition,
+};
 
 use super::argument::{self, Rows, room, shaped};
+use super::results::{Column, Results};
 use super::{Reduced, attributes, innovation};
 
 /// What a Kalman filter did in a run, row by row.
@@ -293,24 +296,26 @@ pub(crate) struct Slices<'a> {
     measurements: &'a [f64],
     inputs: &'a [f64],
     pub(crate) rows: usize,
-    outputs: usize,
+    pub(crate) outputs: usize,
     columns: usize,
     widths: [usize; 2],
 }
 
 /// One sample: what a model without input gets is empty.
-pub(crate) struct Sample {
-    pub(crate) measurement: DVector<f64>,
+pub(crate) struct Sample<M: Dimension> {
+    pub(crate) measurement: OVector<f64, M>,
     /// For the transition, and for the observation.
     pub(crate) inputs: [DVector<f64>; 2],
 }
 
 impl Slices<'_> {
-    pub(crate) fn sample(&self) -> Sample {
-        Sample { measurement: DVector::zeros(self.outputs), inputs: self.widths.map(DVector::zeros) }
+    /// Room for a sample with so many outputs, which are those of these slices.
+    pub(crate) fn sample<M: Dimension>(&self, outputs: M) -> Sample<M> {
+        let measurement = OVector::zeros_generic(outputs, Const::<1>);
+        Sample { measurement, inputs: self.widths.map(DVector::zeros) }
     }
 
-    pub(crate) fn read(&self, row: usize, into: &mut Sample) {
+    pub(crate) fn read<M: Dimension>(&self, row: usize, into: &mut Sample<M>) {
         let measurement = argument::row(self.measurements, row, self.outputs);
         into.measurement.as_mut_slice().copy_from_slice(measurement);
         for input in into.inputs.iter_mut().filter(|input| !input.is_empty()) {
@@ -319,80 +324,115 @@ impl Slices<'_> {
     }
 }
 
-/// A filter with its models.
-pub(crate) trait Steps {
-    fn state(&self) -> &DVector<f64>;
-    fn covariance(&self) -> &Covariance<f64, Dyn>;
-    fn correct(&mut self, sample: &Sample) -> Result<Innovation<f64, DVector<f64>>, Error>;
-    fn predict(&mut self, sample: &Sample) -> Result<(), Error>;
+/// A filter with its models: N states and M outputs.
+pub(crate) trait Steps<N: Dimension, M: Dimension> {
+    fn state(&self) -> &OVector<f64, N>;
+    fn covariance(&self) -> &Covariance<f64, N>;
+    fn correct(&mut self, sample: &Sample<M>) -> Result<Innovation<f64, OVector<f64, M>>, Error>;
+    fn predict(&mut self, sample: &Sample<M>) -> Result<(), Error>;
 }
 
 /// The results of the rows so far.
-pub(crate) struct Record {
-    predicted_states: Vec<f64>,
-    predicted_covariances: Vec<f64>,
-    filtered_states: Vec<f64>,
-    filtered_covariances: Vec<f64>,
-    errors: Vec<f64>,
-    variances: Vec<f64>,
-    nis: Vec<f64>,
+pub(crate) struct Record<'a> {
+    predicted_states: Column<'a>,
+    predicted_covariances: Column<'a>,
+    filtered_states: Column<'a>,
+    filtered_covariances: Column<'a>,
+    errors: Column<'a>,
+    variances: Column<'a>,
+    nis: Column<'a>,
     codes: Vec<u8>,
     log_likelihood: f64,
 }
 
-impl Record {
-    pub(crate) fn new(rows: usize, n: usize, m: usize) -> PyResult<Self> {
-        Ok(Record {
-            predicted_states: room(&[rows, n])?,
-            predicted_covariances: room(&[rows, n, n])?,
-            filtered_states: room(&[rows, n])?,
-            filtered_covariances: room(&[rows, n, n])?,
-            errors: room(&[rows, m])?,
-            variances: room(&[rows, m])?,
-            nis: room(&[rows])?,
-            codes: room(&[rows])?,
-            log_likelihood: 0.0,
-        })
-    }
-
+impl Record<'_> {
     /// Corrects and predicts, row after row.
-    pub(crate) fn run(
+    pub(crate) fn run<N: Dimension, M: Dimension>(
         &mut self,
-        filter: &mut impl Steps,
+        filter: &mut impl Steps<N, M>,
         samples: &Slices<'_>,
+        outputs: M,
     ) -> Result<(), (usize, Error)> {
-        let mut sample = samples.sample();
+        let mut sample = samples.sample(outputs);
+        let entries = filter.state().len() * filter.state().len();
         for row in 0..samples.rows {
             samples.read(row, &mut sample);
-            self.predicted_states.extend_from_slice(filter.state().as_slice());
-            self.predicted_covariances.extend_from_slice(filter.covariance().matrix().as_slice());
+            self.predicted_states.push(filter.state().as_slice());
+            filter
+                .covariance()
+                .write_into(self.predicted_covariances.next(entries))
+                .map_err(|error| (row, error))?;
             let innovation = filter.correct(&sample).map_err(|error| (row, error))?;
-            self.filtered_states.extend_from_slice(filter.state().as_slice());
-            self.filtered_covariances.extend_from_slice(filter.covariance().matrix().as_slice());
-            self.errors.extend_from_slice(innovation.error.as_slice());
-            self.variances.extend_from_slice(innovation.variance.as_slice());
-            self.nis.push(innovation.nis);
+            self.filtered_states.push(filter.state().as_slice());
+            filter
+                .covariance()
+                .write_into(self.filtered_covariances.next(entries))
+                .map_err(|error| (row, error))?;
+            self.errors.push(innovation.error.as_slice());
+            self.variances.push(innovation.variance.as_slice());
+            self.nis.push(&[innovation.nis]);
             self.codes.push(innovation::code(innovation.action));
             self.log_likelihood += innovation.log_likelihood();
             filter.predict(&sample).map_err(|error| (row, error))?;
         }
         Ok(())
     }
+}
 
-    pub(crate) fn finish(self, py: Python<'_>, n: usize, m: usize) -> PyResult<FilterTrajectory> {
-        let rows = self.nis.len();
-        Ok(FilterTrajectory {
-            predicted_states: shaped(py, self.predicted_states, [rows, n])?.unbind(),
-            predicted_covariances: shaped(py, self.predicted_covariances, [rows, n, n])?.unbind(),
-            filtered_states: shaped(py, self.filtered_states, [rows, n])?.unbind(),
-            filtered_covariances: shaped(py, self.filtered_covariances, [rows, n, n])?.unbind(),
-            errors: shaped(py, self.errors, [rows, m])?.unbind(),
-            variances: shaped(py, self.variances, [rows, m])?.unbind(),
-            nis: PyArray1::from_vec(py, self.nis).unbind(),
-            codes: PyArray1::from_vec(py, self.codes).unbind(),
-            log_likelihood: self.log_likelihood,
-        })
-    }
+/// Does the work of a run, and gives back what that returns beside the results.
+pub(crate) fn recorded<F>(
+    py: Python<'_>,
+    [rows, n, m]: [usize; 3],
+    work: impl FnOnce(&mut Record<'_>) -> PyResult<F>,
+) -> PyResult<(F, FilterTrajectory)> {
+    let shapes: [&[usize]; 7] =
+        [&[rows, n], &[rows, n, n], &[rows, n], &[rows, n, n], &[rows, m], &[rows, m], &[rows]];
+    let shapes = shapes.map(<[usize]>::to_vec);
+    let (results, codes) = (Results::new(py, shapes)?, room(&[rows])?);
+    let (filter, codes, log_likelihood) = results.write(|columns| {
+        let [
+            predicted_states,
+            predicted_covariances,
+            filtered_states,
+            filtered_covariances,
+            errors,
+            variances,
+            nis,
+        ] = columns;
+        let mut record = Record {
+            predicted_states,
+            predicted_covariances,
+            filtered_states,
+            filtered_covariances,
+            errors,
+            variances,
+            nis,
+            codes,
+            log_likelihood: 0.0,
+        };
+        work(&mut record).map(|filter| (filter, record.codes, record.log_likelihood))
+    })??;
+    let [
+        predicted_states,
+        predicted_covariances,
+        filtered_states,
+        filtered_covariances,
+        errors,
+        variances,
+        nis,
+    ] = results.arrays()?.map(Bound::unbind);
+    let trajectory = FilterTrajectory {
+        predicted_states,
+        predicted_covariances,
+        filtered_states,
+        filtered_covariances,
+        errors,
+        variances,
+        nis: nis.into_bound(py).cast_into()?.unbind(),
+        codes: PyArray1::from_vec(py, codes).unbind(),
+        log_likelihood,
+    };
+    Ok((filter, trajectory))
 }
 
 /// Smoothed states, and their covariances, row by row.
@@ -405,18 +445,23 @@ pub(crate) fn smooth<T: Transition<f64, Dyn, Dyn>, O: Observation<f64, Dyn, Dyn,
     observation: &O,
     samples: &Slices<'_>,
     before: impl Fn(&Covariance<f64, Dyn>),
+    troubled: impl Fn() -> bool,
 ) -> Result<Smoothed, (usize, Error)> {
     let mut smoother = Smoother::new(filter);
-    let mut sample = samples.sample();
+    let mut sample = samples.sample(Dyn(samples.outputs));
+    // The error gives way to what the function said.
+    let well = |row| if troubled() { Err((row, Error::Overflow)) } else { Ok(()) };
     for row in 0..samples.rows {
         if row > 0 {
             before(smoother.filter().covariance());
             smoother.predict(transition, &sample.inputs[0]).map_err(|error| (row - 1, error))?;
+            well(row - 1)?;
         }
         samples.read(row, &mut sample);
         before(smoother.filter().covariance());
         let corrected = smoother.correct(observation, &sample.inputs[1], &sample.measurement);
         corrected.map_err(|error| (row, error))?;
+        well(row)?;
     }
     let (mut states, mut covariances) = (Vec::new(), Vec::new());
     for smoothed in smoother.smooth().map_err(|error| (0, error))? {

@@ -26,6 +26,11 @@ impl<Linear> Used<'_, '_, Linear> {
         }
     }
 
+    /// Whether something went wrong in a function since the last time.
+    pub(crate) fn is_troubled(&self) -> bool {
+        matches!(self, Used::Called(called) if !called.is_well())
+    }
+
     /// What went wrong in a function since the last time.
     pub(crate) fn trouble(&self) -> Option<Trouble> {
         match self {

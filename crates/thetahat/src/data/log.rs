@@ -47,6 +47,8 @@ pub struct Log {
     jumps: Vec<usize>,
     /// Those of them at which another log begins.
     borders: Vec<usize>,
+    /// Seconds from the first row of the log that this one was cut from, from where slopes are counted.
+    before: f64,
 }
 
 /// How a log that is not uniform is read between its samples.
@@ -119,7 +121,15 @@ impl Log {
             ));
         }
         let rows = check(&channels)?;
-        Ok(Self { channels, rows, sample_time, time: None, jumps: Vec::new(), borders: Vec::new() })
+        Ok(Self {
+            channels,
+            rows,
+            sample_time,
+            time: None,
+            jumps: Vec::new(),
+            borders: Vec::new(),
+            before: 0.0,
+        })
     }
 
     /// A log with a clock: `time` in seconds, one value for each row. The sample time is the median step;
@@ -147,7 +157,15 @@ impl Log {
                 });
             }
         }
-        Ok(Self { channels, rows, sample_time: median, time: Some(time), jumps, borders: Vec::new() })
+        Ok(Self {
+            channels,
+            rows,
+            sample_time: median,
+            time: Some(time),
+            jumps,
+            borders: Vec::new(),
+            before: 0.0,
+        })
     }
 
     /// A uniform log read off one with an irregular clock, every `step` seconds from its first sample on.
@@ -206,6 +224,7 @@ impl Log {
             time: Some(instants),
             jumps: Vec::new(),
             borders: Vec::new(),
+            before: 0.0,
         })
     }
 
@@ -250,7 +269,8 @@ impl Log {
         Ok(joined)
     }
 
-    /// Some rows of some channels, as a log of its own with the same sample time.
+    /// Some rows of some channels, as a log of its own with the same sample time. A line that was taken from a channel goes on
+    /// in it as in the whole log.
     ///
     /// # Errors
     /// [`Error::Data`] for a channel or rows that are not there.
@@ -274,11 +294,12 @@ impl Log {
             time: self.time.as_ref().map(|time| time[range.clone()].to_vec()),
             jumps: inside(&self.jumps),
             borders: inside(&self.borders),
+            before: self.elapsed(range.start),
         })
     }
 
     /// A log that was taken apart to store it: by its channels, [sample time](Self::sample_time), [clock](Self::time),
-    /// [breaks](Self::breaks) and [borders](Self::borders).
+    /// [breaks](Self::breaks), [borders](Self::borders) and what came [before](Self::before).
     ///
     /// # Errors
     /// As for [`Log::new`]; [`Error::Data`] if the clock does not go with the rows, or a break is no row of the log.
@@ -288,6 +309,7 @@ impl Log {
         time: Option<Vec<f64>>,
         breaks: Vec<usize>,
         borders: Vec<usize>,
+        before: f64,
     ) -> Result<Self, Error> {
         let log = Self::new(channels, sample_time)?;
         let finite = |time: &Vec<f64>| time.len() == log.rows && time.iter().all(|time| time.is_finite());
@@ -296,10 +318,10 @@ impl Log {
             inside && positions.is_sorted_by(|a, b| a < b)
         };
         let known = borders.iter().all(|border| breaks.binary_search(border).is_ok());
-        if !(time.iter().all(finite) && rising(&breaks) && rising(&borders) && known) {
+        if !(time.iter().all(finite) && rising(&breaks) && rising(&borders) && known && before.is_finite()) {
             return Err(Error::data("the parts of a stored log do not fit together; store it again"));
         }
-        Ok(Self { time, jumps: breaks, borders, ..log })
+        Ok(Self { time, jumps: breaks, borders, before, ..log })
     }
 
     /// The rows (0-based) before which no segment reaches back: where the clock jumps, or another log begins.
@@ -332,12 +354,18 @@ impl Log {
         self.time.as_deref()
     }
 
-    /// Seconds from the first row to a row (0-based).
+    /// Seconds from the first row to a row (0-based); of a [part](Self::part), from that of the whole log.
     pub(crate) fn elapsed(&self, row: usize) -> f64 {
-        match &self.time {
-            Some(time) => time[row] - time[0],
-            None => row as f64 * self.sample_time,
-        }
+        self.before
+            + match &self.time {
+                Some(time) => time[row] - time[0],
+                None => row as f64 * self.sample_time,
+            }
+    }
+
+    /// Seconds from the first row of the log that this one was cut from to its own.
+    pub fn before(&self) -> f64 {
+        self.before
     }
 
     /// The channels in their order.

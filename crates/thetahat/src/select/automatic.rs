@@ -13,12 +13,22 @@ use crate::{Error, Orders, Structure};
 /// The highest order of ARX and AR models, and of the others.
 const LONGEST: usize = 10;
 const HIGHEST: usize = 3;
+/// So many inputs at most: a Gram matrix of all their lags has to fit.
+const MOST_INPUTS: usize = 100;
 /// So many samples for each parameter at least.
 const SAMPLES: usize = 4;
 /// # Errors
 /// As for [`choose`](super::choose).
 pub(super) fn choose(task: &Task<'_>, automatic: &Automatic) -> Result<Found, Error> {
     let inputs = task.estimation.inputs.len();
+    if inputs > MOST_INPUTS {
+        return Err(Error::argument(
+            "inputs",
+            format!(
+                "{inputs} are too many to choose delays and orders for (at most {MOST_INPUTS}); give orders, or fewer inputs"
+            ),
+        ));
+    }
     let structures = structures(task, automatic)?;
     let driven = structures.iter().any(|structure| !matches!(structure, Structure::Ar | Structure::Arma));
     let mut steps = Vec::new();

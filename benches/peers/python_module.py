@@ -76,7 +76,7 @@ def recursive():
     outputs = regressors @ theta + 0.1 * numpy.random.standard_normal(samples)
 
     def ours():
-        return thetahat.RecursiveLeastSquares(size, forgetting=0.99).run(regressors, outputs).parameters[-1]
+        return thetahat.RecursiveLeastSquares(size, forgetting=0.99).run(regressors, outputs).parameters[-1].copy()
 
     def theirs():
         peer = padasip.filters.FilterRLS(n=size, mu=0.99, w="zeros")
@@ -100,7 +100,8 @@ def kalman():
     observation = thetahat.LinearObservation(look, error)
 
     def ours():
-        return thetahat.KalmanFilter(numpy.zeros(4), numpy.eye(4)).run(transition, observation, measured).filtered_states[-1]
+        kalman = thetahat.KalmanFilter(numpy.zeros(4), numpy.eye(4))
+        return kalman.run(transition, observation, measured).filtered_states[-1].copy()
 
     def theirs():
         peer = KalmanFilter(dim_x=4, dim_z=2)

@@ -220,7 +220,7 @@ def test_a_line_goes_on_in_a_part_of_the_log() -> None:
     for t in range(1, 300):
         y[t] = 0.7 * y[t - 1] + u[t - 1] + 0.01 * e[t]
     for clock in ({"sample_time": 0.5}, {"time": 100 + 0.5 * np.arange(300)}):
-        log = th.Log(y + 0.3 * np.arange(300), u, **clock)  # type: ignore[arg-type]
+        log = th.Log(y + 0.3 * np.arange(300), u, **clock)
         model = th.arx(log[:200], 1, 1, detrend="linear")
         assert np.allclose(model.predict(log[200:])[1:], model.predict(log)[201:], atol=1e-9)
         assert model.validate(log[200:]).fit(1) > 95

@@ -187,7 +187,8 @@ fn a_part_is_cut_where_the_log_is() {
     let values = &part.channels()[0].values;
     assert!(values[4].is_nan() && [&values[..4], &values[5..]].concat() == [4.5, 5.5, 0.5, 1.5, 3.5, 4.5]);
     assert_eq!((part.rows(), part.breaks(), part.borders()), (7, &[2, 5][..], &[2][..]));
-    assert_eq!(part.sample_time(), log.sample_time());
+    assert_eq!((part.sample_time(), part.before()), (log.sample_time(), 1.0));
+    assert_eq!(part.part(&["y"], rows("2..3")).unwrap().before(), 1.1);
     // A jump that the part begins with is none.
     assert!(log.part(&["u"], rows("4..6")).unwrap().breaks().is_empty());
     assert!(log.part(&["w"], rows("1..2")).is_err() && log.part(&["u"], rows("1..7")).is_err());
@@ -204,6 +205,7 @@ fn a_stored_log_comes_back() {
             time,
             breaks.to_vec(),
             borders.to_vec(),
+            joined.before(),
         )
     };
     let time = joined.time().map(<[f64]>::to_vec);

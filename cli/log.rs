@@ -137,7 +137,7 @@ fn columns(
             if let Some(name) =
                 header.iter().find(|name| ["t", "time"].contains(&name.to_lowercase().as_str()))
             {
-                words.push(format!("{file}: column '{name}' looks like a clock; --time={name} would use it"));
+                words.push(format!("{file}: column '{name}' looks like a clock; --time {name} would use it"));
             }
             None
         }

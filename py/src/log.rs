@@ -24,6 +24,9 @@ pub(crate) struct Log {
     pub(crate) output: String,
 }
 
+/// Channels by name.
+type Named<'py> = Vec<(String, Bound<'py, PyAny>)>;
+
 /// Times, how to resample, and the first time as it was written.
 type Clock<'py> = (Bound<'py, PyAny>, Option<(f64, String)>, Option<String>);
 
@@ -35,7 +38,7 @@ impl Log {
     #[pyo3(signature = (channels, inputs, output, sample_time, clock=None))]
     fn new(
         py: Python<'_>,
-        channels: Vec<(String, Bound<'_, PyAny>)>,
+        channels: Named<'_>,
         inputs: Vec<String>,
         output: String,
         sample_time: f64,
@@ -173,10 +176,9 @@ impl Log {
 
     /// Makes the log again of what `__reduce__` gave.
     #[staticmethod]
-    #[allow(clippy::type_complexity, reason = "it mirrors __reduce__")]
     fn _restore(
         py: Python<'_>,
-        data: (Vec<(String, Bound<'_, PyAny>)>, Vec<String>, String, f64),
+        data: (Named<'_>, Vec<String>, String, f64),
         clock: (Option<Bound<'_, PyAny>>, Vec<usize>, Vec<usize>, f64, String),
     ) -> PyResult<Self> {
         let (channels, inputs, output, sample_time) = data;
@@ -197,7 +199,7 @@ pub(crate) fn copy(log: &thetahat::Log, names: &[&str]) -> Result<thetahat::Log,
 }
 
 /// Copies the channels: from then on the log owns its data.
-fn read(channels: Vec<(String, Bound<'_, PyAny>)>) -> PyResult<Vec<Channel>> {
+fn read(channels: Named<'_>) -> PyResult<Vec<Channel>> {
     let own = |(name, values): (String, Bound<'_, PyAny>)| {
         let values = vector(&name, &values, None)?.as_slice()?.to_vec();
         Ok(Channel { name, values })

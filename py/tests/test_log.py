@@ -187,7 +187,7 @@ def test_files_are_read_as_on_the_command_line(tmp_path: Path) -> None:
 def test_what_looks_like_a_clock_is_a_word_of_warning(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text("t,u,y\n0,1,0\n1,0,1\n")
-    with pytest.warns(UserWarning, match="looks like a clock; time=t would use it"):
+    with pytest.warns(UserWarning, match="looks like a clock; time t would use it"):
         th.read_csv(path)
     path.write_text("0,1,2\n1,0,1\n2,0,3\n")
     with pytest.warns(UserWarning, match="read it with header=False"):

@@ -202,6 +202,12 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
         Ok(RecursiveArmax { estimator: self.estimator.with_covariance(covariance)?, ..self })
     }
 
+    /// The same with a noise variance that is known from earlier samples. See
+    /// [`RecursiveLeastSquares::with_noise_variance`], whose errors it has.
+    pub fn with_noise_variance(self, variance: T, samples: usize) -> Result<Self, Error> {
+        Ok(RecursiveArmax { estimator: self.estimator.with_noise_variance(variance, samples)?, ..self })
+    }
+
     /// The same with a dead zone. See [`RecursiveLeastSquares::with_dead_zone`], whose errors it has.
     pub fn with_dead_zone(self, width: T) -> Result<Self, Error> {
         Ok(RecursiveArmax { estimator: self.estimator.with_dead_zone(width)?, ..self })
@@ -295,15 +301,25 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
     /// As [`RecursiveArx::predict`](crate::RecursiveArx::predict), whose arguments and errors it has. Residuals that
     /// are known enter by C(q); those to come are expected to be 0.
     pub fn predict(&self, future_inputs: &[T], outputs: &mut [T]) -> Result<(), Error> {
+        self.predict_in(&mut self.lags.clone(), future_inputs, outputs)
+    }
+
+    /// The same as [`predict`](RecursiveArmax::predict) in delay lines of the caller. As
+    /// [`RecursiveArx::predict_in`](crate::RecursiveArx::predict_in), whose errors it has.
+    pub fn predict_in(
+        &self,
+        room: &mut Lags<T, N, D>,
+        future_inputs: &[T],
+        outputs: &mut [T],
+    ) -> Result<(), Error> {
+        room.copy_from(&self.lags)?;
         let parameters = self.estimator.parameters().as_slice();
-        predict_ahead(
-            self.lags.clone(),
-            self.lags.inputs(),
-            parameters,
-            self.residual,
-            future_inputs,
-            outputs,
-        )
+        predict_ahead(room, self.lags.inputs(), parameters, self.residual, future_inputs, outputs)
+    }
+
+    /// The delay lines: the samples and residuals that the next samples are predicted from.
+    pub fn lags(&self) -> &Lags<T, N, D> {
+        &self.lags
     }
 
     /// A(q): 1, a_1 … a_na.

@@ -130,6 +130,12 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
         Ok(RecursiveArx { estimator: self.estimator.with_solution(solution)?, ..self })
     }
 
+    /// The same with a noise variance that is known from earlier samples. See
+    /// [`RecursiveLeastSquares::with_noise_variance`], whose errors it has.
+    pub fn with_noise_variance(self, variance: T, samples: usize) -> Result<Self, Error> {
+        Ok(RecursiveArx { estimator: self.estimator.with_noise_variance(variance, samples)?, ..self })
+    }
+
     /// The same with a dead zone. See [`RecursiveLeastSquares::with_dead_zone`], whose errors it has.
     pub fn with_dead_zone(self, width: T) -> Result<Self, Error> {
         Ok(RecursiveArx { estimator: self.estimator.with_dead_zone(width)?, ..self })
@@ -183,8 +189,27 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
     /// model; [`Error::Infinite`]; both leave `outputs` as they were. [`Error::Overflow`] if an unstable model grows
     /// out of `T`: the outputs before that are written, the others are NaN.
     pub fn predict(&self, future_inputs: &[T], outputs: &mut [T]) -> Result<(), Error> {
+        self.predict_in(&mut self.lags.clone(), future_inputs, outputs)
+    }
+
+    /// The same as [`predict`](RecursiveArx::predict) in delay lines of the caller, such as a clone of
+    /// [`lags`](RecursiveArx::lags), whose samples are lost: with `Dyn` it does not allocate.
+    ///
+    /// Errors: those of `predict`; [`Error::Length`] (only with `Dyn`) if the lines have another size.
+    pub fn predict_in(
+        &self,
+        room: &mut Lags<T, N, D>,
+        future_inputs: &[T],
+        outputs: &mut [T],
+    ) -> Result<(), Error> {
+        room.copy_from(&self.lags)?;
         let parameters = self.estimator.parameters().as_slice();
-        predict_ahead(self.lags.clone(), self.lags.inputs(), parameters, T::zero(), future_inputs, outputs)
+        predict_ahead(room, self.lags.inputs(), parameters, T::zero(), future_inputs, outputs)
+    }
+
+    /// The delay lines: the samples that the next ones are predicted from.
+    pub fn lags(&self) -> &Lags<T, N, D> {
+        &self.lags
     }
 
     /// A(q): 1, a_1 … a_na.
@@ -234,7 +259,7 @@ pub(crate) fn is_large<T: Real>(sample: T, size: usize) -> bool {
 /// Runs a model on from `lags`: its predictions become its outputs. The model has `inputs` inputs and may have one
 /// more, the residuals: the last one is known, and those to come are expected to be 0.
 pub(crate) fn predict_ahead<T: Real, N: Dimension, D: Dimension>(
-    mut lags: Lags<T, N, D>,
+    lags: &mut Lags<T, N, D>,
     inputs: usize,
     parameters: &[T],
     mut residual: T,

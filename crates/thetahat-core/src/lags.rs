@@ -266,6 +266,23 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
         Ok(())
     }
 
+    /// Takes over the samples of other lines of the same orders.
+    ///
+    /// Errors, after which nothing has changed: [`Error::Length`] (only with `Dyn`).
+    pub(crate) fn copy_from(&mut self, other: &Self) -> Result<(), Error> {
+        check_length("room", other.regressor.len(), self.regressor.len())?;
+        check_length("room", other.delayed.len(), self.delayed.len())?;
+        ud::copy(other.regressor.as_slice(), self.regressor.as_mut_slice());
+        ud::copy(other.delayed.as_slice(), self.delayed.as_mut_slice());
+        self.lines
+            .as_mut_slice()
+            .iter_mut()
+            .zip(other.lines.as_slice())
+            .for_each(|(line, &other)| *line = other);
+        (self.na, self.inputs) = (other.na, other.inputs);
+        Ok(())
+    }
+
     /// The typical magnitude of each element of φ, given that of the output and of each input.
     pub(crate) fn scales(&self, output: T, input: impl Fn(usize) -> T) -> OVector<T, N> {
         let mut scales = self.regressor.shape_generic().0.vector(output);

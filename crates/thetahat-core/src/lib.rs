@@ -19,7 +19,7 @@
 //! | `Differentiated` | exact Jacobians of one generic function (feature `autodiff`) |
 //!
 //! Each sample returns an [`Innovation`]: what was not predicted, how surprising it is, and the [`Action`] that was
-//! taken. A [`Covariance`] is kept factored, so that it never becomes indefinite.
+//! taken. A [`ChangeDetector`] watches innovations for what the model did not expect. A [`Covariance`] is kept factored, so that it never becomes indefinite.
 //!
 //! All work with `f32` and `f64` ([`Real`]) and with sizes in the type, `Const<4>`, or at run time, `Dyn`
 //! ([`Dimension`]). Vectors and matrices are those of [nalgebra](mod@nalgebra), which this crate re-exports.
@@ -96,6 +96,7 @@ mod armax;
 mod arx;
 mod augmented;
 mod covariance;
+mod detect;
 #[cfg(feature = "autodiff")]
 mod differentiated;
 mod dim;
@@ -131,6 +132,7 @@ pub use armax::{ArmaxMethod, ArmaxOrders, RecursiveArmax};
 pub use arx::RecursiveArx;
 pub use augmented::{Augmented, ParametricObservation, ParametricTransition, WithoutParameters};
 pub use covariance::Covariance;
+pub use detect::{Alarm, ChangeDetector, Chart};
 #[cfg(feature = "autodiff")]
 pub use differentiated::{Differentiated, ObservationFunction, TransitionFunction};
 pub use dim::Dimension;

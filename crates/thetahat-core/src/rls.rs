@@ -213,6 +213,42 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>> RecursiveLeastSquares<T, N> {
         Ok(Innovation { error, variance, nis, action })
     }
 
+    /// The same with a noise variance that is known from so many earlier samples, as from a batch fit: σ̂² is
+    /// `variance` until the next sample, and the earlier samples weigh as they would have if they had come in here,
+    /// all alike. For [`with_parameters`](RecursiveLeastSquares::with_parameters) and
+    /// [`with_covariance`](RecursiveLeastSquares::with_covariance), which say nothing of the noise.
+    ///
+    /// ```text
+    /// W = W₂ = samples,     v = variance (samples - n)/samples
+    /// ```
+    ///
+    /// Errors: [`Error::OutOfRange`] if the variance is not finite and at least 0; [`Error::TooFewRows`] if there are
+    /// not more samples than parameters.
+    ///
+    /// ```
+    /// use thetahat_core::nalgebra::{Const, Vector2};
+    /// use thetahat_core::{Error, Forgetting, RecursiveLeastSquares};
+    ///
+    /// let line: RecursiveLeastSquares<f64, Const<2>> =
+    ///     RecursiveLeastSquares::new(&Vector2::new(1.0, 1.0), Forgetting::None)?.with_noise_variance(0.25, 100)?;
+    /// assert!((line.noise_variance().unwrap() - 0.25).abs() < 1e-15);
+    /// # Ok::<(), Error>(())
+    /// ```
+    pub fn with_noise_variance(mut self, variance: T, samples: usize) -> Result<Self, Error> {
+        if !(variance >= T::zero() && variance.is_finite()) {
+            return Err(Error::OutOfRange { argument: "variance", range: "finite and at least 0" });
+        }
+        let n = self.bounds.len();
+        if samples <= n {
+            return Err(Error::TooFewRows { needed: n.saturating_add(1), found: samples });
+        }
+        let share = T::from_count(samples - n) / T::from_count(samples);
+        self.residuals.mean_squares.fill(variance * share);
+        let samples = T::from_count(samples);
+        (self.residuals.weights, self.residuals.squared_weights) = (samples, samples);
+        Ok(self)
+    }
+
     /// φ'θ̂: the output this regressor predicts, in the unit of y. n multiply-adds.
     ///
     /// Errors: [`Error::Length`] (only with `Dyn`); [`Error::NotFinite`] if the regressor holds NaN or infinity;
@@ -241,6 +277,18 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>> RecursiveLeastSquares<T, N> {
     /// [`parameter_covariance`](RecursiveLeastSquares::parameter_covariance), and `None` where that is.
     pub fn standard_errors(&self) -> Option<OVector<T, N>> {
         self.standard_errors_of(0)
+    }
+
+    /// Writes the [standard errors](RecursiveLeastSquares::standard_errors) into `target`, NaN where they are not
+    /// known: with `Dyn` it does not allocate.
+    ///
+    /// Errors: [`Error::Length`] if it does not have n elements.
+    pub fn write_standard_errors(&self, target: &mut [T]) -> Result<(), Error> {
+        check_length("target", self.bounds.len(), target.len())?;
+        if !self.fill_standard_errors(0, target) {
+            target.fill(T::NAN);
+        }
+        Ok(())
     }
 }
 
@@ -514,12 +562,16 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
     /// multiply-adds, n square roots.
     pub fn standard_errors_of(&self, output: usize) -> Option<OVector<T, N>> {
         let mut errors = self.bounds.shape_generic().0.vector(T::zero());
-        ud::diagonals(self.covariance.as_slice(), self.variance_scale(output)?, errors.as_mut_slice());
-        if !errors.as_slice().iter().all(T::is_finite) {
-            return None;
-        }
-        errors.as_mut_slice().iter_mut().for_each(|error| *error = error.sqrt());
-        Some(errors)
+        self.fill_standard_errors(output, errors.as_mut_slice()).then_some(errors)
+    }
+
+    /// Writes the standard errors of one output; says whether they are known.
+    fn fill_standard_errors(&self, output: usize, errors: &mut [T]) -> bool {
+        let Some(scale) = self.variance_scale(output) else { return false };
+        ud::diagonals(self.covariance.as_slice(), scale, errors);
+        let known = errors.iter().all(T::is_finite);
+        errors.iter_mut().for_each(|error| *error = error.sqrt());
+        known
     }
 
     /// What makes P the covariance of the parameters of one output.

@@ -6,9 +6,9 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use thetahat_core::nalgebra::{Const, DVector, Dyn, Matrix2, RowVector2, SVector, Vector1, Vector2, Vector3};
 use thetahat_core::{
-    ArmaxMethod, ArmaxOrders, ArxOrders, Covariance, ExtendedKalmanFilter, Forgetting, InputOrders,
-    KalmanFilter, Lags, LeastSquares, LinearObservation, LinearTransition, LuenbergerObserver,
-    RecursiveArmax, RecursiveArx, RecursiveLeastSquares, Start,
+    Action, ArmaxMethod, ArmaxOrders, ArxOrders, ChangeDetector, Covariance, ExtendedKalmanFilter,
+    Forgetting, Innovation, InputOrders, KalmanFilter, Lags, LeastSquares, LinearObservation,
+    LinearTransition, LuenbergerObserver, RecursiveArmax, RecursiveArx, RecursiveLeastSquares, Start,
 };
 
 const INPUTS: &[InputOrders] = &[InputOrders { nb: 1, nk: 2 }];
@@ -54,6 +54,18 @@ fn check<E: Serialize + DeserializeOwned + Debug, A: Debug>(
 /// A missing output at k = 6 and 19.
 fn output(k: usize) -> f64 {
     if k == 6 || k == 19 { f64::NAN } else { 3.0 * value(5 * k + 2) }
+}
+
+#[test]
+fn change_detector() {
+    for (mean, variance) in [(2.0, 2.0), (f64::INFINITY, 1.5), (3.0, f64::INFINITY)] {
+        check(ChangeDetector::new(mean, variance).expect("thresholds"), |detector, k| {
+            let error = output(k);
+            let innovation =
+                Innovation { error, variance: 0.7, nis: error * error / 0.7, action: Action::Updated };
+            detector.update(&innovation)
+        });
+    }
 }
 
 #[test]

@@ -325,6 +325,41 @@ fn no_sample_that_is_accepted_holds_time() {
     assert!(arx.update(&[1.0], 0.5).unwrap().error.is_finite());
 }
 
+#[cfg(feature = "alloc")]
+#[test]
+fn predictions_in_used_lines_are_the_same() {
+    use nalgebra::Dyn;
+
+    use crate::{ArmaxMethod, ArmaxOrders, RecursiveArmax};
+
+    let inputs = [one(2, 1), one(1, 3)];
+    let orders = ArxOrders { na: 2, inputs: &inputs };
+    let mut arx: RecursiveArx<f64, Dyn, Dyn> =
+        RecursiveArx::new(&orders, 1.0, &[1.0, 1.0], FORGETTING).unwrap();
+    let orders = ArmaxOrders { na: 2, inputs: &inputs, nc: 2 };
+    let method = ArmaxMethod::PredictionError;
+    let mut armax: RecursiveArmax<f64, Dyn, Dyn> =
+        RecursiveArmax::new(&orders, method, 1.0, &[1.0, 1.0], 1.0, FORGETTING).unwrap();
+    let (mut room, mut other) = (arx.lags().clone(), armax.lags().clone());
+    let mut noise = Noise(9);
+    for k in 0..60 {
+        let u = [noise.next(), noise.next()];
+        let y = if k == 30 { f64::NAN } else { noise.next() };
+        arx.update(&u, y).unwrap();
+        armax.update(&u, y).unwrap();
+        let future: Vec<f64> = (0..8).map(|_| noise.next()).collect();
+        let (mut expected, mut found) = ([0.0; 4], [0.0; 4]);
+        arx.predict(&future, &mut expected).unwrap();
+        arx.predict_in(&mut room, &future, &mut found).unwrap();
+        assert_eq!(debug(&found), debug(&expected));
+        armax.predict(&future, &mut expected).unwrap();
+        armax.predict_in(&mut other, &future, &mut found).unwrap();
+        assert_eq!(debug(&found), debug(&expected));
+    }
+    let error = arx.predict_in(&mut other, &[], &mut []).unwrap_err();
+    assert_eq!(error, Error::Length { argument: "room", expected: 5, found: 7 });
+}
+
 #[test]
 fn predictions_need_samples_and_stay_finite() {
     let orders = ArxOrders { na: 1, inputs: &[one(1, 2)] };

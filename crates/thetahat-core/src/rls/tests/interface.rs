@@ -268,6 +268,66 @@ fn arguments_are_checked() {
 }
 
 #[test]
+fn a_noise_variance_that_is_known_is_that_of_a_batch() {
+    let mut batch = LeastSquares::<f64, Const<3>>::new();
+    let mut noise = Noise(30);
+    let row = |noise: &mut Noise| {
+        let phi: Vector3<f64> = random(noise);
+        (phi, phi.sum() + 0.3 * noise.next())
+    };
+    for _ in 0..40 {
+        let (phi, y) = row(&mut noise);
+        batch.add(&phi, y).unwrap();
+    }
+    let solution = batch.solve().unwrap();
+    let variance = solution.residual_variance().unwrap();
+    let relative = Covariance::new(&(solution.covariance().unwrap() / variance)).unwrap();
+    for policy in POLICIES {
+        let mut expected = estimator::<f64, 3>(policy).with_solution(&solution).unwrap();
+        let mut found = estimator::<f64, 3>(policy)
+            .with_parameters(*solution.parameters())
+            .and_then(|estimator| {
+                estimator.with_covariance(relative.clone())?.with_noise_variance(variance, 40)
+            })
+            .unwrap();
+        assert!((found.noise_variance().unwrap() / variance - 1.0).abs() < 1e-14);
+        for _ in 0..50 {
+            let (phi, y) = row(&mut noise);
+            expected.update(&phi, y).unwrap();
+            found.update(&phi, y).unwrap();
+            let ratio = found.noise_variance().unwrap() / expected.noise_variance().unwrap();
+            // Rounding of P, which was formed from R.
+            assert!((ratio - 1.0).abs() < 1e-10, "{policy:?} {ratio}");
+        }
+    }
+    let fresh = || estimator::<f64, 3>(Forgetting::None);
+    let too_few = Error::TooFewRows { needed: 4, found: 3 };
+    assert_eq!(fresh().with_noise_variance(1.0, 3).unwrap_err(), too_few);
+    assert_eq!(fresh().with_noise_variance(0.0, 4).unwrap().noise_variance(), Some(0.0));
+    for variance in [-1.0, f64::NAN, f64::INFINITY] {
+        let error = fresh().with_noise_variance(variance, 9).unwrap_err();
+        assert!(matches!(error, Error::OutOfRange { argument: "variance", .. }));
+    }
+}
+
+#[test]
+fn standard_errors_are_written_where_they_are_asked_for() {
+    let mut estimator = estimator::<f64, 3>(Forgetting::default());
+    let (mut noise, mut errors) = (Noise(31), [0.0; 3]);
+    for k in 0..20 {
+        estimator.write_standard_errors(&mut errors).unwrap();
+        match estimator.standard_errors() {
+            Some(expected) => assert_eq!(errors, expected.as_slice()),
+            None => assert!(k <= 3 && errors.iter().all(|error| error.is_nan())),
+        }
+        let phi: Vector3<f64> = random(&mut noise);
+        estimator.update(&phi, noise.next()).unwrap();
+    }
+    let error = estimator.write_standard_errors(&mut [0.0; 2]).unwrap_err();
+    assert_eq!(error, Error::Length { argument: "target", expected: 3, found: 2 });
+}
+
+#[test]
 fn a_clone_goes_on_as_the_original() {
     for policy in POLICIES {
         let mut original = estimator::<f64, 3>(policy);

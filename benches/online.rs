@@ -7,6 +7,7 @@ use std::time::Duration;
 use criterion::BenchmarkGroup;
 use criterion::Criterion;
 use criterion::measurement::WallTime;
+use thetahat::{Orders, PerChannel, TrackPlan, Tracker};
 use thetahat_core::nalgebra::{self, Const, SMatrix, SVector};
 use thetahat_core::{
     ArxOrders, Covariance, Forgetting, InputOrders, KalmanFilter, LinearObservation, LinearTransition, Real,
@@ -24,6 +25,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         .configure_from_args();
     precision::<f64>(&mut criterion, "f64")?;
     precision::<f32>(&mut criterion, "f32")?;
+    tracker(&mut criterion)?;
     criterion.final_summary();
     Ok(())
 }
@@ -72,6 +74,21 @@ fn recursive_arx<T: Real>(group: &mut BenchmarkGroup<'_, WallTime>) -> Result<()
         bencher.iter(|| {
             k = (k + 1) % SAMPLES;
             plant.update(&[value(k)], value(3 * k + 1))
+        });
+    });
+    Ok(())
+}
+
+/// What a program runs that got its orders from a person: run-time sizes, a prediction, charts for changes.
+fn tracker(criterion: &mut Criterion) -> Result<(), thetahat::Error> {
+    let scales = PerChannel { inputs: vec![1.0], output: 1.0 };
+    let plan = TrackPlan { scales: Some(scales), false_alarms: Some(10_000.0), ..TrackPlan::default() };
+    let mut tracker = Tracker::new(&Orders::arx(4, &[4], &[1])?, &plan)?;
+    let mut k = 0;
+    criterion.bench_function("Tracker, ARX(4, 4, 1)", |bencher| {
+        bencher.iter(|| {
+            k = (k + 1) % SAMPLES;
+            tracker.update(&[value(k)], value(3 * k + 1))
         });
     });
     Ok(())

@@ -16,26 +16,34 @@
 //! - [`predict`], [`simulate`] and [`forecast`] say what a [`Model`] says, [`frequency_response`] what it is to each
 //!   frequency; [`Fit`] says how close that is.
 //! - [`Model::state_space`] writes a model as a recursion of first order, for filters and controllers.
+//! - [`StateFilter`] estimates the state of a [`StateModel`] row by row: of a report, of matrices, or of a model in equations,
+//!   a [`GreyBox`], of which parameters may be unknown.
 //! - [`inspect`] says what a log is worth before any fit.
 //! - [`identify`] goes the whole way from a [`Log`] to a [`Report`], the JSON document; [`apply`] takes a stored model to a log.
 //! - [`validate()`] says how a stored model does on a log and what is left of it, [`compare`] puts several side by side, a
 //!   [`Requirement`] makes a gate of it.
+//! - A [`Tracker`] estimates ARX and ARMAX models while the plant runs, sample by sample, with predictions and with alarms
+//!   where the plant changes.
 //! - With the feature `html`, `fit_page` and its like make pages with charts of them.
 //!
 //! Rows of a log are counted from 1 and ranges include both ends; sample positions inside a [`Record`] are counted from 0.
 //! The same input gives the same bits, whatever the number of threads.
 //!
-//! What it does not do: open files, print, or estimate while a system runs. For the last see `thetahat-core`.
+//! What it does not do: open files, print, or run without a heap. For the last see `thetahat-core`, whose estimators a
+//! [`Tracker`] and a [`StateFilter`] are made of.
 
 mod data;
 mod error;
 mod estimate;
+mod filter;
+mod greybox;
 mod inspect;
 mod model;
 mod regression;
 mod report;
 mod respond;
 mod select;
+mod track;
 mod validate;
 
 pub use data::{Channel, Detrend, Interpolation, Log, Offset, Record, Rows, Split};
@@ -45,6 +53,11 @@ pub use estimate::{
     Procedure, Progress, Search, SearchOutcome, Solver, StartOutcome, Step, Stopped, arx, arx_factor,
     estimate, estimate_monitored,
 };
+pub use filter::{
+    Estimated, Estimator, FilterSummary, NisSummary, ObserverGain, SmoothedStates, StateEstimate,
+    StateFilter, StateModel, Totals, Values,
+};
+pub use greybox::{GreyBox, GreyFit, GreyOutput, GreyParameter, GreyReport, GreySearch, GreyState, fit_grey};
 pub use inspect::{
     ChannelQuality, Clock, DelayEstimate, Excitation, Feedback, Inspection, InspectionPlan, Recording,
     Saturation, SpectrumPoint, Times, inspect,
@@ -67,4 +80,7 @@ pub use select::{
     choose_orders,
 };
 pub use thetahat_core;
+pub use track::{
+    Beginning, PerChannel, Policy, TrackMethod, TrackPlan, TrackScore, Tracked, Tracker, change_detector,
+};
 pub use validate::{Anderson, AndersonLevel, Fit, Horizon, Independence, Part, Residuals, Test};

@@ -1,7 +1,9 @@
-//! Iterations of a search take no memory: more of them allocate no more.
+//! Iterations of a search take no memory: more of them allocate no more. Samples of a tracker take none at all.
 
 use allocation_counter::measure;
-use thetahat::{Algorithm, Initial, Method, Orders, Procedure, Record, Search, estimate};
+use thetahat::{
+    Algorithm, Initial, Method, Orders, Procedure, Record, Search, TrackMethod, TrackPlan, Tracker, estimate,
+};
 
 /// A signal that looks random, and is the same everywhere.
 fn signal(length: usize, mut state: u32) -> Vec<f64> {
@@ -52,5 +54,40 @@ fn iterations_take_no_memory() {
             assert!(many > few, "{algorithm:?} {:?}", orders.structure());
             assert_eq!(after, before, "{algorithm:?} {:?}", orders.structure());
         }
+    }
+}
+
+#[test]
+fn samples_of_a_tracker_take_no_memory() {
+    let (u, e) = (signal(2000, 3), signal(2000, 4));
+    for (nc, method, forgetting) in [
+        (0, TrackMethod::Rls, "0.99"),
+        (0, TrackMethod::Rls, "directional:0.99"),
+        (0, TrackMethod::Rls, "random-walk:1e-4"),
+        (2, TrackMethod::Els, "none"),
+        (2, TrackMethod::Rpem, "0.99"),
+    ] {
+        let plan = TrackPlan {
+            method,
+            forgetting: forgetting.parse().unwrap(),
+            horizon: 5,
+            constant: true,
+            false_alarms: Some(1000.0),
+            ..TrackPlan::default()
+        };
+        let mut tracker = Tracker::new(&Orders::armax(2, &[2], nc, &[3]).unwrap(), &plan).unwrap();
+        let mut errors = vec![0.0; tracker.names().len()];
+        let (mut y, mut work) = (0.0, 0.0);
+        let mut run = |from: usize, to: usize| {
+            for t in from..to {
+                y = 0.8 * y + u[t] + e[t];
+                let measured = if t % 97 == 0 { f64::NAN } else { y };
+                work += tracker.update(&[u[t]], measured).unwrap().excitation;
+                work += tracker.forecast();
+                tracker.write_standard_errors(&mut errors).unwrap();
+            }
+        };
+        run(0, 100);
+        assert_eq!(measure(|| run(100, 2000)).count_total, 0, "{forgetting} {method}");
     }
 }

@@ -1,0 +1,249 @@
+//! Steps of the filters and the observer over models of both kinds.
+
+use thetahat_core::nalgebra::{Complex, DMatrix, DVector, Dyn};
+use thetahat_core::{
+    Covariance, Error, ExtendedKalmanFilter, Innovation, LuenbergerObserver, Observation, Smoother,
+    Transition,
+};
+
+use super::look::{self, Work};
+use super::model::Kind;
+use crate::greybox::{Dynamics, whole_steps};
+
+pub(super) type Filter = ExtendedKalmanFilter<f64, Dyn>;
+pub(super) type Observer = LuenbergerObserver<f64, Dyn, Dyn>;
+
+/// A row as a model sees it: deviations from the channels' offsets.
+#[derive(Debug, Clone)]
+pub(super) struct Moment {
+    /// Seconds since the first row.
+    pub(super) time: f64,
+    pub(super) inputs: DVector<f64>,
+    /// NaN where one is missing.
+    pub(super) outputs: DVector<f64>,
+}
+
+/// How the time from one row to the next is taken: so many steps, of so many seconds.
+pub(super) type Division = (usize, f64);
+
+/// A filter, or a smoother around one.
+pub(super) trait Recursion {
+    fn filter(&self) -> &Filter;
+    fn predict(
+        &mut self,
+        transition: &impl Transition<f64, Dyn, Dyn>,
+        input: &DVector<f64>,
+    ) -> Result<(), Error>;
+    fn correct(
+        &mut self,
+        observation: &impl Observation<f64, Dyn, Dyn, Dyn>,
+        input: &DVector<f64>,
+        measurement: &DVector<f64>,
+    ) -> Result<Innovation<f64, DVector<f64>>, Error>;
+}
+
+impl Recursion for Filter {
+    fn filter(&self) -> &Filter {
+        self
+    }
+
+    fn predict(
+        &mut self,
+        transition: &impl Transition<f64, Dyn, Dyn>,
+        input: &DVector<f64>,
+    ) -> Result<(), Error> {
+        ExtendedKalmanFilter::predict(self, transition, input)
+    }
+
+    fn correct(
+        &mut self,
+        observation: &impl Observation<f64, Dyn, Dyn, Dyn>,
+        input: &DVector<f64>,
+        measurement: &DVector<f64>,
+    ) -> Result<Innovation<f64, DVector<f64>>, Error> {
+        ExtendedKalmanFilter::correct(self, observation, input, measurement)
+    }
+}
+
+impl Recursion for Smoother<f64, Dyn> {
+    fn filter(&self) -> &Filter {
+        Smoother::filter(self)
+    }
+
+    fn predict(
+        &mut self,
+        transition: &impl Transition<f64, Dyn, Dyn>,
+        input: &DVector<f64>,
+    ) -> Result<(), Error> {
+        Smoother::predict(self, transition, input)
+    }
+
+    fn correct(
+        &mut self,
+        observation: &impl Observation<f64, Dyn, Dyn, Dyn>,
+        input: &DVector<f64>,
+        measurement: &DVector<f64>,
+    ) -> Result<Innovation<f64, DVector<f64>>, Error> {
+        Smoother::correct(self, observation, input, measurement)
+    }
+}
+
+impl Kind {
+    /// The filter that stands where the model starts.
+    pub(super) fn started(&self) -> Result<Filter, Error> {
+        match self {
+            Kind::Linear(linear) => Filter::new(linear.start.clone(), linear.start_covariance.clone()),
+            Kind::Grey(grey) => {
+                let (states, deviations) = grey.start();
+                let parameters = || grey.parameters().iter().map(|parameter| parameter.start_variable());
+                let mean: Vec<f64> = states.iter().copied().chain(parameters().map(|(z, _)| z)).collect();
+                let deviations = deviations.iter().copied().chain(parameters().map(|(_, sd)| sd));
+                let variances: Vec<f64> = deviations.map(|deviation| deviation * deviation).collect();
+                Filter::new(mean.into(), Covariance::from_diagonal(&variances.into())?)
+            }
+        }
+    }
+
+    /// The numbers of states, unknown parameters, inputs and outputs.
+    pub(super) fn sizes(&self) -> [usize; 4] {
+        fn of(model: &impl Dynamics) -> [usize; 4] {
+            [model.states(), model.parameters(), model.inputs(), model.outputs()]
+        }
+        match self {
+            Kind::Linear(linear) => [linear.states.len(), 0, linear.inputs.len(), linear.outputs.len()],
+            Kind::Grey(grey) => of(grey.as_ref()),
+        }
+    }
+
+    /// How a step of `dt` seconds is taken.
+    pub(super) fn division(&self, dt: f64) -> Result<Division, crate::Error> {
+        match self {
+            Kind::Linear(linear) => Ok((whole_steps(dt, linear.sample_time)?, linear.sample_time)),
+            Kind::Grey(grey) => grey.division(dt),
+        }
+    }
+
+    /// R_ii.
+    pub(super) fn output_variance(&self, output: usize) -> f64 {
+        match self {
+            Kind::Linear(linear) => linear.output_noise[(output, output)],
+            Kind::Grey(grey) => grey.measurement_variances()[output],
+        }
+    }
+
+    /// From one row to the next.
+    pub(super) fn predict(
+        &self,
+        filter: &mut impl Recursion,
+        from: &Moment,
+        (count, dt): Division,
+        work: &mut Work,
+    ) -> Result<(), Error> {
+        match self {
+            Kind::Linear(linear) => {
+                let there: Vec<bool> = from.outputs.iter().map(|output| !output.is_nan()).collect();
+                let mut left = count;
+                if let Some(transition) = linear.behind(&there)? {
+                    let outputs =
+                        from.outputs.iter().map(|output| if output.is_nan() { 0.0 } else { *output });
+                    let drives: Vec<f64> = from.inputs.iter().copied().chain(outputs).collect();
+                    filter.predict(transition.as_ref(), &drives.into())?;
+                    left -= 1;
+                }
+                for _ in 0..left {
+                    filter.predict(&linear.transition, &from.inputs)?;
+                }
+            }
+            Kind::Grey(grey) => {
+                for index in 0..count {
+                    let (time, estimate) =
+                        (from.time + index as f64 * dt, filter.filter().state().as_slice());
+                    let transition = look::ahead(grey, estimate, from.inputs.as_slice(), time, dt, work)?;
+                    filter.predict(&transition, &from.inputs)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// What the measurement of a row says. Before it is used, `show` is told the predicted outputs and H, which has a column
+    /// for each state and each unknown parameter.
+    pub(super) fn correct(
+        &self,
+        filter: &mut impl Recursion,
+        at: &Moment,
+        work: &mut Work,
+        show: impl FnOnce(&DVector<f64>, &DMatrix<f64>),
+    ) -> Result<Innovation<f64, DVector<f64>>, Error> {
+        let estimate = filter.filter().state();
+        match self {
+            Kind::Linear(linear) => {
+                show(&linear.observation.output(estimate, &at.inputs), &linear.output_matrix);
+                filter.correct(&linear.observation, &at.inputs, &at.outputs)
+            }
+            Kind::Grey(grey) => {
+                let look = look::seen(grey, estimate.as_slice(), at.inputs.as_slice(), at.time, work)?;
+                show(&look.values, &look.jacobian);
+                filter.correct(&look, &at.inputs, &at.outputs)
+            }
+        }
+    }
+
+    /// From one row to the next, as an observer goes. With poles its gain is placed anew where the model bends.
+    pub(super) fn observe(
+        &self,
+        observer: &mut Observer,
+        poles: Option<&DVector<Complex<f64>>>,
+        from: &Moment,
+        (count, dt): Division,
+        work: &mut Work,
+    ) -> Result<(), Error> {
+        let missing = DVector::repeat(from.outputs.len(), f64::NAN);
+        for index in 0..count {
+            let outputs = if index == 0 { &from.outputs } else { &missing };
+            match self {
+                Kind::Linear(linear) => {
+                    observer.update(&linear.transition, &linear.observation, &from.inputs, outputs)?;
+                }
+                Kind::Grey(grey) => {
+                    let (time, estimate) = (from.time + index as f64 * dt, observer.state().as_slice());
+                    let inputs = from.inputs.as_slice();
+                    let transition = look::ahead(grey, estimate, inputs, time, dt, work)?;
+                    let observation = look::seen(grey, estimate, inputs, time, work)?;
+                    if let Some(poles) = poles.filter(|_| index == 0) {
+                        observer.place(&transition, &observation, &from.inputs, &self.weights(), poles)?;
+                    }
+                    observer.update(&transition, &observation, &from.inputs, outputs)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The outputs that an observer expects in a row.
+    pub(super) fn outputs(
+        &self,
+        estimate: &DVector<f64>,
+        at: &Moment,
+        work: &mut Work,
+    ) -> Result<DVector<f64>, Error> {
+        Ok(match self {
+            Kind::Linear(linear) => linear.observation.output(estimate, &at.inputs),
+            Kind::Grey(grey) => {
+                look::seen(grey, estimate.as_slice(), at.inputs.as_slice(), at.time, work)?.values
+            }
+        })
+    }
+
+    /// How the outputs are weighed where an observer needs one number of them.
+    pub(super) fn weights(&self) -> DVector<f64> {
+        let [_, _, _, outputs] = self.sizes();
+        let noisy = outputs > 1 && (0..outputs).all(|output| self.output_variance(output) > 0.0);
+        DVector::from_fn(
+            outputs,
+            |output, _| {
+                if noisy { self.output_variance(output).sqrt().recip() } else { 1.0 }
+            },
+        )
+    }
+}

@@ -1,0 +1,225 @@
+//! Models in matrices.
+
+use std::borrow::Cow;
+
+use thetahat_core::nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use thetahat_core::{Covariance, LinearObservation, LinearTransition};
+
+use crate::data::Offset;
+use crate::{Error, Model, Start};
+
+type Transition = LinearTransition<f64, Dyn, Dyn>;
+
+/// The variance of a state of which nothing is known, in those of e. A millionth of it is what one row leaves: six digits are
+/// lost in a smoother, and none in a filter.
+const UNKNOWN: f64 = 1e6;
+
+/// A model in matrices, with its noises.
+#[derive(Debug, Clone)]
+pub(super) struct Linear {
+    pub(super) states: Vec<String>,
+    pub(super) inputs: Vec<String>,
+    pub(super) outputs: Vec<String>,
+    pub(super) sample_time: f64,
+    /// What is taken from the channels, and put back.
+    pub(super) input_offsets: Vec<Offset>,
+    pub(super) output_offsets: Vec<Offset>,
+    /// x0 and P0.
+    pub(super) start: DVector<f64>,
+    pub(super) start_covariance: Covariance<f64, Dyn>,
+    /// F, G and Q.
+    pub(super) transition: Transition,
+    /// H, D and R.
+    pub(super) observation: LinearObservation<f64, Dyn, Dyn, Dyn>,
+    /// H: the observation keeps it transposed.
+    pub(super) output_matrix: DMatrix<f64>,
+    /// R.
+    pub(super) output_noise: DMatrix<f64>,
+    correlation: Option<Correlation>,
+}
+
+/// How the noises are correlated, if they are.
+#[derive(Debug, Clone)]
+struct Correlation {
+    /// S, n x m.
+    cross: DMatrix<f64>,
+    /// Q.
+    noise: DMatrix<f64>,
+    /// Whether Q - S R⁻¹ S' = 0, as in innovations form.
+    explained: bool,
+    /// The transition after a row of which all outputs are there.
+    full: Transition,
+}
+
+/// The matrices of a model; S is zero if it is not there.
+#[derive(Debug, Clone)]
+pub(super) struct Matrices {
+    pub(super) f: DMatrix<f64>,
+    pub(super) g: DMatrix<f64>,
+    pub(super) h: DMatrix<f64>,
+    pub(super) d: DMatrix<f64>,
+    pub(super) q: Covariance<f64, Dyn>,
+    pub(super) r: Covariance<f64, Dyn>,
+    pub(super) s: Option<DMatrix<f64>>,
+    pub(super) x0: DVector<f64>,
+    pub(super) p0: Covariance<f64, Dyn>,
+}
+
+/// The channels of a model and its sample time.
+#[derive(Debug, Clone)]
+pub(super) struct Names {
+    pub(super) states: Vec<String>,
+    pub(super) inputs: Vec<String>,
+    pub(super) outputs: Vec<String>,
+    pub(super) sample_time: f64,
+}
+
+impl Linear {
+    /// A model of matrices whose sizes fit. `innovations`: Q = K R K' and S = K R to the bit.
+    ///
+    /// # Errors
+    /// If no noises have these covariances, or a number overflows.
+    pub(super) fn new(
+        names: Names,
+        matrices: Matrices,
+        innovations: bool,
+    ) -> Result<Self, thetahat_core::Error> {
+        let Matrices { f, g, h, d, q, r, s, x0, p0 } = matrices;
+        let (noise, output_noise) = (q.matrix(), r.matrix());
+        let transition = LinearTransition::new(f, q)?.with_input(g)?;
+        let observation = LinearObservation::new(h.clone(), r)?.with_input(d)?;
+        let offsets = |channels: &[String]| vec![Offset::default(); channels.len()];
+        let mut linear = Self {
+            input_offsets: offsets(&names.inputs),
+            output_offsets: offsets(&names.outputs),
+            states: names.states,
+            inputs: names.inputs,
+            outputs: names.outputs,
+            sample_time: names.sample_time,
+            start: x0,
+            start_covariance: p0,
+            transition,
+            observation,
+            output_matrix: h,
+            output_noise,
+            correlation: None,
+        };
+        if let Some(cross) = s.filter(|cross| cross.iter().any(|entry| *entry != 0.0)) {
+            let full = linear.transition.clone();
+            let correlation = Correlation { cross, noise, explained: innovations, full };
+            let all = vec![true; linear.outputs.len()];
+            let full = linear.decorrelated(&correlation, &all)?;
+            linear.correlation = Some(Correlation { full, ..correlation });
+        }
+        Ok(linear)
+    }
+
+    /// A fitted model: Q = K R K', S = K R, R = var e.
+    pub(super) fn of_model(model: &Model, start: Start) -> Result<Self, Error> {
+        let space = model.state_space();
+        let variance = space.noise_variance;
+        if variance <= 0.0 {
+            return Err(Error::report(
+                "its noise variance is 0, so that a filter has nothing to weigh the measurements by; simulate the model instead",
+            ));
+        }
+        let n = space.f.nrows();
+        let innovation = Covariance::from_diagonal(&DVector::repeat(1, variance));
+        let build = || -> Result<Self, thetahat_core::Error> {
+            let r: Covariance<f64, Dyn> = innovation?;
+            let names = Names {
+                states: (1..=n).map(|state| format!("x{state}")).collect(),
+                inputs: model.inputs.iter().map(|input| input.name.clone()).collect(),
+                outputs: vec![model.output.name.clone()],
+                sample_time: space.sample_time,
+            };
+            let q = r.transformed(&space.k)?;
+            let s = Some(&space.k * variance);
+            let p0 = match start {
+                Start::Zero => Covariance::zero(Dyn(n)),
+                _ => Covariance::from_diagonal(&DVector::repeat(n, UNKNOWN * variance))?,
+            };
+            let x0 = DVector::zeros(n);
+            let matrices = Matrices { f: space.f, g: space.g, h: space.h, d: space.d, q, r, s, x0, p0 };
+            Linear::new(names, matrices, true)
+        };
+        let linear = build().map_err(|error| Error::report(format!("its model has no filter: {error}")))?;
+        let input_offsets = model.inputs.iter().map(|input| input.offset).collect();
+        Ok(Self { input_offsets, output_offsets: vec![model.output.offset], ..linear })
+    }
+
+    /// The transition behind a row with these outputs there, and what drives it.
+    ///
+    /// Where the noises are correlated, what is measured of v tells of w too. With S_M, R_M and H_M of the outputs that are
+    /// there and W = S_M R_M⁻¹,
+    ///
+    /// ```text
+    /// x(k+1) = (F - W H_M) x(k) + (G - W D_M) u(k) + W y_M(k) + w̄(k),      var w̄ = Q - W S_M'
+    /// ```
+    ///
+    /// in which w̄ and v_M are not correlated (Anderson and Moore, Optimal Filtering, 1979, section 5.5): so the time update
+    /// and the smoother are those of uncorrelated noises. The inputs of this transition are u and y behind one another. None
+    /// if the noises are not correlated, or nothing is there.
+    pub(super) fn behind(&self, there: &[bool]) -> Result<Option<Cow<'_, Transition>>, thetahat_core::Error> {
+        match &self.correlation {
+            Some(correlation) if there.iter().all(|there| *there) => {
+                Ok(Some(Cow::Borrowed(&correlation.full)))
+            }
+            Some(correlation) if there.iter().any(|there| *there) => {
+                Ok(Some(Cow::Owned(self.decorrelated(correlation, there)?)))
+            }
+            _ => Ok(None),
+        }
+    }
+
+    fn decorrelated(
+        &self,
+        correlation: &Correlation,
+        there: &[bool],
+    ) -> Result<Transition, thetahat_core::Error> {
+        let used: Vec<usize> = (0..there.len()).filter(|&output| there[output]).collect();
+        let cross = correlation.cross.select_columns(&used);
+        let noise = self.output_noise.select_rows(&used).select_columns(&used);
+        let singular = thetahat_core::Error::NotPositive {
+            argument: "R, which must be regular where S is not zero,",
+            index: 0,
+        };
+        // W' = R_M⁻¹ S_M'.
+        let weights = Cholesky::new(noise).ok_or(singular)?.solve(&cross.transpose()).transpose();
+        let (f, g) = (self.transition.state_matrix(), self.transition.input_matrix());
+        let (h, d) = (&self.output_matrix, self.observation.input_matrix());
+        let state_matrix = f - &weights * h.select_rows(&used);
+        let by_input = g - &weights * d.select_rows(&used);
+        let (n, inputs) = by_input.shape();
+        let mut input_matrix = DMatrix::zeros(n, inputs + there.len());
+        input_matrix.columns_mut(0, inputs).copy_from(&by_input);
+        for (column, &output) in used.iter().enumerate() {
+            input_matrix.set_column(inputs + output, &weights.column(column));
+        }
+        let rest = if correlation.explained {
+            Covariance::zero(Dyn(n))
+        } else {
+            remaining(&correlation.noise, &weights, &cross)?
+        };
+        LinearTransition::new(state_matrix, rest)?.with_input(input_matrix)
+    }
+}
+
+/// Q - W S': a state of which nothing but rounding is left has no noise.
+fn remaining(
+    noise: &DMatrix<f64>,
+    weights: &DMatrix<f64>,
+    cross: &DMatrix<f64>,
+) -> Result<Covariance<f64, Dyn>, thetahat_core::Error> {
+    let n = noise.nrows();
+    let explained = weights * cross.transpose();
+    let mut rest = noise - (&explained + explained.transpose()) * 0.5;
+    let rounding = 8.0 * (n + 1) as f64 * f64::EPSILON;
+    for state in 0..n {
+        if rest[(state, state)].abs() <= rounding * noise[(state, state)] {
+            rest.row_mut(state).fill(0.0);
+            rest.column_mut(state).fill(0.0);
+        }
+    }
+    Covariance::new(&rest)
+}

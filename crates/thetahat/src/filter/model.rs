@@ -1,0 +1,146 @@
+use super::linear::Linear;
+use super::matrices;
+use crate::greybox::Document;
+use crate::{Error, GreyBox, Report, Start};
+
+/// A model with a state, for a [`StateFilter`](super::StateFilter).
+///
+/// It is a [`Report`] of a fit, in the form of [`Model::state_space`](crate::Model::state_space); or a TOML file with
+/// equations (see [`GreyBox`]), or with matrices:
+///
+/// ```text
+/// x(k+1) = F x(k) + G u(k) + w(k)          w ~ (0, Q), v ~ (0, R), cov(w, v) = S
+/// y(k)   = H x(k) + D u(k) + v(k)          at the first row x ~ (x0, P0)
+///
+/// sample_time = 1
+/// states = ["level"]        # names; x1, x2 … if left out
+/// inputs = []               # the channels that are the columns of G; none if left out
+/// outputs = ["y"]           # the channels that are the rows of H
+/// F = [[1.0]]
+/// H = [[1.0]]
+/// Q = [[1469.1]]
+/// R = [[15099.0]]
+/// x0 = [0]                  # zeros if left out
+/// P0 = [[1e7]]
+/// ```
+///
+/// and with G if there are inputs, and D and S if they are not zero (G: n x inputs, D: outputs x inputs, S: n x outputs).
+#[derive(Debug, Clone)]
+pub struct StateModel {
+    pub(super) kind: Kind,
+}
+
+#[derive(Debug, Clone)]
+pub(super) enum Kind {
+    Linear(Box<Linear>),
+    Grey(Box<GreyBox>),
+}
+
+impl From<GreyBox> for StateModel {
+    fn from(model: GreyBox) -> Self {
+        Self { kind: Kind::Grey(Box::new(model)) }
+    }
+}
+
+impl StateModel {
+    /// Reads a model with equations or with matrices.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] with line and column, and with what is wrong there.
+    ///
+    /// ```
+    /// use thetahat::StateModel;
+    ///
+    /// let text = "sample_time = 1\noutputs = ['y']\nF = [[1]]\nH = [[1]]\nQ = [[0.1]]\nR = [[1, 2]]\nP0 = [[1]]";
+    /// let error = StateModel::from_toml(text).unwrap_err();
+    /// assert_eq!(error.to_string(), "line 6, column 1: 'R' is 1 x 2, but must be 1 x 1 (outputs x outputs)");
+    /// let model = StateModel::from_toml(&text.replace("[1, 2]", "[2]"))?;
+    /// assert_eq!((model.states(), model.outputs()), (["x1".to_owned()].as_slice(), ["y".to_owned()].as_slice()));
+    /// # Ok::<(), thetahat::Error>(())
+    /// ```
+    pub fn from_toml(text: &str) -> Result<Self, Error> {
+        let document = Document::parse(text)?;
+        let root = document.root();
+        if ["F", "H", "P0"].iter().any(|key| root.get(key).is_some()) {
+            return Ok(Self { kind: Kind::Linear(Box::new(matrices::read(&root)?)) });
+        }
+        Ok(GreyBox::from_toml(text)?.into())
+    }
+
+    /// The model of a report, in innovations form.
+    ///
+    /// It starts from a state of 0 that is known, with [`Start::Zero`]: the plant at rest, the channels at their offsets. Or
+    /// from one that is not, with [`Start::Estimated`]: each state, which is in units of the output, has a standard deviation
+    /// of a thousand times that of the noise e. [`Start::Measured`] is for predictions only.
+    ///
+    /// # Errors
+    /// [`Error::Report`] if the noise variance is 0, or the numbers overflow; [`Error::Argument`] for another start.
+    pub fn from_report(report: &Report, start: Start) -> Result<Self, Error> {
+        if start == Start::Measured {
+            return Err(Error::argument(
+                "initial",
+                "a filter starts from zero, or estimates where it starts",
+            ));
+        }
+        Ok(Self { kind: Kind::Linear(Box::new(Linear::of_model(&report.model, start)?)) })
+    }
+
+    /// The names of the states.
+    pub fn states(&self) -> &[String] {
+        match &self.kind {
+            Kind::Linear(linear) => &linear.states,
+            Kind::Grey(grey) => grey.states(),
+        }
+    }
+
+    /// The channels of the inputs.
+    pub fn inputs(&self) -> &[String] {
+        match &self.kind {
+            Kind::Linear(linear) => &linear.inputs,
+            Kind::Grey(grey) => grey.inputs(),
+        }
+    }
+
+    /// The channels of the outputs.
+    pub fn outputs(&self) -> &[String] {
+        match &self.kind {
+            Kind::Linear(linear) => &linear.outputs,
+            Kind::Grey(grey) => grey.outputs(),
+        }
+    }
+
+    /// The names of the unknown parameters.
+    pub fn unknown(&self) -> impl ExactSizeIterator<Item = &str> {
+        let parameters = match &self.kind {
+            Kind::Linear(_) => &[],
+            Kind::Grey(grey) => grey.parameters(),
+        };
+        parameters.iter().map(|parameter| parameter.name.as_str())
+    }
+
+    /// How the unknown parameters are kept within their bounds, in words, such as `mass = 0.1 + exp(z)`.
+    pub fn changes_of_variable(&self) -> impl ExactSizeIterator<Item = String> {
+        let parameters = match &self.kind {
+            Kind::Linear(_) => &[],
+            Kind::Grey(grey) => grey.parameters(),
+        };
+        parameters.iter().map(|parameter| parameter.words())
+    }
+
+    /// The length of a sample, in seconds.
+    pub fn sample_time(&self) -> f64 {
+        match &self.kind {
+            Kind::Linear(linear) => linear.sample_time,
+            Kind::Grey(grey) => grey.sample_time(),
+        }
+    }
+
+    /// Whether it is linear in its state and has no unknown parameters, so that [`Estimator::Kalman`](super::Estimator::Kalman)
+    /// is exact.
+    pub fn is_linear(&self) -> bool {
+        match &self.kind {
+            Kind::Linear(_) => true,
+            Kind::Grey(grey) => grey.is_linear(),
+        }
+    }
+}

@@ -1,0 +1,204 @@
+//! The criterion, its gradient and the information.
+//!
+//! With e and S of every scalar element that was measured:
+//!
+//! ```text
+//! V(z)  = 1/2 sum (e^2/S + ln 2 pi S)
+//! V_i   = sum (e e_i/S + (1 - e^2/S) S_i/(2 S))                      e_i = de/dz_i, S_i = dS/dz_i
+//! I_ij  = sum (e_i e_j/S + S_i S_j/(2 S^2))
+//! ```
+//!
+//! V is the negative logarithm of the likelihood if the innovations are Gaussian; I, what is expected of its Hessian at the
+//! truth (Gupta and Mehra, Computational aspects of maximum likelihood estimation, IEEE Transactions on Automatic Control
+//! 19, 1974; Segal and Weinstein, A new method for evaluating the log-likelihood gradient, the Hessian, and the Fisher
+//! information matrix for linear dynamic systems, IEEE Transactions on Information Theory 35, 1989; Ljung, System
+//! Identification, 2nd ed. 1999, sections 7.4 and 7.6).
+
+use std::f64::consts::TAU;
+
+use thetahat_core::{Dual, Number};
+
+use super::experiment::Experiment;
+use super::predictor::{Innovation, Predictor};
+use crate::greybox::dynamics::Dynamics;
+
+/// Derivatives that are computed together.
+const LANE: usize = 4;
+
+/// Where the filter ceased to work: a number overflowed, or is none.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Failure {
+    /// Which log.
+    pub(super) log: usize,
+    /// The 0-based row.
+    pub(super) row: usize,
+}
+
+/// V of a model on some logs, with the memory that it takes.
+#[derive(Debug)]
+pub(super) struct Criterion<'a, M> {
+    model: &'a M,
+    experiments: &'a [Experiment],
+    /// The elements that are measured.
+    pub(super) readings: usize,
+    plain: Predictor<f64>,
+    lanes: Vec<Predictor<Dual<f64, LANE>>>,
+    /// The parameters as the lanes see them: variables in one, constants in the others.
+    variables: Vec<Vec<Dual<f64, LANE>>>,
+    /// e_i and S_i.
+    error_slopes: Vec<f64>,
+    variance_slopes: Vec<f64>,
+    /// The sum of e^2/S where V was linearised last.
+    pub(super) squares: f64,
+    /// V_i where V was linearised last.
+    pub(super) gradient: Vec<f64>,
+    /// I there, row by row.
+    pub(super) information: Vec<f64>,
+}
+
+impl<'a, M: Dynamics> Criterion<'a, M> {
+    pub(super) fn new(model: &'a M, experiments: &'a [Experiment]) -> Self {
+        let size = model.parameters();
+        let lanes = size.div_ceil(LANE);
+        let readings = |experiment: &Experiment| -> usize {
+            (0..model.outputs()).map(|output| experiment.readings(output)).sum()
+        };
+        Self {
+            model,
+            experiments,
+            readings: experiments.iter().map(readings).sum(),
+            plain: Predictor::new(model),
+            lanes: (0..lanes).map(|_| Predictor::new(model)).collect(),
+            variables: vec![vec![Dual::from(0.0); size]; lanes],
+            error_slopes: vec![0.0; size],
+            variance_slopes: vec![0.0; size],
+            squares: 0.0,
+            gradient: vec![0.0; size],
+            information: vec![0.0; size * size],
+        }
+    }
+
+    /// V. O(N (n^3 + m n^2)) and the model.
+    pub(super) fn evaluate(&mut self, z: &[f64]) -> Result<f64, Failure> {
+        let mut sum = 0.0;
+        walk(self.model, self.experiments, &mut self.plain, z, |_, _, innovation| {
+            sum += innovation.error * innovation.error / innovation.variance;
+            sum += (TAU * innovation.variance).ln();
+        })?;
+        Ok(sum / 2.0)
+    }
+
+    /// V_i and I_ij for p parameters: p/4 times the filter in numbers of five parts, and N p^2. Slopes that are not finite
+    /// are a failure too.
+    pub(super) fn linearize(&mut self, z: &[f64]) -> Result<(), Failure> {
+        for (lane, variables) in self.variables.iter_mut().enumerate() {
+            for (index, (variable, &value)) in variables.iter_mut().zip(z).enumerate() {
+                *variable = Dual::from(value);
+                if index / LANE == lane {
+                    variable.derivatives[index % LANE] = 1.0;
+                }
+            }
+        }
+        let size = self.gradient.len();
+        self.gradient.fill(0.0);
+        self.information.fill(0.0);
+        self.squares = 0.0;
+        for (log, experiment) in self.experiments.iter().enumerate() {
+            self.lanes.iter_mut().for_each(|lane| lane.restart(self.model));
+            for row in 0..experiment.rows() {
+                let failure = Failure { log, row };
+                for (lane, variables) in self.lanes.iter_mut().zip(&self.variables) {
+                    reach(self.model, experiment, lane, variables, row);
+                }
+                let variances = self.model.measurement_variances().iter();
+                for (index, (&measured, &noise)) in experiment.output(row).iter().zip(variances).enumerate() {
+                    if measured.is_nan() {
+                        continue;
+                    }
+                    let (mut error, mut variance) = (0.0, 0.0);
+                    let slopes =
+                        self.error_slopes.chunks_mut(LANE).zip(self.variance_slopes.chunks_mut(LANE));
+                    for (lane, (by_error, by_variance)) in self.lanes.iter_mut().zip(slopes) {
+                        let innovation = lane.absorb(index, measured, noise).ok_or(failure)?;
+                        (error, variance) = (innovation.error.value, innovation.variance.value);
+                        by_error.copy_from_slice(&innovation.error.derivatives[..by_error.len()]);
+                        by_variance.copy_from_slice(&innovation.variance.derivatives[..by_variance.len()]);
+                    }
+                    self.squares += error * error / variance;
+                    let surprise = (1.0 - error * error / variance) / (2.0 * variance);
+                    for i in 0..size {
+                        let (e, s) = (self.error_slopes[i], self.variance_slopes[i]);
+                        self.gradient[i] += error * e / variance + surprise * s;
+                        let (by_error, by_variance) = (e / variance, s / (2.0 * variance * variance));
+                        for j in 0..=i {
+                            self.information[i * size + j] +=
+                                by_error * self.error_slopes[j] + by_variance * self.variance_slopes[j];
+                        }
+                    }
+                }
+                // What is not a number stays in the sums.
+                let sums = self.gradient.iter().chain(&self.information);
+                if !sums.copied().all(f64::is_finite) {
+                    return Err(failure);
+                }
+            }
+        }
+        for i in 0..size {
+            for j in 0..i {
+                self.information[j * size + i] = self.information[i * size + j];
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Takes the filter to a row, and linearises its measurement.
+fn reach<S: Number<f64>>(
+    model: &impl Dynamics,
+    experiment: &Experiment,
+    predictor: &mut Predictor<S>,
+    z: &[S],
+    row: usize,
+) {
+    for (time, step) in experiment.steps(row) {
+        predictor.predict(model, z, experiment.input(row - 1), time, step);
+    }
+    predictor.observe(model, z, experiment.input(row), experiment.times[row]);
+}
+
+/// An element of a measurement.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Element {
+    pub(super) log: usize,
+    pub(super) row: usize,
+    pub(super) output: usize,
+}
+
+/// The filter over all logs. `told` hears of each element that is measured: where it is, the prediction h(x^), and e and S.
+pub(super) fn walk(
+    model: &impl Dynamics,
+    experiments: &[Experiment],
+    predictor: &mut Predictor<f64>,
+    z: &[f64],
+    mut told: impl FnMut(Element, f64, Innovation<f64>),
+) -> Result<(), Failure> {
+    for (log, experiment) in experiments.iter().enumerate() {
+        predictor.restart(model);
+        for row in 0..experiment.rows() {
+            let failure = Failure { log, row };
+            reach(model, experiment, predictor, z, row);
+            let variances = model.measurement_variances().iter();
+            for (output, (&measured, &noise)) in experiment.output(row).iter().zip(variances).enumerate() {
+                if measured.is_nan() {
+                    continue;
+                }
+                let innovation = predictor.absorb(output, measured, noise).ok_or(failure)?;
+                told(Element { log, row, output }, predictor.output[output], innovation);
+            }
+            if !predictor.is_finite() {
+                return Err(failure);
+            }
+        }
+    }
+    Ok(())
+}

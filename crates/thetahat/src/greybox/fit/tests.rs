@@ -1,0 +1,6 @@
+mod examples;
+mod experiments;
+mod gradient;
+mod models;
+mod recovery;
+mod refusals;

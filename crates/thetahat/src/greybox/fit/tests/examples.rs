@@ -1,0 +1,269 @@
+//! The models in tests/data of the repository, on their logs.
+
+use std::io::Write;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+
+use crate::greybox::fit::criterion::Criterion;
+use crate::greybox::fit::experiment::Experiment;
+use crate::{
+    Channel, Error, Estimator, GreyBox, GreyReport, Recording, Rows, Source, StateFilter, StateModel,
+    Stopped, Times, fit_grey,
+};
+
+fn data(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data").join(name)
+}
+
+fn model(name: &str) -> GreyBox {
+    let text = std::fs::read_to_string(data(name).with_extension("toml")).unwrap();
+    GreyBox::from_toml(&text).unwrap()
+}
+
+/// A log whose first column is the time.
+fn log(path: &Path) -> Recording {
+    let text = std::fs::read_to_string(path).unwrap();
+    let mut lines = text.lines();
+    let names = lines.next().unwrap().split(',');
+    let mut channels: Vec<Channel> =
+        names.map(|name| Channel { name: name.into(), values: Vec::new() }).collect();
+    for line in lines {
+        for (channel, field) in channels.iter_mut().zip(line.split(',')) {
+            channel.values.push(field.parse().unwrap());
+        }
+    }
+    let time = channels.remove(0);
+    Recording { channels, times: Times::Measured(time.values) }
+}
+
+/// Some rows of it, counted from 1.
+fn part(recording: &Recording, rows: Rows) -> Recording {
+    let cut = |values: &[f64]| values[rows.first() - 1..rows.last()].to_vec();
+    let channel = |channel: &Channel| Channel { name: channel.name.clone(), values: cut(&channel.values) };
+    let Times::Measured(time) = &recording.times else { panic!("the log has a clock") };
+    Recording {
+        channels: recording.channels.iter().map(channel).collect(),
+        times: Times::Measured(cut(time)),
+    }
+}
+
+fn fitted(model: &GreyBox, logs: &[Recording]) -> GreyReport {
+    fit_grey(model, logs, &[], &|_| ControlFlow::Continue(())).unwrap()
+}
+
+fn experiment(model: &GreyBox, recording: &Recording) -> Experiment {
+    Experiment::new(recording, model.inputs(), model.outputs(), |step| model.division(step)).unwrap()
+}
+
+#[test]
+fn logs_lead_back_to_the_truth() {
+    let examples: [(_, &[(_, f64)], _); 3] = [
+        ("mass_spring_damper", &[("mass", 1.6)], 90.0),
+        ("battery", &[("r0", 0.002), ("r1", 0.0015), ("c1", 20_000.0)], 95.0),
+        ("dc_motor", &[("torque_constant", 0.05), ("friction", 1e-4)], 90.0),
+    ];
+    for (name, truth, free_run) in examples {
+        let report = fitted(&model(name), &[log(&data(name).with_extension("csv"))]);
+        assert_eq!(report.search.stopped, Stopped::Converged);
+        assert_eq!(report.parameters.len(), truth.len());
+        for (parameter, (name, truth)) in report.parameters.iter().zip(truth) {
+            assert_eq!(parameter.name, *name);
+            let away = (parameter.value - truth) / parameter.standard_error;
+            assert!(away.abs() < 3.0, "{name} {} is {away} standard errors off", parameter.value);
+            // A good log says something: 10 % at most.
+            assert!(parameter.standard_error < 0.1 * truth, "{name} {}", parameter.standard_error);
+        }
+        // chi-square of 800 readings and more: standard deviation below 0.05.
+        assert!((report.mean_nis - 1.0).abs() < 0.15, "{name} {}", report.mean_nis);
+        // Binomial: standard deviation below 0.008.
+        assert!((report.within_95 - 0.95).abs() < 0.025, "{name} {}", report.within_95);
+        for output in &report.outputs {
+            assert!(output.whiteness.unwrap().p_value.unwrap() > 0.001, "{name} {}", output.channel);
+            assert!(output.free_run.unwrap().percent.unwrap() > free_run, "{name} {output:?}");
+        }
+        assert_eq!(report.warnings, [""; 0], "{name}");
+    }
+}
+
+#[test]
+fn gradient_of_models_in_equations_is_exact() {
+    for name in ["mass_spring_damper", "battery", "dc_motor"] {
+        let (model, log) = (model(name), log(&data(name).with_extension("csv")));
+        let experiments = [experiment(&model, &part(&log, "1..200".parse().unwrap()))];
+        let mut criterion = Criterion::new(&model, &experiments);
+        let z: Vec<f64> = model.parameters().iter().map(|unknown| unknown.start_variable().0 - 0.2).collect();
+        criterion.linearize(&z).unwrap();
+        let (gradient, value) = (criterion.gradient.clone(), criterion.evaluate(&z).unwrap());
+        for (index, slope) in gradient.iter().enumerate() {
+            let width = 1e-5;
+            let mut at = |steps: f64| {
+                let mut z = z.clone();
+                z[index] += steps * width;
+                criterion.evaluate(&z).unwrap()
+            };
+            // Richardson's extrapolation of two central differences.
+            let (near, far) = ((at(1.0) - at(-1.0)) / (2.0 * width), (at(2.0) - at(-2.0)) / (4.0 * width));
+            let difference = (4.0 * near - far) / 3.0;
+            // 1e-13 V/width of rounding.
+            let rounding = 1e-8 * value.abs();
+            assert!(
+                (slope - difference).abs() < 1e-6 * slope.abs() + rounding,
+                "{name} {slope} {difference}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_missing_row_is_a_longer_step() {
+    let (model, log) = (model("battery"), log(&data("battery.csv")));
+    let current = &log.channels[0].values;
+    // Every third row in which the current has not changed: leaving it out changes no input.
+    let out: Vec<bool> =
+        (0..current.len()).map(|row| row > 0 && row % 3 == 0 && current[row] == current[row - 1]).collect();
+    assert!(out.iter().filter(|out| **out).count() > 300);
+    let mut missing = log.clone();
+    let voltage = &mut missing.channels[1].values;
+    voltage.iter_mut().zip(&out).filter(|(_, out)| **out).for_each(|(value, _)| *value = f64::NAN);
+    let kept = |values: &[f64]| -> Vec<f64> {
+        values.iter().zip(&out).filter(|(_, out)| !**out).map(|(value, _)| *value).collect()
+    };
+    let channel = |channel: &Channel| Channel { name: channel.name.clone(), values: kept(&channel.values) };
+    let Times::Measured(time) = &log.times else { panic!("the log has a clock") };
+    let shorter = Recording {
+        channels: log.channels.iter().map(channel).collect(),
+        times: Times::Measured(kept(time)),
+    };
+    let z: Vec<f64> = model.parameters().iter().map(|unknown| unknown.start_variable().0).collect();
+    let likelihood =
+        |recording| Criterion::new(&model, &[experiment(&model, recording)]).evaluate(&z).unwrap();
+    let (whole, short) = (likelihood(&missing), likelihood(&shorter));
+    // The same operations.
+    assert!((whole - short).abs() < 1e-12 * whole.abs(), "{whole} {short}");
+    // And the fit of the irregular log finds the truth.
+    let report = fitted(&model, &[shorter]);
+    for (parameter, truth) in report.parameters.iter().zip([0.002, 0.0015, 20_000.0]) {
+        assert!((parameter.value - truth).abs() < 3.0 * parameter.standard_error, "{parameter:?}");
+    }
+}
+
+#[test]
+fn two_logs_say_more_than_one() {
+    let (model, log) = (model("mass_spring_damper"), log(&data("mass_spring_damper.csv")));
+    let halves = ["1..400", "401..800"].map(|rows| part(&log, rows.parse().unwrap()));
+    let error = |logs: &[Recording]| {
+        let report = fitted(&model, logs);
+        assert_eq!(report.states[0].starts.len(), logs.len());
+        (report.parameters[0].nominal_standard_error, report.log_likelihood, report.rows)
+    };
+    let first = error(&halves[..1]);
+    let second = error(&halves[1..]);
+    let both = error(&halves);
+    // Information adds up; the estimates differ, and with them the sensitivities.
+    let expected = (first.0.powi(-2) + second.0.powi(-2)).sqrt().recip();
+    assert!((both.0 / expected - 1.0).abs() < 0.05, "{both:?} {expected}");
+    assert!(both.1 <= first.1 + second.1 && both.2 == 800);
+}
+
+#[test]
+fn reports_go_there_and_back() {
+    let model = model("dc_motor");
+    let source = Source {
+        file: "dc_motor.csv".into(),
+        rows: "1..1000".parse().unwrap(),
+        time: Some("t".into()),
+        start: None,
+        resampled: None,
+    };
+    let logs = [log(&data("dc_motor.csv"))];
+    let report = fit_grey(&model, &logs, &[source], &|_| ControlFlow::Continue(())).unwrap();
+    let text = report.to_json().unwrap();
+    assert_eq!(GreyReport::from_json(&text).unwrap(), report);
+    assert_eq!(report.model, model.text());
+    assert!(text.contains("\"torque_constant = 0.001 + 0.999 / (1 + exp(-z))\""));
+    assert!(GreyReport::json_schema().pointer("/properties/parameters").is_some());
+
+    // The fitted model has nothing unknown, and the likelihood of the fit.
+    let fitted = report.fitted_model().unwrap();
+    assert_eq!(fitted.unknown().count(), 0);
+    let value = Criterion::new(&fitted, &[experiment(&fitted, &logs[0])]).evaluate(&[]).unwrap();
+    assert!((value + report.log_likelihood).abs() < 1e-9 * value.abs());
+
+    // What was known before stays known.
+    let half = model.with_parameters(&[("friction", 1e-4)]).unwrap();
+    let report = fit_grey(&half, &logs, &[], &|_| ControlFlow::Continue(())).unwrap();
+    assert_eq!(report.parameters.len(), 1);
+    let report = GreyReport::from_json(&report.to_json().unwrap()).unwrap();
+    assert_eq!(report.fitted_model().unwrap().unknown().count(), 0);
+
+    for (changed, words) in [
+        (text.replace("thetahat.greybox/1", "thetahat.report/1"), "its schema is 'thetahat.report/1'"),
+        (text.replace("\"model\"", "\"modell\""), "missing field `model`"),
+        ("t,u\n".to_owned(), "not a report on a model in equations"),
+    ] {
+        let Err(Error::Report { message }) = GreyReport::from_json(&changed) else { panic!("{words}") };
+        assert!(message.contains(words), "{message}");
+    }
+    let mut lacking = report.clone();
+    lacking.parameters.clear();
+    assert!(lacking.fitted_model().unwrap_err().to_string().contains("torque_constant"));
+}
+
+/// What the filter makes of a log: it estimates unknown parameters with the state.
+fn filtered(model: &GreyBox, log: &Recording) -> StateFilter {
+    let Times::Measured(time) = &log.times else { panic!("the log has a clock") };
+    let mut filter = StateFilter::new(StateModel::from(model.clone()), Estimator::Extended).unwrap();
+    let values = |names: &[String], row: usize| -> Vec<f64> {
+        let channel = |name| log.channels.iter().find(|channel| channel.name == name).unwrap();
+        names.iter().map(|name| channel(name.as_str()).values[row]).collect()
+    };
+    for row in 0..time.len() {
+        let step = (row > 0).then(|| time[row] - time[row - 1]);
+        filter.step(step, &values(model.inputs(), row), &values(model.outputs(), row)).unwrap();
+    }
+    filter
+}
+
+#[test]
+fn filter_of_the_fitted_model_has_its_likelihood() {
+    for name in ["mass_spring_damper", "battery", "dc_motor"] {
+        let log = log(&data(name).with_extension("csv"));
+        let report = fitted(&model(name), std::slice::from_ref(&log));
+        let filter = filtered(&report.fitted_model().unwrap(), &log);
+        let totals = filter.totals();
+        let difference = totals.log_likelihood - report.log_likelihood;
+        assert!(difference.abs() < 1e-9 * report.log_likelihood.abs(), "{name} {difference}");
+        // There it is the mean over the rows, here over the elements.
+        let mean = totals.mean_nis * totals.nis_rows as f64 / totals.measured as f64;
+        assert!((mean / report.mean_nis - 1.0).abs() < 1e-9, "{name}");
+        let outside = (totals.nis_below + totals.nis_above) as f64 / totals.nis_rows as f64;
+        assert!((1.0 - outside - report.within_95).abs() < 1e-12, "{name}");
+    }
+}
+
+/// The rows around the first pulse: rest, 30 s of 30 A, 40 s of rest.
+#[test]
+fn resistance_of_a_measured_cell() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/leaf_cell_hppc_25c.csv");
+    if !path.exists() {
+        let line = b"skipped: ../shared/data is not here (resistance_of_a_measured_cell)\n";
+        // Straight to standard error: the test runner keeps to itself what a test prints that passes.
+        let _ = std::io::stderr().write_all(line);
+        return;
+    }
+    let (model, log) = (model("leaf_cell"), part(&log(&path), "375..476".parse().unwrap()));
+    let report = fitted(&model, std::slice::from_ref(&log));
+    let mut filter = filtered(&model, &log);
+    let values = filter.step(Some(1.0), &[0.0], &[f64::NAN]).unwrap().parameters.values.to_vec();
+    assert_eq!(report.parameters[0].name, "r0");
+    for resistance in [report.parameters[0].value, values[0]] {
+        // Voltages have three decimals, and the drop is 0.053 V.
+        assert!((resistance / 1.77e-3 - 1.0).abs() < 0.05, "{resistance}");
+    }
+    let output = &report.outputs[0];
+    assert!(
+        output.one_step.unwrap().percent.unwrap() > 95.0 && output.free_run.unwrap().percent.unwrap() > 90.0
+    );
+    assert!(output.whiteness.unwrap().p_value.unwrap() > 0.01, "{output:?}");
+    assert_eq!(report.warnings, [""; 0]);
+}

@@ -1,0 +1,215 @@
+//! What a fit refuses, what it warns of, and what ends it.
+
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use crate::regression::noise::Noise;
+use crate::{Channel, Error, GreyBox, GreyReport, Recording, Stopped, Times, fit_grey};
+
+/// dx/dt = (gain scale u - loss x + push)/1, y = x, with the lines of some parameters.
+fn tank(parameters: &str) -> GreyBox {
+    let text = format!(
+        "sample_time = 1
+         [states]
+         level = {{ start = 0, sd = 0.1 }}
+         hidden = {{ start = 0, sd = 0.1 }}
+         [inputs]
+         flow = \"u\"
+         [parameters]
+         {parameters}
+         [next]
+         level = \"level + dt * (gain * scale * flow - loss * level)\"
+         hidden = \"0.5 * hidden + aside * flow\"
+         [outputs]
+         y = \"level\"
+         [noise]
+         process = {{ level = 0.01 }}
+         measurement = {{ y = 0.05 }}"
+    );
+    GreyBox::from_toml(&text).unwrap()
+}
+
+/// With gain scale = 0.8 and a loss.
+fn log(loss: f64) -> Recording {
+    let mut noise = Noise(3);
+    let (mut level, mut flow) = (0.05, 0.0);
+    let (mut u, mut y) = (Vec::new(), Vec::new());
+    for row in 0..300 {
+        if row % 15 == 0 {
+            flow = noise.next();
+        }
+        u.push(flow);
+        y.push(level + 0.05 * 3.0_f64.sqrt() * noise.next());
+        level += 0.8 * flow - loss * level + 0.01 * 3.0_f64.sqrt() * noise.next();
+    }
+    let channel = |name: &str, values| Channel { name: name.into(), values };
+    Recording { channels: vec![channel("u", u), channel("y", y)], times: Times::Uniform(1.0) }
+}
+
+fn fitted(model: &GreyBox, log: Recording) -> Result<GreyReport, Error> {
+    fit_grey(model, &[log], &[], &|_| ControlFlow::Continue(()))
+}
+
+const UNKNOWN: &str = "sd = 1, unknown = true";
+
+#[test]
+fn bounds_are_kept() {
+    // The log was made with a negative loss, and with one beyond the upper bound.
+    for (truth, bounds, bound) in [
+        (-0.02, "min = 0", 0.0),
+        (0.3, "max = 0.2", 0.2),
+        (0.3, "min = 0, max = 0.2", 0.2),
+        (-0.02, "min = 0, max = 0.2", 0.0),
+    ] {
+        let model = tank(&format!(
+            "gain = {{ start = 0.5, {UNKNOWN} }}\nscale = 1\naside = 0\nloss = {{ start = 0.1, {UNKNOWN}, {bounds} }}"
+        ));
+        let report = fitted(&model, log(truth)).unwrap();
+        let loss = &report.parameters[1];
+        assert_ne!(loss.value, bound);
+        assert!(loss.value > loss.min.unwrap_or(f64::MIN) && loss.value < loss.max.unwrap_or(f64::MAX));
+        assert!((loss.value - bound).abs() < 1e-3, "{bounds} {}", loss.value);
+        assert_eq!(report.search.stopped, Stopped::Converged, "{bounds}");
+        assert!(report.search.iterations < 40, "{bounds} {}", report.search.iterations);
+        let words = format!("'loss' is within its standard error of its bound {bound}");
+        assert!(report.warnings.iter().any(|warning| warning.starts_with(&words)), "{:?}", report.warnings);
+        assert!(report.fitted_model().is_ok());
+    }
+    // Inside, a bound changes nothing.
+    let value = |bounds: &str| {
+        let model =
+            tank(&format!("gain = 0.8\nscale = 1\naside = 0\nloss = {{ start = 0.15, {UNKNOWN}{bounds} }}"));
+        let report = fitted(&model, log(0.1)).unwrap();
+        (report.parameters[0].value, report.parameters[0].standard_error)
+    };
+    let free = value("");
+    for bounds in [", min = 0", ", max = 1", ", min = 0, max = 1"] {
+        let (value, error) = value(bounds);
+        // Both stop within a small part of a standard error of the minimum.
+        assert!((value - free.0).abs() < 0.01 * free.1 && (error / free.1 - 1.0).abs() < 0.01, "{bounds}");
+    }
+}
+
+#[test]
+fn what_the_log_leaves_open_is_named() {
+    let open = |parameters: &str| match fitted(&tank(parameters), log(0.1)) {
+        Err(Error::Undetermined { parameters, message }) => (parameters, message),
+        other => panic!("{parameters}: {other:?}"),
+    };
+    let (names, message) = open(&format!(
+        "gain = {{ start = 0.5, {UNKNOWN} }}\nscale = {{ start = 2, {UNKNOWN} }}\naside = 0\nloss = {{ start = 0.2, {UNKNOWN} }}"
+    ));
+    assert_eq!(names, ["gain", "scale"]);
+    assert!(message.starts_with("the log cannot tell 'gain' and 'scale' apart"), "{message}");
+
+    let (names, message) = open(&format!(
+        "gain = {{ start = 0.5, {UNKNOWN} }}\nscale = 1\naside = {{ start = 1, {UNKNOWN} }}\nloss = {{ start = 0.2, {UNKNOWN} }}"
+    ));
+    assert_eq!(names, ["aside"]);
+    assert!(message.starts_with("nothing that was measured depends on 'aside'"), "{message}");
+
+    // Nothing moves: the input is zero, and the level starts at nothing.
+    let mut still = log(0.1);
+    still.channels[0].values.fill(0.0);
+    let model = tank(&format!("gain = {{ start = 0.5, {UNKNOWN} }}\nscale = 1\naside = 0\nloss = 0.1"));
+    let Err(Error::Undetermined { parameters, .. }) = fitted(&model, still) else { panic!("gain") };
+    assert_eq!(parameters, ["gain"]);
+}
+
+#[test]
+fn refusals_say_what_to_do() {
+    let known = "gain = 0.8\nscale = 1\naside = 0\nloss = 0.1";
+    let open = format!("gain = {{ start = 0.5, {UNKNOWN} }}\nscale = 1\naside = 0\nloss = 0.1");
+    let model = tank(&open);
+    let says = |result: Result<GreyReport, Error>, words: &str| {
+        let message = result.unwrap_err().to_string();
+        assert!(message.contains(words), "{message}");
+    };
+    says(fitted(&tank(known), log(0.1)), "none of its parameters is unknown");
+    says(fit_grey(&model, &[], &[], &|_| ControlFlow::Continue(())), "give at least one");
+    let mut renamed = log(0.1);
+    renamed.channels[0].name = "U".into();
+    says(fitted(&model, renamed), "the model needs channel 'u', the log has: U, y");
+    let clock = |times| Recording { times: Times::Measured(times), ..log(0.1) };
+    let mut times: Vec<f64> = (0..300).map(f64::from).collect();
+    times[8] = times[7];
+    says(fitted(&model, clock(times.clone())), "from 7 s in row 8 to 7 s in row 9");
+    times[8] = f64::NAN;
+    says(fitted(&model, clock(times)), "row 9 is not a finite number");
+    says(fitted(&model, clock(vec![0.0, 1.0])), "2 time stamps for 300 rows");
+    says(
+        fitted(&model, Recording { times: Times::Uniform(0.0), ..log(0.1) }),
+        "not a positive number of seconds",
+    );
+    let mut empty = log(0.1);
+    empty.channels[1].values.fill(f64::NAN);
+    says(fitted(&model, empty), "need more than 0 measured values");
+    let mut infinite = log(0.1);
+    infinite.channels[1].values[4] = f64::INFINITY;
+    says(fitted(&model, infinite), "infinite in row 5");
+    // With this gain the level leaves the range of numbers in a few rows.
+    let wild = tank(&format!("gain = 1\nscale = 1\naside = 0\nloss = {{ start = 1e80, {UNKNOWN} }}"));
+    says(fitted(&wild, log(0.1)), "the filter leaves the range of numbers in row");
+}
+
+#[test]
+fn a_trial_that_overflows_is_a_step_refused() {
+    // From here the first step leads to where the filter does not work.
+    let text = "sample_time = 1
+        [states]
+        x = { start = 1, sd = 0.1 }
+        [inputs]
+        [parameters]
+        a = { start = 3, sd = 1, unknown = true }
+        [next]
+        x = \"sqrt(a) * x + 0 * dt\"
+        [outputs]
+        y = \"x\"
+        [noise]
+        measurement = { y = 0.01 }";
+    let model = GreyBox::from_toml(text).unwrap();
+    let y: Vec<f64> = (0..30).map(|row| 0.5_f64.powi(row)).collect();
+    let channels = vec![Channel { name: "y".into(), values: y }];
+    let report = fitted(&model, Recording { channels, times: Times::Uniform(1.0) }).unwrap();
+    assert!((report.parameters[0].value - 0.25).abs() < 1e-3, "{}", report.parameters[0].value);
+}
+
+#[test]
+fn whoever_watches_may_end_it() {
+    let open = format!(
+        "gain = {{ start = 5, {UNKNOWN} }}\nscale = 1\naside = 0\nloss = {{ start = 0.9, {UNKNOWN}, min = 0, max = 1 }}"
+    );
+    let (model, seen) = (tank(&open), AtomicUsize::new(0));
+    let monitored = fit_grey(&model, &[log(0.1)], &[], &|progress| {
+        assert_eq!(progress.iteration, seen.fetch_add(1, Ordering::Relaxed));
+        assert!(progress.cost.is_finite());
+        if progress.iteration < 2 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+    });
+    assert_eq!(monitored, Err(Error::Interrupted));
+    assert_eq!(seen.into_inner(), 3);
+    assert!(fitted(&model, log(0.1)).unwrap().search.iterations > 2);
+}
+
+#[test]
+fn a_careful_reader_is_told() {
+    let open = format!("gain = {{ start = 0.5, {UNKNOWN}, walk = 0.1 }}\nscale = 1\naside = 0\nloss = 0.1");
+    let mut log = log(0.1);
+    log.channels[0].values[30..34].fill(f64::NAN);
+    log.channels[1].values.iter_mut().for_each(|value| *value *= 3.0);
+    let report = fitted(&tank(&open), log).unwrap();
+    for words in ["channel 'u' misses 4 of 300 values", "innovations are larger", "'gain': taken as constant"]
+    {
+        assert!(
+            report.warnings.iter().any(|warning| warning.starts_with(words)),
+            "{words} {:?}",
+            report.warnings
+        );
+    }
+    let gain = &report.parameters[0];
+    let factor = gain.standard_error / gain.nominal_standard_error;
+    assert!(
+        (factor * factor / report.mean_nis - 1.0).abs() < 1e-12
+            && report.covariance_factor == report.mean_nis
+    );
+    assert!((report.covariance[0][0].sqrt() / gain.standard_error - 1.0).abs() < 1e-12);
+}

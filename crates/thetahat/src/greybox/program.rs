@@ -1,0 +1,44 @@
+//! Some nodes of a graph, as a list of operations to be run from its beginning to its end.
+
+use thetahat_core::Number;
+
+use super::graph::{self, Graph, Leaves, Node, Operation};
+
+/// The operations that some nodes need, in order, and where their values end up.
+#[derive(Debug, Clone)]
+pub(super) struct Program {
+    operations: Vec<Operation>,
+    results: Vec<usize>,
+}
+
+impl Program {
+    /// What computes these nodes, and nothing else.
+    pub(super) fn new(graph: &Graph, roots: &[Node]) -> Self {
+        let alive = graph.alive(roots);
+        let mut places = vec![0; alive.len()];
+        let mut operations = Vec::new();
+        for (node, operation) in graph.operations().iter().enumerate().filter(|(node, _)| alive[*node]) {
+            places[node] = operations.len();
+            operations.push(operation.moved(|argument| places[argument]));
+        }
+        Self { operations, results: roots.iter().map(|&root| places[root]).collect() }
+    }
+
+    /// How many numbers [`run`](Program::run) needs to work in.
+    pub(super) fn size(&self) -> usize {
+        self.operations.len()
+    }
+
+    /// Computes the nodes, in the order in which they were given. `values` has [`size`](Program::size) numbers, of any
+    /// content.
+    pub(super) fn run<'s, S: Number<f64>>(
+        &'s self,
+        leaves: &Leaves<'_, S>,
+        values: &'s mut [S],
+    ) -> impl Iterator<Item = S> + use<'s, S> {
+        for (place, &operation) in self.operations.iter().enumerate() {
+            values[place] = graph::value(operation, leaves, values);
+        }
+        self.results.iter().map(|&place| values[place])
+    }
+}

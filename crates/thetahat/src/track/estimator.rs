@@ -1,0 +1,92 @@
+//! The estimators of thetahat-core, with orders and policy known at run time.
+
+use serde::{Deserialize, Serialize};
+use thetahat_core::nalgebra::Dyn;
+use thetahat_core::{
+    ArmaxOrders, ArxOrders, Error, Innovation, InputOrders, Lags, RecursiveArmax, RecursiveArx,
+    RecursiveLeastSquares,
+};
+
+use super::plan::{PerChannel, TrackPlan};
+use crate::Orders;
+
+/// Delay lines.
+pub(super) type Lines = Lags<f64, Dyn, Dyn>;
+
+/// An estimator of one of the two kinds.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) enum Estimator {
+    Arx(RecursiveArx<f64, Dyn, Dyn>),
+    Armax(RecursiveArmax<f64, Dyn, Dyn>),
+}
+
+impl Estimator {
+    /// The estimator of a plan that knows nothing yet. The constant is one more input.
+    pub(super) fn new(orders: &Orders, plan: &TrackPlan, scales: &PerChannel) -> Result<Self, Error> {
+        let constant = usize::from(plan.constant);
+        let mut inputs: Vec<InputOrders> =
+            orders.nb.iter().zip(&orders.nk).map(|(&nb, &nk)| InputOrders { nb, nk }).collect();
+        inputs.extend(std::iter::repeat_n(InputOrders { nb: 1, nk: 0 }, constant));
+        let mut input_scales = scales.inputs.clone();
+        input_scales.extend(std::iter::repeat_n(1.0, constant));
+
+        let (na, nc, forgetting) = (orders.na, orders.nc, plan.forgetting.0);
+        let output = scales.output;
+        match plan.method.with_noise_model() {
+            None => {
+                let orders = ArxOrders { na, inputs: &inputs };
+                let estimator = RecursiveArx::new(&orders, output, &input_scales, forgetting)?;
+                let estimator = estimator.with_start(plan.start.0)?.with_dead_zone(plan.dead_zone)?;
+                Ok(Self::Arx(estimator))
+            }
+            Some(method) => {
+                let noise = plan.noise_scale.unwrap_or(output / 10.0);
+                let orders = ArmaxOrders { na, inputs: &inputs, nc };
+                let estimator =
+                    RecursiveArmax::new(&orders, method, output, &input_scales, noise, forgetting)?;
+                Ok(Self::Armax(estimator.with_dead_zone(plan.dead_zone)?))
+            }
+        }
+    }
+
+    pub(super) fn update(&mut self, inputs: &[f64], output: f64) -> Result<Innovation<f64>, Error> {
+        match self {
+            Self::Arx(arx) => arx.update(inputs, output),
+            Self::Armax(armax) => armax.update(inputs, output),
+        }
+    }
+
+    /// The outputs to come, computed in delay lines that are lost; NaN where they depend on a missing sample, or
+    /// overflow.
+    pub(super) fn predict(&self, room: &mut Lines, inputs: &[f64], outputs: &mut [f64]) {
+        let predicted = match self {
+            Self::Arx(arx) => arx.predict_in(room, inputs, outputs),
+            Self::Armax(armax) => armax.predict_in(room, inputs, outputs),
+        };
+        // After an overflow what is beyond it is NaN already; with inputs of another length nothing was written.
+        if let Err(Error::Length { .. } | Error::Infinite { .. }) = predicted {
+            outputs.fill(f64::NAN);
+        }
+    }
+
+    pub(super) fn gap(&mut self) {
+        match self {
+            Self::Arx(arx) => arx.gap(),
+            Self::Armax(armax) => armax.gap(),
+        }
+    }
+
+    pub(super) fn lines(&self) -> &Lines {
+        match self {
+            Self::Arx(arx) => arx.lags(),
+            Self::Armax(armax) => armax.lags(),
+        }
+    }
+
+    pub(super) fn least_squares(&self) -> &RecursiveLeastSquares<f64, Dyn> {
+        match self {
+            Self::Arx(arx) => arx.estimator(),
+            Self::Armax(armax) => armax.estimator(),
+        }
+    }
+}

@@ -1,0 +1,136 @@
+use serde::{Deserialize, Serialize};
+use thetahat_core::{ArmaxMethod, Forgetting, Start};
+
+/// How a model is tracked.
+///
+/// ```
+/// use thetahat::{Beginning, Policy, TrackPlan};
+///
+/// let plan = TrackPlan { forgetting: "0.98".parse()?, start: "exact".parse()?, ..TrackPlan::default() };
+/// assert_eq!(plan.forgetting.to_string(), "exponential:0.98");
+/// # Ok::<(), thetahat::Error>(())
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TrackPlan {
+    /// Least squares for models without C, one of the two others for models with it.
+    pub method: TrackMethod,
+    /// What is forgotten.
+    pub forgetting: Policy,
+    /// What becomes of the prior. A model with C, and one that goes on from a report, has the standard start.
+    pub start: Beginning,
+    /// T of the prediction T samples ahead, 1 to 10,000.
+    pub horizon: usize,
+    /// An innovation of at most this size corrects nothing, in the output's units. 0: no dead zone.
+    pub dead_zone: f64,
+    /// Whether a constant is estimated beside the model: A y = B u + constant + C e, for signals whose offsets are not known.
+    pub constant: bool,
+    /// What is taken from each channel before, in its own units, and put back in predictions. None: what the report says;
+    /// without a report nothing, or with a constant the first value of each channel. (Far from 0, signals that hardly change
+    /// look like one constant: the prior would pull at what tells them apart.)
+    pub offsets: Option<PerChannel>,
+    /// The typical magnitude of each channel without its offset, in its own units. None: found in the first rows, or in the
+    /// report.
+    pub scales: Option<PerChannel>,
+    /// The typical magnitude of e, in the output's units; only a model with C asks for it. None: a tenth of that of the
+    /// output, or what the report says.
+    pub noise_scale: Option<f64>,
+    /// Whether to watch for changes, and how many samples shall be between two false alarms on average. See
+    /// [`change_detector`](crate::change_detector).
+    pub false_alarms: Option<f64>,
+}
+
+/// Least squares from the prior, a memory of 100 samples, predictions one sample ahead, no detection of changes.
+impl Default for TrackPlan {
+    fn default() -> Self {
+        Self {
+            method: TrackMethod::Rls,
+            forgetting: Policy::default(),
+            start: Beginning::default(),
+            horizon: 1,
+            dead_zone: 0.0,
+            constant: false,
+            offsets: None,
+            scales: None,
+            noise_scale: None,
+            false_alarms: None,
+        }
+    }
+}
+
+/// One number for each channel.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PerChannel {
+    /// Of the inputs, in their order.
+    pub inputs: Vec<f64>,
+    /// Of the output.
+    pub output: f64,
+}
+
+/// By which gradient a model is corrected.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum TrackMethod {
+    /// Recursive least squares, for AR and ARX.
+    Rls,
+    /// Extended least squares, for ARMA and ARMAX. See [`ArmaxMethod::ExtendedLeastSquares`].
+    Els,
+    /// The recursive prediction error method, for ARMA and ARMAX. See [`ArmaxMethod::PredictionError`].
+    Rpem,
+}
+
+impl TrackMethod {
+    /// What the method is to an estimator with C.
+    pub(super) fn with_noise_model(self) -> Option<ArmaxMethod> {
+        match self {
+            Self::Rls => None,
+            Self::Els => Some(ArmaxMethod::ExtendedLeastSquares),
+            Self::Rpem => Some(ArmaxMethod::PredictionError),
+        }
+    }
+}
+
+/// What a tracker forgets, written as a word and its numbers.
+///
+/// | written | [`Forgetting`] |
+/// |---|---|
+/// | `none`, or `1` | nothing |
+/// | `exponential:F`, or only `F` | the factor F = 1 - 1/(memory in samples) |
+/// | `directional:F` | the same factor, along the regressor only |
+/// | `random-walk:V` | the variance of each parameter grows by V noise variances/scale² a sample, 0 to 100 |
+/// | `variable:F:M:N` | the factor F, at least M, where innovations are as large as the noise variance N in units of y² |
+///
+/// What is written is read back as the same. That a factor is above n/(n + 1), for n parameters, is checked when a tracker is
+/// made.
+///
+/// ```
+/// use thetahat::Policy;
+/// use thetahat::thetahat_core::Forgetting;
+///
+/// let policy: Policy = "directional:0.99".parse()?;
+/// assert_eq!(policy.0, Forgetting::Directional { factor: 0.99 });
+/// assert_eq!("1".parse::<Policy>()?.to_string(), "none");
+/// assert!("0.99:0.98".parse::<Policy>().is_err());
+/// # Ok::<(), thetahat::Error>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Policy(pub Forgetting<f64>);
+
+/// How a tracker starts, written as a word: `standard`, `exact`, `mixed` or `mixed:K`, with K samples in which the prior is
+/// taken out. See [`Start`].
+///
+/// ```
+/// use thetahat::Beginning;
+/// use thetahat::thetahat_core::Start;
+///
+/// assert_eq!("mixed:20".parse::<Beginning>()?.0, Start::Mixed { blend: 20 });
+/// # Ok::<(), thetahat::Error>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Beginning(pub Start);
+
+/// The standard start.
+impl Default for Beginning {
+    fn default() -> Self {
+        Self(Start::Standard)
+    }
+}

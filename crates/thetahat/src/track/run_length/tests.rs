@@ -1,0 +1,85 @@
+use thetahat_core::{Action, Chart, Innovation};
+
+use super::*;
+use crate::regression::noise::Noise;
+
+/// Gaussian numbers (Box and Muller 1958).
+fn gaussian(noise: &mut Noise) -> f64 {
+    let (radius, angle) = ((noise.next() + 1.0) / 2.0, noise.next());
+    (-2.0 * (1.0 - radius).ln()).sqrt() * (PI * angle).cos()
+}
+
+#[test]
+fn run_lengths_are_those_of_the_tables() {
+    // Two-sided, reference value 1/2: Lucas and Crosier, Fast initial response for CUSUM quality-control schemes,
+    // Technometrics 24, 1982: 168 and 465, which are half of the one-sided lengths.
+    for (threshold, expected) in [(4.0, 168.0), (5.0, 465.0)] {
+        let found = average_run_length(threshold, mean) / 2.0;
+        assert!((found - expected).abs() < 0.5, "{threshold}: {found}");
+    }
+    // Siegmund, Sequential Analysis, 1985, section 2.6: b = h + 1.166, L = 2 (exp b - b - 1), good to some percent.
+    for threshold in [3.0, 6.0, 9.0, 12.0] {
+        let b: f64 = threshold + 1.166;
+        let approximation = 2.0 * (b.exp() - b - 1.0);
+        assert!((average_run_length(threshold, mean) / approximation - 1.0).abs() < 0.03, "{threshold}");
+    }
+}
+
+#[test]
+fn integrals_are_those_of_the_distributions() {
+    for steps in [mean, variance] {
+        for w in [-0.3466, -0.2, 0.0, 0.7, 2.5] {
+            let half = 1e-5;
+            let slope = (steps(w + half).integral - steps(w - half).integral) / (2.0 * half);
+            // Where the density is infinite the difference is only good to the square root of its width.
+            assert!((slope - steps(w).distribution).abs() < if w < -0.3 { 5e-3 } else { 1e-8 }, "{w}");
+        }
+        assert!((steps(50.0).distribution - 1.0).abs() < 1e-15);
+    }
+    // P(z^2 < 1) = 0.6827 at w = (1/2 - ln 2)/2.
+    assert!((variance((0.5 - LN_2) / 2.0).distribution - 0.682_689_492_137).abs() < 1e-10);
+}
+
+#[test]
+fn thresholds_make_the_intervals_they_are_for() {
+    for steps in [mean, variance] {
+        for interval in [20.0, 500.0, 4e4, 4e9] {
+            let found = average_run_length(threshold(interval, steps), steps);
+            assert!((found / interval - 1.0).abs() < 2.0 * PRECISION, "{interval}: {found}");
+        }
+    }
+}
+
+/// The number of alarms of each chart in so many Gaussian innovations.
+fn alarms(detector: &mut ChangeDetector<f64>, samples: usize) -> [f64; 3] {
+    let (mut noise, mut alarms) = (Noise(5), [0.0; 3]);
+    for _ in 0..samples {
+        let error = gaussian(&mut noise);
+        let innovation = Innovation { error, variance: 1.0, nis: error * error, action: Action::Updated };
+        let alarm = detector.update(&innovation);
+        alarms[0] += f64::from(u8::from(alarm.is_some_and(|alarm| alarm.chart == Chart::MeanUp)));
+        alarms[1] += f64::from(u8::from(alarm.is_some_and(|alarm| alarm.chart == Chart::MeanDown)));
+        alarms[2] += f64::from(u8::from(alarm.is_some_and(|alarm| alarm.chart == Chart::Variance)));
+    }
+    alarms
+}
+
+#[test]
+fn false_alarms_come_as_often_as_asked() {
+    let (interval, samples) = (500.0, 1_000_000);
+    let found = alarms(&mut change_detector(interval).unwrap(), samples);
+    let expected = samples as f64 / interval;
+    for (found, share) in found.into_iter().zip([0.25, 0.25, 0.5]) {
+        let expected = share * expected;
+        // Alarms are nearly a Poisson process: four standard deviations, and 3 % for charts that alarm together.
+        assert!((found - expected).abs() < 4.0 * expected.sqrt() + 0.03 * expected, "{found} {expected}");
+    }
+}
+
+#[test]
+fn an_interval_that_makes_no_sense_is_refused() {
+    for interval in [f64::NAN, 9.0, -1.0, f64::INFINITY, 2e9] {
+        assert!(matches!(change_detector(interval), Err(Error::Argument { .. })));
+    }
+    assert!(change_detector(10.0).is_ok() && change_detector(1e9).is_ok());
+}

@@ -1,0 +1,93 @@
+use thetahat_core::Start;
+
+use super::*;
+
+#[test]
+fn what_is_written_is_read_back() {
+    let policies = [
+        Forgetting::None,
+        Forgetting::Exponential { factor: 0.1 + 0.2 },
+        Forgetting::Exponential { factor: 1.0 },
+        Forgetting::Directional { factor: 0.98 },
+        Forgetting::RandomWalk { variance: 1e-300 },
+        Forgetting::RandomWalk { variance: 0.0 },
+        Forgetting::Variable { factor: 0.99, minimum: 0.9, noise_variance: 2.5e-7 },
+    ];
+    for policy in policies.map(Policy) {
+        assert_eq!(policy.to_string().parse::<Policy>(), Ok(policy));
+    }
+    for start in [Start::Standard, Start::Exact, Start::Mixed { blend: 0 }, Start::Mixed { blend: 65535 }] {
+        assert_eq!(Beginning(start).to_string().parse::<Beginning>(), Ok(Beginning(start)));
+    }
+    for method in [TrackMethod::Rls, TrackMethod::Els, TrackMethod::Rpem] {
+        assert_eq!(method.to_string().parse::<TrackMethod>(), Ok(method));
+    }
+    for (text, policy) in [
+        ("1", Forgetting::None),
+        ("1.0", Forgetting::None),
+        ("0.99", Forgetting::Exponential { factor: 0.99 }),
+        ("random-walk:1e-6", Forgetting::RandomWalk { variance: 1e-6 }),
+    ] {
+        assert_eq!(text.parse(), Ok(Policy(policy)));
+    }
+}
+
+#[test]
+fn words_that_mean_nothing_are_refused() {
+    let message = |text: &str| text.parse::<Policy>().unwrap_err().to_string();
+    for text in ["", "some", "exponential", "none:1", "0.9:0.8", "exponential:", "variable:0.99", "walk:1"] {
+        assert!(
+            message(text).contains(&format!("'{text}'")) && message(text).contains("write none"),
+            "{text}"
+        );
+    }
+    for text in ["nan", "inf", "exponential:nan", "directional:inf", "random-walk:x"] {
+        assert!(message(text).contains("number"), "{}", message(text));
+    }
+    for text in ["0", "1.01", "-1", "exponential:0", "directional:1.5", "variable:2:1:1"] {
+        assert!(message(text).contains("above 0 and at most 1"), "{}", message(text));
+    }
+    for text in ["random-walk:-1", "random-walk:101", "variable:0.9:0.95:1", "variable:0.9:0.8:0"] {
+        assert!(text.parse::<Policy>().is_err(), "{text}");
+    }
+    for text in ["", "exact:1", "mixed:", "mixed:-1", "mixed:65536", "Standard"] {
+        assert!(text.parse::<Beginning>().is_err(), "{text}");
+    }
+    assert!("arx".parse::<TrackMethod>().is_err());
+}
+
+#[test]
+fn plans_that_make_no_tracker_are_refused() {
+    let argument = |orders: &Orders, plan: TrackPlan| match Tracker::new(orders, &plan) {
+        Err(Error::Argument { argument, message }) => {
+            assert!(!message.is_empty());
+            argument
+        }
+        other => panic!("{other:?}"),
+    };
+    let (plain, channels) =
+        (TrackPlan::default(), |output| Some(PerChannel { inputs: vec![1.0, 1.0], output }));
+    let armax = Orders::armax(2, &[2, 1], 1, &[1, 0]).unwrap();
+    let els = TrackPlan { method: TrackMethod::Els, ..plain.clone() };
+    let with = |change: fn(&mut TrackPlan)| {
+        let mut plan = TrackPlan::default();
+        change(&mut plan);
+        plan
+    };
+    assert_eq!(argument(&Orders::oe(&[1], &[1], &[1]).unwrap(), plain.clone()), "orders");
+    assert_eq!(argument(&armax, plain.clone()), "method");
+    assert_eq!(argument(&orders(), els.clone()), "method");
+    assert_eq!(argument(&armax, TrackPlan { start: Beginning(Start::Exact), ..els.clone() }), "start");
+    assert_eq!(argument(&orders(), with(|plan| plan.forgetting = "0.8".parse().unwrap())), "factor");
+    assert_eq!(argument(&orders(), with(|plan| plan.horizon = 0)), "horizon");
+    assert_eq!(argument(&orders(), with(|plan| plan.horizon = 10_001)), "horizon");
+    assert_eq!(argument(&orders(), with(|plan| plan.dead_zone = f64::NAN)), "width");
+    assert_eq!(argument(&orders(), with(|plan| plan.false_alarms = Some(1.0))), "false alarms");
+    assert_eq!(argument(&orders(), with(|plan| plan.noise_scale = Some(f64::NAN))), "noise_scale");
+    let short = Some(PerChannel { inputs: vec![1.0], output: 1.0 });
+    assert_eq!(argument(&orders(), TrackPlan { offsets: short.clone(), ..plain.clone() }), "offsets");
+    assert_eq!(argument(&orders(), TrackPlan { scales: short, ..plain.clone() }), "scales");
+    assert_eq!(argument(&orders(), TrackPlan { scales: channels(0.0), ..plain.clone() }), "scales");
+    assert_eq!(argument(&orders(), TrackPlan { offsets: channels(f64::NAN), ..plain }), "offsets");
+    assert_eq!(argument(&armax, TrackPlan { noise_scale: Some(-1.0), ..els }), "scales");
+}

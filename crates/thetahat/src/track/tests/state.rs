@@ -1,0 +1,102 @@
+use super::*;
+
+/// What a tracker says of a sample, and everything that it is, to the bit: NaN has one name in both.
+fn says(tracker: &mut Tracker, u: [f64; 2], y: f64) -> String {
+    let tracked = tracker.update(&u, y).unwrap();
+    format!("{tracked:?} {:?}", tracker.forecast())
+}
+
+#[test]
+fn what_is_written_goes_on_to_the_bit() {
+    let (mut inputs, mut y) = log(120, 0.3, 0.6, 12);
+    (y[3], y[60], inputs[4][1], inputs[61][0]) = (f64::NAN, f64::NAN, f64::NAN, f64::NAN);
+    y[90] = 1e200;
+    let armax = Orders::armax(2, &[2, 1], 1, &[1, 2]).unwrap();
+    let plain = TrackPlan { horizon: 2, false_alarms: Some(100.0), ..TrackPlan::default() };
+    let with = |orders: &Orders, method, forgetting: &str, start: &str| {
+        let (forgetting, start) = (forgetting.parse().unwrap(), start.parse().unwrap());
+        (orders.clone(), TrackPlan { method, forgetting, start, ..plain.clone() })
+    };
+    let (rls, els, rpem) = (TrackMethod::Rls, TrackMethod::Els, TrackMethod::Rpem);
+    let mut plans = vec![
+        with(&orders(), rls, "none", "exact"),
+        with(&orders(), rls, "0.95", "standard"),
+        with(&orders(), rls, "directional:0.95", "mixed:30"),
+        with(&orders(), rls, "random-walk:1e-4", "mixed"),
+        with(&orders(), rls, "variable:0.99:0.9:0.03", "exact"),
+        with(&armax, els, "0.95", "standard"),
+        with(&armax, rpem, "none", "standard"),
+    ];
+    let (orders, mut plan) = plans[1].clone();
+    plan.constant = true;
+    plan.dead_zone = 0.1;
+    plan.offsets = Some(PerChannel { inputs: vec![0.1, 0.2], output: 0.3 });
+    plan.scales = Some(PerChannel { inputs: vec![3.0, 1.0], output: 9.0 });
+    plans.push((orders, plan));
+    for (orders, plan) in plans {
+        let mut tracker = Tracker::new(&orders, &plan).unwrap();
+        for t in 0..120 {
+            if t == 6 || t == 70 {
+                tracker.gap();
+            }
+            // While rows are collected, after a gap, at the start, with missing samples in the lines, and later.
+            if [0, 1, 5, 6, 13, 14, 25, 62, 70, 91, 119].contains(&t) {
+                let text = serde_json::to_string(&tracker).unwrap();
+                let mut copy: Tracker = serde_json::from_str(&text).unwrap();
+                assert_eq!(serde_json::to_string(&copy).unwrap(), text);
+                assert_eq!(copy.plan(), &plan);
+                let mut original = tracker.clone();
+                assert_eq!(format!("{:?}", copy.forecast()), format!("{:?}", original.forecast()));
+                for later in t..120 {
+                    let said = says(&mut original, inputs[later], y[later]);
+                    assert_eq!(says(&mut copy, inputs[later], y[later]), said, "{plan:?} {t} {later}");
+                }
+                let last = serde_json::to_string(&original).unwrap();
+                assert_eq!(serde_json::to_string(&copy).unwrap(), last);
+            }
+            tracker.update(&inputs[t], y[t]).unwrap();
+        }
+    }
+}
+
+#[test]
+fn nothing_grows_with_the_number_of_samples() {
+    let (inputs, y) = log(400, 0.3, 0.0, 13);
+    let mut tracker = Tracker::new(&orders(), &TrackPlan::default()).unwrap();
+    let mut lengths = vec![];
+    for _ in 0..30 {
+        run(&mut tracker, &inputs, &y);
+        lengths.push(serde_json::to_string(&tracker).unwrap().len());
+    }
+    // Numbers have up to 24 digits, or fewer.
+    let (least, most) = (lengths.iter().min().unwrap(), lengths.iter().max().unwrap());
+    assert!(most - least < 300, "{lengths:?}");
+    // With a channel that stays 0 the rows wait, and no more than are needed.
+    let mut waiting = Tracker::new(&orders(), &TrackPlan::default()).unwrap();
+    let still: Vec<[f64; 2]> = inputs.iter().map(|u| [u[0], 0.0]).collect();
+    run(&mut waiting, &still, &y);
+    let before = serde_json::to_string(&waiting).unwrap().len();
+    run(&mut waiting, &still, &y);
+    assert!(serde_json::to_string(&waiting).unwrap().len().abs_diff(before) < 100);
+}
+
+#[test]
+fn a_gap_while_rows_are_collected_is_kept_with_them() {
+    let (inputs, y) = log(60, 0.3, 0.0, 14);
+    let feed = |tracker: &mut Tracker, gaps: &[usize]| {
+        for t in 0..60 {
+            if gaps.contains(&t) {
+                tracker.gap();
+            }
+            tracker.update(&inputs[t], y[t]).unwrap();
+        }
+    };
+    for gap in [5, 12] {
+        let mut tracker = Tracker::new(&orders(), &TrackPlan::default()).unwrap();
+        feed(&mut tracker, &[gap]);
+        let plan = TrackPlan { scales: tracker.scales().cloned(), ..TrackPlan::default() };
+        let mut given = Tracker::new(&orders(), &plan).unwrap();
+        feed(&mut given, &[gap]);
+        assert_eq!(given.parameters(), tracker.parameters());
+    }
+}

@@ -1,0 +1,453 @@
+use serde::{Deserialize, Serialize};
+use thetahat_core::{Action, Alarm, ChangeDetector, Innovation, Real};
+
+use super::collecting::{Collecting, LARGEST};
+use super::estimator::{Estimator, Lines};
+use super::missing;
+use super::plan::{PerChannel, TrackPlan};
+use super::run_length::change_detector;
+use super::score::TrackScore;
+use crate::{Error, Orders};
+
+/// The farthest horizon: beyond it a number was mistyped.
+const FARTHEST: usize = 10_000;
+
+/// What a tracker made of one sample.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tracked {
+    /// The one-step prediction, from all samples before and the inputs of this one, in the output's units; NaN if there is
+    /// none: while rows are collected, and where it depends on a missing sample. (It is there where only the output is
+    /// missing.)
+    pub prediction: f64,
+    /// The innovation e: the output less its prediction; NaN if one of the two is missing.
+    pub error: f64,
+    /// S, the variance of e; NaN until the noise variance is known.
+    pub variance: f64,
+    /// e²/S, the normalised innovation squared: 1 on average. 0 where S is not known.
+    pub nis: f64,
+    /// What was done with the sample.
+    pub action: Action,
+    /// How much is known of the parameter that least is known of, 0 … 1; 0 while scales are collected. Below 0.5 or so, do
+    /// not rely on the parameters. See [`RecursiveLeastSquares::excitation`](thetahat_core::RecursiveLeastSquares::excitation).
+    pub excitation: f64,
+    /// A change that was noticed, if that was asked for. The charts begin after 2 n + 20 innovations, n being the number of
+    /// parameters: a noise variance from fewer would call many a sample unlikely. After a report they begin at once.
+    pub alarm: Option<Alarm<f64>>,
+    /// Whether a value was so large that sums with it could overflow (beyond about 1e148, or 1e98 while scales are collected):
+    /// it was taken for missing.
+    pub too_large: bool,
+}
+
+/// A model that is estimated while the plant runs: ARX or ARMAX under one forgetting policy.
+///
+/// ```text
+/// A(q) y(k) = sum_j B_j(q) u_j(k) + constant + C(q) e(k)
+/// ```
+///
+/// It is a [`RecursiveArx`](thetahat_core::RecursiveArx) or a [`RecursiveArmax`](thetahat_core::RecursiveArmax), where
+/// the equations and the sources are, with what a program needs that gets its orders from a person: channels with offsets,
+/// scales that are found, predictions, figures, detection of changes, and a start from the report of a fit. NaN is a
+/// missing sample. Parameters are those of the signals less their offsets.
+///
+/// # Scales
+///
+/// The estimator needs the typical magnitude of each channel, for its prior and its bounds. If the plan does not have
+/// them, the tracker keeps the latest L rows, L being the reach of the orders plus two rows for each parameter and
+/// at least 10, until so many have been seen and every channel has shown a value other than 0 (below 1e-98 counts as 0). So
+/// long the action is [`Action::Collecting`]. Then the scales are the largest magnitudes that were seen, the rows that were kept
+/// go into the estimator, and from the next row on all is, to the bit, as if the scales had been given and it had started
+/// with the first of these rows.
+///
+/// # Cost
+///
+/// For n parameters 2 n² + 10 n multiply-adds, 2 n divisions and one logarithm a sample. Once the scales are known a sample
+/// takes no memory, and nothing grows with their number.
+///
+/// A tracker is plain data. With serde it is written and read back, and goes on to the bit.
+///
+/// ```
+/// use thetahat::{Orders, TrackPlan, Tracker};
+///
+/// let mut tracker = Tracker::new(&Orders::arx(1, &[1], &[1])?, &TrackPlan::default())?;
+/// let mut y = 0.0;
+/// for k in 0..200 {
+///     let u = if k % 7 < 3 { 1.0 } else { -1.0 };
+///     tracker.update(&[u], y)?;
+///     y = 0.8 * y + 0.5 * u;
+/// }
+/// assert_eq!(tracker.names(), ["a1", "b1"]);
+/// let parameters = tracker.parameters().expect("an estimate");
+/// assert!((parameters[0] + 0.8).abs() < 1e-3 && (parameters[1] - 0.5).abs() < 1e-3);
+/// // y is the output to come, which the input before it decides.
+/// assert!((tracker.forecast() - y).abs() < 1e-2);
+/// # Ok::<(), thetahat::Error>(())
+/// ```
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Tracker {
+    pub(super) orders: Orders,
+    pub(super) plan: TrackPlan,
+    pub(super) names: Vec<String>,
+    pub(super) offsets: PerChannel,
+    /// Whose offset is the first value to come: the inputs, then the output. Empty if all are known.
+    unset: Vec<bool>,
+    pub(super) scales: Option<PerChannel>,
+    pub(super) stage: Stage,
+    /// Whether an exact start is over, or there was none.
+    pub(super) has_estimate: bool,
+    /// How many innovations are still to come before they count.
+    pub(super) settling: usize,
+    detector: Option<ChangeDetector<f64>>,
+    score: TrackScore,
+    /// The latest inputs as the estimator sees them: less their offsets, the constant at the end.
+    #[serde(with = "missing::vector")]
+    inputs: Vec<f64>,
+    #[serde(skip)]
+    room: Room,
+}
+
+/// Where a tracker stands.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) enum Stage {
+    /// The scales are not known yet.
+    Collecting(Collecting),
+    Running(Box<Estimator>),
+}
+
+/// Memory for predictions.
+#[derive(Debug, Clone, Default)]
+struct Room {
+    lines: Option<Lines>,
+    inputs: Vec<f64>,
+    outputs: Vec<f64>,
+}
+
+impl Tracker {
+    /// A tracker that knows nothing yet. The orders are those of AR, ARX, ARMA or ARMAX.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] if the orders have D or F, or C with the method `rls`, or the other two methods without C; if ARMA or
+    /// ARMAX is to start otherwise than `standard`; if there is not one offset or scale for each channel; if a factor is not above
+    /// n/(n + 1) for n parameters (the constant is one of them); if a scale is not in 1e-98 … 1e98; if another number of the
+    /// plan is out of its range.
+    pub fn new(orders: &Orders, plan: &TrackPlan) -> Result<Self, Error> {
+        check(orders, plan)?;
+        let inputs = orders.inputs();
+        let zeros = || PerChannel { inputs: vec![0.0; inputs], output: 0.0 };
+        let parameters = orders.parameters() + usize::from(plan.constant);
+        // What the scales do not decide is checked at once.
+        let units = PerChannel { inputs: vec![1.0; inputs], output: 1.0 };
+        let estimator =
+            Estimator::new(orders, plan, plan.scales.as_ref().unwrap_or(&units)).map_err(refused)?;
+        let stage = match plan.scales {
+            Some(_) => Stage::Running(Box::new(estimator)),
+            None => Stage::Collecting(Collecting::new(orders.reach() + 2 * parameters, &orders.nb)),
+        };
+        let mut names = orders.names();
+        if plan.constant {
+            names.insert(parameters - 1 - orders.nc, "constant".to_owned());
+        }
+        let mut latest = vec![f64::NAN; inputs];
+        latest.extend(plan.constant.then_some(1.0));
+        Ok(Self {
+            orders: orders.clone(),
+            plan: plan.clone(),
+            names,
+            offsets: plan.offsets.clone().unwrap_or_else(zeros),
+            unset: vec![true; if plan.constant && plan.offsets.is_none() { inputs + 1 } else { 0 }],
+            scales: plan.scales.clone(),
+            stage,
+            has_estimate: plan.start.0 != thetahat_core::Start::Exact,
+            settling: 2 * parameters + 20,
+            detector: plan.false_alarms.map(change_detector).transpose()?,
+            score: TrackScore::default(),
+            inputs: latest,
+            room: Room::default(),
+        })
+    }
+
+    /// One sample: the inputs u(k) in the order of the orders, and the output y(k), in their own units. NaN is a missing
+    /// sample. A finite value that is too large for the arithmetic is taken for missing, and
+    /// [`Tracked::too_large`] says so.
+    ///
+    /// # Errors
+    /// After which nothing has changed: [`Error::Argument`] if there is not one value for each input; [`Error::Data`] if one
+    /// is infinite.
+    pub fn update(&mut self, inputs: &[f64], output: f64) -> Result<Tracked, Error> {
+        if inputs.len() != self.orders.inputs() {
+            let message = format!("there are {} values for {} inputs", inputs.len(), self.orders.inputs());
+            return Err(Error::argument("inputs", message));
+        }
+        if output.is_infinite() {
+            return Err(Error::data("the output is infinite; if the sample is missing, leave it empty"));
+        }
+        if let Some(input) = inputs.iter().position(|value| value.is_infinite()) {
+            let message = "is infinite; if the sample is missing, leave it empty";
+            return Err(Error::data(format!("input {} {message}", input + 1)));
+        }
+        let limit = match self.stage {
+            Stage::Collecting(_) => LARGEST,
+            // A little less than what the estimator refuses.
+            Stage::Running(_) => (f64::LARGEST_ENTRY / self.names.len() as f64).sqrt() * (1.0 - 1e-12),
+        };
+        let PerChannel { inputs: input_offsets, output: output_offset } = &mut self.offsets;
+        let offsets = input_offsets.iter_mut().chain([output_offset]);
+        for ((unset, offset), &value) in
+            self.unset.iter_mut().zip(offsets).zip(inputs.iter().chain([&output]))
+        {
+            if *unset && value.abs() <= limit {
+                (*unset, *offset) = (false, value);
+            }
+        }
+        let mut too_large = false;
+        let mut deviation = |value: f64, offset: f64| {
+            let deviation = value - offset;
+            if deviation.abs() > limit {
+                too_large = true;
+                return f64::NAN;
+            }
+            deviation
+        };
+        let output = deviation(output, self.offsets.output);
+        for (place, (&value, &offset)) in self.inputs.iter_mut().zip(inputs.iter().zip(&self.offsets.inputs))
+        {
+            *place = deviation(value, offset);
+        }
+        let mut tracked = match &mut self.stage {
+            Stage::Collecting(collecting) => {
+                collecting.push(&self.inputs, output);
+                if let Some(scales) = collecting.scales() {
+                    self.start(scales)?;
+                }
+                Tracked::collecting()
+            }
+            Stage::Running(_) => self.step(output)?,
+        };
+        tracked.too_large = too_large;
+        Ok(tracked)
+    }
+
+    /// One sample of a tracker that knows its scales; the inputs are in their place.
+    fn step(&mut self, output: f64) -> Result<Tracked, Error> {
+        let Stage::Running(estimator) = &mut self.stage else { return Ok(Tracked::collecting()) };
+        let lines = self.room.lines.get_or_insert_with(|| estimator.lines().clone());
+        let mut prediction = [f64::NAN];
+        estimator.predict(lines, &self.inputs, &mut prediction);
+        let [mut prediction] = prediction;
+        let innovation = estimator.update(&self.inputs, output).map_err(sample_refused)?;
+        let Innovation { mut error, mut variance, mut nis, action } = innovation;
+        let excitation = estimator.least_squares().excitation();
+        if !self.has_estimate {
+            // What the prior says of a sample is no prediction.
+            (prediction, error, variance, nis) = (f64::NAN, f64::NAN, f64::NAN, 0.0);
+            self.has_estimate = corrects(action);
+        }
+        let mut alarm = None;
+        if error.is_finite() && self.settling > 0 {
+            self.settling -= 1;
+        } else if error.is_finite() {
+            self.score.count(&innovation, output);
+            alarm = self.detector.as_mut().and_then(|detector| detector.update(&innovation));
+        }
+        prediction += self.offsets.output;
+        Ok(Tracked { prediction, error, variance, nis, action, excitation, alarm, too_large: false })
+    }
+
+    /// Goes on from the rows that were collected, with these scales.
+    fn start(&mut self, scales: PerChannel) -> Result<(), Error> {
+        let Stage::Collecting(collecting) = &self.stage else { return Ok(()) };
+        let mut estimator = Estimator::new(&self.orders, &self.plan, &scales).map_err(refused)?;
+        let (rows, gap) = collecting.rows();
+        for row in rows {
+            if row.after_gap {
+                estimator.gap();
+            }
+            let innovation = estimator.update(&row.inputs, row.output).map_err(sample_refused)?;
+            self.has_estimate |= corrects(innovation.action);
+        }
+        if gap {
+            estimator.gap();
+        }
+        self.stage = Stage::Running(Box::new(estimator));
+        self.scales = Some(scales);
+        Ok(())
+    }
+
+    /// Tells that an unknown number of samples is missing here: the delay lines fill anew. What was learnt stays.
+    pub fn gap(&mut self) {
+        match &mut self.stage {
+            Stage::Collecting(collecting) => collecting.gap(),
+            Stage::Running(estimator) => estimator.gap(),
+        }
+        self.inputs.iter_mut().take(self.orders.inputs()).for_each(|input| *input = f64::NAN);
+    }
+
+    /// The prediction T samples ahead, T being the horizon of the plan: y(k + T) from the samples up to k, in the output's
+    /// units. Inputs to come are held at their latest values.
+    ///
+    /// NaN if there is none: before there is an estimate, where it depends on a missing sample, or where an unstable
+    /// model overflows. T times 2 n multiply-adds and moves. (The memory for it is taken at the first call.)
+    pub fn forecast(&mut self) -> f64 {
+        let Stage::Running(estimator) = &self.stage else { return f64::NAN };
+        if !self.has_estimate {
+            return f64::NAN;
+        }
+        let Room { lines, inputs, outputs } = &mut self.room;
+        let lines = lines.get_or_insert_with(|| estimator.lines().clone());
+        outputs.resize(self.plan.horizon, f64::NAN);
+        inputs.clear();
+        (0..self.plan.horizon).for_each(|_| inputs.extend_from_slice(&self.inputs));
+        estimator.predict(lines, inputs, outputs);
+        outputs.last().map_or(f64::NAN, |&predicted| predicted + self.offsets.output)
+    }
+
+    /// The names of the parameters, in their order: those of [`Orders::names`], with `constant` after those of B if there is one.
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// The estimate, in the order of the names; none before there is one.
+    pub fn parameters(&self) -> Option<&[f64]> {
+        match &self.stage {
+            Stage::Running(estimator) if self.has_estimate => {
+                Some(estimator.least_squares().parameters().as_slice())
+            }
+            _ => None,
+        }
+    }
+
+    /// Writes the standard errors of the parameters, in the order of the names; NaN where they are not known.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] if there is not one place for each parameter.
+    pub fn write_standard_errors(&self, target: &mut [f64]) -> Result<(), Error> {
+        if target.len() != self.names.len() {
+            let message = format!("there are {} places for {} parameters", target.len(), self.names.len());
+            return Err(Error::argument("standard errors", message));
+        }
+        match &self.stage {
+            Stage::Running(estimator) if self.has_estimate => {
+                estimator.least_squares().write_standard_errors(target).map_err(refused)
+            }
+            _ => {
+                target.fill(f64::NAN);
+                Ok(())
+            }
+        }
+    }
+
+    /// The variance of e, in the output's units squared; none until enough samples are in.
+    pub fn noise_variance(&self) -> Option<f64> {
+        match &self.stage {
+            Stage::Running(estimator) if self.has_estimate => estimator.least_squares().noise_variance(),
+            _ => None,
+        }
+    }
+
+    /// The figures of the predictions so far.
+    pub fn score(&self) -> &TrackScore {
+        &self.score
+    }
+
+    /// The typical magnitudes of the channels less their offsets: as given, or as found; none while they are not known.
+    pub fn scales(&self) -> Option<&PerChannel> {
+        self.scales.as_ref()
+    }
+
+    /// What is taken from each channel.
+    pub fn offsets(&self) -> &PerChannel {
+        &self.offsets
+    }
+
+    /// The orders of the model, without the constant.
+    pub fn orders(&self) -> &Orders {
+        &self.orders
+    }
+
+    /// The plan that the tracker was made with; after a report with the offsets, scales and noise scale that follow from it,
+    /// where they were left open.
+    pub fn plan(&self) -> &TrackPlan {
+        &self.plan
+    }
+
+    /// The charts that watch for changes, if that was asked for.
+    pub fn detector(&self) -> Option<&ChangeDetector<f64>> {
+        self.detector.as_ref()
+    }
+}
+
+impl Tracked {
+    /// A row that was kept.
+    fn collecting() -> Self {
+        Self {
+            prediction: f64::NAN,
+            error: f64::NAN,
+            variance: f64::NAN,
+            nis: 0.0,
+            action: Action::Collecting,
+            excitation: 0.0,
+            alarm: None,
+            too_large: false,
+        }
+    }
+}
+
+/// Whether the sample corrected an estimate, so that there is one.
+fn corrects(action: Action) -> bool {
+    matches!(action, Action::Updated | Action::Capped | Action::Projected)
+}
+
+/// What a plan asks of orders, and all numbers that no estimator checks.
+pub(super) fn check(orders: &Orders, plan: &TrackPlan) -> Result<(), Error> {
+    let inputs = orders.inputs();
+    // Orders are plain data: these may not be any that `Orders::new` made.
+    Orders::new(orders.na, &orders.nb, orders.nc, orders.nd, &orders.nf, &orders.nk)?;
+    if orders.nd > 0 || orders.nf.iter().any(|&nf| nf > 0) {
+        let message = format!("{orders} has D or F; track AR, ARX, ARMA or ARMAX");
+        return Err(Error::argument("orders", message));
+    }
+    match (plan.method.with_noise_model(), orders.nc) {
+        (None, 1..) => {
+            return Err(Error::argument("method", format!("rls has no C, {orders} has; use els or rpem")));
+        }
+        (Some(_), 0) => {
+            let message = format!("{} is for models with C, {orders} has none; use rls", plan.method);
+            return Err(Error::argument("method", message));
+        }
+        _ => {}
+    }
+    if orders.nc > 0 && plan.start.0 != thetahat_core::Start::Standard {
+        let message = format!("{orders} has only the standard start; leave out '{}'", plan.start);
+        return Err(Error::argument("start", message));
+    }
+    if !(1..=FARTHEST).contains(&plan.horizon) {
+        return Err(Error::argument("horizon", format!("{} is not in 1 … {FARTHEST}", plan.horizon)));
+    }
+    if plan.noise_scale.is_some_and(|scale| !scale.is_finite()) {
+        return Err(Error::argument("noise_scale", "it is not finite"));
+    }
+    for (argument, given) in [("offsets", &plan.offsets), ("scales", &plan.scales)] {
+        let Some(given) = given else { continue };
+        if given.inputs.len() != inputs {
+            let message = format!("there are {} values for {inputs} inputs", given.inputs.len());
+            return Err(Error::argument(argument, message));
+        }
+        if !given.inputs.iter().chain([&given.output]).all(|value| value.is_finite()) {
+            return Err(Error::argument(argument, "a value is not finite"));
+        }
+    }
+    Ok(())
+}
+
+/// What the estimator does not take from a plan.
+pub(super) fn refused(error: thetahat_core::Error) -> Error {
+    let argument = match error {
+        thetahat_core::Error::OutOfRange { argument, .. } => argument,
+        _ => "track",
+    };
+    Error::argument(argument, error.to_string())
+}
+
+/// What the estimator does not take as a sample.
+fn sample_refused(error: thetahat_core::Error) -> Error {
+    Error::data(error.to_string())
+}

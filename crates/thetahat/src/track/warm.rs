@@ -1,0 +1,160 @@
+//! A tracker that goes on from a fit.
+
+use thetahat_core::Covariance;
+use thetahat_core::nalgebra::{DMatrix, DVector};
+
+use super::estimator::Estimator;
+use super::plan::{PerChannel, TrackPlan};
+use super::tracker::{Stage, Tracker, check, refused};
+use crate::{Error, Model, Orders, Report};
+
+impl Tracker {
+    /// A tracker that starts from what a fit found, a report of AR, ARX, ARMA or ARMAX: its parameters, its covariance
+    /// divided by its noise variance as P, its noise variance and number of samples, its offsets.
+    ///
+    /// The orders are those of the report; if some are given they must be the same. Scales that the plan does not have
+    /// follow from P: the regressor of parameter j has the magnitude 1/sqrt(N P_jj) at least, N being the number of samples,
+    /// and a channel the largest of its parameters'. So there are no rows to collect. The noise scale is the square root of
+    /// the noise variance. A constant is not in the report: it starts from 0, and is as free as without a report.
+    ///
+    /// # Errors
+    /// As [`Tracker::new`]; [`Error::Report`] if the report is of another structure, or of other orders than those given;
+    /// if it has no covariance or a noise variance of 0, or an offset that is a line in time; [`Error::Argument`] if the
+    /// plan asks for another start than `standard`.
+    pub fn from_report(report: &Report, orders: Option<&Orders>, plan: &TrackPlan) -> Result<Self, Error> {
+        let model = &report.model;
+        if let Some(orders) = orders.filter(|&orders| *orders != model.orders) {
+            return Err(Error::report(format!(
+                "the report has {}, {orders} was asked for; leave the orders out, or fit with those",
+                model.orders
+            )));
+        }
+        if model.orders.nd > 0 || model.orders.nf.iter().any(|&nf| nf > 0) {
+            return Err(Error::report(format!(
+                "the report has {}: only AR, ARX, ARMA and ARMAX can be tracked",
+                model.orders
+            )));
+        }
+        if plan.start.0 != thetahat_core::Start::Standard {
+            let message = format!("'{}' is a start without a report; leave it out", plan.start);
+            return Err(Error::argument("start", message));
+        }
+        model.check()?;
+        check(&model.orders, plan)?;
+        let relative = relative_covariance(model)?;
+        let mut plan = plan.clone();
+        plan.offsets = Some(match plan.offsets {
+            Some(given) => given,
+            None => offsets(model)?,
+        });
+        if plan.scales.is_none() {
+            plan.scales = Some(scales(&model.orders, &relative, report.estimation.samples));
+        }
+        plan.noise_scale = plan.noise_scale.or(Some(model.noise_variance.sqrt()));
+        let tracker = Self::new(&model.orders, &plan)?;
+        tracker.with_knowledge(model, &relative, report.estimation.samples)
+    }
+
+    /// The same with what a fit knows.
+    fn with_knowledge(
+        mut self,
+        model: &Model,
+        relative: &DMatrix<f64>,
+        samples: usize,
+    ) -> Result<Self, Error> {
+        let Stage::Running(estimator) = self.stage else { return Ok(self) };
+        let known = model.parameters.len();
+        let constant = self.plan.constant.then_some(known - self.orders.nc);
+        // Where the constant stands, those of C are one place on.
+        let place = |index: usize| index + usize::from(constant.is_some_and(|constant| index >= constant));
+        let count = self.names.len();
+        let mut parameters = DVector::zeros(count);
+        let mut covariance = DMatrix::zeros(count, count);
+        for (row, parameter) in model.parameters.iter().enumerate() {
+            parameters[place(row)] = parameter.value;
+            for column in 0..known {
+                covariance[(place(row), place(column))] = relative[(row, column)];
+            }
+        }
+        if let Some(constant) = constant {
+            covariance[(constant, constant)] = 100.0;
+        }
+        let covariance = Covariance::new(&covariance).map_err(unusable)?;
+        let variance = model.noise_variance;
+        let estimator = match *estimator {
+            Estimator::Arx(arx) => arx
+                .with_parameters(parameters)
+                .and_then(|arx| arx.with_covariance(covariance)?.with_noise_variance(variance, samples))
+                .map(Estimator::Arx),
+            Estimator::Armax(armax) => armax
+                .with_parameters(parameters)
+                .and_then(|armax| armax.with_covariance(covariance)?.with_noise_variance(variance, samples))
+                .map(Estimator::Armax),
+        };
+        self.stage = Stage::Running(Box::new(estimator.map_err(unusable)?));
+        // The noise variance is known from the start.
+        self.settling = 0;
+        Ok(self)
+    }
+}
+
+/// P: the covariance over the noise variance, symmetric to the bit.
+fn relative_covariance(model: &Model) -> Result<DMatrix<f64>, Error> {
+    let Some(rows) = &model.covariance else {
+        return Err(Error::report(
+            "the report has no covariance, so that it does not say how sure its model is",
+        ));
+    };
+    if model.noise_variance <= 0.0 {
+        return Err(Error::report(
+            "the report has a noise variance of 0, so that its covariance does not say how sure its model is; start without it",
+        ));
+    }
+    let count = model.parameters.len();
+    if count != model.orders.parameters() {
+        return Err(Error::report(
+            "model.parameters are not as many as its orders make; the report was edited or damaged",
+        ));
+    }
+    let entry = |i: usize, j: usize| rows.get(i).and_then(|row| row.get(j)).copied().unwrap_or(f64::NAN);
+    let relative =
+        DMatrix::from_fn(count, count, |i, j| (entry(i, j) / 2.0 + entry(j, i) / 2.0) / model.noise_variance);
+    Ok(relative)
+}
+
+/// The offsets of a report, which are levels.
+fn offsets(model: &Model) -> Result<PerChannel, Error> {
+    if let Some(signal) = model.inputs.iter().chain([&model.output]).find(|signal| signal.offset.slope != 0.0)
+    {
+        return Err(Error::report(format!(
+            "the offset of '{}' in the report is a line in the time of its log, which has no meaning beyond it; fit with \
+             another way to remove offsets, or give offsets",
+            signal.name
+        )));
+    }
+    Ok(PerChannel {
+        inputs: model.inputs.iter().map(|signal| signal.offset.level).collect(),
+        output: model.output.offset.level,
+    })
+}
+
+/// 1/sqrt(N P_jj), the largest of each channel. A channel without parameters has no say: 1.
+fn scales(orders: &Orders, relative: &DMatrix<f64>, samples: usize) -> PerChannel {
+    let variances = relative.diagonal();
+    let mut magnitudes = variances.iter().map(|variance| 1.0 / (samples as f64 * variance).sqrt());
+    let mut largest = |count: usize| match magnitudes.by_ref().take(count).fold(0.0, f64::max) {
+        0.0 => 1.0,
+        largest => largest,
+    };
+    let output = largest(orders.na);
+    let inputs = orders.nb.iter().map(|&nb| largest(nb)).collect();
+    PerChannel { inputs, output }
+}
+
+/// What of a report the estimator does not take.
+fn unusable(error: thetahat_core::Error) -> Error {
+    match refused(error) {
+        Error::Argument { message, .. } => Error::report(format!("the report cannot be tracked: {message}")),
+        other => other,
+    }
+}

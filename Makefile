@@ -51,8 +51,10 @@ python:
 wheel:
 	py/tests/run --release
 
+# The online estimators by themselves, 10^8 steps each; then 10^8 rows through a pipe to thetahat track.
 soak:
 	SOAK_STEPS=100000000 cargo test --locked --release -p thetahat-core --test soak -- --nocapture
+	SOAK_STEPS=100000000 cargo test --locked --release --test end_to_end -- --nocapture track_soak
 
 monte-carlo:
 	MONTE_CARLO=200 cargo test --locked --release -p thetahat --test monte_carlo -- --nocapture
@@ -60,7 +62,7 @@ monte-carlo:
 
 # Our own benches, then the comparison with other packages. Not part of the tests.
 bench:
-	cargo bench --locked --bench arx --bench online
+	cargo bench --locked --bench arx --bench online --bench track
 	benches/peers/run
 
 # $(call with,COMPONENT,SUBCOMMAND,CHECK): runs the check if cargo has the subcommand or rustup can add the component.

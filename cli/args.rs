@@ -12,7 +12,9 @@ Exit codes:
   4  the data cannot determine the model
   5  input/output: a file cannot be read or written
   6  the model does not meet what --require asks
-  130  interrupted (Ctrl-C); nothing is left half written";
+  7  track ended at an alarm, as --stop-on-alarm asks
+  130  interrupted (Ctrl-C); nothing is left half written
+  143  terminated (SIGTERM), likewise";
 
 /// Identifies dynamic systems from logged data.
 #[derive(Debug, Parser)]
@@ -40,6 +42,7 @@ Examples:
   thetahat fit log.csv --model bj --nb 2 --nc 1 --nd 1 --nf 2 --starts 5
   thetahat fit monday.csv tuesday.csv --model oe --nb 2 --nf 2 --report model.json
   thetahat fit sunspots.csv -y count --model arma --na 2 --nc 1
+  thetahat fit --grey spring.toml log.csv --report spring.json
   thetahat fit log.csv --na 2 --nb 2 --norm 1 --bound a1=-1.9..0 --dc-gain 1..20")]
     Fit(Box<FitArguments>),
     /// Look at a log before any fit
@@ -90,6 +93,30 @@ Examples:
 Example:
   thetahat compare model.json model.json log.csv --rows 501..1000")]
     Compare(CompareArguments),
+    /// Identify a plant while it runs: a line for each sample of a log or a live pipe
+    ///
+    /// Recursive least squares for A(q) y(t) = B(q) u(t - nk) + e(t), and its extension by C(q) e(t). Each line has the
+    /// one-step prediction made before the sample, what the sample told, and the parameters after it. Ends with a table on
+    /// standard error. Runs until the log or the pipe ends, or Ctrl-C or SIGTERM end it; memory does not grow.
+    #[command(after_help = "\
+Examples:
+  thetahat track log.csv --na 2 --nb 2 --nk 3 --format csv > parameters.csv
+  tail -n +1 -F log.csv | thetahat track - --na 2 --nb 2 --alarm 10000 --state track.json
+  thetahat track log.csv --na 2 --nb 2 --forgetting 1,0.99,0.95 --every 100
+  thetahat track log.csv --warm model.json --horizon 5")]
+    Track(Box<TrackArguments>),
+    /// Estimate the state of a model along a log or a live pipe
+    ///
+    /// MODEL is a report of fit, or a text file (TOML) with the matrices F, G, H, Q, R, or with the equations of a plant, of
+    /// which unknown parameters are estimated together with the state. Each line has the states and outputs as predicted
+    /// and as corrected, with standard deviations. Ends with a table on standard error.
+    #[command(after_help = "\
+Examples:
+  thetahat filter spring.toml log.csv --format csv > states.csv
+  thetahat filter model.json log.csv --estimator kalman -o states.jsonl
+  tail -n +1 -F log.csv | thetahat filter cell.toml - --estimator ekf --time t
+  thetahat filter level.toml log.csv --smooth")]
+    Filter(Box<FilterArguments>),
     /// The frequency response of a fitted model
     ///
     /// Writes CSV with a row for each input and frequency, and for the noise (input "noise"): input, frequency [rad/s],
@@ -110,7 +137,7 @@ Example:
 Example:
   thetahat schema > thetahat.report.schema.json")]
     Schema {
-        /// The document: what fit, validate, compare or inspect writes
+        /// The document: what fit, validate, compare, inspect or filter writes
         #[arg(value_enum, default_value = "report")]
         document: DocumentArgument,
     },
@@ -157,6 +184,18 @@ pub(crate) struct FitArguments {
     #[arg(long, value_name = "NAME=VALUE", help_heading = "Channels")]
     pub(crate) offset: Vec<String>,
 
+    /// Fit the unknown parameters of a model in equations (TOML, see filter) by prediction error; channels go by name
+    #[arg(
+        long,
+        value_name = "MODEL",
+        help_heading = "Model",
+        conflicts_with_all = [
+            "input", "output", "validate", "offset", "model", "na", "nb", "nc", "nd", "nf", "nk", "path",
+            "select", "split", "search", "max_iterations", "tolerance", "step", "starts", "time_limit", "norm", "bound",
+            "dc_gain", "ridge", "noise_bound", "html", "resample",
+        ]
+    )]
+    pub(crate) grey: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) model: ModelArguments,
     #[command(flatten)]
@@ -421,6 +460,183 @@ pub(crate) struct LookArguments {
 }
 
 #[derive(Debug, Args)]
+pub(crate) struct TrackArguments {
+    /// The log: a CSV file, gzip-compressed or not (- for standard input)
+    #[arg(value_name = "LOG")]
+    pub(crate) path: PathBuf,
+
+    /// Input columns [default: u, u1, u2, …; those of --warm]
+    #[arg(short = 'u', long, value_name = "NAME[,NAME…]", value_delimiter = ',', help_heading = "Channels")]
+    pub(crate) input: Vec<String>,
+    /// Output column [default: y; that of --warm]
+    #[arg(short = 'y', long, value_name = "NAME", help_heading = "Channels")]
+    pub(crate) output: Option<String>,
+    /// Subtract this from a channel [default: 0; the offsets of --warm]
+    #[arg(long, value_name = "NAME=VALUE", help_heading = "Channels")]
+    pub(crate) offset: Vec<String>,
+    /// The typical magnitude of a channel; a factor of 3 does not matter [default: the largest of the first rows, from which
+    /// then nothing is predicted]
+    #[arg(long, value_name = "NAME=VALUE", help_heading = "Channels")]
+    pub(crate) scale: Vec<String>,
+
+    /// The model structure [default: arx; that of --warm]
+    #[arg(long, value_enum, help_heading = "Model")]
+    pub(crate) model: Option<TrackModelArgument>,
+    /// Coefficients of A: past outputs
+    #[arg(long, value_name = "N", help_heading = "Model")]
+    pub(crate) na: Option<usize>,
+    /// Coefficients of B: inputs; one value for each input or one for all, 0 for a model without inputs
+    #[arg(long, value_name = "N[,…]", value_delimiter = ',', help_heading = "Model")]
+    pub(crate) nb: Vec<usize>,
+    /// Coefficients of C: past disturbances
+    #[arg(long, value_name = "N", help_heading = "Model")]
+    pub(crate) nc: Option<usize>,
+    /// Samples from input to first effect, one value for each input or one for all [default: 1]
+    #[arg(long, value_name = "N[,…]", value_delimiter = ',', help_heading = "Model")]
+    pub(crate) nk: Vec<usize>,
+    /// Estimate a constant beside the model, for logs of which the offsets are not known; without --offset it is that of the
+    /// channels less their first values
+    #[arg(long, help_heading = "Model")]
+    pub(crate) constant: bool,
+
+    /// How to estimate [default: rls; with C rpem]
+    #[arg(long, value_enum, help_heading = "Adaptation")]
+    pub(crate) method: Option<TrackMethodArgument>,
+    /// What is forgotten, several side by side: none, LAMBDA or exponential:LAMBDA, directional:LAMBDA,
+    /// random-walk:VARIANCE, variable:LAMBDA:MINIMUM:NOISE
+    #[arg(
+        long,
+        value_name = "HOW[,HOW…]",
+        value_delimiter = ',',
+        default_value = "exponential:0.99",
+        help_heading = "Adaptation"
+    )]
+    pub(crate) forgetting: Vec<String>,
+    /// How to start: standard (from a wide prior), exact (without prior, once the samples determine the parameters), or
+    /// mixed[:SAMPLES] (standard, then blended into exact)
+    #[arg(long, value_name = "HOW", help_heading = "Adaptation")]
+    pub(crate) start: Option<String>,
+    /// Start from a batch fit: the report's parameters, covariance, noise and offsets
+    #[arg(long, value_name = "REPORT", help_heading = "Adaptation")]
+    pub(crate) warm: Option<PathBuf>,
+    /// Do not adapt where the innovation is smaller than this, in units of the output
+    #[arg(long, value_name = "WIDTH", allow_hyphen_values = true, help_heading = "Adaptation")]
+    pub(crate) dead_zone: Option<f64>,
+
+    /// Predict so many steps ahead too, inputs held at their last value
+    #[arg(long, value_name = "T", value_parser = clap::value_parser!(u32).range(1..=10_000), help_heading = "Output")]
+    pub(crate) horizon: Option<u32>,
+    /// Watch the innovations for changes of their mean and variance (CUSUM): samples between two false alarms, on average
+    #[arg(long, value_name = "SAMPLES", allow_hyphen_values = true, help_heading = "Output")]
+    pub(crate) alarm: Option<f64>,
+    /// End at the first alarm, with exit code 7
+    #[arg(long, requires = "alarm", help_heading = "Output")]
+    pub(crate) stop_on_alarm: bool,
+    #[command(flatten)]
+    pub(crate) lines: LineArguments,
+
+    /// Keep the estimator's whole state in a file, and go on from it if it is there
+    #[arg(long, value_name = "FILE", help_heading = "State")]
+    pub(crate) state: Option<PathBuf>,
+    /// Write the state every so many rows, besides at the end
+    #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u64).range(1..),
+        requires = "state", help_heading = "State")]
+    pub(crate) save_every: u64,
+    /// Where the log stands when the state is taken up again
+    #[arg(long, value_enum, default_value = "auto", requires = "state", help_heading = "State")]
+    pub(crate) resume: ResumeArgument,
+
+    #[command(flatten)]
+    pub(crate) clock: LiveClockArguments,
+    #[command(flatten)]
+    pub(crate) log: LogArguments,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct FilterArguments {
+    /// The model: a report of fit, or a TOML file with matrices or equations (- for standard input)
+    #[arg(value_name = "MODEL")]
+    pub(crate) model: PathBuf,
+    /// The log: a CSV file, gzip-compressed or not (- for standard input)
+    #[arg(value_name = "LOG")]
+    pub(crate) path: PathBuf,
+
+    /// How to estimate [default: kalman for a linear model, else ekf]
+    #[arg(long, value_enum, help_heading = "Estimator")]
+    pub(crate) estimator: Option<EstimatorArgument>,
+    /// Where a report's model starts: at rest, its channels at their offsets, or from a state that is not known [default:
+    /// estimated]
+    #[arg(long, value_enum, value_name = "START", help_heading = "Estimator")]
+    pub(crate) initial: Option<StartArgument>,
+    /// Where the error of the observer is to have its poles in the z plane, such as 0.4+0.3i,0.4-0.3i
+    #[arg(
+        long,
+        value_name = "POLE[,POLE…]",
+        value_delimiter = ',',
+        allow_hyphen_values = true,
+        conflicts_with = "gain",
+        help_heading = "Estimator"
+    )]
+    pub(crate) poles: Vec<String>,
+    /// The gain of the observer: a row for each state, a column for each output, such as 0.5,0;0.1,0.2
+    #[arg(long, value_name = "ROW[;ROW…]", allow_hyphen_values = true, help_heading = "Estimator")]
+    pub(crate) gain: Option<String>,
+    /// Rows to go through, 1-based and inclusive [default: all]
+    #[arg(long, value_name = "A..B", help_heading = "Estimator")]
+    pub(crate) rows: Option<String>,
+    /// Add each state given the whole log, later rows too: nothing is written before the log ends
+    #[arg(long, help_heading = "Estimator")]
+    pub(crate) smooth: bool,
+
+    #[command(flatten)]
+    pub(crate) lines: LineArguments,
+    /// Write what stands at the end as JSON too
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    pub(crate) summary: Option<PathBuf>,
+
+    #[command(flatten)]
+    pub(crate) clock: LiveClockArguments,
+    #[command(flatten)]
+    pub(crate) log: LogArguments,
+}
+
+/// Output that grows line by line.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Output")]
+pub(crate) struct LineArguments {
+    /// Write a line for each N-th row only
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..))]
+    pub(crate) every: u64,
+    /// What a line is
+    #[arg(long, value_enum, default_value = "jsonl")]
+    pub(crate) format: LineFormatArgument,
+    /// Write to a file instead of standard output
+    #[arg(short = 'o', long, value_name = "FILE", default_value = "-", hide_default_value = true)]
+    pub(crate) out: PathBuf,
+    /// A line that is no row of numbers ends the run; without it, it counts as a row of missing values
+    #[arg(long)]
+    pub(crate) strict: bool,
+    /// No table at the end
+    #[arg(short, long)]
+    pub(crate) quiet: bool,
+}
+
+/// The clock of a log that is read as it comes.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Clock")]
+pub(crate) struct LiveClockArguments {
+    /// The column of times: seconds, or ISO 8601 dates
+    #[arg(long, value_name = "NAME")]
+    pub(crate) time: Option<String>,
+    /// How times are written, in the manner of strptime, such as %d.%m.%Y %H:%M:%S
+    #[arg(long, value_name = "FORMAT", requires = "time")]
+    pub(crate) time_format: Option<String>,
+    /// Seconds from one row to the next [default: that of the model; for track with --time, the first step]
+    #[arg(long, value_name = "SECONDS", allow_hyphen_values = true)]
+    pub(crate) sample_time: Option<f64>,
+}
+
+#[derive(Debug, Args)]
 pub(crate) struct BodeArguments {
     /// The report that fit wrote (- for standard input)
     #[arg(value_name = "REPORT")]
@@ -533,6 +749,10 @@ pub(crate) enum DocumentArgument {
     Comparison,
     /// What inspect writes
     Inspection,
+    /// What filter writes at its end
+    Filter,
+    /// What fit --grey writes
+    Grey,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -632,6 +852,52 @@ pub(crate) enum StartArgument {
     Measured,
     /// The initial condition that fits best
     Estimated,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum TrackModelArgument {
+    /// A y = B u + e
+    Arx,
+    /// A y = B u + C e
+    Armax,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum TrackMethodArgument {
+    /// Recursive least squares (arx)
+    Rls,
+    /// Extended least squares (armax): quick, and not always right
+    Els,
+    /// Recursive prediction error method (armax)
+    Rpem,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum EstimatorArgument {
+    /// The Kalman filter (linear models)
+    Kalman,
+    /// The extended Kalman filter; unknown parameters are estimated with the state
+    Ekf,
+    /// The Luenberger observer, with --poles or --gain
+    Luenberger,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum LineFormatArgument {
+    /// JSON Lines: an object a line
+    Jsonl,
+    /// CSV: a row a line, below a header
+    Csv,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ResumeArgument {
+    /// A file from its start; standard input from its start if its first row is the first one of the state, else now
+    Auto,
+    /// From the start: rows that the state has absorbed are skipped
+    Start,
+    /// A live pipe that has moved on: what came in between is a gap
+    Now,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

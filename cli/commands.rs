@@ -3,15 +3,18 @@
 mod bode;
 mod compare;
 pub(crate) mod demo;
+mod filter;
 mod fit;
+mod grey;
 mod help;
 mod inspect;
 mod respond;
 mod stored;
 pub(crate) mod summary;
+mod track;
 mod validate;
 
-pub(crate) use fit::{Experiments, experiments};
+pub(crate) use fit::{Channels, Experiments, experiments};
 pub(crate) use inspect::inspected;
 
 use crate::args::{Arguments, Command};
@@ -26,6 +29,8 @@ pub(crate) fn dispatch(arguments: Arguments, line: &str) -> Result<(), Failure> 
         Command::Simulate(arguments) => respond::simulate(&arguments),
         Command::Validate(arguments) => validate::validate(&arguments, line),
         Command::Compare(arguments) => compare::compare(&arguments, line),
+        Command::Track(arguments) => track::track(&arguments),
+        Command::Filter(arguments) => filter::filter(&arguments),
         Command::Bode(arguments) => bode::bode(&arguments),
         Command::Demo(arguments) => demo::demo(&arguments),
         Command::Schema { document } => help::schema(document),

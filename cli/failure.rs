@@ -10,12 +10,14 @@ use crate::table;
 
 /// The option that an argument of the library is here, if it is one.
 fn option_of(argument: &str) -> Option<&str> {
-    const SAME: [&str; 19] = [
+    const SAME: [&str; 22] = [
         "alpha",
         "alphas",
         "dc-gain",
         "detrend",
+        "estimator",
         "frequencies",
+        "gain",
         "horizon",
         "initial",
         "lags",
@@ -23,6 +25,7 @@ fn option_of(argument: &str) -> Option<&str> {
         "nf",
         "noise-bound",
         "offset",
+        "poles",
         "require",
         "resample",
         "ridge",
@@ -34,6 +37,10 @@ fn option_of(argument: &str) -> Option<&str> {
     match argument {
         // One at a time.
         "bounds" => Some("bound"),
+        "factor" => Some("forgetting"),
+        "false alarms" => Some("alarm"),
+        "scales" => Some("scale"),
+        "width" => Some("dead-zone"),
         same => SAME.contains(&same).then_some(same),
     }
 }
@@ -63,6 +70,8 @@ pub enum Kind {
     Io,
     /// A model does not meet what was asked of it.
     Unmet,
+    /// An alarm ended the run, as was asked.
+    Alarm,
 }
 
 impl Failure {
@@ -106,6 +115,16 @@ impl Failure {
         Self { kind: Kind::Unmet, message: message.into() }
     }
 
+    /// An alarm ended the run, as was asked.
+    pub(crate) fn alarm(message: impl Into<String>) -> Self {
+        Self { kind: Kind::Alarm, message: message.into() }
+    }
+
+    /// Whether nobody reads the output any more.
+    pub(crate) fn is_closed(&self) -> bool {
+        self.kind == Kind::Closed
+    }
+
     /// A file cannot be read or written.
     pub(crate) fn io(path: &Path, what: impl Display, error: &io::Error) -> Self {
         if error.kind() == io::ErrorKind::BrokenPipe {
@@ -147,13 +166,17 @@ impl Failure {
             Kind::Closed => return 0,
             Kind::Interrupted => {
                 say(interrupt::message(interrupt::has_written()));
-                return interrupt::EXIT_CODE;
+                return interrupt::exit_code();
             }
             Kind::Usage => 2,
             Kind::Data => 3,
             Kind::Undetermined => 4,
             Kind::Io => 5,
             Kind::Unmet => 6,
+            Kind::Alarm => {
+                say(&harmless(&self.message));
+                return 7;
+            }
         };
         say(&format!("\x1b[1;31merror:\x1b[0m {}", harmless(&self.message)));
         code

@@ -1,32 +1,45 @@
-//! Ctrl-C: the program ends, and no file is left half written.
+//! Ctrl-C and SIGTERM: the program ends, and no file is left half written.
 //!
-//! A search that asks for it ends by itself at its next iteration. At any other time, and on the second Ctrl-C, the program
-//! ends at once, without the file that it was writing.
+//! A search that asks for it ends by itself at its next iteration, and a stream with the row at hand. At any other time, and
+//! on the second Ctrl-C, the program ends at once, without the file that it was writing.
 
 use std::fs;
 use std::io;
 use std::path::PathBuf;
 use std::process;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
+#[cfg(unix)]
+use std::{sync::Once, thread};
 
 use indicatif::ProgressBar;
+#[cfg(unix)]
+use signal_hook::{consts::SIGTERM, iterator::Signals};
 use tempfile::NamedTempFile;
 use thetahat::Error;
 
 use crate::failure::Failure;
 use crate::output::say;
+use crate::table::Waker;
 
-/// What a shell gives for a program that SIGINT ended.
-pub(crate) const EXIT_CODE: u8 = 130;
+/// What a shell gives for a program that SIGINT ended, and for one that SIGTERM did.
+const INTERRUPTED: u8 = 130;
+#[cfg(unix)]
+const TERMINATED: u8 = 143;
 
+/// Whether a stream has to end. It is asked once a row, so it is apart from the lock.
+static ENDING: AtomicBool = AtomicBool::new(false);
 static STATE: Mutex<State> = Mutex::new(State::new());
 
 /// What the handler, which runs on a thread of its own, must know.
-#[derive(Debug)]
 struct State {
     /// Whether a search is under way that looks at `asked`, and whether it was asked to end.
     searching: bool,
     asked: bool,
+    /// What wakes the stream that is being followed.
+    waker: Option<Waker>,
+    /// The exit code of whoever asked last.
+    code: u8,
     /// The file that is being written, under its passing name.
     unfinished: Option<PathBuf>,
     /// Whether something is written already.
@@ -37,7 +50,15 @@ struct State {
 
 impl State {
     const fn new() -> Self {
-        Self { searching: false, asked: false, unfinished: None, written: false, bar: None }
+        Self {
+            searching: false,
+            asked: false,
+            waker: None,
+            code: INTERRUPTED,
+            unfinished: None,
+            written: false,
+            bar: None,
+        }
     }
 }
 
@@ -48,24 +69,57 @@ fn state() -> MutexGuard<'static, State> {
 /// Begins to listen. Where Ctrl-C is ignored, as of a job in the background of a script, it stays so.
 pub(crate) fn listen() {
     *state() = State::new();
+    ENDING.store(false, Ordering::Relaxed);
     // The handler of an earlier run in this process serves as well.
-    let _ = ctrlc::try_set_handler(|| {
-        let mut state = state();
-        if state.searching && !state.asked {
-            state.asked = true;
-            return;
+    let _ = ctrlc::try_set_handler(|| asked_by(INTERRUPTED));
+    #[cfg(unix)]
+    {
+        static LISTENING: Once = Once::new();
+        LISTENING.call_once(|| {
+            if let Ok(mut signals) = Signals::new([SIGTERM]) {
+                thread::spawn(move || signals.forever().for_each(|_| asked_by(TERMINATED)));
+            }
+        });
+    }
+}
+
+/// What happens when the program is asked to end.
+fn asked_by(code: u8) {
+    let mut state = state();
+    state.code = code;
+    if (state.searching || state.waker.is_some()) && !state.asked {
+        state.asked = true;
+        ENDING.store(true, Ordering::Relaxed);
+        if let Some(waker) = &state.waker {
+            waker.wake();
         }
-        if let Some(bar) = &state.bar {
-            bar.finish_and_clear();
-        }
-        if let Some(path) = &state.unfinished {
-            // What is gone already need not be removed.
-            let _ = fs::remove_file(path);
-        }
-        say(message(state.written));
-        // The state is still locked: the file cannot be finished now.
-        process::exit(EXIT_CODE.into());
-    });
+        return;
+    }
+    if let Some(bar) = &state.bar {
+        bar.finish_and_clear();
+    }
+    if let Some(path) = &state.unfinished {
+        // What is gone already need not be removed.
+        let _ = fs::remove_file(path);
+    }
+    say(message(state.written));
+    // The state is still locked: the file cannot be finished now.
+    process::exit(code.into());
+}
+
+/// The exit code of a program that was asked to end.
+pub(crate) fn exit_code() -> u8 {
+    state().code
+}
+
+/// A stream is followed from now on: when it has to end, it is woken, and [`is_ending`] says so.
+pub(crate) fn follows(waker: Waker) {
+    state().waker = Some(waker);
+}
+
+/// Whether the stream has to end.
+pub(crate) fn is_ending() -> bool {
+    ENDING.load(Ordering::Relaxed)
 }
 
 /// The line for a program that was interrupted.

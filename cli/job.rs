@@ -1,22 +1,30 @@
 //! What a command line means: everything resolved and checked that needs no data.
 
+mod filter;
 mod fit;
 mod inspect;
 mod method;
 mod orders;
 mod search;
+mod track;
 mod validate;
 
+use std::path::PathBuf;
 use std::str::FromStr;
 
 use thetahat::{Interpolation, Rows, Start};
 
-use crate::args::{ClockArguments, LogArguments, StartArgument};
+use crate::args::{
+    ClockArguments, LineArguments, LineFormatArgument, LiveClockArguments, LogArguments, StartArgument,
+};
 use crate::failure::Failure;
+use crate::lines::Format;
 use crate::table;
 
+pub(crate) use filter::FilterJob;
 pub(crate) use fit::FitJob;
 pub(crate) use inspect::InspectJob;
+pub(crate) use track::{StateJob, TrackJob};
 pub(crate) use validate::LookJob;
 
 /// How to read a log.
@@ -72,6 +80,49 @@ impl LogJob {
             (None, None) => Clock::Unknown,
         };
         Ok(Self { options, clock, quiet: false })
+    }
+}
+
+impl LogJob {
+    /// How to read a log as it comes, and the seconds between its rows if they were given.
+    fn live(log: &LogArguments, clock: &LiveClockArguments) -> Result<(Self, Option<f64>), Failure> {
+        let seconds = |value| positive("--sample-time", value, "number of seconds");
+        let sample_time = clock.sample_time.map(seconds).transpose()?;
+        let whole = ClockArguments {
+            time: clock.time.clone(),
+            time_format: clock.time_format.clone(),
+            sample_time: sample_time.filter(|_| clock.time.is_none()),
+            resample: None,
+        };
+        Ok((Self::resolve(log, &whole)?, sample_time))
+    }
+}
+
+/// Output that grows line by line.
+#[derive(Debug)]
+pub(crate) struct LineJob {
+    /// A line for each row of which the number is a multiple of this.
+    pub(crate) every: u64,
+    pub(crate) format: Format,
+    pub(crate) out: PathBuf,
+    /// Whether a malformed line ends the run.
+    pub(crate) strict: bool,
+    /// Whether to say nothing at the end.
+    pub(crate) quiet: bool,
+}
+
+impl LineJob {
+    fn resolve(arguments: &LineArguments) -> Self {
+        Self {
+            every: arguments.every,
+            format: match arguments.format {
+                LineFormatArgument::Jsonl => Format::JsonLines,
+                LineFormatArgument::Csv => Format::Csv,
+            },
+            out: arguments.out.clone(),
+            strict: arguments.strict,
+            quiet: arguments.quiet,
+        }
     }
 }
 

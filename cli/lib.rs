@@ -14,6 +14,8 @@ mod commands;
 mod failure;
 mod interrupt;
 mod job;
+mod lines;
+mod live;
 mod log;
 mod output;
 mod progress;
@@ -30,7 +32,8 @@ pub use commands::summary::{comparison, inspection, table, validation};
 pub use failure::{Failure, Kind};
 
 /// Runs the program on its arguments, the program's name first, and gives its exit code: 0 done, 2 usage, 3 bad data,
-/// 4 the data cannot determine the model, 5 input/output, 6 a model does not meet what was required, 130 interrupted.
+/// 4 the data cannot determine the model, 5 input/output, 6 a model does not meet what was required, 7 an alarm
+/// ended the run, 130 interrupted, 143 terminated.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let words: Vec<OsString> = arguments.into_iter().collect();
     let arguments = match args::Arguments::try_parse_from(&words) {

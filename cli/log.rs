@@ -5,9 +5,10 @@ use std::path::Path;
 use thetahat::{Channel, Error, Log, Recording, Resampling, Rows, Source, Times};
 
 use crate::failure::Failure;
+use crate::interrupt;
 use crate::job::{Clock, LogJob};
 use crate::progress::Reading;
-use crate::table::{Lines, Reader, Selection, Table};
+use crate::table::{Lines, Reader, Selection, Stream, Table};
 
 /// A log and where it came from, its rows counted from 1.
 #[derive(Debug)]
@@ -93,6 +94,23 @@ pub(crate) fn record(
     Ok(Recorded { recording: Recording { channels, times }, source, lines: table.lines, words })
 }
 
+/// Opens a log to be read row by row, as it comes, for the columns that `choose` names. Gives it with what the reader
+/// should know, in plain words. Dates count from `start`, or from the first one.
+pub(crate) fn follow(
+    path: &Path,
+    job: &LogJob,
+    whole_lines: bool,
+    start: Option<&str>,
+    choose: impl FnOnce(&[String]) -> Result<Vec<String>, Failure>,
+) -> Result<(Stream, Vec<String>), Failure> {
+    let reader = Reader::open_live(path, &job.options)?;
+    let names = choose(reader.names())?;
+    let (selection, words) = selected(&reader, &path.display().to_string(), job, &names)?;
+    let stream = reader.stream(&selection, whole_lines, start)?;
+    interrupt::follows(stream.waker());
+    Ok((stream, words))
+}
+
 /// What the library says of the rows of one log, with the line.
 pub(crate) fn at_line(file: &str, lines: &Lines) -> impl Fn(Error) -> Failure {
     move |error| {
@@ -121,17 +139,39 @@ fn columns(
 ) -> Result<Columns, Failure> {
     let reader = Reader::open(path, &job.options)?;
     let file = path.display().to_string();
+    let names = choose(&reader)?;
+    let (selection, words) = selected(&reader, &file, job, &names)?;
+
+    let progress = (!job.quiet).then(Reading::new);
+    let mut update = |read, total| progress.iter().for_each(|progress| progress.update(read, total));
+    let mut table = reader.read(&selection, &mut update)?;
+    drop(progress);
+
+    let values = std::mem::take(&mut table.columns);
+    let channels = names.into_iter().zip(values).map(|(name, values)| Channel { name, values }).collect();
+    let clock = if let Clock::Column { name, .. } = &job.clock { Some(name.clone()) } else { None };
+    let rows = Rows::new(1, table.rows).map_err(|error| Failure::data(format!("{file}: {error}")))?;
+    let source = Source { file, rows, time: clock, start: table.start.take(), resampled: None };
+    Ok(Columns { channels, table, source, words })
+}
+
+/// Where the named columns are, and the clock of the job; with what the reader should know, in plain words.
+fn selected(
+    reader: &Reader,
+    file: &str,
+    job: &LogJob,
+    names: &[String],
+) -> Result<(Selection, Vec<String>), Failure> {
     let bad = |message: String| Failure::data(format!("{file}: {message}"));
-    let header = reader.names().to_vec();
+    let header = reader.names();
     let mut words = Vec::new();
     if job.options.header && header.iter().all(|name| name.trim().parse::<f64>().is_ok()) {
         words.push(format!(
             "{file}: the names of all columns are numbers; if the first row is data, read it with --no-header"
         ));
     }
-    let names = choose(&reader)?;
     let time = match &job.clock {
-        Clock::Column { name, .. } => Some(find(name, &header).map_err(bad)?),
+        Clock::Column { name, .. } => Some(find(name, header).map_err(bad)?),
         Clock::Fixed(_) => None,
         Clock::Unknown => {
             if let Some(name) =
@@ -143,7 +183,7 @@ fn columns(
         }
     };
     let columns: Vec<usize> =
-        names.iter().map(|name| find(name, &header).map_err(bad)).collect::<Result<_, _>>()?;
+        names.iter().map(|name| find(name, header).map_err(bad)).collect::<Result<_, _>>()?;
     for (position, &column) in columns.iter().enumerate() {
         if columns[..position].contains(&column) || time == Some(column) {
             return Err(Failure::usage(format!(
@@ -152,18 +192,7 @@ fn columns(
             )));
         }
     }
-
-    let progress = (!job.quiet).then(Reading::new);
-    let mut update = |read, total| progress.iter().for_each(|progress| progress.update(read, total));
-    let mut table = reader.read(&Selection { columns, time }, &mut update)?;
-    drop(progress);
-
-    let values = std::mem::take(&mut table.columns);
-    let channels = names.into_iter().zip(values).map(|(name, values)| Channel { name, values }).collect();
-    let clock = if let Clock::Column { name, .. } = &job.clock { Some(name.clone()) } else { None };
-    let rows = Rows::new(1, table.rows).map_err(|error| bad(error.to_string()))?;
-    let source = Source { file, rows, time: clock, start: table.start.take(), resampled: None };
-    Ok(Columns { channels, table, source, words })
+    Ok((Selection { columns, time }, words))
 }
 
 /// The one column of a name.

@@ -2,6 +2,7 @@
 //!
 //! [`Reader::open`] reads as far as the first row and knows the columns' names; [`Reader::read`] reads the
 //! columns that were selected. The file is never held in memory: it passes through two blocks of a mebibyte.
+//! [`Reader::open_live`] and [`Reader::stream`] give the rows one by one as they come.
 //!
 //! What is understood: commas, semicolons or tabs, recognised by themselves; quotes as in RFC 4180; blank
 //! lines and comments; decimal commas; gzip; UTF-16 with a byte-order mark and other encodings by name; times
@@ -20,6 +21,7 @@ mod reader;
 mod record;
 mod rows;
 mod source;
+mod stream;
 #[cfg(test)]
 mod tests;
 mod time;
@@ -27,6 +29,7 @@ mod time;
 pub(crate) use error::{Error, ErrorKind};
 pub(crate) use lines::Lines;
 pub(crate) use reader::Reader;
+pub(crate) use stream::{Event, Stream, Waker};
 
 /// How a log is written, as far as it is not recognised by itself.
 #[derive(Clone, Debug)]

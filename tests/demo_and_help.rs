@@ -3,13 +3,15 @@
 use crate::harness::Folder;
 use crate::signals::{Experiment, csv};
 
-const VERBS: [&str; 11] = [
+const VERBS: [&str; 13] = [
     "fit",
     "inspect",
     "predict",
     "simulate",
     "validate",
     "compare",
+    "track",
+    "filter",
     "bode",
     "demo",
     "schema",
@@ -67,9 +69,21 @@ fn every_verb_has_examples_and_they_run() {
     for day in ["monday.csv", "tuesday.csv"] {
         folder.write(day, csv(&[("u", &u), ("y", &y)]));
     }
+    folder.write(
+        "level.toml",
+        "sample_time = 1\noutputs = ['y']\nF = [[1]]\nH = [[1]]\nQ = [[1]]\nR = [[1]]\nP0 = [[100]]\n",
+    );
+    folder.write(
+        "spring.toml",
+        "sample_time = 0.08\n[states]\nx = { start = 20, sd = 5 }\n[inputs]\nforce = 'u'\n[parameters]\n\
+         a = { start = 0.5, sd = 1, unknown = true, min = -1, max = 1 }\n[next]\nx = '20 + a * (x - 20) + force - 5'\n\
+         [outputs]\ny = 'x'\n[noise]\nprocess = { x = 1 }\nmeasurement = { y = 0.5 }\n",
+    );
     for verb in VERBS {
         let examples = examples(&folder.done(&format!("{verb} --help")).stdout);
         assert!(!examples.is_empty(), "{verb}");
+        // Whatever the last fit left there is not for every verb.
+        folder.done("fit log.csv --na 2 --nb 2 --report model.json");
         for example in examples {
             assert!(example.starts_with(verb), "{example}");
             folder.done(&format!("{example} --help"));
@@ -91,6 +105,7 @@ fn help_lists_the_verbs_and_the_exit_codes() {
         "4  the data cannot",
         "5  input/output",
         "6  the model does not meet",
+        "7  track ended at an alarm",
         "130  interrupted",
     ] {
         assert!(help.contains(&format!("\n  {code}")), "{code}");

@@ -7,7 +7,7 @@ use thetahat::{
     Log, Report, Rows, Source, Validated, ValidationPlan, fit_page, identify_monitored, validate,
 };
 
-use super::summary;
+use super::{grey, summary};
 use crate::args::{FitArguments, FormatArgument};
 use crate::failure::Failure;
 use crate::interrupt;
@@ -17,6 +17,9 @@ use crate::output::{self, warn};
 use crate::progress::Searching;
 
 pub(crate) fn fit(arguments: &FitArguments, line: &str) -> Result<(), Failure> {
+    if let Some(model) = &arguments.grey {
+        return grey::fit(arguments, model);
+    }
     let job = FitJob::resolve(arguments)?;
     let outputs = [&arguments.report, &arguments.html];
     for output in outputs.into_iter().flatten() {

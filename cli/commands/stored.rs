@@ -6,7 +6,7 @@ use std::path::Path;
 
 use thetahat::{Model, Report};
 
-use crate::failure::Failure;
+use crate::failure::{Failure, Kind};
 
 /// A report has this many bytes at most: beyond it the file is something else.
 const LARGEST_REPORT: u64 = 1 << 30;
@@ -18,6 +18,16 @@ pub(super) fn model(path: &Path) -> Result<Model, Failure> {
 
 /// A stored report.
 pub(super) fn report(path: &Path) -> Result<Report, Failure> {
+    let bad = |message: String| Failure::data(format!("{}: {message}", path.display()));
+    let text = text(path).map_err(|failure| match failure.kind() {
+        Kind::Data => bad("this is not a thetahat report: not UTF-8 text".to_owned()),
+        _ => failure,
+    })?;
+    Report::from_json(&text).map_err(|error| bad(error.to_string()))
+}
+
+/// The text of a file.
+pub(super) fn text(path: &Path) -> Result<String, Failure> {
     let failed = |error| Failure::io(path, "cannot be read", &error);
     let mut bytes = Vec::new();
     if path == Path::new("-") {
@@ -25,8 +35,5 @@ pub(super) fn report(path: &Path) -> Result<Report, Failure> {
     } else {
         File::open(path).map_err(failed)?.take(LARGEST_REPORT).read_to_end(&mut bytes).map_err(failed)?;
     }
-    let bad = |message: String| Failure::data(format!("{}: {message}", path.display()));
-    let text = String::from_utf8(bytes)
-        .map_err(|_| bad("this is not a thetahat report: not UTF-8 text".to_owned()))?;
-    Report::from_json(&text).map_err(|error| bad(error.to_string()))
+    String::from_utf8(bytes).map_err(|_| Failure::data(format!("{}: this is not UTF-8 text", path.display())))
 }

@@ -1,18 +1,24 @@
 //! A report as a table for people.
 
+mod filtered;
+mod grey;
 mod inspection;
 mod selection;
 mod text;
+mod tracking;
 mod validation;
 
 use thetahat::{
-    Algorithm, CriterionOutcome, Estimation, Fit, Initial, Model, Norm, Part, Procedure, Quantity, Report,
-    Root, Rows, SearchOutcome, Signal, Solver, Start, Stopped, Structure,
+    Algorithm, CriterionOutcome, Estimation, Fit, Initial, Model, Norm, Orders, Part, Procedure, Quantity,
+    Report, Root, Rows, SearchOutcome, Signal, Solver, Start, Stopped, Structure,
 };
 
 use crate::output::harmless;
+pub(crate) use filtered::filtered;
+pub(crate) use grey::grey;
 pub use inspection::inspection;
 use text::{Text, columns, number, or_dash, short, uncertainty};
+pub(crate) use tracking::tracking;
 pub use validation::{comparison, validation};
 
 /// The report's main figures.
@@ -20,7 +26,7 @@ pub fn table(report: &Report) -> String {
     let model = &report.model;
     let mut text = Text::default();
     selection::selection(&mut text, report);
-    text.line(&format!("{}, sample time {} s", formula(model), short(model.sample_time)));
+    text.line(&format!("{}, sample time {} s", formula(&model.orders), short(model.sample_time)));
     let signals = model.inputs.iter().map(|input| signal("input", input));
     let signals: Vec<String> = signals.chain([signal("output", &model.output)]).collect();
     text.line(&signals.join(", "));
@@ -44,8 +50,8 @@ pub fn table(report: &Report) -> String {
 }
 
 /// The model's structure and equation.
-fn formula(model: &Model) -> String {
-    let name = match model.structure {
+fn formula(orders: &Orders) -> String {
+    let name = match orders.structure() {
         Structure::Ar => "AR",
         Structure::Arma => "ARMA",
         Structure::Arx => "ARX",
@@ -54,7 +60,7 @@ fn formula(model: &Model) -> String {
         Structure::Bj => "Box-Jenkins",
         Structure::Pem => "General model",
     };
-    format!("{name}: {}", model.orders.equation())
+    format!("{name}: {}", orders.equation())
 }
 
 fn signal(role: &str, signal: &Signal) -> String {

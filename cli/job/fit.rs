@@ -40,7 +40,7 @@ impl FitJob {
             estimate: rows("--estimate", &arguments.estimate)?,
             validate: rows("--validate", &arguments.validate)?,
             detrend: parsed("--detrend", &arguments.detrend)?,
-            offsets: offsets(&arguments.offset)?,
+            offsets: named_values("--offset", &arguments.offset)?,
             split: arguments.choice.split.as_deref().map(|text| parsed("--split", text)).transpose()?,
             select: select(arguments.choice.select, &orders)?,
             method: method::method(arguments, &orders)?,
@@ -85,23 +85,23 @@ impl FitJob {
     }
 }
 
-/// Offsets set by hand, one for a channel.
-fn offsets(texts: &[String]) -> Result<Vec<(String, f64)>, Failure> {
-    let mut offsets: Vec<(String, f64)> = Vec::new();
+/// Numbers set by hand, one for a channel.
+pub(super) fn named_values(option: &str, texts: &[String]) -> Result<Vec<(String, f64)>, Failure> {
+    let mut values: Vec<(String, f64)> = Vec::new();
     for text in texts {
         let (name, value) = text
             .rsplit_once('=')
             .and_then(|(name, value)| Some((name.to_owned(), value.trim().parse::<f64>().ok()?)))
             .filter(|(_, value)| value.is_finite())
             .ok_or_else(|| {
-                Failure::usage(format!("--offset {text}: write it as NAME=VALUE, such as u=4.5"))
+                Failure::usage(format!("{option} {text}: write it as NAME=VALUE, such as u=4.5"))
             })?;
-        if offsets.iter().any(|(other, _)| *other == name) {
-            return Err(Failure::usage(format!("--offset: '{name}' has two; give one")));
+        if values.iter().any(|(other, _)| *other == name) {
+            return Err(Failure::usage(format!("{option}: '{name}' has two; give one")));
         }
-        offsets.push((name, value));
+        values.push((name, value));
     }
-    Ok(offsets)
+    Ok(values)
 }
 
 fn select(argument: Option<SelectArgument>, orders: &OrderJob) -> Result<Select, Failure> {

@@ -17,12 +17,19 @@ pub(super) struct Block {
     carried: usize,
     /// Whether the text ends with this block.
     last: bool,
+    /// Whether the last newline is not in the text.
+    closed: bool,
 }
 
 impl Block {
     /// The bytes, with a newline after the last one of the whole text.
     pub(super) fn text(&self) -> &[u8] {
         &self.memory[..self.length]
+    }
+
+    /// The bytes as they were read.
+    pub(super) fn raw(&self) -> &[u8] {
+        &self.memory[..self.length - usize::from(self.closed)]
     }
 
     /// How many of the bytes were in the block before.
@@ -47,10 +54,12 @@ impl Block {
         self.carried = left.len();
         self.length = left.len() + read;
         self.last = read < amount;
+        self.closed = false;
         // So that every line ends alike.
         if self.last && self.text().last().is_some_and(|&byte| byte != b'\n') {
             self.memory[self.length] = b'\n';
             self.length += 1;
+            self.closed = true;
         }
         Ok(())
     }

@@ -104,6 +104,16 @@ impl Layout {
         )
     }
 
+    /// The error for a line that ends inside quotes.
+    pub(super) fn unclosed_in_line(&self, row: &Row<'_>) -> Error {
+        let position = row.position_of(row.record.len(), self.dialect);
+        Error::data(
+            &self.file,
+            position,
+            "this quote is not closed before the end of its line; close it, or take it away",
+        )
+    }
+
     /// The error for a row that is longer than `limit` bytes.
     pub(super) fn too_long(&self, line: u64, limit: usize) -> Error {
         let message = format!(

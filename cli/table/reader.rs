@@ -12,6 +12,7 @@ use super::number::{NUL_BYTE, Numbers};
 use super::record::Record;
 use super::rows::{Plan, Rows, Workspace};
 use super::source::Source;
+use super::stream::{Stream, Text, has_lines};
 use super::time::Clock;
 use super::{Options, Selection, Table};
 
@@ -55,6 +56,20 @@ impl Reader {
     pub(crate) fn open(path: &Path, options: &Options) -> Result<Self, Error> {
         options.check().map_err(|message| Error::data(&path.display().to_string(), None, message))?;
         Self::start(Source::open(path, options.encoding)?, options, SIZES)
+    }
+
+    /// Opens a log as [`open`](Reader::open) does, without asking for more than it takes to know its columns: it may be
+    /// a pipe on which the next row is yet to come. For [`stream`](Reader::stream).
+    pub(crate) fn open_live(path: &Path, options: &Options) -> Result<Self, Error> {
+        options.check().map_err(|message| Error::data(&path.display().to_string(), None, message))?;
+        Self::start_live(Source::open(path, options.encoding)?, options)
+    }
+
+    /// Reads a stream as far as its first row, and nothing that it would have to wait for.
+    pub(super) fn start_live(mut source: Source, options: &Options) -> Result<Self, Error> {
+        let lines = usize::from(options.header) + options.skip_rows + 1;
+        let head = source.look_ahead(SIZES.row, |text| has_lines(text, lines, options.comment))?;
+        Self::start(source, options, Sizes { block: head, ..SIZES })
     }
 
     /// Reads a stream as far as its first row.
@@ -254,6 +269,29 @@ impl Reader {
             std::mem::swap(&mut current, &mut next);
             position = 0;
         }
+    }
+
+    /// Gives the rows of the selected columns one by one. With `whole_lines` a last line that has no line break yet is
+    /// not taken for a row: who writes the log may not have finished it. Dates count from `start`, written as they are, or
+    /// from the first one.
+    pub(crate) fn stream(
+        self,
+        selection: &Selection,
+        whole_lines: bool,
+        start: Option<&str>,
+    ) -> Result<Stream, Error> {
+        let fields = self.fields(selection)?;
+        let numbers = Numbers::new(self.options.decimal_comma, &self.options.missing);
+        let (mut clock, mut first) = self.clock(selection, &numbers)?;
+        if let (Some(start), Clock::Calendar { .. }) = (start, &clock) {
+            clock = Clock::decide(start.as_bytes(), self.options.time_format.as_deref(), &numbers)
+                .map_err(|message| Error::data(&self.layout.file, None, message))?;
+            first = Some(start.to_owned());
+        }
+        let Self { source, layout, current, position, line, .. } = self;
+        let text = current.raw().get(position..).unwrap_or_default().to_vec();
+        let plan = Plan { layout, numbers, clock, fields, time: selection.time };
+        Ok(Stream::begin(plan, selection, Text { text, line, source, whole_lines, start: first }))
     }
 
     /// The selected fields in ascending order, if the selection makes sense.

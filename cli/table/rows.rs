@@ -176,7 +176,7 @@ impl Plan {
     }
 
     /// Reads the row at the front of a text and returns its length, unless it needs care.
-    fn row(&self, text: &[u8], values: &mut [f64]) -> Option<usize> {
+    pub(super) fn row(&self, text: &[u8], values: &mut [f64]) -> Option<usize> {
         let (mut taken, mut field) = (0, 0);
         for (value, &wanted) in values.iter_mut().zip(&self.fields) {
             taken += self.skip(text.get(taken..)?, field, wanted)?;
@@ -252,19 +252,25 @@ impl Plan {
             }
             let Some(length) = record.read(rest) else { break };
             let row = Row { record, text: &rest[..length], line: rows.line };
-            if record.len() != layout.width() {
-                return Err(layout.ragged(&row));
-            }
-            for (value, &index) in values.iter_mut().zip(&self.fields) {
-                let content = layout.dialect.trimmed(record.field(index));
-                let report = if rows.count == 0 { Layout::first_fault } else { Layout::fault };
-                *value =
-                    self.content(content, index).map_err(|message| report(layout, &row, index, &message))?;
-            }
+            self.values(&row, rows.count == 0, &mut values)?;
             rows.push(&values, memchr_iter(b'\n', row.text).count() as u64);
             taken += length;
         }
         Ok(taken)
+    }
+
+    /// Takes the values from a row that was read by all the rules.
+    pub(super) fn values(&self, row: &Row<'_>, first: bool, values: &mut [f64]) -> Result<(), Error> {
+        let layout = &self.layout;
+        if row.record.len() != layout.width() {
+            return Err(layout.ragged(row));
+        }
+        for (value, &index) in values.iter_mut().zip(&self.fields) {
+            let content = layout.dialect.trimmed(row.record.field(index));
+            let report = if first { Layout::first_fault } else { Layout::fault };
+            *value = self.content(content, index).map_err(|message| report(layout, row, index, &message))?;
+        }
+        Ok(())
     }
 }
 

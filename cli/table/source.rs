@@ -14,6 +14,8 @@ use super::error::Error;
 
 /// The first bytes of every gzip stream.
 const GZIP: [u8; 2] = [0x1f, 0x8b];
+/// What is asked of a pipe at once: as much as it holds.
+const PIECE: usize = 1 << 16;
 
 /// A stream of text, and how much of its origin has been read.
 pub(super) struct Source {
@@ -115,6 +117,32 @@ impl Source {
             }
         }
         Ok(filled)
+    }
+
+    /// Reads what is there, and waits only if nothing is; 0 is the end of the text.
+    pub(super) fn read_some(&mut self, buffer: &mut [u8]) -> Result<usize, Error> {
+        loop {
+            match self.text.read(buffer) {
+                Ok(count) => return Ok(count),
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) => return Err(self.failure(&error)),
+            }
+        }
+    }
+
+    /// Reads no more than it takes to be `enough`, or all there is, and returns the length. It is read again afterwards.
+    pub(super) fn look_ahead(&mut self, most: usize, enough: impl Fn(&[u8]) -> bool) -> Result<usize, Error> {
+        let (mut head, mut piece) = (Vec::new(), vec![0; PIECE]);
+        while !enough(&head) && head.len() < most {
+            match self.read_some(&mut piece)? {
+                0 => break,
+                count => head.extend_from_slice(&piece[..count]),
+            }
+        }
+        let length = head.len();
+        let rest = std::mem::replace(&mut self.text, Box::new(io::empty()));
+        self.text = Box::new(Cursor::new(head).chain(rest));
+        Ok(length)
     }
 
     /// Says what a failed read means.

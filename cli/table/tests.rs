@@ -12,6 +12,7 @@ use super::source::Source;
 use super::*;
 
 mod random;
+mod stream;
 
 /// Blocks and pieces so small that rows, fields and numbers are cut everywhere.
 const TINY: [(usize, usize); 6] = [(1, 1), (2, 1), (7, 3), (16, 5), (64, 16), (1000, 40)];

@@ -1,0 +1,108 @@
+//! The lines of `filter`.
+
+use thetahat::{StateEstimate, StateModel, Values};
+
+use crate::failure::Failure;
+use crate::job::{Clock, FilterJob};
+use crate::lines::{Cells, Lines};
+use crate::live::action;
+
+/// The columns of a run.
+pub(super) struct Columns {
+    names: Vec<String>,
+    has_time: bool,
+    inputs: Vec<String>,
+}
+
+impl Columns {
+    /// # Errors
+    /// That two columns would have the same name.
+    pub(super) fn new(job: &FilterJob, model: &StateModel) -> Result<Self, Failure> {
+        let has_time = matches!(job.log.clock, Clock::Column { .. });
+        let smoothed: &[&str] = if job.smooth { &["_smoothed", "_smoothed_sd"] } else { &[] };
+        let mut names = vec!["row".to_owned()];
+        names.extend(has_time.then(|| "time".to_owned()));
+        names.push("action".to_owned());
+        let mut add = |name: &str, suffixes: &[&str]| {
+            names.extend(suffixes.iter().chain(smoothed).map(|suffix| format!("{name}{suffix}")));
+        };
+        model.states().iter().for_each(|state| add(state, &["", "_sd", "_predicted", "_predicted_sd"]));
+        model.unknown().for_each(|parameter| add(parameter, &["", "_sd"]));
+        for output in model.outputs() {
+            let parts = [("measured", ""), ("predicted", ""), ("innovation", ""), ("innovation", "_sd")];
+            names.extend(parts.map(|(part, suffix)| format!("{part}_{output}{suffix}")));
+        }
+        names.extend(["nis", "nis_low", "nis_high", "log_likelihood"].map(str::to_owned));
+        names.extend((!model.inputs().is_empty()).then(|| "held".to_owned()));
+        let twice = |(index, name): &(usize, &String)| names.iter().take(*index).any(|other| other == *name);
+        if let Some((_, name)) = names.iter().enumerate().find(twice) {
+            return Err(Failure::data(format!(
+                "{}: the output would have two columns called '{name}'; rename a state or a parameter",
+                job.model.display()
+            )));
+        }
+        Ok(Self { names, has_time, inputs: model.inputs().to_vec() })
+    }
+
+    pub(super) fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// A line about a row, with its states and parameters given the whole log if there are any.
+    pub(super) fn row(
+        &self,
+        lines: &mut Lines,
+        row: u64,
+        time: Option<f64>,
+        measured: &[f64],
+        estimate: &StateEstimate<'_>,
+        smoothed: Option<(Values<'_>, Values<'_>)>,
+    ) -> Result<(), Failure> {
+        lines.add(|cells| {
+            cells.count(row);
+            if self.has_time {
+                cells.number(time.unwrap_or(f64::NAN));
+            }
+            cells.word(action(estimate.action));
+            for index in 0..estimate.predicted.values.len() {
+                pair(cells, estimate.filtered.as_ref(), index);
+                pair(cells, Some(&estimate.predicted), index);
+                if let Some((states, _)) = &smoothed {
+                    pair(cells, Some(states), index);
+                }
+            }
+            for index in 0..estimate.parameters.values.len() {
+                pair(cells, Some(&estimate.parameters), index);
+                if let Some((_, parameters)) = &smoothed {
+                    pair(cells, Some(parameters), index);
+                }
+            }
+            for (index, &measured) in measured.iter().enumerate() {
+                cells.number(measured);
+                cells.number(at(estimate.outputs.values, index));
+                cells.number(at(estimate.innovations, index));
+                cells.number(at(estimate.outputs.standard_deviations.unwrap_or_default(), index));
+            }
+            cells.number(estimate.nis.unwrap_or(f64::NAN));
+            let (low, high) = estimate.nis_bounds.unwrap_or((f64::NAN, f64::NAN));
+            cells.number(low);
+            cells.number(high);
+            cells.number(estimate.log_likelihood.unwrap_or(f64::NAN));
+            if estimate.held.contains(&true) {
+                let held = self.inputs.iter().zip(estimate.held).filter(|(_, held)| **held);
+                let held: Vec<&str> = held.map(|(name, _)| name.as_str()).collect();
+                cells.word(&held.join(" "));
+            }
+        })
+    }
+}
+
+/// A value and its standard deviation.
+fn pair(cells: &mut Cells<'_>, values: Option<&Values<'_>>, index: usize) {
+    cells.number(at(values.map_or(&[], |values| values.values), index));
+    cells.number(at(values.and_then(|values| values.standard_deviations).unwrap_or_default(), index));
+}
+
+fn at(values: &[f64], index: usize) -> f64 {
+    values.get(index).copied().unwrap_or(f64::NAN)
+}

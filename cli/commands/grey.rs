@@ -1,0 +1,95 @@
+//! `thetahat fit --grey`: the unknown parameters of a model in equations.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use thetahat::{Channel, GreyBox, Recording, Rows, Source, Times, fit_grey};
+
+use super::{stored, summary};
+use crate::args::{FitArguments, FormatArgument};
+use crate::failure::Failure;
+use crate::interrupt;
+use crate::job::{Clock, LogJob, rows};
+use crate::log::{self, Recorded};
+use crate::output::{self, warn};
+use crate::progress::Searching;
+
+pub(super) fn fit(arguments: &FitArguments, model: &Path) -> Result<(), Failure> {
+    let job = LogJob::resolve(&arguments.log, &arguments.clock)?;
+    let read = arguments.logs.iter().map(|path| path.as_path()).chain([model]);
+    if read.clone().filter(|path| *path == Path::new("-")).count() > 1 {
+        return Err(Failure::usage("only one of the model and the logs can come from standard input (-)"));
+    }
+    if let Some(report) = &arguments.report {
+        read.clone().try_for_each(|path| output::apart(report, path))?;
+    }
+    let text = stored::text(model)?;
+    let grey =
+        GreyBox::from_toml(&text).map_err(|error| Failure::data(format!("{}: {error}", model.display())))?;
+    let (mut recordings, mut sources) = (Vec::new(), Vec::<Source>::new());
+    for path in &arguments.logs {
+        let names = || grey.inputs().iter().chain(grey.outputs()).cloned().collect();
+        let Recorded { mut recording, mut source, words, .. } = log::record(path, &job, |_| Ok(names()))?;
+        words.iter().for_each(|word| warn(word));
+        if job.clock == Clock::Unknown {
+            recording.times = Times::Uniform(grey.sample_time());
+        }
+        let before = sources.last().map_or(0, |source| source.rows.last());
+        source.rows = Rows::new(before + 1, before + source.rows.last())
+            .map_err(|error| Failure::data(format!("{}: {error}", path.display())))?;
+        recordings.push(recording);
+        sources.push(source);
+    }
+    let asked = rows("--estimate", &arguments.estimate)?;
+    let recordings = parts(recordings, &sources, &asked)?;
+    let progress = Searching::new();
+    let monitor = |now| {
+        progress.update(now);
+        if interrupt::asked() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    };
+    let found = interrupt::during(|| fit_grey(&grey, &recordings, &sources, &monitor));
+    drop(progress);
+    let report = found?.map_err(log::failure(&sources))?;
+    let json = report.to_json().map_err(|error| Failure::data(error.to_string()))?;
+    if let Some(path) = &arguments.report {
+        output::write(path, |file| file.write_all(json.as_bytes()))?;
+    }
+    report.warnings.iter().for_each(|warning| warn(warning));
+    match arguments.format {
+        // Standard output holds one document.
+        _ if arguments.report.as_deref() == Some(Path::new("-")) => Ok(()),
+        FormatArgument::Json => output::print(&json),
+        FormatArgument::Table => output::print(&summary::grey(&report)),
+    }
+}
+
+/// The rows asked for, counted through all logs: each stretch within a log is an experiment of its own. All if none are.
+fn parts(logs: Vec<Recording>, sources: &[Source], asked: &[Rows]) -> Result<Vec<Recording>, Failure> {
+    if asked.is_empty() {
+        return Ok(logs);
+    }
+    let all = sources.last().map_or(0, |source| source.rows.last());
+    if let Some(beyond) = asked.iter().find(|rows| rows.last() > all) {
+        return Err(Failure::data(format!("--estimate {beyond}: there are {all} rows; name some of them")));
+    }
+    let mut parts = Vec::new();
+    for rows in asked {
+        for (log, source) in logs.iter().zip(sources) {
+            let first = rows.first().max(source.rows.first());
+            let last = rows.last().min(source.rows.last());
+            if first > last {
+                continue;
+            }
+            let range = first - source.rows.first()..last + 1 - source.rows.first();
+            let cut = |values: &[f64]| values.get(range.clone()).unwrap_or_default().to_vec();
+            let channel =
+                |channel: &Channel| Channel { name: channel.name.clone(), values: cut(&channel.values) };
+            let times = match &log.times {
+                Times::Measured(times) => Times::Measured(cut(times)),
+                Times::Uniform(step) => Times::Uniform(*step),
+            };
+            parts.push(Recording { channels: log.channels.iter().map(channel).collect(), times });
+        }
+    }
+    Ok(parts)
+}

@@ -1,0 +1,56 @@
+//! What `filter` says at its end.
+
+use thetahat::{Estimated, FilterSummary};
+
+use super::text::{Text, columns, number, or_dash, uncertainty};
+
+/// How surprising the log was, and where the state has come to.
+pub(crate) fn filtered(summary: &FilterSummary, malformed: u64) -> String {
+    let mut text = Text::default();
+    let estimator = match summary.estimator.as_str() {
+        "kalman" => "Kalman filter",
+        "ekf" => "extended Kalman filter",
+        _ => "Luenberger observer",
+    };
+    let malformed = if malformed > 0 { format!(", {malformed} malformed") } else { String::new() };
+    text.line(&format!(
+        "{estimator}: {} rows{malformed}, {} values measured",
+        summary.rows, summary.measured
+    ));
+    if let Some(sum) = summary.log_likelihood {
+        text.line(&format!("log-likelihood {sum:.4}"));
+    }
+    if let Some(nis) = &summary.nis {
+        let percent = |part: f64| format!("{:.1} %", 100.0 * part);
+        text.line(&format!(
+            "normalised innovation squared: mean {:.3}; below its 95 % bounds {}, above {} (2.5 % each if the model is right)",
+            nis.mean,
+            percent(nis.below),
+            percent(nis.above)
+        ));
+    }
+    text.line("");
+    for (title, estimates) in [("state", &summary.states), ("parameter", &summary.parameters)] {
+        if !estimates.is_empty() {
+            table(&mut text, title, estimates);
+        }
+    }
+    text.finish()
+}
+
+fn table(text: &mut Text, title: &str, estimates: &[Estimated]) {
+    let bounded = estimates.iter().any(|estimate| estimate.change_of_variable.is_some());
+    let mut titles = vec![title, "value", "standard deviation"];
+    titles.extend(bounded.then_some("estimated as"));
+    let mut table = columns(&titles);
+    for estimate in estimates {
+        let mut row = vec![
+            estimate.name.clone(),
+            number(estimate.value),
+            or_dash(estimate.standard_deviation, uncertainty),
+        ];
+        row.extend(bounded.then(|| estimate.change_of_variable.clone().unwrap_or_default()));
+        table.add_row(row);
+    }
+    text.table(table, &[1, 2]);
+}

@@ -1,0 +1,52 @@
+//! What `fit --grey` found, as a table for people.
+
+use thetahat::{GreyFit, GreyReport, Stopped};
+
+use super::stopped;
+use super::text::{Text, columns, number, or_dash, short, uncertainty};
+
+/// The main figures of a fit of a model in equations.
+pub(crate) fn grey(report: &GreyReport) -> String {
+    let mut text = Text::default();
+    let mut parameters = columns(&["parameter", "value", "standard error", "start", "estimated as"]);
+    for parameter in &report.parameters {
+        parameters.add_row([
+            parameter.name.clone(),
+            number(parameter.value),
+            uncertainty(parameter.standard_error),
+            short(parameter.start),
+            parameter.variable.clone(),
+        ]);
+    }
+    text.table(parameters, &[1, 2, 3]);
+    let search = &report.search;
+    let why: Stopped = search.stopped;
+    text.line(&format!(
+        "{} rows, {} readings, log-likelihood {:.4}",
+        report.rows, report.readings, report.log_likelihood
+    ));
+    text.line(&format!("prediction error, {} iterations, {}", search.iterations, stopped(why)));
+    text.line(&format!(
+        "normalised innovation squared: mean {:.3}; within its 95 % bounds {:.1} % (95 % if the noises are right)",
+        report.mean_nis,
+        100.0 * report.within_95
+    ));
+    text.line("");
+    let percent =
+        |fit: Option<GreyFit>| or_dash(fit.and_then(|fit| fit.percent), |percent| format!("{percent:.2} %"));
+    let rmse = |fit: Option<GreyFit>| or_dash(fit.map(|fit| fit.rmse), number);
+    let mut outputs = columns(&["output", "1 step", "rmse", "free run", "rmse", "missing", "white (p)"]);
+    for output in &report.outputs {
+        outputs.add_row([
+            output.channel.clone(),
+            percent(output.one_step),
+            rmse(output.one_step),
+            percent(output.free_run),
+            rmse(output.free_run),
+            output.missing.to_string(),
+            or_dash(output.whiteness.as_ref().and_then(|test| test.p_value), |p| format!("{p:.3}")),
+        ]);
+    }
+    text.table(outputs, &[1, 2, 3, 4, 5, 6]);
+    text.finish()
+}

@@ -1,0 +1,231 @@
+//! `thetahat track`: recursive identification along a log, or a pipe that someone is still writing to.
+
+mod channels;
+mod columns;
+mod pace;
+mod state;
+
+use std::path::Path;
+
+use thetahat::{Report, Tracker};
+
+use super::{stored, summary};
+use crate::args::TrackArguments;
+use crate::failure::Failure;
+use crate::job::{StateJob, TrackJob};
+use crate::lines::Lines;
+use crate::live::{Live, Next, action};
+use crate::log;
+use crate::output::{self, say, warn};
+use columns::{Columns, Sample};
+use pace::Step;
+use state::{Place, RowPlace, State};
+
+pub(crate) fn track(arguments: &TrackArguments) -> Result<(), Failure> {
+    let job = TrackJob::resolve(arguments)?;
+    let state_path = job.state.as_ref().map(|state| state.path.as_path());
+    for written in [Some(job.lines.out.as_path()), state_path].into_iter().flatten() {
+        for read in [Some(job.path.as_path()), job.warm.as_deref()].into_iter().flatten() {
+            output::apart(written, read)?;
+        }
+    }
+    if state_path == Some(Path::new("-")) || state_path == Some(job.lines.out.as_path()) {
+        return Err(Failure::usage("--state names what the lines are written to; give it a file of its own"));
+    }
+    let report = job.warm.as_deref().map(stored::report).transpose()?;
+    let mut run = Run::start(&job, report.as_ref())?;
+    let ended = run.follow();
+    // What a closed pipe has not taken is written again by the next run: so it goes on from the last state saved.
+    if ended.as_ref().is_err_and(Failure::is_closed) {
+        return ended.map(drop);
+    }
+    let saved = run.lines.sync().and_then(|()| run.save());
+    let ended = ended?;
+    saved?;
+    run.report();
+    match ended {
+        Ended::Stopped => Err(Failure::interrupted()),
+        Ended::Alarm => Err(Failure::alarm(format!("{}: an alarm in row {}", run.name, run.state.rows))),
+        Ended::End => Ok(()),
+    }
+}
+
+/// Why a run is over.
+enum Ended {
+    End,
+    Stopped,
+    Alarm,
+}
+
+/// A log that is being tracked.
+struct Run<'a> {
+    job: &'a TrackJob,
+    /// The log's name, for messages.
+    name: String,
+    live: Live,
+    lines: Lines,
+    columns: Columns,
+    state: State,
+    place: Place,
+    /// Memory for standard errors.
+    deviations: Vec<f64>,
+}
+
+impl<'a> Run<'a> {
+    fn start(job: &'a TrackJob, report: Option<&Report>) -> Result<Self, Failure> {
+        let name = job.path.display().to_string();
+        let stored = job.state.as_ref().map(|state| State::read(&state.path)).transpose()?.flatten();
+        let mut chosen = None;
+        let start = stored.as_ref().and_then(|state| state.start.as_deref());
+        let (stream, words) = log::follow(&job.path, &job.log, job.state.is_some(), start, |header| {
+            let channels = channels::choose(job, report, header)
+                .map_err(|message| Failure::data(format!("{name}: {message}")))?;
+            let names = channels.inputs.iter().chain([&channels.output]).cloned().collect();
+            chosen = Some(channels);
+            Ok(names)
+        })?;
+        let channels = chosen.unwrap_or_default();
+        let trackers = job.trackers(&channels.inputs, &channels.output, report)?;
+        let columns = Columns::new(job, &trackers);
+        let setting = state::setting(job, &channels, &trackers);
+        let resumed = stored.is_some();
+        let state = match stored {
+            Some(state) => state.checked(&setting, job)?,
+            None => {
+                let sample_time = job.sample_time.or(report.map(|report| report.model.sample_time));
+                State::new(setting, trackers, stream.start().map(str::to_owned), sample_time)
+            }
+        };
+        let place = match &job.state {
+            Some(state_job) if resumed => Place::resumed(state_job.resume, &job.path),
+            _ => Place::There,
+        };
+        let lines = if resumed {
+            say(&format!("goes on after row {}, line {} of the output", state.rows, state.written.lines));
+            Lines::resume(&job.lines.out, job.lines.format, columns.names(), state.written)?
+        } else {
+            Lines::create(&job.lines.out, job.lines.format, columns.names())?
+        };
+        words.iter().for_each(|word| warn(word));
+        let parameters = state.trackers.first().map_or(0, |tracker| tracker.names().len());
+        Ok(Self {
+            job,
+            name,
+            live: Live::new(stream, job.lines.strict),
+            lines,
+            columns,
+            state,
+            place,
+            deviations: vec![f64::NAN; parameters],
+        })
+    }
+
+    /// Goes through the log to its end.
+    fn follow(&mut self) -> Result<Ended, Failure> {
+        let save_every = self.job.state.as_ref().map(|state| state.save_every);
+        loop {
+            match self.live.next()? {
+                Next::Row => {}
+                Next::Idle => {
+                    self.lines.flush()?;
+                    continue;
+                }
+                Next::End => {
+                    self.place.check_end(&self.state, &self.name)?;
+                    return Ok(Ended::End);
+                }
+                Next::Stopped => return Ok(Ended::Stopped),
+            }
+            let alarm = match self.place.of_row(&self.state, &self.live, &self.name)? {
+                RowPlace::Old => continue,
+                RowPlace::Next => self.row(false)?,
+                RowPlace::AfterGap => self.row(true)?,
+            };
+            if alarm && self.job.stop_on_alarm {
+                return Ok(Ended::Alarm);
+            }
+            if save_every.is_some_and(|every| self.state.rows.is_multiple_of(every)) {
+                self.lines.sync()?;
+                self.save()?;
+            }
+        }
+    }
+
+    /// Takes in the row at hand; says whether there was an alarm.
+    fn row(&mut self, after_gap: bool) -> Result<bool, Failure> {
+        let Self { job, name, live, lines, columns, state, deviations, .. } = self;
+        let (values, time, malformed) = (live.values(), live.time(), live.is_malformed());
+        state.rows += 1;
+        let row = state.rows;
+        let step = time.map_or(Step::Regular, |time| state.pace.step(time));
+        if step == Step::Back && job.lines.strict {
+            return Err(Failure::data(format!(
+                "{name}:{}: the time does not rise; correct it, or leave out --strict",
+                live.line()
+            )));
+        }
+        if after_gap || step != Step::Regular {
+            state.trackers.iter_mut().for_each(Tracker::gap);
+            state.gaps += 1;
+            columns.gap(lines, row, time)?;
+        }
+        state.remember(values, time);
+        // With a clock the next time tells what is missing.
+        if malformed && live.has_clock() {
+            return Ok(false);
+        }
+        let Some((&output, inputs)) = values.split_last() else { return Ok(false) };
+        let mut any = false;
+        for (index, (tracker, alarms)) in state.trackers.iter_mut().zip(&mut state.alarms).enumerate() {
+            let tracked = tracker
+                .update(inputs, output)
+                .map_err(|error| Failure::data(format!("{name}:{}: {error}", live.line())))?;
+            if row.is_multiple_of(job.lines.every) {
+                let done = match (malformed, tracked.too_large) {
+                    (true, _) => "malformed",
+                    (_, true) => "too_large",
+                    _ => action(tracked.action),
+                };
+                let sample = Sample { row, time, index, action: done, output, tracked };
+                columns.sample(lines, &sample, tracker, deviations)?;
+            }
+            if let Some(alarm) = tracked.alarm {
+                any = true;
+                *alarms += 1;
+                columns.alarm(lines, row, time, index, &alarm)?;
+            }
+        }
+        Ok(any)
+    }
+
+    fn save(&mut self) -> Result<(), Failure> {
+        self.state.written = self.lines.written();
+        let Some(StateJob { path, .. }) = &self.job.state else { return Ok(()) };
+        self.state.write(path)
+    }
+
+    /// What a person wants to know at the end.
+    fn report(&self) {
+        if self.live.is_unfinished() {
+            warn(&format!(
+                "{}: the last line has no line break yet; it is left for the next time",
+                self.name
+            ));
+        }
+        if !self.job.lines.quiet {
+            let counts = counts(&self.state, &self.live);
+            say(summary::tracking(&self.state.trackers, &self.state.alarms, &counts).trim_end());
+        }
+    }
+}
+
+/// What was in the log besides samples.
+fn counts(state: &State, live: &Live) -> String {
+    let mut text = format!("{} rows", state.rows);
+    for (count, what) in [(live.malformed(), "malformed"), (state.gaps, "gaps")] {
+        if count > 0 {
+            text.push_str(&format!(", {count} {what}"));
+        }
+    }
+    text
+}

@@ -1,0 +1,38 @@
+//! Which columns are tracked.
+
+use thetahat::Report;
+
+use crate::commands::Channels;
+use crate::commands::fit::usual_inputs;
+use crate::job::TrackJob;
+use crate::log::listed;
+
+/// Those named, those of the report, or those called u, u1, u2, … and y; an error is a message.
+pub(super) fn choose(job: &TrackJob, report: Option<&Report>, header: &[String]) -> Result<Channels, String> {
+    let model = report.map(|report| &report.model);
+    let output = match (&job.output, model) {
+        (Some(name), _) => name.clone(),
+        (None, Some(model)) => model.output.name.clone(),
+        (None, None) if header.iter().any(|name| name == "y") => "y".to_owned(),
+        (None, None) => {
+            return Err(format!(
+                "no column is called y; name the output with --output; there are: {}",
+                listed(header)
+            ));
+        }
+    };
+    let inputs = match (&job.inputs, model) {
+        (Some(names), _) => names.clone(),
+        (None, Some(model)) => model.inputs.iter().map(|input| input.name.clone()).collect(),
+        (None, None) if !job.has_inputs() => Vec::new(),
+        (None, None) => usual_inputs(header),
+    };
+    if inputs.is_empty() && model.is_none() && job.has_inputs() {
+        return Err(format!(
+            "no column is called u, u1, u2, …; name the inputs with --input, or give --nb 0 for a model without; there \
+             are: {}",
+            listed(header)
+        ));
+    }
+    Ok(Channels { inputs, output })
+}

@@ -1,0 +1,136 @@
+//! The lines of `track`.
+
+use thetahat::thetahat_core::{Alarm, Chart};
+use thetahat::{Tracked, Tracker};
+
+use crate::failure::Failure;
+use crate::job::{Clock, TrackJob};
+use crate::lines::{Cells, Lines};
+
+/// What stands in front of the parameters of each sample.
+const FIGURES: [&str; 7] =
+    ["action", "measured", "prediction", "innovation", "innovation_sd", "nis", "excitation"];
+/// What an alarm has.
+const ALARM: [&str; 3] = ["chart", "statistic", "samples"];
+
+/// The columns of a run: which of them there are depends on what was asked for.
+pub(super) struct Columns {
+    names: Vec<String>,
+    has_time: bool,
+    /// The policies, where there are several.
+    policies: Vec<String>,
+    has_forecast: bool,
+    parameters: usize,
+}
+
+/// A sample and what became of it.
+pub(super) struct Sample {
+    pub(super) row: u64,
+    pub(super) time: Option<f64>,
+    /// Which tracker it is about.
+    pub(super) index: usize,
+    pub(super) action: &'static str,
+    pub(super) output: f64,
+    pub(super) tracked: Tracked,
+}
+
+impl Columns {
+    pub(super) fn new(job: &TrackJob, trackers: &[Tracker]) -> Self {
+        let parameters = trackers.first().map_or(&[][..], Tracker::names);
+        let policies: Vec<String> = match trackers {
+            [_] => Vec::new(),
+            several => several.iter().map(|tracker| tracker.plan().forgetting.to_string()).collect(),
+        };
+        let has_time = matches!(job.log.clock, Clock::Column { .. });
+        let mut names: Vec<String> = vec!["event".to_owned(), "row".to_owned()];
+        names.extend(has_time.then(|| "time".to_owned()));
+        names.extend((!policies.is_empty()).then(|| "forgetting".to_owned()));
+        names.extend(FIGURES.map(str::to_owned));
+        names.extend(job.forecasts.then(|| "forecast".to_owned()));
+        names.extend(parameters.iter().cloned());
+        names.extend(parameters.iter().map(|name| format!("{name}_se")));
+        if trackers.first().is_some_and(|tracker| tracker.detector().is_some()) {
+            names.extend(ALARM.map(str::to_owned));
+        }
+        Self { names, has_time, policies, has_forecast: job.forecasts, parameters: parameters.len() }
+    }
+
+    pub(super) fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// A line about a sample.
+    pub(super) fn sample(
+        &self,
+        lines: &mut Lines,
+        sample: &Sample,
+        tracker: &mut Tracker,
+        deviations: &mut [f64],
+    ) -> Result<(), Failure> {
+        let Sample { row, time, index, action, output, tracked } = sample;
+        tracker.write_standard_errors(deviations).map_err(|error| Failure::data(error.to_string()))?;
+        let forecast = if self.has_forecast { tracker.forecast() } else { f64::NAN };
+        lines.add(|cells| {
+            self.head(cells, "sample", *row, *time, Some(*index));
+            cells.word(action);
+            cells.number(*output);
+            cells.number(tracked.prediction);
+            cells.number(tracked.error);
+            cells.number(tracked.variance.sqrt());
+            cells.number(if tracked.variance.is_finite() { tracked.nis } else { f64::NAN });
+            cells.number(tracked.excitation);
+            if self.has_forecast {
+                cells.number(forecast);
+            }
+            match tracker.parameters() {
+                Some(parameters) => parameters.iter().for_each(|&value| cells.number(value)),
+                None => (0..self.parameters).for_each(|_| cells.number(f64::NAN)),
+            }
+            deviations.iter().for_each(|&value| cells.number(value));
+        })
+    }
+
+    /// A line about an alarm.
+    pub(super) fn alarm(
+        &self,
+        lines: &mut Lines,
+        row: u64,
+        time: Option<f64>,
+        index: usize,
+        alarm: &Alarm<f64>,
+    ) -> Result<(), Failure> {
+        let chart = match alarm.chart {
+            Chart::MeanUp => "mean_up",
+            Chart::MeanDown => "mean_down",
+            Chart::Variance => "variance",
+        };
+        lines.add(|cells| {
+            self.head(cells, "alarm", row, time, Some(index));
+            cells.skip(FIGURES.len() + usize::from(self.has_forecast) + 2 * self.parameters);
+            cells.word(chart);
+            cells.number(alarm.statistic);
+            cells.count(alarm.samples.into());
+        })
+    }
+
+    /// A line about a gap before a row.
+    pub(super) fn gap(&self, lines: &mut Lines, row: u64, time: Option<f64>) -> Result<(), Failure> {
+        lines.add(|cells| self.head(cells, "gap", row, time, None))
+    }
+
+    /// What every line starts with.
+    fn head(&self, cells: &mut Cells<'_>, event: &str, row: u64, time: Option<f64>, index: Option<usize>) {
+        cells.word(event);
+        cells.count(row);
+        if self.has_time {
+            cells.number(time.unwrap_or(f64::NAN));
+        }
+        if self.policies.is_empty() {
+            return;
+        }
+        match index.and_then(|index| self.policies.get(index)) {
+            Some(policy) => cells.word(policy),
+            None => cells.skip(1),
+        }
+    }
+}

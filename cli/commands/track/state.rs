@@ -1,0 +1,260 @@
+//! The state of a run, kept in a file: a run that was ended, even in the middle of a row, goes on from it.
+
+use std::fs;
+use std::io;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use thetahat::{PerChannel, Tracker};
+
+use super::pace::Pace;
+use crate::args::ResumeArgument;
+use crate::commands::Channels;
+use crate::failure::Failure;
+use crate::job::{Clock, TrackJob};
+use crate::lines::{Format, Written};
+use crate::live::Live;
+use crate::output;
+
+/// The version that this program writes.
+const SCHEMA: &str = "thetahat.track/1";
+
+/// All that a run must know to go on as if it had never ended.
+#[derive(Serialize, Deserialize)]
+pub(super) struct State {
+    schema: String,
+    generator: String,
+    /// What must be the same when it goes on: the option that says it, and its value.
+    setting: Vec<(String, String)>,
+    /// The rows that were absorbed.
+    pub(super) rows: u64,
+    /// The output that belongs to them.
+    pub(super) written: Written,
+    /// The first and the last of the rows, the time in front: what a log is known by. A missing value is null.
+    first: Vec<Option<f64>>,
+    last: Vec<Option<f64>>,
+    /// The first time as it is written, if times are dates.
+    pub(super) start: Option<String>,
+    pub(super) pace: Pace,
+    pub(super) gaps: u64,
+    /// How many alarms each tracker gave.
+    pub(super) alarms: Vec<u64>,
+    pub(super) trackers: Vec<Tracker>,
+}
+
+impl State {
+    pub(super) fn new(
+        setting: Vec<(String, String)>,
+        trackers: Vec<Tracker>,
+        start: Option<String>,
+        sample_time: Option<f64>,
+    ) -> Self {
+        Self {
+            schema: SCHEMA.to_owned(),
+            generator: format!("thetahat {}", env!("CARGO_PKG_VERSION")),
+            setting,
+            rows: 0,
+            written: Written::default(),
+            first: Vec::new(),
+            last: Vec::new(),
+            start,
+            pace: Pace::new(sample_time),
+            gaps: 0,
+            alarms: vec![0; trackers.len()],
+            trackers,
+        }
+    }
+
+    /// Reads a state; none if there is no file yet.
+    pub(super) fn read(path: &Path) -> Result<Option<Self>, Failure> {
+        #[derive(Deserialize)]
+        struct Head {
+            schema: String,
+        }
+        let bad = |message: String| Failure::data(format!("{}: {message}", path.display()));
+        let bytes = match fs::read(path) {
+            Ok(bytes) => bytes,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+            Err(error) => return Err(Failure::io(path, "cannot be read", &error)),
+        };
+        let malformed = |error: serde_json::Error| {
+            bad(format!(
+                "this is no state of thetahat track: {error}; name another file, or remove it to start anew"
+            ))
+        };
+        let head: Head = serde_json::from_slice(&bytes).map_err(malformed)?;
+        if head.schema != SCHEMA {
+            let shown: String = head.schema.chars().take(60).flat_map(char::escape_debug).collect();
+            return Err(bad(format!(
+                "this state is of version '{shown}', this program reads '{SCHEMA}'; remove it to start anew, or use the \
+                 program that wrote it"
+            )));
+        }
+        let state: Self = serde_json::from_slice(&bytes).map_err(malformed)?;
+        if state.trackers.len() != state.alarms.len() || state.trackers.is_empty() {
+            return Err(bad("its parts do not fit together; remove it to start anew".to_owned()));
+        }
+        Ok(Some(state))
+    }
+
+    /// This state, if it is of the same model and options.
+    pub(super) fn checked(self, setting: &[(String, String)], job: &TrackJob) -> Result<Self, Failure> {
+        let path = job.state.as_ref().map_or_else(String::new, |state| state.path.display().to_string());
+        for (option, now) in setting {
+            let before =
+                self.setting.iter().find(|(other, _)| other == option).map(|(_, value)| value.as_str());
+            if before != Some(now.as_str()) {
+                return Err(Failure::data(format!(
+                    "{path}: this state is of another model or run: {option} was '{}' and is '{now}' now; give what it was, or \
+                     another --state",
+                    before.unwrap_or_default()
+                )));
+            }
+        }
+        Ok(self)
+    }
+
+    /// Writes it: the file holds the old state or this one, whatever happens.
+    pub(super) fn write(&self, path: &Path) -> Result<(), Failure> {
+        let mut json = serde_json::to_vec(self).map_err(|error| Failure::data(error.to_string()))?;
+        json.push(b'\n');
+        output::write(path, |file| file.write_all(&json))
+    }
+
+    /// Keeps what the row that was just absorbed is known by.
+    pub(super) fn remember(&mut self, values: &[f64], time: Option<f64>) {
+        if self.first.is_empty() {
+            self.first = print(values, time).collect();
+        }
+        self.last.clear();
+        self.last.extend(print(values, time));
+    }
+}
+
+/// What a row is known by.
+fn print(values: &[f64], time: Option<f64>) -> impl Iterator<Item = Option<f64>> {
+    [time].into_iter().chain(values.iter().map(|value| Some(*value).filter(|value| value.is_finite())))
+}
+
+/// What must be the same when a run goes on.
+pub(super) fn setting(job: &TrackJob, channels: &Channels, trackers: &[Tracker]) -> Vec<(String, String)> {
+    let mut setting = vec![
+        ("--input".to_owned(), channels.inputs.join(",")),
+        ("--output".to_owned(), channels.output.clone()),
+    ];
+    let mut add = |option: &str, value: String| setting.push((option.to_owned(), value));
+    let clock = if let Clock::Column { name, .. } = &job.log.clock { name.as_str() } else { "" };
+    add("--time", clock.to_owned());
+    if let Some(tracker) = trackers.first() {
+        let (orders, plan) = (tracker.orders(), tracker.plan());
+        add("the model", orders.to_string());
+        add("--constant", plan.constant.to_string());
+        add("--method", plan.method.to_string());
+        add("--start", plan.start.to_string());
+        add("--horizon", if job.forecasts { plan.horizon.to_string() } else { String::new() });
+        add("--dead-zone", plan.dead_zone.to_string());
+        add("--offset", numbers(Some(tracker.offsets())));
+        add("--scale", numbers(plan.scales.as_ref()));
+        add("--alarm", plan.false_alarms.map_or_else(String::new, |interval| interval.to_string()));
+    }
+    let policies: Vec<String> =
+        trackers.iter().map(|tracker| tracker.plan().forgetting.to_string()).collect();
+    add("--forgetting", policies.join(","));
+    add("--every", job.lines.every.to_string());
+    let format = match job.lines.format {
+        Format::JsonLines => "jsonl",
+        Format::Csv => "csv",
+    };
+    add("--format", format.to_owned());
+    setting
+}
+
+/// The numbers of all channels, the output's last.
+fn numbers(values: Option<&PerChannel>) -> String {
+    let all = values.iter().flat_map(|values| values.inputs.iter().chain([&values.output]));
+    all.map(f64::to_string).collect::<Vec<_>>().join(",")
+}
+
+/// Where a log stands against the state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Place {
+    /// The next row is new.
+    There,
+    /// The first row tells whether the log starts over.
+    Unknown,
+    /// At its start: the rows that were absorbed are skipped.
+    Behind,
+    /// Beyond a hole.
+    Beyond,
+}
+
+impl Place {
+    pub(super) fn resumed(resume: ResumeArgument, path: &Path) -> Self {
+        match resume {
+            ResumeArgument::Start => Self::Behind,
+            ResumeArgument::Now => Self::Beyond,
+            ResumeArgument::Auto if path == Path::new("-") => Self::Unknown,
+            ResumeArgument::Auto => Self::Behind,
+        }
+    }
+
+    /// What the row at hand is to the state.
+    pub(super) fn of_row(&mut self, state: &State, live: &Live, file: &str) -> Result<RowPlace, Failure> {
+        let is = |known: &[Option<f64>]| print(live.values(), live.time()).eq(known.iter().copied());
+        if *self == Self::Unknown {
+            *self = if is(&state.first) { Self::Behind } else { Self::Beyond };
+        }
+        match self {
+            Self::Behind if state.rows > 0 => {
+                let row = live.row();
+                if row == 1 && !is(&state.first) || row == state.rows && !is(&state.last) {
+                    return Err(Failure::data(format!(
+                        "{file}:{}: this is not row {row} of the log that the state is of; give that log, say --resume now \
+                         if this is a pipe that has moved on, or remove the state to start anew",
+                        live.line()
+                    )));
+                }
+                if row == state.rows {
+                    *self = Self::There;
+                }
+                Ok(RowPlace::Old)
+            }
+            Self::Beyond => {
+                let clock = live.time().zip(state.pace.last());
+                // What came before the last row was absorbed already.
+                if clock.is_some_and(|(time, last)| time <= last) {
+                    return Ok(RowPlace::Old);
+                }
+                *self = Self::There;
+                // The clock tells whether there is a hole.
+                Ok(if clock.is_some() || state.rows == 0 { RowPlace::Next } else { RowPlace::AfterGap })
+            }
+            _ => {
+                *self = Self::There;
+                Ok(RowPlace::Next)
+            }
+        }
+    }
+
+    /// That the log did not end before the rows that were absorbed.
+    pub(super) fn check_end(self, state: &State, file: &str) -> Result<(), Failure> {
+        if self == Self::Behind && state.rows > 0 {
+            return Err(Failure::data(format!(
+                "{file}: it ends before row {}, the last one that the state has absorbed; give the log that the state is of",
+                state.rows
+            )));
+        }
+        Ok(())
+    }
+}
+
+/// What a row is to a state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum RowPlace {
+    /// It was absorbed already.
+    Old,
+    /// It follows the last one.
+    Next,
+    /// Between it and the last one an unknown number is missing.
+    AfterGap,
+}

@@ -1,0 +1,94 @@
+use std::path::{Path, PathBuf};
+
+use thetahat::thetahat_core::nalgebra::Complex;
+use thetahat::{Estimator, ObserverGain, Rows, Start, StateModel};
+
+use super::{LineJob, LogJob, parsed};
+use crate::args::{EstimatorArgument, FilterArguments};
+use crate::failure::Failure;
+
+/// A state to estimate.
+#[derive(Debug)]
+pub(crate) struct FilterJob {
+    pub(crate) model: PathBuf,
+    pub(crate) path: PathBuf,
+    pub(crate) log: LogJob,
+    /// Seconds from one row to the next, if that is given.
+    pub(crate) sample_time: Option<f64>,
+    pub(crate) rows: Option<Rows>,
+    /// How a report's model starts, if that was said.
+    pub(crate) initial: Option<Start>,
+    pub(crate) smooth: bool,
+    pub(crate) lines: LineJob,
+    pub(crate) summary: Option<PathBuf>,
+    estimator: Option<Estimator>,
+}
+
+impl FilterJob {
+    pub(crate) fn resolve(arguments: &FilterArguments) -> Result<Self, Failure> {
+        let (log, sample_time) = LogJob::live(&arguments.log, &arguments.clock)?;
+        let gain = match (&arguments.gain, arguments.poles.as_slice()) {
+            (Some(text), _) => Some(ObserverGain::Matrix(matrix(text)?)),
+            (None, []) => None,
+            (None, poles) => {
+                Some(ObserverGain::Poles(poles.iter().map(|text| pole(text)).collect::<Result<_, _>>()?))
+            }
+        };
+        let estimator = match (arguments.estimator, gain) {
+            (Some(EstimatorArgument::Luenberger), Some(gain)) => Some(Estimator::Luenberger(gain)),
+            (Some(EstimatorArgument::Luenberger), None) => {
+                return Err(Failure::usage("--estimator luenberger needs --poles or --gain"));
+            }
+            (_, Some(_)) => return Err(Failure::usage("--poles and --gain are for --estimator luenberger")),
+            (Some(EstimatorArgument::Kalman), None) => Some(Estimator::Kalman),
+            (Some(EstimatorArgument::Ekf), None) => Some(Estimator::Extended),
+            (None, None) => None,
+        };
+        if arguments.smooth && matches!(estimator, Some(Estimator::Luenberger(_))) {
+            return Err(Failure::usage("--smooth: an observer knows no covariance; use kalman or ekf"));
+        }
+        if arguments.model == Path::new("-") && arguments.path == Path::new("-") {
+            return Err(Failure::usage("only one of the model and the log can come from standard input (-)"));
+        }
+        let dash = |path: Option<&PathBuf>| path.is_some_and(|path| path == Path::new("-"));
+        if dash(arguments.summary.as_ref()) && dash(Some(&arguments.lines.out)) {
+            return Err(Failure::usage("the lines and the summary cannot both go to standard output (-)"));
+        }
+        Ok(Self {
+            model: arguments.model.clone(),
+            path: arguments.path.clone(),
+            log,
+            sample_time,
+            initial: arguments.initial.map(Start::from),
+            rows: arguments.rows.as_deref().map(|text| parsed("--rows", text)).transpose()?,
+            smooth: arguments.smooth,
+            lines: LineJob::resolve(&arguments.lines),
+            summary: arguments.summary.clone(),
+            estimator,
+        })
+    }
+
+    /// What was asked for, or what goes with the model.
+    pub(crate) fn estimator(&self, model: &StateModel) -> Estimator {
+        let usual = || if model.is_linear() { Estimator::Kalman } else { Estimator::Extended };
+        self.estimator.clone().unwrap_or_else(usual)
+    }
+}
+
+/// Rows of numbers.
+fn matrix(text: &str) -> Result<Vec<Vec<f64>>, Failure> {
+    let row =
+        |row: &str| row.split(',').map(|number| number.trim().parse::<f64>().ok()).collect::<Option<_>>();
+    text.split(';').map(row).collect::<Option<_>>().ok_or_else(|| {
+        Failure::usage(format!(
+            "--gain {text}: write numbers, rows apart by ; and columns by , as in 0.5,0;0.1,0.2"
+        ))
+    })
+}
+
+/// A real or complex number.
+fn pole(text: &str) -> Result<Complex<f64>, Failure> {
+    let wrong = || Failure::usage(format!("--poles {text}: write a pole as 0.5 or as 0.4+0.3i"));
+    let number: Complex<f64> = text.trim().parse().map_err(|_| wrong())?;
+    if number.re.is_finite() && number.im.is_finite() { Ok(number) } else { Err(wrong()) }
+}

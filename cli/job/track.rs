@@ -1,0 +1,234 @@
+use std::path::{Path, PathBuf};
+
+use thetahat::{Orders, PerChannel, Policy, Report, TrackMethod, TrackPlan, Tracker};
+
+use super::fit::named_values;
+use super::{LineJob, LogJob, parsed};
+use crate::args::{ResumeArgument, TrackArguments, TrackMethodArgument, TrackModelArgument};
+use crate::failure::Failure;
+
+/// A model to track.
+#[derive(Debug)]
+pub(crate) struct TrackJob {
+    pub(crate) path: PathBuf,
+    pub(crate) log: LogJob,
+    /// Seconds from one row to the next, if that is given.
+    pub(crate) sample_time: Option<f64>,
+    /// Named inputs; none: those of the report, or those called u, u1, u2, …
+    pub(crate) inputs: Option<Vec<String>>,
+    /// The named output; none: that of the report, or y.
+    pub(crate) output: Option<String>,
+    pub(crate) warm: Option<PathBuf>,
+    pub(crate) lines: LineJob,
+    /// Whether forecasts were asked for.
+    pub(crate) forecasts: bool,
+    pub(crate) stop_on_alarm: bool,
+    pub(crate) state: Option<StateJob>,
+    offsets: Vec<(String, f64)>,
+    scales: Vec<(String, f64)>,
+    orders: Given,
+    method: Option<TrackMethod>,
+    policies: Vec<Policy>,
+    plan: TrackPlan,
+}
+
+/// Where the state is kept.
+#[derive(Debug)]
+pub(crate) struct StateJob {
+    pub(crate) path: PathBuf,
+    pub(crate) save_every: u64,
+    pub(crate) resume: ResumeArgument,
+}
+
+/// Orders as far as they were given.
+#[derive(Debug)]
+struct Given {
+    model: Option<TrackModelArgument>,
+    na: Option<usize>,
+    nb: Vec<usize>,
+    nc: Option<usize>,
+    nk: Vec<usize>,
+}
+
+impl TrackJob {
+    pub(crate) fn resolve(arguments: &TrackArguments) -> Result<Self, Failure> {
+        let (log, sample_time) = LogJob::live(&arguments.log, &arguments.clock)?;
+        let policies: Vec<Policy> =
+            arguments.forgetting.iter().map(|text| parsed("--forgetting", text)).collect::<Result<_, _>>()?;
+        if let Some(twice) = policies.iter().enumerate().find(|(index, one)| policies[..*index].contains(one))
+        {
+            return Err(Failure::usage(format!("--forgetting: {} is there twice; give it once", twice.1)));
+        }
+        let plan = TrackPlan {
+            start: arguments
+                .start
+                .as_deref()
+                .map(|text| parsed("--start", text))
+                .transpose()?
+                .unwrap_or_default(),
+            horizon: arguments.horizon.map_or(1, |steps| steps as usize),
+            dead_zone: arguments.dead_zone.unwrap_or(0.0),
+            constant: arguments.constant,
+            false_alarms: arguments.alarm,
+            ..TrackPlan::default()
+        };
+        let orders = Given {
+            model: arguments.model,
+            na: arguments.na,
+            nb: arguments.nb.clone(),
+            nc: arguments.nc,
+            nk: arguments.nk.clone(),
+        };
+        if arguments.warm.is_none() {
+            orders.check()?;
+        }
+        if arguments.warm.as_deref() == Some(Path::new("-")) && arguments.path == Path::new("-") {
+            return Err(Failure::usage(
+                "only one of the report and the log can come from standard input (-)",
+            ));
+        }
+        Ok(Self {
+            path: arguments.path.clone(),
+            log,
+            sample_time,
+            inputs: (!arguments.input.is_empty()).then(|| arguments.input.clone()),
+            output: arguments.output.clone(),
+            warm: arguments.warm.clone(),
+            lines: LineJob::resolve(&arguments.lines),
+            forecasts: arguments.horizon.is_some(),
+            stop_on_alarm: arguments.stop_on_alarm,
+            state: arguments.state.as_ref().map(|path| StateJob {
+                path: path.clone(),
+                save_every: arguments.save_every,
+                resume: arguments.resume,
+            }),
+            offsets: named_values("--offset", &arguments.offset)?,
+            scales: named_values("--scale", &arguments.scale)?,
+            orders,
+            method: arguments.method.map(|method| match method {
+                TrackMethodArgument::Rls => TrackMethod::Rls,
+                TrackMethodArgument::Els => TrackMethod::Els,
+                TrackMethodArgument::Rpem => TrackMethod::Rpem,
+            }),
+            policies,
+            plan,
+        })
+    }
+
+    /// Whether the model has inputs, as far as the options say.
+    pub(crate) fn has_inputs(&self) -> bool {
+        self.orders.nb.iter().any(|&nb| nb > 0)
+    }
+
+    /// A tracker for each policy.
+    pub(crate) fn trackers(
+        &self,
+        inputs: &[String],
+        output: &str,
+        report: Option<&Report>,
+    ) -> Result<Vec<Tracker>, Failure> {
+        let orders = self.orders.of(inputs.len(), report.map(|report| &report.model.orders))?;
+        let method = match self.method {
+            Some(method) => method,
+            None if orders.nc > 0 => TrackMethod::Rpem,
+            None => TrackMethod::Rls,
+        };
+        let known = |name: &String| inputs.contains(name) || name == output;
+        for (option, values) in [("--offset", &self.offsets), ("--scale", &self.scales)] {
+            if let Some((name, _)) = values.iter().find(|(name, _)| !known(name)) {
+                return Err(Failure::usage(format!("{option}: '{name}' is no channel of the model")));
+            }
+        }
+        let value = |values: &[(String, f64)], name: &str| {
+            values.iter().find(|(other, _)| other == name).map(|(_, value)| *value)
+        };
+        let offsets = (!self.offsets.is_empty()).then(|| {
+            let signals = report.map(|report| (&report.model.inputs[..], &report.model.output));
+            let level =
+                |name: &str, stored: Option<f64>| value(&self.offsets, name).or(stored).unwrap_or(0.0);
+            let stored = |index: usize| {
+                signals.and_then(|(inputs, _)| inputs.get(index)).map(|signal| signal.offset.level)
+            };
+            PerChannel {
+                inputs: inputs.iter().enumerate().map(|(index, name)| level(name, stored(index))).collect(),
+                output: level(output, signals.map(|(_, output)| output.offset.level)),
+            }
+        });
+        if let Some((name, scale)) = self.scales.iter().find(|(_, scale)| !(1e-98..=1e98).contains(scale)) {
+            return Err(Failure::usage(format!(
+                "--scale {name}={scale}: give the typical magnitude of the channel, from 1e-98 to 1e98"
+            )));
+        }
+        let scale = |name: &str| {
+            value(&self.scales, name).ok_or_else(|| {
+                Failure::usage(format!(
+                    "--scale: '{name}' has none; give one for each channel, or none at all"
+                ))
+            })
+        };
+        let scales = (!self.scales.is_empty()).then(|| {
+            Ok::<_, Failure>(PerChannel {
+                inputs: inputs.iter().map(|name| scale(name)).collect::<Result<_, _>>()?,
+                output: scale(output)?,
+            })
+        });
+        let plan = TrackPlan { method, offsets, scales: scales.transpose()?, ..self.plan.clone() };
+        let track = |policy: &Policy| {
+            let plan = TrackPlan { forgetting: *policy, ..plan.clone() };
+            match report {
+                Some(report) => Tracker::from_report(report, Some(&orders), &plan),
+                None => Tracker::new(&orders, &plan),
+            }
+            .map_err(|error| match error {
+                thetahat::Error::Report { .. } => {
+                    let file = self.warm.as_ref().map_or_else(String::new, |path| path.display().to_string());
+                    Failure::data(format!("{file}: {error}"))
+                }
+                _ => Failure::option(&error),
+            })
+        };
+        self.policies.iter().map(track).collect()
+    }
+}
+
+impl Given {
+    /// That there are as many as it takes without a report.
+    fn check(&self) -> Result<(), Failure> {
+        if self.na.is_none() && self.nb.is_empty() {
+            return Err(Failure::usage(
+                "the orders are missing: give --na and --nb, or --warm REPORT to take up those of a fit",
+            ));
+        }
+        if self.nb.is_empty() {
+            return Err(Failure::usage("--nb is missing: give it, 0 for a model without inputs"));
+        }
+        match (self.model, self.nc.unwrap_or(0)) {
+            (Some(TrackModelArgument::Arx), 1..) => {
+                Err(Failure::usage("--nc: an arx model has no C; leave it out, or give --model armax"))
+            }
+            (Some(TrackModelArgument::Armax), 0) => {
+                Err(Failure::usage("--model armax needs --nc, the number of coefficients of C"))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The orders for so many inputs; those that were not given are the report's.
+    fn of(&self, inputs: usize, stored: Option<&Orders>) -> Result<Orders, Failure> {
+        let each = |option: &str, given: &[usize], stored: Option<&Vec<usize>>, usual: usize| match given {
+            [] => Ok(stored.cloned().unwrap_or_else(|| vec![usual; inputs])),
+            [one] => Ok(vec![*one; inputs]),
+            all if all.len() == inputs => Ok(all.to_vec()),
+            all => Err(Failure::usage(format!(
+                "{option}: {} values for {inputs} inputs; give one for each, or one for all",
+                all.len()
+            ))),
+        };
+        let na = self.na.or(stored.map(|orders| orders.na)).unwrap_or(0);
+        let nb = each("--nb", &self.nb, stored.map(|orders| &orders.nb), 0)?;
+        let nk = each("--nk", &self.nk, stored.map(|orders| &orders.nk), 1)?;
+        let nc = self.nc.or(stored.map(|orders| orders.nc)).unwrap_or(0);
+        let (nd, nf) = stored.map_or((0, vec![0; inputs]), |orders| (orders.nd, orders.nf.clone()));
+        Orders::new(na, &nb, nc, nd, &nf, &nk).map_err(|error| Failure::option(&error))
+    }
+}

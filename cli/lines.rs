@@ -1,0 +1,246 @@
+//! Output that grows line by line, as JSON Lines or as CSV: both have the same columns.
+
+use std::fs::{File, OpenOptions};
+use std::io::{self, Seek, SeekFrom, Stdout, Write};
+use std::path::{Path, PathBuf};
+
+use memchr::memchr3;
+
+use crate::failure::Failure;
+use crate::interrupt;
+
+/// How a line is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Format {
+    /// An object a line. What a line does not have is left out.
+    JsonLines,
+    /// A row a line, below a header.
+    Csv,
+}
+
+/// So many bytes are written at once, where nobody waits for them.
+const FULL: usize = 1 << 16;
+
+/// A file or standard output, and the lines on their way to it. Only whole lines are ever written.
+pub(crate) struct Lines {
+    path: PathBuf,
+    sink: Sink,
+    format: Format,
+    /// The columns as each format writes them.
+    columns: Vec<Column>,
+    buffer: Vec<u8>,
+    written: Written,
+}
+
+/// How much a stream of lines has come to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub(crate) struct Written {
+    /// The lines, the header of a CSV included.
+    pub(crate) lines: u64,
+    /// Their bytes.
+    pub(crate) bytes: u64,
+}
+
+enum Sink {
+    Stdout(Stdout),
+    File(File),
+}
+
+struct Column {
+    /// `"name":`
+    key: Vec<u8>,
+    /// The name, between quotes if CSV needs them.
+    title: Vec<u8>,
+}
+
+impl Lines {
+    /// Begins a file, or standard output for `-`, with these columns.
+    pub(crate) fn create(path: &Path, format: Format, names: &[String]) -> Result<Self, Failure> {
+        let sink = if path == Path::new("-") {
+            Sink::Stdout(io::stdout())
+        } else {
+            Sink::File(File::create(path).map_err(|error| Failure::io(path, "cannot be written", &error))?)
+        };
+        let mut lines = Self::begin(path, sink, format, names, Written::default());
+        if format == Format::Csv {
+            for (index, column) in lines.columns.iter().enumerate() {
+                if index > 0 {
+                    lines.buffer.push(b',');
+                }
+                lines.buffer.extend_from_slice(&column.title);
+            }
+            lines.buffer.push(b'\n');
+            lines.written = Written { lines: 1, bytes: lines.buffer.len() as u64 };
+        }
+        Ok(lines)
+    }
+
+    /// Goes on where an earlier run saved that it was: what a file has beyond that is taken off.
+    pub(crate) fn resume(
+        path: &Path,
+        format: Format,
+        names: &[String],
+        written: Written,
+    ) -> Result<Self, Failure> {
+        let sink = if path == Path::new("-") {
+            Sink::Stdout(io::stdout())
+        } else {
+            let failed = |error| Failure::io(path, "cannot be written", &error);
+            let mut file = OpenOptions::new().write(true).open(path).map_err(failed)?;
+            let metadata = file.metadata().map_err(failed)?;
+            if metadata.is_file() {
+                if metadata.len() < written.bytes {
+                    return Err(Failure::data(format!(
+                        "{}: it has {} bytes, but the state says that {} were written; give the file that goes with the \
+                         state, or another state",
+                        path.display(),
+                        metadata.len(),
+                        written.bytes
+                    )));
+                }
+                file.set_len(written.bytes).map_err(failed)?;
+                file.seek(SeekFrom::End(0)).map_err(failed)?;
+            }
+            Sink::File(file)
+        };
+        Ok(Self::begin(path, sink, format, names, written))
+    }
+
+    fn begin(path: &Path, sink: Sink, format: Format, names: &[String], written: Written) -> Self {
+        let columns = names.iter().map(|name| Column {
+            key: format!("{}:", serde_json::Value::from(name.as_str())).into_bytes(),
+            title: quoted(name),
+        });
+        Self { path: path.to_owned(), sink, format, columns: columns.collect(), buffer: Vec::new(), written }
+    }
+
+    /// What was written so far, the lines that still wait included.
+    pub(crate) fn written(&self) -> Written {
+        self.written
+    }
+
+    /// Adds a line; `fill` gives its cells from the first column on. Those it does not reach are empty.
+    pub(crate) fn add(&mut self, fill: impl FnOnce(&mut Cells<'_>)) -> Result<(), Failure> {
+        let before = self.buffer.len();
+        let mut cells = Cells { lines: &mut *self, column: 0, any: false };
+        fill(&mut cells);
+        cells.end();
+        self.written.lines += 1;
+        self.written.bytes += (self.buffer.len() - before) as u64;
+        if self.buffer.len() >= FULL { self.flush() } else { Ok(()) }
+    }
+
+    /// Hands all lines over to the system.
+    pub(crate) fn flush(&mut self) -> Result<(), Failure> {
+        if self.buffer.is_empty() {
+            return Ok(());
+        }
+        interrupt::writing();
+        let written = match &mut self.sink {
+            Sink::Stdout(stdout) => {
+                let mut stdout = stdout.lock();
+                stdout.write_all(&self.buffer).and_then(|()| stdout.flush())
+            }
+            Sink::File(file) => file.write_all(&self.buffer),
+        };
+        self.buffer.clear();
+        written.map_err(|error| Failure::io(&self.shown(), "cannot be written", &error))
+    }
+
+    /// Brings all lines to the disk.
+    pub(crate) fn sync(&mut self) -> Result<(), Failure> {
+        self.flush()?;
+        if let Sink::File(file) = &self.sink
+            && file.metadata().is_ok_and(|metadata| metadata.is_file())
+        {
+            return file.sync_data().map_err(|error| Failure::io(&self.path, "cannot be written", &error));
+        }
+        Ok(())
+    }
+
+    fn shown(&self) -> PathBuf {
+        if self.path == Path::new("-") { "standard output".into() } else { self.path.clone() }
+    }
+}
+
+/// The cells of a line, column by column.
+pub(crate) struct Cells<'a> {
+    lines: &'a mut Lines,
+    column: usize,
+    any: bool,
+}
+
+impl Cells<'_> {
+    /// A number. What is not a number is null, or empty.
+    pub(crate) fn number(&mut self, value: f64) {
+        let csv = self.lines.format == Format::Csv;
+        self.cell(|buffer| match value.is_finite() {
+            // A vector takes all that is written to it.
+            true => drop(serde_json::to_writer(buffer, &value)),
+            false if csv => {}
+            false => buffer.extend_from_slice(b"null"),
+        });
+    }
+
+    /// A count.
+    pub(crate) fn count(&mut self, value: u64) {
+        self.cell(|buffer| drop(serde_json::to_writer(buffer, &value)));
+    }
+
+    /// A word.
+    pub(crate) fn word(&mut self, word: &str) {
+        let csv = self.lines.format == Format::Csv;
+        self.cell(|buffer| match csv {
+            true if memchr3(b',', b'"', b'\n', word.as_bytes()).is_none() => {
+                buffer.extend_from_slice(word.as_bytes());
+            }
+            true => buffer.extend_from_slice(&quoted(word)),
+            false => drop(serde_json::to_writer(buffer, word)),
+        });
+    }
+
+    /// Nothing in so many columns.
+    pub(crate) fn skip(&mut self, columns: usize) {
+        for _ in 0..columns {
+            if self.lines.format == Format::Csv {
+                self.cell(|_| ());
+            } else {
+                self.column += 1;
+            }
+        }
+    }
+
+    fn cell(&mut self, write: impl FnOnce(&mut Vec<u8>)) {
+        let Lines { buffer, columns, format, .. } = &mut *self.lines;
+        let Some(column) = columns.get(self.column) else { return };
+        match format {
+            Format::JsonLines => {
+                buffer.push(if self.any { b',' } else { b'{' });
+                buffer.extend_from_slice(&column.key);
+            }
+            Format::Csv if self.any => buffer.push(b','),
+            Format::Csv => {}
+        }
+        self.any = true;
+        self.column += 1;
+        write(buffer);
+    }
+
+    fn end(mut self) {
+        self.skip(self.lines.columns.len().saturating_sub(self.column));
+        match self.lines.format {
+            Format::JsonLines => self.lines.buffer.extend_from_slice(b"}\n"),
+            Format::Csv => self.lines.buffer.push(b'\n'),
+        }
+    }
+}
+
+/// A field of a CSV: as it is, or between quotes if it needs them (RFC 4180).
+fn quoted(word: &str) -> Vec<u8> {
+    let mut csv = csv::Writer::from_writer(Vec::new());
+    // A vector takes all that is written to it.
+    let _ = csv.write_record([word]);
+    let mut field = csv.into_inner().unwrap_or_default();
+    field.pop();
+    field
+}

@@ -1,0 +1,279 @@
+//! A log read row by row, as it comes: a file to its end, or a pipe that someone is still writing to.
+
+use std::sync::mpsc::{Receiver, Sender, SyncSender, TryRecvError, channel, sync_channel};
+use std::thread;
+
+use memchr::memchr;
+
+use super::Selection;
+use super::error::Error;
+use super::layout::Row;
+use super::record::Record;
+use super::rows::Plan;
+use super::source::Source;
+
+/// What is read at once, at most. A pipe gives less.
+const PIECE: usize = 1 << 16;
+/// How many pieces may wait to be parsed.
+const WAITING: usize = 4;
+/// The longest line.
+const LONGEST: usize = 1 << 24;
+
+/// What comes next.
+#[derive(Debug)]
+pub(crate) enum Event {
+    /// A row: [`Stream::values`] and [`Stream::time`] are its own.
+    Row,
+    /// A line that is no row. It was left out.
+    Malformed(Error),
+    /// There is nothing more at the moment: the next call waits. Told once each time.
+    Idle,
+    /// The log ends here.
+    End,
+    /// The program was asked to end.
+    Stopped,
+}
+
+/// What the thread that reads, and whoever ends the stream, tell the one that parses.
+enum Message {
+    Text(Vec<u8>),
+    Failed(Error),
+    End,
+    Stop,
+}
+
+/// Ends a stream from another thread: it wakes if it waits.
+pub(crate) struct Waker(SyncSender<Message>);
+
+impl Waker {
+    pub(crate) fn wake(&self) {
+        // If that many pieces wait, then it does not.
+        let _ = self.0.try_send(Message::Stop);
+    }
+}
+
+/// A log of which the rows are read one after the other. Memory does not grow with their number.
+///
+/// A thread of its own reads the text, so that a row is parsed as soon as its line break is there. Every line is a row:
+/// a quoted field does not reach beyond it.
+pub(crate) struct Stream {
+    plan: Plan,
+    record: Record,
+    /// The values of the row at hand by ascending field, and in the order of the selection.
+    fields: Vec<f64>,
+    values: Vec<f64>,
+    /// Where each selected column is among the fields, and where the time is.
+    places: Vec<usize>,
+    time: Option<usize>,
+    /// What was read and not yet parsed, from `position` on.
+    text: Vec<u8>,
+    position: usize,
+    /// The line of the row at hand, and the line after it.
+    line: u64,
+    next_line: u64,
+    any: bool,
+    /// Whether a last line without a line break is left alone.
+    whole_lines: bool,
+    start: Option<String>,
+    ended: bool,
+    told: bool,
+    messages: Receiver<Message>,
+    sender: SyncSender<Message>,
+    spent: Sender<Vec<u8>>,
+}
+
+/// A text of which something was read already.
+pub(super) struct Text {
+    /// What was read, from the first row on, and on which line that is.
+    pub(super) text: Vec<u8>,
+    pub(super) line: u64,
+    /// Where the rest comes from.
+    pub(super) source: Source,
+    /// Whether a last line without a line break is left alone.
+    pub(super) whole_lines: bool,
+    /// The time that dates count from, as it is written.
+    pub(super) start: Option<String>,
+}
+
+impl Stream {
+    pub(super) fn begin(plan: Plan, selection: &Selection, text: Text) -> Self {
+        let Text { text, line, source, whole_lines, start } = text;
+        let (sender, messages) = sync_channel(WAITING);
+        let (spent, empty) = channel();
+        let pieces = sender.clone();
+        thread::spawn(move || read(source, &pieces, &empty));
+        let place = |field: &usize| plan.fields.binary_search(field).unwrap_or_default();
+        Self {
+            fields: vec![0.0; plan.fields.len()],
+            values: vec![0.0; selection.columns.len()],
+            places: selection.columns.iter().map(place).collect(),
+            time: selection.time.as_ref().map(place),
+            record: Record::new(plan.layout.dialect.delimiter),
+            plan,
+            text,
+            position: 0,
+            line,
+            next_line: line,
+            any: false,
+            whole_lines,
+            start,
+            ended: false,
+            told: false,
+            messages,
+            sender,
+            spent,
+        }
+    }
+
+    /// What ends this stream early.
+    pub(crate) fn waker(&self) -> Waker {
+        Waker(self.sender.clone())
+    }
+
+    /// The time that dates count from, as it is written; none if times are numbers.
+    pub(crate) fn start(&self) -> Option<&str> {
+        self.start.as_deref()
+    }
+
+    /// The row at hand, in the order of the selection; NaN is a missing value.
+    pub(crate) fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    /// The time of the row at hand in seconds, as [`Table::time`](super::Table).
+    pub(crate) fn time(&self) -> Option<f64> {
+        self.fields.get(self.time?).copied()
+    }
+
+    /// The line on which the row at hand is, or the malformed one.
+    pub(crate) fn line(&self) -> u64 {
+        self.line
+    }
+
+    /// Whether the log ended inside a line, which was left alone.
+    pub(crate) fn is_unfinished(&self) -> bool {
+        self.ended && self.position < self.text.len()
+    }
+
+    /// Goes on by one row.
+    ///
+    /// # Errors
+    /// That the text cannot be read, or has a line of more than 16 MiB. What was read before is told first.
+    pub(crate) fn next(&mut self) -> Result<Event, Error> {
+        loop {
+            if let Some(event) = self.parse()? {
+                self.told = false;
+                return Ok(event);
+            }
+            if self.ended {
+                return Ok(Event::End);
+            }
+            let message = match self.messages.try_recv() {
+                Err(TryRecvError::Empty) if !self.told => {
+                    self.told = true;
+                    return Ok(Event::Idle);
+                }
+                Err(TryRecvError::Empty) => self.messages.recv().unwrap_or(Message::End),
+                Err(TryRecvError::Disconnected) => Message::End,
+                Ok(message) => message,
+            };
+            match message {
+                Message::Text(piece) => {
+                    self.text.drain(..self.position);
+                    self.position = 0;
+                    self.text.extend_from_slice(&piece);
+                    // The thread may have ended; then nobody needs the memory.
+                    let _ = self.spent.send(piece);
+                }
+                Message::Failed(error) => return Err(error),
+                Message::Stop => return Ok(Event::Stopped),
+                Message::End => {
+                    self.ended = true;
+                    if !self.whole_lines && self.position < self.text.len() {
+                        self.text.push(b'\n');
+                    }
+                }
+            }
+        }
+    }
+
+    /// Parses the row at the front of the text, if it is there as a whole.
+    fn parse(&mut self) -> Result<Option<Event>, Error> {
+        let layout = &self.plan.layout;
+        while let Some(length) = layout.dialect.skipped_line(&self.text[self.position..]) {
+            self.position += length;
+            self.next_line += 1;
+        }
+        let rest = &self.text[self.position..];
+        let mut event = Event::Row;
+        let length = match self.plan.row(rest, &mut self.fields) {
+            Some(length) => length,
+            None => {
+                let Some(newline) = memchr(b'\n', rest) else {
+                    if rest.len() > LONGEST {
+                        return Err(layout.too_long(self.next_line, LONGEST));
+                    }
+                    return Ok(None);
+                };
+                let text = &rest[..=newline];
+                let whole = self.record.read(text).is_some();
+                let row = Row { record: &self.record, text, line: self.next_line };
+                let read = if whole {
+                    self.plan.values(&row, !self.any, &mut self.fields)
+                } else {
+                    Err(layout.unclosed_in_line(&row))
+                };
+                if let Err(error) = read {
+                    event = Event::Malformed(error);
+                }
+                newline + 1
+            }
+        };
+        self.position += length;
+        self.line = self.next_line;
+        self.next_line += 1;
+        self.any = true;
+        for (value, &place) in self.values.iter_mut().zip(&self.places) {
+            *value = self.fields[place];
+        }
+        Ok(Some(event))
+    }
+}
+
+/// Reads a text to its end, or until nobody takes it.
+fn read(mut source: Source, pieces: &SyncSender<Message>, empty: &Receiver<Vec<u8>>) {
+    loop {
+        let mut piece = empty.try_recv().unwrap_or_default();
+        piece.resize(PIECE, 0);
+        let message = match source.read_some(&mut piece) {
+            Ok(0) => Message::End,
+            Ok(count) => {
+                piece.truncate(count);
+                Message::Text(piece)
+            }
+            Err(error) => Message::Failed(error),
+        };
+        let goes_on = matches!(message, Message::Text(_));
+        if pieces.send(message).is_err() || !goes_on {
+            return;
+        }
+    }
+}
+
+/// Whether a text holds so many whole lines that are neither blank nor comments.
+pub(super) fn has_lines(mut text: &[u8], wanted: usize, comment: Option<u8>) -> bool {
+    // What separates fields does not matter for that.
+    let dialect = super::dialect::Dialect { delimiter: b',', comment };
+    let mut found = 0;
+    while found < wanted {
+        if let Some(length) = dialect.skipped_line(text) {
+            text = &text[length..];
+        } else if let Some(newline) = memchr(b'\n', text) {
+            text = &text[newline + 1..];
+            found += 1;
+        } else {
+            return false;
+        }
+    }
+    true
+}

@@ -1,0 +1,344 @@
+//! `thetahat track` on pipes, ended in all ways, and taken up again.
+#![cfg(unix)]
+
+use std::fs::OpenOptions;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::process::{Child, ChildStdin, Stdio};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
+
+use rustix::process::{Pid, Signal, kill_process};
+use serde_json::Value;
+
+use crate::harness::{Folder, Run, number};
+use crate::signals::{Experiment, Random, csv};
+use crate::track::objects;
+
+/// What a line may take at most where nothing holds it up. It takes about a millisecond; a loaded machine may need more.
+const SOON: Duration = Duration::from_secs(20);
+
+/// A run with a pipe at each end.
+struct Live {
+    child: Child,
+    input: Option<ChildStdin>,
+    lines: Receiver<String>,
+}
+
+impl Live {
+    fn start(folder: &Folder, line: &str) -> Self {
+        let mut command = folder.command(line);
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut child = command.spawn().expect("the program starts");
+        let output = child.stdout.take().expect("standard output is a pipe");
+        let (sender, lines) = channel();
+        std::thread::spawn(move || {
+            for line in BufReader::new(output).lines().map_while(Result::ok) {
+                if sender.send(line).is_err() {
+                    break;
+                }
+            }
+        });
+        Self { input: child.stdin.take(), child, lines }
+    }
+
+    fn write(&mut self, text: &str) {
+        let input = self.input.as_mut().expect("the pipe is open");
+        input.write_all(text.as_bytes()).and_then(|()| input.flush()).expect("the program reads");
+    }
+
+    fn line(&self) -> Value {
+        let line = self.lines.recv_timeout(SOON).expect("a line comes");
+        serde_json::from_str(&line).expect("it is whole")
+    }
+
+    fn signal(&self, signal: Signal) {
+        kill_process(Pid::from_child(&self.child), signal).expect("the program runs");
+    }
+
+    /// The exit code, the lines that were not read yet, and standard error.
+    fn end(mut self) -> (i32, Vec<String>, String) {
+        let Run { code, stderr, .. } = Run::from(self.child.wait_with_output().expect("the program ends"));
+        drop(self.input.take());
+        (code, self.lines.iter().collect(), stderr)
+    }
+}
+
+const MODEL: &str = "--na 1 --nb 1 --scale u=1 --scale y=2";
+
+#[test]
+fn a_sample_is_told_as_soon_as_it_comes() {
+    let Experiment { u, y } = Experiment::new(60);
+    let folder = Folder::new();
+    let mut live = Live::start(&folder, &format!("track - {MODEL}"));
+    live.write("u,y\n");
+    let mut slowest = Duration::ZERO;
+    for (row, (u, y)) in u.iter().zip(&y).enumerate() {
+        let began = Instant::now();
+        live.write(&format!("{u},{y}\n"));
+        assert_eq!(number(&live.line(), "/row"), row as f64 + 1.0);
+        slowest = slowest.max(began.elapsed());
+        // A slow writer.
+        std::thread::sleep(Duration::from_millis(3));
+    }
+    // A row in two pieces is told once it is whole.
+    live.write("0.5,");
+    assert!(live.lines.recv_timeout(Duration::from_millis(50)).is_err());
+    live.write("1.5\n");
+    assert_eq!(number(&live.line(), "/measured"), 1.5);
+    drop(live.input.take());
+    let (code, rest, stderr) = live.end();
+    assert_eq!((code, rest.len()), (0, 0), "{stderr}");
+    assert!(stderr.contains("61 rows"), "{stderr}");
+    assert!(slowest < SOON);
+}
+
+#[test]
+fn a_file_that_grows_is_followed_by_way_of_tail() {
+    let Experiment { u, y } = Experiment::new(40);
+    let folder = Folder::with_log(csv(&[("u", &u[..20]), ("y", &y[..20])]));
+    let mut command = std::process::Command::new("sh");
+    let inner = folder.command(&format!("track - {MODEL}"));
+    // tail ends with its reader, or with the pipe it was told to watch.
+    command.arg("-c").arg("tail -n +1 -s 0.05 -F log.csv 2>/dev/null | \"$0\" \"$@\"");
+    command.arg(inner.get_program()).args(inner.get_args()).current_dir(folder.path(""));
+    command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::null());
+    let mut child = command.spawn().expect("the shell starts");
+    let mut lines = BufReader::new(child.stdout.take().expect("it is a pipe")).lines();
+    let mut next = || objects(&lines.next().expect("a line comes").expect("it can be read")).remove(0);
+    for row in 1..=20 {
+        assert_eq!(number(&next(), "/row"), f64::from(row));
+    }
+    let mut log = OpenOptions::new().append(true).open(folder.path("log.csv")).expect("the log is there");
+    for (row, (u, y)) in u.iter().zip(&y).enumerate().skip(20) {
+        writeln!(log, "{u},{y}").expect("the log can be written");
+        assert_eq!(number(&next(), "/row"), row as f64 + 1.0);
+    }
+    drop(lines);
+    // The program notices that nobody reads at the next row, and tail that the program is gone at the one after.
+    for _ in 0..100 {
+        writeln!(log, "0,0").expect("the log can be written");
+        std::thread::sleep(Duration::from_millis(20));
+        if child.try_wait().expect("the shell can be asked").is_some() {
+            return;
+        }
+    }
+    child.kill().expect("the shell can be ended");
+    panic!("the program went on without a reader");
+}
+
+#[test]
+fn signals_end_a_run_with_its_last_line_whole_and_its_state_saved() {
+    for (signal, code) in [(Signal::INT, 130), (Signal::TERM, 143)] {
+        let folder = Folder::new();
+        let mut live = Live::start(&folder, &format!("track - {MODEL} --state state.json"));
+        live.write("u,y\n1,2\n2,3\n3,");
+        for _ in 0..2 {
+            live.line();
+        }
+        live.signal(signal);
+        let (found, rest, stderr) = live.end();
+        assert_eq!((found, rest.len()), (code, 0), "{stderr}");
+        assert!(stderr.contains("2 rows") && stderr.ends_with("interrupted\n"), "{stderr}");
+        let state: Value = serde_json::from_str(&folder.read("state.json")).expect("it is JSON");
+        assert_eq!(state["rows"], 2);
+        assert_eq!(folder.names(), ["state.json"]);
+    }
+}
+
+#[test]
+fn a_busy_run_ends_between_two_lines() {
+    let Experiment { u, y } = Experiment::new(100_000);
+    let folder = Folder::with_log(csv(&[("u", &u), ("y", &y)]));
+    for signal in [Signal::INT, Signal::TERM] {
+        let live = Live::start(&folder, &format!("track log.csv {MODEL} --state state.json"));
+        live.line();
+        live.signal(signal);
+        let (_, rest, stderr) = live.end();
+        let last = objects(rest.last().expect("there are lines")).remove(0);
+        let state: Value = serde_json::from_str(&folder.read("state.json")).expect("it is JSON");
+        assert_eq!(number(&last, "/row"), number(&state, "/rows"), "{stderr}");
+        assert!(number(&state, "/rows") < 100_000.0);
+        std::fs::remove_file(folder.path("state.json")).expect("it is there");
+    }
+}
+
+#[test]
+fn a_closed_pipe_ends_a_run_in_silence() {
+    let Experiment { u, y } = Experiment::new(20_000);
+    let folder = Folder::with_log(csv(&[("u", &u), ("y", &y)]));
+    let mut command = folder.command(&format!("track log.csv {MODEL} --state state.json --save-every 100"));
+    command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().expect("the program starts");
+    let mut first = [0; 100];
+    child.stdout.take().expect("it is a pipe").read_exact(&mut first).expect("there is a first line");
+    let run = Run::from(child.wait_with_output().expect("the program ends"));
+    assert_eq!((run.code, run.stderr.as_str()), (0, ""));
+}
+
+/// The state's rows, and the bytes of output that belong to them; nothing before the first save.
+fn saved(folder: &Folder) -> (u64, u64) {
+    match std::fs::read_to_string(folder.path("state.json")) {
+        Ok(text) => {
+            let state: Value = serde_json::from_str(&text).expect("a state is always whole");
+            let count = |pointer: &str| state.pointer(pointer).and_then(Value::as_u64).expect("it is there");
+            (count("/rows"), count("/written/bytes"))
+        }
+        Err(_) => (0, 0),
+    }
+}
+
+#[test]
+fn killed_at_any_moment_it_goes_on_as_if_nothing_had_happened() {
+    let Experiment { u, y } = Experiment::new(30_000);
+    let folder = Folder::with_log(csv(&[("u", &u), ("y", &y)]));
+    let options = "--na 2 --nb 2 --forgetting 0.99,0.999 --alarm 2000 --horizon 2";
+    let line = |rest: &str| format!("track log.csv {options} {rest}");
+    let began = Instant::now();
+    let whole = folder.done(&line("")).stdout;
+    // Ten lives together are shorter than the log.
+    let longest = began.elapsed() / 16;
+    let mut random = Random::new(2024);
+    // On a file, which is cut back to the state each time, and on standard output, which is joined here.
+    for out in ["-o lines.jsonl", ""] {
+        let (mut joined, mut moments, mut kills) = (Vec::new(), Vec::new(), 0);
+        while kills < 10 {
+            let (_, from) = saved(&folder);
+            let mut command = folder.command(&line(&format!("--state state.json --save-every 700 {out}")));
+            let piece = std::fs::File::create(folder.path("piece")).expect("the folder can be written to");
+            command.stdout(piece).stderr(Stdio::null());
+            let mut child = command.spawn().expect("the program starts");
+            // Every other one gets as far as a save, however slow the machine is.
+            let (before, began) = (saved(&folder).0, Instant::now());
+            while kills % 2 == 0 && saved(&folder).0 == before && began.elapsed() < SOON {
+                std::thread::sleep(Duration::from_millis(1));
+            }
+            std::thread::sleep(longest.mul_f64((random.uniform() + 1.0) / 2.0));
+            assert!(child.try_wait().expect("it can be asked").is_none(), "it ended by itself: {moments:?}");
+            kill_process(Pid::from_child(&child), Signal::KILL).expect("the program runs");
+            kills += 1;
+            child.wait().expect("the program ends");
+            let (rows, to) = saved(&folder);
+            moments.push(rows);
+            if out.is_empty() {
+                let piece = std::fs::read(folder.path("piece")).expect("it is there");
+                joined.extend_from_slice(&piece[..(to - from) as usize]);
+            }
+        }
+        assert!(moments.windows(2).filter(|pair| pair[0] < pair[1]).count() >= 4, "{moments:?}");
+        let (_, from) = saved(&folder);
+        let run = folder.done(&line(&format!("--state state.json --save-every 700 {out}")));
+        assert!(from == 0 || run.stderr.contains("goes on after row"), "{}", run.stderr);
+        joined.extend_from_slice(run.stdout.as_bytes());
+        let joined = if out.is_empty() { joined } else { folder.read("lines.jsonl").into_bytes() };
+        assert!(joined == whole.as_bytes(), "{moments:?}: {} and {} bytes", joined.len(), whole.len());
+        // At the end of the log there is nothing more to do, and a longer log goes on.
+        assert_eq!(folder.done(&line("--state state.json --save-every 700 -o -")).stdout, "");
+        std::fs::remove_file(folder.path("state.json")).expect("it is there");
+    }
+}
+
+#[test]
+fn a_log_that_has_grown_goes_on_behind_its_last_whole_line() {
+    let Experiment { u, y } = Experiment::new(400);
+    let log = csv(&[("u", &u), ("y", &y)]);
+    let folder = Folder::with_log(&log);
+    let whole = folder.done(&format!("track log.csv {MODEL}")).stdout;
+    let mut joined = String::new();
+    // Cut in the middle of a line, behind a line break, and at the end.
+    for cut in [log.len() / 3, log.len() / 2, log[..log.len() / 2 + 40].rfind('\n').unwrap() + 1, log.len()] {
+        folder.write("log.csv", &log[..cut]);
+        let run = folder.done(&format!("track log.csv {MODEL} --state state.json"));
+        let unfinished = !log[..cut].ends_with('\n');
+        assert_eq!(run.stderr.contains("the last line has no line break yet"), unfinished, "{}", run.stderr);
+        joined.push_str(&run.stdout);
+    }
+    assert_eq!(joined, whole);
+}
+
+#[test]
+fn a_live_pipe_that_has_moved_on_leaves_a_gap() {
+    let Experiment { u, y } = Experiment::new(300);
+    let folder = Folder::new();
+    let line = format!("track - {MODEL} --state state.json");
+    folder.run_on(&line, csv(&[("u", &u[..100]), ("y", &y[..100])]));
+    // From its start again: nothing is told twice.
+    let again = folder.run_on(&line, csv(&[("u", &u[..110]), ("y", &y[..110])]));
+    let rows: Vec<f64> = objects(&again.stdout).iter().map(|line| number(line, "/row")).collect();
+    assert_eq!(rows, (101..=110).map(f64::from).collect::<Vec<_>>(), "{}", again.stderr);
+    // Later on.
+    let later = folder.run_on(&line, csv(&[("u", &u[150..]), ("y", &y[150..])]));
+    let lines = objects(&later.stdout);
+    assert_eq!((&lines[0]["event"], number(&lines[0], "/row")), (&"gap".into(), 111.0));
+    assert_eq!(lines[1]["action"], "not_ready");
+    assert_eq!(lines[2]["action"], "updated");
+    assert_eq!(lines.len(), 151);
+    // Said to be later although its first row is that of the state.
+    folder.run_on(&line, csv(&[("u", &u[..5]), ("y", &y[..5])]));
+    let now = folder.run_on(&format!("{line} --resume now"), csv(&[("u", &u[..5]), ("y", &y[..5])]));
+    assert_eq!(objects(&now.stdout)[0]["event"], "gap", "{}", now.stderr);
+}
+
+#[test]
+fn with_a_clock_a_pipe_may_overlap() {
+    let Experiment { u, y } = Experiment::new(300);
+    let time: Vec<String> = (0..300).map(|t| format!("2026-11-22T10:{:02}:{:02}Z", t / 60, t % 60)).collect();
+    let log = |from: usize, to: usize| -> String {
+        (from..to).fold("t,u,y\n".to_owned(), |text, t| text + &format!("{},{},{}\n", time[t], u[t], y[t]))
+    };
+    let folder = Folder::new();
+    let line = format!("track - --time t {MODEL}");
+    let whole = folder.run_on(&line, log(0, 200)).stdout;
+    let line = format!("{line} --state state.json");
+    let mut joined = folder.run_on(&line, log(0, 90)).stdout;
+    joined.push_str(&folder.run_on(&line, log(50, 200)).stdout);
+    assert_eq!(joined, whole);
+    let later = objects(&folder.run_on(&line, log(210, 220)).stdout);
+    assert_eq!((&later[0]["event"], number(&later[0], "/time")), (&"gap".into(), 210.0));
+    assert_eq!(later.len(), 11);
+}
+
+#[test]
+fn a_state_that_does_not_fit_is_refused_in_words() {
+    let Experiment { u, y } = Experiment::new(100);
+    let folder = Folder::with_log(csv(&[("u", &u), ("y", &y)]));
+    folder.done(&format!("track log.csv {MODEL} --state state.json"));
+    let before = folder.read("state.json");
+    let refused = |line: &str| {
+        let run = folder.run(&format!("track {line} --state state.json"));
+        assert_eq!((run.code, run.stdout.as_str()), (3, ""), "{}", run.stderr);
+        run.stderr
+    };
+    assert!(
+        refused(&format!("log.csv {MODEL} --forgetting 0.9")).contains("--forgetting was 'exponential:0.99'")
+    );
+    assert!(refused("log.csv --na 2 --nb 1").contains("the model was"));
+    assert!(refused(&format!("log.csv {MODEL} --every 2")).contains("--every was '1' and is '2' now"));
+    folder.write("other.csv", csv(&[("u", &y), ("y", &u)]));
+    assert!(refused(&format!("other.csv {MODEL}")).contains("other.csv:2: this is not row 1 of the log"));
+    folder.write("short.csv", csv(&[("u", &u[..50]), ("y", &y[..50])]));
+    assert!(refused(&format!("short.csv {MODEL}")).contains("it ends before row 100"));
+    assert_eq!(folder.read("state.json"), before);
+
+    for (text, expected) in [
+        (
+            before.replace("thetahat.track/1", "thetahat.track/2"),
+            "this state is of version 'thetahat.track/2'",
+        ),
+        (before[..before.len() / 2].to_owned(), "this is no state of thetahat track"),
+        (before.replace("\"trackers\":[", "\"trackers\":[],\"x\":["), "its parts do not fit together"),
+        ("{}".to_owned(), "this is no state of thetahat track"),
+        (String::new(), "this is no state of thetahat track"),
+    ] {
+        folder.write("state.json", &text);
+        assert!(refused(&format!("log.csv {MODEL}")).contains(expected), "{expected}");
+        assert_eq!(folder.read("state.json"), text);
+    }
+    // Output that is shorter than the state says.
+    std::fs::remove_file(folder.path("state.json")).expect("it is there");
+    folder.done(&format!("track log.csv {MODEL} --state state.json -o lines.jsonl"));
+    folder.write("lines.jsonl", "short\n");
+    let run = folder.run(&format!("track log.csv {MODEL} --state state.json -o lines.jsonl"));
+    assert_eq!(run.code, 3);
+    assert!(run.stderr.contains("lines.jsonl: it has 6 bytes, but the state says"), "{}", run.stderr);
+    assert_eq!(folder.read("lines.jsonl"), "short\n");
+}

@@ -1,4 +1,4 @@
-.PHONY: demo test format lint docs rust chromium embedded python wheel soak monte-carlo bench
+.PHONY: demo test format lint docs rust chromium embedded python wheel soak soak-track monte-carlo bench
 
 # Fit the sample log that the program carries.
 demo:
@@ -51,9 +51,11 @@ python:
 wheel:
 	py/tests/run --release
 
-# The online estimators by themselves, 10^8 steps each; then 10^8 rows through a pipe to thetahat track.
 soak:
 	SOAK_STEPS=100000000 cargo test --locked --release -p thetahat-core --test soak -- --nocapture
+
+# 10^8 rows through a pipe to thetahat track: its memory, and how far it strays from the truth.
+soak-track:
 	SOAK_STEPS=100000000 cargo test --locked --release --test end_to_end -- --nocapture track_soak
 
 monte-carlo:

@@ -23,8 +23,10 @@ pub(crate) fn filtered(summary: &FilterSummary, malformed: u64) -> String {
     if let Some(nis) = &summary.nis {
         let percent = |part: f64| format!("{:.1} %", 100.0 * part);
         text.line(&format!(
-            "normalised innovation squared: mean {:.3}; below its 95 % bounds {}, above {} (2.5 % each if the model is right)",
+            "normalised innovation squared: mean {:.3} a row, {:.3} if the model is right; below its 95 % bounds {}, above {}, 2.5 \
+             % each if it is right",
             nis.mean,
+            summary.measured as f64 / nis.rows as f64,
             percent(nis.below),
             percent(nis.above)
         ));

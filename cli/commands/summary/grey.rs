@@ -27,7 +27,7 @@ pub(crate) fn grey(report: &GreyReport) -> String {
     ));
     text.line(&format!("prediction error, {} iterations, {}", search.iterations, stopped(why)));
     text.line(&format!(
-        "normalised innovation squared: mean {:.3}; within its 95 % bounds {:.1} % (95 % if the noises are right)",
+        "normalised innovation squared: mean {:.3} a reading, 1 if the noises are right; within its 95 % bounds {:.1} % of the rows",
         report.mean_nis,
         100.0 * report.within_95
     ));

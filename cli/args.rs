@@ -137,7 +137,7 @@ Example:
 Example:
   thetahat schema > thetahat.report.schema.json")]
     Schema {
-        /// The document: what fit, validate, compare, inspect or filter writes
+        /// The document: what fit, validate, compare, inspect, fit --grey, track or filter writes
         #[arg(value_enum, default_value = "report")]
         document: DocumentArgument,
     },
@@ -190,9 +190,8 @@ pub(crate) struct FitArguments {
         value_name = "MODEL",
         help_heading = "Model",
         conflicts_with_all = [
-            "input", "output", "validate", "offset", "model", "na", "nb", "nc", "nd", "nf", "nk", "path",
-            "select", "split", "search", "max_iterations", "tolerance", "step", "starts", "time_limit", "norm", "bound",
-            "dc_gain", "ridge", "noise_bound", "html", "resample",
+            "ModelArguments", "ChoiceArguments", "SearchArguments", "CriterionArguments", "input", "output", "validate",
+            "detrend", "offset", "html", "resample",
         ]
     )]
     pub(crate) grey: Option<PathBuf>,
@@ -494,8 +493,8 @@ pub(crate) struct TrackArguments {
     /// Samples from input to first effect, one value for each input or one for all [default: 1]
     #[arg(long, value_name = "N[,…]", value_delimiter = ',', help_heading = "Model")]
     pub(crate) nk: Vec<usize>,
-    /// Estimate a constant beside the model, for logs of which the offsets are not known; without --offset it is that of the
-    /// channels less their first values
+    /// Estimate a constant too, for channels of which the offsets are not known; without --offset the first value of each is
+    /// taken off
     #[arg(long, help_heading = "Model")]
     pub(crate) constant: bool,
 
@@ -516,21 +515,27 @@ pub(crate) struct TrackArguments {
     /// mixed[:SAMPLES] (standard, then blended into exact)
     #[arg(long, value_name = "HOW", help_heading = "Adaptation")]
     pub(crate) start: Option<String>,
-    /// Start from a batch fit: the report's parameters, covariance, noise and offsets
-    #[arg(long, value_name = "REPORT", help_heading = "Adaptation")]
+    /// Start from a batch fit: the report's orders, parameters, covariance, noise and offsets
+    #[arg(
+        long,
+        value_name = "REPORT",
+        conflicts_with_all = ["model", "na", "nb", "nc", "nk"],
+        help_heading = "Adaptation"
+    )]
     pub(crate) warm: Option<PathBuf>,
     /// Do not adapt where the innovation is smaller than this, in units of the output
     #[arg(long, value_name = "WIDTH", allow_hyphen_values = true, help_heading = "Adaptation")]
     pub(crate) dead_zone: Option<f64>,
 
-    /// Predict so many steps ahead too, inputs held at their last value
-    #[arg(long, value_name = "T", value_parser = clap::value_parser!(u32).range(1..=10_000), help_heading = "Output")]
+    /// Add to each row a forecast of the output so many rows later, inputs held at their last value
+    #[arg(long, value_name = "T", value_parser = clap::value_parser!(u32).range(1..=10_000), help_heading = "Watch")]
     pub(crate) horizon: Option<u32>,
-    /// Watch the innovations for changes of their mean and variance (CUSUM): samples between two false alarms, on average
-    #[arg(long, value_name = "SAMPLES", allow_hyphen_values = true, help_heading = "Output")]
+    /// Watch the innovations for changes of their mean and variance (CUSUM), with so many samples between two false alarms on
+    /// average
+    #[arg(long, value_name = "SAMPLES", allow_hyphen_values = true, help_heading = "Watch")]
     pub(crate) alarm: Option<f64>,
     /// End at the first alarm, with exit code 7
-    #[arg(long, requires = "alarm", help_heading = "Output")]
+    #[arg(long, requires = "alarm", help_heading = "Watch")]
     pub(crate) stop_on_alarm: bool,
     #[command(flatten)]
     pub(crate) lines: LineArguments,
@@ -582,18 +587,14 @@ pub(crate) struct FilterArguments {
     #[arg(long, value_name = "ROW[;ROW…]", allow_hyphen_values = true, help_heading = "Estimator")]
     pub(crate) gain: Option<String>,
     /// Rows to go through, 1-based and inclusive [default: all]
-    #[arg(long, value_name = "A..B", help_heading = "Estimator")]
+    #[arg(long, value_name = "A..B", help_heading = "Channels")]
     pub(crate) rows: Option<String>,
     /// Add each state given the whole log, later rows too: nothing is written before the log ends
-    #[arg(long, help_heading = "Estimator")]
+    #[arg(long, help_heading = "Output")]
     pub(crate) smooth: bool,
 
     #[command(flatten)]
     pub(crate) lines: LineArguments,
-    /// Write what stands at the end as JSON too
-    #[arg(long, value_name = "FILE", help_heading = "Output")]
-    pub(crate) summary: Option<PathBuf>,
-
     #[command(flatten)]
     pub(crate) clock: LiveClockArguments,
     #[command(flatten)]
@@ -604,7 +605,7 @@ pub(crate) struct FilterArguments {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Output")]
 pub(crate) struct LineArguments {
-    /// Write a line for each N-th row only
+    /// Write a line for each N-th row only; alarms and gaps always have theirs
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..))]
     pub(crate) every: u64,
     /// What a line is
@@ -616,6 +617,9 @@ pub(crate) struct LineArguments {
     /// A line that is no row of numbers ends the run; without it, it counts as a row of missing values
     #[arg(long)]
     pub(crate) strict: bool,
+    /// Write what stands at the end to a file, as JSON
+    #[arg(long, value_name = "FILE")]
+    pub(crate) summary: Option<PathBuf>,
     /// No table at the end
     #[arg(short, long)]
     pub(crate) quiet: bool,
@@ -749,10 +753,12 @@ pub(crate) enum DocumentArgument {
     Comparison,
     /// What inspect writes
     Inspection,
+    /// What track writes at its end
+    Track,
     /// What filter writes at its end
     Filter,
     /// What fit --grey writes
-    Grey,
+    Greybox,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

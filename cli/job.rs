@@ -2,6 +2,7 @@
 
 mod filter;
 mod fit;
+mod grey;
 mod inspect;
 mod method;
 mod orders;
@@ -18,11 +19,12 @@ use crate::args::{
     ClockArguments, LineArguments, LineFormatArgument, LiveClockArguments, LogArguments, StartArgument,
 };
 use crate::failure::Failure;
-use crate::lines::Format;
+use crate::line_writer::Format;
 use crate::table;
 
 pub(crate) use filter::FilterJob;
 pub(crate) use fit::FitJob;
+pub(crate) use grey::GreyJob;
 pub(crate) use inspect::InspectJob;
 pub(crate) use track::{StateJob, TrackJob};
 pub(crate) use validate::LookJob;

@@ -14,7 +14,7 @@ mod commands;
 mod failure;
 mod interrupt;
 mod job;
-mod lines;
+mod line_writer;
 mod live;
 mod log;
 mod output;

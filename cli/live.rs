@@ -7,18 +7,24 @@ use crate::interrupt;
 use crate::output::warn;
 use crate::table::{Event, Stream};
 
-/// So many malformed lines are told one by one.
+/// So many faults of a kind are told one by one.
 const TOLD: u64 = 5;
 
-/// The rows of a log that is followed, malformed lines and requests to end dealt with.
+/// The rows of a log that is followed, malformed lines, odd clocks and requests to end dealt with.
 pub(crate) struct Live {
     stream: Stream,
+    /// The log's name, for messages.
+    name: String,
     strict: bool,
     /// Whether the row at hand is a malformed line: all its values are missing.
     is_blank: bool,
     blank: Vec<f64>,
+    /// The latest time, and the seconds to it from the one before.
+    last: Option<f64>,
+    step: Option<f64>,
     rows: u64,
     malformed: u64,
+    set_back: u64,
 }
 
 /// What comes next.
@@ -34,9 +40,19 @@ pub(crate) enum Next {
 }
 
 impl Live {
-    pub(crate) fn new(stream: Stream, strict: bool) -> Self {
-        let blank = vec![f64::NAN; stream.values().len()];
-        Self { stream, strict, is_blank: false, blank, rows: 0, malformed: 0 }
+    pub(crate) fn new(stream: Stream, name: &str, strict: bool) -> Self {
+        Self {
+            blank: vec![f64::NAN; stream.values().len()],
+            stream,
+            name: name.to_owned(),
+            strict,
+            is_blank: false,
+            last: None,
+            step: None,
+            rows: 0,
+            malformed: 0,
+            set_back: 0,
+        }
     }
 
     /// Goes on by one row.
@@ -44,24 +60,56 @@ impl Live {
         if interrupt::is_ending() {
             return Ok(Next::Stopped);
         }
-        self.is_blank = match self.stream.next()? {
-            Event::Row => false,
-            Event::Malformed(error) if self.strict => return Err(error.into()),
-            Event::Malformed(error) => {
-                self.malformed += 1;
-                match self.malformed {
-                    0..=TOLD => warn(&error.to_string()),
-                    _ if self.malformed == TOLD + 1 => warn("more malformed lines follow; they are counted"),
-                    _ => {}
-                }
-                true
-            }
+        self.is_blank = false;
+        match self.stream.next()? {
+            Event::Row => self.look_at_the_clock()?,
+            Event::Malformed(error) => self.malformed(error.into())?,
             Event::Idle => return Ok(Next::Idle),
             Event::End => return Ok(Next::End),
             Event::Stopped => return Ok(Next::Stopped),
-        };
+        }
         self.rows += 1;
         Ok(Next::Row)
+    }
+
+    /// A row with the time of the one before is one too many; an earlier time is a clock that was set back.
+    fn look_at_the_clock(&mut self) -> Result<(), Failure> {
+        let Some(time) = self.stream.time() else { return Ok(()) };
+        let place = format_args!("{}:{}", self.name, self.stream.line()).to_string();
+        match self.last {
+            Some(last) if time == last => {
+                let message = format!("{place}: the time is that of the row before; take the row out");
+                return self.malformed(Failure::data(message));
+            }
+            Some(last) if time < last => {
+                let message = format!("{place}: the time is before that of the row before");
+                if self.strict {
+                    return Err(Failure::data(format!("{message}; correct it, or leave out --strict")));
+                }
+                self.set_back += 1;
+                tell(self.set_back, &format!("{message}; it goes on from there"), "more of this follows");
+                self.step = None;
+            }
+            last => self.step = last.map(|last| time - last),
+        }
+        self.last = Some(time);
+        Ok(())
+    }
+
+    fn malformed(&mut self, failure: Failure) -> Result<(), Failure> {
+        if self.strict {
+            return Err(failure);
+        }
+        self.is_blank = true;
+        self.malformed += 1;
+        tell(self.malformed, failure.message(), "more malformed lines follow; they are counted");
+        Ok(())
+    }
+
+    /// Seconds since the row before that has a time; none for the first one, without a clock, and where the clock was set
+    /// back.
+    pub(crate) fn step(&self) -> Option<f64> {
+        self.step
     }
 
     /// The values of the row at hand; NaN is a missing one.
@@ -94,14 +142,26 @@ impl Live {
         self.is_blank
     }
 
-    /// How many lines were malformed.
-    pub(crate) fn malformed(&self) -> u64 {
-        self.malformed
+    /// What was in the log besides good rows, as it goes behind the number of rows: nothing, or such as ", 2 malformed".
+    pub(crate) fn faults(&self) -> String {
+        let counts = [(self.malformed, "malformed"), (self.set_back, "times the clock was set back")];
+        let told =
+            counts.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!(", {count} {what}"));
+        told.collect()
     }
 
     /// Whether the log ended inside a line, which was left alone.
     pub(crate) fn is_unfinished(&self) -> bool {
         self.stream.is_unfinished()
+    }
+}
+
+/// Tells the first faults of a kind one by one, and then that there are more.
+fn tell(count: u64, message: &str, more: &str) {
+    match count {
+        0..=TOLD => warn(message),
+        _ if count == TOLD + 1 => warn(more),
+        _ => {}
     }
 }
 

@@ -333,8 +333,16 @@ fn each_step_has_its_own_length() {
 #[test]
 fn smoothed_states_are_better_known() {
     let folder = example("mass_spring_damper");
+    // From another time on, with a line in it that is no row.
+    let mut rows: Vec<String> = folder.read("log.csv").lines().map(str::to_owned).collect();
+    for (index, row) in rows.iter_mut().enumerate().skip(1) {
+        let (_, rest) = row.split_once(',').expect("it has columns");
+        *row = format!("{:.2},{rest}", 100.0 + 0.05 * (index - 1) as f64);
+    }
+    rows[300] = "x".to_owned();
+    folder.write("log.csv", rows.join("\n"));
     let lines = filtered(&folder, "model.toml log.csv --time t --smooth");
-    assert_eq!(lines.len(), 800);
+    assert_eq!(lines.len(), 799);
     for line in &lines {
         assert!(
             number(line, "/velocity_smoothed_sd") <= number(line, "/velocity_sd") * (1.0 + 1e-9),
@@ -348,7 +356,9 @@ fn smoothed_states_are_better_known() {
     // The other figures are those of the filter.
     let plain = filtered(&folder, "model.toml log.csv --time t");
     for (line, plain) in lines.iter().zip(&plain) {
-        assert_eq!((&line["velocity"], &line["nis"]), (&plain["velocity"], &plain["nis"]));
+        for name in ["row", "time", "velocity", "nis"] {
+            assert_eq!(line[name], plain[name]);
+        }
     }
 }
 
@@ -371,6 +381,9 @@ fn csv_has_the_same_columns_and_every_nth_row() {
     }
     let rows = filtered(&folder, "model.toml log.csv --rows 11..20");
     assert_eq!((rows.len(), number(&rows[0], "/row")), (10, 11.0));
+    let run = folder.run("filter model.toml log.csv --rows 900..1100");
+    assert_eq!((run.code, run.stdout.lines().count()), (3, 101));
+    assert!(run.stderr.contains("error: log.csv: --rows 900..1100: there are 1000 rows"), "{}", run.stderr);
 }
 
 #[test]
@@ -438,11 +451,7 @@ fn models_that_make_no_sense_are_refused_where_they_do_not() {
     assert!(folder.refused("filter model.toml log.csv --estimator kalman", 2).contains("--estimator"));
     assert!(folder.refused("filter - -", 2).contains("only one"));
     let run = folder.run("fit --grey model.toml log.csv --na 2");
-    assert!(
-        run.code == 2 && run.stderr.contains("'--grey <MODEL>' cannot be used with '--na"),
-        "{}",
-        run.stderr
-    );
+    assert!(run.code == 2 && run.stderr.contains("'--grey <MODEL>' cannot be used with"), "{}", run.stderr);
     assert!(folder.refused("filter model.toml log.csv -o model.toml", 2).contains("would be replaced"));
 
     folder.write("other.csv", "a,b\n1,2\n");

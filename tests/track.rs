@@ -98,9 +98,14 @@ fn a_warm_start_goes_on_from_a_fit() {
 
     folder.done("fit log.csv --model oe --nb 2 --nf 2 --report oe.json");
     let refusal = folder.refused("track next.csv --warm oe.json", 3);
-    assert!(refusal.contains("oe.json") || refusal.contains("OE"), "{refusal}");
-    let refusal = folder.refused("track next.csv --warm model.json --na 3", 3);
-    assert!(refusal.contains("ARX"), "{refusal}");
+    let words = "error: oe.json: the report has OE(2, 2, 1): only AR, ARX, ARMA and ARMAX can be tracked";
+    assert_eq!(refusal, words);
+    let run = folder.run("track next.csv --warm model.json --na 3");
+    assert!(
+        run.code == 2 && run.stderr.contains("'--warm <REPORT>' cannot be used with '--na <N>'"),
+        "{}",
+        run.stderr
+    );
 }
 
 #[test]
@@ -140,6 +145,17 @@ fn policies_run_side_by_side_and_are_compared() {
     assert!((number(&lines[0], "/b1") - 1.5).abs() < 0.1);
     for line in &lines[1..] {
         assert!((number(line, "/b1") - 2.0).abs() < 0.05, "{line}");
+    }
+    // The summary has them all, as the last lines.
+    folder.done(&format!(
+        "track log.csv --nb 1 --forgetting {policies} --quiet -o lines.jsonl --summary summary.json"
+    ));
+    let summary: Value = serde_json::from_str(&folder.read("summary.json")).unwrap();
+    assert_eq!((&summary["schema"], number(&summary, "/rows")), (&"thetahat.track/1".into(), 2000.0));
+    for (tracker, line) in summary["trackers"].as_array().unwrap().iter().zip(&lines) {
+        assert_eq!(tracker["forgetting"], line["forgetting"]);
+        assert_eq!(tracker["parameters"][0]["value"], line["b1"]);
+        assert_eq!(tracker["parameters"][0]["standard_error"], line["b1_se"]);
     }
     // The table has a line for each, and what forgets predicted better.
     let figure = |policy: &str| -> f64 {
@@ -280,12 +296,23 @@ fn missing_values_gaps_and_malformed_lines() {
 
 #[test]
 fn a_clock_that_goes_back_is_a_gap_or_an_error() {
-    let folder = Folder::with_log("t,u,y\n0,1,1\n1,2,1\n2,1,2\n1,2,3\n2,1,2\n");
-    let lines = tracked(&folder, "log.csv --time t --nb 1");
-    assert_eq!(event(&lines, "gap").iter().map(|gap| number(gap, "/row")).collect::<Vec<_>>(), [4.0]);
+    let folder = Folder::with_log("t,u,y\n0,1,1\n1,2,1\n1,2,1\n2,1,2\n1,2,3\n2,1,2\n");
+    let run = folder.done("track log.csv --time t --nb 1");
+    let lines = objects(&run.stdout);
+    assert_eq!(event(&lines, "gap").iter().map(|gap| number(gap, "/row")).collect::<Vec<_>>(), [5.0]);
+    // The row that is there twice is no sample.
+    let rows: Vec<f64> = event(&lines, "sample").iter().map(|line| number(line, "/row")).collect();
+    assert_eq!(rows, [1.0, 2.0, 4.0, 5.0, 6.0]);
+    for words in [
+        "warning: log.csv:4: the time is that of the row before",
+        "warning: log.csv:6: the time is before that of the row before",
+        "6 rows, 1 malformed, 1 times the clock was set back, 1 gaps",
+    ] {
+        assert!(run.stderr.contains(words), "{words}: {}", run.stderr);
+    }
     let run = folder.run("track log.csv --time t --nb 1 --strict");
     assert_eq!(run.code, 3);
-    assert!(run.stderr.contains("log.csv:5: the time does not rise"), "{}", run.stderr);
+    assert!(run.stderr.contains("error: log.csv:4: the time is that of the row before"), "{}", run.stderr);
 }
 
 #[test]
@@ -328,7 +355,8 @@ fn bad_options_and_logs_are_refused() {
     assert!(usage("--nb 1 --scale u=0 --scale y=1").contains("--scale u=0: give the typical magnitude"));
     assert!(usage("--nb 1 -o log.csv").contains("would be replaced"));
     assert!(usage("--nb 1 --state log.csv").contains("would be replaced"));
-    assert!(usage("--nb 1 --state -").contains("a file of its own"));
+    assert!(usage("--nb 1 --state -").contains("--state -: a state is kept in a file"));
+    assert!(usage("--nb 1 --state s --summary s").contains("s is named for two outputs"));
     assert_eq!(folder.names(), ["log.csv"]);
 
     let data = |log: &str, line: &str| {

@@ -7,8 +7,8 @@ use thetahat::{GreyReport, Report, Start, StateFilter, StateModel};
 use super::{stored, summary};
 use crate::args::FilterArguments;
 use crate::failure::Failure;
-use crate::job::{Clock, FilterJob};
-use crate::lines::Lines;
+use crate::job::FilterJob;
+use crate::line_writer::LineWriter;
 use crate::live::{Live, Next};
 use crate::log;
 use crate::output::{self, say, warn};
@@ -33,7 +33,7 @@ pub(crate) fn filter(arguments: &FilterArguments) -> Result<(), Failure> {
         output::write(path, |file| file.write_all(json.as_bytes()))?;
     }
     if !job.lines.quiet {
-        say(summary::filtered(&run.filter.summary(), run.live.malformed()).trim_end());
+        say(summary::filtered(&run.filter.summary(), &run.live.faults()).trim_end());
     }
     if stopped { Err(Failure::interrupted()) } else { Ok(()) }
 }
@@ -70,13 +70,11 @@ struct Run<'a> {
     /// The log's name, for messages.
     name: String,
     live: Live,
-    lines: Lines,
+    lines: LineWriter,
     columns: Columns,
     filter: StateFilter,
-    /// The time of the row before.
-    last: Option<f64>,
-    /// The rows, with the step before each, where they are smoothed at the end.
-    rows: Vec<(Option<f64>, Vec<f64>)>,
+    /// What was read, where it is smoothed at the end.
+    kept: Vec<Kept>,
     /// The filter as it was before the first row, where all is to be smoothed.
     fresh: Option<StateFilter>,
 }
@@ -88,65 +86,62 @@ impl<'a> Run<'a> {
         let (stream, words) = log::follow(&job.path, &job.log, false, None, |_| {
             Ok(model.inputs().iter().chain(model.outputs()).cloned().collect())
         })?;
-        let lines = Lines::create(&job.lines.out, job.lines.format, columns.names())?;
+        let lines = LineWriter::create(&job.lines.out, job.lines.format, columns.names())?;
         words.iter().for_each(|word| warn(word));
         let fresh = job.smooth.then(|| filter.clone());
         let filter = if job.smooth { filter.recording() } else { filter };
         Ok(Self {
             job,
             name: job.path.display().to_string(),
-            live: Live::new(stream, job.lines.strict),
+            live: Live::new(stream, &job.path.display().to_string(), job.lines.strict),
             lines,
             columns,
             filter,
-            last: None,
-            rows: Vec::new(),
+            kept: Vec::new(),
             fresh,
         })
     }
 
     /// Goes through the log to its end; says whether the program was asked to end before.
     fn follow(&mut self) -> Result<bool, Failure> {
-        loop {
+        let (first, last) =
+            self.job.rows.map_or((1, u64::MAX), |rows| (rows.first() as u64, rows.last() as u64));
+        while self.live.row() < last {
             match self.live.next()? {
-                Next::Row => match self.job.rows {
-                    Some(rows) if self.live.row() < rows.first() as u64 => {}
-                    Some(rows) if self.live.row() > rows.last() as u64 => return Ok(false),
-                    _ => self.row()?,
-                },
+                Next::Row if self.live.row() < first => {}
+                Next::Row => self.row()?,
                 Next::Idle => self.lines.flush()?,
-                Next::End => return Ok(false),
+                Next::End => match self.job.rows {
+                    Some(rows) => {
+                        let all = self.live.row();
+                        let message = format!("--rows {rows}: there are {all} rows; name some of them");
+                        return Err(Failure::data(format!("{}: {message}", self.name)));
+                    }
+                    None => return Ok(false),
+                },
                 Next::Stopped => return Ok(true),
             }
         }
+        Ok(false)
     }
 
     /// Takes in the row at hand.
     fn row(&mut self) -> Result<(), Failure> {
-        let Self { job, name, live, lines, columns, filter, last, rows, .. } = self;
-        let step = match (live.time(), *last) {
-            // Without its time a row has no place; the next one tells how long it took.
-            (None, _) if live.has_clock() => return Ok(()),
-            (Some(time), Some(before)) if time <= before => {
-                let message = format!("{name}:{}: the time does not rise", live.line());
-                if job.lines.strict {
-                    return Err(Failure::data(format!("{message}; correct it, or leave out --strict")));
-                }
-                warn(&format!("{message}; the row is left out"));
-                return Ok(());
-            }
-            (Some(time), before) => before.map(|before| time - before),
-            (None, _) => job.sample_time,
-        };
-        *last = live.time();
-        let (inputs, outputs) = live.values().split_at(filter.model().inputs().len());
+        let Self { job, name, live, lines, columns, filter, kept, .. } = self;
+        // Without its time a row has no place; the next one tells how long it took.
+        if live.has_clock() && live.time().is_none() {
+            return Ok(());
+        }
+        let (row, time, values) = (live.row(), live.time(), live.values());
+        let step = if live.has_clock() { live.step() } else { job.sample_time };
+        let (inputs, outputs) = values.split_at(filter.model().inputs().len());
         let estimate = filter
             .step(step, inputs, outputs)
             .map_err(|error| Failure::data(format!("{name}:{}: {error}", live.line())))?;
         if job.smooth {
-            rows.push((step, live.values().to_vec()));
-        } else if live.row().is_multiple_of(job.lines.every) {
-            columns.row(lines, live.row(), live.time(), outputs, &estimate, None)?;
+            kept.push(Kept { row, time, step, values: values.to_vec() });
+        } else if row.is_multiple_of(job.lines.every) {
+            columns.row(lines, row, time, outputs, &estimate, None)?;
         }
         Ok(())
     }
@@ -157,16 +152,22 @@ impl<'a> Run<'a> {
         let failed = |error: thetahat::Error| Failure::data(format!("{}: {error}", self.name));
         let smoothed = self.filter.smooth().map_err(failed)?;
         let inputs = self.filter.model().inputs().len();
-        let has_time = matches!(self.job.log.clock, Clock::Column { .. });
-        for (index, (step, values)) in self.rows.iter().enumerate() {
+        for (index, Kept { row, time, step, values }) in self.kept.iter().enumerate() {
             let (inputs, outputs) = values.split_at(inputs);
             let estimate = again.step(*step, inputs, outputs).map_err(failed)?;
-            let row = (self.job.rows.map_or(1, |rows| rows.first()) + index) as u64;
             if row.is_multiple_of(self.job.lines.every) {
-                let time = has_time.then_some(estimate.time);
-                self.columns.row(&mut self.lines, row, time, outputs, &estimate, smoothed.row(index))?;
+                self.columns.row(&mut self.lines, *row, *time, outputs, &estimate, smoothed.row(index))?;
             }
         }
         self.lines.flush()
     }
+}
+
+/// A row that was read.
+struct Kept {
+    row: u64,
+    time: Option<f64>,
+    /// The seconds since the row before, as the filter was told.
+    step: Option<f64>,
+    values: Vec<f64>,
 }

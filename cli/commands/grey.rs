@@ -9,29 +9,22 @@ use super::{stored, summary};
 use crate::args::{FitArguments, FormatArgument};
 use crate::failure::Failure;
 use crate::interrupt;
-use crate::job::{Clock, LogJob, rows};
+use crate::job::{Clock, GreyJob};
 use crate::log::{self, Recorded};
 use crate::output::{self, warn};
 use crate::progress::Searching;
 
 pub(super) fn fit(arguments: &FitArguments, model: &Path) -> Result<(), Failure> {
-    let job = LogJob::resolve(&arguments.log, &arguments.clock)?;
-    let read = arguments.logs.iter().map(|path| path.as_path()).chain([model]);
-    if read.clone().filter(|path| *path == Path::new("-")).count() > 1 {
-        return Err(Failure::usage("only one of the model and the logs can come from standard input (-)"));
-    }
-    if let Some(report) = &arguments.report {
-        read.clone().try_for_each(|path| output::apart(report, path))?;
-    }
+    let job = GreyJob::resolve(arguments, model)?;
     let text = stored::text(model)?;
     let grey =
         GreyBox::from_toml(&text).map_err(|error| Failure::data(format!("{}: {error}", model.display())))?;
     let (mut recordings, mut sources) = (Vec::new(), Vec::<Source>::new());
-    for path in &arguments.logs {
+    for path in &job.paths {
         let names = || grey.inputs().iter().chain(grey.outputs()).cloned().collect();
-        let Recorded { mut recording, mut source, words, .. } = log::record(path, &job, |_| Ok(names()))?;
+        let Recorded { mut recording, mut source, words, .. } = log::record(path, &job.log, |_| Ok(names()))?;
         words.iter().for_each(|word| warn(word));
-        if job.clock == Clock::Unknown {
+        if job.log.clock == Clock::Unknown {
             recording.times = Times::Uniform(grey.sample_time());
         }
         let before = sources.last().map_or(0, |source| source.rows.last());
@@ -40,8 +33,7 @@ pub(super) fn fit(arguments: &FitArguments, model: &Path) -> Result<(), Failure>
         recordings.push(recording);
         sources.push(source);
     }
-    let asked = rows("--estimate", &arguments.estimate)?;
-    let recordings = parts(recordings, &sources, &asked)?;
+    let recordings = parts(recordings, &sources, &job.estimate)?;
     let progress = Searching::new();
     let monitor = |now| {
         progress.update(now);

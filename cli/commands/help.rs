@@ -1,7 +1,7 @@
 //! What the program says of itself: the report's schema, shell completions, manual pages.
 
 use clap::CommandFactory;
-use thetahat::{Comparison, FilterSummary, GreyReport, Inspection, Report, Validation};
+use thetahat::{Comparison, FilterSummary, GreyReport, Inspection, Report, TrackSummary, Validation};
 
 use crate::args::{Arguments, DocumentArgument};
 use crate::failure::Failure;
@@ -14,8 +14,9 @@ pub(crate) fn schema(document: DocumentArgument) -> Result<(), Failure> {
         DocumentArgument::Validation => Validation::json_schema(),
         DocumentArgument::Comparison => Comparison::json_schema(),
         DocumentArgument::Inspection => Inspection::json_schema(),
+        DocumentArgument::Track => TrackSummary::json_schema(),
         DocumentArgument::Filter => FilterSummary::json_schema(),
-        DocumentArgument::Grey => GreyReport::json_schema(),
+        DocumentArgument::Greybox => GreyReport::json_schema(),
     };
     output::print(&format!("{schema:#}\n"))
 }

@@ -7,13 +7,13 @@ mod state;
 
 use std::path::Path;
 
-use thetahat::{Report, Tracker};
+use thetahat::{Report, TrackSummary, Tracker};
 
 use super::{stored, summary};
 use crate::args::TrackArguments;
 use crate::failure::Failure;
 use crate::job::{StateJob, TrackJob};
-use crate::lines::Lines;
+use crate::line_writer::LineWriter;
 use crate::live::{Live, Next, action};
 use crate::log;
 use crate::output::{self, say, warn};
@@ -24,13 +24,20 @@ use state::{Place, RowPlace, State};
 pub(crate) fn track(arguments: &TrackArguments) -> Result<(), Failure> {
     let job = TrackJob::resolve(arguments)?;
     let state_path = job.state.as_ref().map(|state| state.path.as_path());
-    for written in [Some(job.lines.out.as_path()), state_path].into_iter().flatten() {
-        for read in [Some(job.path.as_path()), job.warm.as_deref()].into_iter().flatten() {
-            output::apart(written, read)?;
-        }
+    if state_path == Some(Path::new("-")) {
+        return Err(Failure::usage("--state -: a state is kept in a file; name one"));
     }
-    if state_path == Some(Path::new("-")) || state_path == Some(job.lines.out.as_path()) {
-        return Err(Failure::usage("--state names what the lines are written to; give it a file of its own"));
+    let written = [Some(job.lines.out.as_path()), state_path, job.summary.as_deref()];
+    for (index, written_path) in written.iter().flatten().enumerate() {
+        for read in [Some(job.path.as_path()), job.warm.as_deref()].into_iter().flatten() {
+            output::apart(written_path, read)?;
+        }
+        if written.iter().flatten().skip(index + 1).any(|other| other == written_path) {
+            return Err(Failure::usage(format!(
+                "{} is named for two outputs; give each a file of its own",
+                written_path.display()
+            )));
+        }
     }
     let report = job.warm.as_deref().map(stored::report).transpose()?;
     let mut run = Run::start(&job, report.as_ref())?;
@@ -42,7 +49,7 @@ pub(crate) fn track(arguments: &TrackArguments) -> Result<(), Failure> {
     let saved = run.lines.sync().and_then(|()| run.save());
     let ended = ended?;
     saved?;
-    run.report();
+    run.report()?;
     match ended {
         Ended::Stopped => Err(Failure::interrupted()),
         Ended::Alarm => Err(Failure::alarm(format!("{}: an alarm in row {}", run.name, run.state.rows))),
@@ -63,7 +70,7 @@ struct Run<'a> {
     /// The log's name, for messages.
     name: String,
     live: Live,
-    lines: Lines,
+    lines: LineWriter,
     columns: Columns,
     state: State,
     place: Place,
@@ -102,16 +109,16 @@ impl<'a> Run<'a> {
         };
         let lines = if resumed {
             say(&format!("goes on after row {}, line {} of the output", state.rows, state.written.lines));
-            Lines::resume(&job.lines.out, job.lines.format, columns.names(), state.written)?
+            LineWriter::resume(&job.lines.out, job.lines.format, columns.names(), state.written)?
         } else {
-            Lines::create(&job.lines.out, job.lines.format, columns.names())?
+            LineWriter::create(&job.lines.out, job.lines.format, columns.names())?
         };
         words.iter().for_each(|word| warn(word));
         let parameters = state.trackers.first().map_or(0, |tracker| tracker.names().len());
         Ok(Self {
             job,
+            live: Live::new(stream, &name, job.lines.strict),
             name,
-            live: Live::new(stream, job.lines.strict),
             lines,
             columns,
             state,
@@ -158,12 +165,6 @@ impl<'a> Run<'a> {
         state.rows += 1;
         let row = state.rows;
         let step = time.map_or(Step::Regular, |time| state.pace.step(time));
-        if step == Step::Back && job.lines.strict {
-            return Err(Failure::data(format!(
-                "{name}:{}: the time does not rise; correct it, or leave out --strict",
-                live.line()
-            )));
-        }
         if after_gap || step != Step::Regular {
             state.trackers.iter_mut().for_each(Tracker::gap);
             state.gaps += 1;
@@ -204,28 +205,29 @@ impl<'a> Run<'a> {
         self.state.write(path)
     }
 
-    /// What a person wants to know at the end.
-    fn report(&self) {
+    /// What the trackers have come to.
+    fn summary(&self) -> TrackSummary {
+        let State { rows, gaps, trackers, alarms, .. } = &self.state;
+        let trackers = trackers.iter().zip(alarms).map(|(tracker, &alarms)| tracker.summary(alarms));
+        TrackSummary::new(*rows, *gaps, trackers.collect())
+    }
+
+    /// Says it.
+    fn report(&self) -> Result<(), Failure> {
         if self.live.is_unfinished() {
             warn(&format!(
                 "{}: the last line has no line break yet; it is left for the next time",
                 self.name
             ));
         }
+        let summary = self.summary();
+        if let Some(path) = &self.job.summary {
+            let json = summary.to_json().map_err(|error| Failure::data(error.to_string()))?;
+            output::write(path, |file| file.write_all(json.as_bytes()))?;
+        }
         if !self.job.lines.quiet {
-            let counts = counts(&self.state, &self.live);
-            say(summary::tracking(&self.state.trackers, &self.state.alarms, &counts).trim_end());
+            say(summary::tracking(&summary, &self.live.faults(), self.job.is_watched()).trim_end());
         }
+        Ok(())
     }
-}
-
-/// What was in the log besides samples.
-fn counts(state: &State, live: &Live) -> String {
-    let mut text = format!("{} rows", state.rows);
-    for (count, what) in [(live.malformed(), "malformed"), (state.gaps, "gaps")] {
-        if count > 0 {
-            text.push_str(&format!(", {count} {what}"));
-        }
-    }
-    text
 }

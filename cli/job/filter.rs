@@ -51,7 +51,7 @@ impl FilterJob {
             return Err(Failure::usage("only one of the model and the log can come from standard input (-)"));
         }
         let dash = |path: Option<&PathBuf>| path.is_some_and(|path| path == Path::new("-"));
-        if dash(arguments.summary.as_ref()) && dash(Some(&arguments.lines.out)) {
+        if dash(arguments.lines.summary.as_ref()) && dash(Some(&arguments.lines.out)) {
             return Err(Failure::usage("the lines and the summary cannot both go to standard output (-)"));
         }
         Ok(Self {
@@ -63,7 +63,7 @@ impl FilterJob {
             rows: arguments.rows.as_deref().map(|text| parsed("--rows", text)).transpose()?,
             smooth: arguments.smooth,
             lines: LineJob::resolve(&arguments.lines),
-            summary: arguments.summary.clone(),
+            summary: arguments.lines.summary.clone(),
             estimator,
         })
     }

@@ -24,6 +24,7 @@ pub(crate) struct TrackJob {
     pub(crate) forecasts: bool,
     pub(crate) stop_on_alarm: bool,
     pub(crate) state: Option<StateJob>,
+    pub(crate) summary: Option<PathBuf>,
     offsets: Vec<(String, f64)>,
     scales: Vec<(String, f64)>,
     orders: Given,
@@ -102,6 +103,7 @@ impl TrackJob {
                 save_every: arguments.save_every,
                 resume: arguments.resume,
             }),
+            summary: arguments.lines.summary.clone(),
             offsets: named_values("--offset", &arguments.offset)?,
             scales: named_values("--scale", &arguments.scale)?,
             orders,
@@ -120,6 +122,11 @@ impl TrackJob {
         self.orders.nb.iter().any(|&nb| nb > 0)
     }
 
+    /// Whether alarms were asked for.
+    pub(crate) fn is_watched(&self) -> bool {
+        self.plan.false_alarms.is_some()
+    }
+
     /// A tracker for each policy.
     pub(crate) fn trackers(
         &self,
@@ -127,7 +134,10 @@ impl TrackJob {
         output: &str,
         report: Option<&Report>,
     ) -> Result<Vec<Tracker>, Failure> {
-        let orders = self.orders.of(inputs.len(), report.map(|report| &report.model.orders))?;
+        let orders = match report {
+            Some(report) => report.model.orders.clone(),
+            None => self.orders.of(inputs.len())?,
+        };
         let method = match self.method {
             Some(method) => method,
             None if orders.nc > 0 => TrackMethod::Rpem,
@@ -213,10 +223,10 @@ impl Given {
         }
     }
 
-    /// The orders for so many inputs; those that were not given are the report's.
-    fn of(&self, inputs: usize, stored: Option<&Orders>) -> Result<Orders, Failure> {
-        let each = |option: &str, given: &[usize], stored: Option<&Vec<usize>>, usual: usize| match given {
-            [] => Ok(stored.cloned().unwrap_or_else(|| vec![usual; inputs])),
+    /// The orders for so many inputs.
+    fn of(&self, inputs: usize) -> Result<Orders, Failure> {
+        let each = |option: &str, given: &[usize], usual: usize| match given {
+            [] => Ok(vec![usual; inputs]),
             [one] => Ok(vec![*one; inputs]),
             all if all.len() == inputs => Ok(all.to_vec()),
             all => Err(Failure::usage(format!(
@@ -224,11 +234,8 @@ impl Given {
                 all.len()
             ))),
         };
-        let na = self.na.or(stored.map(|orders| orders.na)).unwrap_or(0);
-        let nb = each("--nb", &self.nb, stored.map(|orders| &orders.nb), 0)?;
-        let nk = each("--nk", &self.nk, stored.map(|orders| &orders.nk), 1)?;
-        let nc = self.nc.or(stored.map(|orders| orders.nc)).unwrap_or(0);
-        let (nd, nf) = stored.map_or((0, vec![0; inputs]), |orders| (orders.nd, orders.nf.clone()));
-        Orders::new(na, &nb, nc, nd, &nf, &nk).map_err(|error| Failure::option(&error))
+        let (nb, nk) = (each("--nb", &self.nb, 0)?, each("--nk", &self.nk, 1)?);
+        Orders::new(self.na.unwrap_or(0), &nb, self.nc.unwrap_or(0), 0, &vec![0; inputs], &nk)
+            .map_err(|error| Failure::option(&error))
     }
 }

@@ -4,7 +4,7 @@ use thetahat::{StateEstimate, StateModel, Values};
 
 use crate::failure::Failure;
 use crate::job::{Clock, FilterJob};
-use crate::lines::{Cells, Lines};
+use crate::line_writer::{Cells, LineWriter};
 use crate::live::action;
 
 /// The columns of a run.
@@ -51,7 +51,7 @@ impl Columns {
     /// A line about a row, with its states and parameters given the whole log if there are any.
     pub(super) fn row(
         &self,
-        lines: &mut Lines,
+        lines: &mut LineWriter,
         row: u64,
         time: Option<f64>,
         measured: &[f64],

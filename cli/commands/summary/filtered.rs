@@ -5,18 +5,14 @@ use thetahat::{Estimated, FilterSummary};
 use super::text::{Text, columns, number, or_dash, uncertainty};
 
 /// How surprising the log was, and where the state has come to.
-pub(crate) fn filtered(summary: &FilterSummary, malformed: u64) -> String {
+pub(crate) fn filtered(summary: &FilterSummary, faults: &str) -> String {
     let mut text = Text::default();
     let estimator = match summary.estimator.as_str() {
         "kalman" => "Kalman filter",
         "ekf" => "extended Kalman filter",
         _ => "Luenberger observer",
     };
-    let malformed = if malformed > 0 { format!(", {malformed} malformed") } else { String::new() };
-    text.line(&format!(
-        "{estimator}: {} rows{malformed}, {} values measured",
-        summary.rows, summary.measured
-    ));
+    text.line(&format!("{estimator}: {} rows{faults}, {} values measured", summary.rows, summary.measured));
     if let Some(sum) = summary.log_likelihood {
         text.line(&format!("log-likelihood {sum:.4}"));
     }

@@ -1,62 +1,54 @@
 //! What `track` says at its end.
 
-use thetahat::Tracker;
+use thetahat::TrackSummary;
 
 use super::formula;
 use super::text::{Text, columns, number, or_dash, short, uncertainty};
 
-/// How the policies did, and where each has come to.
-pub(crate) fn tracking(trackers: &[Tracker], alarms: &[u64], counts: &str) -> String {
+/// How the ways to forget did, and where each has come to.
+pub(crate) fn tracking(summary: &TrackSummary, faults: &str, watched: bool) -> String {
     let mut text = Text::default();
-    if let Some(tracker) = trackers.first() {
-        text.line(&formula(tracker.orders()));
-    }
-    text.line(counts);
-    if let Some(tracker) = trackers.first() {
-        let offsets = tracker.offsets();
-        let all: Vec<f64> = offsets.inputs.iter().chain([&offsets.output]).copied().collect();
-        if all.iter().any(|&offset| offset != 0.0) {
-            let shown: Vec<String> = all.iter().map(|&offset| short(offset)).collect();
+    let gaps = if summary.gaps > 0 { format!(", {} gaps", summary.gaps) } else { String::new() };
+    if let Some(tracker) = summary.trackers.first() {
+        text.line(&formula(&tracker.orders));
+        text.line(&format!("{} rows{faults}{gaps}", summary.rows));
+        if tracker.offsets.iter().any(|&offset| offset != 0.0) {
+            let shown: Vec<String> = tracker.offsets.iter().map(|&offset| short(offset)).collect();
             text.line(&format!("offsets of the inputs and the output: {}", shown.join(", ")));
         }
     }
     text.line("");
-    let watched = trackers.iter().any(|tracker| tracker.detector().is_some());
     let mut titles = vec!["forgetting", "predicted", "mse", "fit [%]", "mean nis", "log-likelihood"];
     titles.extend(watched.then_some("alarms"));
     let mut scores = columns(&titles);
-    for (tracker, alarms) in trackers.iter().zip(alarms) {
-        let score = tracker.score();
+    for tracker in &summary.trackers {
         let mut row = vec![
-            tracker.plan().forgetting.to_string(),
-            score.samples().to_string(),
-            or_dash(score.mean_squared_error(), number),
-            or_dash(score.fit(), |fit| format!("{fit:.2}")),
-            or_dash(score.mean_nis(), |nis| format!("{nis:.3}")),
-            or_dash(score.log_likelihood(), |sum| format!("{sum:.2}")),
+            tracker.forgetting.clone(),
+            tracker.samples.to_string(),
+            or_dash(tracker.mean_squared_error, number),
+            or_dash(tracker.fit, |fit| format!("{fit:.2}")),
+            or_dash(tracker.mean_nis, |nis| format!("{nis:.3}")),
+            or_dash(tracker.log_likelihood, |sum| format!("{sum:.2}")),
         ];
-        row.extend(watched.then(|| alarms.to_string()));
+        row.extend(watched.then(|| tracker.alarms.to_string()));
         scores.add_row(row);
     }
     text.table(scores, &[1, 2, 3, 4, 5, 6][..titles.len() - 1]);
-    for tracker in trackers {
-        let Some(parameters) = tracker.parameters() else {
+    for tracker in &summary.trackers {
+        if summary.trackers.len() > 1 {
+            text.line(&tracker.forgetting);
+        }
+        if tracker.parameters.is_empty() {
             text.line("no estimate yet: there were too few samples, or a channel that never left zero");
             continue;
-        };
-        if trackers.len() > 1 {
-            text.line(&tracker.plan().forgetting.to_string());
         }
-        let mut deviations = vec![f64::NAN; parameters.len()];
-        // There is one place for each.
-        let _ = tracker.write_standard_errors(&mut deviations);
         let mut table = columns(&["parameter", "value", "standard error"]);
-        for ((name, &value), &deviation) in tracker.names().iter().zip(parameters).zip(&deviations) {
-            let known = Some(deviation).filter(|deviation| deviation.is_finite());
-            table.add_row([name.clone(), number(value), or_dash(known, uncertainty)]);
+        for parameter in &tracker.parameters {
+            let error = or_dash(parameter.standard_error, uncertainty);
+            table.add_row([parameter.name.clone(), number(parameter.value), error]);
         }
         text.table(table, &[1, 2]);
-        text.line(&format!("noise variance {}", or_dash(tracker.noise_variance(), short)));
+        text.line(&format!("noise variance {}", or_dash(tracker.noise_variance, short)));
         text.line("");
     }
     text.finish()

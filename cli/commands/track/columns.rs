@@ -5,7 +5,7 @@ use thetahat::{Tracked, Tracker};
 
 use crate::failure::Failure;
 use crate::job::{Clock, TrackJob};
-use crate::lines::{Cells, Lines};
+use crate::line_writer::{Cells, LineWriter};
 
 /// What stands in front of the parameters of each sample.
 const FIGURES: [&str; 7] =
@@ -62,7 +62,7 @@ impl Columns {
     /// A line about a sample.
     pub(super) fn sample(
         &self,
-        lines: &mut Lines,
+        lines: &mut LineWriter,
         sample: &Sample,
         tracker: &mut Tracker,
         deviations: &mut [f64],
@@ -93,7 +93,7 @@ impl Columns {
     /// A line about an alarm.
     pub(super) fn alarm(
         &self,
-        lines: &mut Lines,
+        lines: &mut LineWriter,
         row: u64,
         time: Option<f64>,
         index: usize,
@@ -114,7 +114,7 @@ impl Columns {
     }
 
     /// A line about a gap before a row.
-    pub(super) fn gap(&self, lines: &mut Lines, row: u64, time: Option<f64>) -> Result<(), Failure> {
+    pub(super) fn gap(&self, lines: &mut LineWriter, row: u64, time: Option<f64>) -> Result<(), Failure> {
         lines.add(|cells| self.head(cells, "gap", row, time, None))
     }
 

@@ -16,10 +16,8 @@ pub(super) struct Pace {
 pub(super) enum Step {
     /// It follows the row before it.
     Regular,
-    /// The step is less than half or more than one and a half of what it should be.
+    /// The step is less than half or more than one and a half of what it should be, or back.
     Gap,
-    /// The time is not later than that of the row before.
-    Back,
 }
 
 impl Pace {
@@ -37,7 +35,7 @@ impl Pace {
         let Some(last) = self.last.replace(time) else { return Step::Regular };
         let step = time - last;
         if step <= 0.0 {
-            return Step::Back;
+            return Step::Gap;
         }
         let sample_time = *self.sample_time.get_or_insert(step);
         if (0.5 * sample_time..=1.5 * sample_time).contains(&step) { Step::Regular } else { Step::Gap }
@@ -54,9 +52,9 @@ mod tests {
             let mut pace = Pace::new(sample_time);
             times.iter().map(|&time| pace.step(time)).collect()
         };
-        use Step::{Back, Gap, Regular};
+        use Step::{Gap, Regular};
         assert_eq!(steps(None, &[5.0, 5.1, 5.24, 5.38, 5.6]), [Regular, Regular, Regular, Regular, Gap]);
-        assert_eq!(steps(Some(1.0), &[0.0, 3.0, 4.0, 4.2, 4.0]), [Regular, Gap, Regular, Gap, Back]);
-        assert_eq!(steps(None, &[1.0, 1.0, 2.0]), [Regular, Back, Regular]);
+        assert_eq!(steps(Some(1.0), &[0.0, 3.0, 4.0, 4.2, 4.0]), [Regular, Gap, Regular, Gap, Gap]);
+        assert_eq!(steps(None, &[1.0, 1.0, 2.0]), [Regular, Gap, Regular]);
     }
 }

@@ -12,12 +12,12 @@ use crate::args::ResumeArgument;
 use crate::commands::Channels;
 use crate::failure::Failure;
 use crate::job::{Clock, TrackJob};
-use crate::lines::{Format, Written};
+use crate::line_writer::{Format, Written};
 use crate::live::Live;
 use crate::output;
 
 /// The version that this program writes.
-const SCHEMA: &str = "thetahat.track/1";
+const SCHEMA: &str = "thetahat.track-state/1";
 
 /// All that a run must know to go on as if it had never ended.
 #[derive(Serialize, Deserialize)]

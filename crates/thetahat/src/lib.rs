@@ -81,6 +81,7 @@ pub use select::{
 };
 pub use thetahat_core;
 pub use track::{
-    Beginning, PerChannel, Policy, TrackMethod, TrackPlan, TrackScore, Tracked, Tracker, change_detector,
+    Beginning, PerChannel, Policy, TrackMethod, TrackPlan, TrackScore, TrackSummary, Tracked, Tracker,
+    TrackerSummary, change_detector,
 };
 pub use validate::{Anderson, AndersonLevel, Fit, Horizon, Independence, Part, Residuals, Test};

@@ -22,7 +22,7 @@ pub(crate) enum Format {
 const FULL: usize = 1 << 16;
 
 /// A file or standard output, and the lines on their way to it. Only whole lines are ever written.
-pub(crate) struct Lines {
+pub(crate) struct LineWriter {
     path: PathBuf,
     sink: Sink,
     format: Format,
@@ -53,7 +53,7 @@ struct Column {
     title: Vec<u8>,
 }
 
-impl Lines {
+impl LineWriter {
     /// Begins a file, or standard output for `-`, with these columns.
     pub(crate) fn create(path: &Path, format: Format, names: &[String]) -> Result<Self, Failure> {
         let sink = if path == Path::new("-") {
@@ -165,7 +165,7 @@ impl Lines {
 
 /// The cells of a line, column by column.
 pub(crate) struct Cells<'a> {
-    lines: &'a mut Lines,
+    lines: &'a mut LineWriter,
     column: usize,
     any: bool,
 }
@@ -191,6 +191,7 @@ impl Cells<'_> {
     pub(crate) fn word(&mut self, word: &str) {
         let csv = self.lines.format == Format::Csv;
         self.cell(|buffer| match csv {
+            // Words are short and plain: that is seen sooner than they are copied through a writer.
             true if memchr3(b',', b'"', b'\n', word.as_bytes()).is_none() => {
                 buffer.extend_from_slice(word.as_bytes());
             }
@@ -211,7 +212,7 @@ impl Cells<'_> {
     }
 
     fn cell(&mut self, write: impl FnOnce(&mut Vec<u8>)) {
-        let Lines { buffer, columns, format, .. } = &mut *self.lines;
+        let LineWriter { buffer, columns, format, .. } = &mut *self.lines;
         let Some(column) = columns.get(self.column) else { return };
         match format {
             Format::JsonLines => {

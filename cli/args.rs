@@ -108,14 +108,34 @@ Examples:
     /// Estimate the state of a model along a log or a live pipe
     ///
     /// MODEL is a report of fit, or a text file (TOML) with the matrices F, G, H, Q, R, or with the equations of a plant, of
-    /// which unknown parameters are estimated together with the state. Each line has the states and outputs as predicted
-    /// and as corrected, with standard deviations. Ends with a table on standard error.
+    /// which unknown parameters are estimated together with the state. Each line has the states as predicted from the rows
+    /// before and as corrected by this one, with standard deviations (_sd); what was measured and predicted of each output,
+    /// and the innovation; the normalised innovation squared (nis) and between which bounds it lies in 95 % of the rows; and
+    /// held, the inputs that are missing in this row. Ends with a table on standard error.
     #[command(after_help = "\
 Examples:
   thetahat filter spring.toml log.csv --format csv > states.csv
   thetahat filter model.json log.csv --estimator kalman -o states.jsonl
   tail -n +1 -F log.csv | thetahat filter cell.toml - --estimator ekf --time t
-  thetahat filter level.toml log.csv --smooth")]
+  thetahat filter level.toml log.csv --smooth
+
+A model in matrices, and one in equations:
+  sample_time = 1                 # seconds        sample_time = 0.1
+  states = ['x', 'v']             # names          [states]
+  inputs = ['u']                  # channels       x = { start = 0, sd = 1 }
+  outputs = ['y']                 # channels       [inputs]
+  F = [[1, 1], [0, 1]]                             force = 'u'             # a channel
+  G = [[0], [1]]                                   [parameters]
+  H = [[1, 0]]                                     k = { start = 2, sd = 1, unknown = true, min = 0 }
+  Q = [[0, 0], [0, 0.1]]          # variances      [next]                  # or [derivative]
+  R = [[1]]                       # variances      x = 'x + dt * (force - k * x)'
+  x0 = [0, 0]                                      [outputs]
+  P0 = [[9, 0], [0, 9]]           # variances      y = 'x'                 # a channel
+                                                   [noise]                 # standard deviations
+                                                   process = { x = 0.01 }  # added in one sample_time
+                                                   measurement = { y = 0.1 }
+Equations have + - * / ^, sin cos tan asin acos atan atan2 sinh cosh tanh exp ln log10 sqrt abs sign min max, pi, t (seconds
+since the first row) and, in [next], dt (seconds of this step). The process noise grows with the square root of dt.")]
     Filter(Box<FilterArguments>),
     /// The frequency response of a fitted model
     ///
@@ -543,7 +563,7 @@ pub(crate) struct TrackArguments {
     /// Keep the estimator's whole state in a file, and go on from it if it is there
     #[arg(long, value_name = "FILE", help_heading = "State")]
     pub(crate) state: Option<PathBuf>,
-    /// Write the state every so many rows, besides at the end
+    /// Write the state every so many rows, besides at the end, and within 10 s where rows are slow to come
     #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u64).range(1..),
         requires = "state", help_heading = "State")]
     pub(crate) save_every: u64,

@@ -9,8 +9,8 @@ use std::path::PathBuf;
 use std::process;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
-#[cfg(unix)]
-use std::{sync::Once, thread};
+use std::thread;
+use std::time::Duration;
 
 use indicatif::ProgressBar;
 #[cfg(unix)]
@@ -26,6 +26,9 @@ use crate::table::Waker;
 const INTERRUPTED: u8 = 130;
 #[cfg(unix)]
 const TERMINATED: u8 = 143;
+
+/// So long a stream has to end by itself.
+const PATIENCE: Duration = Duration::from_secs(5);
 
 /// Whether a stream has to end. It is asked once a row, so it is apart from the lock.
 static ENDING: AtomicBool = AtomicBool::new(false);
@@ -74,7 +77,7 @@ pub(crate) fn listen() {
     let _ = ctrlc::try_set_handler(|| asked_by(INTERRUPTED));
     #[cfg(unix)]
     {
-        static LISTENING: Once = Once::new();
+        static LISTENING: std::sync::Once = std::sync::Once::new();
         LISTENING.call_once(|| {
             if let Ok(mut signals) = Signals::new([SIGTERM]) {
                 thread::spawn(move || signals.forever().for_each(|_| asked_by(TERMINATED)));
@@ -92,6 +95,11 @@ fn asked_by(code: u8) {
         ENDING.store(true, Ordering::Relaxed);
         if let Some(waker) = &state.waker {
             waker.wake();
+            // It may wait for a reader of its output who does not come.
+            thread::spawn(move || {
+                thread::sleep(PATIENCE);
+                asked_by(code);
+            });
         }
         return;
     }

@@ -1,7 +1,7 @@
 //! Output that grows line by line, as JSON Lines or as CSV: both have the same columns.
 
 use std::fs::{File, OpenOptions};
-use std::io::{self, Seek, SeekFrom, Stdout, Write};
+use std::io::{self, Read, Seek, SeekFrom, Stdout, Write};
 use std::path::{Path, PathBuf};
 
 use memchr::memchr3;
@@ -18,6 +18,9 @@ pub(crate) enum Format {
     Csv,
 }
 
+/// By so many of its last bytes a file is known.
+const KNOWN_BY: usize = 48;
+
 /// So many bytes are written at once, where nobody waits for them.
 const FULL: usize = 1 << 16;
 
@@ -30,15 +33,19 @@ pub(crate) struct LineWriter {
     columns: Vec<Column>,
     buffer: Vec<u8>,
     written: Written,
+    /// Where a file that is gone on with has to be cut off first.
+    cut: Option<u64>,
 }
 
 /// How much a stream of lines has come to.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Written {
     /// The lines, the header of a CSV included.
     pub(crate) lines: u64,
     /// Their bytes.
     pub(crate) bytes: u64,
+    /// The last of them, as they were handed over: what a file is known by.
+    end: Vec<u8>,
 }
 
 enum Sink {
@@ -70,40 +77,51 @@ impl LineWriter {
                 lines.buffer.extend_from_slice(&column.title);
             }
             lines.buffer.push(b'\n');
-            lines.written = Written { lines: 1, bytes: lines.buffer.len() as u64 };
+            lines.written = Written { lines: 1, bytes: lines.buffer.len() as u64, ..Written::default() };
         }
         Ok(lines)
     }
 
-    /// Goes on where an earlier run saved that it was: what a file has beyond that is taken off.
+    /// Goes on where an earlier run saved that it was: what a file has beyond that is taken off when the next line comes.
     pub(crate) fn resume(
         path: &Path,
         format: Format,
         names: &[String],
         written: Written,
     ) -> Result<Self, Failure> {
-        let sink = if path == Path::new("-") {
-            Sink::Stdout(io::stdout())
-        } else {
-            let failed = |error| Failure::io(path, "cannot be written", &error);
-            let mut file = OpenOptions::new().write(true).open(path).map_err(failed)?;
-            let metadata = file.metadata().map_err(failed)?;
-            if metadata.is_file() {
-                if metadata.len() < written.bytes {
-                    return Err(Failure::data(format!(
-                        "{}: it has {} bytes, but the state says that {} were written; give the file that goes with the \
-                         state, or another state",
-                        path.display(),
-                        metadata.len(),
-                        written.bytes
-                    )));
-                }
-                file.set_len(written.bytes).map_err(failed)?;
-                file.seek(SeekFrom::End(0)).map_err(failed)?;
-            }
-            Sink::File(file)
+        if path == Path::new("-") {
+            return Ok(Self::begin(path, Sink::Stdout(io::stdout()), format, names, written));
+        }
+        let failed = |error| Failure::io(path, "cannot be written", &error);
+        let other = |what: String| {
+            let lines = written.lines;
+            Failure::data(format!(
+                "{}: {what}, but the state says that {lines} lines of it were written; give the file that goes with the state, \
+                 or another --state",
+                path.display()
+            ))
         };
-        Ok(Self::begin(path, sink, format, names, written))
+        let opened = OpenOptions::new().read(true).write(true).open(path);
+        let mut file = opened.map_err(|error| match error.kind() {
+            io::ErrorKind::NotFound => other("it is not there".to_owned()),
+            _ => failed(error),
+        })?;
+        let metadata = file.metadata().map_err(failed)?;
+        let cut = metadata.is_file().then_some(written.bytes);
+        if cut.is_some() {
+            let known = (written.end.len() as u64).min(written.bytes);
+            if metadata.len() < written.bytes {
+                return Err(other(format!("it has {} bytes", metadata.len())));
+            }
+            let mut end = vec![0; known as usize];
+            file.seek(SeekFrom::Start(written.bytes - known)).map_err(failed)?;
+            file.read_exact(&mut end).map_err(failed)?;
+            if end != written.end {
+                return Err(other("it holds something else".to_owned()));
+            }
+        }
+        let lines = Self::begin(path, Sink::File(file), format, names, written);
+        Ok(Self { cut, ..lines })
     }
 
     fn begin(path: &Path, sink: Sink, format: Format, names: &[String], written: Written) -> Self {
@@ -111,12 +129,20 @@ impl LineWriter {
             key: format!("{}:", serde_json::Value::from(name.as_str())).into_bytes(),
             title: quoted(name),
         });
-        Self { path: path.to_owned(), sink, format, columns: columns.collect(), buffer: Vec::new(), written }
+        Self {
+            path: path.to_owned(),
+            sink,
+            format,
+            columns: columns.collect(),
+            buffer: Vec::new(),
+            written,
+            cut: None,
+        }
     }
 
     /// What was written so far, the lines that still wait included.
     pub(crate) fn written(&self) -> Written {
-        self.written
+        self.written.clone()
     }
 
     /// Adds a line; `fill` gives its cells from the first column on. Those it does not reach are empty.
@@ -125,8 +151,8 @@ impl LineWriter {
         let mut cells = Cells { lines: &mut *self, column: 0, any: false };
         fill(&mut cells);
         cells.end();
-        self.written.lines += 1;
-        self.written.bytes += (self.buffer.len() - before) as u64;
+        self.written.lines = self.written.lines.saturating_add(1);
+        self.written.bytes = self.written.bytes.saturating_add((self.buffer.len() - before) as u64);
         if self.buffer.len() >= FULL { self.flush() } else { Ok(()) }
     }
 
@@ -141,8 +167,15 @@ impl LineWriter {
                 let mut stdout = stdout.lock();
                 stdout.write_all(&self.buffer).and_then(|()| stdout.flush())
             }
-            Sink::File(file) => file.write_all(&self.buffer),
+            Sink::File(file) => match self.cut.take() {
+                Some(bytes) => file.set_len(bytes).and_then(|()| file.seek(SeekFrom::End(0)).map(drop)),
+                None => Ok(()),
+            }
+            .and_then(|()| file.write_all(&self.buffer)),
         };
+        let end = &mut self.written.end;
+        end.extend_from_slice(&self.buffer[self.buffer.len().saturating_sub(KNOWN_BY)..]);
+        end.drain(..end.len().saturating_sub(KNOWN_BY));
         self.buffer.clear();
         written.map_err(|error| Failure::io(&self.shown(), "cannot be written", &error))
     }
@@ -175,8 +208,8 @@ impl Cells<'_> {
     pub(crate) fn number(&mut self, value: f64) {
         let csv = self.lines.format == Format::Csv;
         self.cell(|buffer| match value.is_finite() {
-            // A vector takes all that is written to it.
-            true => drop(serde_json::to_writer(buffer, &value)),
+            // A vector takes all that is written to it. Adding 0 makes -0 a plain 0.
+            true => drop(serde_json::to_writer(buffer, &(value + 0.0))),
             false if csv => {}
             false => buffer.extend_from_slice(b"null"),
         });

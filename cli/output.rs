@@ -112,6 +112,26 @@ pub(crate) fn apart(output: &Path, read: &Path) -> Result<(), Failure> {
     }
 }
 
+/// Refuses outputs of which two would be the same file.
+pub(crate) fn distinct(outputs: &[&Path]) -> Result<(), Failure> {
+    let place = |path: &Path| {
+        let target = behind_links(path);
+        let folder =
+            target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let folder = fs::canonicalize(folder).unwrap_or_else(|_| folder.to_owned());
+        target.file_name().map_or_else(|| target.clone(), |name| folder.join(name))
+    };
+    for (index, path) in outputs.iter().enumerate() {
+        if outputs.iter().take(index).any(|other| place(other) == place(path)) {
+            return Err(Failure::usage(format!(
+                "{} is named for two outputs; give each a file of its own",
+                path.display()
+            )));
+        }
+    }
+    Ok(())
+}
+
 /// The file behind a link, there already or not: it is replaced, not the link.
 fn behind_links(path: &Path) -> PathBuf {
     let mut target = path.to_owned();

@@ -2,7 +2,9 @@
 
 mod columns;
 
-use thetahat::{GreyReport, Report, Start, StateFilter, StateModel};
+use std::path::Path;
+
+use thetahat::{FilterSummary, GreyReport, Report, Start, StateFilter, StateModel};
 
 use super::{stored, summary};
 use crate::args::FilterArguments;
@@ -16,9 +18,14 @@ use columns::Columns;
 
 pub(crate) fn filter(arguments: &FilterArguments) -> Result<(), Failure> {
     let job = FilterJob::resolve(arguments)?;
-    let written = [Some(&job.lines.out), job.summary.as_ref()].into_iter().flatten();
-    for written in written {
-        [&job.path, &job.model].into_iter().try_for_each(|read| output::apart(written, read))?;
+    let outputs: Vec<&Path> = [Some(&job.lines.out), job.summary.as_ref()]
+        .into_iter()
+        .flatten()
+        .map(|path| path.as_path())
+        .collect();
+    output::distinct(&outputs)?;
+    for read in [&job.path, &job.model] {
+        outputs.iter().try_for_each(|written| output::apart(written, read))?;
     }
     let model = read(&job)?;
     let estimator = job.estimator(&model);
@@ -32,10 +39,27 @@ pub(crate) fn filter(arguments: &FilterArguments) -> Result<(), Failure> {
         let json = run.filter.summary().to_json().map_err(|error| Failure::data(error.to_string()))?;
         output::write(path, |file| file.write_all(json.as_bytes()))?;
     }
+    if let Some(word) = surprise(&run.filter.summary()) {
+        warn(&format!("{}: {word}", run.name));
+    }
     if !job.lines.quiet {
         say(summary::filtered(&run.filter.summary(), &run.live.faults()).trim_end());
     }
     if stopped { Err(Failure::interrupted()) } else { Ok(()) }
+}
+
+/// What to think of normalised innovations that are far from what the model says.
+fn surprise(summary: &FilterSummary) -> Option<String> {
+    let nis = summary.nis.as_ref()?;
+    let ratio = nis.mean / (summary.measured as f64 / nis.rows as f64);
+    let advice = match ratio {
+        2.0.. => {
+            "standard deviations are too small; look at the clock (--time), the start, and the noises of the model"
+        }
+        ..0.5 => "standard deviations are too large; give the model smaller noises",
+        _ => return None,
+    };
+    Some(format!("squared innovations are {ratio:.2} times as large as the model says, so {advice}"))
 }
 
 /// The model in a file: a report of one of the two kinds, or a text.
@@ -60,7 +84,12 @@ fn read(job: &FilterJob) -> Result<StateModel, Failure> {
     };
     model.map_err(|error| match &error {
         thetahat::Error::Argument { argument, .. } if argument == "initial" => Failure::option(&error),
-        _ => Failure::data(format!("{}: {error}", path.display())),
+        _ => {
+            let swapped =
+                job.path.extension().is_some_and(|extension| extension == "toml" || extension == "json");
+            let advice = if swapped { "; the model stands in front of the log" } else { "" };
+            Failure::data(format!("{}: {error}{advice}", path.display()))
+        }
     })
 }
 
@@ -137,7 +166,12 @@ impl<'a> Run<'a> {
         let (inputs, outputs) = values.split_at(filter.model().inputs().len());
         let estimate = filter
             .step(step, inputs, outputs)
-            .map_err(|error| Failure::data(format!("{name}:{}: {error}", live.line())))?;
+            .map_err(|error| {
+                Failure::data(format!(
+                    "{name}:{}: {error}; if the log is right, the filter has diverged: start it nearer, or with larger noises",
+                    live.line()
+                ))
+            })?;
         if job.smooth {
             kept.push(Kept { row, time, step, values: values.to_vec() });
         } else if row.is_multiple_of(job.lines.every) {

@@ -6,6 +6,7 @@ mod pace;
 mod state;
 
 use std::path::Path;
+use std::time::{Duration, Instant};
 
 use thetahat::{Report, TrackSummary, Tracker};
 
@@ -27,26 +28,26 @@ pub(crate) fn track(arguments: &TrackArguments) -> Result<(), Failure> {
     if state_path == Some(Path::new("-")) {
         return Err(Failure::usage("--state -: a state is kept in a file; name one"));
     }
-    let written = [Some(job.lines.out.as_path()), state_path, job.summary.as_deref()];
-    for (index, written_path) in written.iter().flatten().enumerate() {
-        for read in [Some(job.path.as_path()), job.warm.as_deref()].into_iter().flatten() {
-            output::apart(written_path, read)?;
-        }
-        if written.iter().flatten().skip(index + 1).any(|other| other == written_path) {
-            return Err(Failure::usage(format!(
-                "{} is named for two outputs; give each a file of its own",
-                written_path.display()
-            )));
-        }
+    let outputs = [Some(job.lines.out.as_path()), state_path, job.summary.as_deref()];
+    let outputs: Vec<&Path> = outputs.into_iter().flatten().collect();
+    output::distinct(&outputs)?;
+    for read in [Some(job.path.as_path()), job.warm.as_deref()].into_iter().flatten() {
+        outputs.iter().try_for_each(|written| output::apart(written, read))?;
     }
     let report = job.warm.as_deref().map(stored::report).transpose()?;
     let mut run = Run::start(&job, report.as_ref())?;
+    // That it cannot be written is better known now than in a week.
+    if job.state.is_some() {
+        run.lines.sync()?;
+        run.save()?;
+    }
     let ended = run.follow();
     // What a closed pipe has not taken is written again by the next run: so it goes on from the last state saved.
     if ended.as_ref().is_err_and(Failure::is_closed) {
         return ended.map(drop);
     }
-    let saved = run.lines.sync().and_then(|()| run.save());
+    // In the middle of a row the state is neither that before it nor that behind it.
+    let saved = if run.midway { Ok(()) } else { run.lines.sync().and_then(|()| run.save()) };
     let ended = ended?;
     saved?;
     run.report()?;
@@ -56,6 +57,9 @@ pub(crate) fn track(arguments: &TrackArguments) -> Result<(), Failure> {
         Ended::End => Ok(()),
     }
 }
+
+/// While nothing comes, a state that is older is written anew.
+const OLDEST_STATE: Duration = Duration::from_secs(10);
 
 /// Why a run is over.
 enum Ended {
@@ -73,6 +77,11 @@ struct Run<'a> {
     lines: LineWriter,
     columns: Columns,
     state: State,
+    /// When the state was last written, and whether there is more since.
+    saved: Instant,
+    unsaved: bool,
+    /// Whether a row is being taken in.
+    midway: bool,
     place: Place,
     /// Memory for standard errors.
     deviations: Vec<f64>,
@@ -97,7 +106,7 @@ impl<'a> Run<'a> {
         let setting = state::setting(job, &channels, &trackers);
         let resumed = stored.is_some();
         let state = match stored {
-            Some(state) => state.checked(&setting, job)?,
+            Some(state) => state.checked(&setting, &trackers, job)?,
             None => {
                 let sample_time = job.sample_time.or(report.map(|report| report.model.sample_time));
                 State::new(setting, trackers, stream.start().map(str::to_owned), sample_time)
@@ -108,8 +117,13 @@ impl<'a> Run<'a> {
             _ => Place::There,
         };
         let lines = if resumed {
-            say(&format!("goes on after row {}, line {} of the output", state.rows, state.written.lines));
-            LineWriter::resume(&job.lines.out, job.lines.format, columns.names(), state.written)?
+            let written = state.written.lines;
+            let cut = match job.lines.out == Path::new("-") {
+                true => format!(", line {written} of the output: what was written beyond that comes again"),
+                false => String::new(),
+            };
+            say(&format!("goes on after row {}{cut}", state.rows));
+            LineWriter::resume(&job.lines.out, job.lines.format, columns.names(), state.written.clone())?
         } else {
             LineWriter::create(&job.lines.out, job.lines.format, columns.names())?
         };
@@ -122,6 +136,9 @@ impl<'a> Run<'a> {
             lines,
             columns,
             state,
+            saved: Instant::now(),
+            unsaved: false,
+            midway: false,
             place,
             deviations: vec![f64::NAN; parameters],
         })
@@ -135,6 +152,11 @@ impl<'a> Run<'a> {
                 Next::Row => {}
                 Next::Idle => {
                     self.lines.flush()?;
+                    // A slow log would lose hours if only rows counted.
+                    if self.job.state.is_some() && self.saved.elapsed() > OLDEST_STATE && self.unsaved {
+                        self.lines.sync()?;
+                        self.save()?;
+                    }
                     continue;
                 }
                 Next::End => {
@@ -145,9 +167,12 @@ impl<'a> Run<'a> {
             }
             let alarm = match self.place.of_row(&self.state, &self.live, &self.name)? {
                 RowPlace::Old => continue,
-                RowPlace::Next => self.row(false)?,
-                RowPlace::AfterGap => self.row(true)?,
+                place => {
+                    self.midway = true;
+                    self.row(place == RowPlace::AfterGap)?
+                }
             };
+            self.midway = false;
             if alarm && self.job.stop_on_alarm {
                 return Ok(Ended::Alarm);
             }
@@ -160,9 +185,10 @@ impl<'a> Run<'a> {
 
     /// Takes in the row at hand; says whether there was an alarm.
     fn row(&mut self, after_gap: bool) -> Result<bool, Failure> {
-        let Self { job, name, live, lines, columns, state, deviations, .. } = self;
+        let Self { job, name, live, lines, columns, state, unsaved, deviations, .. } = self;
         let (values, time, malformed) = (live.values(), live.time(), live.is_malformed());
         state.rows += 1;
+        *unsaved = true;
         let row = state.rows;
         let step = time.map_or(Step::Regular, |time| state.pace.step(time));
         if after_gap || step != Step::Regular {
@@ -192,7 +218,7 @@ impl<'a> Run<'a> {
             }
             if let Some(alarm) = tracked.alarm {
                 any = true;
-                *alarms += 1;
+                *alarms = alarms.saturating_add(1);
                 columns.alarm(lines, row, time, index, &alarm)?;
             }
         }
@@ -200,6 +226,7 @@ impl<'a> Run<'a> {
     }
 
     fn save(&mut self) -> Result<(), Failure> {
+        (self.saved, self.unsaved) = (Instant::now(), false);
         self.state.written = self.lines.written();
         let Some(StateJob { path, .. }) = &self.job.state else { return Ok(()) };
         self.state.write(path)
@@ -221,6 +248,14 @@ impl<'a> Run<'a> {
             ));
         }
         let summary = self.summary();
+        if summary.gaps > summary.rows / 2 {
+            let expected = self.state.pace.sample_time().unwrap_or(f64::NAN);
+            warn(&format!(
+                "{}: most steps of the clock are not the {expected} s that the model has; give --sample-time, or a report of \
+                 this sample time",
+                self.name
+            ));
+        }
         if let Some(path) = &self.job.summary {
             let json = summary.to_json().map_err(|error| Failure::data(error.to_string()))?;
             output::write(path, |file| file.write_all(json.as_bytes()))?;

@@ -47,6 +47,11 @@ impl FilterJob {
         if arguments.smooth && matches!(estimator, Some(Estimator::Luenberger(_))) {
             return Err(Failure::usage("--smooth: an observer knows no covariance; use kalman or ekf"));
         }
+        if arguments.clock.time.is_some() && sample_time.is_some() {
+            return Err(Failure::usage(
+                "--sample-time: with --time each step has its own length; leave one of them out",
+            ));
+        }
         if arguments.model == Path::new("-") && arguments.path == Path::new("-") {
             return Err(Failure::usage("only one of the model and the log can come from standard input (-)"));
         }

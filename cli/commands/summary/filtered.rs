@@ -14,7 +14,7 @@ pub(crate) fn filtered(summary: &FilterSummary, faults: &str) -> String {
     };
     text.line(&format!("{estimator}: {} rows{faults}, {} values measured", summary.rows, summary.measured));
     if let Some(sum) = summary.log_likelihood {
-        text.line(&format!("log-likelihood {sum:.4}"));
+        text.line(&format!("log-likelihood {}", number(sum)));
     }
     if let Some(nis) = &summary.nis {
         let percent = |part: f64| format!("{:.1} %", 100.0 * part);

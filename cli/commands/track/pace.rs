@@ -25,6 +25,11 @@ impl Pace {
         Self { sample_time, last: None }
     }
 
+    /// Seconds from one sample to the next, if they are known yet.
+    pub(super) fn sample_time(&self) -> Option<f64> {
+        self.sample_time
+    }
+
     /// The latest time.
     pub(super) fn last(&self) -> Option<f64> {
         self.last

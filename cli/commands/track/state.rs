@@ -98,7 +98,12 @@ impl State {
     }
 
     /// This state, if it is of the same model and options.
-    pub(super) fn checked(self, setting: &[(String, String)], job: &TrackJob) -> Result<Self, Failure> {
+    pub(super) fn checked(
+        self,
+        setting: &[(String, String)],
+        trackers: &[Tracker],
+        job: &TrackJob,
+    ) -> Result<Self, Failure> {
         let path = job.state.as_ref().map_or_else(String::new, |state| state.path.display().to_string());
         for (option, now) in setting {
             let before =
@@ -110,6 +115,19 @@ impl State {
                     before.unwrap_or_default()
                 )));
             }
+        }
+        // Whoever edits a state by hand may break it in ways that the settings do not tell.
+        let fits = |(mine, new): (&Tracker, &Tracker)| {
+            mine.orders() == new.orders()
+                && mine.names() == new.names()
+                && mine.plan() == new.plan()
+                && mine.is_sound()
+        };
+        if self.trackers.len() != trackers.len() || !self.trackers.iter().zip(trackers).all(fits) {
+            return Err(Failure::data(format!(
+                "{path}: its parts do not fit together or to this command line; give the options of the run that wrote it, or \
+                 remove it to start anew"
+            )));
         }
         Ok(self)
     }
@@ -238,6 +256,12 @@ impl Place {
 
     /// That the log did not end before the rows that were absorbed.
     pub(super) fn check_end(self, state: &State, file: &str) -> Result<(), Failure> {
+        if let (Self::Beyond, Some(last)) = (self, state.pace.last()) {
+            return Err(Failure::data(format!(
+                "{file}: no row is later than {last} s, the last time of the state; if that was wrong, remove the state to \
+                 start anew"
+            )));
+        }
         if self == Self::Behind && state.rows > 0 {
             return Err(Failure::data(format!(
                 "{file}: it ends before row {}, the last one that the state has absorbed; give the log that the state is of",

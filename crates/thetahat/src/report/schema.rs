@@ -153,6 +153,11 @@ impl Report {
         };
         let head: Head = serde_json::from_str(text).map_err(malformed)?;
         if head.schema != SCHEMA && !head.schema.starts_with(&format!("{SCHEMA}.")) {
+            if head.schema.starts_with("thetahat.greybox/") {
+                return Err(Error::report(
+                    "this is the fit of a model in equations, which only `thetahat filter` reads; give a report of polynomials",
+                ));
+            }
             let shown: String = head.schema.chars().take(60).flat_map(char::escape_debug).collect();
             return Err(Error::report(format!(
                 "its schema is '{shown}', this version reads '{SCHEMA}'; fit the log again"

@@ -74,6 +74,11 @@ impl Collecting {
         Some(PerChannel { inputs: inputs.to_vec(), output })
     }
 
+    /// Whether its rows are of so many channels, and of so many inputs with the constant.
+    pub(super) fn fits(&self, inputs: usize, with_constant: usize) -> bool {
+        self.magnitudes.len() == inputs + 1 && self.rows.iter().all(|row| row.inputs.len() == with_constant)
+    }
+
     /// The latest rows, the oldest first; whether a gap follows the last one.
     pub(super) fn rows(&self) -> (impl Iterator<Item = &Row>, bool) {
         (self.rows.iter(), self.gap)

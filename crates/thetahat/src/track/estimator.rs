@@ -89,4 +89,15 @@ impl Estimator {
             Self::Armax(armax) => armax.estimator(),
         }
     }
+
+    /// Whether it is one for these orders, with so many parameters.
+    pub(super) fn fits(&self, orders: &Orders, parameters: usize) -> bool {
+        let (outputs, noise) = match self {
+            Self::Arx(arx) => (arx.a().count(), 1),
+            Self::Armax(armax) => (armax.a().count(), armax.c().count()),
+        };
+        outputs == orders.na + 1
+            && noise == orders.nc + 1
+            && self.least_squares().parameters().len() == parameters
+    }
 }

@@ -358,6 +358,26 @@ impl Tracker {
         &self.offsets
     }
 
+    /// Whether its parts fit together, as those of any tracker do that was not edited after it was written: for one that
+    /// was read back.
+    pub fn is_sound(&self) -> bool {
+        let inputs = self.orders.inputs();
+        let known = |channels: &PerChannel| channels.inputs.len() == inputs && channels.output.is_finite();
+        let Ok(fresh) = Self::new(&self.orders, &TrackPlan { scales: None, ..self.plan.clone() }) else {
+            return false;
+        };
+        let sizes = match &self.stage {
+            Stage::Running(estimator) => estimator.fits(&self.orders, self.names.len()),
+            Stage::Collecting(collecting) => collecting.fits(inputs, self.inputs.len()),
+        };
+        sizes
+            && fresh.names == self.names
+            && fresh.inputs.len() == self.inputs.len()
+            && known(&self.offsets)
+            && self.scales.as_ref().is_none_or(known)
+            && [0, inputs + 1].contains(&self.unset.len())
+    }
+
     /// The orders of the model, without the constant.
     pub fn orders(&self) -> &Orders {
         &self.orders

@@ -82,7 +82,7 @@ fn recursive_arx<T: Real>(group: &mut BenchmarkGroup<'_, WallTime>) -> Result<()
 /// What a program runs that got its orders from a person: run-time sizes, a prediction, charts for changes.
 fn tracker(criterion: &mut Criterion) -> Result<(), thetahat::Error> {
     let scales = PerChannel { inputs: vec![1.0], output: 1.0 };
-    let plan = TrackPlan { scales: Some(scales), false_alarms: Some(10_000.0), ..TrackPlan::default() };
+    let plan = TrackPlan { scales: Some(scales), alarm_interval: Some(10_000.0), ..TrackPlan::default() };
     let mut tracker = Tracker::new(&Orders::arx(4, &[4], &[1])?, &plan)?;
     let mut k = 0;
     criterion.bench_function("Tracker, ARX(4, 4, 1)", |bencher| {

@@ -111,7 +111,8 @@ Examples:
     /// which unknown parameters are estimated together with the state. Each line has the states as predicted from the rows
     /// before and as corrected by this one, with standard deviations (_sd); what was measured and predicted of each output,
     /// and the innovation; the normalised innovation squared (nis) and between which bounds it lies in 95 % of the rows; and
-    /// held, the inputs that are missing in this row. Ends with a table on standard error.
+    /// held, the inputs that are missing in this row. An observer has predicted states only. Ends with a table on standard
+    /// error.
     #[command(after_help = "\
 Examples:
   thetahat filter spring.toml log.csv --format csv > states.csv

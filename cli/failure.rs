@@ -10,12 +10,16 @@ use crate::table;
 
 /// The option that an argument of the library is here, if it is one.
 fn option_of(argument: &str) -> Option<&str> {
-    const SAME: [&str; 22] = [
+    const SAME: [&str; 29] = [
+        "alarm",
         "alpha",
         "alphas",
+        "constant",
         "dc-gain",
+        "dead-zone",
         "detrend",
         "estimator",
+        "forgetting",
         "frequencies",
         "gain",
         "horizon",
@@ -29,18 +33,17 @@ fn option_of(argument: &str) -> Option<&str> {
         "require",
         "resample",
         "ridge",
+        "rows",
+        "scale",
         "select",
         "split",
+        "start",
         "step",
         "tolerance",
     ];
     match argument {
         // One at a time.
         "bounds" => Some("bound"),
-        "factor" => Some("forgetting"),
-        "false alarms" => Some("alarm"),
-        "scales" => Some("scale"),
-        "width" => Some("dead-zone"),
         same => SAME.contains(&same).then_some(same),
     }
 }

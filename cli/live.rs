@@ -1,7 +1,5 @@
 //! What verbs that follow a log row by row have in common.
 
-use thetahat::thetahat_core::Action;
-
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::output::warn;
@@ -162,21 +160,5 @@ fn tell(count: u64, message: &str, more: &str) {
         0..=TOLD => warn(message),
         _ if count == TOLD + 1 => warn(more),
         _ => {}
-    }
-}
-
-/// What was done with a sample, as a word.
-pub(crate) fn action(action: Action) -> &'static str {
-    match action {
-        Action::Updated => "updated",
-        Action::Capped => "capped",
-        Action::Projected => "projected",
-        Action::Missing => "missing",
-        Action::NotReady => "not_ready",
-        Action::Collecting => "collecting",
-        Action::Frozen => "frozen",
-        Action::Skipped => "skipped",
-        Action::Gated => "gated",
-        _ => "other",
     }
 }

@@ -265,7 +265,7 @@ fn a_live_pipe_that_has_moved_on_leaves_a_gap() {
     let later = folder.run_on(&line, csv(&[("u", &u[150..]), ("y", &y[150..])]));
     let lines = objects(&later.stdout);
     assert_eq!((&lines[0]["event"], number(&lines[0], "/row")), (&"gap".into(), 111.0));
-    assert_eq!(lines[1]["action"], "not_ready");
+    assert_eq!(lines[1]["action"], "not ready");
     assert_eq!(lines[2]["action"], "updated");
     assert_eq!(lines.len(), 151);
     // Said to be later although its first row is that of the state.

@@ -15,7 +15,7 @@ use crate::args::TrackArguments;
 use crate::failure::Failure;
 use crate::job::{StateJob, TrackJob};
 use crate::line_writer::LineWriter;
-use crate::live::{Live, Next, action};
+use crate::live::{Live, Next};
 use crate::log;
 use crate::output::{self, say, warn};
 use columns::{Columns, Sample};
@@ -210,8 +210,8 @@ impl<'a> Run<'a> {
             if row.is_multiple_of(job.lines.every) {
                 let done = match (malformed, tracked.too_large) {
                     (true, _) => "malformed",
-                    (_, true) => "too_large",
-                    _ => action(tracked.action),
+                    (_, true) => "too large",
+                    _ => tracked.action.word(),
                 };
                 let sample = Sample { row, time, index, action: done, output, tracked };
                 columns.sample(lines, &sample, tracker, deviations)?;

@@ -20,8 +20,8 @@ pub(crate) struct TrackJob {
     pub(crate) output: Option<String>,
     pub(crate) warm: Option<PathBuf>,
     pub(crate) lines: LineJob,
-    /// Whether forecasts were asked for.
-    pub(crate) forecasts: bool,
+    /// How many rows ahead a forecast is, if it was asked for.
+    pub(crate) horizon: Option<usize>,
     pub(crate) stop_on_alarm: bool,
     pub(crate) state: Option<StateJob>,
     pub(crate) summary: Option<PathBuf>,
@@ -67,10 +67,9 @@ impl TrackJob {
                 .map(|text| parsed("--start", text))
                 .transpose()?
                 .unwrap_or_default(),
-            horizon: arguments.horizon.map_or(1, |steps| steps as usize),
             dead_zone: arguments.dead_zone.unwrap_or(0.0),
             constant: arguments.constant,
-            false_alarms: arguments.alarm,
+            alarm_interval: arguments.alarm,
             ..TrackPlan::default()
         };
         let orders = Given {
@@ -96,7 +95,7 @@ impl TrackJob {
             output: arguments.output.clone(),
             warm: arguments.warm.clone(),
             lines: LineJob::resolve(&arguments.lines),
-            forecasts: arguments.horizon.is_some(),
+            horizon: arguments.horizon.map(|rows| rows as usize),
             stop_on_alarm: arguments.stop_on_alarm,
             state: arguments.state.as_ref().map(|path| StateJob {
                 path: path.clone(),
@@ -124,7 +123,7 @@ impl TrackJob {
 
     /// Whether alarms were asked for.
     pub(crate) fn is_watched(&self) -> bool {
-        self.plan.false_alarms.is_some()
+        self.plan.alarm_interval.is_some()
     }
 
     /// A tracker for each policy.
@@ -186,7 +185,7 @@ impl TrackJob {
         let track = |policy: &Policy| {
             let plan = TrackPlan { forgetting: *policy, ..plan.clone() };
             match report {
-                Some(report) => Tracker::from_report(report, Some(&orders), &plan),
+                Some(report) => Tracker::from_report(report, &plan),
                 None => Tracker::new(&orders, &plan),
             }
             .map_err(|error| match error {

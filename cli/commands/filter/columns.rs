@@ -1,16 +1,17 @@
 //! The lines of `filter`.
 
-use thetahat::{StateEstimate, StateModel, Values};
+use thetahat::{Estimator, StateEstimate, StateModel, Values};
 
 use crate::failure::Failure;
 use crate::job::{Clock, FilterJob};
 use crate::line_writer::{Cells, LineWriter};
-use crate::live::action;
 
 /// The columns of a run.
 pub(super) struct Columns {
     names: Vec<String>,
     has_time: bool,
+    /// Whether there is no noise, and so neither a corrected state nor a standard deviation.
+    observes: bool,
     inputs: Vec<String>,
 }
 
@@ -26,13 +27,19 @@ impl Columns {
         let mut add = |name: &str, suffixes: &[&str]| {
             names.extend(suffixes.iter().chain(smoothed).map(|suffix| format!("{name}{suffix}")));
         };
-        model.states().iter().for_each(|state| add(state, &["", "_sd", "_predicted", "_predicted_sd"]));
+        let observes = matches!(job.estimator(model), Estimator::Luenberger(_));
+        let of_state: &[&str] =
+            if observes { &["_predicted"] } else { &["", "_sd", "_predicted", "_predicted_sd"] };
+        model.states().iter().for_each(|state| add(state, of_state));
         model.unknown().for_each(|parameter| add(parameter, &["", "_sd"]));
         for output in model.outputs() {
             let parts = [("measured", ""), ("predicted", ""), ("innovation", ""), ("innovation", "_sd")];
-            names.extend(parts.map(|(part, suffix)| format!("{part}_{output}{suffix}")));
+            let parts = if observes { &parts[..3] } else { &parts[..] };
+            names.extend(parts.iter().map(|(part, suffix)| format!("{part}_{output}{suffix}")));
         }
-        names.extend(["nis", "nis_low", "nis_high", "log_likelihood"].map(str::to_owned));
+        if !observes {
+            names.extend(["nis", "nis_low", "nis_high", "log_likelihood"].map(str::to_owned));
+        }
         names.extend((!model.inputs().is_empty()).then(|| "held".to_owned()));
         let twice = |(index, name): &(usize, &String)| names.iter().take(*index).any(|other| other == *name);
         if let Some((_, name)) = names.iter().enumerate().find(twice) {
@@ -41,7 +48,7 @@ impl Columns {
                 job.model.display()
             )));
         }
-        Ok(Self { names, has_time, inputs: model.inputs().to_vec() })
+        Ok(Self { names, has_time, observes, inputs: model.inputs().to_vec() })
     }
 
     pub(super) fn names(&self) -> &[String] {
@@ -63,8 +70,12 @@ impl Columns {
             if self.has_time {
                 cells.number(time.unwrap_or(f64::NAN));
             }
-            cells.word(action(estimate.action));
+            cells.word(estimate.action.word());
             for index in 0..estimate.predicted.values.len() {
+                if self.observes {
+                    cells.number(at(estimate.predicted.values, index));
+                    continue;
+                }
                 pair(cells, estimate.filtered.as_ref(), index);
                 pair(cells, Some(&estimate.predicted), index);
                 if let Some((states, _)) = &smoothed {
@@ -81,19 +92,29 @@ impl Columns {
                 cells.number(measured);
                 cells.number(at(estimate.outputs.values, index));
                 cells.number(at(estimate.innovations, index));
-                cells.number(at(estimate.outputs.standard_deviations.unwrap_or_default(), index));
+                if let Some(deviations) = estimate.outputs.standard_deviations {
+                    cells.number(at(deviations, index));
+                }
+            }
+            if self.observes {
+                return self.held(cells, estimate);
             }
             cells.number(estimate.nis.unwrap_or(f64::NAN));
             let (low, high) = estimate.nis_bounds.unwrap_or((f64::NAN, f64::NAN));
             cells.number(low);
             cells.number(high);
             cells.number(estimate.log_likelihood.unwrap_or(f64::NAN));
-            if estimate.held.contains(&true) {
-                let held = self.inputs.iter().zip(estimate.held).filter(|(_, held)| **held);
-                let held: Vec<&str> = held.map(|(name, _)| name.as_str()).collect();
-                cells.word(&held.join(" "));
-            }
+            self.held(cells, estimate);
         })
+    }
+
+    /// The inputs that are missing in this row.
+    fn held(&self, cells: &mut Cells<'_>, estimate: &StateEstimate<'_>) {
+        if estimate.held.contains(&true) {
+            let held = self.inputs.iter().zip(estimate.held).filter(|(_, held)| **held);
+            let held: Vec<&str> = held.map(|(name, _)| name.as_str()).collect();
+            cells.word(&held.join(" "));
+        }
     }
 }
 

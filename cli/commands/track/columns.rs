@@ -9,7 +9,7 @@ use crate::line_writer::{Cells, LineWriter};
 
 /// What stands in front of the parameters of each sample.
 const FIGURES: [&str; 7] =
-    ["action", "measured", "prediction", "innovation", "innovation_sd", "nis", "excitation"];
+    ["action", "measured", "predicted", "innovation", "innovation_sd", "nis", "excitation"];
 /// What an alarm has.
 const ALARM: [&str; 3] = ["chart", "statistic", "samples"];
 
@@ -19,7 +19,7 @@ pub(super) struct Columns {
     has_time: bool,
     /// The policies, where there are several.
     policies: Vec<String>,
-    has_forecast: bool,
+    horizon: Option<usize>,
     parameters: usize,
 }
 
@@ -46,13 +46,13 @@ impl Columns {
         names.extend(has_time.then(|| "time".to_owned()));
         names.extend((!policies.is_empty()).then(|| "forgetting".to_owned()));
         names.extend(FIGURES.map(str::to_owned));
-        names.extend(job.forecasts.then(|| "forecast".to_owned()));
+        names.extend(job.horizon.map(|_| "forecast".to_owned()));
         names.extend(parameters.iter().cloned());
         names.extend(parameters.iter().map(|name| format!("{name}_se")));
         if trackers.first().is_some_and(|tracker| tracker.detector().is_some()) {
             names.extend(ALARM.map(str::to_owned));
         }
-        Self { names, has_time, policies, has_forecast: job.forecasts, parameters: parameters.len() }
+        Self { names, has_time, policies, horizon: job.horizon, parameters: parameters.len() }
     }
 
     pub(super) fn names(&self) -> &[String] {
@@ -69,19 +69,18 @@ impl Columns {
     ) -> Result<(), Failure> {
         let Sample { row, time, index, action, output, tracked } = sample;
         tracker.write_standard_errors(deviations).map_err(|error| Failure::data(error.to_string()))?;
-        let forecast = if self.has_forecast { tracker.forecast() } else { f64::NAN };
+        let forecast = self.horizon.map(|rows| tracker.forecast(rows)).transpose();
+        let forecast = forecast.map_err(|error| Failure::option(&error))?;
         lines.add(|cells| {
             self.head(cells, "sample", *row, *time, Some(*index));
             cells.word(action);
             cells.number(*output);
-            cells.number(tracked.prediction);
+            cells.number(tracked.predicted);
             cells.number(tracked.error);
             cells.number(tracked.variance.sqrt());
             cells.number(if tracked.variance.is_finite() { tracked.nis } else { f64::NAN });
             cells.number(tracked.excitation);
-            if self.has_forecast {
-                cells.number(forecast);
-            }
+            forecast.into_iter().for_each(|forecast| cells.number(forecast));
             match tracker.parameters() {
                 Some(parameters) => parameters.iter().for_each(|&value| cells.number(value)),
                 None => (0..self.parameters).for_each(|_| cells.number(f64::NAN)),
@@ -106,7 +105,7 @@ impl Columns {
         };
         lines.add(|cells| {
             self.head(cells, "alarm", row, time, Some(index));
-            cells.skip(FIGURES.len() + usize::from(self.has_forecast) + 2 * self.parameters);
+            cells.skip(FIGURES.len() + usize::from(self.horizon.is_some()) + 2 * self.parameters);
             cells.word(chart);
             cells.number(alarm.statistic);
             cells.count(alarm.samples.into());

@@ -169,11 +169,11 @@ pub(super) fn setting(job: &TrackJob, channels: &Channels, trackers: &[Tracker])
         add("--constant", plan.constant.to_string());
         add("--method", plan.method.to_string());
         add("--start", plan.start.to_string());
-        add("--horizon", if job.forecasts { plan.horizon.to_string() } else { String::new() });
+        add("--horizon", job.horizon.map_or_else(String::new, |rows| rows.to_string()));
         add("--dead-zone", plan.dead_zone.to_string());
         add("--offset", numbers(Some(tracker.offsets())));
         add("--scale", numbers(plan.scales.as_ref()));
-        add("--alarm", plan.false_alarms.map_or_else(String::new, |interval| interval.to_string()));
+        add("--alarm", plan.alarm_interval.map_or_else(String::new, |interval| interval.to_string()));
     }
     let policies: Vec<String> =
         trackers.iter().map(|tracker| tracker.plan().forgetting.to_string()).collect();

@@ -38,9 +38,9 @@ pub struct Alarm<T> {
 /// variance      g <- max(0, g + (z²/2 - ln 2)/2)       a variance of 2 against 1
 /// ```
 ///
-/// and an alarm is given where g exceeds its threshold. Among all charts with the same mean time between false alarms
-/// this one finds its change soonest, in the worst case (Lorden 1971; Moustakides 1986); other changes are found
-/// too. Smaller ones take longer. After an alarm, what exceeded its threshold starts again from 0; the other charts
+/// and an alarm is given where g exceeds its threshold. Each chart is the quickest for its change, in the worst case, among
+/// those with the same mean time between false alarms (Lorden 1971; Moustakides 1986). It finds other changes too, smaller
+/// ones later. After an alarm, what exceeded its threshold starts again from 0; the other charts
 /// go on.
 ///
 /// An estimator that forgets follows a change after some time, and its innovations become white again: then the

@@ -29,6 +29,27 @@ pub enum Action {
     Gated,
 }
 
+impl Action {
+    /// The action in a word or two, as tables show it.
+    ///
+    /// ```
+    /// assert_eq!(thetahat_core::Action::NotReady.word(), "not ready");
+    /// ```
+    pub const fn word(self) -> &'static str {
+        match self {
+            Action::Updated => "updated",
+            Action::Capped => "capped",
+            Action::Projected => "projected",
+            Action::Missing => "missing",
+            Action::NotReady => "not ready",
+            Action::Collecting => "collecting",
+            Action::Frozen => "frozen",
+            Action::Skipped => "skipped",
+            Action::Gated => "gated",
+        }
+    }
+}
+
 /// The innovation of a sample: the part of the measurement that was not predicted.
 ///
 /// ```text

@@ -18,8 +18,12 @@
 //! | `Smoother` | the states given the whole record (feature `alloc`) |
 //! | `Differentiated` | exact Jacobians of one generic function (feature `autodiff`) |
 //!
-//! Each sample returns an [`Innovation`]: what was not predicted, how surprising it is, and the [`Action`] that was
-//! taken. A [`ChangeDetector`] watches innovations for what the model did not expect. A [`Covariance`] is kept factored, so that it never becomes indefinite.
+//! | what a sample tells | |
+//! |---|---|
+//! | [`Innovation`] | what was not predicted, how surprising it is, and the [`Action`] that was taken |
+//! | [`ChangeDetector`] | charts that watch innovations; an [`Alarm`] says what changed, and since when |
+//!
+//! A [`Covariance`] is kept factored, so that it never becomes indefinite.
 //!
 //! All work with `f32` and `f64` ([`Real`]) and with sizes in the type, `Const<4>`, or at run time, `Dyn`
 //! ([`Dimension`]). Vectors and matrices are those of [nalgebra](mod@nalgebra), which this crate re-exports.

@@ -70,9 +70,8 @@ fn samples_of_a_tracker_take_no_memory() {
         let plan = TrackPlan {
             method,
             forgetting: forgetting.parse().unwrap(),
-            horizon: 5,
             constant: true,
-            false_alarms: Some(1000.0),
+            alarm_interval: Some(1000.0),
             ..TrackPlan::default()
         };
         let mut tracker = Tracker::new(&Orders::armax(2, &[2], nc, &[3]).unwrap(), &plan).unwrap();
@@ -83,7 +82,7 @@ fn samples_of_a_tracker_take_no_memory() {
                 y = 0.8 * y + u[t] + e[t];
                 let measured = if t % 97 == 0 { f64::NAN } else { y };
                 work += tracker.update(&[u[t]], measured).unwrap().excitation;
-                work += tracker.forecast();
+                work += tracker.forecast(5).unwrap();
                 tracker.write_standard_errors(&mut errors).unwrap();
             }
         };

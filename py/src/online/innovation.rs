@@ -105,10 +105,10 @@ impl Innovation {
 
     #[getter]
     fn action(&self) -> &'static str {
-        name(match &self.value {
-            Value::Number(innovation) => innovation.action,
-            Value::Vector(innovation) => innovation.action,
-        })
+        match &self.value {
+            Value::Number(innovation) => innovation.action.word(),
+            Value::Vector(innovation) => innovation.action.word(),
+        }
     }
 
     #[getter]
@@ -138,19 +138,19 @@ impl Innovation {
 }
 
 /// All actions, in the order of their codes.
-pub(crate) const NAMES: [(Action, &str); 9] = [
-    (Action::Updated, "updated"),
-    (Action::Capped, "capped"),
-    (Action::Projected, "projected"),
-    (Action::Missing, "missing"),
-    (Action::NotReady, "not ready"),
-    (Action::Collecting, "collecting"),
-    (Action::Frozen, "frozen"),
-    (Action::Skipped, "skipped"),
-    (Action::Gated, "gated"),
+const ACTIONS: [Action; 9] = [
+    Action::Updated,
+    Action::Capped,
+    Action::Projected,
+    Action::Missing,
+    Action::NotReady,
+    Action::Collecting,
+    Action::Frozen,
+    Action::Skipped,
+    Action::Gated,
 ];
 
-/// The place of an action among the names.
+/// The place of an action among them.
 pub(crate) fn code(action: Action) -> u8 {
     match action {
         Action::Updated => 0,
@@ -166,20 +166,14 @@ pub(crate) fn code(action: Action) -> u8 {
     }
 }
 
-fn name(action: Action) -> &'static str {
-    NAMES.get(usize::from(code(action))).map_or("unknown", |(_, name)| name)
-}
-
-fn action(name: &str) -> PyResult<Action> {
-    let found = NAMES.iter().find(|(_, known)| *known == name);
-    found
-        .map(|(action, _)| *action)
-        .ok_or_else(|| PyValueError::new_err(format!("action: there is no action {name}")))
+fn action(word: &str) -> PyResult<Action> {
+    let found = ACTIONS.into_iter().find(|action| action.word() == word);
+    found.ok_or_else(|| PyValueError::new_err(format!("action: there is no action {word}")))
 }
 
 /// The actions behind these codes, as an array of strings.
 pub(crate) fn names<'py>(py: Python<'py>, codes: &Bound<'py, PyArray1<u8>>) -> PyResult<Bound<'py, PyAny>> {
-    let all = PyTuple::new(py, NAMES.map(|(_, name)| name))?;
+    let all = PyTuple::new(py, ACTIONS.map(Action::word))?;
     py.import("numpy")?.call_method1("array", (all,))?.get_item(codes)
 }
 

@@ -7,6 +7,7 @@
 //! give it a row in `budgets.md`. Leave out what needs ln, exp, sin or cos: their last bit differs
 //! between the host's library and the firmware's.
 
+mod detect;
 mod kalman;
 mod least_squares;
 mod record;
@@ -69,6 +70,7 @@ pub fn visit_all(visitor: &mut impl Visitor) {
     visitor.visit::<recursive::Recursive<16>>();
     visitor.visit::<recursive::Arx>();
     visitor.visit::<recursive::Armax>();
+    visitor.visit::<detect::Detector>();
     visitor.visit::<kalman::Kalman<2, 1>>();
     visitor.visit::<kalman::Kalman<4, 2>>();
     visitor.visit::<kalman::Kalman<6, 3>>();

@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 use super::missing;
 use super::plan::PerChannel;
 
-/// A number below this is none: its square could not be told from 0.
-const SMALLEST: f64 = 1e-98;
+/// A number below this is none: its square could not be told from 0. No scale can be smaller.
+pub(super) const SMALLEST: f64 = 1e-98;
 /// No scale can be larger.
 pub(super) const LARGEST: f64 = 1e98;
 /// Fewer rows are not enough to tell a magnitude.

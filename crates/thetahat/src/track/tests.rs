@@ -72,7 +72,7 @@ fn with_the_scales_found_it_is_the_library_to_the_bit() {
                 bits([expected.error, expected.variance, expected.nis])
             );
             assert_eq!(found.action, expected.action);
-            assert!(expected.error.is_nan() || y - found.prediction == expected.error);
+            assert!(expected.error.is_nan() || y - found.predicted == expected.error);
         }
     }
     assert_eq!(tracker.parameters().unwrap(), library.estimator().parameters().as_slice());
@@ -184,9 +184,9 @@ fn an_exact_start_predicts_nothing_before_it_knows_something() {
     for (u, &y) in inputs.iter().zip(&y) {
         let before = tracker.parameters().is_some();
         let tracked = tracker.update(u, y).unwrap();
-        assert_eq!(tracked.prediction.is_finite(), before, "{tracked:?}");
+        assert_eq!(tracked.predicted.is_finite(), before, "{tracked:?}");
         assert_eq!(tracked.error.is_finite(), before);
-        assert_eq!(tracker.forecast().is_finite(), tracker.parameters().is_some());
+        assert_eq!(tracker.forecast(1).unwrap().is_finite(), tracker.parameters().is_some());
         known += usize::from(before);
     }
     // Two rows fill the lines, five parameters need five more.
@@ -202,10 +202,10 @@ fn a_missing_output_is_predicted_all_the_same() {
     let tracked = run(&mut tracker, &inputs, &y);
     let missing = tracked[150];
     assert_eq!(missing.action, Action::Missing);
-    assert!((missing.prediction - truth).abs() < 0.5 && missing.error.is_nan() && missing.variance.is_nan());
+    assert!((missing.predicted - truth).abs() < 0.5 && missing.error.is_nan() && missing.variance.is_nan());
     // In the next two samples it is in the taps.
-    assert!(tracked[151].prediction.is_nan() && tracked[152].prediction.is_nan());
-    assert!(tracked[153].prediction.is_finite());
+    assert!(tracked[151].predicted.is_nan() && tracked[152].predicted.is_nan());
+    assert!(tracked[153].predicted.is_finite());
 }
 
 #[test]
@@ -243,9 +243,9 @@ fn a_forecast_holds_the_inputs() {
     let offsets = Some(PerChannel { inputs: vec![1.0, -2.0], output: 50.0 });
     let shifted: Vec<[f64; 2]> = inputs.iter().map(|u| [u[0] + 1.0, u[1] - 2.0]).collect();
     let raised: Vec<f64> = y.iter().map(|y| y + 50.0).collect();
-    let plan = TrackPlan { horizon: 3, offsets, ..exactly(&TrackPlan::default()) };
+    let plan = TrackPlan { offsets, ..exactly(&TrackPlan::default()) };
     let mut tracker = Tracker::new(&orders(), &plan).unwrap();
-    assert!(tracker.forecast().is_nan());
+    assert!(tracker.forecast(3).unwrap().is_nan());
     run(&mut tracker, &shifted, &raised);
 
     let (last, before) = (inputs[499], inputs[498]);
@@ -255,12 +255,19 @@ fn a_forecast_holds_the_inputs() {
     for t in 2..5 {
         future[t] = 1.5 * future[t - 1] - 0.7 * future[t - 2] + 2.0 * u1[t - 1] + 0.5 * u1[t - 2] - last[1];
     }
-    let found = tracker.forecast();
+    let found = tracker.forecast(3).unwrap();
     assert!((found - 50.0 - future[4]).abs() < 1e-8 * future[4].abs(), "{found} {future:?}");
-    // It changes nothing.
-    assert_eq!(tracker.forecast(), found);
+    // It changes nothing, and other horizons do not change it.
+    assert!((tracker.forecast(1).unwrap() - 50.0 - future[2]).abs() < 1e-8 * future[2].abs());
+    assert!(tracker.forecast(10_000).unwrap().is_finite());
+    for steps in [0, 10_001] {
+        assert!(
+            matches!(tracker.forecast(steps), Err(Error::Argument { argument, .. }) if argument == "horizon")
+        );
+    }
+    assert_eq!(tracker.forecast(3).unwrap(), found);
     tracker.update(&[f64::NAN, 0.0], 50.0).unwrap();
-    assert!(tracker.forecast().is_nan());
+    assert!(tracker.forecast(3).unwrap().is_nan());
 }
 
 #[test]
@@ -281,7 +288,7 @@ fn a_constant_and_offsets_are_found_and_put_back() {
     let mut tracker = Tracker::new(&orders(), &TrackPlan { offsets, constant: false, ..plan }).unwrap();
     let with_offsets = run(&mut tracker, &inputs, &raised);
     for (a, b) in with_constant.iter().zip(&with_offsets).skip(200) {
-        assert!((a.prediction - b.prediction).abs() < 0.1 && (raised[0] - 50.0).abs() < 5.0);
+        assert!((a.predicted - b.predicted).abs() < 0.1 && (raised[0] - 50.0).abs() < 5.0);
     }
 }
 
@@ -316,7 +323,7 @@ fn a_change_of_the_plant_is_noticed_at_once() {
     let (inputs, mut y) = log(4000, 0.3, 0.0, 11);
     // From row 3000 on the first input acts on a constant load.
     y.iter_mut().skip(3000).for_each(|y| *y += 2.0);
-    let plan = TrackPlan { false_alarms: Some(1e5), ..TrackPlan::default() };
+    let plan = TrackPlan { alarm_interval: Some(1e5), ..TrackPlan::default() };
     let mut tracker = Tracker::new(&orders(), &plan).unwrap();
     let tracked = run(&mut tracker, &inputs, &y);
     let alarm = tracked.iter().position(|tracked| tracked.alarm.is_some()).unwrap();

@@ -1,7 +1,7 @@
 use serde::{Deserialize, Serialize};
 use thetahat_core::{Action, Alarm, ChangeDetector, Innovation, Real};
 
-use super::collecting::{Collecting, LARGEST};
+use super::collecting::{Collecting, LARGEST, SMALLEST};
 use super::estimator::{Estimator, Lines};
 use super::missing;
 use super::plan::{PerChannel, TrackPlan};
@@ -18,7 +18,7 @@ pub struct Tracked {
     /// The one-step prediction, from all samples before and the inputs of this one, in the output's units; NaN if there is
     /// none: while rows are collected, and where it depends on a missing sample. (It is there where only the output is
     /// missing.)
-    pub prediction: f64,
+    pub predicted: f64,
     /// The innovation e: the output less its prediction; NaN if one of the two is missing.
     pub error: f64,
     /// S, the variance of e; NaN until the noise variance is known.
@@ -79,7 +79,7 @@ pub struct Tracked {
 /// let parameters = tracker.parameters().expect("an estimate");
 /// assert!((parameters[0] + 0.8).abs() < 1e-3 && (parameters[1] - 0.5).abs() < 1e-3);
 /// // y is the output to come, which the input before it decides.
-/// assert!((tracker.forecast() - y).abs() < 1e-2);
+/// assert!((tracker.forecast(1)? - y).abs() < 1e-2);
 /// # Ok::<(), thetahat::Error>(())
 /// ```
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -158,7 +158,7 @@ impl Tracker {
             stage,
             has_estimate: plan.start.0 != thetahat_core::Start::Exact,
             settling: 2 * parameters + 20,
-            detector: plan.false_alarms.map(change_detector).transpose()?,
+            detector: plan.alarm_interval.map(change_detector).transpose()?,
             score: TrackScore::default(),
             inputs: latest,
             room: Room::default(),
@@ -230,15 +230,15 @@ impl Tracker {
     fn step(&mut self, output: f64) -> Result<Tracked, Error> {
         let Stage::Running(estimator) = &mut self.stage else { return Ok(Tracked::collecting()) };
         let lines = self.room.lines.get_or_insert_with(|| estimator.lines().clone());
-        let mut prediction = [f64::NAN];
-        estimator.predict(lines, &self.inputs, &mut prediction);
-        let [mut prediction] = prediction;
+        let mut predicted = [f64::NAN];
+        estimator.predict(lines, &self.inputs, &mut predicted);
+        let [mut predicted] = predicted;
         let innovation = estimator.update(&self.inputs, output).map_err(sample_refused)?;
         let Innovation { mut error, mut variance, mut nis, action } = innovation;
         let excitation = estimator.least_squares().excitation();
         if !self.has_estimate {
             // What the prior says of a sample is no prediction.
-            (prediction, error, variance, nis) = (f64::NAN, f64::NAN, f64::NAN, 0.0);
+            (predicted, error, variance, nis) = (f64::NAN, f64::NAN, f64::NAN, 0.0);
             self.has_estimate = corrects(action);
         }
         let mut alarm = None;
@@ -248,8 +248,8 @@ impl Tracker {
             self.score.count(&innovation, output);
             alarm = self.detector.as_mut().and_then(|detector| detector.update(&innovation));
         }
-        prediction += self.offsets.output;
-        Ok(Tracked { prediction, error, variance, nis, action, excitation, alarm, too_large: false })
+        predicted += self.offsets.output;
+        Ok(Tracked { predicted, error, variance, nis, action, excitation, alarm, too_large: false })
     }
 
     /// Goes on from the rows that were collected, with these scales.
@@ -281,23 +281,29 @@ impl Tracker {
         self.inputs.iter_mut().take(self.orders.inputs()).for_each(|input| *input = f64::NAN);
     }
 
-    /// The prediction T samples ahead, T being the horizon of the plan: y(k + T) from the samples up to k, in the output's
-    /// units. Inputs to come are held at their latest values.
+    /// The prediction so many steps ahead: y(k + steps) from the samples up to k, in the output's units. Inputs to come are
+    /// held at their latest values.
     ///
     /// NaN if there is none: before there is an estimate, where it depends on a missing sample, or where an unstable
-    /// model overflows. T times 2 n multiply-adds and moves. (The memory for it is taken at the first call.)
-    pub fn forecast(&mut self) -> f64 {
-        let Stage::Running(estimator) = &self.stage else { return f64::NAN };
+    /// model overflows. 2 n multiply-adds and moves a step. (The memory for it is taken at the first call with so many steps.)
+    ///
+    /// # Errors
+    /// [`Error::Argument`] if the steps are not in 1 … 10,000.
+    pub fn forecast(&mut self, steps: usize) -> Result<f64, Error> {
+        if !(1..=FARTHEST).contains(&steps) {
+            return Err(Error::argument("horizon", format!("{steps} is not in 1 … {FARTHEST}")));
+        }
+        let Stage::Running(estimator) = &self.stage else { return Ok(f64::NAN) };
         if !self.has_estimate {
-            return f64::NAN;
+            return Ok(f64::NAN);
         }
         let Room { lines, inputs, outputs } = &mut self.room;
         let lines = lines.get_or_insert_with(|| estimator.lines().clone());
-        outputs.resize(self.plan.horizon, f64::NAN);
+        outputs.resize(steps, f64::NAN);
         inputs.clear();
-        (0..self.plan.horizon).for_each(|_| inputs.extend_from_slice(&self.inputs));
+        (0..steps).for_each(|_| inputs.extend_from_slice(&self.inputs));
         estimator.predict(lines, inputs, outputs);
-        outputs.last().map_or(f64::NAN, |&predicted| predicted + self.offsets.output)
+        Ok(outputs.last().map_or(f64::NAN, |&predicted| predicted + self.offsets.output))
     }
 
     /// The names of the parameters, in their order: those of [`Orders::names`], with `constant` after those of B if there is one.
@@ -399,7 +405,7 @@ impl Tracked {
     /// A row that was kept.
     fn collecting() -> Self {
         Self {
-            prediction: f64::NAN,
+            predicted: f64::NAN,
             error: f64::NAN,
             variance: f64::NAN,
             nis: 0.0,
@@ -439,32 +445,63 @@ pub(super) fn check(orders: &Orders, plan: &TrackPlan) -> Result<(), Error> {
         let message = format!("{orders} has only the standard start; leave out '{}'", plan.start);
         return Err(Error::argument("start", message));
     }
-    if !(1..=FARTHEST).contains(&plan.horizon) {
-        return Err(Error::argument("horizon", format!("{} is not in 1 … {FARTHEST}", plan.horizon)));
+    let is_scale = |scale: f64| (SMALLEST..=LARGEST).contains(&scale);
+    if let Some(scale) = plan.noise_scale.filter(|&scale| orders.nc > 0 && !is_scale(scale)) {
+        let message =
+            format!("{scale:?} is not in {SMALLEST:e} … {LARGEST:e}; give the typical magnitude of e");
+        return Err(Error::argument("noise-scale", message));
     }
-    if plan.noise_scale.is_some_and(|scale| !scale.is_finite()) {
-        return Err(Error::argument("noise_scale", "it is not finite"));
+    if let Some(offsets) = &plan.offsets {
+        check_channels(
+            "offset",
+            offsets,
+            inputs,
+            f64::is_finite,
+            "is not finite; give what is to be taken off",
+        )?;
     }
-    for (argument, given) in [("offsets", &plan.offsets), ("scales", &plan.scales)] {
-        let Some(given) = given else { continue };
-        if given.inputs.len() != inputs {
-            let message = format!("there are {} values for {inputs} inputs", given.inputs.len());
-            return Err(Error::argument(argument, message));
-        }
-        if !given.inputs.iter().chain([&given.output]).all(|value| value.is_finite()) {
-            return Err(Error::argument(argument, "a value is not finite"));
-        }
+    if let Some(scales) = &plan.scales {
+        let message = format!("is not in {SMALLEST:e} … {LARGEST:e}; give its typical magnitude");
+        check_channels("scale", scales, inputs, is_scale, &message)?;
     }
     Ok(())
 }
 
-/// What the estimator does not take from a plan.
-pub(super) fn refused(error: thetahat_core::Error) -> Error {
-    let argument = match error {
-        thetahat_core::Error::OutOfRange { argument, .. } => argument,
-        _ => "track",
+/// That each channel has a number that fits.
+fn check_channels(
+    argument: &str,
+    given: &PerChannel,
+    inputs: usize,
+    fits: impl Fn(f64) -> bool,
+    otherwise: &str,
+) -> Result<(), Error> {
+    if given.inputs.len() != inputs {
+        let message =
+            format!("there are {} values for {inputs} inputs; give one for each", given.inputs.len());
+        return Err(Error::argument(argument, message));
+    }
+    let wrong = |channel: &str, value: f64| {
+        Err(Error::argument(argument, format!("that of {channel}, {value:?}, {otherwise}")))
     };
-    Error::argument(argument, error.to_string())
+    match given.inputs.iter().enumerate().find(|(_, value)| !fits(**value)) {
+        Some((input, &value)) => wrong(&format!("input {}", input + 1), value),
+        None if !fits(given.output) => wrong("the output", given.output),
+        None => Ok(()),
+    }
+}
+
+/// What the estimator does not take from a plan.
+fn refused(error: thetahat_core::Error) -> Error {
+    match error {
+        thetahat_core::Error::OutOfRange { argument: "width", range } => {
+            Error::argument("dead-zone", format!("it must be {range}"))
+        }
+        // All else that has a range and was not checked above is a number of a policy.
+        thetahat_core::Error::OutOfRange { argument, range } => {
+            Error::argument("forgetting", format!("its {} must be {range}", argument.replace('_', " ")))
+        }
+        _ => Error::argument("orders", error.to_string()),
+    }
 }
 
 /// What the estimator does not take as a sample.

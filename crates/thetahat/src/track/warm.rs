@@ -5,30 +5,27 @@ use thetahat_core::nalgebra::{DMatrix, DVector};
 
 use super::estimator::Estimator;
 use super::plan::{PerChannel, TrackPlan};
-use super::tracker::{Stage, Tracker, check, refused};
+use super::tracker::{Stage, Tracker, check};
 use crate::{Error, Model, Orders, Report};
+
+/// What P_jj of a parameter that nothing is known of is times the square of its scale, as
+/// [`RecursiveLeastSquares`](thetahat_core::RecursiveLeastSquares) has it. The scale of the constant is 1.
+const PRIOR: f64 = 100.0;
 
 impl Tracker {
     /// A tracker that starts from what a fit found, a report of AR, ARX, ARMA or ARMAX: its parameters, its covariance
     /// divided by its noise variance as P, its noise variance and number of samples, its offsets.
     ///
-    /// The orders are those of the report; if some are given they must be the same. Scales that the plan does not have
+    /// The orders are those of the report. Scales that the plan does not have
     /// follow from P: the regressor of parameter j has the magnitude 1/sqrt(N P_jj) at least, N being the number of samples,
     /// and a channel the largest of its parameters'. So there are no rows to collect. The noise scale is the square root of
     /// the noise variance. A constant is not in the report: it starts from 0, and is as free as without a report.
     ///
     /// # Errors
-    /// As [`Tracker::new`]; [`Error::Report`] if the report is of another structure, or of other orders than those given;
-    /// if it has no covariance or a noise variance of 0, or an offset that is a line in time; [`Error::Argument`] if the
+    /// As [`Tracker::new`]; [`Error::Report`] if the report is of another structure; if it has no covariance or a noise variance of 0, or an offset that is a line in time; [`Error::Argument`] if the
     /// plan asks for another start than `standard`.
-    pub fn from_report(report: &Report, orders: Option<&Orders>, plan: &TrackPlan) -> Result<Self, Error> {
+    pub fn from_report(report: &Report, plan: &TrackPlan) -> Result<Self, Error> {
         let model = &report.model;
-        if let Some(orders) = orders.filter(|&orders| *orders != model.orders) {
-            return Err(Error::report(format!(
-                "the report has {}, {orders} was asked for; leave the orders out, or fit with those",
-                model.orders
-            )));
-        }
         if model.orders.nd > 0 || model.orders.nf.iter().any(|&nf| nf > 0) {
             return Err(Error::report(format!(
                 "the report has {}: only AR, ARX, ARMA and ARMAX can be tracked",
@@ -51,6 +48,8 @@ impl Tracker {
             plan.scales = Some(scales(&model.orders, &relative, report.estimation.samples));
         }
         plan.noise_scale = plan.noise_scale.or(Some(model.noise_variance.sqrt()));
+        // What was given passed before: what does not pass now is what follows from the report.
+        check(&model.orders, &plan).map_err(unusable)?;
         let tracker = Self::new(&model.orders, &plan)?;
         tracker.with_knowledge(model, &relative, report.estimation.samples)
     }
@@ -77,7 +76,7 @@ impl Tracker {
             }
         }
         if let Some(constant) = constant {
-            covariance[(constant, constant)] = 100.0;
+            covariance[(constant, constant)] = PRIOR;
         }
         let covariance = Covariance::new(&covariance).map_err(unusable)?;
         let variance = model.noise_variance;
@@ -152,9 +151,6 @@ fn scales(orders: &Orders, relative: &DMatrix<f64>, samples: usize) -> PerChanne
 }
 
 /// What of a report the estimator does not take.
-fn unusable(error: thetahat_core::Error) -> Error {
-    match refused(error) {
-        Error::Argument { message, .. } => Error::report(format!("the report cannot be tracked: {message}")),
-        other => other,
-    }
+fn unusable(error: impl std::fmt::Display) -> Error {
+    Error::report(format!("the report cannot be tracked: {error}"))
 }

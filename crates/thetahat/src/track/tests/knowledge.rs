@@ -25,7 +25,7 @@ fn unforgetting() -> TrackPlan {
 fn it_goes_on_where_the_fit_ended() {
     let (inputs, y) = log(1000, 0.3, 0.0, 20);
     let report = fit(&inputs, &y, "1..400", orders(), Detrend::None);
-    let mut tracker = Tracker::from_report(&report, Some(&orders()), &unforgetting()).unwrap();
+    let mut tracker = Tracker::from_report(&report, &unforgetting()).unwrap();
     // At first it is the report.
     assert_eq!(tracker.names(), report.model.parameters.iter().map(|p| p.name.clone()).collect::<Vec<_>>());
     let mut errors = [0.0; 5];
@@ -69,7 +69,7 @@ fn offsets_come_along_and_a_constant_stands_beside() {
     let report = fit(&inputs, &raised, "1..400", orders(), Detrend::Mean);
     for constant in [false, true] {
         let plan = TrackPlan { constant, ..unforgetting() };
-        let mut tracker = Tracker::from_report(&report, None, &plan).unwrap();
+        let mut tracker = Tracker::from_report(&report, &plan).unwrap();
         assert_eq!(tracker.offsets().output, report.model.output.offset.level);
         let tracked = run(&mut tracker, &inputs[400..], &raised[400..]);
         assert!(tracked[2..].iter().all(|tracked| tracked.error.abs() < 0.5), "{constant}");
@@ -77,11 +77,11 @@ fn offsets_come_along_and_a_constant_stands_beside() {
     // Given ones come first.
     let offsets = PerChannel { inputs: vec![1.0, 2.0], output: 3.0 };
     let plan = TrackPlan { offsets: Some(offsets.clone()), ..unforgetting() };
-    assert_eq!(Tracker::from_report(&report, None, &plan).unwrap().offsets(), &offsets);
+    assert_eq!(Tracker::from_report(&report, &plan).unwrap().offsets(), &offsets);
 
     let line = fit(&inputs, &raised, "1..400", orders(), Detrend::Linear);
-    assert!(matches!(Tracker::from_report(&line, None, &unforgetting()), Err(Error::Report { .. })));
-    assert!(Tracker::from_report(&line, None, &plan).is_ok());
+    assert!(matches!(Tracker::from_report(&line, &unforgetting()), Err(Error::Report { .. })));
+    assert!(Tracker::from_report(&line, &plan).is_ok());
 }
 
 #[test]
@@ -90,7 +90,7 @@ fn a_noise_model_comes_along() {
     let orders = Orders::armax(2, &[2, 1], 1, &[1, 0]).unwrap();
     let report = fit(&inputs, &y, "1..500", orders.clone(), Detrend::None);
     let plan = TrackPlan { method: TrackMethod::Rpem, constant: true, ..unforgetting() };
-    let mut tracker = Tracker::from_report(&report, None, &plan).unwrap();
+    let mut tracker = Tracker::from_report(&report, &plan).unwrap();
     assert_eq!(tracker.names()[5..], ["constant", "c1"]);
     let parameters = tracker.parameters().unwrap();
     assert_eq!([parameters[5], parameters[6]], [0.0, report.model.c[1]]);
@@ -105,31 +105,30 @@ fn a_noise_model_comes_along() {
 fn reports_that_cannot_be_tracked_are_refused() {
     let (inputs, y) = log(400, 0.3, 0.0, 23);
     let report = fit(&inputs, &y, "1..400", orders(), Detrend::None);
-    let message = |report: &Report, orders: Option<&Orders>, plan: &TrackPlan| {
-        Tracker::from_report(report, orders, plan).unwrap_err().to_string()
-    };
-    let other = Orders::arx(2, &[1, 1], &[1, 0]).unwrap();
+    let message =
+        |report: &Report, plan: &TrackPlan| Tracker::from_report(report, plan).unwrap_err().to_string();
     let plan = unforgetting();
-    assert!(
-        message(&report, Some(&other), &plan).contains("ARX(2, [2 1], [1 0]), ARX(2, 1, [1 0]) was asked")
-    );
     let oe = fit(&inputs, &y, "1..400", Orders::oe(&[1, 1], &[1, 1], &[1, 0]).unwrap(), Detrend::None);
-    assert!(message(&oe, None, &plan).contains("only AR, ARX, ARMA and ARMAX"));
-    assert!(message(&report, None, &exactly(&plan)).starts_with("start"));
+    assert!(message(&oe, &plan).contains("only AR, ARX, ARMA and ARMAX"));
+    assert!(message(&report, &exactly(&plan)).starts_with("start"));
     let rpem = TrackPlan { method: TrackMethod::Rpem, ..plan.clone() };
-    assert!(message(&report, None, &rpem).starts_with("method"));
+    assert!(message(&report, &rpem).starts_with("method"));
 
     type Damage = fn(&mut Report);
-    let damages: [(Damage, &str); 5] = [
+    let damages: [(Damage, &str); 6] = [
         (|report| report.model.covariance = None, "no covariance"),
         (|report| report.model.noise_variance = 0.0, "noise variance of 0"),
         (|report| report.model.parameters.truncate(2), "damaged"),
         (|report| report.model.covariance.iter_mut().for_each(|rows| rows[1][1] = -1.0), "positive"),
         (|report| report.estimation.samples = 5, "5 rows"),
+        (
+            |report| report.model.covariance.iter_mut().for_each(|rows| rows[4][4] = 1e-220),
+            "scale: that of input 2, ",
+        ),
     ];
     for (damage, expected) in damages {
         let mut damaged = report.clone();
         damage(&mut damaged);
-        assert!(message(&damaged, None, &plan).contains(expected), "{}", message(&damaged, None, &plan));
+        assert!(message(&damaged, &plan).contains(expected), "{}", message(&damaged, &plan));
     }
 }

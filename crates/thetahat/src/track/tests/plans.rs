@@ -78,16 +78,31 @@ fn plans_that_make_no_tracker_are_refused() {
     assert_eq!(argument(&armax, plain.clone()), "method");
     assert_eq!(argument(&orders(), els.clone()), "method");
     assert_eq!(argument(&armax, TrackPlan { start: Beginning(Start::Exact), ..els.clone() }), "start");
-    assert_eq!(argument(&orders(), with(|plan| plan.forgetting = "0.8".parse().unwrap())), "factor");
-    assert_eq!(argument(&orders(), with(|plan| plan.horizon = 0)), "horizon");
-    assert_eq!(argument(&orders(), with(|plan| plan.horizon = 10_001)), "horizon");
-    assert_eq!(argument(&orders(), with(|plan| plan.dead_zone = f64::NAN)), "width");
-    assert_eq!(argument(&orders(), with(|plan| plan.false_alarms = Some(1.0))), "false alarms");
-    assert_eq!(argument(&orders(), with(|plan| plan.noise_scale = Some(f64::NAN))), "noise_scale");
+    assert_eq!(argument(&orders(), with(|plan| plan.forgetting = "0.8".parse().unwrap())), "forgetting");
+    assert_eq!(argument(&orders(), with(|plan| plan.dead_zone = f64::NAN)), "dead-zone");
+    assert_eq!(argument(&orders(), with(|plan| plan.alarm_interval = Some(1.0))), "alarm");
     let short = Some(PerChannel { inputs: vec![1.0], output: 1.0 });
-    assert_eq!(argument(&orders(), TrackPlan { offsets: short.clone(), ..plain.clone() }), "offsets");
-    assert_eq!(argument(&orders(), TrackPlan { scales: short, ..plain.clone() }), "scales");
-    assert_eq!(argument(&orders(), TrackPlan { scales: channels(0.0), ..plain.clone() }), "scales");
-    assert_eq!(argument(&orders(), TrackPlan { offsets: channels(f64::NAN), ..plain }), "offsets");
-    assert_eq!(argument(&armax, TrackPlan { noise_scale: Some(-1.0), ..els }), "scales");
+    assert_eq!(argument(&orders(), TrackPlan { offsets: short.clone(), ..plain.clone() }), "offset");
+    assert_eq!(argument(&orders(), TrackPlan { scales: short, ..plain.clone() }), "scale");
+    assert_eq!(argument(&orders(), TrackPlan { scales: channels(0.0), ..plain.clone() }), "scale");
+    assert_eq!(argument(&orders(), TrackPlan { offsets: channels(f64::NAN), ..plain }), "offset");
+    assert_eq!(argument(&armax, TrackPlan { noise_scale: Some(-1.0), ..els }), "noise-scale");
+}
+
+#[test]
+fn a_number_of_a_channel_that_is_out_of_range_names_the_channel_and_the_range() {
+    let message = |plan: TrackPlan| Tracker::new(&orders(), &plan).unwrap_err().to_string();
+    let scales = |second, output| TrackPlan {
+        scales: Some(PerChannel { inputs: vec![1.0, second], output }),
+        ..TrackPlan::default()
+    };
+    let range = "is not in 1e-98 … 1e98; give its typical magnitude";
+    for (second, written) in [(0.0, "0.0"), (-1.0, "-1.0"), (9e-99, "9e-99"), (f64::NAN, "NaN")] {
+        assert_eq!(message(scales(second, 1.0)), format!("scale: that of input 2, {written}, {range}"));
+    }
+    assert_eq!(message(scales(1.0, 1.1e98)), format!("scale: that of the output, 1.1e98, {range}"));
+    assert!(Tracker::new(&orders(), &scales(1e-98, 1e98)).is_ok());
+    let offsets = Some(PerChannel { inputs: vec![f64::INFINITY, 0.0], output: 0.0 });
+    let message = message(TrackPlan { offsets, ..TrackPlan::default() });
+    assert!(message.starts_with("offset: that of input 1, inf, is not finite"), "{message}");
 }

@@ -3,7 +3,7 @@ use super::*;
 /// What a tracker says of a sample, and everything that it is, to the bit: NaN has one name in both.
 fn says(tracker: &mut Tracker, u: [f64; 2], y: f64) -> String {
     let tracked = tracker.update(&u, y).unwrap();
-    format!("{tracked:?} {:?}", tracker.forecast())
+    format!("{tracked:?} {:?}", tracker.forecast(2).unwrap())
 }
 
 #[test]
@@ -12,7 +12,7 @@ fn what_is_written_goes_on_to_the_bit() {
     (y[3], y[60], inputs[4][1], inputs[61][0]) = (f64::NAN, f64::NAN, f64::NAN, f64::NAN);
     y[90] = 1e200;
     let armax = Orders::armax(2, &[2, 1], 1, &[1, 2]).unwrap();
-    let plain = TrackPlan { horizon: 2, false_alarms: Some(100.0), ..TrackPlan::default() };
+    let plain = TrackPlan { alarm_interval: Some(100.0), ..TrackPlan::default() };
     let with = |orders: &Orders, method, forgetting: &str, start: &str| {
         let (forgetting, start) = (forgetting.parse().unwrap(), start.parse().unwrap());
         (orders.clone(), TrackPlan { method, forgetting, start, ..plain.clone() })
@@ -46,7 +46,10 @@ fn what_is_written_goes_on_to_the_bit() {
                 assert_eq!(serde_json::to_string(&copy).unwrap(), text);
                 assert_eq!(copy.plan(), &plan);
                 let mut original = tracker.clone();
-                assert_eq!(format!("{:?}", copy.forecast()), format!("{:?}", original.forecast()));
+                assert_eq!(
+                    format!("{:?}", copy.forecast(2).unwrap()),
+                    format!("{:?}", original.forecast(2).unwrap())
+                );
                 for later in t..120 {
                     let said = says(&mut original, inputs[later], y[later]);
                     assert_eq!(says(&mut copy, inputs[later], y[later]), said, "{plan:?} {t} {later}");

@@ -590,10 +590,9 @@ pub(crate) struct FilterArguments {
     /// How to estimate [default: kalman for a linear model, else ekf]
     #[arg(long, value_enum, help_heading = "Estimator")]
     pub(crate) estimator: Option<EstimatorArgument>,
-    /// Where a report's model starts: at rest, its channels at their offsets, or from a state that is not known [default:
-    /// estimated]
+    /// Where the model of a report starts [default: unknown]
     #[arg(long, value_enum, value_name = "START", help_heading = "Estimator")]
-    pub(crate) initial: Option<StartArgument>,
+    pub(crate) initial: Option<FilterStartArgument>,
     /// Where the error of the observer is to have its poles in the z plane, such as 0.4+0.3i,0.4-0.3i
     #[arg(
         long,
@@ -897,6 +896,14 @@ pub(crate) enum TrackMethodArgument {
     Els,
     /// Recursive prediction error method (armax)
     Rpem,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum FilterStartArgument {
+    /// At rest: the channels are at their offsets
+    Zero,
+    /// Anywhere: the first rows tell
+    Unknown,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -151,11 +151,7 @@ fn a_report_of_fit_is_a_model() {
     close(number(&last, "/predicted_y"), expected[599], 1e-9);
     // The extended filter of a linear model is the same.
     assert_eq!(filtered(&folder, "model.json log.csv --initial zero --estimator ekf"), lines);
-    assert!(
-        folder
-            .refused("filter model.json log.csv --initial measured", 2)
-            .contains("--initial: a filter starts")
-    );
+    assert_eq!(folder.run("filter model.json log.csv --initial measured").code, 2);
     folder.write("model.toml", ALPHA_BETA);
     assert!(
         folder.refused("filter model.toml log.csv --initial zero", 2).contains("--initial is for reports")
@@ -189,6 +185,8 @@ fn an_observer_has_the_poles_or_the_gain_asked_for() {
     assert!(refused("--estimator luenberger --poles 0.5", 2).contains("--poles"), "one pole of two");
     assert!(refused("--estimator luenberger --poles 0.5,x", 2).contains("--poles x: write a pole as"));
     assert!(refused("--estimator luenberger --gain 1,2", 2).contains("--gain: it must have 2 rows"));
+    assert!(refused("--estimator luenberger --gain 2;3", 2).contains("has a pole of modulus"));
+    assert!(refused("--estimator luenberger --gain nan;0", 2).contains("--gain: it must be finite"));
     assert!(refused("--estimator luenberger --gain 1;a", 2).contains("--gain 1;a: write numbers"));
     assert!(refused("--estimator luenberger --gain 1;1 --smooth", 2).contains("--smooth: an observer"));
 }
@@ -223,7 +221,11 @@ fn unknown_parameters_are_found_with_the_state_and_by_a_fit() {
             let one = all.into_iter().find(|one| one["name"] == parameter).expect("it was fitted");
             let (fitted, error) = (number(one, "/value"), number(one, "/standard_error"));
             assert!((fitted - value).abs() < 3.0 * error && error < 0.1 * value, "{name}: {one}");
-            assert!(run.stdout.contains(one["variable"].as_str().expect("it is said")), "{}", run.stdout);
+            assert!(
+                run.stdout.contains(one["change_of_variable"].as_str().expect("it is said")),
+                "{}",
+                run.stdout
+            );
         }
         // The change of variable is named where the parameter is.
         let all = found["parameters"].as_array().into_iter().flatten();
@@ -331,6 +333,39 @@ fn each_step_has_its_own_length() {
 }
 
 #[test]
+fn rows_in_the_middle_of_a_log_have_their_own_time() {
+    // A report whose offsets are lines in time.
+    let Experiment { u, y } = Experiment::new(600);
+    let y: Vec<f64> = y.iter().enumerate().map(|(t, y)| y + 0.05 * t as f64).collect();
+    let folder = Folder::with_log(csv(&[("u", &u), ("y", &y)]));
+    folder.done("fit log.csv --na 2 --nb 2 --detrend linear --report model.json");
+    let whole = filtered(&folder, "model.json log.csv");
+    for how in ["", "--smooth"] {
+        let late = filtered(&folder, &format!("model.json log.csv --rows 401..600 {how}"));
+        assert_eq!(late.len(), 200);
+        close(number(&late[199], "/predicted_y"), number(&whole[599], "/predicted_y"), 1e-6);
+        assert!(number(&late[5], "/nis") < 20.0, "{}", late[5]);
+    }
+}
+
+#[test]
+fn a_parameter_that_wants_out_of_its_bounds_stays_at_one() {
+    let folder = example("mass_spring_damper");
+    let text = folder.read("model.toml");
+    folder.write(
+        "model.toml",
+        text.replace(
+            "start = 3, sd = 1, unknown = true, min = 0.1",
+            "start = 1, sd = 1, unknown = true, min = 0.5, max = 1.2",
+        ),
+    );
+    let run = folder.done("fit --grey model.toml log.csv --time t --format json");
+    let report: Value = serde_json::from_str(&run.stdout).expect("it is JSON");
+    close(number(&report, "/parameters/0/value"), 1.2, 1e-3);
+    assert!(run.stderr.contains("'mass' is within its standard error of its bound 1.2"), "{}", run.stderr);
+}
+
+#[test]
 fn smoothed_states_are_better_known() {
     let folder = example("mass_spring_damper");
     // From another time on, with a line in it that is no row.
@@ -432,6 +467,7 @@ fn models_that_make_no_sense_are_refused_where_they_do_not() {
         ("velocity = \"velocity", "speed = \"velocity", "speed"),
         ("unknown = true, min = 0.1", "unknown = true, min = 5", "5"),
         ("sd = 1, unknown", "sd = -1, unknown", "sd"),
+        ("sd = 1, unknown = true", "sd = 1", "add unknown = true"),
         ("sample_time = 0.05", "sample_time = 0", "sample_time"),
         ("[outputs]", "[output]", "output"),
         ("sample_time = 0.05", "sample_time = = 0.05", "line 3"),

@@ -4,7 +4,7 @@ mod columns;
 
 use std::path::Path;
 
-use thetahat::{FilterSummary, GreyReport, Report, Start, StateFilter, StateModel};
+use thetahat::{FilterSummary, GreyReport, InitialState, Report, StateFilter, StateModel};
 
 use super::{stored, summary};
 use crate::args::FilterArguments;
@@ -29,7 +29,12 @@ pub(crate) fn filter(arguments: &FilterArguments) -> Result<(), Failure> {
     }
     let model = read(&job)?;
     let estimator = job.estimator(&model);
-    let filter = StateFilter::new(model, estimator).map_err(|error| Failure::option(&error))?;
+    let filter = StateFilter::new(model, estimator).map_err(|error| match &error {
+        thetahat::Error::Argument { argument, message } if argument == "start" => {
+            Failure::data(format!("{}: it cannot start: {message}", job.model.display()))
+        }
+        _ => Failure::option(&error),
+    })?;
     let mut run = Run::start(&job, filter)?;
     let ended = run.follow();
     let flushed = run.finish();
@@ -51,7 +56,7 @@ pub(crate) fn filter(arguments: &FilterArguments) -> Result<(), Failure> {
 /// What to think of normalised innovations that are far from what the model says.
 fn surprise(summary: &FilterSummary) -> Option<String> {
     let nis = summary.nis.as_ref()?;
-    let ratio = nis.mean / (summary.measured as f64 / nis.rows as f64);
+    let ratio = nis.mean / nis.expected;
     let advice = match ratio {
         2.0.. => {
             "standard deviations are too small; look at the clock (--time), the start, and the noises of the model"
@@ -78,18 +83,16 @@ fn read(job: &FilterJob) -> Result<StateModel, Failure> {
         (true, true) => {
             GreyReport::from_json(&text).and_then(|report| report.fitted_model()).map(StateModel::from)
         }
-        (true, false) => Report::from_json(&text)
-            .and_then(|report| StateModel::from_report(&report, job.initial.unwrap_or(Start::Estimated))),
+        (true, false) => Report::from_json(&text).and_then(|report| {
+            StateModel::from_report(&report, job.initial.unwrap_or(InitialState::Unknown))
+        }),
         (false, _) => StateModel::from_toml(&text),
     };
-    model.map_err(|error| match &error {
-        thetahat::Error::Argument { argument, .. } if argument == "initial" => Failure::option(&error),
-        _ => {
-            let swapped =
-                job.path.extension().is_some_and(|extension| extension == "toml" || extension == "json");
-            let advice = if swapped { "; the model stands in front of the log" } else { "" };
-            Failure::data(format!("{}: {error}{advice}", path.display()))
-        }
+    model.map_err(|error| {
+        let swapped =
+            job.path.extension().is_some_and(|extension| extension == "toml" || extension == "json");
+        let advice = if swapped { "; the model stands in front of the log" } else { "" };
+        Failure::data(format!("{}: {error}{advice}", path.display()))
     })
 }
 
@@ -102,6 +105,8 @@ struct Run<'a> {
     lines: LineWriter,
     columns: Columns,
     filter: StateFilter,
+    /// The time of the log's first row.
+    began: Option<f64>,
     /// What was read, where it is smoothed at the end.
     kept: Vec<Kept>,
     /// The filter as it was before the first row, where all is to be smoothed.
@@ -126,6 +131,7 @@ impl<'a> Run<'a> {
             lines,
             columns,
             filter,
+            began: None,
             kept: Vec::new(),
             fresh,
         })
@@ -137,8 +143,15 @@ impl<'a> Run<'a> {
             self.job.rows.map_or((1, u64::MAX), |rows| (rows.first() as u64, rows.last() as u64));
         while self.live.row() < last {
             match self.live.next()? {
-                Next::Row if self.live.row() < first => {}
-                Next::Row => self.row()?,
+                Next::Row => {
+                    self.began = self.began.or(self.live.time());
+                    if self.live.row() == first && first > 1 {
+                        self.start_late(first);
+                    }
+                    if self.live.row() >= first {
+                        self.row()?;
+                    }
+                }
                 Next::Idle => self.lines.flush()?,
                 Next::End => match self.job.rows {
                     Some(rows) => {
@@ -152,6 +165,14 @@ impl<'a> Run<'a> {
             }
         }
         Ok(false)
+    }
+
+    /// Says that the first row to go through is not the first one of the log.
+    fn start_late(&mut self, row: u64) {
+        let steps = (row - 1) as f64 * self.job.sample_time.unwrap_or(self.filter.model().sample_time());
+        let seconds = self.live.time().zip(self.began).map_or(steps, |(time, began)| time - began);
+        self.filter = self.filter.clone().starting_at(seconds);
+        self.fresh = self.fresh.take().map(|fresh| fresh.starting_at(seconds));
     }
 
     /// Takes in the row at hand.
@@ -190,7 +211,14 @@ impl<'a> Run<'a> {
             let (inputs, outputs) = values.split_at(inputs);
             let estimate = again.step(*step, inputs, outputs).map_err(failed)?;
             if row.is_multiple_of(self.job.lines.every) {
-                self.columns.row(&mut self.lines, *row, *time, outputs, &estimate, smoothed.row(index))?;
+                self.columns.row(
+                    &mut self.lines,
+                    *row,
+                    *time,
+                    outputs,
+                    &estimate,
+                    smoothed.row(index + 1),
+                )?;
             }
         }
         self.lines.flush()

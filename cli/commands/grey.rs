@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use thetahat::{Channel, GreyBox, Recording, Rows, Source, Times, fit_grey};
+use thetahat::{GreyBox, Recording, Rows, Source, Times, fit_grey};
 
 use super::{stored, summary};
 use crate::args::{FitArguments, FormatArgument};
@@ -66,21 +66,15 @@ fn parts(logs: Vec<Recording>, sources: &[Source], asked: &[Rows]) -> Result<Vec
     }
     let mut parts = Vec::new();
     for rows in asked {
-        for (log, source) in logs.iter().zip(sources) {
+        for (recording, source) in logs.iter().zip(sources) {
             let first = rows.first().max(source.rows.first());
             let last = rows.last().min(source.rows.last());
             if first > last {
                 continue;
             }
-            let range = first - source.rows.first()..last + 1 - source.rows.first();
-            let cut = |values: &[f64]| values.get(range.clone()).unwrap_or_default().to_vec();
-            let channel =
-                |channel: &Channel| Channel { name: channel.name.clone(), values: cut(&channel.values) };
-            let times = match &log.times {
-                Times::Measured(times) => Times::Measured(cut(times)),
-                Times::Uniform(step) => Times::Uniform(*step),
-            };
-            parts.push(Recording { channels: log.channels.iter().map(channel).collect(), times });
+            let before = source.rows.first() - 1;
+            let part = Rows::new(first - before, last - before).and_then(|rows| recording.part(rows));
+            parts.push(part.map_err(log::failure(sources))?);
         }
     }
     Ok(parts)

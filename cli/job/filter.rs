@@ -1,10 +1,10 @@
 use std::path::{Path, PathBuf};
 
 use thetahat::thetahat_core::nalgebra::Complex;
-use thetahat::{Estimator, ObserverGain, Rows, Start, StateModel};
+use thetahat::{Estimator, InitialState, ObserverGain, Rows, StateModel};
 
 use super::{LineJob, LogJob, parsed};
-use crate::args::{EstimatorArgument, FilterArguments};
+use crate::args::{EstimatorArgument, FilterArguments, FilterStartArgument};
 use crate::failure::Failure;
 
 /// A state to estimate.
@@ -17,7 +17,7 @@ pub(crate) struct FilterJob {
     pub(crate) sample_time: Option<f64>,
     pub(crate) rows: Option<Rows>,
     /// How a report's model starts, if that was said.
-    pub(crate) initial: Option<Start>,
+    pub(crate) initial: Option<InitialState>,
     pub(crate) smooth: bool,
     pub(crate) lines: LineJob,
     pub(crate) summary: Option<PathBuf>,
@@ -64,7 +64,10 @@ impl FilterJob {
             path: arguments.path.clone(),
             log,
             sample_time,
-            initial: arguments.initial.map(Start::from),
+            initial: arguments.initial.map(|initial| match initial {
+                FilterStartArgument::Zero => InitialState::Zero,
+                FilterStartArgument::Unknown => InitialState::Unknown,
+            }),
             rows: arguments.rows.as_deref().map(|text| parsed("--rows", text)).transpose()?,
             smooth: arguments.smooth,
             lines: LineJob::resolve(&arguments.lines),

@@ -1,6 +1,6 @@
 //! The lines of `filter`.
 
-use thetahat::{Estimator, StateEstimate, StateModel, Values};
+use thetahat::{Estimator, StateEstimate, StateModel, StateValues};
 
 use crate::failure::Failure;
 use crate::job::{Clock, FilterJob};
@@ -63,7 +63,7 @@ impl Columns {
         time: Option<f64>,
         measured: &[f64],
         estimate: &StateEstimate<'_>,
-        smoothed: Option<(Values<'_>, Values<'_>)>,
+        smoothed: Option<(StateValues<'_>, StateValues<'_>)>,
     ) -> Result<(), Failure> {
         lines.add(|cells| {
             cells.count(row);
@@ -119,7 +119,7 @@ impl Columns {
 }
 
 /// A value and its standard deviation.
-fn pair(cells: &mut Cells<'_>, values: Option<&Values<'_>>, index: usize) {
+fn pair(cells: &mut Cells<'_>, values: Option<&StateValues<'_>>, index: usize) {
     cells.number(at(values.map_or(&[], |values| values.values), index));
     cells.number(at(values.and_then(|values| values.standard_deviations).unwrap_or_default(), index));
 }

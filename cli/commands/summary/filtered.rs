@@ -1,6 +1,6 @@
 //! What `filter` says at its end.
 
-use thetahat::{Estimated, FilterSummary};
+use thetahat::{EstimatedNumber, FilterSummary, NisSummary};
 
 use super::text::{Text, columns, number, or_dash, uncertainty};
 
@@ -17,15 +17,7 @@ pub(crate) fn filtered(summary: &FilterSummary, faults: &str) -> String {
         text.line(&format!("log-likelihood {}", number(sum)));
     }
     if let Some(nis) = &summary.nis {
-        let percent = |part: f64| format!("{:.1} %", 100.0 * part);
-        text.line(&format!(
-            "normalised innovation squared: mean {:.3} a row, {:.3} if the model is right; below its 95 % bounds {}, above {}, 2.5 \
-             % each if it is right",
-            nis.mean,
-            summary.measured as f64 / nis.rows as f64,
-            percent(nis.below),
-            percent(nis.above)
-        ));
+        text.line(&surprise(nis));
     }
     text.line("");
     for (title, estimates) in [("state", &summary.states), ("parameter", &summary.parameters)] {
@@ -36,7 +28,7 @@ pub(crate) fn filtered(summary: &FilterSummary, faults: &str) -> String {
     text.finish()
 }
 
-fn table(text: &mut Text, title: &str, estimates: &[Estimated]) {
+fn table(text: &mut Text, title: &str, estimates: &[EstimatedNumber]) {
     let bounded = estimates.iter().any(|estimate| estimate.change_of_variable.is_some());
     let mut titles = vec![title, "value", "standard deviation"];
     titles.extend(bounded.then_some("estimated as"));
@@ -51,4 +43,16 @@ fn table(text: &mut Text, title: &str, estimates: &[Estimated]) {
         table.add_row(row);
     }
     text.table(table, &[1, 2]);
+}
+
+/// How the normalised innovations squared lie.
+pub(super) fn surprise(nis: &NisSummary) -> String {
+    format!(
+        "normalised innovation squared: mean {:.3}, {:.3} if the model is right; below its 95 % bounds {:.1} %, above {:.1} %, 2.5 \
+         % each if it is right",
+        nis.mean,
+        nis.expected,
+        100.0 * nis.below,
+        100.0 * nis.above
+    )
 }

@@ -2,6 +2,7 @@
 
 use thetahat::{GreyFit, GreyReport, Stopped};
 
+use super::filtered::surprise;
 use super::stopped;
 use super::text::{Text, columns, number, or_dash, short, uncertainty};
 
@@ -15,7 +16,7 @@ pub(crate) fn grey(report: &GreyReport) -> String {
             number(parameter.value),
             uncertainty(parameter.standard_error),
             short(parameter.start),
-            parameter.variable.clone(),
+            parameter.change_of_variable.clone().unwrap_or_default(),
         ]);
     }
     text.table(parameters, &[1, 2, 3]);
@@ -26,11 +27,9 @@ pub(crate) fn grey(report: &GreyReport) -> String {
         report.rows, report.readings, report.log_likelihood
     ));
     text.line(&format!("prediction error, {} iterations, {}", search.iterations, stopped(why)));
-    text.line(&format!(
-        "normalised innovation squared: mean {:.3} a reading, 1 if the noises are right; within its 95 % bounds {:.1} % of the rows",
-        report.mean_nis,
-        100.0 * report.within_95
-    ));
+    if let Some(nis) = &report.nis {
+        text.line(&surprise(nis));
+    }
     text.line("");
     let percent =
         |fit: Option<GreyFit>| or_dash(fit.and_then(|fit| fit.percent), |percent| format!("{percent:.2} %"));

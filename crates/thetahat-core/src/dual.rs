@@ -383,8 +383,9 @@ impl<T: Real, const D: usize> Number<T> for Dual<T, D> {
         self.chain(Number::cosh(self.value), Number::sinh(self.value))
     }
     fn tanh(self) -> Self {
-        let tangent = Number::tanh(self.value);
-        self.chain(tangent, (T::one() - tangent) * (T::one() + tangent))
+        // 1/cosh²: where the tangent rounds to 1, 1 - tanh² is 0, which the slope is not.
+        let cosine = Number::cosh(self.value);
+        self.chain(Number::tanh(self.value), T::one() / (cosine * cosine))
     }
     fn abs(self) -> Self {
         self.chain(Number::abs(self.value), T::one().copysign(self.value))

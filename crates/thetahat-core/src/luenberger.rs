@@ -116,7 +116,7 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension + Dimension<N>> Luenberg
         check_finite("input", input.as_slice())?;
         check_entries("weights", weights.as_slice(), m)?;
         check_length("poles", n, poles.len())?;
-        check_poles(poles.as_slice())?;
+        Self::check_poles(poles)?;
         let state_matrix = transition.jacobian(&self.state, input);
         check_length("transition Jacobian", n, state_matrix.nrows())?;
         check_entries("transition Jacobian", state_matrix.as_slice(), n * n)?;
@@ -145,6 +145,37 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension + Dimension<N>> Luenberg
             return Err(Error::Overflow);
         }
         self.gain = gain;
+        Ok(())
+    }
+
+    /// Checks poles as [`place`](LuenbergerObserver::place) does: for a gain that is placed later, at each estimate.
+    ///
+    /// Errors: [`Error::OutOfRange`] if a pole is not inside the unit circle, or lacks its conjugate beside it;
+    /// [`Error::NotFinite`].
+    pub fn check_poles(poles: &OVector<Complex<T>, N>) -> Result<(), Error> {
+        let poles = poles.as_slice();
+        if !poles.iter().all(|pole| pole.re.is_finite() && pole.im.is_finite()) {
+            return Err(Error::NotFinite { argument: "poles" });
+        }
+        // Not the sum of squares: that overflows.
+        let inside = |pole: &Complex<T>| {
+            pole.re.abs() < T::one()
+                && pole.im.abs() < T::one()
+                && pole.re * pole.re + pole.im * pole.im < T::one()
+        };
+        if !poles.iter().all(inside) {
+            return Err(Error::OutOfRange { argument: "poles", range: "inside the unit circle" });
+        }
+        let mut rest = poles.iter();
+        while let Some(pole) = rest.next() {
+            let beside = |next: &Complex<T>| next.re == pole.re && next.im == -pole.im;
+            if !pole.im.is_zero() && !rest.next().is_some_and(beside) {
+                return Err(Error::OutOfRange {
+                    argument: "poles",
+                    range: "real, or conjugate pairs side by side",
+                });
+            }
+        }
         Ok(())
     }
 
@@ -183,32 +214,6 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension + Dimension<N>> Luenberg
         let variance = error.shape_generic().0.vector(T::NAN);
         Ok(Innovation { error, variance, nis: T::zero(), action })
     }
-}
-
-/// That each pole lies inside the unit circle, and a complex one beside its conjugate.
-fn check_poles<T: Real>(poles: &[Complex<T>]) -> Result<(), Error> {
-    if !poles.iter().all(|pole| pole.re.is_finite() && pole.im.is_finite()) {
-        return Err(Error::NotFinite { argument: "poles" });
-    }
-    // Not the sum of squares: that overflows.
-    let inside = |pole: &Complex<T>| {
-        pole.re.abs() < T::one()
-            && pole.im.abs() < T::one()
-            && pole.re * pole.re + pole.im * pole.im < T::one()
-    };
-    if !poles.iter().all(inside) {
-        return Err(Error::OutOfRange { argument: "poles", range: "inside the unit circle" });
-    }
-    let mut rest = poles.iter();
-    while let Some(pole) = rest.next() {
-        if !pole.im.is_zero() && !rest.next().is_some_and(|next| next.re == pole.re && next.im == -pole.im) {
-            return Err(Error::OutOfRange {
-                argument: "poles",
-                range: "real, or conjugate pairs side by side",
-            });
-        }
-    }
-    Ok(())
 }
 
 /// Replaces A by S⁻¹ A S and b by S⁻¹ b, where S is diagonal, so that the result does not depend on the units of the

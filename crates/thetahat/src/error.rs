@@ -14,6 +14,16 @@ pub enum Error {
         /// What is wrong with it and what to do.
         message: String,
     },
+    /// A model that is written as text has something wrong in it.
+    #[error("line {line}, column {column}: {message}")]
+    Model {
+        /// The line, counted from 1.
+        line: usize,
+        /// The column, counted from 1 in characters.
+        column: usize,
+        /// What is wrong and what to do.
+        message: String,
+    },
     /// The log does not have what was asked of it.
     #[error("{message}")]
     Data {

@@ -27,6 +27,7 @@ pub use arx::{arx, arx_factor};
 pub(crate) use common::{Common, Point, Window, extended};
 pub use criterion::{Bound, Criterion, CriterionOutcome, GainBound, Norm};
 pub use optimize::{Algorithm, Monitor, Progress, Search, SearchOutcome, StartOutcome, Step, Stopped};
+pub(crate) use optimize::{FIRST_DAMPING, LARGEST_DAMPING, ROUNDING, SMALLEST_DAMPING};
 pub(crate) use prediction_error::{drop_is_not_for_f, stretches};
 pub(crate) use uncertainty::{Autoregression, autoregression, backward_filtered_products};
 

@@ -1,21 +1,22 @@
 //! The state of a model, estimated row by row.
 
-mod engine;
 mod estimate;
 mod estimator;
+mod kind;
 mod linear;
-mod look;
+mod linearization;
 mod matrices;
 mod model;
+mod row;
 mod smooth;
 mod step;
 mod summary;
 #[cfg(test)]
 mod tests;
 
-pub use estimate::{StateEstimate, Totals, Values};
+pub use estimate::{StateEstimate, StateValues};
 pub use estimator::{Estimator, ObserverGain};
-pub use model::StateModel;
+pub use model::{InitialState, StateModel};
 pub use smooth::SmoothedStates;
 pub use step::StateFilter;
-pub use summary::{Estimated, FilterSummary, NisSummary};
+pub use summary::{EstimatedNumber, FilterSummary};

@@ -12,7 +12,6 @@ mod scale;
 pub(crate) mod tests;
 
 pub(crate) use document::{Document, Entry, Section, suggestion};
-pub(crate) use dynamics::Dynamics;
 use dynamics::{Functions, Step};
 pub use fit::{GreyFit, GreyOutput, GreyParameter, GreyReport, GreySearch, GreyState, fit_grey};
 pub(crate) use scale::Scale;
@@ -143,7 +142,7 @@ impl GreyBox {
     /// Reads a model.
     ///
     /// # Errors
-    /// [`Error::Argument`] with line and column, and with what is wrong there: of the TOML, of a key, or of an expression.
+    /// [`Error::Model`] with line and column, and with what is wrong there: of the TOML, of a key, or of an expression.
     pub fn from_toml(text: &str) -> Result<Self, Error> {
         read::model(text, &[])
     }
@@ -234,8 +233,8 @@ impl Unknown {
         self.walk / self.scale.slope(self.scale.variable(self.start)).abs()
     }
 
-    /// The change of variable in words.
-    pub(crate) fn words(&self) -> String {
+    /// The change of variable in words; none without bounds.
+    pub(crate) fn change_of_variable(&self) -> Option<String> {
         self.scale.words(&self.name)
     }
 }

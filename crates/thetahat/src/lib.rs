@@ -54,8 +54,8 @@ pub use estimate::{
     estimate, estimate_monitored,
 };
 pub use filter::{
-    Estimated, Estimator, FilterSummary, NisSummary, ObserverGain, SmoothedStates, StateEstimate,
-    StateFilter, StateModel, Totals, Values,
+    EstimatedNumber, Estimator, FilterSummary, InitialState, ObserverGain, SmoothedStates, StateEstimate,
+    StateFilter, StateModel, StateValues,
 };
 pub use greybox::{GreyBox, GreyFit, GreyOutput, GreyParameter, GreyReport, GreySearch, GreyState, fit_grey};
 pub use inspect::{
@@ -84,4 +84,4 @@ pub use track::{
     Beginning, PerChannel, Policy, TrackMethod, TrackPlan, TrackScore, TrackSummary, Tracked, Tracker,
     TrackerSummary, change_detector,
 };
-pub use validate::{Anderson, AndersonLevel, Fit, Horizon, Independence, Part, Residuals, Test};
+pub use validate::{Anderson, AndersonLevel, Fit, Horizon, Independence, NisSummary, Part, Residuals, Test};

@@ -4,12 +4,16 @@ mod distribution;
 mod fit;
 mod independence;
 mod moments;
+mod nis;
 mod residuals;
 #[cfg(test)]
 mod tests;
 mod whiteness;
 
-pub(crate) use distribution::two_sided;
+pub(crate) use distribution::{chi_square_interval, chi_square_tail, two_sided};
+pub(crate) use fit::closeness;
 pub use fit::{Fit, Horizon, Part};
+pub(crate) use nis::NisCount;
+pub use nis::NisSummary;
 pub(crate) use residuals::Relation;
 pub use residuals::{Anderson, AndersonLevel, Independence, Residuals, Test};

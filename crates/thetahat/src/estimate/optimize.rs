@@ -25,11 +25,11 @@ use super::predictor::{Predictor, Unusable};
 use crate::{Error, Orders};
 
 /// The first damping of Levenberg and Marquardt. A larger one wastes iterations on fast-sampled plants.
-const FIRST_DAMPING: f64 = 1e-8;
+pub(crate) const FIRST_DAMPING: f64 = 1e-8;
 /// Always there: directions in which the matrix is nothing but rounding foretell no decrease.
-const SMALLEST_DAMPING: f64 = 1e-12;
+pub(crate) const SMALLEST_DAMPING: f64 = 1e-12;
 /// With a damping beyond this, or after so many halvings, no step is long enough to matter.
-const LARGEST_DAMPING: f64 = 1e12;
+pub(crate) const LARGEST_DAMPING: f64 = 1e12;
 /// The last step is taken if it foretells more than this fraction of the tolerance.
 const WORTH_TAKING: f64 = 0.01;
 const HALVINGS: usize = 40;
@@ -37,7 +37,7 @@ const MOST_ITERATIONS: usize = 10_000;
 /// The first perturbation of a Hessian that is not positive definite, beside a diagonal near 1.
 const FIRST_PERTURBATION: f64 = 1e-4;
 /// A foretold decrease of this fraction of the cost is lost in rounding.
-const ROUNDING: f64 = 1e-10;
+pub(crate) const ROUNDING: f64 = 1e-10;
 /// The relative step of differences of the gradient.
 const DIFFERENCE: f64 = 1e-6;
 

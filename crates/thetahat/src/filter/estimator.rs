@@ -1,4 +1,8 @@
-use thetahat_core::nalgebra::Complex;
+use thetahat_core::nalgebra::{Complex, DMatrix, DVector};
+
+use super::kind::{Filter, Kind, Observer};
+use super::model::StateModel;
+use crate::Error;
 
 /// How a state is estimated.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,4 +30,104 @@ pub enum ObserverGain {
     Poles(Vec<Complex<f64>>),
     /// The gain L, row by row: a row for each state, a column for each output.
     Matrix(Vec<Vec<f64>>),
+}
+
+impl Estimator {
+    /// The word for it.
+    pub(super) fn word(&self) -> &'static str {
+        match self {
+            Self::Kalman => "kalman",
+            Self::Extended => "ekf",
+            Self::Luenberger(_) => "luenberger",
+        }
+    }
+}
+
+/// What does the work of an [`Estimator`].
+#[derive(Debug, Clone)]
+pub(super) enum Engine {
+    Filter(Filter),
+    Observer { observer: Observer, poles: Option<DVector<Complex<f64>>> },
+}
+
+impl Engine {
+    pub(super) fn new(model: &StateModel, estimator: Estimator) -> Result<Self, Error> {
+        let filter = model.kind.started().map_err(|error| Error::argument("start", error.to_string()))?;
+        let unknown: Vec<&str> = model.unknown().collect();
+        match estimator {
+            Estimator::Kalman if !model.is_linear() => {
+                let reason = match unknown.as_slice() {
+                    [] => "the model is not linear in its state".to_owned(),
+                    names => format!("the model has unknown parameters ({})", names.join(", ")),
+                };
+                let message = format!("{reason}: use the extended Kalman filter (ekf)");
+                Err(Error::argument("estimator", message))
+            }
+            Estimator::Kalman | Estimator::Extended => Ok(Self::Filter(filter)),
+            Estimator::Luenberger(_) if !unknown.is_empty() => Err(Error::argument(
+                "estimator",
+                format!(
+                    "an observer estimates no parameters ({}): use the extended Kalman filter (ekf), or make them known",
+                    unknown.join(", ")
+                ),
+            )),
+            Estimator::Luenberger(gain) => observer(model, filter.state(), gain),
+        }
+    }
+}
+
+/// An observer with its gain; for a model in equations the poles are placed later, at each estimate.
+fn observer(model: &StateModel, start: &DVector<f64>, gain: ObserverGain) -> Result<Engine, Error> {
+    let (n, m) = (model.states().len(), model.outputs().len());
+    let wrong = |error: thetahat_core::Error| Error::argument("gain", error.to_string());
+    match gain {
+        ObserverGain::Matrix(rows) => {
+            if rows.len() != n || rows.iter().any(|row| row.len() != m) {
+                let message =
+                    format!("it must have {n} rows, one for each state, of {m} numbers, one for each output");
+                return Err(Error::argument("gain", message));
+            }
+            let gain = DMatrix::from_row_iterator(n, m, rows.into_iter().flatten());
+            if !gain.iter().all(|entry: &f64| entry.is_finite()) {
+                return Err(Error::argument("gain", "it must be finite numbers"));
+            }
+            if let Kind::Linear(linear) = &model.kind {
+                let error = linear.transition.state_matrix() - &gain * &linear.output_matrix;
+                let largest = error.complex_eigenvalues().iter().map(|pole| pole.norm()).fold(0.0, f64::max);
+                if largest >= 1.0 {
+                    let message = format!(
+                        "with it the error of the estimate does not die out: F - L H has a pole of modulus {largest:.6}; \
+                         give a gain that brings all poles inside the unit circle, or the poles themselves"
+                    );
+                    return Err(Error::argument("gain", message));
+                }
+            }
+            let observer = Observer::new(start.clone(), gain).map_err(wrong)?;
+            Ok(Engine::Observer { observer, poles: None })
+        }
+        ObserverGain::Poles(poles) => {
+            if poles.len() != n {
+                let message =
+                    format!("there are {}, but the model has {n} states: give one for each", poles.len());
+                return Err(Error::argument("poles", message));
+            }
+            let mut observer = Observer::new(start.clone(), DMatrix::zeros(n, m)).map_err(wrong)?;
+            let poles = DVector::from_vec(poles);
+            let none = DVector::zeros(model.inputs().len());
+            let wrong = |error: thetahat_core::Error| Error::argument("poles", error.to_string());
+            match &model.kind {
+                Kind::Linear(linear) => {
+                    let weights = model.kind.weights();
+                    let placed =
+                        observer.place(&linear.transition, &linear.observation, &none, &weights, &poles);
+                    placed.map_err(wrong)?;
+                    Ok(Engine::Observer { observer, poles: None })
+                }
+                Kind::Grey(_) => {
+                    Observer::check_poles(&poles).map_err(wrong)?;
+                    Ok(Engine::Observer { observer, poles: Some(poles) })
+                }
+            }
+        }
+    }
 }

@@ -6,7 +6,7 @@ use thetahat_core::nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use thetahat_core::{Covariance, LinearObservation, LinearTransition};
 
 use crate::data::Offset;
-use crate::{Error, Model, Start};
+use crate::{Error, InitialState, Model};
 
 type Transition = LinearTransition<f64, Dyn, Dyn>;
 
@@ -115,7 +115,7 @@ impl Linear {
     }
 
     /// A fitted model: Q = K R K', S = K R, R = var e.
-    pub(super) fn of_model(model: &Model, start: Start) -> Result<Self, Error> {
+    pub(super) fn of_model(model: &Model, start: InitialState) -> Result<Self, Error> {
         let space = model.state_space();
         let variance = space.noise_variance;
         if variance <= 0.0 {
@@ -136,8 +136,8 @@ impl Linear {
             let q = r.transformed(&space.k)?;
             let s = Some(&space.k * variance);
             let p0 = match start {
-                Start::Zero => Covariance::zero(Dyn(n)),
-                _ => Covariance::from_diagonal(&DVector::repeat(n, UNKNOWN * variance))?,
+                InitialState::Zero => Covariance::zero(Dyn(n)),
+                InitialState::Unknown => Covariance::from_diagonal(&DVector::repeat(n, UNKNOWN * variance))?,
             };
             let x0 = DVector::zeros(n);
             let matrices = Matrices { f: space.f, g: space.g, h: space.h, d: space.d, q, r, s, x0, p0 };

@@ -1,7 +1,8 @@
+use super::kind::Kind;
 use super::linear::Linear;
 use super::matrices;
 use crate::greybox::Document;
-use crate::{Error, GreyBox, Report, Start};
+use crate::{Error, GreyBox, Report};
 
 /// A model with a state, for a [`StateFilter`](super::StateFilter).
 ///
@@ -30,10 +31,13 @@ pub struct StateModel {
     pub(super) kind: Kind,
 }
 
-#[derive(Debug, Clone)]
-pub(super) enum Kind {
-    Linear(Box<Linear>),
-    Grey(Box<GreyBox>),
+/// What is known of the state in which the model of a report starts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum InitialState {
+    /// It is 0: the plant is at rest, the channels at their offsets.
+    Zero,
+    /// Nothing: each state, which is in units of the output, has a standard deviation of a thousand times that of the noise e.
+    Unknown,
 }
 
 impl From<GreyBox> for StateModel {
@@ -46,7 +50,7 @@ impl StateModel {
     /// Reads a model with equations or with matrices.
     ///
     /// # Errors
-    /// [`Error::Argument`] with line and column, and with what is wrong there.
+    /// [`Error::Model`] with line and column, and with what is wrong there.
     ///
     /// ```
     /// use thetahat::StateModel;
@@ -69,19 +73,9 @@ impl StateModel {
 
     /// The model of a report, in innovations form.
     ///
-    /// It starts from a state of 0 that is known, with [`Start::Zero`]: the plant at rest, the channels at their offsets. Or
-    /// from one that is not, with [`Start::Estimated`]: each state, which is in units of the output, has a standard deviation
-    /// of a thousand times that of the noise e. [`Start::Measured`] is for predictions only.
-    ///
     /// # Errors
-    /// [`Error::Report`] if the noise variance is 0, or the numbers overflow; [`Error::Argument`] for another start.
-    pub fn from_report(report: &Report, start: Start) -> Result<Self, Error> {
-        if start == Start::Measured {
-            return Err(Error::argument(
-                "initial",
-                "a filter starts from zero, or estimates where it starts",
-            ));
-        }
+    /// [`Error::Report`] if the noise variance is 0, or the numbers overflow.
+    pub fn from_report(report: &Report, start: InitialState) -> Result<Self, Error> {
         Ok(Self { kind: Kind::Linear(Box::new(Linear::of_model(&report.model, start)?)) })
     }
 
@@ -118,13 +112,14 @@ impl StateModel {
         parameters.iter().map(|parameter| parameter.name.as_str())
     }
 
-    /// How the unknown parameters are kept within their bounds, in words, such as `mass = 0.1 + exp(z)`.
-    pub fn changes_of_variable(&self) -> impl ExactSizeIterator<Item = String> {
+    /// How the unknown parameters are kept within their bounds, in words, such as `mass = 0.1 + exp(z)`; none for one without
+    /// bounds.
+    pub fn changes_of_variable(&self) -> impl ExactSizeIterator<Item = Option<String>> {
         let parameters = match &self.kind {
             Kind::Linear(_) => &[],
             Kind::Grey(grey) => grey.parameters(),
         };
-        parameters.iter().map(|parameter| parameter.words())
+        parameters.iter().map(|parameter| parameter.change_of_variable())
     }
 
     /// The length of a sample, in seconds.

@@ -1,9 +1,9 @@
 use thetahat_core::Smoother;
 
 use super::StateFilter;
-use super::estimate::Values;
-use super::look::Work;
-use super::model::Kind;
+use super::estimate::StateValues;
+use super::kind::Kind;
+use super::linearization::Work;
 use crate::Error;
 
 /// The states of a record, each given all of its rows, later ones too.
@@ -22,15 +22,15 @@ impl SmoothedStates {
         self.values.len() / (self.states + self.parameters).max(1)
     }
 
-    /// The state in a row, counted from 0, and the unknown parameters as they were there, in their own units; none behind
-    /// the last one. Parameters that do not walk are the same in all rows.
-    pub fn row(&self, row: usize) -> Option<(Values<'_>, Values<'_>)> {
+    /// The state in a row, counted from 1, and the unknown parameters as they were there, in their own units; none for
+    /// row 0 and behind the last one. Parameters that do not walk are the same in all rows.
+    pub fn row(&self, row: usize) -> Option<(StateValues<'_>, StateValues<'_>)> {
         let size = self.states + self.parameters;
-        let start = row.checked_mul(size)?;
+        let start = row.checked_sub(1)?.checked_mul(size)?;
         let (states, parameters) = self.values.get(start..start.checked_add(size)?)?.split_at(self.states);
         let (deviations, others) = self.deviations.get(start..start + size)?.split_at(self.states);
-        let values = |values, deviations| Values { values, standard_deviations: Some(deviations) };
-        (row < self.rows()).then_some((values(states, deviations), values(parameters, others)))
+        let values = |values, deviations| StateValues { values, standard_deviations: Some(deviations) };
+        (row <= self.rows()).then_some((values(states, deviations), values(parameters, others)))
     }
 }
 
@@ -55,7 +55,7 @@ impl StateFilter {
     /// }
     /// // Between two readings a walk is a line, and least known in the middle.
     /// let smoothed = filter.smooth()?;
-    /// let (state, _) = smoothed.row(2).unwrap();
+    /// let (state, _) = smoothed.row(3).unwrap();
     /// assert!((state.values[0] - 4.0).abs() < 1e-6);
     /// assert!((state.standard_deviations.unwrap()[0] - 1.0).abs() < 1e-6);
     /// # Ok::<(), thetahat::Error>(())

@@ -2,8 +2,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::StateFilter;
-use super::estimate::Values;
-use crate::Error;
+use super::estimate::{StateEstimate, StateValues};
+use crate::validate::NisCount;
+use crate::{Error, NisSummary};
 
 /// The schema that this version writes.
 const SCHEMA: &str = "thetahat.filter/1";
@@ -15,7 +16,7 @@ pub struct FilterSummary {
     pub schema: String,
     /// The program and version that wrote it.
     pub generator: String,
-    /// `kalman`, `ekf` or `luenberger`.
+    /// `kalman`, `ekf` or `luenberger`, as it was asked for.
     pub estimator: String,
     /// The rows.
     pub rows: usize,
@@ -23,30 +24,17 @@ pub struct FilterSummary {
     pub measured: usize,
     /// The log-likelihood of all of them; none from an observer.
     pub log_likelihood: Option<f64>,
-    /// How surprising the rows were; none where nothing was measured, and from an observer.
+    /// How surprising the rows were, counted by row; none where nothing was measured, and from an observer.
     pub nis: Option<NisSummary>,
     /// The states given all rows; from an observer as predicted for the last row.
-    pub states: Vec<Estimated>,
+    pub states: Vec<EstimatedNumber>,
     /// The unknown parameters given all rows.
-    pub parameters: Vec<Estimated>,
-}
-
-/// How the normalised innovations squared lay.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct NisSummary {
-    /// How many rows have one.
-    pub rows: usize,
-    /// Their mean: the number of outputs measured in a row, if the model is right.
-    pub mean: f64,
-    /// The part below the bounds that hold 95 %: 0.025 if the model is right.
-    pub below: f64,
-    /// The part above: 0.025 if the model is right.
-    pub above: f64,
+    pub parameters: Vec<EstimatedNumber>,
 }
 
 /// A number that was estimated.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Estimated {
+pub struct EstimatedNumber {
     /// Its name.
     pub name: String,
     /// The estimate.
@@ -57,19 +45,35 @@ pub struct Estimated {
     pub change_of_variable: Option<String>,
 }
 
+/// What a filter has seen so far.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Totals {
+    pub(super) rows: usize,
+    /// The elements of measurements that were there.
+    measured: usize,
+    /// The sum of the log-likelihoods; 0 from an observer.
+    log_likelihood: f64,
+    nis: NisCount,
+}
+
+impl Totals {
+    /// One more row.
+    pub(super) fn add(&mut self, row: &StateEstimate<'_>) {
+        self.rows += 1;
+        self.measured += row.measured;
+        self.log_likelihood += row.log_likelihood.unwrap_or(0.0);
+        if let Some((nis, bounds)) = row.nis.zip(row.nis_bounds) {
+            self.nis.add(nis, row.measured, bounds);
+        }
+    }
+}
+
 impl StateFilter {
     /// What it has come to.
     pub fn summary(&self) -> FilterSummary {
         let (model, totals) = (self.model(), self.totals());
         let latest = self.latest();
         let states = latest.and_then(|latest| latest.filtered.or(Some(latest.predicted)));
-        let nis = (totals.nis_rows > 0).then(|| NisSummary {
-            rows: totals.nis_rows,
-            mean: totals.mean_nis,
-            below: totals.nis_below as f64 / totals.nis_rows as f64,
-            above: totals.nis_above as f64 / totals.nis_rows as f64,
-        });
-        let changes = model.changes_of_variable().map(Some);
         FilterSummary {
             schema: SCHEMA.to_owned(),
             generator: format!("thetahat {}", env!("CARGO_PKG_VERSION")),
@@ -77,9 +81,13 @@ impl StateFilter {
             rows: totals.rows,
             measured: totals.measured,
             log_likelihood: (!self.is_observer()).then_some(totals.log_likelihood),
-            nis,
+            nis: totals.nis.summary(),
             states: estimated(model.states().iter().map(String::as_str), states, std::iter::repeat(None)),
-            parameters: estimated(model.unknown(), latest.map(|latest| latest.parameters), changes),
+            parameters: estimated(
+                model.unknown(),
+                latest.map(|latest| latest.parameters),
+                model.changes_of_variable(),
+            ),
         }
     }
 }
@@ -87,13 +95,13 @@ impl StateFilter {
 /// Names with their values; nothing before the first row.
 fn estimated<'a>(
     names: impl Iterator<Item = &'a str>,
-    values: Option<Values<'_>>,
+    values: Option<StateValues<'_>>,
     changes: impl Iterator<Item = Option<String>>,
-) -> Vec<Estimated> {
-    let Some(Values { values, standard_deviations }) = values else { return Vec::new() };
+) -> Vec<EstimatedNumber> {
+    let Some(StateValues { values, standard_deviations }) = values else { return Vec::new() };
     let named = names.zip(values).zip(changes).enumerate();
     named
-        .map(|(index, ((name, &value), change_of_variable))| Estimated {
+        .map(|(index, ((name, &value), change_of_variable))| EstimatedNumber {
             name: name.to_owned(),
             value,
             standard_deviation: standard_deviations.and_then(|deviations| deviations.get(index)).copied(),

@@ -29,16 +29,3 @@ pub(super) const FLOW: [f64; 20] = [
 pub(super) fn filter(text: &str, estimator: Estimator) -> StateFilter {
     StateFilter::new(StateModel::from_toml(text).unwrap(), estimator).unwrap()
 }
-
-/// Random numbers of variance 1, near enough to Gaussian: sums of twelve uniform ones.
-pub(super) struct Noise(oorandom::Rand64);
-
-impl Noise {
-    pub(super) fn new(seed: u128) -> Self {
-        Self(oorandom::Rand64::new(seed))
-    }
-
-    pub(super) fn next(&mut self) -> f64 {
-        (0..12).map(|_| self.0.rand_float()).sum::<f64>() - 6.0
-    }
-}

@@ -13,7 +13,7 @@ pub(crate) fn error_at(text: &str, offset: usize, message: impl Into<String>) ->
     let before = text.get(..offset).unwrap_or(text);
     let line = before.matches('\n').count() + 1;
     let column = before.rsplit('\n').next().map_or(0, |line| line.chars().count()) + 1;
-    Error::argument(&format!("line {line}, column {column}"), message)
+    Error::Model { line, column, message: message.into() }
 }
 
 /// The name that differs least from a word, if one is near: at most a third of its characters have to be changed, and
@@ -44,7 +44,7 @@ pub(crate) fn quoted(word: &str) -> String {
     if word.chars().count() > 40 { format!("'{shown}…'") } else { format!("'{shown}'") }
 }
 
-/// ", did you mean 'x'?" or nothing.
+/// "; did you mean 'x'?" or nothing.
 pub(crate) fn suggestion<'n>(word: &str, names: impl IntoIterator<Item = &'n str>) -> String {
     nearest(word, names).map_or(String::new(), |name| format!("; did you mean '{name}'?"))
 }
@@ -57,7 +57,7 @@ pub(crate) struct Document<'t> {
 
 impl<'t> Document<'t> {
     /// # Errors
-    /// [`Error::Argument`] with line and column where it is no TOML.
+    /// [`Error::Model`] where it is no TOML.
     pub(crate) fn parse(text: &'t str) -> Result<Self, Error> {
         let root = DeTable::parse(text).map_err(|error| {
             let offset = error.span().map_or(0, |span| span.start);

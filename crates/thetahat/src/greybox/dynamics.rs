@@ -6,53 +6,6 @@ use super::GreyBox;
 use super::graph::Leaves;
 use super::program::Program;
 
-/// A model with exact derivatives, for any kind of number. `z` are the unknown parameters after the change of variable.
-///
-/// Matrices are column-major. Time is in seconds since the first row. A Jacobian has a column for each state, and behind these
-/// one for each parameter if the slice has room for them: there are then n + p of them, else n. The slices' lengths must fit;
-/// nothing is allocated once `work` has grown.
-pub(crate) trait Dynamics {
-    /// n, the number of states.
-    fn states(&self) -> usize;
-    /// The number of unknown parameters.
-    fn parameters(&self) -> usize;
-    /// The number of inputs.
-    fn inputs(&self) -> usize;
-    /// m, the number of outputs.
-    fn outputs(&self) -> usize;
-    /// x(k+1) and its Jacobian, of n rows, over a step of `dt` seconds from time `t`.
-    #[expect(clippy::too_many_arguments, reason = "the arguments of f, and where its answers go")]
-    fn advance<S: Number<f64>>(
-        &self,
-        x: &[S],
-        z: &[S],
-        u: &[f64],
-        t: f64,
-        dt: f64,
-        next: &mut [S],
-        jacobian: &mut [S],
-        work: &mut Vec<S>,
-    );
-    /// y and its Jacobian, of m rows.
-    #[expect(clippy::too_many_arguments, reason = "the arguments of h, and where its answers go")]
-    fn observe<S: Number<f64>>(
-        &self,
-        x: &[S],
-        z: &[S],
-        u: &[f64],
-        t: f64,
-        y: &mut [S],
-        jacobian: &mut [S],
-        work: &mut Vec<S>,
-    );
-    /// The state at the first row, and the standard deviations of what is known of it.
-    fn start(&self) -> (&[f64], &[f64]);
-    /// What noise adds to the variance of each state over a step of `dt` seconds.
-    fn process_variances(&self, dt: f64) -> impl Iterator<Item = f64>;
-    /// The variance of the noise of each output.
-    fn measurement_variances(&self) -> &[f64];
-}
-
 /// Some functions of state, parameters, inputs and time, with their derivatives.
 ///
 /// The results of a program are the functions, then their derivatives by the states, column after column, and in `full` then
@@ -94,33 +47,25 @@ pub(super) enum Step {
     Integrated(usize),
 }
 
-/// In continuous time a step of h seconds is one of the classical method of order four (Kutta 1901; Hairer, Nørsett and
-/// Wanner, Solving Ordinary Differential Equations I, 2nd ed. 1993, table 1.2), and its Jacobian the exact derivative of
-/// that step, by the chain rule through its stages. With M_j = ∂x_j/∂(x, z), and A = ∂f/∂x, B = ∂f/∂z at stage j:
+/// The model for any kind of number, with exact derivatives. `z` are the unknown parameters after the change of variable.
 ///
-/// ```text
-/// x_j = x + a_j h k_(j-1)       k_j = f(x_j)               a = 0, 1/2, 1/2, 1
-/// M_j = M + a_j h K_(j-1)       K_j = A M_j + [0 B]
-/// x <- x + h sum b_j k_j        M <- M + h sum b_j K_j     b = 1/6, 1/3, 1/3, 1/6
-/// ```
-impl Dynamics for GreyBox {
-    fn states(&self) -> usize {
-        self.states.len()
-    }
-
-    fn parameters(&self) -> usize {
-        self.unknown.len()
-    }
-
-    fn inputs(&self) -> usize {
-        self.inputs.len()
-    }
-
-    fn outputs(&self) -> usize {
-        self.outputs.len()
-    }
-
-    fn advance<S: Number<f64>>(
+/// Matrices are column-major. Time is in seconds since the first row. A Jacobian has a column for each state, and behind these
+/// one for each parameter if the slice has room for them: there are then n + p of them, else n. The slices' lengths must fit;
+/// nothing is allocated once `work` has grown.
+impl GreyBox {
+    /// x(k+1) and its Jacobian, of n rows, over a step of `dt` seconds from time `t`.
+    ///
+    /// In continuous time a step of h seconds is one of the classical method of order four (Kutta 1901; Hairer, Nørsett and
+    /// Wanner, Solving Ordinary Differential Equations I, 2nd ed. 1993, table 1.2), and its Jacobian the exact derivative of
+    /// that step, by the chain rule through its stages. With M_j = ∂x_j/∂(x, z), and A = ∂f/∂x, B = ∂f/∂z at stage j:
+    ///
+    /// ```text
+    /// x_j = x + a_j h k_(j-1)       k_j = f(x_j)               a = 0, 1/2, 1/2, 1
+    /// M_j = M + a_j h K_(j-1)       K_j = A M_j + [0 B]
+    /// x <- x + h sum b_j k_j        M <- M + h sum b_j K_j     b = 1/6, 1/3, 1/3, 1/6
+    /// ```
+    #[expect(clippy::too_many_arguments, reason = "the arguments of f, and where its answers go")]
+    pub(crate) fn advance<S: Number<f64>>(
         &self,
         x: &[S],
         z: &[S],
@@ -180,7 +125,9 @@ impl Dynamics for GreyBox {
         }
     }
 
-    fn observe<S: Number<f64>>(
+    /// y and its Jacobian, of m rows.
+    #[expect(clippy::too_many_arguments, reason = "the arguments of h, and where its answers go")]
+    pub(crate) fn observe<S: Number<f64>>(
         &self,
         x: &[S],
         z: &[S],
@@ -195,16 +142,19 @@ impl Dynamics for GreyBox {
         self.observation.run(&leaves, y, jacobian, program);
     }
 
-    fn start(&self) -> (&[f64], &[f64]) {
+    /// The state at the first row, and the standard deviations of what is known of it.
+    pub(crate) fn start(&self) -> (&[f64], &[f64]) {
         (&self.start, &self.start_deviations)
     }
 
-    fn process_variances(&self, dt: f64) -> impl Iterator<Item = f64> {
+    /// What noise adds to the variance of each state over a step of `dt` seconds.
+    pub(crate) fn process_variances(&self, dt: f64) -> impl Iterator<Item = f64> {
         let share = dt / self.sample_time;
         self.process_variances.iter().map(move |variance| variance * share)
     }
 
-    fn measurement_variances(&self) -> &[f64] {
+    /// The variance of the noise of each output.
+    pub(crate) fn measurement_variances(&self) -> &[f64] {
         &self.measurement_variances
     }
 }

@@ -12,16 +12,14 @@ mod tests;
 mod uncertainty;
 mod warnings;
 
-use thetahat_core::nalgebra::DMatrix;
-
 use criterion::{Criterion, Failure};
 pub use document::{GreyFit, GreyOutput, GreyParameter, GreyReport, GreySearch, GreyState};
 use experiment::Experiment;
 use figures::Figures;
-use search::{Found, search};
+use search::search;
 use uncertainty::covariance;
 
-use super::{Dynamics, GreyBox, Scale, Unknown};
+use super::{GreyBox, Scale, Unknown};
 use crate::estimate::Monitor;
 use crate::{Error, Recording, Source};
 
@@ -51,8 +49,13 @@ const TOLERANCE: f64 = 1e-8;
 /// **Search.** Fisher scoring with the damping of Levenberg and Marquardt. Derivatives of e and S are exact: the filter is
 /// computed in dual numbers. `monitor` is told of V divided by the number of readings before each iteration.
 ///
-/// **Standard errors** come from the inverse of the information, sum (e' e''/S + S' S''/(2 S^2)), which holds if the noises of
-/// the model are those of the log. Then the mean of e^2/S is 1. Where it is above 1, the covariance is multiplied by it: that is
+/// **Standard errors** come from the inverse of the information, with e_i and S_i the derivatives by parameter i,
+///
+/// ```text
+/// I_ij = sum (e_i e_j/S + S_i S_j/(2 S^2))
+/// ```
+///
+/// which holds if the noises of the model are those of the log. Then the mean of e^2/S is 1. Where it is above 1, the covariance is multiplied by it: that is
 /// right if all noises are too small by one factor, and a good guess else. Where it is below 1 the covariance stays, as too
 /// large a noise must not make an estimate look certain. The report has the plain ones too.
 ///
@@ -113,24 +116,32 @@ pub fn fit_grey(
     if logs.is_empty() {
         return Err(Error::argument("logs", "there is none; give at least one"));
     }
-    let (inputs, outputs) = (model.inputs(), model.outputs());
+    let inputs = model.inputs();
     let experiments: Vec<Experiment> = logs
         .iter()
-        .map(|log| Experiment::new(log, inputs, outputs, |step| model.division(step)))
+        .map(|log| Experiment::new(log, inputs, model.outputs(), |step| model.division(step)))
         .collect::<Result<_, Error>>()?;
     let names: Vec<String> = unknown.iter().map(|unknown| unknown.name.clone()).collect();
     let start: Vec<f64> = unknown.iter().map(|unknown| unknown.start_variable().0).collect();
     let bounded: Vec<bool> = unknown.iter().map(|unknown| unknown.scale != Scale::Free).collect();
-    let Fit { found, covariance, figures, readings } = fit(
-        model,
-        &experiments,
-        outputs,
-        &Sought { names: &names, start: &start, bounded: &bounded },
-        |index, z| unknown[index].scale.slope(z),
-        monitor,
-    )?;
+    let mut criterion = Criterion::new(model, &experiments);
+    let readings = criterion.readings;
+    if readings <= names.len() {
+        let message = format!(
+            "{} unknown parameters need more than {readings} measured values; give a longer log",
+            names.len()
+        );
+        return Err(Error::undetermined(names, message));
+    }
+    let failed = |failure: Failure| failure.error(&experiments);
+    let found =
+        search(&mut criterion, &start, &bounded, MAX_ITERATIONS, TOLERANCE, monitor)?.map_err(failed)?;
+    let slopes: Vec<f64> = unknown.iter().zip(&found.z).map(|(unknown, z)| unknown.scale.slope(*z)).collect();
+    // Of the parameters in their own units, as if the noises of the model were those of the log.
+    let covariance = covariance(&criterion.information, &slopes, &names)?;
+    let figures = Figures::of(model, &experiments, &found.z).map_err(failed)?;
 
-    let factor = figures.mean_nis.max(1.0);
+    let factor = figures.nis.map_or(1.0, |nis| nis.relative().max(1.0));
     let parameters = unknown.iter().zip(&found.z).enumerate().map(|(index, (unknown, &z))| {
         let nominal = covariance[(index, index)].sqrt();
         unknown.reported(z, nominal * factor.sqrt(), nominal)
@@ -153,8 +164,7 @@ pub fn fit_grey(
             .collect(),
         log_likelihood: -found.value(),
         readings,
-        mean_nis: figures.mean_nis,
-        within_95: figures.within,
+        nis: figures.nis,
         covariance_factor: factor,
         outputs: figures.outputs,
         states: states.collect(),
@@ -203,52 +213,9 @@ impl Unknown {
             start: self.start,
             min,
             max,
-            variable: self.words(),
+            change_of_variable: self.change_of_variable(),
         }
     }
-}
-
-/// Unknown parameters as a search sees them.
-struct Sought<'a> {
-    names: &'a [String],
-    /// z.
-    start: &'a [f64],
-    /// Which have a bound.
-    bounded: &'a [bool],
-}
-
-/// What came of a search.
-struct Fit {
-    found: Found,
-    /// Of the parameters in their own units, as if the noises of the model were those of the log.
-    covariance: DMatrix<f64>,
-    figures: Figures,
-    readings: usize,
-}
-
-/// The same for any model. `slope` is dp/dz of a parameter.
-fn fit<M: Dynamics>(
-    model: &M,
-    experiments: &[Experiment],
-    channels: &[String],
-    sought: &Sought<'_>,
-    slope: impl Fn(usize, f64) -> f64,
-    monitor: Monitor<'_>,
-) -> Result<Fit, Error> {
-    let mut criterion = Criterion::new(model, experiments);
-    let (readings, size) = (criterion.readings, sought.names.len());
-    if readings <= size {
-        let message =
-            format!("{size} unknown parameters need more than {readings} measured values; give a longer log");
-        return Err(Error::undetermined(sought.names.to_vec(), message));
-    }
-    let failed = |failure: Failure| failure.error(experiments);
-    let found = search(&mut criterion, sought.start, sought.bounded, MAX_ITERATIONS, TOLERANCE, monitor)?
-        .map_err(failed)?;
-    let slopes: Vec<f64> = found.z.iter().enumerate().map(|(index, &z)| slope(index, z)).collect();
-    let covariance = covariance(&criterion.information, &slopes, sought.names)?;
-    let figures = Figures::of(model, experiments, &found.z, channels).map_err(failed)?;
-    Ok(Fit { found, covariance, figures, readings })
 }
 
 impl Failure {

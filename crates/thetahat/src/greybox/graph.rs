@@ -423,9 +423,10 @@ impl Graph {
             Function::Sinh => self.apply(Function::Cosh, x),
             Function::Cosh => self.apply(Function::Sinh, x),
             Function::Tanh => {
-                // (1 - tanh x)(1 + tanh x)
-                let (less, more) = (self.subtract(one, node), self.add(one, node));
-                self.multiply(less, more)
+                // 1/cosh² x: where tanh x rounds to 1, 1 - tanh² x is 0 and tells nothing.
+                let cosine = self.apply(Function::Cosh, x);
+                let square = self.power(cosine, 2);
+                self.divide(one, square)
             }
             Function::Abs => self.apply(Function::Sign, x),
             Function::Sign => Self::ZERO,

@@ -277,7 +277,15 @@ fn parameter(entry: &Entry<'_>, known: &[(String, f64)]) -> Result<Given, Error>
     let deviation = section.get("sd").map(|sd| sd.positive()).transpose()?;
     let walk = section.get("walk").map(|walk| walk.non_negative()).transpose()?;
     if !section.get("unknown").map_or(Ok(false), |flag| flag.flag())? {
-        return Ok(Given::Known(value));
+        let idle = ["sd", "min", "max", "walk"].into_iter().find_map(|key| section.get(key));
+        return match idle.filter(|_| section.get("unknown").is_none()) {
+            Some(idle) => Err(idle.error(format!(
+                "{} is of no use for a parameter that is known: add unknown = true, or write {} = {value}",
+                quoted(idle.key),
+                entry.key
+            ))),
+            None => Ok(Given::Known(value)),
+        };
     }
     if let Some((_, value)) = known.iter().find(|(name, _)| name == entry.key) {
         return Ok(Given::Known(*value));

@@ -58,8 +58,9 @@ impl Scale {
             Self::Above(_) => z.exp(),
             Self::Below(_) => -z.exp(),
             Self::Between(min, max) => {
-                let tangent = (0.5 * z).tanh();
-                0.25 * (max - min) * (1.0 - tangent) * (1.0 + tangent)
+                // Exact where p rounds to its bound, too.
+                let small = (-z.abs()).exp();
+                (max - min) * small / ((1.0 + small) * (1.0 + small))
             }
         }
     }
@@ -97,16 +98,16 @@ impl Scale {
         }
     }
 
-    /// The change of variable in words, such as `mass = 0.1 + exp(z)`.
-    pub(crate) fn words(self, name: &str) -> String {
+    /// The change of variable in words, such as `mass = 0.1 + exp(z)`; none without bounds.
+    pub(crate) fn words(self, name: &str) -> Option<String> {
         match self {
-            Self::Free => format!("{name} = z"),
-            Self::Above(0.0) => format!("{name} = exp(z)"),
-            Self::Above(min) => format!("{name} = {min} + exp(z)"),
-            Self::Below(max) => format!("{name} = {max} - exp(z)"),
+            Self::Free => None,
+            Self::Above(0.0) => Some(format!("{name} = exp(z)")),
+            Self::Above(min) => Some(format!("{name} = {min} + exp(z)")),
+            Self::Below(max) => Some(format!("{name} = {max} - exp(z)")),
             Self::Between(min, max) => {
                 let width = max - min;
-                format!("{name} = {min} + {width} / (1 + exp(-z))")
+                Some(format!("{name} = {min} + {width} / (1 + exp(-z))"))
             }
         }
     }

@@ -14,7 +14,14 @@ impl Noise {
         (bits >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
     }
 
-    /// So many of them.
+    /// Gaussian, of variance 1 (Box and Muller 1958).
+    pub(crate) fn normal(&mut self) -> f64 {
+        let mut uniform = || 0.5 * (1.0 + self.next());
+        // 1 - u is above 0.
+        (-2.0 * (1.0 - uniform()).ln()).sqrt() * (std::f64::consts::TAU * uniform()).cos()
+    }
+
+    /// So many uniform ones.
     pub(crate) fn take(&mut self, count: usize) -> Vec<f64> {
         (0..count).map(|_| self.next()).collect()
     }

@@ -4,9 +4,16 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 use statrs::function::beta::checked_beta_reg;
 
 /// How often a chi-square number of so many degrees of freedom is as large; none for no degrees of freedom.
-pub(super) fn chi_square_tail(statistic: f64, degrees: f64) -> Option<f64> {
+pub(crate) fn chi_square_tail(statistic: f64, degrees: f64) -> Option<f64> {
     let distribution = ChiSquared::new(degrees).ok()?;
     Some(distribution.sf(statistic.max(0.0))).filter(|p| p.is_finite())
+}
+
+/// Between which a chi-square number of so many degrees of freedom lies in 95 % of all cases: its quantiles 0.025 and 0.975;
+/// none for no degrees of freedom.
+pub(crate) fn chi_square_interval(degrees: usize) -> Option<(f64, f64)> {
+    let distribution = ChiSquared::new(degrees as f64).ok()?;
+    Some((distribution.inverse_cdf(0.025), distribution.inverse_cdf(0.975)))
 }
 
 /// How far from zero a standard normal number lies with probability 1 - `alpha`; `alpha` is in 0 … 1.
@@ -38,6 +45,10 @@ mod tests {
         assert_eq!(chi_square_tail(0.0, 3.0), Some(1.0));
         assert_eq!(chi_square_tail(1.0, 0.0), None);
         assert!(chi_square_tail(1e6, 25.0).unwrap() < 1e-300);
+        // Abramowitz and Stegun 1964, table 26.8, has five digits.
+        let (low, high) = chi_square_interval(10).unwrap();
+        assert!((low - 3.24697).abs() < 1e-5 && (high - 20.4832).abs() < 1e-4, "{low} {high}");
+        assert_eq!(chi_square_interval(0), None);
         assert!((two_sided(0.05) - 1.959963985).abs() < 1e-9);
         assert!((two_sided(0.01) - 2.575829304).abs() < 1e-9);
         assert!((two_sided(1.0)).abs() < 1e-12);

@@ -99,22 +99,19 @@ impl Fit {
         };
         let counted = || response.counted.iter().cloned().flatten();
         let samples = response.counted.iter().map(|rows| rows.len()).sum::<usize>();
-        let n = samples as f64;
-        let y = record.output;
-        let mean = sum(counted().map(|t| y[t])) / n;
-        let error = sum(counted().map(|t| (y[t] - response.values[t]).powi(2))).sqrt();
-        let spread = sum(counted().map(|t| (y[t] - mean).powi(2))).sqrt();
-        let fit = Self {
-            rows: rows.to_vec(),
-            part,
-            horizon,
-            initial,
-            samples,
-            percent: Some(100.0 * (1.0 - error / spread)).filter(|percent| percent.is_finite()),
-            rmse: Some(error / n.sqrt()).filter(|rmse| rmse.is_finite()),
-        };
-        Ok((fit, response))
+        let (percent, rmse) = closeness(counted().map(|t| (record.output[t], response.values[t])));
+        Ok((Self { rows: rows.to_vec(), part, horizon, initial, samples, percent, rmse }, response))
     }
+}
+
+/// percent and rmse, as [`Fit`] defines them, of pairs of a measured value and what a model says.
+pub(crate) fn closeness(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> (Option<f64>, Option<f64>) {
+    let n = pairs.clone().count() as f64;
+    let mean = sum(pairs.clone().map(|(measured, _)| measured)) / n;
+    let error = sum(pairs.clone().map(|(measured, said)| (measured - said).powi(2))).sqrt();
+    let spread = sum(pairs.map(|(measured, _)| (measured - mean).powi(2))).sqrt();
+    let finite = |figure: f64| Some(figure).filter(|figure| figure.is_finite());
+    (finite(100.0 * (1.0 - error / spread)), finite(error / n.sqrt()))
 }
 
 #[cfg(test)]

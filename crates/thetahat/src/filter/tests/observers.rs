@@ -2,7 +2,6 @@ use thetahat_core::nalgebra::{Complex, DMatrix, DVector, Dyn};
 use thetahat_core::{Action, Covariance, LinearObservation, LinearTransition, LuenbergerObserver};
 
 use super::filter;
-use crate::greybox::Dynamics;
 use crate::{Estimator, GreyBox, ObserverGain, StateFilter, StateModel};
 
 const CART: &str = "\
@@ -61,7 +60,9 @@ fn it_steps_as_the_observer_of_the_core_does() {
     }
     let last = filters[0].step(None, &[0.0], &[position]).unwrap();
     assert!((last.predicted.values[1] - speed).abs() < 1e-6);
-    assert_eq!((filters[0].totals().rows, filters[0].totals().nis_rows), (61, 0));
+    let summary = filters[0].summary();
+    assert_eq!((summary.rows, summary.nis, summary.log_likelihood), (61, None, None));
+    assert_eq!(summary.estimator, "luenberger");
 }
 
 const PENDULUM: &str = "\

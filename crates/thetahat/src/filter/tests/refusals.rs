@@ -1,6 +1,6 @@
 use super::NILE;
 use crate::greybox::tests::CART;
-use crate::{Estimator, StateFilter, StateModel};
+use crate::{Error, Estimator, StateFilter, StateModel};
 
 const TWO: &str = "\
 sample_time = 0.5
@@ -21,6 +21,8 @@ P0 = [[1, 0], [0, 1]]
 #[test]
 fn matrices_that_do_not_fit_are_named_with_their_place() {
     assert!(StateModel::from_toml(TWO).is_ok());
+    let error = StateModel::from_toml(&TWO.replace("sample_time = 0.5", "sample_time = -1")).unwrap_err();
+    assert!(matches!(error, Error::Model { line: 1, column: 15, .. }), "{error:?}");
     let cases = [
         (
             "sample_time = 0.5",
@@ -135,7 +137,7 @@ fn steps_of_a_model_in_matrices_are_whole_multiples() {
     {
         let error = filter.step(Some(step), &[], &[1.0]).unwrap_err();
         assert!(error.to_string().contains(expected), "{error}");
-        assert!(matches!(error, crate::Error::Data { row: Some(2), .. }));
+        assert!(matches!(error, Error::Data { row: Some(2), .. }));
     }
     let estimate = filter.step(Some(2.0), &[], &[f64::NAN]).unwrap();
     // P = 15076.2… + 2 Q.

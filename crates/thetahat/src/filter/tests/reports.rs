@@ -1,9 +1,9 @@
-use super::Noise;
+use crate::filter::kind::Kind;
 use crate::filter::linear::Linear;
-use crate::filter::model::Kind;
+use crate::regression::noise::Noise;
 use crate::{
-    Channel, Estimator, Log, Model, Offset, Orders, Plan, Record, Start, StateFilter, StateModel, identify,
-    predict,
+    Channel, Estimator, InitialState, Log, Model, Offset, Orders, Plan, Record, Start, StateFilter,
+    StateModel, identify, predict,
 };
 
 /// Models of all structures: na, nb, nc, nd, nf, nk and their parameters a, b, c, d, f.
@@ -27,7 +27,7 @@ fn models() -> Vec<Model> {
 }
 
 fn filter(model: &Model) -> StateFilter {
-    let linear = Linear::of_model(model, Start::Zero).unwrap();
+    let linear = Linear::of_model(model, InitialState::Zero).unwrap();
     StateFilter::new(StateModel { kind: Kind::Linear(Box::new(linear)) }, Estimator::Kalman).unwrap()
 }
 
@@ -41,9 +41,9 @@ fn predictions_are_those_of_the_difference_equation() {
         }
         model.output.name = "y".to_owned();
         model.output.offset = Offset { level: -2.0, slope: 0.02 };
-        let mut noise = Noise::new(17);
-        let u: Vec<Vec<f64>> = (0..inputs).map(|_| (0..80).map(|_| noise.next()).collect()).collect();
-        let y: Vec<f64> = (0..80).map(|_| noise.next()).collect();
+        let mut noise = Noise(17);
+        let u: Vec<Vec<f64>> = (0..inputs).map(|_| (0..80).map(|_| noise.normal()).collect()).collect();
+        let y: Vec<f64> = (0..80).map(|_| noise.normal()).collect();
         let record = Record::new(&y, u.iter().map(Vec::as_slice).collect()).unwrap();
         let expected = predict(&model, &record, 1, Start::Zero).unwrap().values;
 
@@ -81,18 +81,18 @@ fn a_missing_row_makes_the_next_as_uncertain_as_two_steps_ahead() {
 
 #[test]
 fn a_report_of_a_fit_is_a_model() {
-    let mut noise = Noise::new(5);
-    let u: Vec<f64> = (0..300).map(|_| noise.next() + 4.0).collect();
+    let mut noise = Noise(5);
+    let u: Vec<f64> = (0..300).map(|_| noise.normal() + 4.0).collect();
     // At rest at first, as the filter is.
     let mut y = vec![10.0; 300];
     for t in 1..300 {
-        y[t] = 0.8 * y[t - 1] + 0.5 * u[t - 1] + 0.1 * noise.next();
+        y[t] = 0.8 * y[t - 1] + 0.5 * u[t - 1] + 0.1 * noise.normal();
     }
     let channel = |name: &str, values: &[f64]| Channel { name: name.to_owned(), values: values.to_vec() };
     let log = Log::new(vec![channel("u", &u), channel("y", &y)], 0.1).unwrap();
     let plan = Plan::new(&["u"], "y", Orders::arx(1, &[1], &[1]).unwrap());
     let identified = identify(log, &[], &plan).unwrap();
-    let model = StateModel::from_report(&identified, Start::Zero).unwrap();
+    let model = StateModel::from_report(&identified, InitialState::Zero).unwrap();
     assert_eq!(
         (model.inputs(), model.outputs(), model.sample_time()),
         (["u".to_owned()].as_slice(), ["y".to_owned()].as_slice(), 0.1)
@@ -102,7 +102,7 @@ fn a_report_of_a_fit_is_a_model() {
         filter.step(Some(0.1), &[*u], &[*y]).unwrap();
     }
     // The model is right: chi-square of 300 degrees of freedom within 4 standard deviations, but for the first rows.
-    assert!((filter.totals().mean_nis - 1.0).abs() < 0.4, "{}", filter.totals().mean_nis);
+    assert!((filter.summary().nis.unwrap().mean - 1.0).abs() < 0.4, "{}", filter.summary().nis.unwrap().mean);
 
     // A log that begins away from the offsets: where it began is found, and nothing else is as surprising as it was.
     let late = |start| {
@@ -111,12 +111,11 @@ fn a_report_of_a_fit_is_a_model() {
         let rows = u.iter().zip(&y).map(|(u, y)| filter.step(None, &[*u], &[*y + 5.0]).unwrap().nis.unwrap());
         rows.take(10).collect::<Vec<f64>>()
     };
-    let (rest, unknown) = (late(Start::Zero), late(Start::Estimated));
+    let (rest, unknown) = (late(InitialState::Zero), late(InitialState::Unknown));
     assert!(rest[0] > 100.0 && unknown[0] < 1.0, "{} {}", rest[0], unknown[0]);
-    assert!(StateModel::from_report(&identified, Start::Measured).is_err());
 
     let mut silent = identified.clone();
     silent.model.noise_variance = 0.0;
-    let error = StateModel::from_report(&silent, Start::Estimated).unwrap_err().to_string();
+    let error = StateModel::from_report(&silent, InitialState::Unknown).unwrap_err().to_string();
     assert!(error.starts_with("its noise variance is 0"), "{error}");
 }

@@ -12,14 +12,14 @@ fn the_last_state_is_the_filtered_one() {
     }
     let smoothed = filter.smooth().unwrap();
     let last = filter.step(None, &[], &[f64::NAN]).unwrap();
-    let (state, parameters) = smoothed.row(FLOW.len() - 1).unwrap();
+    let (state, parameters) = smoothed.row(FLOW.len()).unwrap();
     assert_eq!((smoothed.rows(), parameters.values.len()), (FLOW.len(), 0));
-    assert_eq!(smoothed.row(FLOW.len()), None);
+    assert_eq!((smoothed.row(0), smoothed.row(FLOW.len() + 1)), (None, None));
     assert_eq!(smoothed.row(usize::MAX), None);
     assert!((state.values[0] - last.predicted.values[0]).abs() < 1e-10);
     // All others are more certain than the last one.
     let deviation = |row: usize| smoothed.row(row).unwrap().0.standard_deviations.unwrap()[0];
-    assert!((1..FLOW.len() - 1).all(|row| deviation(row) < deviation(FLOW.len() - 1)));
+    assert!((2..FLOW.len()).all(|row| deviation(row) < deviation(FLOW.len())));
 }
 
 #[test]
@@ -69,7 +69,7 @@ fn it_is_the_posterior_mean_of_all_states() {
     let mean = &cross * &inverse * y;
     let covariance = &states * &prior * states.transpose() - &cross * inverse * cross.transpose();
     for (row, &sample) in rows.iter().enumerate() {
-        let state = smoothed.row(row).unwrap().0;
+        let state = smoothed.row(row + 1).unwrap().0;
         assert!((state.values[0] - mean[sample]).abs() < 1e-12, "{row}");
         let deviation = covariance[(sample, sample)].sqrt();
         assert!((state.standard_deviations.unwrap()[0] - deviation).abs() < 1e-12, "{row}");
@@ -86,7 +86,7 @@ fn constant_parameters_are_the_same_in_all_rows() {
         last = (estimate.parameters.values[0], estimate.parameters.standard_deviations.unwrap()[0]);
     }
     let smoothed = filter.smooth().unwrap();
-    for row in 0..150 {
+    for row in 1..=150 {
         let (_, mass) = smoothed.row(row).unwrap();
         // Digits are lost where the filtered variance is much larger than the smoothed one.
         assert!((mass.values[0] - last.0).abs() < 1e-8 * last.0, "{row}");

@@ -20,7 +20,7 @@ use thetahat_core::{Dual, Number};
 
 use super::experiment::Experiment;
 use super::predictor::{Innovation, Predictor};
-use crate::greybox::dynamics::Dynamics;
+use crate::GreyBox;
 
 /// Derivatives that are computed together.
 const LANE: usize = 4;
@@ -36,8 +36,8 @@ pub(super) struct Failure {
 
 /// V of a model on some logs, with the memory that it takes.
 #[derive(Debug)]
-pub(super) struct Criterion<'a, M> {
-    model: &'a M,
+pub(super) struct Criterion<'a> {
+    model: &'a GreyBox,
     experiments: &'a [Experiment],
     /// The elements that are measured.
     pub(super) readings: usize,
@@ -56,12 +56,12 @@ pub(super) struct Criterion<'a, M> {
     pub(super) information: Vec<f64>,
 }
 
-impl<'a, M: Dynamics> Criterion<'a, M> {
-    pub(super) fn new(model: &'a M, experiments: &'a [Experiment]) -> Self {
-        let size = model.parameters();
+impl<'a> Criterion<'a> {
+    pub(super) fn new(model: &'a GreyBox, experiments: &'a [Experiment]) -> Self {
+        let size = model.parameters().len();
         let lanes = size.div_ceil(LANE);
         let readings = |experiment: &Experiment| -> usize {
-            (0..model.outputs()).map(|output| experiment.readings(output)).sum()
+            (0..model.outputs().len()).map(|output| experiment.readings(output)).sum()
         };
         Self {
             model,
@@ -154,7 +154,7 @@ impl<'a, M: Dynamics> Criterion<'a, M> {
 
 /// Takes the filter to a row, and linearises its measurement.
 fn reach<S: Number<f64>>(
-    model: &impl Dynamics,
+    model: &GreyBox,
     experiment: &Experiment,
     predictor: &mut Predictor<S>,
     z: &[S],
@@ -176,7 +176,7 @@ pub(super) struct Element {
 
 /// The filter over all logs. `told` hears of each element that is measured: where it is, the prediction h(x^), and e and S.
 pub(super) fn walk(
-    model: &impl Dynamics,
+    model: &GreyBox,
     experiments: &[Experiment],
     predictor: &mut Predictor<f64>,
     z: &[f64],

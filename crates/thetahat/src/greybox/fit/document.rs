@@ -3,7 +3,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{Error, GreyBox, Source, Stopped, Test};
+use crate::{Error, GreyBox, NisSummary, Source, Stopped, Test};
 
 /// The schema that this version writes.
 const SCHEMA: &str = "thetahat.greybox/1";
@@ -34,12 +34,10 @@ pub struct GreyReport {
     pub log_likelihood: f64,
     /// How many values of outputs were measured.
     pub readings: usize,
-    /// The mean over the readings of e^2/S. About 1 if the noises of the model are those of the log; above 1 if they are
-    /// smaller.
-    pub mean_nis: f64,
-    /// The share of the rows whose normalised innovation squared lies within its 95 % bounds.
-    pub within_95: f64,
-    /// What the covariance of the parameters was multiplied by: the mean nis where it is above 1, else 1.
+    /// How surprising the rows were, counted by row: the mean is above what is expected if the noises of the log are larger
+    /// than those of the model. None where nothing was measured.
+    pub nis: Option<NisSummary>,
+    /// What the covariance of the parameters was multiplied by: max(1, nis.mean/nis.expected).
     pub covariance_factor: f64,
     /// How well each output is predicted.
     pub outputs: Vec<GreyOutput>,
@@ -70,8 +68,9 @@ pub struct GreyParameter {
     /// The upper bound, if there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max: Option<f64>,
-    /// The variable z that the search moved, such as `mass = 0.1 + exp(z)`.
-    pub variable: String,
+    /// How it is kept within its bounds, such as `mass = 0.1 + exp(z)`, z being the variable that the search moved; none for
+    /// one without.
+    pub change_of_variable: Option<String>,
 }
 
 /// How well an output is predicted.
@@ -116,7 +115,8 @@ pub struct GreySearch {
     pub max_iterations: usize,
     /// Iterations done.
     pub iterations: usize,
-    /// It stops when a step would raise the log-likelihood by less than this fraction of half the readings.
+    /// It stops when a step would raise the log-likelihood by no more than this fraction of half the readings, or of half the
+    /// sum of e^2/S where that is larger.
     pub tolerance: f64,
     /// Why it stopped.
     pub stopped: Stopped,
@@ -167,7 +167,7 @@ impl GreyReport {
     /// The model with the values that were found, for a filter: nothing of it is unknown.
     ///
     /// # Errors
-    /// [`Error::Argument`] and [`Error::Report`] if the text is no model any more, or has other parameters.
+    /// [`Error::Model`], [`Error::Argument`] and [`Error::Report`] if the text is no model any more, or has other parameters.
     pub fn fitted_model(&self) -> Result<GreyBox, Error> {
         let model = GreyBox::from_toml(&self.model)?;
         let known = self.known.iter().map(|(name, value)| (name.as_str(), *value));

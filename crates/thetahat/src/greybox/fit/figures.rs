@@ -1,14 +1,12 @@
 //! How well a fitted model predicts, and whether its noises are what it says.
 
-use statrs::distribution::{ChiSquared, ContinuousCDF};
-
 use super::criterion::{Element, Failure, walk};
 use super::document::{GreyFit, GreyOutput};
 use super::experiment::Experiment;
 use super::free_run::free_run;
 use super::predictor::Predictor;
-use crate::Test;
-use crate::greybox::dynamics::Dynamics;
+use crate::validate::{NisCount, chi_square_interval, chi_square_tail, closeness};
+use crate::{GreyBox, NisSummary, Test};
 
 /// Lags of the test of whiteness, as far as there are so many readings for each.
 const LAGS: usize = 20;
@@ -20,10 +18,7 @@ pub(super) struct Figures {
     pub(super) outputs: Vec<GreyOutput>,
     /// For each log, the start of the free run.
     pub(super) starts: Vec<Option<Vec<f64>>>,
-    /// The mean of e^2/S over the elements.
-    pub(super) mean_nis: f64,
-    /// The share of rows whose nis lies within its 95 % bounds.
-    pub(super) within: f64,
+    pub(super) nis: Option<NisSummary>,
 }
 
 /// One element as it was predicted.
@@ -38,12 +33,8 @@ struct Predicted {
 
 impl Figures {
     /// O(N (n^3 + m n^2)) a few times.
-    pub(super) fn of(
-        model: &impl Dynamics,
-        experiments: &[Experiment],
-        z: &[f64],
-        channels: &[String],
-    ) -> Result<Self, Failure> {
+    pub(super) fn of(model: &GreyBox, experiments: &[Experiment], z: &[f64]) -> Result<Self, Failure> {
+        let channels = model.outputs();
         let mut predicted = Vec::new();
         walk(model, experiments, &mut Predictor::new(model), z, |at, prediction, innovation| {
             predicted.push(Predicted {
@@ -74,12 +65,10 @@ impl Figures {
                 whiteness: whiteness(&own, experiments),
             }
         });
-        let nis = predicted.iter().map(|one| one.standardised * one.standardised);
         Ok(Self {
             outputs: outputs.collect(),
             starts: runs.iter().map(|run| run.as_ref().map(|run| run.start.clone())).collect(),
-            mean_nis: nis.sum::<f64>() / predicted.len() as f64,
-            within: within(&predicted, channels.len()),
+            nis: nis(&predicted),
         })
     }
 }
@@ -87,40 +76,27 @@ impl Figures {
 impl GreyFit {
     /// Of pairs of a measured value and what the model says; none for no pairs, or numbers out of range.
     fn of(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> Option<Self> {
-        let count = pairs.clone().count() as f64;
-        let mean = pairs.clone().map(|(measured, _)| measured).sum::<f64>() / count;
-        let errors: f64 = pairs.clone().map(|(measured, said)| (measured - said).powi(2)).sum();
-        let spread: f64 = pairs.map(|(measured, _)| (measured - mean).powi(2)).sum();
-        let percent = 100.0 * (1.0 - (errors / spread).sqrt());
-        let rmse = (errors / count).sqrt();
-        rmse.is_finite()
-            .then_some(Self { percent: Some(percent).filter(|percent| percent.is_finite()), rmse })
+        let (percent, rmse) = closeness(pairs);
+        rmse.map(|rmse| Self { percent, rmse })
     }
 }
 
-/// The share of rows whose nis lies between the quantiles 0.025 and 0.975 of chi-square, with as many degrees of freedom as
-/// elements were measured.
-fn within(predicted: &[Predicted], outputs: usize) -> f64 {
-    let bounds: Vec<(f64, f64)> = (1..=outputs)
-        .map(|degrees| {
-            ChiSquared::new(degrees as f64).map_or((f64::NAN, f64::NAN), |distribution| {
-                (distribution.inverse_cdf(0.025), distribution.inverse_cdf(0.975))
-            })
-        })
-        .collect();
-    let (mut rows, mut inside) = (0_usize, 0_usize);
+/// Of each row with something measured, the sum of e^2/S: as the filter's elements come one after the other, each with the
+/// variance that is left by those before, this is the normalised innovation squared of the row.
+fn nis(predicted: &[Predicted]) -> Option<NisSummary> {
+    let mut count = NisCount::default();
     for row in predicted.chunk_by(|one, next| (one.at.log, one.at.row) == (next.at.log, next.at.row)) {
-        let nis: f64 = row.iter().map(|one| one.standardised * one.standardised).sum();
-        let (low, high) = bounds[row.len() - 1];
-        rows += 1;
-        inside += usize::from(low <= nis && nis <= high);
+        let nis = row.iter().map(|one| one.standardised * one.standardised).sum();
+        if let Some(bounds) = chi_square_interval(row.len()) {
+            count.add(nis, row.len(), bounds);
+        }
     }
-    inside as f64 / rows as f64
+    count.summary()
 }
 
 /// Ljung and Box's test on the standardised innovations of one output: Q = N (N + 2) sum_k r_k^2/N_k over the N_k pairs that
 /// are k rows apart in one log, chi-square with as many degrees of freedom as lags (Ljung and Box 1978). The parameters take
-/// none: they do not enter the model of the noise.
+/// none: they do not enter the model of the noise. A row with a missing value takes its own pairs out and no others.
 fn whiteness(own: &[Predicted], experiments: &[Experiment]) -> Option<Test> {
     let longest = experiments.iter().map(Experiment::rows).max().unwrap_or(0);
     let lags = LAGS.min(own.len() / READINGS_PER_LAG).min(longest.saturating_sub(1));
@@ -143,6 +119,6 @@ fn whiteness(own: &[Predicted], experiments: &[Experiment]) -> Option<Test> {
         }
     }
     let (statistic, degrees) = (count * (count + 2.0) * sum, lags as f64);
-    let p_value = ChiSquared::new(degrees).ok().map(|distribution| distribution.sf(statistic));
+    let p_value = chi_square_tail(statistic, degrees);
     statistic.is_finite().then_some(Test { lags, statistic, degrees, p_value })
 }

@@ -12,12 +12,12 @@
 use thetahat_core::nalgebra::{DMatrix, DVector};
 
 use super::experiment::Experiment;
-use crate::greybox::dynamics::Dynamics;
+use crate::GreyBox;
+use crate::estimate::{FIRST_DAMPING, LARGEST_DAMPING, SMALLEST_DAMPING};
 
 const MOST_STEPS: usize = 30;
 /// The start is found when a step would lower the sum by less than this fraction.
 const TOLERANCE: f64 = 1e-9;
-const LARGEST_DAMPING: f64 = 1e9;
 
 /// A response to the inputs.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,11 +28,11 @@ pub(super) struct FreeRun {
 }
 
 /// None where the response leaves the range of numbers. O(N (n^3 + m n^2)) for each of a few iterations.
-pub(super) fn free_run(model: &impl Dynamics, experiment: &Experiment, z: &[f64]) -> Option<FreeRun> {
+pub(super) fn free_run(model: &GreyBox, experiment: &Experiment, z: &[f64]) -> Option<FreeRun> {
     let mut simulation = Simulation::new(model, experiment, z);
     let mut start = model.start().0.to_vec();
     let mut cost = simulation.run(&start, true)?;
-    let mut damping = 1e-6;
+    let mut damping = FIRST_DAMPING;
     'search: for _ in 0..MOST_STEPS {
         let (matrix, right) = (simulation.matrix.clone(), simulation.right.clone());
         loop {
@@ -53,7 +53,7 @@ pub(super) fn free_run(model: &impl Dynamics, experiment: &Experiment, z: &[f64]
             match simulation.run(&trial, true) {
                 Some(lower) if lower < cost => {
                     (start, cost) = (trial, lower);
-                    damping = (damping / 10.0).max(1e-12);
+                    damping = (damping / 10.0).max(SMALLEST_DAMPING);
                     break;
                 }
                 _ => damping *= 10.0,
@@ -65,8 +65,8 @@ pub(super) fn free_run(model: &impl Dynamics, experiment: &Experiment, z: &[f64]
 }
 
 /// A run from one start, its slopes, and the memory that it takes.
-struct Simulation<'a, M> {
-    model: &'a M,
+struct Simulation<'a> {
+    model: &'a GreyBox,
     experiment: &'a Experiment,
     z: &'a [f64],
     /// The normal equations of a step.
@@ -85,9 +85,9 @@ struct Simulation<'a, M> {
     work: Vec<f64>,
 }
 
-impl<'a, M: Dynamics> Simulation<'a, M> {
-    fn new(model: &'a M, experiment: &'a Experiment, z: &'a [f64]) -> Self {
-        let (n, m) = (model.states(), model.outputs());
+impl<'a> Simulation<'a> {
+    fn new(model: &'a GreyBox, experiment: &'a Experiment, z: &'a [f64]) -> Self {
+        let (n, m) = (model.states().len(), model.outputs().len());
         Self {
             model,
             experiment,
@@ -108,7 +108,7 @@ impl<'a, M: Dynamics> Simulation<'a, M> {
 
     /// The sum of squares from a start, and the normal equations there if `sloped`; none where a number is not finite.
     fn run(&mut self, start: &[f64], sloped: bool) -> Option<f64> {
-        let (n, m) = (self.model.states(), self.model.outputs());
+        let (n, m) = (self.model.states().len(), self.model.outputs().len());
         let mut cost = self.begin(start);
         for row in 0..self.experiment.rows() {
             for (time, step) in self.experiment.steps(row) {

@@ -12,13 +12,15 @@
 //! de/dz and dS/dz, exact but for rounding.
 //!
 //! Time update: Thornton's modified weighted Gram-Schmidt on [F U | I] with the weights (D, Q). Measurement update:
-//! Bierman's. Both keep D from going negative (Bierman, Factorization Methods for Discrete Sequential Estimation, 1977,
+//! Bierman's. thetahat-core has both too, in its kernels on slices. They stand here again as those take `Real` numbers, f32 and f64,
+//! and a dual number is none: it carries derivatives along, and is no real field. The test `value_is_the_likelihood_of_the_filter`
+//! holds both to the same likelihood. Both updates keep D from going negative (Bierman, Factorization Methods for Discrete Sequential Estimation, 1977,
 //! chapters V and VI). The quicker refactoring of F P F' + Q is not worth a second path here: derivatives take most of
 //! the time.
 
 use thetahat_core::Number;
 
-use crate::greybox::dynamics::Dynamics;
+use crate::GreyBox;
 
 /// The estimate of the state and its covariance, and room for a step. Matrices are column after column.
 #[derive(Debug, Clone)]
@@ -53,8 +55,8 @@ pub(super) struct Innovation<S> {
 }
 
 impl<S: Number<f64>> Predictor<S> {
-    pub(super) fn new(model: &impl Dynamics) -> Self {
-        let (n, m) = (model.states(), model.outputs());
+    pub(super) fn new(model: &GreyBox) -> Self {
+        let (n, m) = (model.states().len(), model.outputs().len());
         let zeros = |count: usize| vec![S::from(0.0); count];
         Self {
             state: zeros(n),
@@ -73,7 +75,7 @@ impl<S: Number<f64>> Predictor<S> {
     }
 
     /// Goes to the start of a log: x0, and P diagonal.
-    pub(super) fn restart(&mut self, model: &impl Dynamics) {
+    pub(super) fn restart(&mut self, model: &GreyBox) {
         let (start, deviations) = model.start();
         let n = start.len();
         self.factor.fill(S::from(0.0));
@@ -84,7 +86,7 @@ impl<S: Number<f64>> Predictor<S> {
     }
 
     /// Over a step of `dt` seconds from the time `t`, with the input held. About 4 n^3 multiply-adds beside the model.
-    pub(super) fn predict(&mut self, model: &impl Dynamics, z: &[S], u: &[f64], t: f64, dt: f64) {
+    pub(super) fn predict(&mut self, model: &GreyBox, z: &[S], u: &[f64], t: f64, dt: f64) {
         let n = self.state.len();
         model.advance(&self.state, z, u, t, dt, &mut self.next, &mut self.state_matrix, &mut self.work);
         let zero = S::from(0.0);
@@ -129,7 +131,7 @@ impl<S: Number<f64>> Predictor<S> {
     }
 
     /// Linearises the measurement about the predicted state.
-    pub(super) fn observe(&mut self, model: &impl Dynamics, z: &[S], u: &[f64], t: f64) {
+    pub(super) fn observe(&mut self, model: &GreyBox, z: &[S], u: &[f64], t: f64) {
         model.observe(&self.state, z, u, t, &mut self.output, &mut self.output_matrix, &mut self.work);
         self.origin.copy_from_slice(&self.state);
     }

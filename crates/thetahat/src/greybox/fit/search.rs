@@ -3,10 +3,10 @@
 //! Fisher scoring with Levenberg and Marquardt's damping, in parameters scaled so that the matrix has a unit diagonal:
 //!
 //! ```text
-//! (A + mu I) step = -V',   A = I + diag(c_i),   c_i = |V_i| of a parameter with bounds, 0 of the others
+//! (A + mu E) step = -V',   A = I + diag(c_i),   c_i = |V_i| of a parameter with bounds, 0 of the others
 //! ```
 //!
-//! mu goes from 1e-8, times 10 where V rises, a tenth where it falls as foretold (Levenberg 1944; Marquardt 1963; Ljung,
+//! I is the information and E the identity. mu goes from 1e-8, times 10 where V rises, a tenth where it falls as foretold (Levenberg 1944; Marquardt 1963; Ljung,
 //! System Identification, 2nd ed. 1999, section 10.2). c_i is the most that the curvature of p(z) adds to that of V: for
 //! p = min + exp(z), V_p p'' = V_z. It vanishes at a minimum, and keeps a parameter that is drawn to its bound from running away:
 //! there I_ii and V_i vanish together, and V_i^2/I_ii does not.
@@ -22,19 +22,12 @@ use thetahat_core::nalgebra::{DMatrix, DVector};
 
 use super::criterion::{Criterion, Failure};
 use crate::Error;
-use crate::estimate::{Monitor, Progress, Stopped};
-use crate::greybox::dynamics::Dynamics;
+use crate::estimate::{
+    FIRST_DAMPING, LARGEST_DAMPING, Monitor, Progress, ROUNDING, SMALLEST_DAMPING, Stopped,
+};
 
-/// The first damping.
-const FIRST_DAMPING: f64 = 1e-8;
-/// Always there: directions in which the matrix is nothing but rounding foretell no decrease.
-const SMALLEST_DAMPING: f64 = 1e-12;
-/// With a damping beyond this no step is long enough to matter.
-const LARGEST_DAMPING: f64 = 1e12;
 /// Where V falls by so many times what was foretold, a longer step is tried.
 const BETTER: f64 = 1.2;
-/// A foretold decrease of this fraction of V is lost in rounding.
-const ROUNDING: f64 = 1e-10;
 
 /// What a search found.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,8 +49,8 @@ impl Found {
 ///
 /// # Errors
 /// [`Error::Interrupted`]; the [`Failure`] of the filter at the start.
-pub(super) fn search<M: Dynamics>(
-    criterion: &mut Criterion<'_, M>,
+pub(super) fn search(
+    criterion: &mut Criterion<'_>,
     start: &[f64],
     bounded: &[bool],
     max_iterations: usize,
@@ -136,7 +129,7 @@ struct Scaled {
 }
 
 impl Scaled {
-    fn new<M: Dynamics>(criterion: &Criterion<'_, M>, bounded: &[bool]) -> Self {
+    fn new(criterion: &Criterion<'_>, bounded: &[bool]) -> Self {
         let size = criterion.gradient.len();
         let mut matrix = DMatrix::from_row_slice(size, size, &criterion.information);
         for (index, _) in bounded.iter().enumerate().filter(|(_, bounded)| **bounded) {

@@ -4,7 +4,7 @@ use super::document::GreyReport;
 use super::uncertainty::listed;
 use crate::Stopped;
 
-/// Mean nis outside of this range: the noises of the model are not those of the log.
+/// Mean nis, relative to what is expected, outside of this range: the noises of the model are not those of the log.
 const FITTING: std::ops::RangeInclusive<f64> = 0.8..=1.25;
 /// Parameters whose correlation is beyond this one can hardly be told apart.
 const ALIKE: f64 = 0.99;
@@ -50,19 +50,20 @@ pub(super) fn warnings(report: &GreyReport, walking: &[String]) -> Vec<String> {
             }
         }
     }
-    if report.mean_nis > *FITTING.end() {
+    if let Some(nis) = report.nis.filter(|nis| nis.relative() > *FITTING.end()) {
         warnings.push(format!(
-            "innovations are larger than the model tells: the mean nis is {:.3}. Standard errors were multiplied by {:.3}; give \
-             larger noises, or equations that fit better",
-            report.mean_nis,
+            "innovations are larger than the model tells: the mean nis is {:.3}, not {:.3}. Standard errors were multiplied by \
+             {:.3}; give larger noises, or equations that fit better",
+            nis.mean,
+            nis.expected,
             report.covariance_factor.sqrt()
         ));
     }
-    if report.mean_nis < *FITTING.start() {
+    if let Some(nis) = report.nis.filter(|nis| nis.relative() < *FITTING.start()) {
         warnings.push(format!(
-            "innovations are smaller than the model tells: the mean nis is {:.3}, so standard errors are too large; give \
-             smaller noises",
-            report.mean_nis
+            "innovations are smaller than the model tells: the mean nis is {:.3}, not {:.3}, so standard errors are too large; \
+             give smaller noises",
+            nis.mean, nis.expected
         ));
     }
     for output in &report.outputs {

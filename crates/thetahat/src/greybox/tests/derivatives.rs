@@ -3,7 +3,6 @@ use thetahat_core::{Dual, Number};
 use super::expressions::Three;
 use super::{CART, PENDULUM};
 use crate::GreyBox;
-use crate::greybox::Dynamics;
 use crate::greybox::expression::read;
 use crate::greybox::graph::{Graph, Leaves, Operation};
 use crate::greybox::program::Program;

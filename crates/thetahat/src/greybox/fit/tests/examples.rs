@@ -4,10 +4,10 @@ use std::io::Write;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
+use super::models::experiment;
 use crate::greybox::fit::criterion::Criterion;
-use crate::greybox::fit::experiment::Experiment;
 use crate::{
-    Channel, Error, Estimator, GreyBox, GreyReport, Recording, Rows, Source, StateFilter, StateModel,
+    Channel, Error, Estimator, GreyBox, GreyReport, NisSummary, Recording, Source, StateFilter, StateModel,
     Stopped, Times, fit_grey,
 };
 
@@ -36,23 +36,8 @@ fn log(path: &Path) -> Recording {
     Recording { channels, times: Times::Measured(time.values) }
 }
 
-/// Some rows of it, counted from 1.
-fn part(recording: &Recording, rows: Rows) -> Recording {
-    let cut = |values: &[f64]| values[rows.first() - 1..rows.last()].to_vec();
-    let channel = |channel: &Channel| Channel { name: channel.name.clone(), values: cut(&channel.values) };
-    let Times::Measured(time) = &recording.times else { panic!("the log has a clock") };
-    Recording {
-        channels: recording.channels.iter().map(channel).collect(),
-        times: Times::Measured(cut(time)),
-    }
-}
-
 fn fitted(model: &GreyBox, logs: &[Recording]) -> GreyReport {
     fit_grey(model, logs, &[], &|_| ControlFlow::Continue(())).unwrap()
-}
-
-fn experiment(model: &GreyBox, recording: &Recording) -> Experiment {
-    Experiment::new(recording, model.inputs(), model.outputs(), |step| model.division(step)).unwrap()
 }
 
 #[test]
@@ -74,9 +59,10 @@ fn logs_lead_back_to_the_truth() {
             assert!(parameter.standard_error < 0.1 * truth, "{name} {}", parameter.standard_error);
         }
         // chi-square of 800 readings and more: standard deviation below 0.05.
-        assert!((report.mean_nis - 1.0).abs() < 0.15, "{name} {}", report.mean_nis);
+        let nis = report.nis.unwrap();
+        assert!((nis.mean / nis.expected - 1.0).abs() < 0.15, "{name} {nis:?}");
         // Binomial: standard deviation below 0.008.
-        assert!((report.within_95 - 0.95).abs() < 0.025, "{name} {}", report.within_95);
+        assert!((nis.below + nis.above - 0.05).abs() < 0.025, "{name} {nis:?}");
         for output in &report.outputs {
             assert!(output.whiteness.unwrap().p_value.unwrap() > 0.001, "{name} {}", output.channel);
             assert!(output.free_run.unwrap().percent.unwrap() > free_run, "{name} {output:?}");
@@ -89,7 +75,7 @@ fn logs_lead_back_to_the_truth() {
 fn gradient_of_models_in_equations_is_exact() {
     for name in ["mass_spring_damper", "battery", "dc_motor"] {
         let (model, log) = (model(name), log(&data(name).with_extension("csv")));
-        let experiments = [experiment(&model, &part(&log, "1..200".parse().unwrap()))];
+        let experiments = [experiment(&model, &log.part("1..200".parse().unwrap()).unwrap())];
         let mut criterion = Criterion::new(&model, &experiments);
         let z: Vec<f64> = model.parameters().iter().map(|unknown| unknown.start_variable().0 - 0.2).collect();
         criterion.linearize(&z).unwrap();
@@ -150,7 +136,7 @@ fn a_missing_row_is_a_longer_step() {
 #[test]
 fn two_logs_say_more_than_one() {
     let (model, log) = (model("mass_spring_damper"), log(&data("mass_spring_damper.csv")));
-    let halves = ["1..400", "401..800"].map(|rows| part(&log, rows.parse().unwrap()));
+    let halves = ["1..400", "401..800"].map(|rows| log.part(rows.parse().unwrap()).unwrap());
     let error = |logs: &[Recording]| {
         let report = fitted(&model, logs);
         assert_eq!(report.states[0].starts.len(), logs.len());
@@ -230,14 +216,12 @@ fn filter_of_the_fitted_model_has_its_likelihood() {
         let log = log(&data(name).with_extension("csv"));
         let report = fitted(&model(name), std::slice::from_ref(&log));
         let filter = filtered(&report.fitted_model().unwrap(), &log);
-        let totals = filter.totals();
-        let difference = totals.log_likelihood - report.log_likelihood;
+        let summary = filter.summary();
+        let difference = summary.log_likelihood.unwrap() - report.log_likelihood;
         assert!(difference.abs() < 1e-9 * report.log_likelihood.abs(), "{name} {difference}");
-        // There it is the mean over the rows, here over the elements.
-        let mean = totals.mean_nis * totals.nis_rows as f64 / totals.measured as f64;
-        assert!((mean / report.mean_nis - 1.0).abs() < 1e-9, "{name}");
-        let outside = (totals.nis_below + totals.nis_above) as f64 / totals.nis_rows as f64;
-        assert!((1.0 - outside - report.within_95).abs() < 1e-12, "{name}");
+        let (found, expected) = (summary.nis.unwrap(), report.nis.unwrap());
+        assert!((found.mean / expected.mean - 1.0).abs() < 1e-9, "{name}");
+        assert_eq!(NisSummary { mean: 0.0, ..found }, NisSummary { mean: 0.0, ..expected }, "{name}");
     }
 }
 
@@ -251,7 +235,7 @@ fn resistance_of_a_measured_cell() {
         let _ = std::io::stderr().write_all(line);
         return;
     }
-    let (model, log) = (model("leaf_cell"), part(&log(&path), "375..476".parse().unwrap()));
+    let (model, log) = (model("leaf_cell"), log(&path).part("375..476".parse().unwrap()).unwrap());
     let report = fitted(&model, std::slice::from_ref(&log));
     let mut filter = filtered(&model, &log);
     let values = filter.step(Some(1.0), &[0.0], &[f64::NAN]).unwrap().parameters.values.to_vec();

@@ -1,146 +1,86 @@
 //! Models written by hand, and logs of them.
 
-use thetahat_core::Number;
-
-use crate::greybox::dynamics::Dynamics;
 use crate::greybox::fit::experiment::Experiment;
 use crate::regression::noise::Noise;
-use crate::{Channel, Recording, Times};
+use crate::{Channel, GreyBox, Recording, Times};
 
-/// A pendulum with unknown z = (ln of damping, stiffness, gain of the input, sine in the output, unused…): two states, an
-/// input, and outputs of angle and rate.
-///
-/// ```text
-/// angle' = angle + dt rate,   rate' = rate + dt (u gain - exp(z0) rate - z1 sin(angle))
-/// y = (sin(angle) + z3 angle^2, rate)
-/// ```
-#[derive(Debug, Clone)]
-pub(super) struct Pendulum {
-    pub(super) start: [f64; 2],
-    pub(super) deviations: [f64; 2],
-    pub(super) process: f64,
-    pub(super) measurement: Vec<f64>,
-    pub(super) parameters: usize,
-}
-
+/// Of the pendulum's parameters, in their order. None has bounds, so that z is the parameter.
 pub(super) const TRUTH: [f64; 5] = [-0.5, 2.0, 1.5, 0.1, 0.3];
 
-impl Pendulum {
-    pub(super) fn new(outputs: usize, parameters: usize) -> Self {
-        Self {
-            start: [0.2, -0.1],
-            deviations: [0.3, 0.2],
-            process: 1e-4,
-            measurement: vec![4e-4, 1e-3][..outputs].to_vec(),
-            parameters,
+/// A pendulum with this process noise and 1 or 2 outputs, of which the first so many parameters are unknown; a search for
+/// them starts at 0.6 truth + 0.1.
+pub(super) fn pendulum_text(process: f64, outputs: usize, unknown: usize) -> String {
+    let names = ["damping", "stiffness", "gain", "square", "drive"];
+    let parameters = names.iter().zip(TRUTH).enumerate().map(|(index, (name, truth))| {
+        let start = 0.6 * truth + 0.1;
+        if index < unknown {
+            format!("{name} = {{ start = {start}, sd = 1, unknown = true }}\n")
+        } else {
+            format!("{name} = {truth}\n")
         }
-    }
-
-    pub(super) fn truth(&self) -> Vec<f64> {
-        TRUTH[..self.parameters].to_vec()
-    }
-
-    fn all<S: Number<f64>>(&self, z: &[S]) -> [S; 5] {
-        std::array::from_fn(|index| z.get(index).copied().unwrap_or(S::from(TRUTH[index])))
-    }
-
-    /// A log of so many rows every 0.05 s, with the noises that the model tells of times `noise`.
-    pub(super) fn log(&self, rows: usize, seed: u64, noise: f64) -> Recording {
-        let mut random = Noise(seed);
-        let mut normal = || (0..12).map(|_| random.next()).sum::<f64>() / 2.0 * noise;
-        let mut x: Vec<f64> = (0..2).map(|i| self.start[i] + self.deviations[i] * normal()).collect();
-        let (mut u, mut channels) = (Vec::new(), vec![Vec::new(); self.outputs()]);
-        let z = self.truth();
-        let mut work = Vec::new();
-        for row in 0..rows {
-            let input = [if (row / 20) % 3 == 0 { 1.0 } else { -0.7 }];
-            let mut y = vec![0.0; self.outputs()];
-            self.observe(&x, &z, &input, 0.0, &mut y, &mut vec![0.0; 2 * self.outputs()], &mut work);
-            for ((channel, y), variance) in channels.iter_mut().zip(&y).zip(&self.measurement) {
-                channel.push(y + variance.sqrt() * normal());
-            }
-            u.push(input[0]);
-            let mut next = [0.0; 2];
-            self.advance(&x, &z, &input, 0.0, 0.05, &mut next, &mut [0.0; 4], &mut work);
-            x = next.to_vec();
-            x[1] += (self.process * 0.05).sqrt() * normal();
-        }
-        let channel = |name: &str, values| Channel { name: name.into(), values };
-        let mut all = vec![channel("u", u)];
-        all.extend(channels.into_iter().zip(["y1", "y2"]).map(|(values, name)| channel(name, values)));
-        Recording { channels: all, times: Times::Uniform(0.05) }
-    }
-
-    pub(super) fn experiment(&self, recording: &Recording) -> Experiment {
-        Experiment::new(recording, &["u".to_owned()], &self.channels(), |step| Ok((1, step))).unwrap()
-    }
-
-    pub(super) fn channels(&self) -> Vec<String> {
-        (1..=self.outputs()).map(|number| format!("y{number}")).collect()
-    }
+    });
+    let outputs = [("y1 = 'sin(angle) + square * angle^2'\n", "y1 = 0.02"), ("y2 = 'rate'\n", "y2 = 0.03")]
+        .into_iter()
+        .take(outputs);
+    let (outputs, noises): (String, Vec<&str>) = outputs.unzip();
+    format!(
+        "sample_time = 0.05\n\
+         [states]\nangle = {{ start = 0.2, sd = 0.3 }}\nrate = {{ start = -0.1, sd = 0.2 }}\n\
+         [inputs]\ntorque = 'u'\n\
+         [parameters]\n{}\
+         [next]\nangle = 'angle + dt * rate'\n\
+         rate = 'rate + dt * (gain * torque + drive - exp(damping) * rate - stiffness * sin(angle))'\n\
+         [outputs]\n{outputs}\
+         [noise]\nprocess = {{ rate = {process} }}\nmeasurement = {{ {} }}\n",
+        parameters.collect::<String>(),
+        noises.join(", ")
+    )
 }
 
-impl Dynamics for Pendulum {
-    fn states(&self) -> usize {
-        2
-    }
-    fn parameters(&self) -> usize {
-        self.parameters
-    }
-    fn inputs(&self) -> usize {
-        1
-    }
-    fn outputs(&self) -> usize {
-        self.measurement.len()
-    }
-    fn advance<S: Number<f64>>(
-        &self,
-        x: &[S],
-        z: &[S],
-        u: &[f64],
-        _: f64,
-        dt: f64,
-        next: &mut [S],
-        jacobian: &mut [S],
-        _: &mut Vec<S>,
-    ) {
-        let [damping, stiffness, gain, _, drive] = self.all(z);
-        let (sine, cosine) = x[0].sin_cos();
-        next[0] = x[0] + x[1] * dt;
-        next[1] = x[1] + (gain * u[0] + drive - damping.exp() * x[1] - stiffness * sine) * dt;
-        jacobian[0] = S::from(1.0);
-        jacobian[1] = -(stiffness * cosine * dt);
-        jacobian[2] = S::from(dt);
-        jacobian[3] = -(damping.exp() * dt) + 1.0;
-    }
-    fn observe<S: Number<f64>>(
-        &self,
-        x: &[S],
-        z: &[S],
-        _: &[f64],
-        _: f64,
-        y: &mut [S],
-        jacobian: &mut [S],
-        _: &mut Vec<S>,
-    ) {
-        let m = self.outputs();
-        let square = self.all(z)[3];
-        y[0] = x[0].sin() + square * x[0] * x[0];
-        jacobian[0] = x[0].cos() + square * x[0] * 2.0;
-        jacobian[m] = S::from(0.0);
-        if m > 1 {
-            y[1] = x[1];
-            jacobian[1] = S::from(0.0);
-            jacobian[m + 1] = S::from(1.0);
+pub(super) fn pendulum(outputs: usize, unknown: usize) -> GreyBox {
+    GreyBox::from_toml(&pendulum_text(0.002, outputs, unknown)).unwrap()
+}
+
+/// A log of so many rows of a model with these z and one input, with the noises that it tells of times `noise`.
+pub(super) fn log(model: &GreyBox, z: &[f64], rows: usize, seed: u64, noise: f64) -> Recording {
+    let (n, m) = (model.states().len(), model.outputs().len());
+    let mut random = Noise(seed);
+    let mut normal = |deviation: f64| deviation * noise * random.normal();
+    let (start, deviations) = model.start();
+    let mut x: Vec<f64> =
+        start.iter().zip(deviations).map(|(start, deviation)| start + normal(*deviation)).collect();
+    let (mut u, mut y) = (Vec::new(), vec![Vec::new(); m]);
+    let (mut outputs, mut next, mut jacobian, mut work) =
+        (vec![0.0; m], vec![0.0; n], vec![0.0; n * n.max(m)], Vec::new());
+    let dt = model.sample_time();
+    for row in 0..rows {
+        let input = [if (row / 20) % 3 == 0 { 1.0 } else { -0.7 }];
+        let time = row as f64 * dt;
+        model.observe(&x, z, &input, time, &mut outputs, &mut jacobian[..m * n], &mut work);
+        for ((channel, output), variance) in y.iter_mut().zip(&outputs).zip(model.measurement_variances()) {
+            channel.push(output + normal(variance.sqrt()));
+        }
+        u.push(input[0]);
+        model.advance(&x, z, &input, time, dt, &mut next, &mut jacobian[..n * n], &mut work);
+        for ((x, next), variance) in x.iter_mut().zip(&next).zip(model.process_variances(dt)) {
+            *x = next + normal(variance.sqrt());
         }
     }
-    fn start(&self) -> (&[f64], &[f64]) {
-        (&self.start, &self.deviations)
+    let channel = |(name, values): (&String, Vec<f64>)| Channel { name: name.clone(), values };
+    let channels = model.inputs().iter().zip([u]).chain(model.outputs().iter().zip(y)).map(channel);
+    Recording { channels: channels.collect(), times: Times::Uniform(dt) }
+}
+
+/// With missing values: single ones, and whole rows.
+pub(super) fn holed(mut recording: Recording) -> Recording {
+    for channel in recording.channels.iter_mut().skip(1) {
+        let length = channel.values.len();
+        channel.values[length / 2..length / 2 + 7].fill(f64::NAN);
     }
-    fn process_variances(&self, dt: f64) -> impl Iterator<Item = f64> {
-        [0.0, self.process * dt].into_iter()
-    }
-    fn measurement_variances(&self) -> &[f64] {
-        &self.measurement
-    }
+    recording.channels[1].values[13] = f64::NAN;
+    recording
+}
+
+pub(super) fn experiment(model: &GreyBox, recording: &Recording) -> Experiment {
+    Experiment::new(recording, model.inputs(), model.outputs(), |step| model.division(step)).unwrap()
 }

@@ -1,94 +1,76 @@
-//! What the fit finds over many simulated logs.
+//! What the fit finds in simulated logs. How often its intervals cover the truth is in tests/monte_carlo.
 
 use std::ops::ControlFlow;
 
-use super::models::Pendulum;
-use crate::greybox::fit::{Fit, Sought, fit};
-use crate::{Error, Recording, Stopped};
+use super::models::{TRUTH, log, pendulum, pendulum_text};
+use crate::{GreyBox, GreyReport, Recording, Stopped, fit_grey};
 
-fn found(model: &Pendulum, logs: &[Recording], start: &[f64]) -> Result<Fit, Error> {
-    let experiments: Vec<_> = logs.iter().map(|log| model.experiment(log)).collect();
-    let names: Vec<String> = (0..start.len()).map(|index| format!("z{index}")).collect();
-    let bounded = vec![false; start.len()];
-    let sought = Sought { names: &names, start, bounded: &bounded };
-    fit(model, &experiments, &model.channels(), &sought, |_, _| 1.0, &|_| ControlFlow::Continue(()))
+fn found(model: &GreyBox, log: Recording) -> GreyReport {
+    fit_grey(model, &[log], &[], &|_| ControlFlow::Continue(())).unwrap()
 }
 
-/// Over 60 logs of the noises that the model tells of, times `noise`: the share of the 95 % intervals that cover the truth, and
-/// the mean square of the errors in standard errors.
-fn coverage(noise: f64) -> (f64, f64) {
-    let model = Pendulum::new(2, 5);
-    let truth = model.truth();
-    let start: Vec<f64> = truth.iter().map(|truth| 0.6 * truth + 0.1).collect();
-    let (mut squares, mut covered, mut count) = (0.0, 0.0, 0.0);
-    for seed in 0..60 {
-        let fit = found(&model, &[model.log(400, 100 + seed, noise)], &start).unwrap();
-        assert_eq!(fit.found.stopped, Stopped::Converged);
-        assert!(fit.found.values.is_sorted_by(|before, after| before > after));
-        assert!(fit.found.values.len() < 20, "{}", fit.found.values.len());
-        let factor = fit.figures.mean_nis.max(1.0);
-        for (index, truth) in truth.iter().enumerate() {
-            let away = (fit.found.z[index] - truth) / (factor * fit.covariance[(index, index)]).sqrt();
-            squares += away * away;
-            covered += f64::from(u8::from(away.abs() < 1.96));
-            count += 1.0;
-            assert!(away.abs() < 4.0, "seed {seed}, parameter {index}: {away}");
-        }
+fn assert_near(report: &GreyReport, deviations: f64) {
+    for (parameter, truth) in report.parameters.iter().zip(TRUTH) {
+        let away = (parameter.value - truth) / parameter.standard_error;
+        assert!(away.abs() < deviations, "{} is {away} standard errors off", parameter.name);
     }
-    (covered / count, squares / count)
 }
 
 #[test]
-fn standard_errors_cover_the_truth() {
-    // 300 numbers: the standard deviation of the share is 1.3 %, of the mean square 8 %. Over 400 logs (run once) they were
-    // 94.3 % and 1.07. With all noises larger by one factor, that factor is found.
-    for noise in [1.0, 1.7] {
-        let (share, mean) = coverage(noise);
-        assert!((0.90..0.99).contains(&share), "{noise} {share}");
-        assert!((0.75..1.35).contains(&mean), "{noise} {mean}");
-    }
+fn a_fit_leads_to_the_truth() {
+    let model = pendulum(2, 5);
+    let report = found(&model, log(&model, &TRUTH, 400, 100, 1.0));
+    assert_near(&report, 3.0);
+    assert_eq!(report.search.stopped, Stopped::Converged);
+    let likelihoods = &report.search.log_likelihoods;
+    assert!(likelihoods.is_sorted_by(|before, after| before < after));
+    assert!(likelihoods.len() < 20, "{}", likelihoods.len());
 }
 
 #[test]
 fn holes_in_the_log_do_no_harm() {
-    let model = Pendulum::new(2, 3);
-    let mut log = model.log(600, 7, 1.0);
+    let model = pendulum(2, 3);
+    let mut log = log(&model, &TRUTH[..3], 600, 7, 1.0);
     for (channel, period) in [(1, 3), (2, 5)] {
         log.channels[channel].values.iter_mut().step_by(period).for_each(|value| *value = f64::NAN);
     }
-    let fit = found(&model, &[log], &[0.0, 1.0, 1.0]).unwrap();
-    assert_eq!(fit.readings, 1200 - 200 - 120);
-    let missing: Vec<usize> = fit.figures.outputs.iter().map(|output| output.missing).collect();
+    let report = found(&model, log);
+    assert_eq!(report.readings, 1200 - 200 - 120);
+    let missing: Vec<usize> = report.outputs.iter().map(|output| output.missing).collect();
     assert_eq!(missing, [200, 120]);
-    for (index, truth) in model.truth().iter().enumerate() {
-        let error = fit.covariance[(index, index)].sqrt();
-        assert!((fit.found.z[index] - truth).abs() < 3.0 * error, "{index} {} {error}", fit.found.z[index]);
-    }
+    // Every 15th row has nothing.
+    let nis = report.nis.unwrap();
+    assert_eq!((nis.rows, nis.expected), (560, 880.0 / 560.0));
+    assert_near(&report, 3.0);
 }
 
 #[test]
 fn figures_say_whether_the_noises_are_right() {
-    let model = Pendulum::new(1, 2);
-    // The log has the noises that the model tells, twice as much, and half as much.
-    for (noise, mean, words) in [(1.0, 1.0, 0.95), (2.0, 4.0, 0.67), (0.5, 0.25, 0.91)] {
-        let fit = found(&model, &[model.log(1500, 11, noise)], &[0.0, 1.0]).unwrap();
+    let model = pendulum(1, 2);
+    // The log has the noises that the model tells, twice as much, and half as much. The parts of e^2/S below 0.00098 and above
+    // 5.02 are those of normal e of this size.
+    for (noise, mean, below, above) in
+        [(1.0, 1.0, 0.025, 0.025), (2.0, 4.0, 0.013, 0.26), (0.5, 0.25, 0.05, 0.0)]
+    {
+        let nis = found(&model, log(&model, &TRUTH[..2], 1500, 11, noise)).nis.unwrap();
+        assert_eq!((nis.rows, nis.expected), (1500, 1.0));
         // The standard deviation of the mean of 1500 is 4 %.
-        assert!((fit.figures.mean_nis / mean - 1.0).abs() < 0.15, "{noise} {}", fit.figures.mean_nis);
-        // The share of e^2/S within 0.00098 and 5.02, for normal e of this size.
-        assert!((fit.figures.within - words).abs() < 0.08, "{noise} {}", fit.figures.within);
+        assert!((nis.mean / mean - 1.0).abs() < 0.15, "{noise} {}", nis.mean);
+        // Standard deviations of the parts: at most 0.012.
+        assert!((nis.below - below).abs() < 0.03, "{noise} {}", nis.below);
+        assert!((nis.above - above).abs() < 0.05, "{noise} {}", nis.above);
     }
 }
 
 #[test]
 fn free_runs_start_where_they_fit_best() {
     // No noise inside: the free run is as close as the noise of the measurement allows.
-    let model = Pendulum { process: 0.0, ..Pendulum::new(1, 3) };
-    let fit = found(&model, &[model.log(500, 5, 1.0)], &[0.0, 1.0, 1.0]).unwrap();
-    let output = &fit.figures.outputs[0];
-    let deviation = model.measurement[0].sqrt();
+    let model = GreyBox::from_toml(&pendulum_text(0.0, 1, 3)).unwrap();
+    let report = found(&model, log(&model, &TRUTH[..3], 500, 5, 1.0));
+    let output = &report.outputs[0];
     // Standard deviation 3 %.
-    assert!((output.free_run.unwrap().rmse / deviation - 1.0).abs() < 0.12, "{output:?}");
+    assert!((output.free_run.unwrap().rmse / 0.02 - 1.0).abs() < 0.12, "{output:?}");
     assert!(output.free_run.unwrap().rmse <= output.one_step.unwrap().rmse);
-    let start = fit.figures.starts[0].as_ref().unwrap();
-    assert!((start[0] - model.start[0]).abs() > 1e-3 && (start[0] - model.start[0]).abs() < 1.0);
+    let start = report.states[0].starts[0].unwrap();
+    assert!((start - 0.2).abs() > 1e-3 && (start - 0.2).abs() < 1.0);
 }

@@ -1,4 +1,4 @@
-//! Steps of the filters and the observer over models of both kinds.
+//! The two kinds of models, and the steps of filters and observers over them.
 
 use thetahat_core::nalgebra::{Complex, DMatrix, DVector, Dyn};
 use thetahat_core::{
@@ -6,9 +6,11 @@ use thetahat_core::{
     Transition,
 };
 
-use super::look::{self, Work};
-use super::model::Kind;
-use crate::greybox::{Dynamics, whole_steps};
+use super::linear::Linear;
+use super::linearization::{Linearization, Work};
+use crate::GreyBox;
+use crate::data::Offset;
+use crate::greybox::whole_steps;
 
 pub(super) type Filter = ExtendedKalmanFilter<f64, Dyn>;
 pub(super) type Observer = LuenbergerObserver<f64, Dyn, Dyn>;
@@ -88,6 +90,13 @@ impl Recursion for Smoother<f64, Dyn> {
     }
 }
 
+/// A model in matrices, or in equations.
+#[derive(Debug, Clone)]
+pub(super) enum Kind {
+    Linear(Box<Linear>),
+    Grey(Box<GreyBox>),
+}
+
 impl Kind {
     /// The filter that stands where the model starts.
     pub(super) fn started(&self) -> Result<Filter, Error> {
@@ -101,17 +110,6 @@ impl Kind {
                 let variances: Vec<f64> = deviations.map(|deviation| deviation * deviation).collect();
                 Filter::new(mean.into(), Covariance::from_diagonal(&variances.into())?)
             }
-        }
-    }
-
-    /// The numbers of states, unknown parameters, inputs and outputs.
-    pub(super) fn sizes(&self) -> [usize; 4] {
-        fn of(model: &impl Dynamics) -> [usize; 4] {
-            [model.states(), model.parameters(), model.inputs(), model.outputs()]
-        }
-        match self {
-            Kind::Linear(linear) => [linear.states.len(), 0, linear.inputs.len(), linear.outputs.len()],
-            Kind::Grey(grey) => of(grey.as_ref()),
         }
     }
 
@@ -158,7 +156,8 @@ impl Kind {
                 for index in 0..count {
                     let (time, estimate) =
                         (from.time + index as f64 * dt, filter.filter().state().as_slice());
-                    let transition = look::ahead(grey, estimate, from.inputs.as_slice(), time, dt, work)?;
+                    let transition =
+                        Linearization::ahead(grey, estimate, from.inputs.as_slice(), time, dt, work)?;
                     filter.predict(&transition, &from.inputs)?;
                 }
             }
@@ -182,9 +181,10 @@ impl Kind {
                 filter.correct(&linear.observation, &at.inputs, &at.outputs)
             }
             Kind::Grey(grey) => {
-                let look = look::seen(grey, estimate.as_slice(), at.inputs.as_slice(), at.time, work)?;
-                show(&look.values, &look.jacobian);
-                filter.correct(&look, &at.inputs, &at.outputs)
+                let seen =
+                    Linearization::seen(grey, estimate.as_slice(), at.inputs.as_slice(), at.time, work)?;
+                show(&seen.values, &seen.jacobian);
+                filter.correct(&seen, &at.inputs, &at.outputs)
             }
         }
     }
@@ -208,8 +208,8 @@ impl Kind {
                 Kind::Grey(grey) => {
                     let (time, estimate) = (from.time + index as f64 * dt, observer.state().as_slice());
                     let inputs = from.inputs.as_slice();
-                    let transition = look::ahead(grey, estimate, inputs, time, dt, work)?;
-                    let observation = look::seen(grey, estimate, inputs, time, work)?;
+                    let transition = Linearization::ahead(grey, estimate, inputs, time, dt, work)?;
+                    let observation = Linearization::seen(grey, estimate, inputs, time, work)?;
                     if let Some(poles) = poles.filter(|_| index == 0) {
                         observer.place(&transition, &observation, &from.inputs, &self.weights(), poles)?;
                     }
@@ -230,14 +230,17 @@ impl Kind {
         Ok(match self {
             Kind::Linear(linear) => linear.observation.output(estimate, &at.inputs),
             Kind::Grey(grey) => {
-                look::seen(grey, estimate.as_slice(), at.inputs.as_slice(), at.time, work)?.values
+                Linearization::seen(grey, estimate.as_slice(), at.inputs.as_slice(), at.time, work)?.values
             }
         })
     }
 
     /// How the outputs are weighed where an observer needs one number of them.
     pub(super) fn weights(&self) -> DVector<f64> {
-        let [_, _, _, outputs] = self.sizes();
+        let outputs = match self {
+            Kind::Linear(linear) => linear.outputs.len(),
+            Kind::Grey(grey) => grey.outputs().len(),
+        };
         let noisy = outputs > 1 && (0..outputs).all(|output| self.output_variance(output) > 0.0);
         DVector::from_fn(
             outputs,
@@ -245,5 +248,13 @@ impl Kind {
                 if noisy { self.output_variance(output).sqrt().recip() } else { 1.0 }
             },
         )
+    }
+
+    /// What is taken from the channels; nothing where there is no offset.
+    pub(super) fn offsets(&self) -> (&[Offset], &[Offset]) {
+        match self {
+            Kind::Linear(linear) => (&linear.input_offsets, &linear.output_offsets),
+            Kind::Grey(_) => (&[], &[]),
+        }
     }
 }

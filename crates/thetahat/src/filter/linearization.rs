@@ -1,0 +1,108 @@
+//! A model in equations, evaluated at one estimate: what a filter asks of it there.
+
+use thetahat_core::nalgebra::{DMatrix, DVector, Dyn};
+use thetahat_core::{Covariance, Error, Observation, Transition};
+
+use crate::GreyBox;
+
+/// A function of states and unknown parameters with its Jacobian and its noise, all at one estimate.
+///
+/// The estimate is [x; z], z being the unknown parameters after the change of variable, and the model that of
+/// [`Augmented`](thetahat_core::Augmented):
+///
+/// ```text
+/// F = [ ∂f/∂x  ∂f/∂z ]        H = [ ∂h/∂x  ∂h/∂z ]        Q = [ Q_x   0  ]
+///     [   0      I   ]                                        [  0   Q_z ]
+/// ```
+///
+/// A filter asks for function, Jacobian and noise one by one, each time at the same estimate. Computed together they share
+/// what they have in common.
+#[derive(Debug, Clone)]
+pub(super) struct Linearization {
+    pub(super) values: DVector<f64>,
+    pub(super) jacobian: DMatrix<f64>,
+    noise: Covariance<f64, Dyn>,
+}
+
+/// Numbers to work in.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Work {
+    jacobian: Vec<f64>,
+    program: Vec<f64>,
+}
+
+impl Linearization {
+    /// The step of `dt` seconds from time `t`.
+    pub(super) fn ahead(
+        model: &GreyBox,
+        estimate: &[f64],
+        inputs: &[f64],
+        t: f64,
+        dt: f64,
+        work: &mut Work,
+    ) -> Result<Self, Error> {
+        let (n, size) = (model.states().len(), estimate.len());
+        let (x, z) = estimate.split_at(n);
+        let mut values = DVector::from_column_slice(estimate);
+        let mut jacobian = DMatrix::identity(size, size);
+        work.jacobian.resize(n * size, 0.0);
+        let next = &mut values.as_mut_slice()[..n];
+        model.advance(x, z, inputs, t, dt, next, &mut work.jacobian, &mut work.program);
+        let columns = jacobian.as_mut_slice().chunks_exact_mut(size);
+        for (target, column) in columns.zip(work.jacobian.chunks_exact(n)) {
+            target[..n].copy_from_slice(column);
+        }
+        let share = dt / model.sample_time();
+        let walks = model.parameters().iter().map(|parameter| match parameter.walk {
+            0.0 => 0.0,
+            _ => parameter.walk_variable().powi(2) * share,
+        });
+        let noise = DVector::from_iterator(size, model.process_variances(dt).chain(walks));
+        Ok(Self { values, jacobian, noise: Covariance::from_diagonal(&noise)? })
+    }
+
+    /// The outputs at time `t`.
+    pub(super) fn seen(
+        model: &GreyBox,
+        estimate: &[f64],
+        inputs: &[f64],
+        t: f64,
+        work: &mut Work,
+    ) -> Result<Self, Error> {
+        let (x, z) = estimate.split_at(model.states().len());
+        let variances = model.measurement_variances();
+        let mut values = DVector::zeros(variances.len());
+        let mut jacobian = DMatrix::zeros(variances.len(), estimate.len());
+        model.observe(x, z, inputs, t, values.as_mut_slice(), jacobian.as_mut_slice(), &mut work.program);
+        let noise = Covariance::from_diagonal(&DVector::from_column_slice(variances))?;
+        Ok(Self { values, jacobian, noise })
+    }
+}
+
+impl Transition<f64, Dyn, Dyn> for Linearization {
+    fn next(&self, _: &DVector<f64>, _: &DVector<f64>) -> DVector<f64> {
+        self.values.clone()
+    }
+
+    fn jacobian(&self, _: &DVector<f64>, _: &DVector<f64>) -> DMatrix<f64> {
+        self.jacobian.clone()
+    }
+
+    fn noise(&self, _: &DVector<f64>, _: &DVector<f64>) -> Covariance<f64, Dyn> {
+        self.noise.clone()
+    }
+}
+
+impl Observation<f64, Dyn, Dyn, Dyn> for Linearization {
+    fn output(&self, _: &DVector<f64>, _: &DVector<f64>) -> DVector<f64> {
+        self.values.clone()
+    }
+
+    fn jacobian(&self, _: &DVector<f64>, _: &DVector<f64>) -> DMatrix<f64> {
+        self.jacobian.clone()
+    }
+
+    fn noise(&self, _: &DVector<f64>, _: &DVector<f64>) -> Covariance<f64, Dyn> {
+        self.noise.clone()
+    }
+}

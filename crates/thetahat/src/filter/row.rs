@@ -1,0 +1,164 @@
+//! What is shown of a row.
+
+use thetahat_core::nalgebra::{DMatrix, DVector};
+use thetahat_core::{Action, Error, Innovation};
+
+use super::estimate::{StateEstimate, StateValues};
+use super::kind::{Filter, Kind, Moment};
+use super::model::StateModel;
+use crate::validate::chi_square_interval;
+
+/// The numbers of one row.
+#[derive(Debug, Clone)]
+pub(super) struct Row {
+    states: usize,
+    /// Of the states, and behind them of the parameters after the change of variable.
+    pub(super) predicted: Vec<f64>,
+    predicted_deviations: Vec<f64>,
+    filtered: Vec<f64>,
+    filtered_deviations: Vec<f64>,
+    parameters: Vec<f64>,
+    parameter_deviations: Vec<f64>,
+    outputs: Vec<f64>,
+    output_deviations: Vec<f64>,
+    innovations: Vec<f64>,
+    held: Vec<bool>,
+    covariance: Vec<f64>,
+    /// The 95 % bounds of the normalised innovation squared of 1, 2 … elements.
+    bounds: Vec<Option<(f64, f64)>>,
+}
+
+/// What a measurement told.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Told {
+    nis: Option<f64>,
+    log_likelihood: Option<f64>,
+    action: Action,
+}
+
+impl Told {
+    pub(super) fn of(innovation: &Innovation<f64, DVector<f64>>) -> Self {
+        let measured = innovation.action != Action::Missing;
+        let log_likelihood = Some(innovation.log_likelihood());
+        Self { nis: measured.then_some(innovation.nis), log_likelihood, action: innovation.action }
+    }
+
+    /// By an observer, which knows no noise.
+    pub(super) fn nothing(moment: &Moment) -> Self {
+        let missing = moment.outputs.iter().all(|output| output.is_nan());
+        let action = if missing { Action::Missing } else { Action::Updated };
+        Self { nis: None, log_likelihood: None, action }
+    }
+}
+
+impl Row {
+    pub(super) fn new(model: &StateModel) -> Self {
+        let (states, parameters) = (model.states().len(), model.unknown().len());
+        let (size, outputs) = (states + parameters, model.outputs().len());
+        let zeros = |size: usize| vec![0.0; size];
+        Self {
+            states,
+            predicted: zeros(size),
+            predicted_deviations: zeros(size),
+            filtered: zeros(size),
+            filtered_deviations: zeros(size),
+            parameters: zeros(parameters),
+            parameter_deviations: zeros(parameters),
+            outputs: zeros(outputs),
+            output_deviations: zeros(outputs),
+            innovations: zeros(outputs),
+            held: vec![false; model.inputs().len()],
+            covariance: zeros(size * size),
+            bounds: (1..=outputs).map(chi_square_interval).collect(),
+        }
+    }
+
+    pub(super) fn predicted(&mut self, filter: &Filter) -> Result<(), Error> {
+        self.predicted.copy_from_slice(filter.state().as_slice());
+        filter.covariance().write_into(&mut self.covariance)?;
+        let diagonal = self.covariance.iter().step_by(self.predicted.len() + 1);
+        for (deviation, variance) in self.predicted_deviations.iter_mut().zip(diagonal) {
+            *deviation = variance.sqrt();
+        }
+        Ok(())
+    }
+
+    pub(super) fn filtered(&mut self, filter: &Filter) {
+        self.filtered.copy_from_slice(filter.state().as_slice());
+        for (deviation, variance) in self.filtered_deviations.iter_mut().zip(&filter.covariance().variances())
+        {
+            *deviation = variance.sqrt();
+        }
+    }
+
+    /// p(z), and |dp/dz| times the standard deviation of z.
+    pub(super) fn parameters(&mut self, kind: &Kind) {
+        let Kind::Grey(grey) = kind else { return };
+        for (index, parameter) in grey.parameters().iter().enumerate() {
+            let place = self.states + index;
+            let (z, deviation) = (self.filtered[place], self.filtered_deviations[place]);
+            self.parameters[index] = parameter.scale.value(z);
+            self.parameter_deviations[index] = parameter.scale.slope(z).abs() * deviation;
+        }
+    }
+
+    /// The outputs as predicted, and what they are off.
+    pub(super) fn seen(&mut self, outputs: &DVector<f64>, moment: &Moment) {
+        self.outputs.copy_from_slice(outputs.as_slice());
+        for ((innovation, measured), output) in self.innovations.iter_mut().zip(&moment.outputs).zip(outputs)
+        {
+            *innovation = measured - output;
+        }
+    }
+
+    /// The roots of S_ii = h_i'P h_i + R_ii, with the covariance of the prediction.
+    pub(super) fn output_deviations(&mut self, kind: &Kind, h: &DMatrix<f64>) {
+        let (size, outputs) = (self.predicted.len(), self.output_deviations.len());
+        let h = h.as_slice();
+        for (output, deviation) in self.output_deviations.iter_mut().enumerate() {
+            let mut variance = 0.0;
+            for i in 0..size {
+                let row = h.iter().skip(output).step_by(outputs);
+                let column = &self.covariance[i * size..(i + 1) * size];
+                variance += h[output + i * outputs] * column.iter().zip(row).map(|(p, h)| p * h).sum::<f64>();
+            }
+            *deviation = (variance.max(0.0) + kind.output_variance(output)).sqrt();
+        }
+    }
+
+    /// What comes last: the outputs with their offsets, and the inputs that are missing.
+    pub(super) fn finish(&mut self, kind: &Kind, time: f64, inputs: &[f64]) {
+        for (output, offset) in self.outputs.iter_mut().zip(kind.offsets().1) {
+            *output += offset.at(time);
+        }
+        for (held, input) in self.held.iter_mut().zip(inputs) {
+            *held = input.is_nan();
+        }
+    }
+
+    /// `certain`: with standard deviations, and a filtered state.
+    pub(super) fn estimate(&self, row: usize, time: f64, certain: bool, told: &Told) -> StateEstimate<'_> {
+        fn values<'a>(values: &'a [f64], deviations: &'a [f64], certain: bool) -> StateValues<'a> {
+            StateValues { values, standard_deviations: certain.then_some(deviations) }
+        }
+        let states = self.states;
+        let measured = self.innovations.iter().filter(|innovation| !innovation.is_nan()).count();
+        let filtered = values(&self.filtered[..states], &self.filtered_deviations[..states], true);
+        let bounds = measured.checked_sub(1).and_then(|place| self.bounds.get(place).copied().flatten());
+        StateEstimate {
+            row,
+            time,
+            predicted: values(&self.predicted[..states], &self.predicted_deviations[..states], certain),
+            filtered: certain.then_some(filtered),
+            parameters: values(&self.parameters, &self.parameter_deviations, certain),
+            outputs: values(&self.outputs, &self.output_deviations, certain),
+            innovations: &self.innovations,
+            measured,
+            nis: told.nis,
+            nis_bounds: told.nis.and(bounds),
+            log_likelihood: told.log_likelihood,
+            action: told.action,
+            held: &self.held,
+        }
+    }
+}

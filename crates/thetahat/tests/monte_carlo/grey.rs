@@ -1,0 +1,87 @@
+//! Models in equations: whether the intervals of a fit cover the truth.
+
+use std::ops::ControlFlow;
+
+use thetahat::{Channel, GreyBox, Recording, Stopped, Times, fit_grey};
+
+use crate::runs;
+use crate::simulated::Random;
+
+const TRUTH: [f64; 5] = [-0.5, 2.0, 1.5, 0.1, 0.3];
+
+/// A driven pendulum, of which angle and rate are measured, with five unknown parameters.
+const PENDULUM: &str = "\
+sample_time = 0.05
+
+[states]
+angle = { start = 0.2, sd = 0.3 }
+rate = { start = -0.1, sd = 0.2 }
+
+[inputs]
+torque = 'u'
+
+[parameters]
+damping = { start = -0.2, sd = 1, unknown = true }
+stiffness = { start = 1.3, sd = 1, unknown = true }
+gain = { start = 1.0, sd = 1, unknown = true }
+square = { start = 0.16, sd = 1, unknown = true }
+drive = { start = 0.28, sd = 1, unknown = true }
+
+[next]
+angle = 'angle + dt * rate'
+rate = 'rate + dt * (gain * torque + drive - exp(damping) * rate - stiffness * sin(angle))'
+
+[outputs]
+y1 = 'sin(angle) + square * angle^2'
+y2 = 'rate'
+
+[noise]
+process = { rate = 0.002 }
+measurement = { y1 = 0.02, y2 = 0.03 }
+";
+
+/// A log of it, with the noises that it tells of times `noise`.
+fn log(seed: u64, noise: f64) -> Recording {
+    let [damping, stiffness, gain, square, drive] = TRUTH;
+    let mut random = Random(seed);
+    let mut normal = |deviation: f64| deviation * noise * random.normal();
+    let (mut angle, mut rate) = (0.2 + normal(0.3), -0.1 + normal(0.2));
+    let mut channels = ["u", "y1", "y2"].map(|name| Channel { name: name.into(), values: Vec::new() });
+    for row in 0..400 {
+        let torque = if (row / 20) % 3 == 0 { 1.0 } else { -0.7 };
+        let values = [torque, angle.sin() + square * angle * angle + normal(0.02), rate + normal(0.03)];
+        channels.iter_mut().zip(values).for_each(|(channel, value)| channel.values.push(value));
+        let turning = gain * torque + drive - damping.exp() * rate - stiffness * angle.sin();
+        (angle, rate) = (angle + 0.05 * rate, rate + 0.05 * turning + normal(0.002));
+    }
+    Recording { channels: channels.into(), times: Times::Uniform(0.05) }
+}
+
+#[test]
+fn intervals_of_models_in_equations_cover_the_truth() {
+    let model = GreyBox::from_toml(PENDULUM).expect("the case is sound");
+    let runs = runs(40);
+    // With all noises larger by one factor, that factor is found.
+    for noise in [1.0, 1.7] {
+        let (mut squares, mut covered) = (0.0, 0_usize);
+        for seed in 0..runs as u64 {
+            let found = fit_grey(&model, &[log(100 + seed, noise)], &[], &|_| ControlFlow::Continue(()))
+                .expect("the case is sound");
+            assert_eq!(found.search.stopped, Stopped::Converged, "seed {seed}");
+            assert!(found.search.iterations < 20, "seed {seed}");
+            for (parameter, truth) in found.parameters.iter().zip(TRUTH) {
+                let away = (parameter.value - truth) / parameter.standard_error;
+                assert!(away.abs() < 5.0, "seed {seed}, {}: {away}", parameter.name);
+                squares += away * away;
+                covered += usize::from(away.abs() < 1.959964);
+            }
+        }
+        // Five numbers a run, not independent. With 60 runs the standard deviation of the share is about 1.5 %, of the mean
+        // square 10 %.
+        let (count, spread) = ((5 * runs) as f64, (60.0 / runs as f64).sqrt());
+        let (share, square) = (covered as f64 / count, squares / count);
+        eprintln!("noise {noise}: {:.1} %, mean square {square:.3}", 100.0 * share);
+        assert!((share - 0.95).abs() < 0.05 * spread, "{noise}: {share}");
+        assert!((square - 1.0).abs() < 0.35 * spread, "{noise}: {square}");
+    }
+}

@@ -322,6 +322,9 @@ fn a_state_that_does_not_fit_is_refused_in_words() {
         ),
         (before[..before.len() / 2].to_owned(), "this is no state of thetahat track"),
         (before.replace("\"trackers\":[", "\"trackers\":[],\"x\":["), "its parts do not fit together"),
+        (before.replace("\"na\":1", "\"na\":7"), "its parts do not fit together"),
+        (before.replace("\"inputs\":[0.0]", "\"inputs\":[]"), "its parts do not fit together"),
+        (before.replace("\"names\":[\"a1\",", "\"names\":["), "its parts do not fit together"),
         ("{}".to_owned(), "this is no state of thetahat track"),
         (String::new(), "this is no state of thetahat track"),
     ] {
@@ -332,6 +335,11 @@ fn a_state_that_does_not_fit_is_refused_in_words() {
     // Output that is shorter than the state says.
     std::fs::remove_file(folder.path("state.json")).expect("it is there");
     folder.done(&format!("track log.csv {MODEL} --state state.json -o lines.jsonl"));
+    let lines = folder.read("lines.jsonl");
+    folder.write("lines.jsonl", format!("{}x", &lines[..lines.len() - 1]));
+    let run = folder.run(&format!("track log.csv {MODEL} --state state.json -o lines.jsonl"));
+    assert_eq!(run.code, 3);
+    assert!(run.stderr.contains("lines.jsonl: it holds something else"), "{}", run.stderr);
     folder.write("lines.jsonl", "short\n");
     let run = folder.run(&format!("track log.csv {MODEL} --state state.json -o lines.jsonl"));
     assert_eq!(run.code, 3);

@@ -23,8 +23,10 @@ pub(crate) fn grey(report: &GreyReport) -> String {
     let search = &report.search;
     let why: Stopped = search.stopped;
     text.line(&format!(
-        "{} rows, {} readings, log-likelihood {:.4}",
-        report.rows, report.readings, report.log_likelihood
+        "{} rows, {} readings, log-likelihood {}",
+        report.rows,
+        report.readings,
+        number(report.log_likelihood)
     ));
     text.line(&format!("prediction error, {} iterations, {}", search.iterations, stopped(why)));
     if let Some(nis) = &report.nis {

@@ -625,7 +625,7 @@ pub(crate) struct FilterArguments {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Output")]
 pub(crate) struct LineArguments {
-    /// Write a line for each N-th row only; alarms and gaps always have theirs
+    /// Write a line for each N-th row only; alarms and gaps of track always have theirs
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..))]
     pub(crate) every: u64,
     /// What a line is

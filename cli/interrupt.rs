@@ -98,7 +98,9 @@ fn asked_by(code: u8) {
             // It may wait for a reader of its output who does not come.
             thread::spawn(move || {
                 thread::sleep(PATIENCE);
-                asked_by(code);
+                if self::state().waker.is_some() {
+                    asked_by(code);
+                }
             });
         }
         return;
@@ -123,6 +125,11 @@ pub(crate) fn exit_code() -> u8 {
 /// A stream is followed from now on: when it has to end, it is woken, and [`is_ending`] says so.
 pub(crate) fn follows(waker: Waker) {
     state().waker = Some(waker);
+}
+
+/// The stream is not followed any more.
+pub(crate) fn leaves() {
+    state().waker = None;
 }
 
 /// Whether the stream has to end.

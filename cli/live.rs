@@ -142,15 +142,28 @@ impl Live {
 
     /// What was in the log besides good rows, as it goes behind the number of rows: nothing, or such as ", 2 malformed".
     pub(crate) fn faults(&self) -> String {
-        let counts = [(self.malformed, "malformed"), (self.set_back, "times the clock was set back")];
-        let told =
-            counts.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!(", {count} {what}"));
-        told.collect()
+        let malformed = match self.malformed {
+            0 => String::new(),
+            count => format!(", {count} malformed"),
+        };
+        let set_back = match self.set_back {
+            0 => String::new(),
+            1 => ", clock set back once".to_owned(),
+            count => format!(", clock set back {count} times"),
+        };
+        malformed + &set_back
     }
 
     /// Whether the log ended inside a line, which was left alone.
     pub(crate) fn is_unfinished(&self) -> bool {
         self.stream.is_unfinished()
+    }
+}
+
+/// Nobody has to wait for it any more.
+impl Drop for Live {
+    fn drop(&mut self) {
+        interrupt::leaves();
     }
 }
 

@@ -306,7 +306,7 @@ fn a_clock_that_goes_back_is_a_gap_or_an_error() {
     for words in [
         "warning: log.csv:4: the time is that of the row before",
         "warning: log.csv:6: the time is before that of the row before",
-        "6 rows, 1 malformed, 1 times the clock was set back, 1 gaps",
+        "6 rows, 1 malformed, clock set back once, 1 gap\n",
     ] {
         assert!(run.stderr.contains(words), "{words}: {}", run.stderr);
     }

@@ -187,13 +187,13 @@ impl<'a> Run<'a> {
     fn row(&mut self, after_gap: bool) -> Result<bool, Failure> {
         let Self { job, name, live, lines, columns, state, unsaved, deviations, .. } = self;
         let (values, time, malformed) = (live.values(), live.time(), live.is_malformed());
-        state.rows += 1;
+        state.rows = state.rows.saturating_add(1);
         *unsaved = true;
         let row = state.rows;
         let step = time.map_or(Step::Regular, |time| state.pace.step(time));
         if after_gap || step != Step::Regular {
             state.trackers.iter_mut().for_each(Tracker::gap);
-            state.gaps += 1;
+            state.gaps = state.gaps.saturating_add(1);
             columns.gap(lines, row, time)?;
         }
         state.remember(values, time);

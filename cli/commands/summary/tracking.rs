@@ -8,7 +8,11 @@ use super::text::{Text, columns, number, or_dash, short, uncertainty};
 /// How the ways to forget did, and where each has come to.
 pub(crate) fn tracking(summary: &TrackSummary, faults: &str, watched: bool) -> String {
     let mut text = Text::default();
-    let gaps = if summary.gaps > 0 { format!(", {} gaps", summary.gaps) } else { String::new() };
+    let gaps = match summary.gaps {
+        0 => String::new(),
+        1 => ", 1 gap".to_owned(),
+        count => format!(", {count} gaps"),
+    };
     if let Some(tracker) = summary.trackers.first() {
         text.line(&formula(&tracker.orders));
         text.line(&format!("{} rows{faults}{gaps}", summary.rows));

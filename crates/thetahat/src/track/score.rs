@@ -22,14 +22,14 @@ pub struct TrackScore {
 impl TrackScore {
     /// A sample that was predicted and measured; the output may have any origin.
     pub(super) fn count(&mut self, innovation: &Innovation<f64>, output: f64) {
-        self.samples += 1;
+        self.samples = self.samples.saturating_add(1);
         let share = 1.0 / self.samples as f64;
         self.mean_squared_error += (innovation.error * innovation.error - self.mean_squared_error) * share;
         let before = output - self.mean_output;
         self.mean_output += before * share;
         self.output_variance += (before * (output - self.mean_output) - self.output_variance) * share;
         if innovation.variance.is_finite() {
-            self.judged += 1;
+            self.judged = self.judged.saturating_add(1);
             let share = 1.0 / self.judged as f64;
             self.mean_nis += (innovation.nis - self.mean_nis) * share;
             self.mean_log_likelihood += (innovation.log_likelihood() - self.mean_log_likelihood) * share;

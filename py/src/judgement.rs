@@ -1,6 +1,7 @@
 //! Documents about logs and models: validations, comparisons, inspections.
 
 use std::ffi::OsString;
+use std::sync::Arc;
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -8,8 +9,8 @@ use thetahat::{Inspection, InspectionPlan, Recording, Report, Requirement, Times
 
 use crate::error;
 use crate::log::{Log, copy};
-use crate::model::Model;
-use crate::work::{detached, interruptible};
+use crate::model::{Model, channels};
+use crate::work::{awaited, interruptible};
 
 /// How a model does on a log: the document that `thetahat validate` writes.
 #[pyclass(frozen, module = "thetahat._thetahat")]
@@ -29,15 +30,16 @@ pub(crate) fn validate(
 ) -> PyResult<Validation> {
     let (plan, requirements) =
         thetahat_cli::validation_plan(&options).map_err(|failure| error::program(py, &failure))?;
-    let (model, log) = (model.get(), log.get());
-    let report = model.report(py)?;
+    let log = log.get();
+    let report = model.get().report(py)?;
     for requirement in &requirements {
-        requirement.check(report).map_err(|error| error::batch(py, error))?;
+        requirement.check(&report).map_err(|error| error::batch(py, error))?;
     }
-    let found = interruptible(py, |_| {
-        thetahat::validate(report, None, copy(&log.log, &model.channels(log))?, &log.sources, &plan)
+    let (log, sources, alpha) = (Arc::clone(&log.log), log.sources.clone(), plan.alpha);
+    let found = interruptible(py, move |_| {
+        thetahat::validate(&report, None, copy(&log, &channels(&report.model, &log))?, &sources, &plan)
     })?;
-    Ok(Validation { found, requirements, alpha: plan.alpha })
+    Ok(Validation { found, requirements, alpha })
 }
 
 #[pymethods]
@@ -70,12 +72,13 @@ pub(crate) fn compare(
     let (plan, _) =
         thetahat_cli::validation_plan(&options).map_err(|failure| error::program(py, &failure))?;
     let log = log.get();
-    let models = models.iter().map(|(name, model)| Ok((name.as_str(), model.get(), model.get().report(py)?)));
-    let models = models.collect::<PyResult<Vec<(&str, &Model, &Report)>>>()?;
-    let comparison = interruptible(py, |_| {
-        let each = models.iter().map(|(name, model, report)| {
-            let channels = copy(&log.log, &model.channels(log))?;
-            thetahat::validate(report, Some(name), channels, &log.sources, &plan)
+    let models = models.into_iter().map(|(name, model)| Ok((name, model.get().report(py)?)));
+    let models = models.collect::<PyResult<Vec<(String, Arc<Report>)>>>()?;
+    let (log, sources) = (Arc::clone(&log.log), log.sources.clone());
+    let comparison = interruptible(py, move |_| {
+        let each = models.iter().map(|(name, report)| {
+            let channels = copy(&log, &channels(&report.model, &log))?;
+            thetahat::validate(report, Some(name), channels, &sources, &plan)
         });
         let found: Vec<Validated> = each.collect::<Result<_, _>>()?;
         thetahat::compare(&found)
@@ -88,19 +91,20 @@ pub(crate) fn compare(
 #[pyfunction]
 pub(crate) fn inspect(py: Python<'_>, log: &Bound<'_, Log>) -> PyResult<(String, String)> {
     let log = log.get();
-    let Some(source) = log.sources.first() else {
+    let Some(source) = log.sources.first().cloned() else {
         return Err(PyValueError::new_err("log: it comes from nowhere; make another"));
     };
-    let found = interruptible(py, |_| {
-        let times = match log.log.time() {
-            Some(time) if log.log.borders().is_empty() => Times::Measured(time.to_vec()),
+    let plan =
+        InspectionPlan { inputs: log.inputs.clone(), output: Some(log.output.clone()), resample: None };
+    let log = Arc::clone(&log.log);
+    let found = interruptible(py, move |_| {
+        let times = match log.time() {
+            Some(time) if log.borders().is_empty() => Times::Measured(time.to_vec()),
             // Several logs have no common clock.
-            _ => Times::Uniform(log.log.sample_time()),
+            _ => Times::Uniform(log.sample_time()),
         };
-        let recording = Recording { channels: log.log.channels().to_vec(), times };
-        let plan =
-            InspectionPlan { inputs: log.inputs.clone(), output: Some(log.output.clone()), resample: None };
-        thetahat::inspect(recording, source, &plan)
+        let recording = Recording { channels: log.channels().to_vec(), times };
+        thetahat::inspect(recording, &source, &plan)
     })?;
     written(py, &found)
 }
@@ -108,8 +112,8 @@ pub(crate) fn inspect(py: Python<'_>, log: &Bound<'_, Log>) -> PyResult<(String,
 /// The same of a file, with the options of `thetahat inspect`.
 #[pyfunction]
 pub(crate) fn inspect_file(py: Python<'_>, options: Vec<OsString>) -> PyResult<(String, String)> {
-    let found =
-        detached(py, || thetahat_cli::inspect(&options))?.map_err(|failure| error::program(py, &failure))?;
+    let found = awaited(py, move |_| thetahat_cli::inspect(&options))?
+        .map_err(|failure| error::program(py, &failure))?;
     written(py, &found)
 }
 

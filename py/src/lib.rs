@@ -29,6 +29,7 @@ fn _thetahat(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(judgement::inspect, module)?)?;
     module.add_function(wrap_pyfunction!(judgement::inspect_file, module)?)?;
     online::register(module)?;
+    work::register(module)?;
     module.add_function(wrap_pyfunction!(in_python, module)?)?;
     module.add_function(wrap_pyfunction!(run, module)?)
 }
@@ -36,7 +37,7 @@ fn _thetahat(module: &Bound<'_, PyModule>) -> PyResult<()> {
 /// The command line: the exit code for these words, the program's name first.
 #[pyfunction]
 fn run(py: Python<'_>, words: Vec<OsString>) -> PyResult<u8> {
-    work::detached(py, || thetahat_cli::run(words))
+    work::blocking(py, || thetahat_cli::run(words))
 }
 
 /// A message of the command line with the keyword arguments that its options are here.

@@ -11,7 +11,7 @@ use thetahat::{Channel, Interpolation, Resampling, Rows, Source};
 
 use crate::array::vector;
 use crate::error;
-use crate::work::detached;
+use crate::work::{awaited, interruptible};
 
 /// Channels on a common clock, where they came from, and which of them are inputs and output.
 #[pyclass(frozen, module = "thetahat._thetahat")]
@@ -79,8 +79,8 @@ impl Log {
     /// Reads files with the options of `thetahat fit`; also what the reader should know.
     #[staticmethod]
     fn read(py: Python<'_>, options: Vec<OsString>) -> PyResult<(Self, Vec<String>)> {
-        let opened =
-            detached(py, || thetahat_cli::read(&options))?.map_err(|failure| error::program(py, &failure))?;
+        let opened = awaited(py, move |_| thetahat_cli::read(&options))?
+            .map_err(|failure| error::program(py, &failure))?;
         let thetahat_cli::Opened { log, sources, inputs, output, warnings } = opened;
         let warnings = warnings.iter().map(|warning| error::in_python(warning)).collect();
         Ok((Self { log: Arc::new(log), sources, inputs, output }, warnings))
@@ -109,8 +109,11 @@ impl Log {
     /// Some rows (1-based, inclusive) as a log of its own.
     fn part(&self, py: Python<'_>, first: usize, last: usize) -> PyResult<Self> {
         let rows = Rows::new(first, last).map_err(|error| error::batch(py, error))?;
-        let names: Vec<&str> = self.log.channels().iter().map(|channel| channel.name.as_str()).collect();
-        let log = self.log.part(&names, rows).map_err(|error| error::batch(py, error))?;
+        let whole = Arc::clone(&self.log);
+        let log = interruptible(py, move |_| {
+            let names: Vec<&str> = whole.channels().iter().map(|channel| channel.name.as_str()).collect();
+            whole.part(&names, rows)
+        })?;
         let mut sources = Vec::new();
         for source in &self.sources {
             let (begin, end) = (source.rows.first().max(first), source.rows.last().min(last));

@@ -7,8 +7,8 @@ use numpy::{PyArray1, PyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use thetahat::{
-    Channel, Horizon, Procedure, Quantity, Report, Start, StateSpace, Unjudged, apply, frequency_response,
-    logarithmic_frequencies, step_response,
+    Channel, Horizon, Procedure, Quantity, Report, Source, Start, StateSpace, Unjudged, apply,
+    frequency_response, logarithmic_frequencies, step_response,
 };
 
 use crate::array::{from_matrix, matrix, vector};
@@ -21,8 +21,8 @@ use crate::work::interruptible;
 /// Its figures are computed when somebody asks for the document: they take several times as long as least squares.
 #[pyclass(frozen, module = "thetahat._thetahat")]
 pub(crate) struct Model {
-    model: thetahat::Model,
-    report: OnceLock<Report>,
+    model: Arc<thetahat::Model>,
+    report: OnceLock<Arc<Report>>,
     /// What the figures are computed of, as long as they are not.
     unjudged: Mutex<Option<(Unjudged, Arc<thetahat::Log>)>>,
 }
@@ -36,12 +36,13 @@ pub(crate) fn fit(py: Python<'_>, log: &Bound<'_, Log>, options: Vec<OsString>) 
     let log = log.get();
     let plan = thetahat_cli::plan(&options, log.inputs.clone(), log.output.clone())
         .map_err(|failure| error::program(py, &failure))?;
-    let unjudged = interruptible(py, |monitor| {
+    let (channels, sources) = (Arc::clone(&log.log), log.sources.clone());
+    let unjudged = interruptible(py, move |monitor| {
         let names: Vec<&str> = plan.inputs.iter().chain([&plan.output]).map(String::as_str).collect();
-        Unjudged::new(copy(&log.log, &names)?, &log.sources, &plan, monitor)
+        Unjudged::new(copy(&channels, &names)?, &sources, &plan, monitor)
     })?;
     Ok(Model {
-        model: unjudged.report().model.clone(),
+        model: unjudged.report().model.clone().into(),
         report: OnceLock::new(),
         unjudged: Mutex::new(Some((unjudged, Arc::clone(&log.log)))),
     })
@@ -53,7 +54,8 @@ impl Model {
     #[staticmethod]
     fn from_json(py: Python<'_>, text: &str) -> PyResult<Self> {
         let report = Report::from_json(text).map_err(|error| error::batch(py, error))?;
-        Ok(Self { model: report.model.clone(), report: report.into(), unjudged: Mutex::new(None) })
+        let model = report.model.clone().into();
+        Ok(Self { model, report: Arc::new(report).into(), unjudged: Mutex::new(None) })
     }
 
     /// The document.
@@ -64,12 +66,16 @@ impl Model {
     /// What is known without the figures: the parts `model` and `estimation` of the document.
     fn parts(&self, py: Python<'_>) -> PyResult<(String, String)> {
         let known = self.unjudged.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let stored;
         let report = match &known {
             Some((unjudged, _)) => unjudged.report(),
-            None => self.report(py)?,
+            None => {
+                stored = self.report(py)?;
+                &*stored
+            }
         };
         let malformed = |error: serde_json::Error| PyValueError::new_err(error.to_string());
-        let model = serde_json::to_string(&self.model).map_err(malformed)?;
+        let model = serde_json::to_string(&*self.model).map_err(malformed)?;
         Ok((model, serde_json::to_string(&report.estimation).map_err(malformed)?))
     }
 
@@ -80,7 +86,7 @@ impl Model {
 
     /// The table that `thetahat fit` prints.
     fn table(&self, py: Python<'_>) -> PyResult<String> {
-        Ok(thetahat_cli::table(self.report(py)?))
+        Ok(thetahat_cli::table(&*self.report(py)?))
     }
 
     /// What to warn of after a fit. Of least squares alone the figures wait: nothing to warn of hangs on them but how close it is.
@@ -90,24 +96,29 @@ impl Model {
             report.selection.is_none()
                 && !matches!(report.estimation.procedure, Procedure::PredictionError(_))
         };
+        let stored;
         let report = match &known {
             Some((unjudged, _)) if waits(unjudged.report()) => unjudged.report(),
-            _ => self.report(py)?,
+            _ => {
+                stored = self.report(py)?;
+                &*stored
+            }
         };
         Ok(report.warnings.iter().map(|warning| error::in_python(warning)).collect())
     }
 
     /// The page that `thetahat fit --html` writes, with a look at a log if there is one.
     fn page(&self, py: Python<'_>, log: Option<&Bound<'_, Log>>, command: &str) -> PyResult<String> {
-        let log = log.map(Bound::get);
-        let report = self.report(py)?;
-        interruptible(py, |_| {
+        let log = log.map(Bound::get).map(|log| (Arc::clone(&log.log), log.sources.clone()));
+        let (report, command) = (self.report(py)?, command.to_owned());
+        interruptible(py, move |_| {
             let plan = thetahat::ValidationPlan::default();
-            let look = |log: &Log| {
-                thetahat::validate(report, None, copy(&log.log, &self.channels(log))?, &log.sources, &plan)
+            let look = |(log, sources): (Arc<thetahat::Log>, Vec<Source>)| {
+                let channels = copy(&log, &channels(&report.model, &log))?;
+                thetahat::validate(&report, None, channels, &sources, &plan)
             };
             let looks: Vec<_> = log.map(look).transpose()?.into_iter().collect();
-            thetahat::fit_page(report, &looks, command)
+            thetahat::fit_page(&report, &looks, &command)
         })
     }
 
@@ -122,11 +133,11 @@ impl Model {
     ) -> PyResult<(Column<'py>, Option<Column<'py>>)> {
         let horizon = horizon.map_or(Horizon::FreeRun, |steps| Horizon::Steps { steps });
         let start = self.start(initial, horizon)?;
-        let log = log.get();
-        let applied = interruptible(py, |_| {
-            apply(&self.model, copy(&log.log, &self.channels(log))?, &[], None, horizon, start)
+        let (model, log) = (Arc::clone(&self.model), Arc::clone(&log.get().log));
+        let rows = log.rows();
+        let applied = interruptible(py, move |_| {
+            apply(&model, copy(&log, &channels(&model, &log))?, &[], None, horizon, start)
         })?;
-        let rows = log.log.rows();
         let column = |values: &[f64]| PyArray1::from_slice(py, &values[..rows.min(values.len())]);
         Ok((column(&applied.predicted), applied.standard_deviations.as_deref().map(column)))
     }
@@ -144,10 +155,10 @@ impl Model {
         {
             return Err(PyValueError::new_err(format!("u: input '{}' holds NaN or infinity", channel.name)));
         }
-        let model = &self.model;
-        let applied = interruptible(py, |_| {
+        let model = Arc::clone(&self.model);
+        let applied = interruptible(py, move |_| {
             let log = thetahat::Log::new(channels, model.sample_time)?;
-            apply(model, log, &[], None, Horizon::FreeRun, Start::Zero)
+            apply(&model, log, &[], None, Horizon::FreeRun, Start::Zero)
         })?;
         Ok(PyArray1::from_vec(py, applied.predicted))
     }
@@ -166,7 +177,7 @@ impl Model {
         if !(1..=MOST).contains(&steps) {
             return Err(PyValueError::new_err(format!("steps: {steps} is outside 1..{MOST}")));
         }
-        let model = &self.model;
+        let model = Arc::clone(&self.model);
         let driven = model.orders.nb.iter().any(|&nb| nb > 0);
         let future = match inputs {
             Some(inputs) if driven => self.inputs_of("u", inputs, Some(steps))?,
@@ -180,14 +191,14 @@ impl Model {
         };
         let horizon = Horizon::Steps { steps };
         let start = self.start(initial, horizon)?;
-        let log = log.get();
-        let rows = log.log.rows();
-        let applied = interruptible(py, |_| {
-            let mut known = copy(&log.log, &self.channels(log))?;
+        let log = Arc::clone(&log.get().log);
+        let rows = log.rows();
+        let applied = interruptible(py, move |_| {
+            let mut known = copy(&log, &channels(&model, &log))?;
             if driven {
                 known = extended(&known, &future, steps)?;
             }
-            apply(model, known, &[], None, horizon, start)
+            apply(&model, known, &[], None, horizon, start)
         })?;
         let end = rows + steps;
         let ahead = applied.predicted.get(rows..end);
@@ -212,7 +223,7 @@ impl Model {
         frequencies: Option<&Bound<'py, PyAny>>,
         points: usize,
     ) -> PyResult<Vec<(Option<String>, [Column<'py>; 7])>> {
-        let model = &self.model;
+        let model = Arc::clone(&self.model);
         let frequencies = match frequencies {
             Some(frequencies) => vector("w", frequencies, None)?.as_slice()?.to_vec(),
             None => {
@@ -221,8 +232,7 @@ impl Model {
                     .map_err(|error| error::batch(py, error))?
             }
         };
-        let responses =
-            py.detach(|| frequency_response(model, &frequencies)).map_err(|error| error::batch(py, error))?;
+        let responses = interruptible(py, move |_| frequency_response(&model, &frequencies))?;
         let columns = responses.into_iter().map(|response| {
             let column = |of: &dyn Fn(&thetahat::FrequencyPoint) -> f64| {
                 PyArray1::from_vec(py, response.points.iter().map(of).collect())
@@ -249,9 +259,8 @@ impl Model {
         input: usize,
         samples: Option<usize>,
     ) -> PyResult<[Column<'py>; 3]> {
-        let response = py
-            .detach(|| step_response(&self.model, input, samples))
-            .map_err(|error| error::batch(py, error))?;
+        let model = Arc::clone(&self.model);
+        let response = interruptible(py, move |_| step_response(&model, input, samples))?;
         let values = response.values.iter().map(|quantity| quantity.value).collect();
         let errors = response.values.iter().map(or_nan).collect();
         Ok([
@@ -271,30 +280,20 @@ impl Model {
 
 impl Model {
     /// The whole report.
-    pub(crate) fn report(&self, py: Python<'_>) -> PyResult<&Report> {
+    pub(crate) fn report(&self, py: Python<'_>) -> PyResult<Arc<Report>> {
         // The lock is not held while others compute: they may wait for the interpreter, and its owner for the lock.
         let unjudged = self.unjudged.lock().unwrap_or_else(PoisonError::into_inner).clone();
         if let Some((unjudged, log)) = unjudged {
-            let report = interruptible(py, |_| {
-                let copied = copy(&log, &self.channels_of(&log))?;
+            let model = Arc::clone(&self.model);
+            let report = interruptible(py, move |_| {
+                let copied = copy(&log, &channels(&model, &log))?;
                 unjudged.judged(copied)
             })?;
             // Whoever was faster found the same.
-            let _ = self.report.set(report);
+            let _ = self.report.set(Arc::new(report));
             *self.unjudged.lock().unwrap_or_else(PoisonError::into_inner) = None;
         }
-        self.report.get().ok_or_else(|| PyRuntimeError::new_err("the model has no report"))
-    }
-
-    /// The channels of a log that the model is about; it may lack the output.
-    pub(crate) fn channels(&self, log: &Log) -> Vec<&str> {
-        self.channels_of(&log.log)
-    }
-
-    fn channels_of(&self, log: &thetahat::Log) -> Vec<&str> {
-        let inputs = self.model.inputs.iter().map(|input| input.name.as_str());
-        let output = Some(self.model.output.name.as_str()).filter(|output| log.has(output));
-        inputs.chain(output).collect()
+        self.report.get().cloned().ok_or_else(|| PyRuntimeError::new_err("the model has no report"))
     }
 
     fn start(&self, initial: Option<&str>, horizon: Horizon) -> PyResult<Start> {
@@ -332,6 +331,13 @@ impl Model {
         let column = |index: usize| (0..rows).map(|row| entries[row * count + index]).collect();
         Ok(names.enumerate().map(|(index, name)| Channel { name, values: column(index) }).collect())
     }
+}
+
+/// The channels of a log that a model is about; it may lack the output.
+pub(crate) fn channels<'a>(model: &'a thetahat::Model, log: &thetahat::Log) -> Vec<&'a str> {
+    let inputs = model.inputs.iter().map(|input| input.name.as_str());
+    let output = Some(model.output.name.as_str()).filter(|output| log.has(output));
+    inputs.chain(output).collect()
 }
 
 /// A log that goes on with known inputs and no output.

@@ -24,6 +24,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyTuple};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use thetahat_core::Error;
 
 /// Adds all classes of this part.
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -82,6 +83,36 @@ fn _restore<'py>(py: Python<'py>, class_name: &str, kept: &Bound<'py, PyAny>) ->
         }
         "SteadyState" => any(Bound::new(py, trajectory::SteadyState::restore(kept)?)?.into_any()),
         _ => Err(PyValueError::new_err(format!("class_name: there is no class {class_name}"))),
+    }
+}
+
+/// Why a run ended before its last row.
+pub(crate) enum Stop {
+    /// A row, from 0, was refused.
+    Refused(usize, Error),
+    /// A handler of a signal raised this.
+    Interrupted(PyErr),
+}
+
+impl Stop {
+    /// As an exception.
+    pub(crate) fn into_error(self, py: Python<'_>) -> PyErr {
+        match self {
+            Stop::Refused(row, error) => argument::failed_at(py, row, error),
+            Stop::Interrupted(raised) => raised,
+        }
+    }
+}
+
+impl From<(usize, Error)> for Stop {
+    fn from((row, error): (usize, Error)) -> Self {
+        Stop::Refused(row, error)
+    }
+}
+
+impl From<PyErr> for Stop {
+    fn from(raised: PyErr) -> Self {
+        Stop::Interrupted(raised)
     }
 }
 

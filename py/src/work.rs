@@ -1,14 +1,20 @@
-//! Long work without the interpreter lock: it can be interrupted, and goes on in a forked process.
+//! Long work without the interpreter lock: Ctrl-C ends it, and it goes on in a forked process.
+//!
+//! Whatever may use the threads of rayon goes through [`awaited`], or [`blocking`]: in a fork rayon's own pool waits for
+//! threads that only the parent has.
 
+use std::any::Any;
 use std::ops::ControlFlow;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::sync::{Arc, Mutex, PoisonError};
-use std::thread;
-use std::time::Duration;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, sync_channel};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::thread::{self, ThreadId};
+use std::time::{Duration, Instant};
 
-use pyo3::exceptions::PyRuntimeError;
+use pyo3::exceptions::{PyRuntimeError, PySystemExit};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use thetahat::{Error, Monitor};
 
@@ -16,55 +22,69 @@ use crate::error;
 
 /// How often Python is asked whether somebody pressed Ctrl-C.
 const PATIENCE: Duration = Duration::from_millis(50);
+/// A loop looks at the time after about so many multiplications, some tens of microseconds.
+const WORK: usize = 1 << 17;
 
-/// The threads of this process. A fork has none of its parent's, whose pool would wait for them for ever.
+/// How long the interpreter waits at its end for calls of functions to return.
+const FAREWELL: Duration = Duration::from_secs(2);
+
+/// The threads of this process. A fork has none of its parent's.
 static POOL: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
 
-/// Runs work without the interpreter lock. Ctrl-C ends it at the next iteration of a search.
-pub(crate) fn interruptible<T: Send>(
+/// Runs a stage of the library without the interpreter lock, see [`awaited`].
+pub(crate) fn interruptible<T: Send + 'static>(
     py: Python<'_>,
-    work: impl FnOnce(Monitor<'_>) -> Result<T, Error> + Send,
+    work: impl FnOnce(Monitor<'_>) -> Result<T, Error> + Send + 'static,
+) -> PyResult<T> {
+    awaited(py, work)?.map_err(|failure| error::batch(py, failure))
+}
+
+/// Runs work without the interpreter lock. Ctrl-C ends it: a search at its next iteration, anything else at once for
+/// Python, while the work itself, of which nobody takes the result, goes on to its end beside it. So it owns its data.
+pub(crate) fn awaited<T: Send + 'static>(
+    py: Python<'_>,
+    work: impl FnOnce(Monitor<'_>) -> T + Send + 'static,
 ) -> PyResult<T> {
     let pool = pool()?;
-    let asked = AtomicBool::new(false);
-    let monitor =
-        |_| if asked.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
-    let (result, raised) = py.detach(|| {
-        thread::scope(|scope| {
-            let (sender, receiver) = channel();
-            let monitor = &monitor;
-            scope.spawn(move || sender.send(pool.install(|| work(monitor))));
-            let mut raised = None;
-            loop {
-                match receiver.recv_timeout(PATIENCE) {
-                    Ok(result) => return (Some(result), raised),
-                    // The work panicked: the scope says so when it ends.
-                    Err(RecvTimeoutError::Disconnected) => return (None, raised),
-                    Err(RecvTimeoutError::Timeout) => {
-                        if let Err(signal) = Python::attach(|py| py.check_signals()) {
-                            asked.store(true, Ordering::Relaxed);
-                            raised = Some(signal);
-                        }
-                    }
-                }
-            }
-        })
+    let asked = Arc::new(AtomicBool::new(false));
+    let (sender, receiver) = sync_channel::<Result<T, Box<dyn Any + Send>>>(1);
+    let stop = Arc::clone(&asked);
+    pool.spawn(move || {
+        let monitor =
+            |_| if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
+        // Nobody listens after Ctrl-C.
+        let _ = sender.send(catch_unwind(AssertUnwindSafe(|| work(&monitor))));
     });
-    match (raised, result) {
-        (Some(signal), _) => Err(signal),
-        (None, Some(result)) => result.map_err(|failure| error::batch(py, failure)),
-        (None, None) => Err(PyRuntimeError::new_err("the work ended without a result")),
+    let ended = py.detach(move || {
+        loop {
+            match receiver.recv_timeout(PATIENCE) {
+                Ok(result) => return Ok(Some(result)),
+                Err(RecvTimeoutError::Disconnected) => return Ok(None),
+                Err(RecvTimeoutError::Timeout) => signals()?,
+            }
+        }
+    });
+    match ended {
+        Ok(Some(Ok(result))) => Ok(result),
+        Ok(Some(Err(panic))) => resume_unwind(panic),
+        Ok(None) => Err(PyRuntimeError::new_err("the work ended without a result")),
+        Err(signal) => {
+            asked.store(true, Ordering::Relaxed);
+            // What comes next does not wait for the threads that are still at it.
+            known().take();
+            Err(signal)
+        }
     }
 }
 
-/// Runs work that nobody interrupts without the interpreter lock.
-pub(crate) fn detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
+/// Runs work that looks after signals itself without the interpreter lock.
+pub(crate) fn blocking<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
     let pool = pool()?;
     Ok(py.detach(|| pool.install(work)))
 }
 
 fn pool() -> PyResult<Arc<ThreadPool>> {
-    let mut known = POOL.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut known = known();
     let process = std::process::id();
     match &*known {
         Some((owner, pool)) if *owner == process => Ok(Arc::clone(pool)),
@@ -77,4 +97,110 @@ fn pool() -> PyResult<Arc<ThreadPool>> {
             Ok(pool)
         }
     }
+}
+
+fn known() -> MutexGuard<'static, Option<(u32, Arc<ThreadPool>)>> {
+    POOL.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// What Python's handlers of the signals since the last time raise.
+fn signals() -> PyResult<()> {
+    Python::try_attach(|py| py.check_signals()).unwrap_or_else(|| {
+        // The interpreter has ended, and this thread of its with it.
+        loop {
+            thread::park();
+        }
+    })
+}
+
+/// Ends a loop without the interpreter lock at Ctrl-C.
+pub(crate) struct Pulse {
+    /// Rounds of the loop between two looks at the time.
+    stride: usize,
+    left: usize,
+    asked: Instant,
+}
+
+impl Pulse {
+    /// For a loop of which a round takes about so many multiplications.
+    pub(crate) fn new(multiplications: usize) -> Self {
+        let stride = WORK / multiplications.clamp(1, WORK);
+        Self { stride, left: stride, asked: Instant::now() }
+    }
+
+    /// To be called in each round.
+    #[inline(always)]
+    pub(crate) fn check(&mut self) -> PyResult<()> {
+        self.left -= 1;
+        if self.left == 0 { self.look() } else { Ok(()) }
+    }
+
+    #[cold]
+    fn look(&mut self) -> PyResult<()> {
+        self.left = self.stride;
+        if self.asked.elapsed() < PATIENCE {
+            return Ok(());
+        }
+        self.asked = Instant::now();
+        signals()
+    }
+}
+
+/// Calls of Python code that are under way in this process.
+static CALLS: AtomicUsize = AtomicUsize::new(0);
+/// The thread that ends the interpreter.
+static ENDING: OnceLock<ThreadId> = OnceLock::new();
+
+/// Registers what has to be done when the interpreter ends, and in a fork.
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    let py = module.py();
+    py.import("atexit")?.call_method1("register", (wrap_pyfunction!(end, module)?,))?;
+    let os = py.import("os")?;
+    if os.hasattr("register_at_fork")? {
+        let hooks = PyDict::new(py);
+        hooks.set_item("after_in_child", wrap_pyfunction!(forget_calls, module)?)?;
+        os.call_method("register_at_fork", (), Some(&hooks))?;
+    }
+    Ok(())
+}
+
+/// Calls Python code from a loop of ours.
+///
+/// Before Python 3.14 a daemon thread that wants the interpreter lock after the interpreter has ended is torn down where
+/// it stands. With a function of this module under the Python code on its stack that aborts the process. So the
+/// interpreter waits until such calls have returned, and what would be the next one raises SystemExit.
+pub(crate) fn calling<T>(call: impl FnOnce() -> PyResult<T>) -> PyResult<T> {
+    /// Counts while it lives.
+    struct Call;
+    impl Drop for Call {
+        fn drop(&mut self) {
+            let _ = CALLS.fetch_update(Ordering::SeqCst, Ordering::SeqCst, |calls| calls.checked_sub(1));
+        }
+    }
+    CALLS.fetch_add(1, Ordering::SeqCst);
+    let _call = Call;
+    match ENDING.get() {
+        Some(thread) if *thread != thread::current().id() => {
+            Err(PySystemExit::new_err("the interpreter has ended"))
+        }
+        _ => call(),
+    }
+}
+
+/// The interpreter ends.
+#[pyfunction]
+fn end(py: Python<'_>) {
+    let _ = ENDING.set(thread::current().id());
+    py.detach(|| {
+        let asked = Instant::now();
+        while CALLS.load(Ordering::SeqCst) > 0 && asked.elapsed() < FAREWELL {
+            thread::sleep(Duration::from_millis(1));
+        }
+    });
+}
+
+/// The calls of other threads are not in this process.
+#[pyfunction]
+fn forget_calls() {
+    CALLS.store(0, Ordering::SeqCst);
 }

@@ -155,10 +155,27 @@ impl<T: Real, N: Dimension> GainSchedule<T, N> {
     /// # Ok::<(), Error>(())
     /// ```
     pub fn steady_state<M: Dimension + Dimension<U> + Dimension<N>, U: Dimension>(
+        self,
+        transition: &LinearTransition<T, N, U>,
+        observation: &LinearObservation<T, N, M, U>,
+        maximum_steps: usize,
+    ) -> Result<SteadyState<T, N, M>, Error>
+    where
+        N: Dimension<U> + Dimension<M>,
+    {
+        self.steady_state_unless(transition, observation, maximum_steps, || false)
+    }
+
+    /// The same, given up where `interrupted`, which is asked before each step, says so.
+    ///
+    /// Errors: those of [`steady_state`](GainSchedule::steady_state); [`Error::NotConverged`] with the steps done where it
+    /// was given up.
+    pub fn steady_state_unless<M: Dimension + Dimension<U> + Dimension<N>, U: Dimension>(
         mut self,
         transition: &LinearTransition<T, N, U>,
         observation: &LinearObservation<T, N, M, U>,
         maximum_steps: usize,
+        mut interrupted: impl FnMut() -> bool,
     ) -> Result<SteadyState<T, N, M>, Error>
     where
         N: Dimension<U> + Dimension<M>,
@@ -168,6 +185,9 @@ impl<T: Real, N: Dimension> GainSchedule<T, N> {
         let mut matrix = self.covariance().matrix();
         let (mut least_change, mut least_at) = (T::INFINITY, 0);
         for steps in 1..=maximum_steps {
+            if interrupted() {
+                return Err(Error::NotConverged { steps: steps - 1 });
+            }
             self.absorb(observation, outputs.vector(T::zero()))?;
             self.predict(transition)?;
             let next = self.covariance().matrix();

@@ -80,7 +80,7 @@ class Model:
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Model:
         """Read a model back from a file."""
-        with open(path, encoding="utf-8") as file:
+        with open(_files.name(path), encoding="utf-8") as file:
             return cls.from_json(file.read())
 
     def to_json(self) -> str:

@@ -11,6 +11,8 @@ from typing import Any, Optional, TypedDict, Union
 
 import numpy as np
 
+from thetahat import _files
+
 Order = Union[int, range]
 """An order, or the orders among which to choose: ``range(1, 9)`` is 1 to 8."""
 
@@ -269,11 +271,7 @@ def channels(inputs: Sequence[str] | str | None, output: str | None) -> list[str
 
 def path_text(path: str | os.PathLike[str]) -> str:
     """A path as the command line takes it: a name that begins with a hyphen is no option and not standard input."""
-    if not isinstance(path, (str, os.PathLike)):
-        raise TypeError(f"path: expected a str or a path, found {type(path).__name__}")
-    name = os.fspath(path)
-    if not isinstance(name, str):
-        raise TypeError(f"path: expected a str or a path, found {path!r}")
+    name = _files.name(path)
     # Python has an error of its own for a file that is not there.
     os.stat(name)
     return f"./{name}" if name.startswith("-") else name

@@ -4,11 +4,13 @@ use std::cell::RefCell;
 
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::{PyTraverseError, PyVisit};
 use thetahat_core::nalgebra::{DMatrix, DVector, Dyn};
 use thetahat_core::{Covariance, Observation, Transition};
 
 use super::argument::{self, covariance_of, kind};
 use crate::array;
+use crate::work::calling;
 
 /// What both classes hold.
 pub(crate) struct Functions {
@@ -62,6 +64,14 @@ impl Functions {
         let name = name.unwrap_or_else(|_| kind(function));
         let jacobian = if self.jacobian.is_some() { "given" } else { "numerical" };
         format!("{class_name}({name}, jacobian={jacobian})")
+    }
+
+    /// What the cyclic garbage collector asks. There is nothing to clear: nothing of it can change, so that every cycle
+    /// goes through another object, made or changed after this one, that can be cleared.
+    fn traverse(&self, visit: &PyVisit<'_>) -> Result<(), PyTraverseError> {
+        visit.call(&self.function)?;
+        visit.call(&self.noise)?;
+        visit.call(&self.jacobian)
     }
 
     fn reduce<'py>(&self, py: Python<'py>, class: Bound<'py, PyAny>) -> PyResult<Made<'py>> {
@@ -166,6 +176,10 @@ impl NonlinearTransition {
         self.functions.repr(py, "NonlinearTransition")
     }
 
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        self.functions.traverse(&visit)
+    }
+
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Made<'py>> {
         self.functions.reduce(py, py.get_type::<NonlinearTransition>().into_any())
     }
@@ -191,6 +205,10 @@ impl NonlinearObservation {
 
     fn __repr__(&self, py: Python<'_>) -> String {
         self.functions.repr(py, "NonlinearObservation")
+    }
+
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        self.functions.traverse(&visit)
     }
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Made<'py>> {
@@ -259,7 +277,7 @@ impl<'a, 'py> Called<'a, 'py> {
         u: &DVector<f64>,
     ) -> Result<Bound<'py, PyAny>, Trouble> {
         let arguments = (argument::from_vector(self.py, x), argument::from_vector(self.py, u));
-        function.bind(self.py).call1(arguments).map_err(Trouble::Raised)
+        calling(|| function.bind(self.py).call1(arguments)).map_err(Trouble::Raised)
     }
 
     /// The library's NaN for no answer, and the reason for later.

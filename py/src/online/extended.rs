@@ -7,7 +7,7 @@ use thetahat_core::{
     Covariance, Error, ExtendedKalmanFilter as Stepper, Innovation as Told, Observation, Transition,
 };
 
-use super::argument::{self, Whole, failed, failed_at};
+use super::argument::{self, Whole, failed};
 use super::innovation::{Innovation, list};
 use super::kalman::started;
 use super::trajectory::{
@@ -15,7 +15,7 @@ use super::trajectory::{
     smoothed,
 };
 use super::used::{Used, UsedObservation, UsedTransition};
-use super::{Reduced, snapshot};
+use super::{Reduced, Stop, snapshot};
 use crate::array;
 
 /// The extended Kalman filter: the Kalman filter of the linearised model.
@@ -116,11 +116,11 @@ pub(crate) fn explained<T, O>(
     py: Python<'_>,
     transition: &Used<'_, '_, T>,
     observation: &Used<'_, '_, O>,
-    (row, error): (usize, Error),
+    stop: Stop,
 ) -> PyErr {
-    match transition.trouble().or_else(|| observation.trouble()) {
-        Some(trouble) => trouble.into_error(Some(row)),
-        None => failed_at(py, row, error),
+    match (transition.trouble().or_else(|| observation.trouble()), stop) {
+        (Some(trouble), Stop::Refused(row, _)) => trouble.into_error(Some(row)),
+        (_, stop) => stop.into_error(py),
     }
 }
 
@@ -288,7 +288,7 @@ impl ExtendedKalmanFilter {
                     troubled: |_, _| false,
                 };
                 py.detach(|| record.run(&mut stepped, &slices, Dyn(m)))
-                    .map_err(|(row, error)| failed_at(py, row, error))?;
+                    .map_err(|stop| stop.into_error(py))?;
                 return Ok(stepped.filter);
             }
             let mut stepped = Extended {
@@ -302,7 +302,7 @@ impl ExtendedKalmanFilter {
                 troubled: |transition, observation| transition.is_troubled() || observation.is_troubled(),
             };
             let taken = record.run(&mut stepped, &slices, Dyn(m));
-            taken.map_err(|error| explained(py, &transition, &observation, error))?;
+            taken.map_err(|stop| explained(py, &transition, &observation, stop))?;
             Ok(stepped.filter)
         })?;
         self.filter = filter;
@@ -354,7 +354,7 @@ impl ExtendedKalmanFilter {
         };
         let troubled = || transition.is_troubled() || observation.is_troubled();
         let result = smooth(self.filter.clone(), &transition, &observation, &slices, before, troubled)
-            .map_err(|error| explained(py, &transition, &observation, error))?;
+            .map_err(|stop| explained(py, &transition, &observation, stop))?;
         smoothed(py, result, samples.rows, n)
     }
 

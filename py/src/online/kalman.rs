@@ -8,7 +8,7 @@ use thetahat_core::{
     LinearObservation as Observed, LinearTransition as Moved,
 };
 
-use super::argument::{self, Whole, failed, failed_at};
+use super::argument::{self, Whole, failed};
 use super::innovation::{Innovation, list};
 use super::model::{LinearObservation, LinearTransition};
 use super::trajectory::{
@@ -16,8 +16,9 @@ use super::trajectory::{
     recorded, returned, smooth, smoothed,
 };
 use super::used::check_states;
-use super::{Reduced, snapshot};
+use super::{Reduced, Stop, snapshot};
 use crate::array;
+use crate::work::Pulse;
 
 /// The Kalman filter.
 ///
@@ -129,11 +130,7 @@ type Correlated<N, M> = (OMatrix<f64, N, M>, Models<N, M>);
 
 impl Linear<Dyn, Dyn> {
     /// Takes the samples, with usual sizes as types: that gives the same bits several times as fast.
-    fn run(
-        &self,
-        record: &mut Record<'_>,
-        samples: &Slices<'_>,
-    ) -> Result<Stepper<f64, Dyn>, (usize, Error)> {
+    fn run(&self, record: &mut Record<'_>, samples: &Slices<'_>) -> Result<Stepper<f64, Dyn>, Stop> {
         match self.filter.state().len() {
             1 => self.run_states::<1>(record, samples),
             2 => self.run_states::<2>(record, samples),
@@ -149,7 +146,7 @@ impl Linear<Dyn, Dyn> {
         &self,
         record: &mut Record<'_>,
         samples: &Slices<'_>,
-    ) -> Result<Stepper<f64, Dyn>, (usize, Error)> {
+    ) -> Result<Stepper<f64, Dyn>, Stop> {
         match samples.outputs {
             1 => self.run_sized(Const::<N>, Const::<1>, record, samples),
             2 => self.run_sized(Const::<N>, Const::<2>, record, samples),
@@ -164,7 +161,7 @@ impl Linear<Dyn, Dyn> {
         outputs: M,
         record: &mut Record<'_>,
         samples: &Slices<'_>,
-    ) -> Result<Stepper<f64, Dyn>, (usize, Error)>
+    ) -> Result<Stepper<f64, Dyn>, Stop>
     where
         N: Dimension + Dimension<M> + Dimension<Dyn>,
         M: Dimension + Dimension<N> + Dimension<Dyn>,
@@ -172,7 +169,7 @@ impl Linear<Dyn, Dyn> {
         // The sizes are those of the filter and its models, so that only a row can fail.
         let mut sized = self.to_size(states, outputs).map_err(|error| (0, error))?;
         record.run(&mut sized, samples, outputs)?;
-        sized.filter.to_size(Dyn(states.value())).map_err(|error| (0, error))
+        Ok(sized.filter.to_size(Dyn(states.value())).map_err(|error| (0, error))?)
     }
 
     fn to_size<N, M>(&self, states: N, outputs: M) -> Result<Linear<N, M>, Error>
@@ -385,7 +382,7 @@ impl KalmanFilter {
         let models = (transition.clone(), observation.clone());
         let linear = Linear { filter: self.filter.clone(), models, correlated, gated: false };
         let (filter, trajectory) = recorded(py, [samples.rows, n, m], |record| {
-            py.detach(|| linear.run(record, &slices)).map_err(|(row, error)| failed_at(py, row, error))
+            py.detach(|| linear.run(record, &slices)).map_err(|stop| stop.into_error(py))
         })?;
         self.filter = filter;
         Ok(trajectory)
@@ -433,7 +430,7 @@ impl KalmanFilter {
         let filter = self.filter.clone();
         let result = py
             .detach(|| smooth(filter.into(), transition, observation, &slices, |_| (), || false))
-            .map_err(|(row, error)| failed_at(py, row, error))?;
+            .map_err(|stop| stop.into_error(py))?;
         smoothed(py, result, samples.rows, n)
     }
 
@@ -483,9 +480,18 @@ impl KalmanFilter {
         let (transition, observation) =
             with_same_inputs(py, self.transition(transition)?, self.observation(observation)?)?;
         let schedule = GainSchedule::new(self.filter.covariance().clone());
-        let steady = py
-            .detach(|| schedule.steady_state(&transition, &observation, steps))
-            .map_err(|error| failed(py, error))?;
+        let mut pulse = Pulse::new(transition.state_matrix().nrows().pow(3));
+        let mut raised = None;
+        let settled = py.detach(|| {
+            schedule.steady_state_unless(&transition, &observation, steps, || {
+                raised = pulse.check().err();
+                raised.is_some()
+            })
+        });
+        if let Some(raised) = raised {
+            return Err(raised);
+        }
+        let steady = settled.map_err(|error| failed(py, error))?;
         Ok(SteadyState {
             predicted: array::from_matrix(py, &steady.predicted.matrix())?.unbind(),
             filtered: array::from_matrix(py, &steady.filtered.matrix())?.unbind(),

@@ -11,7 +11,7 @@ use super::argument::{self, Whole, failed};
 use super::forgetting::{Forgetting, Memory, STANDARD};
 use super::innovation::{Innovation, list};
 use super::recursive::{self, Around, Record, RecursiveTrajectory};
-use super::{Reduced, snapshot};
+use super::{Reduced, Stop, snapshot};
 use crate::array;
 
 /// One output is a type of its own: it needs no memory in a step.
@@ -126,7 +126,7 @@ fn run_one(
     regressors: &[f64],
     outputs: &[f64],
     record: &mut Record<'_>,
-) -> Result<Stepper<f64, Dyn>, (usize, Error)> {
+) -> Result<Stepper<f64, Dyn>, Stop> {
     match estimator.parameters().len() {
         1 => run_sized(estimator, Const::<1>, regressors, outputs, record),
         2 => run_sized(estimator, Const::<2>, regressors, outputs, record),
@@ -148,7 +148,7 @@ fn run_sized<N: Dimension + Dimension<Const<1>>>(
     regressors: &[f64],
     outputs: &[f64],
     record: &mut Record<'_>,
-) -> Result<Stepper<f64, Dyn>, (usize, Error)> {
+) -> Result<Stepper<f64, Dyn>, Stop> {
     let n = size.value();
     // The size is that of the estimator, so that only a row can fail.
     let sized = estimator.to_size(size).map_err(|error| (0, error))?;
@@ -159,7 +159,7 @@ fn run_sized<N: Dimension + Dimension<Const<1>>>(
         record.take(&estimator.update(&regressor, output)?);
         Ok(())
     })?;
-    sized.to_size(Dyn(n)).map_err(|error| (0, error))
+    Ok(sized.to_size(Dyn(n)).map_err(|error| (0, error))?)
 }
 
 #[pymethods]

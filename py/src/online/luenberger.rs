@@ -4,15 +4,16 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use thetahat_core::nalgebra::{Complex, DVector, Dyn};
-use thetahat_core::{Error, LuenbergerObserver as Stepper, Observation, Transition};
+use thetahat_core::{LuenbergerObserver as Stepper, Observation, Transition};
 
-use super::argument::{self, check_size, failed, failed_at, room, shaped};
+use super::argument::{self, check_size, failed, room, shaped};
 use super::extended::{explained, input};
 use super::innovation::{self, Innovation, list};
 use super::trajectory::{ObserverTrajectory, Samples, Slices, measurement, returned};
 use super::used::{Used, UsedObservation, UsedTransition};
-use super::{Reduced, snapshot};
+use super::{Reduced, Stop, snapshot};
 use crate::array;
+use crate::work::Pulse;
 
 /// The Luenberger observer: a model that is corrected by its own error, with a fixed gain.
 ///
@@ -212,11 +213,11 @@ impl LuenbergerObserver {
         if let (Used::Linear(transition), Used::Linear(observation)) = (&transition, &observation) {
             let (transition, observation) = (*transition, *observation);
             py.detach(|| record.run(&mut stepped, transition, observation, &slices))
-                .map_err(|(row, error)| failed_at(py, row, error))?;
+                .map_err(|stop| stop.into_error(py))?;
         } else {
             record
                 .run(&mut stepped, &transition, &observation, &slices)
-                .map_err(|error| explained(py, &transition, &observation, error))?;
+                .map_err(|stop| explained(py, &transition, &observation, stop))?;
         }
         let Record { states, errors, codes } = record;
         let trajectory = ObserverTrajectory {
@@ -264,9 +265,11 @@ impl Record {
         transition: &impl Transition<f64, Dyn, Dyn>,
         observation: &impl Observation<f64, Dyn, Dyn, Dyn>,
         samples: &Slices<'_>,
-    ) -> Result<(), (usize, Error)> {
+    ) -> Result<(), Stop> {
         let mut sample = samples.sample(Dyn(samples.outputs));
+        let mut pulse = Pulse::new(observer.state().len().pow(2));
         for row in 0..samples.rows {
+            pulse.check()?;
             samples.read(row, &mut sample);
             self.states.extend_from_slice(observer.state().as_slice());
             let [first, second] = &sample.inputs;

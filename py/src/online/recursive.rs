@@ -6,10 +6,11 @@ use pyo3::prelude::*;
 use thetahat_core::nalgebra::{DMatrix, DVector, Dyn};
 use thetahat_core::{Action, Dimension, Error, Innovation, RecursiveLeastSquares, Start};
 
-use super::argument::{Whole, count, failed_at, room, shaped};
+use super::argument::{Whole, count, room, shaped};
 use super::results::{Column, Results};
-use super::{Reduced, attributes, innovation};
+use super::{Reduced, Stop, attributes, innovation};
 use crate::array;
+use crate::work::Pulse;
 
 /// What a recursive estimator did in a run, row by row.
 ///
@@ -111,8 +112,10 @@ impl<'a> Record<'a> {
         mut engine: E,
         rows: usize,
         mut step: impl FnMut(&mut E, usize, &mut Record<'a>) -> Result<(), Error>,
-    ) -> Result<E, (usize, Error)> {
+    ) -> Result<E, Stop> {
+        let mut pulse = Pulse::new(engine.estimator().parameters().len().pow(2));
         for row in 0..rows {
+            pulse.check()?;
             step(&mut engine, row, self).map_err(|error| (row, error))?;
             let estimator = engine.estimator();
             let (n, outputs) = estimator.parameters().shape();
@@ -139,7 +142,7 @@ impl<'a> Record<'a> {
 pub(crate) fn run<E: Send>(
     py: Python<'_>,
     [rows, n, outputs]: [usize; 3],
-    work: impl FnOnce(&mut Record<'_>) -> Result<E, (usize, Error)> + Send,
+    work: impl FnOnce(&mut Record<'_>) -> Result<E, Stop> + Send,
 ) -> PyResult<(E, RecursiveTrajectory)> {
     let (by_parameter, by_output) = match outputs {
         1 => (vec![rows, n], vec![rows]),
@@ -151,7 +154,7 @@ pub(crate) fn run<E: Send>(
         let mut record = Record { parameters, standard_errors, errors, variances, nis, codes };
         py.detach(|| work(&mut record)).map(|engine| (engine, record.codes))
     })?;
-    let (engine, codes) = taken.map_err(|(row, error)| failed_at(py, row, error))?;
+    let (engine, codes) = taken.map_err(|stop| stop.into_error(py))?;
     let [parameters, standard_errors, errors, variances, nis] = results.arrays()?.map(Bound::unbind);
     let nis = nis.into_bound(py).cast_into()?.unbind();
     let codes = PyArray1::from_vec(py, codes).unbind();

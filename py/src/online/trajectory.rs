@@ -10,7 +10,8 @@ use thetahat_core::{
 
 use super::argument::{self, Rows, room, shaped};
 use super::results::{Column, Results};
-use super::{Reduced, attributes, innovation};
+use super::{Reduced, Stop, attributes, innovation};
+use crate::work::Pulse;
 
 /// What a Kalman filter did in a run, row by row.
 ///
@@ -352,10 +353,12 @@ impl Record<'_> {
         filter: &mut impl Steps<N, M>,
         samples: &Slices<'_>,
         outputs: M,
-    ) -> Result<(), (usize, Error)> {
+    ) -> Result<(), Stop> {
         let mut sample = samples.sample(outputs);
         let entries = filter.state().len() * filter.state().len();
+        let mut pulse = Pulse::new(entries * filter.state().len());
         for row in 0..samples.rows {
+            pulse.check()?;
             samples.read(row, &mut sample);
             self.predicted_states.push(filter.state().as_slice());
             filter
@@ -446,12 +449,14 @@ pub(crate) fn smooth<T: Transition<f64, Dyn, Dyn>, O: Observation<f64, Dyn, Dyn,
     samples: &Slices<'_>,
     before: impl Fn(&Covariance<f64, Dyn>),
     troubled: impl Fn() -> bool,
-) -> Result<Smoothed, (usize, Error)> {
+) -> Result<Smoothed, Stop> {
     let mut smoother = Smoother::new(filter);
     let mut sample = samples.sample(Dyn(samples.outputs));
     // The error gives way to what the function said.
     let well = |row| if troubled() { Err((row, Error::Overflow)) } else { Ok(()) };
+    let mut pulse = Pulse::new(smoother.filter().state().len().pow(3));
     for row in 0..samples.rows {
+        pulse.check()?;
         if row > 0 {
             before(smoother.filter().covariance());
             smoother.predict(transition, &sample.inputs[0]).map_err(|error| (row - 1, error))?;

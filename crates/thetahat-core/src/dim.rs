@@ -44,7 +44,50 @@ pub trait Workspace: Dim {
         self,
         kept: &mut Self::Scratch<T>,
         work: impl FnOnce([&mut [T]; V], [&mut [T]; S]) -> A,
-    ) -> A;
+    ) -> A
+    where
+        for<'a> [&'a mut [T]; V]: Parts<'a, T>,
+        for<'a> [&'a mut [T]; S]: Parts<'a, T>;
+}
+
+/// The first parts of a buffer, all of one length. (A loop in their place would hide the length from the compiler where
+/// it optimises for size, and what copies or checks them would grow.)
+pub trait Parts<'a, T>: Sized {
+    /// The parts, and the rest.
+    fn take(buffer: &'a mut [T], length: usize) -> (Self, &'a mut [T]);
+}
+
+impl<'a, T> Parts<'a, T> for [&'a mut [T]; 0] {
+    #[inline(always)]
+    fn take(buffer: &'a mut [T], _: usize) -> (Self, &'a mut [T]) {
+        ([], buffer)
+    }
+}
+
+impl<'a, T> Parts<'a, T> for [&'a mut [T]; 1] {
+    #[inline(always)]
+    fn take(buffer: &'a mut [T], length: usize) -> (Self, &'a mut [T]) {
+        let (first, rest) = buffer.split_at_mut_checked(length).unwrap_or_default();
+        ([first], rest)
+    }
+}
+
+impl<'a, T> Parts<'a, T> for [&'a mut [T]; 2] {
+    #[inline(always)]
+    fn take(buffer: &'a mut [T], length: usize) -> (Self, &'a mut [T]) {
+        let (first, rest) = buffer.split_at_mut_checked(length).unwrap_or_default();
+        let ([second], rest) = Parts::take(rest, length);
+        ([first, second], rest)
+    }
+}
+
+impl<'a, T> Parts<'a, T> for [&'a mut [T]; 3] {
+    #[inline(always)]
+    fn take(buffer: &'a mut [T], length: usize) -> (Self, &'a mut [T]) {
+        let (first, rest) = buffer.split_at_mut_checked(length).unwrap_or_default();
+        let ([second, third], rest) = Parts::take(rest, length);
+        ([first, second, third], rest)
+    }
 }
 
 impl<const N: usize> Workspace for Const<N> {
@@ -72,13 +115,17 @@ impl<const N: usize> Workspace for Const<N> {
         self,
         (): &mut (),
         work: impl FnOnce([&mut [T]; V], [&mut [T]; S]) -> A,
-    ) -> A {
-        let mut vectors = [[T::zero(); N]; V];
-        let mut squares = [[[T::zero(); N]; N]; S];
-        work(
-            vectors.each_mut().map(|vector| vector.as_mut_slice()),
-            squares.each_mut().map(|square| square.as_flattened_mut()),
-        )
+    ) -> A
+    where
+        for<'a> [&'a mut [T]; V]: Parts<'a, T>,
+        for<'a> [&'a mut [T]; S]: Parts<'a, T>,
+    {
+        // Not 0: where it optimises for size, a compiler would call memset for it.
+        let mut vectors = [[T::NAN; N]; V];
+        let mut squares = [[[T::NAN; N]; N]; S];
+        let (vectors, _) = Parts::take(vectors.as_flattened_mut(), N);
+        let (squares, _) = Parts::take(squares.as_flattened_mut().as_flattened_mut(), N * N);
+        work(vectors, squares)
     }
 }
 
@@ -110,19 +157,17 @@ impl Workspace for Dyn {
         self,
         kept: &mut Vec<T>,
         work: impl FnOnce([&mut [T]; V], [&mut [T]; S]) -> A,
-    ) -> A {
+    ) -> A
+    where
+        for<'a> [&'a mut [T]; V]: Parts<'a, T>,
+        for<'a> [&'a mut [T]; S]: Parts<'a, T>,
+    {
         let size = self.value();
         if kept.len() < size * (V + S * size) {
             *kept = self.scratch::<T, V, S>();
         }
-        let mut rest = kept.as_mut_slice();
-        let mut take = |length: usize| {
-            let (taken, left) = core::mem::take(&mut rest).split_at_mut_checked(length).unwrap_or_default();
-            rest = left;
-            taken
-        };
-        let vectors = core::array::from_fn(|_| take(size));
-        let squares = core::array::from_fn(|_| take(size * size));
+        let (vectors, rest) = Parts::take(kept.as_mut_slice(), size);
+        let (squares, _) = Parts::take(rest, size * size);
         work(vectors, squares)
     }
 }

@@ -317,15 +317,6 @@ impl Model {
     ) -> PyResult<Vec<Channel>> {
         let names = self.model.inputs.iter().map(|input| input.name.clone());
         let count = names.len();
-        let flat = count == 1
-            && values.getattr("ndim").and_then(|ndim| ndim.extract::<usize>()).map_or_else(
-                |_| matrix(argument, values, [rows, Some(count)]).is_err(),
-                |dimensions| dimensions == 1,
-            );
-        if flat {
-            let column = vector(argument, values, rows)?.as_slice()?.to_vec();
-            return Ok(names.map(|name| Channel { name, values: column.clone() }).collect());
-        }
         let array = matrix(argument, values, [rows, Some(count)])?;
         let (entries, rows) = (array.as_slice()?, array.shape()[0]);
         let column = |index: usize| (0..rows).map(|row| entries[row * count + index]).collect();

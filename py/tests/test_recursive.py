@@ -197,7 +197,7 @@ def test_arrays_of_every_kind_are_read_alike() -> None:
         ([1.0, 2.0, 3.0], [1.0], "y: expected a number"),
         ([1.0, 2.0, 3.0], "1", "y: expected a number, found str"),
         ([1e200, 2.0, 3.0], 1.0, "too large"),
-        (["a", "b", "c"], 1.0, "phi: expected an array of numbers"),
+        (["a", "b", "c"], 1.0, "phi: expected numbers"),
     ],
 )
 def test_a_failed_update_changes_nothing(phi: Any, y: Any, message: str) -> None:

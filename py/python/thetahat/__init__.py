@@ -4,6 +4,9 @@ A log holds measured signals (`Log`, `read_csv`). A fit makes a model of it (`ar
 `iv`, `sriv`), `search` chooses one, `inspect` looks at a log before. A `Model` predicts, simulates, forecasts and is validated.
 `thetahat.plot` draws, and `thetahat.sklearn` fits into scikit-learn.
 
+Whatever takes numbers takes arrays of NumPy, lists and tuples, and the series and frames of pandas, Polars and PyArrow; of one
+channel also a column. What is None, NaN, NA, null or masked is missing.
+
 Estimators that run with the process take a sample at a time, or a whole array: `RecursiveLeastSquares`, `RecursiveArx`,
 `RecursiveArmax`, `KalmanFilter`, `ExtendedKalmanFilter`, `LuenbergerObserver`.
 

@@ -1,8 +1,6 @@
 """Columns of dataframes as NumPy arrays.
 
-Narwhals reads pandas, polars, pyarrow and Modin tables alike. It has no dependencies and needs none of them installed. No
-protocol does this: pandas 3.1 deprecates `__dataframe__` and needs pyarrow for `__arrow_c_stream__`, polars 2 has only the
-latter.
+Their numbers become float64 as all numbers do, see `thetahat._numbers`.
 """
 
 from __future__ import annotations
@@ -11,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import narwhals.stable.v2 as nw
 import numpy as np
-from narwhals.exceptions import DuplicateError
 from numpy.typing import NDArray
 
+from thetahat import _numbers
 from thetahat._log import instants
 
 if TYPE_CHECKING:
@@ -45,9 +43,9 @@ def columns(frame: Any, names: Sequence[str]) -> dict[str, NDArray[np.float64]]:
     """
     table = _table(frame)
     if len(set(names)) < len(names):
-        message = f"columns: {_twice(names)!r} is asked for twice; name each column once"
+        message = f"columns: {_numbers.twice(names)!r} is asked for twice; name each column once"
         raise ValueError(message)
-    return {name: _numbers(_column(table, name), name) for name in names}
+    return {name: _numbers.series(f"column {name!r}", _column(table, name)) for name in names}
 
 
 def times(frame: Any, name: str) -> tuple[NDArray[np.float64], str | None]:
@@ -78,9 +76,9 @@ def times(frame: Any, name: str) -> tuple[NDArray[np.float64], str | None]:
     column = _column(_table(frame), name)
     second = np.timedelta64(1, "s")
     if column.dtype == nw.Duration:
-        return _contiguous(column.to_numpy() / second), None
+        return np.asarray(column.to_numpy() / second, dtype=np.float64, order="C"), None
     if not (column.dtype == nw.Datetime or column.dtype == nw.Date):
-        return _numbers(column, name), None
+        return _numbers.series(f"column {name!r}", column), None
     if column.dtype == nw.Date:
         # Midnight. The dates of pandas with pyarrow would come as objects.
         column = column.cast(nw.Datetime("us"))
@@ -92,23 +90,14 @@ def times(frame: Any, name: str) -> tuple[NDArray[np.float64], str | None]:
 
 
 def _table(frame: Any) -> nw.DataFrame[Any]:
-    try:
-        table: nw.DataFrame[Any] = nw.from_native(frame, eager_only=True)
-        # Whether names are there twice is seen only here for some.
-        names = table.columns
-    except DuplicateError as error:
-        message = f"frame: two columns have the same name; rename one ({error})"
-        raise ValueError(message) from error
-    except TypeError as error:
+    table = _numbers.of_library("frame", frame)
+    if not isinstance(table, nw.DataFrame):
         kind = type(frame)
         message = (
             f"frame: expected a dataframe of pandas, polars or pyarrow, found {kind.__module__}.{kind.__qualname__}; "
             "collect a lazy frame first, convert anything else"
         )
-        raise TypeError(message) from error
-    if len(set(names)) < len(names):
-        message = f"frame: two columns have the name {_twice(names)!r}; rename one"
-        raise ValueError(message)
+        raise TypeError(message)
     if len(table) == 0:
         message = "frame: there are no rows; give at least one"
         raise ValueError(message)
@@ -121,23 +110,3 @@ def _column(table: nw.DataFrame[Any], name: str) -> nw.Series[Any]:
         message = f"frame: there is no column {name!r}; there are {there}"
         raise ValueError(message)
     return table.get_column(name)
-
-
-def _numbers(column: nw.Series[Any], name: str) -> NDArray[np.float64]:
-    if not (column.dtype.is_numeric() or column.dtype == nw.Boolean):
-        native = column.to_native()
-        dtype = getattr(native, "dtype", getattr(native, "type", column.dtype))
-        message = f"column {name!r}: expected numbers, found {dtype}; convert it to a type of numbers first"
-        raise TypeError(message)
-    # pyarrow does not cast whole numbers that float64 would round, NumPy does.
-    if not column.dtype.is_integer():
-        column = column.cast(nw.Float64())
-    return _contiguous(column.to_numpy())
-
-
-def _contiguous(values: Any) -> NDArray[np.float64]:
-    return np.ascontiguousarray(values, dtype=np.float64)
-
-
-def _twice(names: Sequence[str]) -> str:
-    return next(name for place, name in enumerate(names) if name in names[:place])

@@ -7,21 +7,18 @@ import os
 import sys
 import warnings
 from collections.abc import Mapping, Sequence
-from typing import Any, Union, overload
+from typing import Any, overload
 
 import numpy as np
 import numpy.typing as npt
 
-from thetahat import _options, _picture, _thetahat
+from thetahat import _numbers, _options, _picture, _thetahat
 from thetahat._options import ReadOptions
 
 if sys.version_info >= (3, 11):
     from typing import Unpack
 else:
     from typing_extensions import Unpack
-
-Inputs = Union[npt.ArrayLike, Mapping[str, npt.ArrayLike], None]
-
 
 class Log:
     """Inputs and an output on a common clock.
@@ -31,10 +28,11 @@ class Log:
 
     Parameters
     ----------
-    y : array_like, shape (N,)
-        The measured output.
+    y : array_like, shape (N,) or (N, 1)
+        The measured output: an array or a list, or a series of pandas, Polars or PyArrow. What is None, NaN, NA, null or
+        masked is missing.
     u : array_like, shape (N,) or (N, inputs), or dict of str to array_like, optional
-        The inputs, a column for each, or by name. Without them the log is a time series.
+        The inputs, a column for each, or by name; a data frame. Without them the log is a time series.
     sample_time : float, optional
         Seconds from one row to the next: 1, unless said otherwise.
     time : array_like, shape (N,), optional
@@ -43,9 +41,9 @@ class Log:
     resample : (float, {"linear", "hold"}), optional
         Makes an irregular clock uniform: seconds between the new rows, and how to read between the old ones.
     input_names : sequence of str, optional
-        The names of the inputs: ``u``, or ``u1``, ``u2``, …
-    output_name : str, default "y"
-        The name of the output.
+        The names of the inputs: those of the series or of the frame's columns, or ``u``, or ``u1``, ``u2``, …
+    output_name : str, optional
+        The name of the output: that of the series, or ``y``.
 
     Raises
     ------
@@ -74,17 +72,17 @@ class Log:
     def __init__(
         self,
         y: npt.ArrayLike,
-        u: Inputs = None,
+        u: _numbers.Columns | None = None,
         *,
         sample_time: float | None = None,
         time: npt.ArrayLike | None = None,
         resample: tuple[float, str] | None = None,
         input_names: Sequence[str] | None = None,
-        output_name: str = "y",
+        output_name: str | None = None,
     ) -> None:
         channels = _inputs(u, input_names)
         names = [name for name, _ in channels]
-        output = _options.text("output_name", output_name)
+        output, y = _output(y, output_name)
         start = None
         if time is not None:
             time, start = _seconds(time)
@@ -264,7 +262,9 @@ class Log:
 def handle(argument: str, log: Log) -> _thetahat.Log:
     """The compiled log behind an argument."""
     if not isinstance(log, Log):
-        raise TypeError(f"{argument}: expected a Log, found {type(log).__name__}; make one with thetahat.Log(y, u)")
+        # A frame does not say which column is the output.
+        makes = "Log.from_dataframe(frame, inputs=[...], output=...)" if hasattr(log, "columns") else "Log(y, u)"
+        raise TypeError(f"{argument}: expected a Log, found {type(log).__name__}; make one with thetahat.{makes}")
     return log._log
 
 
@@ -342,28 +342,36 @@ def dc_motor() -> Log:
     return Log(table[:, 2], table[:, 1], time=table[:, 0])
 
 
-def _inputs(u: Inputs, names: Sequence[str] | None) -> list[tuple[str, Any]]:
+def _inputs(u: _numbers.Columns | None, names: Sequence[str] | None) -> list[tuple[str, Any]]:
     """The inputs by name."""
-    if isinstance(u, Mapping):
-        if names is not None:
-            raise ValueError("input_names: the inputs have names already; leave it out")
-        return [(_options.text("u", name), values) for name, values in u.items()]
     if u is None:
         if names:
             raise ValueError("input_names: there are no inputs; give u too")
         return []
-    array = u if isinstance(u, np.ma.MaskedArray) else np.asarray(u)
-    if array.ndim not in (1, 2):
-        raise ValueError(f"u: expected shape (rows,) or (rows, inputs), found shape {array.shape}")
-    columns = [array] if array.ndim == 1 else [array[:, index] for index in range(array.shape[1])]
-    if not columns:
-        raise ValueError(f"u: expected at least one column, found shape {array.shape}")
-    if names is None:
-        names = ["u"] if len(columns) == 1 else [f"u{index + 1}" for index in range(len(columns))]
-    names = [names] if isinstance(names, str) else list(names)
-    if len(names) != len(columns):
-        raise ValueError(f"input_names: expected {len(columns)}, found {len(names)}")
-    return [(_options.text("input_names", name), column) for name, column in zip(names, columns)]
+    columns = _numbers.named("u", u)
+    if columns is None or (names is not None and not isinstance(u, Mapping)):
+        array = _numbers.array("u", u)
+        if array.ndim not in (1, 2):
+            raise ValueError(f"u: expected shape (rows,) or (rows, inputs), found shape {array.shape}")
+        arrays = [array] if array.ndim == 1 else [array[:, index] for index in range(array.shape[1])]
+        if not arrays:
+            raise ValueError(f"u: expected at least one column, found shape {array.shape}")
+        if names is None:
+            names = ["u"] if len(arrays) == 1 else [f"u{index + 1}" for index in range(len(arrays))]
+        names = [names] if isinstance(names, str) else list(names)
+        if len(names) != len(arrays):
+            raise ValueError(f"input_names: expected {len(arrays)}, found {len(names)}")
+        return [(_options.text("input_names", name), column) for name, column in zip(names, arrays)]
+    if names is not None:
+        raise ValueError("input_names: the inputs have names already; leave it out")
+    return [(_options.text("u", name), _numbers.column(f"u: column {name!r}", values)) for name, values in columns]
+
+
+def _output(y: npt.ArrayLike, name: str | None) -> tuple[str, Any]:
+    """The output by its name: the one given, or that of a series or of the only column of a frame."""
+    columns = None if isinstance(y, Mapping) else _numbers.named("y", y)
+    own = columns[0][0] if columns is not None and len(columns) == 1 else "y"
+    return own if name is None else _options.text("output_name", name), _numbers.column("y", y)
 
 
 def _made(

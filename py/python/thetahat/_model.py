@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from html import escape
 from statistics import NormalDist
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from thetahat import _files, _options, _picture, _thetahat
+from thetahat import _files, _numbers, _options, _picture, _thetahat
 from thetahat._judgement import Validation
 from thetahat._log import Log, handle
 from thetahat._options import ValidationOptions
@@ -282,6 +282,20 @@ class Model:
             raise ValueError(f"input: there is no input {index}; the model has {len(self.inputs)}, counted from 0")
         return index
 
+    def _inputs_of(self, u: Any) -> Any:
+        """The columns of a frame or of a dict by the names of the inputs, in their order; what has no names as it is."""
+        columns = _numbers.named("u", u)
+        if columns is None:
+            return u
+        if len(columns) == len(self.inputs) == 1 and not isinstance(u, Mapping):
+            return columns[0][1]
+        there = dict(columns)
+        for name in self.inputs:
+            if name not in there:
+                names = ", ".join(map(repr, there)) or "none"
+                raise ValueError(f"u: there is no column {name!r}, which is an input of the model; there are {names}")
+        return np.column_stack([_numbers.column(f"u: column {name!r}", there[name]) for name in self.inputs])
+
     @property
     def method(self) -> str:
         """How the model was estimated."""
@@ -379,13 +393,13 @@ class Model:
             horizon = _options.count("horizon", horizon, 1_000_000)
         return self._model.predict(handle("log", log), horizon, initial)
 
-    def simulate(self, u: npt.ArrayLike | Log, *, initial: str = "zero") -> Array:
+    def simulate(self, u: _numbers.Columns | Log, *, initial: str = "zero") -> Array:
         """The free run on inputs, in the units of the log.
 
         Parameters
         ----------
-        u : array_like, shape (N,) or (N, inputs), or Log
-            The inputs; of a log, its inputs.
+        u : array_like, shape (N,) or (N, inputs), or data frame, dict of str to array_like, or Log
+            The inputs. Those of a frame, dict or log are found by name.
         initial : {"zero", "estimated", "measured"}, default "zero"
             What the run starts from: rest, or, of a log, what fits its output best, or its first samples.
 
@@ -406,10 +420,10 @@ class Model:
             return self._predicted(u, None, initial)[0]
         if initial != "zero":
             raise ValueError("initial: inputs alone start from zero; give a Log to start from its output")
-        return self._model.simulate(u)
+        return self._model.simulate(self._inputs_of(u))
 
     def forecast(
-        self, log: Log, steps: int, u: npt.ArrayLike | None = None, *, initial: str | None = None
+        self, log: Log, steps: int, u: _numbers.Columns | None = None, *, initial: str | None = None
     ) -> Forecast:
         """What comes after the end of a log.
 
@@ -419,8 +433,8 @@ class Model:
             What is known.
         steps : int
             How far to look.
-        u : array_like, shape (steps,) or (steps, inputs)
-            The inputs in these steps, of a model that has some.
+        u : array_like, shape (steps,) or (steps, inputs), or data frame or dict of str to array_like
+            The inputs in these steps, of a model that has some. Those of a frame or dict are found by name.
         initial : {"zero", "measured", "estimated"}, optional
             As for `predict`.
 
@@ -442,7 +456,8 @@ class Model:
         (3,)
         """
         steps = _options.count("steps", steps, 1_000_000)
-        values, deviations = self._model.forecast(handle("log", log), steps, u, initial)
+        future = None if u is None else self._inputs_of(u)
+        values, deviations = self._model.forecast(handle("log", log), steps, future, initial)
         time = log.time[-1] + self.sample_time * np.arange(1, steps + 1)
         return Forecast(time, values, deviations)
 

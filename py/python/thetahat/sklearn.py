@@ -23,7 +23,7 @@ except ImportError as error:
     )
     raise ImportError(message) from error
 
-from thetahat import Log, Model, arx
+from thetahat import Log, Model, _numbers, arx
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -216,9 +216,10 @@ class ARXRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
             raise ValueError(message)
 
     def _inputs(self, X: ArrayLike, *, reset: bool) -> NDArray[np.float64]:
+        # scikit-learn reads what lies behind a mask.
         inputs: NDArray[np.float64] = validate_data(
             self,
-            X,
+            _numbers.array("X", X) if isinstance(X, np.ma.MaskedArray) else X,
             reset=reset,
             dtype=np.float64,
             ensure_min_samples=2 if reset else 1,
@@ -230,7 +231,7 @@ class ARXRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
             message = "y: ARXRegressor requires y to be passed, but the target y is None"
             raise ValueError(message)
         checked = check_array(
-            y,
+            _numbers.array("y", y),
             dtype=np.float64,
             ensure_all_finite="allow-nan",
             ensure_2d=False,

@@ -1,8 +1,6 @@
 //! Arguments that several classes have, and what the library says of them in Python's names.
 
-use numpy::{
-    PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArray, PyUntypedArrayMethods,
-};
+use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray2, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::Borrowed;
 use pyo3::exceptions::{PyMemoryError, PyOverflowError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -65,22 +63,35 @@ pub(crate) fn check_size(argument: &str, size: usize) -> PyResult<()> {
     Err(PyValueError::new_err(format!("{argument}: expected 1 to {LARGEST_SIZE} entries, found {size}")))
 }
 
-/// One number, NaN included.
+/// One number, NaN and what pandas writes for a missing one included.
 pub(crate) fn number(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
     if let Ok(number) = value.cast_exact::<PyFloat>() {
         return Ok(number.value());
     }
-    if let Ok(array) = value.cast::<PyUntypedArray>()
-        && array.ndim() != 0
-    {
-        return Err(PyValueError::new_err(format!(
-            "{argument}: expected a number, found an array of {} dimensions",
-            array.ndim()
+    if is_missing(value) {
+        return Ok(f64::NAN);
+    }
+    if value.is_none() {
+        return Err(PyTypeError::new_err(format!(
+            "{argument}: expected a number, found None; NaN stands for a missing one"
         )));
     }
-    value
-        .extract()
-        .map_err(|_| PyTypeError::new_err(format!("{argument}: expected a number, found {}", kind(value))))
+    let float = value.is_instance_of::<PyFloat>();
+    if !float && has_no_dimension(value) {
+        // Texts of NumPy and what is masked convert to a float, but are no numbers.
+        return array::numbers(argument, value)?.extract();
+    }
+    if float || is_number(value) {
+        return value.extract();
+    }
+    Err(PyTypeError::new_err(format!("{argument}: expected a number, found {}", kind(value))))
+}
+
+/// Whether it is `pandas.NA`, of which there is one, and of which its class has no other.
+fn is_missing(value: &Bound<'_, PyAny>) -> bool {
+    let class = value.get_type();
+    class.name().is_ok_and(|name| name == "NAType")
+        && class.module().is_ok_and(|module| module.to_string().starts_with("pandas."))
 }
 
 /// One number for each of `length` signals: a number alone where there is one.
@@ -100,7 +111,7 @@ pub(crate) fn sample(
         return Ok(());
     }
     if length == 0 {
-        if value.is_none() || value.len()? == 0 {
+        if value.is_none() || array::numbers(argument, value)?.is_empty() {
             return Ok(());
         }
         return Err(PyValueError::new_err(format!("{argument}: expected None, as there is no input")));
@@ -113,14 +124,22 @@ pub(crate) fn sample(
     Ok(())
 }
 
-/// Whether it is a number, of Python or NumPy, or an array of no dimension.
+/// Whether it is a number: of Python, of NumPy, or of another package, such as a decimal.
 pub(crate) fn is_number(value: &Bound<'_, PyAny>) -> bool {
+    let has = |name: &str| value.hasattr(name).unwrap_or(false);
+    value.is_instance_of::<PyFloat>()
+        || value.is_instance_of::<PyInt>()
+        || has_no_dimension(value)
+        || is_missing(value)
+        // What has a length is an array, even one that converts to a number where it has one entry.
+        || (has("__float__") && !has("__len__"))
+}
+
+/// Whether it is an array of no dimension, or a number of NumPy.
+fn has_no_dimension(value: &Bound<'_, PyAny>) -> bool {
     match value.cast::<PyUntypedArray>() {
         Ok(array) => array.ndim() == 0,
-        Err(_) => {
-            let scalar = || value.getattr("ndim").is_ok_and(|ndim| ndim.eq(0).unwrap_or(false));
-            value.is_instance_of::<PyFloat>() || value.is_instance_of::<PyInt>() || scalar()
-        }
+        Err(_) => value.getattr("ndim").is_ok_and(|ndim| ndim.eq(0).unwrap_or(false)),
     }
 }
 
@@ -128,14 +147,12 @@ pub(crate) fn is_number(value: &Bound<'_, PyAny>) -> bool {
 pub(crate) enum Rows<'py> {
     /// No signal.
     None,
-    /// One signal: a vector.
-    Vector(PyReadonlyArray1<'py, f64>),
-    /// Any number of signals.
+    /// A column for each signal.
     Matrix(PyReadonlyArray2<'py, f64>),
 }
 
 impl<'py> Rows<'py> {
-    /// `rows` samples of `columns` signals; a vector is allowed for one signal.
+    /// `rows` samples of `columns` signals, or at least one; of one signal they may have one dimension.
     pub(crate) fn new(
         argument: &str,
         value: Option<&Bound<'py, PyAny>>,
@@ -150,9 +167,6 @@ impl<'py> Rows<'py> {
             Some(_) if columns == 0 => {
                 Err(PyValueError::new_err(format!("{argument}: expected None, as there is no input")))
             }
-            Some(value) if columns == 1 && dimensions(value) == 1 => {
-                Ok(Rows::Vector(array::vector(argument, value, rows)?))
-            }
             Some(value) => Ok(Rows::Matrix(array::matrix(argument, value, [rows, Some(columns)])?)),
         }
     }
@@ -161,22 +175,9 @@ impl<'py> Rows<'py> {
     pub(crate) fn as_slice(&self) -> PyResult<&[f64]> {
         match self {
             Rows::None => Ok(&[]),
-            Rows::Vector(array) => Ok(array.as_slice()?),
             Rows::Matrix(array) => Ok(array.as_slice()?),
         }
     }
-}
-
-/// How many dimensions an array has, or would have.
-pub(crate) fn dimensions(value: &Bound<'_, PyAny>) -> usize {
-    if let Ok(array) = value.cast::<PyUntypedArray>() {
-        return array.ndim();
-    }
-    let numpy = value.py().import("numpy");
-    numpy
-        .and_then(|numpy| numpy.call_method1("ndim", (value,)))
-        .and_then(|count| count.extract())
-        .unwrap_or_default()
 }
 
 /// Row `row` of an array with this many columns.

@@ -11,8 +11,8 @@ use super::argument::{self, Whole, failed};
 use super::innovation::{Innovation, list};
 use super::kalman::started;
 use super::trajectory::{
-    FilterTrajectory, Sample, Samples, SmoothedTrajectory, Steps, measurement, recorded, returned, smooth,
-    smoothed,
+    FilterTrajectory, Sample, Samples, SmoothedTrajectory, Steps, columns, measurement, recorded, returned,
+    smooth, smoothed,
 };
 use super::used::{Used, UsedObservation, UsedTransition};
 use super::{Reduced, Stop, snapshot};
@@ -220,8 +220,11 @@ impl ExtendedKalmanFilter {
         measurement: &Bound<'_, PyAny>,
         input: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Innovation> {
-        let outputs = if argument::is_number(measurement) { Some(1) } else { Some(measurement.len()?) };
-        let model = UsedObservation::new(observation, self.filter.state().len(), outputs)?;
+        let outputs = match argument::is_number(measurement) {
+            true => 1,
+            false => array::vector("measurement", measurement, None)?.as_slice()?.len(),
+        };
+        let model = UsedObservation::new(observation, self.filter.state().len(), Some(outputs))?;
         let input = self::input(input, model.inputs())?;
         let (measurement, single) = self::measurement(measurement, model.outputs())?;
         model.linearise_within(self.filter.covariance());
@@ -273,9 +276,11 @@ impl ExtendedKalmanFilter {
     ) -> PyResult<FilterTrajectory> {
         let n = self.filter.state().len();
         let transition = UsedTransition::new(transition, n)?;
-        let observation = UsedObservation::new(observation, n, columns(measurements))?;
+        let measurements = array::numbers("measurements", measurements)?.into_any();
+        let outputs = columns("measurements", &measurements)?;
+        let observation = UsedObservation::new(observation, n, Some(outputs))?;
         let m = observation.outputs();
-        let samples = Samples::new(measurements, m, inputs, [transition.inputs(), observation.inputs()])?;
+        let samples = Samples::new(&measurements, m, inputs, [transition.inputs(), observation.inputs()])?;
         let slices = samples.slices()?;
         let filter = self.filter.clone();
         let (filter, trajectory) = recorded(py, [samples.rows, n, m], |record| {
@@ -344,9 +349,11 @@ impl ExtendedKalmanFilter {
     ) -> PyResult<SmoothedTrajectory> {
         let n = self.filter.state().len();
         let transition = UsedTransition::new(transition, n)?;
-        let observation = UsedObservation::new(observation, n, columns(measurements))?;
+        let measurements = array::numbers("measurements", measurements)?.into_any();
+        let outputs = columns("measurements", &measurements)?;
+        let observation = UsedObservation::new(observation, n, Some(outputs))?;
         let wanted = [transition.inputs(), observation.inputs()];
-        let samples = Samples::new(measurements, observation.outputs(), inputs, wanted)?;
+        let samples = Samples::new(&measurements, observation.outputs(), inputs, wanted)?;
         let slices = samples.slices()?;
         let before = |covariance: &Covariance<f64, Dyn>| {
             transition.linearise_within(covariance);
@@ -389,14 +396,5 @@ impl ExtendedKalmanFilter {
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py>> {
         snapshot(py, "ExtendedKalmanFilter", &self.filter)
-    }
-}
-
-/// How many elements a measurement has in these rows.
-pub(crate) fn columns(measurements: &Bound<'_, PyAny>) -> Option<usize> {
-    match argument::dimensions(measurements) {
-        1 => Some(1),
-        2 => measurements.get_item(0).and_then(|first| first.len()).ok(),
-        _ => None,
     }
 }

@@ -117,7 +117,11 @@ impl LuenbergerObserver {
             let part = numpy.call_method1(name, (poles,))?;
             array::finite_vector("poles", &part, Some(n))
         };
-        let poles = part("real")?.zip_map(&part("imag")?, Complex::new);
+        let poles = if numpy.call_method1("iscomplexobj", (poles,))?.is_truthy()? {
+            part("real")?.zip_map(&part("imag")?, Complex::new)
+        } else {
+            array::finite_vector("poles", poles, Some(n))?.map(Complex::from)
+        };
         self.observer.place(&transition, &observation, &input, &weights, &poles).map_err(|error| {
             match transition.trouble().or_else(|| observation.trouble()) {
                 Some(trouble) => trouble.into_error(None),

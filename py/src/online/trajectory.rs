@@ -11,6 +11,7 @@ use thetahat_core::{
 use super::argument::{self, Rows, room, shaped};
 use super::results::{Column, Results};
 use super::{Reduced, Stop, attributes, innovation};
+use crate::array;
 use crate::work::Pulse;
 
 /// What a Kalman filter did in a run, row by row.
@@ -273,10 +274,7 @@ impl<'py> Samples<'py> {
         let columns = match inputs {
             None => known,
             Some(_) if known > 0 => known,
-            Some(given) if wanted.contains(&None) => match argument::dimensions(given) {
-                1 => 1,
-                _ => crate::array::matrix("inputs", given, [Some(rows), None])?.shape()[1],
-            },
+            Some(given) if wanted.contains(&None) => columns("inputs", given)?,
             Some(_) => 0,
         };
         let inputs = Rows::new("inputs", inputs, Some(rows), columns)?;
@@ -289,6 +287,15 @@ impl<'py> Samples<'py> {
         let (measurements, inputs) = (self.measurements.as_slice()?, self.inputs.as_slice()?);
         let (rows, outputs, columns) = (self.rows, self.outputs, self.columns);
         Ok(Slices { measurements, inputs, rows, outputs, columns, widths: self.widths })
+    }
+}
+
+/// How many signals these rows have.
+pub(crate) fn columns(argument: &str, rows: &Bound<'_, PyAny>) -> PyResult<usize> {
+    match *array::numbers(argument, rows)?.shape() {
+        [_] => Ok(1),
+        [_, columns] => Ok(columns),
+        _ => Err(PyValueError::new_err(format!("{argument}: expected one or two dimensions"))),
     }
 }
 

@@ -522,7 +522,7 @@ pub(crate) struct TrackArguments {
     /// How to estimate [default: rls; with C rpem]
     #[arg(long, value_enum, help_heading = "Adaptation")]
     pub(crate) method: Option<TrackMethodArgument>,
-    /// What is forgotten, several side by side: none, LAMBDA or exponential:LAMBDA, directional:LAMBDA,
+    /// What is forgotten, several side by side: none, LAMBDA or exponential:LAMBDA, selective:LAMBDA,
     /// random-walk:VARIANCE, variable:LAMBDA:MINIMUM:NOISE
     #[arg(
         long,

@@ -135,12 +135,12 @@ fn policies_run_side_by_side_and_are_compared() {
         .map(|t| if t == 0 { 0.0 } else { (if t < 1000 { 1.0 } else { 2.0 }) * u[t - 1] + 0.05 * e[t] })
         .collect();
     let folder = Folder::with_log(csv(&[("u", &u), ("y", &y)]));
-    let policies = "1,0.99,directional:0.98,random-walk:1e-4,variable:0.99:0.9:0.001";
+    let policies = "1,0.99,selective:0.98,random-walk:1e-4,variable:0.99:0.9:0.001";
     let run = folder.done(&format!("track log.csv --nb 1 --forgetting {policies} --every 2000"));
     let lines = objects(&run.stdout);
     let names: Vec<&str> = lines.iter().map(|line| line["forgetting"].as_str().unwrap()).collect();
     let expected =
-        ["none", "exponential:0.99", "directional:0.98", "random-walk:0.0001", "variable:0.99:0.9:0.001"];
+        ["none", "exponential:0.99", "selective:0.98", "random-walk:0.0001", "variable:0.99:0.9:0.001"];
     assert_eq!(names, expected);
     assert!((number(&lines[0], "/b1") - 1.5).abs() < 0.1);
     for line in &lines[1..] {

@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 POLICIES: list[float | Forgetting | None] = [
     0.98,
     None,
-    Forgetting.directional(0.97),
+    Forgetting.selective(0.97),
     Forgetting.random_walk(1e-4),
     Forgetting.variable(0.99, 0.92, 0.01),
 ]

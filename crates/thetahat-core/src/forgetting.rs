@@ -7,8 +7,8 @@ use crate::{Error, Real};
 /// | policy | what it is for | bounded |
 /// |---|---|---|
 /// | [`None`](Forgetting::None) | parameters that do not change; a finite record | P never grows, and shrinks for ever: a finite horizon in `f32` |
-/// | [`Exponential`](Forgetting::Exponential) | the default: parameters that drift, or jump | by the cap |
-/// | [`Directional`](Forgetting::Directional) | poor or intermittent excitation: only what a sample tells of is forgotten | by construction, and by the cap |
+/// | [`Exponential`](Forgetting::Exponential) | the default: parameters that drift, or jump, under steady excitation | by the cap |
+/// | [`Selective`](Forgetting::Selective) | excitation that comes and goes: in silence nothing is forgotten | by the cap |
 /// | [`RandomWalk`](Forgetting::RandomWalk) | parameters that drift at a known rate, each by its own scale | by the cap |
 /// | [`Variable`](Forgetting::Variable) | long quiet times, then sudden changes, and a known noise level | by the cap |
 ///
@@ -36,6 +36,28 @@ use crate::{Error, Real};
 /// variance can grow for n samples, by a factor of at most (1 + 1/n)^n < e. The bound stands at the prior: a
 /// parameter that has been forgotten is as free to move as at the start.
 ///
+/// # What each is good at
+///
+/// The distance of four parameters from the truth, the mean of 200 runs: 500 samples after a jump of norm 1.80, with
+/// regressors of variance 1 and correlation 0, 0.95 and 0.99 (noise 0.02); the same after a jump of 0.69 of an ARX
+/// plant whose input is random binary; then the largest distance in 5000 samples (noise 0.1) in which all regressors,
+/// or two of the four, fall to 0.01, or are held but for 0.01. Last, the share of 95 % intervals that hold the truth in
+/// the steady state, of regressors with correlation 0.95, and of a plant in closed loop whose set point changes every
+/// 200 samples.
+///
+/// | policy | 0 | 0.95 | 0.99 | plant | silence | two silent | two silent, 0.95 before | held | open loop | closed loop |
+/// |---|---|---|---|---|---|---|---|---|---|---|
+/// | none | 1.20 | 1.20 | 1.20 | 0.45 | 0.006 | 0.007 | 0.027 | 0.007 | 0.95 | 0.96 |
+/// | exponential, 0.99 | 0.012 | 0.015 | 0.025 | 0.005 | 2.81 | 2.39 | 1.77 | 2.71 | 0.95 | 0.97 |
+/// | selective, 0.99 | 0.019 | 0.020 | 0.027 | 0.006 | 0.013 | 0.026 | 0.10 | 1.89 | 0.95 | 0.96 |
+/// | random walk, 1e-4 | 0.014 | 0.59 | 0.99 | 0.019 | 0.045 | 0.037 | 0.044 | 0.041 | 0.95 | 0.96 |
+/// | variable, 0.99 | 0.003 | 0.010 | 0.022 | 0.003 | 2.80 | 2.37 | 1.80 | 2.71 | 0.95 | 0.97 |
+///
+/// (Printed by `cargo test -p thetahat-core --test forgetting table -- --nocapture`.) The intervals of the random walk
+/// are for parameters that walk as it says. Directly after a jump no interval holds the truth, whatever the policy. Where
+/// the regressors tell too little of a parameter, in closed loop without changes of the set point for instance, intervals
+/// are wider than need be: up to all of them hold the truth.
+///
 /// # What is forgotten when
 ///
 /// Forgetting counts the samples that were measured. A missing one, and one that is skipped or comes while
@@ -51,32 +73,50 @@ pub enum Forgetting<T> {
     /// P shrinks as 1/k. In `f32` that works for a finite time only: rounding is not forgotten either. With four
     /// parameters it exceeds one standard error after 9·10^7 samples (measured by `make soak`).
     None,
-    /// A sample k samples old weighs λ^k (Ljung and Söderström, Theory and Practice of Recursive Identification,
+    /// A sample k samples old weighs λ^k, whether the new ones tell anything or not (Ljung and Söderström, Theory and Practice of Recursive Identification,
     /// 1983, section 2.6).
     ///
     /// ```text
     /// θ̂ = arg min Σ λ^(t-k) (y(k) - φ(k)'θ)²,          P <- (P - P φ φ'P / (λ + φ'P φ)) / λ
     /// ```
+    ///
+    /// In a silence of many times the memory the variances grow to their bounds, and what noise there is in the
+    /// regressors drives the estimate: it bursts to about σ √(p_j/2) from the truth, σ the deviation of the noise.
+    /// The standard errors say so. Where that would do harm, turn adaptation off, or take
+    /// [`Selective`](Forgetting::Selective).
     Exponential {
         /// λ.
         factor: T,
     },
-    /// Forgets only along the regressor: what a sample does not tell of is kept.
+    /// Forgets only what the sample tells of: what is not excited is kept.
     ///
     /// ```text
-    /// P <- P + (1 - μ)/(μ w'P⁻¹w) w w',   w = φ/scale²,   μ = 1 - n (1 - λ),          where |φ/scale|² >= 1/100
+    /// f = U'φ;     D_j <- D_j / λ     where f_j² D_j > (1 - λ)/100
     /// ```
     ///
-    /// and then the update without forgetting. μ, not λ, is the factor of the source. As each sample forgets in
-    /// one of n directions, its memory is n/(1 - μ) samples, which is 1/(1 - λ): so that one factor means one
-    /// memory in all policies. A regressor below the threshold is used, and nothing is forgotten for it: else
-    /// noise would take the place of what is known.
+    /// and then the update without forgetting. f_j is what regressor j adds to those before it, D_j the variance of
+    /// what it tells of, and f_j² D_j is 1 - λ on average while the excitation is steady. A sample that tells less than
+    /// a hundredth of that is silent: forgetting would let the variance grow to 100 times what it is. So neither the
+    /// units of the regressors nor their scales nor the noise matter, and correlated regressors are forgotten as fast
+    /// as others. n multiply-adds and comparisons more than exponential forgetting without any.
     ///
-    /// Three to four times the time of exponential forgetting (measured).
+    /// For plants with long silences. After 10^6 silent samples the error is what it was (measured: 0.02 at the
+    /// most, where exponential forgetting has 3.8). But:
     ///
-    /// Source: Cao and Schwartz, A directional forgetting algorithm based on the decomposition of the
-    /// information matrix, 2000; Lai and Bernstein, arXiv:2404.10844, 2024.
-    Directional {
+    /// - Its memory is up to a tenth longer than 1/(1 - λ), as small samples are not forgotten for.
+    /// - Silence is relative. Where the amplitude of steady regressors falls to less than a tenth (of normally
+    ///   distributed ones, a thirtieth), that counts as silence, for ever: new samples add what they tell, and nothing
+    ///   is forgotten. If that is the new operating condition, widen P by
+    ///   [`with_covariance`](crate::RecursiveLeastSquares::with_covariance).
+    /// - A held input is not silence: until U has turned to it, all of φ is new. That costs all but a hundredth of
+    ///   what is known of other directions, and noise beside it then does the same as with exponential forgetting
+    ///   (the column "held").
+    /// - The order of the regressors decides of which of two that are correlated something is forgotten first. In closed
+    ///   loop the standard errors differed by a tenth, elsewhere by less (measured).
+    ///
+    /// Source: the rule is ours. Its relative on the eigenvectors of P⁻¹ is that of Goel, Bruce and Bernstein,
+    /// Recursive least squares with variable-direction forgetting, 2020.
+    Selective {
         /// λ.
         factor: T,
     },
@@ -133,7 +173,7 @@ impl<T: Real> Forgetting<T> {
         let is_factor = |factor: T| factor > least && factor > T::zero() && factor <= T::one();
         match *self {
             Forgetting::None => Ok(()),
-            Forgetting::Exponential { factor } | Forgetting::Directional { factor } => {
+            Forgetting::Exponential { factor } | Forgetting::Selective { factor } => {
                 check_factor(is_factor(factor))
             }
             Forgetting::RandomWalk { variance } => {
@@ -158,7 +198,7 @@ impl<T: Real> Forgetting<T> {
         match *self {
             Forgetting::None | Forgetting::RandomWalk { .. } => T::one(),
             Forgetting::Exponential { factor }
-            | Forgetting::Directional { factor }
+            | Forgetting::Selective { factor }
             | Forgetting::Variable { factor, .. } => factor,
         }
     }

@@ -54,7 +54,7 @@ use sample::scale_variances;
 /// unknown (`None`) until W²/W₂, the number of samples that count, exceeds n. A sample that tells more of the
 /// parameters than of the noise, φ'P⁻φ > 10, enters as 0, as it would without prior. (Where the noise is below a
 /// hundredth of the output, σ̂² starts too large all the same: the prior pulls at the first samples. The exact start
-/// has no such error: where no prior is in, every sample counts, and without forgetting σ̂² is that of the batch.) With directional forgetting λ is the `factor`; the random walk does not forget residuals, and
+/// has no such error: where no prior is in, every sample counts, and without forgetting σ̂² is that of the batch.) With selective forgetting λ is the `factor`; the random walk does not forget residuals, and
 /// its P is the covariance, cov θ̂ = σ̂² P.
 ///
 /// # Several outputs

@@ -75,7 +75,7 @@ fn recursive_least_squares() {
         for forgetting in [
             Forgetting::None,
             Forgetting::Exponential { factor: 0.9 },
-            Forgetting::Directional { factor: 0.9 },
+            Forgetting::Selective { factor: 0.9 },
             Forgetting::RandomWalk { variance: 0.01 },
             Forgetting::Variable { factor: 0.95, minimum: 0.8, noise_variance: 0.1 },
         ] {

@@ -177,9 +177,9 @@ fn exponential_with_a_dead_zone() {
 }
 
 #[test]
-fn directional() {
-    let forgetting = (Forgetting::Directional { factor: 0.99 }, Forgetting::Directional { factor: 0.99 });
-    soak("directional", forgetting.0, forgetting.1, 0.0, 1e-3);
+fn selective() {
+    let forgetting = (Forgetting::Selective { factor: 0.99 }, Forgetting::Selective { factor: 0.99 });
+    soak("selective", forgetting.0, forgetting.1, 0.0, 1e-3);
 }
 
 #[test]

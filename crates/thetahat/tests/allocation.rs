@@ -62,7 +62,7 @@ fn samples_of_a_tracker_take_no_memory() {
     let (u, e) = (signal(2000, 3), signal(2000, 4));
     for (nc, method, forgetting) in [
         (0, TrackMethod::Rls, "0.99"),
-        (0, TrackMethod::Rls, "directional:0.99"),
+        (0, TrackMethod::Rls, "selective:0.99"),
         (0, TrackMethod::Rls, "random-walk:1e-4"),
         (2, TrackMethod::Els, "none"),
         (2, TrackMethod::Rpem, "0.99"),

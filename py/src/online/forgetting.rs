@@ -44,6 +44,9 @@ impl Forgetting {
 
     /// A sample that is k samples old weighs factor ** k.
     ///
+    /// In a silence of many times the memory the estimate bursts: noise in the regressors drives it away from what
+    /// was known, and the standard errors say so. See ``selective``.
+    ///
     /// Parameters
     /// ----------
     /// factor : float
@@ -55,7 +58,9 @@ impl Forgetting {
         Ok(Forgetting { policy: Policy::Exponential { factor } })
     }
 
-    /// Forgets only along the regressor: what a sample does not tell of is kept.
+    /// Forgets only what a sample tells of: what is not excited is kept. For plants with long silences.
+    ///
+    /// An excitation that falls below a tenth of what it was counts as silence.
     ///
     /// Parameters
     /// ----------
@@ -64,12 +69,11 @@ impl Forgetting {
     ///
     /// References
     /// ----------
-    /// Cao and Schwartz, A directional forgetting algorithm based on the decomposition of the information matrix,
-    /// 2000.
+    /// A relative: Goel, Bruce and Bernstein, Recursive least squares with variable-direction forgetting, 2020.
     #[staticmethod]
-    fn directional(factor: f64) -> PyResult<Self> {
+    fn selective(factor: f64) -> PyResult<Self> {
         check_factor("factor", factor, 1.0)?;
-        Ok(Forgetting { policy: Policy::Directional { factor } })
+        Ok(Forgetting { policy: Policy::Selective { factor } })
     }
 
     /// The parameters do a random walk.
@@ -117,7 +121,7 @@ impl Forgetting {
         match self.policy {
             Policy::None => "Forgetting.none()".to_owned(),
             Policy::Exponential { factor } => format!("Forgetting.exponential(factor={factor:?})"),
-            Policy::Directional { factor } => format!("Forgetting.directional(factor={factor:?})"),
+            Policy::Selective { factor } => format!("Forgetting.selective(factor={factor:?})"),
             Policy::RandomWalk { variance } => format!("Forgetting.random_walk(variance={variance:?})"),
             Policy::Variable { factor, minimum, noise_variance } => format!(
                 "Forgetting.variable(factor={factor:?}, minimum={minimum:?}, noise_variance={noise_variance:?})"

@@ -52,9 +52,6 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
         let running = self.phase.is_running();
         let policy = if running { self.forgetting } else { Forgetting::None };
         let resting = !self.adapting || self.is_in_dead_zone(errors);
-        if let (Forgetting::Directional { factor }, false) = (policy, resting) {
-            self.forget_along(gradient, errors, factor)?;
-        }
         let (adapting, weight, with_prior) = (self.adapting, policy.factor(), self.phase == Phase::Running);
         let RecursiveLeastSquares { parameters, covariance, residuals, .. } = self;
         let factor = covariance.as_mut_slice();
@@ -72,8 +69,12 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
                 residuals.count(errors, T::one(), weight);
                 return Ok((nis, Action::Skipped));
             }
+            let spread = match policy {
+                Forgetting::Selective { factor: lambda } => forget_selectively(factor, f, v, lambda),
+                _ => spread,
+            };
             let noise = match policy {
-                Forgetting::None | Forgetting::RandomWalk { .. } | Forgetting::Directional { .. } => T::one(),
+                Forgetting::None | Forgetting::RandomWalk { .. } | Forgetting::Selective { .. } => T::one(),
                 Forgetting::Exponential { factor } => factor,
                 Forgetting::Variable { factor, minimum, noise_variance } => {
                     let surprise =
@@ -168,64 +169,6 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
         });
     }
 
-    /// Directional forgetting, before a sample is absorbed.
-    ///
-    /// ```text
-    /// P <- P + (1 - μ)/(μ w'P⁻¹w) w w',   w = φ/scale²,   μ = 1 - n (1 - λ),          unless φ is small
-    /// ```
-    ///
-    /// That is the formula of the source for regressors and parameters in units of their scales; in other units
-    /// another direction would be forgotten. What is held, D_j = 0, has no part in w, w'P⁻¹w and n. Fails where the
-    /// sample could not be absorbed.
-    #[inline(never)]
-    fn forget_along(&mut self, gradient: &[T], errors: &[T], lambda: T) -> Result<(), Error> {
-        let size = self.covariance.size();
-        let (factor, bounds) = (self.covariance.as_mut_slice(), self.bounds.as_slice());
-        size.with_scratch(&mut self.scratch, |[z, w], []| {
-            // P grows by at most a factor of 1/μ <= n + 1. Once it has, nothing may fail.
-            let spread = ud::project(factor, gradient, z, w, T::zero());
-            check_small(gradient, errors, spread * T::from_count(gradient.len() + 2))?;
-            let n = gradient.len();
-            let (mut energy, mut free) = (T::zero(), 0);
-            for (index, (&phi, &p)) in gradient.iter().zip(bounds).enumerate() {
-                if !ud::variance(factor, n, index).is_zero() {
-                    energy += phi * p * phi;
-                    free += 1;
-                }
-            }
-            if energy < T::one() {
-                return Ok(());
-            }
-            // 100 w, and z = U⁻¹w, so that w'P⁻¹w = Σ z²/d.
-            for (index, ((w, z), (&phi, &p))) in
-                w.iter_mut().zip(z.iter_mut()).zip(gradient.iter().zip(bounds)).enumerate()
-            {
-                *w = if ud::variance(factor, n, index).is_zero() { T::zero() } else { phi * p };
-                *z = *w;
-            }
-            let mut information = T::zero();
-            for index in (0..n).rev() {
-                let Some((above, [z, ..])) = z.split_at_mut_checked(index) else { return Ok(()) };
-                add_multiple(above, -*z, column(factor, n, index));
-                let variance = ud::variance(factor, n, index);
-                if variance.is_zero() {
-                    // Held is a combination of parameters: what w has of it goes. 0 where one is held by itself.
-                    let Some((above, [w, ..])) = w.split_at_mut_checked(index) else { return Ok(()) };
-                    add_multiple(above, -*z, column(factor, n, index));
-                    *w -= *z;
-                } else if !z.is_zero() {
-                    information += *z / variance * *z;
-                }
-            }
-            let lost = T::from_count(free) * (T::one() - lambda);
-            let weight = lost / (T::one() - lost) / information;
-            if weight > T::zero() && weight.is_finite() {
-                ud::add_dyad(factor, w, weight);
-            }
-            Ok(())
-        })
-    }
-
     /// Takes a share of the prior θ_j = 0, var p_j, out of the estimate, once the data outweigh it.
     ///
     /// ```text
@@ -318,6 +261,24 @@ fn check_small<T: Real>(gradient: &[T], errors: &[T], spread: T) -> Result<(), E
         return Err(Error::TooLarge { argument: "output" });
     }
     Ok(())
+}
+
+/// Selective forgetting, between the two phases of an update: D_j <- D_j/λ where f_j² D_j > (1 - λ)/100. Keeps
+/// v = D f; returns φ'P φ.
+#[inline(always)]
+fn forget_selectively<T: Real>(factor: &mut [T], f: &[T], v: &mut [T], lambda: T) -> T {
+    let (growth, least) = (T::one() / lambda, (T::one() - lambda) / T::from_count(100));
+    let (size, mut spread) = (f.len(), T::zero());
+    for (index, (&f, v)) in f.iter().zip(v).enumerate() {
+        if f * *v > least
+            && let Some(variance) = diagonal_mut(factor, size, index)
+        {
+            *variance *= growth;
+            *v *= growth;
+        }
+        spread += f * *v;
+    }
+    spread
 }
 
 fn diagonal_mut<T: Real>(factor: &mut [T], size: usize, index: usize) -> Option<&mut T> {

@@ -20,7 +20,7 @@ type Estimator<T, const K: usize> = RecursiveLeastSquares<T, Const<K>>;
 const POLICIES: [Forgetting<f64>; 5] = [
     Forgetting::None,
     Forgetting::Exponential { factor: 0.97 },
-    Forgetting::Directional { factor: 0.97 },
+    Forgetting::Selective { factor: 0.97 },
     Forgetting::RandomWalk { variance: 0.01 },
     Forgetting::Variable { factor: 0.97, minimum: 0.9, noise_variance: 0.01 },
 ];
@@ -31,7 +31,7 @@ fn convert<T: Real>(policy: Forgetting<f64>) -> Forgetting<T> {
     match policy {
         Forgetting::None => Forgetting::None,
         Forgetting::Exponential { factor } => Forgetting::Exponential { factor: number(factor) },
-        Forgetting::Directional { factor } => Forgetting::Directional { factor: number(factor) },
+        Forgetting::Selective { factor } => Forgetting::Selective { factor: number(factor) },
         Forgetting::RandomWalk { variance } => Forgetting::RandomWalk { variance: number(variance) },
         Forgetting::Variable { factor, minimum, noise_variance } => Forgetting::Variable {
             factor: number(factor),
@@ -172,31 +172,46 @@ fn it_is_a_kalman_filter_of_a_state_that_stays_or_walks() {
 }
 
 #[test]
-fn directional_forgetting_is_its_definition_on_the_information() {
+fn selective_forgetting_is_its_definition_on_the_information() {
     const K: usize = 3;
     let (lambda, mut noise) = (0.95, Noise(3));
-    let mu = 1.0 - K as f64 * (1.0 - lambda);
-    let mut estimator = estimator::<f64, K>(Forgetting::Directional { factor: lambda });
+    let mut estimator = estimator::<f64, K>(Forgetting::Selective { factor: lambda });
     let (mut information, mut theta) = (SMatrix::<f64, K, K>::identity() / 100.0, SVector::<f64, K>::zeros());
+    let mut forgotten = [0; K];
     for k in 0..300 {
-        // Some regressors are below the threshold.
-        let phi: SVector<f64, K> = random(&mut noise) * if k % 3 == 0 { 0.05 } else { 1.0 };
+        // Correlated regressors; for some time the last of them says little that is new.
+        let mut phi: SVector<f64, K> = random(&mut noise);
+        phi[1] += phi[0];
+        phi[2] = phi[1] + phi[2] * if (100..200).contains(&k) { 0.01 } else { 1.0 };
         let y = phi.sum() + 0.1 * noise.next();
         estimator.update(&phi, y).unwrap();
-        if phi.norm_squared() >= 0.01 {
-            let along = information * phi;
-            information -= along * along.transpose() * ((1.0 - mu) / phi.dot(&along));
+        // P⁻¹ = L Δ L', and f = L⁻¹φ are the regressors without what those before them tell.
+        let (mut lower, mut rest, mut f) = (SMatrix::<f64, K, K>::identity(), information, phi);
+        let mut kept = SMatrix::<f64, K, K>::zeros();
+        for j in 0..K {
+            kept[(j, j)] = rest[(j, j)];
+            let column = rest.column(j) / rest[(j, j)];
+            rest -= column * column.transpose() * kept[(j, j)];
+            lower.set_column(j, &column);
+            for i in j + 1..K {
+                f[i] -= column[i] * f[j];
+            }
+            if f[j] * f[j] > (1.0 - lambda) / 100.0 * kept[(j, j)] {
+                kept[(j, j)] *= lambda;
+                forgotten[j] += 1;
+            }
         }
-        information += phi * phi.transpose();
+        information = lower * kept * lower.transpose() + phi * phi.transpose();
         theta += information.try_inverse().unwrap() * phi * (y - phi.dot(&theta));
         assert!(close(estimator.parameters(), &theta, 1e-10));
         assert!(close(&estimator.covariance().matrix(), &information.try_inverse().unwrap(), 1e-10));
     }
+    assert!(forgotten[0] > 250 && forgotten[2] < 250, "{forgotten:?}");
 }
 
 #[test]
-fn directional_forgetting_keeps_what_is_not_excited() {
-    let mut estimator = estimator::<f64, 2>(Forgetting::Directional { factor: 0.98 });
+fn selective_forgetting_keeps_what_is_not_excited() {
+    let mut estimator = estimator::<f64, 2>(Forgetting::Selective { factor: 0.98 });
     let mut noise = Noise(4);
     for _ in 0..500 {
         let phi = random(&mut noise);
@@ -212,6 +227,27 @@ fn directional_forgetting_keeps_what_is_not_excited() {
     assert!((estimator.parameters()[0] - 3.0).abs() < 0.01);
     assert!((estimator.parameters()[1] - known).abs() < 0.1);
     assert!(estimator.covariance().variances()[1] <= 1.5 * before);
+}
+
+#[test]
+fn selective_forgetting_does_not_depend_on_units() {
+    // Powers of 2: the same to the bit.
+    let scales = Vector3::new(1.0, 64.0, 1.0 / 1024.0);
+    let policy = Forgetting::Selective { factor: 0.98 };
+    let mut plain = estimator::<f64, 3>(policy);
+    let mut scaled = RecursiveLeastSquares::new(&scales, policy).unwrap();
+    let mut noise = Noise(23);
+    for k in 0..500 {
+        let mut phi: SVector<f64, 3> = random(&mut noise);
+        phi[1] += phi[0];
+        if (200..400).contains(&k) {
+            phi *= 1e-3;
+        }
+        let y = phi.sum() + noise.next();
+        plain.update(&phi, y).unwrap();
+        scaled.update(&phi.component_mul(&scales), 8.0 * y).unwrap();
+        assert_eq!(*plain.parameters() * 8.0, scaled.parameters().component_mul(&scales));
+    }
 }
 
 #[test]
@@ -231,11 +267,11 @@ fn one_factor_is_one_memory() {
         sum
     };
     let exponential = variance(Forgetting::Exponential { factor });
-    let directional = variance(Forgetting::Directional { factor });
+    let selective = variance(Forgetting::Selective { factor });
     let noise_variance = 0.01 / 3.0;
     let variable = variance(Forgetting::Variable { factor, minimum: 0.9, noise_variance });
     // Measured: 1.02 and 0.96.
-    assert!((directional / exponential - 1.0).abs() < 0.1, "{}", directional / exponential);
+    assert!((selective / exponential - 1.0).abs() < 0.1, "{}", selective / exponential);
     assert!((variable / exponential - 1.0).abs() < 0.1, "{}", variable / exponential);
 }
 

@@ -93,7 +93,7 @@ impl TrackMethod {
 /// |---|---|
 /// | `none`, or `1` | nothing |
 /// | `exponential:F`, or only `F` | the factor F = 1 - 1/(memory in samples) |
-/// | `directional:F` | the same factor, along the regressor only |
+/// | `selective:F` | the same factor, only for what a sample tells of |
 /// | `random-walk:V` | the variance of each parameter grows by V noise variances/scale² a sample, 0 to 100 |
 /// | `variable:F:M:N` | the factor F, at least M, where innovations are as large as the noise variance N in units of y² |
 ///
@@ -104,8 +104,8 @@ impl TrackMethod {
 /// use thetahat::Policy;
 /// use thetahat::thetahat_core::Forgetting;
 ///
-/// let policy: Policy = "directional:0.99".parse()?;
-/// assert_eq!(policy.0, Forgetting::Directional { factor: 0.99 });
+/// let policy: Policy = "selective:0.99".parse()?;
+/// assert_eq!(policy.0, Forgetting::Selective { factor: 0.99 });
 /// assert_eq!("1".parse::<Policy>()?.to_string(), "none");
 /// assert!("0.99:0.98".parse::<Policy>().is_err());
 /// # Ok::<(), thetahat::Error>(())

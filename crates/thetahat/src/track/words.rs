@@ -35,7 +35,7 @@ impl fmt::Display for TrackMethod {
 }
 
 /// The policies, in the words of a message.
-const POLICIES: &str = "write none, a factor such as 0.99, exponential:0.99, directional:0.99, random-walk:1e-6 or \
+const POLICIES: &str = "write none, a factor such as 0.99, exponential:0.99, selective:0.99, random-walk:1e-6 or \
                         variable:FACTOR:MINIMUM:NOISE_VARIANCE";
 
 impl FromStr for Policy {
@@ -60,7 +60,7 @@ impl FromStr for Policy {
         let forgetting = match (word, given.as_slice()) {
             ("none", []) => Forgetting::None,
             ("exponential", [one]) => Forgetting::Exponential { factor: factor(one)? },
-            ("directional", [one]) => Forgetting::Directional { factor: factor(one)? },
+            ("selective", [one]) => Forgetting::Selective { factor: factor(one)? },
             ("random-walk", [variance]) => {
                 let variance = number(variance)?;
                 if !(0.0..=100.0).contains(&variance) {
@@ -82,7 +82,7 @@ impl FromStr for Policy {
                 1.0 => Forgetting::None,
                 factor => Forgetting::Exponential { factor },
             },
-            ("none" | "exponential" | "directional" | "random-walk" | "variable", _) => {
+            ("none" | "exponential" | "selective" | "random-walk" | "variable", _) => {
                 return Err(wrong(&format!("does not have the numbers of its word; {POLICIES}")));
             }
             _ => return Err(wrong(&format!("is no policy; {POLICIES}"))),
@@ -97,7 +97,7 @@ impl fmt::Display for Policy {
         // `{:?}` writes small numbers with an exponent, and all so that they are read back to the bit.
         match self.0 {
             Forgetting::Exponential { factor } => write!(f, "exponential:{factor:?}"),
-            Forgetting::Directional { factor } => write!(f, "directional:{factor:?}"),
+            Forgetting::Selective { factor } => write!(f, "selective:{factor:?}"),
             Forgetting::RandomWalk { variance } => write!(f, "random-walk:{variance:?}"),
             Forgetting::Variable { factor, minimum, noise_variance } => {
                 write!(f, "variable:{factor:?}:{minimum:?}:{noise_variance:?}")

@@ -64,14 +64,13 @@ fn calibration(policy: Forgetting<f64>, start: Start, walk: f64, sigma: f64, ste
 #[test]
 fn the_noise_variance_and_the_covariance_are_calibrated() {
     let exponential = |factor| Forgetting::Exponential { factor };
-    let directional = |factor| Forgetting::Directional { factor };
+    let selective = |factor| Forgetting::Selective { factor };
     let cases = [
         (Forgetting::None, 0.0, 0.05),
         (exponential(0.98), 0.0, 0.05),
         (exponential(0.9), 0.0, 0.12),
-        (directional(0.98), 0.0, 0.06),
-        // The formulas are an approximation here, to the first order in 1 - λ.
-        (directional(0.9), 0.0, 0.35),
+        (selective(0.98), 0.0, 0.06),
+        (selective(0.9), 0.0, 0.12),
         (Forgetting::Variable { factor: 0.98, minimum: 0.9, noise_variance: 0.01 }, 0.0, 0.06),
         (Forgetting::RandomWalk { variance: 0.01 }, 0.01, 0.05),
     ];
@@ -165,7 +164,7 @@ fn bounded_policies_endure_in_single_precision() {
     let factor = 0.99;
     let policies = [
         Forgetting::Exponential { factor },
-        Forgetting::Directional { factor },
+        Forgetting::Selective { factor },
         Forgetting::RandomWalk { variance: 1e-4 },
         Forgetting::Variable { factor, minimum: 0.9, noise_variance: 1e-4 },
     ];

@@ -237,7 +237,7 @@ fn arguments_are_checked() {
     };
     for factor in [0.79, 1.01, 0.0, -1.0, f32::NAN] {
         assert_eq!(argument(new(&scales, Forgetting::Exponential { factor })), "factor");
-        assert_eq!(argument(new(&scales, Forgetting::Directional { factor })), "factor");
+        assert_eq!(argument(new(&scales, Forgetting::Selective { factor })), "factor");
         let variable = Forgetting::Variable { factor, minimum: 0.8, noise_variance: 1.0 };
         assert_eq!(argument(new(&scales, variable)), "factor");
         let variable = Forgetting::Variable { factor: 0.98, minimum: factor, noise_variance: 1.0 };

@@ -8,7 +8,7 @@ fn what_is_written_is_read_back() {
         Forgetting::None,
         Forgetting::Exponential { factor: 0.1 + 0.2 },
         Forgetting::Exponential { factor: 1.0 },
-        Forgetting::Directional { factor: 0.98 },
+        Forgetting::Selective { factor: 0.98 },
         Forgetting::RandomWalk { variance: 1e-300 },
         Forgetting::RandomWalk { variance: 0.0 },
         Forgetting::Variable { factor: 0.99, minimum: 0.9, noise_variance: 2.5e-7 },
@@ -41,10 +41,10 @@ fn words_that_mean_nothing_are_refused() {
             "{text}"
         );
     }
-    for text in ["nan", "inf", "exponential:nan", "directional:inf", "random-walk:x"] {
+    for text in ["nan", "inf", "exponential:nan", "selective:inf", "random-walk:x"] {
         assert!(message(text).contains("number"), "{}", message(text));
     }
-    for text in ["0", "1.01", "-1", "exponential:0", "directional:1.5", "variable:2:1:1"] {
+    for text in ["0", "1.01", "-1", "exponential:0", "selective:1.5", "variable:2:1:1"] {
         assert!(message(text).contains("above 0 and at most 1"), "{}", message(text));
     }
     for text in ["random-walk:-1", "random-walk:101", "variable:0.9:0.95:1", "variable:0.9:0.8:0"] {

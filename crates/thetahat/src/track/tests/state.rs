@@ -21,7 +21,7 @@ fn what_is_written_goes_on_to_the_bit() {
     let mut plans = vec![
         with(&orders(), rls, "none", "exact"),
         with(&orders(), rls, "0.95", "standard"),
-        with(&orders(), rls, "directional:0.95", "mixed:30"),
+        with(&orders(), rls, "selective:0.95", "mixed:30"),
         with(&orders(), rls, "random-walk:1e-4", "mixed"),
         with(&orders(), rls, "variable:0.99:0.9:0.03", "exact"),
         with(&armax, els, "0.95", "standard"),

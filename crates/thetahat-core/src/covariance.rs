@@ -95,21 +95,20 @@ impl<T: Real, N: Dimension> Covariance<T, N> {
         let n = size.value();
         check_length("covariance", n, columns.value())?;
         check_finite("covariance", matrix.as_slice())?;
-        let entry = |row, index| column(matrix.as_slice(), n, index).get(row).copied().unwrap_or(T::zero());
-        let given = |index| entry(index, index);
-        let rounding = Self::rounding(n);
-        for index in 0..n {
-            for row in 0..index {
-                let most = given(row).max(T::zero()).sqrt() * given(index).max(T::zero()).sqrt();
-                let largest = entry(row, index).abs().max(entry(index, row).abs()).max(most);
-                if (entry(row, index) - entry(index, row)).abs() > rounding * largest {
-                    return Err(Error::NotSymmetric { row, column: index });
-                }
-            }
-        }
         let mut variances = size.vector(T::zero());
+        // Of one element there is nothing to eliminate: so the noise of one sensor does not link what does that.
+        if let ([variance], [given]) = (variances.as_mut_slice(), matrix.as_slice()) {
+            if *given < T::zero() {
+                return Err(Error::NotPositive { argument: "covariance", index: 0 });
+            }
+            *variance = if *given >= T::MIN_POSITIVE { *given } else { T::zero() };
+            return Ok(Self::independent(&variances));
+        }
+        if let Some((row, column)) = first_asymmetry(matrix.as_slice(), n) {
+            return Err(Error::NotSymmetric { row, column });
+        }
         for (index, variance) in variances.as_mut_slice().iter_mut().enumerate() {
-            *variance = given(index);
+            *variance = ud::variance(matrix.as_slice(), n, index);
         }
         Self::decomposed(matrix.clone(), &variances, "covariance")
     }
@@ -205,20 +204,23 @@ impl<T: Real, N: Dimension> Covariance<T, N> {
     /// # Ok::<(), Error>(())
     /// ```
     pub fn from_diagonal(variances: &OVector<T, N>) -> Result<Self, Error> {
+        check_finite("variances", variances.as_slice())?;
+        if variances.as_slice().iter().any(|&variance| variance < T::zero()) {
+            return Err(Error::Negative { argument: "variances" });
+        }
+        Ok(Self::independent(variances))
+    }
+
+    /// Independent elements, with these variances, which are finite and not negative.
+    pub(crate) fn independent(variances: &OVector<T, N>) -> Self {
         let size = variances.shape_generic().0;
         let mut factor = size.square(T::zero());
         for (index, &variance) in variances.as_slice().iter().enumerate() {
-            if !variance.is_finite() {
-                return Err(Error::NotFinite { argument: "variances" });
-            }
-            if variance < T::zero() {
-                return Err(Error::Negative { argument: "variances" });
-            }
             if let Some(diagonal) = column_mut(factor.as_mut_slice(), size.value(), index).get_mut(index) {
                 *diagonal = variance;
             }
         }
-        Ok(Covariance { factor })
+        Covariance { factor }
     }
 
     /// The covariance A P A' of A x, where P is that of x and A is m x n.
@@ -381,63 +383,24 @@ impl<T: Real, N: Dimension> Covariance<T, N> {
     }
 
     /// Factors a symmetric matrix, n x n, that may be singular, and that was computed from one with the diagonal
-    /// `given`: so of element i, `given_i` times [`rounding`](Covariance::rounding) is nothing but rounding.
-    ///
-    /// Elements are eliminated one by one, each time the one of which the largest share is left: in a fixed order,
-    /// small pivots would make large errors of the rounding of what comes after them, and singular matrices would
-    /// be taken for indefinite ones. What is eliminated is added to the factors.
+    /// `given`: see [`eliminate`].
     pub(crate) fn decomposed(
         mut rest: OMatrix<T, N, N>,
         given: &OVector<T, N>,
         argument: &'static str,
     ) -> Result<Self, Error> {
-        let size = given.shape_generic().0;
-        let (n, rounding) = (size.value(), Self::rounding(size.value()));
-        let mut covariance = Self::zero(size);
-        for _ in 0..n {
-            let shares = given.iter().enumerate().map(|(index, &given)| {
-                let variance = ud::variance(rest.as_slice(), n, index);
-                let counts = variance > rounding * given && variance >= T::MIN_POSITIVE;
-                (index, if counts { variance / given } else { T::zero() })
-            });
-            let (index, share) =
-                shares.fold((0, T::zero()), |best, next| if next.1 > best.1 { next } else { best });
-            if share.is_zero() {
-                break;
-            }
-            let pivot = ud::variance(rest.as_slice(), n, index);
-            let mut weights = size.vector(T::zero());
-            for (weight, &entry) in weights.as_mut_slice().iter_mut().zip(column(rest.as_slice(), n, index)) {
-                *weight = entry / pivot;
-            }
-            for (k, &weight) in weights.as_slice().iter().enumerate() {
-                let target = column_mut(rest.as_mut_slice(), n, k);
-                ud::add_multiple(target, -(weight * pivot), weights.as_slice());
-                if k == index {
-                    target.fill(T::zero());
-                } else if let Some(eliminated) = target.get_mut(index) {
-                    *eliminated = T::zero();
-                }
-            }
-            ud::add_dyad(covariance.as_mut_slice(), weights.as_mut_slice(), pivot);
+        let mut covariance = Self::zero(given.shape_generic().0);
+        let mut weights = given.clone();
+        let factor = covariance.as_mut_slice();
+        match eliminate(rest.as_mut_slice(), given.as_slice(), factor, weights.as_mut_slice()) {
+            Some(index) => Err(Error::NotPositive { argument, index }),
+            None => Ok(covariance),
         }
-        let deviation =
-            |index| given.as_slice().get(index).map_or(T::zero(), |given: &T| given.max(T::zero()).sqrt());
-        for (index, &given) in given.as_slice().iter().enumerate() {
-            let most = rounding * (deviation(index) + deviation(index));
-            let left = column(rest.as_slice(), n, index);
-            let nothing = |row| (most * deviation(row)).max(T::MIN_POSITIVE);
-            let off = left.iter().enumerate().any(|(row, entry)| entry.abs() > nothing(row));
-            if given < T::zero() || off {
-                return Err(Error::NotPositive { argument, index });
-            }
-        }
-        Ok(covariance)
     }
 
     /// What counts as nothing but rounding beside a variance.
     pub(crate) fn rounding(size: usize) -> T {
-        T::EPSILON * T::from_count(8 * size.max(1))
+        rounding(size)
     }
 
     /// The factors in one square: D on the diagonal, U above it.
@@ -453,6 +416,86 @@ impl<T: Real, N: Dimension> Covariance<T, N> {
     pub(crate) fn size(&self) -> N {
         self.factor.shape_generic().0
     }
+}
+
+/// What counts as nothing but rounding beside a variance.
+fn rounding<T: Real>(size: usize) -> T {
+    T::EPSILON * T::from_count(8 * size.max(1))
+}
+
+// What follows runs when a filter is set up. It knows no sizes but those of its slices, so that a program has it once.
+
+/// The first two entries of a matrix, n x n, that should be equal and differ by more than rounding: row and column.
+#[inline(never)]
+fn first_asymmetry<T: Real>(matrix: &[T], size: usize) -> Option<(usize, usize)> {
+    for index in 0..size {
+        for row in 0..index {
+            let (above, below) = (ud::entry(matrix, size, row, index), ud::entry(matrix, size, index, row));
+            let excess = (above - below).abs() / rounding(size);
+            if excess > above.abs()
+                && excess > below.abs()
+                && exceeds(excess, ud::variance(matrix, size, row), ud::variance(matrix, size, index))
+            {
+                return Some((row, index));
+            }
+        }
+    }
+    None
+}
+
+/// Factors a symmetric matrix, n x n, that may be singular, into `factor`, which holds zeros. Returns the first element
+/// of which more is left than rounding, or of which the variance is negative: then the matrix is no covariance.
+///
+/// The matrix was computed from one with the diagonal `given`: so of element i, `given_i` times [`rounding`] is nothing
+/// but rounding.
+///
+/// Elements are eliminated one by one, each time the one of which the largest share is left: in a fixed order,
+/// small pivots would make large errors of the rounding of what comes after them, and singular matrices would
+/// be taken for indefinite ones. What is eliminated is added to the factors.
+#[inline(never)]
+fn eliminate<T: Real>(rest: &mut [T], given: &[T], factor: &mut [T], weights: &mut [T]) -> Option<usize> {
+    let (size, rounding) = (given.len(), rounding::<T>(given.len()));
+    for _ in 0..size {
+        let (mut index, mut share) = (0, T::zero());
+        for (candidate, &given) in given.iter().enumerate() {
+            let variance = ud::variance(rest, size, candidate);
+            if variance > rounding * given && variance >= T::MIN_POSITIVE && variance / given > share {
+                (index, share) = (candidate, variance / given);
+            }
+        }
+        if share.is_zero() {
+            break;
+        }
+        let pivot = ud::variance(rest, size, index);
+        for (weight, &entry) in weights.iter_mut().zip(column(rest, size, index)) {
+            *weight = entry / pivot;
+        }
+        for (k, &weight) in weights.iter().enumerate() {
+            let target = column_mut(rest, size, k);
+            ud::add_multiple(target, -(weight * pivot), weights);
+            for (row, entry) in target.iter_mut().enumerate() {
+                if k == index || row == index {
+                    *entry = T::zero();
+                }
+            }
+        }
+        ud::add_dyad(factor, weights, pivot);
+    }
+    let twice = rounding + rounding;
+    given.iter().enumerate().position(|(index, &variance)| {
+        let left = column(rest, size, index).iter().zip(given);
+        let off = |(entry, &other): (&T, &T)| {
+            entry.abs() > T::MIN_POSITIVE && exceeds(entry.abs() / twice, variance, other)
+        };
+        variance < T::zero() || left.into_iter().any(off)
+    })
+}
+
+/// Whether x, which is above 0, exceeds √(p q). A variance below `MIN_POSITIVE` counts as 0. (A square root would link the
+/// one of the mathematical library, which is longer than all of this.)
+fn exceeds<T: Real>(x: T, p: T, q: T) -> bool {
+    let (small, large) = if p < q { (p, q) } else { (q, p) };
+    small < T::MIN_POSITIVE || x / large > small / x
 }
 
 #[cfg(test)]

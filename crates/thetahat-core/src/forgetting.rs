@@ -256,10 +256,12 @@ pub enum Start {
 pub(crate) enum Phase {
     /// The start is over, or a prior is in again: the forgetting policy rules.
     Running,
-    /// Not of full rank yet.
-    Waiting { collecting: bool, blend: u16 },
-    /// The prior is being taken out; `left` of `total` shares of it are still in.
-    Blending { left: u16, total: u16 },
+    /// Not of full rank yet: there is no estimate.
+    Collecting,
+    /// Not of full rank yet: the estimate is that with the prior.
+    Waiting,
+    /// The prior is being taken out, share by share.
+    Blending,
     /// As `Running`, and no prior is in the estimate.
     Free,
 }
@@ -269,15 +271,5 @@ impl Phase {
     #[inline(always)]
     pub(crate) fn is_running(self) -> bool {
         matches!(self, Phase::Running | Phase::Free)
-    }
-}
-
-impl From<Start> for Phase {
-    fn from(start: Start) -> Self {
-        match start {
-            Start::Standard => Phase::Running,
-            Start::Exact => Phase::Waiting { collecting: true, blend: 0 },
-            Start::Mixed { blend } => Phase::Waiting { collecting: false, blend },
-        }
     }
 }

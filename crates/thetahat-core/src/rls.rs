@@ -9,9 +9,11 @@ use crate::triangle::{column, column_mut};
 use crate::ud::dot;
 use crate::{Covariance, Dimension, Error, Innovation, Real, Solution, ud};
 
+mod after;
 mod residuals;
 mod sample;
 
+use after::After;
 use residuals::Residuals;
 pub(crate) use sample::is_small;
 use sample::scale_variances;
@@ -108,9 +110,14 @@ pub struct RecursiveLeastSquares<T: Real, N: Dimension + Dimension<M>, M: Dimens
     forgetting: Forgetting<T>,
     dead_zone: T,
     /// Whose variance is compared with its bound next.
-    turn: usize,
+    turn: u16,
     phase: Phase,
+    /// In how many shares the start takes the prior out, and how many of them are still in.
+    shares: u16,
+    shares_left: u16,
     adapting: bool,
+    #[cfg_attr(feature = "serde", serde(skip, default = "After::any"))]
+    after: After<Self>,
     #[cfg_attr(feature = "serde", serde(skip))]
     scratch: N::Scratch<T>,
 }
@@ -123,7 +130,12 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>> RecursiveLeastSquares<T, N> {
     ///
     /// Errors: [`Error::NotFinite`]; [`Error::OutOfRange`] if a scale is not above 0 or its third power or that of
     /// its reciprocal exceeds [`Real::LARGEST_ENTRY`] (in `f32` they lie in 6e-10 … 1.7e9), or if a number of the
-    /// forgetting policy is out of its range.
+    /// forgetting policy is out of its range; [`Error::Length`] for more than 65,535 parameters.
+    ///
+    /// A policy that is a constant here, and a start that is one in [`with_start`](RecursiveLeastSquares::with_start),
+    /// keep out of the program what others would need: of 2.9 kB on a Cortex-M4F, 1 kB more with the random walk or
+    /// another start.
+    #[inline]
     pub fn new(scales: &OVector<T, N>, forgetting: Forgetting<T>) -> Result<Self, Error> {
         Self::with_outputs(scales, Const, forgetting)
     }
@@ -155,7 +167,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>> RecursiveLeastSquares<T, N> {
     pub fn with_solution(self, solution: &Solution<T, N>) -> Result<Self, Error> {
         let n = self.bounds.len();
         check_length("solution", n, solution.parameters.len())?;
-        let mut covariance = Covariance::from_diagonal(&self.bounds)?;
+        let mut covariance = Covariance::independent(&self.bounds);
         // R⁻¹ R⁻¹' = U D U', with the columns of R⁻¹ divided by its diagonal.
         for index in 0..n {
             let inverse = |row: usize| {
@@ -312,12 +324,18 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
     /// assert!((estimator.parameters() - truth).amax() < 1e-3);
     /// # Ok::<(), Error>(())
     /// ```
+    #[inline]
     pub fn with_outputs(
         scales: &OVector<T, N>,
         outputs: M,
         forgetting: Forgetting<T>,
     ) -> Result<Self, Error> {
         let size = scales.shape_generic().0;
+        // `turn` counts them.
+        let most = usize::from(u16::MAX);
+        if size.value() > most {
+            return Err(Error::Length { argument: "scales", expected: most, found: size.value() });
+        }
         forgetting.check(size.value())?;
         check_entries("scales", scales.as_slice(), size.value())?;
         let mut bounds = size.vector(T::zero());
@@ -331,14 +349,17 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
         }
         Ok(RecursiveLeastSquares {
             parameters: size.rows_by(outputs, T::zero()),
-            covariance: Covariance::from_diagonal(&bounds)?,
+            covariance: Covariance::independent(&bounds),
             bounds,
             residuals: Residuals::new(outputs),
             forgetting,
             dead_zone: T::zero(),
             turn: 0,
             phase: Phase::Running,
+            shares: 0,
+            shares_left: 0,
             adapting: true,
+            after: After::of(forgetting),
             scratch: size.scratch::<T, 2, 0>(),
         })
     }
@@ -360,11 +381,20 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
     /// assert!((line.parameters() - Vector2::new(3.0, 2.0)).amax() < 1e-12);
     /// # Ok::<(), Error>(())
     /// ```
+    #[inline]
     pub fn with_start(mut self, start: Start) -> Result<Self, Error> {
-        self.phase = start.into();
+        (self.phase, self.shares) = match start {
+            Start::Standard => (Phase::Running, 0),
+            Start::Exact => (Phase::Collecting, 1),
+            Start::Mixed { blend } => (Phase::Waiting, blend.max(1)),
+        };
+        self.shares_left = self.shares;
+        if !self.phase.is_running() {
+            self.after = After::any();
+        }
         let mut prior = self.bounds.clone();
         prior.as_mut_slice().iter_mut().for_each(|variance| *variance *= self.width());
-        self.covariance = Covariance::from_diagonal(&prior)?;
+        self.covariance = Covariance::independent(&prior);
         self.parameters.fill(T::zero());
         self.residuals.clear();
         self.turn = 0;
@@ -379,8 +409,8 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
         check_length("parameters", self.parameters.nrows(), parameters.nrows())?;
         check_entries("parameters", parameters.as_slice(), self.parameters.len())?;
         self.parameters = parameters;
-        if let Phase::Waiting { collecting: true, .. } = self.phase {
-            self.covariance = Covariance::from_diagonal(&self.bounds)?;
+        if self.phase == Phase::Collecting {
+            self.covariance = Covariance::independent(&self.bounds);
         }
         self.phase = Phase::Running;
         Ok(self)
@@ -476,12 +506,13 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
     /// One sample without a measurement, which is what a NaN is. Only the random walk takes note of it, once the
     /// start is over and while adaptation is on; a variance that comes back to its bound here is not reported.
     pub fn advance(&mut self) {
-        let Forgetting::RandomWalk { variance } = self.forgetting else { return };
-        if !self.phase.is_running() || !self.adapting {
-            return;
+        if matches!(self.forgetting, Forgetting::RandomWalk { .. })
+            && self.phase.is_running()
+            && self.adapting
+        {
+            self.after.call(self);
+            self.cap();
         }
-        self.walk(variance);
-        self.cap();
     }
 
     /// The same to the bit, with the number of parameters in another type, see [`Covariance::to_size`]: with `Const`
@@ -502,7 +533,10 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
             dead_zone: self.dead_zone,
             turn: self.turn,
             phase: self.phase,
+            shares: self.shares,
+            shares_left: self.shares_left,
             adapting: self.adapting,
+            after: After::any(),
             scratch: size.scratch::<T, 2, 0>(),
         })
     }

@@ -154,7 +154,9 @@ fn clear_negligible<T: Real>(f: &mut [T], v: &mut [T], noise: T) -> T {
         if v.is_zero() {
             *f = T::zero();
         }
-        largest = largest.max(f.abs());
+        if f.abs() > largest {
+            largest = f.abs();
+        }
     }
     let least = T::MIN_POSITIVE * largest * largest;
     let mut sum = noise;
@@ -315,19 +317,21 @@ pub(crate) fn expand<T: Real>(factor: &[T], matrix: &mut [T], size: usize) {
                 let weight = variance(factor, size, k) * entry(factor, size, index, k);
                 sum + weight * entry(factor, size, row, k)
             });
-            for place in [index * size + row, row * size + index] {
-                if let Some(target) = matrix.get_mut(place) {
-                    *target = sum;
-                }
+            if let Some(target) = matrix.get_mut(index * size + row) {
+                *target = sum;
+            }
+            if let Some(target) = matrix.get_mut(row * size + index) {
+                *target = sum;
             }
         }
     }
 }
 
-/// Whether U, D and the variances, the diagonal of P, are finite.
+/// Whether U, D and the variances, the diagonal of P, are finite. (What is not among U and D shows in the variances, as
+/// nothing in those sums is negative.)
 #[inline(never)]
 pub(crate) fn has_finite_variances<T: Real>(factor: &[T], size: usize) -> bool {
-    is_finite(factor, size) && (0..size).all(|index| diagonal(factor, size, index).is_finite())
+    (0..size).all(|index| diagonal(factor, size, index).is_finite())
 }
 
 /// Whether U and D are finite.

@@ -60,6 +60,6 @@ impl<T: Real, M: Dimension> Residuals<T, M> {
             }
         }
         // Without noise a sum of these could overflow.
-        nis.min(T::LARGEST_ENTRY)
+        if nis < T::LARGEST_ENTRY { nis } else { T::LARGEST_ENTRY }
     }
 }

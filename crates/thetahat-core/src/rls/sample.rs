@@ -3,7 +3,7 @@
 use crate::error::check_length;
 use crate::forgetting::{Forgetting, Phase};
 use crate::lags::is_infinite;
-use crate::triangle::{column, column_mut};
+use crate::triangle::column_mut;
 use crate::ud::{add_multiple, dot};
 use crate::{Action, Dimension, Error, Real, RecursiveLeastSquares, ud};
 
@@ -60,50 +60,53 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
             let spread = ud::project(factor, gradient, f, v, T::zero());
             check_small(gradient, errors, spread)?;
             // Nothing can fail from here on.
-            if resting {
-                let nis = residuals.normalise(errors, variances, n, T::one() + spread);
-                if !adapting {
-                    return Ok((nis, Action::Frozen));
-                }
-                // P does not shrink meanwhile, but the estimate is better than it says.
-                residuals.count(errors, T::one(), weight);
-                return Ok((nis, Action::Skipped));
-            }
-            let spread = match policy {
+            let rule = if resting { Forgetting::None } else { policy };
+            let spread = match rule {
                 Forgetting::Selective { factor: lambda } => forget_selectively(factor, f, v, lambda),
                 _ => spread,
             };
-            let noise = match policy {
+            let noise = match rule {
                 Forgetting::None | Forgetting::RandomWalk { .. } | Forgetting::Selective { .. } => T::one(),
                 Forgetting::Exponential { factor } => factor,
                 Forgetting::Variable { factor, minimum, noise_variance } => {
                     let surprise =
                         errors.iter().fold(T::zero(), |sum, &error| sum + error / noise_variance * error);
                     let surprise = surprise / T::from_count(errors.len()) / (T::one() + spread);
-                    (T::one() - (T::one() - factor) * surprise).max(minimum)
+                    let factor = T::one() - (T::one() - factor) * surprise;
+                    if factor > minimum { factor } else { minimum }
                 }
             };
             // The divisions for the innovation come first: they go on beside those of the update.
             let (total, growth) = (noise + spread, T::one() / noise);
             let nis = residuals.normalise(errors, variances, n, total * growth);
-            let inverse = ud::update(factor, f, v, noise, growth);
-            // A sample that fixes parameters tells of the prior as well as of the noise. A start that takes the prior
-            // out does so from the residuals too: then every sample counts.
-            let fixing = with_prior && total * growth > T::from_count(11);
-            let weight = if let Forgetting::Variable { .. } = policy { noise } else { weight };
-            residuals.count(errors, if fixing { T::zero() } else { noise * inverse }, weight);
-            let mut restrained = false;
-            for (index, &error) in errors.iter().enumerate() {
-                restrained |= move_by(column_mut(parameters.as_mut_slice(), n, index), v, error * inverse);
+            if !adapting {
+                return Ok((nis, Action::Frozen));
             }
-            Ok((nis, if restrained { Action::Projected } else { Action::Updated }))
+            // P does not shrink in a dead zone, but the estimate is better than it says.
+            let (mut share, mut action) = (T::one(), Action::Skipped);
+            let weight = if let Forgetting::Variable { .. } = rule { noise } else { weight };
+            if !resting {
+                let inverse = ud::update(factor, f, v, noise, growth);
+                // A sample that fixes parameters tells of the prior as well as of the noise. A start that takes the prior
+                // out does so from the residuals too: then every sample counts.
+                let fixing = with_prior && total * growth > T::from_count(11);
+                share = if fixing { T::zero() } else { noise * inverse };
+                action = Action::Updated;
+                for (index, &error) in errors.iter().enumerate() {
+                    if move_by(column_mut(parameters.as_mut_slice(), n, index), v, error * inverse) {
+                        action = Action::Projected;
+                    }
+                }
+            }
+            residuals.count(errors, share, weight);
+            Ok((nis, action))
         })?;
         if resting {
             return Ok((nis, action));
         }
+        self.after.call(self);
         if !running {
-            self.remove_prior();
-            if let Phase::Waiting { collecting: true, .. } = self.phase {
+            if self.phase == Phase::Collecting {
                 action = Action::Collecting;
             }
             return Ok((nis, action));
@@ -111,37 +114,16 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
         if let Forgetting::None = policy {
             return Ok((nis, action));
         }
-        if let Forgetting::RandomWalk { variance } = policy {
-            self.walk(variance);
-        }
         if self.cap() && action == Action::Updated {
             action = Action::Capped;
         }
         Ok((nis, action))
     }
 
-    /// P_jj <- P_jj + n `variance` / scale_j², for the parameter whose turn it is, unless it is held.
-    #[inline(never)]
-    pub(super) fn walk(&mut self, variance: T) {
-        let growth = variance * T::from_count(self.bounds.len()) / T::from_count(100);
-        let (factor, bounds, turn) = (self.covariance.as_mut_slice(), self.bounds.as_slice(), self.turn);
-        // A parameter that is held stays.
-        if ud::diagonal(factor, bounds.len(), turn).is_zero() {
-            return;
-        }
-        self.bounds.shape_generic().0.with_scratch(&mut self.scratch, |[unit], []| {
-            unit.fill(T::zero());
-            if let (Some(entry), Some(&bound)) = (unit.get_mut(turn), bounds.get(turn)) {
-                *entry = T::one();
-                ud::add_dyad(factor, unit, growth * bound);
-            }
-        });
-    }
-
     /// Brings P_jj back to p_j, if it is above, for the parameter whose turn it is; the next one is next.
     #[inline(always)]
     pub(super) fn cap(&mut self) -> bool {
-        let (turn, n) = (self.turn, self.bounds.len());
+        let (turn, n) = (usize::from(self.turn), self.bounds.len());
         let variance = ud::diagonal(self.covariance.as_slice(), n, turn);
         let bound = self.bounds.as_slice().get(turn).copied().unwrap_or(T::INFINITY);
         let above = variance > bound;
@@ -149,7 +131,7 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
             // In this order nothing overflows.
             self.bring_back(bound / ((variance - bound) / variance));
         }
-        self.turn = if turn + 1 < n { turn + 1 } else { 0 };
+        self.turn = if turn + 1 < n { self.turn + 1 } else { 0 };
         above
     }
 
@@ -161,68 +143,12 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
         if self.phase == Phase::Free {
             self.phase = Phase::Running;
         }
-        let (size, turn) = (self.covariance.size(), self.turn);
+        let (size, turn) = (self.covariance.size(), usize::from(self.turn));
         let factor = self.covariance.as_mut_slice();
         size.with_scratch(&mut self.scratch, |[f, v], []| {
             measure_one(factor, turn, f, v);
             ud::update(factor, f, v, noise, T::one());
         });
-    }
-
-    /// Takes a share of the prior θ_j = 0, var p_j, out of the estimate, once the data outweigh it.
-    ///
-    /// ```text
-    /// q = p_j/share - P_jj,    W v <- W v - θ̂_j²/q,    θ̂ <- θ̂ + P e_j θ̂_j / q,    P <- P + P e_j e_j'P / q
-    /// ```
-    ///
-    /// Σ P_jj/p_j <= 1/2 says that P⁻¹ is at least twice the information of the prior. So q >= p_j/2 in every step.
-    /// Here p_j is that of the start, see [`width`](RecursiveLeastSquares::width).
-    #[cold]
-    #[inline(never)]
-    fn remove_prior(&mut self) {
-        let width = self.width();
-        let RecursiveLeastSquares { parameters, covariance, bounds, residuals, phase, .. } = self;
-        let size = covariance.size();
-        let (n, factor) = (size.value(), covariance.as_mut_slice());
-        let (left, total) = match *phase {
-            Phase::Running | Phase::Free => return,
-            Phase::Blending { left, total } => (left, total.max(1)),
-            Phase::Waiting { blend, .. } => {
-                let known = bounds.as_slice().iter().enumerate();
-                let sum = known.fold(T::zero(), |sum, (index, &p)| sum + ud::diagonal(factor, n, index) / p);
-                if sum > width / T::from_count(2) {
-                    return;
-                }
-                (blend.max(1), blend.max(1))
-            }
-        };
-        size.with_scratch(&mut self.scratch, |[gain], []| {
-            for (index, &bound) in bounds.as_slice().iter().enumerate() {
-                covariance_column(factor, index, gain);
-                let variance = gain.get(index).copied().unwrap_or(T::zero());
-                let rest = bound * width * T::from_count(usize::from(total)) - variance;
-                if rest <= T::zero() {
-                    continue;
-                }
-                for (output, mean) in residuals.mean_squares.as_mut_slice().iter_mut().enumerate() {
-                    let parameters = column_mut(parameters.as_mut_slice(), n, output);
-                    let parameter = parameters.get(index).copied().unwrap_or(T::zero());
-                    *mean = (*mean - parameter / rest * parameter / residuals.weights).max(T::zero());
-                    add_multiple(parameters, parameter / rest, gain);
-                }
-                ud::add_dyad(factor, gain, T::one() / rest);
-            }
-        });
-        *phase = if left > 1 { Phase::Blending { left: left - 1, total } } else { Phase::Free };
-    }
-
-    /// By how much the variances of the prior that an exact start takes out are above p_j. With forgetting it cannot
-    /// be more than 1: an estimate that is less sure than the cap lets it be would be held where it is.
-    pub(super) fn width(&self) -> T {
-        match (self.phase, self.forgetting) {
-            (Phase::Waiting { collecting: true, .. }, Forgetting::None) => T::from_count(10_000),
-            _ => T::one(),
-        }
     }
 
     fn is_in_dead_zone(&self, errors: &[T]) -> bool {
@@ -233,10 +159,11 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
 /// That no number of a sample is infinite, and one is NaN.
 #[cold]
 fn check_sample<T: Real>(regressor: &[T], outputs: &[T]) -> Result<(), Error> {
-    for (argument, values) in [("regressor", regressor), ("output", outputs)] {
-        if values.iter().any(is_infinite) {
-            return Err(Error::Infinite { argument });
-        }
+    if regressor.iter().any(is_infinite) {
+        return Err(Error::Infinite { argument: "regressor" });
+    }
+    if outputs.iter().any(is_infinite) {
+        return Err(Error::Infinite { argument: "output" });
     }
     let missing = regressor.iter().chain(outputs).any(|value| !value.is_finite());
     missing.then_some(()).ok_or(Error::TooLarge { argument: "regressor" })
@@ -305,20 +232,5 @@ fn measure_one<T: Real>(factor: &[T], index: usize, f: &mut [T], v: &mut [T]) {
             _ => ud::entry(factor, size, index, k),
         };
         *v = ud::variance(factor, size, k) * *f;
-    }
-}
-
-/// Writes P e_j into `target`.
-fn covariance_column<T: Real>(factor: &[T], index: usize, target: &mut [T]) {
-    let size = target.len();
-    target.fill(T::zero());
-    for k in index..size {
-        let variance = ud::variance(factor, size, k);
-        let weight = if k == index { variance } else { variance * ud::entry(factor, size, index, k) };
-        let (above, rest) = target.split_at_mut_checked(k).unwrap_or_default();
-        add_multiple(above, weight, column(factor, size, k));
-        if let [diagonal, ..] = rest {
-            *diagonal += weight;
-        }
     }
 }

@@ -430,7 +430,7 @@ fn the_mixed_start_is_standard_then_exact() {
         standard.update(phi, *y).unwrap();
         exact.update(phi, *y).unwrap();
         assert_eq!(mixed.update(phi, *y).unwrap().action, Action::Updated);
-        let collecting = matches!(mixed.phase, super::Phase::Waiting { .. });
+        let collecting = mixed.phase == super::Phase::Waiting;
         assert_eq!(blended.update(phi, *y).unwrap().action, Action::Updated);
         if !collecting && moment.is_none() {
             moment = Some(k);

@@ -380,9 +380,44 @@ fn run_time_sizes_give_the_same_bits() {
     }
 }
 
+#[cfg(feature = "alloc")]
+#[test]
+fn more_parameters_than_are_counted_are_an_error() {
+    use nalgebra::{DVector, Dyn};
+
+    let many = DVector::repeat(65_536, 1.0_f32);
+    let made = RecursiveLeastSquares::<f32, Dyn>::new(&many, Forgetting::None);
+    assert_eq!(made.err(), Some(Error::Length { argument: "scales", expected: 65_535, found: 65_536 }));
+}
+
+/// What follows a sample is a pointer, which no snapshot and no change of size keeps: it is found out again.
+#[cfg(feature = "alloc")]
+#[test]
+fn a_copy_in_another_size_goes_on_with_its_policy_and_start() {
+    use nalgebra::{DVector, Dyn};
+
+    for policy in POLICIES {
+        for start in [Start::Standard, Start::Exact, Start::Mixed { blend: 5 }] {
+            let mut fixed = estimator::<f64, 3>(policy).with_start(start).unwrap();
+            for (k, (phi, y)) in samples(20, &Vector3::new(1.0, 2.0, 3.0), 0.1, 60).into_iter().enumerate() {
+                let mut copy = fixed.to_size(Dyn(3)).unwrap();
+                let row = DVector::from_column_slice(phi.as_slice());
+                let expected = debug(&fixed.update(&phi, y).unwrap());
+                assert_eq!(debug(&copy.update(&row, y).unwrap()), expected, "{policy:?} {start:?} {k}");
+                for _ in 0..3 {
+                    fixed.advance();
+                    copy.advance();
+                }
+                assert_eq!(fixed.covariance().factor().as_slice(), copy.covariance().factor().as_slice());
+                assert_eq!(fixed.parameters().as_slice(), copy.parameters().as_slice());
+            }
+        }
+    }
+}
+
 #[test]
 fn it_is_small() {
-    // On a microcontroller 4, 8 and 16 parameters take 140, 364 and 1196 bytes; here the counter has a longer word.
+    // On a microcontroller 4, 8 and 16 parameters take 140, 364 and 1196 bytes; here the pointer is a longer word.
     let word = size_of::<usize>() - 4;
     assert!(size_of::<Estimator<f32, 4>>() <= 140 + word);
     assert!(size_of::<Estimator<f32, 8>>() <= 364 + word);

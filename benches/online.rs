@@ -66,14 +66,14 @@ fn recursive<T: Real, const N: usize>(
 }
 
 fn recursive_arx<T: Real>(group: &mut BenchmarkGroup<'_, WallTime>) -> Result<(), thetahat_core::Error> {
-    let orders = ArxOrders { na: 4, inputs: &[InputOrders { nb: 4, nk: 1 }] };
+    let orders = ArxOrders { na: 4, inputs: &[InputOrders { nb: 4, nk: 1 }], constant: false };
     let forgetting = Forgetting::Exponential { factor: nalgebra::convert(0.99) };
     let mut plant = RecursiveArx::<T, Const<8>>::new(&orders, T::one(), &[T::one()], forgetting)?;
     let mut k = 0;
     group.bench_function("RecursiveArx(4, 4, 1)", |bencher| {
         bencher.iter(|| {
             k = (k + 1) % SAMPLES;
-            plant.update(&[value(k)], value(3 * k + 1))
+            plant.log_row(value(3 * k + 1), &[value(k)])
         });
     });
     Ok(())
@@ -88,7 +88,7 @@ fn tracker(criterion: &mut Criterion) -> Result<(), thetahat::Error> {
     criterion.bench_function("Tracker, ARX(4, 4, 1)", |bencher| {
         bencher.iter(|| {
             k = (k + 1) % SAMPLES;
-            tracker.update(&[value(k)], value(3 * k + 1))
+            tracker.log_row(value(3 * k + 1), &[value(k)])
         });
     });
     Ok(())

@@ -39,13 +39,13 @@ fn its_numbers_are_those_of_the_library_to_the_bit() {
     assert_eq!(lines.len(), 600);
 
     let inputs = [InputOrders { nb: 2, nk: 1 }, InputOrders { nb: 1, nk: 2 }];
-    let orders = ArxOrders { na: 2, inputs: &inputs };
+    let orders = ArxOrders { na: 2, inputs: &inputs, constant: false };
     let policy = Forgetting::Exponential { factor: 0.98 };
     let mut library: RecursiveArx<f64, Const<5>, Const<3>> =
         RecursiveArx::new(&orders, 3.0, &[1.0, 1.0], policy).unwrap();
     let mut compared = 0;
     for (row, line) in lines.iter().enumerate() {
-        let innovation = library.update(&[u1[row], u2[row]], y[row]).unwrap();
+        let innovation = library.log_row(y[row], &[u1[row], u2[row]]).unwrap();
         assert_eq!(number(line, "/row"), row as f64 + 1.0);
         assert_eq!(number(line, "/excitation").to_bits(), library.estimator().excitation().to_bits());
         if innovation.action == Action::NotReady {

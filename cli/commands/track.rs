@@ -205,7 +205,7 @@ impl<'a> Run<'a> {
         let mut any = false;
         for (index, (tracker, alarms)) in state.trackers.iter_mut().zip(&mut state.alarms).enumerate() {
             let tracked = tracker
-                .update(inputs, output)
+                .log_row(output, inputs)
                 .map_err(|error| Failure::data(format!("{name}:{}: {error}", live.line())))?;
             if row.is_multiple_of(job.lines.every) {
                 let done = match (malformed, tracked.too_large) {

@@ -102,7 +102,7 @@ observation = th.NonlinearObservation(measure, [[2e-3**2]])
 start = np.array([0.8, 0.0, np.log(0.080), np.log(0.020), np.log(60.0)])
 start_deviations = np.array([0.1, 0.01, 0.5, 0.5, 0.5])
 estimator = th.ExtendedKalmanFilter(start, np.diag(start_deviations**2))
-run = estimator.run(transition, observation, voltage, current)
+run = estimator.run(transition, observation, voltage, inputs=current)
 deviations = np.sqrt(np.diagonal(run.filtered_covariances, axis1=1, axis2=2))
 
 # %%
@@ -159,7 +159,7 @@ print(f"mean NIS {nis:.3f}, expected 1 ± {bound:.3f}")
 # %%
 fixed = th.NonlinearTransition(move, np.diag(np.concatenate([state_noise, np.zeros(3)]) ** 2))
 sure = th.ExtendedKalmanFilter(start, np.diag(np.array([0.01, 0.01, 0.005, 0.005, 0.005]) ** 2))
-wrong = sure.run(fixed, observation, voltage, current)
+wrong = sure.run(fixed, observation, voltage, inputs=current)
 wrong_nis = float(np.mean(wrong.nis[settled]))
 wrong_resistance = float(np.exp(wrong.filtered_states[-1, 2]))
 wrong_deviation = float(np.sqrt(wrong.filtered_covariances[-1, 2, 2]))

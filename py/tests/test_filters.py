@@ -129,7 +129,7 @@ def test_it_agrees_with_filterpy() -> None:
     other = filterpy.KalmanFilter(dim_x=3, dim_z=2, dim_u=2)
     other.F, other.H, other.Q = TURN, observation.output_matrix, transition.noise
     other.R, other.B, other.x, other.P = observation.noise, transition.input_matrix, np.zeros(3), np.eye(3)
-    trajectory = KalmanFilter(np.zeros(3), np.eye(3)).run(transition, observation, measurements, inputs)
+    trajectory = KalmanFilter(np.zeros(3), np.eye(3)).run(transition, observation, measurements, inputs=inputs)
     for k, (y, u) in enumerate(zip(measurements, inputs)):
         np.testing.assert_allclose(trajectory.predicted_states[k], other.x, rtol=1e-9, atol=1e-12)
         other.update(y)
@@ -142,7 +142,7 @@ def test_it_agrees_with_filterpy() -> None:
 def test_steps_in_a_loop_and_run_give_the_same_bits() -> None:
     transition, observation, measurements, inputs = vehicle()
     loop, run = (KalmanFilter(np.zeros(3), np.eye(3), gate=9.0) for _ in range(2))
-    trajectory = run.run(transition, observation, measurements, inputs)
+    trajectory = run.run(transition, observation, measurements, inputs=inputs)
     actions = []
     for k, (y, u) in enumerate(zip(measurements, inputs)):
         np.testing.assert_array_equal(trajectory.predicted_states[k], loop.state)
@@ -175,7 +175,7 @@ def test_every_size_gives_the_same_bits(n: int, m: int, correlated: bool) -> Non
     inputs, measurements = random.standard_normal(60), random.standard_normal((60, m))
     measurements[10, m - 1], measurements[20] = np.nan, np.nan
     loop, run = (KalmanFilter(np.ones(n), np.eye(n), gate=12.0) for _ in range(2))
-    trajectory = run.run(transition, observation, measurements, inputs, cross)
+    trajectory = run.run(transition, observation, measurements, inputs=inputs, cross_covariance=cross)
     likelihood = 0.0
     for k, (y, u) in enumerate(zip(measurements, inputs.tolist())):
         np.testing.assert_array_equal(trajectory.predicted_states[k], loop.state)
@@ -190,28 +190,28 @@ def test_every_size_gives_the_same_bits(n: int, m: int, correlated: bool) -> Non
         if cross is None or innovation.action == "gated":
             loop.predict(transition, u)
         else:
-            loop.predict_correlated(transition, observation, cross, y, u)
+            loop.predict_correlated(transition, observation, cross, y, input=u)
     assert trajectory.log_likelihood == likelihood
     before = pickle.dumps(run)
     assert pickle.dumps(loop) == before
     measurements[7, 0] = np.inf
     with pytest.raises(ValueError, match="^row 7: measurement is infinite"):
-        run.run(transition, observation, measurements, inputs, cross)
+        run.run(transition, observation, measurements, inputs=inputs, cross_covariance=cross)
     assert pickle.dumps(run) == before
 
 
 def test_a_linear_model_makes_the_extended_filter_a_kalman_filter() -> None:
     transition, observation, measurements, inputs = vehicle()
-    linear = KalmanFilter(np.zeros(3), np.eye(3)).run(transition, observation, measurements, inputs)
+    linear = KalmanFilter(np.zeros(3), np.eye(3)).run(transition, observation, measurements, inputs=inputs)
     extended = ExtendedKalmanFilter(np.zeros(3), np.eye(3))
-    same = extended.run(transition, observation, measurements, inputs)
+    same = extended.run(transition, observation, measurements, inputs=inputs)
     np.testing.assert_array_equal(same.filtered_states, linear.filtered_states)
     np.testing.assert_array_equal(same.filtered_covariances, linear.filtered_covariances)
-    called = ExtendedKalmanFilter(np.zeros(3), np.eye(3)).run(*linear_as_functions(), measurements, inputs)
+    called = ExtendedKalmanFilter(np.zeros(3), np.eye(3)).run(*linear_as_functions(), measurements, inputs=inputs)
     np.testing.assert_allclose(called.filtered_states, linear.filtered_states, rtol=1e-9, atol=1e-12)
     assert called.log_likelihood == pytest.approx(linear.log_likelihood)
     mixed = ExtendedKalmanFilter(np.zeros(3), np.eye(3))
-    mixed.run(transition, linear_as_functions()[1], measurements, inputs)
+    mixed.run(transition, linear_as_functions()[1], measurements, inputs=inputs)
     np.testing.assert_allclose(mixed.state, extended.state, rtol=1e-9)
 
 
@@ -219,9 +219,9 @@ def test_the_smoother() -> None:
     transition, observation, measurements, inputs = vehicle()
     filter = KalmanFilter(np.zeros(3), np.eye(3))
     before = pickle.dumps(filter)
-    smoothed = filter.smooth(transition, observation, measurements, inputs)
+    smoothed = filter.smooth(transition, observation, measurements, inputs=inputs)
     assert pickle.dumps(filter) == before
-    trajectory = filter.run(transition, observation, measurements, inputs)
+    trajectory = filter.run(transition, observation, measurements, inputs=inputs)
     # Rauch, Tung and Striebel, 1965.
     state, covariance = trajectory.filtered_states[-1], trajectory.filtered_covariances[-1]
     for k in reversed(range(len(measurements) - 1)):
@@ -232,7 +232,7 @@ def test_the_smoother() -> None:
         np.testing.assert_allclose(smoothed.states[k], state, rtol=1e-8, atol=1e-10)
         np.testing.assert_allclose(smoothed.covariances[k], covariance, rtol=1e-8, atol=1e-10)
     extended = ExtendedKalmanFilter(np.zeros(3), np.eye(3))
-    again = extended.smooth(*linear_as_functions(), measurements, inputs)
+    again = extended.smooth(*linear_as_functions(), measurements, inputs=inputs)
     np.testing.assert_allclose(again.states, smoothed.states, rtol=1e-8, atol=1e-10)
 
 
@@ -330,10 +330,10 @@ def test_a_failed_step_changes_nothing_and_a_run_names_the_row() -> None:
         (lambda: filter.run(MOTION, POSITION, [1.0] * 7 + [np.inf]), "^row 7: measurement is infinite"),
         (lambda: filter.run(MOTION, POSITION, np.ones((5, 2))), r"measurements: expected shape \(any, 1\)"),
         (lambda: filter.run(MOTION, POSITION, []), "measurements: expected at least one"),
-        (lambda: filter.run(MOTION, POSITION, [1.0], [1.0]), "inputs: expected None"),
+        (lambda: filter.run(MOTION, POSITION, [1.0], inputs=[1.0]), "inputs: expected None"),
         (lambda: filter.correct(POSITION, [1.0, 2.0]), "measurement: expected 1 entry"),
         (lambda: filter.correct(POSITION, np.inf), "measurement is infinite"),
-        (lambda: filter.correct(POSITION, 1.0, 1.0), "input: expected 0 entries|no input"),
+        (lambda: filter.correct(POSITION, 1.0, input=1.0), "input: expected 0 entries|no input"),
         (lambda: filter.correct(LEVEL, 1.0), "observation: expected a model with 2 states, found 1"),
         (lambda: filter.predict(WALK), "transition: expected a model with 2 states, found 1"),
     ]
@@ -381,11 +381,11 @@ def test_a_copy_goes_on_to_the_same_bits(restore: Callable[[Any], Any]) -> None:
     transition, observation, measurements, inputs = vehicle()
     for make in (KalmanFilter, ExtendedKalmanFilter):
         filter = make(np.ones(3) / 3.0, np.eye(3) / 7.0)
-        filter.run(transition, observation, measurements[:50], inputs[:50])
+        filter.run(transition, observation, measurements[:50], inputs=inputs[:50])
         other = restore(filter)
         models = (restore(transition), restore(observation))
-        first = filter.run(transition, observation, measurements[50:], inputs[50:])
-        second = restore(other.run(*models, measurements[50:], inputs[50:]))
+        first = filter.run(transition, observation, measurements[50:], inputs=inputs[50:])
+        second = restore(other.run(*models, measurements[50:], inputs=inputs[50:]))
         np.testing.assert_array_equal(first.filtered_covariances, second.filtered_covariances)
         np.testing.assert_array_equal(first.filtered_states, second.filtered_states)
         assert first.log_likelihood == second.log_likelihood
@@ -409,15 +409,15 @@ def test_the_observer() -> None:
         measured.append(truth[0])
         truth = np.array([truth[0] + 0.1 * truth[1] + 0.005 * value, truth[1] + 0.1 * value])
     loop, called = copy.copy(observer), copy.deepcopy(observer)
-    trajectory = observer.run(cart, POSITION, measured, u)
+    trajectory = observer.run(cart, POSITION, measured, inputs=u)
     for k in range(40):
         np.testing.assert_array_equal(trajectory.predicted_states[k], loop.state)
-        innovation = loop.update(cart, POSITION, measured[k], u[k])
+        innovation = loop.update(cart, POSITION, measured[k], input=u[k])
         assert innovation.error == trajectory.errors[k, 0] and math.isnan(float(np.sum(innovation.variance)))
     np.testing.assert_allclose(observer.state, truth, atol=1e-8)
     f, g = cart.state_matrix, np.array([[0.005], [0.1]])
     moved = NonlinearTransition(lambda x, u: f @ x + g @ u, np.zeros((2, 2)))
-    called.run(moved, POSITION, measured, u)
+    called.run(moved, POSITION, measured, inputs=u)
     np.testing.assert_allclose(called.state, observer.state, atol=1e-12)
     called.place(moved, POSITION, [0.5, 0.1], input=0.0)
     with pytest.raises(EstimationError, match="only 1 of the 2 states"):
@@ -425,7 +425,7 @@ def test_the_observer() -> None:
     with pytest.raises(ValueError, match="poles is out of range"):
         observer.place(cart, POSITION, [1.5, 0.1], input=0.0)
     with pytest.raises(ValueError, match="observation: expected a model with 1 outputs, found 2"):
-        observer.update(cart, LinearObservation(np.eye(2), np.eye(2)), [1.0, 2.0], 0.0)
+        observer.update(cart, LinearObservation(np.eye(2), np.eye(2)), [1.0, 2.0], input=0.0)
 
 
 def test_arrays_of_every_kind_are_read_alike() -> None:
@@ -446,7 +446,7 @@ def test_arrays_of_every_kind_are_read_alike() -> None:
     results = set()
     for kind in kinds:
         filter = KalmanFilter(np.zeros(3), np.eye(3))
-        filter.run(transition, observation, kind, inputs)
+        filter.run(transition, observation, kind, inputs=inputs)
         results.add(pickle.dumps(filter))
     assert len(results) == 1
 

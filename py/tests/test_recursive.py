@@ -224,7 +224,7 @@ def test_a_failed_run_names_the_row_and_changes_nothing() -> None:
     arx = RecursiveArx(1, 1)
     before = state(arx)
     with pytest.raises(ValueError, match="^row 5: u is infinite"):
-        arx.run(u, y)
+        arx.run(y, u=u)
     assert state(arx) == before
 
 
@@ -278,12 +278,12 @@ def test_wrong_arguments_are_named(make: Callable[[], object], error: type[Excep
         lambda: RecursiveArmax(1, 1, 1, 2, method="prediction-error", noise_scale=0.1),
     ],
 )
-def test_a_plant_is_found_by_update_and_by_run_alike(make: Callable[[], RecursiveArx | RecursiveArmax]) -> None:
+def test_a_plant_is_found_row_by_row_and_by_run_alike(make: Callable[[], RecursiveArx | RecursiveArmax]) -> None:
     u, y = plant()
     y[40] = np.nan
     loop, run = make(), make()
-    innovations = [loop.update(v, z) for v, z in zip(u.tolist(), y.tolist())]
-    trajectory = run.run(u, y)
+    innovations = [loop.log_row(z, u=v) for v, z in zip(u.tolist(), y.tolist())]
+    trajectory = run.run(y, u=u)
     same(trajectory, innovations)
     assert innovations[0].action == innovations[41].action == "not ready"
     assert innovations[40].action == "missing"
@@ -294,9 +294,92 @@ def test_a_plant_is_found_by_update_and_by_run_alike(make: Callable[[], Recursiv
     np.testing.assert_array_equal(restored.predict(np.ones(5)), loop.predict(np.ones((5, 1)), 5))
     assert loop.predict(np.ones(5))[0] == pytest.approx(-run.a[1] * y[-1] + run.b[0][2] * u[-2], abs=0.05)
     run.gap()
-    assert run.update(0.0, 0.0).action == "not ready"
+    assert run.log_row(0.0, u=0.0).action == "not ready"
     run.adapting = False
     assert not run.adapting and run.forgetting == Forgetting.exponential()
+
+
+@pytest.mark.parametrize("make", [lambda: RecursiveArx(1, 1), lambda: RecursiveArmax(1, 1, 1)])
+def test_time_is_the_order_of_the_calls(make: Callable[[], RecursiveArx | RecursiveArmax]) -> None:
+    rows, moments = make(), make()
+    u, y = plant()
+    for v, z in zip(u.tolist(), y.tolist()):
+        expected = rows.log_row(z, u=v)
+        assert moments.measured(z).error == expected.error or np.isnan(expected.error)
+        ahead = moments.predict([v, 1.0])
+        moments.applied(v)
+        assert moments.predict([1.0, 9.0]) == pytest.approx(ahead, abs=0.0, nan_ok=True)
+        assert state(moments) == state(rows)
+    # A measurement, and another: the input in between is missing.
+    moments.measured(1.0)
+    moments.measured(1.0)
+    assert moments.measured(1.0).action == "not ready"
+    rows.run([1.0, 1.0, 1.0], u=[np.nan] * 3)
+    moments.applied(np.nan)
+    assert state(moments) == state(rows)
+    # Inputs, and others: the output in between is missing.
+    moments.applied(2.0)
+    rows.log_row(np.nan, u=2.0)
+    assert state(moments) == state(rows)
+
+
+@pytest.mark.parametrize("make", [lambda: RecursiveArx(1, 1, nk=0), lambda: RecursiveArmax(1, 1, 1, nk=0)])
+def test_an_input_that_acts_at_once_needs_the_row(make: Callable[[], RecursiveArx | RecursiveArmax]) -> None:
+    estimator = make()
+    before = state(estimator)
+    with pytest.raises(ValueError, match="nk = 0.*log_row"):
+        estimator.measured(1.0)
+    assert state(estimator) == before
+    assert estimator.log_row(1.0, u=1.0).action == "not ready"
+
+
+@pytest.mark.parametrize("make", [lambda: RecursiveArx(1, 1), lambda: RecursiveArmax(1, 1, 1)])
+def test_outputs_and_inputs_cannot_be_swapped_by_place(make: Callable[[], RecursiveArx | RecursiveArmax]) -> None:
+    estimator = make()
+    before = state(estimator)
+    for call in (estimator.run, estimator.log_row):
+        with pytest.raises(TypeError, match="positional"):
+            call([1.0, 2.0], [3.0, 4.0])  # type: ignore[arg-type, misc, call-arg]
+    with pytest.raises(ValueError, match="u: expected"):
+        estimator.run([1.0, 2.0])
+    with pytest.raises(ValueError, match="u: expected"):
+        estimator.log_row(1.0)
+    with pytest.raises((TypeError, ValueError), match="y: expected"):
+        estimator.log_row([1.0, 2.0], u=1.0)  # type: ignore[arg-type]
+    assert state(estimator) == before
+
+
+def test_a_controller_learns_its_plant_under_noise() -> None:
+    random = np.random.default_rng(7)
+    heater = RecursiveArx(1, 1, output_scale=20.0, input_scales=50.0)
+    y, u, left = 0.0, 0.0, []
+    for k in range(2000):
+        y = 0.9 * y + 0.08 * u + 0.1 * random.standard_normal()
+        set_point = 30.0 if k // 100 % 2 == 0 else 35.0
+        if k % 100 > 20:
+            left.append(y - set_point)
+        heater.measured(y)
+        a1, b1 = heater.parameters
+        u = float(np.clip((set_point + a1 * y) / b1, 0.0, 100.0)) if b1 else 50.0
+        heater.applied(u)
+    assert np.sqrt(np.mean(np.square(left))) < 0.12
+    errors = heater.standard_errors
+    assert errors is not None
+    assert np.all(np.abs(heater.parameters - [-0.9, 0.08]) < 3.0 * errors)
+
+
+def test_a_constant_is_estimated_too() -> None:
+    u, y = plant()
+    raised = y + 20.0
+    arx = RecursiveArx(1, 1, 2, forgetting=None, constant=True, output_scale=20.0)
+    arx.run(raised, u=u)
+    assert arx.constant == arx.parameters[2]
+    # The level is constant / A(1).
+    assert arx.constant / arx.a.sum() == pytest.approx(20.0, abs=0.2)
+    armax = RecursiveArmax(1, 1, 1, 2, forgetting=None, constant=True, output_scale=20.0, noise_scale=0.1)
+    armax.run(raised, u=u)
+    assert armax.constant == armax.parameters[2] and armax.c[1] == armax.parameters[3]
+    assert RecursiveArx(1, 1).constant is None
 
 
 def test_two_inputs_and_none() -> None:
@@ -304,20 +387,20 @@ def test_two_inputs_and_none() -> None:
     u = random.standard_normal((300, 2))
     y = np.r_[0.0, u[:-1, 0] + 2.0 * u[:-1, 1]]
     two = RecursiveArx(0, [1, 1])
-    two.run(u, y)
+    two.run(y, u=u)
     np.testing.assert_allclose([b[1] for b in two.b], [1.0, 2.0], atol=1e-3)
-    assert two.update([1.0, 2.0], 0.0).action == "updated"
+    assert two.log_row(0.0, u=[1.0, 2.0]).action == "updated"
     with pytest.raises(ValueError, match="u: expected 2 entries, found a number"):
-        two.update(1.0, 0.0)
+        two.log_row(0.0, u=1.0)
     with pytest.raises(ValueError, match="u"):
-        two.run(u[:, :1], y)
+        two.run(y, u=u[:, :1])
     series = RecursiveArx(1, 0)
-    series.run(None, 0.5 ** np.arange(20.0))
+    series.run(0.5 ** np.arange(20.0))
     np.testing.assert_allclose(series.predict(steps=3)[1:] / series.predict(steps=3)[:-1], -series.a[1])
     with pytest.raises(ValueError, match="steps"):
         series.predict()
     with pytest.raises(ValueError, match="u: expected None"):
-        series.update([1.0], 1.0)
+        series.log_row(1.0, u=[1.0])
 
 
 def test_armax_finds_the_noise() -> None:
@@ -325,7 +408,7 @@ def test_armax_finds_the_noise() -> None:
     e = 0.5 * random.standard_normal(6000)
     y = e + 0.6 * np.r_[0.0, e[:-1]]
     series = RecursiveArmax(0, 0, 1, forgetting=None, noise_scale=0.5, method="prediction-error")
-    series.run(None, y)
+    series.run(y)
     assert series.c[1] == pytest.approx(0.6, abs=0.03)
     assert series.noise_variance == pytest.approx(0.25, rel=0.05)
 

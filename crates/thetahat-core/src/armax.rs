@@ -3,7 +3,6 @@
 use nalgebra::{Const, OMatrix, OVector};
 
 use crate::arx::{check_samples, is_large, predict_ahead};
-use crate::error::check_length;
 use crate::rls::is_small;
 use crate::triangle::{column, column_mut};
 use crate::ud::{add_multiple, copy, dot};
@@ -21,7 +20,7 @@ const HALVINGS: usize = 10;
 /// use thetahat_core::{ArmaxOrders, InputOrders};
 ///
 /// const ORDERS: ArmaxOrders =
-///     ArmaxOrders { na: 2, inputs: &[InputOrders { nb: 2, nk: 3 }], nc: 1 };
+///     ArmaxOrders { na: 2, inputs: &[InputOrders { nb: 2, nk: 3 }], nc: 1, constant: false };
 /// assert_eq!(ORDERS.parameters(), 5);
 /// assert_eq!(ORDERS.delays(), 3);
 /// ```
@@ -33,10 +32,12 @@ pub struct ArmaxOrders<'a> {
     pub inputs: &'a [InputOrders],
     /// The number of past residuals.
     pub nc: usize,
+    /// Whether a constant is a parameter too, as in [`ArxOrders`].
+    pub constant: bool,
 }
 
 impl<'a> ArmaxOrders<'a> {
-    /// The number of parameters: na plus every nb plus nc.
+    /// The number of parameters: na plus every nb plus nc, plus 1 with a constant.
     pub const fn parameters(&self) -> usize {
         self.plant().parameters().saturating_add(self.nc)
     }
@@ -47,7 +48,7 @@ impl<'a> ArmaxOrders<'a> {
     }
 
     const fn plant(&self) -> ArxOrders<'a> {
-        ArxOrders { na: self.na, inputs: self.inputs }
+        ArxOrders { na: self.na, inputs: self.inputs, constant: self.constant }
     }
 }
 
@@ -68,15 +69,15 @@ pub enum ArmaxMethod {
 /// An ARMAX model, estimated while the plant runs.
 ///
 /// ```text
-/// A(q) y(k) = Σ over the inputs B_i(q) u_i(k) + C(q) e(k),       C(q) = 1 + c_1 q⁻¹ + … + c_nc q⁻ⁿᶜ
+/// A(q) y(k) = Σ over the inputs B_i(q) u_i(k) [+ constant] + C(q) e(k),       C(q) = 1 + c_1 q⁻¹ + … + c_nc q⁻ⁿᶜ
 /// ```
 ///
 /// with A and B as in [`RecursiveArx`](crate::RecursiveArx). Where the disturbance is not white, it finds the plant
 /// without bias, and predicts the disturbance too. The regressor holds past residuals beside the signals,
 ///
 /// ```text
-/// φ(k) = [ -y(k-1) … -y(k-na)   u_1(k-nk_1) …   ε(k-1) … ε(k-nc) ]'
-/// θ    = [ a_1 … a_na           b_0 …           c_1 … c_nc ]'
+/// φ(k) = [ -y(k-1) … -y(k-na)   u_1(k-nk_1) …   1          ε(k-1) … ε(k-nc) ]'
+/// θ    = [ a_1 … a_na           b_0 …           constant   c_1 … c_nc ]'
 ///
 /// e = y - φ'θ̂                                  the innovation
 /// ψ = φ, or ψ(k) = φ(k) - c_1 ψ(k-1) - … - c_nc ψ(k-nc)
@@ -91,7 +92,8 @@ pub enum ArmaxMethod {
 /// thousand samples: a step that would lead out is halved until it does not, at most ten times, and else left out.
 /// [`Action::Projected`] tells.
 ///
-/// A missing sample is NaN, as in `RecursiveArx`. Residuals that are not known, at the start and of missing samples,
+/// Time is the order of the calls, and a missing sample is NaN, as in
+/// [`RecursiveArx`](crate::RecursiveArx#time). Residuals that are not known, at the start and of missing samples,
 /// count as 0.
 ///
 /// # Sizes
@@ -108,7 +110,7 @@ pub enum ArmaxMethod {
 /// use thetahat_core::{ArmaxMethod, ArmaxOrders, Error, Forgetting, InputOrders, RecursiveArmax};
 ///
 /// // y(k) = 0.8 y(k-1) + u(k-1) + e(k) + 0.6 e(k-1)
-/// let orders = ArmaxOrders { na: 1, inputs: &[InputOrders { nb: 1, nk: 1 }], nc: 1 };
+/// let orders = ArmaxOrders { na: 1, inputs: &[InputOrders { nb: 1, nk: 1 }], nc: 1, constant: false };
 /// // Outputs are about 2, inputs 1, the noise 0.5.
 /// let mut plant: RecursiveArmax<f64, Const<3>> =
 ///     RecursiveArmax::new(&orders, ArmaxMethod::PredictionError, 2.0, &[1.0], 0.5, Forgetting::None)?;
@@ -118,9 +120,10 @@ pub enum ArmaxMethod {
 ///     seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
 ///     let e = f64::from(seed) / f64::from(u32::MAX) - 0.5;
 ///     y = 0.8 * y + u + e + 0.6 * before;
-///     u = if k % 13 < 5 { 1.0 } else { -1.0 };
 ///     before = e;
-///     plant.update(&[u], y)?;
+///     plant.measured(y)?;
+///     u = if k % 13 < 5 { 1.0 } else { -1.0 };
+///     plant.applied(&[u])?;
 /// }
 /// assert!((plant.a().nth(1).unwrap() + 0.8).abs() < 0.01);
 /// assert!((plant.b(0).unwrap().nth(1).unwrap() - 1.0).abs() < 0.05);
@@ -131,7 +134,6 @@ pub enum ArmaxMethod {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(bound = ""))]
 pub struct RecursiveArmax<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension = Const<1>> {
-    /// φ; the residuals are one more input.
     lags: Lags<T, N, D>,
     estimator: RecursiveLeastSquares<T, N>,
     /// ψ(k-1) … ψ(k-nc), a column each. There are at most n, as each has a parameter.
@@ -164,9 +166,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
         forgetting: Forgetting<T>,
     ) -> Result<Self, Error> {
         let mut lags: Lags<T, N, D> = Lags::with_residuals(&orders.plant(), orders.nc)?;
-        check_length("input_scales", orders.inputs.len(), input_scales.len())?;
-        let scales =
-            lags.scales(output_scale, |input| input_scales.get(input).copied().unwrap_or(noise_scale));
+        let scales = lags.scales(output_scale, input_scales, noise_scale)?;
         let estimator = RecursiveLeastSquares::new(&scales, forgetting)?;
         lags.clear_last(orders.nc);
         let size = scales.shape_generic().0;
@@ -177,7 +177,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
             residual: T::zero(),
             nc: orders.nc,
             method,
-            scratch: size.scratch::<T, 3, 0>(),
+            scratch: size.scratch::<T, 2, 0>(),
         })
     }
 
@@ -213,7 +213,8 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
         Ok(RecursiveArmax { estimator: self.estimator.with_dead_zone(width)?, ..self })
     }
 
-    /// One sample: u(k), one number for each input, and y(k). NaN is a missing sample.
+    /// y(k) arrives: time goes on to k, and the model learns from y(k) and the inputs that were
+    /// [`applied`](RecursiveArmax::applied) before. NaN is a missing sample.
     ///
     /// The innovation is that of [`RecursiveLeastSquares::update`]. Its action is
     /// [`NotReady`](Action::NotReady) while a missing sample sits in a tap, the lines are not filled yet, or numbers
@@ -221,29 +222,57 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
     /// shortened to keep C stable. (A variance may have been brought back to its bound in the same sample:
     /// `Projected` comes before `Capped`.)
     ///
-    /// Errors, after which nothing has changed, time included: as for [`RecursiveArx::update`](crate::RecursiveArx::update).
+    /// Errors, after which nothing has changed, time included: as for
+    /// [`RecursiveArx::measured`](crate::RecursiveArx::measured).
     ///
-    /// 1.5 n² + (9 + nc) n multiply-adds, n divisions, and moves of (2 + nc) n + 2 D numbers; each halving nc²/2 more.
-    pub fn update(&mut self, inputs: &[T], output: T) -> Result<Innovation<T>, Error> {
+    /// 1.5 n² + (9 + nc) n multiply-adds, n divisions, and moves of (1 + nc) n + D numbers; each halving nc²/2 more.
+    pub fn measured(&mut self, output: T) -> Result<Innovation<T>, Error> {
+        self.lags.check_delays()?;
+        check_samples(&[], output, self.gradients.ncols())?;
+        Ok(self.step(&[], output, true))
+    }
+
+    /// u(k), one number for each input: what acts on the plant from now on, until the next measurement. NaN is a missing
+    /// sample.
+    ///
+    /// As [`RecursiveArx::applied`](crate::RecursiveArx::applied), whose errors it has.
+    pub fn applied(&mut self, inputs: &[T]) -> Result<(), Error> {
+        self.lags.check_inputs(inputs)?;
+        check_samples(inputs, T::NAN, self.gradients.ncols())?;
+        if self.lags.awaits_inputs() {
+            self.lags.complete(inputs);
+        } else {
+            self.step(inputs, T::NAN, false);
+        }
+        Ok(())
+    }
+
+    /// One row of a log: y(k) and u(k), recorded at the same instant k. NaN is a missing sample.
+    ///
+    /// As [`RecursiveArx::log_row`](crate::RecursiveArx::log_row), whose errors it has: not the call for a controller that
+    /// knows u(k-1) when y(k) arrives.
+    pub fn log_row(&mut self, output: T, inputs: &[T]) -> Result<Innovation<T>, Error> {
         self.lags.check_inputs(inputs)?;
         check_samples(inputs, output, self.gradients.ncols())?;
+        Ok(self.step(inputs, output, false))
+    }
+
+    /// One sample, checked.
+    fn step(&mut self, inputs: &[T], output: T, inputs_follow: bool) -> Innovation<T> {
         let RecursiveArmax { lags, estimator, gradients, residual, nc, method, scratch } = self;
-        let (nc, known) = (*nc, *residual);
-        let newest = |input: usize| match inputs.get(input) {
-            Some(&sample) => sample,
-            None => known,
-        };
+        let nc = *nc;
+        lags.push(inputs, *residual);
         let size = gradients.shape_generic().0;
-        let innovation = size.with_scratch(scratch, |[regressor, gradient, work], []| {
+        let regressor = lags.regressor().map(OVector::as_slice);
+        let innovation = size.with_scratch(scratch, |[gradient, work], []| {
             let mut innovation =
                 Innovation { error: T::NAN, variance: T::NAN, nis: T::zero(), action: Action::NotReady };
-            lags.peek(newest, regressor);
-            if !regressor.iter().all(T::is_finite) {
+            let Some(regressor) = regressor else {
                 estimator.advance();
                 gradients.fill(T::zero());
                 *residual = T::zero();
                 return innovation;
-            }
+            };
             copy(regressor, gradient);
             if *method == ArmaxMethod::PredictionError {
                 let c = last(estimator.parameters().as_slice(), nc).iter();
@@ -290,13 +319,12 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
             }
             innovation
         });
-        lags.push(newest);
-        lags.push_output(output)?;
-        Ok(innovation)
+        lags.push_checked(output);
+        lags.await_inputs(inputs_follow);
+        innovation
     }
 
-    /// The outputs to come, ŷ(k+1), ŷ(k+2), …, as many as `outputs` holds, after
-    /// [`update`](RecursiveArmax::update) of sample k.
+    /// The outputs to come, ŷ(k+1), ŷ(k+2), …, as many as `outputs` holds, y(k) being the latest one.
     ///
     /// As [`RecursiveArx::predict`](crate::RecursiveArx::predict), whose arguments and errors it has. Residuals that
     /// are known enter by C(q); those to come are expected to be 0.
@@ -314,7 +342,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
     ) -> Result<(), Error> {
         room.copy_from(&self.lags)?;
         let parameters = self.estimator.parameters().as_slice();
-        predict_ahead(room, self.lags.inputs(), parameters, self.residual, future_inputs, outputs)
+        predict_ahead(room, parameters, self.residual, future_inputs, outputs)
     }
 
     /// The delay lines: the samples and residuals that the next samples are predicted from.
@@ -331,6 +359,11 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
     /// if the input has no coefficients; `None` if there is no such input.
     pub fn b(&self, input: usize) -> Option<impl Iterator<Item = T> + Clone + '_> {
         self.lags.input_coefficients(self.estimator.parameters().as_slice(), input)
+    }
+
+    /// The constant; `None` if the orders have none.
+    pub fn constant(&self) -> Option<T> {
+        self.lags.constant(self.estimator.parameters().as_slice())
     }
 
     /// C(q): 1, c_1 … c_nc.

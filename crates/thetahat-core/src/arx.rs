@@ -13,22 +13,45 @@ use crate::{
 /// An ARX model, estimated while the plant runs.
 ///
 /// ```text
-/// A(q) y(k) = Σ over the inputs B_i(q) u_i(k) + e(k)
+/// A(q) y(k) = Σ over the inputs B_i(q) u_i(k) [+ constant] + e(k)
 ///
 /// A(q) = 1 + a_1 q⁻¹ + … + a_na q⁻ⁿᵃ,     B_i(q) = q⁻ⁿᵏ (b_0 + b_1 q⁻¹ + … + b_(nb-1) q⁻ⁿᵇ⁺¹)
 /// ```
 ///
-/// It is [`RecursiveLeastSquares`] on the regressor of [`Lags`], φ(k) = \[-y(k-1) … u(k-nk) …\]', with θ = \[a_1 …
-/// a_na  b_0 … of the first input, then of the next\]. Everything said there of forgetting, starts and bounds
-/// holds here. [`ArxOrders`] describes orders and delays.
+/// It is [`RecursiveLeastSquares`] on the regressor of [`Lags`], φ(k) = \[-y(k-1) … u(k-nk) … 1\]', with θ = \[a_1 …
+/// a_na  b_0 … of the first input, then of the next, and the constant if the orders have one\]. Everything said there
+/// of forgetting, starts and bounds holds here. [`ArxOrders`] describes orders and delays.
 ///
-/// Each sample is one call of [`update`](RecursiveArx::update). A missing sample is NaN: time goes on, and while it
-/// sits in a tap nothing is corrected.
+/// # Time
+///
+/// Time is the order of the calls, and a controller writes them in the order in which things happen:
+///
+/// ```text
+/// measured(y(k))      y(k) arrives; the model learns from it, with the inputs that were applied before
+/// …                   the controller computes u(k)
+/// applied(u(k))       what acts from now on, until the next measurement
+/// ```
+///
+/// A call that is left out is a missing sample, and never shifts one signal against the other: after two measurements in
+/// a row the input between them is missing, after two inputs in a row the output between them. A missing number is NaN.
+/// Time goes on, and while it sits in a tap nothing is corrected.
+///
+/// [`log_row`](RecursiveArx::log_row) takes u(k) and y(k) that were recorded at the same instant k, as a row of a log
+/// holds them: it is `measured(y(k))`, then `applied(u(k))`. Where an input acts in its own sample (nk = 0), y(k) needs
+/// u(k), and only `log_row` can take the two.
+///
+/// # Noise
+///
+/// The equation has its noise e inside: a disturbance of the plant, filtered by 1/A(q). Then the estimate has no bias,
+/// in a closed loop either, if the loop has a delay and is excited, as by changes of the set point. Noise of the sensor is
+/// another: it enters φ, and pulls A(q) towards 1. With the plant y(k) = 0.9 y(k-1) + 0.08 u(k-1) in an open loop,
+/// u a random ±1, and a standard deviation of the noise half that of y, a_1 comes out as -0.72; with a tenth, as -0.89.
+/// Where that matters, slow the sampling, or model the noise: [`RecursiveArmax`](crate::RecursiveArmax).
 ///
 /// # Sizes
 ///
 /// `N` is the number of parameters, [`ArxOrders::parameters`], and `D` the room for inputs on their way, at least
-/// [`ArxOrders::delays`], as for [`Lags`]. Memory: that of both; for 4 parameters in `f32` on a 32-bit machine 216
+/// [`ArxOrders::delays`], as for [`Lags`]. Memory: that of both; for 4 parameters in `f32` on a 32-bit machine 220
 /// bytes.
 ///
 /// Source: Ljung, System Identification, 2nd ed., sections 4.2 and 11.2.
@@ -38,16 +61,17 @@ use crate::{
 /// use thetahat_core::{ArxOrders, Error, Forgetting, InputOrders, RecursiveArx};
 ///
 /// // y(k) = 0.8 y(k-1) + 0.5 u(k-2): a heater that answers after two samples.
-/// let orders = ArxOrders { na: 1, inputs: &[InputOrders { nb: 1, nk: 2 }] };
+/// let orders = ArxOrders { na: 1, inputs: &[InputOrders { nb: 1, nk: 2 }], constant: false };
 /// // Outputs are about 2, inputs about 1.
 /// let mut plant: RecursiveArx<f32, Const<2>, Const<2>> =
 ///     RecursiveArx::new(&orders, 2.0, &[1.0], Forgetting::Exponential { factor: 0.98 })?;
 ///
 /// let (mut y, mut before) = (0.0, [0.0; 2]);
 /// for k in 0..200 {
-///     let u = if k % 7 < 3 { 1.0 } else { -1.0 };
 ///     y = 0.8 * y + 0.5 * before[1];
-///     plant.update(&[u], y)?;
+///     plant.measured(y)?;
+///     let u = if k % 7 < 3 { 1.0 } else { -1.0 };
+///     plant.applied(&[u])?;
 ///     before = [u, before[0]];
 /// }
 /// assert!(plant.a().zip([1.0, -0.8]).all(|(a, truth)| (a - truth).abs() < 1e-4));
@@ -65,8 +89,6 @@ use crate::{
 pub struct RecursiveArx<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension = Const<1>> {
     lags: Lags<T, N, D>,
     estimator: RecursiveLeastSquares<T, N>,
-    #[cfg_attr(feature = "serde", serde(skip))]
-    scratch: N::Scratch<T>,
 }
 
 impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, N, D> {
@@ -86,6 +108,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
     /// const ORDERS: ArxOrders = ArxOrders {
     ///     na: 2,
     ///     inputs: &[InputOrders { nb: 2, nk: 1 }, InputOrders { nb: 1, nk: 3 }],
+    ///     constant: false,
     /// };
     /// type Plant = RecursiveArx<f32, Const<{ ORDERS.parameters() }>, Const<{ ORDERS.delays() }>>;
     ///
@@ -101,10 +124,8 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
         forgetting: Forgetting<T>,
     ) -> Result<Self, Error> {
         let lags: Lags<T, N, D> = Lags::new(orders)?;
-        check_length("input_scales", orders.inputs.len(), input_scales.len())?;
-        let scales = lags.scales(output_scale, |input| input_scales.get(input).copied().unwrap_or(T::NAN));
-        let estimator = RecursiveLeastSquares::new(&scales, forgetting)?;
-        Ok(RecursiveArx { scratch: scales.shape_generic().0.scratch::<T, 1, 0>(), lags, estimator })
+        let scales = lags.scales(output_scale, input_scales, T::NAN)?;
+        Ok(RecursiveArx { estimator: RecursiveLeastSquares::new(&scales, forgetting)?, lags })
     }
 
     /// The same with another start. See [`RecursiveLeastSquares::with_start`].
@@ -141,46 +162,82 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
         Ok(RecursiveArx { estimator: self.estimator.with_dead_zone(width)?, ..self })
     }
 
-    /// One sample: u(k), one number for each input, and y(k). NaN is a missing sample.
+    /// y(k) arrives: time goes on to k, and the model learns from y(k) and the inputs that were
+    /// [`applied`](RecursiveArx::applied) before. NaN is a missing sample.
     ///
     /// The innovation is that of [`RecursiveLeastSquares::update`]. Its action is
     /// [`NotReady`](Action::NotReady) while a missing sample sits in a tap, or the lines are not filled yet; and
     /// where numbers that are accepted one by one would overflow together with P or the parameters: nothing is
     /// corrected then, but time goes on, so that a large sample leaves the taps again.
     ///
-    /// Errors, after which nothing has changed, time included: [`Error::Length`] if the number of inputs is not that
-    /// of the orders; [`Error::Infinite`]; [`Error::TooLarge`] for a sample whose square times n exceeds
-    /// [`Real::LARGEST_ENTRY`] (7e13/√n in `f32`). If time should go on, pass NaN instead.
+    /// Errors, after which nothing has changed, time included: [`Error::InputFirst`] if an input acts in its own sample:
+    /// [`log_row`](RecursiveArx::log_row) takes that; [`Error::Infinite`]; [`Error::TooLarge`] for a sample whose square
+    /// times n exceeds [`Real::LARGEST_ENTRY`] (7e13/√n in `f32`). If time should go on, pass NaN instead.
     ///
-    /// 1.5 n² + 7 n multiply-adds, n divisions, and two moves of n + D numbers.
-    pub fn update(&mut self, inputs: &[T], output: T) -> Result<Innovation<T>, Error> {
-        let size = self.estimator.covariance().size();
+    /// 1.5 n² + 7 n multiply-adds, n divisions, and one move of n + D numbers.
+    pub fn measured(&mut self, output: T) -> Result<Innovation<T>, Error> {
+        self.lags.check_delays()?;
+        check_samples(&[], output, self.size())?;
+        Ok(self.step(&[], output, true))
+    }
+
+    /// u(k), one number for each input: what acts on the plant from now on, until the next measurement, as the plant got
+    /// it (so after all limits). NaN is a missing sample.
+    ///
+    /// If no measurement has come since the inputs before, that one is missing, and time goes on first.
+    ///
+    /// Errors, after which nothing has changed: [`Error::Length`] if the number of inputs is not that of the orders;
+    /// [`Error::Infinite`]; [`Error::TooLarge`], as for [`measured`](RecursiveArx::measured).
+    pub fn applied(&mut self, inputs: &[T]) -> Result<(), Error> {
         self.lags.check_inputs(inputs)?;
-        check_samples(inputs, output, size.value())?;
-        let newest = |input: usize| inputs.get(input).copied().unwrap_or(T::NAN);
-        let RecursiveArx { lags, estimator, scratch } = self;
-        let innovation = size.with_scratch(scratch, |[regressor], []| {
-            lags.peek(newest, regressor);
-            if regressor.iter().all(T::is_finite) {
-                // What is too large here is so by what came before: time must go on, or it would stay.
-                if let Ok(innovation) = estimator.take(regressor, output) {
-                    return innovation;
-                }
-            }
+        check_samples(inputs, T::NAN, self.size())?;
+        if self.lags.awaits_inputs() {
+            self.lags.complete(inputs);
+        } else {
+            self.step(inputs, T::NAN, false);
+        }
+        Ok(())
+    }
+
+    /// One row of a log: y(k) and u(k), recorded at the same instant k. NaN is a missing sample.
+    ///
+    /// With every nk at least 1 it is [`measured`](RecursiveArx::measured) and then [`applied`](RecursiveArx::applied), to
+    /// the bit: u(k) has no part in the innovation of y(k). It is not the call for a controller that knows u(k-1) when
+    /// y(k) arrives: to take that as u(k) would make the model a sample late.
+    ///
+    /// Errors, after which nothing has changed, time included: those of the two, but for [`Error::InputFirst`].
+    pub fn log_row(&mut self, output: T, inputs: &[T]) -> Result<Innovation<T>, Error> {
+        self.lags.check_inputs(inputs)?;
+        check_samples(inputs, output, self.size())?;
+        Ok(self.step(inputs, output, false))
+    }
+
+    /// One sample, checked.
+    fn step(&mut self, inputs: &[T], output: T, inputs_follow: bool) -> Innovation<T> {
+        let RecursiveArx { lags, estimator } = self;
+        lags.push(inputs, T::NAN);
+        // What is too large here is so by what came before: time must go on, or it would stay.
+        let taken = lags.regressor().and_then(|regressor| estimator.take(regressor.as_slice(), output).ok());
+        let innovation = taken.unwrap_or_else(|| {
             estimator.advance();
             Innovation { error: T::NAN, variance: T::NAN, nis: T::zero(), action: Action::NotReady }
         });
-        lags.push(newest);
-        lags.push_output(output)?;
-        Ok(innovation)
+        lags.push_checked(output);
+        lags.await_inputs(inputs_follow);
+        innovation
     }
 
-    /// The outputs to come, ŷ(k+1), ŷ(k+2), …, as many as `outputs` holds, after
-    /// [`update`](RecursiveArx::update) of sample k.
+    fn size(&self) -> usize {
+        self.estimator.covariance().size().value()
+    }
+
+    /// The outputs to come, ŷ(k+1), ŷ(k+2), …, as many as `outputs` holds, y(k) being the latest one.
     ///
-    /// `future_inputs` are u(k+1), then u(k+2), …, each with one number for every input. (With nk = 1 the last one
-    /// acts on nothing, but is there.) Predicted outputs take the place of measured ones. An output that depends on
-    /// a missing sample is NaN.
+    /// `future_inputs` are those to come, each with one number for every input, and as many as outputs. Which is the first
+    /// follows from the latest call: after [`measured`](RecursiveArx::measured) of y(k) it is u(k), which is still to be
+    /// chosen; after [`applied`](RecursiveArx::applied) or [`log_row`](RecursiveArx::log_row) of u(k) it is u(k+1). (With
+    /// nk = 1 the last one acts on nothing then, but is there.) Predicted outputs take the place of measured ones. An
+    /// output that depends on a missing sample is NaN.
     ///
     /// The state of the estimator does not change. With `Dyn` the delay lines are cloned. n multiply-adds and moves
     /// a step.
@@ -204,7 +261,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
     ) -> Result<(), Error> {
         room.copy_from(&self.lags)?;
         let parameters = self.estimator.parameters().as_slice();
-        predict_ahead(room, self.lags.inputs(), parameters, T::zero(), future_inputs, outputs)
+        predict_ahead(room, parameters, T::zero(), future_inputs, outputs)
     }
 
     /// The delay lines: the samples that the next ones are predicted from.
@@ -221,6 +278,11 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
     /// if the input has no coefficients; `None` if there is no such input.
     pub fn b(&self, input: usize) -> Option<impl Iterator<Item = T> + Clone + '_> {
         self.lags.input_coefficients(self.estimator.parameters().as_slice(), input)
+    }
+
+    /// The constant; `None` if the orders have none.
+    pub fn constant(&self) -> Option<T> {
+        self.lags.constant(self.estimator.parameters().as_slice())
     }
 
     /// Tells that an unknown number of samples is missing here. See [`Lags::gap`].
@@ -256,28 +318,32 @@ pub(crate) fn is_large<T: Real>(sample: T, size: usize) -> bool {
     sample * sample * T::from_count(size.max(1)) > T::LARGEST_ENTRY
 }
 
-/// Runs a model on from `lags`: its predictions become its outputs. The model has `inputs` inputs and may have one
-/// more, the residuals: the last one is known, and those to come are expected to be 0.
+/// Runs a model on from `lags`: its predictions become its outputs. Of the residuals, if the model has them, the last one
+/// is known, and those to come are expected to be 0.
 pub(crate) fn predict_ahead<T: Real, N: Dimension, D: Dimension>(
     lags: &mut Lags<T, N, D>,
-    inputs: usize,
     parameters: &[T],
     mut residual: T,
     future_inputs: &[T],
     outputs: &mut [T],
 ) -> Result<(), Error> {
+    let inputs = lags.inputs();
     check_length("future_inputs", outputs.len().saturating_mul(inputs), future_inputs.len())?;
     if future_inputs.iter().any(is_infinite) {
         return Err(Error::Infinite { argument: "future_inputs" });
     }
+    let awaiting = lags.awaits_inputs();
     let mut grown = false;
     for (step, output) in outputs.iter_mut().enumerate() {
         if grown {
             *output = T::NAN;
             continue;
         }
-        let now = future_inputs.get(step * inputs..).unwrap_or_default();
-        lags.push(|input| if input < inputs { now.get(input).copied().unwrap_or(T::NAN) } else { residual });
+        let next = future_inputs.get(step * inputs..).unwrap_or_default();
+        if awaiting {
+            lags.complete(next);
+        }
+        lags.push(if awaiting { &[] } else { next }, residual);
         *output = match lags.regressor().map(|regressor| dot(regressor.as_slice(), parameters)) {
             Some(predicted) if !predicted.is_finite() => {
                 grown = true;
@@ -285,7 +351,7 @@ pub(crate) fn predict_ahead<T: Real, N: Dimension, D: Dimension>(
             }
             predicted => predicted.unwrap_or(T::NAN),
         };
-        lags.push_output(*output)?;
+        lags.push_checked(*output);
         residual = T::zero();
     }
     if grown { Err(Error::Overflow) } else { Ok(()) }

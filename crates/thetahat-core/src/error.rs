@@ -48,7 +48,7 @@ pub enum Error {
     },
     /// The orders make another number of parameters than the type holds.
     Orders {
-        /// The number of parameters the orders make: na plus every nb, plus nc.
+        /// The number of parameters the orders make: na plus every nb, plus nc, plus 1 with a constant.
         needed: usize,
         /// The number of parameters the type holds.
         available: usize,
@@ -59,6 +59,11 @@ pub enum Error {
         needed: usize,
         /// The number of samples the type holds.
         available: usize,
+    },
+    /// An input acts on the output of its own sample (nk = 0), so that u(k) must be known before y(k) is.
+    InputFirst {
+        /// The input, from 0.
+        input: usize,
     },
     /// A covariance is not symmetric.
     NotSymmetric {
@@ -144,13 +149,18 @@ impl fmt::Display for Error {
             }
             Error::Orders { needed, available } => write!(
                 formatter,
-                "the orders make {needed} parameters (na plus every nb, plus nc), but the type holds {available}: \
+                "the orders make {needed} parameters (na plus every nb, plus nc, plus 1 with a constant), but the type holds {available}: \
                  make the two equal"
             ),
             Error::Delays { needed, available } => write!(
                 formatter,
                 "the delays need {needed} stored samples (the nk of all inputs, added up), but the type holds \
                  {available}: make room for {needed}"
+            ),
+            Error::InputFirst { input } => write!(
+                formatter,
+                "input {input} acts on the output of its own sample (nk = 0), so that u(k) must be known before \
+                 y(k) is: give both with log_row"
             ),
             Error::NotSymmetric { row, column } => write!(
                 formatter,
@@ -239,7 +249,7 @@ mod tests {
         let argument = "output";
         let (needed, available, found, expected) = (731, 732, 733, 734);
         let (row, column) = (735, 736);
-        let cases: [(Error, &[&str]); 18] = [
+        let cases: [(Error, &[&str]); 19] = [
             (Error::NotFinite { argument }, &["output", "leave"]),
             (Error::Infinite { argument }, &["output", "pass NaN"]),
             (Error::TooLarge { argument }, &["output", "unit"]),
@@ -247,6 +257,7 @@ mod tests {
             (Error::Length { argument, expected, found }, &["output", "733", "734"]),
             (Error::Orders { needed, available }, &["731", "732", "make the two equal"]),
             (Error::Delays { needed, available }, &["731", "732", "make room"]),
+            (Error::InputFirst { input: 735 }, &["735", "nk = 0", "log_row"]),
             (Error::NotTriangular { row, column }, &["735", "736", "must be 0"]),
             (Error::TooFewRows { needed, found }, &["731", "733", "add more rows"]),
             (Error::TooManyRows, &["start again"]),

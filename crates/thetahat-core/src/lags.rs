@@ -18,7 +18,7 @@ pub struct InputOrders {
 ///
 /// ```text
 /// y(k) + a_1 y(k-1) + … + a_na y(k-na)
-///     = Σ over the inputs:  b_0 u(k-nk) + b_1 u(k-nk-1) + … + b_(nb-1) u(k-nk-nb+1)  + e(k)
+///     = Σ over the inputs:  b_0 u(k-nk) + b_1 u(k-nk-1) + … + b_(nb-1) u(k-nk-nb+1)  [+ constant] + e(k)
 /// ```
 ///
 /// It borrows the list of inputs, so that it serves a constant and a value read at run time. The sizes that
@@ -30,6 +30,7 @@ pub struct InputOrders {
 /// const ORDERS: ArxOrders = ArxOrders {
 ///     na: 2,
 ///     inputs: &[InputOrders { nb: 2, nk: 1 }, InputOrders { nb: 1, nk: 3 }],
+///     constant: false,
 /// };
 /// assert_eq!(ORDERS.parameters(), 5);
 /// assert_eq!(ORDERS.delays(), 4);
@@ -41,12 +42,15 @@ pub struct ArxOrders<'a> {
     /// The orders of each input, in the order in which samples are pushed. Empty for a time series without
     /// input.
     pub inputs: &'a [InputOrders],
+    /// Whether a constant is a parameter too, for signals that are not about 0: the level of the output where the
+    /// inputs are 0 is constant/A(1).
+    pub constant: bool,
 }
 
 impl ArxOrders<'_> {
-    /// The number of parameters: na plus every nb.
+    /// The number of parameters: na plus every nb, plus 1 with a constant.
     pub const fn parameters(&self) -> usize {
-        let mut sum = self.na;
+        let mut sum = self.na.saturating_add(self.constant as usize);
         let mut inputs = self.inputs;
         while let [first, rest @ ..] = inputs {
             sum = sum.saturating_add(first.nb);
@@ -69,21 +73,44 @@ impl ArxOrders<'_> {
     }
 }
 
-/// The delay line of one input that has coefficients.
+/// The delay line of one input that has coefficients, or of what else is in φ after the outputs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Line {
-    pub(crate) input: usize,
+    /// The index of an input; the next two are those of the constant and of the residuals.
+    pub(crate) index: usize,
     pub(crate) nb: usize,
     pub(crate) nk: usize,
+}
+
+/// What goes into a delay line.
+#[derive(PartialEq)]
+enum Source {
+    Input(usize),
+    /// 1.
+    Constant,
+    /// The residual of the sample before.
+    Residual,
+}
+
+impl Line {
+    /// What goes into it, of a model with so many inputs.
+    fn source(&self, inputs: usize) -> Source {
+        match self.index.checked_sub(inputs) {
+            None => Source::Input(self.index),
+            Some(0) => Source::Constant,
+            Some(_) => Source::Residual,
+        }
+    }
 }
 
 /// Tapped delay lines: recent inputs and outputs, arranged as the regressor of an ARX model.
 ///
 /// ```text
-/// φ(k) = [ -y(k-1) … -y(k-na)   u1(k-nk1) … u1(k-nk1-nb1+1)   u2(k-nk2) … ]'
+/// φ(k) = [ -y(k-1) … -y(k-na)   u1(k-nk1) … u1(k-nk1-nb1+1)   u2(k-nk2) …   1 ]'
 /// ```
 ///
-/// so that y(k) = φ(k)'θ + e(k) with θ = [a_1 … a_na  b1_0 … b1_(nb1-1)  b2_0 …]. See [`ArxOrders`].
+/// so that y(k) = φ(k)'θ + e(k) with θ = [a_1 … a_na  b1_0 … b1_(nb1-1)  b2_0 …  constant]. The 1 is there if the
+/// [`ArxOrders`] have a constant.
 /// The outputs enter with a minus sign (Ljung, System Identification, 2nd ed., section 4.2).
 ///
 /// Each sample takes three steps, in this order:
@@ -110,7 +137,7 @@ pub(crate) struct Line {
 /// use thetahat_core::{ArxOrders, Error, InputOrders, Lags};
 ///
 /// // One input: y(k) depends on y(k-1), u(k-1) and u(k-2).
-/// let orders = ArxOrders { na: 1, inputs: &[InputOrders { nb: 2, nk: 1 }] };
+/// let orders = ArxOrders { na: 1, inputs: &[InputOrders { nb: 2, nk: 1 }], constant: false };
 /// let mut lags: Lags<f64, Const<3>> = Lags::new(&orders)?;
 ///
 /// for (u, y) in [(1.0, 10.0), (2.0, 20.0)] {
@@ -132,6 +159,7 @@ pub(crate) struct Line {
 /// const ORDERS: ArxOrders = ArxOrders {
 ///     na: 2,
 ///     inputs: &[InputOrders { nb: 2, nk: 1 }, InputOrders { nb: 1, nk: 3 }],
+///     constant: false,
 /// };
 /// type Plant = Lags<f32, Const<{ ORDERS.parameters() }>, Const<{ ORDERS.delays() }>>;
 ///
@@ -156,6 +184,8 @@ pub struct Lags<T: Real, N: Dimension, D: Dimension = Const<1>> {
     lines: OVector<Line, N>,
     na: usize,
     inputs: usize,
+    /// Whether y(k) is in, and u(k) is not.
+    awaiting_inputs: bool,
 }
 
 impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
@@ -168,7 +198,7 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
     /// use thetahat_core::nalgebra::Const;
     /// use thetahat_core::{ArxOrders, Error, InputOrders, Lags};
     ///
-    /// let orders = ArxOrders { na: 2, inputs: &[InputOrders { nb: 2, nk: 5 }] };
+    /// let orders = ArxOrders { na: 2, inputs: &[InputOrders { nb: 2, nk: 5 }], constant: false };
     /// let error = Lags::<f32, Const<3>, Const<5>>::new(&orders).unwrap_err();
     /// assert_eq!(error, Error::Orders { needed: 4, available: 3 });
     /// let error = Lags::<f32, Const<4>, Const<1>>::new(&orders).unwrap_err();
@@ -178,28 +208,28 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
         Self::with_residuals(orders, 0)
     }
 
-    /// The same with one more line after those of the inputs, for `residuals` past residuals. To
-    /// [`push`](Lags::push) it is the input whose index is the number of inputs.
+    /// The same with one more line after all others, for `residuals` past residuals.
     pub(crate) fn with_residuals(orders: &ArxOrders<'_>, residuals: usize) -> Result<Self, Error> {
         let needed = orders.parameters().saturating_add(residuals);
         let parameters = N::exactly(needed).map_err(|available| Error::Orders { needed, available })?;
         let delays = D::at_least(orders.delays())
             .map_err(|available| Error::Delays { needed: orders.delays(), available })?;
-        let unused = Line { input: 0, nb: 0, nk: 0 };
-        let mut lines = parameters.vector(unused);
-        let residuals = InputOrders { nb: residuals, nk: 0 };
-        let inputs = orders.inputs.iter().chain([&residuals]).enumerate();
-        let in_use = inputs.filter(|(_, input)| input.nb > 0);
-        for (line, (input, &InputOrders { nb, nk })) in lines.as_mut_slice().iter_mut().zip(in_use) {
-            *line = Line { input, nb, nk };
+        let mut lines = parameters.vector(Line { index: 0, nb: 0, nk: 0 });
+        let others = [usize::from(orders.constant), residuals].map(|nb| InputOrders { nb, nk: 0 });
+        let in_use = orders.inputs.iter().chain(&others).enumerate().filter(|(_, input)| input.nb > 0);
+        for (line, (index, &InputOrders { nb, nk })) in lines.as_mut_slice().iter_mut().zip(in_use) {
+            *line = Line { index, nb, nk };
         }
-        Ok(Lags {
+        let mut lags = Lags {
             regressor: parameters.vector(T::NAN),
             delayed: delays.vector(T::NAN),
             lines,
             na: orders.na,
             inputs: orders.inputs.len(),
-        })
+            awaiting_inputs: false,
+        };
+        lags.gap();
+        Ok(lags)
     }
 
     /// Step 1 of a sample: takes u(k), one number for each input, in the order of [`ArxOrders::inputs`]. NaN
@@ -211,7 +241,7 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
     /// orders; [`Error::Infinite`].
     pub fn push_inputs(&mut self, inputs: &[T]) -> Result<(), Error> {
         self.check_inputs(inputs)?;
-        self.push(|input| inputs.get(input).copied().unwrap_or(T::NAN));
+        self.push(inputs, T::NAN);
         Ok(())
     }
 
@@ -221,27 +251,51 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
         if inputs.iter().any(is_infinite) { Err(Error::Infinite { argument: "inputs" }) } else { Ok(()) }
     }
 
-    /// Step 1 of a sample, unchecked: `newest` tells u(k) of an input.
-    pub(crate) fn push(&mut self, newest: impl Fn(usize) -> T) {
+    /// Step 1 of a sample, unchecked. Inputs that are not given yet are missing; `residual` is that of the sample
+    /// before.
+    pub(crate) fn push(&mut self, inputs: &[T], residual: T) {
         let mut taps = self.regressor.as_mut_slice().iter_mut().skip(self.na);
         let mut delayed = self.delayed.as_mut_slice().iter_mut();
         for line in self.lines.as_slice() {
-            let arriving = shift(delayed.by_ref().take(line.nk), newest(line.input));
+            let newest = match line.source(self.inputs) {
+                Source::Input(input) => inputs.get(input).copied().unwrap_or(T::NAN),
+                Source::Constant => T::one(),
+                Source::Residual => residual,
+            };
+            let arriving = shift(delayed.by_ref().take(line.nk), newest);
             shift(taps.by_ref().take(line.nb), arriving);
         }
     }
 
-    /// Writes what φ will be once these inputs are pushed, missing samples as NaN.
-    pub(crate) fn peek(&self, newest: impl Fn(usize) -> T, regressor: &mut [T]) {
-        ud::copy(self.regressor.as_slice(), regressor);
-        let mut taps = regressor.iter_mut().skip(self.na);
-        let mut delayed = self.delayed.as_slice();
+    /// The inputs of the sample whose step 1 went without them, where no input acts in its own sample.
+    pub(crate) fn complete(&mut self, inputs: &[T]) {
+        let mut delayed = self.delayed.as_mut_slice();
         for line in self.lines.as_slice() {
-            let (mine, others) = delayed.split_at_checked(line.nk).unwrap_or_default();
-            let arriving = mine.last().copied().unwrap_or_else(|| newest(line.input));
-            shift(taps.by_ref().take(line.nb), arriving);
+            let (mine, others) = delayed.split_at_mut_checked(line.nk).unwrap_or_default();
+            if let (Source::Input(input), [newest, ..]) = (line.source(self.inputs), mine) {
+                *newest = inputs.get(input).copied().unwrap_or(T::NAN);
+            }
             delayed = others;
         }
+        self.awaiting_inputs = false;
+    }
+
+    /// That no input acts in its own sample, so that y(k) can be predicted before u(k) is known.
+    pub(crate) fn check_delays(&self) -> Result<(), Error> {
+        self.lines.as_slice().iter().try_for_each(|line| match line.source(self.inputs) {
+            Source::Input(input) if line.nb > 0 && line.nk == 0 => Err(Error::InputFirst { input }),
+            _ => Ok(()),
+        })
+    }
+
+    /// Whether y(k) is in, and u(k) is still to come.
+    pub(crate) fn awaits_inputs(&self) -> bool {
+        self.awaiting_inputs
+    }
+
+    /// Says so.
+    pub(crate) fn await_inputs(&mut self, awaiting: bool) {
+        self.awaiting_inputs = awaiting;
     }
 
     /// Step 2 of a sample: φ(k), or `None` while a sample in it is missing.
@@ -262,8 +316,13 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
         if is_infinite(&output) {
             return Err(Error::Infinite { argument: "output" });
         }
-        shift(self.regressor.as_mut_slice().iter_mut().take(self.na), -output);
+        self.push_checked(output);
         Ok(())
+    }
+
+    /// Step 3 of a sample, unchecked.
+    pub(crate) fn push_checked(&mut self, output: T) {
+        shift(self.regressor.as_mut_slice().iter_mut().take(self.na), -output);
     }
 
     /// Takes over the samples of other lines of the same orders.
@@ -279,18 +338,24 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
             .iter_mut()
             .zip(other.lines.as_slice())
             .for_each(|(line, &other)| *line = other);
-        (self.na, self.inputs) = (other.na, other.inputs);
+        (self.na, self.inputs, self.awaiting_inputs) = (other.na, other.inputs, other.awaiting_inputs);
         Ok(())
     }
 
-    /// The typical magnitude of each element of φ, given that of the output and of each input.
-    pub(crate) fn scales(&self, output: T, input: impl Fn(usize) -> T) -> OVector<T, N> {
+    /// The typical magnitude of each element of φ, given that of the output, of each input and of the residuals.
+    pub(crate) fn scales(&self, output: T, inputs: &[T], residual: T) -> Result<OVector<T, N>, Error> {
+        check_length("input_scales", self.inputs, inputs.len())?;
         let mut scales = self.regressor.shape_generic().0.vector(output);
         let mut taps = scales.as_mut_slice().iter_mut().skip(self.na);
         for line in self.lines.as_slice() {
-            taps.by_ref().take(line.nb).for_each(|scale| *scale = input(line.input));
+            let magnitude = match line.source(self.inputs) {
+                Source::Input(input) => inputs.get(input).copied().unwrap_or(T::NAN),
+                Source::Constant => T::one(),
+                Source::Residual => residual,
+            };
+            taps.by_ref().take(line.nb).for_each(|scale| *scale = magnitude);
         }
-        scales
+        Ok(scales)
     }
 
     /// Takes the last `count` elements of φ for 0.
@@ -322,12 +387,29 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
         }
         let mut start = self.na;
         for line in self.lines.as_slice() {
-            if line.input == input && line.nb > 0 {
+            if line.index == input && line.nb > 0 {
                 return Some(coefficients(parameters, start, line.nb, line.nk));
             }
             start += line.nb;
         }
         Some(coefficients(parameters, start, 0, 0))
+    }
+
+    /// The constant among parameters in the order of φ; `None` if there is none.
+    pub(crate) fn constant(&self, parameters: &[T]) -> Option<T> {
+        parameters.get(self.constant_place()?).copied()
+    }
+
+    /// Where φ holds the 1 of the constant.
+    fn constant_place(&self) -> Option<usize> {
+        let mut start = self.na;
+        for line in self.lines.as_slice() {
+            if line.nb > 0 && line.source(self.inputs) == Source::Constant {
+                return Some(start);
+            }
+            start += line.nb;
+        }
+        None
     }
 
     /// Forgets all samples: an unknown number of them is missing here. The regressor comes back once it is
@@ -337,7 +419,7 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
     /// use thetahat_core::nalgebra::Const;
     /// use thetahat_core::{ArxOrders, Error, Lags};
     ///
-    /// let mut lags: Lags<f64, Const<1>> = Lags::new(&ArxOrders { na: 1, inputs: &[] })?;
+    /// let mut lags: Lags<f64, Const<1>> = Lags::new(&ArxOrders { na: 1, inputs: &[], constant: false })?;
     /// lags.push_output(1.0)?;
     /// assert!(lags.regressor().is_some());
     /// lags.gap();
@@ -347,6 +429,12 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
     pub fn gap(&mut self) {
         self.regressor.fill(T::NAN);
         self.delayed.fill(T::NAN);
+        self.awaiting_inputs = false;
+        if let Some(one) =
+            self.constant_place().and_then(|place| self.regressor.as_mut_slice().get_mut(place))
+        {
+            *one = T::one();
+        }
     }
 }
 
@@ -450,18 +538,18 @@ mod tests {
     fn static_sizes_follow_the_definition() {
         for nk in DELAYS {
             let inputs = [one(2, nk)];
-            let orders = |na| ArxOrders { na, inputs: &inputs };
+            let orders = |na| ArxOrders { na, inputs: &inputs, constant: false };
             check::<Const<2>, Const<7>>(&orders(0));
             check::<Const<4>, Const<7>>(&orders(2));
         }
         let two = [one(2, 1), one(1, 3)];
-        check::<Const<6>, Const<4>>(&ArxOrders { na: 3, inputs: &two });
+        check::<Const<6>, Const<4>>(&ArxOrders { na: 3, inputs: &two, constant: false });
         let three = [one(1, 0), one(0, 5), one(2, 1)];
-        check::<Const<4>, Const<1>>(&ArxOrders { na: 1, inputs: &three });
+        check::<Const<4>, Const<1>>(&ArxOrders { na: 1, inputs: &three, constant: false });
         // No stored samples at all.
-        check::<Const<3>, Const<0>>(&ArxOrders { na: 1, inputs: &[one(2, 0)] });
-        check::<Const<3>, Const<1>>(&ArxOrders { na: 3, inputs: &[] });
-        check::<Const<0>, Const<1>>(&ArxOrders { na: 0, inputs: &[] });
+        check::<Const<3>, Const<0>>(&ArxOrders { na: 1, inputs: &[one(2, 0)], constant: false });
+        check::<Const<3>, Const<1>>(&ArxOrders { na: 3, inputs: &[], constant: false });
+        check::<Const<0>, Const<1>>(&ArxOrders { na: 0, inputs: &[], constant: false });
     }
 
     #[cfg(feature = "alloc")]
@@ -473,9 +561,9 @@ mod tests {
             for nb in 0..4 {
                 for nk in DELAYS {
                     let first = one(nb, nk);
-                    check::<Dyn, Dyn>(&ArxOrders { na, inputs: &[first] });
+                    check::<Dyn, Dyn>(&ArxOrders { na, inputs: &[first], constant: false });
                     for second in [one(0, 1), one(1, 0), one(2, 3)] {
-                        check::<Dyn, Dyn>(&ArxOrders { na, inputs: &[first, second] });
+                        check::<Dyn, Dyn>(&ArxOrders { na, inputs: &[first, second], constant: false });
                     }
                 }
             }
@@ -486,7 +574,7 @@ mod tests {
     fn a_missing_sample_matters_only_in_a_tap() {
         // y(k) depends on u(k-2) alone: u(1) is missed at k = 3 only.
         let mut lags: Lags<f32, Const<1>, Const<2>> =
-            Lags::new(&ArxOrders { na: 0, inputs: &[one(1, 2), one(0, 1)] }).unwrap();
+            Lags::new(&ArxOrders { na: 0, inputs: &[one(1, 2), one(0, 1)], constant: false }).unwrap();
         let mut ready = vec![];
         for k in 0..6 {
             let u = if k == 1 { f32::NAN } else { 1.0 };
@@ -499,7 +587,8 @@ mod tests {
 
     #[test]
     fn bad_samples_are_named() {
-        let mut lags: Lags<f64, Const<2>> = Lags::new(&ArxOrders { na: 1, inputs: &[one(1, 1)] }).unwrap();
+        let mut lags: Lags<f64, Const<2>> =
+            Lags::new(&ArxOrders { na: 1, inputs: &[one(1, 1)], constant: false }).unwrap();
         let length = |found| Error::Length { argument: "inputs", expected: 1, found };
         assert_eq!(lags.push_inputs(&[]), Err(length(0)));
         assert_eq!(lags.push_inputs(&[1.0, 2.0]), Err(length(2)));
@@ -511,7 +600,7 @@ mod tests {
     #[test]
     fn an_infinite_input_leaves_every_line_as_it_was() {
         let mut lags: Lags<f64, Const<2>, Const<2>> =
-            Lags::new(&ArxOrders { na: 0, inputs: &[one(1, 1), one(1, 1)] }).unwrap();
+            Lags::new(&ArxOrders { na: 0, inputs: &[one(1, 1), one(1, 1)], constant: false }).unwrap();
         lags.push_inputs(&[1.0, 2.0]).unwrap();
         assert!(lags.push_inputs(&[3.0, f64::INFINITY]).is_err());
         lags.push_inputs(&[4.0, 5.0]).unwrap();
@@ -521,7 +610,7 @@ mod tests {
     #[test]
     fn orders_that_do_not_fit_are_an_error() {
         fn error<N: Dimension, D: Dimension>(na: usize, inputs: &[InputOrders]) -> Option<Error> {
-            Lags::<f32, N, D>::new(&ArxOrders { na, inputs }).err()
+            Lags::<f32, N, D>::new(&ArxOrders { na, inputs, constant: false }).err()
         }
         let orders = |needed, available| Some(Error::Orders { needed, available });
         let delays = |needed, available| Some(Error::Delays { needed, available });
@@ -549,7 +638,8 @@ mod tests {
             y
         }
         let theta = Vector3::new(-0.5, 1.0, 0.25);
-        let mut lags: Lags<f64, Const<3>> = Lags::new(&ArxOrders { na: 1, inputs: &[one(2, 1)] }).unwrap();
+        let mut lags: Lags<f64, Const<3>> =
+            Lags::new(&ArxOrders { na: 1, inputs: &[one(2, 1)], constant: false }).unwrap();
         for _ in 0..2 {
             lags.push_inputs(&[0.0]).unwrap();
             lags.push_output(0.0).unwrap();

@@ -36,13 +36,14 @@
 //! use thetahat_core::nalgebra::{Const, Vector2};
 //! use thetahat_core::{ArxOrders, Error, Forgetting, InputOrders, RecursiveArx};
 //!
-//! let orders = ArxOrders { na: 1, inputs: &[InputOrders { nb: 1, nk: 1 }] };
+//! let orders = ArxOrders { na: 1, inputs: &[InputOrders { nb: 1, nk: 1 }], constant: false };
 //! let mut plant: RecursiveArx<f32, Const<2>> = RecursiveArx::new(&orders, 1.0, &[1.0], Forgetting::default())?;
-//! let mut y = 0.0;
+//! let (mut y, mut u) = (0.0, 0.0);
 //! for k in 0..200 {
-//!     let u = if k % 7 < 3 { 1.0 } else { -1.0 };
-//!     plant.update(&[u], y)?;
-//!     y = 0.8 * y + 0.5 * u;
+//!     y = 0.8 * y + 0.5 * u; // the plant
+//!     plant.measured(y)?; // what it answered to all that was applied before
+//!     u = if k % 7 < 3 { 1.0 } else { -1.0 };
+//!     plant.applied(&[u])?; // what acts from now on
 //! }
 //! assert!((plant.estimator().parameters() - Vector2::new(-0.8, 0.5)).amax() < 1e-4);
 //! # Ok::<(), Error>(())

@@ -50,15 +50,15 @@ impl<T: Real> Entry for T {
 struct Number<T>(PhantomData<T>);
 
 impl Entry for Line {
-    const BLANK: Line = Line { input: 0, nb: 0, nk: 0 };
+    const BLANK: Line = Line { index: 0, nb: 0, nk: 0 };
 
     fn write<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        (self.input, self.nb, self.nk).serialize(serializer)
+        (self.index, self.nb, self.nk).serialize(serializer)
     }
 
     fn read<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Line, D::Error> {
-        let (input, nb, nk) = Deserialize::deserialize(deserializer)?;
-        Ok(Line { input, nb, nk })
+        let (index, nb, nk) = Deserialize::deserialize(deserializer)?;
+        Ok(Line { index, nb, nk })
     }
 }
 

@@ -98,15 +98,15 @@ fn recursive_least_squares() {
 
 #[test]
 fn recursive_arx_and_armax() {
-    let orders = ArxOrders { na: 1, inputs: INPUTS };
+    let orders = ArxOrders { na: 1, inputs: INPUTS, constant: false };
     let arx: RecursiveArx<f32, Const<2>, Const<2>> =
         RecursiveArx::new(&orders, 1.0, &[1.0], Forgetting::default()).unwrap();
-    check(arx, |arx, k| (arx.update(&[value(k) as f32], output(k) as f32), *arx.estimator().parameters()));
+    check(arx, |arx, k| (arx.log_row(output(k) as f32, &[value(k) as f32]), *arx.estimator().parameters()));
     for method in [ArmaxMethod::ExtendedLeastSquares, ArmaxMethod::PredictionError] {
-        let orders = ArmaxOrders { na: 1, inputs: INPUTS, nc: 1 };
+        let orders = ArmaxOrders { na: 1, inputs: INPUTS, nc: 1, constant: false };
         let armax: RecursiveArmax<f64, Const<3>, Const<2>> =
             RecursiveArmax::new(&orders, method, 1.0, &[1.0], 0.1, Forgetting::default()).unwrap();
-        check(armax, |armax, k| (armax.update(&[value(k)], output(k)), *armax.estimator().parameters()));
+        check(armax, |armax, k| (armax.log_row(output(k), &[value(k)]), *armax.estimator().parameters()));
     }
 }
 
@@ -162,7 +162,7 @@ fn least_squares_and_delay_lines() {
         let added = problem.add(&Vector2::new(value(k) as f32, 1.0), value(2 * k) as f32);
         (added, problem.solve())
     });
-    let lags: Lags<f64, Dyn, Dyn> = Lags::new(&ArxOrders { na: 2, inputs: INPUTS }).unwrap();
+    let lags: Lags<f64, Dyn, Dyn> = Lags::new(&ArxOrders { na: 2, inputs: INPUTS, constant: false }).unwrap();
     check(lags, |lags, k| {
         lags.push_inputs(&[value(k)]).unwrap();
         let regressor = lags.regressor().cloned();

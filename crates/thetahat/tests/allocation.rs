@@ -81,7 +81,7 @@ fn samples_of_a_tracker_take_no_memory() {
             for t in from..to {
                 y = 0.8 * y + u[t] + e[t];
                 let measured = if t % 97 == 0 { f64::NAN } else { y };
-                work += tracker.update(&[u[t]], measured).unwrap().excitation;
+                work += tracker.log_row(measured, &[u[t]]).unwrap().excitation;
                 work += tracker.forecast(5).unwrap();
                 tracker.write_standard_errors(&mut errors).unwrap();
             }

@@ -190,6 +190,7 @@ class RecursiveArx:
         nk: int | Sequence[int] = 1,
         forgetting: float | Forgetting | None = 0.99,
         *,
+        constant: bool = False,
         output_scale: float = 1.0,
         input_scales: ArrayLike | None = None,
         start: _Start = "standard",
@@ -198,14 +199,18 @@ class RecursiveArx:
         covariance: ArrayLike | None = None,
         dead_zone: float = 0.0,
     ) -> RecursiveArx: ...
-    def update(self, u: ArrayLike | None, y: float) -> Innovation: ...
-    def run(self, u: ArrayLike | None, y: ArrayLike) -> RecursiveTrajectory: ...
+    def measured(self, y: float) -> Innovation: ...
+    def applied(self, u: ArrayLike) -> None: ...
+    def log_row(self, y: float, *, u: ArrayLike | None = None) -> Innovation: ...
+    def run(self, y: ArrayLike, *, u: ArrayLike | None = None) -> RecursiveTrajectory: ...
     def predict(self, future_inputs: ArrayLike | None = None, steps: int | None = None) -> _Array: ...
     def gap(self) -> None: ...
     @property
     def a(self) -> _Array: ...
     @property
     def b(self) -> list[_Array]: ...
+    @property
+    def constant(self) -> float | None: ...
     @property
     def parameters(self) -> _Array: ...
     @property
@@ -236,6 +241,7 @@ class RecursiveArmax:
         forgetting: float | Forgetting | None = 0.99,
         *,
         method: _Method = "extended-least-squares",
+        constant: bool = False,
         output_scale: float = 1.0,
         input_scales: ArrayLike | None = None,
         noise_scale: float = 1.0,
@@ -243,8 +249,10 @@ class RecursiveArmax:
         covariance: ArrayLike | None = None,
         dead_zone: float = 0.0,
     ) -> RecursiveArmax: ...
-    def update(self, u: ArrayLike | None, y: float) -> Innovation: ...
-    def run(self, u: ArrayLike | None, y: ArrayLike) -> RecursiveTrajectory: ...
+    def measured(self, y: float) -> Innovation: ...
+    def applied(self, u: ArrayLike) -> None: ...
+    def log_row(self, y: float, *, u: ArrayLike | None = None) -> Innovation: ...
+    def run(self, y: ArrayLike, *, u: ArrayLike | None = None) -> RecursiveTrajectory: ...
     def predict(self, future_inputs: ArrayLike | None = None, steps: int | None = None) -> _Array: ...
     def gap(self) -> None: ...
     @property
@@ -253,6 +261,8 @@ class RecursiveArmax:
     def b(self) -> list[_Array]: ...
     @property
     def c(self) -> _Array: ...
+    @property
+    def constant(self) -> float | None: ...
     @property
     def parameters(self) -> _Array: ...
     @property
@@ -340,16 +350,18 @@ class KalmanFilter:
         observation: LinearObservation,
         cross_covariance: ArrayLike,
         measurement: ArrayLike,
+        *,
         input: ArrayLike | None = None,
     ) -> None: ...
     def correct(
-        self, observation: LinearObservation, measurement: ArrayLike, input: ArrayLike | None = None
+        self, observation: LinearObservation, measurement: ArrayLike, *, input: ArrayLike | None = None
     ) -> Innovation: ...
     def run(
         self,
         transition: LinearTransition,
         observation: LinearObservation,
         measurements: ArrayLike,
+        *,
         inputs: ArrayLike | None = None,
         cross_covariance: ArrayLike | None = None,
     ) -> FilterTrajectory: ...
@@ -358,6 +370,7 @@ class KalmanFilter:
         transition: LinearTransition,
         observation: LinearObservation,
         measurements: ArrayLike,
+        *,
         inputs: ArrayLike | None = None,
     ) -> SmoothedTrajectory: ...
     def steady_state(
@@ -377,13 +390,14 @@ class ExtendedKalmanFilter:
     ) -> ExtendedKalmanFilter: ...
     def predict(self, transition: _Transition, input: ArrayLike | None = None) -> None: ...
     def correct(
-        self, observation: _Observation, measurement: ArrayLike, input: ArrayLike | None = None
+        self, observation: _Observation, measurement: ArrayLike, *, input: ArrayLike | None = None
     ) -> Innovation: ...
     def run(
         self,
         transition: _Transition,
         observation: _Observation,
         measurements: ArrayLike,
+        *,
         inputs: ArrayLike | None = None,
     ) -> FilterTrajectory: ...
     def smooth(
@@ -391,6 +405,7 @@ class ExtendedKalmanFilter:
         transition: _Transition,
         observation: _Observation,
         measurements: ArrayLike,
+        *,
         inputs: ArrayLike | None = None,
     ) -> SmoothedTrajectory: ...
     @property
@@ -419,6 +434,7 @@ class LuenbergerObserver:
         transition: _Transition,
         observation: _Observation,
         measurement: ArrayLike,
+        *,
         input: ArrayLike | None = None,
     ) -> Innovation: ...
     def run(
@@ -426,6 +442,7 @@ class LuenbergerObserver:
         transition: _Transition,
         observation: _Observation,
         measurements: ArrayLike,
+        *,
         inputs: ArrayLike | None = None,
     ) -> ObserverTrajectory: ...
     @property

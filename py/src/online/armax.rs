@@ -50,6 +50,9 @@ impl Around<Dyn, Const<1>> for Engine {
 ///     The gradient along which it corrects. The first one takes the residuals for measured: it is quick, and
 ///     converges to the truth if 1 / C(q) - 1/2 is positive real. The second one filters by 1 / C(q): it converges
 ///     to a minimum of the prediction error, and may be slow at the start.
+/// constant : bool, default False
+///     Whether a constant is estimated too, for signals that are not about 0: the level of the output where the inputs
+///     are 0 is constant / A(1).
 /// output_scale : float, default 1.0
 ///     The typical magnitude of the output, in its own unit.
 /// input_scales : float or array_like, optional
@@ -57,7 +60,7 @@ impl Around<Dyn, Const<1>> for Engine {
 /// noise_scale : float, default 1.0
 ///     The typical magnitude of the noise e, in the unit of the output.
 /// parameters : array_like, shape (n,), optional
-///     What to start from: a_1 ... a_na, then b_0 ... of each input, then c_1 ... c_nc.
+///     What to start from: a_1 ... a_na, then b_0 ... of each input, then the constant, then c_1 ... c_nc.
 /// covariance : array_like, shape (n, n), optional
 ///     P to start from, in units of the noise variance.
 /// dead_zone : float, default 0.0
@@ -67,7 +70,7 @@ impl Around<Dyn, Const<1>> for Engine {
 /// -----
 /// The model is::
 ///
-///     A(q) y(k) = sum over the inputs of B_i(q) u_i(k) + C(q) e(k)
+///     A(q) y(k) = sum over the inputs of B_i(q) u_i(k) [+ constant] + C(q) e(k)
 ///     C(q) = 1 + c_1 q^-1 + ... + c_nc q^-nc
 ///
 /// with A and B as in `RecursiveArx`. C stays stable: a step that would lead out is shortened, and the action is
@@ -84,7 +87,7 @@ impl Around<Dyn, Const<1>> for Engine {
 /// >>> e = 0.5 * np.random.default_rng(1).standard_normal(4000)
 /// >>> y = e + 0.6 * np.r_[0.0, e[:-1]]
 /// >>> series = RecursiveArmax(0, 0, 1, forgetting=None, noise_scale=0.5)
-/// >>> trajectory = series.run(None, y)
+/// >>> trajectory = series.run(y)
 /// >>> bool(abs(series.c[1] - 0.6) < 0.03)
 /// True
 #[pyclass(module = "thetahat")]
@@ -107,10 +110,10 @@ impl RecursiveArmax {
 impl RecursiveArmax {
     #[new]
     #[pyo3(signature = (na, nb, nc, nk = None, forgetting = STANDARD, *, method = "extended-least-squares",
-        output_scale = 1.0, input_scales = None, noise_scale = 1.0, parameters = None, covariance = None,
+        constant = false, output_scale = 1.0, input_scales = None, noise_scale = 1.0, parameters = None, covariance = None,
         dead_zone = 0.0))]
     #[pyo3(
-        text_signature = "(na, nb, nc, nk=1, forgetting=0.99, *, method='extended-least-squares', output_scale=1.0, input_scales=None, noise_scale=1.0, parameters=None, covariance=None, dead_zone=0.0)"
+        text_signature = "(na, nb, nc, nk=1, forgetting=0.99, *, method='extended-least-squares', constant=False, output_scale=1.0, input_scales=None, noise_scale=1.0, parameters=None, covariance=None, dead_zone=0.0)"
     )]
     #[expect(clippy::too_many_arguments, reason = "most are options, given by name")]
     fn new(
@@ -121,6 +124,7 @@ impl RecursiveArmax {
         nk: Option<&Bound<'_, PyAny>>,
         forgetting: Memory,
         method: &str,
+        constant: bool,
         output_scale: f64,
         input_scales: Option<&Bound<'_, PyAny>>,
         noise_scale: f64,
@@ -131,7 +135,7 @@ impl RecursiveArmax {
         let one = 1_u8.into_pyobject(py)?.into_any();
         let (others, inputs) = orders(&[("na", na), ("nc", nc)], nb, nk.unwrap_or(&one))?;
         let each = |place: usize| others.get(place).copied().unwrap_or_default();
-        let orders = ArmaxOrders { na: each(0), inputs: &inputs, nc: each(1) };
+        let orders = ArmaxOrders { na: each(0), inputs: &inputs, nc: each(1), constant };
         let scales = scales(input_scales, inputs.len())?;
         let method = match method {
             "extended-least-squares" => ArmaxMethod::ExtendedLeastSquares,
@@ -158,12 +162,13 @@ impl RecursiveArmax {
         Ok(RecursiveArmax::of(Engine { stepper, inputs: inputs.len() }))
     }
 
-    /// Take one sample, u(k) and y(k), and correct the model by it.
+    /// y(k) arrives: time goes on to k, and the model learns from y(k) and the inputs that were `applied` before.
+    ///
+    /// A controller writes `measured(y)`, computes its input, and writes `applied(u)`, in the order in which things
+    /// happen. A call that is left out is a missing sample: time goes on all the same.
     ///
     /// Parameters
     /// ----------
-    /// u : float, or array_like with one number for each input; None without input
-    ///     The inputs. NaN is a missing sample.
     /// y : float
     ///     The output. NaN is a missing sample.
     ///
@@ -175,25 +180,76 @@ impl RecursiveArmax {
     /// Raises
     /// ------
     /// ValueError
-    ///     If a shape is wrong, a number infinite or too large. Nothing has changed then, time included.
-    fn update(&mut self, py: Python<'_>, u: &Bound<'_, PyAny>, y: &Bound<'_, PyAny>) -> PyResult<Innovation> {
-        argument::sample("u", u, self.engine.inputs, &mut self.inputs)?;
+    ///     If a number is infinite or too large, or an input acts on the output of its own sample (nk = 0): `log_row` takes
+    ///     that. Nothing has changed then, time included.
+    fn measured(&mut self, py: Python<'_>, y: &Bound<'_, PyAny>) -> PyResult<Innovation> {
         let output = argument::number("y", y)?;
-        let innovation =
-            self.engine.stepper.update(&self.inputs, output).map_err(|error| failed(py, error))?;
+        let innovation = self.engine.stepper.measured(output).map_err(|error| failed(py, error))?;
         Ok(innovation.into())
     }
 
-    /// Take many samples: the same as `update` in a loop, to the bit.
+    /// u(k): what acts on the plant from now on, until the next measurement.
+    ///
+    /// Parameters
+    /// ----------
+    /// u : float, or array_like with one number for each input
+    ///     The inputs, as the plant got them, so after all limits. NaN is a missing sample.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     If a shape is wrong, a number infinite or too large. Nothing has changed then.
+    fn applied(&mut self, py: Python<'_>, u: &Bound<'_, PyAny>) -> PyResult<()> {
+        argument::sample("u", u, self.engine.inputs, &mut self.inputs)?;
+        self.engine.stepper.applied(&self.inputs).map_err(|error| failed(py, error))
+    }
+
+    /// Take one row of a log: y(k) and u(k), recorded at the same instant.
+    ///
+    /// It is `measured(y)` and then `applied(u)`, to the bit, where every nk is at least 1; with nk = 0 it is the call
+    /// that there is. It is not the one for a controller that knows u(k-1) when y(k) arrives.
+    ///
+    /// Parameters
+    /// ----------
+    /// y : float
+    ///     The output. NaN is a missing sample.
+    /// u : float, or array_like with one number for each input; None without input
+    ///     The inputs. NaN is a missing sample.
+    ///
+    /// Returns
+    /// -------
+    /// Innovation
+    ///     What was not predicted, and what was done.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     If a shape is wrong, a number infinite or too large. Nothing has changed then, time included.
+    #[pyo3(signature = (y, *, u = None))]
+    fn log_row(
+        &mut self,
+        py: Python<'_>,
+        y: &Bound<'_, PyAny>,
+        u: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Innovation> {
+        let none = py.None().into_bound(py);
+        argument::sample("u", u.unwrap_or(&none), self.engine.inputs, &mut self.inputs)?;
+        let output = argument::number("y", y)?;
+        let innovation =
+            self.engine.stepper.log_row(output, &self.inputs).map_err(|error| failed(py, error))?;
+        Ok(innovation.into())
+    }
+
+    /// Take many rows of a log: the same as `log_row` in a loop, to the bit.
     ///
     /// The interpreter lock is released meanwhile.
     ///
     /// Parameters
     /// ----------
-    /// u : array_like, shape (N,) for one input, or (N, inputs); None without input
-    ///     The inputs.
     /// y : array_like, shape (N,)
     ///     The outputs.
+    /// u : array_like, shape (N,) for one input, or (N, inputs); None without input
+    ///     The inputs, recorded at the same instants.
     ///
     /// Returns
     /// -------
@@ -203,13 +259,13 @@ impl RecursiveArmax {
     /// Raises
     /// ------
     /// ValueError
-    ///     As for `update`; the message names the row, from 0. Nothing has changed then.
-    #[pyo3(signature = (u, y))]
+    ///     As for `log_row`; the message names the row, from 0. Nothing has changed then.
+    #[pyo3(signature = (y, *, u = None))]
     fn run(
         &mut self,
         py: Python<'_>,
-        u: Option<&Bound<'_, PyAny>>,
         y: &Bound<'_, PyAny>,
+        u: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<RecursiveTrajectory> {
         let outputs = array::vector("y", y, None)?;
         let outputs = outputs.as_slice()?;
@@ -220,7 +276,7 @@ impl RecursiveArmax {
         let (engine, trajectory) = recursive::run(py, shape, |record| {
             record.run(engine, rows, |engine, row, record| {
                 let output = outputs.get(row).copied().unwrap_or(f64::NAN);
-                record.take(&engine.stepper.update(argument::row(inputs, row, columns), output)?);
+                record.take(&engine.stepper.log_row(output, argument::row(inputs, row, columns))?);
                 Ok(())
             })
         })?;
@@ -228,12 +284,13 @@ impl RecursiveArmax {
         Ok(trajectory)
     }
 
-    /// Predict the outputs to come, y(k+1), y(k+2), ..., after `update` of sample k.
+    /// Predict the outputs to come, y(k+1), y(k+2), ..., y(k) being the latest one.
     ///
     /// Parameters
     /// ----------
     /// future_inputs : array_like, shape (steps,) for one input, or (steps, inputs); None without input
-    ///     u(k+1), u(k+2), ... With nk = 1 the last one acts on nothing, but is there.
+    ///     The inputs to come, as many as outputs. After `measured` of y(k) the first is u(k), which is still to be chosen;
+    ///     after `applied` or `log_row` of u(k) it is u(k+1). (With nk = 1 the last one acts on nothing then, but is there.)
     /// steps : int, optional
     ///     How many; it is needed without input only.
     ///
@@ -277,6 +334,12 @@ impl RecursiveArmax {
     #[getter]
     fn c<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         recursive::coefficients(py, self.engine.stepper.c())
+    }
+
+    /// The constant; None if the model has none.
+    #[getter]
+    fn constant(&self) -> Option<f64> {
+        self.engine.stepper.constant()
     }
 
     /// The parameters, shape (n,), in the order of the regressor.

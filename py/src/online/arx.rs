@@ -39,6 +39,9 @@ impl Around<Dyn, Const<1>> for Engine {
 ///     The delay of each input; an int is the delay of all of them.
 /// forgetting : float, Forgetting or None, default 0.99
 ///     How old samples are forgotten. A float is exponential forgetting with that factor, None is no forgetting.
+/// constant : bool, default False
+///     Whether a constant is estimated too, for signals that are not about 0: the level of the output where the inputs
+///     are 0 is constant / A(1).
 /// output_scale : float, default 1.0
 ///     The typical magnitude of the output, in its own unit.
 /// input_scales : float or array_like, optional
@@ -48,7 +51,7 @@ impl Around<Dyn, Const<1>> for Engine {
 /// blend : int, optional
 ///     With "mixed", and only there: in how many samples the prior is taken out.
 /// parameters : array_like, shape (n,), optional
-///     What to start from: a_1 ... a_na, then b_0 ... of the first input, and of the next.
+///     What to start from: a_1 ... a_na, then b_0 ... of the first input, and of the next, then the constant.
 /// covariance : array_like, shape (n, n), optional
 ///     P to start from, in units of the noise variance.
 /// dead_zone : float, default 0.0
@@ -58,7 +61,7 @@ impl Around<Dyn, Const<1>> for Engine {
 /// -----
 /// The model is::
 ///
-///     A(q) y(k) = sum over the inputs of B_i(q) u_i(k) + e(k)
+///     A(q) y(k) = sum over the inputs of B_i(q) u_i(k) [+ constant] + e(k)
 ///     A(q) = 1 + a_1 q^-1 + ... + a_na q^-na
 ///     B(q) = q^-nk (b_0 + b_1 q^-1 + ... + b_(nb-1) q^-(nb-1))
 ///
@@ -74,9 +77,10 @@ impl Around<Dyn, Const<1>> for Engine {
 /// >>> plant = RecursiveArx(1, 1, nk=2, forgetting=0.98)
 /// >>> y, before = 0.0, [0.0, 0.0]
 /// >>> for k in range(200):
-/// ...     u = 1.0 if k % 7 < 3 else -1.0
 /// ...     y = 0.8 * y + 0.5 * before[1]
-/// ...     innovation = plant.update(u, y)
+/// ...     innovation = plant.measured(y)
+/// ...     u = 1.0 if k % 7 < 3 else -1.0
+/// ...     plant.applied(u)
 /// ...     before = [u, before[0]]
 /// >>> plant.a.round(4)
 /// array([ 1. , -0.8])
@@ -171,10 +175,10 @@ pub(crate) fn future<'py>(
 #[pymethods]
 impl RecursiveArx {
     #[new]
-    #[pyo3(signature = (na, nb, nk = None, forgetting = STANDARD, *, output_scale = 1.0, input_scales = None,
-        start = "standard", blend = None, parameters = None, covariance = None, dead_zone = 0.0))]
+    #[pyo3(signature = (na, nb, nk = None, forgetting = STANDARD, *, constant = false, output_scale = 1.0,
+        input_scales = None, start = "standard", blend = None, parameters = None, covariance = None, dead_zone = 0.0))]
     #[pyo3(
-        text_signature = "(na, nb, nk=1, forgetting=0.99, *, output_scale=1.0, input_scales=None, start='standard', blend=None, parameters=None, covariance=None, dead_zone=0.0)"
+        text_signature = "(na, nb, nk=1, forgetting=0.99, *, constant=False, output_scale=1.0, input_scales=None, start='standard', blend=None, parameters=None, covariance=None, dead_zone=0.0)"
     )]
     #[expect(clippy::too_many_arguments, reason = "most are options, given by name")]
     fn new(
@@ -183,6 +187,7 @@ impl RecursiveArx {
         nb: &Bound<'_, PyAny>,
         nk: Option<&Bound<'_, PyAny>>,
         forgetting: Memory,
+        constant: bool,
         output_scale: f64,
         input_scales: Option<&Bound<'_, PyAny>>,
         start: &str,
@@ -193,7 +198,7 @@ impl RecursiveArx {
     ) -> PyResult<Self> {
         let one = 1_u8.into_pyobject(py)?.into_any();
         let (others, inputs) = orders(&[("na", na)], nb, nk.unwrap_or(&one))?;
-        let orders = ArxOrders { na: others.iter().sum(), inputs: &inputs };
+        let orders = ArxOrders { na: others.iter().sum(), inputs: &inputs, constant };
         let scales = scales(input_scales, inputs.len())?;
         let start = recursive::start(start, blend, parameters.is_some() || covariance.is_some())?;
         let say = |error| failed(py, error);
@@ -213,12 +218,13 @@ impl RecursiveArx {
         Ok(RecursiveArx::of(Engine { stepper, inputs: inputs.len() }))
     }
 
-    /// Take one sample, u(k) and y(k), and correct the model by it.
+    /// y(k) arrives: time goes on to k, and the model learns from y(k) and the inputs that were `applied` before.
+    ///
+    /// A controller writes `measured(y)`, computes its input, and writes `applied(u)`, in the order in which things
+    /// happen. A call that is left out is a missing sample: time goes on all the same.
     ///
     /// Parameters
     /// ----------
-    /// u : float, or array_like with one number for each input; None without input
-    ///     The inputs. NaN is a missing sample.
     /// y : float
     ///     The output. NaN is a missing sample.
     ///
@@ -230,25 +236,76 @@ impl RecursiveArx {
     /// Raises
     /// ------
     /// ValueError
-    ///     If a shape is wrong, a number infinite or too large. Nothing has changed then, time included.
-    fn update(&mut self, py: Python<'_>, u: &Bound<'_, PyAny>, y: &Bound<'_, PyAny>) -> PyResult<Innovation> {
-        argument::sample("u", u, self.engine.inputs, &mut self.inputs)?;
+    ///     If a number is infinite or too large, or an input acts on the output of its own sample (nk = 0): `log_row` takes
+    ///     that. Nothing has changed then, time included.
+    fn measured(&mut self, py: Python<'_>, y: &Bound<'_, PyAny>) -> PyResult<Innovation> {
         let output = argument::number("y", y)?;
-        let innovation =
-            self.engine.stepper.update(&self.inputs, output).map_err(|error| failed(py, error))?;
+        let innovation = self.engine.stepper.measured(output).map_err(|error| failed(py, error))?;
         Ok(innovation.into())
     }
 
-    /// Take many samples: the same as `update` in a loop, to the bit.
+    /// u(k): what acts on the plant from now on, until the next measurement.
+    ///
+    /// Parameters
+    /// ----------
+    /// u : float, or array_like with one number for each input
+    ///     The inputs, as the plant got them, so after all limits. NaN is a missing sample.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     If a shape is wrong, a number infinite or too large. Nothing has changed then.
+    fn applied(&mut self, py: Python<'_>, u: &Bound<'_, PyAny>) -> PyResult<()> {
+        argument::sample("u", u, self.engine.inputs, &mut self.inputs)?;
+        self.engine.stepper.applied(&self.inputs).map_err(|error| failed(py, error))
+    }
+
+    /// Take one row of a log: y(k) and u(k), recorded at the same instant.
+    ///
+    /// It is `measured(y)` and then `applied(u)`, to the bit, where every nk is at least 1; with nk = 0 it is the call
+    /// that there is. It is not the one for a controller that knows u(k-1) when y(k) arrives.
+    ///
+    /// Parameters
+    /// ----------
+    /// y : float
+    ///     The output. NaN is a missing sample.
+    /// u : float, or array_like with one number for each input; None without input
+    ///     The inputs. NaN is a missing sample.
+    ///
+    /// Returns
+    /// -------
+    /// Innovation
+    ///     What was not predicted, and what was done.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     If a shape is wrong, a number infinite or too large. Nothing has changed then, time included.
+    #[pyo3(signature = (y, *, u = None))]
+    fn log_row(
+        &mut self,
+        py: Python<'_>,
+        y: &Bound<'_, PyAny>,
+        u: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Innovation> {
+        let none = py.None().into_bound(py);
+        argument::sample("u", u.unwrap_or(&none), self.engine.inputs, &mut self.inputs)?;
+        let output = argument::number("y", y)?;
+        let innovation =
+            self.engine.stepper.log_row(output, &self.inputs).map_err(|error| failed(py, error))?;
+        Ok(innovation.into())
+    }
+
+    /// Take many rows of a log: the same as `log_row` in a loop, to the bit.
     ///
     /// The interpreter lock is released meanwhile.
     ///
     /// Parameters
     /// ----------
-    /// u : array_like, shape (N,) for one input, or (N, inputs); None without input
-    ///     The inputs.
     /// y : array_like, shape (N,)
     ///     The outputs.
+    /// u : array_like, shape (N,) for one input, or (N, inputs); None without input
+    ///     The inputs, recorded at the same instants.
     ///
     /// Returns
     /// -------
@@ -258,13 +315,13 @@ impl RecursiveArx {
     /// Raises
     /// ------
     /// ValueError
-    ///     As for `update`; the message names the row, from 0. Nothing has changed then.
-    #[pyo3(signature = (u, y))]
+    ///     As for `log_row`; the message names the row, from 0. Nothing has changed then.
+    #[pyo3(signature = (y, *, u = None))]
     fn run(
         &mut self,
         py: Python<'_>,
-        u: Option<&Bound<'_, PyAny>>,
         y: &Bound<'_, PyAny>,
+        u: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<RecursiveTrajectory> {
         let outputs = array::vector("y", y, None)?;
         let outputs = outputs.as_slice()?;
@@ -275,7 +332,7 @@ impl RecursiveArx {
         let (engine, trajectory) = recursive::run(py, shape, |record| {
             record.run(engine, rows, |engine, row, record| {
                 let output = outputs.get(row).copied().unwrap_or(f64::NAN);
-                record.take(&engine.stepper.update(argument::row(inputs, row, columns), output)?);
+                record.take(&engine.stepper.log_row(output, argument::row(inputs, row, columns))?);
                 Ok(())
             })
         })?;
@@ -283,12 +340,13 @@ impl RecursiveArx {
         Ok(trajectory)
     }
 
-    /// Predict the outputs to come, y(k+1), y(k+2), ..., after `update` of sample k.
+    /// Predict the outputs to come, y(k+1), y(k+2), ..., y(k) being the latest one.
     ///
     /// Parameters
     /// ----------
     /// future_inputs : array_like, shape (steps,) for one input, or (steps, inputs); None without input
-    ///     u(k+1), u(k+2), ... With nk = 1 the last one acts on nothing, but is there.
+    ///     The inputs to come, as many as outputs. After `measured` of y(k) the first is u(k), which is still to be chosen;
+    ///     after `applied` or `log_row` of u(k) it is u(k+1). (With nk = 1 the last one acts on nothing then, but is there.)
     /// steps : int, optional
     ///     How many; it is needed without input only.
     ///
@@ -326,6 +384,12 @@ impl RecursiveArx {
     fn b<'py>(&self, py: Python<'py>) -> Vec<Bound<'py, PyArray1<f64>>> {
         let each = (0..self.engine.inputs).filter_map(|input| self.engine.stepper.b(input));
         each.map(|coefficients| recursive::coefficients(py, coefficients)).collect()
+    }
+
+    /// The constant; None if the model has none.
+    #[getter]
+    fn constant(&self) -> Option<f64> {
+        self.engine.stepper.constant()
     }
 
     /// The parameters, shape (n,), in the order of the regressor.

@@ -212,7 +212,7 @@ impl ExtendedKalmanFilter {
     ///     If a shape is wrong, a number too large, or a function returns NaN or infinity. Nothing has changed then.
     /// Exception
     ///     Whatever a function raises.
-    #[pyo3(signature = (observation, measurement, input = None))]
+    #[pyo3(signature = (observation, measurement, *, input = None))]
     fn correct(
         &mut self,
         py: Python<'_>,
@@ -265,7 +265,7 @@ impl ExtendedKalmanFilter {
     ///     As for one step; the message names the row, from 0. Nothing has changed then.
     /// Exception
     ///     Whatever a function raises.
-    #[pyo3(signature = (transition, observation, measurements, inputs = None))]
+    #[pyo3(signature = (transition, observation, measurements, *, inputs = None))]
     fn run(
         &mut self,
         py: Python<'_>,
@@ -338,7 +338,7 @@ impl ExtendedKalmanFilter {
     /// References
     /// ----------
     /// Bryson and Frazier, Smoothing for linear and nonlinear dynamic systems, 1963.
-    #[pyo3(signature = (transition, observation, measurements, inputs = None))]
+    #[pyo3(signature = (transition, observation, measurements, *, inputs = None))]
     fn smooth(
         &self,
         py: Python<'_>,

@@ -272,7 +272,7 @@ impl KalmanFilter {
     /// References
     /// ----------
     /// Anderson and Moore, Optimal Filtering, 1979, section 5.5.
-    #[pyo3(signature = (transition, observation, cross_covariance, measurement, input = None))]
+    #[pyo3(signature = (transition, observation, cross_covariance, measurement, *, input = None))]
     fn predict_correlated(
         &mut self,
         py: Python<'_>,
@@ -315,7 +315,7 @@ impl KalmanFilter {
     ///     If a shape is wrong, or a number infinite or too large. Nothing has changed then.
     /// EstimationError
     ///     If what is measured is known exactly, and measured without noise.
-    #[pyo3(signature = (observation, measurement, input = None))]
+    #[pyo3(signature = (observation, measurement, *, input = None))]
     fn correct(
         &mut self,
         py: Python<'_>,
@@ -357,7 +357,7 @@ impl KalmanFilter {
     /// ------
     /// ValueError, EstimationError
     ///     As for one step; the message names the row, from 0. Nothing has changed then.
-    #[pyo3(signature = (transition, observation, measurements, inputs = None, cross_covariance = None))]
+    #[pyo3(signature = (transition, observation, measurements, *, inputs = None, cross_covariance = None))]
     fn run(
         &mut self,
         py: Python<'_>,
@@ -413,7 +413,7 @@ impl KalmanFilter {
     /// ----------
     /// Bryson and Frazier, Smoothing for linear and nonlinear dynamic systems, 1963. Bierman, Fixed interval smoothing
     /// with discrete measurements, 1973.
-    #[pyo3(signature = (transition, observation, measurements, inputs = None))]
+    #[pyo3(signature = (transition, observation, measurements, *, inputs = None))]
     fn smooth(
         &self,
         py: Python<'_>,

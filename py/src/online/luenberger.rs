@@ -147,7 +147,7 @@ impl LuenbergerObserver {
     /// -------
     /// Innovation
     ///     The error. An observer knows no variances.
-    #[pyo3(signature = (transition, observation, measurement, input = None))]
+    #[pyo3(signature = (transition, observation, measurement, *, input = None))]
     fn update(
         &mut self,
         py: Python<'_>,
@@ -194,7 +194,7 @@ impl LuenbergerObserver {
     /// -------
     /// ObserverTrajectory
     ///     States and errors, row by row.
-    #[pyo3(signature = (transition, observation, measurements, inputs = None))]
+    #[pyo3(signature = (transition, observation, measurements, *, inputs = None))]
     fn run(
         &mut self,
         py: Python<'_>,

@@ -15,7 +15,7 @@ impl Scenario for Lines {
     type Output = Option<Vector4<f32>>;
 
     fn start(_: Case) -> Result<Self, Error> {
-        Lags::new(&ArxOrders { na: 2, inputs: &[InputOrders { nb: 2, nk: 1 }] }).map(Lines)
+        Lags::new(&ArxOrders { na: 2, inputs: &[InputOrders { nb: 2, nk: 1 }], constant: false }).map(Lines)
     }
 
     fn input(case: Case, k: usize) -> Sample {

@@ -53,7 +53,7 @@ impl Scenario for Arx {
     type Output = Innovation<f32>;
 
     fn start(_: Case) -> Result<Self, Error> {
-        RecursiveArx::new(&ArxOrders { na: 2, inputs: INPUTS }, 1.0, &[1.0], FORGETTING).map(Arx)
+        RecursiveArx::new(&ArxOrders { na: 2, inputs: INPUTS, constant: false }, 1.0, &[1.0], FORGETTING).map(Arx)
     }
 
     fn input(case: Case, k: usize) -> Sample {
@@ -62,7 +62,7 @@ impl Scenario for Arx {
 
     #[inline(never)]
     fn step(&mut self, sample: &Sample) -> Result<Innovation<f32>, Error> {
-        self.0.update(&[sample.u], sample.y)
+        self.0.log_row(sample.y, &[sample.u])
     }
 
     fn numbers(&self, innovation: &Innovation<f32>, number: &mut impl FnMut(f32)) {
@@ -84,7 +84,7 @@ impl Scenario for Armax {
     type Output = Innovation<f32>;
 
     fn start(_: Case) -> Result<Self, Error> {
-        let orders = ArmaxOrders { na: 2, inputs: INPUTS, nc: 1 };
+        let orders = ArmaxOrders { na: 2, inputs: INPUTS, nc: 1, constant: false };
         RecursiveArmax::new(&orders, ArmaxMethod::PredictionError, 1.0, &[1.0], 0.1, FORGETTING).map(Armax)
     }
 
@@ -94,7 +94,7 @@ impl Scenario for Armax {
 
     #[inline(never)]
     fn step(&mut self, sample: &Sample) -> Result<Innovation<f32>, Error> {
-        self.0.update(&[sample.u], sample.y)
+        self.0.log_row(sample.y, &[sample.u])
     }
 
     fn numbers(&self, innovation: &Innovation<f32>, number: &mut impl FnMut(f32)) {

@@ -79,10 +79,10 @@ fn a_step_is_halved_until_c_is_stable() {
 
 #[test]
 fn without_residuals_it_is_arx() {
-    let orders = ArxOrders { na: 2, inputs: &[one(1, 1), one(1, 2)] };
+    let orders = ArxOrders { na: 2, inputs: &[one(1, 1), one(1, 2)], constant: false };
     let mut arx: RecursiveArx<f64, Const<4>, Const<3>> =
         RecursiveArx::new(&orders, 2.0, &[1.0, 10.0], FORGETTING).unwrap();
-    let same = ArmaxOrders { na: 2, inputs: orders.inputs, nc: 0 };
+    let same = ArmaxOrders { na: 2, inputs: orders.inputs, nc: 0, constant: false };
     let mut armax = METHODS.map(|method| {
         RecursiveArmax::<f64, Const<4>, Const<3>>::new(&same, method, 2.0, &[1.0, 10.0], 1.0, FORGETTING)
             .unwrap()
@@ -91,11 +91,11 @@ fn without_residuals_it_is_arx() {
     for k in 0..500 {
         let mut sample = || if noise.next() < -0.95 { f64::NAN } else { noise.next() };
         let (u, y) = ([sample(), sample()], sample());
-        let expected = debug(&arx.update(&u, y));
+        let expected = debug(&arx.log_row(y, &u));
         let (mut ahead, mut other) = ([0.0; 5], [0.0; 5]);
         arx.predict(&[0.5; 10], &mut ahead).unwrap();
         for armax in &mut armax {
-            assert_eq!(debug(&armax.update(&u, y)), expected);
+            assert_eq!(debug(&armax.log_row(y, &u)), expected);
             assert_eq!(debug(armax.estimator()), debug(arx.estimator()));
             armax.predict(&[0.5; 10], &mut other).unwrap();
             assert_eq!(debug(&other), debug(&ahead), "{k}");
@@ -121,8 +121,8 @@ fn frozen<const K: usize, const L: usize>(
 
 #[test]
 fn the_gradient_is_that_of_the_prediction() {
-    let orders = ArmaxOrders { na: 2, inputs: &[one(1, 1)], nc: 2 };
-    let plant = ArxOrders { na: 2, inputs: orders.inputs };
+    let orders = ArmaxOrders { na: 2, inputs: &[one(1, 1)], nc: 2, constant: false };
+    let plant = ArxOrders { na: 2, inputs: orders.inputs, constant: false };
     for seed in 0..10 {
         let mut noise = Noise(seed);
         let truth = Plant::random(&plant, 2, &mut noise);
@@ -143,9 +143,9 @@ fn the_gradient_is_that_of_the_prediction() {
             .collect::<Vec<_>>();
         for (k, &y) in outputs.iter().enumerate() {
             let u = inputs_at(&inputs, k);
-            centre.update(&u, y).unwrap();
+            centre.log_row(y, &u).unwrap();
             for (index, sides) in sides.iter_mut().enumerate() {
-                let [above, below] = sides.each_mut().map(|side| side.update(&u, y).unwrap().error);
+                let [above, below] = sides.each_mut().map(|side| side.log_row(y, &u).unwrap().error);
                 // dŷ/dθ = -de/dθ. The first residuals are counted as 0 by all.
                 let slope = (below - above) / (2.0 * step);
                 if k > 2 {
@@ -162,7 +162,11 @@ fn the_gradient_is_that_of_the_prediction() {
 /// Random stable plants: with the true parameters, what is left is the noise, and predictions use it.
 fn follow<const K: usize, const L: usize>(orders: &ArmaxOrders<'_>, seed: u64) {
     let mut noise = Noise(seed);
-    let plant = Plant::random(&ArxOrders { na: orders.na, inputs: orders.inputs }, orders.nc, &mut noise);
+    let plant = Plant::random(
+        &ArxOrders { na: orders.na, inputs: orders.inputs, constant: false },
+        orders.nc,
+        &mut noise,
+    );
     let parameters = SVector::<f64, K>::from_row_slice(&plant.parameters());
     let steps = 300;
     let inputs: Vec<Vec<f64>> =
@@ -176,7 +180,7 @@ fn follow<const K: usize, const L: usize>(orders: &ArmaxOrders<'_>, seed: u64) {
     for method in METHODS {
         let mut armax = frozen::<K, L>(orders, method, parameters);
         for k in 0..280 {
-            let innovation = armax.update(&inputs_at(&inputs, k), outputs[k]).unwrap();
+            let innovation = armax.log_row(outputs[k], &inputs_at(&inputs, k)).unwrap();
             if k > 250 {
                 // The start has been forgotten.
                 assert!((innovation.error - e[k]).abs() < 1e-8, "{orders:?} {seed} {k}");
@@ -203,20 +207,25 @@ fn follow<const K: usize, const L: usize>(orders: &ArmaxOrders<'_>, seed: u64) {
 #[test]
 fn true_parameters_leave_the_noise_and_predict_with_it() {
     for seed in 0..20 {
-        follow::<4, 1>(&ArmaxOrders { na: 2, inputs: &[], nc: 2 }, seed);
-        follow::<4, 1>(&ArmaxOrders { na: 1, inputs: &[one(1, 1)], nc: 2 }, seed);
-        follow::<6, 4>(&ArmaxOrders { na: 2, inputs: &[one(2, 1), one(1, 3)], nc: 1 }, seed);
-        follow::<5, 2>(&ArmaxOrders { na: 1, inputs: &[one(0, 7), one(1, 0), one(1, 2)], nc: 2 }, seed);
-        follow::<3, 1>(&ArmaxOrders { na: 0, inputs: &[one(1, 1)], nc: 2 }, seed);
+        follow::<4, 1>(&ArmaxOrders { na: 2, inputs: &[], nc: 2, constant: false }, seed);
+        follow::<4, 1>(&ArmaxOrders { na: 1, inputs: &[one(1, 1)], nc: 2, constant: false }, seed);
+        follow::<6, 4>(&ArmaxOrders { na: 2, inputs: &[one(2, 1), one(1, 3)], nc: 1, constant: false }, seed);
+        follow::<5, 2>(
+            &ArmaxOrders { na: 1, inputs: &[one(0, 7), one(1, 0), one(1, 2)], nc: 2, constant: false },
+            seed,
+        );
+        follow::<3, 1>(&ArmaxOrders { na: 0, inputs: &[one(1, 1)], nc: 2, constant: false }, seed);
     }
 }
 
 #[test]
 fn random_stable_plants_are_identified() {
-    const ORDERS: ArmaxOrders = ArmaxOrders { na: 2, inputs: &[InputOrders { nb: 1, nk: 1 }], nc: 1 };
+    const ORDERS: ArmaxOrders =
+        ArmaxOrders { na: 2, inputs: &[InputOrders { nb: 1, nk: 1 }], nc: 1, constant: false };
     for seed in 0..12 {
         let mut noise = Noise(seed);
-        let mut plant = Plant::random(&ArxOrders { na: 2, inputs: ORDERS.inputs }, 0, &mut noise);
+        let mut plant =
+            Plant::random(&ArxOrders { na: 2, inputs: ORDERS.inputs, constant: false }, 0, &mut noise);
         // |c| < 1: 1/C - 1/2 is positive real, so that both methods converge.
         plant.c = stable_polynomial(1, 0.9, &mut noise);
         plant.b[0].0[0] = 1.0;
@@ -226,7 +235,7 @@ fn random_stable_plants_are_identified() {
             let mut armax: RecursiveArmax<f64, Const<4>> =
                 RecursiveArmax::new(&ORDERS, method, 2.0, &[1.0], 0.3, forgetting).unwrap();
             for (k, &y) in outputs.iter().enumerate() {
-                armax.update(&inputs_at(&inputs, k), y).unwrap();
+                armax.log_row(y, &inputs_at(&inputs, k)).unwrap();
             }
             // Eight standard errors, as they are estimated, or so.
             let away = armax.estimator().parameters() - Vector4::from_row_slice(&plant.parameters());
@@ -242,7 +251,7 @@ fn random_stable_plants_are_identified() {
 #[test]
 fn extended_least_squares_stays_away_where_prediction_error_arrives() {
     // The counterexample of Ljung, Söderström and Gustavsson 1975; Ljung and Söderström 1983, example 5.11.
-    let orders = ArmaxOrders { na: 2, inputs: &[], nc: 2 };
+    let orders = ArmaxOrders { na: 2, inputs: &[], nc: 2, constant: false };
     let truth = Vector4::new(0.9, 0.95, 1.5, 0.75);
     let furthest = |method| {
         let forgetting = Forgetting::Exponential { factor: 0.999 };
@@ -253,7 +262,7 @@ fn extended_least_squares_stays_away_where_prediction_error_arrives() {
             let now = 3.0_f64.sqrt() * noise.next();
             let output = -0.9 * y[0] - 0.95 * y[1] + now + 1.5 * e[0] + 0.75 * e[1];
             (y, e) = ([output, y[0]], [now, e[0]]);
-            armax.update(&[], output).unwrap();
+            armax.log_row(output, &[]).unwrap();
             if k >= 20_000 {
                 sum += (armax.estimator().parameters() - truth).norm_squared() / 20_000.0;
             }
@@ -270,7 +279,7 @@ fn extended_least_squares_stays_away_where_prediction_error_arrives() {
 #[test]
 fn c_stays_stable_in_single_precision() {
     // A zero on the unit circle, and one just inside: the estimate is pushed out again and again.
-    let orders = ArmaxOrders { na: 1, inputs: &[one(1, 1)], nc: 2 };
+    let orders = ArmaxOrders { na: 1, inputs: &[one(1, 1)], nc: 2, constant: false };
     for method in METHODS {
         let mut armax: RecursiveArmax<f32, Const<4>> =
             RecursiveArmax::new(&orders, method, 2.0, &[1.0], 0.5, Forgetting::Exponential { factor: 0.95 })
@@ -283,7 +292,7 @@ fn c_stays_stable_in_single_precision() {
             // Sometimes an outlier, sometimes silence.
             let output = if k % 997 == 0 { 1e4 } else { y };
             projected +=
-                usize::from(armax.update(&[u as f32], output as f32).unwrap().action == Action::Projected);
+                usize::from(armax.log_row(output as f32, &[u as f32]).unwrap().action == Action::Projected);
             let mut c: Vec<f32> = armax.c().skip(1).collect();
             assert!(is_stable(&mut c), "{k}");
             assert!(armax.residual.is_finite() && armax.gradients.iter().all(|entry| entry.is_finite()));
@@ -295,7 +304,7 @@ fn c_stays_stable_in_single_precision() {
 
 #[test]
 fn missing_samples_and_gaps_are_survived() {
-    let orders = ArmaxOrders { na: 2, inputs: &[one(1, 1)], nc: 1 };
+    let orders = ArmaxOrders { na: 2, inputs: &[one(1, 1)], nc: 1, constant: false };
     let plant = Plant { a: vec![-1.5, 0.7], b: vec![(vec![1.0], 1)], c: vec![0.6] };
     let (inputs, outputs) = plant.record(20_000, 0.5, &mut Noise(5));
     for method in METHODS {
@@ -307,7 +316,7 @@ fn missing_samples_and_gaps_are_survived() {
             if k % 1000 == 500 {
                 armax.gap();
             }
-            let action = armax.update(&inputs_at(&inputs, k), output).unwrap().action;
+            let action = armax.log_row(output, &inputs_at(&inputs, k)).unwrap().action;
             let since_gap = (k + 500) % 1000;
             let expected = match k % 50 {
                 _ if k < 2 || k >= 500 && since_gap < 2 => Action::NotReady,
@@ -330,7 +339,7 @@ fn missing_samples_and_gaps_are_survived() {
 
 #[test]
 fn a_refused_sample_changes_nothing() {
-    let orders = ArmaxOrders { na: 1, inputs: &[one(1, 1), one(1, 0)], nc: 1 };
+    let orders = ArmaxOrders { na: 1, inputs: &[one(1, 1), one(1, 0)], nc: 1, constant: false };
     for method in METHODS {
         let mut armax: RecursiveArmax<f32, Const<4>> =
             RecursiveArmax::new(&orders, method, 1.0, &[1.0, 1.0], 0.5, Forgetting::default()).unwrap();
@@ -338,23 +347,29 @@ fn a_refused_sample_changes_nothing() {
         for _ in 0..100 {
             let before = debug(&armax);
             let length = |argument, expected, found| Err(Error::Length { argument, expected, found });
-            assert_eq!(armax.update(&[1.0], 1.0).map(|_| ()), length("inputs", 2, 1));
-            assert_eq!(armax.update(&[1.0, f32::INFINITY], 1.0), Err(Error::Infinite { argument: "inputs" }));
-            assert_eq!(armax.update(&[1.0, 1.0], f32::INFINITY), Err(Error::Infinite { argument: "output" }));
-            assert_eq!(armax.update(&[1.0, 1e14], 1.0), Err(Error::TooLarge { argument: "inputs" }));
-            assert_eq!(armax.update(&[1e20, 1.0], 1.0), Err(Error::TooLarge { argument: "inputs" }));
-            assert_eq!(armax.update(&[1.0, 1.0], -1e14), Err(Error::TooLarge { argument: "output" }));
+            assert_eq!(armax.log_row(1.0, &[1.0]).map(|_| ()), length("inputs", 2, 1));
+            assert_eq!(
+                armax.log_row(1.0, &[1.0, f32::INFINITY]),
+                Err(Error::Infinite { argument: "inputs" })
+            );
+            assert_eq!(
+                armax.log_row(f32::INFINITY, &[1.0, 1.0]),
+                Err(Error::Infinite { argument: "output" })
+            );
+            assert_eq!(armax.log_row(1.0, &[1.0, 1e14]), Err(Error::TooLarge { argument: "inputs" }));
+            assert_eq!(armax.log_row(1.0, &[1e20, 1.0]), Err(Error::TooLarge { argument: "inputs" }));
+            assert_eq!(armax.log_row(-1e14, &[1.0, 1.0]), Err(Error::TooLarge { argument: "output" }));
             assert_eq!(armax.predict(&[0.0; 3], &mut [0.0; 2]), length("future_inputs", 4, 3));
             assert_eq!(debug(&armax), before);
             let mut sample = || noise.next() as f32;
-            armax.update(&[sample(), sample()], sample()).unwrap();
+            armax.log_row(sample(), &[sample(), sample()]).unwrap();
         }
     }
 }
 
 #[test]
 fn no_sample_that_is_accepted_holds_time() {
-    let orders = ArmaxOrders { na: 1, inputs: &[one(2, 1)], nc: 2 };
+    let orders = ArmaxOrders { na: 1, inputs: &[one(2, 1)], nc: 2, constant: false };
     for method in METHODS {
         for scale in [1.0, 1e-9_f32] {
             for (large_inputs, large_outputs) in [(3e13, 0.0), (0.0, 3e13), (3e13, -3e13)] {
@@ -366,7 +381,7 @@ fn no_sample_that_is_accepted_holds_time() {
                     let (u, y) = (scale * noise.next() as f32, noise.next() as f32);
                     let (u, y) = if burst { (u + large_inputs, y + large_outputs) } else { (u, y) };
                     // Always accepted, so that time never stands still.
-                    armax.update(&[u], y).unwrap();
+                    armax.log_row(y, &[u]).unwrap();
                     let finite = |entries: &[f32]| entries.iter().all(|entry| entry.is_finite());
                     assert!(finite(armax.estimator().parameters().as_slice()));
                     assert!(finite(armax.gradients.as_slice()) && finite(&[armax.residual]));
@@ -378,24 +393,24 @@ fn no_sample_that_is_accepted_holds_time() {
     let mut armax: RecursiveArmax<f32, Const<5>> =
         RecursiveArmax::new(&orders, METHODS[0], 1.0, &[1.0], 0.5, Forgetting::default()).unwrap();
     for k in 0..20 {
-        armax.update(&[(k % 3) as f32], (k % 5) as f32).unwrap();
+        armax.log_row((k % 5) as f32, &[(k % 3) as f32]).unwrap();
     }
     let mut armax = armax.with_parameters([0.0, 1e8, 0.0, 0.0, 0.0].into()).unwrap();
-    let actions = [3e13, 1.0, 1.0, 1.0].map(|u| armax.update(&[u], 0.5).unwrap().action);
+    let actions = [3e13, 1.0, 1.0, 1.0].map(|u| armax.log_row(0.5, &[u]).unwrap().action);
     assert_eq!(actions[1], Action::NotReady);
 
     // An innovation that is accepted, but a residual that is too large for a tap.
     let mut armax = armax.with_parameters([0.0, 1.0, 0.0, 0.0, 0.0].into()).unwrap();
     armax.set_adaptation(false);
-    armax.update(&[-3e13], 0.5).unwrap();
-    let innovation = armax.update(&[1.0], 3e13).unwrap();
+    armax.log_row(0.5, &[-3e13]).unwrap();
+    let innovation = armax.log_row(3e13, &[1.0]).unwrap();
     assert_eq!((innovation.action, innovation.error), (Action::Frozen, 6e13));
     assert_eq!(armax.residual, 0.0);
 }
 
 #[test]
 fn options_are_checked_and_reach_the_estimator() {
-    let orders = ArmaxOrders { na: 1, inputs: &[one(1, 1)], nc: 2 };
+    let orders = ArmaxOrders { na: 1, inputs: &[one(1, 1)], nc: 2, constant: false };
     let new = || {
         let method = ArmaxMethod::PredictionError;
         RecursiveArmax::<f64, Const<4>>::new(&orders, method, 1.0, &[2.0], 0.5, FORGETTING)
@@ -428,7 +443,7 @@ fn options_are_checked_and_reach_the_estimator() {
 fn run_time_sizes_give_the_same_bits() {
     use nalgebra::Dyn;
 
-    let orders = ArmaxOrders { na: 2, inputs: &[one(1, 1), one(1, 2)], nc: 2 };
+    let orders = ArmaxOrders { na: 2, inputs: &[one(1, 1), one(1, 2)], nc: 2, constant: false };
     for method in METHODS {
         let mut fixed: RecursiveArmax<f64, Const<6>, Const<3>> =
             RecursiveArmax::new(&orders, method, 1.0, &[1.0, 1.0], 1.0, FORGETTING).unwrap();
@@ -438,7 +453,7 @@ fn run_time_sizes_give_the_same_bits() {
         for _ in 0..300 {
             let mut sample = || if noise.next() < -0.98 { f64::NAN } else { noise.next() };
             let (u, y) = ([sample(), sample()], sample());
-            assert_eq!(debug(&fixed.update(&u, y)), debug(&free.update(&u, y)));
+            assert_eq!(debug(&fixed.log_row(y, &u)), debug(&free.log_row(y, &u)));
         }
         assert_eq!(fixed.estimator().parameters().as_slice(), free.estimator().parameters().as_slice());
         let (mut ahead, mut other) = ([0.0; 5], [0.0; 5]);
@@ -450,19 +465,19 @@ fn run_time_sizes_give_the_same_bits() {
 
 #[test]
 fn a_clone_goes_on_as_the_original() {
-    let orders = ArmaxOrders { na: 2, inputs: &[one(1, 1)], nc: 1 };
+    let orders = ArmaxOrders { na: 2, inputs: &[one(1, 1)], nc: 1, constant: false };
     for method in METHODS {
         let mut original: RecursiveArmax<f32, Const<4>> =
             RecursiveArmax::new(&orders, method, 1.0, &[1.0], 1.0, Forgetting::default()).unwrap();
         let mut noise = Noise(8);
         let mut sample = || noise.next() as f32;
         for _ in 0..100 {
-            original.update(&[sample()], sample()).unwrap();
+            original.log_row(sample(), &[sample()]).unwrap();
         }
         let mut copy = original.clone();
         for _ in 0..100 {
             let (u, y) = ([sample()], sample());
-            assert_eq!(debug(&original.update(&u, y)), debug(&copy.update(&u, y)));
+            assert_eq!(debug(&original.log_row(y, &u)), debug(&copy.log_row(y, &u)));
         }
         assert_eq!(debug(&original), debug(&copy));
     }

@@ -45,7 +45,7 @@ impl Collecting {
         Self { enough: enough.max(FEWEST), rows: VecDeque::new(), magnitudes, gap: false }
     }
 
-    /// Takes a row. The inputs may have more at their end, which is no channel.
+    /// Takes a row.
     pub(super) fn push(&mut self, inputs: &[f64], output: f64) {
         // The larger of a number and NaN is the number.
         if let Some((largest_output, largest)) = self.magnitudes.split_last_mut() {
@@ -74,9 +74,9 @@ impl Collecting {
         Some(PerChannel { inputs: inputs.to_vec(), output })
     }
 
-    /// Whether its rows are of so many channels, and of so many inputs with the constant.
-    pub(super) fn fits(&self, inputs: usize, with_constant: usize) -> bool {
-        self.magnitudes.len() == inputs + 1 && self.rows.iter().all(|row| row.inputs.len() == with_constant)
+    /// Whether its rows are of so many inputs.
+    pub(super) fn fits(&self, inputs: usize) -> bool {
+        self.magnitudes.len() == inputs + 1 && self.rows.iter().all(|row| row.inputs.len() == inputs)
     }
 
     /// The latest rows, the oldest first; whether a gap follows the last one.

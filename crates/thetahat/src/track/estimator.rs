@@ -21,38 +21,33 @@ pub(super) enum Estimator {
 }
 
 impl Estimator {
-    /// The estimator of a plan that knows nothing yet. The constant is one more input.
+    /// The estimator of a plan that knows nothing yet.
     pub(super) fn new(orders: &Orders, plan: &TrackPlan, scales: &PerChannel) -> Result<Self, Error> {
-        let constant = usize::from(plan.constant);
-        let mut inputs: Vec<InputOrders> =
+        let inputs: Vec<InputOrders> =
             orders.nb.iter().zip(&orders.nk).map(|(&nb, &nk)| InputOrders { nb, nk }).collect();
-        inputs.extend(std::iter::repeat_n(InputOrders { nb: 1, nk: 0 }, constant));
-        let mut input_scales = scales.inputs.clone();
-        input_scales.extend(std::iter::repeat_n(1.0, constant));
-
-        let (na, nc, forgetting) = (orders.na, orders.nc, plan.forgetting.0);
-        let output = scales.output;
+        let (na, nc, constant, forgetting) = (orders.na, orders.nc, plan.constant, plan.forgetting.0);
+        let PerChannel { inputs: input_scales, output } = scales;
         match plan.method.with_noise_model() {
             None => {
-                let orders = ArxOrders { na, inputs: &inputs };
-                let estimator = RecursiveArx::new(&orders, output, &input_scales, forgetting)?;
+                let orders = ArxOrders { na, inputs: &inputs, constant };
+                let estimator = RecursiveArx::new(&orders, *output, input_scales, forgetting)?;
                 let estimator = estimator.with_start(plan.start.0)?.with_dead_zone(plan.dead_zone)?;
                 Ok(Self::Arx(estimator))
             }
             Some(method) => {
                 let noise = plan.noise_scale.unwrap_or(output / 10.0);
-                let orders = ArmaxOrders { na, inputs: &inputs, nc };
+                let orders = ArmaxOrders { na, inputs: &inputs, nc, constant };
                 let estimator =
-                    RecursiveArmax::new(&orders, method, output, &input_scales, noise, forgetting)?;
+                    RecursiveArmax::new(&orders, method, *output, input_scales, noise, forgetting)?;
                 Ok(Self::Armax(estimator.with_dead_zone(plan.dead_zone)?))
             }
         }
     }
 
-    pub(super) fn update(&mut self, inputs: &[f64], output: f64) -> Result<Innovation<f64>, Error> {
+    pub(super) fn log_row(&mut self, output: f64, inputs: &[f64]) -> Result<Innovation<f64>, Error> {
         match self {
-            Self::Arx(arx) => arx.update(inputs, output),
-            Self::Armax(armax) => armax.update(inputs, output),
+            Self::Arx(arx) => arx.log_row(output, inputs),
+            Self::Armax(armax) => armax.log_row(output, inputs),
         }
     }
 

@@ -36,7 +36,7 @@ const INPUTS: [InputOrders; 2] = [InputOrders { nb: 2, nk: 1 }, InputOrders { nb
 
 /// Runs a tracker over a log.
 pub(super) fn run(tracker: &mut Tracker, inputs: &[[f64; 2]], y: &[f64]) -> Vec<Tracked> {
-    inputs.iter().zip(y).map(|(u, &y)| tracker.update(u, y).unwrap()).collect()
+    inputs.iter().zip(y).map(|(u, &y)| tracker.log_row(y, u).unwrap()).collect()
 }
 
 pub(super) fn exactly(plan: &TrackPlan) -> TrackPlan {
@@ -59,11 +59,11 @@ fn with_the_scales_found_it_is_the_library_to_the_bit() {
     assert_eq!(scales.output, largest(&mut y[..12].iter().copied()));
     assert_eq!(scales.inputs, [0, 1].map(|j| largest(&mut inputs[..12].iter().map(|u| u[j]))));
 
-    let library = ArxOrders { na: 2, inputs: &INPUTS };
+    let library = ArxOrders { na: 2, inputs: &INPUTS, constant: false };
     let mut library: RecursiveArx<f64, Dyn, Dyn> =
         RecursiveArx::new(&library, scales.output, &scales.inputs, Forgetting::default()).unwrap();
     for (t, (u, &y)) in inputs.iter().zip(&y).enumerate() {
-        let expected = library.update(u, y).unwrap();
+        let expected = library.log_row(y, u).unwrap();
         if t >= collected {
             let found = tracked[t];
             let bits = |values: [f64; 3]| values.map(f64::to_bits);
@@ -116,7 +116,7 @@ fn armax_is_the_library_to_the_bit() {
 
         let scales = tracker.scales().unwrap();
         let with_constant = [INPUTS[0], INPUTS[1], InputOrders { nb: 1, nk: 0 }];
-        let library = ArmaxOrders { na: 2, inputs: &with_constant, nc: 1 };
+        let library = ArmaxOrders { na: 2, inputs: &with_constant, nc: 1, constant: false };
         let input_scales = [scales.inputs[0], scales.inputs[1], 1.0];
         let mut library: RecursiveArmax<f64, Dyn, Dyn> = RecursiveArmax::new(
             &library,
@@ -130,7 +130,7 @@ fn armax_is_the_library_to_the_bit() {
         let expected: Vec<f64> = inputs
             .iter()
             .zip(&y)
-            .map(|(u, &y)| library.update(&[u[0], u[1], 1.0], y).unwrap().error)
+            .map(|(u, &y)| library.log_row(y, &[u[0], u[1], 1.0]).unwrap().error)
             .collect();
         assert!(tracked.iter().zip(&expected).skip(16).all(|(found, expected)| found.error == *expected));
         assert_eq!(tracker.parameters().unwrap(), library.estimator().parameters().as_slice());
@@ -183,7 +183,7 @@ fn an_exact_start_predicts_nothing_before_it_knows_something() {
     let mut known = 0;
     for (u, &y) in inputs.iter().zip(&y) {
         let before = tracker.parameters().is_some();
-        let tracked = tracker.update(u, y).unwrap();
+        let tracked = tracker.log_row(y, u).unwrap();
         assert_eq!(tracked.predicted.is_finite(), before, "{tracked:?}");
         assert_eq!(tracked.error.is_finite(), before);
         assert_eq!(tracker.forecast(1).unwrap().is_finite(), tracker.parameters().is_some());
@@ -212,13 +212,13 @@ fn a_missing_output_is_predicted_all_the_same() {
 fn what_is_too_large_is_missing_and_what_is_infinite_is_refused() {
     let (inputs, y) = log(200, 0.3, 0.0, 7);
     let mut tracker = Tracker::new(&orders(), &TrackPlan::default()).unwrap();
-    assert!(tracker.update(&[1.0, 2.0], -2e98).unwrap().too_large);
+    assert!(tracker.log_row(-2e98, &[1.0, 2.0]).unwrap().too_large);
     run(&mut tracker, &inputs, &y);
     assert!(tracker.scales().unwrap().output < 1e3);
 
     let mut missing = tracker.clone();
-    let found = tracker.update(&[1e200, 1.0], f64::MAX).unwrap();
-    let expected = missing.update(&[f64::NAN, 1.0], f64::NAN).unwrap();
+    let found = tracker.log_row(f64::MAX, &[1e200, 1.0]).unwrap();
+    let expected = missing.log_row(f64::NAN, &[f64::NAN, 1.0]).unwrap();
     assert!(found.too_large && !expected.too_large && found.action == expected.action);
     let after = |tracker: &mut Tracker| {
         run(tracker, &inputs, &y);
@@ -227,14 +227,14 @@ fn what_is_too_large_is_missing_and_what_is_infinite_is_refused() {
     assert_eq!(after(&mut tracker), after(&mut missing));
 
     let before = serde_json::to_string(&tracker).unwrap();
-    assert!(matches!(tracker.update(&[1.0, f64::INFINITY], 1.0), Err(Error::Data { .. })));
-    assert!(matches!(tracker.update(&[1.0, 1.0], f64::NEG_INFINITY), Err(Error::Data { .. })));
-    assert!(matches!(tracker.update(&[1.0], 1.0), Err(Error::Argument { .. })));
+    assert!(matches!(tracker.log_row(1.0, &[1.0, f64::INFINITY]), Err(Error::Data { .. })));
+    assert!(matches!(tracker.log_row(f64::NEG_INFINITY, &[1.0, 1.0]), Err(Error::Data { .. })));
+    assert!(matches!(tracker.log_row(1.0, &[1.0]), Err(Error::Argument { .. })));
     assert_eq!(serde_json::to_string(&tracker).unwrap(), before);
 
     // The largest that is taken is taken.
     let largest = (f64::MAX / 2_f64.powi(36) / 5.0).sqrt() * (1.0 - 1e-11);
-    assert!(!tracker.update(&[1.0, largest], 1.0).unwrap().too_large);
+    assert!(!tracker.log_row(1.0, &[1.0, largest]).unwrap().too_large);
 }
 
 #[test]
@@ -266,7 +266,7 @@ fn a_forecast_holds_the_inputs() {
         );
     }
     assert_eq!(tracker.forecast(3).unwrap(), found);
-    tracker.update(&[f64::NAN, 0.0], 50.0).unwrap();
+    tracker.log_row(50.0, &[f64::NAN, 0.0]).unwrap();
     assert!(tracker.forecast(3).unwrap().is_nan());
 }
 

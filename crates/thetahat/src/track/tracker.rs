@@ -72,7 +72,7 @@ pub struct Tracked {
 /// let mut y = 0.0;
 /// for k in 0..200 {
 ///     let u = if k % 7 < 3 { 1.0 } else { -1.0 };
-///     tracker.update(&[u], y)?;
+///     tracker.log_row(y, &[u])?;
 ///     y = 0.8 * y + 0.5 * u;
 /// }
 /// assert_eq!(tracker.names(), ["a1", "b1"]);
@@ -98,7 +98,7 @@ pub struct Tracker {
     pub(super) settling: usize,
     detector: Option<ChangeDetector<f64>>,
     score: TrackScore,
-    /// The latest inputs as the estimator sees them: less their offsets, the constant at the end.
+    /// The latest inputs as the estimator sees them: less their offsets.
     #[serde(with = "missing::vector")]
     inputs: Vec<f64>,
     #[serde(skip)]
@@ -146,8 +146,6 @@ impl Tracker {
         if plan.constant {
             names.insert(parameters - 1 - orders.nc, "constant".to_owned());
         }
-        let mut latest = vec![f64::NAN; inputs];
-        latest.extend(plan.constant.then_some(1.0));
         Ok(Self {
             orders: orders.clone(),
             plan: plan.clone(),
@@ -160,19 +158,19 @@ impl Tracker {
             settling: 2 * parameters + 20,
             detector: plan.alarm_interval.map(change_detector).transpose()?,
             score: TrackScore::default(),
-            inputs: latest,
+            inputs: vec![f64::NAN; inputs],
             room: Room::default(),
         })
     }
 
-    /// One sample: the inputs u(k) in the order of the orders, and the output y(k), in their own units. NaN is a missing
-    /// sample. A finite value that is too large for the arithmetic is taken for missing, and
+    /// One row of a log: the output y(k) and the inputs u(k) in the order of the orders, recorded at the same instant, in
+    /// their own units. NaN is a missing sample. A finite value that is too large for the arithmetic is taken for missing, and
     /// [`Tracked::too_large`] says so.
     ///
     /// # Errors
     /// After which nothing has changed: [`Error::Argument`] if there is not one value for each input; [`Error::Data`] if one
     /// is infinite.
-    pub fn update(&mut self, inputs: &[f64], output: f64) -> Result<Tracked, Error> {
+    pub fn log_row(&mut self, output: f64, inputs: &[f64]) -> Result<Tracked, Error> {
         if inputs.len() != self.orders.inputs() {
             let message = format!("there are {} values for {} inputs", inputs.len(), self.orders.inputs());
             return Err(Error::argument("inputs", message));
@@ -233,7 +231,7 @@ impl Tracker {
         let mut predicted = [f64::NAN];
         estimator.predict(lines, &self.inputs, &mut predicted);
         let [mut predicted] = predicted;
-        let innovation = estimator.update(&self.inputs, output).map_err(sample_refused)?;
+        let innovation = estimator.log_row(output, &self.inputs).map_err(sample_refused)?;
         let Innovation { mut error, mut variance, mut nis, action } = innovation;
         let excitation = estimator.least_squares().excitation();
         if !self.has_estimate {
@@ -261,7 +259,7 @@ impl Tracker {
             if row.after_gap {
                 estimator.gap();
             }
-            let innovation = estimator.update(&row.inputs, row.output).map_err(sample_refused)?;
+            let innovation = estimator.log_row(row.output, &row.inputs).map_err(sample_refused)?;
             self.has_estimate |= corrects(innovation.action);
         }
         if gap {
@@ -278,7 +276,7 @@ impl Tracker {
             Stage::Collecting(collecting) => collecting.gap(),
             Stage::Running(estimator) => estimator.gap(),
         }
-        self.inputs.iter_mut().take(self.orders.inputs()).for_each(|input| *input = f64::NAN);
+        self.inputs.fill(f64::NAN);
     }
 
     /// The prediction so many steps ahead: y(k + steps) from the samples up to k, in the output's units. Inputs to come are
@@ -374,11 +372,11 @@ impl Tracker {
         };
         let sizes = match &self.stage {
             Stage::Running(estimator) => estimator.fits(&self.orders, self.names.len()),
-            Stage::Collecting(collecting) => collecting.fits(inputs, self.inputs.len()),
+            Stage::Collecting(collecting) => collecting.fits(inputs),
         };
         sizes
             && fresh.names == self.names
-            && fresh.inputs.len() == self.inputs.len()
+            && self.inputs.len() == inputs
             && known(&self.offsets)
             && self.scales.as_ref().is_none_or(known)
             && [0, inputs + 1].contains(&self.unset.len())

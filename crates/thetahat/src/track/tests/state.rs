@@ -2,7 +2,7 @@ use super::*;
 
 /// What a tracker says of a sample, and everything that it is, to the bit: NaN has one name in both.
 fn says(tracker: &mut Tracker, u: [f64; 2], y: f64) -> String {
-    let tracked = tracker.update(&u, y).unwrap();
+    let tracked = tracker.log_row(y, &u).unwrap();
     format!("{tracked:?} {:?}", tracker.forecast(2).unwrap())
 }
 
@@ -57,7 +57,7 @@ fn what_is_written_goes_on_to_the_bit() {
                 let last = serde_json::to_string(&original).unwrap();
                 assert_eq!(serde_json::to_string(&copy).unwrap(), last);
             }
-            tracker.update(&inputs[t], y[t]).unwrap();
+            tracker.log_row(y[t], &inputs[t]).unwrap();
         }
     }
 }
@@ -91,7 +91,7 @@ fn a_gap_while_rows_are_collected_is_kept_with_them() {
             if gaps.contains(&t) {
                 tracker.gap();
             }
-            tracker.update(&inputs[t], y[t]).unwrap();
+            tracker.log_row(y[t], &inputs[t]).unwrap();
         }
     };
     for gap in [5, 12] {

@@ -454,8 +454,8 @@ def test_arrays_of_every_kind_are_read_alike() -> None:
 def test_two_threads_run_two_filters_at_once() -> None:
     transition, observation, measurements, inputs = vehicle(3000)
     filters = [KalmanFilter(np.zeros(3), np.eye(3)) for _ in range(3)]
-    arguments = (transition, observation, measurements, inputs)
-    threads = [threading.Thread(target=filter.run, args=arguments) for filter in filters]
+    arguments = (transition, observation, measurements)
+    threads = [threading.Thread(target=filter.run, args=arguments, kwargs={"inputs": inputs}) for filter in filters]
     for thread in threads:
         thread.start()
     for thread in threads:

@@ -151,29 +151,29 @@ def steps(run: Any) -> list[Any]:
 
 def recursive(kind: Any, orders: tuple[int, ...], y: Any, u: Any, inputs: int) -> list[Any]:
     estimator = kind(1, [1] * inputs, *orders)
-    run = steps(estimator.run(u=u, y=y))
+    run = steps(estimator.run(y, u=u))
     return [*run, estimator.predict(u)]
 
 
 def kalman(y: Any, u: Any, inputs: int) -> list[Any]:
     transition = th.LinearTransition([[0.5]], [[1.0]], [[1.0] * inputs])
     observation = th.LinearObservation([[1.0]], [[1.0]])
-    run = th.KalmanFilter([0.0], [[1.0]]).run(transition, observation, y, u)
-    smooth = th.KalmanFilter([0.0], [[1.0]]).smooth(transition, observation, y, u)
+    run = th.KalmanFilter([0.0], [[1.0]]).run(transition, observation, y, inputs=u)
+    smooth = th.KalmanFilter([0.0], [[1.0]]).smooth(transition, observation, y, inputs=u)
     return [run.filtered_states, run.errors, smooth.states]
 
 
 def extended(y: Any, u: Any) -> list[Any]:
     transition = th.NonlinearTransition(lambda x, u: np.sin(x) + u[:1], [[1.0]])
     observation = th.NonlinearObservation(lambda x, u: x, [[1.0]])
-    run = th.ExtendedKalmanFilter([0.0], [[1.0]]).run(transition, observation, y, u)
-    smooth = th.ExtendedKalmanFilter([0.0], [[1.0]]).smooth(transition, observation, y, u)
+    run = th.ExtendedKalmanFilter([0.0], [[1.0]]).run(transition, observation, y, inputs=u)
+    smooth = th.ExtendedKalmanFilter([0.0], [[1.0]]).smooth(transition, observation, y, inputs=u)
     return [run.filtered_states, run.errors, smooth.states]
 
 
 def observer(y: Any, u: Any, inputs: int) -> list[Any]:
     transition = th.LinearTransition([[0.5]], [[1.0]], [[1.0] * inputs])
-    run = th.LuenbergerObserver([0.0], [[0.3]]).run(transition, th.LinearObservation([[1.0]], [[1.0]]), y, u)
+    run = th.LuenbergerObserver([0.0], [[0.3]]).run(transition, th.LinearObservation([[1.0]], [[1.0]]), y, inputs=u)
     return [run.predicted_states, run.errors]
 
 
@@ -195,18 +195,20 @@ def stepped(vector: Any) -> list[Any]:
         one.correct(measured, vector)
         one.predict(motion, vector)
     called = th.ExtendedKalmanFilter([0, 0], np.eye(2))
-    called.correct(th.NonlinearObservation(lambda x, u: x + u, np.eye(2)), vector, vector)
+    called.correct(th.NonlinearObservation(lambda x, u: x + u, np.eye(2)), vector, input=vector)
     called.predict(th.NonlinearTransition(lambda x, u: x + u, np.eye(2)), vector)
     luenberger = th.LuenbergerObserver(vector, 0.5 * np.eye(2))
-    luenberger.update(motion, measured, vector, vector)
+    luenberger.update(motion, measured, vector, input=vector)
     plain = th.RecursiveLeastSquares(2, scales=vector, parameters=vector)
     plain.update(vector, 1.0)
     many = th.RecursiveLeastSquares(2, outputs=2)
     many.update(vector, vector)
     arx = th.RecursiveArx(1, [1, 1], input_scales=vector)
-    arx.update(u=vector, y=1.0)
+    arx.log_row(1.0, u=vector)
+    arx.applied(vector)
     armax = th.RecursiveArmax(1, [1, 1], 1, input_scales=vector)
-    armax.update(u=vector, y=1.0)
+    armax.log_row(1.0, u=vector)
+    armax.applied(vector)
     estimators: list[Any] = [plain, many, arx, armax]
     return [
         *(one.state for one in (kalman, extended, called, luenberger)),
@@ -346,7 +348,7 @@ SERIES_OF_DATES = pd.Series(pd.date_range("2026-01-01", periods=60, freq="s"))
 def test_what_is_no_number_is_named(kind: Any, words: str) -> None:
     calls: list[Callable[[Any], Any]] = [
         lambda u: th.Log(Y, u),
-        lambda u: th.RecursiveArx(1, 1).run(u=u, y=Y),
+        lambda u: th.RecursiveArx(1, 1).run(Y, u=u),
         lambda u: kalman(Y, u, 1),
     ]
     if not hasattr(kind, "shape") or len(kind.shape) == 1:
@@ -396,8 +398,9 @@ def test_one_measurement_is_a_number_of_any_kind() -> None:
     def estimate(value: Any) -> list[Any]:
         arx, plain = th.RecursiveArx(1, 1), th.RecursiveLeastSquares(1)
         filter = th.KalmanFilter([0.0], [[1.0]])
-        arx.update(u=1.0, y=2.0)
-        arx.update(u=1.0, y=value)
+        arx.log_row(2.0, u=1.0)
+        arx.log_row(value, u=1.0)
+        arx.measured(value)
         plain.update([1.0], value)
         filter.correct(th.LinearObservation([[1.0]], [[1.0]]), value)
         return [arx.parameters, plain.parameters, filter.state]
@@ -410,6 +413,6 @@ def test_one_measurement_is_a_number_of_any_kind() -> None:
     refused: list[Any] = ["3", np.str_("3"), None, pd.Series([3.0]), [3.0], pd.NaT, 3j, np.datetime64("2026-01-01")]
     for value in refused:
         with pytest.raises((TypeError, ValueError), match="^y: expected (a number|numbers|a datetime)"):
-            th.RecursiveArx(1, 1).update(u=1.0, y=value)
+            th.RecursiveArx(1, 1).log_row(value, u=1.0)
     with pytest.raises(TypeError, match="y: expected a number, found None; NaN stands for a missing one"):
-        th.RecursiveArx(1, 1).update(u=1.0, y=None)  # type: ignore[arg-type]
+        th.RecursiveArx(1, 1).log_row(None, u=1.0)  # type: ignore[arg-type]

@@ -256,7 +256,7 @@ fn rows(rows: &[Rows]) -> String {
 fn start(start: Start) -> &'static str {
     match start {
         Start::Zero => "zero",
-        Start::Measured => "measured",
-        Start::Estimated => "estimated",
+        Start::Drop => "drop",
+        Start::Estimate => "estimate",
     }
 }

@@ -25,13 +25,17 @@ pub fn inspection(inspection: &Inspection) -> String {
 
 fn clock(inspection: &Inspection) -> String {
     let clock = &inspection.clock;
-    let (file, rows, step) = (harmless(&inspection.log.file), inspection.rows, short(clock.sample_time));
+    let (file, step) = (harmless(&inspection.log.file), short(clock.sample_time));
+    let rows = match inspection.experiments {
+        1 => format!("{} rows", inspection.rows),
+        experiments => format!("{} rows in {experiments} experiments", inspection.rows),
+    };
     if !clock.measured {
-        return format!("{file}: {rows} rows, sample time {step} s");
+        return format!("{file}: {rows}, sample time {step} s");
     }
     let (shortest, longest) = clock.steps;
     format!(
-        "{file}: {rows} rows, {} clock: steps from {} s to {} s, median {step} s, jitter {:.2} %, {} gap{}",
+        "{file}: {rows}, {} clock: steps from {} s to {} s, median {step} s, jitter {:.2} %, {} gap{}",
         if clock.irregular { "irregular" } else { "regular" },
         short(shortest),
         short(longest),

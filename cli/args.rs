@@ -348,7 +348,7 @@ pub(crate) struct SearchArguments {
     /// Which random starts [default: 0]
     #[arg(long, value_name = "S", requires = "starts")]
     pub(crate) seed: Option<u64>,
-    /// Begin no iteration after so long
+    /// After so long begin no iteration, and look for no further start
     #[arg(long, value_name = "SECONDS", allow_hyphen_values = true)]
     pub(crate) time_limit: Option<f64>,
 }

@@ -66,7 +66,7 @@ class FitOptions(TypedDict, total=False):
     seed : int
         Which random starts.
     time_limit : float
-        Begin no iteration after so many seconds.
+        After so many seconds begin no iteration, and look for no further start.
     """
 
     estimate: Rows

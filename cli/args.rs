@@ -1,8 +1,11 @@
 //! The syntax of the command line, and nothing else. `job` says what it means.
 
 use std::path::PathBuf;
+use std::str::FromStr;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+
+use crate::table;
 
 const EXIT_CODES: &str = "\
 Exit codes:
@@ -186,9 +189,9 @@ pub(crate) struct FitArguments {
     #[arg(value_name = "LOG", required = true)]
     pub(crate) logs: Vec<PathBuf>,
 
-    /// Input columns [default: u, u1, u2, …]
-    #[arg(short = 'u', long, value_name = "NAME[,NAME…]", value_delimiter = ',', help_heading = "Channels")]
-    pub(crate) input: Vec<String>,
+    /// Input columns; a name that holds a comma stands between double quotes, as in CSV [default: u, u1, u2, …]
+    #[arg(short = 'u', long, value_name = "NAME[,NAME…]", help_heading = "Channels")]
+    pub(crate) input: Vec<Names>,
     /// Output column [default: y]
     #[arg(short = 'y', long, value_name = "NAME", help_heading = "Channels")]
     pub(crate) output: Option<String>,
@@ -247,9 +250,9 @@ pub(crate) struct InspectArguments {
     #[arg(value_name = "LOG")]
     pub(crate) path: PathBuf,
 
-    /// Input columns [default: u, u1, u2, …, if they are there]
-    #[arg(short = 'u', long, value_name = "NAME[,NAME…]", value_delimiter = ',', help_heading = "Channels")]
-    pub(crate) input: Vec<String>,
+    /// Input columns; a name that holds a comma stands between double quotes, as in CSV [default: u, u1, u2, …, if they are there]
+    #[arg(short = 'u', long, value_name = "NAME[,NAME…]", help_heading = "Channels")]
+    pub(crate) input: Vec<Names>,
     /// Output column [default: y, if it is there]
     #[arg(short = 'y', long, value_name = "NAME", help_heading = "Channels")]
     pub(crate) output: Option<String>,
@@ -348,7 +351,7 @@ pub(crate) struct SearchArguments {
     /// Which random starts [default: 0]
     #[arg(long, value_name = "S", requires = "starts")]
     pub(crate) seed: Option<u64>,
-    /// After so long begin no iteration, and look for no further start
+    /// Begin no iteration after so long
     #[arg(long, value_name = "SECONDS", allow_hyphen_values = true)]
     pub(crate) time_limit: Option<f64>,
 }
@@ -379,18 +382,18 @@ pub(crate) struct PredictArguments {
     /// Steps ahead; inf for a free run, like simulate
     #[arg(long, value_name = "K", default_value = "1", allow_hyphen_values = true)]
     pub(crate) horizon: String,
-    /// What stands before the first sample of a stretch
-    #[arg(long, value_enum, default_value = "auto")]
-    pub(crate) initial: StartArgument,
+    /// What the prediction starts from [default: what the model needs: measured samples, or an estimate]
+    #[arg(long, value_enum)]
+    pub(crate) initial: Option<StartArgument>,
     #[command(flatten)]
     pub(crate) respond: RespondArguments,
 }
 
 #[derive(Debug, Args)]
 pub(crate) struct SimulateArguments {
-    /// What stands before the first sample of a stretch
-    #[arg(long, value_enum, default_value = "auto")]
-    pub(crate) initial: StartArgument,
+    /// What the run starts from [default: estimated; zero if the log has no output]
+    #[arg(long, value_enum)]
+    pub(crate) initial: Option<StartArgument>,
     #[command(flatten)]
     pub(crate) respond: RespondArguments,
 }
@@ -485,9 +488,9 @@ pub(crate) struct TrackArguments {
     #[arg(value_name = "LOG")]
     pub(crate) path: PathBuf,
 
-    /// Input columns [default: u, u1, u2, …; those of --warm]
-    #[arg(short = 'u', long, value_name = "NAME[,NAME…]", value_delimiter = ',', help_heading = "Channels")]
-    pub(crate) input: Vec<String>,
+    /// Input columns; a name that holds a comma stands between double quotes, as in CSV [default: u, u1, u2, …; those of --warm]
+    #[arg(short = 'u', long, value_name = "NAME[,NAME…]", help_heading = "Channels")]
+    pub(crate) input: Vec<Names>,
     /// Output column [default: y; that of --warm]
     #[arg(short = 'y', long, value_name = "NAME", help_heading = "Channels")]
     pub(crate) output: Option<String>,
@@ -609,7 +612,7 @@ pub(crate) struct FilterArguments {
     /// Rows to go through, 1-based and inclusive [default: all]
     #[arg(long, value_name = "A..B", help_heading = "Channels")]
     pub(crate) rows: Option<String>,
-    /// Add each state given the whole log, later rows too: nothing is written before the log ends
+    /// Add each state given the whole log, later rows too: nothing is written before the log ends, or if Ctrl-C comes first
     #[arg(long, help_heading = "Output")]
     pub(crate) smooth: bool,
 
@@ -708,6 +711,25 @@ pub(crate) struct DemoArguments {
     pub(crate) folder: PathBuf,
 }
 
+/// A list of names, written as the header of a CSV with commas is.
+#[derive(Debug, Clone)]
+pub(crate) struct Names(Vec<String>);
+
+impl FromStr for Names {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        table::names(text).map(Self)
+    }
+}
+
+impl Names {
+    /// The names of all lists; none if there is no list.
+    pub(crate) fn all(lists: &[Self]) -> Option<Vec<String>> {
+        (!lists.is_empty()).then(|| lists.iter().flat_map(|Self(names)| names).cloned().collect())
+    }
+}
+
 /// How a log is written.
 #[derive(Debug, Args)]
 pub(crate) struct LogArguments {
@@ -747,19 +769,13 @@ pub(crate) struct ClockArguments {
     #[arg(long, value_name = "NAME", conflicts_with = "sample_time", help_heading = "Clock")]
     pub(crate) time: Option<String>,
     /// How times are written, in the manner of strptime, such as %d.%m.%Y %H:%M:%S
-    #[arg(long, value_name = "FORMAT", requires = "time", help_heading = "Clock")]
+    #[arg(long, value_name = "FORMAT", help_heading = "Clock")]
     pub(crate) time_format: Option<String>,
     /// Seconds from one row to the next [default: 1, so that times count rows]
     #[arg(long, value_name = "SECONDS", allow_hyphen_values = true, help_heading = "Clock")]
     pub(crate) sample_time: Option<f64>,
     /// Make a log with an irregular clock uniform: a step in seconds, and how values between samples are read
-    #[arg(
-        long,
-        value_name = "STEP:hold|linear",
-        requires = "time",
-        allow_hyphen_values = true,
-        help_heading = "Clock"
-    )]
+    #[arg(long, value_name = "STEP:hold|linear", allow_hyphen_values = true, help_heading = "Clock")]
     pub(crate) resample: Option<String>,
 }
 
@@ -872,14 +888,12 @@ pub(crate) enum SearchArgument {
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 pub(crate) enum StartArgument {
-    /// What the model needs: drop where that is all, else estimate; zero where the log has no output
-    Auto,
-    /// Nothing: measured samples before the rows, or the first rows, which then do not count
-    Drop,
-    /// Zeros before the first sample
+    /// Rest: zeros before the first sample
     Zero,
+    /// Measured samples before the rows, or the first rows, which then do not count
+    Measured,
     /// The initial condition that fits best
-    Estimate,
+    Estimated,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -5,7 +5,7 @@ use std::io;
 use std::path::Path;
 
 use crate::interrupt;
-use crate::output::{harmless, say};
+use crate::output::{harmless, say, tell};
 use crate::table;
 
 /// The option that an argument of the library is here, if it is one.
@@ -177,11 +177,11 @@ impl Failure {
             Kind::Io => 5,
             Kind::Unmet => 6,
             Kind::Alarm => {
-                say(&harmless(&self.message));
+                tell(&harmless(&self.message));
                 return 7;
             }
         };
-        say(&format!("\x1b[1;31merror:\x1b[0m {}", harmless(&self.message)));
+        tell(&format!("\x1b[1;31merror:\x1b[0m {}", harmless(&self.message)));
         code
     }
 }

@@ -132,6 +132,21 @@ pub(crate) fn leaves() {
     state().waker = None;
 }
 
+/// Does what has not written anything and does not ask [`is_ending`]: meanwhile the program ends at once when it has to. None
+/// if it has to end already.
+pub(crate) fn at_once<T>(work: impl FnOnce() -> T) -> Option<T> {
+    let waker = {
+        let mut state = state();
+        if state.asked {
+            return None;
+        }
+        state.waker.take()
+    };
+    let done = work();
+    state().waker = waker;
+    Some(done)
+}
+
 /// Whether the stream has to end.
 pub(crate) fn is_ending() -> bool {
     ENDING.load(Ordering::Relaxed)

@@ -20,6 +20,7 @@ use crate::args::{
 };
 use crate::failure::Failure;
 use crate::line_writer::Format;
+use crate::memory::PerValue;
 use crate::table;
 
 pub(crate) use filter::FilterJob;
@@ -34,6 +35,8 @@ pub(crate) use validate::LookJob;
 pub(crate) struct LogJob {
     pub(crate) options: table::Options,
     pub(crate) clock: Clock,
+    /// What is to be done with it takes so much memory.
+    pub(crate) per_value: PerValue,
     /// Whether to draw no progress.
     pub(crate) quiet: bool,
 }
@@ -67,8 +70,18 @@ impl LogJob {
             missing: log.missing.clone(),
             encoding: encoding.transpose()?,
             time_format: clock.time_format.clone(),
+            bound: None,
         };
         options.check().map_err(Failure::usage)?;
+        for (option, given) in
+            [("--time-format", clock.time_format.is_some()), ("--resample", clock.resample.is_some())]
+        {
+            if given && clock.time.is_none() {
+                return Err(Failure::usage(format!(
+                    "{option} needs the column of times: give --time; without one, rows are evenly apart"
+                )));
+            }
+        }
         let seconds = |argument, value| positive(argument, value, "number of seconds");
         let clock = match (&clock.time, clock.sample_time) {
             (Some(name), _) => {
@@ -81,7 +94,7 @@ impl LogJob {
             (None, Some(step)) => Clock::Fixed(seconds("--sample-time", step)?),
             (None, None) => Clock::Unknown,
         };
-        Ok(Self { options, clock, quiet: false })
+        Ok(Self { options, clock, per_value: PerValue::Plain, quiet: false })
     }
 }
 
@@ -128,14 +141,12 @@ impl LineJob {
     }
 }
 
-impl StartArgument {
-    /// The start, unless it is left to the model.
-    pub(crate) fn given(self) -> Option<Start> {
-        match self {
-            Self::Auto => None,
-            Self::Drop => Some(Start::Drop),
-            Self::Zero => Some(Start::Zero),
-            Self::Estimate => Some(Start::Estimate),
+impl From<StartArgument> for Start {
+    fn from(start: StartArgument) -> Self {
+        match start {
+            StartArgument::Zero => Self::Zero,
+            StartArgument::Measured => Self::Measured,
+            StartArgument::Estimated => Self::Estimated,
         }
     }
 }

@@ -17,10 +17,12 @@ mod job;
 mod line_writer;
 mod live;
 mod log;
+mod memory;
 mod output;
 mod progress;
 mod shell;
 mod table;
+mod wrap;
 
 use std::ffi::OsString;
 
@@ -30,6 +32,7 @@ pub use binding::{Opened, inspect, plan, read, validation_plan};
 pub use commands::demo::LOG as DEMO_LOG;
 pub use commands::summary::{comparison, inspection, table, validation};
 pub use failure::{Failure, Kind};
+pub use wrap::WIDTH;
 
 /// Runs the program on its arguments, the program's name first, and gives its exit code: 0 done, 2 usage, 3 bad data,
 /// 4 the data cannot determine the model, 5 input/output, 6 a model does not meet what was required, 7 an alarm

@@ -1,5 +1,6 @@
 //! From a text table to a log: which columns, which clock, and on which line an error is.
 
+use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 use thetahat::{Channel, Error, Log, Recording, Resampling, Rows, Source, Times};
@@ -7,8 +8,9 @@ use thetahat::{Channel, Error, Log, Recording, Resampling, Rows, Source, Times};
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::job::{Clock, LogJob};
+use crate::memory::Bound;
 use crate::progress::Reading;
-use crate::table::{Lines, Reader, Selection, Stream, Table};
+use crate::table::{self, Lines, Reader, Selection, Stream, Table};
 
 /// A log and where it came from, its rows counted from 1.
 #[derive(Debug)]
@@ -137,7 +139,9 @@ fn columns(
     job: &LogJob,
     choose: impl FnOnce(&Reader) -> Result<Vec<String>, Failure>,
 ) -> Result<Columns, Failure> {
-    let reader = Reader::open(path, &job.options)?;
+    // As much as there is now: other logs may be in memory already.
+    let bound = Some(Bound::now(job.per_value));
+    let reader = Reader::open(path, &table::Options { bound, ..job.options.clone() })?;
     let file = path.display().to_string();
     let names = choose(&reader)?;
     let (selection, words) = selected(&reader, &file, job, &names)?;
@@ -182,10 +186,10 @@ fn selected(
             None
         }
     };
-    let columns: Vec<usize> =
-        names.iter().map(|name| find(name, header).map_err(bad)).collect::<Result<_, _>>()?;
-    for (position, &column) in columns.iter().enumerate() {
-        if columns[..position].contains(&column) || time == Some(column) {
+    let columns = find_all(names, header).map_err(bad)?;
+    let mut taken: HashSet<usize> = time.into_iter().collect();
+    for &column in &columns {
+        if !taken.insert(column) {
             return Err(Failure::usage(format!(
                 "column '{}' is named twice; each has one role",
                 header[column]
@@ -193,6 +197,20 @@ fn selected(
         }
     }
     Ok((Selection { columns, time }, words))
+}
+
+/// The one column of each name.
+fn find_all(names: &[String], header: &[String]) -> Result<Vec<usize>, String> {
+    let mut columns: HashMap<&str, Option<usize>> = HashMap::with_capacity(header.len());
+    for (column, name) in header.iter().enumerate() {
+        // None for a name that is there twice.
+        columns.entry(name).and_modify(|twice| *twice = None).or_insert(Some(column));
+    }
+    let one = |name: &String| match columns.get(name.as_str()) {
+        Some(Some(column)) => Ok(*column),
+        _ => find(name, header),
+    };
+    names.iter().map(one).collect()
 }
 
 /// The one column of a name.

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use crate::failure::Failure;
 use crate::interrupt;
+use crate::wrap;
 
 /// Text without control characters: names come from files, and could hold anything.
 pub(crate) fn harmless(text: &str) -> String {
@@ -22,7 +23,15 @@ pub(crate) fn harmless(text: &str) -> String {
 
 /// Says something that the reader should know.
 pub(crate) fn warn(message: &str) {
-    say(&format!("\x1b[1;33mwarning:\x1b[0m {}", harmless(message)));
+    tell(&format!("\x1b[1;33mwarning:\x1b[0m {}", harmless(message)));
+}
+
+/// Says something that may be long: on a terminal it is broken between words.
+pub(crate) fn tell(line: &str) {
+    match wrap::stderr_width() {
+        Some(width) => say(&wrap::wrapped(line, width)),
+        None => say(line),
+    }
 }
 
 /// Writes a line to standard error, in colour only on a terminal. Where that fails there is nobody left to tell.

@@ -6,6 +6,8 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 
+use thetahat::figures::scientific;
+
 use crate::interrupt;
 
 /// What takes longer shows its progress on a terminal.
@@ -88,7 +90,11 @@ impl Searching {
             (bar, "searching {spinner} {msg} {elapsed}")
         };
         if let Some(bar) = self.0.due(make) {
-            bar.set_message(format!("iteration {}, cost {:.6e}", progress.iteration, progress.cost));
+            bar.set_message(format!(
+                "iteration {}, cost {}",
+                progress.iteration,
+                scientific(progress.cost, 6)
+            ));
         }
     }
 }

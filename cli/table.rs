@@ -16,6 +16,7 @@ mod dialect;
 mod error;
 mod layout;
 mod lines;
+mod names;
 mod number;
 mod reader;
 mod record;
@@ -26,8 +27,11 @@ mod stream;
 mod tests;
 mod time;
 
+use crate::memory::Bound;
+
 pub(crate) use error::{Error, ErrorKind};
 pub(crate) use lines::Lines;
+pub(crate) use names::{list, names};
 pub(crate) use reader::Reader;
 pub(crate) use stream::{Event, Stream, Waker};
 
@@ -51,6 +55,8 @@ pub(crate) struct Options {
     pub(crate) encoding: Option<&'static encoding_rs::Encoding>,
     /// How times are written, in the manner of strptime, if they are neither seconds nor ISO 8601.
     pub(crate) time_format: Option<String>,
+    /// What memory there is for; times count as values, too.
+    pub(crate) bound: Option<Bound>,
 }
 
 impl Default for Options {
@@ -64,6 +70,7 @@ impl Default for Options {
             missing: Vec::new(),
             encoding: None,
             time_format: None,
+            bound: None,
         }
     }
 }

@@ -205,6 +205,30 @@ fn a_resampled_log_gives_the_fit_of_the_uniform_one() {
 }
 
 #[test]
+fn fit_and_inspect_advise_the_same() {
+    // Every second under load, and every minute at rest, as a cell is logged.
+    let mut times: Vec<f64> = (0..600).map(f64::from).collect();
+    times[300] += 0.2;
+    times.extend((1..=540).map(|k| 599.0 + 60.0 * f64::from(k)));
+    let folder = Folder::with_log(Experiment::new(1140).timed(&times));
+    let refusal = folder.refused("fit log.csv --time time --na 2 --nb 2", 3);
+    let advice =
+        "resampled every 1 s it would have 33000 rows, of which 1140 were recorded; cut it at its pauses";
+    assert!(refusal.contains(advice), "{refusal}");
+    let document = folder.done("inspect log.csv --time time --format json").stdout;
+    assert!(document.contains(advice) && !document.contains("--resample 1"), "{document}");
+    // A few pauses are bridged.
+    times.truncate(620);
+    folder.write("log.csv", Experiment::new(620).timed(&times));
+    let advice = "resample it every 1 s (--resample 1:linear)";
+    let refusal = folder.refused("fit log.csv --time time --na 2 --nb 2", 3);
+    assert!(refusal.contains(advice), "{refusal}");
+    let document = folder.done("inspect log.csv --time time --format json").stdout;
+    assert!(document.contains(advice) && document.contains("--resample 1:linear -u u"), "{document}");
+    folder.done("fit log.csv --time time --resample 1:linear --na 2 --nb 2");
+}
+
+#[test]
 fn an_irregular_log_is_refused_unless_it_is_resampled() {
     let line = Folder::with_log(irregular().0).refused("fit log.csv --time t --na 2 --nb 2", 3);
     assert!(line.contains("log.csv:") && line.contains("--resample"), "{line}");
@@ -235,7 +259,14 @@ fn predictions_carry_the_logs_own_times() {
 #[test]
 fn options_of_the_clock_that_exclude_or_need_each_other() {
     let folder = Folder::with_log(written(|time| time.to_string()));
-    for options in ["--time time --sample-time 1", "--resample 1:hold", "--time-format %s"] {
+    for options in [
+        "--time time --sample-time 1",
+        "--resample 1:hold",
+        "--time-format %s",
+        // The sample time does not make up for the column of times.
+        "--sample-time 1 --resample 2:hold",
+        "--sample-time 1 --time-format %s",
+    ] {
         let run = folder.run(&format!("fit log.csv {options} --na 2 --nb 2"));
         assert_eq!(run.code, 2, "{options}: {}", run.stderr);
         assert!(run.stdout.is_empty() && run.stderr.starts_with("error: "), "{options}: {}", run.stderr);

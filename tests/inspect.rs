@@ -158,6 +158,41 @@ fn names_and_options_come_back_ready_for_a_shell() {
 }
 
 #[test]
+fn names_with_commas_and_quotes_stand_between_quotes() {
+    let Experiment { u, y } = Experiment::new(200);
+    let other = Random::new(4).signal(200);
+    let log =
+        csv(&[("in", &u), ("2nd", &other), ("y", &y)]).replacen("in,2nd", "\"flow, in\",\"5\"\" pipe\"", 1);
+    let folder = Folder::with_log(log);
+    let mut command = folder.command("inspect log.csv --format json");
+    command.args(["-u", "\"flow, in\",5\" pipe"]);
+    let run = Run::of(command);
+    assert_eq!(run.code, 0, "{}", run.stderr);
+    let document: Value = serde_json::from_str(&run.stdout).expect("the document is JSON");
+    let names: Vec<&Value> =
+        document["channels"].as_array().into_iter().flatten().map(|channel| &channel["name"]).collect();
+    assert_eq!(names, ["flow, in", "5\" pipe", "y"]);
+    for (options, name) in [("fit", "--nb"), ("track", "-o lines.jsonl --nb")] {
+        let mut command = folder.command(&format!("{options} log.csv --na 2 {name} 2,2"));
+        command.args(["--input", "\"flow, in\",\"5\"\" pipe\""]);
+        let run = Run::of(command);
+        assert_eq!(run.code, 0, "{}", run.stderr);
+    }
+    // What inspect suggests is written so, too.
+    let log = folder.read("log.csv").replace("5\"\" pipe", "other");
+    folder.write("log.csv", log);
+    let mut command = folder.command("inspect log.csv --format json");
+    command.args(["-u", "\"flow, in\""]);
+    let document: Value = serde_json::from_str(&Run::of(command).stdout).expect("the document is JSON");
+    assert_eq!(document["command"], "thetahat fit log.csv -u '\"flow, in\"' -y y --report model.json");
+    assert_fits(&folder, &document);
+    let mut command = folder.command("fit log.csv --na 2 --nb 2");
+    command.args(["-u", "\"flow, in"]);
+    let run = Run::of(command);
+    assert!(run.code == 2 && run.stderr.contains("a double quote is not closed"), "{}", run.stderr);
+}
+
+#[test]
 fn all_columns_of_numbers_are_looked_at() {
     let mut log = String::from("u2,note,u1,x,y,x,when\n");
     let (Experiment { u, y }, mut random) = (Experiment::new(200), Random::new(5));

@@ -109,6 +109,64 @@ fn what_goes_to_standard_output_may_be_cut_and_the_line_does_not_deny_it() {
     assert_eq!((run.code, run.stderr.as_str()), (130, "interrupted\n"));
 }
 
+/// A log of a walk in two dimensions, and its model.
+fn walk(rows: usize) -> Folder {
+    let Experiment { u, y } = Experiment::new(rows);
+    let folder = Folder::with_log(csv(&[("u", &u), ("y", &y)]));
+    folder.write(
+        "walk.toml",
+        "sample_time = 1\noutputs = ['y', 'u']\nF = [[1, 1], [0, 1]]\nH = [[1, 0], [0, 1]]\nQ = [[1, 0], [0, 1]]\n\
+         R = [[1, 0], [0, 1]]\nP0 = [[1, 0], [0, 1]]\n",
+    );
+    folder
+}
+
+#[test]
+fn smoothing_ends_while_it_writes() {
+    let folder = walk(5000);
+    // More than a pipe holds, so that it waits for a reader.
+    let mut child = started(folder.command("filter walk.toml log.csv --smooth"));
+    let mut first = [0; 10];
+    child.stdout.as_mut().expect("it is a pipe").read_exact(&mut first).expect("there is a first line");
+    press(&child);
+    // Whoever is slow to hear of it has written one buffer more.
+    std::thread::sleep(Duration::from_millis(200));
+    let run = ended(child);
+    assert_eq!(run.code, 130, "{}", run.stderr);
+    assert!(run.stderr.ends_with("interrupted\n") && run.stdout.ends_with("}\n"), "{}", run.stderr);
+    assert!(run.stdout.lines().count() < 4000, "{}", run.stdout.lines().count());
+}
+
+#[test]
+fn smoothing_ends_before_it_writes() {
+    let folder = walk(40_000);
+    // While the log is read, and while it is smoothed, however long either takes.
+    for wait in [50, 400] {
+        let child = started(folder.command("filter walk.toml log.csv --smooth -o lines.jsonl"));
+        std::thread::sleep(Duration::from_millis(wait));
+        press(&child);
+        let run = ended(child);
+        assert_eq!(run.code, 130, "{}", run.stderr);
+        assert!(folder.read("lines.jsonl").lines().count() < 40_000);
+    }
+}
+
+#[test]
+fn a_log_that_has_not_ended_is_not_smoothed() {
+    let folder = walk(10);
+    let mut command = folder.command("filter walk.toml - --smooth");
+    command.stdin(Stdio::piped());
+    let mut child = started(command);
+    let mut input = child.stdin.take().expect("standard input is a pipe");
+    input.write_all(b"u,y\n1,2\n3,4\n").expect("the program reads");
+    std::thread::sleep(Duration::from_millis(300));
+    press(&child);
+    let run = ended(child);
+    assert_eq!((run.code, run.stdout.as_str()), (130, ""), "{}", run.stderr);
+    assert!(run.stderr.ends_with(NOTHING), "{}", run.stderr);
+    drop(input);
+}
+
 #[test]
 fn a_job_that_ignores_interrupts_goes_on() {
     let folder = Folder::with_log(plain_log());

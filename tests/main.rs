@@ -31,3 +31,4 @@ mod track;
 mod track_live;
 mod track_soak;
 mod validate;
+mod width;

@@ -286,7 +286,7 @@ fn the_table_says_how_the_search_went() {
         search["iterations"],
         search["start"].as_str().unwrap_or_default()
     );
-    assert!(table.contains(&went), "{table}");
+    assert!(table.replace("\n  ", " ").contains(&went), "{table}");
     for root in ["pole of F", "noise pole of D", "noise zero of C"] {
         assert!(table.contains(&format!("\n{root} ")), "{table}");
     }

@@ -75,6 +75,21 @@ mod unix {
         assert!(shown.starts_with("error:") && !shown.contains('\u{1b}'), "{shown:?}");
     }
 
+    #[test]
+    fn messages_are_wrapped_at_the_width_of_the_terminal() {
+        let folder = Folder::with_log("a,b,y\n1,2,3\n");
+        let mut command = folder.command("fit log.csv --na 2 --nb 2");
+        command.env("NO_COLOR", "1");
+        let shown = on_terminal(command, |_| {});
+        assert!(shown.starts_with("error: log.csv: no column is called u"), "{shown:?}");
+        assert!(shown.contains("\r\n  "), "{shown:?}");
+        assert!(shown.lines().all(|line| line.trim_end().chars().count() <= 80), "{shown:?}");
+        assert_eq!(
+            folder.run("fit log.csv --na 2 --nb 2").stderr,
+            shown.replace("\r\n  ", " ").replace('\r', "")
+        );
+    }
+
     /// A log in two pieces of more than two mebibytes, the second of which comes more than a second later.
     fn slowly(child: &mut Child) {
         let mut into = child.stdin.take().expect("standard input is a pipe");

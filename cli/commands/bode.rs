@@ -32,10 +32,14 @@ pub(crate) fn bode(arguments: &BodeArguments) -> Result<(), Failure> {
         for response in &responses {
             let name = response.input.as_deref().unwrap_or("noise");
             for point in &response.points {
-                let degrees = |radians: f64| radians.to_degrees();
+                // What is not a number is left empty.
+                let known = |value: f64| Some(value).filter(|value| value.is_finite());
+                let degrees = |radians: f64| known(radians.to_degrees());
                 let Quantity { value: magnitude, standard_error } = point.magnitude;
-                let (phase, turn) = (degrees(point.phase.value), point.phase.standard_error.map(degrees));
-                csv.serialize((name, point.frequency, magnitude, standard_error, phase, turn))?;
+                let (magnitude, spread) = (known(magnitude), standard_error.and_then(known));
+                let (phase, turn) =
+                    (degrees(point.phase.value), point.phase.standard_error.and_then(degrees));
+                csv.serialize((name, point.frequency, magnitude, spread, phase, turn))?;
             }
         }
         Ok(())

@@ -9,6 +9,7 @@ use crate::failure::Failure;
 use crate::job::LookJob;
 use crate::log::Loaded;
 use crate::output::{self, warn};
+use crate::wrap::stdout_width;
 
 pub(crate) fn compare(arguments: &CompareArguments, line: &str) -> Result<(), Failure> {
     let look = &arguments.look;
@@ -30,5 +31,5 @@ pub(crate) fn compare(arguments: &CompareArguments, line: &str) -> Result<(), Fa
     for (path, model) in arguments.reports.iter().zip(&comparison.models) {
         model.warnings.iter().for_each(|warning| warn(&format!("{}: {warning}", path.display())));
     }
-    print(look, &json, || summary::comparison(&comparison))
+    print(look, &json, || summary::comparison(&comparison, stdout_width()))
 }

@@ -9,6 +9,7 @@ use crate::args::{Arguments, Command, DemoArguments};
 use crate::failure::Failure;
 use crate::job::FitJob;
 use crate::output::{self, warn};
+use crate::wrap::stdout_width;
 
 /// A log of a DC motor: its columns are t, u and y. Made by the program beside it.
 pub const LOG: &str = include_str!("../demo/dc_motor.csv");
@@ -39,6 +40,6 @@ pub(crate) fn demo(arguments: &DemoArguments) -> Result<(), Failure> {
         log.display(),
         OPTIONS.join(" "),
         report.display(),
-        summary::table(&found)
+        summary::table(&found, stdout_width())
     ))
 }

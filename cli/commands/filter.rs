@@ -4,16 +4,19 @@ mod columns;
 
 use std::path::Path;
 
+use thetahat::figures::fixed;
 use thetahat::{FilterSummary, GreyReport, InitialState, Report, StateFilter, StateModel};
 
 use super::{stored, summary};
 use crate::args::FilterArguments;
 use crate::failure::Failure;
+use crate::interrupt;
 use crate::job::FilterJob;
 use crate::line_writer::LineWriter;
 use crate::live::{Live, Next};
 use crate::log;
 use crate::output::{self, say, warn};
+use crate::wrap::{WIDTH, stderr_width};
 use columns::Columns;
 
 pub(crate) fn filter(arguments: &FilterArguments) -> Result<(), Failure> {
@@ -37,9 +40,8 @@ pub(crate) fn filter(arguments: &FilterArguments) -> Result<(), Failure> {
     })?;
     let mut run = Run::start(&job, filter)?;
     let ended = run.follow();
-    let flushed = run.finish();
-    let stopped = ended?;
-    flushed?;
+    let finished = run.finish();
+    let stopped = ended? | !finished?;
     if let Some(path) = &job.summary {
         let json = run.filter.summary().to_json().map_err(|error| Failure::data(error.to_string()))?;
         output::write(path, |file| file.write_all(json.as_bytes()))?;
@@ -48,7 +50,8 @@ pub(crate) fn filter(arguments: &FilterArguments) -> Result<(), Failure> {
         warn(&format!("{}: {word}", run.name));
     }
     if !job.lines.quiet {
-        say(summary::filtered(&run.filter.summary(), &run.live.faults()).trim_end());
+        let width = stderr_width().unwrap_or(WIDTH);
+        say(summary::filtered(&run.filter.summary(), &run.live.faults(), width).trim_end());
     }
     if stopped { Err(Failure::interrupted()) } else { Ok(()) }
 }
@@ -64,7 +67,8 @@ fn surprise(summary: &FilterSummary) -> Option<String> {
         ..0.5 => "standard deviations are too large; give the model smaller noises",
         _ => return None,
     };
-    Some(format!("squared innovations are {ratio:.2} times as large as the model says, so {advice}"))
+    let ratio = fixed(ratio, 2);
+    Some(format!("squared innovations are {ratio} times as large as the model says, so {advice}"))
 }
 
 /// The model in a file: a report of one of the two kinds, or a text.
@@ -201,13 +205,18 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// Writes what still waits.
-    fn finish(&mut self) -> Result<(), Failure> {
-        let Some(mut again) = self.fresh.take() else { return self.lines.flush() };
+    /// Writes what still waits; says whether that was all. A log that did not come to its end is not smoothed.
+    fn finish(&mut self) -> Result<bool, Failure> {
+        let Some(mut again) = self.fresh.take() else { return self.lines.flush().map(|()| true) };
         let failed = |error: thetahat::Error| Failure::data(format!("{}: {error}", self.name));
-        let smoothed = self.filter.smooth().map_err(failed)?;
+        let Some(smoothed) = interrupt::at_once(|| self.filter.smooth()) else { return Ok(false) };
+        let smoothed = smoothed.map_err(failed)?;
         let inputs = self.filter.model().inputs().len();
         for (index, Kept { row, time, step, values }) in self.kept.iter().enumerate() {
+            if interrupt::is_ending() {
+                self.lines.flush()?;
+                return Ok(false);
+            }
             let (inputs, outputs) = values.split_at(inputs);
             let estimate = again.step(*step, inputs, outputs).map_err(failed)?;
             if row.is_multiple_of(self.job.lines.every) {
@@ -221,7 +230,7 @@ impl<'a> Run<'a> {
                 )?;
             }
         }
-        self.lines.flush()
+        self.lines.flush().map(|()| true)
     }
 }
 

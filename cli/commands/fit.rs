@@ -15,6 +15,7 @@ use crate::job::FitJob;
 use crate::log::{self, Loaded};
 use crate::output::{self, warn};
 use crate::progress::Searching;
+use crate::wrap::stdout_width;
 
 pub(crate) fn fit(arguments: &FitArguments, line: &str) -> Result<(), Failure> {
     if let Some(model) = &arguments.grey {
@@ -47,7 +48,7 @@ pub(crate) fn fit(arguments: &FitArguments, line: &str) -> Result<(), Failure> {
         // Standard output holds one document.
         _ if outputs.into_iter().flatten().any(|path| path == Path::new("-")) => Ok(()),
         FormatArgument::Json => output::print(&json),
-        FormatArgument::Table => output::print(&summary::table(&report)),
+        FormatArgument::Table => output::print(&summary::table(&report, stdout_width())),
     }
 }
 

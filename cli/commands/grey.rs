@@ -13,6 +13,7 @@ use crate::job::{Clock, GreyJob};
 use crate::log::{self, Recorded};
 use crate::output::{self, warn};
 use crate::progress::Searching;
+use crate::wrap::stdout_width;
 
 pub(super) fn fit(arguments: &FitArguments, model: &Path) -> Result<(), Failure> {
     let job = GreyJob::resolve(arguments, model)?;
@@ -51,7 +52,7 @@ pub(super) fn fit(arguments: &FitArguments, model: &Path) -> Result<(), Failure>
         // Standard output holds one document.
         _ if arguments.report.as_deref() == Some(Path::new("-")) => Ok(()),
         FormatArgument::Json => output::print(&json),
-        FormatArgument::Table => output::print(&summary::grey(&report)),
+        FormatArgument::Table => output::print(&summary::grey(&report, stdout_width())),
     }
 }
 

@@ -1,5 +1,8 @@
 //! `thetahat inspect`: what a log is worth, before any fit.
 
+use std::collections::{HashMap, HashSet};
+use std::path::Path;
+
 use thetahat::{Inspection, InspectionPlan, Recording, Times, inspection_page};
 
 use super::fit::usual_inputs;
@@ -10,6 +13,7 @@ use crate::job::{Clock, InspectJob};
 use crate::log::{self, Recorded};
 use crate::output;
 use crate::table::Reader;
+use crate::wrap::{WIDTH, stdout_width};
 
 pub(crate) fn inspect(arguments: &InspectArguments, line: &str) -> Result<(), Failure> {
     let job = InspectJob::resolve(arguments)?;
@@ -28,9 +32,11 @@ pub(crate) fn inspect(arguments: &InspectArguments, line: &str) -> Result<(), Fa
             channels.into_iter().map(|channel| (channel.name, channel.values)).collect();
         output::page(path, &inspection_page(&inspection, &signals, &time, line))?;
     }
+    // What goes into a file does not depend on the terminal.
+    let width = if arguments.out == Path::new("-") { stdout_width() } else { WIDTH };
     let text = match arguments.format {
         FormatArgument::Json => inspection.to_json().map_err(|error| Failure::data(error.to_string()))?,
-        FormatArgument::Table => summary::inspection(&inspection),
+        FormatArgument::Table => summary::inspection(&inspection, width),
     };
     output::write(&arguments.out, |file| file.write_all(text.as_bytes()))
 }
@@ -58,6 +64,9 @@ pub(crate) fn inspected(
     inspection.command = job.command(arguments, &inspection);
     Ok((inspection, kept))
 }
+
+/// So many columns that are left out for one reason are named.
+const MOST_TOLD: usize = 3;
 
 /// Which columns are looked at, and what they are.
 #[derive(Debug, Default)]
@@ -98,28 +107,42 @@ impl Chosen {
 
     /// The columns but the clock that can be read; says which cannot.
     fn readable(&mut self, job: &InspectJob, reader: &Reader) -> Vec<String> {
+        const REASONS: [&str; 3] = [
+            "its name is not UTF-8; name the file's encoding (--encoding)",
+            "another one has the same name; rename one of them",
+            "it holds no numbers",
+        ];
         let names = reader.names();
         let is_time = |name: &str| matches!(&job.log.clock, Clock::Column { name: time, .. } if time == name);
-        let nameless: Vec<usize> = reader.nameless().collect();
+        let nameless: HashSet<usize> = reader.nameless().collect();
+        let mut count: HashMap<&str, usize> = HashMap::with_capacity(names.len());
+        names.iter().for_each(|name| *count.entry(name).or_default() += 1);
         let mut readable: Vec<String> = Vec::new();
+        let mut left_out = [const { Vec::new() }; REASONS.len()];
         for ((column, name), holds_words) in names.iter().enumerate().zip(reader.words()) {
-            if is_time(name) {
-                continue;
-            }
-            let why = if nameless.contains(&column) {
-                "its name is not UTF-8; name the file's encoding (--encoding)"
-            } else if names[..column].contains(name) {
-                "another one has the same name; rename one of them"
-            } else if holds_words {
-                "it holds no numbers"
-            } else {
-                readable.push(name.clone());
-                continue;
+            let reason = match (nameless.contains(&column), count[name.as_str()]) {
+                _ if is_time(name) => continue,
+                (true, _) => 0,
+                // A name that stands twice cannot be read at all.
+                (_, 2..) => 1,
+                _ if holds_words => 2,
+                _ => {
+                    readable.push(name.clone());
+                    continue;
+                }
             };
-            self.words.push(format!("column {} ('{}') is left out: {why}", column + 1, log::brief(name)));
+            left_out[reason].push(column);
         }
-        // A name that stands twice cannot be read at all.
-        readable.retain(|name| names.iter().filter(|other| *other == name).count() == 1);
+        for (columns, reason) in left_out.iter().zip(REASONS) {
+            for &column in columns.iter().take(MOST_TOLD) {
+                let name = log::brief(&names[column]);
+                self.words.push(format!("column {} ('{name}') is left out: {reason}", column + 1));
+            }
+            if columns.len() > MOST_TOLD {
+                let more = columns.len() - MOST_TOLD;
+                self.words.push(format!("{more} more columns are left out for the same reason: {reason}"));
+            }
+        }
         readable
     }
 }

@@ -10,7 +10,7 @@ use crate::args::{PredictArguments, RespondArguments, SimulateArguments};
 use crate::failure::Failure;
 use crate::job::{LogJob, parsed, rows};
 use crate::log::{self, Loaded};
-use crate::output::{self, say, warn};
+use crate::output::{self, tell, warn};
 
 pub(crate) fn predict(arguments: &PredictArguments) -> Result<(), Failure> {
     let horizon = match arguments.horizon.as_str() {
@@ -24,11 +24,11 @@ pub(crate) fn predict(arguments: &PredictArguments) -> Result<(), Failure> {
             }
         },
     };
-    respond(&arguments.respond, horizon, arguments.initial.given())
+    respond(&arguments.respond, horizon, arguments.initial.map(Start::from))
 }
 
 pub(crate) fn simulate(arguments: &SimulateArguments) -> Result<(), Failure> {
-    respond(&arguments.respond, Horizon::FreeRun, arguments.initial.given())
+    respond(&arguments.respond, Horizon::FreeRun, arguments.initial.map(Start::from))
 }
 
 fn respond(arguments: &RespondArguments, horizon: Horizon, initial: Option<Start>) -> Result<(), Failure> {
@@ -64,7 +64,7 @@ fn respond(arguments: &RespondArguments, horizon: Horizon, initial: Option<Start
         Some(_) if !applied.predicted.iter().any(|value| value.is_finite()) => {
             warn("no row could be predicted: the stretches without a gap are too short")
         }
-        Some(fit) => say(&summary::figure(fit)),
+        Some(fit) => tell(&summary::figure(fit)),
         None => {}
     }
     Ok(())

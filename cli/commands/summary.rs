@@ -8,6 +8,7 @@ mod text;
 mod tracking;
 mod validation;
 
+use thetahat::figures::{error, fixed, number, scientific, short};
 use thetahat::{
     Algorithm, CriterionOutcome, Estimation, Fit, Initial, Model, Norm, Orders, Part, Procedure, Quantity,
     Report, Root, Rows, SearchOutcome, Signal, Solver, Start, Stopped, Structure,
@@ -17,14 +18,22 @@ use crate::output::harmless;
 pub(crate) use filtered::filtered;
 pub(crate) use grey::grey;
 pub use inspection::inspection;
-use text::{Text, columns, number, or_dash, short, uncertainty};
+use text::{Text, columns, or_dash, some};
 pub(crate) use tracking::tracking;
 pub use validation::{comparison, validation};
 
-/// The report's main figures.
-pub fn table(report: &Report) -> String {
+/// So many of a list are written.
+const MOST: usize = 8;
+/// Why there may be no figure.
+const NO_ERROR: &str = "the way it was estimated gives no standard error";
+const NO_ROOT_ERROR: &str =
+    "no standard error is known, or no time constant goes with a pole on or outside of the unit circle";
+const NO_FIT: &str = "the output is constant, no sample counts, or the response overflows";
+
+/// The report's main figures, so many columns wide.
+pub fn table(report: &Report, width: usize) -> String {
     let model = &report.model;
-    let mut text = Text::default();
+    let mut text = Text::new(width);
     selection::selection(&mut text, report);
     text.line(&format!("{}, sample time {} s", formula(&model.orders), short(model.sample_time)));
     let signals = model.inputs.iter().map(|input| signal("input", input));
@@ -32,15 +41,15 @@ pub fn table(report: &Report) -> String {
     text.line(&signals.join(", "));
     text.line("");
 
-    let mut parameters = columns(&["parameter", "value", "standard error"]);
+    let mut parameters = columns(&["parameter", "value", "standard error"]).none(NO_ERROR);
     for parameter in &model.parameters {
-        parameters.add_row([
+        parameters.row([
             parameter.name.clone(),
             number(parameter.value),
-            or_dash(parameter.standard_error, uncertainty),
+            or_dash(parameter.standard_error, error),
         ]);
     }
-    text.table(parameters, &[1, 2]);
+    text.table(parameters);
     estimation(&mut text, &report.estimation, model);
     text.line("");
     dynamics(&mut text, model);
@@ -77,12 +86,12 @@ fn estimation(text: &mut Text, estimation: &Estimation, model: &Model) {
         "{} samples, noise variance {}, condition number {}",
         estimation.samples,
         number(model.noise_variance),
-        or_dash(estimation.condition, |condition| format!("{condition:.3e}"))
+        or_dash(estimation.condition, |condition| scientific(condition, 3))
     ));
     let criteria = &estimation.criteria;
-    let four = |value: f64| format!("{value:.4}");
+    let four = |value: f64| fixed(value, 4);
     text.line(&format!(
-        "FPE {}, AIC {}, AICc {}, MDL {}",
+        "FPE {}; for each sample AIC {}, AICc {}, MDL {}",
         number(criteria.fpe),
         or_dash(criteria.aic, four),
         or_dash(criteria.aicc, four),
@@ -163,22 +172,22 @@ fn criterion(text: &mut Text, outcome: &CriterionOutcome, model: &Model, start: 
     let ridge = if outcome.ridge > 0.0 { format!(", ridge {}", short(outcome.ridge)) } else { String::new() };
     text.line(&format!("criterion: {norm} {}{ridge}, {}", number(outcome.objective), initial(start, 0)));
     if !outcome.active.is_empty() {
-        text.line(&format!("at a bound: {}", outcome.active.join(", ")));
+        text.line(&format!("at a bound: {}", some(&outcome.active, MOST, ", ")));
     }
     if let (Some(bound), Some(ranges)) = (outcome.noise_bound, &outcome.box_) {
         text.line("");
         let mut table = columns(&["parameter", "least", "largest"]);
         for (parameter, [least, largest]) in model.parameters.iter().zip(ranges) {
-            table.add_row([parameter.name.clone(), number(*least), number(*largest)]);
+            table.row([parameter.name.clone(), number(*least), number(*largest)]);
         }
         text.line(&format!("all parameters with no error above {}:", short(bound)));
-        text.table(table, &[1, 2]);
+        text.table(table);
     }
 }
 
 /// Roots, gains and time constants.
 fn dynamics(text: &mut Text, model: &Model) {
-    let mut roots = columns(&["root", "value", "standard error", "time constant [s]"]);
+    let mut roots = columns(&["root", "value", "standard error", "time constant [s]"]).none(NO_ROOT_ERROR);
     let mut count = 0;
     let mut add = |role: &str, root: &Root, time: Option<String>| {
         // What one letter says elsewhere.
@@ -187,7 +196,7 @@ fn dynamics(text: &mut Text, model: &Model) {
             text::complex(root),
             text::spread(root),
         ];
-        roots.add_row(row.into_iter().chain([time.unwrap_or_default()]));
+        roots.row(row.into_iter().chain([time.unwrap_or_default()]));
         count += 1;
     };
     for (pole, time) in model.poles.iter().zip(&model.time_constants) {
@@ -197,7 +206,7 @@ fn dynamics(text: &mut Text, model: &Model) {
     model.noise_poles.iter().for_each(|pole| add("noise pole", pole, None));
     model.noise_zeros.iter().for_each(|zero| add("noise zero", zero, None));
     if count > 0 {
-        text.table(roots, &[1, 2, 3]);
+        text.table(roots);
     }
     for (input, gain) in model.inputs.iter().zip(&model.dc_gain) {
         let gain = gain.map_or_else(|| "none (integrator)".to_owned(), quantity);
@@ -208,13 +217,14 @@ fn dynamics(text: &mut Text, model: &Model) {
 
 /// A figure and its standard error.
 fn quantity(quantity: Quantity) -> String {
-    let error =
-        quantity.standard_error.map_or_else(String::new, |error| format!(" ± {}", uncertainty(error)));
-    format!("{}{error}", number(quantity.value))
+    let spread = quantity.standard_error.map_or_else(String::new, |spread| format!(" ± {}", error(spread)));
+    format!("{}{spread}", number(quantity.value))
 }
 
 fn fits(text: &mut Text, fits: &[Fit]) {
-    let mut table = columns(&["part", "rows", "horizon", "initial", "samples", "fit [%]", "RMSE"]);
+    let mut table = columns(&["part", "rows", "horizon", "initial", "samples", "fit [%]", "RMSE"])
+        .words(&[1, 2, 3])
+        .none(NO_FIT);
     for fit in fits {
         let part = match fit.part {
             Some(Part::Estimation) => "estimation",
@@ -222,22 +232,22 @@ fn fits(text: &mut Text, fits: &[Fit]) {
             Some(Part::Test) => "test",
             None => "",
         };
-        table.add_row([
+        table.row([
             part.to_owned(),
             rows(&fit.rows),
             fit.horizon.to_string(),
             start(fit.initial).to_owned(),
             fit.samples.to_string(),
-            or_dash(fit.percent, |percent| format!("{percent:.3}")),
+            or_dash(fit.percent, |percent| fixed(percent, 3)),
             or_dash(fit.rmse, number),
         ]);
     }
-    text.table(table, &[4, 5, 6]);
+    text.table(table);
 }
 
 /// One line that says how close a response is.
 pub(crate) fn figure(fit: &Fit) -> String {
-    let percent = fit.percent.map_or_else(|| "none".to_owned(), |percent| format!("{percent:.3} %"));
+    let percent = fit.percent.map_or_else(|| "none".to_owned(), |percent| format!("{} %", fixed(percent, 3)));
     let rmse = fit.rmse.map_or_else(|| "none".to_owned(), number);
     format!(
         "fit {percent}, RMSE {rmse} ({}, initial {}, rows {}, {} samples)",
@@ -249,14 +259,21 @@ pub(crate) fn figure(fit: &Fit) -> String {
 }
 
 fn rows(rows: &[Rows]) -> String {
-    let shown: Vec<String> = rows.iter().map(Rows::to_string).collect();
-    shown.join(",")
+    some(rows, MOST, ",")
+}
+
+/// What the numbers of some models stand for.
+fn orders_legend<'a>(models: impl IntoIterator<Item = &'a Orders>) -> String {
+    let mut kinds: Vec<&str> = models.into_iter().map(Orders::legend).collect();
+    kinds.sort_unstable();
+    kinds.dedup();
+    format!("orders: {}", kinds.join(", "))
 }
 
 fn start(start: Start) -> &'static str {
     match start {
         Start::Zero => "zero",
-        Start::Drop => "drop",
-        Start::Estimate => "estimate",
+        Start::Measured => "measured",
+        Start::Estimated => "estimated",
     }
 }

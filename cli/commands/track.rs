@@ -18,6 +18,7 @@ use crate::line_writer::LineWriter;
 use crate::live::{Live, Next};
 use crate::log;
 use crate::output::{self, say, warn};
+use crate::wrap::{WIDTH, stderr_width};
 use columns::{Columns, Sample};
 use pace::Step;
 use state::{Place, RowPlace, State};
@@ -261,7 +262,9 @@ impl<'a> Run<'a> {
             output::write(path, |file| file.write_all(json.as_bytes()))?;
         }
         if !self.job.lines.quiet {
-            say(summary::tracking(&summary, &self.live.faults(), self.job.is_watched()).trim_end());
+            let width = stderr_width().unwrap_or(WIDTH);
+            let watched = self.job.is_watched();
+            say(summary::tracking(&summary, &self.live.faults(), watched, width).trim_end());
         }
         Ok(())
     }

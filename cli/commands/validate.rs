@@ -10,6 +10,7 @@ use crate::failure::Failure;
 use crate::job::LookJob;
 use crate::log::{self, Loaded};
 use crate::output::{self, warn};
+use crate::wrap::stdout_width;
 
 pub(crate) fn validate(arguments: &ValidateArguments, line: &str) -> Result<(), Failure> {
     let look = &arguments.look;
@@ -29,7 +30,7 @@ pub(crate) fn validate(arguments: &ValidateArguments, line: &str) -> Result<(), 
     for warning in &validation.warnings {
         warn(warning);
     }
-    print(look, &json, || summary::validation(validation, &requirements, job.plan.alpha))?;
+    print(look, &json, || summary::validation(validation, &requirements, job.plan.alpha, stdout_width()))?;
 
     let unmet = requirements.iter().filter_map(|requirement| requirement.unmet(validation, job.plan.alpha));
     let unmet: Vec<String> = unmet.collect();

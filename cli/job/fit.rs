@@ -4,8 +4,9 @@ use thetahat::{Detrend, Initial, Method, Plan, Rows, Select, Split};
 
 use super::orders::OrderJob;
 use super::{LogJob, method, parsed, rows};
-use crate::args::{FitArguments, InitialArgument, SelectArgument};
+use crate::args::{FitArguments, InitialArgument, Names, SelectArgument};
 use crate::failure::Failure;
+use crate::memory::PerValue;
 
 /// A model to fit.
 #[derive(Debug)]
@@ -32,10 +33,10 @@ pub(crate) struct FitJob {
 impl FitJob {
     pub(crate) fn resolve(arguments: &FitArguments) -> Result<Self, Failure> {
         let orders = OrderJob::resolve(&arguments.model, arguments.choice.path)?;
-        let job = Self {
+        let mut job = Self {
             paths: arguments.logs.clone(),
             log: LogJob::resolve(&arguments.log, &arguments.clock)?,
-            inputs: (!arguments.input.is_empty()).then(|| arguments.input.clone()),
+            inputs: Names::all(&arguments.input),
             output: arguments.output.clone(),
             estimate: rows("--estimate", &arguments.estimate)?,
             validate: rows("--validate", &arguments.validate)?,
@@ -47,6 +48,9 @@ impl FitJob {
             initial: initial(arguments.model.initial, &orders)?,
             orders,
         };
+        if !job.orders.is_linear() || job.orders.is_choice() || !job.is_plain() || arguments.html.is_some() {
+            job.log.per_value = PerValue::Search;
+        }
         let validates = !job.validate.is_empty() || job.split.is_some_and(|split| split.validates());
         if job.select == Select::Validation && !validates {
             return Err(Failure::usage(
@@ -65,6 +69,11 @@ impl FitJob {
             job.orders.of(inputs.len())?;
         }
         Ok(job)
+    }
+
+    /// Whether squares are made small and nothing else is asked.
+    fn is_plain(&self) -> bool {
+        matches!(self.method, Method::PredictionError(_))
     }
 
     /// The same for the channels of a log.

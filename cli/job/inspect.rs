@@ -3,9 +3,10 @@ use std::path::PathBuf;
 use thetahat::Inspection;
 
 use super::{Clock, LogJob};
-use crate::args::InspectArguments;
+use crate::args::{InspectArguments, Names};
 use crate::failure::Failure;
 use crate::shell::quoted;
+use crate::table;
 
 /// A log to look at.
 #[derive(Debug)]
@@ -23,7 +24,7 @@ impl InspectJob {
         Ok(Self {
             path: arguments.path.clone(),
             log: LogJob::resolve(&arguments.log, &arguments.clock)?,
-            inputs: (!arguments.input.is_empty()).then(|| arguments.input.clone()),
+            inputs: Names::all(&arguments.input),
             output: arguments.output.clone(),
         })
     }
@@ -77,7 +78,7 @@ impl InspectJob {
         if inputs.is_empty() {
             option("--nb", "0");
         } else {
-            option("-u", &inputs.join(","));
+            option("-u", &table::list(&inputs));
         }
         option("-y", &output.name);
         let log = &arguments.log;

@@ -4,7 +4,7 @@ use thetahat::{Orders, PerChannel, Policy, Report, TrackMethod, TrackPlan, Track
 
 use super::fit::named_values;
 use super::{LineJob, LogJob, parsed};
-use crate::args::{ResumeArgument, TrackArguments, TrackMethodArgument, TrackModelArgument};
+use crate::args::{Names, ResumeArgument, TrackArguments, TrackMethodArgument, TrackModelArgument};
 use crate::failure::Failure;
 
 /// A model to track.
@@ -91,7 +91,7 @@ impl TrackJob {
             path: arguments.path.clone(),
             log,
             sample_time,
-            inputs: (!arguments.input.is_empty()).then(|| arguments.input.clone()),
+            inputs: Names::all(&arguments.input),
             output: arguments.output.clone(),
             warm: arguments.warm.clone(),
             lines: LineJob::resolve(&arguments.lines),

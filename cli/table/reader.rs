@@ -224,7 +224,18 @@ impl Reader {
         let fields = self.fields(selection)?;
         let numbers = Numbers::new(self.options.decimal_comma, &self.options.missing);
         let (clock, start) = self.clock(selection, &numbers)?;
-        let Self { sizes, mut source, layout, mut current, mut next, record, mut position, line, .. } = self;
+        let Self {
+            options,
+            sizes,
+            mut source,
+            layout,
+            mut current,
+            mut next,
+            record,
+            mut position,
+            line,
+            ..
+        } = self;
         let plan = Plan { layout, numbers, clock, fields, time: selection.time };
         let mut workspace = Workspace::new(record);
         let mut rows = Rows::new(plan.fields.len(), line);
@@ -245,6 +256,11 @@ impl Reader {
             );
             // What is wrong with this block comes before what is wrong with the next.
             let taken = read?;
+            if let Some(words) =
+                options.bound.and_then(|bound| bound.passed_by(rows.count * plan.fields.len()))
+            {
+                return Err(plan.layout.too_large(rows.line, &words));
+            }
             let left = &text[taken..];
             if current.is_last() {
                 if !left.is_empty() {

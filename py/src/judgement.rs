@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use thetahat::{Inspection, InspectionPlan, Report, Requirement, Validated};
+use thetahat::{Inspection, InspectionPlan, Recording, Report, Requirement, Times, Validated};
 
 use crate::error;
 use crate::log::{Log, copy};
@@ -17,7 +17,6 @@ use crate::work::{awaited, interruptible};
 pub(crate) struct Validation {
     found: Validated,
     requirements: Vec<Requirement>,
-    #[pyo3(get)]
     alpha: f64,
 }
 
@@ -52,7 +51,7 @@ impl Validation {
 
     /// The table that `thetahat validate` prints.
     fn table(&self) -> String {
-        thetahat_cli::validation(&self.found.validation, &self.requirements, self.alpha)
+        thetahat_cli::validation(&self.found.validation, &self.requirements, self.alpha, thetahat_cli::WIDTH)
     }
 
     /// What was required and is not met, in words with the figures.
@@ -85,7 +84,7 @@ pub(crate) fn compare(
         thetahat::compare(&found)
     })?;
     let json = comparison.to_json().map_err(|error| error::batch(py, error))?;
-    Ok((json, thetahat_cli::comparison(&comparison)))
+    Ok((json, thetahat_cli::comparison(&comparison, thetahat_cli::WIDTH)))
 }
 
 /// What a log is worth: the document that `thetahat inspect` writes, and its table.
@@ -98,7 +97,15 @@ pub(crate) fn inspect(py: Python<'_>, log: &Bound<'_, Log>) -> PyResult<(String,
     let plan =
         InspectionPlan { inputs: log.inputs.clone(), output: Some(log.output.clone()), resample: None };
     let log = Arc::clone(&log.log);
-    let found = interruptible(py, move |_| thetahat::inspect_log(&log, &source, &plan))?;
+    let found = interruptible(py, move |_| {
+        let times = match log.time() {
+            Some(time) if log.borders().is_empty() => Times::Measured(time.to_vec()),
+            // Several logs have no common clock.
+            _ => Times::Uniform(log.sample_time()),
+        };
+        let recording = Recording { channels: log.channels().to_vec(), times };
+        thetahat::inspect(recording, &source, &plan)
+    })?;
     written(py, &found)
 }
 
@@ -112,5 +119,5 @@ pub(crate) fn inspect_file(py: Python<'_>, options: Vec<OsString>) -> PyResult<(
 
 fn written(py: Python<'_>, found: &Inspection) -> PyResult<(String, String)> {
     let json = found.to_json().map_err(|error| error::batch(py, error))?;
-    Ok((json, thetahat_cli::inspection(found)))
+    Ok((json, thetahat_cli::inspection(found, thetahat_cli::WIDTH)))
 }

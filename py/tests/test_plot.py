@@ -146,6 +146,22 @@ def test_fit_of_a_free_run_has_no_band(log: th.Log, model: th.Model) -> None:
     assert f"free run: {model.validate(log[700:]).fit(None):.2f} %" in legend(ax)[1]
 
 
+def test_fit_is_scaled_to_what_was_measured() -> None:
+    random = np.random.default_rng(3)
+    u = random.standard_normal(1500)
+    grown = np.zeros(60)
+    for k in range(1, 60):
+        grown[k] = 1.2 * grown[k - 1] + u[k - 1] + 0.01 * random.standard_normal()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        growing = th.arx(th.Log(grown, u[:60]), na=1, nb=1, detrend="none")
+        ax = plot.fit(growing, th.Log(random.standard_normal(1500), u))
+    low, high = ax.get_ylim()
+    assert -20 < low < 0 < high < 20
+    label = ax.get_legend().get_texts()[1].get_text()
+    assert "e+" in label and all(len(word) <= 12 for word in label.split())
+
+
 def test_fit_of_several_models_and_a_level(log: th.Log, model: th.Model, plain: th.Model) -> None:
     figure, given = plt.subplots()
     ax = plot.fit({"good": model, "plain": plain}, log[700:], 1, given, level=0.5)
@@ -218,34 +234,8 @@ def test_instrumental_variables_have_their_bands(log: th.Log) -> None:
 def test_experiments_that_were_joined_are_not_connected(log: th.Log) -> None:
     joined = th.Log.join([log[500:503], log[:3]])
     assert joined.time[3] < joined.time[2]
-    line, border = plot.log(joined)[0].get_lines()
+    (line,) = plot.log(joined)[0].get_lines()
     np.testing.assert_array_equal(np.isnan(np.asarray(line.get_ydata(), dtype=float)), [0, 0, 0, 1, 0, 0, 0])
-    # One after the other, whatever their clocks say.
-    time = np.asarray(line.get_xdata(), dtype=float)
-    assert np.all(np.diff(time[np.isfinite(time)]) > 0)
-    assert time[2] < np.ravel(border.get_xdata())[0] < time[4]
-
-
-def test_experiments_with_clocks_that_go_on_are_not_connected_either() -> None:
-    joined = th.Log.join([th.Log([1.0, 2.0], time=[0.0, 1.0]), th.Log([3.0, 4.0, 5.0, 6.0], time=[2.0, 3.0, 9.0, 10.0])])
-    line, _ = plot.log(joined)[0].get_lines()
-    np.testing.assert_array_equal(line.get_xdata(), [0, 1, np.nan, 2, 3, np.nan, 9, 10])
-    assert len(plot.fit(th.ar(joined, 1, detrend="none"), joined, 1).get_lines()) == 3
-
-
-def test_residuals_are_titled_by_the_verdict(log: th.Log) -> None:
-    model = th.arx(log[:700], na=1, nb=1)
-    validation = model.validate(log[700:])
-    assert validation.whiteness < validation.alpha == 0.05
-    white, _ = plot.residuals(validation)
-    assert white.get_title() == f"residuals: not white, p = {validation.whiteness:.2g}"
-    good = th.bj(log[:700], nb=2, nc=0, nd=1, nf=2).validate(log[700:])
-    assert [ax.get_title().partition(", p =")[0] for ax in plot.residuals(good)] == [
-        "residuals: white",
-        "residuals and u: independent",
-    ]
-    strict = th.bj(log[:700], nb=2, nc=0, nd=1, nf=2).validate(log[700:], alpha=0.999)
-    assert plot.residuals(strict)[0].get_title().startswith("residuals: not white, p =")
 
 
 def test_log_draws_every_channel(two_inputs: th.Log) -> None:

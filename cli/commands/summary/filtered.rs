@@ -2,11 +2,13 @@
 
 use thetahat::{EstimatedNumber, FilterSummary, NisSummary};
 
-use super::text::{Text, columns, number, or_dash, uncertainty};
+use thetahat::figures::{error, fixed, number};
+
+use super::text::{Text, columns, or_dash};
 
 /// How surprising the log was, and where the state has come to.
-pub(crate) fn filtered(summary: &FilterSummary, faults: &str) -> String {
-    let mut text = Text::default();
+pub(crate) fn filtered(summary: &FilterSummary, faults: &str, width: usize) -> String {
+    let mut text = Text::new(width);
     let estimator = match summary.estimator.as_str() {
         "kalman" => "Kalman filter",
         "ekf" => "extended Kalman filter",
@@ -32,27 +34,24 @@ fn table(text: &mut Text, title: &str, estimates: &[EstimatedNumber]) {
     let bounded = estimates.iter().any(|estimate| estimate.change_of_variable.is_some());
     let mut titles = vec![title, "value", "standard deviation"];
     titles.extend(bounded.then_some("estimated as"));
-    let mut table = columns(&titles);
+    let mut table = columns(&titles).words(&[3]).none("an observer knows no standard deviations");
     for estimate in estimates {
-        let mut row = vec![
-            estimate.name.clone(),
-            number(estimate.value),
-            or_dash(estimate.standard_deviation, uncertainty),
-        ];
+        let mut row =
+            vec![estimate.name.clone(), number(estimate.value), or_dash(estimate.standard_deviation, error)];
         row.extend(bounded.then(|| estimate.change_of_variable.clone().unwrap_or_default()));
-        table.add_row(row);
+        table.row(row);
     }
-    text.table(table, &[1, 2]);
+    text.table(table);
 }
 
 /// How the normalised innovations squared lie.
 pub(super) fn surprise(nis: &NisSummary) -> String {
     format!(
-        "normalised innovation squared: mean {:.3}, {:.3} if the model is right; below its 95 % bounds {:.1} %, above {:.1} %, 2.5 \
-         % each if it is right",
-        nis.mean,
-        nis.expected,
-        100.0 * nis.below,
-        100.0 * nis.above
+        "normalised innovation squared: mean {}, {} if the model is right; below its 95 % bounds {} %, above {} %, 2.5 % each if \
+         it is right",
+        fixed(nis.mean, 3),
+        fixed(nis.expected, 3),
+        fixed(100.0 * nis.below, 1),
+        fixed(100.0 * nis.above, 1)
     )
 }

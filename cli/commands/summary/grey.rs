@@ -1,25 +1,27 @@
 //! What `fit --grey` found, as a table for people.
 
+use thetahat::figures::{chance, error, fixed, number, short};
 use thetahat::{GreyFit, GreyReport, Stopped};
 
 use super::filtered::surprise;
 use super::stopped;
-use super::text::{Text, columns, number, or_dash, short, uncertainty};
+use super::text::{Text, columns, or_dash};
 
 /// The main figures of a fit of a model in equations.
-pub(crate) fn grey(report: &GreyReport) -> String {
-    let mut text = Text::default();
-    let mut parameters = columns(&["parameter", "value", "standard error", "start", "estimated as"]);
+pub(crate) fn grey(report: &GreyReport, width: usize) -> String {
+    let mut text = Text::new(width);
+    let mut parameters =
+        columns(&["parameter", "value", "standard error", "start", "estimated as"]).words(&[4]);
     for parameter in &report.parameters {
-        parameters.add_row([
+        parameters.row([
             parameter.name.clone(),
             number(parameter.value),
-            uncertainty(parameter.standard_error),
+            error(parameter.standard_error),
             short(parameter.start),
             parameter.change_of_variable.clone().unwrap_or_default(),
         ]);
     }
-    text.table(parameters, &[1, 2, 3]);
+    text.table(parameters);
     let search = &report.search;
     let why: Stopped = search.stopped;
     text.line(&format!(
@@ -33,21 +35,23 @@ pub(crate) fn grey(report: &GreyReport) -> String {
         text.line(&surprise(nis));
     }
     text.line("");
-    let percent =
-        |fit: Option<GreyFit>| or_dash(fit.and_then(|fit| fit.percent), |percent| format!("{percent:.2} %"));
+    let percent = |fit: Option<GreyFit>| {
+        or_dash(fit.and_then(|fit| fit.percent), |percent| format!("{} %", fixed(percent, 2)))
+    };
     let rmse = |fit: Option<GreyFit>| or_dash(fit.map(|fit| fit.rmse), number);
-    let mut outputs = columns(&["output", "1 step", "rmse", "free run", "rmse", "missing", "white (p)"]);
+    let mut outputs = columns(&["output", "1 step", "rmse", "free run", "rmse", "missing", "white (p)"])
+        .none("nothing was measured, it is constant, or the free run overflows");
     for output in &report.outputs {
-        outputs.add_row([
+        outputs.row([
             output.channel.clone(),
             percent(output.one_step),
             rmse(output.one_step),
             percent(output.free_run),
             rmse(output.free_run),
             output.missing.to_string(),
-            or_dash(output.whiteness.as_ref().and_then(|test| test.p_value), |p| format!("{p:.3}")),
+            or_dash(output.whiteness.as_ref().and_then(|test| test.p_value), chance),
         ]);
     }
-    text.table(outputs, &[1, 2, 3, 4, 5, 6]);
+    text.table(outputs);
     text.finish()
 }

@@ -1,74 +1,87 @@
 //! An inspection as a table for people.
 
+use thetahat::figures::{chance, fixed, number, short};
 use thetahat::{ChannelQuality, Excitation, Inspection, SpectrumPoint};
 
-use super::text::{Text, columns, number, or_dash, short};
+use super::text::{Text, columns, or_dash};
+use crate::log;
 use crate::output::harmless;
 
-/// What was found, the warnings, and the line that would fit a model.
-pub fn inspection(inspection: &Inspection) -> String {
-    let mut text = Text::default();
+/// So many channels, and warnings, are shown of very many.
+const MOST: usize = 10;
+
+/// What was found, the warnings, and the line that would fit a model, so many columns wide.
+pub fn inspection(inspection: &Inspection, width: usize) -> String {
+    let mut text = Text::new(width);
     text.line(&clock(inspection));
     text.line("");
-    values(&mut text, &inspection.channels);
-    quality(&mut text, &inspection.channels);
-    inputs(&mut text, inspection);
-    for warning in &inspection.warnings {
+    let brief = inspection.brief(MOST);
+    values(&mut text, &brief.channels);
+    quality(&mut text, &brief.channels);
+    more(&mut text, inspection.channels.len(), brief.channels.len(), "channels");
+    inputs(&mut text, &brief);
+    for warning in &brief.warnings {
         text.line(&format!("warning: {}", harmless(warning)));
     }
-    if let Some(command) = &inspection.command {
+    if !brief.warnings.is_empty() {
         text.line("");
-        text.line(&harmless(command));
+    }
+    more(&mut text, inspection.warnings.len(), brief.warnings.len(), "warnings");
+    if let Some(command) = &inspection.command {
+        text.verbatim(&harmless(command));
     }
     text.finish()
 }
 
+/// Says what is not shown.
+fn more(text: &mut Text, all: usize, shown: usize, what: &str) {
+    if shown < all {
+        text.line(&format!("and {} more {what}, which the JSON document has", all - shown));
+        text.line("");
+    }
+}
+
 fn clock(inspection: &Inspection) -> String {
     let clock = &inspection.clock;
-    let (file, step) = (harmless(&inspection.log.file), short(clock.sample_time));
-    let rows = match inspection.experiments {
-        1 => format!("{} rows", inspection.rows),
-        experiments => format!("{} rows in {experiments} experiments", inspection.rows),
-    };
+    let (file, rows, step) = (harmless(&inspection.log.file), inspection.rows, short(clock.sample_time));
     if !clock.measured {
-        return format!("{file}: {rows}, sample time {step} s");
+        return format!("{file}: {rows} rows, sample time {step} s");
     }
     let (shortest, longest) = clock.steps;
     format!(
-        "{file}: {rows}, {} clock: steps from {} s to {} s, median {step} s, jitter {:.2} %, {} gap{}",
+        "{file}: {rows} rows, {} clock: steps from {} s to {} s, median {step} s, jitter {} %, {} gap{}",
         if clock.irregular { "irregular" } else { "regular" },
         short(shortest),
         short(longest),
-        100.0 * clock.jitter,
+        fixed(100.0 * clock.jitter, 2),
         clock.gaps,
         if clock.gaps == 1 { "" } else { "s" }
     )
 }
 
+fn name(name: &str) -> String {
+    harmless(&log::brief(name))
+}
+
 fn values(text: &mut Text, channels: &[ChannelQuality]) {
-    let mut table = columns(&[
-        "channel",
-        "role",
-        "minimum",
-        "maximum",
-        "mean",
-        "standard deviation",
-        "trend [1/s]",
-        "trend [% of variance]",
-    ]);
+    let mut table =
+        columns(&["channel", "role", "minimum", "maximum", "mean", "deviation", "trend [1/s]", "[%]"])
+            .words(&[1])
+            .none("there is no value, or all are the same");
     for channel in channels {
-        table.add_row([
-            harmless(&channel.name),
+        table.row([
+            name(&channel.name),
             channel.role.clone().unwrap_or_default(),
             or_dash(channel.minimum, number),
             or_dash(channel.maximum, number),
             or_dash(channel.mean, number),
             or_dash(channel.standard_deviation, number),
             or_dash(channel.trend, number),
-            or_dash(channel.trend_share, |share| format!("{:.1}", 100.0 * share)),
+            or_dash(channel.trend_share, |share| fixed(100.0 * share, 1)),
         ]);
     }
-    text.table(table, &[2, 3, 4, 5, 6, 7]);
+    table.legend("trend: the slope of the best straight line, and the part of the variance that it explains");
+    text.table(table);
 }
 
 fn quality(text: &mut Text, channels: &[ChannelQuality]) {
@@ -78,13 +91,14 @@ fn quality(text: &mut Text, channels: &[ChannelQuality]) {
         "repeated",
         "longest hold",
         "rounded to",
-        "at minimum",
-        "at maximum",
+        "lowest",
+        "highest",
         "outliers",
-    ]);
+    ])
+    .none("it is not rounded, and does not rest at a limit");
     for channel in channels {
-        table.add_row([
-            harmless(&channel.name),
+        table.row([
+            name(&channel.name),
             channel.missing.to_string(),
             channel.repeated.to_string(),
             channel.longest_hold.to_string(),
@@ -94,7 +108,8 @@ fn quality(text: &mut Text, channels: &[ChannelQuality]) {
             channel.outlier_count.to_string(),
         ]);
     }
-    text.table(table, &[1, 2, 3, 4, 5, 6, 7]);
+    table.legend("lowest, highest: rows in which it rests at its smallest and at its largest value");
+    text.table(table);
 }
 
 fn inputs(text: &mut Text, inspection: &Inspection) {
@@ -109,24 +124,25 @@ fn inputs(text: &mut Text, inspection: &Inspection) {
         "delay [rows]",
         "confidence [%]",
         "feedback p-value",
-    ]);
+    ])
+    .none("nothing stands out, or there are too few rows");
     for excitation in &inspection.excitation {
         let delay = inspection.delays.iter().find(|delay| delay.input == excitation.input);
         let feedback = inspection.feedback.iter().find(|feedback| feedback.input == excitation.input);
-        table.add_row([
-            harmless(&excitation.input),
+        table.row([
+            name(&excitation.input),
             order(excitation),
-            format!("{:.1}", 100.0 * excitation.changes),
+            fixed(100.0 * excitation.changes, 1),
             or_dash(half_power(&excitation.spectrum), number),
             or_dash(delay.and_then(|delay| delay.nk), |nk| nk.to_string()),
             or_dash(delay.and_then(|delay| delay.confidence), |confidence| {
                 // No rounding up to certainty.
-                format!("{:.2}", (1e4 * confidence).floor() / 100.0)
+                fixed((1e4 * confidence).floor() / 100.0, 2)
             }),
-            or_dash(feedback.and_then(|feedback| feedback.p_value), |p_value| format!("{p_value:.4}")),
+            or_dash(feedback.and_then(|feedback| feedback.p_value), chance),
         ]);
     }
-    text.table(table, &[1, 2, 3, 4, 5, 6]);
+    text.table(table);
 }
 
 fn order(excitation: &Excitation) -> String {

@@ -1,8 +1,10 @@
 //! How a model was chosen, for people.
 
+use thetahat::figures::{fixed, number};
 use thetahat::{Report, Scored, Select, Selection};
 
-use super::text::{Text, columns, number, or_dash};
+use super::orders_legend;
+use super::text::{Text, columns, or_dash};
 
 /// So many of the best are shown; the report has more.
 const SHOWN: usize = 8;
@@ -23,16 +25,14 @@ pub(super) fn selection(text: &mut Text, report: &Report) {
     let unseen = selection.best.iter().any(|scored| scored.unseen.is_some());
     let score = score(selection);
     let mut names = vec!["", "model", "parameters", "MSE"];
-    let mut right = vec![2, 3];
-    for name in unseen.then_some("MSE on unseen").into_iter().chain(score) {
-        right.push(names.len());
-        names.push(name);
-    }
-    let mut table = columns(&names);
+    names.extend(unseen.then_some("MSE on unseen").into_iter().chain(score));
+    let mut table =
+        columns(&names).words(&[1]).none("not defined: the model is exact, or has too many parameters");
     // The smallest model within a percent of the least may stand far behind it.
     let chosen = std::iter::once(&selection.chosen);
     let others = selection.best.iter().filter(|scored| scored.orders != selection.chosen.orders);
-    for (position, scored) in chosen.chain(others).take(SHOWN).enumerate() {
+    let shown: Vec<&Scored> = chosen.chain(others).take(SHOWN).collect();
+    for (position, scored) in shown.iter().enumerate() {
         let role = match &selection.least {
             _ if position == 0 => "chosen",
             Some(least) if least.orders == scored.orders => "least",
@@ -47,9 +47,17 @@ pub(super) fn selection(text: &mut Text, report: &Report) {
         ];
         row.extend(unseen.then(|| or_dash(scored.unseen, number)));
         row.extend(score.map(|_| criterion(selection.select, scored)));
-        table.add_row(row);
+        table.row(row);
     }
-    text.table(table, &right);
+    table.legend(orders_legend(shown.iter().map(|scored| &scored.orders)));
+    if let Some(score) = score {
+        let what = if score == "FPE" { "" } else { " for each sample," };
+        table.legend(format!(
+            "{score}:{what} on the {} samples that all models share; below on all samples of the fit",
+            selection.samples
+        ));
+    }
+    text.table(table);
 }
 
 /// The name of a score that has no column of its own.
@@ -64,5 +72,5 @@ fn score(selection: &Selection) -> Option<&'static str> {
 }
 
 fn criterion(select: Select, scored: &Scored) -> String {
-    or_dash(scored.score, |score| if select == Select::Fpe { number(score) } else { format!("{score:.4}") })
+    or_dash(scored.score, |score| if select == Select::Fpe { number(score) } else { fixed(score, 4) })
 }

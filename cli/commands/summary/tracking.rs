@@ -1,13 +1,14 @@
 //! What `track` says at its end.
 
 use thetahat::TrackSummary;
+use thetahat::figures::{error, fixed, number, short};
 
-use super::formula;
-use super::text::{Text, columns, number, or_dash, short, uncertainty};
+use super::text::{Text, columns, or_dash, some};
+use super::{MOST, NO_ERROR, formula};
 
 /// How the ways to forget did, and where each has come to.
-pub(crate) fn tracking(summary: &TrackSummary, faults: &str, watched: bool) -> String {
-    let mut text = Text::default();
+pub(crate) fn tracking(summary: &TrackSummary, faults: &str, watched: bool, width: usize) -> String {
+    let mut text = Text::new(width);
     let gaps = match summary.gaps {
         0 => String::new(),
         1 => ", 1 gap".to_owned(),
@@ -18,26 +19,26 @@ pub(crate) fn tracking(summary: &TrackSummary, faults: &str, watched: bool) -> S
         text.line(&format!("{} rows{faults}{gaps}", summary.rows));
         if tracker.offsets.iter().any(|&offset| offset != 0.0) {
             let shown: Vec<String> = tracker.offsets.iter().map(|&offset| short(offset)).collect();
-            text.line(&format!("offsets of the inputs and the output: {}", shown.join(", ")));
+            text.line(&format!("offsets of the inputs and the output: {}", some(&shown, MOST, ", ")));
         }
     }
     text.line("");
     let mut titles = vec!["forgetting", "predicted", "mse", "fit [%]", "mean nis", "log-likelihood"];
     titles.extend(watched.then_some("alarms"));
-    let mut scores = columns(&titles);
+    let mut scores = columns(&titles).none("no row was predicted, or a sum of squares overflows");
     for tracker in &summary.trackers {
         let mut row = vec![
             tracker.forgetting.clone(),
             tracker.samples.to_string(),
             or_dash(tracker.mean_squared_error, number),
-            or_dash(tracker.fit, |fit| format!("{fit:.2}")),
-            or_dash(tracker.mean_nis, |nis| format!("{nis:.3}")),
-            or_dash(tracker.log_likelihood, |sum| format!("{sum:.2}")),
+            or_dash(tracker.fit, |fit| fixed(fit, 2)),
+            or_dash(tracker.mean_nis, |nis| fixed(nis, 3)),
+            or_dash(tracker.log_likelihood, |sum| fixed(sum, 2)),
         ];
         row.extend(watched.then(|| tracker.alarms.to_string()));
-        scores.add_row(row);
+        scores.row(row);
     }
-    text.table(scores, &[1, 2, 3, 4, 5, 6][..titles.len() - 1]);
+    text.table(scores);
     for tracker in &summary.trackers {
         if summary.trackers.len() > 1 {
             text.line(&tracker.forgetting);
@@ -46,12 +47,12 @@ pub(crate) fn tracking(summary: &TrackSummary, faults: &str, watched: bool) -> S
             text.line("no estimate yet: there were too few samples, or a channel that never left zero");
             continue;
         }
-        let mut table = columns(&["parameter", "value", "standard error"]);
+        let mut table = columns(&["parameter", "value", "standard error"]).none(NO_ERROR);
         for parameter in &tracker.parameters {
-            let error = or_dash(parameter.standard_error, uncertainty);
-            table.add_row([parameter.name.clone(), number(parameter.value), error]);
+            let error = or_dash(parameter.standard_error, error);
+            table.row([parameter.name.clone(), number(parameter.value), error]);
         }
-        text.table(table, &[1, 2]);
+        text.table(table);
         text.line(&format!("noise variance {}", or_dash(tracker.noise_variance, short)));
         text.line("");
     }

@@ -1,26 +1,28 @@
 //! Validations and comparisons as tables for people.
 
+use thetahat::figures::{chance, fixed, number, short, three};
 use thetahat::{Comparison, Coverage, Horizon, Independence, Requirement, Seen, Test, Validation};
 
-use super::text::{Text, columns, number, or_dash, short};
-use super::{fits, rows};
+use super::text::{Text, columns, or_dash, some};
+use super::{MOST, fits, orders_legend, rows};
 use crate::output::harmless;
 
 /// The level of the intervals of which a comparison says the coverage.
 const LEVEL: f64 = 0.95;
 
-/// How a model does on a log, and what was required of it.
-pub fn validation(found: &Validation, requirements: &[Requirement], alpha: f64) -> String {
-    let mut text = Text::default();
+/// How a model does on a log, and what was required of it, so many columns wide.
+pub fn validation(found: &Validation, requirements: &[Requirement], alpha: f64, width: usize) -> String {
+    let mut text = Text::new(width);
     let files: Vec<String> = found.logs.iter().map(|log| harmless(&log.file)).collect();
     text.line(&format!(
         "{}, {}, on {} rows {}: {}",
         or_dash(found.report.as_deref(), harmless),
         found.orders,
-        files.join(", "),
+        some(&files, MOST, ", "),
         rows(&found.rows),
         seen(found.seen)
     ));
+    text.line(&orders_legend([&found.orders]));
     text.line(stable(found.stable));
     text.line("");
     fits(&mut text, &found.fit);
@@ -29,36 +31,37 @@ pub fn validation(found: &Validation, requirements: &[Requirement], alpha: f64) 
         "errors one step ahead: mean square {}, expected {}, ratio {}",
         or_dash(noise.mse, number),
         number(noise.model),
-        or_dash(noise.ratio, ratio)
+        or_dash(noise.ratio, three)
     ));
     text.line("");
     coverage(&mut text, &found.coverage);
     residuals(&mut text, found, alpha);
     if !requirements.is_empty() {
-        let mut table = columns(&["required", ""]);
+        let mut table = columns(&["required", ""]).words(&[1]);
         for requirement in requirements {
             let met = requirement.unmet(found, alpha).is_none();
-            table.add_row([requirement.to_string(), if met { "met" } else { "not met" }.to_owned()]);
+            table.row([requirement.to_string(), if met { "met" } else { "not met" }.to_owned()]);
         }
-        text.table(table, &[]);
+        text.table(table);
     }
     text.finish()
 }
 
-/// Several models, a column for each.
-pub fn comparison(comparison: &Comparison) -> String {
+/// Several models, a column for each, so many columns of text wide.
+pub fn comparison(comparison: &Comparison, width: usize) -> String {
     let models = &comparison.models;
-    let mut text = Text::default();
+    let mut text = Text::new(width);
     if let Some(first) = models.first() {
         let files: Vec<String> = first.logs.iter().map(|log| harmless(&log.file)).collect();
-        text.line(&format!("{} rows {}", files.join(", "), rows(&first.rows)));
+        text.line(&format!("{} rows {}", some(&files, MOST, ", "), rows(&first.rows)));
         text.line("");
     }
     let names = models.iter().map(|model| or_dash(model.report.as_deref(), harmless));
     let header: Vec<String> = std::iter::once(String::new()).chain(names).collect();
-    let mut table = columns(&header.iter().map(String::as_str).collect::<Vec<_>>());
+    let mut table = columns(&header.iter().map(String::as_str).collect::<Vec<_>>())
+        .none("the model or the log does not have it, or too few samples count");
     let mut row = |what: &str, of: &dyn Fn(&Validation) -> String| {
-        table.add_row(std::iter::once(what.to_owned()).chain(models.iter().map(of)));
+        table.row(std::iter::once(what.to_owned()).chain(models.iter().map(of)));
     };
     row("orders", &|model| model.orders.to_string());
     row("parameters", &|model| model.orders.parameters().to_string());
@@ -85,11 +88,11 @@ pub fn comparison(comparison: &Comparison) -> String {
     for horizon in horizons {
         row(&format!("fit [%], {horizon}"), &|model| {
             let fit = model.fit.iter().find(|fit| fit.horizon == horizon);
-            or_dash(fit.and_then(|fit| fit.percent), |percent| format!("{percent:.3}"))
+            or_dash(fit.and_then(|fit| fit.percent), |percent| fixed(percent, 3))
         });
     }
     row("mean square error", &|model| or_dash(model.noise.mse, number));
-    row("  of that expected", &|model| or_dash(model.noise.ratio, ratio));
+    row("  of that expected", &|model| or_dash(model.noise.ratio, three));
     let p = |p: Option<f64>| or_dash(p, chance);
     row("Ljung-Box p-value", &|model| {
         p(model.residuals.as_ref().and_then(|residuals| residuals.ljung_box.p_value))
@@ -113,7 +116,8 @@ pub fn comparison(comparison: &Comparison) -> String {
         let one = model.coverage.iter().find(|one| one.steps == 1 && one.level == LEVEL);
         or_dash(one.and_then(|one| one.actual), percent)
     });
-    text.table(table, &(1..=models.len()).collect::<Vec<_>>());
+    table.legend(orders_legend(models.iter().map(|model| &model.orders)));
+    text.table(table);
     let silent: Vec<String> = models
         .iter()
         .filter(|model| !model.white_expected)
@@ -122,7 +126,7 @@ pub fn comparison(comparison: &Comparison) -> String {
     if !silent.is_empty() {
         text.line(&format!(
             "need not be white (output error, instrumental variables): {}",
-            silent.join(", ")
+            some(&silent, MOST, ", ")
         ));
     }
     text.finish()
@@ -144,20 +148,12 @@ fn yes(value: bool) -> String {
     if value { "yes" } else { "no" }.to_owned()
 }
 
-fn ratio(value: f64) -> String {
-    if (0.001..1000.0).contains(&value) { format!("{value:.3}") } else { format!("{value:.2e}") }
-}
-
 fn percent(fraction: f64) -> String {
-    format!("{:.2}", 100.0 * fraction)
-}
-
-fn chance(p: f64) -> String {
-    if p == 0.0 || p >= 1e-4 { format!("{p:.4}") } else { format!("{p:.1e}") }
+    fixed(100.0 * fraction, 2)
 }
 
 fn stops(alpha: Option<f64>) -> String {
-    alpha.map_or_else(|| "none up to 0.5".to_owned(), |alpha| format!("{alpha:.3}"))
+    alpha.map_or_else(|| "none up to 0.5".to_owned(), |alpha| fixed(alpha, 3))
 }
 
 /// One line for each horizon, the levels side by side.
@@ -171,14 +167,15 @@ fn coverage(text: &mut Text, coverage: &[Coverage]) {
     let header: Vec<String> = std::iter::once("outputs in their intervals [%]".to_owned())
         .chain(levels.iter().map(|level| format!("{} %", short(100.0 * level))))
         .collect();
-    let mut table = columns(&header.iter().map(String::as_str).collect::<Vec<_>>());
+    let mut table = columns(&header.iter().map(String::as_str).collect::<Vec<_>>())
+        .none("no deviation of the prediction is known, or no sample counts");
     for ahead in coverage.chunk_by(|a, b| a.steps == b.steps) {
         let Some(first) = ahead.first() else { continue };
         let horizon = Horizon::Steps { steps: first.steps }.to_string();
         let each = ahead.iter().map(|one| or_dash(one.actual, percent));
-        table.add_row(std::iter::once(horizon).chain(each));
+        table.row(std::iter::once(horizon).chain(each));
     }
-    text.table(table, &(1..=levels.len()).collect::<Vec<_>>());
+    text.table(table);
 }
 
 /// The tests of what is left.
@@ -194,14 +191,16 @@ fn residuals(text: &mut Text, found: &Validation, alpha: f64) {
     };
     let asked = if found.white_expected { "" } else { ", which need not be white" };
     text.line(&format!("residuals: {} samples, {fitted}{asked}", residuals.samples));
-    let mut table =
-        columns(&["test", "lags", "statistic", "degrees", "p-value", &format!("at {}", short(alpha))]);
+    let level = format!("at {}", short(alpha));
+    let mut table = columns(&["test", "lags", "statistic", "degrees", "p-value", &level])
+        .words(&[5])
+        .none("the test has no degree of freedom left");
     let mut add = |what: String, test: &Test, verdict: [&str; 2]| {
         let word = or_dash(test.p_value, |p| verdict[usize::from(p < alpha)].to_owned());
-        table.add_row([
+        table.row([
             what,
             test.lags.to_string(),
-            format!("{:.2}", test.statistic),
+            fixed(test.statistic, 2),
             short(test.degrees),
             or_dash(test.p_value, chance),
             word,
@@ -213,11 +212,11 @@ fn residuals(text: &mut Text, found: &Validation, alpha: f64) {
         add(format!("independent of past {input}"), past, ["independent", "dependent"]);
         add(format!("no feedback to {input}"), feedback, ["none seen", "feedback"]);
     }
-    text.table(table, &[1, 2, 3, 4]);
+    text.table(table);
     let anderson = &residuals.anderson;
-    let mut table = columns(&["Anderson: alpha", "outside", "of", "verdict", "p-value"]);
+    let mut table = columns(&["Anderson: alpha", "outside", "of", "verdict", "p-value"]).words(&[3]);
     for level in &anderson.levels {
-        table.add_row([
+        table.row([
             short(level.alpha),
             level.outside.to_string(),
             anderson.lags.to_string(),
@@ -225,7 +224,7 @@ fn residuals(text: &mut Text, found: &Validation, alpha: f64) {
             chance(level.p_value),
         ]);
     }
-    text.table(table, &[1, 2, 4]);
+    text.table(table);
     text.line(&format!("Anderson stops passing at alpha {}", stops(anderson.stops_at)));
     text.line("");
 }

@@ -2,6 +2,7 @@
 
 mod log;
 mod prepare;
+mod regular;
 mod split;
 #[cfg(test)]
 mod tests;
@@ -9,5 +10,6 @@ mod tests;
 pub use log::{Channel, Interpolation, Log, Record};
 pub(crate) use log::{GAP, JITTER, check, shortest};
 pub use prepare::{Detrend, Offset};
+pub(crate) use regular::Regular;
 pub use split::{Rows, Split};
 pub(crate) use split::{between, checked};

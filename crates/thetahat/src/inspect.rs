@@ -17,23 +17,19 @@ mod whitening;
 #[cfg(test)]
 mod tests;
 
+use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 
 use rayon::prelude::*;
 
 use crate::Error;
-use crate::data::{Channel, Interpolation, Log, Rows, check, checked, shortest};
+use crate::data::{Channel, Interpolation, Log, Regular, Rows, check, checked};
 use crate::report::{Resampling, Source};
 use clock::Ticks;
 
 pub use inspection::{
     ChannelQuality, Clock, DelayEstimate, Excitation, Feedback, Inspection, Saturation, SpectrumPoint,
 };
-
-/// Resampling on the inspection's own account gives so many rows for each row at most.
-const MOST_GROWTH: usize = 20;
-/// A step that the inspection proposes has the fewest digits within this fraction of the median.
-const ROUND_STEP: f64 = 0.02;
 
 /// A log as it was recorded: unlike a [`Log`] it may have an irregular clock. NaN means that the sample is missing.
 #[derive(Debug, Clone, PartialEq)]
@@ -130,9 +126,28 @@ pub struct InspectionPlan {
 /// ```
 pub fn inspect(recording: Recording, source: &Source, plan: &InspectionPlan) -> Result<Inspection, Error> {
     let Recording { channels, times } = recording;
-    let ticks = Ticks::new(&times, check(&channels)?)?;
-    let mut inspection = of_the_rows(&channels, &times, &ticks, source, plan)?;
-    match uniform(channels, times, &ticks, plan)? {
+    let rows = check(&channels)?;
+    let roles = roles(&channels, plan)?;
+    let ticks = Ticks::new(&times, rows)?;
+    let quality: Vec<ChannelQuality> = channels
+        .par_iter()
+        .map(|channel| channel::quality(channel, roles.get(channel.name.as_str()).copied(), &times))
+        .collect();
+    let mut inspection = Inspection {
+        schema: Inspection::schema_name(),
+        generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
+        log: Source { rows: Rows::new(1, rows)?, resampled: None, ..source.clone() },
+        rows,
+        clock: ticks.clock.clone(),
+        channels: quality,
+        excitation: Vec::new(),
+        delays: Vec::new(),
+        feedback: Vec::new(),
+        command: None,
+        warnings: Vec::new(),
+    };
+    inspection.warnings = warnings::of_the_rows(&inspection, &ticks, &times, plan);
+    match uniform(channels, times, &ticks, &roles, plan)? {
         Ok((log, resampled)) => {
             inspection.log.rows = Rows::new(1, log.rows())?;
             inspection.log.resampled = resampled;
@@ -145,107 +160,24 @@ pub fn inspect(recording: Recording, source: &Source, plan: &InspectionPlan) -> 
     Ok(inspection)
 }
 
-/// The same of a log, of one experiment or several: nothing reaches from one into the next, and gaps are those of their own
-/// clocks.
-///
-/// # Errors
-/// As for [`inspect`].
-///
-/// ```
-/// use thetahat::{Channel, InspectionPlan, Log, Rows, Source, inspect_log};
-///
-/// let day = |times: Vec<f64>| {
-///     let y = times.iter().map(|time| (7.0 * time).sin()).collect();
-///     Log::with_time(vec![Channel { name: "y".into(), values: y }], times)
-/// };
-/// let log = Log::join(vec![day(vec![0.0, 1.0, 2.0, 9.0])?, day(vec![0.0, 1.0, 2.0, 3.0])?])?;
-/// let source =
-///     Source { file: "days".into(), rows: Rows::new(1, 8)?, time: None, start: None, resampled: None };
-/// let plan = InspectionPlan { inputs: vec![], output: Some("y".into()), resample: None };
-/// let inspection = inspect_log(&log, &source, &plan)?;
-/// assert_eq!((inspection.experiments, inspection.clock.gaps), (2, 1));
-/// # Ok::<(), thetahat::Error>(())
-/// ```
-pub fn inspect_log(log: &Log, source: &Source, plan: &InspectionPlan) -> Result<Inspection, Error> {
-    let times = match log.time() {
-        Some(time) if !log.is_joined() => Times::Measured(time.to_vec()),
-        // Several experiments have no common clock.
-        _ => Times::Uniform(log.sample_time()),
-    };
-    let ticks = match log.time() {
-        Some(time) if log.is_joined() => {
-            let ends = log.borders().iter().copied().chain([log.rows()]);
-            let mut begin = 0;
-            Ticks::joined(ends.map(|end| &time[std::mem::replace(&mut begin, end)..end]), log.sample_time())?
-        }
-        _ => Ticks::new(&times, log.rows())?,
-    };
-    let mut inspection = of_the_rows(log.channels(), &times, &ticks, source, plan)?;
-    inspection.experiments = log.borders().len() + 1;
-    dynamics(&mut inspection, log, plan)?;
-    let words = warnings::of_the_dynamics(&inspection, plan);
-    inspection.warnings.extend(words);
-    Ok(inspection)
-}
-
-/// What there is to say of the rows as they are.
-fn of_the_rows(
+/// What each channel of the plan is in it. All are there, and have one role.
+fn roles<'a>(
     channels: &[Channel],
-    times: &Times,
-    ticks: &Ticks,
-    source: &Source,
-    plan: &InspectionPlan,
-) -> Result<Inspection, Error> {
-    let rows = check(channels)?;
-    roles(channels, plan)?;
-    let quality: Vec<ChannelQuality> = channels
-        .par_iter()
-        .map(|channel| channel::quality(channel, plan.role(&channel.name), times))
-        .collect();
-    let mut inspection = Inspection {
-        schema: Inspection::schema_name(),
-        generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
-        log: Source { rows: Rows::new(1, rows)?, resampled: None, ..source.clone() },
-        rows,
-        experiments: 1,
-        clock: ticks.clock.clone(),
-        channels: quality,
-        excitation: Vec::new(),
-        delays: Vec::new(),
-        feedback: Vec::new(),
-        command: None,
-        warnings: Vec::new(),
-    };
-    inspection.warnings = warnings::of_the_rows(&inspection, ticks, times, plan);
-    Ok(inspection)
-}
-
-impl InspectionPlan {
-    /// What a channel is in the plan.
-    fn role(&self, name: &str) -> Option<&'static str> {
-        if self.inputs.iter().any(|input| input == name) {
-            Some("input")
-        } else if self.output.as_deref() == Some(name) {
-            Some("output")
-        } else {
-            None
-        }
-    }
-}
-
-/// Every channel of the plan is there, and has one role.
-fn roles(channels: &[Channel], plan: &InspectionPlan) -> Result<(), Error> {
-    let names: Vec<&str> = plan.inputs.iter().chain(&plan.output).map(String::as_str).collect();
-    for (position, name) in names.iter().enumerate() {
-        if !channels.iter().any(|channel| channel.name == *name) {
+    plan: &'a InspectionPlan,
+) -> Result<HashMap<&'a str, &'static str>, Error> {
+    let there: HashSet<&str> = channels.iter().map(|channel| channel.name.as_str()).collect();
+    let inputs = plan.inputs.iter().map(|input| (input.as_str(), "input"));
+    let mut roles = HashMap::new();
+    for (name, role) in inputs.chain(plan.output.as_deref().map(|output| (output, "output"))) {
+        if !there.contains(name) {
             return Err(Error::in_channel(name, None, format!("there is no channel '{name}'")));
         }
-        if names[..position].contains(name) {
+        if roles.insert(name, role).is_some() {
             let message = format!("'{name}' is named twice; a channel has one role");
             return Err(Error::argument("channels", message));
         }
     }
-    Ok(())
+    Ok(roles)
 }
 
 /// The channels of the plan as a fit would see them, and how they were resampled; or why there is no such log.
@@ -253,9 +185,10 @@ fn uniform(
     mut channels: Vec<Channel>,
     times: Times,
     ticks: &Ticks,
+    roles: &HashMap<&str, &str>,
     plan: &InspectionPlan,
 ) -> Result<Result<(Log, Option<Resampling>), String>, Error> {
-    channels.retain(|channel| plan.role(&channel.name).is_some());
+    channels.retain(|channel| roles.contains_key(channel.name.as_str()));
     if channels.is_empty() {
         return Ok(Err("no column is an input or the output: name them (-u, -y) to learn of excitation, delay and feedback"
             .to_owned()));
@@ -274,18 +207,11 @@ fn uniform(
     if asked.is_none() && !ticks.clock.irregular {
         return Ok(Ok((Log::with_time(channels, time)?, None)));
     }
-    let (step, interpolation) = asked.unwrap_or_else(|| {
-        let median = ticks.clock.sample_time;
-        (shortest(median, ROUND_STEP * median), Interpolation::Linear)
-    });
-    let span = time.last().zip(time.first()).map_or(0.0, |(last, first)| last - first);
-    if asked.is_none() && span / step > (MOST_GROWTH * rows) as f64 {
-        return Ok(Err(format!(
-            "excitation, delay and feedback are left out: the clock is irregular, and its pauses are so long that a log \
-             resampled every {step} s would have {:.0} rows; take the pauses out, or choose a longer step (--resample)",
-            span / step
-        )));
+    let regular = Regular::of(&time, ticks.clock.sample_time);
+    if asked.is_none() && !regular.is_worth() {
+        return Ok(Err("excitation, delay and feedback are left out, as the log is not uniform".to_owned()));
     }
+    let (step, interpolation) = asked.unwrap_or((regular.step, Interpolation::Linear));
     let log = Log::resampled(channels, &time, step, interpolation)?;
     Ok(Ok((log, Some(Resampling { step, interpolation, rows }))))
 }
@@ -293,30 +219,28 @@ fn uniform(
 /// Excitation, delay and feedback of each input.
 fn dynamics(inspection: &mut Inspection, log: &Log, plan: &InspectionPlan) -> Result<(), Error> {
     let all = [Rows::new(1, log.rows())?];
-    for (position, name) in plan.inputs.iter().enumerate() {
-        let segments = log.segments(&[name], &all)?;
-        let values = &log.channel(name)?.values;
-        let mut excitation = excitation::excitation(name, values, &segments, log.sample_time())?;
-        for other in &plan.inputs[..position] {
-            let segments = log.segments(&[other, name], &all)?;
-            if excitation::are_the_same(&log.channel(other)?.values, values, &segments) {
-                excitation.same_as = Some(other.clone());
-                break;
-            }
-        }
-        inspection.excitation.push(excitation);
+    let values = |name: &str| Ok(log.channel(name)?.values.as_slice());
+    let inputs: Vec<&[f64]> = plan.inputs.iter().map(|name| values(name)).collect::<Result<_, Error>>()?;
+    let of_input = |(name, input): (&String, &&[f64])| {
+        excitation::excitation(name, input, &log.segments_of(&[input], &all), log.sample_time())
+    };
+    inspection.excitation =
+        plan.inputs.par_iter().zip(&inputs).map(of_input).collect::<Result<_, Error>>()?;
+    for (later, earlier) in excitation::copies(&inputs, |signals| log.segments_of(signals, &all)) {
+        inspection.excitation[later].same_as = Some(plan.inputs[earlier].clone());
     }
     let Some(output) = &plan.output else { return Ok(()) };
-    for name in &plan.inputs {
-        let segments = log.segments(&[name, output], &all)?;
-        let input = moments::deviations(&log.channel(name)?.values, &segments);
-        let output = moments::deviations(&log.channel(output)?.values, &segments);
-        inspection.delays.push(delay::delay(name, &input, &output, &segments));
-    }
-    let names: Vec<&str> = plan.inputs.iter().chain([output]).map(String::as_str).collect();
-    let segments = log.segments(&names, &all)?;
-    let signals = names.iter().map(|name| Ok(moments::deviations(&log.channel(name)?.values, &segments)));
-    let mut signals: Vec<Vec<f64>> = signals.collect::<Result<_, Error>>()?;
+    let output = values(output)?;
+    let of_input = |(name, input): (&String, &&[f64])| {
+        let segments = log.segments_of(&[input, output], &all);
+        let (input, output) = (moments::deviations(input, &segments), moments::deviations(output, &segments));
+        delay::delay(name, &input, &output, &segments)
+    };
+    inspection.delays = plan.inputs.par_iter().zip(&inputs).map(of_input).collect();
+    let signals: Vec<&[f64]> = inputs.iter().copied().chain([output]).collect();
+    let segments = log.segments_of(&signals, &all);
+    let mut signals: Vec<Vec<f64>> =
+        signals.iter().map(|values| moments::deviations(values, &segments)).collect();
     // One that repeats another would leave the model open.
     let excitations = inspection.excitation.iter();
     for (signal, _) in signals.iter_mut().zip(excitations).filter(|(_, of)| of.same_as.is_some()) {

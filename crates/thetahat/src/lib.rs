@@ -35,6 +35,7 @@
 mod data;
 mod error;
 mod estimate;
+pub mod figures;
 mod filter;
 mod greybox;
 mod inspect;
@@ -60,10 +61,9 @@ pub use filter::{
 pub use greybox::{GreyBox, GreyFit, GreyOutput, GreyParameter, GreyReport, GreySearch, GreyState, fit_grey};
 pub use inspect::{
     ChannelQuality, Clock, DelayEstimate, Excitation, Feedback, Inspection, InspectionPlan, Recording,
-    Saturation, SpectrumPoint, Times, inspect, inspect_log,
+    Saturation, SpectrumPoint, Times, inspect,
 };
 pub use model::{Model, Orders, Parameter, Quantity, Root, Signal, StateSpace, Structure};
-pub use report::figures;
 pub use report::{
     Applied, Comparison, Coverage, Data, Estimation, Missing, NoiseLevel, Parts, Plan, Report, Requirement,
     Resampling, Seen, Signals, Source, Unjudged, Validated, Validation, ValidationPlan, apply, compare,

@@ -1,7 +1,6 @@
 //! The document that a fit leaves behind, and the way there.
 
 mod apply;
-pub mod figures;
 #[cfg(feature = "html")]
 mod html;
 mod identify;

@@ -2,7 +2,8 @@
 
 use allocation_counter::measure;
 use thetahat::{
-    Algorithm, Initial, Method, Orders, Procedure, Record, Search, TrackMethod, TrackPlan, Tracker, estimate,
+    Algorithm, Channel, Initial, InspectionPlan, Method, Orders, Procedure, Record, Recording, Rows, Search,
+    Source, Times, TrackMethod, TrackPlan, Tracker, estimate, inspect,
 };
 
 /// A signal that looks random, and is the same everywhere.
@@ -89,4 +90,33 @@ fn samples_of_a_tracker_take_no_memory() {
         run(0, 100);
         assert_eq!(measure(|| run(100, 2000)).count_total, 0, "{forgetting} {method}");
     }
+}
+
+#[test]
+fn an_inspection_takes_no_more_than_it_says_for_each_value() {
+    // Values of which no two are the same take most: each is a level of its own.
+    let rows = 200_000;
+    let channel = |name: &str, seed| {
+        let mut values = signal(rows, seed);
+        values.iter_mut().enumerate().for_each(|(row, value)| *value += 1e-9 * row as f64);
+        Channel { name: name.into(), values }
+    };
+    let recording =
+        Recording { channels: vec![channel("u", 1), channel("y", 2)], times: Times::Uniform(0.1) };
+    let source = Source {
+        file: "log".into(),
+        rows: Rows::new(1, rows).unwrap(),
+        time: None,
+        start: None,
+        resampled: None,
+    };
+    let plan = InspectionPlan { inputs: vec!["u".into()], output: Some("y".into()), resample: None };
+    // On one thread, as its memory alone is counted; a second one would look at the other channel.
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build().unwrap();
+    let counted = measure(|| {
+        pool.install(|| inspect(recording, &source, &plan)).unwrap();
+    });
+    // Besides the values themselves, which were there before.
+    let each = counted.bytes_max as f64 / (2 * rows) as f64;
+    assert!(each < 40.0, "{each} bytes for each value");
 }

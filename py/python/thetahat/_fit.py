@@ -2,38 +2,26 @@
 
 from __future__ import annotations
 
+import sys
 import warnings
-from collections.abc import Mapping
 from typing import Any
 
 from thetahat import _options, _thetahat
 from thetahat._log import Log, handle
 from thetahat._model import Model
-from thetahat._options import Bound, FitOptions, Orders, Rows
+from thetahat._options import FitOptions, Orders
+
+if sys.version_info >= (3, 11):
+    from typing import Unpack
+else:
+    from typing_extensions import Unpack
 
 
 class EstimationWarning(UserWarning):
     """What to know of a model before relying on it, such as missing samples or a search that did not converge."""
 
 
-def arx(
-    log: Log,
-    na: int,
-    nb: Orders,
-    nk: Orders = 1,
-    *,
-    estimate: Rows | None = None,
-    validate: Rows | None = None,
-    split: tuple[float, float, float] | None = None,
-    detrend: str | None = None,
-    offset: Mapping[str, float] | None = None,
-    initial: str | None = None,
-    norm: float | str | None = None,
-    bound: Mapping[str, Bound] | None = None,
-    dc_gain: Bound | Mapping[str, Bound] | None = None,
-    ridge: float | None = None,
-    noise_bound: float | None = None,
-) -> Model:
+def arx(log: Log, na: int, nb: Orders, nk: Orders = 1, **options: Unpack[FitOptions]) -> Model:
     """Fit an ARX model, A(q) y(t) = B(q) u(t) + e(t), by least squares.
 
     Parameters
@@ -46,7 +34,7 @@ def arx(
         Coefficients of B.
     nk : int, or one for each input
         Samples from input to first effect.
-    estimate, validate, split, detrend, offset, initial, norm, bound, dc_gain, ridge, noise_bound
+    **options
         What to fit to and how, see `thetahat.FitOptions`.
 
     Returns
@@ -79,30 +67,10 @@ def arx(
     >>> model.parameter_names
     ['a1', 'a2', 'b1', 'b2']
     """
-    return _fit("arx", locals())
+    return _fit(log, "arx", {"na": na, "nb": nb, "nk": nk}, options)
 
 
-def armax(
-    log: Log,
-    na: int,
-    nb: Orders,
-    nc: int,
-    nk: Orders = 1,
-    *,
-    estimate: Rows | None = None,
-    validate: Rows | None = None,
-    split: tuple[float, float, float] | None = None,
-    detrend: str | None = None,
-    offset: Mapping[str, float] | None = None,
-    initial: str | None = None,
-    search: str | None = None,
-    max_iterations: int | None = None,
-    tolerance: float | None = None,
-    step: float | tuple[float, float] | None = None,
-    starts: int | None = None,
-    seed: int | None = None,
-    time_limit: float | None = None,
-) -> Model:
+def armax(log: Log, na: int, nb: Orders, nc: int, nk: Orders = 1, **options: Unpack[FitOptions]) -> Model:
     """Fit an ARMAX model, A(q) y(t) = B(q) u(t) + C(q) e(t), by prediction errors.
 
     Parameters
@@ -113,8 +81,7 @@ def armax(
         Coefficients of A, B and C; nb may be one for each input.
     nk : int, or one for each input
         Samples from input to first effect.
-    estimate, validate, split, detrend, offset, initial, search, max_iterations, tolerance, step, starts, seed,
-    time_limit
+    **options
         What to fit to and how to search, see `thetahat.FitOptions`.
 
     Returns
@@ -133,29 +100,10 @@ def armax(
     >>> model.c.round(3)
     array([ 1.  , -0.55])
     """
-    return _fit("armax", locals())
+    return _fit(log, "armax", {"na": na, "nb": nb, "nc": nc, "nk": nk}, options)
 
 
-def oe(
-    log: Log,
-    nb: Orders,
-    nf: Orders,
-    nk: Orders = 1,
-    *,
-    estimate: Rows | None = None,
-    validate: Rows | None = None,
-    split: tuple[float, float, float] | None = None,
-    detrend: str | None = None,
-    offset: Mapping[str, float] | None = None,
-    initial: str | None = None,
-    search: str | None = None,
-    max_iterations: int | None = None,
-    tolerance: float | None = None,
-    step: float | tuple[float, float] | None = None,
-    starts: int | None = None,
-    seed: int | None = None,
-    time_limit: float | None = None,
-) -> Model:
+def oe(log: Log, nb: Orders, nf: Orders, nk: Orders = 1, **options: Unpack[FitOptions]) -> Model:
     """Fit an output error model, y(t) = B(q)/F(q) u(t) + e(t), by prediction errors.
 
     Standard errors hold for coloured noise too.
@@ -168,8 +116,7 @@ def oe(
         Coefficients of B and F.
     nk : int, or one for each input
         Samples from input to first effect.
-    estimate, validate, split, detrend, offset, initial, search, max_iterations, tolerance, step, starts, seed,
-    time_limit
+    **options
         What to fit to and how to search, see `thetahat.FitOptions`.
 
     Returns
@@ -187,31 +134,10 @@ def oe(
     >>> th.oe(th.dc_motor(), nb=2, nf=2).structure
     'oe'
     """
-    return _fit("oe", locals())
+    return _fit(log, "oe", {"nb": nb, "nf": nf, "nk": nk}, options)
 
 
-def bj(
-    log: Log,
-    nb: Orders,
-    nc: int,
-    nd: int,
-    nf: Orders,
-    nk: Orders = 1,
-    *,
-    estimate: Rows | None = None,
-    validate: Rows | None = None,
-    split: tuple[float, float, float] | None = None,
-    detrend: str | None = None,
-    offset: Mapping[str, float] | None = None,
-    initial: str | None = None,
-    search: str | None = None,
-    max_iterations: int | None = None,
-    tolerance: float | None = None,
-    step: float | tuple[float, float] | None = None,
-    starts: int | None = None,
-    seed: int | None = None,
-    time_limit: float | None = None,
-) -> Model:
+def bj(log: Log, nb: Orders, nc: int, nd: int, nf: Orders, nk: Orders = 1, **options: Unpack[FitOptions]) -> Model:
     """Fit a Box-Jenkins model, y(t) = B(q)/F(q) u(t) + C(q)/D(q) e(t), by prediction errors.
 
     Parameters
@@ -222,8 +148,7 @@ def bj(
         Coefficients of B, C, D and F; nb and nf may be one for each input.
     nk : int, or one for each input
         Samples from input to first effect.
-    estimate, validate, split, detrend, offset, initial, search, max_iterations, tolerance, step, starts, seed,
-    time_limit
+    **options
         What to fit to and how to search, see `thetahat.FitOptions`.
 
     Returns
@@ -242,25 +167,10 @@ def bj(
     >>> abs(model.poles()).round(2)
     array([0.89, 0.69])
     """
-    return _fit("bj", locals())
+    return _fit(log, "bj", {"nb": nb, "nc": nc, "nd": nd, "nf": nf, "nk": nk}, options)
 
 
-def ar(
-    log: Log,
-    na: int,
-    *,
-    estimate: Rows | None = None,
-    validate: Rows | None = None,
-    split: tuple[float, float, float] | None = None,
-    detrend: str | None = None,
-    offset: Mapping[str, float] | None = None,
-    initial: str | None = None,
-    norm: float | str | None = None,
-    bound: Mapping[str, Bound] | None = None,
-    dc_gain: Bound | Mapping[str, Bound] | None = None,
-    ridge: float | None = None,
-    noise_bound: float | None = None,
-) -> Model:
+def ar(log: Log, na: int, **options: Unpack[FitOptions]) -> Model:
     """Fit an autoregressive model of a time series, A(q) y(t) = e(t); inputs of the log are left out.
 
     Parameters
@@ -269,7 +179,7 @@ def ar(
         The data.
     na : int
         Coefficients of A.
-    estimate, validate, split, detrend, offset, initial, norm, bound, dc_gain, ridge, noise_bound
+    **options
         What to fit to and how, see `thetahat.FitOptions`.
 
     Returns
@@ -289,28 +199,10 @@ def ar(
     >>> bool(np.isclose(th.ar(th.Log(y), na=2, detrend="none").a[1], -1.8 * np.cos(0.3)))
     True
     """
-    return _fit("ar", locals())
+    return _fit(log, "ar", {"na": na}, options)
 
 
-def arma(
-    log: Log,
-    na: int,
-    nc: int,
-    *,
-    estimate: Rows | None = None,
-    validate: Rows | None = None,
-    split: tuple[float, float, float] | None = None,
-    detrend: str | None = None,
-    offset: Mapping[str, float] | None = None,
-    initial: str | None = None,
-    search: str | None = None,
-    max_iterations: int | None = None,
-    tolerance: float | None = None,
-    step: float | tuple[float, float] | None = None,
-    starts: int | None = None,
-    seed: int | None = None,
-    time_limit: float | None = None,
-) -> Model:
+def arma(log: Log, na: int, nc: int, **options: Unpack[FitOptions]) -> Model:
     """Fit an ARMA model of a time series, A(q) y(t) = C(q) e(t); inputs of the log are left out.
 
     Parameters
@@ -319,8 +211,7 @@ def arma(
         The data.
     na, nc : int
         Coefficients of A and C.
-    estimate, validate, split, detrend, offset, initial, search, max_iterations, tolerance, step, starts, seed,
-    time_limit
+    **options
         What to fit to and how to search, see `thetahat.FitOptions`.
 
     Returns
@@ -338,7 +229,7 @@ def arma(
     >>> th.arma(th.dc_motor(), na=2, nc=1).orders["nc"]
     1
     """
-    return _fit("arma", locals())
+    return _fit(log, "arma", {"na": na, "nc": nc}, options)
 
 
 def pem(
@@ -349,25 +240,7 @@ def pem(
     nd: int = 0,
     nf: Orders | None = None,
     nk: Orders | None = None,
-    *,
-    estimate: Rows | None = None,
-    validate: Rows | None = None,
-    split: tuple[float, float, float] | None = None,
-    detrend: str | None = None,
-    offset: Mapping[str, float] | None = None,
-    initial: str | None = None,
-    norm: float | str | None = None,
-    bound: Mapping[str, Bound] | None = None,
-    dc_gain: Bound | Mapping[str, Bound] | None = None,
-    ridge: float | None = None,
-    noise_bound: float | None = None,
-    search: str | None = None,
-    max_iterations: int | None = None,
-    tolerance: float | None = None,
-    step: float | tuple[float, float] | None = None,
-    starts: int | None = None,
-    seed: int | None = None,
-    time_limit: float | None = None,
+    **options: Unpack[FitOptions],
 ) -> Model:
     """Fit the general model, A(q) y(t) = B(q)/F(q) u(t) + C(q)/D(q) e(t), by prediction errors.
 
@@ -379,8 +252,7 @@ def pem(
         Coefficients of the polynomials; nb and nf may be one for each input.
     nk : int, or one for each input
         Samples from input to first effect: 1, unless said otherwise.
-    estimate, validate, split, detrend, offset, initial, norm, bound, dc_gain, ridge, noise_bound, search,
-    max_iterations, tolerance, step, starts, seed, time_limit
+    **options
         What to fit to and how to search, see `thetahat.FitOptions`.
 
     Returns
@@ -398,22 +270,10 @@ def pem(
     >>> th.pem(th.dc_motor(), na=1, nb=2, nf=1, nd=1).structure
     'pem'
     """
-    return _fit("pem", locals())
+    return _fit(log, "pem", {"na": na, "nb": nb, "nc": nc, "nd": nd, "nf": nf, "nk": nk}, options)
 
 
-def iv(
-    log: Log,
-    na: int,
-    nb: Orders,
-    nk: Orders = 1,
-    *,
-    estimate: Rows | None = None,
-    validate: Rows | None = None,
-    split: tuple[float, float, float] | None = None,
-    detrend: str | None = None,
-    offset: Mapping[str, float] | None = None,
-    initial: str | None = None,
-) -> Model:
+def iv(log: Log, na: int, nb: Orders, nk: Orders = 1, **options: Unpack[FitOptions]) -> Model:
     """Fit A and B of an ARX model by instrumental variables in four stages: right about the plant whatever the noise.
 
     Parameters
@@ -422,7 +282,7 @@ def iv(
         The data.
     na, nb, nk
         As for `arx`.
-    estimate, validate, split, detrend, offset, initial
+    **options
         What to fit to, see `thetahat.FitOptions`.
 
     Returns
@@ -444,22 +304,10 @@ def iv(
     >>> th.iv(th.dc_motor(), na=2, nb=2).method
     'instrumental-variables'
     """
-    return _fit("arx", locals(), "--method=iv")
+    return _fit(log, "arx", {"na": na, "nb": nb, "nk": nk}, options, "--method=iv")
 
 
-def sriv(
-    log: Log,
-    nb: Orders,
-    nf: Orders,
-    nk: Orders = 1,
-    *,
-    estimate: Rows | None = None,
-    validate: Rows | None = None,
-    split: tuple[float, float, float] | None = None,
-    detrend: str | None = None,
-    offset: Mapping[str, float] | None = None,
-    initial: str | None = None,
-) -> Model:
+def sriv(log: Log, nb: Orders, nf: Orders, nk: Orders = 1, **options: Unpack[FitOptions]) -> Model:
     """Fit B and F of an output error model by refined instrumental variables: right about the plant whatever the noise.
 
     Parameters
@@ -468,7 +316,7 @@ def sriv(
         The data.
     nb, nf, nk
         As for `oe`.
-    estimate, validate, split, detrend, offset, initial
+    **options
         What to fit to, see `thetahat.FitOptions`.
 
     Returns
@@ -490,7 +338,7 @@ def sriv(
     >>> th.sriv(th.dc_motor(), nb=2, nf=2).method
     'refined-instrumental-variables'
     """
-    return _fit("oe", locals(), "--method=sriv")
+    return _fit(log, "oe", {"nb": nb, "nf": nf, "nk": nk}, options, "--method=sriv")
 
 
 def search(
@@ -505,24 +353,7 @@ def search(
     nk: Orders | None = None,
     select: str | None = None,
     path: str | None = None,
-    estimate: Rows | None = None,
-    validate: Rows | None = None,
-    split: tuple[float, float, float] | None = None,
-    detrend: str | None = None,
-    offset: Mapping[str, float] | None = None,
-    initial: str | None = None,
-    norm: float | str | None = None,
-    bound: Mapping[str, Bound] | None = None,
-    dc_gain: Bound | Mapping[str, Bound] | None = None,
-    ridge: float | None = None,
-    noise_bound: float | None = None,
-    search: str | None = None,
-    max_iterations: int | None = None,
-    tolerance: float | None = None,
-    step: float | tuple[float, float] | None = None,
-    starts: int | None = None,
-    seed: int | None = None,
-    time_limit: float | None = None,
+    **options: Unpack[FitOptions],
 ) -> Model:
     """Choose a model among many, all compared on the same samples.
 
@@ -540,8 +371,7 @@ def search(
         What makes one model better than another: MDL, unless said otherwise.
     path : {"all", "alternate"}
         Which are tried: all of them, or one order up at a time.
-    estimate, validate, split, detrend, offset, initial, norm, bound, dc_gain, ridge, noise_bound, search,
-    max_iterations, tolerance, step, starts, seed, time_limit
+    **options
         What to fit to and how to search, see `thetahat.FitOptions`.
 
     Returns
@@ -561,17 +391,15 @@ def search(
     >>> model.selection["models"]
     18
     """
+    orders = {"na": na, "nb": nb, "nc": nc, "nd": nd, "nf": nf, "nk": nk}
     more = [f"--{name}={_options.text(name, value)}" for name, value in (("select", select), ("path", path)) if value is not None]
-    return _fit(model, locals(), *more)
+    return _fit(log, model, orders, options, *more)
 
 
-def _fit(model: str | None, arguments: dict[str, Any], *more: str) -> Model:
-    """A fit by one of the functions above, with its arguments: the log, orders and options."""
-    log = arguments["log"]
+def _fit(log: Log, model: str | None, orders: dict[str, Any], options: Any, *more: str) -> Model:
     data = handle("log", log)
-    orders = {name: arguments[name] for name in ("na", "nb", "nc", "nd", "nf", "nk") if name in arguments}
     words = [] if model is None else [f"--model={_options.text('model', model)}"]
-    words += [*_options.order_words(**orders), *_options.words(FitOptions, arguments, len(log)), *more]
+    words += [*_options.order_words(**orders), *_options.words(FitOptions, options, len(log)), *more]
     fitted = Model._of(_thetahat.fit(data, words))
     for warning in fitted._model.warnings():
         warnings.warn(warning, EstimationWarning, stacklevel=3)

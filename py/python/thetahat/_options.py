@@ -66,7 +66,7 @@ class FitOptions(TypedDict, total=False):
     seed : int
         Which random starts.
     time_limit : float
-        After so many seconds begin no iteration, and look for no further start.
+        Begin no iteration after so many seconds.
     """
 
     estimate: Rows
@@ -75,7 +75,7 @@ class FitOptions(TypedDict, total=False):
     detrend: str
     offset: Mapping[str, float]
     initial: str
-    norm: Union[float, str]
+    norm: Union[int, float, str]
     bound: Mapping[str, Bound]
     dc_gain: Union[Bound, Mapping[str, Bound]]
     ridge: float
@@ -154,20 +154,21 @@ class ReadOptions(TypedDict, total=False):
     missing: Union[str, Sequence[str]]
 
 
-def words(allowed: type, arguments: Mapping[str, Any], rows: int | None = None) -> list[str]:
-    """Those of a function's arguments that are options, in the words of the command line; ``rows`` is where an open slice
-    ends.
+def words(allowed: type, options: Mapping[str, Any], rows: int | None = None) -> list[str]:
+    """The options of the command line that say the same; ``rows`` is where an open slice ends.
 
     Raises
     ------
     TypeError
-        For a value of a type that an option cannot have.
+        For an option that there is not, or a value of a type that it cannot have.
     ValueError
         For a value that cannot be.
     """
+    there_are = allowed.__annotations__
     found: list[str] = []
-    for name in allowed.__annotations__:
-        value = arguments.get(name)
+    for name, value in options.items():
+        if name not in there_are:
+            raise TypeError(f"{name}: there is no such option; there are: {', '.join(sorted(there_are))}")
         if value is None:
             continue
         if name == "header":
@@ -262,8 +263,10 @@ def channels(inputs: Sequence[str] | str | None, output: str | None) -> list[str
     """The channels of a file as options of the command line."""
     found = []
     for name in [inputs] if isinstance(inputs, str) else inputs or ():
-        if "," in text("inputs", name):
-            raise ValueError(f"inputs: '{name}' holds a comma; read the file with another package and give its data frame")
+        name = text("inputs", name)
+        if any(sign in name for sign in ',"\n'):
+            # As in CSV.
+            name = '"' + name.replace('"', '""') + '"'
         found.append(f"--input={name}")
     return found if output is None else [*found, f"--output={text('output', output)}"]
 

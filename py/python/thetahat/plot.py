@@ -73,8 +73,7 @@ def log(log: Log, axes: Any = None) -> Grid:
     Parameters
     ----------
     log : Log
-        The data. Inputs are drawn as held from one sample to the next. Experiments follow one another, whatever their
-        clocks say, with a line where one begins.
+        The data. Inputs are drawn as held from one sample to the next.
     axes : array_like of Axes, shape (1 + inputs,), optional
         Where to draw.
 
@@ -97,7 +96,6 @@ def log(log: Log, axes: Any = None) -> Grid:
         time, values = _broken(log, values)
         ax.plot(time, values, drawstyle=style, **_lone(values))
         ax.set_ylabel(_shown(name))
-        _borders(ax, log)
     grid[-1].set_xlabel("time [s]")
     return grid
 
@@ -151,17 +149,19 @@ def fit(
         ax.plot(time, values, color="0.4", linewidth=1.0, label=label, **_lone(values))
     far = "free run" if horizon is None else "1 step ahead" if horizon == 1 else f"{horizon} steps ahead"
     bands = []
+    drawn_all = []
     for name, model in named:
         values = model.predict(log, horizon)
         percent = _percent(measured[model.output], values)
         time, drawn = _broken(log, values)
-        label = _shown(f"{name}, {far}" + (f": {percent:.2f} %" if isfinite(percent) else ""))
+        drawn_all.append(drawn)
+        label = _shown(f"{name}, {far}" + (f": {_fixed(percent, 2)} %" if isfinite(percent) else ""))
         (line,) = ax.plot(time, drawn, linewidth=1.0, label=label, **_lone(drawn))
         if horizon is not None:
             low, high = (_broken(log, end)[1] for end in model.predict_interval(log, horizon, level=level))
             bands.append(_band(ax, time, low, high, line.get_color()))
     _label_one(bands, level)
-    _borders(ax, log)
+    _scale_to(ax, list(measured.values()), drawn_all)
     ax.set_xlabel("time [s]")
     ax.set_ylabel(_shown(", ".join(measured)))
     # To find the best place takes long in a long log.
@@ -172,8 +172,7 @@ def fit(
 def residuals(of: Validation | Model, log: Log | None = None, axes: Any = None) -> Grid:
     """The correlation of the one-step errors with themselves and with each input.
 
-    The titles say what the tests find at the level of the validation, 0.05 unless said otherwise: errors are not white, or
-    not independent of an input, where their p-value is below it. White errors stay inside the band at 95 of 100 lags. Outside of it at positive lags of an input: past inputs are still in
+    White errors stay inside the band at 95 of 100 lags. Outside of it at positive lags of an input: past inputs are still in
     the errors, so the model lacks dynamics or delay. At negative lags: the input follows the output, there is feedback.
 
     Parameters
@@ -201,7 +200,7 @@ def residuals(of: Validation | Model, log: Log | None = None, axes: Any = None) 
     >>> log = th.dc_motor()
     >>> axes = plot.residuals(th.armax(log[:700], na=2, nb=2, nc=1), log[700:])
     >>> [ax.get_title() for ax in axes]
-    ['residuals: white, p = 0.59', 'residuals and u: independent, p = 0.87']
+    ['residuals, white with p = 0.59', 'residuals and u, independent with p = 0.87']
     """
     if isinstance(of, Model):
         if log is None:
@@ -218,13 +217,13 @@ def residuals(of: Validation | Model, log: Log | None = None, axes: Any = None) 
 
     values = _array(tests["autocorrelation"])[1:]
     _correlation(grid[0], np.arange(1, len(values) + 1), values, np.full(len(values), tests["band"]))
-    grid[0].set_title("residuals" + _verdict("white", of.whiteness, of.alpha))
+    grid[0].set_title("residuals" + _p_value(", white with", of.whiteness))
     grid[0].set_ylabel("autocorrelation")
     for ax, test in zip(grid[1:], inputs):
         values = _array(test["correlation"])
         _correlation(ax, np.arange(len(values)) - len(values) // 2, values, _array(test["band"]))
         name = test["input"]
-        ax.set_title(_shown(f"residuals and {name}" + _verdict("independent", of.independence[name], of.alpha)))
+        ax.set_title(_shown(f"residuals and {name}" + _p_value(", independent with", of.independence[name])))
         ax.set_ylabel("correlation")
     return grid
 
@@ -651,27 +650,12 @@ def _region(ax: Axes, root: Mapping[str, Any], half: float, level: float, colour
     ax.add_patch(Ellipse((root["re"], root["im"]), width, height, angle=angle, fill=False, color=colour))
 
 
-def _time(log: Log) -> Array:
-    """The time of each row: that of the log; of several experiments, each begins one sample after the one before it."""
-    time = log.time.copy()
-    for rows in log.experiments[1:]:
-        time[rows.start : rows.stop] += time[rows.start - 1] + log.sample_time - time[rows.start]
-    return time
-
-
 def _broken(log: Log, values: Array) -> tuple[Array, Array]:
-    """Time and values, with a break of the line where the clock jumps, and where an experiment begins."""
-    time = _time(log)
-    jumps = np.flatnonzero(np.diff(time) > 1.5 * log.sample_time) + 1
-    breaks = np.union1d(jumps, [rows.start for rows in log.experiments[1:]]).astype(np.intp)
-    return np.insert(time, breaks, np.nan), np.insert(values, breaks, np.nan)
-
-
-def _borders(ax: Axes, log: Log) -> None:
-    """A line between each experiment and the one before it."""
-    time = _time(log)
-    for rows in log.experiments[1:]:
-        ax.axvline(time[rows.start] - log.sample_time / 2, color="0.7", linewidth=0.8, linestyle=":")
+    """Time and values, with a break of the line where the clock jumps."""
+    time = log.time
+    steps = np.diff(time)
+    jumps = np.flatnonzero((steps > 1.5 * log.sample_time) | (steps < 0)) + 1
+    return np.insert(time, jumps, np.nan), np.insert(values, jumps, np.nan)
 
 
 def _lone(values: Array) -> dict[str, Any]:
@@ -679,6 +663,24 @@ def _lone(values: Array) -> dict[str, Any]:
     there = np.concatenate([[False], np.isfinite(values), [False]])
     lone = there[1:-1] & ~there[:-2] & ~there[2:]
     return {"marker": ".", "markevery": lone} if lone.any() else {}
+
+
+def _scale_to(ax: Axes, measured: Sequence[Array], modelled: Sequence[Array]) -> None:
+    """What diverges leaves the chart, which shows as much again above and below what was measured."""
+    there = np.concatenate([values[np.isfinite(values)] for values in measured])
+    if there.size == 0:
+        return
+    low, high = there.min(), there.max()
+    span = high - low or abs(high) or 1.0
+    low, high = low - span, high + span
+    if any(np.any((values < low) | (values > high)) for values in modelled):
+        ax.set_ylim(low, high)
+
+
+def _fixed(value: float, decimals: int) -> str:
+    """So many decimals, or powers of ten where that is wider than twelve characters."""
+    text = f"{value:.{decimals}f}"
+    return text if len(text) <= 12 else f"{value:.4e}"
 
 
 def _percent(measured: Array, values: Array) -> float:
@@ -696,9 +698,8 @@ def _quantile(level: float) -> float:
     return NormalDist().inv_cdf((1 + level) / 2)
 
 
-def _verdict(null: str, p: float, alpha: float) -> str:
-    """What a test finds of its null hypothesis at the level alpha; nothing where it could not be made."""
-    return f": {null if p >= alpha else f'not {null}'}, p = {p:.2g}" if isfinite(p) else ""
+def _p_value(words: str, value: float) -> str:
+    return f"{words} p = {value:.2g}" if isfinite(value) else ""
 
 
 def _array(values: Sequence[float | None]) -> Array:

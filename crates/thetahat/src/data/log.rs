@@ -1,3 +1,4 @@
+use std::collections::HashSet;
 use std::ops::Range;
 
 use rayon::prelude::*;
@@ -5,7 +6,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
-use crate::data::{Offset, Rows, checked};
+use crate::data::{Offset, Regular, Rows, checked};
+use crate::figures::short;
 
 /// A step longer than so many medians starts a new segment.
 pub(crate) const GAP: f64 = 1.5;
@@ -151,9 +153,11 @@ impl Log {
                     channel: None,
                     row: Some(position + 2),
                     message: format!(
-                        "the time step is {step:.6} s where the median is {median:.6} s: more than {:.0} % off, \
-                         so the samples are not uniform; resample the log (--resample {median:.6}:linear)",
-                        100.0 * JITTER
+                        "the time step is {} s where the median is {} s: more than {} % off, so the log is not uniform; {}",
+                        short(step),
+                        short(median),
+                        100.0 * JITTER,
+                        Regular::of(&time, median)
                     ),
                 });
             }
@@ -198,7 +202,7 @@ impl Log {
         if count > MOST_ROWS {
             return Err(Error::argument(
                 "resample",
-                format!("a step of {step} s would give {count:.0} rows; take a longer one"),
+                format!("a step of {step} s would give {} rows; take a longer one", short(count)),
             ));
         }
         let instants: Vec<f64> = (0..count as usize).map(|k| first + k as f64 * step).collect();
@@ -410,8 +414,13 @@ impl Log {
             .iter()
             .map(|name| Ok(self.channel(name)?.values.as_slice()))
             .collect::<Result<_, Error>>()?;
+        Ok(self.segments_of(&channels, parts))
+    }
+
+    /// The same for the values of some of its channels.
+    pub(crate) fn segments_of(&self, channels: &[&[f64]], parts: &[Rows]) -> Vec<Range<usize>> {
         // Those that miss nothing need not be looked through row by row.
-        let channels: Vec<&[f64]> = channels.into_iter().filter(|values| misses(values)).collect();
+        let channels: Vec<&[f64]> = channels.iter().copied().filter(|values| misses(values)).collect();
         let mut segments = Vec::new();
         for part in parts {
             let part = part.positions();
@@ -435,7 +444,7 @@ impl Log {
                 }
             }
         }
-        Ok(segments)
+        segments
     }
 
     /// The signals of some channels over some rows.
@@ -505,9 +514,10 @@ pub(crate) fn check(channels: &[Channel]) -> Result<usize, Error> {
     if rows == 0 {
         return Err(Error::data("the log has no rows"));
     }
-    for (position, channel) in channels.iter().enumerate() {
+    let mut names = HashSet::with_capacity(channels.len());
+    for channel in channels {
         let name = channel.name.as_str();
-        if channels[..position].iter().any(|other| other.name == name) {
+        if !names.insert(name) {
             return Err(Error::in_channel(name, None, format!("two channels are called '{name}'")));
         }
         if channel.values.len() != rows {

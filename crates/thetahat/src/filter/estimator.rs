@@ -3,6 +3,7 @@ use thetahat_core::nalgebra::{Complex, DMatrix, DVector};
 use super::kind::{Filter, Kind, Observer};
 use super::model::StateModel;
 use crate::Error;
+use crate::figures::number;
 
 /// How a state is estimated.
 #[derive(Debug, Clone, PartialEq)]
@@ -96,8 +97,9 @@ fn observer(model: &StateModel, start: &DVector<f64>, gain: ObserverGain) -> Res
                 let largest = error.complex_eigenvalues().iter().map(|pole| pole.norm()).fold(0.0, f64::max);
                 if largest >= 1.0 {
                     let message = format!(
-                        "with it the error of the estimate does not die out: F - L H has a pole of modulus {largest:.6}; \
-                         give a gain that brings all poles inside the unit circle, or the poles themselves"
+                        "with it the error of the estimate does not die out: F - L H has a pole of modulus {}; \
+                         give a gain that brings all poles inside the unit circle, or the poles themselves",
+                        number(largest)
                     );
                     return Err(Error::argument("gain", message));
                 }

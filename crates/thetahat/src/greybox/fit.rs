@@ -66,7 +66,7 @@ const TOLERANCE: f64 = 1e-8;
 /// # Errors
 /// [`Error::Argument`] if nothing in the model is unknown, or there is no log; [`Error::Data`] if a channel is not there, the clock
 /// does not run forward, a step is not one that the model can take, or the filter leaves the range of numbers where the search
-/// starts; [`Error::Undetermined`] with the parameters that the logs leave open; [`Error::Interrupted`] if the monitor says so.
+/// starts; [`Error::Undetermined`] with the parameters that the logs leave open, or that ran away to where they have no effect; [`Error::Interrupted`] if the monitor says so.
 ///
 /// ```
 /// use std::ops::ControlFlow;
@@ -139,6 +139,7 @@ pub fn fit_grey(
     let slopes: Vec<f64> = unknown.iter().zip(&found.z).map(|(unknown, z)| unknown.scale.slope(*z)).collect();
     // Of the parameters in their own units, as if the noises of the model were those of the log.
     let covariance = covariance(&criterion.information, &slopes, &names)?;
+    uncertainty::check(unknown, &found.z, &covariance)?;
     let figures = Figures::of(model, &experiments, &found.z).map_err(failed)?;
 
     let factor = figures.nis.map_or(1.0, |nis| nis.relative().max(1.0));

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use rayon::prelude::*;
 use thetahat_core::nalgebra::DMatrix;
 
 use super::{Excitation, moments, samples, spectrum};
@@ -17,6 +18,8 @@ const TOLERANCE: f64 = 1e-6;
 
 /// Of the square of a signal, what is left by another one is rounding below this fraction.
 const SAME: f64 = 1e-20;
+/// The mean squares of signals that are the same differ by less than this fraction.
+const ALIKE: f64 = 1e-6;
 
 /// The order of persistence of excitation (Ljung, System Identification, 2nd ed. 1999, section 13.2; Söderström and Stoica, System
 /// Identification, 1989, section 5.4): the rank of the covariance matrix of
@@ -45,7 +48,7 @@ pub(super) fn excitation(
     let changes = pairs().filter(|pair| pair[0] != pair[1]).count();
     let present = || segments.iter().flat_map(|segment| values[segment.clone()].iter().copied());
     let scale = moments::scale(present());
-    let unit = unit(&present().map(|value| scale * value).collect::<Vec<_>>()) / scale;
+    let unit = unit(|| present().map(|value| scale * value)) / scale;
     Ok(Excitation {
         input: name.to_owned(),
         order: rank(&deviations, segments, highest).min(changes),
@@ -54,6 +57,48 @@ pub(super) fn excitation(
         spectrum: spectrum::spectrum(&deviations, segments, unit, sample_time)?,
         same_as: None,
     })
+}
+
+/// Inputs that are the same as an earlier one but for scale and offset, each with the first such one. `segments` gives those in
+/// which none of some signals misses a value.
+///
+/// Of the same rows they have the same mean square in units of the largest deviation. So no more are compared than have
+/// about the same, or miss values. O(M N + M log M) for M inputs, if few are alike.
+pub(super) fn copies(
+    signals: &[&[f64]],
+    segments: impl Fn(&[&[f64]]) -> Vec<Range<usize>>,
+) -> Vec<(usize, usize)> {
+    let whole = segments(&[]);
+    let level = |signal: &&[f64]| -> Option<f64> {
+        let misses = signal.iter().any(|value| value.is_nan());
+        (!misses).then(|| sum_of_squares(&moments::deviations(signal, &whole)))
+    };
+    let levels: Vec<Option<f64>> = signals.par_iter().map(level).collect();
+    let mut sorted: Vec<(f64, usize)> =
+        levels.iter().enumerate().filter_map(|(position, level)| Some(((*level)?, position))).collect();
+    sorted.sort_unstable_by(|(left, _), (right, _)| left.total_cmp(right));
+    let missing: Vec<usize> = (0..signals.len()).filter(|&position| levels[position].is_none()).collect();
+    let mut copies = Vec::new();
+    for (position, level) in levels.iter().enumerate() {
+        let mut earlier: Vec<usize> = match level {
+            None => (0..position).collect(),
+            Some(level) => {
+                let first = sorted.partition_point(|(other, _)| *other < level * (1.0 - ALIKE));
+                let alike = sorted[first..].iter().take_while(|(other, _)| *other <= level * (1.0 + ALIKE));
+                let alike = alike.map(|(_, other)| *other);
+                alike.chain(missing.iter().copied()).filter(|other| *other < position).collect()
+            }
+        };
+        earlier.sort_unstable();
+        for other in earlier {
+            let segments = segments(&[signals[other], signals[position]]);
+            if are_the_same(signals[other], signals[position], &segments) {
+                copies.push((position, other));
+                break;
+            }
+        }
+    }
+    copies
 }
 
 /// Whether two signals are the same but for scale and offset, to rounding: their correlation is 1 or -1. O(N).
@@ -75,9 +120,9 @@ fn highest(segments: &[Range<usize>]) -> usize {
 }
 
 /// The largest deviation from the mean: the unit of [`moments::deviations`].
-fn unit(values: &[f64]) -> f64 {
-    let mean = moments::mean(values);
-    values.iter().fold(0.0, |largest: f64, value| largest.max((value - mean).abs()))
+fn unit<I: Iterator<Item = f64>>(values: impl Fn() -> I) -> f64 {
+    let mean = moments::mean_of(&values);
+    values().fold(0.0, |largest: f64, value| largest.max((value - mean).abs()))
 }
 
 /// The rank of the covariance of so many lags.

@@ -1,3 +1,5 @@
+use std::collections::HashSet;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -17,9 +19,6 @@ pub struct Inspection {
     pub log: Source,
     /// The number of rows.
     pub rows: usize,
-    /// How many experiments they are.
-    #[serde(default = "one", skip_serializing_if = "is_one")]
-    pub experiments: usize,
     /// The clock.
     pub clock: Clock,
     /// One entry for each channel.
@@ -36,16 +35,7 @@ pub struct Inspection {
     pub warnings: Vec<String>,
 }
 
-fn one() -> usize {
-    1
-}
-
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for it")]
-fn is_one(count: &usize) -> bool {
-    *count == 1
-}
-
-/// The clock of a log; of several experiments all of theirs.
+/// The clock of a log.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Clock {
     /// The median step, in seconds.
@@ -159,9 +149,54 @@ pub struct Feedback {
     pub found: bool,
 }
 
+fn only<T: Clone>(all: &[T], wanted: impl Fn(&T) -> bool) -> Vec<T> {
+    all.iter().filter(|one| wanted(one)).cloned().collect()
+}
+
+impl ChannelQuality {
+    /// How many things may be wrong with it.
+    fn faults(&self) -> usize {
+        let constant = self.minimum == self.maximum;
+        let faults = [constant, self.missing > 0, self.outlier_count > 0, self.saturation.is_some()];
+        faults.into_iter().filter(|fault| *fault).count()
+    }
+}
+
 impl Inspection {
     pub(super) fn schema_name() -> String {
         SCHEMA.to_owned()
+    }
+
+    /// The same about the channels that matter most, `most` at most, in the order of the log: the output comes before the inputs,
+    /// these before the others, and among them those first with the most to say of. Warnings are cut to as many. A log of
+    /// up to twice as many channels, or warnings, keeps all of them. O(M log M) for M channels.
+    pub fn brief(&self, most: usize) -> Self {
+        let role = |channel: &ChannelQuality| match channel.role.as_deref() {
+            Some("output") => 2,
+            Some(_) => 1,
+            None => 0,
+        };
+        let shown = |all: usize| if all > 2 * most { most } else { all };
+        let mut positions: Vec<usize> = (0..self.channels.len()).collect();
+        let rank = |&at: &usize| (role(&self.channels[at]), self.channels[at].faults());
+        // Equal ones stay in the order of the log.
+        positions.sort_by_key(|at| std::cmp::Reverse(rank(at)));
+        positions.truncate(shown(self.channels.len()));
+        positions.sort_unstable();
+        let names: HashSet<&str> = positions.iter().map(|&at| self.channels[at].name.as_str()).collect();
+        Self {
+            schema: self.schema.clone(),
+            generator: self.generator.clone(),
+            log: self.log.clone(),
+            rows: self.rows,
+            clock: self.clock.clone(),
+            channels: positions.iter().map(|&at| self.channels[at].clone()).collect(),
+            excitation: only(&self.excitation, |of| names.contains(of.input.as_str())),
+            delays: only(&self.delays, |of| names.contains(of.input.as_str())),
+            feedback: only(&self.feedback, |of| names.contains(of.input.as_str())),
+            command: self.command.clone(),
+            warnings: self.warnings[..shown(self.warnings.len())].to_vec(),
+        }
     }
 
     /// The document, indented, with a line break at its end.

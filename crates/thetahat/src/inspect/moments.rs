@@ -19,11 +19,16 @@ pub(super) fn scale(values: impl Iterator<Item = f64>) -> f64 {
 
 /// The mean of values that are there, in two passes: the second takes the rounding of the first away.
 pub(super) fn mean(values: &[f64]) -> f64 {
-    let count = values.len().max(1) as f64;
+    mean_of(|| values.iter().copied())
+}
+
+/// The mean of values that can be asked for again.
+pub(super) fn mean_of<I: Iterator<Item = f64>>(values: impl Fn() -> I) -> f64 {
+    let count = values().count().max(1) as f64;
     // From the first value: the mean of a constant is then that constant, to the bit.
-    let base = values.first().copied().unwrap_or(0.0);
-    let first = base + sum(values.iter().map(|value| value - base)) / count;
-    first + sum(values.iter().map(|value| value - first)) / count
+    let base = values().next().unwrap_or(0.0);
+    let first = base + sum(values().map(|value| value - base)) / count;
+    first + sum(values().map(|value| value - first)) / count
 }
 
 /// The least-squares line through points: its slope, and the fraction of the variance that it explains.
@@ -33,20 +38,18 @@ pub(super) fn mean(values: &[f64]) -> f64 {
 /// share = slope^2 sum (t - mean t)^2 / sum (x - mean x)^2
 /// ```
 ///
-/// None if all t, or all x, are the same.
-pub(super) fn line(times: &[f64], values: &[f64]) -> Option<(f64, f64)> {
-    let span = times.iter().fold(0.0_f64, |span, time| span.max(time.abs()));
-    let times: Vec<f64> = times.iter().map(|time| time / span).collect();
-    let (middle, level) = (mean(&times), mean(values));
-    let products = |left: &[f64], right: &[f64], (a, b): (f64, f64)| {
-        sum(left.iter().zip(right).map(|(left, right)| (left - a) * (right - b)))
-    };
-    let spread = products(&times, &times, (middle, middle));
-    let square = products(values, values, (level, level));
+/// None if all t, or all x, are the same. `time` gives t at a position.
+pub(super) fn line(time: impl Fn(usize) -> f64, values: &[f64]) -> Option<(f64, f64)> {
+    let span = (0..values.len()).fold(0.0_f64, |span, position| span.max(time(position).abs()));
+    let time = |position: usize| time(position) / span;
+    let times = || (0..values.len()).map(time);
+    let (middle, level) = (mean_of(times), mean(values));
+    let spread = sum(times().map(|time| (time - middle) * (time - middle)));
+    let square = sum(values.iter().map(|value| (value - level) * (value - level)));
     if !(spread > 0.0 && square > 0.0) {
         return None;
     }
-    let product = products(&times, values, (middle, level));
+    let product = sum(times().zip(values).map(|(time, value)| (time - middle) * (value - level)));
     let slope = product / spread;
     Some((slope / span, (slope * product / square).min(1.0)))
 }
@@ -56,16 +59,15 @@ pub(super) fn line(times: &[f64], values: &[f64]) -> Option<(f64, f64)> {
 pub(super) fn deviations(values: &[f64], segments: &[Range<usize>]) -> Vec<f64> {
     let inside = || segments.iter().flat_map(|segment| values[segment.clone()].iter().copied());
     let scale = scale(inside());
-    let scaled: Vec<f64> = inside().map(|value| scale * value).collect();
-    let mean = mean(&scaled);
-    let largest = scaled.iter().fold(0.0_f64, |largest, value| largest.max((value - mean).abs()));
+    let scaled = || inside().map(|value| scale * value);
+    let mean = mean_of(scaled);
+    let largest = scaled().fold(0.0_f64, |largest, value| largest.max((value - mean).abs()));
     let mut deviations = vec![0.0; values.len()];
-    let size = scaled.iter().fold(0.0_f64, |size, value| size.max(value.abs()));
+    let size = scaled().fold(0.0_f64, |size, value| size.max(value.abs()));
     if largest > ROUNDING * size {
-        let mut next = scaled.iter();
         for segment in segments {
-            for (deviation, value) in deviations[segment.clone()].iter_mut().zip(next.by_ref()) {
-                *deviation = (value - mean) / largest;
+            for (deviation, value) in deviations[segment.clone()].iter_mut().zip(&values[segment.clone()]) {
+                *deviation = (scale * value - mean) / largest;
             }
         }
     }

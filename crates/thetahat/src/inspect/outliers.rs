@@ -34,11 +34,11 @@ pub(super) fn outliers(values: &[f64]) -> Vec<usize> {
         window.sort_unstable_by(f64::total_cmp);
         (value - window[HALF]).abs()
     };
+    let changes = values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|change| *change > 0.0);
+    let change = quantile(&mut changes.collect::<Vec<_>>(), 0.5);
     let distances: Vec<f64> = values.iter().enumerate().map(distance).collect();
-    let mut changes: Vec<f64> = values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
-    changes.retain(|change| *change > 0.0);
     let distance = quantile(&mut distances.clone(), ORDINARY) / NORMAL_SIZE;
-    let limit = THRESHOLD * distance.max(quantile(&mut changes, 0.5));
+    let limit = THRESHOLD * distance.max(change);
     let far = |position: usize| distances[position] > limit;
     let mut outliers: Vec<usize> = (0..values.len()).filter(|&position| far(position)).collect();
     let jump = |position: usize| {

@@ -16,28 +16,10 @@ pub(super) struct Run {
     pub(super) rows: usize,
 }
 
-/// A value, and in how many rows it stands.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Level {
-    pub(super) value: f64,
-    pub(super) rows: usize,
-}
-
 /// The stretches of equal values, those of missing ones left out. A missing value ends a stretch.
-pub(super) fn runs(values: &[f64]) -> Vec<Run> {
-    values
-        .chunk_by(|left, right| left == right)
-        .filter(|run| !run[0].is_nan())
-        .map(|run| Run { value: run[0], rows: run.len() })
-        .collect()
-}
-
-/// The different values in rising order.
-pub(super) fn levels(sorted: &[f64]) -> Vec<Level> {
-    sorted
-        .chunk_by(|left, right| left == right)
-        .map(|level| Level { value: level[0], rows: level.len() })
-        .collect()
+pub(super) fn runs(values: &[f64]) -> impl Iterator<Item = Run> {
+    let stretches = values.chunk_by(|left, right| left == right).filter(|run| !run[0].is_nan());
+    stretches.map(|run| Run { value: run[0], rows: run.len() })
 }
 
 /// Rows in stretches of two and more at the limits, where a limit is crowded.
@@ -47,19 +29,22 @@ pub(super) fn levels(sorted: &[f64]) -> Vec<Level> {
 /// level below, whatever its curvature (a parabola spends sqrt(q) within one rounding step q
 /// of its top and sqrt(2q) - sqrt(q) within the next: 1/(sqrt 2 - 1)), hence the factor of 5. A stretch with which the log begins or ends does not count:
 /// experiments begin and end at rest.
-pub(super) fn saturation(runs: &[Run], levels: &[Level]) -> Option<Saturation> {
-    let (low, between, high) = match levels {
-        [low, between @ .., high] if between.len() >= NEAR => (low, between, high),
-        _ => return None,
-    };
-    let inner = runs.get(1..runs.len().saturating_sub(1)).unwrap_or(&[]);
-    let rows = |limit: &Level, near: &[Level]| {
-        let rows: usize =
-            inner.iter().filter(|run| run.value == limit.value && run.rows > 1).map(|run| run.rows).sum();
-        let most = near.iter().map(|level| level.rows).max().unwrap_or(0);
+///
+/// `sorted` are the values that are there, in rising order.
+pub(super) fn saturation(values: &[f64], sorted: &[f64]) -> Option<Saturation> {
+    let levels = || sorted.chunk_by(|left, right| left == right);
+    // Two limits, and so many levels between them.
+    levels().nth(NEAR + 1)?;
+    let stretches = runs(values).count();
+    let most = |near: &mut dyn Iterator<Item = &[f64]>| near.map(<[f64]>::len).max().unwrap_or(0);
+    let rows = |limit: f64, most: usize| {
+        // Without the first and the last.
+        let inner = runs(values).take(stretches.saturating_sub(1)).skip(1);
+        let rows: usize = inner.filter(|run| run.value == limit && run.rows > 1).map(|run| run.rows).sum();
         if rows >= FEWEST && rows > CROWDED * most { rows } else { 0 }
     };
-    let saturation =
-        Saturation { low: rows(low, &between[..NEAR]), high: rows(high, &between[between.len() - NEAR..]) };
-    (saturation.low + saturation.high > 0).then_some(saturation)
+    let (lowest, highest) = (sorted.first()?, sorted.last()?);
+    let low = rows(*lowest, most(&mut levels().skip(1).take(NEAR)));
+    let high = rows(*highest, most(&mut levels().rev().skip(1).take(NEAR)));
+    (low + high > 0).then_some(Saturation { low, high })
 }

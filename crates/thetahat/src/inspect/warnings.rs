@@ -2,6 +2,8 @@
 
 use super::clock::Ticks;
 use super::{ChannelQuality, Inspection, InspectionPlan, Times};
+use crate::data::Regular;
+use crate::figures::{fixed, short};
 
 /// A trend that explains this much of an output is worth a word.
 const TREND: f64 = 0.25;
@@ -45,12 +47,13 @@ fn clock(inspection: &Inspection, ticks: &Ticks, times: &Times, plan: &Inspectio
             "the time {how} at row {row} ({} such rows): sort the log by time and remove repeated rows",
             ticks.backward
         ));
-    } else if clock.irregular && plan.resample.is_none() {
+    } else if let (true, None, Times::Measured(time)) = (clock.irregular, plan.resample, times) {
         words.push(format!(
-            "the clock is irregular (steps from {} s to {} s, median {} s): a fit needs --resample",
-            digits(clock.steps.0),
-            digits(clock.steps.1),
-            digits(clock.sample_time)
+            "the clock is irregular (steps from {} s to {} s, median {} s), which a fit does not take: {}",
+            short(clock.steps.0),
+            short(clock.steps.1),
+            short(clock.sample_time),
+            Regular::of(time, clock.sample_time)
         ));
     }
     if clock.gaps > 0 && !clock.irregular {
@@ -101,16 +104,16 @@ fn of_channel(channel: &ChannelQuality, rows: usize) -> Vec<String> {
     if let Some((step, _)) = coarse.filter(|(step, deviation)| *step > COARSE * deviation) {
         say(format!(
             "is rounded to multiples of {}, which is coarse for a standard deviation of {}: that rounding is noise",
-            digits(step),
-            digits(channel.standard_deviation.unwrap_or(0.0))
+            short(step),
+            short(channel.standard_deviation.unwrap_or(0.0))
         ));
     }
     let trend =
         channel.trend_share.filter(|share| *share >= TREND && channel.role.as_deref() == Some("output"));
     if let Some(share) = trend {
         say(format!(
-            "has a trend that explains {:.0} % of it: if that is drift and no answer to an input, fit with --detrend linear",
-            100.0 * share
+            "has a trend that explains {} % of it: if that is drift and no answer to an input, fit with --detrend linear",
+            fixed(100.0 * share, 0)
         ));
     }
     words
@@ -121,8 +124,7 @@ pub(super) fn of_the_dynamics(inspection: &Inspection, plan: &InspectionPlan) ->
     let mut words = Vec::new();
     if let Some(resampled) = inspection.log.resampled.as_ref().filter(|_| plan.resample.is_none()) {
         words.push(format!(
-            "excitation, delay and feedback are those of the log resampled every {0} s by straight lines \
-             (--resample {0}:linear)",
+            "excitation, delay and feedback are those of the log resampled every {} s by straight lines",
             resampled.step
         ));
     }
@@ -190,9 +192,4 @@ pub(super) fn of_the_dynamics(inspection: &Inspection, plan: &InspectionPlan) ->
 
 fn plural(count: usize) -> &'static str {
     if count == 1 { "" } else { "s" }
-}
-
-/// Four significant digits.
-fn digits(value: f64) -> f64 {
-    format!("{value:.3e}").parse().unwrap_or(value)
 }

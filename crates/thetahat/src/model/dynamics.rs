@@ -23,6 +23,7 @@ use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::{Complex, ComplexField};
 
 use super::polynomial;
+use crate::figures::fixed;
 use crate::{Error, Model};
 
 /// A root this close to another one, in its own standard deviations, may not be simple as far as the data can tell.
@@ -304,8 +305,9 @@ pub(crate) fn near_cancellation(model: &Model) -> Option<(Root, Root)> {
 pub(crate) fn cancel(pole: &Root, zero: &Root) -> String {
     let shown = |root: &Root| {
         let (name, sign) = (root.polynomial.to_uppercase(), if root.im < 0.0 { '-' } else { '+' });
-        let imaginary = if root.im == 0.0 { String::new() } else { format!(" {sign} {:.4}i", root.im.abs()) };
-        format!("{:.4}{imaginary} of {name}", root.re)
+        let imaginary =
+            if root.im == 0.0 { String::new() } else { format!(" {sign} {}i", fixed(root.im.abs(), 4)) };
+        format!("{}{imaginary} of {name}", fixed(root.re, 4))
     };
     format!("the pole {} and the zero {} nearly cancel", shown(pole), shown(zero))
 }

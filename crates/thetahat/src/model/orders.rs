@@ -149,6 +149,24 @@ impl Orders {
         }
     }
 
+    /// What the numbers of these orders stand for, as they are written: `ARX(na, nb, nk)`.
+    ///
+    /// ```
+    /// assert_eq!(thetahat::Orders::oe(&[2], &[1], &[3])?.legend(), "OE(nb, nf, nk)");
+    /// # Ok::<(), thetahat::Error>(())
+    /// ```
+    pub fn legend(&self) -> &'static str {
+        match self.structure() {
+            Structure::Ar => "AR(na)",
+            Structure::Arma => "ARMA(na, nc)",
+            Structure::Arx => "ARX(na, nb, nk)",
+            Structure::Armax => "ARMAX(na, nb, nc, nk)",
+            Structure::Oe => "OE(nb, nf, nk)",
+            Structure::Bj => "BJ(nb, nc, nd, nf, nk)",
+            Structure::Pem => "PEM(na, nb, nc, nd, nf, nk)",
+        }
+    }
+
     /// The equation of these orders, without what they do not have.
     ///
     /// ```
@@ -238,8 +256,8 @@ impl Orders {
     }
 }
 
-/// As the field writes them: `ARX(2, 2, 3)` is ARX(na, nb, nk), and so on with ARMAX(na, nb, nc, nk), OE(nb, nf, nk), BJ(nb, nc,
-/// nd, nf, nk), AR(na), ARMA(na, nc) and PEM(na, nb, nc, nd, nf, nk). Several inputs stand in brackets where they differ.
+/// As the field writes them: `ARX(2, 2, 3)` is ARX(na, nb, nk), and so on, see [`Orders::legend`]. Several inputs stand in
+/// brackets where they differ.
 ///
 /// ```
 /// assert_eq!(thetahat::Orders::oe(&[2], &[1], &[3])?.to_string(), "OE(2, 1, 3)");
@@ -254,16 +272,11 @@ impl fmt::Display for Orders {
         };
         let (na, nc, nd) = (one(&self.na), one(&self.nc), one(&self.nd));
         let (nb, nf, nk) = (each(&self.nb), each(&self.nf), each(&self.nk));
-        let (name, orders) = match self.structure() {
-            Structure::Ar => ("AR", vec![na]),
-            Structure::Arma => ("ARMA", vec![na, nc]),
-            Structure::Arx => ("ARX", vec![na, nb, nk]),
-            Structure::Armax => ("ARMAX", vec![na, nb, nc, nk]),
-            Structure::Oe => ("OE", vec![nb, nf, nk]),
-            Structure::Bj => ("BJ", vec![nb, nc, nd, nf, nk]),
-            Structure::Pem => ("PEM", vec![na, nb, nc, nd, nf, nk]),
-        };
-        write!(f, "{name}({})", orders.join(", "))
+        let mut written = self.legend().to_owned();
+        for (letters, orders) in [("na", na), ("nb", nb), ("nc", nc), ("nd", nd), ("nf", nf), ("nk", nk)] {
+            written = written.replace(letters, &orders);
+        }
+        f.write_str(&written)
     }
 }
 

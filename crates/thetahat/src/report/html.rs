@@ -17,6 +17,7 @@ use charts::{Marked, Shade, Stack};
 use page::{Block, Page, Section};
 
 use super::{Report, Validated, Validation};
+use crate::figures::{self, fixed};
 use crate::{Error, Fit, Inspection, Model, Part, Residuals, Rows, Source};
 
 /// The most points of a curve over time.
@@ -25,6 +26,8 @@ const POINTS: usize = 4000;
 const ALL_POINTS: usize = 100_000;
 /// The rows that are shown one by one where the whole log is too dense for that.
 const DETAIL: usize = 1000;
+/// The channels of a log of very many that are on its page.
+const CHANNELS: usize = 16;
 /// What is said of models whose residuals need not be white.
 const UNASKED: &str = "Not asked: models of output error and those by instrumental variables say nothing of the noise, so their \
                        residuals are not asked to be white.";
@@ -179,11 +182,22 @@ pub fn inspection_page(
         "{} rows of {} channels, {} s apart.",
         inspection.rows,
         inspection.channels.len(),
-        text::short(inspection.clock.sample_time)
+        figures::short(inspection.clock.sample_time)
     )];
-    page.warnings = &inspection.warnings;
+    let brief = inspection.brief(CHANNELS);
+    page.warnings = &brief.warnings;
 
     let mut section = Section::new("Channels");
+    let left_out = inspection.channels.len() - brief.channels.len();
+    if left_out > 0 {
+        section.text(format!(
+            "The channels that matter most; the JSON document has {left_out} more, and {} warnings in all.",
+            inspection.warnings.len()
+        ));
+    }
+    let inspection = &brief;
+    let shown = |name: &str| inspection.channels.iter().find(|channel| channel.name == name);
+    let signals: Vec<_> = signals.iter().filter(|(name, _)| left_out == 0 || shown(name).is_some()).collect();
     // Steps of a clock without a rhythm are no gaps.
     let step = if inspection.clock.irregular { f64::INFINITY } else { inspection.clock.sample_time };
     let mut stack = Stack::new(time, step, points(signals.len()));
@@ -201,7 +215,7 @@ pub fn inspection_page(
             first = true;
         }
         stack.alone(name, values, position);
-        if let Some(channel) = inspection.channels.iter().find(|channel| channel.name == *name)
+        if let Some(channel) = shown(name)
             && !channel.outliers.is_empty()
         {
             stack.marks(&Marked { name: "outliers", rows: &channel.outliers }, values, first);
@@ -260,13 +274,13 @@ fn lead(model: &Model, fits: &[Fit]) -> Vec<String> {
         format!("{}.", headline(model)),
         format!(
             "Sample time {} s, {} parameters, {stable}.",
-            text::short(model.sample_time),
+            figures::short(model.sample_time),
             model.parameters.len()
         ),
     ];
     let figure = |fit: &Fit| {
         let on = fit.part.map_or_else(String::new, |part| format!(", {} rows", tables::part(part)));
-        Some(format!("{:.1} % ({}{on})", fit.percent?, fit.horizon))
+        Some(format!("{} % ({}{on})", fixed(fit.percent?, 1), fit.horizon))
     };
     let figures: Vec<String> = fits.iter().filter_map(figure).collect();
     if !figures.is_empty() {
@@ -464,7 +478,7 @@ fn residuals(parts: &[(String, &Validated)]) -> Section {
     for (name, residuals) in residuals_of(parts) {
         section.text(match residuals.anderson.stops_at {
             Some(alpha) => {
-                format!("The smallest alpha at which too many do ({name}): {}.", text::short(alpha))
+                format!("The smallest alpha at which too many do ({name}): {}.", figures::short(alpha))
             }
             None => format!("At no alpha up to 0.5 too many do ({name})."),
         });

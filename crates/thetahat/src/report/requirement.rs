@@ -1,8 +1,8 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::validation::shown;
 use super::{Report, Validation};
+use crate::figures::{chance, fixed};
 use crate::validate::Horizon;
 use crate::{Error, Procedure, Structure};
 
@@ -129,7 +129,7 @@ impl Requirement {
             Self::White => match residuals.map(|residuals| residuals.ljung_box.p_value) {
                 Some(Some(p)) if p >= alpha => None,
                 Some(Some(p)) => {
-                    Some(format!("{self}: the p-value of Ljung-Box is {}, below {alpha}", shown(p)))
+                    Some(format!("{self}: the p-value of Ljung-Box is {}, below {alpha}", chance(p)))
                 }
                 _ => Some(untested()),
             },
@@ -141,7 +141,7 @@ impl Requirement {
                     .iter()
                     .filter_map(|test| match test.past.p_value {
                         Some(p) if p >= level => None,
-                        Some(p) => Some(format!("'{}' has p-value {}, below {level}", test.input, shown(p))),
+                        Some(p) => Some(format!("'{}' has p-value {}, below {level}", test.input, chance(p))),
                         None => Some(format!("'{}' is constant, it could not be tested", test.input)),
                     })
                     .collect();
@@ -161,7 +161,7 @@ impl Requirement {
                 let fit = validation.fit.iter().find(|fit| fit.horizon == horizon);
                 match fit.and_then(|fit| fit.percent) {
                     Some(found) if found >= percent => None,
-                    Some(found) => Some(format!("{self}: the fit is {found:.3} % ({horizon})")),
+                    Some(found) => Some(format!("{self}: the fit is {} % ({horizon})", fixed(found, 3))),
                     None => Some(format!("{self}: there is no fit figure ({horizon})")),
                 }
             }
@@ -170,7 +170,8 @@ impl Requirement {
                 match one.and_then(|one| one.actual).map(|actual| 100.0 * actual) {
                     Some(actual) if actual >= percent => None,
                     Some(actual) => Some(format!(
-                        "{self}: the 95 % intervals one step ahead hold {actual:.2} % of the outputs"
+                        "{self}: the 95 % intervals one step ahead hold {} % of the outputs",
+                        fixed(actual, 2)
                     )),
                     None => Some(format!("{self}: no interval could be told")),
                 }

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::apply::check_sample_time;
 use super::{Report, Source};
 use crate::data::{Detrend, Log, Offset, Record, Rows, checked};
+use crate::figures::{chance, fixed, number};
 use crate::regression::sum;
 use crate::respond::{Innovations, Response, check_steps, deviations, innovations};
 use crate::validate::{Fit, Horizon, Relation, Residuals, two_sided};
@@ -327,8 +328,8 @@ fn is_of_fit(report: &Report, log: &Log, inputs: &[String]) -> bool {
     record.past.fill(0);
     let (start, tolerance) = match estimation.initial {
         Initial::Zero => (Start::Zero, SAME),
-        Initial::Estimate if !model.orders.is_linear() => (Start::Estimate, NEARLY_SAME),
-        _ => (Start::Drop, SAME),
+        Initial::Estimate if !model.orders.is_linear() => (Start::Estimated, NEARLY_SAME),
+        _ => (Start::Measured, SAME),
     };
     let Ok(found) = innovations(model, &record, 1, start) else { return false };
     let (mut samples, mut square, mut size) = (0, 0.0, 0.0);
@@ -464,8 +465,10 @@ fn off_center(found: &[Innovations]) -> Option<String> {
     let share = mean.abs() / deviation;
     (share > OFF_CENTER && share * samples.sqrt() > CERTAIN).then(|| {
         format!(
-            "the errors one step ahead have a mean of {mean:.4e}, {share:.2} times their standard deviation: the offsets of this \
-             log are not those of the model; --detrend mean takes its own"
+            "the errors one step ahead have a mean of {}, {} times their standard deviation: the offsets of this \
+             log are not those of the model; --detrend mean takes its own",
+            number(mean),
+            fixed(share, 2)
         )
     })
 }
@@ -485,8 +488,11 @@ fn warn(plan: &ValidationPlan, validation: &mut Validation) {
             "the log is quieter than that of the fit: the model's intervals are too wide for it"
         };
         words.push(format!(
-            "the mean square of the errors one step ahead, {mse:.4e}, is {ratio:.2} times the model's noise variance, \
-             {model:.4e}: {what}"
+            "the mean square of the errors one step ahead, {}, is {} times the model's noise variance, \
+             {}: {what}",
+            number(mse),
+            fixed(ratio, 2),
+            number(model)
         ));
     }
     if let Some(residuals) = &validation.residuals {
@@ -498,7 +504,7 @@ fn warn(plan: &ValidationPlan, validation: &mut Validation) {
                 "the residuals are not white (Ljung-Box, {} lags, p-value {}): the model lacks dynamics of the plant or of \
                  the noise",
                 residuals.ljung_box.lags,
-                shown(p)
+                chance(p)
             ));
         }
         for independence in &residuals.independence {
@@ -510,7 +516,7 @@ fn warn(plan: &ValidationPlan, validation: &mut Validation) {
                 words.push(format!(
                     "the residuals depend on past values of input '{input}' (p-value {}): the model lacks dynamics or has \
                      the wrong delay{lags}",
-                    shown(p)
+                    chance(p)
                 ));
             }
             if let Some(p) = rejected(independence.feedback.p_value) {
@@ -521,17 +527,12 @@ fn warn(plan: &ValidationPlan, validation: &mut Validation) {
                 };
                 words.push(format!(
                     "input '{input}' follows the residuals (p-value {}): there is feedback from the output to the input{doubt}",
-                    shown(p)
+                    chance(p)
                 ));
             }
         }
     }
     validation.warnings.extend(words);
-}
-
-/// A p-value as people read it.
-pub(super) fn shown(p: f64) -> String {
-    if p >= 0.001 || p == 0.0 { format!("{p:.3}") } else { format!("{p:.1e}") }
 }
 
 /// The past lags farthest outside their band, three at most, in rising order.

@@ -3,6 +3,7 @@
 use super::schema::Report;
 use crate::Orders;
 use crate::estimate::{Procedure, SearchOutcome, Stopped};
+use crate::figures::{fixed, number, scientific};
 use crate::model::{cancel, near_cancellation};
 use crate::select::{Grid, OrderRange};
 
@@ -34,7 +35,8 @@ pub(super) fn warnings(report: &Report) -> Vec<String> {
     if !model.stable {
         let largest = model.poles.iter().map(|pole| pole.re.hypot(pole.im)).fold(0.0, f64::max);
         warnings.push(format!(
-            "the model is unstable (largest pole {largest:.6}): its free run grows without bound"
+            "the model is unstable (largest pole {}): its free run grows without bound",
+            number(largest)
         ));
     }
     if let Procedure::PredictionError(search) = &report.estimation.procedure {
@@ -52,8 +54,9 @@ pub(super) fn warnings(report: &Report) -> Vec<String> {
     }
     if let Some(condition) = report.estimation.condition.filter(|condition| *condition > ILL_CONDITIONED) {
         warnings.push(format!(
-            "the regressors are nearly dependent (condition number {condition:.1e}): parameters are uncertain; lower the orders \
-             or sample more slowly"
+            "the regressors are nearly dependent (condition number {}): parameters are uncertain; lower the orders \
+             or sample more slowly",
+            scientific(condition, 1)
         ));
     }
     warnings
@@ -73,9 +76,9 @@ fn search_warnings(search: &SearchOutcome) -> Vec<String> {
             "no convergence: the time was used up after {iterations} iterations; allow more (--time-limit)"
         )),
         Stopped::NoDescent if !search.stability_bound => warnings.push(format!(
-            "the search stopped after {iterations} iterations where no step lowers the cost (gradient {:.1e}): the cost is \
+            "the search stopped after {iterations} iterations where no step lowers the cost (gradient {}): the cost is \
              flat or rough there; lower the orders",
-            search.gradient_norm
+            scientific(search.gradient_norm, 1)
         )),
         Stopped::NoDescent => {}
     }
@@ -96,8 +99,10 @@ pub(super) fn unstable_plant(report: &Report) -> Option<String> {
     let explained = report.fit.first()?.percent?;
     (explained < POOR).then(|| {
         format!(
-            "the plant seems to be unstable: least squares finds a pole of modulus {pole:.4}; F must be stable and \
-             explains {explained:.1} % only; an unstable plant needs A (arx or armax)"
+            "the plant seems to be unstable: least squares finds a pole of modulus {}; F must be stable and \
+             explains {} % only; an unstable plant needs A (arx or armax)",
+            fixed(pole, 4),
+            fixed(explained, 1)
         )
     })
 }

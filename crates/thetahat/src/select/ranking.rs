@@ -6,6 +6,7 @@ use super::compare::Outcome;
 use super::{Found, Path, Scored, Select, Selection, Task};
 use crate::Error;
 use crate::estimate::{Method, estimate_of_channels};
+use crate::figures::{fixed, scientific};
 
 /// Models of a table.
 const BEST: usize = 50;
@@ -121,5 +122,5 @@ fn described(model: &Scored, select: Select) -> String {
 
 /// Five digits or more.
 pub(super) fn number(value: f64) -> String {
-    if (0.01..1e5).contains(&value.abs()) { format!("{value:.4}") } else { format!("{value:.4e}") }
+    if (0.01..1e5).contains(&value.abs()) { fixed(value, 4) } else { scientific(value, 4) }
 }

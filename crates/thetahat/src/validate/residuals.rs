@@ -124,6 +124,13 @@ pub(crate) enum Untestable {
         /// As many are needed.
         needed: usize,
     },
+    /// Gaps leave too few of them beside another one.
+    Apart {
+        /// N.
+        samples: usize,
+        /// How many follow directly on another one.
+        pairs: usize,
+    },
     /// They are zero up to rounding.
     Nothing,
     /// Their squares leave the range of numbers.
@@ -136,6 +143,11 @@ impl fmt::Display for Untestable {
             Self::Few { samples, needed } => {
                 write!(f, "{samples} samples count, and tests need {needed}; name more rows")
             }
+            Self::Apart { samples, pairs } => write!(
+                f,
+                "gaps leave {pairs} of {samples} samples directly behind another one, and tests need a fourth of them; name rows \
+                 without gaps"
+            ),
             Self::Nothing => {
                 f.write_str("the model explains all but rounding, there is nothing left to test")
             }
@@ -169,7 +181,9 @@ impl Residuals {
         }
         let outputs: f64 = counted.iter().map(|rows| sum_of_squares(&record.output[rows.clone()])).sum();
         let usable = |lag: &usize| PAIRS * pairs(&counted, *lag) >= samples;
-        let longest = (1..=samples / SAMPLES_PER_INPUT_LAG).take_while(usable).last().unwrap_or(1);
+        let Some(longest) = (1..=samples / SAMPLES_PER_INPUT_LAG).take_while(usable).last() else {
+            return Err(Untestable::Apart { samples, pairs: pairs(&counted, 1) });
+        };
         let lags = lags.min(samples / SAMPLES_PER_LAG).clamp(1, longest);
         let correlation = Autocorrelation::new(traces.signal(Traces::ERROR), &counted, lags);
         let square = correlation.square;

@@ -6,11 +6,15 @@
 use thetahat_core::nalgebra::{DMatrix, SymmetricEigen};
 
 use crate::Error;
+use crate::figures::{self, number};
+use crate::greybox::Unknown;
 
 /// With a unit diagonal, eigenvalues of the information below this one are rounding.
 const NOTHING: f64 = 1e-12;
 /// A parameter takes part in a direction if its component is at least this fraction of the largest.
 const PART: f64 = 0.1;
+/// A standard error of so many times the size of a parameter says that nothing is known of it.
+const AWAY: f64 = 1e6;
 
 /// The covariance of the parameters in their own units, `slopes` being dp/dz.
 ///
@@ -59,6 +63,30 @@ pub(super) fn covariance(
         let inverse: f64 = parts.map(|(value, vector)| vector[i] * vector[j] / value).sum();
         inverse * (slopes[i] / scales[i]) * (slopes[j] / scales[j])
     }))
+}
+
+/// Refuses a parameter that the search has drawn to where it has hardly an effect, as a time constant that grows without
+/// bound: nothing is known of it there.
+///
+/// # Errors
+/// [`Error::Undetermined`] that names the first such parameter.
+pub(super) fn check(unknown: &[Unknown], z: &[f64], covariance: &DMatrix<f64>) -> Result<(), Error> {
+    for (index, (unknown, &z)) in unknown.iter().zip(z).enumerate() {
+        let (value, error) = (unknown.scale.value(z), covariance[(index, index)].sqrt());
+        let size = value.abs().max(unknown.start.abs()).max(unknown.deviation.abs());
+        // Written so that a NaN is refused.
+        if !(value.is_finite() && error <= AWAY * size) {
+            let name = &unknown.name;
+            let message = format!(
+                "the log does not determine '{name}': the search has drawn it to {}, where it has hardly an effect (standard error \
+                 {}); give it bounds (min, max) or another start, take it as known, or measure more",
+                number(value),
+                figures::error(error)
+            );
+            return Err(Error::undetermined(vec![name.clone()], message));
+        }
+    }
+    Ok(())
 }
 
 fn named(names: &[String], chosen: impl Fn(usize) -> bool) -> Vec<String> {

@@ -3,6 +3,7 @@
 use super::document::GreyReport;
 use super::uncertainty::listed;
 use crate::Stopped;
+use crate::figures::{chance, fixed};
 
 /// Mean nis, relative to what is expected, outside of this range: the noises of the model are not those of the log.
 const FITTING: std::ops::RangeInclusive<f64> = 0.8..=1.25;
@@ -44,35 +45,38 @@ pub(super) fn warnings(report: &GreyReport, walking: &[String]) -> Vec<String> {
             if correlation.abs() > ALIKE {
                 let names = [j, i].map(|index| report.parameters[index].name.clone());
                 warnings.push(format!(
-                    "the log can hardly tell {} apart (correlation {correlation:.4}): take one of them as known, or measure more",
-                    listed(&names)
+                    "the log can hardly tell {} apart (correlation {}): take one of them as known, or measure more",
+                    listed(&names),
+                    fixed(correlation, 4)
                 ));
             }
         }
     }
     if let Some(nis) = report.nis.filter(|nis| nis.relative() > *FITTING.end()) {
         warnings.push(format!(
-            "innovations are larger than the model tells: the mean nis is {:.3}, not {:.3}. Standard errors were multiplied by \
-             {:.3}; give larger noises, or equations that fit better",
-            nis.mean,
-            nis.expected,
-            report.covariance_factor.sqrt()
+            "innovations are larger than the model tells: the mean nis is {}, not {}. Standard errors were multiplied by {}; \
+             give larger noises, or equations that fit better",
+            fixed(nis.mean, 3),
+            fixed(nis.expected, 3),
+            fixed(report.covariance_factor.sqrt(), 3)
         ));
     }
     if let Some(nis) = report.nis.filter(|nis| nis.relative() < *FITTING.start()) {
         warnings.push(format!(
-            "innovations are smaller than the model tells: the mean nis is {:.3}, not {:.3}, so standard errors are too large; \
+            "innovations are smaller than the model tells: the mean nis is {}, not {}, so standard errors are too large; \
              give smaller noises",
-            nis.mean, nis.expected
+            fixed(nis.mean, 3),
+            fixed(nis.expected, 3)
         ));
     }
     for output in &report.outputs {
         let test = output.whiteness.as_ref();
         if let Some(p_value) = test.and_then(|test| test.p_value).filter(|p_value| *p_value < COLOURED) {
             warnings.push(format!(
-                "the innovations of '{}' are not white (p = {p_value:.1e}): the equations or the noises lack something, and \
+                "the innovations of '{}' are not white (p-value {}): the equations or the noises lack something, and \
                  standard errors are too small",
-                output.channel
+                output.channel,
+                chance(p_value)
             ));
         }
         if output.free_run.is_none() && output.readings > 0 {

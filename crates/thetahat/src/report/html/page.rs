@@ -4,6 +4,7 @@ use askama::Template;
 use plotly::Plot;
 
 use super::figure::{Chart, Drawn};
+use super::text;
 use crate::Error;
 
 /// A page before it is written. All of its text is escaped when it is.
@@ -96,6 +97,9 @@ impl Section {
         };
         let column = |k: usize| k > 0 && table.rows.iter().filter_map(|row| row.get(k)).all(figure);
         table.figures = (0..table.head.len()).map(column).collect();
+        if table.rows.iter().flatten().any(|cell| cell == text::NONE) {
+            table.caption = format!("{} ({}: not known)", table.caption, text::NONE);
+        }
         if !table.rows.is_empty() {
             self.blocks.push(Block::Table(table));
         }

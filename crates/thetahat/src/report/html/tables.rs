@@ -1,10 +1,11 @@
 //! The tables.
 
 use super::page::Table;
-use super::text::{chance, complex, number, or_dash, percent, quantity, rows, short, three};
+use super::text::{complex, or_dash, percent, quantity, rows};
+use crate::figures::{chance, fixed, number, scientific, short, three};
 use crate::{
-    Estimation, Fit, Inspection, Model, Part, Procedure, Report, Root, Rows, Scored, Seen, Selection, Source,
-    Start, Stopped, Validated, Validation,
+    Estimation, Fit, Inspection, Model, Orders, Part, Procedure, Report, Root, Rows, Scored, Seen, Selection,
+    Source, Start, Stopped, Validated, Validation,
 };
 
 /// The models of a search that are listed.
@@ -33,7 +34,7 @@ pub(super) fn fits(fits: &[Fit]) -> Table {
         cells.extend([
             fit.horizon.to_string(),
             start(fit.initial).to_owned(),
-            or_dash(fit.percent, |percent| format!("{percent:.3}")),
+            or_dash(fit.percent, |percent| fixed(percent, 3)),
             or_dash(fit.rmse, number),
             fit.samples.to_string(),
             rows(&fit.rows),
@@ -92,13 +93,13 @@ pub(super) fn estimation(estimation: &Estimation, model: &Model) -> Table {
     add("samples", estimation.samples.to_string());
     add("mean of e²", number(estimation.mse));
     add("noise variance", number(model.noise_variance));
-    add("condition number", or_dash(estimation.condition, |condition| format!("{condition:.3e}")));
-    let four = |value: f64| format!("{value:.4}");
+    add("condition number", or_dash(estimation.condition, |condition| scientific(condition, 3)));
+    let four = |value: f64| fixed(value, 4);
     let criteria = &estimation.criteria;
     add("FPE", number(criteria.fpe));
-    add("AIC", or_dash(criteria.aic, four));
-    add("AICc", or_dash(criteria.aicc, four));
-    add("MDL", or_dash(criteria.mdl, four));
+    add("AIC, for each sample", or_dash(criteria.aic, four));
+    add("AICc, for each sample", or_dash(criteria.aicc, four));
+    add("MDL, for each sample", or_dash(criteria.mdl, four));
     table
 }
 
@@ -135,7 +136,7 @@ pub(super) fn tests(who: &str, parts: &[(String, &Validation)]) -> Table {
                 label,
                 name.clone(),
                 test.lags.to_string(),
-                format!("{:.2}", test.statistic),
+                fixed(test.statistic, 2),
                 short(test.degrees),
                 or_dash(test.p_value, chance),
             ]);
@@ -270,7 +271,12 @@ pub(super) fn best(selection: &Selection) -> Table {
         head.push("mean of e², unseen");
     }
     let best = &selection.best[..selection.best.len().min(BEST)];
-    let mut table = Table::new("The best models of the search", &head);
+    let caption = format!(
+        "The best models of the search, on the {} samples that all share ({})",
+        selection.samples,
+        legend(best.iter().map(|model| &model.orders))
+    );
+    let mut table = Table::new(caption, &head);
     let row = |model: &Scored| {
         let mut cells = vec![
             model.orders.to_string(),
@@ -285,6 +291,14 @@ pub(super) fn best(selection: &Selection) -> Table {
     };
     best.iter().for_each(|model| table.row(row(model)));
     table
+}
+
+/// What the numbers of some models stand for.
+fn legend<'a>(models: impl Iterator<Item = &'a Orders>) -> String {
+    let mut kinds: Vec<&str> = models.map(Orders::legend).collect();
+    kinds.sort_unstable();
+    kinds.dedup();
+    kinds.join(", ")
 }
 
 /// Several models side by side.
@@ -308,7 +322,8 @@ pub(super) fn comparison(models: &[(String, &Validated)]) -> Table {
     ];
     head.extend(tests.map(str::to_owned));
     let head: Vec<&str> = head.iter().map(String::as_str).collect();
-    let mut table = Table::new("Figures", &head);
+    let orders = models.iter().map(|(_, validated)| &validated.validation.orders);
+    let mut table = Table::new(format!("Figures ({})", legend(orders)), &head);
     for (name, Validated { validation, .. }) in models {
         let mut cells = vec![
             name.clone(),
@@ -319,7 +334,7 @@ pub(super) fn comparison(models: &[(String, &Validated)]) -> Table {
         ];
         cells.extend(horizons.iter().map(|horizon| {
             let fit = validation.fit.iter().find(|fit| said(fit) == *horizon);
-            or_dash(fit.and_then(|fit| fit.percent), |percent| format!("{percent:.3}"))
+            or_dash(fit.and_then(|fit| fit.percent), |percent| fixed(percent, 3))
         }));
         cells.push(or_dash(validation.noise.ratio, three));
         let residuals = validation.residuals.as_ref();
@@ -461,8 +476,8 @@ pub(super) fn part(part: Part) -> &'static str {
 fn start(start: Start) -> &'static str {
     match start {
         Start::Zero => "from zero",
-        Start::Drop => "from measured",
-        Start::Estimate => "start estimated",
+        Start::Measured => "from measured",
+        Start::Estimated => "start estimated",
     }
 }
 

@@ -1,19 +1,12 @@
 //! How numbers and names are written.
 
-pub(super) use crate::report::figures::{number, short};
+use crate::figures::{number, three};
 use crate::{Quantity, Root, Rows};
 
+/// What stands where there is no figure.
+pub(super) const NONE: &str = "–";
 /// A name in a chart takes no more room than so many characters, and less beside an axis.
 const LONGEST: [usize; 2] = [40, 15];
-
-/// Three digits: an uncertainty, or a probability.
-pub(super) fn three(value: f64) -> String {
-    if (1e-3..1e3).contains(&value.abs()) {
-        let decimals = (2 - value.abs().log10().floor() as i32).clamp(0, 5) as usize;
-        return format!("{value:.decimals$}");
-    }
-    if value == 0.0 { "0".to_owned() } else { format!("{value:.2e}") }
-}
 
 /// Percent of a whole, to three digits.
 pub(super) fn percent(fraction: f64) -> String {
@@ -22,13 +15,8 @@ pub(super) fn percent(fraction: f64) -> String {
     format!("{} %", if plain { text.trim_end_matches('0').trim_end_matches('.') } else { &text })
 }
 
-/// A probability; below the smallest number it is said to be so.
-pub(super) fn chance(probability: f64) -> String {
-    if probability == 0.0 { "< 1e-300".to_owned() } else { three(probability) }
-}
-
 pub(super) fn or_dash<T>(value: Option<T>, shown: impl FnOnce(T) -> String) -> String {
-    value.map_or_else(|| "–".to_owned(), shown)
+    value.map_or_else(|| NONE.to_owned(), shown)
 }
 
 /// A figure and its standard error.
@@ -106,15 +94,9 @@ mod tests {
     #[test]
     fn numbers_are_short() {
         assert_eq!([number(0.0), number(0.1), number(-12.0)], ["0", "0.100000", "-12.0000"]);
-        assert_eq!([short(0.1), short(1e-7), short(250.0)], ["0.1", "1.00000e-7", "250"]);
-        assert_eq!(
-            [three(0.0), three(0.012_34), three(1.0), three(1e-9)],
-            ["0", "0.0123", "1.00", "1.00e-9"]
-        );
         assert_eq!(
             [percent(0.95), percent(0.518_148), percent(1.0), percent(0.0)],
             ["95 %", "51.8 %", "100 %", "0 %"]
         );
-        assert_eq!([chance(0.0), chance(0.05)], ["< 1e-300", "0.0500"]);
     }
 }

@@ -115,7 +115,7 @@ fn figures_are_those_of_their_definitions() {
     assert!(signals.predicted[299].is_nan() && run[299].is_nan() && run[300].is_finite());
     let square = (300..600).map(|t| (y[t] - run[t]).powi(2)).sum::<f64>();
     assert!((found.fit[3].rmse.unwrap() - (square / 300.0).sqrt()).abs() < 1e-12);
-    assert_eq!(found.fit[3].initial, Start::Estimate);
+    assert_eq!(found.fit[3].initial, Start::Estimated);
 
     assert!(found.white_expected && found.stable && found.warnings.is_empty(), "{:?}", found.warnings);
     let text = found.to_json().unwrap();
@@ -132,7 +132,7 @@ fn offsets_of_the_rows_are_taken_where_asked_for() {
     let high = log(&u, &high);
     let plain = validate(&report, None, high.clone(), &[], &plan("301..600")).unwrap();
     let text = plain.validation.warnings.join("\n");
-    assert!(text.contains("have a mean of 9.") && text.contains("--detrend mean"), "{text}");
+    assert!(text.contains("have a mean of 0.90") && text.contains("--detrend mean"), "{text}");
     assert!(text.contains("times the model's noise variance"), "{text}");
     // An offset is no matter of dynamics.
     assert!(!text.contains("white") && !text.contains("past values"), "{text}");
@@ -181,7 +181,7 @@ fn what_is_wrong_is_said() {
         Requirement::Independent.unmet(&two, 0.05)
     };
     assert_eq!(of(0.03), None);
-    assert!(of(0.02).unwrap().contains("p-value 0.020, below 0.025"));
+    assert!(of(0.02).unwrap().contains("p-value 0.0200, below 0.025"));
     // Without a test there is nothing that could be met.
     let untested = Validation { residuals: None, fit: vec![], coverage: vec![], stable: false, ..found };
     for text in ["white", "independent", "fit>=0", "coverage>=0", "stable"] {

@@ -212,3 +212,36 @@ fn a_careful_reader_is_told() {
     assert!((factor * factor / report.covariance_factor - 1.0).abs() < 1e-12);
     assert!((report.covariance[0][0].sqrt() / gain.standard_error - 1.0).abs() < 1e-12);
 }
+
+#[test]
+fn a_parameter_that_runs_away_is_undetermined() {
+    // The plant answers the other way: the heavier the mass, the better.
+    let mut noise = Noise(5);
+    let (mut x, mut u, mut y) = (0.0, Vec::new(), Vec::new());
+    for _ in 0..200 {
+        u.push(noise.next());
+        y.push(x + 0.1 * noise.next());
+        x = 0.5 * x - u[u.len() - 1];
+    }
+    let channel = |name: &str, values| Channel { name: name.into(), values };
+    let log = Recording { channels: vec![channel("u", u), channel("y", y)], times: Times::Uniform(1.0) };
+    let model = GreyBox::from_toml(
+        "sample_time = 1
+         [states]
+         x = { start = 0, sd = 1 }
+         [inputs]
+         force = \"u\"
+         [parameters]
+         mass = { start = 1, sd = 10, unknown = true, min = 0 }
+         [next]
+         x = \"0.5 * x + force / mass\"
+         [outputs]
+         y = \"x\"
+         [noise]
+         measurement = { y = 0.1 }",
+    )
+    .unwrap();
+    let Err(Error::Undetermined { parameters, message }) = fitted(&model, log) else { panic!() };
+    assert_eq!(parameters, ["mass"]);
+    assert!(message.contains("the search has drawn it to") && message.contains("bounds"), "{message}");
+}

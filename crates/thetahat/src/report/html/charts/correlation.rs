@@ -7,7 +7,7 @@ use plotly::{Bar, Trace};
 use super::super::decimate::{Curve, rounded};
 use super::super::figure::{COLOURS, Drawn, NEUTRAL, axis, band, chart, layout, line, significant};
 use super::super::text;
-use crate::{DelayEstimate, Independence, Residuals};
+use crate::{DelayEstimate, Independence, Residuals, figures};
 
 const HEIGHT: usize = 320;
 const BAND: &str = "95 % band";
@@ -45,7 +45,7 @@ pub(crate) fn autocorrelation(residuals: &Residuals, white_expected: bool) -> Dr
         "Correlation of the errors one step ahead with themselves, lags 1 to {}. White errors stay inside the band, ± {}, at \
          95 of 100 lags.{asked}",
         values.len(),
-        text::three(residuals.band)
+        figures::three(residuals.band)
     );
     chart("Autocorrelation of the residuals", words, HEIGHT, traces, layout)
 }

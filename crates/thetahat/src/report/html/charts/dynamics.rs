@@ -13,7 +13,8 @@ use super::super::figure::{
 };
 use super::super::text;
 use crate::{
-    FrequencyResponse, Model, Quantity, Root, frequency_response, logarithmic_frequencies, step_response,
+    FrequencyResponse, Model, Quantity, Root, figures, frequency_response, logarithmic_frequencies,
+    step_response,
 };
 
 /// Frequencies of a Bode plot.
@@ -220,9 +221,9 @@ pub(crate) fn roots(model: &Model) -> Drawn {
                 "{} of {}<br>modulus {}<br>angle {} rad, {} rad/s",
                 text::complex(root),
                 root.polynomial.to_uppercase(),
-                text::short(modulus),
-                text::three(angle),
-                text::three(frequency)
+                figures::short(modulus),
+                figures::three(angle),
+                figures::three(frequency)
             )
         });
         let marker = Marker::new()

@@ -7,7 +7,7 @@ use plotly::{Scatter, Trace};
 use super::super::decimate::{Curve, rounded};
 use super::super::figure::{COLOURS, Drawn, axis, chart, layout, line, significant};
 use super::super::text;
-use crate::{Scored, Select, Selection};
+use crate::{Scored, Select, Selection, figures};
 
 /// What models were chosen by.
 pub(crate) fn score(select: Select) -> &'static str {
@@ -40,7 +40,7 @@ pub(crate) fn search(selection: &Selection) -> Drawn {
         let (x, y): (Vec<f64>, Vec<f64>) = points
             .into_iter()
             .map(|(x, y, words)| {
-                said.push(format!("{words}<br>{x} parameters, {}", text::short(y)));
+                said.push(format!("{words}<br>{x} parameters, {}", figures::short(y)));
                 (x, y)
             })
             .unzip();

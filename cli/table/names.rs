@@ -1,0 +1,57 @@
+//! Lists of names in one text: written, and read, as the header of a table with commas.
+
+use super::dialect::Dialect;
+use super::record::Record;
+
+const COMMAS: Dialect = Dialect { delimiter: b',', comment: None };
+
+/// The names in a list: between commas, and between double quotes where a name holds a comma.
+///
+/// # Errors
+/// A message for a quote that is not closed.
+pub(crate) fn names(list: &str) -> Result<Vec<String>, String> {
+    if list.trim().is_empty() {
+        // A blank line is no row.
+        return Ok(vec![String::new()]);
+    }
+    let mut record = Record::new(COMMAS.delimiter);
+    let line = format!("{list}\n");
+    if record.read(line.as_bytes()) != Some(line.len()) {
+        return Err("a double quote is not closed; write it as in CSV: \"a, b\",c".to_owned());
+    }
+    let name = |index| String::from_utf8_lossy(COMMAS.trimmed(record.field(index))).into_owned();
+    Ok((0..record.len()).map(name).collect())
+}
+
+/// A list that [`names`] reads as these names.
+pub(crate) fn list(names: &[&str]) -> String {
+    let field = |name: &&str| {
+        if name.contains([',', '"', '\n']) {
+            format!("\"{}\"", name.replace('"', "\"\""))
+        } else {
+            (*name).to_owned()
+        }
+    };
+    names.iter().map(field).collect::<Vec<_>>().join(",")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_read_as_a_header_is() {
+        assert_eq!(names("u1, u2").unwrap(), ["u1", "u2"]);
+        assert_eq!(names("\"flow, in\",p").unwrap(), ["flow, in", "p"]);
+        assert_eq!(names("5\" pipe,\"say \"\"so\"\"\"").unwrap(), ["5\" pipe", "say \"so\""]);
+        assert_eq!(names("").unwrap(), [""]);
+        assert!(names("\"a,b").unwrap_err().contains("not closed"));
+    }
+
+    #[test]
+    fn a_list_is_read_as_it_was_written() {
+        for written in [&["u"][..], &["a,b", "c"], &["\"", "a\"b,", "x y"], &["a\nb", "ä;ö"]] {
+            assert_eq!(names(&list(written)).unwrap(), written);
+        }
+    }
+}

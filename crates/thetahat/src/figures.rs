@@ -1,0 +1,141 @@
+//! How numbers are written for people: in tables, on pages and in sentences. All are written here, so that none is wider than
+//! [`WIDEST`], and none is `NaN` or `inf`.
+
+/// No number takes more characters.
+pub const WIDEST: usize = 12;
+
+/// What stands for a number that is none, or too large to be one.
+const UNKNOWN: &str = "unknown";
+
+/// A number to six significant digits, as tables and pages write it.
+///
+/// ```
+/// use thetahat::figures::number;
+///
+/// assert_eq!(number(18.9182446), "18.9182");
+/// assert_eq!(number(-2.5e-7), "-2.50000e-7");
+/// assert_eq!(number(f64::NAN), "unknown");
+/// ```
+pub fn number(value: f64) -> String {
+    let size = value.abs();
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    if !(1e-4..1e6).contains(&size) {
+        return scientific(value, 5);
+    }
+    let decimals = (5 - size.log10().floor() as i32).clamp(0, 9) as usize;
+    format!("{value:.decimals$}")
+}
+
+/// [`number`] without zeros at its end.
+///
+/// ```
+/// use thetahat::figures::short;
+///
+/// assert_eq!([short(0.0800000001), short(2.5e-7), short(1e9)], ["0.08", "2.5e-7", "1e9"]);
+/// ```
+pub fn short(value: f64) -> String {
+    let text = number(value);
+    let (mantissa, exponent) = text.split_at(text.find('e').unwrap_or(text.len()));
+    if mantissa.contains('.') {
+        return format!("{}{exponent}", mantissa.trim_end_matches('0').trim_end_matches('.'));
+    }
+    text
+}
+
+/// A number with so many decimals; as [`number`] where that is too wide.
+///
+/// ```
+/// use thetahat::figures::fixed;
+///
+/// assert_eq!([fixed(98.0602, 3), fixed(-1e160, 3)], ["98.060", "-1.00000e160"]);
+/// ```
+pub fn fixed(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    if value.is_finite() && text.len() <= WIDEST { text } else { number(value) }
+}
+
+/// A number in powers of ten with so many decimals, or as many of them as there is room for.
+///
+/// ```
+/// use thetahat::figures::scientific;
+///
+/// assert_eq!([scientific(0.012345, 2), scientific(-1e-300, 5)], ["1.23e-2", "-1.0000e-300"]);
+/// ```
+pub fn scientific(value: f64, decimals: usize) -> String {
+    if !value.is_finite() {
+        return UNKNOWN.to_owned();
+    }
+    let text = format!("{value:.decimals$e}");
+    match text.len().saturating_sub(WIDEST) {
+        0 => text,
+        wide => format!("{value:.*e}", decimals.saturating_sub(wide)),
+    }
+}
+
+/// A standard error: three digits.
+///
+/// ```
+/// assert_eq!(thetahat::figures::error(0.0110412), "1.10e-2");
+/// ```
+pub fn error(value: f64) -> String {
+    scientific(value, 2)
+}
+
+/// Three digits: a ratio, or a probability.
+///
+/// ```
+/// use thetahat::figures::three;
+///
+/// assert_eq!([three(0.0), three(0.012_34), three(1.0), three(1e-9)], ["0", "0.0123", "1.00", "1.00e-9"]);
+/// ```
+pub fn three(value: f64) -> String {
+    if (1e-3..1e3).contains(&value.abs()) {
+        let decimals = (2 - value.abs().log10().floor() as i32).clamp(0, 5) as usize;
+        return format!("{value:.decimals$}");
+    }
+    if value == 0.0 { "0".to_owned() } else { scientific(value, 2) }
+}
+
+/// A p-value, or another probability that may be small.
+///
+/// ```
+/// use thetahat::figures::chance;
+///
+/// assert_eq!([chance(0.593_91), chance(8.5e-7), chance(0.0)], ["0.5939", "8.5e-7", "<1e-300"]);
+/// ```
+pub fn chance(probability: f64) -> String {
+    match probability {
+        0.0 => "<1e-300".to_owned(),
+        1e-4.. => fixed(probability, 4),
+        small => scientific(small, 1),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_number_is_wider_than_twelve_characters_or_not_a_number() {
+        let sizes =
+            [0.0, 5e-324, 1e-300, 1.234_567_89e-5, 0.1, 1.0 / 3.0, 99.999_999, 999_999.7, 1e160, 1e307];
+        let odd = [f64::NAN, f64::INFINITY];
+        let values = sizes.iter().chain(&odd).flat_map(|size| [*size, -size]);
+        for value in values {
+            let mut written = vec![number(value), short(value), error(value), three(value)];
+            written.extend((0..9).flat_map(|decimals| [fixed(value, decimals), scientific(value, decimals)]));
+            for text in written {
+                assert!(text.len() <= WIDEST, "{value:e}: {text}");
+                let read = text.parse::<f64>();
+                // Adding a half: what has no decimals is rounded.
+                let close = |read: f64| (read - value).abs() <= 0.5 + 0.5 * value.abs();
+                assert!(
+                    value.is_finite() && read.clone().is_ok_and(close) || text == UNKNOWN,
+                    "{value:e}: {text}"
+                );
+            }
+        }
+    }
+}

@@ -33,7 +33,7 @@ fn simulated(polynomials: &Polynomials, samples: usize, noise: f64, seed: u64) -
 
 #[test]
 fn the_delay_of_the_hair_dryer_is_found_on_common_samples() {
-    let Some(folder) = folder_with("hair_dryer.csv") else { return };
+    let folder = folder_with("hair_dryer.csv");
     let fit = |nk: &str| folder.fit(&format!("log.csv --estimate 1..500 --na 2 --nb 2 --nk {nk}"));
     for (range, first, expected) in [
         ("1..10", 12, [0.008790, 0.002801, 0.001670, 0.007196, 0.009917]),

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use crate::fit_reference::shared;
+use crate::fit_reference::folder_with;
 use crate::harness::{Answer, Folder, distance, number};
 use crate::signals::{Experiment, Random, csv};
 use crate::track::objects;
@@ -76,11 +76,8 @@ fn the_level_of_the_nile() {
     }
     close(number(&lines[0], "/innovation_y_sd").powi(2), 1e7 + 15_099.0, 1e-6);
 
-    let Some(data) = shared("data") else { return };
-    folder.write("log.csv", fs::read(data.join("nile.csv")).expect("it is there"));
-    let output =
-        folder.read("log.csv").lines().next().and_then(|header| header.split(',').nth(1).map(str::to_owned));
-    folder.write("nile.toml", NILE.replace("'y'", &format!("'{}'", output.expect("it has two columns"))));
+    let folder = folder_with("nile.csv");
+    folder.write("nile.toml", NILE);
     let found = summary(&folder, "nile.toml log.csv");
     let (level, deviation) = estimate(&found, "states", "level");
     close(level, 798.370_293, 1e-6);
@@ -247,8 +244,8 @@ fn unknown_parameters_are_found_with_the_state_and_by_a_fit() {
 
 #[test]
 fn the_series_resistance_of_a_cell_from_its_first_pulse() {
-    let Some(data) = shared("data") else { return };
-    let log = fs::read_to_string(data.join("leaf_cell_hppc_25c.csv")).expect("it is there");
+    let folder = folder_with("leaf_cell_hppc_25c.csv");
+    let log = folder.read("log.csv");
     let model = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/leaf_cell.toml");
     // The rows around the first discharge: from a minute of rest to half a minute behind the pulse.
     let rows: Vec<(f64, f64)> = log
@@ -263,7 +260,6 @@ fn the_series_resistance_of_a_cell_from_its_first_pulse() {
     let from = rows.iter().position(|&(t, _)| t > rows[start].0 - 60.0).expect("there is rest before");
     let to = rows.iter().rposition(|&(t, _)| t < rows[start].0 + 70.0).expect("there is rest behind");
     let range = format!("{}..{}", from + 1, to + 1);
-    let folder = Folder::with_log(log);
     folder.write("cell.toml", fs::read(model).expect("it is there"));
     let found = summary(&folder, &format!("cell.toml log.csv --time t --rows {range}"));
     let (r0, deviation) = estimate(&found, "parameters", "r0");

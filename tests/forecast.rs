@@ -152,7 +152,7 @@ fn rows_with_inputs_and_no_output_are_forecast() {
 
 #[test]
 fn sunspots_are_forecast() {
-    let Some(folder) = folder_with("sunspots.csv") else { return };
+    let folder = folder_with("sunspots.csv");
     folder.done("fit log.csv --time year -y y --model ar --na 9 --report model.json");
     let run = folder.done("predict model.json log.csv --time year --horizon 11");
     let answer = Answer::read(&run.stdout);

@@ -18,10 +18,10 @@ def motor() -> th.Log:
     return th.dc_motor()
 
 
-@pytest.fixture
-def shared() -> Path:
-    """The public logs beside the repository, where they are."""
-    folder = Path(__file__).parents[3] / "shared"
-    if not (folder / "data").is_dir():
-        pytest.skip("../shared/data is not here")
-    return folder
+def public_log(name: str) -> Path:
+    """Where a public log is: among those that come with the tests, or beside the repository."""
+    root = Path(__file__).parents[2]
+    for folder in (root / "tests" / "data" / "public", root.parent / "shared" / "data"):
+        if (folder / name).exists():
+            return folder / name
+    pytest.skip(f"{name} is not in ../shared/data")

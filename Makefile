@@ -1,8 +1,11 @@
-.PHONY: demo test format lint docs rust chromium embedded python wheel soak soak-track monte-carlo bench
+.PHONY: demo check test format lint docs unit rust chromium embedded python wheel soak soak-track monte-carlo bench
 
 # Fit the sample log that the program carries.
 demo:
 	cargo run --release -- demo
+
+# What is run while one works: formatting, lints, unit tests; within a minute where little has changed since the last run.
+check: format lint unit
 
 # Everything that must pass. A tool that is missing is installed where that is possible; else its check is skipped by
 # name, or fails where CI=true.
@@ -21,6 +24,9 @@ lint:
 
 docs:
 	RUSTDOCFLAGS="-D warnings" cargo doc --locked --workspace --all-features --no-deps
+
+unit:
+	cargo test --locked --workspace --all-features --lib
 
 # thetahat-core once more on its own: there it has no heap.
 rust: chromium

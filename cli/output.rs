@@ -104,8 +104,7 @@ pub(crate) fn write_csv(
 }
 
 /// Writes a page, like [`write`].
-pub(crate) fn page(path: &Path, page: &Result<String, thetahat::Error>) -> Result<(), Failure> {
-    let page = page.as_ref().map_err(|error| Failure::data(error.to_string()))?;
+pub(crate) fn page(path: &Path, page: &str) -> Result<(), Failure> {
     write(path, |file| file.write_all(page.as_bytes()))
 }
 

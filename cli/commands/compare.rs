@@ -26,7 +26,8 @@ pub(crate) fn compare(arguments: &CompareArguments, line: &str) -> Result<(), Fa
     let comparison = compared(&found).map_err(|error| Failure::option(&error))?;
     let json = comparison.to_json().map_err(|error| Failure::data(error.to_string()))?;
     if let Some(path) = &look.html {
-        output::page(path, &comparison_page(&reports, &found, line))?;
+        let page = comparison_page(&reports, &found, line);
+        output::page(path, &page.map_err(|error| Failure::data(error.to_string()))?)?;
     }
     for (path, model) in arguments.reports.iter().zip(&comparison.models) {
         model.warnings.iter().for_each(|warning| warn(&format!("{}: {warning}", path.display())));

@@ -53,12 +53,7 @@ pub(crate) fn fit(arguments: &FitArguments, line: &str) -> Result<(), Failure> {
 }
 
 /// The page of a fit, with a look at each part of the log.
-fn page(
-    report: &Report,
-    log: Log,
-    sources: &[Source],
-    line: &str,
-) -> Result<Result<String, thetahat::Error>, Failure> {
+fn page(report: &Report, log: Log, sources: &[Source], line: &str) -> Result<String, Failure> {
     let data = &report.data;
     let test = data.split.as_ref().map_or(&[][..], |parts| &parts.test);
     let parts = [&data.estimation[..], &data.validation, test].into_iter().filter(|rows| !rows.is_empty());

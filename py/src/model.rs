@@ -118,7 +118,7 @@ impl Model {
                 thetahat::validate(&report, None, channels, &sources, &plan)
             };
             let looks: Vec<_> = log.map(look).transpose()?.into_iter().collect();
-            thetahat::fit_page(&report, &looks, &command)
+            Ok(thetahat::fit_page(&report, &looks, &command))
         })
     }
 

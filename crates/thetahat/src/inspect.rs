@@ -5,6 +5,7 @@ mod clock;
 mod delay;
 mod excitation;
 mod feedback;
+mod fourier;
 mod inspection;
 mod moments;
 mod outliers;
@@ -224,8 +225,7 @@ fn dynamics(inspection: &mut Inspection, log: &Log, plan: &InspectionPlan) -> Re
     let of_input = |(name, input): (&String, &&[f64])| {
         excitation::excitation(name, input, &log.segments_of(&[input], &all), log.sample_time())
     };
-    inspection.excitation =
-        plan.inputs.par_iter().zip(&inputs).map(of_input).collect::<Result<_, Error>>()?;
+    inspection.excitation = plan.inputs.par_iter().zip(&inputs).map(of_input).collect();
     for (later, earlier) in excitation::copies(&inputs, |signals| log.segments_of(signals, &all)) {
         inspection.excitation[later].same_as = Some(plan.inputs[earlier].clone());
     }

@@ -6,7 +6,6 @@ use rayon::prelude::*;
 use thetahat_core::nalgebra::DMatrix;
 
 use super::{Excitation, moments, samples, spectrum};
-use crate::Error;
 use crate::regression::{Lagged, Presample, Taps, sum, sum_of_squares};
 
 /// The highest order looked for.
@@ -41,7 +40,7 @@ pub(super) fn excitation(
     values: &[f64],
     segments: &[Range<usize>],
     sample_time: f64,
-) -> Result<Excitation, Error> {
+) -> Excitation {
     let deviations = moments::deviations(values, segments);
     let highest = highest(segments);
     let pairs = || segments.iter().flat_map(|segment| values[segment.clone()].windows(2));
@@ -49,14 +48,14 @@ pub(super) fn excitation(
     let present = || segments.iter().flat_map(|segment| values[segment.clone()].iter().copied());
     let scale = moments::scale(present());
     let unit = unit(|| present().map(|value| scale * value)) / scale;
-    Ok(Excitation {
+    Excitation {
         input: name.to_owned(),
         order: rank(&deviations, segments, highest).min(changes),
         highest,
         changes: changes as f64 / pairs().count().max(1) as f64,
-        spectrum: spectrum::spectrum(&deviations, segments, unit, sample_time)?,
+        spectrum: spectrum::spectrum(&deviations, segments, unit, sample_time),
         same_as: None,
-    })
+    }
 }
 
 /// Inputs that are the same as an earlier one but for scale and offset, each with the first such one. `segments` gives those in

@@ -3,10 +3,8 @@
 use std::f64::consts::PI;
 use std::ops::Range;
 
-use realfft::RealFftPlanner;
-
+use super::fourier::RealTransform;
 use super::{SpectrumPoint, samples};
-use crate::Error;
 use crate::regression::sum;
 
 /// The longest window, in samples: it gives 513 frequencies.
@@ -31,19 +29,18 @@ pub(super) fn spectrum(
     segments: &[Range<usize>],
     unit: f64,
     sample_time: f64,
-) -> Result<Vec<SpectrumPoint>, Error> {
+) -> Vec<SpectrumPoint> {
     let longest = segments.iter().map(Range::len).max().unwrap_or(0);
     let most = LONGEST.min(samples(segments) / 4).min(longest);
     let length = if most == 0 { 0 } else { 1 << most.ilog2() };
     if length < SHORTEST {
-        return Ok(Vec::new());
+        return Vec::new();
     }
     let window: Vec<f64> = (0..length).map(|t| (PI * t as f64 / length as f64).sin().powi(2)).collect();
     let weight = sum(window.iter().map(|h| h * h));
-    let transform = RealFftPlanner::<f64>::new().plan_fft_forward(length);
-    let mut windowed = transform.make_input_vec();
-    let mut transformed = transform.make_output_vec();
-    let mut powers = vec![0.0; transformed.len()];
+    let mut transform = RealTransform::new(length);
+    let mut windowed = vec![0.0; length];
+    let mut powers = vec![0.0; length / 2 + 1];
     let mut count = 0;
     for segment in segments {
         let mut first = segment.start;
@@ -51,10 +48,7 @@ pub(super) fn spectrum(
             for ((into, h), x) in windowed.iter_mut().zip(&window).zip(&deviations[first..first + length]) {
                 *into = h * x;
             }
-            transform
-                .process(&mut windowed, &mut transformed)
-                .map_err(|error| Error::data(format!("no Fourier transform: {error}")))?;
-            powers.iter_mut().zip(&transformed).for_each(|(power, value)| *power += value.norm_sqr());
+            powers.iter_mut().zip(transform.powers(&windowed)).for_each(|(sum, power)| *sum += power);
             count += 1;
             first += length / 2;
         }
@@ -69,5 +63,5 @@ pub(super) fn spectrum(
         })
         .collect();
     let finite = points.iter().all(|point| point.frequency.is_finite() && point.density.is_finite());
-    Ok(if finite { points } else { Vec::new() })
+    if finite { points } else { Vec::new() }
 }

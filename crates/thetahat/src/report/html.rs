@@ -1,12 +1,13 @@
 //! Reports as pages: one file of HTML that loads nothing, with charts that can be zoomed.
 //!
-//! Names of channels and files are shown as they are, whatever is in them: text is escaped by the template, data inside
+//! Names of channels and files are shown as they are, whatever is in them: text is escaped where it is written, data inside
 //! scripts by [`text::inside_script`], and text for the charting library, which reads some HTML itself, by
 //! [`text::plain`]. A content security policy forbids every request and every script but the page's own.
 
 mod charts;
 mod decimate;
 mod figure;
+mod object;
 mod page;
 mod tables;
 mod text;
@@ -38,13 +39,10 @@ const INPUTS: usize = 5;
 ///
 /// `validated` has one entry for each part: estimation, validation, test, as far as there are any, all on the whole log.
 /// `command` is shown as what made the page.
-///
-/// # Errors
-/// [`Error::Report`] if the page cannot be written.
-pub fn fit_page(report: &Report, validated: &[Validated], command: &str) -> Result<String, Error> {
+pub fn fit_page(report: &Report, validated: &[Validated], command: &str) -> String {
     let model = &report.model;
     let title = format!("Fit of {}{}", model.output.name, of(&report.data.logs));
-    let mut page = Page::new(title, command, &report.generator)?;
+    let mut page = Page::new(title, command, &report.generator);
     page.lead = lead(model, &report.fit);
     page.warnings = &report.warnings;
     let parts: Vec<(String, &Validated)> =
@@ -76,13 +74,10 @@ pub fn fit_page(report: &Report, validated: &[Validated], command: &str) -> Resu
 }
 
 /// The page of a validation: how a stored model does on a log.
-///
-/// # Errors
-/// [`Error::Report`] if the page cannot be written.
-pub fn validation_page(report: &Report, validated: &Validated, command: &str) -> Result<String, Error> {
+pub fn validation_page(report: &Report, validated: &Validated, command: &str) -> String {
     let (model, validation) = (&report.model, &validated.validation);
     let title = format!("Validation of {}{}", model_name(validation, 0), of(&validation.logs));
-    let mut page = Page::new(title, command, &validation.generator)?;
+    let mut page = Page::new(title, command, &validation.generator);
     page.lead = lead(model, &validation.fit);
     page.lead.push(match validation.seen {
         super::Seen::No => "The model was not fitted to these rows.".to_owned(),
@@ -109,7 +104,7 @@ pub fn validation_page(report: &Report, validated: &Validated, command: &str) ->
 /// The page of a comparison: several models on one log. `reports` and `validated` are in the same order.
 ///
 /// # Errors
-/// [`Error::Report`] if the page cannot be written, or there are not as many of the one as of the other.
+/// [`Error::Report`] if there are not as many of the one as of the other.
 pub fn comparison_page(reports: &[Report], validated: &[Validated], command: &str) -> Result<String, Error> {
     if reports.len() != validated.len() {
         return Err(Error::report(format!("{} models and {} validations", reports.len(), validated.len())));
@@ -117,8 +112,7 @@ pub fn comparison_page(reports: &[Report], validated: &[Validated], command: &st
     let names = distinct(validated);
     let generator = validated.first().map_or("thetahat", |validated| &validated.validation.generator);
     let logs = validated.first().map_or(&[][..], |validated| &validated.validation.logs);
-    let mut page =
-        Page::new(format!("Comparison of {} models{}", names.len(), of(logs)), command, generator)?;
+    let mut page = Page::new(format!("Comparison of {} models{}", names.len(), of(logs)), command, generator);
     let named: Vec<(String, &Validated)> = names.iter().cloned().zip(validated).collect();
     let models: Vec<(String, &Model)> =
         names.iter().cloned().zip(reports.iter().map(|report| &report.model)).collect();
@@ -161,23 +155,20 @@ pub fn comparison_page(reports: &[Report], validated: &[Validated], command: &st
     let mut section = Section::new("Data");
     section.table(tables::logs(logs));
     page.sections.push(section);
-    page.write()
+    Ok(page.write())
 }
 
 /// The page of an inspection: what a log is worth, before any fit.
 ///
 /// `signals` are the channels with their names, one value for each row; `time` is in seconds, one value for each row.
-///
-/// # Errors
-/// [`Error::Report`] if the page cannot be written.
 pub fn inspection_page(
     inspection: &Inspection,
     signals: &[(String, Vec<f64>)],
     time: &[f64],
     command: &str,
-) -> Result<String, Error> {
+) -> String {
     let title = format!("Inspection{}", of(std::slice::from_ref(&inspection.log)));
-    let mut page = Page::new(title, command, &inspection.generator)?;
+    let mut page = Page::new(title, command, &inspection.generator);
     page.lead = vec![format!(
         "{} rows of {} channels, {} s apart.",
         inspection.rows,

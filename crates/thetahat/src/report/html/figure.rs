@@ -1,14 +1,10 @@
 //! What all charts have in common: they are described here and drawn by the charting library.
 
-use plotly::common::{
-    Anchor, DashType, ExponentFormat, Fill, Font, HoverInfo, Label, Line, Mode, Orientation, Title,
-};
-use plotly::configuration::{Configuration, DisplayModeBar, DoubleClick, ModeBarButtonName};
-use plotly::layout::{Axis, AxisType, HoverMode, Legend, Margin, ModeBar};
-use plotly::{Layout, Scatter, Trace};
 use serde::Serialize;
+use serde_json::json;
 
 use super::decimate::Curve;
+use super::object::{Object, scatter, stroke};
 use super::text;
 
 /// Colours that differ in lightness and hue for people who see colours differently (Okabe and Ito 2008, Color Universal
@@ -40,9 +36,9 @@ pub(super) type Drawn = Result<Chart, String>;
 
 #[derive(Serialize)]
 struct Figure {
-    data: Vec<Box<dyn Trace>>,
-    layout: Layout,
-    config: Configuration,
+    data: Vec<Object>,
+    layout: Object,
+    config: Object,
 }
 
 /// A chart of these traces.
@@ -50,63 +46,59 @@ pub(super) fn chart(
     title: impl Into<String>,
     words: impl Into<String>,
     height: usize,
-    traces: Vec<Box<dyn Trace>>,
-    layout: Layout,
+    traces: Vec<Object>,
+    layout: Object,
 ) -> Drawn {
-    let figure = Figure { data: traces, layout: layout.height(height), config: configuration() };
+    let figure = Figure { data: traces, layout: layout.with("height", height), config: configuration() };
     let json =
         serde_json::to_string(&figure).map_err(|error| format!("This chart cannot be written: {error}."))?;
     Ok(Chart { title: title.into(), words: words.into(), height, json: text::inside_script(&json) })
 }
 
-fn configuration() -> Configuration {
-    Configuration::new()
-        .responsive(true)
-        .display_logo(false)
-        .display_mode_bar(DisplayModeBar::Hover)
-        .double_click(DoubleClick::ResetAutoSize)
-        .typeset_math(false)
-        .mode_bar_buttons_to_remove(vec![ModeBarButtonName::Select2d, ModeBarButtonName::Lasso2d])
+fn configuration() -> Object {
+    Object::default()
+        .with("responsive", true)
+        .with("displaylogo", false)
+        .with("displayModeBar", "hover")
+        .with("doubleClick", "reset+autosize")
+        .with("typesetMath", false)
+        .with("modeBarButtonsToRemove", json!(["select2d", "lasso2d"]))
 }
 
 /// A layout without its axes. Text gets its colour from the page.
-pub(super) fn layout() -> Layout {
-    let legend = Legend::new()
-        .orientation(Orientation::Horizontal)
-        .x(0.0)
-        .x_anchor(Anchor::Left)
-        .y(1.02)
-        .y_anchor(Anchor::Bottom)
-        .background_color(CLEAR);
-    Layout::new()
-        .auto_size(true)
-        .paper_background_color(CLEAR)
-        .plot_background_color(CLEAR)
-        .font(Font::new().family("system-ui, sans-serif").size(13).color(NEUTRAL))
-        .margin(Margin::new().left(56).right(12).top(40).bottom(52))
-        .legend(legend)
-        .mode_bar(ModeBar::new().background_color(CLEAR).color(NEUTRAL).active_color(COLOURS[1]))
-        .show_legend(true)
-        .hover_mode(HoverMode::XUnified)
+pub(super) fn layout() -> Object {
+    let legend = json!({
+        "orientation": "h", "x": 0, "xanchor": "left", "y": 1.02, "yanchor": "bottom", "bgcolor": CLEAR,
+    });
+    Object::default()
+        .with("autosize", true)
+        .with("paper_bgcolor", CLEAR)
+        .with("plot_bgcolor", CLEAR)
+        .with("font", json!({"family": "system-ui, sans-serif", "size": 13, "color": NEUTRAL}))
+        .with("margin", json!({"l": 56, "r": 12, "t": 40, "b": 52}))
+        .with("legend", legend)
+        .with("modebar", json!({"bgcolor": CLEAR, "color": NEUTRAL, "activecolor": COLOURS[1]}))
+        .with("showlegend", true)
+        .with("hovermode", "x unified")
         // The whole name.
-        .hover_label(Label::new().name_length(-1))
+        .with("hoverlabel", json!({"namelength": -1}))
 }
 
 /// An axis with a title, in which names are [`text::plain`].
-pub(super) fn axis(title: &str) -> Axis {
-    Axis::new()
-        .title(Title::with_text(title))
-        .auto_margin(true)
-        .grid_color(GRID)
-        .zero_line_color("rgba(128,128,128,0.6)")
-        .line_color(GRID)
+pub(super) fn axis(title: &str) -> Object {
+    Object::default()
+        .with("title", json!({"text": title}))
+        .with("automargin", true)
+        .with("gridcolor", GRID)
+        .with("zerolinecolor", "rgba(128,128,128,0.6)")
+        .with("linecolor", GRID)
 }
 
 /// A logarithmic axis for values between these.
-pub(super) fn logarithmic(title: &str, low: f64, high: f64) -> Axis {
-    let axis = axis(title).type_(AxisType::Log).exponent_format(ExponentFormat::Power);
+pub(super) fn logarithmic(title: &str, low: f64, high: f64) -> Object {
+    let axis = axis(title).with("type", "log").with("exponentformat", "power");
     // Over a decade and more their names are enough.
-    if high > 10.0 * low { axis.dtick(1.0) } else { axis.n_ticks(5) }
+    if high > 10.0 * low { axis.with("dtick", 1) } else { axis.with("nticks", 5) }
 }
 
 /// The smallest and the largest of the values that a logarithmic axis can show.
@@ -116,36 +108,34 @@ pub(super) fn positive_range(values: impl Iterator<Item = f64>) -> (f64, f64) {
 }
 
 /// The colour and the dashes of the curve at a position: a second round has the colours again, but dashed.
-pub(super) fn look(position: usize) -> (&'static str, DashType) {
-    const DASHES: [DashType; 4] = [DashType::Solid, DashType::Dash, DashType::Dot, DashType::LongDashDot];
-    (COLOURS[position % COLOURS.len()], DASHES[position / COLOURS.len() % DASHES.len()].clone())
+pub(super) fn look(position: usize) -> (&'static str, &'static str) {
+    const DASHES: [&str; 4] = ["solid", "dash", "dot", "longdashdot"];
+    (COLOURS[position % COLOURS.len()], DASHES[position / COLOURS.len() % DASHES.len()])
 }
 
 /// A line with a name, which is [`text::plain`].
-pub(super) fn line(name: &str, curve: Curve, position: usize) -> Box<Scatter<f64, f64>> {
+pub(super) fn line(name: &str, curve: Curve, position: usize) -> Object {
     let (colour, dash) = look(position);
-    plain_line(name, curve, colour).line(Line::new().color(colour).dash(dash).width(1.6))
+    plain_line(name, curve, colour).with("line", stroke(colour, 1.6).with("dash", dash))
 }
 
 /// A line in a colour of its own.
-pub(super) fn plain_line(name: &str, curve: Curve, colour: &'static str) -> Box<Scatter<f64, f64>> {
-    Scatter::new(curve.x, curve.y).name(name).mode(Mode::Lines).line(Line::new().color(colour).width(1.4))
+pub(super) fn plain_line(name: &str, curve: Curve, colour: &str) -> Object {
+    scatter(name, curve.x, curve.y, "lines").with("line", stroke(colour, 1.4))
 }
 
 /// The area between two curves over the same x.
-pub(super) fn band(name: &str, x: &[f64], low: &[f64], high: &[f64], colour: &str) -> Box<Scatter<f64, f64>> {
+pub(super) fn band(name: &str, x: &[f64], low: &[f64], high: &[f64], colour: &str) -> Object {
     let there = (0..x.len()).filter(|&k| low[k].is_finite() && high[k].is_finite());
     let there: Vec<usize> = there.collect();
     let forth = there.iter().map(|&k| (x[k], high[k]));
     let back = there.iter().rev().map(|&k| (x[k], low[k]));
     let (x, y) = forth.chain(back).map(|(x, y)| (significant(x), significant(y))).unzip();
-    Scatter::new(x, y)
-        .name(name)
-        .mode(Mode::Lines)
-        .fill(Fill::ToSelf)
-        .fill_color(faint(colour))
-        .line(Line::new().color(CLEAR).width(0.0))
-        .hover_info(HoverInfo::Skip)
+    scatter(name, x, y, "lines")
+        .with("fill", "toself")
+        .with("fillcolor", faint(colour))
+        .with("line", stroke(CLEAR, 0.0))
+        .with("hoverinfo", "skip")
 }
 
 /// The colour as that of an area.

@@ -1,15 +1,30 @@
 //! A page as a document: sections of sentences, tables and charts.
 
-use askama::Template;
-use plotly::Plot;
+use std::fmt::{self, Display, Formatter, Write};
 
 use super::figure::{Chart, Drawn};
 use super::text;
-use crate::Error;
+
+/// The charting library, plotly.js by its name: the bundle of lines, bars and their axes. See plotly/README.md.
+const LIBRARY: &str = include_str!("plotly/plotly-basic.min.js");
+const STYLE: &str = include_str!("style.css");
+const SCRIPT: &str = include_str!("page.js");
+/// Up to the title. The policy forbids every request, and every script without the nonce.
+const HEAD: &str = r#"<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="color-scheme" content="light dark">
+<meta http-equiv="Content-Security-Policy" content="default-src 'none'; script-src 'nonce-page'; style-src 'unsafe-inline'; img-src data: blob:">
+<link rel="icon" href="data:,">
+"#;
+const NO_SCRIPT: &str =
+    r#"<noscript><p class="note">The charts need JavaScript. The tables do not.</p></noscript>"#;
+const HOW_TO: &str = "It loads nothing from elsewhere. Charts: drag to zoom, double-click to zoom out, hover or tap to read \
+                      values, click a name to hide a curve.";
 
 /// A page before it is written. All of its text is escaped when it is.
-#[derive(Template)]
-#[template(path = "page.html")]
 pub(super) struct Page<'a> {
     pub(super) title: String,
     /// Below the title: sentences, the first as the headline.
@@ -20,9 +35,6 @@ pub(super) struct Page<'a> {
     pub(super) command: &'a str,
     /// The program and version that made it.
     pub(super) generator: &'a str,
-    style: &'static str,
-    script: &'static str,
-    library: String,
 }
 
 /// A part of a page with a heading.
@@ -61,8 +73,8 @@ impl Table {
         }
     }
 
-    fn is_figures(&self, column: &usize) -> bool {
-        self.figures.get(*column).is_some_and(|figures| *figures)
+    fn is_figures(&self, column: usize) -> bool {
+        self.figures.get(column).is_some_and(|figures| *figures)
     }
 
     /// The same with rows for columns.
@@ -115,48 +127,121 @@ impl Section {
 }
 
 impl<'a> Page<'a> {
-    pub(super) fn new(title: String, command: &'a str, generator: &'a str) -> Result<Self, Error> {
-        Ok(Self {
-            title,
-            lead: Vec::new(),
-            warnings: &[],
-            sections: Vec::new(),
-            command,
-            generator,
-            style: include_str!("style.css"),
-            script: include_str!("page.js"),
-            library: library()?,
-        })
+    pub(super) fn new(title: String, command: &'a str, generator: &'a str) -> Self {
+        Self { title, lead: Vec::new(), warnings: &[], sections: Vec::new(), command, generator }
     }
 
     /// The page as HTML.
-    pub(super) fn write(&self) -> Result<String, Error> {
-        self.render().map_err(|error| Error::report(format!("the page cannot be written: {error}")))
+    pub(super) fn write(&self) -> String {
+        self.to_string()
     }
 }
 
-/// The charting library alone: the crate brings it as the first script element, and one for formulas behind it.
-fn library() -> Result<String, Error> {
-    let mut sources = Plot::offline_js_sources();
-    let start = sources.find("<script").and_then(|tag| Some(tag + sources[tag..].find('>')? + 1));
-    let script = start.and_then(|start| Some(start..start + sources[start..].find("</script")?));
-    match script {
-        Some(script) if sources[script.clone()].contains("plotly.js") => {
-            sources.truncate(script.end);
-            sources.drain(..script.start);
-            Ok(sources)
+/// Text as HTML shows it, in elements and in quoted attributes.
+struct Text<'a>(&'a str);
+
+impl Display for Text<'_> {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        self.0.chars().try_for_each(|character| match character {
+            '&' => f.write_str("&amp;"),
+            '<' => f.write_str("&lt;"),
+            '>' => f.write_str("&gt;"),
+            '"' => f.write_str("&quot;"),
+            '\'' => f.write_str("&#39;"),
+            other => f.write_char(other),
+        })
+    }
+}
+
+impl Display for Page<'_> {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let (title, generator) = (Text(&self.title), Text(self.generator));
+        f.write_str(HEAD)?;
+        writeln!(f, r#"<meta name="generator" content="{generator}">"#)?;
+        writeln!(f, "<title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>")?;
+        writeln!(f, "<header>\n<h1>{title}</h1>")?;
+        self.lead.iter().try_for_each(|sentence| writeln!(f, "<p>{}</p>", Text(sentence)))?;
+        writeln!(f, "{NO_SCRIPT}\n</header>\n<nav aria-label=\"Sections\">\n<ul>")?;
+        for (number, section) in (1..).zip(&self.sections) {
+            writeln!(f, r##"<li><a href="#section-{number}">{}</a></li>"##, Text(&section.title))?;
         }
-        _ => Err(Error::report("the charting library is not where it was; this is a mistake of the program")),
+        writeln!(f, "<li><a href=\"#command\">Command</a></li>\n</ul>\n</nav>\n<main>")?;
+        if !self.warnings.is_empty() {
+            writeln!(f, r#"<section aria-labelledby="warnings" class="note">"#)?;
+            writeln!(f, "<h2 id=\"warnings\">Warnings</h2>\n<ul>")?;
+            self.warnings.iter().try_for_each(|warning| writeln!(f, "<li>{}</li>", Text(warning)))?;
+            writeln!(f, "</ul>\n</section>")?;
+        }
+        for (number, section) in (1..).zip(&self.sections) {
+            writeln!(f, r#"<section aria-labelledby="section-{number}">"#)?;
+            writeln!(f, r#"<h2 id="section-{number}">{}</h2>"#, Text(&section.title))?;
+            section.blocks.iter().try_for_each(|block| block.fmt(f))?;
+            writeln!(f, "</section>")?;
+        }
+        writeln!(f, "</main>\n<footer>\n<h2 id=\"command\">Command</h2>\n<p>This page was made by</p>")?;
+        writeln!(f, "<pre><code>{}</code></pre>", Text(self.command))?;
+        writeln!(f, "<p>with {generator}. {HOW_TO}</p>\n</footer>")?;
+        for script in [LIBRARY, SCRIPT] {
+            writeln!(f, "<script nonce=\"page\">\n{script}</script>")?;
+        }
+        f.write_str("</body>\n</html>\n")
+    }
+}
+
+impl Display for Block {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Text(text) => writeln!(f, "<p>{}</p>", Text(text)),
+            Self::Command(text) => writeln!(f, "<pre><code>{}</code></pre>", Text(text)),
+            Self::Table(table) => table.fmt(f),
+            Self::Chart(Chart { title, words, height, json }) => {
+                let (title, words) = (Text(title), Text(words));
+                writeln!(f, "<figure>\n<h3>{title}</h3>")?;
+                write!(f, r#"<div class="chart" role="img" aria-label="{title}. {words}" "#)?;
+                writeln!(f, r#"style="height:{height}px"></div>"#)?;
+                writeln!(f, r#"<script type="application/json">{json}</script>"#)?;
+                writeln!(f, "<figcaption>{words}</figcaption>\n</figure>")
+            }
+        }
+    }
+}
+
+impl Display for Table {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let caption = Text(&self.caption);
+        let class = |column: usize| if self.is_figures(column) { r#" class="figure""# } else { "" };
+        writeln!(f, r#"<div class="table" role="region" aria-label="{caption}" tabindex="0">"#)?;
+        write!(f, "<table>\n<caption>{caption}</caption>\n<thead><tr>")?;
+        for (column, name) in self.head.iter().enumerate() {
+            write!(f, r#"<th scope="col"{}>{}</th>"#, class(column), Text(name))?;
+        }
+        writeln!(f, "</tr></thead>\n<tbody>")?;
+        for row in &self.rows {
+            f.write_str("<tr>")?;
+            for (column, cell) in row.iter().map(|cell| Text(cell)).enumerate() {
+                match column {
+                    0 => write!(f, r#"<th scope="row">{cell}</th>"#)?,
+                    _ => write!(f, "<td{}>{cell}</td>", class(column))?,
+                }
+            }
+            writeln!(f, "</tr>")?;
+        }
+        writeln!(f, "</tbody>\n</table>\n</div>")
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::*;
+
     #[test]
-    fn the_library_is_taken_alone() {
-        let library = super::library().unwrap();
-        assert!(library.trim_start().starts_with("/**\n* plotly.js v"));
-        assert!(library.trim_end().ends_with("return Plotly;\n}));"), "{}", &library[library.len() - 80..]);
-        assert!(library.len() < 4_700_000 && !library.contains("</script") && !library.contains("<!--"));
+    fn the_library_stands_in_a_script_element() {
+        assert!(LIBRARY.starts_with("/**\n* plotly.js (basic - minified) v"));
+        assert!(!LIBRARY.contains("</script") && !LIBRARY.contains("<!--"));
+    }
+
+    #[test]
+    fn text_is_no_markup() {
+        assert_eq!(Text("<a href=\"'\">&").to_string(), "&lt;a href=&quot;&#39;&quot;&gt;&amp;");
     }
 }

@@ -1,11 +1,8 @@
 //! Correlations with their bands.
 
-use plotly::common::Marker;
-use plotly::layout::BarMode;
-use plotly::{Bar, Trace};
-
 use super::super::decimate::{Curve, rounded};
 use super::super::figure::{COLOURS, Drawn, NEUTRAL, axis, band, chart, layout, line, significant};
+use super::super::object::{self, Object};
 use super::super::text;
 use crate::{DelayEstimate, Independence, Residuals, figures};
 
@@ -13,18 +10,19 @@ const HEIGHT: usize = 320;
 const BAND: &str = "95 % band";
 
 /// Bars, with another colour and name where they are outside of the band.
-fn bars(lags: &[f64], values: &[f64], half: &[f64]) -> Vec<Box<dyn Trace>> {
+fn bars(lags: &[f64], values: &[f64], half: &[f64]) -> Vec<Object> {
     let low: Vec<f64> = half.iter().map(|half| -half).collect();
     // As wide as the bars.
     let wide = |values: &[f64]| -> Vec<f64> { values.iter().flat_map(|value| [*value; 2]).collect() };
     let edges: Vec<f64> = lags.iter().flat_map(|lag| [lag - 0.5, lag + 0.5]).collect();
-    let mut traces: Vec<Box<dyn Trace>> = vec![band(BAND, &edges, &wide(&low), &wide(half), NEUTRAL)];
+    let mut traces: Vec<Object> = vec![band(BAND, &edges, &wide(&low), &wide(half), NEUTRAL)];
     let outside = |k: usize| values[k].abs() > half[k];
     for (name, wanted, colour) in [("inside", false, COLOURS[0]), ("outside", true, COLOURS[1])] {
         let there = (0..lags.len()).filter(|&k| values[k].is_finite() && outside(k) == wanted);
         let (x, y): (Vec<f64>, Vec<f64>) = there.map(|k| (lags[k], significant(values[k]))).unzip();
         if !x.is_empty() {
-            traces.push(Bar::new(x, y).name(name).width(0.35).marker(Marker::new().color(colour)));
+            let filled = Object::default().with("color", colour);
+            traces.push(object::bars(name, x, y).with("width", 0.35).with("marker", filled));
         }
     }
     traces
@@ -38,8 +36,10 @@ pub(crate) fn autocorrelation(residuals: &Residuals, white_expected: bool) -> Dr
     }
     let lags: Vec<f64> = (1..=values.len()).map(|lag| lag as f64).collect();
     let traces = bars(&lags, values, &vec![residuals.band; values.len()]);
-    let layout =
-        layout().x_axis(axis("lag [samples]")).y_axis(axis("autocorrelation")).bar_mode(BarMode::Overlay);
+    let layout = layout()
+        .with("xaxis", axis("lag [samples]"))
+        .with("yaxis", axis("autocorrelation"))
+        .with("barmode", "overlay");
     let asked = if white_expected { "" } else { " The model does not say that they are white." };
     let words = format!(
         "Correlation of the errors one step ahead with themselves, lags 1 to {}. White errors stay inside the band, ± {}, at \
@@ -62,8 +62,10 @@ pub(crate) fn cross_correlation(independence: &Independence) -> Drawn {
     let most = (count / 2) as f64;
     let lags: Vec<f64> = (0..count).map(|k| k as f64 - most).collect();
     let traces = bars(&lags, &independence.correlation, &independence.band);
-    let layout =
-        layout().x_axis(axis("lag [samples]")).y_axis(axis("correlation")).bar_mode(BarMode::Overlay);
+    let layout = layout()
+        .with("xaxis", axis("lag [samples]"))
+        .with("yaxis", axis("correlation"))
+        .with("barmode", "overlay");
     let words = "Correlation of e(t) with u(t − lag). Outside of the band at positive lags: past inputs are still in the \
                  errors, the model lacks dynamics or delay. At negative lags: the input follows the output.";
     chart(format!("Residuals and {}", independence.input), words, HEIGHT, traces, layout)
@@ -79,14 +81,14 @@ pub(crate) fn compared_autocorrelations(models: &[(String, &Residuals)]) -> Draw
         return Err("No model has residuals enough for their autocorrelation.".to_owned());
     }
     let widest = models.iter().map(|(_, (_, residuals))| residuals.band).fold(0.0, f64::max);
-    let mut traces: Vec<Box<dyn Trace>> =
+    let mut traces: Vec<Object> =
         vec![band(BAND, &[0.5, longest as f64 - 0.5], &[-widest; 2], &[widest; 2], NEUTRAL)];
     for (position, (name, residuals)) in models {
         let values = &residuals.autocorrelation[1..];
         let lags = (1..=values.len()).map(|lag| lag as f64).collect();
         traces.push(line(&text::plain(name), Curve { x: lags, y: rounded(values) }, position));
     }
-    let layout = layout().x_axis(axis("lag [samples]")).y_axis(axis("autocorrelation"));
+    let layout = layout().with("xaxis", axis("lag [samples]")).with("yaxis", axis("autocorrelation"));
     let words = "Correlation of each model's errors one step ahead with themselves, from lag 1 on. White errors stay inside \
                  the band at 95 of 100 lags.";
     chart("Autocorrelation of the residuals", words, HEIGHT, traces, layout)
@@ -99,8 +101,10 @@ pub(crate) fn prewhitened(delay: &DelayEstimate) -> Drawn {
     }
     let lags: Vec<f64> = (0..delay.correlation.len()).map(|lag| lag as f64).collect();
     let traces = bars(&lags, &delay.correlation, &vec![delay.band; lags.len()]);
-    let layout =
-        layout().x_axis(axis("lag [samples]")).y_axis(axis("correlation")).bar_mode(BarMode::Overlay);
+    let layout = layout()
+        .with("xaxis", axis("lag [samples]"))
+        .with("yaxis", axis("correlation"))
+        .with("barmode", "overlay");
     let found = match delay.nk {
         Some(nk) => format!("Delay found, in samples: {nk}."),
         None => "No delay was found: at no lag the output surely follows the input.".to_owned(),

@@ -2,15 +2,14 @@
 
 use std::f64::consts::{PI, TAU};
 
-use plotly::common::{HoverInfo, Line, Marker, MarkerSymbol, Mode};
-use plotly::layout::{Axis, AxisConstrain, HoverMode};
-use plotly::{Scatter, Trace};
+use serde_json::json;
 
 use super::super::decimate::{Curve, rounded};
 use super::super::figure::{
     COLOURS, Drawn, NEUTRAL, NORMAL_95, axis, band, chart, layout, line, logarithmic, look, plain_line,
     positive_range, significant,
 };
+use super::super::object::{Object, marker, scatter, stroke};
 use super::super::text;
 use crate::{
     FrequencyResponse, Model, Quantity, Root, figures, frequency_response, logarithmic_frequencies,
@@ -56,7 +55,7 @@ pub(crate) fn bode(models: &[(String, &Model)], input: Option<&str>) -> Drawn {
     let (least, largest) = positive_range(points().map(|point| point.magnitude.value));
     let (first, last) = positive_range(points().map(|point| point.frequency));
     let single = models.len() == 1;
-    let mut traces: Vec<Box<dyn Trace>> = Vec::new();
+    let mut traces: Vec<Object> = Vec::new();
     let mut certain = true;
     for (position, name, response) in &found {
         let (colour, _) = look(*position);
@@ -70,18 +69,18 @@ pub(crate) fn bode(models: &[(String, &Model)], input: Option<&str>) -> Drawn {
             let lowest = if turn { f64::NEG_INFINITY } else { least / 10.0 };
             if let Some((low, high)) = interval(&values, lowest) {
                 certain = false;
-                let shown = band("95 % band", &x, &low, &high, colour).y_axis(axis);
-                traces.push(grouped(shown, &name, single).show_legend(single && !turn));
+                let shown = band("95 % band", &x, &low, &high, colour).with("yaxis", axis);
+                traces.push(grouped(shown, &name, single).with("showlegend", single && !turn));
             }
             let y = values.iter().map(|value| significant(value.value)).collect();
             let curve = line(&name, Curve { x: x.clone(), y }, *position);
-            traces.push(grouped(curve.y_axis(axis), &name, single).show_legend(!turn));
+            traces.push(grouped(curve.with("yaxis", axis), &name, single).with("showlegend", !turn));
         }
     }
     let layout = layout()
-        .x_axis(logarithmic("frequency [rad/s]", first, last).anchor("y2"))
-        .y_axis(logarithmic("magnitude", least, largest).domain(&[0.47, 1.0]))
-        .y_axis2(axis("phase [°]").domain(&[0.0, 0.43]));
+        .with("xaxis", logarithmic("frequency [rad/s]", first, last).with("anchor", "y2"))
+        .with("yaxis", logarithmic("magnitude", least, largest).with("domain", json!([0.47, 1.0])))
+        .with("yaxis2", axis("phase [°]").with("domain", json!([0.0, 0.43])));
     let source = if input.is_some() { "unit of the input" } else { "unit of e" };
     let mut words = format!(
         "How much of a sine of each frequency arrives at the output, in units of the output for each {source}, and by how many \
@@ -116,8 +115,8 @@ fn response(model: &Model, input: Option<&str>) -> Result<Option<FrequencyRespon
 }
 
 /// A curve that comes and goes with the others of its model, where there are several.
-fn grouped(curve: Box<Scatter<f64, f64>>, name: &str, single: bool) -> Box<Scatter<f64, f64>> {
-    if single { curve } else { curve.legend_group(name) }
+fn grouped(curve: Object, name: &str, single: bool) -> Object {
+    if single { curve } else { curve.with("legendgroup", name) }
 }
 
 fn degrees(radians: Quantity) -> Quantity {
@@ -142,7 +141,7 @@ fn interval(values: &[Quantity], lowest: f64) -> Option<(Vec<f64>, Vec<f64>)> {
 /// What a unit step of an input does in several models.
 pub(crate) fn step(models: &[(String, &Model)], input: &str) -> Drawn {
     let single = models.len() == 1;
-    let mut traces: Vec<Box<dyn Trace>> = Vec::new();
+    let mut traces: Vec<Object> = Vec::new();
     let mut unstable = false;
     let mut certain = true;
     let title = format!("Step response from {input}");
@@ -159,12 +158,13 @@ pub(crate) fn step(models: &[(String, &Model)], input: &str) -> Drawn {
         if let Some((low, high)) = interval(&response.values, f64::NEG_INFINITY) {
             certain = false;
             let shown = band("95 % band", &x, &thin(&low), &thin(&high), colour);
-            traces.push(grouped(shown, &name, single).show_legend(single));
+            traces.push(grouped(shown, &name, single).with("showlegend", single));
         }
         let values: Vec<f64> = response.values.iter().map(|value| value.value).collect();
-        let shape = if x.len() > 80 { Mode::Lines } else { Mode::LinesMarkers };
+        let shape = if x.len() > 80 { "lines" } else { "lines+markers" };
         let curve = line(&name, Curve { x, y: rounded(&thin(&values)) }, position);
-        traces.push(grouped(curve.mode(shape).marker(Marker::new().size(4)), &name, single));
+        let curve = curve.with("mode", shape).with("marker", Object::default().with("size", 4));
+        traces.push(grouped(curve, &name, single));
     }
     if traces.is_empty() {
         return Err(format!("{title}: none, no model has this input."));
@@ -174,17 +174,17 @@ pub(crate) fn step(models: &[(String, &Model)], input: &str) -> Drawn {
     if unstable {
         words.push_str(" An unstable model grows without bound: only its beginning is shown.");
     }
-    let layout = layout().x_axis(axis("time [s]")).y_axis(axis("output per unit of input"));
+    let layout = layout().with("xaxis", axis("time [s]")).with("yaxis", axis("output per unit of input"));
     chart(title, words, 340, traces, layout)
 }
 
 /// Poles and zeros in the z plane.
 pub(crate) fn roots(model: &Model) -> Drawn {
-    let groups: [(&str, Vec<&Root>, MarkerSymbol, usize); 4] = [
-        ("poles", model.poles.iter().collect(), MarkerSymbol::XThin, 0),
-        ("zeros", model.zeros.iter().flatten().collect(), MarkerSymbol::CircleOpen, 1),
-        ("noise poles", model.noise_poles.iter().collect(), MarkerSymbol::CrossThin, 2),
-        ("noise zeros", model.noise_zeros.iter().collect(), MarkerSymbol::DiamondOpen, 3),
+    let groups: [(&str, Vec<&Root>, &str, usize); 4] = [
+        ("poles", model.poles.iter().collect(), "x-thin", 0),
+        ("zeros", model.zeros.iter().flatten().collect(), "circle-open", 1),
+        ("noise poles", model.noise_poles.iter().collect(), "cross-thin", 2),
+        ("noise zeros", model.noise_zeros.iter().collect(), "diamond-open", 3),
     ];
     let all = || groups.iter().flat_map(|(_, roots, _, _)| roots.iter());
     if all().next().is_none() {
@@ -196,8 +196,8 @@ pub(crate) fn roots(model: &Model) -> Drawn {
 
     let circle = (0..=ROUND).map(|k| TAU * k as f64 / ROUND as f64).map(|angle| (angle.cos(), angle.sin()));
     let (x, y): (Vec<f64>, Vec<f64>) = circle.map(|(x, y)| (significant(x), significant(y))).unzip();
-    let circle = plain_line("unit circle", Curve { x, y }, NEUTRAL).hover_info(HoverInfo::Skip);
-    let mut traces: Vec<Box<dyn Trace>> = vec![circle];
+    let circle = plain_line("unit circle", Curve { x, y }, NEUTRAL).with("hoverinfo", "skip");
+    let mut traces: Vec<Object> = vec![circle];
     let mut certain = true;
     for (name, roots, symbol, position) in &groups {
         if roots.is_empty() {
@@ -208,9 +208,9 @@ pub(crate) fn roots(model: &Model) -> Drawn {
         if !outlines.is_empty() {
             certain = false;
             let (x, y) = outlines.into_iter().map(|(x, y)| (significant(x), significant(y))).unzip();
-            let trace =
-                plain_line("95 % region", Curve { x, y }, colour).line(Line::new().color(colour).width(1.2));
-            traces.push(trace.legend_group(*name).show_legend(false).hover_info(HoverInfo::Skip));
+            let trace = plain_line("95 % region", Curve { x, y }, colour).with("line", stroke(colour, 1.2));
+            let trace = trace.with("legendgroup", *name).with("showlegend", false);
+            traces.push(trace.with("hoverinfo", "skip"));
         }
         let (x, y): (Vec<f64>, Vec<f64>) =
             roots.iter().map(|root| (significant(root.re), significant(root.im))).unzip();
@@ -226,20 +226,16 @@ pub(crate) fn roots(model: &Model) -> Drawn {
                 figures::three(frequency)
             )
         });
-        let marker = Marker::new()
-            .symbol(symbol.clone())
-            .size(11)
-            .color(colour)
-            .line(Line::new().color(colour).width(2.0));
-        let trace = Scatter::new(x, y).name(*name).mode(Mode::Markers).marker(marker).legend_group(*name);
-        traces.push(trace.text_array(words.collect::<Vec<_>>()).hover_info(HoverInfo::Text));
+        let marker = marker(colour, 11).with("symbol", *symbol).with("line", stroke(colour, 2.0));
+        let trace = scatter(name, x, y, "markers").with("marker", marker).with("legendgroup", *name);
+        traces.push(trace.with("text", words.collect::<Vec<_>>()).with("hoverinfo", "text"));
     }
     let reach = 1.12 * reach;
-    let range = |axis: Axis| axis.range(vec![-reach, reach]).constrain(AxisConstrain::Domain);
+    let range = |axis: Object| axis.with("range", json!([-reach, reach])).with("constrain", "domain");
     let layout = layout()
-        .x_axis(range(axis("real part")))
-        .y_axis(range(axis("imaginary part")).scale_anchor("x").scale_ratio(1.0))
-        .hover_mode(HoverMode::Closest);
+        .with("xaxis", range(axis("real part")))
+        .with("yaxis", range(axis("imaginary part")).with("scaleanchor", "x").with("scaleratio", 1))
+        .with("hovermode", "closest");
     let mut words =
         "Poles inside the unit circle decay, outside they grow; the nearer to the circle, the more slowly."
             .to_owned();

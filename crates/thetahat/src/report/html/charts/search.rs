@@ -1,11 +1,8 @@
 //! How the orders were found.
 
-use plotly::common::{Line, Marker, MarkerSymbol, Mode};
-use plotly::layout::HoverMode;
-use plotly::{Scatter, Trace};
-
 use super::super::decimate::{Curve, rounded};
 use super::super::figure::{COLOURS, Drawn, axis, chart, layout, line, significant};
+use super::super::object::{Object, marker, scatter, stroke};
 use super::super::text;
 use crate::{Scored, Select, Selection, figures};
 
@@ -35,7 +32,7 @@ pub(crate) fn search(selection: &Selection) -> Drawn {
     if sizes.is_empty() {
         return Err(format!("There is no picture of the search: no model has a finite {name}."));
     }
-    let trace = |name: &str, points: Vec<(f64, f64, String)>| {
+    let trace = |name: &str, points: Vec<(f64, f64, String)>, mode: &str| {
         let mut said = Vec::new();
         let (x, y): (Vec<f64>, Vec<f64>) = points
             .into_iter()
@@ -44,23 +41,22 @@ pub(crate) fn search(selection: &Selection) -> Drawn {
                 (x, y)
             })
             .unzip();
-        Scatter::new(x, y).name(name).text_array(said).hover_info(plotly::common::HoverInfo::Text)
+        scatter(name, x, y, mode).with("text", said).with("hoverinfo", "text")
     };
-    let mut traces: Vec<Box<dyn Trace>> = vec![
-        trace("best of each size", sizes)
-            .mode(Mode::LinesMarkers)
-            .line(Line::new().color(COLOURS[0]).width(1.6))
-            .marker(Marker::new().color(COLOURS[0]).size(7)),
+    let mut traces: Vec<Object> = vec![
+        trace("best of each size", sizes, "lines+markers")
+            .with("line", stroke(COLOURS[0], 1.6))
+            .with("marker", marker(COLOURS[0], 7)),
     ];
     let chosen = scored(std::slice::from_ref(&selection.chosen));
     if !chosen.is_empty() {
-        let star = Marker::new().color(COLOURS[1]).size(16).symbol(MarkerSymbol::StarOpen);
-        traces.push(trace("chosen", chosen).mode(Mode::Markers).marker(star.line(Line::new().width(2.0))));
+        let star = marker(COLOURS[1], 16).with("symbol", "star-open").with("line", stroke(COLOURS[1], 2.0));
+        traces.push(trace("chosen", chosen, "markers").with("marker", star));
     }
     let layout = layout()
-        .x_axis(axis("number of parameters"))
-        .y_axis(axis(&format!("{name}, the smaller the better")))
-        .hover_mode(HoverMode::Closest);
+        .with("xaxis", axis("number of parameters"))
+        .with("yaxis", axis(&format!("{name}, the smaller the better")))
+        .with("hovermode", "closest");
     let words = format!(
         "The least {name} of the models with so many parameters, and the model that was chosen: {}.",
         selection.chosen.orders
@@ -70,17 +66,17 @@ pub(crate) fn search(selection: &Selection) -> Drawn {
 
 /// What each delay costs.
 pub(crate) fn delays(selection: &Selection) -> Drawn {
-    let mut traces: Vec<Box<dyn Trace>> = Vec::new();
+    let mut traces: Vec<Object> = Vec::new();
     for (position, delay) in selection.delays.iter().enumerate() {
         let scans = delay.mdl.iter().filter(|scan| scan.mdl.is_finite());
         let (x, y): (Vec<f64>, Vec<f64>) = scans.map(|scan| (scan.nk as f64, scan.mdl)).unzip();
         let curve = line(&text::plain(&delay.input), Curve { x, y: rounded(&y) }, position);
-        traces.push(curve.mode(Mode::LinesMarkers));
+        traces.push(curve.with("mode", "lines+markers"));
     }
     let found: Vec<String> =
         selection.delays.iter().map(|delay| format!("{} {}", delay.input, delay.nk)).collect();
     let words =
         format!("MDL of models that differ in their delay alone. Found: {} samples.", found.join(", "));
-    let layout = layout().x_axis(axis("delay [samples]")).y_axis(axis("MDL"));
+    let layout = layout().with("xaxis", axis("delay [samples]")).with("yaxis", axis("MDL"));
     chart("Delay", words, 300, traces, layout)
 }

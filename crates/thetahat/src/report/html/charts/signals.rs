@@ -1,17 +1,16 @@
 //! Signals over time: one above the other on a common clock, so that they are zoomed together.
 
-use plotly::common::{Anchor, ExponentFormat, Font, Line, Marker, MarkerSymbol, Mode};
-use plotly::layout::{Annotation, Axis, Shape, ShapeLayer, ShapeLine, ShapeType};
-use plotly::{Layout, Scatter, Trace};
+use serde_json::{Value, json};
 
 use super::super::decimate::decimate;
 use super::super::figure::{
     self, COLOURS, Drawn, NEUTRAL, axis, chart, layout, line, plain_line, significant,
 };
+use super::super::object::{Object, marker, scatter, stroke};
 use super::super::text;
 use crate::Rows;
 
-/// As many axes as the layout of the charting library has.
+/// More panels than these go into a further figure.
 const MOST_PANELS: usize = 8;
 /// More shaded stretches than these are no help.
 const MOST_SHADES: usize = 40;
@@ -41,7 +40,7 @@ pub(crate) struct Stack<'a> {
     longest: f64,
     /// The most points of a curve.
     points: usize,
-    traces: Vec<Box<dyn Trace>>,
+    traces: Vec<Object>,
     /// Their titles and heights.
     panels: Vec<(String, usize)>,
     curves: usize,
@@ -70,8 +69,8 @@ impl<'a> Stack<'a> {
     pub(crate) fn measured(&mut self, name: &str, values: &[f64]) {
         let curve = decimate(self.time, values, self.points, self.longest);
         // Wide and faint: what lies on it leaves it in sight.
-        let wide = Line::new().color(MEASURED).width(4.0);
-        self.traces.push(plain_line(name, curve, NEUTRAL).line(wide).y_axis(self.axis()));
+        let wide = stroke(MEASURED, 4.0);
+        self.traces.push(plain_line(name, curve, NEUTRAL).with("line", wide).with("yaxis", self.axis()));
     }
 
     /// A signal in the next colour.
@@ -90,7 +89,8 @@ impl<'a> Stack<'a> {
 
     fn coloured(&mut self, name: &str, values: &[f64], position: usize, legend: bool) {
         let curve = decimate(self.time, values, self.points, self.longest);
-        let trace = line(&text::plain(name), curve, position).y_axis(self.axis()).show_legend(legend);
+        let trace =
+            line(&text::plain(name), curve, position).with("yaxis", self.axis()).with("showlegend", legend);
         self.traces.push(trace);
     }
 
@@ -103,21 +103,16 @@ impl<'a> Stack<'a> {
         if x.is_empty() {
             return;
         }
-        let trace = Scatter::new(x, y)
-            .name(marked.name)
-            .mode(Mode::Markers)
-            .marker(Marker::new().color(COLOURS[1]).size(10).symbol(MarkerSymbol::CircleOpen))
-            .legend_group(marked.name)
-            .show_legend(legend)
-            .y_axis(self.axis());
+        let trace = scatter(marked.name, x, y, "markers")
+            .with("marker", marker(COLOURS[1], 10).with("symbol", "circle-open"))
+            .with("legendgroup", marked.name)
+            .with("showlegend", legend)
+            .with("yaxis", self.axis());
         self.traces.push(trace);
     }
 
     fn axis(&self) -> String {
-        match self.panels.len() {
-            0 | 1 => "y".to_owned(),
-            number => format!("y{number}"),
-        }
+        format!("y{}", number(self.panels.len()))
     }
 
     /// The figure.
@@ -128,19 +123,19 @@ impl<'a> Stack<'a> {
         for (position, (title, height)) in self.panels.iter().enumerate() {
             let below = top - *height as f64 / all as f64;
             let bottom = if position + 1 == self.panels.len() { 0.0 } else { below + SPACE };
-            let own = axis(title).domain(&[bottom.max(0.0), top.max(bottom)]);
-            layout = with_y_axis(layout, position, own);
+            let own = axis(title).with("domain", json!([bottom.max(0.0), top.max(bottom)]));
+            layout = layout.with(&format!("yaxis{}", number(position + 1)), own);
             top = below;
         }
         let anchor = self.axis();
-        layout = layout.x_axis(axis("time [s]").anchor(&anchor).exponent_format(ExponentFormat::None));
+        layout = layout.with("xaxis", axis("time [s]").with("anchor", anchor).with("exponentformat", "none"));
         let (shapes, labels) = self.shades(shades);
-        layout = layout.shapes(shapes).annotations(labels);
+        layout = layout.with("shapes", shapes).with("annotations", labels);
         chart(title, words, all + HEIGHTS[2], self.traces, layout)
     }
 
     /// Areas behind the curves, with their names.
-    fn shades(&self, shades: &[Shade]) -> (Vec<Shape>, Vec<Annotation>) {
+    fn shades(&self, shades: &[Shade]) -> (Vec<Value>, Vec<Value>) {
         let stretches = shades
             .iter()
             .enumerate()
@@ -156,31 +151,16 @@ impl<'a> Stack<'a> {
                 continue;
             }
             let (colour, _) = figure::look(position);
-            shapes.push(
-                Shape::new()
-                    .shape_type(ShapeType::Rect)
-                    .layer(ShapeLayer::Below)
-                    .x_ref("x")
-                    .y_ref("paper")
-                    .x0(first)
-                    .x1(last)
-                    .y0(0.0)
-                    .y1(1.0)
-                    .fill_color(format!("{colour}14"))
-                    .line(ShapeLine::new().width(0.0)),
-            );
-            labels.push(
-                Annotation::new()
-                    .text(text::plain(&shade.name))
-                    .show_arrow(false)
-                    .x_ref("x")
-                    .y_ref("paper")
-                    .x(first)
-                    .y(1.0)
-                    .x_anchor(Anchor::Left)
-                    .y_anchor(Anchor::Top)
-                    .font(Font::new().size(11).color(NEUTRAL)),
-            );
+            shapes.push(json!({
+                "type": "rect", "layer": "below", "xref": "x", "yref": "paper",
+                "x0": first, "x1": last, "y0": 0, "y1": 1,
+                "fillcolor": format!("{colour}14"), "line": {"width": 0},
+            }));
+            labels.push(json!({
+                "text": text::plain(&shade.name), "showarrow": false, "xref": "x", "yref": "paper",
+                "x": first, "y": 1, "xanchor": "left", "yanchor": "top",
+                "font": {"size": 11, "color": NEUTRAL},
+            }));
         }
         (shapes, labels)
     }
@@ -204,15 +184,7 @@ pub(crate) fn outputs(
     stack.draw(title, words, &[])
 }
 
-fn with_y_axis(layout: Layout, position: usize, axis: Axis) -> Layout {
-    match position {
-        0 => layout.y_axis(axis),
-        1 => layout.y_axis2(axis),
-        2 => layout.y_axis3(axis),
-        3 => layout.y_axis4(axis),
-        4 => layout.y_axis5(axis),
-        5 => layout.y_axis6(axis),
-        6 => layout.y_axis7(axis),
-        _ => layout.y_axis8(axis),
-    }
+/// What follows the name of the axis of a panel, counted from 1: the first has no number.
+fn number(panel: usize) -> String {
+    if panel > 1 { panel.to_string() } else { String::new() }
 }

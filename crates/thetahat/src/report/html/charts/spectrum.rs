@@ -1,9 +1,8 @@
 //! Power over frequency.
 
-use plotly::Trace;
-
 use super::super::decimate::Curve;
 use super::super::figure::{Drawn, chart, layout, line, logarithmic, positive_range, significant};
+use super::super::object::Object;
 use super::super::text;
 use crate::Excitation;
 
@@ -13,7 +12,7 @@ const POINTS: [usize; 2] = [2000, 20_000];
 /// The power spectral densities of the inputs.
 pub(crate) fn spectrum(inputs: &[Excitation]) -> Drawn {
     let most = (POINTS[1] / inputs.len().max(1)).clamp(20, POINTS[0]);
-    let mut traces: Vec<Box<dyn Trace>> = Vec::new();
+    let mut traces: Vec<Object> = Vec::new();
     for (position, input) in inputs.iter().enumerate() {
         let there = input.spectrum.iter().filter(|point| point.frequency > 0.0 && point.density > 0.0);
         let points: Vec<_> =
@@ -39,11 +38,9 @@ pub(crate) fn spectrum(inputs: &[Excitation]) -> Drawn {
     let points = || inputs.iter().flat_map(|input| &input.spectrum);
     let (first, last) = positive_range(points().map(|point| point.frequency));
     let (least, largest) = positive_range(points().map(|point| point.density));
-    let layout = layout().x_axis(logarithmic("frequency [rad/s]", first, last)).y_axis(logarithmic(
-        "power spectral density",
-        least,
-        largest,
-    ));
+    let layout = layout()
+        .with("xaxis", logarithmic("frequency [rad/s]", first, last))
+        .with("yaxis", logarithmic("power spectral density", least, largest));
     let words = "Power spectral density of the inputs in units squared per rad/s, the mean removed. Where an input has no \
                  power, a fit learns nothing.";
     chart("Spectra of the inputs", words, 340, traces, layout)

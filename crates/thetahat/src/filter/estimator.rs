@@ -94,7 +94,8 @@ fn observer(model: &StateModel, start: &DVector<f64>, gain: ObserverGain) -> Res
             }
             if let Kind::Linear(linear) = &model.kind {
                 let error = linear.transition.state_matrix() - &gain * &linear.output_matrix;
-                let largest = error.complex_eigenvalues().iter().map(|pole| pole.norm()).fold(0.0, f64::max);
+                let largest =
+                    error.complex_eigenvalues().iter().map(|pole| pole.re.hypot(pole.im)).fold(0.0, f64::max);
                 if largest >= 1.0 {
                     let message = format!(
                         "with it the error of the estimate does not die out: F - L H has a pole of modulus {}; \

@@ -26,7 +26,7 @@ impl RealTransform {
     pub(super) fn new(length: usize) -> Self {
         debug_assert!(length.is_power_of_two() && length >= 4);
         let half = length / 2;
-        let turn = |k: usize| Complex::from_polar(1.0, -TAU * k as f64 / length as f64);
+        let turn = |k: usize| unit(-TAU * k as f64 / length as f64);
         Self { turns: (0..half).map(turn).collect(), halves: vec![Complex::default(); half] }
     }
 
@@ -60,6 +60,12 @@ impl RealTransform {
     }
 }
 
+/// exp(i angle).
+fn unit(angle: f64) -> Complex<f64> {
+    let (sine, cosine) = angle.sin_cos();
+    Complex::new(cosine, sine)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -74,7 +80,7 @@ mod tests {
             for (k, found) in found.into_iter().enumerate() {
                 let terms = signal.iter().enumerate().map(|(t, x)| {
                     // The product is taken modulo L: an angle of 10^6 would have lost digits.
-                    Complex::from_polar(*x, -TAU * (k * t % length) as f64 / length as f64)
+                    unit(-TAU * (k * t % length) as f64 / length as f64) * *x
                 });
                 let expected = terms.sum::<Complex<f64>>().norm_sqr();
                 // Of the largest that it can be.

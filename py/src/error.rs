@@ -82,6 +82,19 @@ pub(crate) fn in_python(message: &str) -> String {
         match &option[..length] {
             "input" => text.push_str("inputs"),
             "no-header" => text.push_str("header=False"),
+            "resample" => {
+                // `--resample 0.1:linear`.
+                let value = option[length..].strip_prefix(' ').unwrap_or_default();
+                let end = value.find(|c: char| !(c.is_ascii_alphanumeric() || ":.-".contains(c)));
+                match value[..end.unwrap_or(value.len())].split_once(':') {
+                    Some((step, how)) if step.parse::<f64>().is_ok() => {
+                        text.push_str(&format!("resample=({step}, '{how}')"));
+                        rest = &value[step.len() + 1 + how.len()..];
+                        continue;
+                    }
+                    _ => text.push_str("resample"),
+                }
+            }
             other => text.push_str(&other.replace('-', "_")),
         }
         rest = &option[length..];

@@ -27,13 +27,13 @@ pub(crate) struct Log {
 /// Channels by name.
 type Named<'py> = Vec<(String, Bound<'py, PyAny>)>;
 
-/// Times, how to resample, and the first time as it was written.
-type Clock<'py> = (Bound<'py, PyAny>, Option<(f64, String)>, Option<String>);
+/// Times, how to resample, the first time as it was written, and what the times are called.
+type Clock<'py> = (Bound<'py, PyAny>, Option<(f64, String)>, Option<String>, String);
 
 #[pymethods]
 impl Log {
-    /// Channels by name with a fixed sample time, or with a clock: the times, how to resample, (step, "hold" or "linear"), and
-    /// the first time as it was written.
+    /// Channels by name with a fixed sample time, or with a clock: the times, how to resample, (step, "hold" or "linear"),
+    /// the first time as it was written, and what the times are called.
     #[new]
     #[pyo3(signature = (channels, inputs, output, sample_time, clock=None))]
     fn new(
@@ -45,9 +45,10 @@ impl Log {
         clock: Option<Clock<'_>>,
     ) -> PyResult<Self> {
         let channels = read(channels)?;
-        let has_clock = clock.is_some();
-        let (time, resample, start) =
-            clock.map_or((None, None, None), |(time, resample, start)| (Some(time), resample, start));
+        let (time, resample, start, called) = match clock {
+            Some((time, resample, start, called)) => (Some(time), resample, start, Some(called)),
+            None => (None, None, None, None),
+        };
         let mut resampled = None;
         let log = match (time, resample) {
             (None, _) => thetahat::Log::new(channels, sample_time),
@@ -71,8 +72,7 @@ impl Log {
         };
         let log = log.map_err(|error| error::batch(py, error))?;
         let rows = Rows::new(1, log.rows()).map_err(|error| error::batch(py, error))?;
-        let clock = has_clock.then(|| "time".to_owned());
-        let source = Source { file: "memory".to_owned(), rows, time: clock, start, resampled };
+        let source = Source { file: "memory".to_owned(), rows, time: called, start, resampled };
         Ok(Self { log: Arc::new(log), sources: vec![source], inputs, output })
     }
 

@@ -201,7 +201,7 @@ def test_what_looks_like_a_clock_is_a_word_of_warning(tmp_path: Path) -> None:
 
 def test_a_log_shows_itself() -> None:
     log = th.Log([1.0, np.nan, 3.0], {"<b>": [0, 1, 0]})
-    assert repr(log) == "Log(3 rows, inputs <b>, output y, sample time 1.0 s)"
+    assert repr(log) == "Log(3 rows, inputs <b>, output y, sample time 1.0 s assumed)"
     page = log._repr_html_()
     assert "<svg" in page and "&lt;b&gt;" in page and "nan" not in page
     assert "<svg" in th.Log(np.full(2000, 5.0))._repr_html_()

@@ -11,8 +11,7 @@ import narwhals.stable.v2 as nw
 import numpy as np
 from numpy.typing import NDArray
 
-from thetahat import _numbers
-from thetahat._log import instants
+from thetahat import _clock, _numbers
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -48,45 +47,40 @@ def columns(frame: Any, names: Sequence[str]) -> dict[str, NDArray[np.float64]]:
     return {name: _numbers.series(f"column {name!r}", _column(table, name)) for name in names}
 
 
-def times(frame: Any, name: str) -> tuple[NDArray[np.float64], str | None]:
-    """A column of times, in seconds.
-
-    Parameters
-    ----------
-    frame : dataframe
-        As for `columns`.
-    name : str
-        The column: dates, instants with or without a time zone, durations, or numbers, which are taken to be seconds.
-
-    Returns
-    -------
-    seconds : numpy.ndarray
-        Of dates and instants those since the first row. A null is NaN.
-    first : str or None
-        The first instant in ISO 8601: of instants with a time zone in UTC and with a Z behind it, of others as they are written.
-        None for durations and numbers.
+def clock(frame: Any, name: str) -> _clock.Clock:
+    """The times in a column, or in the index of pandas that has this name.
 
     Raises
     ------
     TypeError
         If this is no dataframe, or the column does not hold times.
     ValueError
-        If the column is missing or begins with a null, or the frame has no rows.
+        If there is no such column, or the frame has no rows.
     """
-    column = _column(_table(frame), name)
-    second = np.timedelta64(1, "s")
-    if column.dtype == nw.Duration:
-        return np.asarray(column.to_numpy() / second, dtype=np.float64, order="C"), None
-    if not (column.dtype == nw.Datetime or column.dtype == nw.Date):
-        return _numbers.series(f"column {name!r}", column), None
-    if column.dtype == nw.Date:
-        # Midnight. The dates of pandas with pyarrow would come as objects.
-        column = column.cast(nw.Datetime("us"))
-    # With a time zone these are in UTC.
-    seconds, text = instants(f"column {name!r}", column.to_numpy())
-    if getattr(column.dtype, "time_zone", None) is not None:
-        text += "Z"
-    return seconds, text
+    table = _table(frame)
+    index = _clock.common_index([("frame", frame)])
+    there = table.columns
+    if name not in there and index is not None and name == index.name:
+        said = f"the index {name!r}"
+        return _clock.Clock(f"by {said}", _clock.read(said, index), _clock.labels_of(index))
+    if name not in there and index is not None and index.name is not None:
+        message = f"frame: there is no column {name!r}, and the index is called {index.name!r}"
+        raise ValueError(message)
+    said = f"column {name!r}"
+    times = _clock.read(said, _column(table, name).to_native(), name)
+    return _clock.Clock(f"by {said}", times, None if index is None else _clock.labels_of(index), column=True)
+
+
+def clocks(frame: Any, but: Sequence[str]) -> list[str]:
+    """The columns that hold times or texts of instants, but for some."""
+    table = _table(frame)
+
+    def is_clock(name: str) -> bool:
+        dtype = table.schema[name]
+        text = dtype == nw.String or dtype == nw.Object
+        return dtype.is_temporal() or (text and _clock.are_times(table.get_column(name).head(10).to_list()))
+
+    return [name for name in table.columns if name not in but and is_clock(name)]
 
 
 def _table(frame: Any) -> nw.DataFrame[Any]:

@@ -12,8 +12,9 @@ from typing import Any, overload
 import numpy as np
 import numpy.typing as npt
 
-from thetahat import _numbers, _options, _picture, _thetahat
-from thetahat._options import ReadOptions
+from thetahat import _clock, _numbers, _options, _picture, _thetahat
+from thetahat._clock import Clock
+from thetahat._options import Duration, ReadOptions
 
 if sys.version_info >= (3, 11):
     from typing import Unpack
@@ -33,13 +34,15 @@ class Log:
         masked is missing.
     u : array_like, shape (N,) or (N, inputs), or dict of str to array_like, optional
         The inputs, a column for each, or by name; a data frame. Without them the log is a time series.
-    sample_time : float, optional
-        Seconds from one row to the next: 1, unless said otherwise.
+    sample_time : float or timedelta, optional
+        Time from one row to the next: seconds, or a timedelta of Python, NumPy or pandas. Without it and a clock it is assumed
+        to be 1 s; the repr says so.
     time : array_like, shape (N,), optional
-        The clock instead: seconds, or datetime64. Steps may differ from their median by 10 %; one longer than 1.5 medians
-        is a gap.
-    resample : (float, {"linear", "hold"}), optional
-        Makes an irregular clock uniform: seconds between the new rows, and how to read between the old ones.
+        The clock instead: instants with or without a time zone, texts of them in ISO 8601, durations, or seconds. Steps may
+        differ from their median by 10 %; one longer than 1.5 medians is a gap. An index of pandas that all series share is the
+        clock if it holds times; one that counts rows is not.
+    resample : (float or timedelta, {"linear", "hold"}), optional
+        Makes an irregular clock uniform: time between the new rows, and how to read between the old ones.
     input_names : sequence of str, optional
         The names of the inputs: those of the series or of the frame's columns, or ``u``, or ``u1``, ``u2``, …
     output_name : str, optional
@@ -66,27 +69,34 @@ class Log:
     array([0., 0.])
     """
 
-    __slots__ = ("_log",)
+    __slots__ = ("_clock", "_log")
     _log: _thetahat.Log
+    _clock: Clock
 
     def __init__(
         self,
         y: npt.ArrayLike,
         u: _numbers.Columns | None = None,
         *,
-        sample_time: float | None = None,
+        sample_time: Duration | None = None,
         time: npt.ArrayLike | None = None,
-        resample: tuple[float, str] | None = None,
+        resample: tuple[Duration, str] | None = None,
         input_names: Sequence[str] | None = None,
         output_name: str | None = None,
     ) -> None:
         channels = _inputs(u, input_names)
         names = [name for name, _ in channels]
-        output, y = _output(y, output_name)
-        start = None
+        name, values = _output(y, output_name)
+        of_pandas = [("y", y), *(u.items() if isinstance(u, Mapping) else [("u", u)])]
+        index = _clock.common_index(of_pandas if time is None else [*of_pandas, ("time", time)])
+        clock = None
         if time is not None:
-            time, start = _seconds(time)
-        self._log = _made([*channels, (output, y)], names, output, sample_time, time, resample, start)
+            times = _clock.read("time", time)
+            if not times.are_times:
+                # Seconds are what they are.
+                times = times._replace(name="time" if times.name is None else times.name)
+            clock = Clock("by time" if times.are_times else "", times, _labels(index), column=True)
+        self._log, self._clock = _made([*channels, (name, values)], names, name, clock, index, sample_time, resample, "time")
 
     @classmethod
     def from_dataframe(
@@ -95,9 +105,9 @@ class Log:
         *,
         inputs: Sequence[str] | str = (),
         output: str,
-        time: str | None = None,
-        sample_time: float | None = None,
-        resample: tuple[float, str] | None = None,
+        time: str | npt.ArrayLike | None = None,
+        sample_time: Duration | None = None,
+        resample: tuple[Duration, str] | None = None,
     ) -> Log:
         """A log of some columns of a data frame.
 
@@ -109,10 +119,16 @@ class Log:
             The columns that are inputs; none for a time series.
         output : str
             The column that is the output.
-        time : str, optional
-            The column that holds the time: seconds, or dates.
+        time : str or array_like, optional
+            The column that holds the times, or the index of this name, or the times themselves, see `Log`. Without it an index
+            of pandas is the clock if it holds times; one that counts rows is not.
         sample_time, resample
             As for `Log`.
+
+        Warns
+        -----
+        UserWarning
+            If 1 s is assumed where a column or an index may be a clock.
 
         Raises
         ------
@@ -128,15 +144,26 @@ class Log:
         >>> frame = pd.DataFrame({"heater": [0.0, 1.0, 1.0], "temperature": [20.0, 20.0, 20.5]})
         >>> th.Log.from_dataframe(frame, inputs=["heater"], output="temperature", sample_time=2.0)
         Log(3 rows, inputs heater, output temperature, sample time 2.0 s)
+        >>> frame.index = pd.date_range("2026-03-29 01:59", periods=3, freq="min", tz="Europe/Berlin", name="when")
+        >>> th.Log.from_dataframe(frame, inputs="heater", output="temperature")
+        Log(3 rows, inputs heater, output temperature, sample time 60.0 s by the index 'when' from 2026-03-29T01:59:00+01:00)
         """
         from thetahat import _frames
 
         names = [_options.text("inputs", name) for name in ([inputs] if isinstance(inputs, str) else inputs)]
         _options.text("output", output)
         columns = _frames.columns(frame, [*names, output])
-        clock, start = (None, None) if time is None else _frames.times(frame, time)
         channels = [(name, columns[name]) for name in [*names, output]]
-        return cls._of(_made(channels, names, output, sample_time, clock, resample, start))
+        index, clock, argument = _clock.common_index([("frame", frame)]), None, "time"
+        if isinstance(time, str):
+            clock, argument = _frames.clock(frame, time), f"time={time!r}"
+        elif time is not None:
+            clock = Clock("by time", _clock.read("time", time), _labels(index))
+        log, clock = _made(channels, names, output, clock, index, sample_time, resample, argument)
+        if clock.said.startswith("assumed"):
+            for name in _frames.clocks(frame, [*names, output])[:1]:
+                warnings.warn(f"column {name!r} looks like a clock; time={name!r} would use it; 1 s is assumed", stacklevel=2)
+        return cls._of(log, clock)
 
     @classmethod
     def join(cls, logs: Sequence[Log]) -> Log:
@@ -152,14 +179,15 @@ class Log:
         >>> import thetahat as th
         >>> monday, tuesday = th.Log([1.0, 2.0]), th.Log([3.0, 4.0, 5.0])
         >>> th.Log.join([monday, tuesday])
-        Log(5 rows, no inputs, output y, sample time 1.0 s)
+        Log(5 rows, no inputs, output y, sample time 1.0 s assumed)
         """
-        return cls._of(_thetahat.Log.join([handle("logs", log) for log in logs]))
+        joined = _thetahat.Log.join([handle("logs", log) for log in logs])
+        return cls._of(joined, _clock.joined([log._clock for log in logs]))
 
     @classmethod
-    def _of(cls, log: _thetahat.Log) -> Log:
+    def _of(cls, log: _thetahat.Log, clock: Clock) -> Log:
         made = object.__new__(cls)
-        made._log = log
+        made._log, made._clock = log, clock
         return made
 
     @property
@@ -197,6 +225,64 @@ class Log:
             clock = np.arange(len(self), dtype=np.float64) * self.sample_time
         return clock
 
+    def to_pandas(self, **columns: npt.ArrayLike) -> Any:
+        """A data frame of pandas with the index that the log came with, beside its channels what belongs to its rows.
+
+        Parameters
+        ----------
+        **columns : array_like, shape (N,)
+            Further columns by name, such as predictions.
+
+        Returns
+        -------
+        pandas.DataFrame
+            The index is that of the frame that the log was made of, a part of it for a part of the log; of other logs the
+            times, as they were given, or in seconds. A column that held the times is there again.
+
+        Raises
+        ------
+        ValueError
+            If a column has not one value for each row, or is called as a channel.
+        ImportError
+            If pandas is not installed.
+
+        Examples
+        --------
+        >>> import pandas as pd
+        >>> import thetahat as th
+        >>> index = pd.date_range("2026-03-01", periods=4, freq="10s")
+        >>> frame = pd.DataFrame({"fan": [0.0, 1.0, 1.0, 0.0], "room": [20.0, 20.0, 19.5, 19.25]}, index)
+        >>> log = th.Log.from_dataframe(frame, inputs="fan", output="room")
+        >>> model = th.arx(log, na=1, nb=1, detrend="none")
+        >>> log[2:].to_pandas(predicted=model.predict(log)[2:])[["room", "predicted"]].round(3)
+                              room  predicted
+        2026-03-01 00:00:20  19.50     19.625
+        2026-03-01 00:00:30  19.25     19.125
+        """
+        return _clock.to_pandas(self._clock, self.time, self._columns(columns))
+
+    def to_polars(self, **columns: npt.ArrayLike) -> Any:
+        """As `to_pandas`, for Polars: the times are the first column, in seconds where the log has no others.
+
+        Examples
+        --------
+        >>> import thetahat as th
+        >>> th.Log([1.0, 2.0], sample_time=0.5).to_polars(twice=[2.0, 4.0]).rows()
+        [(0.0, 1.0, 2.0), (0.5, 2.0, 4.0)]
+        """
+        return _clock.to_polars(self._clock, self.time, self._columns(columns))
+
+    def _columns(self, columns: Mapping[str, npt.ArrayLike]) -> dict[str, npt.NDArray[np.float64]]:
+        found = {name: self._log.values(name) for name in [*self.inputs, self.output]}
+        for name, column in columns.items():
+            if name in found:
+                raise ValueError(f"{name}: the log has a channel of this name; give the column another")
+            values = _numbers.column(name, column)
+            if len(values) != len(self):
+                raise ValueError(f"{name}: expected {len(self)} values, one for each row of the log, found {len(values)}")
+            found[name] = values
+        return found
+
     def __len__(self) -> int:
         return self._log.rows
 
@@ -223,7 +309,7 @@ class Log:
             raise ValueError(f"rows: a step of {step} leaves some out; give one of 1")
         if stop <= start:
             raise ValueError(f"rows: {start}:{stop} is empty; the log has {len(self)}")
-        return self._of(self._log.part(start + 1, stop))
+        return self._of(self._log.part(start + 1, stop), self._clock.part(start, stop))
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Log):
@@ -241,7 +327,7 @@ class Log:
     __hash__ = None  # type: ignore[assignment]
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return (Log._of, (self._log,))
+        return (Log._of, (self._log, self._clock))
 
     def __copy__(self) -> Log:
         return self
@@ -252,7 +338,7 @@ class Log:
 
     def __repr__(self) -> str:
         inputs = f"inputs {', '.join(self.inputs)}" if self.inputs else "no inputs"
-        return f"Log({len(self)} rows, {inputs}, output {self.output}, sample time {self.sample_time} s)"
+        return f"Log({len(self)} rows, {inputs}, output {self.output}, sample time {self.sample_time} s{self._clock.text()})"
 
     def _repr_html_(self) -> str:
         names = [self.output, *self.inputs]
@@ -314,7 +400,7 @@ def read_csv(
     ...     _ = path.write_text("t,u,y\\n0,1,0\\n0.5,1,0.5\\n1,1,0.75\\n")
     ...     log = th.read_csv(path, time="t")
     >>> log
-    Log(3 rows, inputs u, output y, sample time 0.5 s)
+    Log(3 rows, inputs u, output y, sample time 0.5 s by column 't')
     """
     paths: list[Any] = list(path) if isinstance(path, (list, tuple)) else [path]
     if not paths:
@@ -326,7 +412,9 @@ def read_csv(
     log, notes = _thetahat.Log.read([*words, "--", *map(_options.path_text, paths)])
     for note in notes:
         warnings.warn(note, stacklevel=2)
-    return Log._of(log)
+    named, given = options.get("time"), options.get("sample_time")
+    said = "assumed" if named is None and given is None else "" if named is None else f"by column {named!r}"
+    return Log._of(log, Clock(f"{said}, resampled" if options.get("resample") is not None else said))
 
 
 def dc_motor() -> Log:
@@ -374,42 +462,39 @@ def _output(y: npt.ArrayLike, name: str | None) -> tuple[str, Any]:
     return own if name is None else _options.text("output_name", name), _numbers.column("y", y)
 
 
+def _labels(index: Any) -> _clock.Labels | None:
+    return None if index is None else _clock.labels_of(index)
+
+
 def _made(
     channels: Sequence[tuple[str, Any]],
     inputs: Sequence[str],
     output: str,
-    sample_time: float | None,
-    time: Any,
-    resample: tuple[float, str] | None,
-    start: str | None,
-) -> _thetahat.Log:
-    if time is not None and sample_time is not None:
+    clock: Clock | None,
+    index: Any,
+    sample_time: Duration | None,
+    resample: tuple[Duration, str] | None,
+    argument: str,
+) -> tuple[_thetahat.Log, Clock]:
+    """The compiled log, and its clock: the one given, or an index of pandas; without one the sample time counts."""
+    if clock is None and index is not None:
+        clock = _clock.of_index(index)
+        argument = "index"
+        if clock is not None and sample_time is not None:
+            raise ValueError("sample_time: the index is a clock; leave sample_time out, or drop the index (reset_index in pandas)")
+    if clock is not None and sample_time is not None:
         raise ValueError("sample_time: the log has a clock; give one of time and sample_time")
-    if resample is not None and time is None:
+    if resample is not None and clock is None:
         raise ValueError("resample: it is for logs with a clock; give time too")
     if resample is not None:
         resample = _options.resampling("resample", resample)
-    step = 1.0 if sample_time is None else float(_options.number("sample_time", sample_time))
-    clock = None if time is None else (time, resample, start)
-    return _thetahat.Log(channels, inputs, output, step, clock)
-
-
-def _seconds(time: npt.ArrayLike) -> tuple[Any, str | None]:
-    """Times in seconds, and the first one in words where they are dates."""
-    array = np.asarray(time)
-    if array.dtype.kind == "m":
-        return array / np.timedelta64(1, "s"), None
-    if array.dtype.kind != "M" or array.size == 0:
-        return time, None
-    return instants("time", array)
-
-
-def instants(argument: str, times: npt.NDArray[np.datetime64]) -> tuple[npt.NDArray[np.float64], str]:
-    """Seconds since the first row, NaN for NaT, and the first instant as ISO 8601 writes it."""
-    first = times[0]
-    if np.isnat(first):
-        raise ValueError(f"{argument}: the first row has no time; drop the rows in front of the first time")
-    text = str(np.datetime_as_string(first))
-    if "." in text:
-        text = text.rstrip("0").rstrip(".")
-    return np.ascontiguousarray((times - first) / np.timedelta64(1, "s"), dtype=np.float64), text
+    if clock is None or clock.times is None:
+        step = 1.0 if sample_time is None else _options.seconds("sample_time", sample_time)
+        found = _clock.assumed(index) if sample_time is None else Clock("", None, _labels(index))
+        return _thetahat.Log(channels, inputs, output, step), found
+    times = clock.times
+    seconds = times.seconds(argument)
+    name = "time" if times.name is None else str(times.name)
+    log = _thetahat.Log(channels, inputs, output, 1.0, (seconds, resample, times.start(), name))
+    new = None if resample is None else log.time()
+    return log, clock if new is None else clock.resampled(new)

@@ -459,7 +459,7 @@ class Model:
         future = None if u is None else self._inputs_of(u)
         values, deviations = self._model.forecast(handle("log", log), steps, future, initial)
         time = log.time[-1] + self.sample_time * np.arange(1, steps + 1)
-        return Forecast(time, values, deviations)
+        return Forecast(time, values, deviations, log._clock.after(steps, self.sample_time))
 
     def residuals(self, log: Log, horizon: int = 1, *, initial: str | None = None) -> Array:
         """The measured output less its prediction.

@@ -131,6 +131,16 @@ def twice(names: Sequence[Any]) -> Any:
     return next(name for place, name in enumerate(names) if name in names[:place])
 
 
+def is_number(entry: object) -> bool:
+    """Whether it is a real number; NaN is one."""
+    return isinstance(entry, (numbers.Real, decimal.Decimal, np.bool_))
+
+
+def is_null(entry: object) -> bool:
+    """Whether it stands for what is missing and is no number: None, and `pandas.NA` where pandas is in use."""
+    return entry is None or entry is getattr(sys.modules.get("pandas"), "NA", None)
+
+
 def _of_masked(argument: str, value: np.ma.MaskedArray[Any, Any]) -> Array:
     """What is masked is missing, whatever lies behind the mask."""
     if value.dtype.kind in "biuf":
@@ -150,17 +160,16 @@ def _of_array(argument: str, found: NDArray[Any], value: Any) -> Array:
         raise _no_numbers(argument, f"dtype {found.dtype}")
     if found.ndim == 0:
         raise _no_numbers(argument, _kind(value))
-    missing = _pandas_missing()
     floats = np.empty(found.shape)
     flat = floats.reshape(-1)
     for place, entry in enumerate(found.flat):
-        if entry is None or entry is missing:
-            flat[place] = np.nan
-        elif isinstance(entry, (numbers.Real, decimal.Decimal, np.bool_)):
+        if is_number(entry):
             try:
                 flat[place] = entry
             except (OverflowError, ValueError) as error:
                 raise ValueError(f"{argument}: entry {_place(place, found)}: {error}") from None
+        elif is_null(entry):
+            flat[place] = np.nan
         else:
             raise _no_numbers(argument, f"{entry!r} ({_kind(entry)}) in entry {_place(place, found)}")
     return floats
@@ -169,12 +178,6 @@ def _of_array(argument: str, found: NDArray[Any], value: Any) -> Array:
 def _place(place: int, found: NDArray[Any]) -> str:
     where = np.unravel_index(place, found.shape)
     return str(where[0]) if len(where) == 1 else f"({', '.join(map(str, where))})"
-
-
-def _pandas_missing() -> Any:
-    """`pandas.NA`, where pandas is in use; what is missing to it otherwise is NaN or None."""
-    pandas = sys.modules.get("pandas")
-    return getattr(pandas, "NA", None)
 
 
 def _no_numbers(argument: str, found: object) -> TypeError:

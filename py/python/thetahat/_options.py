@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import datetime
 import math
 import operator
 import os
@@ -24,6 +25,10 @@ Rows = Union[str, slice, range, Sequence[Union[str, slice, range]]]
 
 Bound = Union[float, tuple[Optional[float], Optional[float]]]
 """A value, or the lower and the upper end of a range, either of which may be None."""
+
+
+Duration = Union[float, datetime.timedelta, "np.timedelta64"]
+"""Seconds, or a timedelta of Python, NumPy or pandas."""
 
 
 class FitOptions(TypedDict, total=False):
@@ -123,10 +128,10 @@ class ReadOptions(TypedDict, total=False):
     ----------
     time : str
         The column that holds the times: seconds, or dates.
-    sample_time : float
-        Seconds from one row to the next, where no column holds the time.
-    resample : (float, {"linear", "hold"})
-        Make an irregular log uniform: seconds between the new rows, and how to read between the old ones.
+    sample_time : float or timedelta
+        Time from one row to the next, where no column holds it.
+    resample : (float or timedelta, {"linear", "hold"})
+        Make an irregular log uniform: time between the new rows, and how to read between the old ones.
     time_format : str
         How times are written, in strftime's notation.
     delimiter, comment, encoding : str
@@ -142,8 +147,8 @@ class ReadOptions(TypedDict, total=False):
     """
 
     time: str
-    sample_time: float
-    resample: tuple[float, str]
+    sample_time: Duration
+    resample: tuple[Duration, str]
     time_format: str
     delimiter: str
     comment: str
@@ -239,6 +244,20 @@ def number(name: str, value: Any) -> str:
     return repr(found)
 
 
+def seconds(name: str, value: Any) -> float:
+    """A duration: seconds, or a timedelta."""
+    if isinstance(value, (datetime.timedelta, np.timedelta64)):
+        # NumPy's keeps the nanoseconds of pandas.
+        lasts = value.to_timedelta64() if hasattr(value, "to_timedelta64") else np.timedelta64(value)
+        try:
+            value = lasts / np.timedelta64(1, "s")
+        except TypeError:
+            raise TypeError(f"{name}: {value!r} has no fixed length; give seconds or a timedelta of days or less") from None
+    if isinstance(value, str):
+        raise TypeError(f"{name}: expected seconds or a timedelta, found {value!r}")
+    return float(number(name, value))
+
+
 def text(name: str, value: Any) -> str:
     """The value, if it is a str."""
     if not isinstance(value, str):
@@ -250,7 +269,7 @@ def resampling(name: str, value: Any) -> tuple[float, str]:
     """The step in seconds, and how to read between rows."""
     if not isinstance(value, (tuple, list)) or len(value) != 2:
         raise TypeError(f"{name}: expected (seconds, 'linear' or 'hold'), found {value!r}")
-    return float(number(name, value[0])), text(name, value[1])
+    return seconds(name, value[0]), text(name, value[1])
 
 
 def _flag(name: str, value: Any) -> bool:
@@ -348,7 +367,9 @@ def _texts(name: str, value: Any, rows: int | None) -> list[str]:
     if name in ("alphas", "step"):
         every = value if isinstance(value, (list, tuple)) else [value]
         return [",".join(number(name, one) for one in every)]
-    if name in ("tolerance", "time_limit", "ridge", "noise_bound", "alpha", "sample_time"):
+    if name == "sample_time":
+        return [number(name, seconds(name, value))]
+    if name in ("tolerance", "time_limit", "ridge", "noise_bound", "alpha"):
         return [number(name, value)]
     return [text(name, value)]
 

@@ -9,6 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from thetahat import _clock
+from thetahat._clock import Clock
+
 Array = npt.NDArray[np.float64]
 
 
@@ -25,10 +28,11 @@ class Forecast:
         Those of their errors.
     """
 
-    def __init__(self, time: Array, values: Array, standard_deviations: Array) -> None:
+    def __init__(self, time: Array, values: Array, standard_deviations: Array, clock: Clock | None = None) -> None:
         self.time = time
         self.values = values
         self.standard_deviations = standard_deviations
+        self._clock = Clock() if clock is None else clock
 
     def interval(self, level: float = 0.95) -> tuple[Array, Array]:
         """The lower and the upper ends of intervals that hold the output with this probability."""
@@ -36,6 +40,43 @@ class Forecast:
             raise ValueError(f"level: {level} is not between 0 and 1; give one such as 0.95")
         half = NormalDist().inv_cdf((1 + level) / 2) * self.standard_deviations
         return self.values - half, self.values + half
+
+    def to_pandas(self, level: float = 0.95) -> Any:
+        """A data frame of pandas, whose index goes on from that of the log, or is the time in seconds.
+
+        Where the log's times follow a calendar, such as the first days of months, so do these.
+
+        Parameters
+        ----------
+        level : float, default 0.95
+            The probability with which the intervals from ``lower`` to ``upper`` hold the output.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns ``value``, ``standard_deviation``, ``lower`` and ``upper``.
+
+        Examples
+        --------
+        >>> import pandas as pd
+        >>> import thetahat as th
+        >>> months = pd.date_range("2025-01-01", periods=12, freq="MS")
+        >>> sales = pd.Series([3.0, 4.0, 3.5, 5.0, 4.0, 4.5, 5.5, 5.0, 4.0, 4.5, 5.0, 4.0], months)
+        >>> log = th.Log(sales)
+        >>> th.ar(log, na=1).forecast(log, 2).to_pandas()["value"].round(1)
+        2026-01-01    4.3
+        2026-02-01    4.3
+        Freq: MS, Name: value, dtype: float64
+        """
+        return _clock.to_pandas(self._clock, self.time, self._columns(level))
+
+    def to_polars(self, level: float = 0.95) -> Any:
+        """As `to_pandas`, for Polars: the times are the first column."""
+        return _clock.to_polars(self._clock, self.time, self._columns(level))
+
+    def _columns(self, level: float) -> dict[str, Array]:
+        lower, upper = self.interval(level)
+        return {"value": self.values, "standard_deviation": self.standard_deviations, "lower": lower, "upper": upper}
 
     def __repr__(self) -> str:
         return f"Forecast({len(self.values)} steps from {self.time[0]:g} s)"

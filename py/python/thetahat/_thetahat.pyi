@@ -52,7 +52,7 @@ class Log:
         inputs: Sequence[str],
         output: str,
         sample_time: float,
-        clock: tuple[ArrayLike, tuple[float, str] | None, str | None] | None = None,
+        clock: tuple[ArrayLike, tuple[float, str] | None, str | None, str] | None = None,
     ) -> Log: ...
     @staticmethod
     def read(options: Sequence[str]) -> tuple[Log, list[str]]: ...

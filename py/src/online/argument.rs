@@ -65,23 +65,23 @@ pub(crate) fn check_size(argument: &str, size: usize) -> PyResult<()> {
 
 /// One number, NaN and what pandas writes for a missing one included.
 pub(crate) fn number(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
-    if let Ok(number) = value.cast_exact::<PyFloat>() {
+    // Floats of Python, of which those of NumPy in double precision are a kind.
+    if let Ok(number) = value.cast::<PyFloat>() {
         return Ok(number.value());
-    }
-    if is_missing(value) {
-        return Ok(f64::NAN);
     }
     if value.is_none() {
         return Err(PyTypeError::new_err(format!(
             "{argument}: expected a number, found None; NaN stands for a missing one"
         )));
     }
-    let float = value.is_instance_of::<PyFloat>();
-    if !float && has_no_dimension(value) {
+    if has_no_dimension(value) {
         // Texts of NumPy and what is masked convert to a float, but are no numbers.
         return array::numbers(argument, value)?.extract();
     }
-    if float || is_number(value) {
+    if is_missing(value) {
+        return Ok(f64::NAN);
+    }
+    if is_number(value) {
         return value.extract();
     }
     Err(PyTypeError::new_err(format!("{argument}: expected a number, found {}", kind(value))))

@@ -1,5 +1,7 @@
 //! The syntax of the command line, and nothing else. `job` says what it means.
 
+mod files;
+
 use std::path::PathBuf;
 use std::str::FromStr;
 

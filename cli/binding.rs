@@ -2,6 +2,7 @@
 //! nothing is printed, and nothing is drawn on a terminal.
 
 use std::ffi::OsString;
+use std::path::Path;
 
 use clap::Args;
 use thetahat::{Inspection, Log, Plan, Requirement, Source, ValidationPlan};
@@ -10,6 +11,7 @@ use crate::args::{InspectArguments, ValidateArguments};
 use crate::commands::{Experiments, experiments, inspected};
 use crate::failure::Failure;
 use crate::job::{FitJob, InspectJob, LookJob};
+use crate::replace::replace;
 
 /// Logs that were read as one.
 #[derive(Debug)]
@@ -75,6 +77,14 @@ pub fn inspect(options: &[OsString]) -> Result<Inspection, Failure> {
     let mut job = InspectJob::resolve(&arguments)?;
     job.log.quiet = true;
     Ok(inspected(&job, &arguments)?.0)
+}
+
+/// Writes a file as the program does: whole, or not at all.
+///
+/// # Errors
+/// A [`Failure`] as the program would report it.
+pub fn write(path: &Path, text: &str) -> Result<(), Failure> {
+    replace(path, |file| file.write_all(text.as_bytes()))
 }
 
 /// The arguments of a verb.

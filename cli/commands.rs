@@ -22,6 +22,7 @@ use crate::failure::Failure;
 
 /// `line` is the command line as it was typed.
 pub(crate) fn dispatch(arguments: Arguments, line: &str) -> Result<(), Failure> {
+    arguments.command.files().check()?;
     match arguments.command {
         Command::Fit(arguments) => fit::fit(&arguments, line),
         Command::Inspect(arguments) => inspect::inspect(&arguments, line),

@@ -4,8 +4,10 @@ use std::fmt::Display;
 use std::io;
 use std::path::Path;
 
+use thetahat::text;
+
 use crate::interrupt;
-use crate::output::{harmless, say, tell};
+use crate::output::{say, tell};
 use crate::table;
 
 /// The option that an argument of the library is here, if it is one.
@@ -69,8 +71,8 @@ pub enum Kind {
     Data,
     /// The data cannot determine the model.
     Undetermined,
-    /// A file cannot be read or written.
-    Io,
+    /// A file cannot be read or written, and what the system says of it.
+    Io(io::ErrorKind),
     /// A model does not meet what was asked of it.
     Unmet,
     /// An alarm ended the run, as was asked.
@@ -88,9 +90,14 @@ impl Failure {
         &self.message
     }
 
+    /// The message may repeat names and parts of files: it is shown as [`text::message`] does.
+    fn new(kind: Kind, message: impl AsRef<str>) -> Self {
+        Self { kind, message: text::message(message.as_ref()) }
+    }
+
     /// The command line does not make sense.
-    pub(crate) fn usage(message: impl Into<String>) -> Self {
-        Self { kind: Kind::Usage, message: message.into() }
+    pub(crate) fn usage(message: impl AsRef<str>) -> Self {
+        Self::new(Kind::Usage, message)
     }
 
     /// What the library says of an argument.
@@ -105,22 +112,22 @@ impl Failure {
 
     /// Ctrl-C.
     pub(crate) fn interrupted() -> Self {
-        Self { kind: Kind::Interrupted, message: String::new() }
+        Self::new(Kind::Interrupted, "")
     }
 
     /// The log or the report does not hold what was asked of it.
-    pub(crate) fn data(message: impl Into<String>) -> Self {
-        Self { kind: Kind::Data, message: message.into() }
+    pub(crate) fn data(message: impl AsRef<str>) -> Self {
+        Self::new(Kind::Data, message)
     }
 
     /// A model does not meet what was asked of it.
-    pub(crate) fn unmet(message: impl Into<String>) -> Self {
-        Self { kind: Kind::Unmet, message: message.into() }
+    pub(crate) fn unmet(message: impl AsRef<str>) -> Self {
+        Self::new(Kind::Unmet, message)
     }
 
     /// An alarm ended the run, as was asked.
-    pub(crate) fn alarm(message: impl Into<String>) -> Self {
-        Self { kind: Kind::Alarm, message: message.into() }
+    pub(crate) fn alarm(message: impl AsRef<str>) -> Self {
+        Self::new(Kind::Alarm, message)
     }
 
     /// Whether nobody reads the output any more.
@@ -131,14 +138,19 @@ impl Failure {
     /// A file cannot be read or written.
     pub(crate) fn io(path: &Path, what: impl Display, error: &io::Error) -> Self {
         if error.kind() == io::ErrorKind::BrokenPipe {
-            return Self { kind: Kind::Closed, message: String::new() };
+            return Self::new(Kind::Closed, "");
         }
         let remedy = match error.kind() {
             io::ErrorKind::StorageFull => "make room on the disk",
             io::ErrorKind::IsADirectory => "name a file in it",
             _ => "check the path and its permissions",
         };
-        Self { kind: Kind::Io, message: format!("{}: {what}: {error}; {remedy}", path.display()) }
+        Self::new(Kind::Io(error.kind()), format!("{}: {what}: {error}; {remedy}", path.display()))
+    }
+
+    /// Another run has the file.
+    pub(crate) fn busy(message: impl AsRef<str>) -> Self {
+        Self::new(Kind::Io(io::ErrorKind::ResourceBusy), message)
     }
 
     /// Standard output cannot be written.
@@ -155,12 +167,12 @@ impl Failure {
             thetahat::Error::Data { row, .. } => (Kind::Data, *row),
             _ => (Kind::Data, None),
         };
-        Self { kind, message: format!("{}: {error}", place(row)) }
+        Self::new(kind, format!("{}: {error}", place(row)))
     }
 
     /// The same, with the file that it is about in front.
     pub(crate) fn of(self, path: &Path) -> Self {
-        Self { message: format!("{}: {}", path.display(), self.message), ..self }
+        Self::new(self.kind, format!("{}: {}", path.display(), self.message))
     }
 
     /// Says it on standard error and gives the exit code.
@@ -174,14 +186,14 @@ impl Failure {
             Kind::Usage => 2,
             Kind::Data => 3,
             Kind::Undetermined => 4,
-            Kind::Io => 5,
+            Kind::Io(_) => 5,
             Kind::Unmet => 6,
             Kind::Alarm => {
-                tell(&harmless(&self.message));
+                tell(&self.message);
                 return 7;
             }
         };
-        tell(&format!("\x1b[1;31merror:\x1b[0m {}", harmless(&self.message)));
+        tell(&format!("\x1b[1;31merror:\x1b[0m {}", self.message));
         code
     }
 }
@@ -189,9 +201,9 @@ impl Failure {
 impl From<table::Error> for Failure {
     fn from(error: table::Error) -> Self {
         let kind = match error.kind() {
-            table::ErrorKind::Io => Kind::Io,
+            table::ErrorKind::Io => Kind::Io(io::ErrorKind::Other),
             table::ErrorKind::Data => Kind::Data,
         };
-        Self { kind, message: error.to_string() }
+        Self::new(kind, error.to_string())
     }
 }

@@ -27,7 +27,7 @@ pub(crate) use filter::FilterJob;
 pub(crate) use fit::FitJob;
 pub(crate) use grey::GreyJob;
 pub(crate) use inspect::InspectJob;
-pub(crate) use track::{StateJob, TrackJob};
+pub(crate) use track::TrackJob;
 pub(crate) use validate::LookJob;
 
 /// How to read a log.

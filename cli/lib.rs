@@ -12,6 +12,7 @@ mod args;
 mod binding;
 mod commands;
 mod failure;
+mod files;
 mod interrupt;
 mod job;
 mod line_writer;
@@ -20,6 +21,7 @@ mod log;
 mod memory;
 mod output;
 mod progress;
+mod replace;
 mod shell;
 mod table;
 mod wrap;
@@ -27,8 +29,9 @@ mod wrap;
 use std::ffi::OsString;
 
 use clap::Parser;
+use thetahat::text;
 
-pub use binding::{Opened, inspect, plan, read, validation_plan};
+pub use binding::{Opened, inspect, plan, read, validation_plan, write};
 pub use commands::demo::LOG as DEMO_LOG;
 pub use commands::summary::{comparison, inspection, table, validation};
 pub use failure::{Failure, Kind};
@@ -42,8 +45,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let arguments = match args::Arguments::try_parse_from(&words) {
         Ok(arguments) => arguments,
         Err(error) => {
-            // Help and version come this way too, with code 0. Nobody is left to tell that printing failed.
-            let _ = error.print();
+            // Help and version come this way too, with code 0.
+            print(&error);
             return u8::try_from(error.exit_code()).unwrap_or(2);
         }
     };
@@ -51,5 +54,16 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     match commands::dispatch(arguments, &shell::line(&words)) {
         Ok(()) => 0,
         Err(failure) => failure.report(),
+    }
+}
+
+/// Prints what the syntax of a command line says. Nobody is left to tell if that fails.
+fn print(error: &clap::Error) {
+    let plain = error.render().to_string();
+    if plain.lines().any(|line| line.contains(text::is_unseen)) {
+        // A file's name, which may hold anything, stood for a pattern of the shell.
+        plain.lines().for_each(|line| output::say(&text::harmless(line)));
+    } else {
+        let _ = error.print();
     }
 }

@@ -4,10 +4,10 @@ use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Seek, SeekFrom, Stdout, Write};
 use std::path::{Path, PathBuf};
 
-use memchr::memchr3;
+use thetahat::text;
 
 use crate::failure::Failure;
-use crate::interrupt;
+use crate::{interrupt, output, replace};
 
 /// How a line is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,6 +48,13 @@ pub(crate) struct Written {
     end: Vec<u8>,
 }
 
+impl Written {
+    /// Whether its numbers fit together.
+    pub(crate) fn is_sound(&self) -> bool {
+        self.lines <= self.bytes && self.end.len() as u64 == self.bytes.min(KNOWN_BY as u64)
+    }
+}
+
 enum Sink {
     Stdout(Stdout),
     File(File),
@@ -56,7 +63,7 @@ enum Sink {
 struct Column {
     /// `"name":`
     key: Vec<u8>,
-    /// The name, between quotes if CSV needs them.
+    /// The name as CSV has it.
     title: Vec<u8>,
 }
 
@@ -66,7 +73,15 @@ impl LineWriter {
         let sink = if path == Path::new("-") {
             Sink::Stdout(io::stdout())
         } else {
-            Sink::File(File::create(path).map_err(|error| Failure::io(path, "cannot be written", &error))?)
+            let failed = |error| Failure::io(path, "cannot be written", &error);
+            let mut options = OpenOptions::new();
+            // It is emptied only once nobody else writes it.
+            let file = options.write(true).create(true).truncate(false).open(path).map_err(failed)?;
+            if is_file(&file) {
+                replace::lock(path, &file)?;
+                file.set_len(0).map_err(failed)?;
+            }
+            Sink::File(file)
         };
         let mut lines = Self::begin(path, sink, format, names, Written::default());
         if format == Format::Csv {
@@ -109,6 +124,7 @@ impl LineWriter {
         let metadata = file.metadata().map_err(failed)?;
         let cut = metadata.is_file().then_some(written.bytes);
         if cut.is_some() {
+            replace::lock(path, &file)?;
             let known = (written.end.len() as u64).min(written.bytes);
             if metadata.len() < written.bytes {
                 return Err(other(format!("it has {} bytes", metadata.len())));
@@ -125,10 +141,9 @@ impl LineWriter {
     }
 
     fn begin(path: &Path, sink: Sink, format: Format, names: &[String], written: Written) -> Self {
-        let columns = names.iter().map(|name| Column {
-            key: format!("{}:", serde_json::Value::from(name.as_str())).into_bytes(),
-            title: quoted(name),
-        });
+        let columns = names
+            .iter()
+            .map(|name| Column { key: format!("{}:", text::json(name)).into_bytes(), title: quoted(name) });
         Self {
             path: path.to_owned(),
             sink,
@@ -184,7 +199,7 @@ impl LineWriter {
     pub(crate) fn sync(&mut self) -> Result<(), Failure> {
         self.flush()?;
         if let Sink::File(file) = &self.sink
-            && file.metadata().is_ok_and(|metadata| metadata.is_file())
+            && is_file(file)
         {
             return file.sync_data().map_err(|error| Failure::io(&self.path, "cannot be written", &error));
         }
@@ -223,13 +238,13 @@ impl Cells<'_> {
     /// A word.
     pub(crate) fn word(&mut self, word: &str) {
         let csv = self.lines.format == Format::Csv;
-        self.cell(|buffer| match csv {
-            // Words are short and plain: that is seen sooner than they are copied through a writer.
-            true if memchr3(b',', b'"', b'\n', word.as_bytes()).is_none() => {
-                buffer.extend_from_slice(word.as_bytes());
-            }
-            true => buffer.extend_from_slice(&quoted(word)),
-            false => drop(serde_json::to_writer(buffer, word)),
+        // Words are short, and plain but for names: that is seen sooner than they are copied through a writer.
+        let plain = word.bytes().all(|byte| byte.is_ascii_alphanumeric() || b" _:.".contains(&byte));
+        self.cell(|buffer| match (csv, plain) {
+            (true, true) => buffer.extend_from_slice(word.as_bytes()),
+            (true, false) => buffer.extend_from_slice(&quoted(word)),
+            (false, true) => drop(serde_json::to_writer(buffer, word)),
+            (false, false) => buffer.extend_from_slice(text::json(word).as_bytes()),
         });
     }
 
@@ -269,11 +284,16 @@ impl Cells<'_> {
     }
 }
 
-/// A field of a CSV: as it is, or between quotes if it needs them (RFC 4180).
-fn quoted(word: &str) -> Vec<u8> {
+/// Whether it is no device and no pipe.
+fn is_file(file: &File) -> bool {
+    file.metadata().is_ok_and(|metadata| metadata.is_file())
+}
+
+/// A name as a field of a CSV: [`output::cell`], between quotes if it needs them (RFC 4180).
+fn quoted(name: &str) -> Vec<u8> {
     let mut csv = csv::Writer::from_writer(Vec::new());
     // A vector takes all that is written to it.
-    let _ = csv.write_record([word]);
+    let _ = csv.write_record([output::cell(name)]);
     let mut field = csv.into_inner().unwrap_or_default();
     field.pop();
     field

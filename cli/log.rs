@@ -3,7 +3,7 @@
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
-use thetahat::{Channel, Error, Log, Recording, Resampling, Rows, Source, Times};
+use thetahat::{Channel, Error, Log, Recording, Resampling, Rows, Source, Times, text};
 
 use crate::failure::Failure;
 use crate::interrupt;
@@ -219,22 +219,14 @@ fn find(name: &str, header: &[String]) -> Result<usize, String> {
     match (found.next(), found.next()) {
         (Some((column, _)), None) => Ok(column),
         (Some(_), Some(_)) => Err(format!("two columns are called '{name}'; rename one of them")),
-        _ => Err(format!("there is no column '{}'; there are: {}", brief(name), listed(header))),
+        _ => Err(format!("there is no column '{}'; there are: {}", text::brief(name, 40), listed(header))),
     }
 }
 
 /// The names of columns as a message lists them: not all of very many, and not all of a very long one.
 pub(crate) fn listed(header: &[String]) -> String {
     const MOST: usize = 12;
-    let names: Vec<String> = header.iter().take(MOST).map(|name| brief(name)).collect();
+    let names: Vec<String> = header.iter().take(MOST).map(|name| text::brief(name, 24)).collect();
     let more = if header.len() > MOST { format!(", … ({} in all)", header.len()) } else { String::new() };
     format!("{}{more}", names.join(", "))
-}
-
-pub(crate) fn brief(name: &str) -> String {
-    const LONGEST: usize = 24;
-    match name.char_indices().nth(LONGEST) {
-        Some((end, _)) => format!("{}…", &name[..end]),
-        None => name.to_owned(),
-    }
 }

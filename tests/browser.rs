@@ -12,8 +12,7 @@ use std::time::{Duration, Instant};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-/// After this long a browser that does not answer has failed.
-const PATIENCE: Duration = Duration::from_secs(60);
+use crate::harness::HANGS;
 
 /// One browser at a time: they take all there is of the machine.
 static ALONE: Mutex<()> = Mutex::new(());
@@ -105,7 +104,7 @@ impl Browser {
         bytes.push(0);
         self.requests.write_all(&bytes).expect("the browser listens");
         loop {
-            let answer = self.answers.recv_timeout(PATIENCE).expect("the browser answers in time");
+            let answer = self.answers.recv_timeout(HANGS).expect("the browser answers in time");
             if answer["id"] == json!(self.last) {
                 assert!(answer["error"].is_null(), "{method}: {}", answer["error"]);
                 return answer["result"].clone();
@@ -126,7 +125,7 @@ impl Browser {
     pub(crate) fn wait_for(&mut self, expression: &str) {
         let start = Instant::now();
         while self.value(expression) != json!(true) {
-            assert!(start.elapsed() < PATIENCE, "{expression} does not become true");
+            assert!(start.elapsed() < HANGS, "{expression} does not become true");
             thread::sleep(Duration::from_millis(20));
         }
     }

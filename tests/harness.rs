@@ -4,9 +4,14 @@ use std::fs;
 use std::io::Write;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
+use std::time::Duration;
 
 use serde_json::Value;
 use tempfile::TempDir;
+
+/// So long a test waits for something that has to happen before it takes it for lost. Nothing else depends on the clock: a
+/// loaded machine is slow, not wrong.
+pub(crate) const HANGS: Duration = Duration::from_secs(120);
 
 /// A temporary folder in which the program runs.
 pub(crate) struct Folder(TempDir);
@@ -22,6 +27,8 @@ pub(crate) struct Run {
 
 impl Folder {
     pub(crate) fn new() -> Self {
+        #[cfg(unix)]
+        handle_signals();
         Self(TempDir::new().expect("there is a place for temporary folders"))
     }
 
@@ -101,6 +108,23 @@ impl Folder {
         assert_eq!(run.code, code, "thetahat {line}: {}", run.stderr);
         run.refusal()
     }
+}
+
+/// Gives all that this process starts the default signals, whatever it was started with itself: a script has its jobs in the
+/// background ignore SIGINT, and what is ignored stays so in a new program. What is handled does not (POSIX, `execve`), so this
+/// process handles them, as the default would.
+#[cfg(unix)]
+fn handle_signals() {
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGXFSZ};
+    use signal_hook::flag::register_conditional_default;
+    use std::sync::{Arc, Once, atomic::AtomicBool};
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| {
+        for signal in [SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGXFSZ] {
+            register_conditional_default(signal, Arc::new(AtomicBool::new(true)))
+                .expect("a signal can be handled");
+        }
+    });
 }
 
 impl Run {

@@ -121,6 +121,27 @@ mod unix {
     }
 
     #[test]
+    fn what_a_killed_run_left_is_swept_and_what_a_live_one_writes_is_not() {
+        let folder = Folder::with_log(plain_log());
+        folder.done(&format!("{FIT} --report model.json"));
+        for line in [
+            format!("{FIT} --report model.json"),
+            "predict model.json log.csv -o predicted.csv".to_owned(),
+            "track log.csv --na 1 --nb 1 --state state.json -o lines.jsonl".to_owned(),
+        ] {
+            folder.write(".thetahat-abcdefABCDEF.tmp", "left");
+            folder.write(".thetahat-0123456789ab.tmp", "live");
+            folder.write(".thetahat-config", "mine");
+            let live = File::open(folder.path(".thetahat-0123456789ab.tmp")).unwrap();
+            live.lock().unwrap();
+            folder.done(&line);
+            let hidden: Vec<String> =
+                folder.names().into_iter().filter(|name| name.starts_with('.')).collect();
+            assert_eq!(hidden, [".thetahat-0123456789ab.tmp", ".thetahat-config"], "{line}");
+        }
+    }
+
+    #[test]
     fn a_device_is_written_to_and_not_replaced() {
         let folder = Folder::with_log(plain_log());
         folder.done(&format!("{FIT} --report /dev/null"));

@@ -24,39 +24,19 @@ fn colours_can_be_asked_for_in_a_pipe() {
 
 #[cfg(unix)]
 mod unix {
-    use std::ffi::OsStr;
-    use std::fs::File;
-    use std::io::{Read, Write};
-    use std::os::unix::ffi::OsStrExt;
+    use std::io::Write;
     use std::process::{Child, Command, Stdio};
     use std::time::Duration;
 
-    use rustix::process::{Pid, Signal, kill_process};
-    use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
-    use rustix::termios::{Winsize, tcsetwinsize};
-
     use super::*;
+    use crate::pseudo_terminal::Terminal;
     use crate::signals::Experiment;
 
     /// Runs the program with standard error on a terminal, and gives what that shows.
-    fn on_terminal(mut command: Command, feed: impl FnOnce(&mut Child)) -> String {
-        let ours = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).expect("there is a pseudo-terminal");
-        grantpt(&ours).and_then(|()| unlockpt(&ours)).expect("it is ours");
-        let size = Winsize { ws_row: 24, ws_col: 80, ws_xpixel: 0, ws_ypixel: 0 };
-        tcsetwinsize(&ours, size).expect("it has a size");
-        let name = ptsname(&ours, Vec::new()).expect("it has a name");
-        let theirs = File::options().read(true).write(true).open(OsStr::from_bytes(name.as_bytes()));
-        command.env("TERM", "xterm").stdin(Stdio::piped()).stdout(Stdio::null());
-        command.stderr(theirs.expect("its other side opens"));
-        let mut child = command.spawn().expect("the program starts");
-        // With its other side: reading ends when nobody holds that any more.
-        drop(command);
-        feed(&mut child);
-        let mut shown = Vec::new();
-        // Linux says with an error that the other side is closed.
-        let _ = File::from(ours).read_to_end(&mut shown);
-        child.wait().expect("the program ends");
-        String::from_utf8_lossy(&shown).into_owned()
+    fn on_terminal(command: Command, feed: impl FnOnce(&mut Child)) -> String {
+        let mut terminal = Terminal::start(command);
+        feed(&mut terminal.child);
+        terminal.end().stderr
     }
 
     #[test]
@@ -139,11 +119,10 @@ mod unix {
         let folder = Folder::with_log(Experiment::new(200).csv());
         let line = "fit log.csv --model oe --nb 2 --nf 2 --search gradient --step 1e-6 --max-iterations 1000000 \
                     --tolerance 1e-300 --report model.json";
-        let shown = on_terminal(folder.command(line), |child| {
-            // Patience is a second.
-            std::thread::sleep(Duration::from_millis(1500));
-            kill_process(Pid::from_child(child), Signal::INT).expect("the program runs");
-        });
+        let mut terminal = Terminal::start(folder.command(line));
+        terminal.wait_for("searching");
+        terminal.press_control_c();
+        let shown = terminal.end().stderr;
         let last = shown.rfind("searching").unwrap_or_default();
         assert!(last > 0 && shown[last..].contains("\u{1b}[2K"), "{shown:?}");
         assert!(shown.ends_with("interrupted; nothing was written\r\n"), "{shown:?}");

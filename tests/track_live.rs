@@ -5,17 +5,15 @@ use std::fs::OpenOptions;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Child, ChildStdin, Stdio};
 use std::sync::mpsc::{Receiver, channel};
+use std::thread;
 use std::time::{Duration, Instant};
 
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 
-use crate::harness::{Folder, Run, number};
+use crate::harness::{Folder, HANGS, Run, number};
 use crate::signals::{Experiment, Random, csv};
 use crate::track::objects;
-
-/// What a line may take at most where nothing holds it up. It takes about a millisecond; a loaded machine may need more.
-const SOON: Duration = Duration::from_secs(20);
 
 /// A run with a pipe at each end.
 struct Live {
@@ -31,7 +29,7 @@ impl Live {
         let mut child = command.spawn().expect("the program starts");
         let output = child.stdout.take().expect("standard output is a pipe");
         let (sender, lines) = channel();
-        std::thread::spawn(move || {
+        thread::spawn(move || {
             for line in BufReader::new(output).lines().map_while(Result::ok) {
                 if sender.send(line).is_err() {
                     break;
@@ -47,7 +45,7 @@ impl Live {
     }
 
     fn line(&self) -> Value {
-        let line = self.lines.recv_timeout(SOON).expect("a line comes");
+        let line = self.lines.recv_timeout(HANGS).expect("a line comes");
         serde_json::from_str(&line).expect("it is whole")
     }
 
@@ -75,7 +73,7 @@ fn a_sample_is_told_as_soon_as_it_comes() {
         live.write(&format!("{u},{y}\n"));
         assert_eq!(number(&live.line(), "/row"), row as f64 + 1.0);
         // A slow writer.
-        std::thread::sleep(Duration::from_millis(3));
+        thread::sleep(Duration::from_millis(3));
     }
     // A row in two pieces is told once it is whole.
     live.write("0.5,");
@@ -111,15 +109,12 @@ fn a_file_that_grows_is_followed_by_way_of_tail() {
     }
     drop(lines);
     // The program notices that nobody reads at the next row, and tail that the program is gone at the one after.
-    for _ in 0..100 {
+    let began = Instant::now();
+    while child.try_wait().expect("the shell can be asked").is_none() {
+        assert!(began.elapsed() < HANGS, "the program went on without a reader");
         writeln!(log, "0,0").expect("the log can be written");
-        std::thread::sleep(Duration::from_millis(20));
-        if child.try_wait().expect("the shell can be asked").is_some() {
-            return;
-        }
+        thread::sleep(Duration::from_millis(20));
     }
-    child.kill().expect("the shell can be ended");
-    panic!("the program went on without a reader");
 }
 
 #[test]
@@ -146,14 +141,19 @@ fn a_busy_run_ends_between_two_lines() {
     let Experiment { u, y } = Experiment::new(100_000);
     let folder = Folder::with_log(csv(&[("u", &u), ("y", &y)]));
     for signal in [Signal::INT, Signal::TERM] {
-        let live = Live::start(&folder, &format!("track log.csv {MODEL} --state state.json"));
-        live.line();
-        live.signal(signal);
-        let (_, rest, stderr) = live.end();
-        let last = objects(rest.last().expect("there are lines")).remove(0);
+        let mut command = folder.command(&format!("track log.csv {MODEL} --state state.json"));
+        let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it starts");
+        let mut output = BufReader::new(child.stdout.take().expect("it is a pipe"));
+        let mut lines = String::new();
+        output.read_line(&mut lines).expect("a line comes");
+        // The pipe holds a small part of what is still to come: the run is in its midst for as long as nobody reads.
+        kill_process(Pid::from_child(&child), signal).expect("the program runs");
+        output.read_to_string(&mut lines).expect("lines are text");
+        let run = Run::from(child.wait_with_output().expect("the program ends"));
+        let last = objects(lines.lines().last().expect("there are lines")).remove(0);
         let state: Value = serde_json::from_str(&folder.read("state.json")).expect("it is JSON");
-        assert_eq!(number(&last, "/row"), number(&state, "/rows"), "{stderr}");
-        assert!(number(&state, "/rows") < 100_000.0);
+        assert_eq!(number(&last, "/row"), number(&state, "/rows"), "{}", run.stderr);
+        assert!(lines.ends_with('\n') && number(&state, "/rows") < 100_000.0);
         std::fs::remove_file(folder.path("state.json")).expect("it is there");
     }
 }
@@ -187,32 +187,44 @@ fn saved(folder: &Folder) -> (u64, u64) {
 fn killed_at_any_moment_it_goes_on_as_if_nothing_had_happened() {
     let Experiment { u, y } = Experiment::new(30_000);
     let folder = Folder::with_log(csv(&[("u", &u), ("y", &y)]));
+    let log = folder.read("log.csv");
+    let row_ends: Vec<usize> = log.match_indices('\n').map(|(end, _)| end + 1).collect();
     let options = "--na 2 --nb 2 --forgetting 0.99,0.999 --alarm 2000 --horizon 2";
-    let line = |rest: &str| format!("track log.csv {options} {rest}");
-    let began = Instant::now();
-    let whole = folder.done(&line("")).stdout;
-    // Ten lives together are shorter than the log.
-    let longest = began.elapsed() / 16;
+    let whole = folder.done(&format!("track log.csv {options}")).stdout;
     let mut random = Random::new(2024);
     // On a file, which is cut back to the state each time, and on standard output, which is joined here.
     for out in ["-o lines.jsonl", ""] {
-        let (mut joined, mut moments, mut kills) = (Vec::new(), Vec::new(), 0);
-        while kills < 10 {
-            let (_, from) = saved(&folder);
-            let mut command = folder.command(&line(&format!("--state state.json --save-every 700 {out}")));
+        let line = |log: &str| {
+            format!("track {log} {options} --state state.json --save-every 700 --resume start {out}")
+        };
+        let (mut joined, mut moments) = (Vec::new(), Vec::new());
+        for life in 0..10 {
+            let (before, from) = saved(&folder);
+            let mut command = folder.command(&line("-"));
             let piece = std::fs::File::create(folder.path("piece")).expect("the folder can be written to");
-            command.stdout(piece).stderr(Stdio::null());
-            let mut child = command.spawn().expect("the program starts");
-            // Every other one gets as far as a save, however slow the machine is.
-            let (before, began) = (saved(&folder).0, Instant::now());
-            while kills % 2 == 0 && saved(&folder).0 == before && began.elapsed() < SOON {
-                std::thread::sleep(Duration::from_millis(1));
-            }
-            std::thread::sleep(longest.mul_f64((random.uniform() + 1.0) / 2.0));
-            assert!(child.try_wait().expect("it can be asked").is_none(), "it ended by itself: {moments:?}");
-            kill_process(Pid::from_child(&child), Signal::KILL).expect("the program runs");
-            kills += 1;
-            child.wait().expect("the program ends");
+            let mut child =
+                command.stdin(Stdio::piped()).stdout(piece).stderr(Stdio::null()).spawn().expect("it starts");
+            // It gets the log from its start, some rows more than in the life before, and never its end: it cannot end by itself.
+            let mut input = child.stdin.take().expect("it is a pipe");
+            let given = &log[..row_ends[2_900 * (life + 1) + random.below(100)]];
+            thread::scope(|scope| {
+                let feeder = scope.spawn(move || {
+                    // It ends when the program is killed.
+                    let _ = input.write_all(given.as_bytes());
+                    input
+                });
+                // Every other one gets as far as a save.
+                let began = Instant::now();
+                while life % 2 == 0 && saved(&folder).0 == before {
+                    assert!(began.elapsed() < HANGS, "nothing is saved: {moments:?}");
+                    thread::sleep(Duration::from_millis(1));
+                }
+                thread::sleep(Duration::from_micros(random.below(20_000) as u64));
+                assert!(child.try_wait().expect("it can be asked").is_none(), "it ended: {moments:?}");
+                kill_process(Pid::from_child(&child), Signal::KILL).expect("the program runs");
+                child.wait().expect("the program ends");
+                drop(feeder.join());
+            });
             let (rows, to) = saved(&folder);
             moments.push(rows);
             if out.is_empty() {
@@ -220,15 +232,16 @@ fn killed_at_any_moment_it_goes_on_as_if_nothing_had_happened() {
                 joined.extend_from_slice(&piece[..(to - from) as usize]);
             }
         }
+        // Every other one; before the first there is none to compare with.
         assert!(moments.windows(2).filter(|pair| pair[0] < pair[1]).count() >= 4, "{moments:?}");
-        let (_, from) = saved(&folder);
-        let run = folder.done(&line(&format!("--state state.json --save-every 700 {out}")));
-        assert!(from == 0 || run.stderr.contains("goes on after row"), "{}", run.stderr);
+        let run = folder.done(&line("log.csv"));
+        assert!(run.stderr.contains("goes on after row"), "{}", run.stderr);
         joined.extend_from_slice(run.stdout.as_bytes());
         let joined = if out.is_empty() { joined } else { folder.read("lines.jsonl").into_bytes() };
         assert!(joined == whole.as_bytes(), "{moments:?}: {} and {} bytes", joined.len(), whole.len());
         // At the end of the log there is nothing more to do, and a longer log goes on.
-        assert_eq!(folder.done(&line("--state state.json --save-every 700 -o -")).stdout, "");
+        let again = format!("track log.csv {options} --state state.json --save-every 700 -o -");
+        assert_eq!(folder.done(&again).stdout, "");
         std::fs::remove_file(folder.path("state.json")).expect("it is there");
     }
 }
@@ -345,4 +358,70 @@ fn a_state_that_does_not_fit_is_refused_in_words() {
     assert_eq!(run.code, 3);
     assert!(run.stderr.contains("lines.jsonl: it has 6 bytes, but the state says"), "{}", run.stderr);
     assert_eq!(folder.read("lines.jsonl"), "short\n");
+}
+
+#[test]
+fn one_run_at_a_time_has_a_state_and_an_output() {
+    let Experiment { u, y } = Experiment::new(50);
+    let folder = Folder::with_log(csv(&[("u", &u), ("y", &y)]));
+    let line = |state: &str, out: &str| format!("track log.csv {MODEL} --state {state} -o {out}");
+    let mut live =
+        Live::start(&folder, &format!("track - {MODEL} --state state.json --save-every 1 -o lines.jsonl"));
+    live.write("u,y\n1,2\n2,3\n");
+    let began = Instant::now();
+    while saved(&folder).0 < 2 {
+        assert!(began.elapsed() < HANGS, "nothing is saved");
+        thread::sleep(Duration::from_millis(1));
+    }
+    // Though it was replaced since the run began.
+    let before = (folder.read("state.json"), folder.read("lines.jsonl"));
+    for (state, out, name) in [
+        ("state.json", "other.jsonl", "state.json"),
+        ("other.json", "lines.jsonl", "lines.jsonl"),
+        ("state.json", "lines.jsonl", "state.json"),
+    ] {
+        let refusal = folder.refused(&line(state, out), 5);
+        assert!(refusal.contains(&format!("{name}: another run is writing it")), "{refusal}");
+        assert_eq!((folder.read("state.json"), folder.read("lines.jsonl")), before);
+    }
+    assert_eq!(folder.names(), ["lines.jsonl", "log.csv", "state.json"]);
+    // In whatever way a run ends, the next one has both.
+    live.signal(Signal::KILL);
+    live.end();
+    folder.done(&format!("track log.csv {MODEL} --state state.json -o lines.jsonl --resume now"));
+    assert!(folder.read("lines.jsonl").starts_with(&before.1));
+}
+
+#[test]
+fn a_state_whose_numbers_were_edited_is_refused() {
+    let Experiment { u, y } = Experiment::new(100);
+    let folder = Folder::with_log(csv(&[("u", &u), ("y", &y)]));
+    let line = format!("track log.csv {MODEL} --state state.json");
+    folder.done(&line);
+    let whole: Value = serde_json::from_str(&folder.read("state.json")).expect("it is JSON");
+    for (place, value) in [
+        ("/rows", 0.into()),
+        ("/written/lines", u64::MAX.into()),
+        ("/written/bytes", 1.into()),
+        ("/first", Value::Array(Vec::new())),
+        ("/last/1", "x".into()),
+        ("/pace/sample_time", (-1).into()),
+        ("/gaps", 101.into()),
+        ("/alarms/0", 1000.into()),
+        ("/trackers/0/score/mean_squared_error", (-1.0).into()),
+        ("/trackers/0/score/output_variance", (-1.0).into()),
+        ("/trackers/0/score/mean_nis", (-1.0).into()),
+        ("/trackers/0/score/samples", 101.into()),
+        ("/trackers/0/score/judged", 1000.into()),
+        ("/trackers/0/scales/output", (-2.0).into()),
+        ("/trackers/0/settling", 1000.into()),
+        ("/trackers/0/has_estimate", false.into()),
+    ] {
+        let mut edited = whole.clone();
+        *edited.pointer_mut(place).unwrap_or_else(|| panic!("{place}: {whole:#}")) = value;
+        folder.write("state.json", edited.to_string());
+        let refusal = folder.refused(&line, 3);
+        assert!(refusal.contains("state.json: "), "{place}: {refusal}");
+        assert_eq!(folder.read("state.json"), edited.to_string());
+    }
 }

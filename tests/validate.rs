@@ -205,7 +205,7 @@ fn options_that_make_no_sense_are_usage_errors() {
         ("arx.json log.csv -o log.csv", ["log.csv", "replaced"]),
         ("arx.json log.csv -o arx.json", ["arx.json", "replaced"]),
         ("arx.json log.csv --html log.csv", ["log.csv", "replaced"]),
-        ("arx.json log.csv --html new --out new", ["same file", "name two"]),
+        ("arx.json log.csv --html new --out new", ["new", "two outputs"]),
     ] {
         let line = folder.refused(&format!("validate {words}"), 2);
         for part in parts {

@@ -11,7 +11,6 @@ use crate::output;
 
 pub(crate) fn bode(arguments: &BodeArguments) -> Result<(), Failure> {
     let asked = arguments.frequencies.as_deref().map(range).transpose()?;
-    output::apart(&arguments.out, &arguments.report)?;
     let model = stored::model(&arguments.report)?;
     let nyquist = PI / model.sample_time;
     let (low, high) = asked.unwrap_or((nyquist / 1000.0, nyquist));
@@ -30,7 +29,7 @@ pub(crate) fn bode(arguments: &BodeArguments) -> Result<(), Failure> {
             "phase_standard_error",
         ])?;
         for response in &responses {
-            let name = response.input.as_deref().unwrap_or("noise");
+            let name = output::cell(response.input.as_deref().unwrap_or("noise"));
             for point in &response.points {
                 // What is not a number is left empty.
                 let known = |value: f64| Some(value).filter(|value| value.is_finite());
@@ -39,7 +38,7 @@ pub(crate) fn bode(arguments: &BodeArguments) -> Result<(), Failure> {
                 let (magnitude, spread) = (known(magnitude), standard_error.and_then(known));
                 let (phase, turn) =
                     (degrees(point.phase.value), point.phase.standard_error.and_then(degrees));
-                csv.serialize((name, point.frequency, magnitude, spread, phase, turn))?;
+                csv.serialize((&name, point.frequency, magnitude, spread, phase, turn))?;
             }
         }
         Ok(())

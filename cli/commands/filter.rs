@@ -2,8 +2,6 @@
 
 mod columns;
 
-use std::path::Path;
-
 use thetahat::figures::fixed;
 use thetahat::{FilterSummary, GreyReport, InitialState, Report, StateFilter, StateModel};
 
@@ -21,15 +19,6 @@ use columns::Columns;
 
 pub(crate) fn filter(arguments: &FilterArguments) -> Result<(), Failure> {
     let job = FilterJob::resolve(arguments)?;
-    let outputs: Vec<&Path> = [Some(&job.lines.out), job.summary.as_ref()]
-        .into_iter()
-        .flatten()
-        .map(|path| path.as_path())
-        .collect();
-    output::distinct(&outputs)?;
-    for read in [&job.path, &job.model] {
-        outputs.iter().try_for_each(|written| output::apart(written, read))?;
-    }
     let model = read(&job)?;
     let estimator = job.estimator(&model);
     let filter = StateFilter::new(model, estimator).map_err(|error| match &error {

@@ -23,12 +23,6 @@ pub(crate) fn fit(arguments: &FitArguments, line: &str) -> Result<(), Failure> {
     }
     let job = FitJob::resolve(arguments)?;
     let outputs = [&arguments.report, &arguments.html];
-    for output in outputs.into_iter().flatten() {
-        job.paths.iter().try_for_each(|path| output::apart(output, path))?;
-    }
-    if arguments.html.is_some() && arguments.html == arguments.report {
-        return Err(Failure::usage("--report and --html name the same file; name two"));
-    }
     let logs = experiments(&job)?;
     logs.words.iter().for_each(|word| warn(word));
     let kept = arguments.html.is_some().then(|| logs.log.clone());

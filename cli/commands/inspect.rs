@@ -3,7 +3,7 @@
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
-use thetahat::{Inspection, InspectionPlan, Recording, Times, inspection_page};
+use thetahat::{Inspection, InspectionPlan, Recording, Times, inspection_page, text};
 
 use super::fit::usual_inputs;
 use super::summary;
@@ -17,11 +17,6 @@ use crate::wrap::{WIDTH, stdout_width};
 
 pub(crate) fn inspect(arguments: &InspectArguments, line: &str) -> Result<(), Failure> {
     let job = InspectJob::resolve(arguments)?;
-    output::apart(&arguments.out, &arguments.path)?;
-    if let Some(page) = &arguments.html {
-        output::apart(page, &arguments.path)?;
-        output::apart(page, &arguments.out)?;
-    }
     let (inspection, recording) = inspected(&job, arguments)?;
     if let (Some(path), Some(Recording { channels, times })) = (&arguments.html, recording) {
         let time = match times {
@@ -135,7 +130,7 @@ impl Chosen {
         }
         for (columns, reason) in left_out.iter().zip(REASONS) {
             for &column in columns.iter().take(MOST_TOLD) {
-                let name = log::brief(&names[column]);
+                let name = text::brief(&names[column], 40);
                 self.words.push(format!("column {} ('{name}') is left out: {reason}", column + 1));
             }
             if columns.len() > MOST_TOLD {

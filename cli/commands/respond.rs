@@ -41,8 +41,6 @@ fn respond(arguments: &RespondArguments, horizon: Horizon, initial: Option<Start
     if arguments.report == Path::new("-") && arguments.path == Path::new("-") {
         return Err(Failure::usage("the report and the log cannot both come from standard input"));
     }
-    output::apart(&arguments.out, &arguments.path)?;
-    output::apart(&arguments.out, &arguments.report)?;
     let model = stored::model(&arguments.report)?;
 
     let output = model.output.name.clone();

@@ -9,12 +9,12 @@ mod tracking;
 mod validation;
 
 use thetahat::figures::{error, fixed, number, scientific, short};
+use thetahat::text::harmless;
 use thetahat::{
     Algorithm, CriterionOutcome, Estimation, Fit, Initial, Model, Norm, Orders, Part, Procedure, Quantity,
     Report, Root, Rows, SearchOutcome, Signal, Solver, Start, Stopped, Structure,
 };
 
-use crate::output::harmless;
 pub(crate) use filtered::filtered;
 pub(crate) use grey::grey;
 pub use inspection::inspection;

@@ -13,11 +13,12 @@ use thetahat::{Report, TrackSummary, Tracker};
 use super::{stored, summary};
 use crate::args::TrackArguments;
 use crate::failure::Failure;
-use crate::job::{StateJob, TrackJob};
+use crate::job::TrackJob;
 use crate::line_writer::LineWriter;
 use crate::live::{Live, Next};
 use crate::log;
 use crate::output::{self, say, warn};
+use crate::replace::Held;
 use crate::wrap::{WIDTH, stderr_width};
 use columns::{Columns, Sample};
 use pace::Step;
@@ -25,16 +26,6 @@ use state::{Place, RowPlace, State};
 
 pub(crate) fn track(arguments: &TrackArguments) -> Result<(), Failure> {
     let job = TrackJob::resolve(arguments)?;
-    let state_path = job.state.as_ref().map(|state| state.path.as_path());
-    if state_path == Some(Path::new("-")) {
-        return Err(Failure::usage("--state -: a state is kept in a file; name one"));
-    }
-    let outputs = [Some(job.lines.out.as_path()), state_path, job.summary.as_deref()];
-    let outputs: Vec<&Path> = outputs.into_iter().flatten().collect();
-    output::distinct(&outputs)?;
-    for read in [Some(job.path.as_path()), job.warm.as_deref()].into_iter().flatten() {
-        outputs.iter().try_for_each(|written| output::apart(written, read))?;
-    }
     let report = job.warm.as_deref().map(stored::report).transpose()?;
     let mut run = Run::start(&job, report.as_ref())?;
     // That it cannot be written is better known now than in a week.
@@ -84,6 +75,8 @@ struct Run<'a> {
     /// Whether a row is being taken in.
     midway: bool,
     place: Place,
+    /// The state's file, which no other run may write meanwhile.
+    state_file: Option<Held>,
     /// Memory for standard errors.
     deviations: Vec<f64>,
 }
@@ -91,7 +84,11 @@ struct Run<'a> {
 impl<'a> Run<'a> {
     fn start(job: &'a TrackJob, report: Option<&Report>) -> Result<Self, Failure> {
         let name = job.path.display().to_string();
-        let stored = job.state.as_ref().map(|state| State::read(&state.path)).transpose()?.flatten();
+        let mut state_file = job.state.as_ref().map(|state| Held::open(&state.path)).transpose()?;
+        let stored = match (&mut state_file, &job.state) {
+            (Some(file), Some(state)) => State::read(file, &state.path)?,
+            _ => None,
+        };
         let mut chosen = None;
         let start = stored.as_ref().and_then(|state| state.start.as_deref());
         let (stream, words) = log::follow(&job.path, &job.log, job.state.is_some(), start, |header| {
@@ -141,6 +138,7 @@ impl<'a> Run<'a> {
             unsaved: false,
             midway: false,
             place,
+            state_file,
             deviations: vec![f64::NAN; parameters],
         })
     }
@@ -229,8 +227,7 @@ impl<'a> Run<'a> {
     fn save(&mut self) -> Result<(), Failure> {
         (self.saved, self.unsaved) = (Instant::now(), false);
         self.state.written = self.lines.written();
-        let Some(StateJob { path, .. }) = &self.job.state else { return Ok(()) };
-        self.state.write(path)
+        self.state_file.as_mut().map_or(Ok(()), |file| self.state.write(file))
     }
 
     /// What the trackers have come to.

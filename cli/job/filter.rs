@@ -55,10 +55,6 @@ impl FilterJob {
         if arguments.model == Path::new("-") && arguments.path == Path::new("-") {
             return Err(Failure::usage("only one of the model and the log can come from standard input (-)"));
         }
-        let dash = |path: Option<&PathBuf>| path.is_some_and(|path| path == Path::new("-"));
-        if dash(arguments.lines.summary.as_ref()) && dash(Some(&arguments.lines.out)) {
-            return Err(Failure::usage("the lines and the summary cannot both go to standard output (-)"));
-        }
         Ok(Self {
             model: arguments.model.clone(),
             path: arguments.path.clone(),

@@ -5,7 +5,6 @@ use thetahat::Rows;
 use super::{LogJob, rows};
 use crate::args::FitArguments;
 use crate::failure::Failure;
-use crate::output;
 
 /// A model in equations to fit.
 #[derive(Debug)]
@@ -27,14 +26,10 @@ impl GreyJob {
             log: LogJob::resolve(&arguments.log, &arguments.clock)?,
             estimate: rows("--estimate", &arguments.estimate)?,
         };
-        let read = || job.paths.iter().chain([&job.model]);
-        if read().filter(|path| *path == Path::new("-")).count() > 1 {
+        if job.paths.iter().chain([&job.model]).filter(|path| *path == Path::new("-")).count() > 1 {
             return Err(Failure::usage(
                 "only one of the model and the logs can come from standard input (-)",
             ));
-        }
-        if let Some(report) = &arguments.report {
-            read().try_for_each(|path| output::apart(report, path))?;
         }
         Ok(job)
     }

@@ -87,6 +87,9 @@ impl TrackJob {
                 "only one of the report and the log can come from standard input (-)",
             ));
         }
+        if arguments.state.as_deref() == Some(Path::new("-")) {
+            return Err(Failure::usage("--state -: a state is kept in a file; name one"));
+        }
         Ok(Self {
             path: arguments.path.clone(),
             log,

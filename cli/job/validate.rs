@@ -5,7 +5,6 @@ use thetahat::{Detrend, Requirement, ValidationPlan};
 use super::{LogJob, parsed, rows};
 use crate::args::LookArguments;
 use crate::failure::Failure;
-use crate::output;
 
 /// How to look at a log with one model or several.
 #[derive(Debug)]
@@ -35,12 +34,6 @@ impl LookJob {
             alphas: arguments.alphas.clone(),
         };
         plan.check().map_err(|error| Failure::option(&error))?;
-        if arguments.html.is_some() && arguments.html == arguments.out {
-            return Err(Failure::usage("--out and --html name the same file; name two"));
-        }
-        for output in [&arguments.out, &arguments.html].into_iter().flatten() {
-            read.iter().try_for_each(|path| output::apart(output, path))?;
-        }
         Ok(Self { log: LogJob::resolve(&arguments.log, &arguments.clock)?, plan })
     }
 

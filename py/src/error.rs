@@ -1,7 +1,9 @@
 //! The one map of errors: what the libraries say, as Python raises it.
 
+use std::io;
+
 use pyo3::create_exception;
-use pyo3::exceptions::{PyException, PyKeyboardInterrupt, PyOSError, PyValueError};
+use pyo3::exceptions::{PyException, PyKeyboardInterrupt, PyValueError};
 use pyo3::prelude::*;
 
 create_exception!(
@@ -53,7 +55,7 @@ pub(crate) fn program(py: Python<'_>, failure: &thetahat_cli::Failure) -> PyErr 
     match failure.kind() {
         thetahat_cli::Kind::Interrupted => PyKeyboardInterrupt::new_err(()),
         thetahat_cli::Kind::Undetermined => undetermined(py, message, Vec::new()),
-        thetahat_cli::Kind::Io => PyOSError::new_err(message),
+        thetahat_cli::Kind::Io(kind) => io::Error::new(kind, message).into(),
         _ => PyValueError::new_err(message),
     }
 }
@@ -68,9 +70,12 @@ fn undetermined(py: Python<'_>, message: String, parameters: Vec<String>) -> PyE
 
 /// A message that names options of the command line, with the keyword arguments that they are here: `--sample-time 0` is
 /// `sample_time 0`.
+///
+/// It may repeat names and parts of files, and goes to a terminal: it is bounded, and what is not seen is an escape.
 pub(crate) fn in_python(message: &str) -> String {
+    let message = thetahat::text::message(message);
     let mut text = String::with_capacity(message.len());
-    let mut rest = message;
+    let mut rest = message.as_str();
     while let Some(start) = rest.find("--") {
         let (before, option) = (&rest[..start], &rest[start + 2..]);
         let length = option.bytes().take_while(|byte| byte.is_ascii_lowercase() || *byte == b'-').count();

@@ -12,6 +12,7 @@ mod online;
 mod work;
 
 use std::ffi::OsString;
+use std::path::PathBuf;
 
 use pyo3::prelude::*;
 
@@ -31,6 +32,7 @@ fn _thetahat(module: &Bound<'_, PyModule>) -> PyResult<()> {
     online::register(module)?;
     work::register(module)?;
     module.add_function(wrap_pyfunction!(in_python, module)?)?;
+    module.add_function(wrap_pyfunction!(write, module)?)?;
     module.add_function(wrap_pyfunction!(run, module)?)
 }
 
@@ -38,6 +40,12 @@ fn _thetahat(module: &Bound<'_, PyModule>) -> PyResult<()> {
 #[pyfunction]
 fn run(py: Python<'_>, words: Vec<OsString>) -> PyResult<u8> {
     work::blocking(py, || thetahat_cli::run(words))
+}
+
+/// Writes a text to a file, which holds either all of it or what it held before.
+#[pyfunction]
+fn write(py: Python<'_>, path: PathBuf, text: &str) -> PyResult<()> {
+    py.detach(|| thetahat_cli::write(&path, text)).map_err(|failure| error::program(py, &failure))
 }
 
 /// A message of the command line with the keyword arguments that its options are here.

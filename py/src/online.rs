@@ -141,5 +141,5 @@ fn restore_function(py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
 fn read<T: DeserializeOwned>(kept: &Bound<'_, PyAny>) -> PyResult<T> {
     let bytes = kept.cast::<PyBytes>()?;
     serde_json::from_slice(bytes.as_bytes())
-        .map_err(|error| PyValueError::new_err(format!("not a snapshot: {error}")))
+        .map_err(|error| PyValueError::new_err(crate::error::in_python(&format!("not a snapshot: {error}"))))
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from pathlib import Path
 
 import matplotlib
@@ -10,6 +11,11 @@ import pytest
 import thetahat as th
 
 matplotlib.use("Agg")
+
+# A script has its jobs in the background ignore SIGINT, and what is ignored stays so in all that they start.
+for number in (signal.SIGINT, signal.SIGTERM):
+    if signal.getsignal(number) is signal.SIG_IGN:
+        signal.signal(number, signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL)
 
 
 @pytest.fixture

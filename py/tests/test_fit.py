@@ -220,21 +220,22 @@ def test_fits_at_once_give_the_same_bytes(log: th.Log) -> None:
 
 
 def test_others_run_while_a_fit_does(log: th.Log) -> None:
-    counted, ended = 0, threading.Event()
+    fits, ended = 0, threading.Event()
 
     def fit() -> None:
-        for _ in range(5):
+        nonlocal fits
+        while not ended.is_set():
             th.oe(log, 6, 6)
-        ended.set()
+            fits += 1
 
     thread = threading.Thread(target=fit)
     thread.start()
-    while not ended.is_set():
-        counted += 1
+    for _ in range(100):
         time.sleep(0)
+    ended.set()
     thread.join()
-    # With the interpreter lock held there would be a turn between two fits at most.
-    assert counted > 1000
+    # With the interpreter lock held there would be a fit or more between two turns.
+    assert fits < 25
 
 
 def test_threads_may_ask_one_model_at_once(log: th.Log) -> None:
@@ -259,18 +260,18 @@ def test_a_forked_process_can_fit_too(log: th.Log) -> None:
 def test_control_c_ends_a_search(tmp_path: Path) -> None:
     script = tmp_path / "long.py"
     script.write_text(
-        "import _thread, threading, time, numpy as np, thetahat as th\n"
+        "import _thread, threading, numpy as np, thetahat as th\n"
         "random = np.random.default_rng(0)\n"
         "log = th.Log(random.standard_normal(4_000), random.standard_normal(4_000))\n"
-        "threading.Timer(1.0, _thread.interrupt_main).start()\n"
-        "began = time.monotonic()\n"
         "try:\n"
+        "    threading.Timer(1.0, _thread.interrupt_main).start()\n"
         "    th.bj(log, 4, 4, 4, 4, starts=10_000)\n"
         "except KeyboardInterrupt:\n"
-        "    print('ended', time.monotonic() - began < 20)\n"
+        "    print('ended')\n"
     )
     found = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, timeout=120, check=False)
-    assert found.stdout.strip() == "ended True", found.stderr
+    # By itself the search would take hours.
+    assert found.stdout.strip() == "ended", found.stderr
 
 
 def test_the_document_is_json_with_a_line_break(log: th.Log) -> None:

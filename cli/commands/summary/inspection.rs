@@ -1,11 +1,10 @@
 //! An inspection as a table for people.
 
 use thetahat::figures::{chance, fixed, number, short};
+use thetahat::text::{brief, harmless};
 use thetahat::{ChannelQuality, Excitation, Inspection, SpectrumPoint};
 
 use super::text::{Text, columns, or_dash};
-use crate::log;
-use crate::output::harmless;
 
 /// So many channels, and warnings, are shown of very many.
 const MOST: usize = 10;
@@ -60,7 +59,7 @@ fn clock(inspection: &Inspection) -> String {
 }
 
 fn name(name: &str) -> String {
-    harmless(&log::brief(name))
+    brief(name, 24)
 }
 
 fn values(text: &mut Text, channels: &[ChannelQuality]) {

@@ -6,6 +6,7 @@ use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, Width, pr
 use textwrap::core::display_width;
 use thetahat::Root;
 use thetahat::figures::{error, number};
+use thetahat::text::harmless;
 
 use crate::wrap::wrapped;
 
@@ -34,8 +35,11 @@ impl Text {
 
     /// Appends a line as it is, such as one to be typed.
     pub(super) fn verbatim(&mut self, content: &str) {
-        self.lines.push_str(content);
-        self.lines.push('\n');
+        // Names in it come from files.
+        for line in content.split('\n') {
+            self.lines.push_str(&harmless(line));
+            self.lines.push('\n');
+        }
     }
 
     /// Appends a table, what its signs mean, and an empty line. What is too wide goes on below, the first column again in front.
@@ -81,7 +85,7 @@ pub(super) struct Table {
 /// A table of columns with these names: words in the first one, and figures in the others.
 pub(super) fn columns(names: &[&str]) -> Table {
     Table {
-        head: names.iter().map(|name| (*name).to_owned()).collect(),
+        head: names.iter().map(|name| harmless(name)).collect(),
         rows: Vec::new(),
         words: vec![0],
         none: "not known",
@@ -108,7 +112,7 @@ impl Table {
     }
 
     pub(super) fn row(&mut self, cells: impl IntoIterator<Item = String>) {
-        self.rows.push(cells.into_iter().collect());
+        self.rows.push(cells.into_iter().map(|cell| harmless(&cell)).collect());
     }
 
     /// The columns of each part that is not too wide. The first column, half as wide at most, is in all of them.

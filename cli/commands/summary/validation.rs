@@ -1,11 +1,11 @@
 //! Validations and comparisons as tables for people.
 
 use thetahat::figures::{chance, fixed, number, short, three};
+use thetahat::text::harmless;
 use thetahat::{Comparison, Coverage, Horizon, Independence, Requirement, Seen, Test, Validation};
 
 use super::text::{Text, columns, or_dash, some};
 use super::{MOST, fits, orders_legend, rows};
-use crate::output::harmless;
 
 /// The level of the intervals of which a comparison says the coverage.
 const LEVEL: f64 = 0.95;

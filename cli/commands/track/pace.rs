@@ -25,6 +25,12 @@ impl Pace {
         Self { sample_time, last: None }
     }
 
+    /// Whether its numbers fit together.
+    pub(super) fn is_sound(&self) -> bool {
+        self.sample_time.is_none_or(|step| step.is_finite() && step > 0.0)
+            && self.last.is_none_or(f64::is_finite)
+    }
+
     /// Seconds from one sample to the next, if they are known yet.
     pub(super) fn sample_time(&self) -> Option<f64> {
         self.sample_time

@@ -1,11 +1,9 @@
 //! The state of a run, kept in a file: a run that was ended, even in the middle of a row, goes on from it.
 
-use std::fs;
-use std::io;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
-use thetahat::{PerChannel, Tracker};
+use thetahat::{PerChannel, Tracker, text};
 
 use super::pace::Pace;
 use crate::args::ResumeArgument;
@@ -14,7 +12,7 @@ use crate::failure::Failure;
 use crate::job::{Clock, TrackJob};
 use crate::line_writer::{Format, Written};
 use crate::live::Live;
-use crate::output;
+use crate::replace::Held;
 
 /// The version that this program writes.
 const SCHEMA: &str = "thetahat.track-state/1";
@@ -66,17 +64,13 @@ impl State {
     }
 
     /// Reads a state; none if there is no file yet.
-    pub(super) fn read(path: &Path) -> Result<Option<Self>, Failure> {
+    pub(super) fn read(file: &mut Held, path: &Path) -> Result<Option<Self>, Failure> {
         #[derive(Deserialize)]
         struct Head {
             schema: String,
         }
         let bad = |message: String| Failure::data(format!("{}: {message}", path.display()));
-        let bytes = match fs::read(path) {
-            Ok(bytes) => bytes,
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
-            Err(error) => return Err(Failure::io(path, "cannot be read", &error)),
-        };
+        let Some(bytes) = file.read()? else { return Ok(None) };
         let malformed = |error: serde_json::Error| {
             bad(format!(
                 "this is no state of thetahat track: {error}; name another file, or remove it to start anew"
@@ -84,17 +78,30 @@ impl State {
         };
         let head: Head = serde_json::from_slice(&bytes).map_err(malformed)?;
         if head.schema != SCHEMA {
-            let shown: String = head.schema.chars().take(60).flat_map(char::escape_debug).collect();
             return Err(bad(format!(
-                "this state is of version '{shown}', this program reads '{SCHEMA}'; remove it to start anew, or use the \
-                 program that wrote it"
+                "this state is of version '{}', this program reads '{SCHEMA}'; remove it to start anew, or use the \
+                 program that wrote it",
+                text::brief(&head.schema, 40)
             )));
         }
         let state: Self = serde_json::from_slice(&bytes).map_err(malformed)?;
-        if state.trackers.len() != state.alarms.len() || state.trackers.is_empty() {
+        if !state.is_sound() {
             return Err(bad("its parts do not fit together; remove it to start anew".to_owned()));
         }
         Ok(Some(state))
+    }
+
+    /// Whether its own parts fit together, as they do if nobody has edited it. The trackers are looked at beside new ones.
+    fn is_sound(&self) -> bool {
+        let Self { rows, written, first, last, pace, gaps, alarms, trackers, .. } = self;
+        !trackers.is_empty()
+            && trackers.len() == alarms.len()
+            && alarms.iter().all(|alarms| alarms <= rows)
+            && gaps <= rows
+            && first.len() == last.len()
+            && (*rows == 0) == first.is_empty()
+            && written.is_sound()
+            && pace.is_sound()
     }
 
     /// This state, if it is of the same model and options.
@@ -122,6 +129,7 @@ impl State {
                 && mine.names() == new.names()
                 && mine.plan() == new.plan()
                 && mine.is_sound()
+                && mine.score().samples() <= self.rows
         };
         if self.trackers.len() != trackers.len() || !self.trackers.iter().zip(trackers).all(fits) {
             return Err(Failure::data(format!(
@@ -133,10 +141,10 @@ impl State {
     }
 
     /// Writes it: the file holds the old state or this one, whatever happens.
-    pub(super) fn write(&self, path: &Path) -> Result<(), Failure> {
+    pub(super) fn write(&self, file: &mut Held) -> Result<(), Failure> {
         let mut json = serde_json::to_vec(self).map_err(|error| Failure::data(error.to_string()))?;
         json.push(b'\n');
-        output::write(path, |file| file.write_all(&json))
+        file.write(&json)
     }
 
     /// Keeps what the row that was just absorbed is known by.

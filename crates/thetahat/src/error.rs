@@ -1,5 +1,7 @@
 use thiserror::Error;
 
+use crate::text;
+
 /// What went wrong, in which place, and what to do about it.
 ///
 /// Rows are 1-based positions in the log. The command line adds the file and the line.
@@ -70,7 +72,8 @@ impl Error {
         Self::Undetermined { parameters, message: message.into() }
     }
 
-    pub(crate) fn report(message: impl Into<String>) -> Self {
-        Self::Report { message: message.into() }
+    /// The message may repeat parts of a damaged document.
+    pub(crate) fn report(message: impl AsRef<str>) -> Self {
+        Self::Report { message: text::message(message.as_ref()) }
     }
 }

@@ -33,6 +33,7 @@
 //! [`Tracker`] and a [`StateFilter`] are made of.
 
 mod data;
+mod document;
 mod error;
 mod estimate;
 pub mod figures;
@@ -44,6 +45,7 @@ mod regression;
 mod report;
 mod respond;
 mod select;
+pub mod text;
 mod track;
 mod validate;
 

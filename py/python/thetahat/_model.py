@@ -89,7 +89,7 @@ class Model:
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write the document to a file, whole or not at all."""
-        _files.write(path, self.to_json())
+        _thetahat.write(_files.name(path), self.to_json())
 
     def write_html(self, path: str | os.PathLike[str], log: Log | None = None) -> None:
         """Write a page with charts, which loads nothing from elsewhere.
@@ -101,7 +101,7 @@ class Model:
         log : Log, optional
             Data to look at, such as those of the fit.
         """
-        _files.write(path, self._model.page(None if log is None else handle("log", log), "thetahat.Model.write_html"))
+        _thetahat.write(_files.name(path), self._model.page(None if log is None else handle("log", log), "thetahat.Model.write_html"))
 
     def summary(self) -> str:
         """The table that ``thetahat fit`` prints.

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use super::StateFilter;
 use super::estimate::{StateEstimate, StateValues};
 use crate::validate::NisCount;
-use crate::{Error, NisSummary};
+use crate::{Error, NisSummary, document};
 
 /// The schema that this version writes.
 const SCHEMA: &str = "thetahat.filter/1";
@@ -116,10 +116,7 @@ impl FilterSummary {
     /// # Errors
     /// [`Error::Report`] if it cannot be written as JSON.
     pub fn to_json(&self) -> Result<String, Error> {
-        let mut text = serde_json::to_string_pretty(self)
-            .map_err(|error| Error::report(format!("the summary cannot be written as JSON: {error}")))?;
-        text.push('\n');
-        Ok(text)
+        document::written("summary", self)
     }
 
     /// The JSON Schema of the document.

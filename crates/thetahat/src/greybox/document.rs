@@ -6,14 +6,14 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use crate::Error;
+use crate::{Error, text};
 
 /// An error at a place of a text, with line and column, both counted from 1.
-pub(crate) fn error_at(text: &str, offset: usize, message: impl Into<String>) -> Error {
+pub(crate) fn error_at(text: &str, offset: usize, message: impl AsRef<str>) -> Error {
     let before = text.get(..offset).unwrap_or(text);
     let line = before.matches('\n').count() + 1;
     let column = before.rsplit('\n').next().map_or(0, |line| line.chars().count()) + 1;
-    Error::Model { line, column, message: message.into() }
+    Error::Model { line, column, message: text::message(message.as_ref()) }
 }
 
 /// The name that differs least from a word, if one is near: at most a third of its characters have to be changed, and
@@ -40,8 +40,7 @@ fn nearest<'n>(word: &str, names: impl IntoIterator<Item = &'n str>) -> Option<&
 
 /// A word as it is quoted in an error: not too long, and without control characters.
 pub(crate) fn quoted(word: &str) -> String {
-    let shown: String = word.chars().take(40).flat_map(char::escape_debug).collect();
-    if word.chars().count() > 40 { format!("'{shown}…'") } else { format!("'{shown}'") }
+    format!("'{}'", text::brief(word, 40))
 }
 
 /// "; did you mean 'x'?" or nothing.
@@ -83,7 +82,7 @@ pub(crate) struct Section<'d> {
 
 impl<'d> Section<'d> {
     /// An error at the table.
-    pub(crate) fn error(&self, message: impl Into<String>) -> Error {
+    pub(crate) fn error(&self, message: impl AsRef<str>) -> Error {
         error_at(self.text, self.offset, message)
     }
 
@@ -159,12 +158,12 @@ pub(crate) struct Entry<'d> {
 
 impl<'d> Entry<'d> {
     /// An error at the key.
-    pub(crate) fn error(&self, message: impl Into<String>) -> Error {
+    pub(crate) fn error(&self, message: impl AsRef<str>) -> Error {
         error_at(self.text, self.key_offset, message)
     }
 
     /// An error at the value.
-    pub(crate) fn value_error(&self, message: impl Into<String>) -> Error {
+    pub(crate) fn value_error(&self, message: impl AsRef<str>) -> Error {
         error_at(self.text, self.value.span().start, message)
     }
 

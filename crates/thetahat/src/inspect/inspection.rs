@@ -3,7 +3,7 @@ use std::collections::HashSet;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{Error, Source};
+use crate::{Error, Source, document};
 
 /// The schema that this version writes.
 const SCHEMA: &str = "thetahat.inspection/1";
@@ -204,10 +204,7 @@ impl Inspection {
     /// # Errors
     /// [`Error::Report`] if it cannot be written as JSON.
     pub fn to_json(&self) -> Result<String, Error> {
-        let mut text = serde_json::to_string_pretty(self)
-            .map_err(|error| Error::report(format!("the inspection cannot be written as JSON: {error}")))?;
-        text.push('\n');
-        Ok(text)
+        document::written("inspection", self)
     }
 
     /// The JSON Schema of the document.

@@ -2,7 +2,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::data::Rows;
-use crate::{Criteria, Error, Fit, Initial, Interpolation, Model, Procedure, Selection};
+use crate::{Criteria, Error, Fit, Initial, Interpolation, Model, Procedure, Selection, document, text};
 
 /// The schema that this version writes.
 const SCHEMA: &str = "thetahat.report/1";
@@ -132,10 +132,7 @@ impl Report {
     /// # Errors
     /// [`Error::Report`] if it cannot be written as JSON.
     pub fn to_json(&self) -> Result<String, Error> {
-        let mut text = serde_json::to_string_pretty(self)
-            .map_err(|error| Error::report(format!("the report cannot be written as JSON: {error}")))?;
-        text.push('\n');
-        Ok(text)
+        document::written("report", self)
     }
 
     /// Reads a document back.
@@ -158,9 +155,9 @@ impl Report {
                     "this is the fit of a model in equations, which only `thetahat filter` reads; give a report of polynomials",
                 ));
             }
-            let shown: String = head.schema.chars().take(60).flat_map(char::escape_debug).collect();
             return Err(Error::report(format!(
-                "its schema is '{shown}', this version reads '{SCHEMA}'; fit the log again"
+                "its schema is '{}', this version reads '{SCHEMA}'; fit the log again",
+                text::brief(&head.schema, 40)
             )));
         }
         let report: Self = serde_json::from_str(text).map_err(malformed)?;

@@ -9,7 +9,7 @@ use crate::figures::{chance, fixed, number};
 use crate::regression::sum;
 use crate::respond::{Innovations, Response, check_steps, deviations, innovations};
 use crate::validate::{Fit, Horizon, Relation, Residuals, two_sided};
-use crate::{Error, Initial, Model, Orders, Procedure, Start, Structure};
+use crate::{Error, Initial, Model, Orders, Procedure, Start, Structure, document, text};
 
 /// The schemas that this version writes.
 const VALIDATION: &str = "thetahat.validation/1";
@@ -577,7 +577,7 @@ impl Validation {
     /// # Errors
     /// [`Error::Report`] if it cannot be written as JSON.
     pub fn to_json(&self) -> Result<String, Error> {
-        written("validation", self)
+        document::written("validation", self)
     }
 
     /// Reads a document back.
@@ -600,7 +600,7 @@ impl Comparison {
     /// # Errors
     /// [`Error::Report`] if it cannot be written as JSON.
     pub fn to_json(&self) -> Result<String, Error> {
-        written("comparison", self)
+        document::written("comparison", self)
     }
 
     /// Reads a document back.
@@ -617,13 +617,6 @@ impl Comparison {
     }
 }
 
-fn written(what: &str, document: &impl Serialize) -> Result<String, Error> {
-    let mut text = serde_json::to_string_pretty(document)
-        .map_err(|error| Error::report(format!("the {what} cannot be written as JSON: {error}")))?;
-    text.push('\n');
-    Ok(text)
-}
-
 fn read<T: DeserializeOwned>(what: &str, schema: &str, text: &str) -> Result<T, Error> {
     #[derive(Deserialize)]
     struct Head {
@@ -633,8 +626,8 @@ fn read<T: DeserializeOwned>(what: &str, schema: &str, text: &str) -> Result<T, 
         |error: serde_json::Error| Error::report(format!("this is not a thetahat {what}: {error}"));
     let head: Head = serde_json::from_str(text).map_err(malformed)?;
     if head.schema != schema && !head.schema.starts_with(&format!("{schema}.")) {
-        let shown: String = head.schema.chars().take(60).flat_map(char::escape_debug).collect();
-        return Err(Error::report(format!("its schema is '{shown}', this version reads '{schema}'")));
+        let found = text::brief(&head.schema, 40);
+        return Err(Error::report(format!("its schema is '{found}', this version reads '{schema}'")));
     }
     serde_json::from_str(text).map_err(malformed)
 }

@@ -74,9 +74,17 @@ impl Collecting {
         Some(PerChannel { inputs: inputs.to_vec(), output })
     }
 
-    /// Whether its rows are of so many inputs.
-    pub(super) fn fits(&self, inputs: usize) -> bool {
-        self.magnitudes.len() == inputs + 1 && self.rows.iter().all(|row| row.inputs.len() == inputs)
+    /// Whether its rows are of so many inputs, and no more than those of another
+    /// one could be.
+    pub(super) fn fits(&self, other: &Self, inputs: usize) -> bool {
+        let is_sample = |value: &f64| value.is_nan() || value.abs() <= LARGEST;
+        self.enough == other.enough
+            && self.rows.len() <= self.enough
+            && self.magnitudes.len() == inputs + 1
+            && self.magnitudes.iter().all(|largest| (0.0..=LARGEST).contains(largest))
+            && self.rows.iter().all(|row| {
+                row.inputs.len() == inputs && row.inputs.iter().chain([&row.output]).all(is_sample)
+            })
     }
 
     /// The latest rows, the oldest first; whether a gap follows the last one.

@@ -85,8 +85,8 @@ impl Estimator {
         }
     }
 
-    /// Whether it is one for these orders, with so many parameters.
-    pub(super) fn fits(&self, orders: &Orders, parameters: usize) -> bool {
+    /// Whether it is one for these orders and this plan, with so many parameters.
+    pub(super) fn fits(&self, orders: &Orders, plan: &TrackPlan, parameters: usize) -> bool {
         let (outputs, noise) = match self {
             Self::Arx(arx) => (arx.a().count(), 1),
             Self::Armax(armax) => (armax.a().count(), armax.c().count()),
@@ -94,5 +94,7 @@ impl Estimator {
         outputs == orders.na + 1
             && noise == orders.nc + 1
             && self.least_squares().parameters().len() == parameters
+            && self.least_squares().forgetting() == plan.forgetting.0
+            && matches!(self, Self::Arx(_)) == plan.method.with_noise_model().is_none()
     }
 }

@@ -36,6 +36,15 @@ impl TrackScore {
         }
     }
 
+    /// Whether its numbers can be those of any samples.
+    pub(super) fn is_sound(&self) -> bool {
+        let squares = [self.mean_squared_error, self.output_variance, self.mean_nis];
+        self.judged <= self.samples
+            && squares.iter().all(|square| square.is_finite() && *square >= 0.0)
+            && self.mean_output.is_finite()
+            && self.mean_log_likelihood.is_finite()
+    }
+
     /// The number of samples that count: predicted and measured.
     pub fn samples(&self) -> u64 {
         self.samples

@@ -2,7 +2,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Tracker;
-use crate::{Error, Orders, Parameter};
+use crate::{Error, Orders, Parameter, document};
 
 /// The schema that this version writes.
 const SCHEMA: &str = "thetahat.track/1";
@@ -96,10 +96,7 @@ impl TrackSummary {
     /// # Errors
     /// [`Error::Report`] if it cannot be written as JSON.
     pub fn to_json(&self) -> Result<String, Error> {
-        let mut text = serde_json::to_string_pretty(self)
-            .map_err(|error| Error::report(format!("the summary cannot be written as JSON: {error}")))?;
-        text.push('\n');
-        Ok(text)
+        document::written("summary", self)
     }
 
     /// The JSON Schema of the document.

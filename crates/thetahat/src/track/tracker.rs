@@ -1,5 +1,5 @@
 use serde::{Deserialize, Serialize};
-use thetahat_core::{Action, Alarm, ChangeDetector, Innovation, Real};
+use thetahat_core::{Action, Alarm, ChangeDetector, Chart, Innovation, Real};
 
 use super::collecting::{Collecting, LARGEST, SMALLEST};
 use super::estimator::{Estimator, Lines};
@@ -366,20 +366,42 @@ impl Tracker {
     /// was read back.
     pub fn is_sound(&self) -> bool {
         let inputs = self.orders.inputs();
-        let known = |channels: &PerChannel| channels.inputs.len() == inputs && channels.output.is_finite();
         let Ok(fresh) = Self::new(&self.orders, &TrackPlan { scales: None, ..self.plan.clone() }) else {
             return false;
         };
-        let sizes = match &self.stage {
-            Stage::Running(estimator) => estimator.fits(&self.orders, self.names.len()),
-            Stage::Collecting(collecting) => collecting.fits(inputs),
+        let stage = match (&self.stage, &fresh.stage, &self.scales) {
+            (Stage::Running(estimator), _, Some(_)) => {
+                estimator.fits(&self.orders, &self.plan, self.names.len())
+            }
+            (Stage::Collecting(collecting), Stage::Collecting(other), None) => {
+                self.plan.scales.is_none() && collecting.fits(other, inputs)
+            }
+            _ => false,
         };
-        sizes
+        let each = |channels: &PerChannel, holds: fn(f64) -> bool| {
+            channels.inputs.len() == inputs
+                && channels.inputs.iter().chain([&channels.output]).all(|&value| holds(value))
+        };
+        let given =
+            |asked: &Option<PerChannel>, have: &PerChannel| asked.as_ref().is_none_or(|asked| asked == have);
+        let charts = [Chart::MeanUp, Chart::MeanDown, Chart::Variance];
+        let thresholds = |tracker: &Self| {
+            tracker.detector.as_ref().map(|detector| charts.map(|chart| detector.threshold(chart)))
+        };
+        stage
             && fresh.names == self.names
             && self.inputs.len() == inputs
-            && known(&self.offsets)
-            && self.scales.as_ref().is_none_or(known)
-            && [0, inputs + 1].contains(&self.unset.len())
+            && each(&self.offsets, f64::is_finite)
+            && given(&self.plan.offsets, &self.offsets)
+            && self.scales.as_ref().is_none_or(|scales| {
+                each(scales, |scale| (SMALLEST..=LARGEST).contains(&scale))
+                    && given(&self.plan.scales, scales)
+            })
+            && (self.unset.is_empty() || self.unset.len() == fresh.unset.len())
+            && (self.has_estimate || !fresh.has_estimate)
+            && self.settling <= fresh.settling
+            && thresholds(self) == thresholds(&fresh)
+            && self.score.is_sound()
     }
 
     /// The orders of the model, without the constant.

@@ -3,7 +3,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{Error, GreyBox, NisSummary, Source, Stopped, Test};
+use crate::{Error, GreyBox, NisSummary, Source, Stopped, Test, document, text};
 
 /// The schema that this version writes.
 const SCHEMA: &str = "thetahat.greybox/1";
@@ -134,10 +134,7 @@ impl GreyReport {
     /// # Errors
     /// [`Error::Report`] if it cannot be written as JSON.
     pub fn to_json(&self) -> Result<String, Error> {
-        let mut text = serde_json::to_string_pretty(self)
-            .map_err(|error| Error::report(format!("the report cannot be written as JSON: {error}")))?;
-        text.push('\n');
-        Ok(text)
+        document::written("report", self)
     }
 
     /// Reads a document back.
@@ -156,9 +153,9 @@ impl GreyReport {
         };
         let head: Head = serde_json::from_str(text).map_err(malformed)?;
         if head.schema != SCHEMA && !head.schema.starts_with(&format!("{SCHEMA}.")) {
-            let shown: String = head.schema.chars().take(60).flat_map(char::escape_debug).collect();
             return Err(Error::report(format!(
-                "its schema is '{shown}', this version reads models in equations as '{SCHEMA}'; fit the log again"
+                "its schema is '{}', this version reads models in equations as '{SCHEMA}'; fit the log again",
+                text::brief(&head.schema, 40)
             )));
         }
         serde_json::from_str(text).map_err(malformed)

@@ -103,3 +103,70 @@ fn a_gap_while_rows_are_collected_is_kept_with_them() {
         assert_eq!(given.parameters(), tracker.parameters());
     }
 }
+
+/// The places of all numbers in a document.
+fn numbers(value: &serde_json::Value, place: &str, found: &mut Vec<String>) {
+    match value {
+        serde_json::Value::Number(_) => found.push(place.to_owned()),
+        serde_json::Value::Array(items) => {
+            items
+                .iter()
+                .enumerate()
+                .for_each(|(index, item)| numbers(item, &format!("{place}/{index}"), found));
+        }
+        serde_json::Value::Object(fields) => {
+            fields.iter().for_each(|(name, field)| numbers(field, &format!("{place}/{name}"), found));
+        }
+        _ => {}
+    }
+}
+
+#[test]
+fn what_was_edited_is_no_tracker_or_goes_on_in_numbers() {
+    let (inputs, y) = log(200, 0.3, 0.6, 12);
+    let armax = Orders::armax(2, &[2, 1], 1, &[1, 2]).unwrap();
+    let watched = TrackPlan { alarm_interval: Some(100.0), constant: true, ..TrackPlan::default() };
+    let rpem = TrackPlan { method: TrackMethod::Rpem, ..watched.clone() };
+    let mut tried = 0;
+    // While rows are collected, and later; the estimators themselves are checked where they are made.
+    for (orders, plan, rows) in [(&orders(), &watched, 9), (&orders(), &watched, 90), (&armax, &rpem, 120)] {
+        let mut tracker = Tracker::new(orders, plan).unwrap();
+        run(&mut tracker, &inputs[..rows], &y[..rows]);
+        let whole = serde_json::to_value(&tracker).unwrap();
+        let mut places = Vec::new();
+        numbers(&whole, "", &mut places);
+        places.retain(|place| !place.starts_with("/stage/Running"));
+        for place in &places {
+            for number in [-1.0_f64, 1e300, 0.0, 3.0] {
+                let mut edited = whole.clone();
+                let found = edited.pointer_mut(place).unwrap();
+                // A count stays one.
+                *found = match found.is_u64() {
+                    true => (number.clamp(0.0, 1e15) as u64).into(),
+                    false => number.into(),
+                };
+                let Ok(mut tracker) = serde_json::from_value::<Tracker>(edited) else { continue };
+                // It takes two tables of run lengths.
+                let is_figure = place.starts_with("/plan/alarm_interval");
+                if is_figure || tracker.plan() != plan || !tracker.is_sound() {
+                    continue;
+                }
+                tried += 1;
+                let tracked = run(&mut tracker, &inputs[rows..], &y[rows..]);
+                let score = tracker.score();
+                let figures =
+                    [score.mean_squared_error(), score.mean_nis(), score.fit(), score.log_likelihood()];
+                assert!(
+                    tracked.iter().all(|tracked| !(tracked.nis < 0.0 || tracked.variance < 0.0))
+                        && figures.iter().flatten().all(|figure| figure.is_finite())
+                        && [score.mean_squared_error(), score.mean_nis()]
+                            .iter()
+                            .flatten()
+                            .all(|&square| square >= 0.0),
+                    "{place} = {number}: {score:?}"
+                );
+            }
+        }
+    }
+    assert!(tried > 20, "{tried}");
+}

@@ -1,0 +1,54 @@
+//! Which of the arguments are files.
+
+use std::path::Path;
+
+use super::{Command, PredictArguments, SimulateArguments};
+use crate::files::Files;
+
+impl Command {
+    /// The files that a verb reads and writes.
+    pub(crate) fn files(&self) -> Files {
+        let mut files = Files::default();
+        let Files { read, written } = &mut files;
+        match self {
+            Self::Fit(fit) => {
+                read.extend(fit.grey.iter().chain(&fit.logs).cloned());
+                written.extend(fit.report.iter().chain(&fit.html).cloned());
+            }
+            Self::Inspect(inspect) => {
+                read.push(inspect.path.clone());
+                written.extend([&inspect.out].into_iter().chain(&inspect.html).cloned());
+            }
+            Self::Predict(PredictArguments { respond, .. })
+            | Self::Simulate(SimulateArguments { respond, .. }) => {
+                read.extend([respond.report.clone(), respond.path.clone()]);
+                written.push(respond.out.clone());
+            }
+            Self::Validate(validate) => {
+                read.extend([validate.report.clone(), validate.path.clone()]);
+                written.extend(validate.look.out.iter().chain(&validate.look.html).cloned());
+            }
+            Self::Compare(compare) => {
+                read.extend(compare.reports.iter().chain([&compare.path]).cloned());
+                written.extend(compare.look.out.iter().chain(&compare.look.html).cloned());
+            }
+            Self::Track(track) => {
+                read.extend([&track.path].into_iter().chain(&track.warm).cloned());
+                // That a state is kept on standard output is refused by itself.
+                let state = track.state.iter().filter(|path| path.as_path() != Path::new("-"));
+                written
+                    .extend([&track.lines.out].into_iter().chain(state).chain(&track.lines.summary).cloned());
+            }
+            Self::Filter(filter) => {
+                read.extend([filter.model.clone(), filter.path.clone()]);
+                written.extend([&filter.lines.out].into_iter().chain(&filter.lines.summary).cloned());
+            }
+            Self::Bode(bode) => {
+                read.push(bode.report.clone());
+                written.push(bode.out.clone());
+            }
+            Self::Demo(_) | Self::Schema { .. } | Self::Completions { .. } | Self::Man { .. } => {}
+        }
+        files
+    }
+}

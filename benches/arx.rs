@@ -62,12 +62,12 @@ fn responses(criterion: &mut Criterion, input: &[f64], output: &[f64]) -> Result
     let mut group = criterion.benchmark_group("respond");
     group.throughput(Throughput::Elements(SAMPLES as u64));
     for horizon in [1, 10] {
-        predict(&model, &record, horizon, Start::Measured)?;
+        predict(&model, &record, horizon, Start::Drop)?;
         group.bench_function(BenchmarkId::new("predict", horizon), |bencher| {
-            bencher.iter(|| predict(&model, black_box(&record), horizon, Start::Measured));
+            bencher.iter(|| predict(&model, black_box(&record), horizon, Start::Drop));
         });
     }
-    for (name, start) in [("zero", Start::Zero), ("estimated", Start::Estimated)] {
+    for (name, start) in [("zero", Start::Zero), ("estimated", Start::Estimate)] {
         simulate(&model, &record, start)?;
         group.bench_function(BenchmarkId::new("simulate", name), |bencher| {
             bencher.iter(|| simulate(&model, black_box(&record), start));

@@ -353,7 +353,7 @@ pub(crate) struct SearchArguments {
     /// Which random starts [default: 0]
     #[arg(long, value_name = "S", requires = "starts")]
     pub(crate) seed: Option<u64>,
-    /// Begin no iteration after so long
+    /// After so long begin no iteration, and look for no further start
     #[arg(long, value_name = "SECONDS", allow_hyphen_values = true)]
     pub(crate) time_limit: Option<f64>,
 }
@@ -384,18 +384,18 @@ pub(crate) struct PredictArguments {
     /// Steps ahead; inf for a free run, like simulate
     #[arg(long, value_name = "K", default_value = "1", allow_hyphen_values = true)]
     pub(crate) horizon: String,
-    /// What the prediction starts from [default: what the model needs: measured samples, or an estimate]
-    #[arg(long, value_enum)]
-    pub(crate) initial: Option<StartArgument>,
+    /// What stands before the first sample of a stretch
+    #[arg(long, value_enum, default_value = "auto")]
+    pub(crate) initial: StartArgument,
     #[command(flatten)]
     pub(crate) respond: RespondArguments,
 }
 
 #[derive(Debug, Args)]
 pub(crate) struct SimulateArguments {
-    /// What the run starts from [default: estimated; zero if the log has no output]
-    #[arg(long, value_enum)]
-    pub(crate) initial: Option<StartArgument>,
+    /// What stands before the first sample of a stretch
+    #[arg(long, value_enum, default_value = "auto")]
+    pub(crate) initial: StartArgument,
     #[command(flatten)]
     pub(crate) respond: RespondArguments,
 }
@@ -890,12 +890,14 @@ pub(crate) enum SearchArgument {
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 pub(crate) enum StartArgument {
-    /// Rest: zeros before the first sample
+    /// What the model needs: drop where that is all, else estimate; zero where the log has no output
+    Auto,
+    /// Nothing: measured samples before the rows, or the first rows, which then do not count
+    Drop,
+    /// Zeros before the first sample
     Zero,
-    /// Measured samples before the rows, or the first rows, which then do not count
-    Measured,
     /// The initial condition that fits best
-    Estimated,
+    Estimate,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

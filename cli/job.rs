@@ -141,12 +141,14 @@ impl LineJob {
     }
 }
 
-impl From<StartArgument> for Start {
-    fn from(start: StartArgument) -> Self {
-        match start {
-            StartArgument::Zero => Self::Zero,
-            StartArgument::Measured => Self::Measured,
-            StartArgument::Estimated => Self::Estimated,
+impl StartArgument {
+    /// The start, unless it is left to the model.
+    pub(crate) fn given(self) -> Option<Start> {
+        match self {
+            Self::Auto => None,
+            Self::Drop => Some(Start::Drop),
+            Self::Zero => Some(Start::Zero),
+            Self::Estimate => Some(Start::Estimate),
         }
     }
 }

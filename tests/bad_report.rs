@@ -152,8 +152,8 @@ fn a_log_without_the_output_cannot_be_predicted_or_started_from() {
     for line in [
         "predict model.json inputs.csv",
         "predict model.json inputs.csv --initial zero",
-        "simulate model.json inputs.csv --initial measured",
-        "simulate model.json inputs.csv --initial estimated",
+        "simulate model.json inputs.csv --initial drop",
+        "simulate model.json inputs.csv --initial estimate",
     ] {
         let refusal = folder.refused(line, 3);
         assert!(refusal.contains("inputs.csv: ") && refusal.contains("'y'"), "{line}: {refusal}");
@@ -213,6 +213,6 @@ fn a_horizon_beyond_the_log_predicts_nothing_and_says_so() {
 
 #[test]
 fn a_one_step_prediction_has_no_start_to_estimate() {
-    let line = folder().refused("predict model.json log.csv --initial estimated", 2);
-    assert!(line.contains("--initial") && line.contains("measured"), "{line}");
+    let line = folder().refused("predict model.json log.csv --initial estimate", 2);
+    assert!(line.contains("--initial") && line.contains("use drop, zero or auto"), "{line}");
 }

@@ -148,7 +148,7 @@ fn a_report_of_fit_is_a_model() {
     close(number(&last, "/predicted_y"), expected[599], 1e-9);
     // The extended filter of a linear model is the same.
     assert_eq!(filtered(&folder, "model.json log.csv --initial zero --estimator ekf"), lines);
-    assert_eq!(folder.run("filter model.json log.csv --initial measured").code, 2);
+    assert_eq!(folder.run("filter model.json log.csv --initial drop").code, 2);
     folder.write("model.toml", ALPHA_BETA);
     assert!(
         folder.refused("filter model.toml log.csv --initial zero", 2).contains("--initial is for reports")

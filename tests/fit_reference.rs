@@ -177,7 +177,7 @@ fn hair_dryer_rows_1_to_500() {
     assert_eq!(number(&report, "/estimation/samples"), 496.0);
     assert!((number(&report, "/estimation/fpe") - 0.00171399).abs() < 5.1e-9);
     let free_run = figures(&report, "validation", "free-run");
-    assert_eq!(free_run["initial"], "estimated");
+    assert_eq!(free_run["initial"], "estimate");
     assert!((number(free_run, "/percent") - 85.585).abs() < 5.1e-4, "{free_run}");
 }
 
@@ -187,12 +187,12 @@ fn free_runs_of_the_hair_dryer_from_every_start_and_with_either_means() {
     folder.done("fit log.csv --sample-time 0.08 --estimate 1..500 --na 2 --nb 2 --nk 3 --report model.json");
     for (options, expected) in [
         ("--initial zero", 84.733),
-        ("--initial estimated", 85.585),
-        ("--initial measured", 85.581),
+        ("--initial estimate", 85.585),
+        ("--initial drop", 85.581),
         ("--initial zero --detrend mean", 89.546),
-        ("--initial estimated --detrend mean", 91.221),
+        ("--initial estimate --detrend mean", 91.221),
         // The measured samples before the rows are the start.
-        ("--initial measured --detrend mean", 91.162),
+        ("--initial drop --detrend mean", 91.162),
     ] {
         let run = folder.done(&format!("simulate model.json log.csv --rows 501..1000 {options}"));
         let answer = Answer::read(&run.stdout);
@@ -242,7 +242,7 @@ fn cascaded_tanks_free_run_and_one_step() {
     let Some(validation) = public_log("cascaded_tanks_val.csv") else { return };
     folder.done("fit log.csv --sample-time 4 --estimate 1..700 --na 8 --nb 9 --nk 0 --report model.json");
     let rmse = |line: &str| {
-        let run = folder.done(&format!("{line} --rows 9..1024 --initial measured"));
+        let run = folder.done(&format!("{line} --rows 9..1024 --initial drop"));
         let answer = Answer::read(&run.stdout);
         assert_eq!(answer.samples(), 1016, "{line}");
         answer.rmse()
@@ -261,7 +261,7 @@ fn coupled_drives_free_run() {
             "fit log.csv --sample-time 0.02 -u {input} -y {output} --estimate 1..200 --na 10 --nb 10 --nk 0 \
              --report model.json"
         ));
-        let run = folder.done("simulate model.json log.csv --rows 411..500 --initial measured");
+        let run = folder.done("simulate model.json log.csv --rows 411..500 --initial drop");
         let answer = Answer::read(&run.stdout);
         assert_eq!(answer.samples(), 90);
         assert!((answer.rmse() - expected).abs() < 1e-9, "{}", answer.rmse());
@@ -286,7 +286,7 @@ fn z_scored_tanks_give_the_same_predictions() {
     folder.write("scored.csv", csv(&[("u", &scores[0].0), ("y", &scores[1].0)]));
     let answer = |log: &str| {
         folder.done(&format!("fit {log} --estimate 1..700 --na 8 --nb 9 --nk 0 --report model.json"));
-        let run = folder.done(&format!("simulate model.json {log} --rows 701..1024 --initial measured"));
+        let run = folder.done(&format!("simulate model.json {log} --rows 701..1024 --initial drop"));
         Answer::read(&run.stdout).predicted
     };
     for (plain, scored) in answer("log.csv").into_iter().zip(answer("scored.csv")) {

@@ -179,7 +179,7 @@ fn predict_and_simulate_give_the_figures_of_the_report() {
                     .map(str::to_owned)
                     .to_vec()
             };
-            if initial == "measured" {
+            if initial == "drop" {
                 lines.push("predict model.json log.csv".to_owned());
             }
             let ranges = entry["rows"].as_array().unwrap().iter();
@@ -251,10 +251,8 @@ fn a_long_horizon_from_measured_samples_is_the_free_run_from_them() {
     folder.done("fit log.csv --na 2 --nb 2 --report model.json");
     let last = |line: &str| *Answer::read(&folder.done(line).stdout).predicted.last().unwrap();
     // With two measured samples, row 40 is 38 steps ahead.
-    let (free, ahead) = (
-        last("simulate model.json log.csv --initial measured"),
-        last("predict model.json log.csv --horizon 38"),
-    );
+    let (free, ahead) =
+        (last("simulate model.json log.csv --initial drop"), last("predict model.json log.csv --horizon 38"));
     assert!((free.unwrap() - ahead.unwrap()).abs() < 1e-10, "{free:?} {ahead:?}");
 }
 

@@ -54,7 +54,7 @@ fn the_measured_samples_before_the_rows_are_the_start() {
         assert!(distance(&all(&part.predicted), &all(&whole.predicted[99..150])) < 1e-12);
     }
     // The first sample of a free run from measured samples is one step ahead of them, the second two.
-    let free = answer(&folder, "simulate model.json log.csv --rows 100..150 --initial measured");
+    let free = answer(&folder, "simulate model.json log.csv --rows 100..150 --initial drop");
     assert_eq!(free.samples(), 51);
     for horizon in [1, 2] {
         let ahead = answer(&folder, &format!("predict model.json log.csv --horizon {horizon}"));
@@ -72,8 +72,8 @@ fn where_the_log_has_no_samples_before_the_rows_the_first_ones_are_the_start() {
         ("predict model.json log.csv --rows 2..50", 1),
         ("predict model.json log.csv --rows 3..50", 0),
         ("predict model.json log.csv --horizon 3", 4),
-        ("simulate model.json log.csv --initial measured", 2),
-        ("simulate model.json log.csv --initial measured --rows 2..50", 1),
+        ("simulate model.json log.csv --initial drop", 2),
+        ("simulate model.json log.csv --initial drop --rows 2..50", 1),
     ] {
         let answer = answer(&folder, line);
         let missing = answer.predicted.iter().take_while(|value| value.is_none()).count();
@@ -99,8 +99,8 @@ fn from_zero_and_from_an_estimated_start_every_sample_counts() {
     for line in [
         "predict model.json log.csv --initial zero",
         "simulate model.json log.csv --initial zero",
-        "simulate model.json log.csv --initial estimated",
-        "simulate model.json log.csv --initial estimated --rows 20..80",
+        "simulate model.json log.csv --initial estimate",
+        "simulate model.json log.csv --initial estimate --rows 20..80",
     ] {
         let answer = answer(&folder, line);
         assert_eq!(answer.samples(), answer.time.len(), "{line}");
@@ -114,8 +114,8 @@ fn an_estimated_start_is_the_default_and_the_best() {
         answer(&folder, &format!("simulate model.json log.csv --rows 100..130 {initial}")).rmse()
     };
     let best = rmse("");
-    assert_eq!(best, rmse("--initial estimated"));
-    assert!(best <= rmse("--initial zero") && best <= rmse("--initial measured"));
+    assert_eq!(best, rmse("--initial estimate"));
+    assert!(best <= rmse("--initial zero") && best <= rmse("--initial drop"));
 }
 
 #[test]
@@ -145,7 +145,7 @@ fn noise_free_data_with_two_inputs_are_predicted_exactly() {
         "predict model.json log.csv --initial zero",
         "predict model.json log.csv --horizon 5",
         "simulate model.json log.csv --initial zero",
-        "simulate model.json log.csv --initial measured --rows 90..200",
+        "simulate model.json log.csv --initial drop --rows 90..200",
     ] {
         assert!(answer(&folder, line).rmse() < 1e-10, "{line}");
     }
@@ -214,7 +214,7 @@ fn a_series_without_inputs_is_predicted() {
     folder.done("fit log.csv -y count --na 2 --nb 0 --report model.json");
     let steps = answer(&folder, "predict model.json log.csv --horizon 2");
     assert_eq!(steps.samples(), 97);
-    let free = answer(&folder, "simulate model.json log.csv --initial measured");
+    let free = answer(&folder, "simulate model.json log.csv --initial drop");
     // Left alone, a stable series goes to its mean.
     let mean = Experiment::new(100).y.iter().sum::<f64>() / 100.0;
     assert!((free.predicted[99].unwrap() - mean).abs() < 1e-6);
@@ -226,7 +226,7 @@ fn an_unstable_model_overflows_without_a_figure() {
     let folder = Folder::with_log(csv(&[("y", &y)]));
     folder.done("fit log.csv --detrend none --na 1 --nb 0 --report model.json");
     folder.write("long.csv", csv(&[("y", &[1e10; 2000])]));
-    let run = folder.done("simulate model.json long.csv --initial measured");
+    let run = folder.done("simulate model.json long.csv --initial drop");
     assert!(run.stderr.starts_with("fit none, RMSE none"), "{}", run.stderr);
     assert!(run.stdout.ends_with("2000,10000000000.0,\n"), "{}", &run.stdout[run.stdout.len() - 60..]);
 }

@@ -87,7 +87,7 @@ fn the_skeleton_that_other_tools_rely_on_is_there() {
         .as_array()
         .unwrap()
         .iter()
-        .zip([(json!({"kind": "steps", "steps": 1}), "measured"), (json!({"kind": "free-run"}), "estimated")])
+        .zip([(json!({"kind": "steps", "steps": 1}), "drop"), (json!({"kind": "free-run"}), "estimate")])
     {
         assert_eq!(fit["rows"], json!([[1, 300]]));
         assert_eq!(fit["part"], "estimation");

@@ -24,11 +24,11 @@ pub(crate) fn predict(arguments: &PredictArguments) -> Result<(), Failure> {
             }
         },
     };
-    respond(&arguments.respond, horizon, arguments.initial.map(Start::from))
+    respond(&arguments.respond, horizon, arguments.initial.given())
 }
 
 pub(crate) fn simulate(arguments: &SimulateArguments) -> Result<(), Failure> {
-    respond(&arguments.respond, Horizon::FreeRun, arguments.initial.map(Start::from))
+    respond(&arguments.respond, Horizon::FreeRun, arguments.initial.given())
 }
 
 fn respond(arguments: &RespondArguments, horizon: Horizon, initial: Option<Start>) -> Result<(), Failure> {

@@ -273,7 +273,7 @@ fn orders_legend<'a>(models: impl IntoIterator<Item = &'a Orders>) -> String {
 fn start(start: Start) -> &'static str {
     match start {
         Start::Zero => "zero",
-        Start::Measured => "measured",
-        Start::Estimated => "estimated",
+        Start::Drop => "drop",
+        Start::Estimate => "estimate",
     }
 }

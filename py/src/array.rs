@@ -10,6 +10,8 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use thetahat_core::nalgebra::{DMatrix, DVector};
 
+use crate::work::calling;
+
 /// The numbers of an argument as a contiguous array of float64, whatever its shape.
 pub(crate) fn numbers<'py>(
     argument: &str,
@@ -20,7 +22,7 @@ pub(crate) fn numbers<'py>(
         Ok(array) if array.is_c_contiguous() && is_plain(value) => Ok(array.clone()),
         _ => {
             let conversion = CONVERSION.import(value.py(), "thetahat._numbers", "array")?;
-            Ok(conversion.call1((argument, value))?.cast_into()?)
+            Ok(calling(value.py(), || conversion.call1((argument, value)))?.cast_into()?)
         }
     }
 }

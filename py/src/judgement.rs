@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use thetahat::{Inspection, InspectionPlan, Recording, Report, Requirement, Times, Validated};
+use thetahat::{Inspection, InspectionPlan, Report, Requirement, Validated};
 
 use crate::error;
 use crate::log::{Log, copy};
@@ -17,6 +17,7 @@ use crate::work::{awaited, interruptible};
 pub(crate) struct Validation {
     found: Validated,
     requirements: Vec<Requirement>,
+    #[pyo3(get)]
     alpha: f64,
 }
 
@@ -97,15 +98,7 @@ pub(crate) fn inspect(py: Python<'_>, log: &Bound<'_, Log>) -> PyResult<(String,
     let plan =
         InspectionPlan { inputs: log.inputs.clone(), output: Some(log.output.clone()), resample: None };
     let log = Arc::clone(&log.log);
-    let found = interruptible(py, move |_| {
-        let times = match log.time() {
-            Some(time) if log.borders().is_empty() => Times::Measured(time.to_vec()),
-            // Several logs have no common clock.
-            _ => Times::Uniform(log.sample_time()),
-        };
-        let recording = Recording { channels: log.channels().to_vec(), times };
-        thetahat::inspect(recording, &source, &plan)
-    })?;
+    let found = interruptible(py, move |_| thetahat::inspect_log(&log, &source, &plan))?;
     written(py, &found)
 }
 

@@ -153,6 +153,12 @@ impl Log {
         self.log.breaks().to_vec()
     }
 
+    /// Those of them (from 0) at which another experiment begins.
+    #[getter]
+    fn borders(&self) -> Vec<usize> {
+        self.log.borders().to_vec()
+    }
+
     /// A channel.
     fn values<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let channel = self.log.channel(name).map_err(|error| error::batch(py, error))?;

@@ -129,10 +129,10 @@ impl Model {
         py: Python<'py>,
         log: &Bound<'py, Log>,
         horizon: Option<usize>,
-        initial: Option<&str>,
+        initial: &str,
     ) -> PyResult<(Column<'py>, Option<Column<'py>>)> {
         let horizon = horizon.map_or(Horizon::FreeRun, |steps| Horizon::Steps { steps });
-        let start = self.start(initial, horizon)?;
+        let start = self.start(initial, log.get(), horizon)?;
         let (model, log) = (Arc::clone(&self.model), Arc::clone(&log.get().log));
         let rows = log.rows();
         let applied = interruptible(py, move |_| {
@@ -171,7 +171,7 @@ impl Model {
         log: &Bound<'py, Log>,
         steps: usize,
         inputs: Option<&Bound<'py, PyAny>>,
-        initial: Option<&str>,
+        initial: &str,
     ) -> PyResult<(Column<'py>, Column<'py>)> {
         const MOST: usize = 1_000_000;
         if !(1..=MOST).contains(&steps) {
@@ -190,7 +190,7 @@ impl Model {
             None => Vec::new(),
         };
         let horizon = Horizon::Steps { steps };
-        let start = self.start(initial, horizon)?;
+        let start = self.start(initial, log.get(), horizon)?;
         let log = Arc::clone(&log.get().log);
         let rows = log.rows();
         let applied = interruptible(py, move |_| {
@@ -296,14 +296,16 @@ impl Model {
         self.report.get().cloned().ok_or_else(|| PyRuntimeError::new_err("the model has no report"))
     }
 
-    fn start(&self, initial: Option<&str>, horizon: Horizon) -> PyResult<Start> {
+    /// The start of this name, for a log that may have the output.
+    fn start(&self, initial: &str, log: &Log, horizon: Horizon) -> PyResult<Start> {
         match initial {
-            None => Ok(Start::natural(&self.model, horizon)),
-            Some("zero") => Ok(Start::Zero),
-            Some("measured") => Ok(Start::Measured),
-            Some("estimated") => Ok(Start::Estimated),
-            Some(other) => Err(PyValueError::new_err(format!(
-                "initial: '{other}' is none of 'zero', 'measured', 'estimated'"
+            "auto" if !log.log.has(&self.model.output.name) => Ok(Start::Zero),
+            "auto" => Ok(Start::natural(&self.model, horizon)),
+            "drop" => Ok(Start::Drop),
+            "zero" => Ok(Start::Zero),
+            "estimate" => Ok(Start::Estimate),
+            other => Err(PyValueError::new_err(format!(
+                "initial: '{other}' is none of 'auto', 'drop', 'zero', 'estimate'"
             ))),
         }
     }

@@ -12,7 +12,7 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::thread::{self, ThreadId};
 use std::time::{Duration, Instant};
 
-use pyo3::exceptions::{PyRuntimeError, PySystemExit};
+use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -27,6 +27,8 @@ const WORK: usize = 1 << 17;
 
 /// How long the interpreter waits at its end for calls of functions to return.
 const FAREWELL: Duration = Duration::from_secs(2);
+/// How long there has to be none for that.
+const QUIET: Duration = Duration::from_millis(30);
 
 /// The threads of this process. A fork has none of its parent's.
 static POOL: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
@@ -106,10 +108,8 @@ fn known() -> MutexGuard<'static, Option<(u32, Arc<ThreadPool>)>> {
 /// What Python's handlers of the signals since the last time raise.
 fn signals() -> PyResult<()> {
     Python::try_attach(|py| py.check_signals()).unwrap_or_else(|| {
-        // The interpreter has ended, and this thread of its with it.
-        loop {
-            thread::park();
-        }
+        rest();
+        Ok(())
     })
 }
 
@@ -148,12 +148,17 @@ impl Pulse {
 
 /// Calls of Python code that are under way in this process.
 static CALLS: AtomicUsize = AtomicUsize::new(0);
+/// Whether another thread than that which imported the module has made one.
+static ELSEWHERE: AtomicBool = AtomicBool::new(false);
+/// The thread that imported the module.
+static HERE: OnceLock<ThreadId> = OnceLock::new();
 /// The thread that ends the interpreter.
 static ENDING: OnceLock<ThreadId> = OnceLock::new();
 
 /// Registers what has to be done when the interpreter ends, and in a fork.
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     let py = module.py();
+    let _ = HERE.set(thread::current().id());
     py.import("atexit")?.call_method1("register", (wrap_pyfunction!(end, module)?,))?;
     let os = py.import("os")?;
     if os.hasattr("register_at_fork")? {
@@ -168,8 +173,9 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 ///
 /// Before Python 3.14 a daemon thread that wants the interpreter lock after the interpreter has ended is torn down where
 /// it stands. With a function of this module under the Python code on its stack that aborts the process. So the
-/// interpreter waits until such calls have returned, and what would be the next one raises SystemExit.
-pub(crate) fn calling<T>(call: impl FnOnce() -> PyResult<T>) -> PyResult<T> {
+/// interpreter waits until such calls have returned, and a thread that begins another one rests for ever, as every daemon
+/// thread does from Python 3.14 on.
+pub(crate) fn calling<T>(py: Python<'_>, call: impl FnOnce() -> T) -> T {
     /// Counts while it lives.
     struct Call;
     impl Drop for Call {
@@ -177,13 +183,23 @@ pub(crate) fn calling<T>(call: impl FnOnce() -> PyResult<T>) -> PyResult<T> {
             let _ = CALLS.fetch_update(Ordering::SeqCst, Ordering::SeqCst, |calls| calls.checked_sub(1));
         }
     }
+    let own = thread::current().id();
     CALLS.fetch_add(1, Ordering::SeqCst);
-    let _call = Call;
-    match ENDING.get() {
-        Some(thread) if *thread != thread::current().id() => {
-            Err(PySystemExit::new_err("the interpreter has ended"))
-        }
-        _ => call(),
+    let counted = Call;
+    if ENDING.get().is_some_and(|thread| *thread != own) {
+        drop(counted);
+        py.detach(rest);
+    }
+    if HERE.get() != Some(&own) {
+        ELSEWHERE.store(true, Ordering::SeqCst);
+    }
+    call()
+}
+
+/// For a thread whose interpreter has ended.
+fn rest() {
+    loop {
+        thread::park();
     }
 }
 
@@ -191,9 +207,17 @@ pub(crate) fn calling<T>(call: impl FnOnce() -> PyResult<T>) -> PyResult<T> {
 #[pyfunction]
 fn end(py: Python<'_>) {
     let _ = ENDING.set(thread::current().id());
+    if !ELSEWHERE.load(Ordering::SeqCst) {
+        return;
+    }
     py.detach(|| {
         let asked = Instant::now();
-        while CALLS.load(Ordering::SeqCst) > 0 && asked.elapsed() < FAREWELL {
+        let mut quiet = Instant::now();
+        // A thread in a loop begins its next call soon, and rests.
+        while quiet.elapsed() < QUIET && asked.elapsed() < FAREWELL {
+            if CALLS.load(Ordering::SeqCst) > 0 {
+                quiet = Instant::now();
+            }
             thread::sleep(Duration::from_millis(1));
         }
     });

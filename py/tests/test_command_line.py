@@ -66,7 +66,7 @@ def test_tables_and_other_documents_are_the_same(folder: Path) -> None:
     predicted = np.genfromtxt(program(folder, "predict", "model.json", LOG, "--time=t").splitlines(), delimiter=",", names=True)
     assert np.array_equal(predicted["predicted"], model.predict(log), equal_nan=True)
     simulated = np.genfromtxt(program(folder, "simulate", "model.json", LOG, "--time=t").splitlines(), delimiter=",", names=True)
-    assert np.array_equal(simulated["predicted"], model.simulate(log, initial="estimated"), equal_nan=True)
+    assert np.array_equal(simulated["predicted"], model.simulate(log), equal_nan=True)
 
 
 def test_several_logs_and_resampling(folder: Path) -> None:

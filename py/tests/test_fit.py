@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import copy
+import inspect
 import json
 import multiprocessing
 import os
 import pickle
+import re
 import subprocess
 import sys
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any, Callable
+from typing import Any, Callable, Optional, get_type_hints
 
 import numpy as np
 import pytest
@@ -136,7 +138,7 @@ BAD: list[tuple[Callable[[th.Log], Any], type[Exception], str]] = [
     (lambda log: th.arx(log, 2, 2, bound={"z9": 1.0}), ValueError, "z9"),
     (lambda log: th.arx(log, 2, 2, bound=[1]), TypeError, "bound: expected a dict"),  # type: ignore[arg-type]
     (lambda log: th.arx(log, 2, 2, offset={"w": 1.0}), ValueError, "offset: 'w' is neither"),
-    (lambda log: th.arx(log, 2, 2, oofset={}), TypeError, "oofset: there is no such option"),  # type: ignore[call-arg]
+    (lambda log: th.arx(log, 2, 2, oofset={}), TypeError, "unexpected keyword argument 'oofset'"),  # type: ignore[call-arg]
     (lambda log: th.oe(log, 2, 2, search="magic"), ValueError, "search"),
     (lambda log: th.oe(log, 2, 2, max_iterations=0), ValueError, "max_iterations"),
     (lambda log: th.oe(log, 2, 2, tolerance=-1.0), ValueError, "tolerance"),
@@ -278,3 +280,39 @@ def test_the_document_is_json_with_a_line_break(log: th.Log) -> None:
     text = th.arx(log, 2, 2).to_json()
     assert text.endswith("}\n") and json.loads(text)["schema"] == "thetahat.report/1"
     assert json.loads(text)["data"]["logs"][0]["file"] == "memory"
+
+
+EVERY_FIT = (th.ar, th.arma, th.armax, th.arx, th.bj, th.iv, th.oe, th.pem, th.search, th.sriv)
+
+
+@pytest.mark.parametrize(
+    ("function", "options"),
+    [
+        *((fit, th.FitOptions) for fit in EVERY_FIT),
+        *((look, th.ValidationOptions) for look in (th.compare, th.Model.validate)),
+        *((read, th.ReadOptions) for read in (th.read_csv, th.inspect)),
+    ],
+    ids=lambda value: value.__name__,
+)
+def test_options_are_keyword_parameters(function: Any, options: Any) -> None:
+    parameters = inspect.signature(function).parameters
+    assert not [one for one in parameters.values() if one.kind is inspect.Parameter.VAR_KEYWORD]
+    shown = {name for name, one in parameters.items() if one.kind is inspect.Parameter.KEYWORD_ONLY}
+    known = set(options.__annotations__)
+    assert shown >= known or (options is th.FitOptions and shown & known and function not in (th.pem, th.search))
+    # Their types are told once, and each is described where the options are.
+    own, told = get_type_hints(function, localns={"Model": th.Model}), get_type_hints(options)
+    for name in shown & known:
+        assert own[name] in (told[name], Optional[told[name]]), name
+        assert parameters[name].default is None or options is th.ReadOptions
+        assert re.search(rf"\b{name}\b", function.__doc__), name
+        assert re.search(rf"^    (\w+, )*{name}(, \w+)* : ", options.__doc__, flags=re.M), name
+
+
+def test_a_fit_without_time_looks_for_one_start(log: th.Log) -> None:
+    plenty = th.bj(log, 2, 1, 1, 2, starts=20)
+    with pytest.warns(th.EstimationWarning):
+        none = th.bj(log, 2, 1, 1, 2, starts=20, time_limit=1e-9)
+    starts = [model.document["estimation"]["starts"] for model in (plenty, none)]
+    assert len(starts[0]) > 20 and len(starts[1]) == 1
+    assert none.document["estimation"]["stopped"] == "time-limit"

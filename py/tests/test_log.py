@@ -126,6 +126,50 @@ def test_logs_join() -> None:
         th.Log.join([])
 
 
+def test_a_log_says_what_there_is() -> None:
+    plain = th.Log(Y, U)
+    assert (plain.experiments, plain.segments, plain.missing) == ([range(5)], [range(5)], {"u": 0, "y": 0})
+    assert repr(plain) == "Log(5 rows, inputs u, output y, sample time 1.0 s)"
+    holed = th.Log([np.nan, 1.0, 2.0, 3.0, np.nan], [1.0, 0.0, np.nan, 0.0, 1.0])
+    assert (holed.segments, holed.missing) == ([range(1, 2), range(3, 4)], {"u": 1, "y": 2})
+    assert repr(holed) == "Log(5 rows in 2 segments, 3 values missing, inputs u, output y, sample time 1.0 s)"
+    gap = th.Log(Y, time=[0.0, 1.0, 2.0, 5.0, 6.0])
+    assert gap.segments == [range(3), range(3, 5)] and gap.experiments == [range(5)]
+    joined = th.Log.join([gap, th.Log([1.0, np.nan, 3.0]), th.Log([1.0])])
+    assert joined.experiments == [range(5), range(5, 8), range(8, 9)]
+    assert joined.segments == [range(3), range(3, 5), range(5, 6), range(7, 8), range(8, 9)]
+    assert repr(joined) == (
+        "Log(9 rows in 3 experiments and 5 segments, 1 value missing, no inputs, output y, sample time 1.0 s)"
+    )
+    assert [len(joined[rows]) for rows in joined.experiments] == [5, 3, 1]
+    assert joined[joined.experiments[1]] == th.Log([1.0, np.nan, 3.0])
+    # A part keeps the borders inside of it, and those are no gaps of one experiment.
+    assert joined[4:6].experiments == [range(1), range(1, 2)]
+    assert th.Log.join([th.Log(Y), th.Log(Y)]) != th.Log(np.tile(Y, 2), time=[*range(5), *range(9, 14)])
+    assert th.Log([np.nan, np.nan]).segments == []
+    with pytest.raises(ValueError, match=r"rows: range\(3, 9\) is not inside of the log, which has 5"):
+        plain[range(3, 9)]
+
+
+def test_an_inspection_keeps_experiments_apart() -> None:
+    random = np.random.default_rng(3)
+    y, u = random.standard_normal((2, 600))
+    y[2:] += 3 * u[:-2]
+    clock = np.arange(600.0)
+    clock[100:] += 7
+    clock[500:] += 7
+    one = th.Log(y, u, time=clock)
+    assert th.inspect(one).document["clock"]["gaps"] == 2
+    joined = th.Log.join([one, one[:300], one[300:301]])
+    document = th.inspect(joined).document
+    assert (document["experiments"], document["clock"]["gaps"]) == (3, 3)
+    assert "experiments" not in th.inspect(one).document
+    assert "901 rows in 3 experiments" in th.inspect(joined).summary()
+    # Across a border u and y have nothing to do with one another.
+    short = th.Log.join([th.Log(y[k : k + 4], u[k : k + 4]) for k in range(0, 600, 4)])
+    assert th.inspect(one).delays == {"u": 2} and th.inspect(short).excitation["u"] < th.inspect(one).excitation["u"]
+
+
 @pytest.mark.parametrize(
     "log",
     [
@@ -180,7 +224,7 @@ def test_files_are_read_as_on_the_command_line(tmp_path: Path) -> None:
         th.read_csv(path, inputs="ventil", output="druck", delimiter=";", decimal_comma=True, comment="#")
     with pytest.raises(ValueError, match="name the output with output"):
         th.read_csv(path, delimiter=";", comment="#")
-    with pytest.raises(TypeError, match="delimeter: there is no such option"):
+    with pytest.raises(TypeError, match="unexpected keyword argument 'delimeter'"):
         th.read_csv(path, delimeter=";")  # type: ignore[call-arg]
 
 
@@ -201,7 +245,7 @@ def test_what_looks_like_a_clock_is_a_word_of_warning(tmp_path: Path) -> None:
 
 def test_a_log_shows_itself() -> None:
     log = th.Log([1.0, np.nan, 3.0], {"<b>": [0, 1, 0]})
-    assert repr(log) == "Log(3 rows, inputs <b>, output y, sample time 1.0 s assumed)"
+    assert repr(log) == "Log(3 rows in 2 segments, 1 value missing, inputs <b>, output y, sample time 1.0 s assumed)"
     page = log._repr_html_()
     assert "<svg" in page and "&lt;b&gt;" in page and "nan" not in page
     assert "<svg" in th.Log(np.full(2000, 5.0))._repr_html_()

@@ -25,14 +25,52 @@ def test_residuals_are_those_of_the_fit(motor: th.Log) -> None:
 
 def test_predictions_meet_the_free_run(motor: th.Log) -> None:
     model = th.arx(motor, 2, 2)
-    assert np.array_equal(model.predict(motor, None, initial="zero"), model.simulate(motor))
-    assert np.array_equal(model.simulate(motor.u), model.simulate(motor))
+    assert np.array_equal(model.predict(motor, None, initial="zero"), model.simulate(motor.u))
+    assert np.array_equal(model.simulate(motor.u), model.simulate(motor, initial="zero"))
     assert np.allclose(model.simulate(motor.u[:, 0])[:700], model.simulate(motor[:700].u), atol=1e-12)
     lower, upper = model.predict_interval(motor, 5)
     values = model.predict(motor, 5)
     assert np.allclose((lower + upper) / 2, values, equal_nan=True)
     inside = (lower < motor.y) & (motor.y < upper)
     assert inside[10:].mean() > 0.9
+
+
+def test_what_stands_before_a_log_has_one_set_of_words(motor: th.Log) -> None:
+    words = ["auto", "drop", "zero", "estimate"]
+    for word in words:
+        th.armax(motor, 2, 2, 1, initial=word)
+    model = th.oe(motor, 2, 2)
+    predicted = {word: model.predict(motor, initial=word) for word in words}
+    assert np.array_equal(model.predict(motor), predicted["auto"]) and np.array_equal(predicted["auto"], predicted["estimate"])
+    assert not np.array_equal(predicted["zero"], predicted["estimate"])
+    assert np.array_equal(model.simulate(motor), model.simulate(motor, initial="estimate"))
+    assert np.array_equal(model.simulate(motor.u), model.simulate(motor, initial="zero"))
+    arx = th.arx(motor, 2, 2)
+    assert np.array_equal(arx.predict(motor), arx.predict(motor, initial="drop"), equal_nan=True)
+    dropped, started = arx.predict(motor, initial="drop"), arx.predict(motor, initial="zero")
+    assert np.isnan(dropped[:2]).all() and np.isfinite(started).all()
+    assert [fit["initial"] for fit in arx.fits] == ["drop", "estimate"]
+    with pytest.raises(ValueError, match="initial: 'measured' is none of 'auto', 'drop', 'zero', 'estimate'"):
+        model.predict(motor, initial="measured")
+
+
+def test_information_criteria_are_those_of_statsmodels() -> None:
+    random = np.random.default_rng(5)
+    y, u = np.zeros(400), random.standard_normal(400)
+    for t in range(2, 400):
+        y[t] = 1.2 * y[t - 1] - 0.5 * y[t - 2] + u[t - 1] + random.standard_normal()
+    ours, theirs = th.ar(th.Log(y), 2, detrend="none"), sm.tsa.AutoReg(y, 2, trend="n").fit()
+    assert np.allclose([ours.log_likelihood, ours.aic, ours.bic], [theirs.llf, theirs.aic, theirs.bic], rtol=1e-12)
+    # A regression does not count the variance as a parameter.
+    arx = th.arx(th.Log(y, u), 2, 1, detrend="none")
+    ols = sm.OLS(y[2:], np.column_stack([-y[1:-1], -y[:-2], u[1:-1]])).fit()
+    assert np.allclose([arx.log_likelihood, arx.aic, arx.bic], [ols.llf, ols.aic + 2, ols.bic + np.log(398)], rtol=1e-12)
+    # They order models as those beside them do.
+    scale = np.log(2 * np.pi) + 1
+    assert np.isclose(arx.aic, arx.samples * (arx.criteria["aic"] + scale) + 2, rtol=1e-12)
+    assert np.isclose(arx.bic, arx.samples * (arx.criteria["mdl"] + scale) + np.log(arx.samples), rtol=1e-12)
+    exact = th.ar(th.Log(np.zeros(20) + 0.5 ** np.arange(20)), 1, detrend="none")
+    assert np.isnan(exact.aic) == (exact.mse == 0)
 
 
 def test_a_forecast_goes_on_where_the_log_ends(motor: th.Log) -> None:
@@ -68,7 +106,7 @@ def test_responses_are_those_of_the_polynomials(motor: th.Log) -> None:
 def test_other_packages_simulate_the_same(motor: th.Log) -> None:
     model = th.armax(motor, 2, 2, 1)
     u = motor.u[:, 0] - model.offsets["u"][0]
-    free = model.simulate(motor) - model.offsets["y"][0]
+    free = model.simulate(motor.u) - model.offsets["y"][0]
     for system in (model.to_control(), model.to_state_space().to_control()):
         assert system.dt == 0.01 and system.input_labels == ["u"] and system.output_labels == ["y"]
         assert np.allclose(control.forced_response(system, inputs=u).outputs, free, atol=1e-9)
@@ -165,7 +203,7 @@ def test_what_a_model_cannot_answer_is_refused(motor: th.Log) -> None:
         (lambda: model.simulate([]), "u: "),
         (lambda: model.simulate(np.ones((5, 3))), r"u: expected shape \(any, 1\)"),
         (lambda: model.simulate([1.0, np.nan]), "u: input 'u' holds NaN"),
-        (lambda: model.simulate(motor.u, initial="estimated"), "initial"),
+        (lambda: model.simulate(motor.u, initial="estimate"), "initial"),
         (lambda: series.simulate([1.0]), "no inputs"),
         (lambda: model.forecast(motor, 3), "u: the model has inputs"),
         (lambda: model.forecast(motor, 3, [1.0]), "u: expected 3 entries"),

@@ -234,8 +234,34 @@ def test_instrumental_variables_have_their_bands(log: th.Log) -> None:
 def test_experiments_that_were_joined_are_not_connected(log: th.Log) -> None:
     joined = th.Log.join([log[500:503], log[:3]])
     assert joined.time[3] < joined.time[2]
-    (line,) = plot.log(joined)[0].get_lines()
+    line, border = plot.log(joined)[0].get_lines()
     np.testing.assert_array_equal(np.isnan(np.asarray(line.get_ydata(), dtype=float)), [0, 0, 0, 1, 0, 0, 0])
+    # One after the other, whatever their clocks say.
+    time = np.asarray(line.get_xdata(), dtype=float)
+    assert np.all(np.diff(time[np.isfinite(time)]) > 0)
+    assert time[2] < np.ravel(border.get_xdata())[0] < time[4]
+
+
+def test_experiments_with_clocks_that_go_on_are_not_connected_either() -> None:
+    joined = th.Log.join([th.Log([1.0, 2.0], time=[0.0, 1.0]), th.Log([3.0, 4.0, 5.0, 6.0], time=[2.0, 3.0, 9.0, 10.0])])
+    line, _ = plot.log(joined)[0].get_lines()
+    np.testing.assert_array_equal(line.get_xdata(), [0, 1, np.nan, 2, 3, np.nan, 9, 10])
+    assert len(plot.fit(th.ar(joined, 1, detrend="none"), joined, 1).get_lines()) == 3
+
+
+def test_residuals_are_titled_by_the_verdict(log: th.Log) -> None:
+    model = th.arx(log[:700], na=1, nb=1)
+    validation = model.validate(log[700:])
+    assert validation.whiteness < validation.alpha == 0.05
+    white, _ = plot.residuals(validation)
+    assert white.get_title() == f"residuals: not white, p = {validation.whiteness:.2g}"
+    good = th.bj(log[:700], nb=2, nc=0, nd=1, nf=2).validate(log[700:])
+    assert [ax.get_title().partition(", p =")[0] for ax in plot.residuals(good)] == [
+        "residuals: white",
+        "residuals and u: independent",
+    ]
+    strict = th.bj(log[:700], nb=2, nc=0, nd=1, nf=2).validate(log[700:], alpha=0.999)
+    assert plot.residuals(strict)[0].get_title().startswith("residuals: not white, p =")
 
 
 def test_log_draws_every_channel(two_inputs: th.Log) -> None:

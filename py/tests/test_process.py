@@ -145,7 +145,8 @@ def test_a_daemon_thread_in_a_function_of_a_model_ends_with_the_interpreter() ->
 
         def f(x, u):
             begun.set()
-            return np.array([sum(x[0] for _ in range(50)) / 50])
+            # A list is converted by Python code.
+            return [sum(x[0] for _ in range(50)) / 50]
 
         def forever():
             moved = th.NonlinearTransition(f, [[1.0]])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import pickle
+import re
 import threading
 import warnings
 from typing import Any, Callable, Literal
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+import thetahat as th
 from thetahat import (
     EstimationError,
     Forgetting,
@@ -474,3 +476,18 @@ def test_a_bad_snapshot_is_an_error() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert pickle.loads(pickle.dumps(Forgetting.random_walk(0.1))) == Forgetting.random_walk(0.1)
+
+
+def test_messages_name_nothing_of_another_language() -> None:
+    refused: list[Callable[[], object]] = [
+        lambda: th.RecursiveLeastSquares(1, scales=[1e-200]),
+        lambda: th.RecursiveLeastSquares(1, scales=[1e200]),
+        lambda: th.RecursiveLeastSquares(1).update([1e300], 1.0),
+        lambda: th.RecursiveArx(1, 1, output_scale=1e200),
+        lambda: th.KalmanFilter([0.0], [[1e308]]).predict(th.LinearTransition([[1e200]], [[1.0]])),
+        lambda: th.KalmanFilter([1e308], [[1.0]]).predict(th.LinearTransition([[1e308]], [[1.0]])),
+    ]
+    for call in refused:
+        with pytest.raises((ValueError, th.EstimationError)) as found:
+            call()
+        assert not re.search(r"[A-Z]+_[A-Z]+|::|\b(Dyn|Const|usize|f32|f64|scalar type|Some|None)\b", str(found.value)), found.value

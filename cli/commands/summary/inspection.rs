@@ -42,13 +42,17 @@ fn more(text: &mut Text, all: usize, shown: usize, what: &str) {
 
 fn clock(inspection: &Inspection) -> String {
     let clock = &inspection.clock;
-    let (file, rows, step) = (harmless(&inspection.log.file), inspection.rows, short(clock.sample_time));
+    let (file, step) = (harmless(&inspection.log.file), short(clock.sample_time));
+    let rows = match inspection.experiments {
+        1 => format!("{} rows", inspection.rows),
+        experiments => format!("{} rows in {experiments} experiments", inspection.rows),
+    };
     if !clock.measured {
-        return format!("{file}: {rows} rows, sample time {step} s");
+        return format!("{file}: {rows}, sample time {step} s");
     }
     let (shortest, longest) = clock.steps;
     format!(
-        "{file}: {rows} rows, {} clock: steps from {} s to {} s, median {step} s, jitter {} %, {} gap{}",
+        "{file}: {rows}, {} clock: steps from {} s to {} s, median {step} s, jitter {} %, {} gap{}",
         if clock.irregular { "irregular" } else { "regular" },
         short(shortest),
         short(longest),

@@ -202,7 +202,10 @@ impl fmt::Display for Error {
                 "not settled after {steps} steps: allow more, or check that all that is unstable is measured"
             ),
             Error::Overflow => {
-                write!(formatter, "the result does not fit the scalar type: use other units, or f64")
+                write!(
+                    formatter,
+                    "the result is too large for a number: use other units, or double precision"
+                )
             }
         }
     }
@@ -268,7 +271,7 @@ mod tests {
             (Error::NoVariance { index: row }, &["735", "noise variance above 0"]),
             (Error::NotObservable { rank: row, states: column }, &["735", "736", "measure"]),
             (Error::NotConverged { steps: needed }, &["731", "allow more"]),
-            (Error::Overflow, &["f64"]),
+            (Error::Overflow, &["double precision"]),
         ];
         for (error, parts) in cases {
             let message: String = error.to_string();

@@ -342,7 +342,7 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
         for (bound, &scale) in bounds.as_mut_slice().iter_mut().zip(scales.as_slice()) {
             let cube = scale * scale * scale;
             if !(cube * T::LARGEST_ENTRY >= T::one() && cube <= T::LARGEST_ENTRY) {
-                let range = "above 0, neither its third power nor that of its reciprocal above LARGEST_ENTRY";
+                let range = "from 1e-99 to 1e99 (in single precision from 6e-10 to 1.7e9): use other units";
                 return Err(Error::OutOfRange { argument: "scales", range });
             }
             *bound = T::from_count(100) / (scale * scale);

@@ -127,27 +127,9 @@ pub struct InspectionPlan {
 /// ```
 pub fn inspect(recording: Recording, source: &Source, plan: &InspectionPlan) -> Result<Inspection, Error> {
     let Recording { channels, times } = recording;
-    let rows = check(&channels)?;
     let roles = roles(&channels, plan)?;
-    let ticks = Ticks::new(&times, rows)?;
-    let quality: Vec<ChannelQuality> = channels
-        .par_iter()
-        .map(|channel| channel::quality(channel, roles.get(channel.name.as_str()).copied(), &times))
-        .collect();
-    let mut inspection = Inspection {
-        schema: Inspection::schema_name(),
-        generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
-        log: Source { rows: Rows::new(1, rows)?, resampled: None, ..source.clone() },
-        rows,
-        clock: ticks.clock.clone(),
-        channels: quality,
-        excitation: Vec::new(),
-        delays: Vec::new(),
-        feedback: Vec::new(),
-        command: None,
-        warnings: Vec::new(),
-    };
-    inspection.warnings = warnings::of_the_rows(&inspection, &ticks, &times, plan);
+    let ticks = Ticks::new(&times, check(&channels)?)?;
+    let mut inspection = of_the_rows(&channels, &times, &ticks, &roles, source, plan)?;
     match uniform(channels, times, &ticks, &roles, plan)? {
         Ok((log, resampled)) => {
             inspection.log.rows = Rows::new(1, log.rows())?;
@@ -158,6 +140,82 @@ pub fn inspect(recording: Recording, source: &Source, plan: &InspectionPlan) -> 
     }
     let words = warnings::of_the_dynamics(&inspection, plan);
     inspection.warnings.extend(words);
+    Ok(inspection)
+}
+
+/// The same of a log, of one experiment or several: nothing reaches from one into the next, and gaps are those of their own
+/// clocks.
+///
+/// # Errors
+/// As for [`inspect`].
+///
+/// ```
+/// use thetahat::{Channel, InspectionPlan, Log, Rows, Source, inspect_log};
+///
+/// let day = |times: Vec<f64>| {
+///     let y = times.iter().map(|time| (7.0 * time).sin()).collect();
+///     Log::with_time(vec![Channel { name: "y".into(), values: y }], times)
+/// };
+/// let log = Log::join(vec![day(vec![0.0, 1.0, 2.0, 9.0])?, day(vec![0.0, 1.0, 2.0, 3.0])?])?;
+/// let source =
+///     Source { file: "days".into(), rows: Rows::new(1, 8)?, time: None, start: None, resampled: None };
+/// let plan = InspectionPlan { inputs: vec![], output: Some("y".into()), resample: None };
+/// let inspection = inspect_log(&log, &source, &plan)?;
+/// assert_eq!((inspection.experiments, inspection.clock.gaps), (2, 1));
+/// # Ok::<(), thetahat::Error>(())
+/// ```
+pub fn inspect_log(log: &Log, source: &Source, plan: &InspectionPlan) -> Result<Inspection, Error> {
+    let times = match log.time() {
+        Some(time) if !log.is_joined() => Times::Measured(time.to_vec()),
+        // Several experiments have no common clock.
+        _ => Times::Uniform(log.sample_time()),
+    };
+    let ticks = match log.time() {
+        Some(time) if log.is_joined() => {
+            let ends = log.borders().iter().copied().chain([log.rows()]);
+            let mut begin = 0;
+            Ticks::joined(ends.map(|end| &time[std::mem::replace(&mut begin, end)..end]), log.sample_time())?
+        }
+        _ => Ticks::new(&times, log.rows())?,
+    };
+    let roles = roles(log.channels(), plan)?;
+    let mut inspection = of_the_rows(log.channels(), &times, &ticks, &roles, source, plan)?;
+    inspection.experiments = log.borders().len() + 1;
+    dynamics(&mut inspection, log, plan)?;
+    let words = warnings::of_the_dynamics(&inspection, plan);
+    inspection.warnings.extend(words);
+    Ok(inspection)
+}
+
+/// What there is to say of the rows as they are.
+fn of_the_rows(
+    channels: &[Channel],
+    times: &Times,
+    ticks: &Ticks,
+    roles: &HashMap<&str, &'static str>,
+    source: &Source,
+    plan: &InspectionPlan,
+) -> Result<Inspection, Error> {
+    let rows = check(channels)?;
+    let quality: Vec<ChannelQuality> = channels
+        .par_iter()
+        .map(|channel| channel::quality(channel, roles.get(channel.name.as_str()).copied(), times))
+        .collect();
+    let mut inspection = Inspection {
+        schema: Inspection::schema_name(),
+        generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
+        log: Source { rows: Rows::new(1, rows)?, resampled: None, ..source.clone() },
+        rows,
+        experiments: 1,
+        clock: ticks.clock.clone(),
+        channels: quality,
+        excitation: Vec::new(),
+        delays: Vec::new(),
+        feedback: Vec::new(),
+        command: None,
+        warnings: Vec::new(),
+    };
+    inspection.warnings = warnings::of_the_rows(&inspection, ticks, times, plan);
     Ok(inspection)
 }
 
@@ -186,7 +244,7 @@ fn uniform(
     mut channels: Vec<Channel>,
     times: Times,
     ticks: &Ticks,
-    roles: &HashMap<&str, &str>,
+    roles: &HashMap<&str, &'static str>,
     plan: &InspectionPlan,
 ) -> Result<Result<(Log, Option<Resampling>), String>, Error> {
     channels.retain(|channel| roles.contains_key(channel.name.as_str()));

@@ -63,7 +63,7 @@ pub use filter::{
 pub use greybox::{GreyBox, GreyFit, GreyOutput, GreyParameter, GreyReport, GreySearch, GreyState, fit_grey};
 pub use inspect::{
     ChannelQuality, Clock, DelayEstimate, Excitation, Feedback, Inspection, InspectionPlan, Recording,
-    Saturation, SpectrumPoint, Times, inspect,
+    Saturation, SpectrumPoint, Times, inspect, inspect_log,
 };
 pub use model::{Model, Orders, Parameter, Quantity, Root, Signal, StateSpace, Structure};
 pub use report::{

@@ -27,7 +27,7 @@ pub use predict::{predict, prediction_deviation};
 pub use simulate::simulate;
 pub use step::{StepResponse, step_response};
 
-/// What a response starts from.
+/// What a response starts from, in the words of [`Initial`](crate::Initial) for fits.
 ///
 /// In the first r = max(na, nb + nk - 1 of the inputs without F) + nd samples of a stretch, A, B and D reach back to
 /// samples that are not there. Unless these are taken as zero, e is, and the r samples do not count.
@@ -36,15 +36,15 @@ pub use step::{StepResponse, step_response};
 pub enum Start {
     /// Rest: all samples before the first of a segment are zero, and all of the segment count.
     Zero,
-    /// Measured samples: those directly before the segment where the log has them, else the segment's first ones. The
-    /// first r of all these do not count. They are all that ARX models need. C and F begin there from rest: samples
+    /// Nothing but measured samples: those directly before the segment where the log has them, else the segment's first
+    /// ones. The first r of all these do not count. They are all that ARX models need. C and F begin there from rest: samples
     /// before the segment warm them up, and without such samples their first outputs are wrong where they were not at
     /// rest.
-    Measured,
+    Drop,
     /// The initial condition that fits best in the least-squares sense, found from the segment alone: the segment's
     /// output in a free run, of which all samples count; the one-step predictions otherwise, and there the first r do
     /// not count.
-    Estimated,
+    Estimate,
 }
 
 /// A record must have as many inputs as the model.

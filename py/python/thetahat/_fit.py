@@ -2,26 +2,38 @@
 
 from __future__ import annotations
 
-import sys
 import warnings
+from collections.abc import Mapping
 from typing import Any
 
 from thetahat import _options, _thetahat
 from thetahat._log import Log, handle
 from thetahat._model import Model
-from thetahat._options import FitOptions, Orders
-
-if sys.version_info >= (3, 11):
-    from typing import Unpack
-else:
-    from typing_extensions import Unpack
+from thetahat._options import Bound, FitOptions, Orders, Rows
 
 
 class EstimationWarning(UserWarning):
     """What to know of a model before relying on it, such as missing samples or a search that did not converge."""
 
 
-def arx(log: Log, na: int, nb: Orders, nk: Orders = 1, **options: Unpack[FitOptions]) -> Model:
+def arx(
+    log: Log,
+    na: int,
+    nb: Orders,
+    nk: Orders = 1,
+    *,
+    estimate: Rows | None = None,
+    validate: Rows | None = None,
+    split: tuple[float, float, float] | None = None,
+    detrend: str | None = None,
+    offset: Mapping[str, float] | None = None,
+    initial: str | None = None,
+    norm: float | str | None = None,
+    bound: Mapping[str, Bound] | None = None,
+    dc_gain: Bound | Mapping[str, Bound] | None = None,
+    ridge: float | None = None,
+    noise_bound: float | None = None,
+) -> Model:
     """Fit an ARX model, A(q) y(t) = B(q) u(t) + e(t), by least squares.
 
     Parameters
@@ -34,7 +46,7 @@ def arx(log: Log, na: int, nb: Orders, nk: Orders = 1, **options: Unpack[FitOpti
         Coefficients of B.
     nk : int, or one for each input
         Samples from input to first effect.
-    **options
+    estimate, validate, split, detrend, offset, initial, norm, bound, dc_gain, ridge, noise_bound
         What to fit to and how, see `thetahat.FitOptions`.
 
     Returns
@@ -67,10 +79,30 @@ def arx(log: Log, na: int, nb: Orders, nk: Orders = 1, **options: Unpack[FitOpti
     >>> model.parameter_names
     ['a1', 'a2', 'b1', 'b2']
     """
-    return _fit(log, "arx", {"na": na, "nb": nb, "nk": nk}, options)
+    return _fit("arx", locals())
 
 
-def armax(log: Log, na: int, nb: Orders, nc: int, nk: Orders = 1, **options: Unpack[FitOptions]) -> Model:
+def armax(
+    log: Log,
+    na: int,
+    nb: Orders,
+    nc: int,
+    nk: Orders = 1,
+    *,
+    estimate: Rows | None = None,
+    validate: Rows | None = None,
+    split: tuple[float, float, float] | None = None,
+    detrend: str | None = None,
+    offset: Mapping[str, float] | None = None,
+    initial: str | None = None,
+    search: str | None = None,
+    max_iterations: int | None = None,
+    tolerance: float | None = None,
+    step: float | tuple[float, float] | None = None,
+    starts: int | None = None,
+    seed: int | None = None,
+    time_limit: float | None = None,
+) -> Model:
     """Fit an ARMAX model, A(q) y(t) = B(q) u(t) + C(q) e(t), by prediction errors.
 
     Parameters
@@ -81,7 +113,8 @@ def armax(log: Log, na: int, nb: Orders, nc: int, nk: Orders = 1, **options: Unp
         Coefficients of A, B and C; nb may be one for each input.
     nk : int, or one for each input
         Samples from input to first effect.
-    **options
+    estimate, validate, split, detrend, offset, initial, search, max_iterations, tolerance, step, starts, seed,
+    time_limit
         What to fit to and how to search, see `thetahat.FitOptions`.
 
     Returns
@@ -100,10 +133,29 @@ def armax(log: Log, na: int, nb: Orders, nc: int, nk: Orders = 1, **options: Unp
     >>> model.c.round(3)
     array([ 1.  , -0.55])
     """
-    return _fit(log, "armax", {"na": na, "nb": nb, "nc": nc, "nk": nk}, options)
+    return _fit("armax", locals())
 
 
-def oe(log: Log, nb: Orders, nf: Orders, nk: Orders = 1, **options: Unpack[FitOptions]) -> Model:
+def oe(
+    log: Log,
+    nb: Orders,
+    nf: Orders,
+    nk: Orders = 1,
+    *,
+    estimate: Rows | None = None,
+    validate: Rows | None = None,
+    split: tuple[float, float, float] | None = None,
+    detrend: str | None = None,
+    offset: Mapping[str, float] | None = None,
+    initial: str | None = None,
+    search: str | None = None,
+    max_iterations: int | None = None,
+    tolerance: float | None = None,
+    step: float | tuple[float, float] | None = None,
+    starts: int | None = None,
+    seed: int | None = None,
+    time_limit: float | None = None,
+) -> Model:
     """Fit an output error model, y(t) = B(q)/F(q) u(t) + e(t), by prediction errors.
 
     Standard errors hold for coloured noise too.
@@ -116,7 +168,8 @@ def oe(log: Log, nb: Orders, nf: Orders, nk: Orders = 1, **options: Unpack[FitOp
         Coefficients of B and F.
     nk : int, or one for each input
         Samples from input to first effect.
-    **options
+    estimate, validate, split, detrend, offset, initial, search, max_iterations, tolerance, step, starts, seed,
+    time_limit
         What to fit to and how to search, see `thetahat.FitOptions`.
 
     Returns
@@ -134,10 +187,31 @@ def oe(log: Log, nb: Orders, nf: Orders, nk: Orders = 1, **options: Unpack[FitOp
     >>> th.oe(th.dc_motor(), nb=2, nf=2).structure
     'oe'
     """
-    return _fit(log, "oe", {"nb": nb, "nf": nf, "nk": nk}, options)
+    return _fit("oe", locals())
 
 
-def bj(log: Log, nb: Orders, nc: int, nd: int, nf: Orders, nk: Orders = 1, **options: Unpack[FitOptions]) -> Model:
+def bj(
+    log: Log,
+    nb: Orders,
+    nc: int,
+    nd: int,
+    nf: Orders,
+    nk: Orders = 1,
+    *,
+    estimate: Rows | None = None,
+    validate: Rows | None = None,
+    split: tuple[float, float, float] | None = None,
+    detrend: str | None = None,
+    offset: Mapping[str, float] | None = None,
+    initial: str | None = None,
+    search: str | None = None,
+    max_iterations: int | None = None,
+    tolerance: float | None = None,
+    step: float | tuple[float, float] | None = None,
+    starts: int | None = None,
+    seed: int | None = None,
+    time_limit: float | None = None,
+) -> Model:
     """Fit a Box-Jenkins model, y(t) = B(q)/F(q) u(t) + C(q)/D(q) e(t), by prediction errors.
 
     Parameters
@@ -148,7 +222,8 @@ def bj(log: Log, nb: Orders, nc: int, nd: int, nf: Orders, nk: Orders = 1, **opt
         Coefficients of B, C, D and F; nb and nf may be one for each input.
     nk : int, or one for each input
         Samples from input to first effect.
-    **options
+    estimate, validate, split, detrend, offset, initial, search, max_iterations, tolerance, step, starts, seed,
+    time_limit
         What to fit to and how to search, see `thetahat.FitOptions`.
 
     Returns
@@ -167,10 +242,25 @@ def bj(log: Log, nb: Orders, nc: int, nd: int, nf: Orders, nk: Orders = 1, **opt
     >>> abs(model.poles()).round(2)
     array([0.89, 0.69])
     """
-    return _fit(log, "bj", {"nb": nb, "nc": nc, "nd": nd, "nf": nf, "nk": nk}, options)
+    return _fit("bj", locals())
 
 
-def ar(log: Log, na: int, **options: Unpack[FitOptions]) -> Model:
+def ar(
+    log: Log,
+    na: int,
+    *,
+    estimate: Rows | None = None,
+    validate: Rows | None = None,
+    split: tuple[float, float, float] | None = None,
+    detrend: str | None = None,
+    offset: Mapping[str, float] | None = None,
+    initial: str | None = None,
+    norm: float | str | None = None,
+    bound: Mapping[str, Bound] | None = None,
+    dc_gain: Bound | Mapping[str, Bound] | None = None,
+    ridge: float | None = None,
+    noise_bound: float | None = None,
+) -> Model:
     """Fit an autoregressive model of a time series, A(q) y(t) = e(t); inputs of the log are left out.
 
     Parameters
@@ -179,7 +269,7 @@ def ar(log: Log, na: int, **options: Unpack[FitOptions]) -> Model:
         The data.
     na : int
         Coefficients of A.
-    **options
+    estimate, validate, split, detrend, offset, initial, norm, bound, dc_gain, ridge, noise_bound
         What to fit to and how, see `thetahat.FitOptions`.
 
     Returns
@@ -199,10 +289,28 @@ def ar(log: Log, na: int, **options: Unpack[FitOptions]) -> Model:
     >>> bool(np.isclose(th.ar(th.Log(y), na=2, detrend="none").a[1], -1.8 * np.cos(0.3)))
     True
     """
-    return _fit(log, "ar", {"na": na}, options)
+    return _fit("ar", locals())
 
 
-def arma(log: Log, na: int, nc: int, **options: Unpack[FitOptions]) -> Model:
+def arma(
+    log: Log,
+    na: int,
+    nc: int,
+    *,
+    estimate: Rows | None = None,
+    validate: Rows | None = None,
+    split: tuple[float, float, float] | None = None,
+    detrend: str | None = None,
+    offset: Mapping[str, float] | None = None,
+    initial: str | None = None,
+    search: str | None = None,
+    max_iterations: int | None = None,
+    tolerance: float | None = None,
+    step: float | tuple[float, float] | None = None,
+    starts: int | None = None,
+    seed: int | None = None,
+    time_limit: float | None = None,
+) -> Model:
     """Fit an ARMA model of a time series, A(q) y(t) = C(q) e(t); inputs of the log are left out.
 
     Parameters
@@ -211,7 +319,8 @@ def arma(log: Log, na: int, nc: int, **options: Unpack[FitOptions]) -> Model:
         The data.
     na, nc : int
         Coefficients of A and C.
-    **options
+    estimate, validate, split, detrend, offset, initial, search, max_iterations, tolerance, step, starts, seed,
+    time_limit
         What to fit to and how to search, see `thetahat.FitOptions`.
 
     Returns
@@ -229,7 +338,7 @@ def arma(log: Log, na: int, nc: int, **options: Unpack[FitOptions]) -> Model:
     >>> th.arma(th.dc_motor(), na=2, nc=1).orders["nc"]
     1
     """
-    return _fit(log, "arma", {"na": na, "nc": nc}, options)
+    return _fit("arma", locals())
 
 
 def pem(
@@ -240,7 +349,25 @@ def pem(
     nd: int = 0,
     nf: Orders | None = None,
     nk: Orders | None = None,
-    **options: Unpack[FitOptions],
+    *,
+    estimate: Rows | None = None,
+    validate: Rows | None = None,
+    split: tuple[float, float, float] | None = None,
+    detrend: str | None = None,
+    offset: Mapping[str, float] | None = None,
+    initial: str | None = None,
+    norm: float | str | None = None,
+    bound: Mapping[str, Bound] | None = None,
+    dc_gain: Bound | Mapping[str, Bound] | None = None,
+    ridge: float | None = None,
+    noise_bound: float | None = None,
+    search: str | None = None,
+    max_iterations: int | None = None,
+    tolerance: float | None = None,
+    step: float | tuple[float, float] | None = None,
+    starts: int | None = None,
+    seed: int | None = None,
+    time_limit: float | None = None,
 ) -> Model:
     """Fit the general model, A(q) y(t) = B(q)/F(q) u(t) + C(q)/D(q) e(t), by prediction errors.
 
@@ -252,7 +379,8 @@ def pem(
         Coefficients of the polynomials; nb and nf may be one for each input.
     nk : int, or one for each input
         Samples from input to first effect: 1, unless said otherwise.
-    **options
+    estimate, validate, split, detrend, offset, initial, norm, bound, dc_gain, ridge, noise_bound, search,
+    max_iterations, tolerance, step, starts, seed, time_limit
         What to fit to and how to search, see `thetahat.FitOptions`.
 
     Returns
@@ -270,10 +398,22 @@ def pem(
     >>> th.pem(th.dc_motor(), na=1, nb=2, nf=1, nd=1).structure
     'pem'
     """
-    return _fit(log, "pem", {"na": na, "nb": nb, "nc": nc, "nd": nd, "nf": nf, "nk": nk}, options)
+    return _fit("pem", locals())
 
 
-def iv(log: Log, na: int, nb: Orders, nk: Orders = 1, **options: Unpack[FitOptions]) -> Model:
+def iv(
+    log: Log,
+    na: int,
+    nb: Orders,
+    nk: Orders = 1,
+    *,
+    estimate: Rows | None = None,
+    validate: Rows | None = None,
+    split: tuple[float, float, float] | None = None,
+    detrend: str | None = None,
+    offset: Mapping[str, float] | None = None,
+    initial: str | None = None,
+) -> Model:
     """Fit A and B of an ARX model by instrumental variables in four stages: right about the plant whatever the noise.
 
     Parameters
@@ -282,7 +422,7 @@ def iv(log: Log, na: int, nb: Orders, nk: Orders = 1, **options: Unpack[FitOptio
         The data.
     na, nb, nk
         As for `arx`.
-    **options
+    estimate, validate, split, detrend, offset, initial
         What to fit to, see `thetahat.FitOptions`.
 
     Returns
@@ -304,10 +444,22 @@ def iv(log: Log, na: int, nb: Orders, nk: Orders = 1, **options: Unpack[FitOptio
     >>> th.iv(th.dc_motor(), na=2, nb=2).method
     'instrumental-variables'
     """
-    return _fit(log, "arx", {"na": na, "nb": nb, "nk": nk}, options, "--method=iv")
+    return _fit("arx", locals(), "--method=iv")
 
 
-def sriv(log: Log, nb: Orders, nf: Orders, nk: Orders = 1, **options: Unpack[FitOptions]) -> Model:
+def sriv(
+    log: Log,
+    nb: Orders,
+    nf: Orders,
+    nk: Orders = 1,
+    *,
+    estimate: Rows | None = None,
+    validate: Rows | None = None,
+    split: tuple[float, float, float] | None = None,
+    detrend: str | None = None,
+    offset: Mapping[str, float] | None = None,
+    initial: str | None = None,
+) -> Model:
     """Fit B and F of an output error model by refined instrumental variables: right about the plant whatever the noise.
 
     Parameters
@@ -316,7 +468,7 @@ def sriv(log: Log, nb: Orders, nf: Orders, nk: Orders = 1, **options: Unpack[Fit
         The data.
     nb, nf, nk
         As for `oe`.
-    **options
+    estimate, validate, split, detrend, offset, initial
         What to fit to, see `thetahat.FitOptions`.
 
     Returns
@@ -338,7 +490,7 @@ def sriv(log: Log, nb: Orders, nf: Orders, nk: Orders = 1, **options: Unpack[Fit
     >>> th.sriv(th.dc_motor(), nb=2, nf=2).method
     'refined-instrumental-variables'
     """
-    return _fit(log, "oe", {"nb": nb, "nf": nf, "nk": nk}, options, "--method=sriv")
+    return _fit("oe", locals(), "--method=sriv")
 
 
 def search(
@@ -353,7 +505,24 @@ def search(
     nk: Orders | None = None,
     select: str | None = None,
     path: str | None = None,
-    **options: Unpack[FitOptions],
+    estimate: Rows | None = None,
+    validate: Rows | None = None,
+    split: tuple[float, float, float] | None = None,
+    detrend: str | None = None,
+    offset: Mapping[str, float] | None = None,
+    initial: str | None = None,
+    norm: float | str | None = None,
+    bound: Mapping[str, Bound] | None = None,
+    dc_gain: Bound | Mapping[str, Bound] | None = None,
+    ridge: float | None = None,
+    noise_bound: float | None = None,
+    search: str | None = None,
+    max_iterations: int | None = None,
+    tolerance: float | None = None,
+    step: float | tuple[float, float] | None = None,
+    starts: int | None = None,
+    seed: int | None = None,
+    time_limit: float | None = None,
 ) -> Model:
     """Choose a model among many, all compared on the same samples.
 
@@ -371,7 +540,8 @@ def search(
         What makes one model better than another: MDL, unless said otherwise.
     path : {"all", "alternate"}
         Which are tried: all of them, or one order up at a time.
-    **options
+    estimate, validate, split, detrend, offset, initial, norm, bound, dc_gain, ridge, noise_bound, search,
+    max_iterations, tolerance, step, starts, seed, time_limit
         What to fit to and how to search, see `thetahat.FitOptions`.
 
     Returns
@@ -391,15 +561,17 @@ def search(
     >>> model.selection["models"]
     18
     """
-    orders = {"na": na, "nb": nb, "nc": nc, "nd": nd, "nf": nf, "nk": nk}
     more = [f"--{name}={_options.text(name, value)}" for name, value in (("select", select), ("path", path)) if value is not None]
-    return _fit(log, model, orders, options, *more)
+    return _fit(model, locals(), *more)
 
 
-def _fit(log: Log, model: str | None, orders: dict[str, Any], options: Any, *more: str) -> Model:
+def _fit(model: str | None, arguments: dict[str, Any], *more: str) -> Model:
+    """A fit by one of the functions above, with its arguments: the log, orders and options."""
+    log = arguments["log"]
     data = handle("log", log)
+    orders = {name: arguments[name] for name in ("na", "nb", "nc", "nd", "nf", "nk") if name in arguments}
     words = [] if model is None else [f"--model={_options.text('model', model)}"]
-    words += [*_options.order_words(**orders), *_options.words(FitOptions, options, len(log)), *more]
+    words += [*_options.order_words(**orders), *_options.words(FitOptions, arguments, len(log)), *more]
     fitted = Model._of(_thetahat.fit(data, words))
     for warning in fitted._model.warnings():
         warnings.warn(warning, EstimationWarning, stacklevel=3)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import sys
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from html import escape
@@ -12,12 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from thetahat import _options, _thetahat
 from thetahat._log import Log, handle
-from thetahat._options import ValidationOptions, ReadOptions
-
-if sys.version_info >= (3, 11):
-    from typing import Unpack
-else:
-    from typing_extensions import Unpack
+from thetahat._options import ReadOptions, Rows, ValidationOptions
 
 if TYPE_CHECKING:
     from thetahat._model import Model
@@ -60,6 +54,8 @@ class Validation(_Document):
     ----------
     unmet : list of str
         What was required and is not met, with the figures.
+    alpha : float
+        The level at which tests reject.
 
     Examples
     --------
@@ -77,10 +73,11 @@ class Validation(_Document):
     @classmethod
     def _of(cls, validation: _thetahat.Validation) -> Validation:
         made = cls(validation.to_json(), validation.table())
-        made.unmet = validation.unmet()
+        made.unmet, made.alpha = validation.unmet(), validation.alpha
         return made
 
     unmet: list[str]
+    alpha: float
 
     def fit(self, horizon: int | None = 1) -> float:
         """The fit in percent so many steps ahead, or in a free run (None); NaN where there is none.
@@ -168,7 +165,17 @@ class Inspection(_Document):
         return f"Inspection({self.document['rows']} rows, {count} warning{'' if count == 1 else 's'})"
 
 
-def compare(models: Mapping[str, Model] | Sequence[Model], log: Log, **options: Unpack[ValidationOptions]) -> Comparison:
+def compare(
+    models: Mapping[str, Model] | Sequence[Model],
+    log: Log,
+    *,
+    rows: Rows | None = None,
+    detrend: str | None = None,
+    horizon: int | Sequence[int] | None = None,
+    lags: int | None = None,
+    alpha: float | None = None,
+    alphas: Sequence[float] | None = None,
+) -> Comparison:
     """Put several fitted models side by side on a log.
 
     Parameters
@@ -177,7 +184,7 @@ def compare(models: Mapping[str, Model] | Sequence[Model], log: Log, **options: 
         The models, with the names that they have in the table.
     log : Log
         The data.
-    **options
+    rows, detrend, horizon, lags, alpha, alphas
         What to validate on and how, see `thetahat.ValidationOptions`.
 
     Returns
@@ -192,6 +199,7 @@ def compare(models: Mapping[str, Model] | Sequence[Model], log: Log, **options: 
     >>> th.compare(models, log[700:])
     Comparison(arx, oe)
     """
+    words = _options.words(ValidationOptions, locals(), len(log) if isinstance(log, Log) else None)
     named = dict(models) if isinstance(models, Mapping) else {f"model {k}": m for k, m in enumerate(models, 1)}
     if not named:
         raise ValueError("models: there is none; give at least one")
@@ -201,7 +209,7 @@ def compare(models: Mapping[str, Model] | Sequence[Model], log: Log, **options: 
         if not isinstance(model, Model):
             raise TypeError(f"models: expected a Model, found {type(model).__name__}")
     handles = [(_options.text("models", name), model._model) for name, model in named.items()]
-    return Comparison(*_thetahat.compare(handles, handle("log", log), _options.words(ValidationOptions, options, len(log))))
+    return Comparison(*_thetahat.compare(handles, handle("log", log), words))
 
 
 def inspect(
@@ -209,7 +217,17 @@ def inspect(
     *,
     inputs: Sequence[str] | str | None = None,
     output: str | None = None,
-    **options: Unpack[ReadOptions],
+    time: str | None = None,
+    sample_time: float | None = None,
+    resample: tuple[float, str] | None = None,
+    time_format: str | None = None,
+    delimiter: str | None = None,
+    comment: str | None = None,
+    encoding: str | None = None,
+    decimal_comma: bool = False,
+    header: bool = True,
+    skip_rows: int | None = None,
+    missing: str | Sequence[str] | None = None,
 ) -> Inspection:
     """Look at a log before any fit: its clock, the quality of its channels, excitation, delays and feedback.
 
@@ -217,8 +235,10 @@ def inspect(
     ----------
     log : Log, or path
         The data, or a CSV file, whose clock may be irregular.
-    inputs, output, **options
-        How a file is read, as for `read_csv`; without names all columns of numbers are looked at.
+    inputs, output
+        The columns of a file that are inputs and output; without names all columns of numbers are looked at.
+    time, sample_time, resample, time_format, delimiter, comment, encoding, decimal_comma, header, skip_rows, missing
+        How a file is read, see `thetahat.ReadOptions`.
 
     Returns
     -------
@@ -230,7 +250,7 @@ def inspect(
     >>> th.inspect(th.dc_motor())
     Inspection(1000 rows, 0 warnings)
     """
-    words = _options.words(ReadOptions, options)
+    words = _options.words(ReadOptions, locals())
     if isinstance(log, Log):
         if words or inputs is not None or output is not None:
             raise TypeError("inputs, output and how to read are for files; a Log has its own")

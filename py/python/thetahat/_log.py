@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import os
-import sys
 import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any, overload
@@ -16,10 +15,6 @@ from thetahat import _clock, _numbers, _options, _picture, _thetahat
 from thetahat._clock import Clock
 from thetahat._options import Duration, ReadOptions
 
-if sys.version_info >= (3, 11):
-    from typing import Unpack
-else:
-    from typing_extensions import Unpack
 
 class Log:
     """Inputs and an output on a common clock.
@@ -167,7 +162,7 @@ class Log:
 
     @classmethod
     def join(cls, logs: Sequence[Log]) -> Log:
-        """Several experiments with one plant as one log: nothing reaches from one into the next.
+        """Several experiments with one plant as one log: nothing reaches from one into the next, see `experiments`.
 
         Parameters
         ----------
@@ -179,7 +174,7 @@ class Log:
         >>> import thetahat as th
         >>> monday, tuesday = th.Log([1.0, 2.0]), th.Log([3.0, 4.0, 5.0])
         >>> th.Log.join([monday, tuesday])
-        Log(5 rows, no inputs, output y, sample time 1.0 s assumed)
+        Log(5 rows in 2 experiments, no inputs, output y, sample time 1.0 s assumed)
         """
         joined = _thetahat.Log.join([handle("logs", log) for log in logs])
         return cls._of(joined, _clock.joined([log._clock for log in logs]))
@@ -283,6 +278,53 @@ class Log:
             found[name] = values
         return found
 
+    @property
+    def experiments(self) -> list[range]:
+        """The rows of each experiment, of one that was not joined all of them. ``log[log.experiments[0]]`` is the first.
+
+        Examples
+        --------
+        >>> import thetahat as th
+        >>> log = th.Log.join([th.Log([1.0, 2.0]), th.Log([3.0, 4.0, 5.0])])
+        >>> log.experiments
+        [range(0, 2), range(2, 5)]
+        """
+        edges = [0, *self._log.borders, len(self)]
+        return [range(*ends) for ends in zip(edges, edges[1:])]
+
+    @property
+    def segments(self) -> list[range]:
+        """The stretches of rows that estimators see: in none a value is missing, the clock jumps, or an experiment ends.
+
+        Examples
+        --------
+        >>> import thetahat as th
+        >>> th.Log([1.0, 2.0, float("nan"), 4.0]).segments
+        [range(0, 2), range(3, 4)]
+        """
+        present = np.ones(len(self), dtype=bool)
+        for name in [*self.inputs, self.output]:
+            present &= ~np.isnan(self._log.values(name))
+        breaks = np.array(self._log.breaks, dtype=np.intp)
+        first, last = present.copy(), present.copy()
+        first[1:] &= ~present[:-1]
+        last[:-1] &= ~present[1:]
+        first[breaks], last[breaks - 1] = present[breaks], present[breaks - 1]
+        return [range(*ends) for ends in zip(np.flatnonzero(first).tolist(), (np.flatnonzero(last) + 1).tolist())]
+
+    @property
+    def missing(self) -> dict[str, int]:
+        """How many values each channel misses.
+
+        Examples
+        --------
+        >>> import thetahat as th
+        >>> th.Log([1.0, 2.0, float("nan"), 4.0]).missing
+        {'y': 1}
+        """
+        names = [*self.inputs, self.output]
+        return {name: int(np.count_nonzero(np.isnan(self._log.values(name)))) for name in names}
+
     def __len__(self) -> int:
         return self._log.rows
 
@@ -292,16 +334,20 @@ class Log:
     __iter__ = None
 
     @overload
-    def __getitem__(self, rows: slice) -> Log: ...
+    def __getitem__(self, rows: slice | range) -> Log: ...
 
     @overload
     def __getitem__(self, rows: str) -> npt.NDArray[np.float64]: ...
 
-    def __getitem__(self, rows: slice | str) -> Log | npt.NDArray[np.float64]:
+    def __getitem__(self, rows: slice | range | str) -> Log | npt.NDArray[np.float64]:
         if isinstance(rows, str):
             if rows not in self:
                 raise KeyError(f"there is no channel '{rows}'; there are: {', '.join([*self.inputs, self.output])}")
             return self._log.values(rows)
+        if isinstance(rows, range):
+            if not 0 <= rows.start <= rows.stop <= len(self):
+                raise ValueError(f"rows: {rows} is not inside of the log, which has {len(self)}")
+            rows = slice(rows.start, rows.stop, rows.step)
         if not isinstance(rows, slice):
             raise TypeError(f"a log is cut by a slice such as log[:500], found {rows!r}")
         start, stop, step = rows.indices(len(self))
@@ -315,11 +361,12 @@ class Log:
         if not isinstance(other, Log):
             return NotImplemented
         mine, yours = self._log, other._log
-        same = (mine.inputs, mine.output, mine.sample_time, mine.breaks) == (
+        same = (mine.inputs, mine.output, mine.sample_time, mine.breaks, mine.borders) == (
             yours.inputs,
             yours.output,
             yours.sample_time,
             yours.breaks,
+            yours.borders,
         )
         arrays = ((self.y, other.y), (self.u, other.u), (self.time, other.time))
         return same and all(np.array_equal(one, another, equal_nan=True) for one, another in arrays)
@@ -338,7 +385,15 @@ class Log:
 
     def __repr__(self) -> str:
         inputs = f"inputs {', '.join(self.inputs)}" if self.inputs else "no inputs"
-        return f"Log({len(self)} rows, {inputs}, output {self.output}, sample time {self.sample_time} s{self._clock.text()})"
+        experiments, segments, missing = len(self.experiments), len(self.segments), sum(self.missing.values())
+        rows = f"{len(self)} rows"
+        if experiments > 1:
+            rows += f" in {experiments} experiments"
+        if segments != experiments:
+            rows += f"{' and' if experiments > 1 else ' in'} {segments} segment{'' if segments == 1 else 's'}"
+        if missing:
+            rows += f", {missing} value{'' if missing == 1 else 's'} missing"
+        return f"Log({rows}, {inputs}, output {self.output}, sample time {self.sample_time} s{self._clock.text()})"
 
     def _repr_html_(self) -> str:
         names = [self.output, *self.inputs]
@@ -359,7 +414,17 @@ def read_csv(
     *,
     inputs: Sequence[str] | str | None = None,
     output: str | None = None,
-    **options: Unpack[ReadOptions],
+    time: str | None = None,
+    sample_time: float | None = None,
+    resample: tuple[float, str] | None = None,
+    time_format: str | None = None,
+    delimiter: str | None = None,
+    comment: str | None = None,
+    encoding: str | None = None,
+    decimal_comma: bool = False,
+    header: bool = True,
+    skip_rows: int | None = None,
+    missing: str | Sequence[str] | None = None,
 ) -> Log:
     """Read a log from a CSV file, as the command line does.
 
@@ -371,9 +436,8 @@ def read_csv(
         The columns that are inputs: those called u, u1, u2, …, unless said otherwise. An empty one makes a time series.
     output : str, optional
         The column that is the output: y, unless said otherwise.
-    **options
-        How the file is read, see `thetahat.ReadOptions`: `time`, `sample_time`, `resample`, `time_format`, `delimiter`,
-        `decimal_comma`, `header`, `skip_rows`, `comment`, `missing`, `encoding`.
+    time, sample_time, resample, time_format, delimiter, comment, encoding, decimal_comma, header, skip_rows, missing
+        How the file is read, see `thetahat.ReadOptions`.
 
     Returns
     -------
@@ -402,10 +466,10 @@ def read_csv(
     >>> log
     Log(3 rows, inputs u, output y, sample time 0.5 s by column 't')
     """
+    words = [*_options.channels(inputs, output), *_options.words(ReadOptions, locals())]
     paths: list[Any] = list(path) if isinstance(path, (list, tuple)) else [path]
     if not paths:
         raise ValueError("path: there is none; give at least one")
-    words = [*_options.channels(inputs, output), *_options.words(ReadOptions, options)]
     if inputs is not None and not isinstance(inputs, str) and not inputs:
         # The command line reads no inputs for a model without them.
         words += ["--na=1", "--nb=0"]

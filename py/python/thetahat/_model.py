@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from html import escape
@@ -16,13 +15,8 @@ import numpy.typing as npt
 from thetahat import _files, _numbers, _options, _picture, _thetahat
 from thetahat._judgement import Validation
 from thetahat._log import Log, handle
-from thetahat._options import ValidationOptions
+from thetahat._options import Rows, ValidationOptions
 from thetahat._responses import Forecast, FrequencyResponse, StateSpace, StepResponse
-
-if sys.version_info >= (3, 11):
-    from typing import Unpack
-else:
-    from typing_extensions import Unpack
 
 if TYPE_CHECKING:
     import os
@@ -313,10 +307,55 @@ class Model:
 
     @property
     def criteria(self) -> dict[str, float]:
-        """FPE, AIC, AICc and MDL; NaN where one is not defined."""
+        """FPE, AIC, AICc and MDL for each sample, as Ljung counts them; NaN where one is not defined. `aic` and `bic` are those
+        of the whole log."""
         estimation = self._estimation
         names = ("fpe", "aic", "aicc", "mdl")
         return {name: float("nan" if estimation.get(name) is None else estimation[name]) for name in names}
+
+    @property
+    def log_likelihood(self) -> float:
+        """The logarithm of the likelihood of the fit, as statsmodels counts it.
+
+        Notes
+        -----
+        For Gaussian errors with the variance V that makes it largest, the mean of e^2 over the N samples that count::
+
+            ln L = -N/2 (ln 2 pi + ln V + 1)
+
+        It is the likelihood given the samples that do not count (the conditional one), of a fit by least squared errors of
+        which V is the least. NaN for an exact fit.
+
+        References
+        ----------
+        Akaike, A new look at the statistical model identification, 1974. Schwarz, Estimating the dimension of a model, 1978.
+        """
+        return -self.samples / 2 * (np.log(2 * np.pi) + np.log(self.mse) + 1) if self.mse > 0 else np.nan
+
+    @property
+    def aic(self) -> float:
+        """Akaike's information criterion as statsmodels counts it, -2 ln L + 2 (p + 1), with the p parameters and V.
+
+        It is on another scale than ``criteria["aic"]``, which is ln V + 2 p/N: N (AIC + ln 2 pi + 1) + 2. Both order models
+        that were fitted to the same samples in the same way.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import thetahat as th
+        >>> model = th.arx(th.dc_motor(), na=2, nb=2)
+        >>> bool(np.isclose(model.aic, model.samples * (model.criteria["aic"] + np.log(2 * np.pi) + 1) + 2))
+        True
+        """
+        return -2 * self.log_likelihood + 2 * (len(self.parameters) + 1)
+
+    @property
+    def bic(self) -> float:
+        """Schwarz's Bayesian information criterion as statsmodels counts it, -2 ln L + (p + 1) ln N.
+
+        It is N (MDL + ln 2 pi + 1) + ln N, where MDL, ``criteria["mdl"]``, is ln V + p ln(N)/N.
+        """
+        return -2 * self.log_likelihood + (len(self.parameters) + 1) * float(np.log(self.samples))
 
     @property
     def fits(self) -> list[dict[str, Any]]:
@@ -333,7 +372,7 @@ class Model:
         """What a careful reader should know, in plain words."""
         return [_thetahat.in_python(warning) for warning in self.document["warnings"]]
 
-    def predict(self, log: Log, horizon: int | None = 1, *, initial: str | None = None) -> Array:
+    def predict(self, log: Log, horizon: int | None = 1, *, initial: str = "auto") -> Array:
         """The prediction of each row from what was known some steps before, in the units of the log.
 
         Parameters
@@ -342,8 +381,10 @@ class Model:
             The data; its channels are found by name.
         horizon : int or None, default 1
             Steps ahead. None is a free run: the inputs alone drive the model.
-        initial : {"zero", "measured", "estimated"}, optional
-            What the prediction starts from: what the model needs, unless said otherwise.
+        initial : {"auto", "drop", "zero", "estimate"}, default "auto"
+            What stands before the first sample of a stretch, in the words of the fits: nothing ("drop": measured samples
+            start the prediction, and the first ones have none), zeros, or what fits best. "auto" is "drop" where the
+            model needs no more, else "estimate"; "zero" where the log has no output.
 
         Returns
         -------
@@ -366,7 +407,7 @@ class Model:
         return self._predicted(log, horizon, initial)[0]
 
     def predict_interval(
-        self, log: Log, horizon: int = 1, *, level: float = 0.95, initial: str | None = None
+        self, log: Log, horizon: int = 1, *, level: float = 0.95, initial: str = "auto"
     ) -> tuple[Array, Array]:
         """Intervals that hold the output, as far as one knows some steps before.
 
@@ -388,20 +429,21 @@ class Model:
         half = NormalDist().inv_cdf((1 + level) / 2) * (np.nan if deviations is None else deviations)
         return values - half, values + half
 
-    def _predicted(self, log: Log, horizon: int | None, initial: str | None) -> tuple[Array, Array | None]:
+    def _predicted(self, log: Log, horizon: int | None, initial: str) -> tuple[Array, Array | None]:
         if horizon is not None:
             horizon = _options.count("horizon", horizon, 1_000_000)
         return self._model.predict(handle("log", log), horizon, initial)
 
-    def simulate(self, u: _numbers.Columns | Log, *, initial: str = "zero") -> Array:
+    def simulate(self, u: _numbers.Columns | Log, *, initial: str = "auto") -> Array:
         """The free run on inputs, in the units of the log.
 
         Parameters
         ----------
         u : array_like, shape (N,) or (N, inputs), or data frame, dict of str to array_like, or Log
             The inputs. Those of a frame, dict or log are found by name.
-        initial : {"zero", "estimated", "measured"}, default "zero"
-            What the run starts from: rest, or, of a log, what fits its output best, or its first samples.
+        initial : {"auto", "drop", "zero", "estimate"}, default "auto"
+            What stands before the first sample, as for `predict`. "auto" is "zero" for inputs alone, and "estimate" for a
+            log with the output, as of ``thetahat simulate``.
 
         Returns
         -------
@@ -418,12 +460,12 @@ class Model:
         """
         if isinstance(u, Log):
             return self._predicted(u, None, initial)[0]
-        if initial != "zero":
-            raise ValueError("initial: inputs alone start from zero; give a Log to start from its output")
+        if initial not in ("auto", "zero"):
+            raise ValueError(f"initial: inputs alone start from zero, not '{initial}'; give a Log to start from its output")
         return self._model.simulate(self._inputs_of(u))
 
     def forecast(
-        self, log: Log, steps: int, u: _numbers.Columns | None = None, *, initial: str | None = None
+        self, log: Log, steps: int, u: _numbers.Columns | None = None, *, initial: str = "auto"
     ) -> Forecast:
         """What comes after the end of a log.
 
@@ -435,7 +477,7 @@ class Model:
             How far to look.
         u : array_like, shape (steps,) or (steps, inputs), or data frame or dict of str to array_like
             The inputs in these steps, of a model that has some. Those of a frame or dict are found by name.
-        initial : {"zero", "measured", "estimated"}, optional
+        initial : {"auto", "drop", "zero", "estimate"}, default "auto"
             As for `predict`.
 
         Returns
@@ -461,7 +503,7 @@ class Model:
         time = log.time[-1] + self.sample_time * np.arange(1, steps + 1)
         return Forecast(time, values, deviations, log._clock.after(steps, self.sample_time))
 
-    def residuals(self, log: Log, horizon: int = 1, *, initial: str | None = None) -> Array:
+    def residuals(self, log: Log, horizon: int = 1, *, initial: str = "auto") -> Array:
         """The measured output less its prediction.
 
         Parameters
@@ -486,7 +528,16 @@ class Model:
         return log[self.output] - values
 
     def validate(
-        self, log: Log, require: str | Sequence[str] | None = None, **options: Unpack[ValidationOptions]
+        self,
+        log: Log,
+        require: str | Sequence[str] | None = None,
+        *,
+        rows: Rows | None = None,
+        detrend: str | None = None,
+        horizon: int | Sequence[int] | None = None,
+        lags: int | None = None,
+        alpha: float | None = None,
+        alphas: Sequence[float] | None = None,
     ) -> Validation:
         """Say how the model does on a log: fits, tests of its residuals, coverage of its intervals.
 
@@ -497,7 +548,7 @@ class Model:
         require : str or sequence of str, optional
             What the model must be or do: ``white``, ``independent``, ``stable``, ``fit>=80``, ``fit@5>=80``,
             ``coverage>=90``. `Validation.unmet` says what it is not.
-        **options
+        rows, detrend, horizon, lags, alpha, alphas
             What to validate on and how, see `thetahat.ValidationOptions`.
 
         Returns
@@ -517,7 +568,7 @@ class Model:
         >>> model.validate(log[700:], require=["white", "independent", "fit>=90"]).unmet
         []
         """
-        words = _options.words(ValidationOptions, options, len(log) if isinstance(log, Log) else None)
+        words = _options.words(ValidationOptions, locals(), len(log) if isinstance(log, Log) else None)
         words += [f"--require={one}" for one in ([require] if isinstance(require, str) else require or ())]
         return Validation._of(_thetahat.validate(self._model, handle("log", log), words))
 

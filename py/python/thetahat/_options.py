@@ -71,7 +71,7 @@ class FitOptions(TypedDict, total=False):
     seed : int
         Which random starts.
     time_limit : float
-        Begin no iteration after so many seconds.
+        After so many seconds begin no iteration, and look for no further start.
     """
 
     estimate: Rows
@@ -80,7 +80,7 @@ class FitOptions(TypedDict, total=False):
     detrend: str
     offset: Mapping[str, float]
     initial: str
-    norm: Union[int, float, str]
+    norm: Union[float, str]
     bound: Mapping[str, Bound]
     dc_gain: Union[Bound, Mapping[str, Bound]]
     ridge: float
@@ -159,21 +159,20 @@ class ReadOptions(TypedDict, total=False):
     missing: Union[str, Sequence[str]]
 
 
-def words(allowed: type, options: Mapping[str, Any], rows: int | None = None) -> list[str]:
-    """The options of the command line that say the same; ``rows`` is where an open slice ends.
+def words(allowed: type, arguments: Mapping[str, Any], rows: int | None = None) -> list[str]:
+    """Those of a function's arguments that are options, in the words of the command line; ``rows`` is where an open slice
+    ends.
 
     Raises
     ------
     TypeError
-        For an option that there is not, or a value of a type that it cannot have.
+        For a value of a type that an option cannot have.
     ValueError
         For a value that cannot be.
     """
-    there_are = allowed.__annotations__
     found: list[str] = []
-    for name, value in options.items():
-        if name not in there_are:
-            raise TypeError(f"{name}: there is no such option; there are: {', '.join(sorted(there_are))}")
+    for name in allowed.__annotations__:
+        value = arguments.get(name)
         if value is None:
             continue
         if name == "header":

@@ -73,7 +73,8 @@ def log(log: Log, axes: Any = None) -> Grid:
     Parameters
     ----------
     log : Log
-        The data. Inputs are drawn as held from one sample to the next.
+        The data. Inputs are drawn as held from one sample to the next. Experiments follow one another, whatever their
+        clocks say, with a line where one begins.
     axes : array_like of Axes, shape (1 + inputs,), optional
         Where to draw.
 
@@ -96,6 +97,7 @@ def log(log: Log, axes: Any = None) -> Grid:
         time, values = _broken(log, values)
         ax.plot(time, values, drawstyle=style, **_lone(values))
         ax.set_ylabel(_shown(name))
+        _borders(ax, log)
     grid[-1].set_xlabel("time [s]")
     return grid
 
@@ -161,6 +163,7 @@ def fit(
             low, high = (_broken(log, end)[1] for end in model.predict_interval(log, horizon, level=level))
             bands.append(_band(ax, time, low, high, line.get_color()))
     _label_one(bands, level)
+    _borders(ax, log)
     _scale_to(ax, list(measured.values()), drawn_all)
     ax.set_xlabel("time [s]")
     ax.set_ylabel(_shown(", ".join(measured)))
@@ -172,7 +175,8 @@ def fit(
 def residuals(of: Validation | Model, log: Log | None = None, axes: Any = None) -> Grid:
     """The correlation of the one-step errors with themselves and with each input.
 
-    White errors stay inside the band at 95 of 100 lags. Outside of it at positive lags of an input: past inputs are still in
+    The titles say what the tests find at the level of the validation, 0.05 unless said otherwise: errors are not white, or
+    not independent of an input, where their p-value is below it. White errors stay inside the band at 95 of 100 lags. Outside of it at positive lags of an input: past inputs are still in
     the errors, so the model lacks dynamics or delay. At negative lags: the input follows the output, there is feedback.
 
     Parameters
@@ -200,7 +204,7 @@ def residuals(of: Validation | Model, log: Log | None = None, axes: Any = None) 
     >>> log = th.dc_motor()
     >>> axes = plot.residuals(th.armax(log[:700], na=2, nb=2, nc=1), log[700:])
     >>> [ax.get_title() for ax in axes]
-    ['residuals, white with p = 0.59', 'residuals and u, independent with p = 0.87']
+    ['residuals: white, p = 0.59', 'residuals and u: independent, p = 0.87']
     """
     if isinstance(of, Model):
         if log is None:
@@ -217,13 +221,13 @@ def residuals(of: Validation | Model, log: Log | None = None, axes: Any = None) 
 
     values = _array(tests["autocorrelation"])[1:]
     _correlation(grid[0], np.arange(1, len(values) + 1), values, np.full(len(values), tests["band"]))
-    grid[0].set_title("residuals" + _p_value(", white with", of.whiteness))
+    grid[0].set_title("residuals" + _verdict("white", of.whiteness, of.alpha))
     grid[0].set_ylabel("autocorrelation")
     for ax, test in zip(grid[1:], inputs):
         values = _array(test["correlation"])
         _correlation(ax, np.arange(len(values)) - len(values) // 2, values, _array(test["band"]))
         name = test["input"]
-        ax.set_title(_shown(f"residuals and {name}" + _p_value(", independent with", of.independence[name])))
+        ax.set_title(_shown(f"residuals and {name}" + _verdict("independent", of.independence[name], of.alpha)))
         ax.set_ylabel("correlation")
     return grid
 
@@ -650,12 +654,27 @@ def _region(ax: Axes, root: Mapping[str, Any], half: float, level: float, colour
     ax.add_patch(Ellipse((root["re"], root["im"]), width, height, angle=angle, fill=False, color=colour))
 
 
+def _time(log: Log) -> Array:
+    """The time of each row: that of the log; of several experiments, each begins one sample after the one before it."""
+    time = log.time.copy()
+    for rows in log.experiments[1:]:
+        time[rows.start : rows.stop] += time[rows.start - 1] + log.sample_time - time[rows.start]
+    return time
+
+
 def _broken(log: Log, values: Array) -> tuple[Array, Array]:
-    """Time and values, with a break of the line where the clock jumps."""
-    time = log.time
-    steps = np.diff(time)
-    jumps = np.flatnonzero((steps > 1.5 * log.sample_time) | (steps < 0)) + 1
-    return np.insert(time, jumps, np.nan), np.insert(values, jumps, np.nan)
+    """Time and values, with a break of the line where the clock jumps, and where an experiment begins."""
+    time = _time(log)
+    jumps = np.flatnonzero(np.diff(time) > 1.5 * log.sample_time) + 1
+    breaks = np.union1d(jumps, [rows.start for rows in log.experiments[1:]]).astype(np.intp)
+    return np.insert(time, breaks, np.nan), np.insert(values, breaks, np.nan)
+
+
+def _borders(ax: Axes, log: Log) -> None:
+    """A line between each experiment and the one before it."""
+    time = _time(log)
+    for rows in log.experiments[1:]:
+        ax.axvline(time[rows.start] - log.sample_time / 2, color="0.7", linewidth=0.8, linestyle=":")
 
 
 def _lone(values: Array) -> dict[str, Any]:
@@ -698,8 +717,9 @@ def _quantile(level: float) -> float:
     return NormalDist().inv_cdf((1 + level) / 2)
 
 
-def _p_value(words: str, value: float) -> str:
-    return f"{words} p = {value:.2g}" if isfinite(value) else ""
+def _verdict(null: str, p: float, alpha: float) -> str:
+    """What a test finds of its null hypothesis at the level alpha; nothing where it could not be made."""
+    return f": {null if p >= alpha else f'not {null}'}, p = {p:.2g}" if isfinite(p) else ""
 
 
 def _array(values: Sequence[float | None]) -> Array:

@@ -26,11 +26,36 @@ except ImportError as error:
 from thetahat import Log, Model, _numbers, arx
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["ARXRegressor"]
+    from thetahat._options import Bound, Rows
+
+__all__ = ["EXPECTED_FAILED_CHECKS", "ARXRegressor"]
+
+EXPECTED_FAILED_CHECKS = {
+    "check_methods_sample_order_invariance": "rows are in the order of time",
+    "check_methods_subset_invariance": "a row depends on those before it",
+    "check_regressors_no_decision_function": "its 10 rows with 4 inputs do not determine the parameters",
+    "check_estimators_nan_inf": "its 10 rows with 3 inputs are too few for two coefficients each; passes with na=1, nb=1",
+    "check_estimators_dtypes": "its 20 rows of whole numbers do not determine 12 parameters; passes with na=1, nb=1",
+}
+"""The checks of `sklearn.utils.estimator_checks.check_estimator` that an `ARXRegressor` fails by what it is, and why."""
+
+_OPTIONS = (
+    "estimate",
+    "validate",
+    "split",
+    "detrend",
+    "offset",
+    "initial",
+    "norm",
+    "bound",
+    "dc_gain",
+    "ridge",
+    "noise_bound",
+)
 
 
 # Without stubs of scikit-learn its classes are Any to mypy.
@@ -49,6 +74,9 @@ class ARXRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         How many samples ahead `predict` and `score` predict. None: the free run, which sees no outputs.
     sample_time : float, default=1.0
         Seconds from one sample to the next.
+    estimate, validate, split, detrend, offset, initial, norm, bound, dc_gain, ridge, noise_bound : default=None
+        What to fit to and how, as for `thetahat.arx`, see `thetahat.FitOptions`. Channels are called as the columns of a data
+        frame, else u, or u1, u2, …, and y.
 
     Attributes
     ----------
@@ -63,13 +91,14 @@ class ARXRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
 
     Notes
     -----
-    NaN in y means a sample that is missing.
+    NaN in y means a sample that is missing. Without inputs, X being None, this is an AR model of y, and nb and nk are not read;
+    its free run is the level that was taken from y before the fit.
 
     With a horizon leave `scoring` of searches and cross-validation at its default, which is `score`: all others call `predict`
     without the outputs. The `predict` of a pipeline hands them on: `pipeline.predict(X, y=y)`.
 
-    Of the checks in `sklearn.utils.estimator_checks` those that shuffle rows or leave some out fail, as time is in their order,
-    and so does the one that wants NaN in y refused.
+    It passes scikit-learn's `check_estimator` but for `EXPECTED_FAILED_CHECKS` of this module, which says why:
+    ``check_estimator(ARXRegressor(), expected_failed_checks=EXPECTED_FAILED_CHECKS)``.
 
     Examples
     --------
@@ -94,20 +123,42 @@ class ARXRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         *,
         horizon: int | None = None,
         sample_time: float = 1.0,
+        estimate: Rows | None = None,
+        validate: Rows | None = None,
+        split: tuple[float, float, float] | None = None,
+        detrend: str | None = None,
+        offset: Mapping[str, float] | None = None,
+        initial: str | None = None,
+        norm: float | str | None = None,
+        bound: Mapping[str, Bound] | None = None,
+        dc_gain: Bound | Mapping[str, Bound] | None = None,
+        ridge: float | None = None,
+        noise_bound: float | None = None,
     ) -> None:
         self.na = na
         self.nb = nb
         self.nk = nk
         self.horizon = horizon
         self.sample_time = sample_time
+        self.estimate = estimate
+        self.validate = validate
+        self.split = split
+        self.detrend = detrend
+        self.offset = offset
+        self.initial = initial
+        self.norm = norm
+        self.bound = bound
+        self.dc_gain = dc_gain
+        self.ridge = ridge
+        self.noise_bound = noise_bound
 
-    def fit(self, X: ArrayLike, y: ArrayLike) -> ARXRegressor:
+    def fit(self, X: ArrayLike | None, y: ArrayLike) -> ARXRegressor:
         """Estimate the model.
 
         Parameters
         ----------
-        X : array_like of shape (n_samples, n_inputs)
-            The inputs in the order of time.
+        X : array_like of shape (n_samples, n_inputs), or None
+            The inputs in the order of time; None for a time series.
         y : array_like of shape (n_samples,)
             The output.
 
@@ -126,11 +177,13 @@ class ARXRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         self._check_horizon()
         inputs = self._inputs(X, reset=True)
         log = self._log(inputs, self._output(y, inputs))
-        self.model_: Model = arx(log, na=self.na, nb=_orders(self.nb), nk=_orders(self.nk))
+        orders = {"nb": 0} if inputs is None else {"nb": _orders(self.nb), "nk": _orders(self.nk)}
+        options: Any = {name: getattr(self, name) for name in _OPTIONS}
+        self.model_: Model = arx(log, na=self.na, **orders, **options)
         self.coef_: NDArray[np.float64] = np.asarray(self.model_.parameters, dtype=np.float64)
         return self
 
-    def predict(self, X: ArrayLike, y: ArrayLike | None = None) -> NDArray[np.float64]:
+    def predict(self, X: ArrayLike | None, y: ArrayLike | None = None) -> NDArray[np.float64]:
         """Predict the output.
 
         Without a horizon this is the free run: the model is driven by the inputs alone and begins at rest, all deviations zero
@@ -138,10 +191,11 @@ class ARXRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
 
         Parameters
         ----------
-        X : array_like of shape (n_samples, n_inputs)
-            The inputs in the order of time.
+        X : array_like of shape (n_samples, n_inputs), or None
+            The inputs in the order of time; None for a time series.
         y : array_like of shape (n_samples,), optional
-            The measured output, of which a prediction with a horizon sees what is that far back. Not read without a horizon.
+            The measured output, of which a prediction with a horizon sees what is that far back. Not read without a horizon,
+            but for its length where there are no inputs.
 
         Returns
         -------
@@ -151,15 +205,21 @@ class ARXRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         Raises
         ------
         ValueError
-            If there is a horizon and no y, or X does not have the inputs of the fit.
+            If there is a horizon and no y, or neither X nor y, or X does not have the inputs of the fit.
         sklearn.exceptions.NotFittedError
             If there is no model yet.
         """
         check_is_fitted(self)
         self._check_horizon()
         inputs = self._inputs(X, reset=False)
-        if self.horizon is None:
+        if self.horizon is None and inputs is not None and self.model_.inputs:
             return np.asarray(self.model_.simulate(inputs, initial="zero"), dtype=np.float64)
+        if self.horizon is None:
+            if inputs is None and y is None:
+                raise ValueError("y: without inputs it says how many samples to predict; give predict(None, y)")
+            count = len(self._output(y, None) if inputs is None else inputs)
+            level, slope = self.model_.offsets[self.model_.output]
+            return np.asarray(level + slope * self.sample_time * np.arange(count), dtype=np.float64)
         if y is None:
             message = (
                 f"y: a prediction {self.horizon} samples ahead starts from measured outputs; give predict(X, y), "
@@ -169,13 +229,13 @@ class ARXRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         log = self._log(inputs, self._output(y, inputs))
         return np.asarray(self.model_.predict(log, horizon=int(self.horizon)), dtype=np.float64)
 
-    def score(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> float:
+    def score(self, X: ArrayLike | None, y: ArrayLike, sample_weight: ArrayLike | None = None) -> float:
         """The coefficient of determination, R^2, of `predict(X, y)`.
 
         Parameters
         ----------
-        X : array_like of shape (n_samples, n_inputs)
-            The inputs in the order of time.
+        X : array_like of shape (n_samples, n_inputs), or None
+            The inputs in the order of time; None for a time series.
         y : array_like of shape (n_samples,)
             The measured output.
         sample_weight : array_like of shape (n_samples,), optional
@@ -215,7 +275,16 @@ class ARXRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
             message = f"horizon: expected a whole number of samples from 1 on, or None, found {horizon!r}"
             raise ValueError(message)
 
-    def _inputs(self, X: ArrayLike, *, reset: bool) -> NDArray[np.float64]:
+    def _inputs(self, X: ArrayLike | None, *, reset: bool) -> NDArray[np.float64] | None:
+        if X is None and reset:
+            self.n_features_in_ = 0
+            # Names of an earlier fit go with its inputs.
+            if hasattr(self, "feature_names_in_"):
+                del self.feature_names_in_
+        if X is None:
+            if self.n_features_in_ > 0:
+                raise ValueError(f"X: expected {self.n_features_in_} inputs, as in the fit, found None")
+            return None
         # scikit-learn reads what lies behind a mask.
         inputs: NDArray[np.float64] = validate_data(
             self,
@@ -226,7 +295,7 @@ class ARXRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         )
         return inputs
 
-    def _output(self, y: ArrayLike, beside: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _output(self, y: ArrayLike | None, beside: NDArray[np.float64] | None) -> NDArray[np.float64]:
         if y is None:
             message = "y: ARXRegressor requires y to be passed, but the target y is None"
             raise ValueError(message)
@@ -239,10 +308,11 @@ class ARXRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
             estimator=self,
         )
         output: NDArray[np.float64] = column_or_1d(checked, warn=True)
-        check_consistent_length(beside, output)
+        if beside is not None:
+            check_consistent_length(beside, output)
         return output
 
-    def _log(self, inputs: NDArray[np.float64], output: NDArray[np.float64]) -> Log:
+    def _log(self, inputs: NDArray[np.float64] | None, output: NDArray[np.float64]) -> Log:
         names = getattr(self, "feature_names_in_", None)
         taken = [] if names is None else [str(name) for name in names]
         # No input may have the output's name.

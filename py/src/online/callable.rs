@@ -277,7 +277,7 @@ impl<'a, 'py> Called<'a, 'py> {
         u: &DVector<f64>,
     ) -> Result<Bound<'py, PyAny>, Trouble> {
         let arguments = (argument::from_vector(self.py, x), argument::from_vector(self.py, u));
-        calling(|| function.bind(self.py).call1(arguments)).map_err(Trouble::Raised)
+        calling(self.py, || function.bind(self.py).call1(arguments)).map_err(Trouble::Raised)
     }
 
     /// The library's NaN for no answer, and the reason for later.

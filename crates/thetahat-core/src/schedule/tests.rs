@@ -159,6 +159,18 @@ fn what_does_not_settle_is_an_error() {
 }
 
 #[test]
+fn it_is_given_up_when_asked() {
+    let (motion, sensor) = alpha_beta::<f64>();
+    let mut asked = 0;
+    let third = || {
+        asked += 1;
+        asked > 3
+    };
+    let given_up = GainSchedule::new(unit()).steady_state_unless(&motion, &sensor, 100, third);
+    assert_eq!(given_up.unwrap_err(), Error::NotConverged { steps: 3 });
+}
+
+#[test]
 fn what_is_stable_and_not_driven_becomes_known() {
     let known = LinearTransition::new(Matrix2::new(0.5, 0.0, 0.0, 0.9), Covariance::zero(Const)).unwrap();
     let sensor = LinearObservation::new(Matrix2::identity(), unit()).unwrap();

@@ -1,9 +1,8 @@
 //! Fits of several models to the same samples, so that their costs can be compared.
 
 use std::ops::Range;
-use std::time::Instant;
 
-use super::optimize::{Monitor, Search, best_free, search};
+use super::optimize::{Deadline, Monitor, Search, best_free, search};
 use super::prediction_error::{NOTHING_LEFT, energy, is_determined};
 use super::predictor::{Begin, Polynomials, Predictor};
 use super::start::candidates;
@@ -38,7 +37,7 @@ pub(crate) struct Common<'a> {
     options: Search,
     /// A sum of squares that is nothing.
     smallest: f64,
-    deadline: Option<Instant>,
+    deadline: Deadline,
     monitor: Monitor<'a>,
 }
 
@@ -67,7 +66,7 @@ impl<'a> Common<'a> {
         let samples: usize = record.segments.iter().map(Range::len).sum();
         let tolerance = options.tolerance.max(SETTLED / samples.max(1) as f64);
         let options = Search { guess: None, starts: 0, tolerance, ..options.clone() };
-        let deadline = options.time_limit.and_then(|limit| Instant::now().checked_add(limit));
+        let deadline = Deadline::after(options.time_limit);
         let smallest = NOTHING_LEFT * energy(record);
         let begin = if free { Begin::Unknown } else { Begin::Zero };
         Ok(Self { record, begin, window, options, smallest, deadline, monitor })
@@ -100,8 +99,8 @@ impl<'a> Common<'a> {
         if predictor.samples() <= orders.parameters() + predictor.initial_conditions() {
             return Ok(None);
         }
-        let own: Vec<Vec<f64>> = if recipes {
-            let candidates = candidates(self.record, orders).unwrap_or_default();
+        let own: Vec<Vec<f64>> = if recipes && (starts.is_empty() || !self.deadline.is_over()) {
+            let candidates = candidates(self.record, orders, self.deadline).unwrap_or_default();
             candidates.into_iter().map(|candidate| candidate.parameters).collect()
         } else {
             Vec::new()

@@ -6,7 +6,7 @@ use thetahat_core::LeastSquares;
 use thetahat_core::nalgebra::{DMatrix, DVector, Dyn};
 
 use super::arx::{arx, resolved, rows, signals};
-use super::optimize::Stopped;
+use super::optimize::{Deadline, Stopped};
 use super::start::noise::{Equation, Mixed, behind};
 use super::start::plant::{
     Equations, Group, Input, Plant, Point, add_delayed, divided, energy, inverse, multiplied,
@@ -277,7 +277,7 @@ pub(super) fn refined_instrumental_variables(
              let auto choose",
         ));
     }
-    let starts: Vec<Vec<Vec<f64>>> = candidates(record, orders)?
+    let starts: Vec<Vec<Vec<f64>>> = candidates(record, orders, Deadline::default())?
         .iter()
         .map(|candidate| {
             let mut rest = &candidate.parameters[orders.nb.iter().sum()..];

@@ -87,7 +87,7 @@ pub struct Search {
     pub starts: usize,
     /// Which random starts.
     pub seed: u64,
-    /// No iteration begins after so long.
+    /// After so long no iteration begins, no start is searched from, and none is looked for but the first.
     pub time_limit: Option<Duration>,
     /// One more start: parameters in their order, such as those of a model that is known to be close.
     pub guess: Option<Vec<f64>>,
@@ -141,6 +141,21 @@ impl Default for Search {
             time_limit: None,
             guess: None,
         }
+    }
+}
+
+/// When to begin nothing more; never, unless there is a limit.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Deadline(Option<Instant>);
+
+impl Deadline {
+    /// So long from now. A limit beyond the end of the clock is none.
+    pub(super) fn after(limit: Option<Duration>) -> Self {
+        Self(limit.and_then(|limit| Instant::now().checked_add(limit)))
+    }
+
+    pub(super) fn is_over(self) -> bool {
+        self.0.is_some_and(|deadline| Instant::now() >= deadline)
     }
 }
 
@@ -377,7 +392,7 @@ pub(super) fn search(
     start: &[f64],
     search: &Search,
     smallest: f64,
-    deadline: Option<Instant>,
+    deadline: Deadline,
     monitor: Monitor<'_>,
 ) -> Result<Result<Found, Unusable>, Error> {
     let size = start.len();
@@ -439,7 +454,7 @@ pub(super) fn search(
         if iteration >= search.max_iterations {
             break Stopped::MaxIterations;
         }
-        if deadline.is_some_and(|deadline| Instant::now() >= deadline) {
+        if deadline.is_over() {
             break Stopped::TimeLimit;
         }
         let rule = match search.algorithm {

@@ -1,14 +1,13 @@
 //! The estimate of least squared prediction errors for the general family: starts, search, initial conditions, covariance.
 
 use std::ops::Range;
-use std::time::Instant;
 
 use rayon::prelude::*;
 use thetahat_core::nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::arx::{arx, out_of_range, rows, signals};
 use super::optimize::{
-    Algorithm, Found, Monitor, Search, SearchOutcome, StartOutcome, Stopped, best_free, search,
+    Algorithm, Deadline, Found, Monitor, Search, SearchOutcome, StartOutcome, Stopped, best_free, search,
 };
 use super::predictor::{Begin, Predictor, Unusable};
 use super::restart::restarts;
@@ -68,7 +67,7 @@ pub(super) fn prediction_error(
     if !energy.is_normal() && energy != 0.0 {
         return Err(out_of_range());
     }
-    let deadline = options.time_limit.and_then(|limit| Instant::now().checked_add(limit));
+    let deadline = Deadline::after(options.time_limit);
     let job = Job { options, smallest: NOTHING_LEFT * energy, deadline, monitor };
     let mut beginning = job.beginning(record, orders, begin, &mut predictor)?;
     if choose {
@@ -88,7 +87,7 @@ pub(super) fn prediction_error(
 struct Job<'a> {
     options: &'a Search,
     smallest: f64,
-    deadline: Option<Instant>,
+    deadline: Deadline,
     monitor: Monitor<'a>,
 }
 
@@ -212,13 +211,18 @@ impl Job<'_> {
         let samples = predictor.samples() as f64;
         let mut starts = Vec::new();
         let guess = self.options.guess.iter().map(|guess| ("guess", guess.clone()));
-        let found = match candidates(record, orders) {
+        let found = match candidates(record, orders, self.deadline) {
             Err(error) if self.options.guess.is_none() => return Err(error),
             found => found.unwrap_or_default(),
         };
         let unstable_pole = found.iter().filter_map(|candidate| candidate.unstable_pole).reduce(f64::max);
         let candidates = found.into_iter().map(|candidate| (candidate.name, candidate.parameters));
         for (name, parameters) in guess.chain(candidates) {
+            if self.deadline.is_over()
+                && starts.iter().any(|(start, _): &(StartOutcome, _)| start.cost.is_some())
+            {
+                break;
+            }
             let cost = best_free(predictor, &parameters).ok();
             starts.push((
                 StartOutcome { name: name.to_owned(), cost: cost.map(|c| c / samples), reached: None },
@@ -228,7 +232,7 @@ impl Job<'_> {
         // Stable: of equal ones the first stays first; those without a cost come last.
         let cost = |start: &StartOutcome| start.cost.unwrap_or(f64::INFINITY);
         starts.sort_by(|(a, _), (b, _)| cost(a).total_cmp(&cost(b)));
-        if let Some((_, best)) = starts.first() {
+        if let Some((_, best)) = starts.first().filter(|_| !self.deadline.is_over()) {
             let missing = (self.options.starts + 1).saturating_sub(starts.len());
             let more: Vec<_> = restarts(orders, best, self.options.seed, missing).collect();
             for (number, parameters) in more.into_iter().enumerate() {
@@ -246,7 +250,10 @@ impl Job<'_> {
             return Ok(Beginning { parameters: first, starts, unstable_pole, samples: None, found: None });
         }
         let searched = starts.len().min(self.options.starts + 1);
-        let results = starts[..searched].par_iter().map(|(_, parameters)| {
+        let results = starts[..searched].par_iter().enumerate().map(|(number, (_, parameters))| {
+            if number > 0 && self.deadline.is_over() {
+                return Ok(None);
+            }
             Ok(self.search(&mut Predictor::new(record, orders, begin), parameters)?.ok())
         });
         let mut results = results.collect::<Result<Vec<_>, Error>>()?;

@@ -24,6 +24,7 @@ use std::ops::Range;
 use thetahat_core::nalgebra::{Complex, ComplexField};
 
 use super::arx::{enough, out_of_range, signals};
+use super::optimize::Deadline;
 use crate::data::Record;
 use crate::model::polynomial::{is_stable, roots};
 use crate::regression::{Lagged, Presample, Taps, Unsolved};
@@ -47,15 +48,20 @@ pub(super) struct Candidate {
 
 /// The starts for a model, the most promising recipe first. O(N p), some dozen passes over the data.
 ///
-/// A recipe that the data do not serve is left out. Segments begin with unknown initial conditions.
+/// A recipe that the data do not serve is left out. Segments begin with unknown initial conditions. After the deadline no
+/// recipe begins but the first, and no iteration of one.
 ///
 /// # Errors
 /// As for [`arx`](super::arx()): [`Error::Undetermined`] if the data serve none, with the parameters concerned.
-pub(super) fn candidates(record: &Record<'_>, orders: &Orders) -> Result<Vec<Candidate>, Error> {
+pub(super) fn candidates(
+    record: &Record<'_>,
+    orders: &Orders,
+    deadline: Deadline,
+) -> Result<Vec<Candidate>, Error> {
     let signals = signals(record, orders)?;
     let lost = |segment: &Range<usize>| segment.len().saturating_sub(orders.conditioned());
     enough(record.segments.iter().map(lost).sum(), orders)?;
-    let mut candidates = mixed::starts(record.output, &record.inputs, &record.segments, orders);
+    let mut candidates = mixed::starts(record.output, &record.inputs, &record.segments, orders, deadline);
     candidates.retain(|candidate| candidate.parameters.iter().all(|value| value.is_finite()));
     if candidates.is_empty() {
         return Err(undetermined(&signals, record, orders));

@@ -94,6 +94,44 @@ impl Ticks {
     }
 }
 
+impl Ticks {
+    /// The steps inside of each of several experiments, which are uniform with this sample time. O(N).
+    ///
+    /// # Errors
+    /// As for [`Ticks::new`].
+    pub(super) fn joined<'a>(
+        times: impl Iterator<Item = &'a [f64]>,
+        sample_time: f64,
+    ) -> Result<Self, Error> {
+        let clock = Clock {
+            sample_time,
+            measured: true,
+            steps: (f64::INFINITY, f64::NEG_INFINITY),
+            jitter: 0.0,
+            gaps: 0,
+            irregular: false,
+        };
+        let mut joined = Self { clock, backward: 0, first_backward: None };
+        let (mut square, mut count) = (0.0, 0.0);
+        // One row has no step.
+        for time in times.filter(|time| time.len() > 1) {
+            let own = Self::new(&Times::Measured(time.to_vec()), time.len())?.clock;
+            let (low, high) = joined.clock.steps;
+            joined.clock.steps = (low.min(own.steps.0), high.max(own.steps.1));
+            joined.clock.gaps += own.gaps;
+            let steps = (time.len() - 1 - own.gaps) as f64;
+            square += steps * own.jitter * own.jitter;
+            count += steps;
+        }
+        if count > 0.0 {
+            joined.clock.jitter = (square / count).sqrt();
+        } else {
+            joined.clock.steps = (sample_time, sample_time);
+        }
+        Ok(joined)
+    }
+}
+
 /// The median; the mean of the middle two of an even number.
 fn median(values: &mut [f64]) -> Option<f64> {
     let middle = values.len() / 2;

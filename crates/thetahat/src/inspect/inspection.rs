@@ -19,6 +19,9 @@ pub struct Inspection {
     pub log: Source,
     /// The number of rows.
     pub rows: usize,
+    /// How many experiments they are.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub experiments: usize,
     /// The clock.
     pub clock: Clock,
     /// One entry for each channel.
@@ -35,7 +38,16 @@ pub struct Inspection {
     pub warnings: Vec<String>,
 }
 
-/// The clock of a log.
+fn one() -> usize {
+    1
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for it")]
+fn is_one(count: &usize) -> bool {
+    *count == 1
+}
+
+/// The clock of a log; of several experiments all of theirs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Clock {
     /// The median step, in seconds.
@@ -189,6 +201,7 @@ impl Inspection {
             generator: self.generator.clone(),
             log: self.log.clone(),
             rows: self.rows,
+            experiments: self.experiments,
             clock: self.clock.clone(),
             channels: positions.iter().map(|&at| self.channels[at].clone()).collect(),
             excitation: only(&self.excitation, |of| names.contains(of.input.as_str())),

@@ -200,7 +200,7 @@ mod tests {
     }
 
     fn predicted(model: &Model, log: &Log, rows: &[Rows], steps: usize) -> Applied {
-        apply(model, log.clone(), rows, None, Horizon::Steps { steps }, Start::Measured).unwrap()
+        apply(model, log.clone(), rows, None, Horizon::Steps { steps }, Start::Drop).unwrap()
     }
 
     fn near(found: f64, expected: f64) -> bool {
@@ -253,7 +253,7 @@ mod tests {
         assert_eq!(predicted(&model, &log, &rows("4..4"), 2).beyond, 2);
         let none = Log::new(vec![channel("y", &[f64::NAN; 4])], 2.0).unwrap();
         assert_eq!(predicted(&model, &none, &[], 2).beyond, 0);
-        let far = apply(&model, log, &[], None, Horizon::Steps { steps: usize::MAX }, Start::Measured);
+        let far = apply(&model, log, &[], None, Horizon::Steps { steps: usize::MAX }, Start::Drop);
         assert!(matches!(far, Err(Error::Argument { argument, .. }) if argument == "horizon"));
     }
 
@@ -297,7 +297,7 @@ mod tests {
         let model = model(-0.5, &[2.0]);
         let y = [5.0, 6.0, 7.0, 5.0, 4.0];
         let log = Log::new(vec![channel("u", &[1.0; 5]), channel("y", &y)], 2.0).unwrap();
-        let run = apply(&model, log.clone(), &[], None, Horizon::FreeRun, Start::Estimated).unwrap();
+        let run = apply(&model, log.clone(), &[], None, Horizon::FreeRun, Start::Estimate).unwrap();
         assert_eq!((run.beyond, run.standard_deviations, run.predicted.len()), (0, None, 5));
         let inputs = Log::new(vec![channel("u", &[1.0; 5])], 2.0).unwrap();
         let run = apply(&model, inputs, &[], None, Horizon::FreeRun, Start::Zero).unwrap();

@@ -397,12 +397,12 @@ fn judge(report: &mut Report, record: &Record<'_>, rows: &[Rows], part: Part, in
     let first = match initial {
         _ if part != Part::Estimation => Start::natural(&report.model, Horizon::Steps { steps: 1 }),
         Initial::Zero => Start::Zero,
-        Initial::Estimate => Start::Estimated,
-        Initial::Auto | Initial::Drop => Start::Measured,
+        Initial::Estimate => Start::Estimate,
+        Initial::Auto | Initial::Drop => Start::Drop,
     };
     let mut looks = vec![(Horizon::Steps { steps: 1 }, first)];
     if report.model.orders.nb.iter().any(|&nb| nb > 0) {
-        looks.push((Horizon::FreeRun, Start::Estimated));
+        looks.push((Horizon::FreeRun, Start::Estimate));
     }
     for (horizon, start) in looks {
         let name = match part {

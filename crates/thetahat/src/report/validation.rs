@@ -328,8 +328,8 @@ fn is_of_fit(report: &Report, log: &Log, inputs: &[String]) -> bool {
     record.past.fill(0);
     let (start, tolerance) = match estimation.initial {
         Initial::Zero => (Start::Zero, SAME),
-        Initial::Estimate if !model.orders.is_linear() => (Start::Estimated, NEARLY_SAME),
-        _ => (Start::Measured, SAME),
+        Initial::Estimate if !model.orders.is_linear() => (Start::Estimate, NEARLY_SAME),
+        _ => (Start::Drop, SAME),
     };
     let Ok(found) = innovations(model, &record, 1, start) else { return false };
     let (mut samples, mut square, mut size) = (0, 0.0, 0.0);

@@ -46,7 +46,7 @@ pub struct Forecast {
 /// let estimate = arx(&record, &orders, Initial::Drop)?;
 /// let model = Model::new(&orders, &estimate, 1.0, vec![Signal::default()], Signal::default())?;
 /// // Two steps ahead; the second needs the input of the first.
-/// let ahead = forecast(&model, &record, &[&[3.0]], 2, Start::Measured)?;
+/// let ahead = forecast(&model, &record, &[&[3.0]], 2, Start::Drop)?;
 /// let first = 0.8 * y[99] + 0.5 * u[99];
 /// assert!((ahead.values[0] - first).abs() < 1e-9);
 /// assert!((ahead.values[1] - (0.8 * first + 0.5 * 3.0)).abs() < 1e-9);

@@ -166,6 +166,6 @@ pub(super) fn closest_of(target: &[f64], columns: &[Column]) -> Result<Vec<f64>,
 fn unknown() -> Error {
     Error::undetermined(
         Vec::new(),
-        "the initial condition of a response cannot be told from the data; start it from zero or from measured samples",
+        "the initial condition of a response cannot be told from the data; use zero or drop",
     )
 }

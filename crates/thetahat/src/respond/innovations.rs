@@ -80,10 +80,8 @@ pub(super) fn of_segment(
     let ahead = horizon.saturating_sub(1);
     let (first, silent, skipped) = match start {
         Start::Zero => (segment.start, 0, 0),
-        Start::Measured => {
-            (history(model, segment, past, ahead), conditioned, conditioned.saturating_add(ahead))
-        }
-        Start::Estimated => (segment.start, conditioned, conditioned.saturating_add(ahead)),
+        Start::Drop => (history(model, segment, past, ahead), conditioned, conditioned.saturating_add(ahead)),
+        Start::Estimate => (segment.start, conditioned, conditioned.saturating_add(ahead)),
     };
     let rows = first..segment.end;
     let counted = first.saturating_add(skipped).clamp(segment.start, segment.end)..segment.end;
@@ -92,7 +90,7 @@ pub(super) fn of_segment(
     }
     let mut impulses = Impulses::none(model);
     let (mut disturbance, mut errors) = residuals(model, record, &rows, silent, &impulses);
-    if start == Start::Estimated {
+    if start == Start::Estimate {
         let unknown = unknowns(model);
         // Numbers that as many samples determine fit them, whatever they are.
         if rows.len() - silent <= unknown {

@@ -21,8 +21,8 @@ pub(super) const MOST_STEPS: usize = 1_000_000;
 /// which is what the equation gives that runs k steps from what was known, with e = 0 (Ljung, System Identification, 2nd
 /// ed. 1999, section 3.2; Åström, Introduction to Stochastic Control Theory, 1970, chapter 6).
 ///
-/// [`Start::Zero`] takes zeros before each segment, and every sample has a prediction. [`Start::Measured`] and
-/// [`Start::Estimated`] leave out the samples without an output k steps before them to look from: the first r + k - 1
+/// [`Start::Zero`] takes zeros before each segment, and every sample has a prediction. [`Start::Drop`] and
+/// [`Start::Estimate`] leave out the samples without an output k steps before them to look from: the first r + k - 1
 /// of those they look at (for r see [`Start`]). What unknown inputs have done to B/F u is nothing to the first two; the
 /// last estimates it from the one-step errors, whatever k is, as estimates with
 /// [`Initial::Estimate`](crate::Initial::Estimate) do. It leaves out segments with no more samples than there are numbers
@@ -32,7 +32,7 @@ pub(super) const MOST_STEPS: usize = 1_000_000;
 /// away; for n initial conditions to be estimated O(N n^2) more, up to where their responses have.
 ///
 /// # Errors
-/// [`Error::Argument`] if `horizon` is 0, the record does not have the model's inputs, or [`Start::Estimated`] is
+/// [`Error::Argument`] if `horizon` is 0, the record does not have the model's inputs, or [`Start::Estimate`] is
 /// asked of a model without C, D and F, which has nothing to estimate; [`Error::Undetermined`] if an initial
 /// condition cannot be told from the data, as for a model so unstable that its responses overflow.
 ///
@@ -49,7 +49,7 @@ pub(super) const MOST_STEPS: usize = 1_000_000;
 /// let estimate = arx(&record, &orders, Initial::Drop)?;
 /// let model = Model::new(&orders, &estimate, 1.0, vec![Signal::default()], Signal::default())?;
 /// // Two steps ahead: from y(48), and from the inputs that are known by then.
-/// let response = predict(&model, &record, 2, Start::Measured)?;
+/// let response = predict(&model, &record, 2, Start::Drop)?;
 /// let expected = 0.8 * (0.8 * y[48] + 0.5 * u[48]) + 0.5 * u[49];
 /// assert!((response.values[50] - expected).abs() < 1e-9);
 /// // The first two samples have no output two steps before them.
@@ -153,11 +153,11 @@ pub(crate) fn longest(record: &Record<'_>) -> usize {
 }
 
 pub(super) fn check_start(model: &Model, start: Start) -> Result<(), Error> {
-    if start == Start::Estimated && model.orders.is_linear() {
+    if start == Start::Estimate && model.orders.is_linear() {
         return Err(Error::argument(
             "initial",
-            "a model without C, D and F predicts from measured samples or from zero; only its free run estimates a \
-             start",
+            "estimate is for models with C, D or F, and for free runs: others predict from measured samples alone; use drop, \
+             zero or auto",
         ));
     }
     Ok(())

@@ -10,9 +10,9 @@ use crate::{Error, Model};
 
 /// The free run of a model: A(q) y^(t) = sum_j (B_j(q)/F_j(q)) u_j(t), driven by the inputs alone.
 ///
-/// [`Start::Zero`] takes zeros before each segment. [`Start::Measured`] goes on from measured samples, with e = 0
+/// [`Start::Zero`] takes zeros before each segment. [`Start::Drop`] goes on from measured samples, with e = 0
 /// from the first sample that counts: what they say of the disturbance, which C and D give a memory, dies away from
-/// there. For ARX it is the difference equation run from measured outputs and inputs. [`Start::Estimated`] adds the
+/// there. For ARX it is the difference equation run from measured outputs and inputs. [`Start::Estimate`] adds the
 /// combination of free responses
 ///
 /// ```text
@@ -43,7 +43,7 @@ use crate::{Error, Model};
 /// let estimate = arx(&record, &orders, Initial::Drop)?;
 /// let model = Model::new(&orders, &estimate, 1.0, vec![Signal::default()], Signal::default())?;
 /// // What began at y = 1 is made up for.
-/// let run = simulate(&model, &record, Start::Estimated)?;
+/// let run = simulate(&model, &record, Start::Estimate)?;
 /// assert!(run.values.iter().zip(&y).all(|(run, y)| (run - y).abs() < 1e-9));
 /// // From rest, a decaying part is missing.
 /// let run = simulate(&model, &record, Start::Zero)?;
@@ -54,11 +54,11 @@ pub fn simulate(model: &Model, record: &Record<'_>, start: Start) -> Result<Resp
     check_inputs(model, record)?;
     let conditioned = model.orders.conditioned();
     let longest = record.segments.iter().map(Range::len).max().unwrap_or(0);
-    let free = (start == Start::Estimated).then(|| Free::of(model, longest));
+    let free = (start == Start::Estimate).then(|| Free::of(model, longest));
     let mut response = Response::empty(record.output.len());
     for (segment, past) in record.segments.iter().zip(&record.past) {
-        let first = if start == Start::Measured { history(model, segment, *past, 0) } else { segment.start };
-        let known = if start == Start::Measured { conditioned } else { 0 };
+        let first = if start == Start::Drop { history(model, segment, *past, 0) } else { segment.start };
+        let known = if start == Start::Drop { conditioned } else { 0 };
         let counted = (first + known).clamp(segment.start, segment.end)..segment.end;
         // An initial condition of n numbers needs more than n samples to be estimated from.
         if counted.is_empty() || free.as_ref().is_some_and(|free| counted.len() <= free.count) {
@@ -70,7 +70,7 @@ pub fn simulate(model: &Model, record: &Record<'_>, start: Start) -> Result<Resp
         let x = x.split_off(counted.start - first);
         let values = &mut response.values[counted.clone()];
         values.copy_from_slice(&x);
-        if start == Start::Measured {
+        if start == Start::Drop {
             let before = first..counted.start;
             let (disturbance, errors) =
                 residuals(model, record, &before, conditioned, &Impulses::none(model));

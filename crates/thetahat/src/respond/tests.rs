@@ -93,7 +93,7 @@ fn a_prediction_is_the_difference_equation_run_from_measured_samples() {
         let (u, y) = (signals(model.b.len(), 150, &mut noise), noise.take(150));
         let record = cut(&y, &u);
         for horizon in [1, 2, 5, 40, 1000] {
-            for start in [Start::Zero, Start::Measured] {
+            for start in [Start::Zero, Start::Drop] {
                 let skipped = if start == Start::Zero { 0 } else { model.orders.reach() + horizon - 1 };
                 let mut expected = vec![f64::NAN; 150];
                 let mut counted = Vec::new();
@@ -131,7 +131,7 @@ fn no_horizon_is_too_far() {
     assert_eq!(far, predict(&model, &record, 3, Start::Zero).unwrap());
     let run = simulate(&model, &record, Start::Zero).unwrap();
     assert!(difference(&far, &run.values) < 1e-15);
-    assert_eq!(predict(&model, &record, usize::MAX, Start::Measured).unwrap().counted, []);
+    assert_eq!(predict(&model, &record, usize::MAX, Start::Drop).unwrap().counted, []);
     assert!(predict(&model, &record, 0, Start::Zero).is_err());
 }
 
@@ -141,7 +141,7 @@ fn a_free_run_is_the_difference_equation() {
     for model in models() {
         let (u, y) = (signals(model.b.len(), 150, &mut noise), noise.take(150));
         let record = cut(&y, &u);
-        for start in [Start::Zero, Start::Measured] {
+        for start in [Start::Zero, Start::Drop] {
             let mut expected = vec![f64::NAN; 150];
             let mut counted = Vec::new();
             for (segment, past) in record.segments.iter().zip(&record.past) {
@@ -177,7 +177,7 @@ fn an_estimated_start_makes_up_for_any_past() {
             segments: vec![50..120, 130..150, 200..500],
             past: vec![0; 3],
         };
-        let response = simulate(&model, &record, Start::Estimated).unwrap();
+        let response = simulate(&model, &record, Start::Estimate).unwrap();
         assert_eq!(response.counted, record.segments);
         assert!(difference(&response, &y) < 1e-10, "{model:?} {}", difference(&response, &y));
     }
@@ -197,11 +197,11 @@ fn growing_and_silent_starts_are_estimated() {
             segments: std::iter::once(60..1000).collect(),
             past: vec![0],
         };
-        let response = simulate(&model, &record, Start::Estimated).unwrap();
+        let response = simulate(&model, &record, Start::Estimate).unwrap();
         assert!(difference(&response, &y) < 1e-9, "{poles:?} {:e}", difference(&response, &y));
         // From rest there is nothing to estimate.
         let record = Record::new(&y, views(&u)).unwrap();
-        let response = simulate(&model, &record, Start::Estimated).unwrap();
+        let response = simulate(&model, &record, Start::Estimate).unwrap();
         assert!(difference(&response, &y) < 1e-9, "{poles:?}");
     }
 }
@@ -218,7 +218,7 @@ fn an_estimated_start_is_the_best_there_is() {
             segments: std::iter::once(40..240).collect(),
             past: vec![0],
         };
-        let values = &simulate(&model, &record, Start::Estimated).unwrap().values[40..240];
+        let values = &simulate(&model, &record, Start::Estimate).unwrap().values[40..240];
         let errors: Vec<f64> = y[40..240].iter().zip(values).map(|(y, x)| y - x).collect();
         let size = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
         // The errors are orthogonal to every free response: moving along one only makes them larger.
@@ -236,8 +236,8 @@ fn what_overflows_is_an_error_or_infinite_and_never_a_panic() {
     for pole in [2.0, -2.0, 1e200] {
         let model = model(&with_poles(&[pole]), &[(1, &[1.0])]);
         let record = Record::new(&u, vec![&u]).unwrap();
-        assert!(simulate(&model, &record, Start::Estimated).is_err());
-        for start in [Start::Zero, Start::Measured] {
+        assert!(simulate(&model, &record, Start::Estimate).is_err());
+        for start in [Start::Zero, Start::Drop] {
             assert_eq!(simulate(&model, &record, start).unwrap().values.len(), 3000);
             assert_eq!(predict(&model, &record, 2900, start).unwrap().values.len(), 3000);
         }

@@ -68,14 +68,14 @@ pub struct Fit {
 
 impl Start {
     /// What a response to measured data had better start from. Free runs, and predictions with C, D or F, of which
-    /// the filters have a memory: [`Start::Estimated`]. Other predictions, which need no more than a few measured
-    /// samples: [`Start::Measured`].
+    /// the filters have a memory: [`Start::Estimate`]. Other predictions, which need no more than a few measured
+    /// samples: [`Start::Drop`].
     ///
     /// A log without the output leaves only [`Start::Zero`].
     pub fn natural(model: &Model, horizon: Horizon) -> Self {
         match horizon {
-            Horizon::Steps { .. } if model.orders.is_linear() => Self::Measured,
-            Horizon::Steps { .. } | Horizon::FreeRun => Self::Estimated,
+            Horizon::Steps { .. } if model.orders.is_linear() => Self::Drop,
+            Horizon::Steps { .. } | Horizon::FreeRun => Self::Estimate,
         }
     }
 }
@@ -138,7 +138,7 @@ mod tests {
         };
 
         // One step ahead on the rows of the fit: its own residuals.
-        let (figures, _) = fit(&record, Horizon::Steps { steps: 1 }, Start::Measured);
+        let (figures, _) = fit(&record, Horizon::Steps { steps: 1 }, Start::Drop);
         assert_eq!(figures.samples, 199);
         assert!((figures.rmse.unwrap() - estimate.mse().sqrt()).abs() < 1e-14);
 
@@ -154,19 +154,19 @@ mod tests {
         assert!((figures.percent.unwrap() - 100.0 * (1.0 - (error / spread).sqrt())).abs() < 1e-11);
 
         // What starts naturally counts as much as it can.
-        assert_eq!(Start::natural(&model, Horizon::Steps { steps: 3 }), Start::Measured);
-        assert_eq!(Start::natural(&model, Horizon::FreeRun), Start::Estimated);
+        assert_eq!(Start::natural(&model, Horizon::Steps { steps: 3 }), Start::Drop);
+        assert_eq!(Start::natural(&model, Horizon::FreeRun), Start::Estimate);
         let orders = Orders::armax(1, &[1], 1, &[1]).unwrap();
         let armax = Model::from_parameters(&orders, &[-0.5, 1.0, 0.5], None, 1.0, 1.0).unwrap();
         let start = Start::natural(&armax, Horizon::Steps { steps: 1 });
-        assert_eq!(start, Start::Estimated);
+        assert_eq!(start, Start::Estimate);
         assert_eq!(
             Fit::of(&armax, &record, &[], None, Horizon::Steps { steps: 1 }, start).unwrap().0.samples,
             100
         );
 
         // No sample is far enough from a start; nothing to explain.
-        let (figures, _) = fit(&record, Horizon::Steps { steps: 300 }, Start::Measured);
+        let (figures, _) = fit(&record, Horizon::Steps { steps: 300 }, Start::Drop);
         assert_eq!((figures.samples, figures.percent, figures.rmse), (0, None, None));
         let constant = [1.0; 10];
         let (figures, _) =

@@ -45,7 +45,7 @@ fn truth() -> Model {
 }
 
 fn tested(model: &Model, record: &Record<'_>, relation: Relation) -> Result<Residuals, Untestable> {
-    let found = innovations(model, record, 1, Start::Measured).unwrap();
+    let found = innovations(model, record, 1, Start::Drop).unwrap();
     Residuals::of(model, record, &found, relation, 25, &[0.05, 0.2])
 }
 
@@ -210,7 +210,7 @@ fn psi_is_the_derivative_of_the_errors() {
 fn instruments_are_free_of_noise() {
     let (u, y) = experiment(300, 0.3);
     let record = Record::new(&y, vec![&u]).unwrap();
-    let found = innovations(&truth(), &record, 1, Start::Measured).unwrap();
+    let found = innovations(&truth(), &record, 1, Start::Drop).unwrap();
     let traces = Traces::new(&truth(), &record, &found, true);
     let (_, clean) = experiment(300, 0.0);
     let signal = traces.signal(traces.psi[0].signal);

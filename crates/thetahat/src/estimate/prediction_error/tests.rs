@@ -81,6 +81,29 @@ fn a_falling_step_of_steepest_descent_is_c1_over_c2_and_the_iteration() {
 }
 
 #[test]
+fn without_time_one_start_is_looked_for_and_none_searched_from_further() {
+    let (u, y) = box_jenkins(500, &mut Noise(3));
+    let record = Record::new(&y, vec![&u]).unwrap();
+    for starts in [0, 20] {
+        let plenty = Search { starts, ..Search::default() };
+        let none = Search { time_limit: Some(std::time::Duration::ZERO), ..plenty.clone() };
+        for (orders, recipes) in [
+            (Orders::bj(&[2], 1, 1, &[2], &[1]).unwrap(), 4),
+            (Orders::oe(&[2], &[2], &[1]).unwrap(), 2),
+            (Orders { na: 1, nb: vec![2], nc: 1, nd: 1, nf: vec![1], nk: vec![1] }, 4),
+            (Orders { na: 2, nb: vec![2], nc: 0, nd: 1, nf: vec![0], nk: vec![1] }, 2),
+        ] {
+            let estimate = found(&record, &orders, Initial::Zero, &plenty).unwrap();
+            assert!(outcome(&estimate).starts.len() >= recipes.max(starts), "{orders}");
+            let estimate = found(&record, &orders, Initial::Zero, &none).unwrap();
+            let outcome = outcome(&estimate);
+            assert_eq!((outcome.starts.len(), outcome.iterations), (1, 0), "{orders}");
+            assert_eq!(outcome.stopped, Stopped::TimeLimit, "{orders}");
+        }
+    }
+}
+
+#[test]
 fn the_report_says_why_a_search_stopped() {
     let mut noise = Noise(3);
     let (u, y) = box_jenkins(500, &mut noise);

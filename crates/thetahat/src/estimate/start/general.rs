@@ -22,6 +22,10 @@ impl Data<'_> {
         let orders = self.orders;
         let mut candidates = Vec::new();
         candidates.extend(self.with_plant_poles());
+        let is_over = |candidates: &[Candidate]| !candidates.is_empty() && self.deadline.is_over();
+        if is_over(&candidates) {
+            return candidates;
+        }
         let without_a = Orders { na: 0, ..orders.clone() };
         let output_error = Data { orders: &without_a, ..*self };
         let found = output_error.output_error().starts();
@@ -29,10 +33,16 @@ impl Data<'_> {
             candidates.extend(self.in_turn(first, &without_a));
             candidates.extend(self.with_noise_poles(first, &without_a));
         }
+        if is_over(&candidates) {
+            return candidates;
+        }
         let without_f = Orders { nf: vec![0; orders.nf.len()], ..orders.clone() };
-        for mut candidate in starts(self.output, self.inputs, self.segments, &without_f) {
+        for mut candidate in starts(self.output, self.inputs, self.segments, &without_f, self.deadline) {
             candidate.parameters.extend(self.unit_f().concat());
             candidates.push(candidate);
+        }
+        if is_over(&candidates) {
+            return candidates;
         }
         for mut candidate in output_error.box_jenkins(&found) {
             candidate.parameters.splice(0..0, vec![0.0; orders.na]);
@@ -49,8 +59,9 @@ impl Data<'_> {
         let start = Data { orders: &whole, ..*self }.output_error().starts().into_iter().next()?;
         let total = [&[1.0], &start.f[0][..]].concat();
         let later = behind(self.segments, orders.na);
-        let splits = factors(&total, orders.na)?.into_iter().take(SPLITS);
-        let found = splits.filter_map(|(a, f)| {
+        let splits = factors(&total, orders.na)?.into_iter().take(SPLITS).enumerate();
+        let splits = splits.take_while(|(number, _)| *number == 0 || !self.deadline.is_over());
+        let found = splits.filter_map(|(_, (a, f))| {
             let v = multiplied(&a, &start.errors, self.segments);
             let noise = self.noise_of(&v, &later)?;
             let cost = energy(&self.whitened(&noise, &v, &later), &later);
@@ -74,6 +85,9 @@ impl Data<'_> {
         let mut start = first.clone();
         let mut best: Option<(f64, Coefficients)> = None;
         for _ in 0..ROUNDS {
+            if best.is_some() && self.deadline.is_over() {
+                break;
+            }
             let by_f = |(input, f): (&&[f64], &Vec<f64>)| {
                 let mut filtered = Vec::new();
                 divided(&mut filtered, input, &[&[1.0], &f[..]].concat(), self.segments);
@@ -101,7 +115,7 @@ impl Data<'_> {
             };
             best = Some((cost, found));
             let later = behind(self.segments, orders.na + orders.nd);
-            let filtered = OutputError::new(&output, &inputs, &later, without_a);
+            let filtered = OutputError::new(&output, &inputs, &later, without_a, self.deadline);
             let Some(next) = filtered.refined("in-turn", &start) else { break };
             start = next;
         }

@@ -7,6 +7,7 @@ use super::noise::{Equation, Mixed, behind};
 use super::output_error::{OutputError, Start};
 use super::plant::{Equations, Group, Input, Limits, Plant, Point, divided, energy, multiplied};
 use crate::Orders;
+use crate::estimate::optimize::Deadline;
 
 /// Rounds of least squares with filtered signals.
 pub(super) const ROUNDS: usize = 3;
@@ -37,8 +38,9 @@ pub(super) fn starts(
     inputs: &[&[f64]],
     segments: &[Range<usize>],
     orders: &Orders,
+    deadline: Deadline,
 ) -> Vec<Candidate> {
-    let data = Data { output, inputs, segments, orders };
+    let data = Data { output, inputs, segments, orders, deadline };
     let driven = orders.nb.iter().any(|&nb| nb > 0);
     let filtered = orders.nf.iter().any(|&nf| nf > 0);
     match (driven, filtered, orders.na > 0, orders.nd > 0) {
@@ -57,6 +59,7 @@ pub(super) struct Data<'a> {
     pub(super) inputs: &'a [&'a [f64]],
     pub(super) segments: &'a [Range<usize>],
     pub(super) orders: &'a Orders,
+    pub(super) deadline: Deadline,
 }
 
 impl<'a> Data<'a> {
@@ -112,10 +115,17 @@ impl<'a> Data<'a> {
     fn ararmax(&self) -> Vec<Candidate> {
         let equation = self.equation();
         let orders = self.orders;
-        let by_regression = equation.hannan_rissanen(orders.nc + orders.nd);
-        let starts = [("hannan-rissanen", by_regression), ("refined-instruments", self.by_instruments())];
-        let refined = starts.into_iter().filter_map(|(name, start)| {
-            let (_, plant, noise) = self.generalised(&equation, start?)?;
+        let recipes: [(_, &dyn Fn() -> Option<Mixed>); 2] = [
+            ("hannan-rissanen", &|| equation.hannan_rissanen(orders.nc + orders.nd)),
+            ("refined-instruments", &|| self.by_instruments()),
+        ];
+        let mut candidates = Vec::new();
+        for (name, start) in recipes {
+            if !candidates.is_empty() && self.deadline.is_over() {
+                break;
+            }
+            let start = start().and_then(|start| self.generalised(&equation, start));
+            let Some((_, plant, noise)) = start else { continue };
             let found = Coefficients {
                 a: plant.a[1..].to_vec(),
                 b: plant.b,
@@ -123,9 +133,9 @@ impl<'a> Data<'a> {
                 d: noise.a[1..].to_vec(),
                 f: self.unit_f(),
             };
-            Some(found.candidate(name, None))
-        });
-        refined.collect()
+            candidates.push(found.candidate(name, None));
+        }
+        candidates
     }
 
     /// A and B as the plant B/A of an output-error model.
@@ -136,8 +146,15 @@ impl<'a> Data<'a> {
         }
         let group = Group { order: self.orders.na, free: self.orders.reach(), inputs };
         let plant = Plant { output: self.output, groups: vec![group], segments: self.segments };
-        let first = plant.iterate(&plant.unit(), Equations::SteiglitzMcBride, None, ITERATIONS)?;
-        let best = plant.iterate(&first.denominators, Equations::RefinedInstruments, None, ITERATIONS)?;
+        let first =
+            plant.iterate(&plant.unit(), Equations::SteiglitzMcBride, None, ITERATIONS, self.deadline)?;
+        let best = plant.iterate(
+            &first.denominators,
+            Equations::RefinedInstruments,
+            None,
+            ITERATIONS,
+            self.deadline,
+        )?;
         let mut point = Point::new(&plant);
         point.move_to(&best.denominators, None)?;
         let a = best.denominators.into_iter().next()?;
@@ -151,6 +168,9 @@ impl<'a> Data<'a> {
         let mut plant = start;
         let mut best: Option<(f64, Mixed, Mixed)> = None;
         for _ in 0..ROUNDS {
+            if best.is_some() && self.deadline.is_over() {
+                break;
+            }
             let w = equation.errors(&plant, reach);
             let Some(noise) = self.noise_of(&w, &later) else { break };
             let cost = energy(&self.whitened(&noise, &w, &later), &later);
@@ -202,14 +222,17 @@ impl<'a> Data<'a> {
         };
         let mut candidates = Vec::new();
         for (position, start) in starts.iter().enumerate() {
+            if position > 0 && self.deadline.is_over() {
+                break;
+            }
             let (found, noise) = candidate(start.name, start);
             candidates.push(found);
             // The recipe that leads.
-            let (0, Some(noise)) = (position, noise) else { continue };
+            let (0, Some(noise), false) = (position, noise, self.deadline.is_over()) else { continue };
             let output = self.whitened(&noise, self.output, self.segments);
             let inputs = self.whitened_inputs(&noise);
             let inputs: Vec<&[f64]> = inputs.iter().map(Vec::as_slice).collect();
-            let whitened = OutputError::new(&output, &inputs, self.segments, self.orders);
+            let whitened = OutputError::new(&output, &inputs, self.segments, self.orders, self.deadline);
             let refined = whitened.refined("filtered-refined-instruments", start).and_then(|refined| {
                 // What the refined F leaves of y itself.
                 let of_output = self.output_error().at(refined.name, &refined.f, refined.unstable_pole)?;
@@ -222,7 +245,7 @@ impl<'a> Data<'a> {
 
     /// y = B/F u + v.
     pub(super) fn output_error(&self) -> OutputError<'a> {
-        OutputError::new(self.output, self.inputs, self.segments, self.orders)
+        OutputError::new(self.output, self.inputs, self.segments, self.orders, self.deadline)
     }
 
     /// The noise model of what a plant leaves, where there is no A; none where that is rounding, or white by the orders.

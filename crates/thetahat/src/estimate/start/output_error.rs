@@ -10,9 +10,10 @@
 use std::ops::Range;
 
 use super::noise::{Equation, Mixed};
-use super::plant::{Equations, Group, Input, Limits, Plant, Point, add_delayed, divided};
+use super::plant::{Best, Equations, Group, Input, Limits, Plant, Point, add_delayed, divided};
 use super::stable;
 use crate::Orders;
+use crate::estimate::optimize::Deadline;
 use crate::model::polynomial::product;
 
 const STEIGLITZ_MCBRIDE: Limits = Limits { iterations: 20, tolerance: 1e-3 };
@@ -57,6 +58,7 @@ pub(super) struct OutputError<'a> {
     /// Initial conditions of each.
     free: Vec<usize>,
     segments: &'a [Range<usize>],
+    deadline: Deadline,
 }
 
 impl<'a> OutputError<'a> {
@@ -65,6 +67,7 @@ impl<'a> OutputError<'a> {
         inputs: &[&'a [f64]],
         segments: &'a [Range<usize>],
         orders: &Orders,
+        deadline: Deadline,
     ) -> Self {
         let free = |input| if segments.len() > MOST_SEGMENTS { 0 } else { orders.free_responses(input) };
         let input =
@@ -75,6 +78,7 @@ impl<'a> OutputError<'a> {
             orders: orders.nf.clone(),
             free: (0..inputs.len()).map(free).collect(),
             segments,
+            deadline,
         }
     }
 
@@ -90,12 +94,16 @@ impl<'a> OutputError<'a> {
         let new = |costs: &[f64], cost: f64, tolerance: f64| {
             costs.iter().all(|other| (other - cost).abs() > tolerance * cost)
         };
-        for (names, found) in [
-            (["steiglitz-mcbride", "steiglitz-mcbride-refined"], self.common_denominator(0.0)),
-            (["low-pass", "low-pass-refined"], self.common_denominator(LOW_PASS)),
-            (["long-arx", "long-arx-refined"], self.long_model()),
-        ] {
-            let Some((denominators, unstable_pole)) = found else { continue };
+        let recipes: [(_, &dyn Fn() -> Option<Found>); 3] = [
+            (["steiglitz-mcbride", "steiglitz-mcbride-refined"], &|| self.common_denominator(0.0)),
+            (["low-pass", "low-pass-refined"], &|| self.common_denominator(LOW_PASS)),
+            (["long-arx", "long-arx-refined"], &|| self.long_model()),
+        ];
+        for (names, found) in recipes {
+            if !starts.is_empty() && self.deadline.is_over() {
+                break;
+            }
+            let Some((denominators, unstable_pole)) = found() else { continue };
             let start =
                 |name, denominators: &[Vec<f64>]| self.start(name, &separate, denominators, unstable_pole);
             let Some((first, cost)) = start(names[0], &denominators) else { continue };
@@ -103,7 +111,7 @@ impl<'a> OutputError<'a> {
                 continue;
             }
             begun.push(cost);
-            let refined = separate.iterate(&denominators, Equations::RefinedInstruments, None, REFINED);
+            let refined = if self.deadline.is_over() { None } else { self.refine(&separate, &denominators) };
             let refined = refined.and_then(|refined| start(names[1], &refined.denominators));
             for (start, cost) in refined.into_iter().chain([(first, cost)]) {
                 if new(&seen, cost, SAME_COST) {
@@ -118,8 +126,13 @@ impl<'a> OutputError<'a> {
     /// Refined instrumental variables from a start that other data gave.
     pub(super) fn refined(&self, name: &'static str, start: &Start) -> Option<Start> {
         let separate = self.separate();
-        let best = separate.iterate(&monic(&start.f), Equations::RefinedInstruments, None, REFINED)?;
+        let best = self.refine(&separate, &monic(&start.f))?;
         self.start(name, &separate, &best.denominators, start.unstable_pole).map(|(start, _)| start)
+    }
+
+    /// Iterates with refined instrumental variables.
+    fn refine(&self, plant: &Plant<'_>, start: &[Vec<f64>]) -> Option<Best> {
+        plant.iterate(start, Equations::RefinedInstruments, None, REFINED, self.deadline)
     }
 
     /// The start with given f.
@@ -153,7 +166,8 @@ impl<'a> OutputError<'a> {
         };
         let common = Plant { output: self.output, groups: vec![group], segments: self.segments };
         let start = (0..order).fold(vec![1.0], |start, _| product(&start, &[1.0, -pole]));
-        let best = common.iterate(&[start], Equations::SteiglitzMcBride, None, STEIGLITZ_MCBRIDE)?;
+        let best =
+            common.iterate(&[start], Equations::SteiglitzMcBride, None, STEIGLITZ_MCBRIDE, self.deadline)?;
         let used = || self.inputs.iter().zip(&self.orders).filter(|(input, _)| input.count > 0);
         if used().all(|(_, &own)| own == order) {
             let unused = |input: &Input<'_>| input.count == 0;
@@ -204,8 +218,14 @@ impl<'a> OutputError<'a> {
             }
             let group = Group { order: self.orders[j], free: self.free[j], inputs: vec![input.clone()] };
             let plant = Plant { output: &parts[j], groups: vec![group], segments: self.segments };
-            let mut best =
-                plant.iterate(&plant.unit(), Equations::SteiglitzMcBride, Some(&judge), STEIGLITZ_MCBRIDE)?;
+            let unit = plant.unit();
+            let mut best = plant.iterate(
+                &unit,
+                Equations::SteiglitzMcBride,
+                Some(&judge),
+                STEIGLITZ_MCBRIDE,
+                self.deadline,
+            )?;
             unstable_pole = [unstable_pole, best.unstable_pole].into_iter().flatten().reduce(f64::max);
             denominators.append(&mut best.denominators);
         }

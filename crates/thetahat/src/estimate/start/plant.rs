@@ -25,6 +25,7 @@ use thetahat_core::nalgebra::{DMatrix, DVector};
 
 use super::reduced::{Factor, Free, Reduced};
 use super::stable;
+use crate::estimate::optimize::Deadline;
 use crate::regression::{Lagged, Presample, Taps, add_filtered, divide, divide_together, sum_of_squares};
 
 /// Below this fraction of sum y^2, sum e^2 is rounding.
@@ -126,13 +127,15 @@ impl<'a> Plant<'a> {
     }
 
     /// Iterates from some denominators, reflecting unstable roots, and keeps those of the lowest cost: on `judge` where
-    /// there is one, else on the plant's own output. O(N p) for each iteration. None if no cost is a number.
+    /// there is one, else on the plant's own output. O(N p) for each iteration, of which none begins after the deadline.
+    /// None if no cost is a number.
     pub(in crate::estimate) fn iterate(
         &self,
         start: &[Vec<f64>],
         equations: Equations,
         judge: Option<&[f64]>,
         limits: Limits,
+        deadline: Deadline,
     ) -> Option<Best> {
         let mut point = Point::new(self);
         let mut best: Option<Best> = None;
@@ -143,7 +146,7 @@ impl<'a> Plant<'a> {
             if best.as_ref().is_none_or(|best| cost < best.cost) {
                 best = Some(Best { denominators: next, cost, unstable_pole });
             }
-            if iterations == limits.iterations || point.cost <= exact {
+            if iterations == limits.iterations || point.cost <= exact || deadline.is_over() {
                 break;
             }
             let Some(step) = point.step(equations) else { break };

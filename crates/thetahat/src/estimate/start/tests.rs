@@ -6,6 +6,7 @@ use super::plant::{Group, Input, Plant, Point, divided};
 use super::reduced::{Free, Reduced};
 use super::{Candidate, candidates, stable};
 use crate::data::Record;
+use crate::estimate::optimize::Deadline;
 use crate::estimate::{Method, Search, estimate};
 use crate::model::polynomial::{is_stable, product};
 use crate::regression::noise::Noise;
@@ -116,7 +117,7 @@ impl Modes<'_> {
         let group = Group { order, free: order, inputs: vec![input] };
         let plant = Plant { output: &y, groups: vec![group], segments: &record.segments };
         let cost = |f: &[f64]| Point::new(&plant).move_to(&[f.to_vec()], None).unwrap();
-        let found = candidates(&record, &orders).unwrap();
+        let found = candidates(&record, &orders, Deadline::default()).unwrap();
         let costs = found.iter().map(|candidate| cost(&[&[1.0], &candidate.parameters[order..]].concat()));
         costs.fold(f64::INFINITY, f64::min) / cost(&f)
     }
@@ -157,7 +158,7 @@ fn best(record: &Record<'_>, orders: &Orders, truth: &[f64]) -> (f64, Candidate)
         let cost = sum_of_squares(&e);
         if cost.is_finite() { cost } else { f64::INFINITY }
     };
-    let found = candidates(record, orders).unwrap().into_iter();
+    let found = candidates(record, orders, Deadline::default()).unwrap().into_iter();
     let (cost_of_best, best) = found
         .map(|candidate| (cost(&candidate.parameters), candidate))
         .min_by(|(left, _), (right, _)| left.total_cmp(right))
@@ -304,7 +305,7 @@ fn data_without_noise_give_the_plant_back() {
                     found.drain(first..first + orders.nc + orders.nd);
                     found.iter().zip(&truth.parameters).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
                 };
-                let found = candidates(&record, &orders).unwrap();
+                let found = candidates(&record, &orders, Deadline::default()).unwrap();
                 let least = found.into_iter().map(error).fold(f64::INFINITY, f64::min);
                 assert!(least < 1e-7, "{orders:?} {:?} {least:e}", record.segments);
             }
@@ -325,7 +326,7 @@ fn candidates_are_complete_and_stable_whatever_the_segments() {
         ] {
             record.past = vec![0; segments.len()];
             record.segments = segments;
-            let found = candidates(&record, &orders).unwrap();
+            let found = candidates(&record, &orders, Deadline::default()).unwrap();
             for Candidate { name, parameters, .. } in &found {
                 assert_eq!(parameters.len(), orders.parameters(), "{name} {orders:?}");
                 assert!(parameters.iter().all(|value| value.is_finite()), "{name} {orders:?}");
@@ -357,6 +358,7 @@ fn records_that_say_too_little_are_refused_with_the_parameters() {
     let concerned = |y: &[f64], inputs: &[&[f64]], orders: &Orders| match candidates(
         &Record::new(y, inputs.to_vec()).unwrap(),
         orders,
+        Deadline::default(),
     ) {
         Err(Error::Undetermined { parameters, .. }) => parameters,
         other => panic!("{orders:?} {other:?}"),
@@ -377,7 +379,7 @@ fn records_that_say_too_little_are_refused_with_the_parameters() {
         let large: Vec<f64> = y.iter().map(|y| size * y).collect();
         for orders in [&oe, &bj, &armax] {
             for (y, input) in [(&y, &one), (&large, &u), (&y, &large), (&large, &large)] {
-                match candidates(&Record::new(y, vec![input]).unwrap(), orders) {
+                match candidates(&Record::new(y, vec![input]).unwrap(), orders, Deadline::default()) {
                     Ok(found) => assert!(found.iter().all(|c| c.parameters.iter().all(|p| p.is_finite()))),
                     Err(error) => {
                         assert!(matches!(error, Error::Undetermined { .. } | Error::Data { .. }), "{error}")
@@ -385,7 +387,7 @@ fn records_that_say_too_little_are_refused_with_the_parameters() {
                 }
             }
         }
-        let _ = candidates(&Record::new(&y, vec![&u, &u]).unwrap(), &two);
+        let _ = candidates(&Record::new(&y, vec![&u, &u]).unwrap(), &two, Deadline::default());
     }
 }
 
@@ -401,12 +403,16 @@ fn an_unstable_plant_is_noticed() {
     }
     y.pop();
     let record = Record::new(&y, vec![&u]).unwrap();
-    let found = candidates(&record, &Orders::oe(&[1], &[1], &[1]).unwrap()).unwrap();
+    let found = candidates(&record, &Orders::oe(&[1], &[1], &[1]).unwrap(), Deadline::default()).unwrap();
     let pole = found.iter().find_map(|candidate| candidate.unstable_pole).unwrap();
     assert!((pole - 1.1).abs() < 0.05, "{found:?}");
     let y = response(&[0.0, 1.0], &[1.0, -0.9], &u);
-    let stable =
-        candidates(&Record::new(&y, vec![&u]).unwrap(), &Orders::oe(&[1], &[1], &[1]).unwrap()).unwrap();
+    let stable = candidates(
+        &Record::new(&y, vec![&u]).unwrap(),
+        &Orders::oe(&[1], &[1], &[1]).unwrap(),
+        Deadline::default(),
+    )
+    .unwrap();
     assert!(stable.iter().all(|candidate| candidate.unstable_pole.is_none()));
 }
 

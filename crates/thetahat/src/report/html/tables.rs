@@ -476,8 +476,8 @@ pub(super) fn part(part: Part) -> &'static str {
 fn start(start: Start) -> &'static str {
     match start {
         Start::Zero => "from zero",
-        Start::Measured => "from measured",
-        Start::Estimated => "start estimated",
+        Start::Drop => "from measured",
+        Start::Estimate => "start estimated",
     }
 }
 

@@ -115,7 +115,7 @@ fn figures_are_those_of_their_definitions() {
     assert!(signals.predicted[299].is_nan() && run[299].is_nan() && run[300].is_finite());
     let square = (300..600).map(|t| (y[t] - run[t]).powi(2)).sum::<f64>();
     assert!((found.fit[3].rmse.unwrap() - (square / 300.0).sqrt()).abs() < 1e-12);
-    assert_eq!(found.fit[3].initial, Start::Estimated);
+    assert_eq!(found.fit[3].initial, Start::Estimate);
 
     assert!(found.white_expected && found.stable && found.warnings.is_empty(), "{:?}", found.warnings);
     let text = found.to_json().unwrap();

@@ -14,7 +14,7 @@ fn a_forecast_is_what_the_recursions_give_from_the_end() {
         let record =
             Record { output: &y, inputs: views(&u), segments: vec![0..50, 70..150], past: vec![0, 12] };
         let future: Vec<&[f64]> = u.iter().map(|u| &u[150..]).collect();
-        for start in [Start::Zero, Start::Measured] {
+        for start in [Start::Zero, Start::Drop] {
             let silent = if start == Start::Zero { 0 } else { model.orders.conditioned() };
             let begin = if start == Start::Zero { 70 } else { 58 };
             let mut expected = y.clone();
@@ -42,7 +42,7 @@ fn a_forecast_is_the_prediction_of_samples_that_are_still_to_come() {
         };
         let future: Vec<&[f64]> = u.iter().map(|u| &u[100..]).collect();
         let starts: &[Start] =
-            if model.orders.is_linear() { &[Start::Measured] } else { &[Start::Measured, Start::Estimated] };
+            if model.orders.is_linear() { &[Start::Drop] } else { &[Start::Drop, Start::Estimate] };
         for &start in starts {
             let found = forecast(&model, &part(100), &future, 20, start).unwrap();
             for steps in [1, 2, 20] {
@@ -51,7 +51,7 @@ fn a_forecast_is_the_prediction_of_samples_that_are_still_to_come() {
                     prediction_deviation(&model, steps).unwrap()
                 );
                 // From an estimated start the later samples have a say in it.
-                if start == Start::Measured {
+                if start == Start::Drop {
                     let predicted = predict(&model, &part(120), steps, start).unwrap().values[99 + steps];
                     let error = (found.values[steps - 1] - predicted).abs();
                     assert!(
@@ -116,7 +116,7 @@ fn an_estimated_start_forecasts_from_the_segment_alone() {
             past: vec![0],
         };
         let future: Vec<&[f64]> = u.iter().map(|u| &u[380..]).collect();
-        let found = forecast(&model, &record, &future, 20, Start::Estimated).unwrap();
+        let found = forecast(&model, &record, &future, 20, Start::Estimate).unwrap();
         let largest = y.iter().fold(0.0_f64, |largest, y| largest.max(y.abs()));
         for (found, expected) in found.values.iter().zip(&y[380..]) {
             assert!((found - expected).abs() < 1e-9 * largest, "{:?} {found} {expected}", model.structure);
@@ -152,7 +152,7 @@ fn there_is_no_forecast_from_too_few_samples() {
         let end = 10 + model.orders.conditioned();
         for segments in [vec![], std::iter::once(10..end).collect()] {
             let record = Record { output: &y, inputs: views(&u), past: vec![0; segments.len()], segments };
-            let found = forecast(model, &record, &future, 3, Start::Measured);
+            let found = forecast(model, &record, &future, 3, Start::Drop);
             assert!(matches!(found, Err(Error::Data { .. })), "{:?}", model.structure);
         }
     }

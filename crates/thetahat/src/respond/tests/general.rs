@@ -125,7 +125,7 @@ fn a_prediction_is_what_the_recursions_give_from_what_is_known() {
         let record = cut(&y, &u);
         let conditioned = model.orders.conditioned();
         for horizon in [1, 2, 5, 40] {
-            for start in [Start::Zero, Start::Measured] {
+            for start in [Start::Zero, Start::Drop] {
                 let (silent, skipped) =
                     if start == Start::Zero { (0, 0) } else { (conditioned, conditioned + horizon - 1) };
                 let mut expected = vec![f64::NAN; 150];
@@ -164,7 +164,7 @@ fn a_free_run_goes_on_from_what_is_known() {
         let (u, y) = (signals(model.b.len(), 150, &mut noise), noise.take(150));
         let record = cut(&y, &u);
         let conditioned = model.orders.conditioned();
-        for start in [Start::Zero, Start::Measured] {
+        for start in [Start::Zero, Start::Drop] {
             let mut expected = vec![f64::NAN; 150];
             let mut counted = Vec::new();
             for (segment, past) in record.segments.iter().zip(&record.past) {
@@ -244,11 +244,9 @@ fn innovations_are_the_residuals_of_the_estimate() {
         Orders::new(1, &[3], 1, 1, &[1], &[1]),
     ] {
         let orders = orders.unwrap();
-        for (initial, start) in [
-            (Initial::Zero, Start::Zero),
-            (Initial::Drop, Start::Measured),
-            (Initial::Estimate, Start::Estimated),
-        ] {
+        for (initial, start) in
+            [(Initial::Zero, Start::Zero), (Initial::Drop, Start::Drop), (Initial::Estimate, Start::Estimate)]
+        {
             let Ok(found) = estimate(&record, &orders, &Method::default(), initial) else {
                 assert!(initial == Initial::Drop && orders.nf != [0], "{:?} {initial:?}", orders.structure());
                 continue;
@@ -334,7 +332,7 @@ fn an_estimated_start_leaves_the_least_errors_that_any_past_can() {
             past: vec![0, 3, 3],
         };
         let silent = model.orders.conditioned();
-        let found = innovations(&model, &record, 1, Start::Estimated).unwrap();
+        let found = innovations(&model, &record, 1, Start::Estimate).unwrap();
         assert!(found.len() >= 2, "{:?}", model.structure);
         for found in found {
             let segment = found.rows.clone();
@@ -376,11 +374,11 @@ fn an_estimated_start_makes_up_for_any_past() {
             segments: vec![50..120, 130..160, 200..500],
             past: vec![0; 3],
         };
-        let run = simulate(&model, &record, Start::Estimated).unwrap();
+        let run = simulate(&model, &record, Start::Estimate).unwrap();
         assert_eq!(run.counted, record.segments);
         assert!(difference(&run, &y) < 1e-10, "{:?} {}", model.structure, difference(&run, &y));
         for horizon in [1, 7] {
-            let response = predict(&model, &record, horizon, Start::Estimated).unwrap();
+            let response = predict(&model, &record, horizon, Start::Estimate).unwrap();
             let counts = |segment: &Range<usize>| {
                 segment.start + model.orders.conditioned() + horizon - 1..segment.end
             };
@@ -404,7 +402,7 @@ fn an_estimated_start_is_the_best_there_is_for_a_free_run() {
             segments: std::iter::once(segment.clone()).collect(),
             past: vec![0],
         };
-        let values = &simulate(&model, &record, Start::Estimated).unwrap().values[segment.clone()];
+        let values = &simulate(&model, &record, Start::Estimate).unwrap().values[segment.clone()];
         let errors: Vec<f64> = y[segment.clone()].iter().zip(values).map(|(y, x)| y - x).collect();
         let from_rest = simulate(&model, &record, Start::Zero).unwrap();
         let from_rest: Vec<f64> =
@@ -448,7 +446,7 @@ fn measured_samples_warm_the_filters_up() {
             segments: std::iter::once(1400..1500).collect(),
             past: vec![1300],
         };
-        let response = predict(model, &record, 1, Start::Measured).unwrap();
+        let response = predict(model, &record, 1, Start::Drop).unwrap();
         let mut worst = 0.0_f64;
         (1400..1500).for_each(|t| worst = worst.max((y[t] - response.values[t] - e[t]).abs()));
         assert!(worst < 1e-9, "{:?} {worst}", model.structure);
@@ -509,7 +507,7 @@ fn what_does_not_fit_is_refused_or_left_out() {
     let record = Record::new(&y, vec![&u]).unwrap();
     assert!(matches!(predict(bj, &record, 0, Start::Zero), Err(Error::Argument { .. })));
     let several = Record::new(&y, vec![&u, &u]).unwrap();
-    for start in [Start::Zero, Start::Measured, Start::Estimated] {
+    for start in [Start::Zero, Start::Drop, Start::Estimate] {
         assert!(matches!(predict(bj, &several, 1, start), Err(Error::Argument { .. })));
         assert!(matches!(simulate(bj, &several, start), Err(Error::Argument { .. })));
         // One sample, and none.
@@ -526,7 +524,7 @@ fn what_does_not_fit_is_refused_or_left_out() {
     }
     // An ARX model has no start to estimate for its predictions.
     let arx = super::models().remove(0);
-    assert!(matches!(predict(&arx, &record, 1, Start::Estimated), Err(Error::Argument { .. })));
+    assert!(matches!(predict(&arx, &record, 1, Start::Estimate), Err(Error::Argument { .. })));
 }
 
 #[test]
@@ -542,14 +540,14 @@ fn what_overflows_is_an_error_or_infinite_and_never_a_panic() {
             model(one, &[(1, &[1.0], &with_poles(&[0.5]))], one, &grown),
         ];
         for (index, model) in models.iter().enumerate() {
-            for start in [Start::Zero, Start::Measured] {
+            for start in [Start::Zero, Start::Drop] {
                 assert_eq!(simulate(model, &record, start).unwrap().values.len(), 3000);
                 assert_eq!(predict(model, &record, 2900, start).unwrap().values.len(), 3000);
             }
             // D does no harm by itself, as long as its products stay within range.
-            let estimated = predict(model, &record, 5, Start::Estimated);
+            let estimated = predict(model, &record, 5, Start::Estimate);
             assert_eq!(estimated.is_err(), index < 2 || root == 1e200, "{root} {index}");
-            assert_eq!(simulate(model, &record, Start::Estimated).is_err(), index < 1);
+            assert_eq!(simulate(model, &record, Start::Estimate).is_err(), index < 1);
         }
     }
 }

@@ -129,10 +129,10 @@ def test_logs_join() -> None:
 def test_a_log_says_what_there_is() -> None:
     plain = th.Log(Y, U)
     assert (plain.experiments, plain.segments, plain.missing) == ([range(5)], [range(5)], {"u": 0, "y": 0})
-    assert repr(plain) == "Log(5 rows, inputs u, output y, sample time 1.0 s)"
+    assert repr(plain) == "Log(5 rows, inputs u, output y, sample time 1.0 s assumed)"
     holed = th.Log([np.nan, 1.0, 2.0, 3.0, np.nan], [1.0, 0.0, np.nan, 0.0, 1.0])
     assert (holed.segments, holed.missing) == ([range(1, 2), range(3, 4)], {"u": 1, "y": 2})
-    assert repr(holed) == "Log(5 rows in 2 segments, 3 values missing, inputs u, output y, sample time 1.0 s)"
+    assert repr(holed) == "Log(5 rows in 2 segments, 3 values missing, inputs u, output y, sample time 1.0 s assumed)"
     gap = th.Log(Y, time=[0.0, 1.0, 2.0, 5.0, 6.0])
     assert gap.segments == [range(3), range(3, 5)] and gap.experiments == [range(5)]
     joined = th.Log.join([gap, th.Log([1.0, np.nan, 3.0]), th.Log([1.0])])

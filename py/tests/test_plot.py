@@ -158,7 +158,7 @@ def test_fit_is_scaled_to_what_was_measured() -> None:
         ax = plot.fit(growing, th.Log(random.standard_normal(1500), u))
     low, high = ax.get_ylim()
     assert -20 < low < 0 < high < 20
-    label = ax.get_legend().get_texts()[1].get_text()
+    label = legend(ax)[1]
     assert "e+" in label and all(len(word) <= 12 for word in label.split())
 
 

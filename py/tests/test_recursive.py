@@ -341,7 +341,7 @@ def test_outputs_and_inputs_cannot_be_swapped_by_place(make: Callable[[], Recurs
     before = state(estimator)
     for call in (estimator.run, estimator.log_row):
         with pytest.raises(TypeError, match="positional"):
-            call([1.0, 2.0], [3.0, 4.0])  # type: ignore[arg-type, misc, call-arg]
+            call([1.0, 2.0], [3.0, 4.0])  # type: ignore[arg-type, call-arg]
     with pytest.raises(ValueError, match="u: expected"):
         estimator.run([1.0, 2.0])
     with pytest.raises(ValueError, match="u: expected"):

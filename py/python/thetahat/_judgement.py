@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from thetahat import _options, _thetahat
 from thetahat._log import Log, handle
-from thetahat._options import ReadOptions, Rows, ValidationOptions
+from thetahat._options import Duration, ReadOptions, Rows, ValidationOptions
 
 if TYPE_CHECKING:
     from thetahat._model import Model
@@ -218,8 +218,8 @@ def inspect(
     inputs: Sequence[str] | str | None = None,
     output: str | None = None,
     time: str | None = None,
-    sample_time: float | None = None,
-    resample: tuple[float, str] | None = None,
+    sample_time: Duration | None = None,
+    resample: tuple[Duration, str] | None = None,
     time_format: str | None = None,
     delimiter: str | None = None,
     comment: str | None = None,

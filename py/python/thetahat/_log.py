@@ -415,8 +415,8 @@ def read_csv(
     inputs: Sequence[str] | str | None = None,
     output: str | None = None,
     time: str | None = None,
-    sample_time: float | None = None,
-    resample: tuple[float, str] | None = None,
+    sample_time: Duration | None = None,
+    resample: tuple[Duration, str] | None = None,
     time_format: str | None = None,
     delimiter: str | None = None,
     comment: str | None = None,
@@ -476,9 +476,8 @@ def read_csv(
     log, notes = _thetahat.Log.read([*words, "--", *map(_options.path_text, paths)])
     for note in notes:
         warnings.warn(note, stacklevel=2)
-    named, given = options.get("time"), options.get("sample_time")
-    said = "assumed" if named is None and given is None else "" if named is None else f"by column {named!r}"
-    return Log._of(log, Clock(f"{said}, resampled" if options.get("resample") is not None else said))
+    said = "assumed" if time is None and sample_time is None else "" if time is None else f"by column {time!r}"
+    return Log._of(log, Clock(said if resample is None else f"{said}, resampled"))
 
 
 def dc_motor() -> Log:

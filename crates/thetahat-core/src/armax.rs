@@ -132,19 +132,17 @@ pub enum ArmaxMethod {
 /// ```
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(bound = ""))]
+#[cfg_attr(feature = "serde", serde(bound = "", into = "snapshot::Snapshot<T, N, D>"))]
+#[cfg_attr(feature = "serde", serde(try_from = "snapshot::Snapshot<T, N, D>"))]
 pub struct RecursiveArmax<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension = Const<1>> {
     lags: Lags<T, N, D>,
     estimator: RecursiveLeastSquares<T, N>,
     /// ψ(k-1) … ψ(k-nc), a column each. There are at most n, as each has a parameter.
-    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::square"))]
     gradients: OMatrix<T, N, N>,
     /// ε(k-1), on its way to φ.
-    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::number"))]
     residual: T,
     nc: usize,
     method: ArmaxMethod,
-    #[cfg_attr(feature = "serde", serde(skip))]
     scratch: N::Scratch<T>,
 }
 
@@ -187,14 +185,17 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
     /// Errors: also [`Error::OutOfRange`] if C is not stable.
     pub fn with_parameters(mut self, parameters: OVector<T, N>) -> Result<Self, Error> {
         self.estimator = self.estimator.with_parameters(parameters)?;
+        self.check_stable()?;
+        Ok(self)
+    }
+
+    /// That C is stable.
+    fn check_stable(&self) -> Result<(), Error> {
         let mut c = self.gradients.shape_generic().0.vector(T::zero());
         let c = c.as_mut_slice().get_mut(..self.nc).unwrap_or_default();
         copy(last(self.estimator.parameters().as_slice(), self.nc), c);
-        if is_stable(c) {
-            Ok(self)
-        } else {
-            Err(Error::OutOfRange { argument: "parameters", range: "such that C(q) is stable" })
-        }
+        let range = "such that C(q) is stable";
+        is_stable(c).then_some(()).ok_or(Error::OutOfRange { argument: "parameters", range })
     }
 
     /// The same with this P to start from. See [`RecursiveLeastSquares::with_covariance`], whose errors it has.
@@ -442,5 +443,7 @@ fn is_stable<T: Real>(mut c: &mut [T]) -> bool {
     true
 }
 
+#[cfg(feature = "serde")]
+mod snapshot;
 #[cfg(test)]
 mod tests;

@@ -85,7 +85,8 @@ use crate::{
 /// ```
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(bound = ""))]
+#[cfg_attr(feature = "serde", serde(bound = "", into = "snapshot::Snapshot<T, N, D>"))]
+#[cfg_attr(feature = "serde", serde(try_from = "snapshot::Snapshot<T, N, D>"))]
 pub struct RecursiveArx<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension = Const<1>> {
     lags: Lags<T, N, D>,
     estimator: RecursiveLeastSquares<T, N>,
@@ -357,5 +358,7 @@ pub(crate) fn predict_ahead<T: Real, N: Dimension, D: Dimension>(
     if grown { Err(Error::Overflow) } else { Ok(()) }
 }
 
+#[cfg(feature = "serde")]
+mod snapshot;
 #[cfg(test)]
 pub(crate) mod tests;

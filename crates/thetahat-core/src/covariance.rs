@@ -36,35 +36,11 @@ use crate::{Dimension, Error, Real, ud};
 /// ```
 #[derive(Clone)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(bound = "", into = "Factor<T, N>", try_from = "Factor<T, N>"))]
+#[cfg_attr(feature = "serde", serde(bound = "", into = "snapshot::Snapshot<T, N>"))]
+#[cfg_attr(feature = "serde", serde(try_from = "snapshot::Snapshot<T, N>"))]
 pub struct Covariance<T: Real, N: Dimension> {
     /// D on the diagonal, U above it. What lies below is anything: the kernels write there.
     factor: OMatrix<T, N, N>,
-}
-
-/// A covariance as it is written: what lies below the diagonal is 0, and what is read is checked.
-#[cfg(feature = "serde")]
-#[derive(serde::Serialize, serde::Deserialize)]
-#[serde(bound = "")]
-struct Factor<T: Real, N: Dimension> {
-    #[serde(with = "crate::snapshot::square")]
-    factor: OMatrix<T, N, N>,
-}
-
-#[cfg(feature = "serde")]
-impl<T: Real, N: Dimension> From<Covariance<T, N>> for Factor<T, N> {
-    fn from(covariance: Covariance<T, N>) -> Self {
-        Factor { factor: covariance.factor() }
-    }
-}
-
-#[cfg(feature = "serde")]
-impl<T: Real, N: Dimension> TryFrom<Factor<T, N>> for Covariance<T, N> {
-    type Error = Error;
-
-    fn try_from(Factor { factor }: Factor<T, N>) -> Result<Self, Error> {
-        Covariance::from_factor(factor)
-    }
 }
 
 /// Equal to the bit: the same factors.
@@ -130,7 +106,7 @@ impl<T: Real, N: Dimension> Covariance<T, N> {
     ///
     /// Errors: [`Error::Length`] if it is not square (only with `Dyn`); [`Error::NotFinite`];
     /// [`Error::NotTriangular`] if an entry below the diagonal is not 0; [`Error::Negative`] if one on it is
-    /// negative.
+    /// negative; [`Error::Overflow`] if a variance does not fit `T`.
     pub fn from_factor(factor: OMatrix<T, N, N>) -> Result<Self, Error> {
         let n = factor.nrows();
         check_length("factor", n, factor.ncols())?;
@@ -144,7 +120,8 @@ impl<T: Real, N: Dimension> Covariance<T, N> {
                 return Err(Error::NotTriangular { row: index + 1 + below, column: index });
             }
         }
-        Ok(Covariance { factor })
+        let fits = ud::has_finite_variances(factor.as_slice(), n);
+        fits.then_some(Covariance { factor }).ok_or(Error::Overflow)
     }
 
     /// The factors in one n x n matrix: D on the diagonal, U above it (its diagonal of ones is left out), zeros
@@ -498,5 +475,7 @@ fn exceeds<T: Real>(x: T, p: T, q: T) -> bool {
     small < T::MIN_POSITIVE || x / large > small / x
 }
 
+#[cfg(feature = "serde")]
+mod snapshot;
 #[cfg(test)]
 mod tests;

@@ -83,11 +83,10 @@ pub struct Alarm<T> {
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(bound = ""))]
+#[cfg_attr(feature = "serde", serde(bound = "", into = "snapshot::Snapshot<T>"))]
+#[cfg_attr(feature = "serde", serde(try_from = "snapshot::Snapshot<T>"))]
 pub struct ChangeDetector<T: Real> {
-    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::number"))]
     mean_threshold: T,
-    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::number"))]
     variance_threshold: T,
     mean_up: Sum<T>,
     mean_down: Sum<T>,
@@ -197,5 +196,7 @@ fn square<T: Real>(z: T) -> T {
     (z * z).min(T::LARGEST_ENTRY)
 }
 
+#[cfg(feature = "serde")]
+mod snapshot;
 #[cfg(test)]
 mod tests;

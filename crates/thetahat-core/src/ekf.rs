@@ -84,7 +84,8 @@ use crate::{Action, Covariance, Dimension, Error, Innovation, KalmanFilter, Obse
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(bound = ""))]
+#[cfg_attr(feature = "serde", serde(bound = "", into = "snapshot::Snapshot<T, N>"))]
+#[cfg_attr(feature = "serde", serde(try_from = "snapshot::Snapshot<T, N>"))]
 pub struct ExtendedKalmanFilter<T: Real, N: Dimension> {
     linear: KalmanFilter<T, N>,
     iterations: usize,
@@ -292,5 +293,7 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension + Dimension<N>> Linearis
     }
 }
 
+#[cfg(feature = "serde")]
+mod snapshot;
 #[cfg(test)]
 mod tests;

@@ -71,14 +71,12 @@ use crate::{
 /// ```
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(bound = ""))]
+#[cfg_attr(feature = "serde", serde(bound = "", into = "snapshot::Snapshot<T, N>"))]
+#[cfg_attr(feature = "serde", serde(try_from = "snapshot::Snapshot<T, N>"))]
 pub struct KalmanFilter<T: Real, N: Dimension> {
-    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::vector"))]
     state: OVector<T, N>,
     covariance: Covariance<T, N>,
-    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::number"))]
     gate: T,
-    #[cfg_attr(feature = "serde", serde(skip))]
     scratch: N::Scratch<T>,
 }
 
@@ -461,5 +459,7 @@ fn whiten<T: Real, M: Dimension>(
     partial
 }
 
+#[cfg(feature = "serde")]
+mod snapshot;
 #[cfg(test)]
 mod tests;

@@ -170,17 +170,15 @@ impl Line {
 /// ```
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(bound = ""))]
+#[cfg_attr(feature = "serde", serde(bound = "", into = "snapshot::Snapshot<T, N, D>"))]
+#[cfg_attr(feature = "serde", serde(try_from = "snapshot::Snapshot<T, N, D>"))]
 pub struct Lags<T: Real, N: Dimension, D: Dimension = Const<1>> {
     /// φ; NaN where a sample is missing.
-    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::vector"))]
     regressor: OVector<T, N>,
     /// The inputs on their way to φ, line after line, each line the newest first.
-    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::vector"))]
     delayed: OVector<T, D>,
     /// The lines in use, then some with nb = 0. There are at most N, as each has a coefficient: so the number
     /// of inputs need not be one more size in the type.
-    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::vector"))]
     lines: OVector<Line, N>,
     na: usize,
     inputs: usize,
@@ -457,6 +455,8 @@ pub(crate) fn is_infinite<T: Real>(sample: &T) -> bool {
     sample.abs() == T::INFINITY
 }
 
+#[cfg(feature = "serde")]
+mod snapshot;
 #[cfg(test)]
 mod tests {
     extern crate std;

@@ -56,19 +56,16 @@ use crate::{Dimension, Error, Real, Solution};
 /// ```
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(bound = ""))]
+#[cfg_attr(feature = "serde", serde(bound = "", into = "snapshot::Snapshot<T, N>"))]
+#[cfg_attr(feature = "serde", serde(try_from = "snapshot::Snapshot<T, N>"))]
 pub struct LeastSquares<T: Real, N: Dimension> {
     /// R, transposed: column i is row i of R, so that a rotation runs over contiguous numbers.
-    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::square"))]
     factor_rows: OMatrix<Sum<T>, N, N>,
-    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::vector"))]
     rotated_output: OVector<Sum<T>, N>,
-    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::number"))]
     residual_norm: Sum<T>,
     rows: usize,
     /// Those of the rows that came by `from_factor`: `rank` expects more rounding of them.
     uncompensated_rows: usize,
-    #[cfg_attr(feature = "serde", serde(skip))]
     scratch: N::Scratch<T>,
 }
 
@@ -470,5 +467,7 @@ impl<N: Dimension> Rank<N> {
     }
 }
 
+#[cfg(feature = "serde")]
+mod snapshot;
 #[cfg(test)]
 mod tests;

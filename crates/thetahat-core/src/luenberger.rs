@@ -54,12 +54,21 @@ use crate::{Action, Dimension, Error, Innovation, Observation, Real, Transition,
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(bound = ""))]
+#[cfg_attr(feature = "serde", serde(bound = "", into = "snapshot::Snapshot<T, N, M>"))]
+#[cfg_attr(feature = "serde", serde(try_from = "snapshot::Snapshot<T, N, M>"))]
 pub struct LuenbergerObserver<T: Real, N: Dimension + Dimension<M>, M: Dimension> {
-    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::vector"))]
     state: OVector<T, N>,
-    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::matrix"))]
     gain: OMatrix<T, N, M>,
+}
+
+impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> LuenbergerObserver<T, N, M> {
+    /// What [`new`](LuenbergerObserver::new) checks.
+    fn checked(state: OVector<T, N>, gain: OMatrix<T, N, M>) -> Result<Self, Error> {
+        check_finite("state", state.as_slice())?;
+        check_length("gain", state.len(), gain.nrows())?;
+        check_finite("gain", gain.as_slice())?;
+        Ok(LuenbergerObserver { state, gain })
+    }
 }
 
 impl<T: Real, N: Dimension + Dimension<M>, M: Dimension + Dimension<N>> LuenbergerObserver<T, N, M> {
@@ -67,10 +76,7 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension + Dimension<N>> Luenberg
     ///
     /// Errors: [`Error::NotFinite`]; [`Error::Length`] (only with `Dyn`).
     pub fn new(state: OVector<T, N>, gain: OMatrix<T, N, M>) -> Result<Self, Error> {
-        check_finite("state", state.as_slice())?;
-        check_length("gain", state.len(), gain.nrows())?;
-        check_finite("gain", gain.as_slice())?;
-        Ok(LuenbergerObserver { state, gain })
+        Self::checked(state, gain)
     }
 
     /// The estimate of the state at the next sample.
@@ -382,5 +388,7 @@ fn reflect<T: Real>(v: &[T], x: &mut [T]) {
     add_multiple(x, -twice, v);
 }
 
+#[cfg(feature = "serde")]
+mod snapshot;
 #[cfg(test)]
 mod tests;

@@ -12,6 +12,8 @@ use crate::{Covariance, Dimension, Error, Innovation, Real, Solution, ud};
 mod after;
 mod residuals;
 mod sample;
+#[cfg(feature = "serde")]
+mod snapshot;
 
 use after::After;
 use residuals::Residuals;
@@ -98,13 +100,12 @@ use sample::scale_variances;
 /// ```
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(bound = ""))]
+#[cfg_attr(feature = "serde", serde(bound = "", into = "snapshot::Snapshot<T, N, M>"))]
+#[cfg_attr(feature = "serde", serde(try_from = "snapshot::Snapshot<T, N, M>"))]
 pub struct RecursiveLeastSquares<T: Real, N: Dimension + Dimension<M>, M: Dimension = Const<1>> {
-    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::matrix"))]
     parameters: OMatrix<T, N, M>,
     covariance: Covariance<T, N>,
     /// p_j: the prior variances, and the largest that the cap leaves.
-    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::vector"))]
     bounds: OVector<T, N>,
     residuals: Residuals<T, M>,
     forgetting: Forgetting<T>,
@@ -116,9 +117,7 @@ pub struct RecursiveLeastSquares<T: Real, N: Dimension + Dimension<M>, M: Dimens
     shares: u16,
     shares_left: u16,
     adapting: bool,
-    #[cfg_attr(feature = "serde", serde(skip, default = "After::any"))]
     after: After<Self>,
-    #[cfg_attr(feature = "serde", serde(skip))]
     scratch: N::Scratch<T>,
 }
 
@@ -404,10 +403,12 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
     /// The same with these parameters, n x m, to start from: a warm start. The start is then [`Start::Standard`]; if
     /// it still was collecting, P is that of [`new`](RecursiveLeastSquares::new).
     ///
-    /// Errors: [`Error::Length`] (only with `Dyn`); [`Error::NotFinite`].
+    /// Errors: [`Error::Length`] (only with `Dyn`); [`Error::NotFinite`]; [`Error::TooLarge`] if a regressor of its
+    /// scale would predict more than any output that can be absorbed (7e15 in `f32`).
     pub fn with_parameters(mut self, parameters: OMatrix<T, N, M>) -> Result<Self, Error> {
         check_length("parameters", self.parameters.nrows(), parameters.nrows())?;
-        check_entries("parameters", parameters.as_slice(), self.parameters.len())?;
+        check_length("parameters", self.parameters.ncols(), parameters.ncols())?;
+        check_parameters(parameters.as_slice(), self.bounds.as_slice())?;
         self.parameters = parameters;
         if self.phase == Phase::Collecting {
             self.covariance = Covariance::independent(&self.bounds);
@@ -426,14 +427,8 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
     /// prior can be (3e20 in `f32`).
     pub fn with_covariance(mut self, covariance: Covariance<T, N>) -> Result<Self, Error> {
         check_length("covariance", self.bounds.len(), covariance.size().value())?;
-        for &variance in covariance.variances().as_slice() {
-            let reciprocal_scale = (variance / T::from_count(100)).sqrt();
-            let cube = reciprocal_scale * reciprocal_scale * reciprocal_scale;
-            // Twice the limit, for the rounding.
-            if cube > T::LARGEST_ENTRY * T::from_count(2) {
-                return Err(Error::TooLarge { argument: "covariance" });
-            }
-        }
+        let fits = covariance.variances().iter().all(|&variance| is_prior(variance));
+        fits.then_some(()).ok_or(Error::TooLarge { argument: "covariance" })?;
         self.covariance = covariance;
         self.phase = Phase::Running;
         Ok(self)
@@ -635,6 +630,24 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
     fn of_output(&self, index: usize) -> &[T] {
         column(self.parameters.as_slice(), self.bounds.len(), index)
     }
+}
+
+/// Whether a variance is none that exceeds that of the smallest scale.
+fn is_prior<T: Real>(variance: T) -> bool {
+    let reciprocal_scale = (variance / T::from_count(100)).sqrt();
+    // Twice the limit, for the rounding.
+    reciprocal_scale * reciprocal_scale * reciprocal_scale <= T::LARGEST_ENTRY * T::from_count(2)
+}
+
+/// That parameters are finite, and what they predict of regressors of their scales can be absorbed.
+fn check_parameters<T: Real>(parameters: &[T], bounds: &[T]) -> Result<(), Error> {
+    check_finite("parameters", parameters)?;
+    let fits = |(&parameter, &bound): (&T, &T)| {
+        // The square of a hundredth of what is predicted: what was absorbed may have made more of it than can be absorbed again.
+        parameter / bound * parameter / T::from_count(100) <= T::LARGEST_ENTRY
+    };
+    let fit = parameters.iter().zip(bounds.iter().cycle()).all(fits);
+    fit.then_some(()).ok_or(Error::TooLarge { argument: "parameters" })
 }
 
 #[cfg(test)]

@@ -40,7 +40,8 @@ use crate::{Covariance, Dimension, Error, KalmanFilter, LinearObservation, Linea
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(bound = ""))]
+#[cfg_attr(feature = "serde", serde(bound = "", into = "snapshot::Snapshot<T, N>"))]
+#[cfg_attr(feature = "serde", serde(try_from = "snapshot::Snapshot<T, N>"))]
 pub struct GainSchedule<T: Real, N: Dimension> {
     /// Its state stays 0.
     filter: KalmanFilter<T, N>,
@@ -248,5 +249,7 @@ fn relative_change<T: Real>(old: &[T], new: &[T], size: usize) -> T {
     largest
 }
 
+#[cfg(feature = "serde")]
+mod snapshot;
 #[cfg(test)]
 mod tests;

@@ -3,6 +3,9 @@
 //! A snapshot is exact: what is read back is what was written, to the bit. In text, where a format may have neither
 //! NaN nor infinity (JSON has not), these are the words "NaN", "inf" and "-inf".
 //!
+//! Each type has a `Snapshot` of its own, in a file beside it: its fields without what follows from them, a
+//! [`Version`] in front. What is read is made of it by the constructor, or by the same checks.
+//!
 //! nalgebra's own implementations would ask for bounds that [`Dimension`] hides; the functions here ask for none.
 
 use core::fmt;
@@ -15,6 +18,30 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use crate::lags::Line;
 use crate::triangle::Sum;
 use crate::{Dimension, Real};
+
+/// The version of a snapshot: the first of its fields. It is read only if it is the one that is written.
+pub(crate) struct Version;
+
+/// The version that is written.
+const VERSION: u32 = 1;
+
+impl Serialize for Version {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        VERSION.serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for Version {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        match u32::deserialize(deserializer)? {
+            VERSION => Ok(Version),
+            found => Err(D::Error::custom(format_args!(
+                "this snapshot is of version {found}, and version {VERSION} is understood: read it with the release that \
+                 wrote it"
+            ))),
+        }
+    }
+}
 
 /// What stands in a vector or matrix.
 pub(crate) trait Entry: Scalar + Copy {
@@ -141,9 +168,6 @@ fn write<E: Entry, S: Serializer>(
     (rows, columns, All(entries)).serialize(serializer)
 }
 
-/// The most entries that are read: a snapshot that claims more is not one.
-const MOST_ENTRIES: usize = 1 << 24;
-
 /// Reads what [`write()`] writes, into the matrix that `make` makes for the sizes.
 struct Matrix<M, E> {
     make: fn(usize, usize) -> Option<M>,
@@ -161,17 +185,43 @@ impl<'de, M, E: Entry> Visitor<'de> for Matrix<M, E> {
         let wrong = |index| A::Error::invalid_length(index, &self);
         let rows = parts.next_element::<usize>()?.ok_or_else(|| wrong(0))?;
         let columns = parts.next_element::<usize>()?.ok_or_else(|| wrong(1))?;
-        let count = rows.checked_mul(columns).filter(|&count| count <= MOST_ENTRIES);
-        let mut matrix = count.and_then(|_| (self.make)(rows, columns)).ok_or_else(|| wrong(rows))?;
-        parts.next_element_seed(Entries((self.entries)(&mut matrix)))?.ok_or_else(|| wrong(2))?;
-        Ok(matrix)
+        let count = rows.checked_mul(columns).ok_or_else(|| wrong(rows))?;
+        let make = || (self.make)(rows, columns).ok_or_else(|| wrong(rows));
+        // What a snapshot claims asks for no memory before it is there.
+        #[cfg(feature = "alloc")]
+        {
+            let mut found = alloc::vec::Vec::new();
+            parts
+                .next_element_seed(Entries { count, take: |entry| found.push(entry), kind: PhantomData })?
+                .ok_or_else(|| wrong(2))?;
+            let mut matrix = make()?;
+            crate::ud::copy(&found, (self.entries)(&mut matrix));
+            Ok(matrix)
+        }
+        // Without a heap the type says how large it is.
+        #[cfg(not(feature = "alloc"))]
+        {
+            let mut matrix = make()?;
+            let mut places = (self.entries)(&mut matrix).iter_mut();
+            let take = |entry| {
+                if let Some(place) = places.next() {
+                    *place = entry;
+                }
+            };
+            parts.next_element_seed(Entries { count, take, kind: PhantomData })?.ok_or_else(|| wrong(2))?;
+            Ok(matrix)
+        }
     }
 }
 
-/// Reads exactly as many entries as there are places.
-struct Entries<'a, E>(&'a mut [E]);
+/// Reads exactly `count` entries.
+struct Entries<E, F> {
+    count: usize,
+    take: F,
+    kind: PhantomData<E>,
+}
 
-impl<'de, E: Entry> DeserializeSeed<'de> for Entries<'_, E> {
+impl<'de, E: Entry, F: FnMut(E)> DeserializeSeed<'de> for Entries<E, F> {
     type Value = ();
 
     fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<(), D::Error> {
@@ -179,23 +229,22 @@ impl<'de, E: Entry> DeserializeSeed<'de> for Entries<'_, E> {
     }
 }
 
-impl<'de, E: Entry> Visitor<'de> for Entries<'_, E> {
+impl<'de, E: Entry, F: FnMut(E)> Visitor<'de> for Entries<E, F> {
     type Value = ();
 
     fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(formatter, "{} entries", self.0.len())
+        write!(formatter, "{} entries", self.count)
     }
 
-    fn visit_seq<A: SeqAccess<'de>>(self, mut entries: A) -> Result<(), A::Error> {
-        let expected = self.0.len();
+    fn visit_seq<A: SeqAccess<'de>>(mut self, mut entries: A) -> Result<(), A::Error> {
         let wrong = |count| A::Error::invalid_length(count, &"as many entries as rows times columns");
-        for (index, place) in self.0.iter_mut().enumerate() {
+        for index in 0..self.count {
             let Read(entry) = entries.next_element()?.ok_or_else(|| wrong(index))?;
-            *place = entry;
+            (self.take)(entry);
         }
         match entries.next_element::<Read<E>>()? {
             None => Ok(()),
-            Some(_) => Err(wrong(expected + 1)),
+            Some(_) => Err(wrong(self.count.saturating_add(1))),
         }
     }
 }

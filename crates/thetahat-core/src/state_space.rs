@@ -106,15 +106,13 @@ pub trait Observation<
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(bound = ""))]
+#[cfg_attr(feature = "serde", serde(bound = "", into = "snapshot::Transition<T, N, U>"))]
+#[cfg_attr(feature = "serde", serde(try_from = "snapshot::Transition<T, N, U>"))]
 pub struct LinearTransition<T: Real, N: Dimension + Dimension<U>, U: Dimension = Const<0>> {
-    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::square"))]
     state_matrix: OMatrix<T, N, N>,
-    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::matrix"))]
     input_matrix: OMatrix<T, N, U>,
     noise: Covariance<T, N>,
     /// Q as a matrix: the time update needs it beside its factor.
-    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::square"))]
     noise_matrix: OMatrix<T, N, N>,
 }
 
@@ -123,18 +121,28 @@ impl<T: Real, N: Dimension + Dimension<Const<0>>> LinearTransition<T, N> {
     ///
     /// Errors: [`Error::NotFinite`]; [`Error::Length`] (only with `Dyn`); [`Error::Overflow`].
     pub fn new(state_matrix: OMatrix<T, N, N>, noise: Covariance<T, N>) -> Result<Self, Error> {
-        let size = noise.size();
-        check_shape("state_matrix", &state_matrix, size, size)?;
-        let noise_matrix = noise.matrix();
-        if !noise_matrix.as_slice().iter().all(T::is_finite) {
-            return Err(Error::Overflow);
-        }
-        let input_matrix = size.rows_by(Const, T::zero());
-        Ok(LinearTransition { state_matrix, input_matrix, noise, noise_matrix })
+        let input_matrix = noise.size().rows_by(Const, T::zero());
+        Self::checked(state_matrix, input_matrix, noise)
     }
 }
 
 impl<T: Real, N: Dimension + Dimension<U>, U: Dimension> LinearTransition<T, N, U> {
+    /// The model of these, once they are checked.
+    fn checked(
+        state_matrix: OMatrix<T, N, N>,
+        input_matrix: OMatrix<T, N, U>,
+        noise: Covariance<T, N>,
+    ) -> Result<Self, Error> {
+        let size = noise.size();
+        check_shape("state_matrix", &state_matrix, size, size)?;
+        check_shape("input_matrix", &input_matrix, size, input_matrix.shape_generic().1)?;
+        let noise_matrix = noise.matrix();
+        if !noise_matrix.as_slice().iter().all(T::is_finite) {
+            return Err(Error::Overflow);
+        }
+        Ok(LinearTransition { state_matrix, input_matrix, noise, noise_matrix })
+    }
+
     /// The same with the input matrix G, n x (number of inputs), in place of the one it had.
     ///
     /// Errors: as for [`new`](LinearTransition::new).
@@ -145,9 +153,7 @@ impl<T: Real, N: Dimension + Dimension<U>, U: Dimension> LinearTransition<T, N, 
     where
         N: Dimension<V>,
     {
-        let LinearTransition { state_matrix, noise, noise_matrix, .. } = self;
-        check_shape("input_matrix", &input_matrix, noise.size(), input_matrix.shape_generic().1)?;
-        Ok(LinearTransition { state_matrix, input_matrix, noise, noise_matrix })
+        LinearTransition::checked(self.state_matrix, input_matrix, self.noise)
     }
 
     /// The same to the bit, with the number of states in another type, see [`Covariance::to_size`].
@@ -224,7 +230,8 @@ impl<T: Real, N: Dimension + Dimension<U>, U: Dimension> Transition<T, N, U> for
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(bound = ""))]
+#[cfg_attr(feature = "serde", serde(bound = "", into = "snapshot::Observation<T, N, M, U>"))]
+#[cfg_attr(feature = "serde", serde(try_from = "snapshot::Observation<T, N, M, U>"))]
 pub struct LinearObservation<
     T: Real,
     N: Dimension + Dimension<M>,
@@ -232,9 +239,7 @@ pub struct LinearObservation<
     U: Dimension = Const<0>,
 > {
     /// H', so that each row of H is contiguous.
-    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::matrix"))]
     output_rows: OMatrix<T, N, M>,
-    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::matrix"))]
     input_matrix: OMatrix<T, M, U>,
     noise: Covariance<T, M>,
 }
@@ -363,3 +368,6 @@ fn check_shape<T: Real, R: Dimension<C>, C: Dim>(
     check_length(argument, columns.value(), found_columns.value())?;
     check_finite(argument, matrix.as_slice())
 }
+
+#[cfg(feature = "serde")]
+mod snapshot;

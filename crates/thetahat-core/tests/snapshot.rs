@@ -4,10 +4,13 @@ use std::fmt::Debug;
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use thetahat_core::nalgebra::{Const, DVector, Dyn, Matrix2, RowVector2, SVector, Vector1, Vector2, Vector3};
+use serde_json::{Value, json};
+use thetahat_core::nalgebra::{
+    Const, DMatrix, DVector, Dyn, Matrix2, RowVector2, SVector, Vector1, Vector2, Vector3,
+};
 use thetahat_core::{
     Action, ArmaxMethod, ArmaxOrders, ArxOrders, ChangeDetector, Covariance, ExtendedKalmanFilter,
-    Forgetting, Innovation, InputOrders, KalmanFilter, Lags, LeastSquares, LinearObservation,
+    Forgetting, GainSchedule, Innovation, InputOrders, KalmanFilter, Lags, LeastSquares, LinearObservation,
     LinearTransition, LuenbergerObserver, RecursiveArmax, RecursiveArx, RecursiveLeastSquares, Start,
 };
 
@@ -175,26 +178,243 @@ fn least_squares_and_delay_lines() {
 fn what_is_not_a_snapshot_is_refused() {
     let covariance: Covariance<f64, Const<2>> = Covariance::from_diagonal(&Vector2::new(1.0, 2.0)).unwrap();
     let text = serde_json::to_string(&covariance).unwrap();
-    assert_eq!(text, r#"{"factor":[2,2,[1.0,0.0,0.0,2.0]]}"#);
+    assert_eq!(text, r#"{"version":1,"factor":[2,2,[1.0,0.0,0.0,2.0]]}"#);
     let read =
         |text: &str| serde_json::from_str::<Covariance<f64, Const<2>>>(text).map_err(|e| e.to_string());
     assert!(read(&text).is_ok());
     for bad in [
-        r#"{"factor":[2,2,[1.0,0.0,0.0]]}"#,
-        r#"{"factor":[2,2,[1.0,0.0,0.0,2.0,3.0]]}"#,
-        r#"{"factor":[3,3,[1,0,0,0,1,0,0,0,1]]}"#,
-        r#"{"factor":[2,2,[1.0,0.0,0.0,"many"]]}"#,
-        r#"{"factor":[2,2,[-1.0,0.0,0.0,2.0]]}"#,
-        r#"{"factor":[2,2,["NaN",0.0,0.0,2.0]]}"#,
-        r#"{"factor":[2,2,[1.0,0.5,0.0,2.0]]}"#,
-        r#"{"factor":[2,2]}"#,
-        r#"{"factor":[]}"#,
+        r#"{"version":1,"factor":[2,2,[1.0,0.0,0.0]]}"#,
+        r#"{"version":1,"factor":[2,2,[1.0,0.0,0.0,2.0,3.0]]}"#,
+        r#"{"version":1,"factor":[3,3,[1,0,0,0,1,0,0,0,1]]}"#,
+        r#"{"version":1,"factor":[2,2,[1.0,0.0,0.0,"many"]]}"#,
+        r#"{"version":1,"factor":[2,2,[-1.0,0.0,0.0,2.0]]}"#,
+        r#"{"version":1,"factor":[2,2,["NaN",0.0,0.0,2.0]]}"#,
+        r#"{"version":1,"factor":[2,2,[1.0,0.5,0.0,2.0]]}"#,
+        r#"{"version":1,"factor":[2,2]}"#,
+        r#"{"version":1,"factor":[]}"#,
+        r#"{"version":1,"factor":[2,2,[1e308,0.0,1e308,2.0]]}"#,
         r#"{}"#,
     ] {
         assert!(read(bad).is_err(), "{bad}");
     }
-    let huge = r#"{"factor":[4000000000,4000000000,[]]}"#;
+    let huge = r#"{"version":1,"factor":[4000000000,4000000000,[]]}"#;
     assert!(serde_json::from_str::<Covariance<f64, Dyn>>(huge).is_err());
+}
+
+/// An estimator, the paths of fields in its snapshot, and numbers that they must not hold.
+fn refuses<E: Serialize + DeserializeOwned + Debug>(estimator: &E, cases: &[(&str, &[Value])]) {
+    let whole = serde_json::to_value(estimator).expect("a snapshot");
+    let read =
+        |value: &Value| serde_json::from_str::<E>(&value.to_string()).map_err(|error| error.to_string());
+    assert!(read(&whole).is_ok());
+    for (path, bad) in cases {
+        for bad in *bad {
+            let mut tampered = whole.clone();
+            *tampered.pointer_mut(path).unwrap_or_else(|| panic!("{path} in {whole}")) = bad.clone();
+            assert!(read(&tampered).is_err(), "{path} = {bad}");
+        }
+    }
+    let mut later = whole.clone();
+    later["version"] = json!(7);
+    let message = read(&later).unwrap_err();
+    assert!(message.contains("of version 7, and version 1 is understood"), "{message}");
+    let mut without = whole.clone();
+    without.as_object_mut().expect("fields").remove("version");
+    assert!(read(&without).unwrap_err().contains("version"));
+}
+
+#[test]
+fn what_no_constructor_makes_is_refused() {
+    let numbers = &[json!("NaN"), json!("inf"), json!("many")][..];
+    let (negative, nothing) = (&[json!(-1.0), json!("NaN")][..], &[json!(0.0), json!("NaN")][..]);
+
+    let mut estimator =
+        RecursiveLeastSquares::<f32, Const<2>>::new(&Vector2::repeat(1.0), Forgetting::default()).unwrap();
+    for k in 0..20 {
+        estimator.update(&Vector2::new(value(k) as f32, 1.0), output(k) as f32).unwrap();
+    }
+    let entries = &[json!("NaN"), json!("inf"), json!(6e37)][..];
+    refuses(
+        &estimator,
+        &[
+            ("/forgetting/Exponential/factor", &[json!(1.99), json!(0.1), json!(null), json!("NaN")]),
+            ("/parameters/2/1", entries),
+            ("/parameters/0", &[json!(3)]),
+            ("/covariance/factor/2/0", entries),
+            ("/covariance/factor/2/2", entries),
+            ("/covariance/factor/2/3", negative),
+            ("/bounds/2/0", &[json!(0.0), json!(-1.0), json!(1e-30), json!(6e37), json!("NaN")]),
+            ("/residuals/mean_squares/2/0", negative),
+            ("/residuals/weights", negative),
+            ("/residuals/squared_weights", &[json!(-1.0), json!(1e6)]),
+            ("/dead_zone", &[json!(-1.0), json!(null)]),
+            ("/turn", &[json!(2), json!(-1)]),
+            ("/phase", &[json!("Resting"), json!("Blending"), json!("Waiting")]),
+            ("/covariance/version", &[json!(2)]),
+        ],
+    );
+    let variable = Forgetting::Variable { factor: 0.95, minimum: 0.8, noise_variance: 0.1 };
+    let estimator = RecursiveLeastSquares::<f64, Dyn>::new(&DVector::repeat(3, 1.0), variable).unwrap();
+    refuses(
+        &estimator,
+        &[
+            ("/forgetting/Variable/minimum", &[json!(0.99), json!(0.1)]),
+            ("/forgetting/Variable/noise_variance", &[json!(0.0), json!(-1.0)]),
+            ("/bounds", &[json!([2, 1, [100.0, 100.0]])]),
+            (
+                "/parameters",
+                &[json!([2, 1, [0.0, 0.0]]), json!([3, 1, [0.0, 0.0]]), json!([3, 2, [0, 0, 0, 0, 0, 0]])],
+            ),
+            (
+                "/covariance/factor",
+                &[json!([2, 2, [1.0, 0.0, 0.0, 1.0]]), json!([1u64 << 40, 1u64 << 40, [1.0]])],
+            ),
+            ("/residuals/mean_squares", &[json!([1u64 << 60, 1, [0.0]]), json!([0, 1, []])]),
+        ],
+    );
+
+    let orders = ArmaxOrders { na: 1, inputs: INPUTS, nc: 1, constant: false };
+    let method = ArmaxMethod::PredictionError;
+    let armax: RecursiveArmax<f64, Dyn, Dyn> =
+        RecursiveArmax::new(&orders, method, 1.0, &[1.0], 0.1, Forgetting::default()).unwrap();
+    refuses(
+        &armax,
+        &[
+            (
+                "/lags/lines/2/0",
+                &[json!([3, 1, 2]), json!([1, 1, 2]), json!([0, 2, 2]), json!([0, 1, 3]), json!([0, 0, 0])],
+            ),
+            ("/lags/lines/2/1", &[json!([2, 1, 1]), json!([1, 1, 0]), json!([1, u64::MAX, 0])]),
+            ("/lags/na", &[json!(0), json!(2), json!(u64::MAX)]),
+            ("/lags/inputs", &[json!(0), json!(2)]),
+            ("/lags/regressor/2/0", &[json!("inf")]),
+            ("/lags/delayed", &[json!([1, 1, [0.0]]), json!([2, 1, [0.0, "-inf"]])]),
+            ("/estimator/parameters/2/2", &[json!(1.5), json!("NaN")]),
+            ("/gradients/2/4", numbers),
+            ("/gradients", &[json!([2, 2, [0.0, 0.0, 0.0, 0.0]])]),
+            ("/residual", &[json!(null), json!("NaN")]),
+            ("/nc", &[json!(0), json!(2), json!(u64::MAX)]),
+        ],
+    );
+    let orders = ArxOrders { na: 1, inputs: INPUTS, constant: false };
+    let arx: RecursiveArx<f64, Dyn, Dyn> =
+        RecursiveArx::new(&orders, 1.0, &[1.0], Forgetting::default()).unwrap();
+    let other = serde_json::to_value(&armax).unwrap();
+    refuses(&arx, &[("/lags", &[other["lags"].clone()]), ("/estimator", &[other["estimator"].clone()])]);
+    refuses(arx.lags(), &[("/regressor", &[json!([3, 1, [0.0, 0.0, 0.0]])])]);
+
+    let prior = Covariance::new(&Matrix2::new(4.0, 1.0, 1.0, 2.0)).unwrap();
+    let filter: KalmanFilter<f64, Const<2>> = KalmanFilter::new(Vector2::zeros(), prior.clone()).unwrap();
+    let covariance = ("/covariance/factor/2/3", negative);
+    refuses(&filter, &[("/state/2/0", numbers), ("/gate", nothing), covariance]);
+    let dynamic = filter.to_size(Dyn(2)).unwrap();
+    refuses(&dynamic, &[("/state", &[json!([3, 1, [0.0, 0.0, 0.0]])])]);
+    let extended = ExtendedKalmanFilter::from(filter);
+    refuses(&extended, &[("/iterations", &[json!(0)]), ("/linear/state/2/0", numbers)]);
+    refuses(&GainSchedule::new(prior), &[("/covariance/factor/2/0", negative)]);
+    let (transition, observation) = model();
+    let transition = transition.to_size(Dyn(2)).unwrap();
+    refuses(
+        &transition,
+        &[
+            ("/state_matrix/2/0", numbers),
+            ("/state_matrix", &[json!([3, 3, [1, 0, 0, 0, 1, 0, 0, 0, 1]])]),
+            ("/input_matrix", &[json!([3, 0, []]), json!([2, 1, [0.0, 0.0]])]),
+            ("/noise/factor/2/3", negative),
+        ],
+    );
+    let observation = observation.to_size(Dyn(2), Dyn(1)).unwrap();
+    refuses(
+        &observation,
+        &[
+            ("/output_rows/2/0", numbers),
+            ("/output_rows", &[json!([1, 2, [1.0, 1.0]])]),
+            ("/noise/factor/2/0", negative),
+        ],
+    );
+    let observer: LuenbergerObserver<f64, Dyn, Dyn> =
+        LuenbergerObserver::new(DVector::zeros(2), DMatrix::zeros(2, 1)).unwrap();
+    refuses(
+        &observer,
+        &[("/state/2/0", numbers), ("/gain/2/1", numbers), ("/gain", &[json!([3, 1, [0.0, 0.0, 0.0]])])],
+    );
+
+    let detector = ChangeDetector::new(2.0, 3.0).unwrap();
+    refuses(
+        &detector,
+        &[
+            ("/mean_threshold", nothing),
+            ("/variance_threshold", nothing),
+            ("/mean_up/statistic", &[json!(-1.0), json!(2.5), json!(1.0)]),
+            ("/variance/samples", &[json!(-1), json!(5)]),
+        ],
+    );
+    let mut problem = LeastSquares::<f64, Const<2>>::new();
+    problem.add(&Vector2::new(1.0, 2.0), 3.0).unwrap();
+    refuses(
+        &problem,
+        &[
+            ("/factor_rows/2/0/0", &[json!("NaN"), json!(1e300)]),
+            ("/factor_rows/2/0/1", &[json!("NaN"), json!(7.0)]),
+            ("/factor_rows/2/2/0", &[json!(1.0)]),
+            ("/rotated_output/2/0/0", numbers),
+            ("/residual_norm/0", &[json!(-1.0), json!("inf")]),
+            ("/rows", &[json!(0), json!(-1)]),
+            ("/uncompensated_rows", &[json!(2)]),
+        ],
+    );
+}
+
+/// Every number of a snapshot, one after the other, replaced: what is still read must not panic, nor stay deaf.
+#[test]
+fn a_tampered_number_is_refused_or_overcome() {
+    fn numbers(value: &Value, path: &str, found: &mut Vec<String>) {
+        match value {
+            Value::Number(_) => found.push(path.to_owned()),
+            Value::Array(parts) => {
+                parts.iter().enumerate().for_each(|(k, part)| numbers(part, &format!("{path}/{k}"), found));
+            }
+            Value::Object(parts) => {
+                parts.iter().for_each(|(key, part)| numbers(part, &format!("{path}/{key}"), found));
+            }
+            _ => {}
+        }
+    }
+    let orders = ArmaxOrders { na: 2, inputs: INPUTS, nc: 1, constant: false };
+    let method = ArmaxMethod::PredictionError;
+    let mut armax: RecursiveArmax<f32, Dyn, Dyn> =
+        RecursiveArmax::new(&orders, method, 1.0, &[1.0], 0.1, Forgetting::default()).unwrap();
+    for k in 20..50 {
+        armax.log_row(output(k) as f32, &[value(k) as f32]).unwrap();
+    }
+    let whole = serde_json::to_value(&armax).unwrap();
+    let mut paths = vec![];
+    numbers(&whole, "", &mut paths);
+    // That is a setting: a wide dead zone is a legal one.
+    paths.retain(|path| path != "/estimator/dead_zone");
+    assert!(paths.len() > 50);
+    let bad =
+        [json!(0), json!(1), json!(7), json!(-1), json!(1.99), json!(6e37), json!(-6e37), json!(u64::MAX)];
+    let bad = bad.into_iter().chain([json!(1e-40), json!("NaN"), json!("inf"), json!(1_u64 << 40)]);
+    let mut overcome = 0;
+    for bad in bad {
+        for path in &paths {
+            let mut tampered = whole.clone();
+            *tampered.pointer_mut(path).unwrap() = bad.clone();
+            let read: Result<RecursiveArmax<f32, Dyn, Dyn>, _> = serde_json::from_str(&tampered.to_string());
+            let Ok(mut armax) = read else { continue };
+            let mut last = Action::NotReady;
+            for k in 50..3000 {
+                if let Ok(innovation) = armax.log_row(output(k) as f32, &[value(k) as f32]) {
+                    last = innovation.action;
+                }
+            }
+            let heard = matches!(last, Action::Updated | Action::Capped | Action::Projected);
+            assert!(heard, "{path} = {bad}: {last:?}");
+            overcome += 1;
+        }
+    }
+    assert!(overcome > 100, "{overcome}");
 }
 
 /// Everything there is to an estimator.

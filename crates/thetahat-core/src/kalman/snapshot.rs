@@ -1,0 +1,33 @@
+//! What is written, and how it is checked when it is read back.
+
+use nalgebra::OVector;
+use serde::{Deserialize, Serialize};
+
+use crate::snapshot::{Version, number, vector};
+use crate::{Covariance, Dimension, Error, KalmanFilter, Real};
+
+#[derive(Serialize, Deserialize)]
+#[serde(bound = "")]
+pub(super) struct Snapshot<T: Real, N: Dimension> {
+    version: Version,
+    #[serde(with = "vector")]
+    state: OVector<T, N>,
+    covariance: Covariance<T, N>,
+    #[serde(with = "number")]
+    gate: T,
+}
+
+impl<T: Real, N: Dimension> From<KalmanFilter<T, N>> for Snapshot<T, N> {
+    fn from(filter: KalmanFilter<T, N>) -> Self {
+        let KalmanFilter { state, covariance, gate, .. } = filter;
+        Snapshot { version: Version, state, covariance, gate }
+    }
+}
+
+impl<T: Real, N: Dimension> TryFrom<Snapshot<T, N>> for KalmanFilter<T, N> {
+    type Error = Error;
+
+    fn try_from(read: Snapshot<T, N>) -> Result<Self, Error> {
+        KalmanFilter::new(read.state, read.covariance)?.with_gate(read.gate)
+    }
+}

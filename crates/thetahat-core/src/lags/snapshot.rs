@@ -1,0 +1,86 @@
+//! What is written, and how it is checked when it is read back.
+
+use nalgebra::OVector;
+use serde::{Deserialize, Serialize};
+
+use super::{Line, Source, is_infinite};
+use crate::error::check_length;
+use crate::snapshot::{Version, vector};
+use crate::{Dimension, Error, Lags, Real};
+
+#[derive(Serialize, Deserialize)]
+#[serde(bound = "")]
+pub(super) struct Snapshot<T: Real, N: Dimension, D: Dimension> {
+    version: Version,
+    #[serde(with = "vector")]
+    regressor: OVector<T, N>,
+    #[serde(with = "vector")]
+    delayed: OVector<T, D>,
+    #[serde(with = "vector")]
+    lines: OVector<Line, N>,
+    na: usize,
+    inputs: usize,
+    awaiting_inputs: bool,
+}
+
+impl<T: Real, N: Dimension, D: Dimension> From<Lags<T, N, D>> for Snapshot<T, N, D> {
+    fn from(lags: Lags<T, N, D>) -> Self {
+        let Lags { regressor, delayed, lines, na, inputs, awaiting_inputs } = lags;
+        Snapshot { version: Version, regressor, delayed, lines, na, inputs, awaiting_inputs }
+    }
+}
+
+impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
+    /// That they make so many parameters, of which the last `residuals` are those of past residuals.
+    pub(crate) fn check_residuals(&self, parameters: usize, residuals: usize) -> Result<(), Error> {
+        check_length("lags", parameters, self.regressor.len())?;
+        let of_residuals = |line: &&Line| line.nb > 0 && line.source(self.inputs) == Source::Residual;
+        let line = self.lines.as_slice().iter().find(of_residuals);
+        check_length("residuals", residuals, line.map_or(0, |line| line.nb))
+    }
+}
+
+impl<T: Real, N: Dimension, D: Dimension> TryFrom<Snapshot<T, N, D>> for Lags<T, N, D> {
+    type Error = Error;
+
+    fn try_from(read: Snapshot<T, N, D>) -> Result<Self, Error> {
+        let Snapshot { version: _, regressor, delayed, lines, na, inputs, awaiting_inputs } = read;
+        check_length("lines", regressor.len(), lines.len())?;
+        for (argument, samples) in [("regressor", regressor.as_slice()), ("delayed", delayed.as_slice())] {
+            if samples.iter().any(is_infinite) {
+                return Err(Error::Infinite { argument });
+            }
+        }
+        // Those in use come first, in the order of their indices.
+        let (mut parameters, mut delays, mut next) = (na, 0_usize, Some(0));
+        for line in lines.as_slice() {
+            let fits = match next {
+                Some(least) if line.nb > 0 => {
+                    line.index >= least
+                        && match line.source(inputs) {
+                            Source::Input(_) => true,
+                            Source::Constant => (line.nb, line.nk) == (1, 0),
+                            Source::Residual => line.index - inputs == 1 && line.nk == 0,
+                        }
+                }
+                _ => *line == Line { index: 0, nb: 0, nk: 0 },
+            };
+            fits.then_some(()).ok_or(Error::OutOfRange { argument: "lines", range: "one for each input" })?;
+            next = next.filter(|_| line.nb > 0).map(|_| line.index.saturating_add(1));
+            parameters = parameters.saturating_add(line.nb);
+            delays = delays.saturating_add(line.nk);
+        }
+        let available = regressor.len();
+        if parameters != available {
+            return Err(Error::Orders { needed: parameters, available });
+        }
+        if delays > delayed.len() {
+            return Err(Error::Delays { needed: delays, available: delayed.len() });
+        }
+        let lags = Lags { regressor, delayed, lines, na, inputs, awaiting_inputs };
+        if awaiting_inputs {
+            lags.check_delays()?;
+        }
+        Ok(lags)
+    }
+}

@@ -335,7 +335,23 @@ fn a_state_that_does_not_fit_is_refused_in_words() {
         ),
         (before[..before.len() / 2].to_owned(), "this is no state of thetahat track"),
         (before.replace("\"trackers\":[", "\"trackers\":[],\"x\":["), "its parts do not fit together"),
-        (before.replace("\"na\":1", "\"na\":7"), "its parts do not fit together"),
+        (
+            before.replace("\"na\":1", "\"na\":7"),
+            "this is no state of thetahat track: the orders make 8 parameters",
+        ),
+        (before.replace("\"factor\":0.99", "\"factor\":1.99"), "factor is out of range"),
+        (
+            before.replace("\"mean_squares\":[1,1,[", "\"mean_squares\":[1,1,[-"),
+            "mean_squares is out of range",
+        ),
+        (
+            before.replace("\"mean_squared_error\":", "\"mean_squared_error\":-"),
+            "its parts do not fit together",
+        ),
+        (
+            before.replace("\"version\":1", "\"version\":2"),
+            "this snapshot is of version 2, and version 1 is understood",
+        ),
         (before.replace("\"inputs\":[0.0]", "\"inputs\":[]"), "its parts do not fit together"),
         (before.replace("\"names\":[\"a1\",", "\"names\":["), "its parts do not fit together"),
         ("{}".to_owned(), "this is no state of thetahat track"),

@@ -53,13 +53,13 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 fn _restore<'py>(py: Python<'py>, class_name: &str, kept: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     let any = |object: Bound<'py, PyAny>| Ok(object);
     match class_name {
-        "Forgetting" => any(Bound::new(py, forgetting::Forgetting { policy: read(kept)? })?.into_any()),
+        "Forgetting" => any(Bound::new(py, forgetting::Forgetting::restore(read(kept)?)?)?.into_any()),
         "Innovation" => any(Bound::new(py, innovation::Innovation::restore(kept)?)?.into_any()),
         "RecursiveLeastSquares" => {
             any(Bound::new(py, least_squares::RecursiveLeastSquares::of(read(kept)?))?.into_any())
         }
-        "RecursiveArx" => any(Bound::new(py, arx::RecursiveArx::of(read(kept)?))?.into_any()),
-        "RecursiveArmax" => any(Bound::new(py, armax::RecursiveArmax::of(read(kept)?))?.into_any()),
+        "RecursiveArx" => any(Bound::new(py, arx::RecursiveArx::restore(read(kept)?)?)?.into_any()),
+        "RecursiveArmax" => any(Bound::new(py, armax::RecursiveArmax::restore(read(kept)?)?)?.into_any()),
         "LinearTransition" => any(Bound::new(py, model::LinearTransition { model: read(kept)? })?.into_any()),
         "LinearObservation" => {
             any(Bound::new(py, model::LinearObservation { model: read(kept)? })?.into_any())

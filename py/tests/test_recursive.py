@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
+import json
 import pickle
 import re
 import threading
 import warnings
-from typing import Any, Callable, Literal
+from typing import Any, Callable, Iterator, Literal
 
 import numpy as np
 import pytest
@@ -52,6 +54,50 @@ def plant(rows: int = 300, seed: int = 2) -> tuple[Array, Array]:
 
 def state(estimator: RecursiveLeastSquares | RecursiveArx | RecursiveArmax) -> bytes:
     return pickle.dumps(estimator)
+
+
+def numbers(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    """Where the numbers of a snapshot are."""
+    if isinstance(value, dict):
+        for key, part in value.items():
+            yield from numbers(part, (*path, key))
+    elif isinstance(value, list):
+        for index, part in enumerate(value):
+            yield from numbers(part, (*path, index))
+    elif not isinstance(value, (str, bool)):
+        yield path
+
+
+@pytest.mark.parametrize("estimator", [RecursiveLeastSquares(2), RecursiveArx(1, 1), RecursiveArmax(1, 1, nc=1)])
+def test_a_tampered_pickle_is_an_error_or_goes_on(estimator: Any) -> None:
+    restore, (name, kept) = estimator.__reduce__()
+    refused = 0
+    for path in list(numbers(json.loads(kept))):
+        for bad in (-1, 7, 1.99, 6e300, 2**63, "NaN", "inf", None, []):
+            tampered = part = json.loads(kept)
+            for key in path[:-1]:
+                part = part[key]
+            part[path[-1]] = bad
+            try:
+                read = restore(name, json.dumps(tampered).encode())
+            except ValueError:
+                refused += 1
+                continue
+            for k in range(20):
+                with contextlib.suppress(ValueError, OverflowError):
+                    read.update([0.1, 1.0] if name == "RecursiveLeastSquares" else float(k % 3), 0.5)
+    assert refused > 50
+    with pytest.raises(ValueError, match="of version 2, and version 1 is understood"):
+        restore(name, kept.replace(b'"version":1', b'"version":2'))
+    with pytest.raises(ValueError, match="not a snapshot"):
+        restore(name, kept[:-5])
+
+
+def test_a_tampered_policy_is_an_error() -> None:
+    restore, (name, kept) = Forgetting.exponential(0.9).__reduce__()  # type: ignore[misc]
+    for bad in (b"1.99", b"0", b'"NaN"', b"null"):
+        with pytest.raises(ValueError):
+            restore(name, kept.replace(b"0.9", bad))
 
 
 def same(trajectory: RecursiveTrajectory, innovations: list[Any]) -> None:

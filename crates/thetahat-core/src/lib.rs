@@ -92,7 +92,8 @@
 //! # Snapshots
 //!
 //! Every estimator is plain data: a clone is a snapshot. With the feature `serde` it can be written and read back,
-//! and goes on to the bit as if nothing had happened.
+//! and goes on to the bit as if nothing had happened. What is read is checked as the constructors check it, and carries
+//! a version: a snapshot that was damaged, edited or written by another release is an error.
 
 #[cfg(feature = "alloc")]
 extern crate alloc;
@@ -156,5 +157,7 @@ pub use scalar::Real;
 pub use schedule::{GainSchedule, SteadyState};
 #[cfg(feature = "alloc")]
 pub use smoother::{Smoothed, Smoother};
+#[cfg(feature = "serde")]
+pub use snapshot::SnapshotVersion;
 pub use solution::Solution;
 pub use state_space::{LinearObservation, LinearTransition, Observation, Transition};

@@ -4,7 +4,7 @@
 //! NaN nor infinity (JSON has not), these are the words "NaN", "inf" and "-inf".
 //!
 //! Each type has a `Snapshot` of its own, in a file beside it: its fields without what follows from them, a
-//! [`Version`] in front. What is read is made of it by the constructor, or by the same checks.
+//! [`SnapshotVersion`] in front. What is read is made of it by the constructor, or by the same checks.
 //!
 //! nalgebra's own implementations would ask for bounds that [`Dimension`] hides; the functions here ask for none.
 
@@ -19,22 +19,33 @@ use crate::lags::Line;
 use crate::triangle::Sum;
 use crate::{Dimension, Real};
 
-/// The version of a snapshot: the first of its fields. It is read only if it is the one that is written.
-pub(crate) struct Version;
+/// The version of a snapshot, 1, as the first of its fields: it is read if it is the one that this release writes.
+///
+/// Every snapshot of this crate has it. A type that keeps estimators may start with it too.
+///
+/// ```
+/// use thetahat_core::SnapshotVersion;
+///
+/// assert_eq!(serde_json::to_string(&SnapshotVersion).unwrap(), "1");
+/// let error = serde_json::from_str::<SnapshotVersion>("2").unwrap_err();
+/// assert!(error.to_string().starts_with("this snapshot is of version 2, and version 1 is understood"));
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SnapshotVersion;
 
 /// The version that is written.
 const VERSION: u32 = 1;
 
-impl Serialize for Version {
+impl Serialize for SnapshotVersion {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         VERSION.serialize(serializer)
     }
 }
 
-impl<'de> Deserialize<'de> for Version {
+impl<'de> Deserialize<'de> for SnapshotVersion {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         match u32::deserialize(deserializer)? {
-            VERSION => Ok(Version),
+            VERSION => Ok(SnapshotVersion),
             found => Err(D::Error::custom(format_args!(
                 "this snapshot is of version {found}, and version {VERSION} is understood: read it with the release that \
                  wrote it"

@@ -10,7 +10,7 @@ use thetahat_core::{
 };
 
 use super::argument::{self, Rows, Whole, failed, room};
-use super::arx::{future, orders, scales};
+use super::arx::{check_inputs, future, orders, scales};
 use super::forgetting::{Forgetting, Memory, STANDARD};
 use super::innovation::{Innovation, list};
 use super::recursive::{self, Around, RecursiveTrajectory};
@@ -99,6 +99,12 @@ pub(crate) struct RecursiveArmax {
 impl RecursiveArmax {
     pub(crate) fn of(engine: Engine) -> Self {
         RecursiveArmax { inputs: vec![0.0; engine.inputs], engine }
+    }
+
+    /// What was read back, checked.
+    pub(crate) fn restore(engine: Engine) -> PyResult<Self> {
+        check_inputs(engine.inputs, |input| engine.stepper.b(input).is_some())?;
+        Ok(Self::of(engine))
     }
 
     fn estimator(&self) -> &LeastSquares<f64, Dyn> {

@@ -97,9 +97,21 @@ impl RecursiveArx {
         RecursiveArx { inputs: vec![0.0; engine.inputs], engine }
     }
 
+    /// What was read back, checked.
+    pub(crate) fn restore(engine: Engine) -> PyResult<Self> {
+        check_inputs(engine.inputs, |input| engine.stepper.b(input).is_some())?;
+        Ok(Self::of(engine))
+    }
+
     fn estimator(&self) -> &LeastSquares<f64, Dyn> {
         self.engine.stepper.estimator()
     }
+}
+
+/// That a stepper that was read back has so many inputs.
+pub(crate) fn check_inputs(inputs: usize, has: impl Fn(usize) -> bool) -> PyResult<()> {
+    let fits = inputs <= LONGEST_DELAY && !has(inputs) && inputs.checked_sub(1).is_none_or(has);
+    fits.then_some(()).ok_or_else(|| PyValueError::new_err("not a snapshot: it has another number of inputs"))
 }
 
 /// The orders of the inputs, and how many parameters there are with `others`.

@@ -34,6 +34,21 @@ pub(crate) struct Forgetting {
     pub(crate) policy: Policy<f64>,
 }
 
+impl Forgetting {
+    /// A policy that was read back, checked as a new one is.
+    pub(crate) fn restore(policy: Policy<f64>) -> PyResult<Self> {
+        match policy {
+            Policy::Exponential { factor } => Self::exponential(factor),
+            Policy::Selective { factor } => Self::selective(factor),
+            Policy::RandomWalk { variance } => Self::random_walk(variance),
+            Policy::Variable { factor, minimum, noise_variance } => {
+                Self::variable(factor, minimum, noise_variance)
+            }
+            _ => Ok(Forgetting { policy }),
+        }
+    }
+}
+
 #[pymethods]
 impl Forgetting {
     /// Nothing is forgotten: all samples weigh the same.

@@ -4,13 +4,15 @@ use nalgebra::{Const, OMatrix};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{check_entries, check_finite};
-use crate::snapshot::{Version, square};
-use crate::{ArmaxMethod, Dimension, Error, Lags, Real, RecursiveArmax, RecursiveLeastSquares};
+use crate::snapshot::square;
+use crate::{
+    ArmaxMethod, Dimension, Error, Lags, Real, RecursiveArmax, RecursiveLeastSquares, SnapshotVersion,
+};
 
 #[derive(Serialize, Deserialize)]
 #[serde(bound = "")]
 pub(super) struct Snapshot<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> {
-    version: Version,
+    version: SnapshotVersion,
     lags: Lags<T, N, D>,
     estimator: RecursiveLeastSquares<T, N>,
     #[serde(with = "square")]
@@ -25,7 +27,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> From<RecursiveAr
 {
     fn from(armax: RecursiveArmax<T, N, D>) -> Self {
         let RecursiveArmax { lags, estimator, gradients, residual, nc, method, .. } = armax;
-        Snapshot { version: Version, lags, estimator, gradients, residual, nc, method }
+        Snapshot { version: SnapshotVersion, lags, estimator, gradients, residual, nc, method }
     }
 }
 

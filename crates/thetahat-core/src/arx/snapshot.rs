@@ -3,13 +3,12 @@
 use nalgebra::Const;
 use serde::{Deserialize, Serialize};
 
-use crate::snapshot::Version;
-use crate::{Dimension, Error, Lags, Real, RecursiveArx, RecursiveLeastSquares};
+use crate::{Dimension, Error, Lags, Real, RecursiveArx, RecursiveLeastSquares, SnapshotVersion};
 
 #[derive(Serialize, Deserialize)]
 #[serde(bound = "")]
 pub(super) struct Snapshot<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> {
-    version: Version,
+    version: SnapshotVersion,
     lags: Lags<T, N, D>,
     estimator: RecursiveLeastSquares<T, N>,
 }
@@ -19,7 +18,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> From<RecursiveAr
 {
     fn from(arx: RecursiveArx<T, N, D>) -> Self {
         let RecursiveArx { lags, estimator } = arx;
-        Snapshot { version: Version, lags, estimator }
+        Snapshot { version: SnapshotVersion, lags, estimator }
     }
 }
 

@@ -3,13 +3,13 @@
 use nalgebra::OMatrix;
 use serde::{Deserialize, Serialize};
 
-use crate::snapshot::{Version, square};
-use crate::{Covariance, Dimension, Error, Real};
+use crate::snapshot::square;
+use crate::{Covariance, Dimension, Error, Real, SnapshotVersion};
 
 #[derive(Serialize, Deserialize)]
 #[serde(bound = "")]
 pub(super) struct Snapshot<T: Real, N: Dimension> {
-    version: Version,
+    version: SnapshotVersion,
     /// What lies below the diagonal is 0.
     #[serde(with = "square")]
     factor: OMatrix<T, N, N>,
@@ -17,7 +17,7 @@ pub(super) struct Snapshot<T: Real, N: Dimension> {
 
 impl<T: Real, N: Dimension> From<Covariance<T, N>> for Snapshot<T, N> {
     fn from(covariance: Covariance<T, N>) -> Self {
-        Snapshot { version: Version, factor: covariance.factor() }
+        Snapshot { version: SnapshotVersion, factor: covariance.factor() }
     }
 }
 

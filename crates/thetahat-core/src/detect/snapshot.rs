@@ -3,13 +3,13 @@
 use serde::{Deserialize, Serialize};
 
 use super::Sum;
-use crate::snapshot::{Version, number};
-use crate::{ChangeDetector, Error, Real};
+use crate::snapshot::number;
+use crate::{ChangeDetector, Error, Real, SnapshotVersion};
 
 #[derive(Serialize, Deserialize)]
 #[serde(bound = "")]
 pub(super) struct Snapshot<T: Real> {
-    version: Version,
+    version: SnapshotVersion,
     #[serde(with = "number")]
     mean_threshold: T,
     #[serde(with = "number")]
@@ -22,7 +22,14 @@ pub(super) struct Snapshot<T: Real> {
 impl<T: Real> From<ChangeDetector<T>> for Snapshot<T> {
     fn from(detector: ChangeDetector<T>) -> Self {
         let ChangeDetector { mean_threshold, variance_threshold, mean_up, mean_down, variance } = detector;
-        Snapshot { version: Version, mean_threshold, variance_threshold, mean_up, mean_down, variance }
+        Snapshot {
+            version: SnapshotVersion,
+            mean_threshold,
+            variance_threshold,
+            mean_up,
+            mean_down,
+            variance,
+        }
     }
 }
 

@@ -2,13 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::snapshot::Version;
-use crate::{Dimension, Error, ExtendedKalmanFilter, KalmanFilter, Real};
+use crate::{Dimension, Error, ExtendedKalmanFilter, KalmanFilter, Real, SnapshotVersion};
 
 #[derive(Serialize, Deserialize)]
 #[serde(bound = "")]
 pub(super) struct Snapshot<T: Real, N: Dimension> {
-    version: Version,
+    version: SnapshotVersion,
     linear: KalmanFilter<T, N>,
     iterations: usize,
 }
@@ -16,7 +15,7 @@ pub(super) struct Snapshot<T: Real, N: Dimension> {
 impl<T: Real, N: Dimension> From<ExtendedKalmanFilter<T, N>> for Snapshot<T, N> {
     fn from(filter: ExtendedKalmanFilter<T, N>) -> Self {
         let ExtendedKalmanFilter { linear, iterations } = filter;
-        Snapshot { version: Version, linear, iterations }
+        Snapshot { version: SnapshotVersion, linear, iterations }
     }
 }
 

@@ -3,13 +3,13 @@
 use nalgebra::OVector;
 use serde::{Deserialize, Serialize};
 
-use crate::snapshot::{Version, number, vector};
-use crate::{Covariance, Dimension, Error, KalmanFilter, Real};
+use crate::snapshot::{number, vector};
+use crate::{Covariance, Dimension, Error, KalmanFilter, Real, SnapshotVersion};
 
 #[derive(Serialize, Deserialize)]
 #[serde(bound = "")]
 pub(super) struct Snapshot<T: Real, N: Dimension> {
-    version: Version,
+    version: SnapshotVersion,
     #[serde(with = "vector")]
     state: OVector<T, N>,
     covariance: Covariance<T, N>,
@@ -20,7 +20,7 @@ pub(super) struct Snapshot<T: Real, N: Dimension> {
 impl<T: Real, N: Dimension> From<KalmanFilter<T, N>> for Snapshot<T, N> {
     fn from(filter: KalmanFilter<T, N>) -> Self {
         let KalmanFilter { state, covariance, gate, .. } = filter;
-        Snapshot { version: Version, state, covariance, gate }
+        Snapshot { version: SnapshotVersion, state, covariance, gate }
     }
 }
 

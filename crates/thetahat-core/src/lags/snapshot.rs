@@ -5,13 +5,13 @@ use serde::{Deserialize, Serialize};
 
 use super::{Line, Source, is_infinite};
 use crate::error::check_length;
-use crate::snapshot::{Version, vector};
-use crate::{Dimension, Error, Lags, Real};
+use crate::snapshot::vector;
+use crate::{Dimension, Error, Lags, Real, SnapshotVersion};
 
 #[derive(Serialize, Deserialize)]
 #[serde(bound = "")]
 pub(super) struct Snapshot<T: Real, N: Dimension, D: Dimension> {
-    version: Version,
+    version: SnapshotVersion,
     #[serde(with = "vector")]
     regressor: OVector<T, N>,
     #[serde(with = "vector")]
@@ -26,7 +26,7 @@ pub(super) struct Snapshot<T: Real, N: Dimension, D: Dimension> {
 impl<T: Real, N: Dimension, D: Dimension> From<Lags<T, N, D>> for Snapshot<T, N, D> {
     fn from(lags: Lags<T, N, D>) -> Self {
         let Lags { regressor, delayed, lines, na, inputs, awaiting_inputs } = lags;
-        Snapshot { version: Version, regressor, delayed, lines, na, inputs, awaiting_inputs }
+        Snapshot { version: SnapshotVersion, regressor, delayed, lines, na, inputs, awaiting_inputs }
     }
 }
 

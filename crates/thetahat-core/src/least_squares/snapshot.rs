@@ -4,14 +4,14 @@ use nalgebra::{OMatrix, OVector};
 use serde::{Deserialize, Serialize};
 
 use super::transpose;
-use crate::snapshot::{Version, number, square, vector};
+use crate::snapshot::{number, square, vector};
 use crate::triangle::Sum;
-use crate::{Dimension, Error, LeastSquares, Real};
+use crate::{Dimension, Error, LeastSquares, Real, SnapshotVersion};
 
 #[derive(Serialize, Deserialize)]
 #[serde(bound = "")]
 pub(super) struct Snapshot<T: Real, N: Dimension> {
-    version: Version,
+    version: SnapshotVersion,
     #[serde(with = "square")]
     factor_rows: OMatrix<Sum<T>, N, N>,
     #[serde(with = "vector")]
@@ -26,7 +26,14 @@ impl<T: Real, N: Dimension> From<LeastSquares<T, N>> for Snapshot<T, N> {
     fn from(problem: LeastSquares<T, N>) -> Self {
         let LeastSquares { factor_rows, rotated_output, residual_norm, rows, uncompensated_rows, .. } =
             problem;
-        Snapshot { version: Version, factor_rows, rotated_output, residual_norm, rows, uncompensated_rows }
+        Snapshot {
+            version: SnapshotVersion,
+            factor_rows,
+            rotated_output,
+            residual_norm,
+            rows,
+            uncompensated_rows,
+        }
     }
 }
 

@@ -3,13 +3,13 @@
 use nalgebra::{OMatrix, OVector};
 use serde::{Deserialize, Serialize};
 
-use crate::snapshot::{Version, matrix, vector};
-use crate::{Dimension, Error, LuenbergerObserver, Real};
+use crate::snapshot::{matrix, vector};
+use crate::{Dimension, Error, LuenbergerObserver, Real, SnapshotVersion};
 
 #[derive(Serialize, Deserialize)]
 #[serde(bound = "")]
 pub(super) struct Snapshot<T: Real, N: Dimension + Dimension<M>, M: Dimension> {
-    version: Version,
+    version: SnapshotVersion,
     #[serde(with = "vector")]
     state: OVector<T, N>,
     #[serde(with = "matrix")]
@@ -21,7 +21,7 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> From<LuenbergerObserver
 {
     fn from(observer: LuenbergerObserver<T, N, M>) -> Self {
         let LuenbergerObserver { state, gain } = observer;
-        Snapshot { version: Version, state, gain }
+        Snapshot { version: SnapshotVersion, state, gain }
     }
 }
 

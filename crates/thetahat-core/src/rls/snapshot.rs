@@ -8,13 +8,13 @@ use super::residuals::Residuals;
 use super::{check_parameters, is_prior};
 use crate::error::{check_finite, check_length};
 use crate::forgetting::{Forgetting, Phase};
-use crate::snapshot::{Version, matrix, vector};
-use crate::{Covariance, Dimension, Error, Real, RecursiveLeastSquares};
+use crate::snapshot::{matrix, vector};
+use crate::{Covariance, Dimension, Error, Real, RecursiveLeastSquares, SnapshotVersion};
 
 #[derive(Serialize, Deserialize)]
 #[serde(bound = "")]
 pub(super) struct Snapshot<T: Real, N: Dimension + Dimension<M>, M: Dimension> {
-    version: Version,
+    version: SnapshotVersion,
     #[serde(with = "matrix")]
     parameters: OMatrix<T, N, M>,
     covariance: Covariance<T, N>,
@@ -48,7 +48,7 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> From<RecursiveLeastSqua
             adapting,
             ..
         } = estimator;
-        let version = Version;
+        let version = SnapshotVersion;
         Snapshot {
             version,
             parameters,
@@ -98,9 +98,10 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> TryFrom<Snapshot<T, N, 
         in_range("mean_squares", squares, "0 or more")?;
         let Residuals { weights, squared_weights, .. } = residuals;
         // Every weight is at most 1; twice that, for the rounding.
-        let weighed =
-            weights.is_finite() && squared_weights >= T::zero() && squared_weights <= weights + weights;
-        in_range("weights", weighed, "finite, 0 or more, and no less than their squares")?;
+        let weighed = (weights * weights * T::from_count(n)).is_finite()
+            && squared_weights >= T::zero()
+            && squared_weights <= weights + weights;
+        in_range("weights", weighed, "what samples make, and no less than their squares")?;
         in_range("turn", usize::from(read.turn) < n.max(1), "below the number of parameters")?;
         let shared = read.phase.is_running() || 0 < read.shares_left && read.shares_left <= read.shares;
         in_range("shares_left", shared, "such that a share of the prior is left")?;

@@ -2,19 +2,18 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::snapshot::Version;
-use crate::{Covariance, Dimension, GainSchedule, Real};
+use crate::{Covariance, Dimension, GainSchedule, Real, SnapshotVersion};
 
 #[derive(Serialize, Deserialize)]
 #[serde(bound = "")]
 pub(super) struct Snapshot<T: Real, N: Dimension> {
-    version: Version,
+    version: SnapshotVersion,
     covariance: Covariance<T, N>,
 }
 
 impl<T: Real, N: Dimension> From<GainSchedule<T, N>> for Snapshot<T, N> {
     fn from(schedule: GainSchedule<T, N>) -> Self {
-        Snapshot { version: Version, covariance: schedule.covariance().clone() }
+        Snapshot { version: SnapshotVersion, covariance: schedule.covariance().clone() }
     }
 }
 

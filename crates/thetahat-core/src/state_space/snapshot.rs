@@ -4,13 +4,13 @@ use nalgebra::OMatrix;
 use serde::{Deserialize, Serialize};
 
 use super::check_shape;
-use crate::snapshot::{Version, matrix, square};
-use crate::{Covariance, Dimension, Error, LinearObservation, LinearTransition, Real};
+use crate::snapshot::{matrix, square};
+use crate::{Covariance, Dimension, Error, LinearObservation, LinearTransition, Real, SnapshotVersion};
 
 #[derive(Serialize, Deserialize)]
 #[serde(bound = "")]
 pub(super) struct Transition<T: Real, N: Dimension + Dimension<U>, U: Dimension> {
-    version: Version,
+    version: SnapshotVersion,
     #[serde(with = "square")]
     state_matrix: OMatrix<T, N, N>,
     #[serde(with = "matrix")]
@@ -23,7 +23,7 @@ impl<T: Real, N: Dimension + Dimension<U>, U: Dimension> From<LinearTransition<T
 {
     fn from(model: LinearTransition<T, N, U>) -> Self {
         let LinearTransition { state_matrix, input_matrix, noise, .. } = model;
-        Transition { version: Version, state_matrix, input_matrix, noise }
+        Transition { version: SnapshotVersion, state_matrix, input_matrix, noise }
     }
 }
 
@@ -45,7 +45,7 @@ pub(super) struct Observation<
     M: Dimension + Dimension<U> + Dimension<N>,
     U: Dimension,
 > {
-    version: Version,
+    version: SnapshotVersion,
     #[serde(with = "matrix")]
     output_rows: OMatrix<T, N, M>,
     #[serde(with = "matrix")]
@@ -58,7 +58,7 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension + Dimension<U> + Dimensi
 {
     fn from(model: LinearObservation<T, N, M, U>) -> Self {
         let LinearObservation { output_rows, input_matrix, noise } = model;
-        Observation { version: Version, output_rows, input_matrix, noise }
+        Observation { version: SnapshotVersion, output_rows, input_matrix, noise }
     }
 }
 

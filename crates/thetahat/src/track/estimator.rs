@@ -85,16 +85,25 @@ impl Estimator {
         }
     }
 
-    /// Whether it is one for these orders and this plan, with so many parameters.
-    pub(super) fn fits(&self, orders: &Orders, plan: &TrackPlan, parameters: usize) -> bool {
-        let (outputs, noise) = match self {
-            Self::Arx(arx) => (arx.a().count(), 1),
-            Self::Armax(armax) => (armax.a().count(), armax.c().count()),
+    /// Whether it has the orders and the policy of this one.
+    pub(super) fn fits(&self, fresh: &Self) -> bool {
+        let forgetting = |estimator: &Self| estimator.least_squares().forgetting();
+        self.counts().eq(fresh.counts()) && forgetting(self) == forgetting(fresh)
+    }
+
+    /// How many coefficients there are of A, of C and of each B, with their leading ones and zeros; whether there is a
+    /// constant, and how many parameters.
+    fn counts(&self) -> impl Iterator<Item = usize> {
+        let (outputs, noise, constant) = match self {
+            Self::Arx(arx) => (arx.a().count(), 0, arx.constant()),
+            Self::Armax(armax) => (armax.a().count(), armax.c().count(), armax.constant()),
         };
-        outputs == orders.na + 1
-            && noise == orders.nc + 1
-            && self.least_squares().parameters().len() == parameters
-            && self.least_squares().forgetting() == plan.forgetting.0
-            && matches!(self, Self::Arx(_)) == plan.method.with_noise_model().is_none()
+        let inputs = (0..).map_while(|input| match self {
+            Self::Arx(arx) => arx.b(input).map(Iterator::count),
+            Self::Armax(armax) => armax.b(input).map(Iterator::count),
+        });
+        [outputs, noise, usize::from(constant.is_some()), self.least_squares().parameters().len()]
+            .into_iter()
+            .chain(inputs)
     }
 }

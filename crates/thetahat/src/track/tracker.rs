@@ -3,11 +3,12 @@ use thetahat_core::{Action, Alarm, ChangeDetector, Chart, Innovation, Real};
 
 use super::collecting::{Collecting, LARGEST, SMALLEST};
 use super::estimator::{Estimator, Lines};
-use super::missing;
 use super::plan::{PerChannel, TrackPlan};
 use super::run_length::change_detector;
 use super::score::TrackScore;
 use crate::{Error, Orders};
+
+mod snapshot;
 
 /// The farthest horizon: beyond it a number was mistyped.
 const FARTHEST: usize = 10_000;
@@ -63,7 +64,8 @@ pub struct Tracked {
 /// For n parameters 2 n² + 10 n multiply-adds, 2 n divisions and one logarithm a sample. Once the scales are known a sample
 /// takes no memory, and nothing grows with their number.
 ///
-/// A tracker is plain data. With serde it is written and read back, and goes on to the bit.
+/// A tracker is plain data. With serde it is written and read back, and goes on to the bit; what does not fit together is an
+/// error.
 ///
 /// ```
 /// use thetahat::{Orders, TrackPlan, Tracker};
@@ -83,6 +85,7 @@ pub struct Tracked {
 /// # Ok::<(), thetahat::Error>(())
 /// ```
 #[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(into = "snapshot::Snapshot", try_from = "snapshot::Snapshot")]
 pub struct Tracker {
     pub(super) orders: Orders,
     pub(super) plan: TrackPlan,
@@ -99,9 +102,7 @@ pub struct Tracker {
     detector: Option<ChangeDetector<f64>>,
     score: TrackScore,
     /// The latest inputs as the estimator sees them: less their offsets.
-    #[serde(with = "missing::vector")]
     inputs: Vec<f64>,
-    #[serde(skip)]
     room: Room,
 }
 
@@ -362,16 +363,15 @@ impl Tracker {
         &self.offsets
     }
 
-    /// Whether its parts fit together, as those of any tracker do that was not edited after it was written: for one that
-    /// was read back.
-    pub fn is_sound(&self) -> bool {
+    /// Whether its parts fit together, as those of any tracker do that was not edited after it was written.
+    fn is_sound(&self) -> bool {
         let inputs = self.orders.inputs();
         let Ok(fresh) = Self::new(&self.orders, &TrackPlan { scales: None, ..self.plan.clone() }) else {
             return false;
         };
         let stage = match (&self.stage, &fresh.stage, &self.scales) {
-            (Stage::Running(estimator), _, Some(_)) => {
-                estimator.fits(&self.orders, &self.plan, self.names.len())
+            (Stage::Running(estimator), _, Some(scales)) => {
+                Estimator::new(&self.orders, &self.plan, scales).is_ok_and(|fresh| estimator.fits(&fresh))
             }
             (Stage::Collecting(collecting), Stage::Collecting(other), None) => {
                 self.plan.scales.is_none() && collecting.fits(other, inputs)

@@ -190,9 +190,11 @@ fn what_does_not_fit_is_not_a_result() {
         assert_eq!(estimator.predict(&Vector2::new(1.0, element)), not_finite);
         assert!(estimator.predict_all(&Vector2::new(element, 1.0)).is_err());
     }
-    let estimator = estimator.with_parameters(Vector2::repeat(1e30)).unwrap();
-    assert_eq!(estimator.predict(&(phi * 1e20)), Err(Error::Overflow));
-    assert_eq!(estimator.predict_all(&(phi * 1e20)), Err(Error::Overflow));
+    let estimator = estimator.with_parameters(Vector2::repeat(1e15)).unwrap();
+    let too_large = estimator.clone().with_parameters(Vector2::repeat(1e30)).map(|_| ());
+    assert_eq!(too_large, Err(Error::TooLarge { argument: "parameters" }));
+    assert_eq!(estimator.predict(&(phi * 1e25)), Err(Error::Overflow));
+    assert_eq!(estimator.predict_all(&(phi * 1e25)), Err(Error::Overflow));
 }
 
 #[test]

@@ -1,3 +1,5 @@
+use serde_json::{Value, json};
+
 use super::*;
 
 /// What a tracker says of a sample, and everything that it is, to the bit: NaN has one name in both.
@@ -60,6 +62,66 @@ fn what_is_written_goes_on_to_the_bit() {
             tracker.log_row(y[t], &inputs[t]).unwrap();
         }
     }
+}
+
+/// Every number of a state, one after the other, replaced: what is read all the same goes on.
+#[test]
+fn a_tampered_number_is_refused_or_overcome() {
+    fn numbers(value: &Value, path: &str, found: &mut Vec<String>) {
+        match value {
+            Value::Number(_) => found.push(path.to_owned()),
+            Value::Array(parts) => {
+                parts.iter().enumerate().for_each(|(k, part)| numbers(part, &format!("{path}/{k}"), found));
+            }
+            Value::Object(parts) => {
+                parts.iter().for_each(|(key, part)| numbers(part, &format!("{path}/{key}"), found));
+            }
+            _ => {}
+        }
+    }
+    let (inputs, y) = log(120, 0.3, 0.6, 12);
+    let orders = Orders::armax(2, &[2, 1], 1, &[1, 2]).unwrap();
+    let method = TrackMethod::Rpem;
+    let plan = TrackPlan { constant: true, method, ..TrackPlan::default() };
+    let (mut refused, mut read) = (0, 0);
+    // While rows are collected, and later.
+    for rows in [5, 80] {
+        let mut tracker = Tracker::new(&orders, &plan).unwrap();
+        for t in 0..rows {
+            tracker.log_row(y[t], &inputs[t]).unwrap();
+        }
+        let whole = serde_json::to_value(&tracker).unwrap();
+        let mut paths = vec![];
+        numbers(&whole, "", &mut paths);
+        for path in &paths {
+            for bad in
+                [json!(-1), json!(7), json!(1.99), json!(6e200), json!(u64::MAX), json!("NaN"), json!("inf")]
+            {
+                let mut tampered = whole.clone();
+                *tampered.pointer_mut(path).unwrap() = bad.clone();
+                let Ok(mut tracker) = serde_json::from_str::<Tracker>(&tampered.to_string()) else {
+                    refused += 1;
+                    continue;
+                };
+                read += 1;
+                for t in rows..120 {
+                    if let Err(error) = tracker.log_row(y[t], &inputs[t]) {
+                        panic!("{path} = {bad}: {error}");
+                    }
+                    tracker.forecast(3).unwrap();
+                }
+                assert!(tracker.noise_variance().is_none_or(|variance| variance >= 0.0), "{path} = {bad}");
+                assert!(
+                    tracker.score().mean_squared_error().is_none_or(|square| square >= 0.0),
+                    "{path} = {bad}"
+                );
+            }
+        }
+    }
+    assert!(refused > 500 && read > 100, "{refused} {read}");
+    let text = serde_json::to_string(&Tracker::new(&orders, &plan).unwrap()).unwrap();
+    let later = serde_json::from_str::<Tracker>(&text.replace("\"version\":1", "\"version\":2")).unwrap_err();
+    assert!(later.to_string().starts_with("this snapshot is of version 2, and version 1 is understood"));
 }
 
 #[test]

@@ -1,0 +1,75 @@
+//! What is written of a tracker, and how it is checked when it is read back.
+
+use serde::{Deserialize, Serialize};
+use thetahat_core::{ChangeDetector, SnapshotVersion};
+
+use super::{Room, Stage, Tracker};
+use crate::track::missing;
+use crate::track::plan::{PerChannel, TrackPlan};
+use crate::track::score::TrackScore;
+use crate::{Error, Orders};
+
+#[derive(Serialize, Deserialize)]
+pub(super) struct Snapshot {
+    version: SnapshotVersion,
+    orders: Orders,
+    plan: TrackPlan,
+    names: Vec<String>,
+    offsets: PerChannel,
+    unset: Vec<bool>,
+    scales: Option<PerChannel>,
+    stage: Stage,
+    has_estimate: bool,
+    settling: usize,
+    detector: Option<ChangeDetector<f64>>,
+    score: TrackScore,
+    #[serde(with = "missing::vector")]
+    inputs: Vec<f64>,
+}
+
+impl From<Tracker> for Snapshot {
+    fn from(tracker: Tracker) -> Self {
+        let Tracker { orders, plan, names, offsets, unset, scales, stage, .. } = tracker;
+        let Tracker { has_estimate, settling, detector, score, inputs, .. } = tracker;
+        Self {
+            version: SnapshotVersion,
+            orders,
+            plan,
+            names,
+            offsets,
+            unset,
+            scales,
+            stage,
+            has_estimate,
+            settling,
+            detector,
+            score,
+            inputs,
+        }
+    }
+}
+
+impl TryFrom<Snapshot> for Tracker {
+    type Error = Error;
+
+    fn try_from(read: Snapshot) -> Result<Self, Error> {
+        let Snapshot { orders, plan, names, offsets, unset, scales, stage, .. } = read;
+        let Snapshot { has_estimate, settling, detector, score, inputs, .. } = read;
+        let tracker = Self {
+            orders,
+            plan,
+            names,
+            offsets,
+            unset,
+            scales,
+            stage,
+            has_estimate,
+            settling,
+            detector,
+            score,
+            inputs,
+            room: Room::default(),
+        };
+        if tracker.is_sound() { Ok(tracker) } else { Err(Error::data("its parts do not fit together")) }
+    }
+}

@@ -50,10 +50,9 @@ impl Terminal {
     /// Waits until the terminal has shown this.
     pub(crate) fn wait_for(&mut self, word: &str) {
         while !self.text().contains(word) {
-            let piece = self.pieces.recv_timeout(HANGS).unwrap_or_else(|error| {
-                panic!("{word} is not shown ({error}): {:?}", self.text());
-            });
-            self.shown.extend(piece);
+            let piece = self.pieces.recv_timeout(HANGS);
+            assert!(piece.is_ok(), "{word} is not shown ({piece:?}): {:?}", self.text());
+            self.shown.extend(piece.into_iter().flatten());
         }
     }
 

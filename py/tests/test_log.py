@@ -81,7 +81,7 @@ def test_several_inputs_have_names() -> None:
         ({"y": Y, "resample": (1.0, "linear")}, "resample: it is for logs with a clock"),
         ({"y": Y, "time": Y[:4]}, "there are 4 time stamps for 5 rows"),
         ({"y": Y, "time": Y[::-1]}, "time goes back"),
-        ({"y": Y, "time": [0, 1, 2, 2.7, 4]}, "the samples are not uniform"),
+        ({"y": Y, "time": [0, 1, 2, 2.7, 4]}, "the log is not uniform; resample it every 1 s"),
         ({"y": Y, "time": Y, "resample": (1.0, "cubic")}, "resample: 'cubic' is neither"),
         ({"y": Y, "time": Y, "resample": (-1.0, "hold")}, "resample: -1 is not a positive"),
         ({"y": [1.0], "time": [0.0]}, "one row has no time step"),

@@ -364,7 +364,7 @@ impl Tracker {
     }
 
     /// Whether its parts fit together, as those of any tracker do that was not edited after it was written.
-    fn is_sound(&self) -> bool {
+    pub(super) fn is_sound(&self) -> bool {
         let inputs = self.orders.inputs();
         let Ok(fresh) = Self::new(&self.orders, &TrackPlan { scales: None, ..self.plan.clone() }) else {
             return false;

@@ -301,7 +301,7 @@ def test_options_are_keyword_parameters(function: Any, options: Any) -> None:
     known = set(options.__annotations__)
     assert shown >= known or (options is th.FitOptions and shown & known and function not in (th.pem, th.search))
     # Their types are told once, and each is described where the options are.
-    own, told = get_type_hints(function, localns={"Model": th.Model}), get_type_hints(options)
+    own, told = get_type_hints(function, localns={"Model": th.Model, "np": np}), get_type_hints(options)
     for name in shown & known:
         assert own[name] in (told[name], Optional[told[name]]), name
         assert parameters[name].default is None or options is th.ReadOptions

@@ -12,6 +12,7 @@ mod forgetting;
 mod innovation;
 mod kalman;
 mod least_squares;
+mod limits;
 mod luenberger;
 mod model;
 mod recursive;

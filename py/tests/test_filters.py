@@ -451,6 +451,22 @@ def test_arrays_of_every_kind_are_read_alike() -> None:
     assert len(results) == 1
 
 
+@pytest.mark.parametrize("kind", [KalmanFilter, ExtendedKalmanFilter])
+def test_a_gate_that_locks_out_lets_go(kind: Any) -> None:
+    walk, level = LinearTransition([[1.0]], [[0.01]]), LinearObservation([[1.0]], [[1.0]])
+    locked, released = kind([0.0], [[1.0]], gate=9.0), kind([0.0], [[1.0]], gate=9.0, release=3)
+    y = np.full(50, 100.0)
+    assert set(locked.run(walk, level, y).actions) == {"gated"} and locked.gated_in_a_row == 50
+    actions = released.run(walk, level, y).actions
+    assert actions[:4].tolist() == ["gated"] * 3 + ["released"]
+    assert actions[-1] == "updated" and released.gated_in_a_row == 0
+    assert (locked.release, released.release) == (0, 3)
+    assert pickle.loads(pickle.dumps(locked)).gated_in_a_row == 50
+    for wrong in (-1, 70000):
+        with pytest.raises(ValueError, match="release: expected an int from 0 to 65535"):
+            kind([0.0], [[1.0]], release=wrong)
+
+
 def test_two_threads_run_two_filters_at_once() -> None:
     transition, observation, measurements, inputs = vehicle(3000)
     filters = [KalmanFilter(np.zeros(3), np.eye(3)) for _ in range(3)]

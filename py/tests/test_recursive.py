@@ -416,6 +416,32 @@ def test_a_controller_learns_its_plant_under_noise() -> None:
     assert np.all(np.abs(heater.parameters - [-0.9, 0.08]) < 3.0 * errors)
 
 
+@pytest.mark.parametrize("kind", [RecursiveArx, RecursiveArmax])
+def test_parameters_stay_within_their_limits(kind: Any) -> None:
+    u, y = plant()
+    orders = (1, 1) if kind is RecursiveArx else (1, 1, 1)
+    limits = [(-0.7, 0.0), None]
+    estimator = kind(*orders, nk=2, limits=limits)
+    assert estimator.limits == [(-0.7, 0.0), (-np.inf, np.inf)]
+    loop = pickle.loads(state(estimator))
+    run = estimator.run(y, u=u)
+    assert "projected" in run.actions
+    assert np.all((run.parameters[:, 0] >= -0.7) & (run.parameters[:, 0] <= 0.0))
+    for v, z in zip(u.tolist(), y.tolist()):
+        loop.measured(z)
+        loop.applied(v)
+    assert state(loop) == state(estimator)
+    assert kind(*orders).limits is None
+    # It starts within.
+    assert kind(*orders, limits=[(-0.7, 0.0), (0.1, np.inf)]).parameters[1] == 0.1
+    for wrong in ([(0.0, 1.0)], [(0.0, 1.0), 3.0], 5.0, [None, None, None, None]):
+        with pytest.raises(ValueError, match="limits: expected a pair .* 2 parameters"):
+            kind(*orders, limits=wrong)
+    for wrong in ([(1.0, 0.0), None], [(np.nan, 0.0), None]):
+        with pytest.raises(ValueError, match="limits is out of range"):
+            kind(*orders, limits=wrong)
+
+
 def test_a_constant_is_estimated_too() -> None:
     u, y = plant()
     raised = y + 20.0

@@ -1,9 +1,11 @@
 //! A recursive ARMAX estimator: extended least squares, and the prediction error method.
 
+use core::ops::RangeInclusive;
+
 use nalgebra::{Const, OMatrix, OVector};
 
 use crate::arx::{check_samples, is_large, predict_ahead};
-use crate::rls::is_small;
+use crate::rls::{check_limits, is_small};
 use crate::triangle::{column, column_mut};
 use crate::ud::{add_multiple, copy, dot};
 use crate::{
@@ -344,6 +346,31 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
         room.copy_from(&self.lags)?;
         let parameters = self.estimator.parameters().as_slice();
         predict_ahead(room, parameters, self.residual, future_inputs, outputs)
+    }
+
+    /// Takes the parameters of A, B and the constant back to their limits, one range for each, and returns whether one was
+    /// out. See [`RecursiveLeastSquares::keep_within`], whose errors it has. C has no limits but its stability: where
+    /// the nearest point has no stable C, each parameter is cut off by itself.
+    pub fn keep_within(&mut self, limits: &[RangeInclusive<T>]) -> Result<bool, Error> {
+        let RecursiveArmax { estimator, gradients, nc, scratch, .. } = self;
+        let size = gradients.shape_generic().0;
+        check_limits(limits, size.value().saturating_sub(*nc))?;
+        Ok(size.with_scratch(scratch, |[before, work], []| {
+            copy(estimator.parameters().as_slice(), before);
+            let out = estimator.project(limits);
+            let c = work.get_mut(..*nc).unwrap_or_default();
+            copy(last(estimator.parameters().as_slice(), *nc), c);
+            if out && !is_stable(c) {
+                estimator.set_parameters(before);
+                estimator.cut_off(limits);
+            }
+            out
+        }))
+    }
+
+    /// Whether this type has the sizes for these orders. As [`RecursiveArx::fits`](crate::RecursiveArx::fits).
+    pub const fn fits(orders: &ArmaxOrders<'_>) -> bool {
+        Lags::<T, N, D>::fits_with(&orders.plant(), orders.nc)
     }
 
     /// The delay lines: the samples and residuals that the next samples are predicted from.

@@ -1,5 +1,7 @@
 //! A recursive ARX estimator: delay lines that feed recursive least squares.
 
+use core::ops::RangeInclusive;
+
 use nalgebra::{Const, OVector};
 
 use crate::error::check_length;
@@ -263,6 +265,64 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
         room.copy_from(&self.lags)?;
         let parameters = self.estimator.parameters().as_slice();
         predict_ahead(room, parameters, T::zero(), future_inputs, outputs)
+    }
+
+    /// Takes the parameters back to their limits, one range for each, and returns whether one was out. See
+    /// [`RecursiveLeastSquares::keep_within`], whose errors it has.
+    ///
+    /// ```
+    /// use core::ops::RangeInclusive;
+    /// use thetahat_core::nalgebra::Const;
+    /// use thetahat_core::{ArxOrders, Error, Forgetting, InputOrders, RecursiveArx};
+    ///
+    /// // A heater: its gain b1 is positive, whatever the first samples look like.
+    /// const LIMITS: [RangeInclusive<f32>; 2] = [-0.999..=0.0, 0.001..=f32::INFINITY];
+    /// let orders = ArxOrders { na: 1, inputs: &[InputOrders { nb: 1, nk: 1 }], constant: false };
+    /// let mut heater: RecursiveArx<f32, Const<2>> =
+    ///     RecursiveArx::new(&orders, 20.0, &[50.0], Forgetting::default())?;
+    /// heater.measured(3.0)?;
+    /// heater.applied(&[50.0])?;
+    /// heater.measured(-1.0)?; // a draught
+    /// assert!(heater.keep_within(&LIMITS)?);
+    /// let [a1, b1] = (*heater.estimator().parameters()).into();
+    /// assert!(LIMITS[0].contains(&a1) && LIMITS[1].contains(&b1));
+    /// # Ok::<(), Error>(())
+    /// ```
+    pub fn keep_within(&mut self, limits: &[RangeInclusive<T>]) -> Result<bool, Error> {
+        self.estimator.keep_within(limits)
+    }
+
+    /// Whether this type has the sizes for these orders: that [`new`](RecursiveArx::new) answers neither
+    /// [`Error::Orders`] nor [`Error::Delays`]. Where the orders are constants, the compiler can be asked:
+    ///
+    /// ```
+    /// use thetahat_core::nalgebra::Const;
+    /// use thetahat_core::{ArxOrders, InputOrders, RecursiveArx};
+    ///
+    /// const ORDERS: ArxOrders = ArxOrders { na: 2, inputs: &[InputOrders { nb: 2, nk: 3 }], constant: false };
+    /// type Plant = RecursiveArx<f32, Const<4>, Const<3>>;
+    /// const _: () = assert!(Plant::fits(&ORDERS));
+    /// ```
+    ///
+    /// A wrong size does not compile then:
+    ///
+    /// ```compile_fail,E0080
+    /// # use thetahat_core::nalgebra::Const;
+    /// # use thetahat_core::{ArxOrders, InputOrders, RecursiveArx};
+    /// # const ORDERS: ArxOrders = ArxOrders { na: 2, inputs: &[InputOrders { nb: 2, nk: 3 }], constant: false };
+    /// type Plant = RecursiveArx<f32, Const<5>, Const<3>>;
+    /// const _: () = assert!(Plant::fits(&ORDERS));
+    /// ```
+    ///
+    /// ```compile_fail,E0080
+    /// # use thetahat_core::nalgebra::Const;
+    /// # use thetahat_core::{ArxOrders, InputOrders, RecursiveArx};
+    /// # const ORDERS: ArxOrders = ArxOrders { na: 2, inputs: &[InputOrders { nb: 2, nk: 3 }], constant: false };
+    /// type Plant = RecursiveArx<f32, Const<4>>; // room for one input on its way, of three
+    /// const _: () = assert!(Plant::fits(&ORDERS));
+    /// ```
+    pub const fn fits(orders: &ArxOrders<'_>) -> bool {
+        Lags::<T, N, D>::fits(orders)
     }
 
     /// The delay lines: the samples that the next ones are predicted from.

@@ -1,6 +1,8 @@
 //! Change detection: charts that watch the innovations of an estimator.
 
-use crate::{Innovation, Real};
+use nalgebra::OVector;
+
+use crate::{Dimension, Innovation, Real};
 
 /// What a chart watches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,11 +48,24 @@ pub struct Alarm<T> {
 /// An estimator that forgets follows a change after some time, and its innovations become white again: then the
 /// charts fall back by themselves.
 ///
+/// # Several outputs
+///
+/// The innovation of a filter with m outputs has no one direction: [`update_all`](ChangeDetector::update_all) watches its
+/// normalised square alone, chi-square with as many degrees of freedom as elements were measured, mean m and variance 2 m.
+///
+/// ```text
+/// variance      g <- max(0, g + (nis/2 - m ln 2)/2)    a covariance of 2 S against S
+/// ```
+///
+/// It finds a shift of the mean too, as that makes the square larger. With m = 1 all charts are as above, to the bit.
+///
 /// # Thresholds
 ///
 /// They set the mean time between false alarms. For Gaussian innovations both mean charts together give one in
-/// 168 samples with the threshold 4, in 465 with 5, and roughly e times as many for each unit more. The crate `thetahat`
-/// computes them from the interval that is asked for. Infinity turns a chart off.
+/// 168 samples with the threshold 4, in 465 with 5, and roughly e times as many for each unit more. As each step is a
+/// log-likelihood ratio, a chart with the threshold h gives at most one false alarm in exp(h) samples on average, whatever m
+/// is, and whatever is missing. The crate `thetahat` computes the thresholds from the interval that is asked for and m. Infinity
+/// turns a chart off.
 ///
 /// # Cost
 ///
@@ -147,7 +162,57 @@ impl<T: Real> ChangeDetector<T> {
         self.mean_up.add(z - half);
         self.mean_down.add(-z - half);
         self.variance.add((square(z) * half - T::ln_2()) * half);
+        self.alarm()
+    }
 
+    /// Takes the innovation of a filter: of one output as [`update`](ChangeDetector::update) does, of several by its
+    /// normalised square. A measurement that is missing changes nothing; one that is missing in part counts by the
+    /// elements that are there. One that a gate kept out is taken all the same: so a filter that a gate has locked out
+    /// is found.
+    ///
+    /// ```
+    /// use thetahat_core::nalgebra::{Const, Matrix1, Vector1};
+    /// use thetahat_core::{ChangeDetector, Chart, Covariance, Error, KalmanFilter};
+    /// use thetahat_core::{LinearObservation, LinearTransition};
+    ///
+    /// // A constant level, until it jumps.
+    /// let variance = |value: f64| Covariance::<f64, Const<1>>::from_diagonal(&Vector1::new(value));
+    /// let walk = LinearTransition::new(Matrix1::new(1.0), variance(1e-4)?)?;
+    /// let gauge = LinearObservation::new(Matrix1::new(1.0), variance(1.0)?)?;
+    /// let mut filter = KalmanFilter::new(Vector1::new(0.0), variance(1.0)?)?;
+    /// let mut detector = ChangeDetector::new(8.0, 12.0)?;
+    /// let mut alarm = None;
+    /// for k in 0..340_u32 {
+    ///     let noise = (f64::from(k) * 0.754_877_666_246_692_7).fract() * 2.0 - 1.0;
+    ///     let y = if k < 300 { noise } else { noise + 3.0 };
+    ///     let innovation = filter.correct(&gauge, &Default::default(), &Vector1::new(y))?;
+    ///     alarm = alarm.or(detector.update_all(&innovation).map(|alarm| (k, alarm)));
+    ///     filter.predict(&walk, &Default::default())?;
+    /// }
+    /// let (k, alarm) = alarm.expect("the jump was found");
+    /// assert!((300..310).contains(&k) && alarm.chart == Chart::MeanUp);
+    /// assert!((i64::from(k + 1 - alarm.samples) - 300).abs() <= 3);
+    /// # Ok::<(), Error>(())
+    /// ```
+    pub fn update_all<M: Dimension>(
+        &mut self,
+        innovation: &Innovation<T, OVector<T, M>>,
+    ) -> Option<Alarm<T>> {
+        let Innovation { ref error, ref variance, nis, action } = *innovation;
+        if let ([error], [variance]) = (error.as_slice(), variance.as_slice()) {
+            return self.update(&Innovation { error: *error, variance: *variance, nis, action });
+        }
+        let measured = variance.as_slice().iter().filter(|variance| variance.is_finite()).count();
+        if measured == 0 || !nis.is_finite() {
+            return None;
+        }
+        let half = T::one() / T::from_count(2);
+        self.variance.add((nis.min(T::LARGEST_ENTRY) * half - T::from_count(measured) * T::ln_2()) * half);
+        self.alarm()
+    }
+
+    /// The alarm of this sample, if a chart has passed its threshold.
+    fn alarm(&mut self) -> Option<Alarm<T>> {
         let charts = [
             (Chart::MeanUp, &mut self.mean_up, self.mean_threshold),
             (Chart::MeanDown, &mut self.mean_down, self.mean_threshold),

@@ -20,6 +20,8 @@ use crate::{Real, ud};
 pub trait Workspace: Dim {
     /// What `with_scratch` keeps between calls: nothing for a static size, a buffer for a run-time size.
     type Scratch<T: Real>: Clone + Debug + Default;
+    /// The size, if it is in the type.
+    const SIZE: Option<usize>;
 
     /// The dimension of exactly `size`, or the only size this type has.
     fn exactly(size: usize) -> Result<Self, usize>;
@@ -90,8 +92,18 @@ impl<'a, T> Parts<'a, T> for [&'a mut [T]; 3] {
     }
 }
 
+impl<'a, T> Parts<'a, T> for [&'a mut [T]; 4] {
+    #[inline(always)]
+    fn take(buffer: &'a mut [T], length: usize) -> (Self, &'a mut [T]) {
+        let (first, rest) = buffer.split_at_mut_checked(length).unwrap_or_default();
+        let ([second, third, fourth], rest) = Parts::take(rest, length);
+        ([first, second, third, fourth], rest)
+    }
+}
+
 impl<const N: usize> Workspace for Const<N> {
     type Scratch<T: Real> = ();
+    const SIZE: Option<usize> = Some(N);
 
     fn exactly(size: usize) -> Result<Self, usize> {
         (size == N).then_some(Const).ok_or(N)
@@ -132,6 +144,7 @@ impl<const N: usize> Workspace for Const<N> {
 #[cfg(feature = "alloc")]
 impl Workspace for Dyn {
     type Scratch<T: Real> = Vec<T>;
+    const SIZE: Option<usize> = None;
 
     fn exactly(size: usize) -> Result<Self, usize> {
         Ok(Dyn(size))

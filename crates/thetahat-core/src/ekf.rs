@@ -146,6 +146,21 @@ impl<T: Real, N: Dimension> ExtendedKalmanFilter<T, N> {
         self.linear.covariance()
     }
 
+    /// The same with a gate that lets go: see [`KalmanFilter::with_release`].
+    pub fn with_release(self, count: u16) -> Self {
+        ExtendedKalmanFilter { linear: self.linear.with_release(count), ..self }
+    }
+
+    /// After how many measurements in a row the gate lets go; 0 if never.
+    pub fn release(&self) -> u16 {
+        self.linear.release()
+    }
+
+    /// How many of the latest measurements were above the gate: see [`KalmanFilter::gated_in_a_row`].
+    pub fn gated_in_a_row(&self) -> u16 {
+        self.linear.gated_in_a_row()
+    }
+
     /// The gate on the normalised innovation squared: infinite if there is none.
     pub fn gate(&self) -> T {
         self.linear.gate()
@@ -236,10 +251,11 @@ impl<T: Real, N: Dimension> ExtendedKalmanFilter<T, N> {
         let mut corrected = self.linear.clone();
         let innovation =
             corrected.absorb(first.rows, first.error, &first.noise, |h, v, s, e| record(0, h, v, s, e))?;
-        if innovation.action != Action::Updated {
+        if !matches!(innovation.action, Action::Updated | Action::Released) {
+            self.linear = corrected;
             return Ok(innovation);
         }
-        let ungated = self.linear.clone().with_gate(T::INFINITY)?;
+        let (ungated, judged) = (self.linear.clone().with_gate(T::INFINITY)?, corrected.clone());
         for iteration in 1..self.iterations {
             let Linearised { rows, error, noise } =
                 Linearised::at(corrected.state(), observation, input, measurement)?
@@ -247,7 +263,7 @@ impl<T: Real, N: Dimension> ExtendedKalmanFilter<T, N> {
             corrected.clone_from(&ungated);
             corrected.absorb(rows, error, &noise, |h, v, s, e| record(iteration, h, v, s, e))?;
         }
-        self.linear = corrected.with_gate(self.linear.gate())?;
+        self.linear = corrected.with_gate_of(&judged);
         Ok(innovation)
     }
 }

@@ -256,6 +256,8 @@ pub enum Start {
 pub(crate) enum Phase {
     /// The start is over, or a prior is in again: the forgetting policy rules.
     Running,
+    /// As `Running`, from parameters or a P that were given.
+    Given,
     /// Not of full rank yet: there is no estimate.
     Collecting,
     /// Not of full rank yet: the estimate is that with the prior.
@@ -270,6 +272,6 @@ impl Phase {
     /// Whether the forgetting policy rules.
     #[inline(always)]
     pub(crate) fn is_running(self) -> bool {
-        matches!(self, Phase::Running | Phase::Free)
+        matches!(self, Phase::Running | Phase::Given | Phase::Free)
     }
 }

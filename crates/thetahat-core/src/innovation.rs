@@ -12,7 +12,8 @@ pub enum Action {
     Updated,
     /// The estimate was corrected, and a variance that had grown to its bound was brought back to it.
     Capped,
-    /// The estimate was corrected by less than the innovation asks for, so that C(q) stays stable.
+    /// The estimate was corrected by less than the innovation asks for, so that C(q) stays stable, or parameters stay within
+    /// limits.
     Projected,
     /// The measurement is missing (NaN): time went on, nothing was corrected.
     Missing,
@@ -27,6 +28,9 @@ pub enum Action {
     Skipped,
     /// The normalised innovation squared is above the gate: the measurement was not used.
     Gated,
+    /// It is above the gate, and so were those before it, so many in a row that the filter must be wrong and not they: the
+    /// measurement was used.
+    Released,
 }
 
 impl Action {
@@ -46,6 +50,7 @@ impl Action {
             Action::Frozen => "frozen",
             Action::Skipped => "skipped",
             Action::Gated => "gated",
+            Action::Released => "released",
         }
     }
 }

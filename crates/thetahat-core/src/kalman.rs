@@ -35,9 +35,9 @@ use crate::{
 ///
 /// Its state is plain data: [`state`](KalmanFilter::state), [`covariance`](KalmanFilter::covariance) and
 /// [`gate`](KalmanFilter::gate) are a snapshot, and [`new`](KalmanFilter::new) and
-/// [`with_gate`](KalmanFilter::with_gate) restore it to the bit.
+/// [`with_gate`](KalmanFilter::with_gate) restore it to the bit. (What a gate that lets go has counted starts anew.)
 ///
-/// Units: those of the model. Memory: n² + n + 1 numbers. On the stack, `predict` takes 2 n² + 3 n numbers more, and
+/// Units: those of the model. Memory: n² + n + 2 numbers. On the stack, `predict` takes 2 n² + 3 n numbers more, and
 /// `correct` n² + 3 n + (n + 3) m, with m outputs; with `Dyn` 2 n² + 3 n of them are kept in the filter.
 ///
 /// Source: Kalman, A new approach to linear filtering and prediction problems, 1960; Bierman, Factorization
@@ -77,13 +77,17 @@ pub struct KalmanFilter<T: Real, N: Dimension> {
     state: OVector<T, N>,
     covariance: Covariance<T, N>,
     gate: T,
+    /// After how many measurements in a row the gate lets go; 0 if never. How many the latest ones are.
+    release: u16,
+    gated: u16,
     scratch: N::Scratch<T>,
 }
 
 /// Equal to the bit: the same state, factors and gate.
 impl<T: Real, N: Dimension> PartialEq for KalmanFilter<T, N> {
     fn eq(&self, other: &Self) -> bool {
-        self.state == other.state && self.covariance == other.covariance && self.gate == other.gate
+        let gate = |filter: &Self| (filter.gate, filter.release, filter.gated);
+        self.state == other.state && self.covariance == other.covariance && gate(self) == gate(other)
     }
 }
 
@@ -99,11 +103,15 @@ impl<T: Real, N: Dimension> KalmanFilter<T, N> {
     /// A filter that starts from this state, which is finite and has the size of the covariance.
     pub(crate) fn started(state: OVector<T, N>, covariance: Covariance<T, N>) -> Self {
         let scratch = covariance.size().scratch::<T, 3, 2>();
-        KalmanFilter { state, covariance, gate: T::INFINITY, scratch }
+        KalmanFilter { state, covariance, gate: T::INFINITY, release: 0, gated: 0, scratch }
     }
 
     /// The same with a gate: a measurement whose normalised innovation squared is above `gate` is not used, and
     /// [`Action::Gated`] says so. Infinite at first, which is no gate.
+    ///
+    /// A gate can lock out: once the state is far off, as after a jump of the plant, all measurements are above it, and P
+    /// grows too slowly to let them in. [`gated_in_a_row`](KalmanFilter::gated_in_a_row) tells, and
+    /// [`with_release`](KalmanFilter::with_release) lets go.
     ///
     /// Errors: [`Error::OutOfRange`] if it is not above 0.
     pub fn with_gate(self, gate: T) -> Result<Self, Error> {
@@ -114,6 +122,35 @@ impl<T: Real, N: Dimension> KalmanFilter<T, N> {
         }
     }
 
+    /// The same with a gate that lets go: after `count` measurements in a row that were above it, those that follow are used,
+    /// and [`Action::Released`] says so, until one is within the gate again. 0 is a gate that never lets go, as at first.
+    ///
+    /// An outlier is rarely followed by another: with independent outliers, one in twenty say, `count` of them in a row come
+    /// once in 20^count samples. Each released measurement is weighed as any other: where P is small the state comes back
+    /// slowly, by the gain of the filter. ([`new`](KalmanFilter::new) with a large P is quicker, where the plant has jumped.)
+    ///
+    /// ```
+    /// use thetahat_core::nalgebra::{Const, Matrix1, Vector1};
+    /// use thetahat_core::{Action, Covariance, Error, KalmanFilter, LinearObservation, LinearTransition};
+    ///
+    /// let variance = |value: f64| Covariance::<f64, Const<1>>::from_diagonal(&Vector1::new(value));
+    /// let walk = LinearTransition::new(Matrix1::new(1.0), variance(0.01)?)?;
+    /// let gauge = LinearObservation::new(Matrix1::new(1.0), variance(1.0)?)?;
+    /// let mut filter = KalmanFilter::new(Vector1::new(0.0), variance(1.0)?)?.with_gate(9.0)?.with_release(5);
+    /// let mut actions = [Action::Missing; 40];
+    /// for action in &mut actions {
+    ///     filter.predict(&walk, &Default::default())?;
+    ///     *action = filter.correct(&gauge, &Default::default(), &Vector1::new(100.0))?.action; // it is at 100, not 0
+    /// }
+    /// assert_eq!(actions[4..6], [Action::Gated, Action::Released]);
+    /// assert_eq!(actions[39], Action::Updated);
+    /// assert!(filter.gated_in_a_row() == 0 && (filter.state()[0] - 100.0).abs() < 5.0);
+    /// # Ok::<(), Error>(())
+    /// ```
+    pub fn with_release(self, count: u16) -> Self {
+        KalmanFilter { release: count, ..self }
+    }
+
     /// The same to the bit, with its size in another type, see [`Covariance::to_size`]. With `Const` a step needs no heap,
     /// and is quicker.
     ///
@@ -121,7 +158,8 @@ impl<T: Real, N: Dimension> KalmanFilter<T, N> {
     pub fn to_size<K: Dimension>(&self, size: K) -> Result<KalmanFilter<T, K>, Error> {
         let covariance = self.covariance.to_size(size)?;
         let state = filled(size.vector(T::zero()), self.state.as_slice());
-        Ok(KalmanFilter { gate: self.gate, ..KalmanFilter::started(state, covariance) })
+        let KalmanFilter { gate, release, gated, .. } = *self;
+        Ok(KalmanFilter { gate, release, gated, ..KalmanFilter::started(state, covariance) })
     }
 
     /// The mean of the state, x̂.
@@ -137,6 +175,22 @@ impl<T: Real, N: Dimension> KalmanFilter<T, N> {
     /// The gate on the normalised innovation squared: infinite if there is none.
     pub fn gate(&self) -> T {
         self.gate
+    }
+
+    /// The same with the gate of another filter, and what it has counted.
+    pub(crate) fn with_gate_of(self, other: &Self) -> Self {
+        KalmanFilter { gate: other.gate, release: other.release, gated: other.gated, ..self }
+    }
+
+    /// After how many measurements in a row the gate lets go; 0 if never.
+    pub fn release(&self) -> u16 {
+        self.release
+    }
+
+    /// How many of the latest measurements were above the gate, since the last one within it, at most 65,535; missing ones do
+    /// not count. More than a few: the gate has locked the filter out.
+    pub fn gated_in_a_row(&self) -> u16 {
+        self.gated
     }
 
     /// S = H P H' + R, the covariance of the innovation that this observation would have now, m x m.
@@ -384,9 +438,10 @@ impl<T: Real, N: Dimension> KalmanFilter<T, N> {
                 action = Action::Updated;
             }
             if nis > self.gate {
-                action = Action::Gated;
+                let lets_go = self.release > 0 && self.gated >= self.release;
+                action = if lets_go { Action::Released } else { Action::Gated };
             }
-            if action == Action::Updated {
+            if matches!(action, Action::Updated | Action::Released) {
                 add_multiple(step, T::one(), state);
                 if !(step.iter().all(T::is_finite) && ud::is_finite(work, n)) {
                     return Err(Error::TooLarge { argument: "measurement" });
@@ -396,6 +451,11 @@ impl<T: Real, N: Dimension> KalmanFilter<T, N> {
             }
             Ok(())
         })?;
+        match action {
+            Action::Updated => self.gated = 0,
+            Action::Gated | Action::Released => self.gated = self.gated.saturating_add(1),
+            _ => {}
+        }
         Ok(Innovation { error, variance, nis, action })
     }
 }

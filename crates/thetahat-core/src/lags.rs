@@ -206,6 +206,26 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
         Self::with_residuals(orders, 0)
     }
 
+    /// Whether this type has the sizes for these orders: that [`new`](Lags::new) has no error. For orders that are
+    /// constants, `const _: () = assert!(…)` asks the compiler: see [`RecursiveArx::fits`](crate::RecursiveArx::fits).
+    pub const fn fits(orders: &ArxOrders<'_>) -> bool {
+        Self::fits_with(orders, 0)
+    }
+
+    /// The same with so many past residuals.
+    pub(crate) const fn fits_with(orders: &ArxOrders<'_>, residuals: usize) -> bool {
+        let parameters = orders.parameters().saturating_add(residuals);
+        let exact = match N::SIZE {
+            Some(size) => size == parameters,
+            None => true,
+        };
+        let enough = match D::SIZE {
+            Some(size) => size >= orders.delays(),
+            None => true,
+        };
+        exact && enough
+    }
+
     /// The same with one more line after all others, for `residuals` past residuals.
     pub(crate) fn with_residuals(orders: &ArxOrders<'_>, residuals: usize) -> Result<Self, Error> {
         let needed = orders.parameters().saturating_add(residuals);

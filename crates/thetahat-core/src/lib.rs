@@ -4,7 +4,7 @@
 //!
 //! | parameters of a model | |
 //! |---|---|
-//! | [`RecursiveArx`], [`RecursiveArmax`] | from inputs and outputs, sample by sample; predict some samples ahead |
+//! | [`RecursiveArx`], [`RecursiveArmax`] | from what is measured and applied, call by call; predict some samples ahead |
 //! | [`RecursiveLeastSquares`] | from any regressors; [`Forgetting`] policies that stay bounded, three ways to [`Start`] |
 //! | [`LeastSquares`] | all rows at once: merges with others, says which columns are at fault |
 //! | [`Lags`], [`ArxOrders`] | delay lines that make regressors of samples, and know of missing ones |
@@ -21,7 +21,7 @@
 //! | what a sample tells | |
 //! |---|---|
 //! | [`Innovation`] | what was not predicted, how surprising it is, and the [`Action`] that was taken |
-//! | [`ChangeDetector`] | charts that watch innovations; an [`Alarm`] says what changed, and since when |
+//! | [`ChangeDetector`] | charts that watch innovations, of estimators and filters; an [`Alarm`] says what changed, and since when |
 //!
 //! A [`Covariance`] is kept factored, so that it never becomes indefinite.
 //!

@@ -10,12 +10,14 @@ use crate::ud::dot;
 use crate::{Covariance, Dimension, Error, Innovation, Real, Solution, ud};
 
 mod after;
+mod limits;
 mod residuals;
 mod sample;
 #[cfg(feature = "serde")]
 mod snapshot;
 
 use after::After;
+pub(crate) use limits::check_limits;
 use residuals::Residuals;
 pub(crate) use sample::is_small;
 use sample::scale_variances;
@@ -366,6 +368,9 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
     /// The same with another start, from the prior of [`new`](RecursiveLeastSquares::new): parameters, P and what is
     /// known of the noise are as there.
     ///
+    /// Where parameters, P or a batch solution are given, before this call or after it, they are the start: it is the
+    /// standard one, as there is no prior that the others could take out, and what is given stays.
+    ///
     /// Errors: none that can occur.
     ///
     /// ```
@@ -382,6 +387,10 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
     /// ```
     #[inline]
     pub fn with_start(mut self, start: Start) -> Result<Self, Error> {
+        // A start that is over leaves shares behind, a batch solution does not.
+        if self.phase == Phase::Given || self.phase == Phase::Free && self.shares == 0 {
+            return Ok(self);
+        }
         (self.phase, self.shares) = match start {
             Start::Standard => (Phase::Running, 0),
             Start::Exact => (Phase::Collecting, 1),
@@ -400,8 +409,9 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
         Ok(self)
     }
 
-    /// The same with these parameters, n x m, to start from: a warm start. The start is then [`Start::Standard`]; if
-    /// it still was collecting, P is that of [`new`](RecursiveLeastSquares::new).
+    /// The same with these parameters, n x m, to start from: a warm start. The start is then [`Start::Standard`],
+    /// whatever [`with_start`](RecursiveLeastSquares::with_start) asks for before or after; if it still was collecting,
+    /// P is that of [`new`](RecursiveLeastSquares::new).
     ///
     /// Errors: [`Error::Length`] (only with `Dyn`); [`Error::NotFinite`]; [`Error::TooLarge`] if a regressor of its
     /// scale would predict more than any output that can be absorbed (7e15 in `f32`).
@@ -413,12 +423,12 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
         if self.phase == Phase::Collecting {
             self.covariance = Covariance::independent(&self.bounds);
         }
-        self.phase = Phase::Running;
+        (self.phase, self.shares, self.shares_left) = (Phase::Given, 0, 0);
         Ok(self)
     }
 
     /// The same with this P, n x n, to start from, in units of the noise variance: how sure the parameters of
-    /// [`with_parameters`](RecursiveLeastSquares::with_parameters) are. The start is then [`Start::Standard`].
+    /// [`with_parameters`](RecursiveLeastSquares::with_parameters) are. The start is then [`Start::Standard`], as there.
     ///
     /// A variance of 0 holds a parameter at its value, with every policy. One above the bound is brought back to it, if the policy
     /// forgets.
@@ -430,7 +440,7 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
         let fits = covariance.variances().iter().all(|&variance| is_prior(variance));
         fits.then_some(()).ok_or(Error::TooLarge { argument: "covariance" })?;
         self.covariance = covariance;
-        self.phase = Phase::Running;
+        (self.phase, self.shares, self.shares_left) = (Phase::Given, 0, 0);
         Ok(self)
     }
 

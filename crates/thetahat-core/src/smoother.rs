@@ -156,7 +156,7 @@ impl<T: Real, N: Dimension> Smoother<T, N> {
             elements.push(Element { row: h, gain, variance, error });
         };
         let innovation = self.filter.correct_recorded(observation, input, measurement, record)?;
-        if innovation.action == Action::Updated {
+        if matches!(innovation.action, Action::Updated | Action::Released) {
             self.elements.append(&mut elements);
         }
         Ok(innovation)

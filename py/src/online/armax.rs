@@ -6,13 +6,15 @@ use pyo3::prelude::*;
 use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::{Const, Dyn};
 use thetahat_core::{
-    ArmaxMethod, ArmaxOrders, RecursiveArmax as Stepper, RecursiveLeastSquares as LeastSquares,
+    ArmaxMethod, ArmaxOrders, Error, Innovation as StepInnovation, RecursiveArmax as Stepper,
+    RecursiveLeastSquares as LeastSquares,
 };
 
 use super::argument::{self, Rows, Whole, failed, room};
 use super::arx::{check_inputs, future, orders, scales};
 use super::forgetting::{Forgetting, Memory, STANDARD};
 use super::innovation::{Innovation, list};
+use super::limits::Limits;
 use super::recursive::{self, Around, RecursiveTrajectory};
 use super::{Reduced, snapshot};
 use crate::array;
@@ -22,6 +24,20 @@ use crate::array;
 pub(crate) struct Engine {
     stepper: Stepper<f64, Dyn, Dyn>,
     inputs: usize,
+    /// One for each parameter but those of C, or none at all.
+    limits: Limits,
+}
+
+impl Engine {
+    fn measured(&mut self, output: f64) -> Result<StepInnovation<f64>, Error> {
+        let innovation = self.stepper.measured(output)?;
+        self.limits.after(innovation, |limits| self.stepper.keep_within(limits))
+    }
+
+    fn log_row(&mut self, output: f64, inputs: &[f64]) -> Result<StepInnovation<f64>, Error> {
+        let innovation = self.stepper.log_row(output, inputs)?;
+        self.limits.after(innovation, |limits| self.stepper.keep_within(limits))
+    }
 }
 
 impl Around<Dyn, Const<1>> for Engine {
@@ -65,6 +81,10 @@ impl Around<Dyn, Const<1>> for Engine {
 ///     P to start from, in units of the noise variance.
 /// dead_zone : float, default 0.0
 ///     An innovation of at most this size corrects nothing.
+/// limits : sequence, optional
+///     A pair (lower, upper) or None for each parameter of A, B and the constant, such as the sign of a gain that a controller divides by. What an
+///     update leads out is taken back to the nearest point within, in the metric of P, so that the other parameters make up
+///     for it; the action is "projected" then.
 ///
 /// Notes
 /// -----
@@ -117,9 +137,9 @@ impl RecursiveArmax {
     #[new]
     #[pyo3(signature = (na, nb, nc, nk = None, forgetting = STANDARD, *, method = "extended-least-squares",
         constant = false, output_scale = 1.0, input_scales = None, noise_scale = 1.0, parameters = None, covariance = None,
-        dead_zone = 0.0))]
+        dead_zone = 0.0, limits = None))]
     #[pyo3(
-        text_signature = "(na, nb, nc, nk=1, forgetting=0.99, *, method='extended-least-squares', constant=False, output_scale=1.0, input_scales=None, noise_scale=1.0, parameters=None, covariance=None, dead_zone=0.0)"
+        text_signature = "(na, nb, nc, nk=1, forgetting=0.99, *, method='extended-least-squares', constant=False, output_scale=1.0, input_scales=None, noise_scale=1.0, parameters=None, covariance=None, dead_zone=0.0, limits=None)"
     )]
     #[expect(clippy::too_many_arguments, reason = "most are options, given by name")]
     fn new(
@@ -137,6 +157,7 @@ impl RecursiveArmax {
         parameters: Option<&Bound<'_, PyAny>>,
         covariance: Option<&Bound<'_, PyAny>>,
         dead_zone: f64,
+        limits: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let one = 1_u8.into_pyobject(py)?.into_any();
         let (others, inputs) = orders(&[("na", na), ("nc", nc)], nb, nk.unwrap_or(&one))?;
@@ -165,7 +186,11 @@ impl RecursiveArmax {
             let covariance = argument::covariance("covariance", covariance, Some(n))?;
             stepper = stepper.with_covariance(covariance).map_err(say)?;
         }
-        Ok(RecursiveArmax::of(Engine { stepper, inputs: inputs.len() }))
+        let limits = Limits::new(limits, n - each(1))?;
+        if !limits.ranges().is_empty() {
+            stepper.keep_within(limits.ranges()).map_err(say)?;
+        }
+        Ok(RecursiveArmax::of(Engine { stepper, inputs: inputs.len(), limits }))
     }
 
     /// y(k) arrives: time goes on to k, and the model learns from y(k) and the inputs that were `applied` before.
@@ -190,7 +215,7 @@ impl RecursiveArmax {
     ///     that. Nothing has changed then, time included.
     fn measured(&mut self, py: Python<'_>, y: &Bound<'_, PyAny>) -> PyResult<Innovation> {
         let output = argument::number("y", y)?;
-        let innovation = self.engine.stepper.measured(output).map_err(|error| failed(py, error))?;
+        let innovation = self.engine.measured(output).map_err(|error| failed(py, error))?;
         Ok(innovation.into())
     }
 
@@ -241,8 +266,7 @@ impl RecursiveArmax {
         let none = py.None().into_bound(py);
         argument::sample("u", u.unwrap_or(&none), self.engine.inputs, &mut self.inputs)?;
         let output = argument::number("y", y)?;
-        let innovation =
-            self.engine.stepper.log_row(output, &self.inputs).map_err(|error| failed(py, error))?;
+        let innovation = self.engine.log_row(output, &self.inputs).map_err(|error| failed(py, error))?;
         Ok(innovation.into())
     }
 
@@ -282,7 +306,7 @@ impl RecursiveArmax {
         let (engine, trajectory) = recursive::run(py, shape, |record| {
             record.run(engine, rows, |engine, row, record| {
                 let output = outputs.get(row).copied().unwrap_or(f64::NAN);
-                record.take(&engine.stepper.log_row(output, argument::row(inputs, row, columns))?);
+                record.take(&engine.log_row(output, argument::row(inputs, row, columns))?);
                 Ok(())
             })
         })?;
@@ -388,6 +412,12 @@ impl RecursiveArmax {
     #[getter]
     fn forgetting(&self) -> Forgetting {
         Forgetting { policy: self.estimator().forgetting() }
+    }
+
+    /// The limits of the parameters, a pair (lower, upper) each; None if there are none.
+    #[getter]
+    fn limits(&self) -> Option<Vec<(f64, f64)>> {
+        self.engine.limits.pairs()
     }
 
     /// Whether samples correct the estimate. Set it to turn that off and on; samples are taken in all the same.

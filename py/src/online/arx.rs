@@ -5,11 +5,15 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::{Const, Dyn};
-use thetahat_core::{ArxOrders, InputOrders, RecursiveArx as Stepper, RecursiveLeastSquares as LeastSquares};
+use thetahat_core::{
+    ArxOrders, Error, Innovation as StepInnovation, InputOrders, RecursiveArx as Stepper,
+    RecursiveLeastSquares as LeastSquares,
+};
 
 use super::argument::{self, LARGEST_SIZE, LONGEST_DELAY, Rows, Whole, count, failed, room};
 use super::forgetting::{Forgetting, Memory, STANDARD};
 use super::innovation::{Innovation, list};
+use super::limits::Limits;
 use super::recursive::{self, Around, RecursiveTrajectory};
 use super::{Reduced, snapshot};
 use crate::array;
@@ -19,6 +23,20 @@ use crate::array;
 pub(crate) struct Engine {
     stepper: Stepper<f64, Dyn, Dyn>,
     inputs: usize,
+    /// One for each parameter, or none at all.
+    limits: Limits,
+}
+
+impl Engine {
+    fn measured(&mut self, output: f64) -> Result<StepInnovation<f64>, Error> {
+        let innovation = self.stepper.measured(output)?;
+        self.limits.after(innovation, |limits| self.stepper.keep_within(limits))
+    }
+
+    fn log_row(&mut self, output: f64, inputs: &[f64]) -> Result<StepInnovation<f64>, Error> {
+        let innovation = self.stepper.log_row(output, inputs)?;
+        self.limits.after(innovation, |limits| self.stepper.keep_within(limits))
+    }
 }
 
 impl Around<Dyn, Const<1>> for Engine {
@@ -56,6 +74,10 @@ impl Around<Dyn, Const<1>> for Engine {
 ///     P to start from, in units of the noise variance.
 /// dead_zone : float, default 0.0
 ///     An innovation of at most this size corrects nothing.
+/// limits : sequence, optional
+///     A pair (lower, upper) or None for each parameter, such as the sign of a gain that a controller divides by. What an
+///     update leads out is taken back to the nearest point within, in the metric of P, so that the other parameters make up
+///     for it; the action is "projected" then.
 ///
 /// Notes
 /// -----
@@ -188,9 +210,9 @@ pub(crate) fn future<'py>(
 impl RecursiveArx {
     #[new]
     #[pyo3(signature = (na, nb, nk = None, forgetting = STANDARD, *, constant = false, output_scale = 1.0,
-        input_scales = None, start = "standard", blend = None, parameters = None, covariance = None, dead_zone = 0.0))]
+        input_scales = None, start = "standard", blend = None, parameters = None, covariance = None, dead_zone = 0.0, limits = None))]
     #[pyo3(
-        text_signature = "(na, nb, nk=1, forgetting=0.99, *, constant=False, output_scale=1.0, input_scales=None, start='standard', blend=None, parameters=None, covariance=None, dead_zone=0.0)"
+        text_signature = "(na, nb, nk=1, forgetting=0.99, *, constant=False, output_scale=1.0, input_scales=None, start='standard', blend=None, parameters=None, covariance=None, dead_zone=0.0, limits=None)"
     )]
     #[expect(clippy::too_many_arguments, reason = "most are options, given by name")]
     fn new(
@@ -207,6 +229,7 @@ impl RecursiveArx {
         parameters: Option<&Bound<'_, PyAny>>,
         covariance: Option<&Bound<'_, PyAny>>,
         dead_zone: f64,
+        limits: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let one = 1_u8.into_pyobject(py)?.into_any();
         let (others, inputs) = orders(&[("na", na)], nb, nk.unwrap_or(&one))?;
@@ -227,7 +250,11 @@ impl RecursiveArx {
             let covariance = argument::covariance("covariance", covariance, Some(n))?;
             stepper = stepper.with_covariance(covariance).map_err(say)?;
         }
-        Ok(RecursiveArx::of(Engine { stepper, inputs: inputs.len() }))
+        let limits = Limits::new(limits, n)?;
+        if !limits.ranges().is_empty() {
+            stepper.keep_within(limits.ranges()).map_err(say)?;
+        }
+        Ok(RecursiveArx::of(Engine { stepper, inputs: inputs.len(), limits }))
     }
 
     /// y(k) arrives: time goes on to k, and the model learns from y(k) and the inputs that were `applied` before.
@@ -252,7 +279,7 @@ impl RecursiveArx {
     ///     that. Nothing has changed then, time included.
     fn measured(&mut self, py: Python<'_>, y: &Bound<'_, PyAny>) -> PyResult<Innovation> {
         let output = argument::number("y", y)?;
-        let innovation = self.engine.stepper.measured(output).map_err(|error| failed(py, error))?;
+        let innovation = self.engine.measured(output).map_err(|error| failed(py, error))?;
         Ok(innovation.into())
     }
 
@@ -303,8 +330,7 @@ impl RecursiveArx {
         let none = py.None().into_bound(py);
         argument::sample("u", u.unwrap_or(&none), self.engine.inputs, &mut self.inputs)?;
         let output = argument::number("y", y)?;
-        let innovation =
-            self.engine.stepper.log_row(output, &self.inputs).map_err(|error| failed(py, error))?;
+        let innovation = self.engine.log_row(output, &self.inputs).map_err(|error| failed(py, error))?;
         Ok(innovation.into())
     }
 
@@ -344,7 +370,7 @@ impl RecursiveArx {
         let (engine, trajectory) = recursive::run(py, shape, |record| {
             record.run(engine, rows, |engine, row, record| {
                 let output = outputs.get(row).copied().unwrap_or(f64::NAN);
-                record.take(&engine.stepper.log_row(output, argument::row(inputs, row, columns))?);
+                record.take(&engine.log_row(output, argument::row(inputs, row, columns))?);
                 Ok(())
             })
         })?;
@@ -444,6 +470,12 @@ impl RecursiveArx {
     #[getter]
     fn forgetting(&self) -> Forgetting {
         Forgetting { policy: self.estimator().forgetting() }
+    }
+
+    /// The limits of the parameters, a pair (lower, upper) each; None if there are none.
+    #[getter]
+    fn limits(&self) -> Option<Vec<(f64, f64)>> {
+        self.engine.limits.pairs()
     }
 
     /// Whether samples correct the estimate. Set it to turn that off and on; samples are taken in all the same.

@@ -30,6 +30,9 @@ use crate::array;
 ///     The covariance of its error.
 /// gate : float, default inf
 ///     A measurement whose normalised innovation squared is above it is not used.
+/// release : int, default 0
+///     After so many measurements in a row above the gate, those that follow are used, until one is within it again. 0 is a
+///     gate that never lets go: it may lock the filter out for ever.
 /// iterations : int, default 1
 ///     How often a correction linearises the observation, each time about its last result.
 ///
@@ -140,17 +143,18 @@ pub(crate) fn input(value: Option<&Bound<'_, PyAny>>, wanted: Option<usize>) -> 
 #[pymethods]
 impl ExtendedKalmanFilter {
     #[new]
-    #[pyo3(signature = (state, covariance, *, gate = f64::INFINITY, iterations = Whole(1)))]
-    #[pyo3(text_signature = "(state, covariance, *, gate=1e999, iterations=1)")]
+    #[pyo3(signature = (state, covariance, *, gate = f64::INFINITY, release = Whole(0), iterations = Whole(1)))]
+    #[pyo3(text_signature = "(state, covariance, *, gate=1e999, release=0, iterations=1)")]
     fn new(
         py: Python<'_>,
         state: &Bound<'_, PyAny>,
         covariance: &Bound<'_, PyAny>,
         gate: f64,
+        release: Whole,
         iterations: Whole,
     ) -> PyResult<Self> {
         let iterations = argument::count("iterations", iterations, 1, 1000)?;
-        let filter = Stepper::from(started(py, state, covariance, gate)?);
+        let filter = Stepper::from(started(py, state, covariance, gate, release)?);
         let filter = filter.with_iterations(iterations).map_err(|error| failed(py, error))?;
         Ok(ExtendedKalmanFilter { filter })
     }
@@ -375,6 +379,18 @@ impl ExtendedKalmanFilter {
     #[getter]
     fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         array::from_matrix(py, &self.filter.covariance().matrix())
+    }
+
+    /// After how many measurements in a row the gate lets go; 0 if never.
+    #[getter]
+    fn release(&self) -> u16 {
+        self.filter.release()
+    }
+
+    /// How many of the latest measurements were above the gate, since the last one within it.
+    #[getter]
+    fn gated_in_a_row(&self) -> u16 {
+        self.filter.gated_in_a_row()
     }
 
     /// The gate on the normalised innovation squared: inf if there is none.

@@ -24,7 +24,8 @@ use crate::array;
 /// action : str
 ///     "updated"; "capped": updated, and a variance brought back to its bound; "projected": updated by a shorter
 ///     step; "missing"; "not ready": the delay lines are not filled; "collecting": there is no estimate yet;
-///     "frozen": adaptation is off; "skipped": in the dead zone; "gated": above the gate.
+///     "frozen": adaptation is off; "skipped": in the dead zone; "gated": above the gate;
+///     "released": above it too, but used, as so many before it were.
 /// log_likelihood : float
 ///     -1/2 (m ln 2 pi + ln det S + e' S^-1 e) for the m elements measured; 0 if nothing was measured.
 ///
@@ -138,7 +139,7 @@ impl Innovation {
 }
 
 /// All actions, in the order of their codes.
-const ACTIONS: [Action; 9] = [
+const ACTIONS: [Action; 10] = [
     Action::Updated,
     Action::Capped,
     Action::Projected,
@@ -148,6 +149,7 @@ const ACTIONS: [Action; 9] = [
     Action::Frozen,
     Action::Skipped,
     Action::Gated,
+    Action::Released,
 ];
 
 /// The place of an action among them.
@@ -162,6 +164,7 @@ pub(crate) fn code(action: Action) -> u8 {
         Action::Frozen => 6,
         Action::Skipped => 7,
         Action::Gated => 8,
+        Action::Released => 9,
         _ => u8::MAX,
     }
 }

@@ -32,6 +32,9 @@ use crate::work::Pulse;
 ///     Its covariance.
 /// gate : float, default inf
 ///     A measurement whose normalised innovation squared is above it is not used.
+/// release : int, default 0
+///     After so many measurements in a row above the gate, those that follow are used, until one is within it again. 0 is a
+///     gate that never lets go: it may lock the filter out for ever.
 ///
 /// Raises
 /// ------
@@ -76,12 +79,15 @@ pub(crate) fn started(
     state: &Bound<'_, PyAny>,
     covariance: &Bound<'_, PyAny>,
     gate: f64,
+    release: Whole,
 ) -> PyResult<Stepper<f64, Dyn>> {
     let state = array::finite_vector("state", state, None)?;
     argument::check_size("state", state.len())?;
+    let release = argument::count("release", release, 0, usize::from(u16::MAX))?;
+    let release = u16::try_from(release).unwrap_or(u16::MAX);
     let covariance = argument::covariance("covariance", covariance, Some(state.len()))?;
     Stepper::new(state, covariance)
-        .and_then(|filter| filter.with_gate(gate))
+        .and_then(|filter| Ok(filter.with_gate(gate)?.with_release(release)))
         .map_err(|error| failed(py, error))
 }
 
@@ -213,15 +219,16 @@ fn with_same_inputs(
 #[pymethods]
 impl KalmanFilter {
     #[new]
-    #[pyo3(signature = (state, covariance, *, gate = f64::INFINITY))]
-    #[pyo3(text_signature = "(state, covariance, *, gate=1e999)")]
+    #[pyo3(signature = (state, covariance, *, gate = f64::INFINITY, release = Whole(0)))]
+    #[pyo3(text_signature = "(state, covariance, *, gate=1e999, release=0)")]
     fn new(
         py: Python<'_>,
         state: &Bound<'_, PyAny>,
         covariance: &Bound<'_, PyAny>,
         gate: f64,
+        release: Whole,
     ) -> PyResult<Self> {
-        Ok(KalmanFilter { filter: started(py, state, covariance, gate)? })
+        Ok(KalmanFilter { filter: started(py, state, covariance, gate, release)? })
     }
 
     /// Move the state on by one sample.
@@ -511,6 +518,18 @@ impl KalmanFilter {
     #[getter]
     fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         array::from_matrix(py, &self.filter.covariance().matrix())
+    }
+
+    /// After how many measurements in a row the gate lets go; 0 if never.
+    #[getter]
+    fn release(&self) -> u16 {
+        self.filter.release()
+    }
+
+    /// How many of the latest measurements were above the gate, since the last one within it.
+    #[getter]
+    fn gated_in_a_row(&self) -> u16 {
+        self.filter.gated_in_a_row()
     }
 
     /// The gate on the normalised innovation squared: inf if there is none.

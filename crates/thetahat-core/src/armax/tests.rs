@@ -438,6 +438,37 @@ fn options_are_checked_and_reach_the_estimator() {
     assert!(matches!(wrong, Err(Error::OutOfRange { argument: "scales", .. })));
 }
 
+#[test]
+fn limits_leave_c_stable() {
+    // C near the border of stability, and limits that pull at what correlates with it.
+    let orders = ArmaxOrders { na: 1, inputs: &[one(1, 1)], nc: 2, constant: false };
+    let limits = [-0.5..=0.0, 1.2..=f64::INFINITY];
+    for method in METHODS {
+        let forgetting = Forgetting::Exponential { factor: 0.95 };
+        let mut armax: RecursiveArmax<f64, Const<4>> =
+            RecursiveArmax::new(&orders, method, 2.0, &[1.0], 0.5, forgetting).unwrap();
+        let (mut noise, mut y, mut u, mut e, mut moved) = (Noise(14), 0.0, 0.0, [0.0; 2], 0);
+        for k in 0..5000 {
+            let now = noise.next();
+            y = 0.9 * y + u + now - 0.05 * e[0] - 0.95 * e[1];
+            e = [now, e[0]];
+            armax.measured(y).unwrap();
+            moved += usize::from(armax.keep_within(&limits).unwrap());
+            u = if k % 11 < 5 { 1.0 } else { -1.0 };
+            armax.applied(&[u]).unwrap();
+            let parameters = armax.estimator().parameters();
+            assert!(limits.iter().zip(parameters.iter()).all(|(limit, theta)| limit.contains(theta)));
+            assert!(is_stable(&mut armax.c().skip(1).collect::<Vec<_>>()), "{k}");
+        }
+        assert!(moved > 2000, "{moved}");
+        let all = [limits[0].clone(), limits[1].clone(), -1.0..=1.0, -1.0..=1.0];
+        let length = Error::Length { argument: "limits", expected: 2, found: 4 };
+        assert_eq!(armax.keep_within(&all).unwrap_err(), length);
+    }
+    assert!(RecursiveArmax::<f32, Const<4>>::fits(&orders));
+    assert!(!RecursiveArmax::<f32, Const<3>>::fits(&orders));
+}
+
 #[cfg(feature = "alloc")]
 #[test]
 fn run_time_sizes_give_the_same_bits() {

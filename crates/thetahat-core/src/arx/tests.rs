@@ -404,6 +404,18 @@ fn predictions_need_samples_and_stay_finite() {
     assert_eq!(unstable.predict(&[], &mut [0.0; 5]), Ok(()));
 }
 
+#[cfg(feature = "alloc")]
+#[test]
+fn sizes_known_at_run_time_fit() {
+    use nalgebra::Dyn;
+
+    let orders = ArxOrders { na: 2, inputs: &[one(2, 3)], constant: true };
+    assert!(RecursiveArx::<f32, Dyn, Dyn>::fits(&orders));
+    assert!(RecursiveArx::<f32, Const<5>, Const<7>>::fits(&orders));
+    assert!(!RecursiveArx::<f32, Const<4>, Dyn>::fits(&orders));
+    assert!(!RecursiveArx::<f32, Dyn, Const<2>>::fits(&orders));
+}
+
 #[test]
 fn options_reach_the_estimator() {
     let orders = ArxOrders { na: 2, inputs: &[one(1, 1)], constant: false };

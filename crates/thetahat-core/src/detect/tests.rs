@@ -1,6 +1,8 @@
 extern crate std;
 use std::vec::Vec;
 
+use nalgebra::{Vector1, Vector2, Vector3};
+
 use super::{Alarm, ChangeDetector, Chart};
 use crate::noise::Noise;
 use crate::{Action, Error, Innovation, Real};
@@ -68,6 +70,57 @@ fn of_several_charts_the_furthest_is_named_and_all_start_again() {
         [Chart::MeanUp, Chart::MeanDown, Chart::Variance].map(|chart| detector.statistic(chart)),
         [0.0; 3]
     );
+}
+
+#[test]
+fn of_a_filter_with_one_output_it_is_the_same_to_the_bit() {
+    let (mut one, mut other) =
+        (ChangeDetector::new(4.0, 5.0).unwrap(), ChangeDetector::new(4.0, 5.0).unwrap());
+    let (mut noise, mut alarms) = (Noise(6), 0);
+    for k in 0..2000 {
+        let error = if k % 50 == 0 { f64::NAN } else { 1.5 * gaussian(&mut noise) };
+        let Innovation { variance, nis, action, .. } = innovation(error, 1.3);
+        let vector = Innovation { error: Vector1::new(error), variance: Vector1::new(variance), nis, action };
+        let alarm = one.update(&innovation(error, 1.3));
+        assert_eq!(other.update_all(&vector), alarm);
+        assert_eq!(one, other);
+        alarms += usize::from(alarm.is_some());
+    }
+    assert!(alarms > 20);
+}
+
+#[test]
+fn of_several_outputs_it_takes_the_normalised_square() {
+    let mut detector = ChangeDetector::new(1.0, f64::INFINITY).unwrap();
+    let (mut noise, mut g) = (Noise(7), 0.0_f64);
+    for k in 0..1000 {
+        let z = Vector3::from_fn(|_, _| gaussian(&mut noise));
+        let measured = k % 4;
+        let entry = |row: usize, value: f64| if row < measured { value } else { f64::NAN };
+        let nis: f64 = (0..measured).map(|row| z[row] * z[row]).sum();
+        let innovation = Innovation {
+            error: Vector3::from_fn(|row, _| entry(row, 3.0 * z[row])),
+            variance: Vector3::from_fn(|row, _| entry(row, 9.0)),
+            nis,
+            action: if k % 7 == 0 { Action::Gated } else { Action::Updated },
+        };
+        assert_eq!(detector.update_all(&innovation), None);
+        // The log-likelihood ratio of Gaussian numbers with variances 2 and 1, one after another.
+        let ratio = |z: f64| 0.5 * z * z - 0.5 * (z * z / 2.0) - 0.5 * 2.0_f64.ln();
+        g = (g + (0..measured).map(|row| ratio(z[row])).sum::<f64>()).max(0.0);
+        // Rounding of a hundred additions.
+        assert!((detector.statistic(Chart::Variance) - g).abs() < 1e-12);
+        assert_eq!(detector.statistic(Chart::MeanUp), 0.0);
+    }
+    let broken = Innovation {
+        error: Vector2::repeat(1.0),
+        variance: Vector2::repeat(1.0),
+        nis: f64::INFINITY,
+        action: Action::Updated,
+    };
+    let before = detector.clone();
+    assert_eq!(detector.update_all(&broken), None);
+    assert_eq!(detector, before);
 }
 
 #[test]

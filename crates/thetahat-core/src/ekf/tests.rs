@@ -82,15 +82,17 @@ fn check_linear_model<T: Real, const N: usize, const M: usize>(seed: u64) {
     let prior = Covariance::new(&(matrix(&mut noise) * nalgebra::convert::<f64, T>(100.0))).unwrap();
     let gate = nalgebra::convert(20.0);
 
-    let mut filter = KalmanFilter::new(start, prior.clone()).unwrap().with_gate(gate).unwrap();
-    let mut extended = ExtendedKalmanFilter::new(start, prior).unwrap().with_gate(gate).unwrap();
-    let mut gated = 0;
+    let mut filter =
+        KalmanFilter::new(start, prior.clone()).unwrap().with_gate(gate).unwrap().with_release(1);
+    let mut extended =
+        ExtendedKalmanFilter::new(start, prior).unwrap().with_gate(gate).unwrap().with_release(1);
+    let (mut gated, mut released) = (0, 0);
     for k in 0..60 {
         let u: SVector<T, 2> = nalgebra::convert(random::<2, 1>(&mut noise));
         let mut y: SVector<T, M> = nalgebra::convert(random::<M, 1>(&mut noise));
-        match k % 5 {
-            1 => y[k % M] = T::NAN,
-            2 => y *= nalgebra::convert::<f64, T>(20.0),
+        match k % 15 {
+            1 | 6 | 11 => y[k % M] = T::NAN,
+            2 | 7 | 8 | 9 => y *= nalgebra::convert::<f64, T>(60.0),
             _ => (),
         }
         filter.predict(&model, &u).unwrap();
@@ -104,12 +106,16 @@ fn check_linear_model<T: Real, const N: usize, const M: usize>(seed: u64) {
         assert!((0..M).all(|i| y[i].partial_cmp(&y[i]).is_none() || innovation.error[i] == found.error[i]));
         assert_eq!(filter.state(), extended.state());
         assert_eq!(filter.covariance(), extended.covariance());
-        let tolerance = T::EPSILON * nalgebra::convert::<f64, T>(100.0);
+        assert_eq!(filter.gated_in_a_row(), extended.gated_in_a_row());
+        assert_eq!(filter.gated_in_a_row(), iterated.gated_in_a_row());
+        assert_eq!((iterated.gate(), iterated.release()), (gate, 1));
+        let tolerance = T::EPSILON * nalgebra::convert::<f64, T>(100.0) * (T::one() + filter.state().amax());
         assert!((iterated.state() - filter.state()).amax() < tolerance);
         assert_eq!(iterated.covariance(), filter.covariance());
         gated += usize::from(found.action == Action::Gated);
+        released += usize::from(found.action == Action::Released);
     }
-    assert!(gated > 0);
+    assert!(gated > 0 && released > 0, "{gated} {released}");
 }
 
 #[test]
@@ -165,7 +171,9 @@ fn what_is_gated_or_missing_is_not_iterated() {
     let innovation = filter.correct(&sensor, &None::zeros(), &Vector1::new(8.0)).unwrap();
     assert_eq!(innovation.action, Action::Gated);
     assert!((innovation.nis - 4.5).abs() < 1e-14);
-    assert_eq!(filter, before);
+    assert_eq!(filter.gated_in_a_row(), 1);
+    assert_eq!((filter.state(), filter.covariance()), (before.state(), before.covariance()));
+    let before = filter.clone();
     let innovation = filter.correct(&sensor, &None::zeros(), &Vector1::new(f64::NAN)).unwrap();
     assert_eq!((innovation.action, innovation.nis), (Action::Missing, 0.0));
     assert_eq!(filter, before);

@@ -15,12 +15,14 @@ pub(super) struct Snapshot<T: Real, N: Dimension> {
     covariance: Covariance<T, N>,
     #[serde(with = "number")]
     gate: T,
+    release: u16,
+    gated: u16,
 }
 
 impl<T: Real, N: Dimension> From<KalmanFilter<T, N>> for Snapshot<T, N> {
     fn from(filter: KalmanFilter<T, N>) -> Self {
-        let KalmanFilter { state, covariance, gate, .. } = filter;
-        Snapshot { version: SnapshotVersion, state, covariance, gate }
+        let KalmanFilter { state, covariance, gate, release, gated, .. } = filter;
+        Snapshot { version: SnapshotVersion, state, covariance, gate, release, gated }
     }
 }
 
@@ -28,6 +30,7 @@ impl<T: Real, N: Dimension> TryFrom<Snapshot<T, N>> for KalmanFilter<T, N> {
     type Error = Error;
 
     fn try_from(read: Snapshot<T, N>) -> Result<Self, Error> {
-        KalmanFilter::new(read.state, read.covariance)?.with_gate(read.gate)
+        let filter = KalmanFilter::new(read.state, read.covariance)?.with_gate(read.gate)?;
+        Ok(KalmanFilter { release: read.release, gated: read.gated, ..filter })
     }
 }

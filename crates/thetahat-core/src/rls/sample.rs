@@ -52,7 +52,8 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
         let running = self.phase.is_running();
         let policy = if running { self.forgetting } else { Forgetting::None };
         let resting = !self.adapting || self.is_in_dead_zone(errors);
-        let (adapting, weight, with_prior) = (self.adapting, policy.factor(), self.phase == Phase::Running);
+        let (adapting, weight, with_prior) =
+            (self.adapting, policy.factor(), self.phase != Phase::Free && running);
         let RecursiveLeastSquares { parameters, covariance, residuals, .. } = self;
         let factor = covariance.as_mut_slice();
         // Only what is needed in each step is in here: what a function out of line is given cannot stay in registers.
@@ -223,7 +224,7 @@ pub(super) fn scale_variances<T: Real>(factor: &mut [T], size: usize, scale: T) 
 }
 
 /// f = U'h, v = D f for h = e_j.
-fn measure_one<T: Real>(factor: &[T], index: usize, f: &mut [T], v: &mut [T]) {
+pub(super) fn measure_one<T: Real>(factor: &[T], index: usize, f: &mut [T], v: &mut [T]) {
     let size = f.len();
     for (k, (f, v)) in f.iter_mut().zip(v).enumerate() {
         *f = match k {

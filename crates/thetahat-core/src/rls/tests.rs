@@ -2,6 +2,7 @@ extern crate std;
 
 mod endurance;
 mod interface;
+mod limits;
 
 use std::format;
 use std::string::String;

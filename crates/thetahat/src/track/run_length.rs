@@ -19,7 +19,8 @@
 
 use std::f64::consts::{LN_2, PI, SQRT_2};
 
-use statrs::function::erf::{erf, erfc};
+use statrs::function::erf::erfc;
+use statrs::function::gamma::gamma_lr;
 use thetahat_core::ChangeDetector;
 use thetahat_core::nalgebra::{DMatrix, DVector};
 
@@ -31,8 +32,8 @@ const STRETCHES: usize = 240;
 const PRECISION: f64 = 1e-6;
 
 /// The charts that give one false alarm in `interval` samples on average, all together, if the innovations are Gaussian
-/// and as large as their variance says: half of the alarms from the two charts of the mean, half from that of the
-/// variance. With L the average run length of a chart, the mean number of samples until it gives a false alarm,
+/// and as large as their variance says. With one output half of the alarms are from the two charts of the mean, half from that
+/// of the variance. With L the average run length of a chart, the mean number of samples until it gives a false alarm,
 ///
 /// ```text
 /// mean up       L = 4 interval
@@ -43,6 +44,10 @@ const PRECISION: f64 = 1e-6;
 /// Rates add: 1/(4 interval) + 1/(4 interval) + 1/(2 interval) = 1/interval. So they do for the two charts of the mean (Kemp,
 /// The average run length of the cumulative sum chart when a V-mask is used, J. R. Statist. Soc. B 23, 1961); with the chart
 /// of the variance as far as alarms do not coincide.
+///
+/// With several outputs the chart of the variance is alone, and its L is the interval: its steps are those of chi-square with
+/// as many degrees of freedom as `outputs`. Where some are missing at times it gives alarms about as often: with three
+/// outputs, each missing in a fifth of the samples, 1.0 to 1.2 times (measured).
 ///
 /// For the charts see [`ChangeDetector`]. The thresholds solve Page's integral equation (1954) to 0.1 % of the interval
 /// up to 1e6, and to 1 % at 1e9.
@@ -56,17 +61,17 @@ const PRECISION: f64 = 1e-6;
 /// (measured). Outliers and heavy tails give more, mostly on the chart of the variance.
 ///
 /// # Errors
-/// [`Error::Argument`] if the interval is not in 10 … 1e9.
+/// [`Error::Argument`] if the interval is not in 10 … 1e9, or there are not 1 to 1000 outputs.
 ///
 /// ```
 /// use thetahat::change_detector;
 /// use thetahat::thetahat_core::Chart;
 ///
-/// let detector = change_detector(10_000.0)?;
+/// let detector = change_detector(10_000.0, 1)?;
 /// assert!((detector.threshold(Chart::MeanUp) - 8.75).abs() < 0.01);
 /// # Ok::<(), thetahat::Error>(())
 /// ```
-pub fn change_detector(interval: f64) -> Result<ChangeDetector<f64>, Error> {
+pub fn change_detector(interval: f64, outputs: usize) -> Result<ChangeDetector<f64>, Error> {
     if !(10.0..=1e9).contains(&interval) {
         return Err(Error::argument(
             "alarm",
@@ -75,7 +80,11 @@ pub fn change_detector(interval: f64) -> Result<ChangeDetector<f64>, Error> {
             ),
         ));
     }
-    let thresholds = (threshold(4.0 * interval, mean), threshold(2.0 * interval, variance));
+    let thresholds = match outputs {
+        1 => (threshold(4.0 * interval, mean), threshold(2.0 * interval, |w| variance(w, 1))),
+        2..=1000 => (f64::INFINITY, threshold(interval, |w| variance(w, outputs))),
+        _ => return Err(Error::argument("outputs", format!("{outputs} is not in 1 … 1000"))),
+    };
     ChangeDetector::new(thresholds.0, thresholds.1)
         .map_err(|error| Error::argument("alarm", error.to_string()))
 }
@@ -87,20 +96,21 @@ fn mean(w: f64) -> Steps {
     Steps { distribution, integral: x * distribution + density(x) }
 }
 
-/// The steps of the chart of the variance, (z^2/2 - ln 2)/2: with s = z^2 at w and F the distribution function of
-/// chi-square with one degree of freedom,
+/// The steps of the chart of the variance, (s/2 - m ln 2)/2: with F_m the distribution function of chi-square with m degrees
+/// of freedom,
 ///
 /// ```text
-/// s = 4 w + 2 ln 2,     4 G = (s - 1) F(s) + 2 sqrt(s) phi(sqrt(s))
+/// s = 4 w + 2 m ln 2,     4 G = s F_m(s) - m F_(m+2)(s)
 /// ```
-fn variance(w: f64) -> Steps {
-    let square = 4.0 * w + 2.0 * LN_2;
+fn variance(w: f64, outputs: usize) -> Steps {
+    let degrees = outputs as f64;
+    let square = 4.0 * w + 2.0 * degrees * LN_2;
     if square <= 0.0 {
         return Steps::default();
     }
-    let z = square.sqrt();
-    let distribution = erf(z / SQRT_2);
-    Steps { distribution, integral: ((square - 1.0) * distribution + 2.0 * z * density(z)) / 4.0 }
+    let distribution = gamma_lr(degrees / 2.0, square / 2.0);
+    let next = gamma_lr(degrees / 2.0 + 1.0, square / 2.0);
+    Steps { distribution, integral: (square * distribution - degrees * next) / 4.0 }
 }
 
 /// phi, the density of the normal distribution.
@@ -113,7 +123,7 @@ fn density(x: f64) -> f64 {
 ///
 /// The steps are log-likelihood ratios, so that L >= exp(h) (Lorden, Procedures for reacting to a change in distribution,
 /// 1971): h lies between 0 and ln L.
-fn threshold(interval: f64, steps: fn(f64) -> Steps) -> f64 {
+fn threshold(interval: f64, steps: impl Fn(f64) -> Steps + Copy) -> f64 {
     let excess = |h: f64| (average_run_length(h, steps) / interval).ln();
     let (mut low, mut high) = (0.0, interval.ln());
     let (mut below, mut above) = (-(interval * (1.0 - steps(0.0).distribution)).ln(), excess(high));
@@ -136,14 +146,14 @@ fn threshold(interval: f64, steps: fn(f64) -> Steps) -> f64 {
 }
 
 /// L for a start at 0, the error in 1/m^2 taken off.
-fn average_run_length(threshold: f64, steps: fn(f64) -> Steps) -> f64 {
+fn average_run_length(threshold: f64, steps: impl Fn(f64) -> Steps + Copy) -> f64 {
     let coarse = on_points(STRETCHES / 2, threshold, steps);
     let fine = on_points(STRETCHES, threshold, steps);
     fine + (fine - coarse) / 3.0
 }
 
 /// L for a start at 0 by collocation at m + 1 points: (I - P) L = 1.
-fn on_points(intervals: usize, threshold: f64, steps: fn(f64) -> Steps) -> f64 {
+fn on_points(intervals: usize, threshold: f64, steps: impl Fn(f64) -> Steps + Copy) -> f64 {
     let width = threshold / intervals as f64;
     let points = intervals + 1;
     // F and G at all differences of two points, from -m d to m d.

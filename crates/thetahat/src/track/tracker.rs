@@ -157,7 +157,7 @@ impl Tracker {
             stage,
             has_estimate: plan.start.0 != thetahat_core::Start::Exact,
             settling: 2 * parameters + 20,
-            detector: plan.alarm_interval.map(change_detector).transpose()?,
+            detector: plan.alarm_interval.map(|interval| change_detector(interval, 1)).transpose()?,
             score: TrackScore::default(),
             inputs: vec![f64::NAN; inputs],
             room: Room::default(),

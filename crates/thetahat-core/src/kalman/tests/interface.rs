@@ -34,6 +34,62 @@ fn a_measurement_above_the_gate_is_not_used() {
     }
 }
 
+/// What each of these measurements of a level becomes, and how many in a row were above the gate after it.
+fn gate_of<const K: usize>(filter: &mut Filter<1>, measurements: [f64; K]) -> [(Action, u16); K] {
+    let one = Vector1::new(1.0);
+    let (model, sensor) = (transition(&one, &(0.01 * one)), observation::<f64, 1, 1>(&one, &one));
+    measurements.map(|y| {
+        filter.predict(&model, &NONE).unwrap();
+        let action = filter.correct(&sensor, &NONE, &Vector1::new(y)).unwrap().action;
+        (action, filter.gated_in_a_row())
+    })
+}
+
+#[test]
+fn a_gate_that_locks_out_says_so_and_lets_go_where_it_may() {
+    use Action::{Gated, Missing, Released, Updated};
+
+    let one = Vector1::new(1.0);
+    let given: Filter<1> = filter(&Vector1::zeros(), &one).with_gate(9.0).unwrap();
+    assert_eq!((given.release(), given.gated_in_a_row()), (0, 0));
+    // It never lets go by itself, and tells how long that has been so.
+    let mut locked = given.clone();
+    let actions = gate_of(&mut locked, [100.0; 400]);
+    assert!(actions.iter().enumerate().all(|(k, &found)| found == (Gated, k as u16 + 1)));
+    assert_eq!(gate_of(&mut locked, [0.5]), [(Updated, 0)]);
+
+    // After three in a row it lets go, until one is within again; a missing one says nothing.
+    let mut released = given.clone().with_release(3);
+    let actions = gate_of(&mut released, [100.0, 100.0, f64::NAN, 100.0, 100.0, f64::NAN, 100.0]);
+    let expected =
+        [(Gated, 1), (Gated, 2), (Missing, 2), (Gated, 3), (Released, 4), (Missing, 4), (Released, 5)];
+    assert_eq!(actions, expected);
+    let actions = gate_of(&mut released, [100.0; 40]);
+    let first = actions.iter().position(|&(action, _)| action == Updated).unwrap();
+    assert!(actions[..first].iter().all(|&(action, _)| action == Released));
+    assert!(actions[first..].iter().all(|&found| found == (Updated, 0)) && first < 30, "{first}");
+    // Then it counts anew.
+    assert_eq!(
+        gate_of(&mut released, [0.0, 0.0, 0.0, 0.0]).map(|(action, _)| action),
+        [Gated, Gated, Gated, Released]
+    );
+    // An outlier alone is none of that, and one that is within starts the count anew.
+    let mut filter = given.with_release(1);
+    let actions = gate_of(&mut filter, [0.0, 50.0, 0.0, 50.0, 0.0]).map(|(action, _)| action);
+    assert_eq!(actions, [Updated, Gated, Updated, Gated, Updated]);
+    // It goes with the size, and a released measurement is weighed as any other.
+    let free = filter.clone().with_gate(f64::INFINITY).unwrap();
+    let copies = [filter.clone(), filter.to_size(Const::<1>).unwrap()];
+    for mut copy in copies {
+        let mut free = free.clone();
+        gate_of(&mut copy, [50.0]);
+        gate_of(&mut free, [f64::NAN]);
+        assert_eq!(gate_of(&mut copy, [50.0]), [(Released, 2)]);
+        gate_of(&mut free, [50.0]);
+        assert_eq!((copy.state(), copy.covariance()), (free.state(), free.covariance()));
+    }
+}
+
 #[test]
 fn a_measurement_that_is_missing_changes_nothing_and_says_so() {
     let mut noise = Noise(1);

@@ -210,6 +210,37 @@ fn another_start_knows_nothing_of_the_noise() {
 }
 
 #[test]
+fn what_is_given_to_start_from_stays_whatever_the_order() {
+    let parameters = Vector2::new(1.0, 2.0);
+    let covariance = Covariance::from_diagonal(&Vector2::new(0.3, 0.2)).unwrap();
+    let new = || estimator::<f64, 2>(Forgetting::Exponential { factor: 0.9 });
+    for start in [Start::Standard, Start::Exact, Start::Mixed { blend: 3 }] {
+        let orders = [
+            [
+                new().with_parameters(parameters).unwrap().with_start(start).unwrap(),
+                new().with_start(start).unwrap().with_parameters(parameters).unwrap(),
+            ],
+            [
+                new().with_covariance(covariance.clone()).unwrap().with_start(start).unwrap(),
+                new().with_start(start).unwrap().with_covariance(covariance.clone()).unwrap(),
+            ],
+        ];
+        for [mut first, mut second] in orders {
+            assert_eq!(first.parameters(), second.parameters());
+            assert_eq!(first.covariance(), second.covariance());
+            for (phi, y) in samples(52, &Vector2::new(1.0, -1.0), 0.1, 30) {
+                assert_eq!(debug(&first.update(&phi, y)), debug(&second.update(&phi, y)));
+                assert_eq!(first.parameters(), second.parameters());
+                assert_eq!(first.covariance(), second.covariance());
+            }
+        }
+    }
+    let given = new().with_parameters(parameters).unwrap().with_start(Start::Exact).unwrap();
+    assert_eq!(*given.parameters(), parameters);
+    assert_eq!(given.covariance(), new().covariance());
+}
+
+#[test]
 fn a_spread_that_forgetting_would_carry_over_is_refused() {
     let scales = Vector2::new(1e-9, 1.0_f32);
     let factor = 0.9;

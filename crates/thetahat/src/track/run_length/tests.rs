@@ -1,4 +1,7 @@
-use thetahat_core::{Action, Chart, Innovation};
+use thetahat_core::nalgebra::{Matrix2, Matrix3x2, SVector, Vector2, Vector3};
+use thetahat_core::{
+    Action, Chart, Covariance, Innovation, KalmanFilter, LinearObservation, LinearTransition,
+};
 
 use super::*;
 use crate::regression::noise::Noise;
@@ -27,7 +30,8 @@ fn run_lengths_are_those_of_the_tables() {
 
 #[test]
 fn integrals_are_those_of_the_distributions() {
-    for steps in [mean, variance] {
+    let one = |w| variance(w, 1);
+    for steps in [&mean as &dyn Fn(f64) -> Steps, &one, &|w| variance(w, 2), &|w| variance(w, 5)] {
         for w in [-0.3466, -0.2, 0.0, 0.7, 2.5] {
             let half = 1e-5;
             let slope = (steps(w + half).integral - steps(w - half).integral) / (2.0 * half);
@@ -37,12 +41,12 @@ fn integrals_are_those_of_the_distributions() {
         assert!((steps(50.0).distribution - 1.0).abs() < 1e-15);
     }
     // P(z^2 < 1) = 0.6827 at w = (1/2 - ln 2)/2.
-    assert!((variance((0.5 - LN_2) / 2.0).distribution - 0.682_689_492_137).abs() < 1e-10);
+    assert!((one((0.5 - LN_2) / 2.0).distribution - 0.682_689_492_137).abs() < 1e-10);
 }
 
 #[test]
 fn thresholds_make_the_intervals_they_are_for() {
-    for steps in [mean, variance] {
+    for steps in [&mean as &dyn Fn(f64) -> Steps, &|w| variance(w, 1), &|w| variance(w, 4)] {
         for interval in [20.0, 500.0, 4e4, 4e9] {
             let found = average_run_length(threshold(interval, steps), steps);
             assert!((found / interval - 1.0).abs() < 2.0 * PRECISION, "{interval}: {found}");
@@ -67,7 +71,7 @@ fn alarms(detector: &mut ChangeDetector<f64>, samples: usize) -> [f64; 3] {
 #[test]
 fn false_alarms_come_as_often_as_asked() {
     let (interval, samples) = (500.0, 1_000_000);
-    let found = alarms(&mut change_detector(interval).unwrap(), samples);
+    let found = alarms(&mut change_detector(interval, 1).unwrap(), samples);
     let expected = samples as f64 / interval;
     for (found, share) in found.into_iter().zip([0.25, 0.25, 0.5]) {
         let expected = share * expected;
@@ -76,10 +80,70 @@ fn false_alarms_come_as_often_as_asked() {
     }
 }
 
+/// The number of alarms that a detector gives of a filter with three sensors of a wandering position and its speed, whose
+/// model is right but for the variances of two sensors, which are `factor` times as large. Each measurement is missing in
+/// `missing` of 1000 samples.
+fn alarms_of_a_filter(detector: &mut ChangeDetector<f64>, samples: usize, factor: f64, missing: u32) -> f64 {
+    let diagonal = |entries: [f64; 3]| Covariance::from_diagonal(&entries.into()).unwrap();
+    let noise = Covariance::from_diagonal(&Vector2::new(0.0, 0.04)).unwrap();
+    let motion = LinearTransition::new(Matrix2::new(0.95, 0.1, 0.0, 0.9), noise).unwrap();
+    let rows = Matrix3x2::new(1.0, 0.0, 0.0, 1.0, 1.0, 1.0);
+    let variances = [0.5, 0.1, 0.3];
+    let sensors = LinearObservation::new(rows, diagonal(variances)).unwrap();
+    let prior = Covariance::from_diagonal(&Vector2::new(1.0, 1.0)).unwrap();
+    let mut filter = KalmanFilter::new(Vector2::zeros(), prior).unwrap();
+    let (mut noise, mut alarms, none) = (Noise(8), 0.0, SVector::zeros());
+    let mut state = Vector2::new(gaussian(&mut noise), gaussian(&mut noise));
+    for _ in 0..samples {
+        let factors = [1.0, factor, factor];
+        let error = Vector3::from_fn(|row, _| (variances[row] * factors[row]).sqrt() * gaussian(&mut noise));
+        let measured = (rows * state + error)
+            .map(|y| if (noise.next() + 1.0) * 500.0 < f64::from(missing) { f64::NAN } else { y });
+        let innovation = filter.correct(&sensors, &none, &measured).unwrap();
+        alarms += f64::from(u8::from(detector.update_all(&innovation).is_some()));
+        filter.predict(&motion, &none).unwrap();
+        state = motion.state_matrix() * state + Vector2::new(0.0, 0.2 * gaussian(&mut noise));
+    }
+    alarms
+}
+
+#[test]
+fn false_alarms_of_a_filter_come_as_often_as_asked() {
+    let (interval, samples) = (500.0, 300_000);
+    let expected = samples as f64 / interval;
+    let mut detector = change_detector(interval, 3).unwrap();
+    assert_eq!(detector.threshold(Chart::MeanUp), f64::INFINITY);
+    let found = alarms_of_a_filter(&mut detector, samples, 1.0, 0);
+    // Four standard deviations of a Poisson process.
+    assert!((found - expected).abs() < 4.0 * expected.sqrt(), "{found} {expected}");
+    // With measurements missing the steps are those of fewer degrees of freedom.
+    let found = alarms_of_a_filter(&mut detector, samples, 1.0, 200);
+    std::println!("missing {found} {expected}");
+    assert!((found - expected).abs() < 0.3 * expected, "{found} {expected}");
+    // Twice the variance of two sensors is found within some samples.
+    let found = alarms_of_a_filter(&mut detector, 2_000, 2.0, 0);
+    std::println!("changed {found}");
+    assert!(found > 100.0, "{found}");
+}
+
+#[test]
+fn the_number_of_outputs_is_checked() {
+    for outputs in [0, 1001] {
+        assert!(matches!(change_detector(100.0, outputs), Err(Error::Argument { .. })));
+    }
+    // More outputs tell more of a change, and of chance.
+    let thresholds = [2, 3, 10, 1000].map(|outputs| change_detector(1e4, outputs).unwrap());
+    let thresholds = thresholds.map(|detector| detector.threshold(Chart::Variance));
+    assert!(
+        thresholds.iter().all(|&threshold| threshold > 4.0 && threshold < 1e4_f64.ln()),
+        "{thresholds:?}"
+    );
+}
+
 #[test]
 fn an_interval_that_makes_no_sense_is_refused() {
     for interval in [f64::NAN, 9.0, -1.0, f64::INFINITY, 2e9] {
-        assert!(matches!(change_detector(interval), Err(Error::Argument { .. })));
+        assert!(matches!(change_detector(interval, 1), Err(Error::Argument { .. })));
     }
-    assert!(change_detector(10.0).is_ok() && change_detector(1e9).is_ok());
+    assert!(change_detector(10.0, 1).is_ok() && change_detector(1e9, 1).is_ok());
 }

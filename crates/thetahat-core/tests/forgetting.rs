@@ -10,13 +10,20 @@ use thetahat_core::{Forgetting, Real, RecursiveLeastSquares};
 
 const RUNS: u64 = 200;
 
-/// SplitMix64 (Steele, Lea and Flood 2014), and normal numbers of it (Box and Muller 1958).
-struct Noise(u64);
+/// SplitMix64 (Steele, Lea and Flood 2014), and normal numbers of it by twos (Box and Muller 1958).
+struct Noise {
+    state: u64,
+    spare: Option<f64>,
+}
 
 impl Noise {
+    fn new(seed: u64) -> Self {
+        Noise { state: seed, spare: None }
+    }
+
     fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut bits = self.0;
+        self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut bits = self.state;
         bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         bits ^ (bits >> 31)
@@ -28,7 +35,12 @@ impl Noise {
     }
 
     fn normal(&mut self) -> f64 {
-        (-2.0 * self.uniform().ln()).sqrt() * (std::f64::consts::TAU * self.uniform()).cos()
+        self.spare.take().unwrap_or_else(|| {
+            let radius = (-2.0 * self.uniform().ln()).sqrt();
+            let (sine, cosine) = (std::f64::consts::TAU * self.uniform()).sin_cos();
+            self.spare = Some(radius * sine);
+            radius * cosine
+        })
     }
 
     /// Normal numbers of variance 1, each two of them with this correlation.
@@ -109,7 +121,7 @@ fn after_a_jump<T: Real, const K: usize>(subject: Subject<T>, correlation: f64) 
     });
     let jump = jump * (1.8 / jump.norm());
     mean(|seed| {
-        let (mut noise, mut run, mut theta) = (Noise(seed), subject.estimator::<K>(), truth::<K>());
+        let (mut noise, mut run, mut theta) = (Noise::new(seed), subject.estimator::<K>(), truth::<K>());
         for k in 0..1500 {
             if k == 1000 {
                 theta += jump;
@@ -125,7 +137,7 @@ fn after_a_jump<T: Real, const K: usize>(subject: Subject<T>, correlation: f64) 
 /// sequence of 1 and -1, and a jump of norm 0.69.
 fn after_a_jump_of_a_plant<T: Real>(subject: Subject<T>) -> f64 {
     mean(|seed| {
-        let (mut noise, mut run) = (Noise(1000 + seed), subject.estimator::<4>());
+        let (mut noise, mut run) = (Noise::new(1000 + seed), subject.estimator::<4>());
         let mut theta = SVector::<f64, 4>::new(-1.2, 0.5, 1.0, 0.5);
         let mut phi = SVector::<f64, 4>::zeros();
         for k in 0..1500 {
@@ -161,7 +173,7 @@ fn in_silence<T: Real, const K: usize>(
     runs: u64,
 ) -> f64 {
     let largest = |seed| {
-        let (mut noise, mut run, theta) = (Noise(2000 + seed), subject.estimator::<K>(), truth::<K>());
+        let (mut noise, mut run, theta) = (Noise::new(2000 + seed), subject.estimator::<K>(), truth::<K>());
         let (mut held, mut largest) = (SVector::zeros(), 0.0_f64);
         for k in 0..1000 + steps {
             let mut phi = noise.correlated::<K>(correlation);
@@ -188,7 +200,7 @@ fn in_silence<T: Real, const K: usize>(
 /// `walk` times the variance of the noise.
 fn coverage<T: Real>(subject: Subject<T>, walk: f64) -> f64 {
     mean(|seed| {
-        let (mut noise, mut run, mut theta) = (Noise(3000 + seed), subject.estimator::<4>(), truth::<4>());
+        let (mut noise, mut run, mut theta) = (Noise::new(3000 + seed), subject.estimator::<4>(), truth::<4>());
         let mut covered = 0.0;
         for k in 1..=2000 {
             let phi = noise.correlated(0.95);
@@ -205,7 +217,7 @@ fn coverage<T: Real>(subject: Subject<T>, walk: f64) -> f64 {
 /// The same for the plant in closed loop: u = 0.3 (r - y), where r is 1 or -1, for 200 samples each.
 fn coverage_in_closed_loop<T: Real>(subject: Subject<T>, walk: f64) -> f64 {
     mean(|seed| {
-        let (mut noise, mut run) = (Noise(4000 + seed), subject.estimator::<4>());
+        let (mut noise, mut run) = (Noise::new(4000 + seed), subject.estimator::<4>());
         let mut theta = SVector::<f64, 4>::new(-1.2, 0.5, 0.5, 0.25);
         let (mut phi, mut covered) = (SVector::<f64, 4>::zeros(), 0.0);
         let phase = seed as usize;

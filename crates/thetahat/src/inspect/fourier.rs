@@ -1,6 +1,6 @@
 //! The discrete Fourier transform of real signals.
 
-use std::f64::consts::TAU;
+use std::f64::consts::PI;
 
 use thetahat_core::nalgebra::Complex;
 
@@ -15,7 +15,7 @@ use thetahat_core::nalgebra::Complex;
 /// There is one length in one place, and no need for speed: a library for all lengths would be a sixth of what the compiler
 /// makes of this crate.
 pub(super) struct RealTransform {
-    /// exp(-i 2 pi k/L), k = 0 … L/2 - 1.
+    /// exp(-i pi k/m) at m + k, for each power of two m up to L/2 and k = 0 … m - 1.
     turns: Vec<Complex<f64>>,
     /// Of half the length.
     halves: Vec<Complex<f64>>,
@@ -25,9 +25,11 @@ impl RealTransform {
     /// For signals of this length.
     pub(super) fn new(length: usize) -> Self {
         debug_assert!(length.is_power_of_two() && length >= 4);
-        let half = length / 2;
-        let turn = |k: usize| unit(-TAU * k as f64 / length as f64);
-        Self { turns: (0..half).map(turn).collect(), halves: vec![Complex::default(); half] }
+        let turn = |position: usize| {
+            let size = 1_usize << position.checked_ilog2().unwrap_or(0);
+            unit(-PI * (position % size) as f64 / size as f64)
+        };
+        Self { turns: (0..length).map(turn).collect(), halves: vec![Complex::default(); length / 2] }
     }
 
     /// |X_k|^2 of a signal, for each k.
@@ -39,10 +41,10 @@ impl RealTransform {
         }
         let mut size = 1;
         while size < half {
-            let step = half / size;
+            let turns = &self.turns[size..2 * size];
             for block in self.halves.chunks_exact_mut(2 * size) {
                 let (even, odd) = block.split_at_mut(size);
-                for ((even, odd), turn) in even.iter_mut().zip(odd).zip(self.turns.iter().step_by(step)) {
+                for ((even, odd), turn) in even.iter_mut().zip(odd).zip(turns) {
                     let turned = *odd * turn;
                     (*even, *odd) = (*even + turned, *even - turned);
                 }
@@ -53,7 +55,7 @@ impl RealTransform {
             let (here, mirrored) = (self.halves[k % half], self.halves[(half - k) % half].conj());
             let (even, odd) = ((here + mirrored).scale(0.5), (here - mirrored).scale(0.5));
             // At k = L/2 the turn is by pi.
-            let turn = self.turns.get(k).copied().unwrap_or(Complex::new(-1.0, 0.0));
+            let turn = self.turns.get(half + k).copied().unwrap_or(Complex::new(-1.0, 0.0));
             let turned = Complex::<f64>::i() * turn * odd;
             (even - turned).norm_sqr()
         })
@@ -68,6 +70,8 @@ fn unit(angle: f64) -> Complex<f64> {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::TAU;
+
     use super::*;
 
     #[test]

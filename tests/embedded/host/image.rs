@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 
 use object::read::elf::ElfFile32;
-use object::{Object, ObjectSection, ObjectSymbol, RelocationTarget, SymbolKind};
+use object::{Object, ObjectSection, ObjectSymbol, RelocationTarget, SectionKind, SymbolKind};
 
 /// Parts of symbols that mean panics, their messages, or an allocator.
 const UNWANTED_SYMBOLS: [&str; 5] = ["panic", "unwind", "_failed", "3fmt", "alloc"];
@@ -17,13 +17,15 @@ const UNWANTED_TEXTS: [&str; 6] = [".rs", "panic", "unwrap", "attempt to", "out 
 /// The shortest run of letters that is taken for a text.
 const SHORTEST_TEXT: usize = 6;
 
-/// An image that was linked with its relocations.
+/// A firmware image.
 pub(crate) struct Image {
+    /// The bytes of code and data.
+    pub(crate) size: u64,
     symbols: Vec<String>,
     texts: Vec<String>,
     /// The size of each function, by its address.
     functions: BTreeMap<u64, u64>,
-    /// From where in the code to which function.
+    /// From where in the code to which function, if it was linked with its relocations.
     references: Vec<(u64, u64)>,
 }
 
@@ -32,6 +34,7 @@ impl Image {
         let data = fs::read(path).map_err(|error| format!("{}: {error}", path.display()))?;
         let file: ElfFile32<'_> = ElfFile32::parse(&*data)?;
         let mut image = Image {
+            size: 0,
             symbols: Vec::new(),
             texts: Vec::new(),
             functions: BTreeMap::new(),
@@ -42,6 +45,11 @@ impl Image {
             if symbol.kind() == SymbolKind::Text && symbol.size() > 0 {
                 image.functions.insert(even(symbol.address()), symbol.size());
             }
+        }
+        let loaded =
+            [SectionKind::Text, SectionKind::ReadOnlyData, SectionKind::Data, SectionKind::UninitializedData];
+        for section in file.sections().filter(|section| loaded.contains(&section.kind())) {
+            image.size += section.size();
         }
         let code = file.section_by_name(".text").ok_or("no .text")?;
         let texts = code.data()?.split(|byte| !(b' '..=b'~').contains(byte));

@@ -1,8 +1,8 @@
-//! Judges the firmware: the bits it printed, what the bare image holds, what each step cost.
+//! Judges the firmware: the bits it printed, what the bare image holds, what each step cost, how large images are.
 //!
-//! `check FOLDER` reads, for each level of optimisation, the images and the output of the reporting one. It
-//! prints the table of costs, and compares it with `budgets.md` and with the README. `--write` renews the
-//! README's table instead. `--bits` compares the bits alone: for this program in its other build.
+//! `check FOLDER` reads, in Cargo's target folder, the images for each processor and level of optimisation and the output
+//! of the reporting one. It prints the tables of costs and sizes, and compares them with `budgets.md` and with the
+//! README. `--write` renews the README's tables instead. `--bits` compares the bits alone: for this program in its other build.
 
 mod image;
 mod log;
@@ -15,10 +15,24 @@ use std::{env, fs};
 
 use crate::image::Image;
 use crate::log::Log;
-use crate::table::{Costs, Table};
+use crate::table::{Costs, IMAGES, Kind, STEPS, Table};
 
 /// The profiles the firmware was built with, and the levels of optimisation they stand for.
 const LEVELS: [(&str, &str); 2] = [("fast", "3"), ("small", "s")];
+
+/// The processor on which the steps are run.
+const FIRMWARE: &str = "thumbv7em-none-eabihf";
+
+/// The processors for which images are measured, and the profiles they are built with.
+const PROCESSORS: [&str; 3] = [FIRMWARE, "thumbv6m-none-eabi", "riscv32imc-unknown-none-elf"];
+const SMALL: [&str; 2] = ["small", "tiny"];
+
+/// The images with one estimator.
+const ALONE: [(&str, &str); 3] = [
+    ("KalmanFilter, 2 x 1", "alone-kalman"),
+    ("RecursiveLeastSquares, n = 4", "alone-least-squares"),
+    ("RecursiveArx, ARX(2, 2)", "alone-arx"),
+];
 
 const BUDGETS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/budgets.md");
 const README: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../README.md");
@@ -53,7 +67,7 @@ fn bits(folder: &Path) -> Result<Vec<Log>, Box<dyn Error>> {
     let expected = log::expected()?;
     let mut logs = Vec::new();
     for (profile, level) in LEVELS {
-        let log = Log::read(&folder.join(profile).join("report.log"))?;
+        let log = Log::read(&folder.join(FIRMWARE).join(profile).join("report.log"))?;
         if let Some(difference) = log.first_difference(&expected) {
             return Err(format!("opt-level {level}: {difference}").into());
         }
@@ -62,28 +76,52 @@ fn bits(folder: &Path) -> Result<Vec<Log>, Box<dyn Error>> {
     Ok(logs)
 }
 
-/// Checks everything. Returns what is wrong with the table.
+/// Checks everything. Returns what is wrong with the tables.
 fn costs(folder: &Path, write: bool) -> Result<Vec<String>, Box<dyn Error>> {
-    let mut measured = Table::default();
+    let mut measured = Table::new(&STEPS);
     for ((profile, level), log) in LEVELS.into_iter().zip(bits(folder)?) {
-        let [bare, report] = ["bare", "report"].map(|name| Image::read(&folder.join(profile).join(name)));
+        let path = |name| folder.join(FIRMWARE).join(profile).join(name);
+        let [bare, report] = ["bare", "report"].map(|name| Image::read(&path(name)));
         let (bare, report) = (bare?, report?);
         check_bare(&bare, &report, log.steps.len()).map_err(|error| format!("opt-level {level}: {error}"))?;
         for step in &log.steps {
             let code =
                 report.reach(step.address).ok_or_else(|| format!("{}: not in the image", step.name))?;
             let (typical, worst) = step.instructions()?;
-            measured.add(&step.name, step.ram, Costs { code, stack: step.stack, typical, worst });
+            measured.add_costs(&step.name, step.ram, Costs { code, stack: step.stack, typical, worst });
         }
     }
-    println!("{measured}");
+    let mut faults = judge(&STEPS, &measured, write)?;
+    faults.extend(judge(&IMAGES, &images(folder)?, write)?);
+    Ok(faults)
+}
 
-    let mut faults = measured.above(&Table::read(&fs::read_to_string(BUDGETS)?)?);
+/// How large the images with one estimator are. They hold neither panics nor an allocator.
+fn images(folder: &Path) -> Result<Table, Box<dyn Error>> {
+    let mut measured = Table::new(&IMAGES);
+    for (estimator, name) in ALONE {
+        for (processor, profile) in
+            PROCESSORS.iter().flat_map(|processor| SMALL.map(|small| (processor, small)))
+        {
+            let image = Image::read(&folder.join(processor).join(profile).join(name))?;
+            if let [first, ..] = &image.unwanted()[..] {
+                return Err(format!("{name} for {processor}, {profile}: the image holds {first}").into());
+            }
+            measured.add(estimator, image.size);
+        }
+    }
+    Ok(measured)
+}
+
+/// Prints what was measured. Returns what is above its budget, or not as the README says; or renews the README.
+fn judge(kind: &'static Kind, measured: &Table, write: bool) -> Result<Vec<String>, Box<dyn Error>> {
+    println!("{measured}");
+    let mut faults = measured.above(&Table::read(kind, &fs::read_to_string(BUDGETS)?)?);
     let readme = fs::read_to_string(README)?;
     if write {
-        fs::write(README, table::replace(&readme, &measured)?)?;
+        fs::write(README, table::replace(&readme, measured)?)?;
     } else {
-        match table::find(&readme).and_then(Table::read) {
+        match table::find(kind, &readme).and_then(|text| Table::read(kind, text)) {
             Ok(written) => faults.extend(measured.apart(&written, MARGIN_PERCENT)),
             Err(error) => faults.push(error.to_string()),
         }

@@ -1,15 +1,26 @@
-//! The table of costs, in Markdown: measured, as budgets, and in the README.
+//! Tables of costs, in Markdown: measured, as budgets, and in the README.
 
 use std::error::Error;
 use std::fmt;
 
-/// What surrounds the table in the README.
-const BEGIN: &str = "<!-- embedded: written by tests/embedded/run --write -->\n";
-const END: &str = "<!-- /embedded -->\n";
+/// A table that is measured: where the README has it, and its columns.
+pub(crate) struct Kind {
+    name: &'static str,
+    /// The name of the row, then its figures.
+    columns: &'static [&'static str],
+}
 
-/// The name of the step, then its figures.
-const COLUMNS: [&str; 10] =
-    ["f32", "RAM", "O3 code", "stack", "typical", "worst", "Os code", "stack", "typical", "worst"];
+/// What a step costs: the name of the step, then its figures.
+pub(crate) static STEPS: Kind = Kind {
+    name: "embedded",
+    columns: &["f32", "RAM", "O3 code", "stack", "typical", "worst", "Os code", "stack", "typical", "worst"],
+};
+
+/// How large an image is: the estimator in it, then the processors at both levels that save code.
+pub(crate) static IMAGES: Kind = Kind {
+    name: "images",
+    columns: &["f32", "M4F, s", "M4F, z", "M0+, s", "M0+, z", "RV32IMC, s", "RV32IMC, z"],
+};
 
 /// What one step costs at one level of optimisation.
 pub(crate) struct Costs {
@@ -24,34 +35,53 @@ pub(crate) struct Costs {
 }
 
 /// Rows of a name and its figures.
-#[derive(Default)]
-pub(crate) struct Table(Vec<(String, Vec<u64>)>);
+pub(crate) struct Table {
+    kind: &'static Kind,
+    rows: Vec<(String, Vec<u64>)>,
+}
 
 impl Table {
+    /// A table without rows.
+    pub(crate) fn new(kind: &'static Kind) -> Self {
+        Table { kind, rows: Vec::new() }
+    }
+
     /// Adds the costs at one level to the step's row.
-    pub(crate) fn add(&mut self, name: &str, ram: u64, costs: Costs) {
-        let row = self.0.iter_mut().find(|(known, _)| known == name);
-        let costs = [costs.code, costs.stack, costs.typical, costs.worst];
-        match row {
-            Some((_, figures)) => figures.extend(costs),
-            None => self.0.push((name.to_owned(), [ram].into_iter().chain(costs).collect())),
+    pub(crate) fn add_costs(&mut self, name: &str, ram: u64, costs: Costs) {
+        if self.rows.iter().all(|(known, _)| known != name) {
+            self.add(name, ram);
+        }
+        for figure in [costs.code, costs.stack, costs.typical, costs.worst] {
+            self.add(name, figure);
         }
     }
 
-    /// Reads the table in a text of Markdown.
-    pub(crate) fn read(text: &str) -> Result<Self, Box<dyn Error>> {
-        let mut rows = Vec::new();
-        for line in text.lines().filter(|line| line.starts_with('|')).skip(2) {
-            let mut cells = line.trim_matches('|').split('|').map(str::trim);
-            let name = cells.next().unwrap_or_default().to_owned();
-            let figures: Result<Vec<u64>, _> = cells.map(str::parse).collect();
-            let figures = figures.map_err(|error| format!("{error}: {line}"))?;
-            if figures.len() + 1 != COLUMNS.len() {
-                return Err(format!("{} cells expected: {line}", COLUMNS.len()).into());
-            }
-            rows.push((name, figures));
+    /// Adds a figure to the row of this name.
+    pub(crate) fn add(&mut self, name: &str, figure: u64) {
+        match self.rows.iter_mut().find(|(known, _)| known == name) {
+            Some((_, figures)) => figures.push(figure),
+            None => self.rows.push((name.to_owned(), vec![figure])),
         }
-        Ok(Table(rows))
+    }
+
+    /// Reads the table of this kind in a text of Markdown.
+    pub(crate) fn read(kind: &'static Kind, text: &str) -> Result<Self, Box<dyn Error>> {
+        let cells = |line: &str| -> Vec<String> {
+            line.trim_matches('|').split('|').map(|cell| cell.trim().to_owned()).collect()
+        };
+        let mut table = Table::new(kind);
+        let lines = text.lines().skip_while(|line| cells(line) != kind.columns).skip(2);
+        for line in lines.take_while(|line| line.starts_with('|')) {
+            let mut cells = cells(line).into_iter();
+            let name = cells.next().unwrap_or_default();
+            let figures: Result<Vec<u64>, _> = cells.map(|cell| cell.parse()).collect();
+            let figures = figures.map_err(|error| format!("{error}: {line}"))?;
+            if figures.len() + 1 != kind.columns.len() {
+                return Err(format!("{} cells expected: {line}", kind.columns.len()).into());
+            }
+            table.rows.push((name, figures));
+        }
+        Ok(table)
     }
 
     /// The figures that are above their budgets.
@@ -67,18 +97,25 @@ impl Table {
 
     /// What is wrong with the figures that are not `fine` beside their counterparts.
     fn compare(&self, other: &Table, title: &str, fine: impl Fn(u64, u64) -> bool) -> Vec<String> {
-        let lacks = |table: &Table, name: &str| table.0.iter().all(|(known, _)| known != name);
-        let only_here = self.0.iter().filter(|(name, _)| lacks(other, name));
-        let only_there = other.0.iter().filter(|(name, _)| lacks(self, name));
+        let lacks = |table: &Table, name: &str| table.rows.iter().all(|(known, _)| known != name);
+        let only_here = self.rows.iter().filter(|(name, _)| lacks(other, name));
+        let only_there = other.rows.iter().filter(|(name, _)| lacks(self, name));
         let mut faults: Vec<String> =
             only_here.map(|(name, _)| format!("{name}: not in the {title}")).collect();
         faults.extend(only_there.map(|(name, _)| format!("{name}: in the {title}, but not measured")));
-        for (name, figures) in &self.0 {
-            let Some((_, others)) = other.0.iter().find(|(known, _)| known == name) else { continue };
+        for (name, figures) in &self.rows {
+            let Some((_, others)) = other.rows.iter().find(|(known, _)| known == name) else { continue };
             for (index, (&measured, &other)) in figures.iter().zip(others).enumerate() {
                 if !fine(measured, other) {
-                    let column = COLUMNS.get(index + 1).unwrap_or(&"");
-                    let level = ["", " (O3)", " (Os)"][index.div_ceil(4)];
+                    let column = self.kind.columns.get(index + 1).unwrap_or(&"");
+                    let twice = self.kind.columns.iter().filter(|other| *other == column).count() > 1;
+                    let level = if !twice {
+                        ""
+                    } else if index < 5 {
+                        " (O3)"
+                    } else {
+                        " (Os)"
+                    };
                     faults.push(format!("{name}: {column}{level} is {measured}, {other} in the {title}"));
                 }
             }
@@ -89,8 +126,9 @@ impl Table {
 
 impl fmt::Display for Table {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let widest = self.0.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
-        let width = |index: usize| if index == 0 { widest } else { COLUMNS[index].len() };
+        let widest = self.rows.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
+        let columns = self.kind.columns;
+        let width = |index: usize| if index == 0 { widest } else { columns[index].len() };
         let mut line = |cells: &[String]| {
             for (index, cell) in cells.iter().enumerate() {
                 let width = width(index);
@@ -101,10 +139,10 @@ impl fmt::Display for Table {
             }
             writeln!(formatter)
         };
-        line(&COLUMNS.map(str::to_owned))?;
+        line(&columns.iter().map(|&column| column.to_owned()).collect::<Vec<_>>())?;
         let rule = |index| format!("{}{}", "-".repeat(width(index) - 1), if index == 0 { "-" } else { ":" });
-        line(&std::array::from_fn::<_, { COLUMNS.len() }, _>(rule))?;
-        for (name, figures) in &self.0 {
+        line(&(0..columns.len()).map(rule).collect::<Vec<_>>())?;
+        for (name, figures) in &self.rows {
             let cells: Vec<String> =
                 [name.clone()].into_iter().chain(figures.iter().map(u64::to_string)).collect();
             line(&cells)?;
@@ -113,28 +151,37 @@ impl fmt::Display for Table {
     }
 }
 
-/// The part of the README that holds the table.
-pub(crate) fn find(readme: &str) -> Result<&str, Box<dyn Error>> {
+/// What surrounds the table in the README.
+fn markers(kind: &Kind) -> [String; 2] {
+    let Kind { name, .. } = kind;
+    [format!("<!-- {name}: written by tests/embedded/run --write -->\n"), format!("<!-- /{name} -->\n")]
+}
+
+/// The part of the README that holds the table of this kind.
+pub(crate) fn find<'a>(kind: &Kind, readme: &'a str) -> Result<&'a str, Box<dyn Error>> {
+    let [begin, end] = markers(kind);
     let lacks = |line: &str| format!("README.md has no line {}", line.trim());
-    let (_, rest) = readme.split_once(BEGIN).ok_or_else(|| lacks(BEGIN))?;
-    let (table, _) = rest.split_once(END).ok_or_else(|| lacks(END))?;
+    let (_, rest) = readme.split_once(&begin).ok_or_else(|| lacks(&begin))?;
+    let (table, _) = rest.split_once(&end).ok_or_else(|| lacks(&end))?;
     Ok(table)
 }
 
-/// The README with another table.
+/// The README with another table of its kind.
 pub(crate) fn replace(readme: &str, table: &Table) -> Result<String, Box<dyn Error>> {
-    Ok(readme.replacen(&format!("{BEGIN}{}{END}", find(readme)?), &format!("{BEGIN}{table}{END}"), 1))
+    let [begin, end] = markers(table.kind);
+    let old = find(table.kind, readme)?;
+    Ok(readme.replacen(&format!("{begin}{old}{end}"), &format!("{begin}{table}{end}"), 1))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{BEGIN, Costs, END, Table, find, replace};
+    use super::{Costs, IMAGES, STEPS, Table, find, markers, replace};
 
     fn table(worst: u64) -> Table {
-        let mut table = Table::default();
+        let mut table = Table::new(&STEPS);
         for (name, ram) in [("a", 1), ("b", 2)] {
-            table.add(name, ram, Costs { code: 10, stack: 20, typical: 30, worst: 40 });
-            table.add(name, ram, Costs { code: 100, stack: 200, typical: 300, worst });
+            table.add_costs(name, ram, Costs { code: 10, stack: 20, typical: 30, worst: 40 });
+            table.add_costs(name, ram, Costs { code: 100, stack: 200, typical: 300, worst });
         }
         table
     }
@@ -142,9 +189,15 @@ mod tests {
     #[test]
     fn a_table_is_read_as_it_is_written() {
         let written = table(400).to_string();
-        assert_eq!(Table::read(&written).unwrap().to_string(), written);
+        assert_eq!(Table::read(&STEPS, &written).unwrap().to_string(), written);
+        // Another table beside it is another one.
+        let mut images = Table::new(&IMAGES);
+        (1..7).for_each(|figure| images.add("a", figure));
+        let both = format!("text\n\n{written}\n{images}\nmore\n");
+        assert_eq!(Table::read(&STEPS, &both).unwrap().to_string(), written);
+        assert_eq!(Table::read(&IMAGES, &both).unwrap().to_string(), images.to_string());
         for row in ["| c | 1 | 2 |", "| c | 1 | 2 | 3 | 4 | 5 | 6 | 7 | 8 | 9.5 |"] {
-            assert!(Table::read(&format!("{written}{row}\n")).is_err(), "{row}");
+            assert!(Table::read(&STEPS, &format!("{written}{row}\n")).is_err(), "{row}");
         }
     }
 
@@ -156,8 +209,8 @@ mod tests {
             table(401).above(&table(400)),
             ["a", "b"].map(|name| format!("{name}: worst (Os) is 401, 400 in the budget"))
         );
-        assert_eq!(table(400).above(&Table::default()).len(), 2);
-        assert_eq!(Table::default().above(&table(400)).len(), 2);
+        assert_eq!(table(400).above(&Table::new(&STEPS)).len(), 2);
+        assert_eq!(Table::new(&STEPS).above(&table(400)).len(), 2);
     }
 
     #[test]
@@ -169,10 +222,11 @@ mod tests {
 
     #[test]
     fn only_what_is_between_the_markers_is_replaced() {
-        let readme = |table: &str| format!("before\n{BEGIN}{table}{END}after\n");
+        let [begin, end] = markers(&STEPS);
+        let readme = |table: &str| format!("before\n{begin}{table}{end}after\n");
         let renewed = replace(&readme("old\n"), &table(400)).unwrap();
         assert_eq!(renewed, readme(&table(400).to_string()));
-        assert_eq!(find(&renewed).unwrap(), table(400).to_string());
+        assert_eq!(find(&STEPS, &renewed).unwrap(), table(400).to_string());
         assert!(replace("no markers", &table(400)).is_err());
     }
 }

@@ -77,9 +77,9 @@ impl ArxOrders<'_> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Line {
     /// The index of an input; the next two are those of the constant and of the residuals.
-    pub(crate) index: usize,
-    pub(crate) nb: usize,
-    pub(crate) nk: usize,
+    pub(crate) index: u16,
+    pub(crate) nb: u16,
+    pub(crate) nk: u16,
 }
 
 /// What goes into a delay line.
@@ -93,10 +93,26 @@ enum Source {
 }
 
 impl Line {
+    /// The line of an input, of the constant or of the residuals. Fails where a number does not fit.
+    fn new(index: usize, &InputOrders { nb, nk }: &InputOrders) -> Result<Self, Error> {
+        let available = usize::from(u16::MAX);
+        let narrow = |count| u16::try_from(count).ok();
+        Ok(Line {
+            index: narrow(index).ok_or(Error::Length {
+                argument: "inputs",
+                expected: available,
+                found: index,
+            })?,
+            nb: narrow(nb).ok_or(Error::Orders { needed: nb, available })?,
+            nk: narrow(nk).ok_or(Error::Delays { needed: nk, available })?,
+        })
+    }
+
     /// What goes into it, of a model with so many inputs.
     fn source(&self, inputs: usize) -> Source {
-        match self.index.checked_sub(inputs) {
-            None => Source::Input(self.index),
+        let index = usize::from(self.index);
+        match index.checked_sub(inputs) {
+            None => Source::Input(index),
             Some(0) => Source::Constant,
             Some(_) => Source::Residual,
         }
@@ -130,7 +146,7 @@ impl Line {
 /// feature `alloc` both may be `Dyn`: then they follow from the orders, and `new` allocates, and fails as a
 /// `Vec` does if there is no memory.
 ///
-/// Memory: N + D numbers, 3 N + 2 machine words. Plain data: a clone can be driven on with predicted outputs.
+/// Memory: N + D numbers, 6 N bytes and three machine words. Plain data: a clone can be driven on with predicted outputs.
 ///
 /// ```
 /// use thetahat_core::nalgebra::{Const, Vector3};
@@ -190,7 +206,7 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
     /// Empty delay lines: every earlier sample is missing.
     ///
     /// Errors: [`Error::Orders`] if the orders do not make exactly `N` parameters; [`Error::Delays`] if `D`
-    /// is too small for the delays.
+    /// is too small for the delays; these and [`Error::Length`] for an nb, an nk or a number of inputs above 65,535.
     ///
     /// ```
     /// use thetahat_core::nalgebra::Const;
@@ -234,9 +250,13 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
             .map_err(|available| Error::Delays { needed: orders.delays(), available })?;
         let mut lines = parameters.vector(Line { index: 0, nb: 0, nk: 0 });
         let others = [usize::from(orders.constant), residuals].map(|nb| InputOrders { nb, nk: 0 });
-        let in_use = orders.inputs.iter().chain(&others).enumerate().filter(|(_, input)| input.nb > 0);
-        for (line, (index, &InputOrders { nb, nk })) in lines.as_mut_slice().iter_mut().zip(in_use) {
-            *line = Line { index, nb, nk };
+        let mut places = lines.as_mut_slice().iter_mut();
+        for (index, orders) in orders.inputs.iter().chain(&others).enumerate() {
+            if orders.nb > 0
+                && let Some(line) = places.next()
+            {
+                *line = Line::new(index, orders)?;
+            }
         }
         let mut lags = Lags {
             regressor: parameters.vector(T::NAN),
@@ -246,7 +266,7 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
             inputs: orders.inputs.len(),
             awaiting_inputs: false,
         };
-        lags.gap();
+        lags.set_constant();
         Ok(lags)
     }
 
@@ -272,16 +292,16 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
     /// Step 1 of a sample, unchecked. Inputs that are not given yet are missing; `residual` is that of the sample
     /// before.
     pub(crate) fn push(&mut self, inputs: &[T], residual: T) {
-        let mut taps = self.regressor.as_mut_slice().iter_mut().skip(self.na);
-        let mut delayed = self.delayed.as_mut_slice().iter_mut();
+        let mut taps = self.regressor.as_mut_slice().get_mut(self.na..).unwrap_or_default();
+        let mut delayed = self.delayed.as_mut_slice();
         for line in self.lines.as_slice() {
             let newest = match line.source(self.inputs) {
                 Source::Input(input) => inputs.get(input).copied().unwrap_or(T::NAN),
                 Source::Constant => T::one(),
                 Source::Residual => residual,
             };
-            let arriving = shift(delayed.by_ref().take(line.nk), newest);
-            shift(taps.by_ref().take(line.nb), arriving);
+            let arriving = shift(take(&mut delayed, line.nk.into()), newest);
+            shift(take(&mut taps, line.nb.into()), arriving);
         }
     }
 
@@ -289,11 +309,10 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
     pub(crate) fn complete(&mut self, inputs: &[T]) {
         let mut delayed = self.delayed.as_mut_slice();
         for line in self.lines.as_slice() {
-            let (mine, others) = delayed.split_at_mut_checked(line.nk).unwrap_or_default();
+            let mine = take(&mut delayed, line.nk.into());
             if let (Source::Input(input), [newest, ..]) = (line.source(self.inputs), mine) {
                 *newest = inputs.get(input).copied().unwrap_or(T::NAN);
             }
-            delayed = others;
         }
         self.awaiting_inputs = false;
     }
@@ -340,7 +359,7 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
 
     /// Step 3 of a sample, unchecked.
     pub(crate) fn push_checked(&mut self, output: T) {
-        shift(self.regressor.as_mut_slice().iter_mut().take(self.na), -output);
+        shift(take(&mut self.regressor.as_mut_slice(), self.na), -output);
     }
 
     /// Takes over the samples of other lines of the same orders.
@@ -364,14 +383,14 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
     pub(crate) fn scales(&self, output: T, inputs: &[T], residual: T) -> Result<OVector<T, N>, Error> {
         check_length("input_scales", self.inputs, inputs.len())?;
         let mut scales = self.regressor.shape_generic().0.vector(output);
-        let mut taps = scales.as_mut_slice().iter_mut().skip(self.na);
+        let mut taps = scales.as_mut_slice().get_mut(self.na..).unwrap_or_default();
         for line in self.lines.as_slice() {
             let magnitude = match line.source(self.inputs) {
                 Source::Input(input) => inputs.get(input).copied().unwrap_or(T::NAN),
                 Source::Constant => T::one(),
                 Source::Residual => residual,
             };
-            taps.by_ref().take(line.nb).for_each(|scale| *scale = magnitude);
+            take(&mut taps, line.nb.into()).fill(magnitude);
         }
         Ok(scales)
     }
@@ -405,10 +424,10 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
         }
         let mut start = self.na;
         for line in self.lines.as_slice() {
-            if line.index == input && line.nb > 0 {
-                return Some(coefficients(parameters, start, line.nb, line.nk));
+            if usize::from(line.index) == input && line.nb > 0 {
+                return Some(coefficients(parameters, start, line.nb.into(), line.nk.into()));
             }
-            start += line.nb;
+            start += usize::from(line.nb);
         }
         Some(coefficients(parameters, start, 0, 0))
     }
@@ -425,7 +444,7 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
             if line.nb > 0 && line.source(self.inputs) == Source::Constant {
                 return Some(start);
             }
-            start += line.nb;
+            start += usize::from(line.nb);
         }
         None
     }
@@ -445,9 +464,14 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
     /// # Ok::<(), Error>(())
     /// ```
     pub fn gap(&mut self) {
-        self.regressor.fill(T::NAN);
-        self.delayed.fill(T::NAN);
+        self.regressor.as_mut_slice().fill(T::NAN);
+        self.delayed.as_mut_slice().fill(T::NAN);
         self.awaiting_inputs = false;
+        self.set_constant();
+    }
+
+    /// The 1 in φ that the constant is multiplied by.
+    fn set_constant(&mut self) {
         if let Some(one) =
             self.constant_place().and_then(|place| self.regressor.as_mut_slice().get_mut(place))
         {
@@ -466,9 +490,14 @@ fn coefficients<T: Real>(
     core::iter::repeat_n(T::zero(), zeros).chain(parameters.iter().skip(start).take(count).copied())
 }
 
+/// The first `count` places, which are there; `rest` is what follows them.
+fn take<'a, T>(rest: &mut &'a mut [T], count: usize) -> &'a mut [T] {
+    rest.split_off_mut(..count).unwrap_or_default()
+}
+
 /// Moves each sample one place on, the new one to the front; returns the one that falls out.
-fn shift<'a, T: Real>(line: impl Iterator<Item = &'a mut T>, new: T) -> T {
-    line.fold(new, |moving, place| core::mem::replace(place, moving))
+fn shift<T: Real>(line: &mut [T], new: T) -> T {
+    line.iter_mut().fold(new, |moving, place| core::mem::replace(place, moving))
 }
 
 pub(crate) fn is_infinite<T: Real>(sample: &T) -> bool {
@@ -646,6 +675,24 @@ mod tests {
         let most = usize::MAX;
         assert_eq!(error::<Three, One>(1, &[one(most, 1)]), orders(most, 3));
         assert_eq!(error::<Three, One>(2, &[one(1, most)]), delays(most, 1));
+    }
+
+    #[cfg(feature = "alloc")]
+    #[test]
+    fn numbers_that_a_line_does_not_hold_are_an_error() {
+        use nalgebra::Dyn;
+
+        let error = |inputs: &[InputOrders]| {
+            Lags::<f32, Dyn, Dyn>::new(&ArxOrders { na: 0, inputs, constant: false }).err()
+        };
+        let (most, available) = (65_535, 65_535);
+        assert_eq!(error(&[one(1, most)]), None);
+        assert_eq!(error(&[one(1, most + 1)]), Some(Error::Delays { needed: most + 1, available }));
+        assert_eq!(error(&[one(most + 1, 1)]), Some(Error::Orders { needed: most + 1, available }));
+        let mut many = vec![one(0, 0); most + 1];
+        many.push(one(1, 1));
+        let length = Error::Length { argument: "inputs", expected: most, found: most + 1 };
+        assert_eq!(error(&many), Some(length));
     }
 
     #[test]

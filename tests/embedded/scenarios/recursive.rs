@@ -53,7 +53,8 @@ impl Scenario for Arx {
     type Output = Innovation<f32>;
 
     fn start(_: Case) -> Result<Self, Error> {
-        RecursiveArx::new(&ArxOrders { na: 2, inputs: INPUTS, constant: false }, 1.0, &[1.0], FORGETTING).map(Arx)
+        RecursiveArx::new(&ArxOrders { na: 2, inputs: INPUTS, constant: false }, 1.0, &[1.0], FORGETTING)
+            .map(Arx)
     }
 
     fn input(case: Case, k: usize) -> Sample {

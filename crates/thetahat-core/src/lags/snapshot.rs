@@ -36,7 +36,7 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
         check_length("lags", parameters, self.regressor.len())?;
         let of_residuals = |line: &&Line| line.nb > 0 && line.source(self.inputs) == Source::Residual;
         let line = self.lines.as_slice().iter().find(of_residuals);
-        check_length("residuals", residuals, line.map_or(0, |line| line.nb))
+        check_length("residuals", residuals, line.map_or(0, |line| line.nb.into()))
     }
 }
 
@@ -60,15 +60,15 @@ impl<T: Real, N: Dimension, D: Dimension> TryFrom<Snapshot<T, N, D>> for Lags<T,
                         && match line.source(inputs) {
                             Source::Input(_) => true,
                             Source::Constant => (line.nb, line.nk) == (1, 0),
-                            Source::Residual => line.index - inputs == 1 && line.nk == 0,
+                            Source::Residual => usize::from(line.index) - inputs == 1 && line.nk == 0,
                         }
                 }
                 _ => *line == Line { index: 0, nb: 0, nk: 0 },
             };
             fits.then_some(()).ok_or(Error::OutOfRange { argument: "lines", range: "one for each input" })?;
             next = next.filter(|_| line.nb > 0).map(|_| line.index.saturating_add(1));
-            parameters = parameters.saturating_add(line.nb);
-            delays = delays.saturating_add(line.nk);
+            parameters = parameters.saturating_add(line.nb.into());
+            delays = delays.saturating_add(line.nk.into());
         }
         let available = regressor.len();
         if parameters != available {

@@ -200,7 +200,8 @@ fn in_silence<T: Real, const K: usize>(
 /// `walk` times the variance of the noise.
 fn coverage<T: Real>(subject: Subject<T>, walk: f64) -> f64 {
     mean(|seed| {
-        let (mut noise, mut run, mut theta) = (Noise::new(3000 + seed), subject.estimator::<4>(), truth::<4>());
+        let (mut noise, mut run, mut theta) =
+            (Noise::new(3000 + seed), subject.estimator::<4>(), truth::<4>());
         let mut covered = 0.0;
         for k in 1..=2000 {
             let phi = noise.correlated(0.95);
@@ -224,7 +225,7 @@ fn coverage_in_closed_loop<T: Real>(subject: Subject<T>, walk: f64) -> f64 {
         for k in 1..=4000 {
             let y = phi.dot(&theta) + 0.1 * noise.normal();
             run.update(&phi, y);
-            let reference = if (k + phase) / 200 % 2 == 0 { 1.0 } else { -1.0 };
+            let reference = if ((k + phase) / 200).is_multiple_of(2) { 1.0 } else { -1.0 };
             phi = [-y, phi[0], 0.3 * (reference - y), phi[2]].into();
             if k > 1000 && k % 100 == 0 {
                 covered += run.covered(&theta) / 30.0;

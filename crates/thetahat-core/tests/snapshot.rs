@@ -210,17 +210,17 @@ fn refuses<E: Serialize + DeserializeOwned + Debug>(estimator: &E, cases: &[(&st
     for (path, bad) in cases {
         for bad in *bad {
             let mut tampered = whole.clone();
-            *tampered.pointer_mut(path).unwrap_or_else(|| panic!("{path} in {whole}")) = bad.clone();
+            *tampered.pointer_mut(path).expect(path) = bad.clone();
             assert!(read(&tampered).is_err(), "{path} = {bad}");
         }
     }
     let mut later = whole.clone();
     later["version"] = json!(7);
-    let message = read(&later).unwrap_err();
+    let message = read(&later).expect_err("a later version");
     assert!(message.contains("of version 7, and version 1 is understood"), "{message}");
     let mut without = whole.clone();
     without.as_object_mut().expect("fields").remove("version");
-    assert!(read(&without).unwrap_err().contains("version"));
+    assert!(read(&without).expect_err("no version").contains("version"));
 }
 
 #[test]

@@ -127,6 +127,10 @@ fn threshold(interval: f64, steps: impl Fn(f64) -> Steps + Copy) -> f64 {
     let excess = |h: f64| (average_run_length(h, steps) / interval).ln();
     let (mut low, mut high) = (0.0, interval.ln());
     let (mut below, mut above) = (-(interval * (1.0 - steps(0.0).distribution)).ln(), excess(high));
+    // Where a step above 0 is rarer than that, as with many outputs, so is an alarm: the least threshold is the answer.
+    if below >= 0.0 {
+        return f64::MIN_POSITIVE;
+    }
     let mut middle = high;
     for _ in 0..60 {
         middle = low - below * (high - low) / (above - below);

@@ -41,9 +41,23 @@ pub(crate) struct Stack<'a> {
     /// The most points of a curve.
     points: usize,
     traces: Vec<Object>,
-    /// Their titles and heights.
-    panels: Vec<(String, usize)>,
+    panels: Vec<Panel>,
     curves: usize,
+}
+
+struct Panel {
+    title: String,
+    height: usize,
+    /// As much again above and below what was measured, if something was.
+    window: Option<[f64; 2]>,
+    /// Whether a curve leaves the window.
+    left: bool,
+}
+
+impl Panel {
+    fn new(title: String, height: usize) -> Self {
+        Self { title, height, window: None, left: false }
+    }
 }
 
 impl<'a> Stack<'a> {
@@ -62,11 +76,14 @@ impl<'a> Stack<'a> {
 
     /// A further panel below the others, for several curves.
     pub(crate) fn panel(&mut self, name: &str) {
-        self.panels.push((text::plain(name), HEIGHTS[1]));
+        self.panels.push(Panel::new(text::plain(name), HEIGHTS[1]));
     }
 
-    /// What was measured.
+    /// What was measured. The panel scales to it: a curve that diverges leaves the chart.
     pub(crate) fn measured(&mut self, name: &str, values: &[f64]) {
+        if let Some(panel) = self.panels.last_mut() {
+            panel.window = window(values);
+        }
         let curve = decimate(self.time, values, self.points, self.longest);
         // Wide and faint: what lies on it leaves it in sight.
         let wide = stroke(MEASURED, 4.0);
@@ -82,12 +99,15 @@ impl<'a> Stack<'a> {
 
     /// A signal in a further panel of its own.
     pub(crate) fn alone(&mut self, name: &str, values: &[f64], position: usize) {
-        self.panels.push((text::brief(name), HEIGHTS[0]));
+        self.panels.push(Panel::new(text::brief(name), HEIGHTS[0]));
         // Nothing else is there to be told apart from: no dashes.
         self.coloured(name, values, position % COLOURS.len(), false);
     }
 
     fn coloured(&mut self, name: &str, values: &[f64], position: usize, legend: bool) {
+        if let Some(Panel { window: Some([low, high]), left, .. }) = self.panels.last_mut() {
+            *left |= values.iter().any(|value| value < low || value > high);
+        }
         let curve = decimate(self.time, values, self.points, self.longest);
         let trace =
             line(&text::plain(name), curve, position).with("yaxis", self.axis()).with("showlegend", legend);
@@ -117,13 +137,16 @@ impl<'a> Stack<'a> {
 
     /// The figure.
     pub(crate) fn draw(self, title: &str, words: &str, shades: &[Shade]) -> Drawn {
-        let all: usize = self.panels.iter().map(|(_, height)| height).sum();
+        let all: usize = self.panels.iter().map(|panel| panel.height).sum();
         let mut layout = layout();
         let mut top = 1.0;
-        for (position, (title, height)) in self.panels.iter().enumerate() {
-            let below = top - *height as f64 / all as f64;
+        for (position, panel) in self.panels.iter().enumerate() {
+            let below = top - panel.height as f64 / all as f64;
             let bottom = if position + 1 == self.panels.len() { 0.0 } else { below + SPACE };
-            let own = axis(title).with("domain", json!([bottom.max(0.0), top.max(bottom)]));
+            let mut own = axis(&panel.title).with("domain", json!([bottom.max(0.0), top.max(bottom)]));
+            if let (Some(window), true) = (panel.window, panel.left) {
+                own = own.with("range", json!(window.map(significant)));
+            }
             layout = layout.with(&format!("yaxis{}", number(position + 1)), own);
             top = below;
         }
@@ -187,4 +210,41 @@ pub(crate) fn outputs(
 /// What follows the name of the axis of a panel, counted from 1: the first has no number.
 fn number(panel: usize) -> String {
     if panel > 1 { panel.to_string() } else { String::new() }
+}
+
+/// As much again above and below these values as they span; none if none of them is a number.
+fn window(values: &[f64]) -> Option<[f64; 2]> {
+    let there = values.iter().copied().filter(|value| value.is_finite());
+    let (low, high) = there
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+    let span = match high - low {
+        span if span > 0.0 => span,
+        _ if high != 0.0 => high.abs(),
+        _ => 1.0,
+    };
+    (low <= high).then_some([low - span, high + span])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_chart_scales_to_what_was_measured() {
+        let (time, measured) = ([0.0, 1.0, 2.0, 3.0], [1.0, 3.0, f64::NAN, 2.0]);
+        let range = |curve: [f64; 4]| {
+            let mut stack = Stack::new(&time, 1.0, 100);
+            stack.panel("y");
+            stack.measured("measured", &measured);
+            stack.curve("free run", &curve);
+            let chart = stack.draw("", "", &[]).map(|chart| chart.json).unwrap();
+            let figure: Value = serde_json::from_str(&chart).unwrap();
+            figure["layout"]["yaxis"]["range"].clone()
+        };
+        assert_eq!(range([1.0, 2.0, -9.0, 1e30]), json!([-1.0, 5.0]));
+        assert_eq!(range([1.0, 2.0, 4.0, f64::NAN]), Value::Null);
+        assert_eq!(window(&[f64::NAN]), None);
+        assert_eq!(window(&[-2.0, -2.0]), Some([-4.0, 0.0]));
+        assert_eq!(window(&[0.0]), Some([-1.0, 1.0]));
+    }
 }

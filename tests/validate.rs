@@ -103,9 +103,9 @@ fn the_table_says_what_the_document_says() {
     for part in [
         "arx.json, ARX(2, 2, 1), on log.csv rows 301..600: fresh",
         "\nstable\n",
-        "1 step ahead   measured",
-        "5 steps ahead  measured",
-        "free run       estimated",
+        "1 step ahead   drop",
+        "5 steps ahead  drop",
+        "free run       estimate",
         "errors one step ahead: mean square ",
         "residuals: 300 samples, fresh",
         "white (Ljung-Box)        25",

@@ -47,7 +47,7 @@ const PRECISION: f64 = 1e-6;
 ///
 /// With several outputs the chart of the variance is alone, and its L is the interval: its steps are those of chi-square with
 /// as many degrees of freedom as `outputs`. Where some are missing at times it gives alarms about as often: with three
-/// outputs, each missing in a fifth of the samples, 1.0 to 1.2 times (measured).
+/// outputs, each missing in a fifth of the samples, 0.84 times (measured).
 ///
 /// For the charts see [`ChangeDetector`]. The thresholds solve Page's integral equation (1954) to 0.1 % of the interval
 /// up to 1e6, and to 1 % at 1e9.

@@ -53,7 +53,7 @@ use crate::{
 /// # Sizes
 ///
 /// `N` is the number of parameters, [`ArxOrders::parameters`], and `D` the room for inputs on their way, at least
-/// [`ArxOrders::delays`], as for [`Lags`]. Memory: that of both; for 4 parameters in `f32` on a 32-bit machine 220
+/// [`ArxOrders::delays`], as for [`Lags`]. Memory: that of both; for 4 parameters in `f32` on a 32-bit machine 196
 /// bytes.
 ///
 /// Source: Ljung, System Identification, 2nd ed., sections 4.2 and 11.2.

@@ -294,7 +294,7 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
     pub(crate) fn push(&mut self, inputs: &[T], residual: T) {
         let mut taps = self.regressor.as_mut_slice().get_mut(self.na..).unwrap_or_default();
         let mut delayed = self.delayed.as_mut_slice();
-        for line in self.lines.as_slice() {
+        for line in in_use(self.lines.as_slice()) {
             let newest = match line.source(self.inputs) {
                 Source::Input(input) => inputs.get(input).copied().unwrap_or(T::NAN),
                 Source::Constant => T::one(),
@@ -308,7 +308,7 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
     /// The inputs of the sample whose step 1 went without them, where no input acts in its own sample.
     pub(crate) fn complete(&mut self, inputs: &[T]) {
         let mut delayed = self.delayed.as_mut_slice();
-        for line in self.lines.as_slice() {
+        for line in in_use(self.lines.as_slice()) {
             let mine = take(&mut delayed, line.nk.into());
             if let (Source::Input(input), [newest, ..]) = (line.source(self.inputs), mine) {
                 *newest = inputs.get(input).copied().unwrap_or(T::NAN);
@@ -319,8 +319,8 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
 
     /// That no input acts in its own sample, so that y(k) can be predicted before u(k) is known.
     pub(crate) fn check_delays(&self) -> Result<(), Error> {
-        self.lines.as_slice().iter().try_for_each(|line| match line.source(self.inputs) {
-            Source::Input(input) if line.nb > 0 && line.nk == 0 => Err(Error::InputFirst { input }),
+        in_use(self.lines.as_slice()).try_for_each(|line| match line.source(self.inputs) {
+            Source::Input(input) if line.nk == 0 => Err(Error::InputFirst { input }),
             _ => Ok(()),
         })
     }
@@ -384,7 +384,7 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
         check_length("input_scales", self.inputs, inputs.len())?;
         let mut scales = self.regressor.shape_generic().0.vector(output);
         let mut taps = scales.as_mut_slice().get_mut(self.na..).unwrap_or_default();
-        for line in self.lines.as_slice() {
+        for line in in_use(self.lines.as_slice()) {
             let magnitude = match line.source(self.inputs) {
                 Source::Input(input) => inputs.get(input).copied().unwrap_or(T::NAN),
                 Source::Constant => T::one(),
@@ -423,8 +423,8 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
             return None;
         }
         let mut start = self.na;
-        for line in self.lines.as_slice() {
-            if usize::from(line.index) == input && line.nb > 0 {
+        for line in in_use(self.lines.as_slice()) {
+            if usize::from(line.index) == input {
                 return Some(coefficients(parameters, start, line.nb.into(), line.nk.into()));
             }
             start += usize::from(line.nb);
@@ -440,8 +440,8 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
     /// Where φ holds the 1 of the constant.
     fn constant_place(&self) -> Option<usize> {
         let mut start = self.na;
-        for line in self.lines.as_slice() {
-            if line.nb > 0 && line.source(self.inputs) == Source::Constant {
+        for line in in_use(self.lines.as_slice()) {
+            if line.source(self.inputs) == Source::Constant {
                 return Some(start);
             }
             start += usize::from(line.nb);
@@ -488,6 +488,12 @@ fn coefficients<T: Real>(
     zeros: usize,
 ) -> impl Iterator<Item = T> + Clone + use<'_, T> {
     core::iter::repeat_n(T::zero(), zeros).chain(parameters.iter().skip(start).take(count).copied())
+}
+
+/// The lines in use: they come first.
+#[inline(always)]
+fn in_use(lines: &[Line]) -> impl Iterator<Item = &Line> {
+    lines.iter().take_while(|line| line.nb > 0)
 }
 
 /// The first `count` places, which are there; `rest` is what follows them.

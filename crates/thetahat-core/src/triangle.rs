@@ -22,13 +22,11 @@ fn row_mut<T>(triangle: &mut [T], size: usize, index: usize) -> &mut [T] {
 }
 
 /// Column `index` of a square matrix stored column after column.
-#[inline(always)]
 pub(crate) fn column<T>(columns: &[T], size: usize, index: usize) -> &[T] {
     columns.get(index * size..(index + 1) * size).unwrap_or_default()
 }
 
 /// Column `index` of a square matrix stored column after column.
-#[inline(always)]
 pub(crate) fn column_mut<T>(columns: &mut [T], size: usize, index: usize) -> &mut [T] {
     columns.get_mut(index * size..(index + 1) * size).unwrap_or_default()
 }

@@ -10,7 +10,6 @@ use crate::Real;
 use crate::triangle::{column, column_mut};
 
 /// Element `index`, which exists.
-#[inline(always)]
 fn at<T: Real>(values: &[T], index: usize) -> T {
     values.get(index).copied().unwrap_or(T::zero())
 }
@@ -65,7 +64,6 @@ pub(crate) fn add_multiple<T: Real>(y: &mut [T], factor: T, x: &[T]) {
     }
 }
 
-#[inline(always)]
 pub(crate) fn copy<T: Copy>(from: &[T], into: &mut [T]) {
     for (to, &from) in into.iter_mut().zip(from) {
         *to = from;

@@ -72,8 +72,9 @@ def numbers(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]
 def test_a_tampered_pickle_is_an_error_or_goes_on(estimator: Any) -> None:
     restore, (name, kept) = estimator.__reduce__()
     refused = 0
+    damage: list[Any] = [-1, 7, 1.99, 6e300, 2**63, "NaN", "inf", None, []]
     for path in list(numbers(json.loads(kept))):
-        for bad in (-1, 7, 1.99, 6e300, 2**63, "NaN", "inf", None, []):
+        for bad in damage:
             tampered = part = json.loads(kept)
             for key in path[:-1]:
                 part = part[key]
@@ -85,7 +86,10 @@ def test_a_tampered_pickle_is_an_error_or_goes_on(estimator: Any) -> None:
                 continue
             for k in range(20):
                 with contextlib.suppress(ValueError, OverflowError):
-                    read.update([0.1, 1.0] if name == "RecursiveLeastSquares" else float(k % 3), 0.5)
+                    if name == "RecursiveLeastSquares":
+                        read.update([0.1, 1.0], 0.5)
+                    else:
+                        read.log_row(0.5, u=float(k % 3))
     assert refused > 50
     with pytest.raises(ValueError, match="of version 2, and version 1 is understood"):
         restore(name, kept.replace(b'"version":1', b'"version":2'))
@@ -94,7 +98,8 @@ def test_a_tampered_pickle_is_an_error_or_goes_on(estimator: Any) -> None:
 
 
 def test_a_tampered_policy_is_an_error() -> None:
-    restore, (name, kept) = Forgetting.exponential(0.9).__reduce__()  # type: ignore[misc]
+    policy: Any = Forgetting.exponential(0.9)
+    restore, (name, kept) = policy.__reduce__()
     for bad in (b"1.99", b"0", b'"NaN"', b"null"):
         with pytest.raises(ValueError):
             restore(name, kept.replace(b"0.9", bad))
@@ -434,10 +439,12 @@ def test_parameters_stay_within_their_limits(kind: Any) -> None:
     assert kind(*orders).limits is None
     # It starts within.
     assert kind(*orders, limits=[(-0.7, 0.0), (0.1, np.inf)]).parameters[1] == 0.1
-    for wrong in ([(0.0, 1.0)], [(0.0, 1.0), 3.0], 5.0, [None, None, None, None]):
+    shapes: list[Any] = [[(0.0, 1.0)], [(0.0, 1.0), 3.0], 5.0, [None, None, None, None]]
+    for wrong in shapes:
         with pytest.raises(ValueError, match="limits: expected a pair .* 2 parameters"):
             kind(*orders, limits=wrong)
-    for wrong in ([(1.0, 0.0), None], [(np.nan, 0.0), None]):
+    ranges: list[Any] = [[(1.0, 0.0), None], [(np.nan, 0.0), None]]
+    for wrong in ranges:
         with pytest.raises(ValueError, match="limits is out of range"):
             kind(*orders, limits=wrong)
 

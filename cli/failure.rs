@@ -12,7 +12,7 @@ use crate::table;
 
 /// The option that an argument of the library is here, if it is one.
 fn option_of(argument: &str) -> Option<&str> {
-    const SAME: [&str; 29] = [
+    const SAME: [&str; 31] = [
         "alarm",
         "alpha",
         "alphas",
@@ -20,6 +20,7 @@ fn option_of(argument: &str) -> Option<&str> {
         "dc-gain",
         "dead-zone",
         "detrend",
+        "draws",
         "estimator",
         "forgetting",
         "frequencies",
@@ -32,6 +33,7 @@ fn option_of(argument: &str) -> Option<&str> {
         "noise-bound",
         "offset",
         "poles",
+        "prefilter",
         "require",
         "resample",
         "ridge",

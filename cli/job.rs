@@ -13,7 +13,7 @@ mod validate;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use thetahat::{Interpolation, Rows, Start};
+use thetahat::{Interpolation, Resample, Rows, Start};
 
 use crate::args::{
     ClockArguments, LineArguments, LineFormatArgument, LiveClockArguments, LogArguments, StartArgument,
@@ -45,7 +45,7 @@ pub(crate) struct LogJob {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Clock {
     /// A column of times, and how to make them uniform if they are not.
-    Column { name: String, resample: Option<(f64, Interpolation)> },
+    Column { name: String, resample: Option<Resample> },
     /// A fixed sample time in seconds.
     Fixed(f64),
     /// Not given.
@@ -86,8 +86,8 @@ impl LogJob {
         let clock = match (&clock.time, clock.sample_time) {
             (Some(name), _) => {
                 let resample = clock.resample.as_deref().map(resampling).transpose()?;
-                if let Some((step, _)) = resample {
-                    seconds("--resample", step)?;
+                if let Some(how) = &resample {
+                    seconds("--resample", how.step)?;
                 }
                 Clock::Column { name: name.clone(), resample }
             }
@@ -174,18 +174,25 @@ pub(crate) fn parsed<T: FromStr<Err = thetahat::Error>>(argument: &str, text: &s
     })
 }
 
-/// STEP:hold or STEP:linear.
-fn resampling(text: &str) -> Result<(f64, Interpolation), Failure> {
+/// STEP:hold or STEP:linear, and :unfiltered behind it.
+fn resampling(text: &str) -> Result<Resample, Failure> {
     let wrong = || {
-        Failure::usage(format!("--resample {text}: write it as STEP:hold or STEP:linear, such as 0.5:linear"))
+        Failure::usage(format!(
+            "--resample {text}: write it as STEP:hold or STEP:linear, such as 0.5:linear; with :unfiltered behind it without \
+             a filter"
+        ))
     };
-    let (step, how) = text.rsplit_once(':').ok_or_else(wrong)?;
+    let (plain, anti_alias) = match text.strip_suffix(":unfiltered") {
+        Some(plain) => (plain, false),
+        None => (text, true),
+    };
+    let (step, how) = plain.rsplit_once(':').ok_or_else(wrong)?;
     let interpolation = match how {
         "hold" => Interpolation::Hold,
         "linear" => Interpolation::Linear,
         _ => return Err(wrong()),
     };
-    Ok((step.parse().map_err(|_| wrong())?, interpolation))
+    Ok(Resample { step: step.parse().map_err(|_| wrong())?, interpolation, anti_alias })
 }
 
 /// One ASCII character, or a name for it.

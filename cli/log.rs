@@ -56,10 +56,9 @@ pub(crate) fn load(
     let Columns { channels, table, mut source, words } = columns(path, job, |reader| choose(reader.names()))?;
     let file = source.file.clone();
     let log = match (&job.clock, table.time) {
-        (Clock::Column { resample: Some((step, interpolation)), .. }, Some(time)) => {
-            source.resampled =
-                Some(Resampling { step: *step, interpolation: *interpolation, rows: table.rows });
-            Log::resampled(channels, &time, *step, *interpolation)
+        (Clock::Column { resample: Some(how), .. }, Some(time)) => {
+            source.resampled = Some(Resampling::new(how, &time).map_err(at_line(&file, &table.lines))?);
+            Log::resampled(channels, &time, how)
         }
         (_, Some(time)) => Log::with_time(channels, time),
         (Clock::Fixed(seconds), None) => Log::new(channels, *seconds),

@@ -272,3 +272,51 @@ fn options_of_the_clock_that_exclude_or_need_each_other() {
         assert!(run.stdout.is_empty() && run.stderr.starts_with("error: "), "{options}: {}", run.stderr);
     }
 }
+
+/// A positioning drive that is logged every millisecond: a slow lag, a lightly damped mode of 150 Hz that no clock of 10 ms
+/// shows, and an encoder. Its setpoint jumps at any millisecond.
+fn drive() -> String {
+    const ROWS: usize = 20_000;
+    let mut random = Random::new(11);
+    let mut level = 1.0;
+    let u: Vec<f64> = (0..ROWS)
+        .map(|_| {
+            if random.uniform() > 0.92 {
+                level = random.uniform();
+            }
+            level
+        })
+        .collect();
+    let lag = (-1.0_f64 / 80.0).exp();
+    let (radius, angle) = (0.985, std::f64::consts::TAU * 0.15);
+    let (mut slow, mut fast) = (0.0, [0.0; 2]);
+    let mut y = Vec::with_capacity(ROWS);
+    for t in 0..ROWS {
+        let before = if t > 0 { u[t - 1] } else { 0.0 };
+        slow = lag * slow + (1.0 - lag) * before;
+        let next = 2.0 * radius * angle.cos() * fast[0] - radius * radius * fast[1] + 0.05 * before;
+        fast = [next, fast[0]];
+        y.push(slow + next + 0.02 * random.uniform());
+    }
+    let time: Vec<f64> = (0..ROWS).map(|row| row as f64 * 1e-3).collect();
+    csv(&[("t", &time), ("u", &u), ("y", &y)])
+}
+
+#[test]
+fn a_fast_log_is_filtered_before_it_is_thinned() {
+    let folder = Folder::with_log(drive());
+    let free_run = |how: &str| {
+        let line = format!("log.csv --time t --resample 0.01:{how} --model oe --nb 3 --nf 1 --nk 0");
+        let report = folder.fit(&format!("{line} --estimate 1..1400 --validate 1401..2000"));
+        assert_eq!(report["data"]["rows"], 2000);
+        let filter = report["data"]["logs"][0]["resampled"]["anti_alias"].clone();
+        let fits = report["fit"].as_array().unwrap();
+        (number(fits.last().unwrap(), "/percent"), filter)
+    };
+    let (raw, none) = free_run("hold:unfiltered");
+    let (filtered, filter) = free_run("hold");
+    println!("free run on the validation rows: {raw} % unfiltered, {filtered} % filtered");
+    assert_eq!((none, &filter["taps"]), (Value::Null, &json!(365)));
+    assert!((number(&filter, "/cutoff") - 45.0).abs() < 1e-9);
+    assert!(raw < 88.0 && filtered > 94.0, "{raw} {filtered}");
+}

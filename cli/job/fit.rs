@@ -1,6 +1,6 @@
 use std::path::{Path, PathBuf};
 
-use thetahat::{Detrend, Initial, Method, Plan, Rows, Select, Split};
+use thetahat::{Detrend, Initial, Method, Plan, Prefilter, Rows, Select, Split};
 
 use super::orders::OrderJob;
 use super::{LogJob, method, parsed, rows};
@@ -24,6 +24,7 @@ pub(crate) struct FitJob {
     pub(crate) split: Option<Split>,
     pub(crate) detrend: Detrend,
     pub(crate) offsets: Vec<(String, f64)>,
+    pub(crate) prefilter: Option<Prefilter>,
     pub(crate) orders: OrderJob,
     pub(crate) select: Select,
     pub(crate) method: Method,
@@ -42,6 +43,7 @@ impl FitJob {
             validate: rows("--validate", &arguments.validate)?,
             detrend: parsed("--detrend", &arguments.detrend)?,
             offsets: named_values("--offset", &arguments.offset)?,
+            prefilter: arguments.prefilter.as_deref().map(|text| parsed("--prefilter", text)).transpose()?,
             split: arguments.choice.split.as_deref().map(|text| parsed("--split", text)).transpose()?,
             select: select(arguments.choice.select, &orders)?,
             method: method::method(arguments, &orders)?,
@@ -88,6 +90,7 @@ impl FitJob {
             split: self.split,
             detrend: self.detrend,
             offsets: self.offsets.clone(),
+            prefilter: self.prefilter,
             method: self.method.clone(),
             initial: self.initial,
         })

@@ -7,7 +7,7 @@ use numpy::PyArray1;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
-use thetahat::{Channel, Interpolation, Resampling, Rows, Source};
+use thetahat::{Channel, Interpolation, Resample, Resampling, Rows, Source};
 
 use crate::array::vector;
 use crate::error;
@@ -28,11 +28,12 @@ pub(crate) struct Log {
 type Named<'py> = Vec<(String, Bound<'py, PyAny>)>;
 
 /// Times, how to resample, the first time as it was written, and what the times are called.
-type Clock<'py> = (Bound<'py, PyAny>, Option<(f64, String)>, Option<String>, String);
+type Clock<'py> = (Bound<'py, PyAny>, Option<(f64, String, bool)>, Option<String>, String);
 
 #[pymethods]
 impl Log {
-    /// Channels by name with a fixed sample time, or with a clock: the times, how to resample, (step, "hold" or "linear"),
+    /// Channels by name with a fixed sample time, or with a clock: the times, how to resample, (step, "hold" or "linear", whether
+    /// to filter against aliasing),
     /// the first time as it was written, and what the times are called.
     #[new]
     #[pyo3(signature = (channels, inputs, output, sample_time, clock=None))]
@@ -55,7 +56,7 @@ impl Log {
             (Some(time), None) => {
                 thetahat::Log::with_time(channels, vector("time", &time, None)?.as_slice()?.to_vec())
             }
-            (Some(time), Some((step, how))) => {
+            (Some(time), Some((step, how, anti_alias))) => {
                 let time = vector("time", &time, None)?;
                 let interpolation = match how.as_str() {
                     "hold" => Interpolation::Hold,
@@ -66,8 +67,9 @@ impl Log {
                         )));
                     }
                 };
-                resampled = Some(Resampling { step, interpolation, rows: time.as_slice()?.len() });
-                thetahat::Log::resampled(channels, time.as_slice()?, step, interpolation)
+                let (how, time) = (Resample { step, interpolation, anti_alias }, time.as_slice()?);
+                resampled = Some(Resampling::new(&how, time).map_err(|error| error::batch(py, error))?);
+                thetahat::Log::resampled(channels, time, &how)
             }
         };
         let log = log.map_err(|error| error::batch(py, error))?;

@@ -84,6 +84,7 @@ def test_several_inputs_have_names() -> None:
         ({"y": Y, "time": [0, 1, 2, 2.7, 4]}, "the log is not uniform; resample it every 1 s"),
         ({"y": Y, "time": Y, "resample": (1.0, "cubic")}, "resample: 'cubic' is neither"),
         ({"y": Y, "time": Y, "resample": (-1.0, "hold")}, "resample: -1 is not a positive"),
+        ({"y": Y, "time": Y, "resample": (1.0, "hold", "raw")}, "resample: 'raw' is not 'unfiltered'"),
         ({"y": [1.0], "time": [0.0]}, "one row has no time step"),
         ({"y": [[1.0], [2.0, 3.0]]}, "y: "),
     ],

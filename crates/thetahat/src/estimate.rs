@@ -243,6 +243,21 @@ impl Estimate {
         &self.procedure
     }
 
+    /// What the estimate from prefiltered signals says of those that are not: their noise variance, and the covariance of the
+    /// parameters with filtered errors, which have a colour where e is white. None for convex criteria.
+    pub(crate) fn of_prefiltered(self, record: &Record<'_>, orders: &Orders, noise_variance: f64) -> Self {
+        let covariance = match &self.procedure {
+            Procedure::LeastSquares { .. } | Procedure::PredictionError(_) => {
+                prediction_error::coloured_covariance(record, orders, &self)
+            }
+            Procedure::Constrained(_) => None,
+            Procedure::InstrumentalVariables { .. } | Procedure::RefinedInstrumentalVariables { .. } => {
+                self.covariance
+            }
+        };
+        Self { covariance, noise_variance, ..self }
+    }
+
     /// FPE, AIC, AICc and MDL.
     pub fn criteria(&self) -> Criteria {
         Criteria::new(self.mse, self.parameters.len(), self.samples)

@@ -24,7 +24,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use crate::Error;
-use crate::data::{Channel, Interpolation, Log, Regular, Rows, check, checked};
+use crate::data::{Channel, Interpolation, Log, Regular, Resample, Rows, check, checked};
 use crate::report::{Resampling, Source};
 use clock::Ticks;
 
@@ -92,8 +92,8 @@ pub struct InspectionPlan {
     pub inputs: Vec<String>,
     /// The output channel.
     pub output: Option<String>,
-    /// How an irregular clock is made uniform; none: every median step, rounded, by straight lines.
-    pub resample: Option<(f64, Interpolation)>,
+    /// How the log is put on another clock; none: an irregular one: every median step, rounded, by straight lines.
+    pub resample: Option<Resample>,
 }
 
 /// Says what a log is worth before any fit: its clock, the quality of each channel, how rich the inputs are, their delays,
@@ -261,7 +261,6 @@ fn uniform(
             "excitation, delay and feedback are left out, as the time does not run forward".to_owned()
         ));
     }
-    let rows = time.len();
     let asked = plan.resample;
     if asked.is_none() && !ticks.clock.irregular {
         return Ok(Ok((Log::with_time(channels, time)?, None)));
@@ -270,9 +269,9 @@ fn uniform(
     if asked.is_none() && !regular.is_worth() {
         return Ok(Err("excitation, delay and feedback are left out, as the log is not uniform".to_owned()));
     }
-    let (step, interpolation) = asked.unwrap_or((regular.step, Interpolation::Linear));
-    let log = Log::resampled(channels, &time, step, interpolation)?;
-    Ok(Ok((log, Some(Resampling { step, interpolation, rows }))))
+    let how = asked.unwrap_or_else(|| Resample::new(regular.step, Interpolation::Linear));
+    let log = Log::resampled(channels, &time, &how)?;
+    Ok(Ok((log, Some(Resampling::new(&how, &time)?))))
 }
 
 /// Excitation, delay and feedback of each input.

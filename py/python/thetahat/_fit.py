@@ -9,7 +9,7 @@ from typing import Any
 from thetahat import _options, _thetahat
 from thetahat._log import Log, handle
 from thetahat._model import Model
-from thetahat._options import Bound, FitOptions, Orders, Rows
+from thetahat._options import Band, Bound, FitOptions, Orders, Rows
 
 
 class EstimationWarning(UserWarning):
@@ -27,6 +27,7 @@ def arx(
     split: tuple[float, float, float] | None = None,
     detrend: str | None = None,
     offset: Mapping[str, float] | None = None,
+    prefilter: Band | None = None,
     initial: str | None = None,
     norm: float | str | None = None,
     bound: Mapping[str, Bound] | None = None,
@@ -46,7 +47,7 @@ def arx(
         Coefficients of B.
     nk : int, or one for each input
         Samples from input to first effect.
-    estimate, validate, split, detrend, offset, initial, norm, bound, dc_gain, ridge, noise_bound
+    estimate, validate, split, detrend, offset, prefilter, initial, norm, bound, dc_gain, ridge, noise_bound
         What to fit to and how, see `thetahat.FitOptions`.
 
     Returns
@@ -94,6 +95,7 @@ def armax(
     split: tuple[float, float, float] | None = None,
     detrend: str | None = None,
     offset: Mapping[str, float] | None = None,
+    prefilter: Band | None = None,
     initial: str | None = None,
     search: str | None = None,
     max_iterations: int | None = None,
@@ -113,7 +115,7 @@ def armax(
         Coefficients of A, B and C; nb may be one for each input.
     nk : int, or one for each input
         Samples from input to first effect.
-    estimate, validate, split, detrend, offset, initial, search, max_iterations, tolerance, step, starts, seed,
+    estimate, validate, split, detrend, offset, prefilter, initial, search, max_iterations, tolerance, step, starts, seed,
     time_limit
         What to fit to and how to search, see `thetahat.FitOptions`.
 
@@ -147,6 +149,7 @@ def oe(
     split: tuple[float, float, float] | None = None,
     detrend: str | None = None,
     offset: Mapping[str, float] | None = None,
+    prefilter: Band | None = None,
     initial: str | None = None,
     search: str | None = None,
     max_iterations: int | None = None,
@@ -168,7 +171,7 @@ def oe(
         Coefficients of B and F.
     nk : int, or one for each input
         Samples from input to first effect.
-    estimate, validate, split, detrend, offset, initial, search, max_iterations, tolerance, step, starts, seed,
+    estimate, validate, split, detrend, offset, prefilter, initial, search, max_iterations, tolerance, step, starts, seed,
     time_limit
         What to fit to and how to search, see `thetahat.FitOptions`.
 
@@ -203,6 +206,7 @@ def bj(
     split: tuple[float, float, float] | None = None,
     detrend: str | None = None,
     offset: Mapping[str, float] | None = None,
+    prefilter: Band | None = None,
     initial: str | None = None,
     search: str | None = None,
     max_iterations: int | None = None,
@@ -222,7 +226,7 @@ def bj(
         Coefficients of B, C, D and F; nb and nf may be one for each input.
     nk : int, or one for each input
         Samples from input to first effect.
-    estimate, validate, split, detrend, offset, initial, search, max_iterations, tolerance, step, starts, seed,
+    estimate, validate, split, detrend, offset, prefilter, initial, search, max_iterations, tolerance, step, starts, seed,
     time_limit
         What to fit to and how to search, see `thetahat.FitOptions`.
 
@@ -254,6 +258,7 @@ def ar(
     split: tuple[float, float, float] | None = None,
     detrend: str | None = None,
     offset: Mapping[str, float] | None = None,
+    prefilter: Band | None = None,
     initial: str | None = None,
     norm: float | str | None = None,
     bound: Mapping[str, Bound] | None = None,
@@ -269,7 +274,7 @@ def ar(
         The data.
     na : int
         Coefficients of A.
-    estimate, validate, split, detrend, offset, initial, norm, bound, dc_gain, ridge, noise_bound
+    estimate, validate, split, detrend, offset, prefilter, initial, norm, bound, dc_gain, ridge, noise_bound
         What to fit to and how, see `thetahat.FitOptions`.
 
     Returns
@@ -302,6 +307,7 @@ def arma(
     split: tuple[float, float, float] | None = None,
     detrend: str | None = None,
     offset: Mapping[str, float] | None = None,
+    prefilter: Band | None = None,
     initial: str | None = None,
     search: str | None = None,
     max_iterations: int | None = None,
@@ -319,7 +325,7 @@ def arma(
         The data.
     na, nc : int
         Coefficients of A and C.
-    estimate, validate, split, detrend, offset, initial, search, max_iterations, tolerance, step, starts, seed,
+    estimate, validate, split, detrend, offset, prefilter, initial, search, max_iterations, tolerance, step, starts, seed,
     time_limit
         What to fit to and how to search, see `thetahat.FitOptions`.
 
@@ -355,6 +361,7 @@ def pem(
     split: tuple[float, float, float] | None = None,
     detrend: str | None = None,
     offset: Mapping[str, float] | None = None,
+    prefilter: Band | None = None,
     initial: str | None = None,
     norm: float | str | None = None,
     bound: Mapping[str, Bound] | None = None,
@@ -379,7 +386,7 @@ def pem(
         Coefficients of the polynomials; nb and nf may be one for each input.
     nk : int, or one for each input
         Samples from input to first effect: 1, unless said otherwise.
-    estimate, validate, split, detrend, offset, initial, norm, bound, dc_gain, ridge, noise_bound, search,
+    estimate, validate, split, detrend, offset, prefilter, initial, norm, bound, dc_gain, ridge, noise_bound, search,
     max_iterations, tolerance, step, starts, seed, time_limit
         What to fit to and how to search, see `thetahat.FitOptions`.
 
@@ -412,6 +419,7 @@ def iv(
     split: tuple[float, float, float] | None = None,
     detrend: str | None = None,
     offset: Mapping[str, float] | None = None,
+    prefilter: Band | None = None,
     initial: str | None = None,
 ) -> Model:
     """Fit A and B of an ARX model by instrumental variables in four stages: right about the plant whatever the noise.
@@ -422,7 +430,7 @@ def iv(
         The data.
     na, nb, nk
         As for `arx`.
-    estimate, validate, split, detrend, offset, initial
+    estimate, validate, split, detrend, offset, prefilter, initial
         What to fit to, see `thetahat.FitOptions`.
 
     Returns
@@ -458,6 +466,7 @@ def sriv(
     split: tuple[float, float, float] | None = None,
     detrend: str | None = None,
     offset: Mapping[str, float] | None = None,
+    prefilter: Band | None = None,
     initial: str | None = None,
 ) -> Model:
     """Fit B and F of an output error model by refined instrumental variables: right about the plant whatever the noise.
@@ -468,7 +477,7 @@ def sriv(
         The data.
     nb, nf, nk
         As for `oe`.
-    estimate, validate, split, detrend, offset, initial
+    estimate, validate, split, detrend, offset, prefilter, initial
         What to fit to, see `thetahat.FitOptions`.
 
     Returns
@@ -510,6 +519,7 @@ def search(
     split: tuple[float, float, float] | None = None,
     detrend: str | None = None,
     offset: Mapping[str, float] | None = None,
+    prefilter: Band | None = None,
     initial: str | None = None,
     norm: float | str | None = None,
     bound: Mapping[str, Bound] | None = None,
@@ -540,7 +550,7 @@ def search(
         What makes one model better than another: MDL, unless said otherwise.
     path : {"all", "alternate"}
         Which are tried: all of them, or one order up at a time.
-    estimate, validate, split, detrend, offset, initial, norm, bound, dc_gain, ridge, noise_bound, search,
+    estimate, validate, split, detrend, offset, prefilter, initial, norm, bound, dc_gain, ridge, noise_bound, search,
     max_iterations, tolerance, step, starts, seed, time_limit
         What to fit to and how to search, see `thetahat.FitOptions`.
 

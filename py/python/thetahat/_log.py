@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from thetahat import _clock, _numbers, _options, _picture, _thetahat
 from thetahat._clock import Clock
-from thetahat._options import Duration, ReadOptions
+from thetahat._options import Duration, ReadOptions, Resample
 
 
 class Log:
@@ -36,8 +36,9 @@ class Log:
         The clock instead: instants with or without a time zone, texts of them in ISO 8601, durations, or seconds. Steps may
         differ from their median by 10 %; one longer than 1.5 medians is a gap. An index of pandas that all series share is the
         clock if it holds times; one that counts rows is not.
-    resample : (float or timedelta, {"linear", "hold"}), optional
-        Makes an irregular clock uniform: time between the new rows, and how to read between the old ones.
+    resample : (float or timedelta, {"linear", "hold"}) or (…, "unfiltered"), optional
+        Puts the log on another clock: time between the new rows, and how to read between the old ones. A step of two recorded
+        ones or more is filtered against aliasing first, unless "unfiltered" is added or the clock is irregular.
     input_names : sequence of str, optional
         The names of the inputs: those of the series or of the frame's columns, or ``u``, or ``u1``, ``u2``, …
     output_name : str, optional
@@ -75,7 +76,7 @@ class Log:
         *,
         sample_time: Duration | None = None,
         time: npt.ArrayLike | None = None,
-        resample: tuple[Duration, str] | None = None,
+        resample: Resample | None = None,
         input_names: Sequence[str] | None = None,
         output_name: str | None = None,
     ) -> None:
@@ -102,7 +103,7 @@ class Log:
         output: str,
         time: str | npt.ArrayLike | None = None,
         sample_time: Duration | None = None,
-        resample: tuple[Duration, str] | None = None,
+        resample: Resample | None = None,
     ) -> Log:
         """A log of some columns of a data frame.
 
@@ -416,7 +417,7 @@ def read_csv(
     output: str | None = None,
     time: str | None = None,
     sample_time: Duration | None = None,
-    resample: tuple[Duration, str] | None = None,
+    resample: Resample | None = None,
     time_format: str | None = None,
     delimiter: str | None = None,
     comment: str | None = None,
@@ -536,7 +537,7 @@ def _made(
     clock: Clock | None,
     index: Any,
     sample_time: Duration | None,
-    resample: tuple[Duration, str] | None,
+    resample: Resample | None,
     argument: str,
 ) -> tuple[_thetahat.Log, Clock]:
     """The compiled log, and its clock: the one given, or an index of pandas; without one the sample time counts."""
@@ -549,8 +550,7 @@ def _made(
         raise ValueError("sample_time: the log has a clock; give one of time and sample_time")
     if resample is not None and clock is None:
         raise ValueError("resample: it is for logs with a clock; give time too")
-    if resample is not None:
-        resample = _options.resampling("resample", resample)
+    resampling = None if resample is None else _options.resampling("resample", resample)
     if clock is None or clock.times is None:
         step = 1.0 if sample_time is None else _options.seconds("sample_time", sample_time)
         found = _clock.assumed(index) if sample_time is None else Clock("", None, _labels(index))
@@ -558,6 +558,6 @@ def _made(
     times = clock.times
     seconds = times.seconds(argument)
     name = "time" if times.name is None else str(times.name)
-    log = _thetahat.Log(channels, inputs, output, 1.0, (seconds, resample, times.start(), name))
+    log = _thetahat.Log(channels, inputs, output, 1.0, (seconds, resampling, times.start(), name))
     new = None if resample is None else log.time()
     return log, clock if new is None else clock.resampled(new)

@@ -30,6 +30,13 @@ Bound = Union[float, tuple[Optional[float], Optional[float]]]
 Duration = Union[float, datetime.timedelta, "np.timedelta64"]
 """Seconds, or a timedelta of Python, NumPy or pandas."""
 
+Resample = Union["tuple[Duration, str]", "tuple[Duration, str, str]"]
+"""The time between the new rows, "linear" or "hold", and "unfiltered" where no filter is wanted."""
+
+
+Band = Union["tuple[float | None, float | None]", str]
+"""The lower and the upper end in Hz, either of which may be None; or a text such as "0.1..5"."""
+
 
 class FitOptions(TypedDict, total=False):
     """What every fit can be told, beside the orders.
@@ -45,6 +52,9 @@ class FitOptions(TypedDict, total=False):
         What is taken from each channel before the fit and kept in the model.
     offset : dict of str to float
         Offsets of channels that are set by hand.
+    prefilter : (float or None, float or None) or str
+        The band of frequencies in Hz whose errors the fit makes small, such as ``(0.1, 5)``: inputs and output go through one
+        Butterworth filter. The model and its figures are of the signals as they are.
     initial : {"auto", "drop", "zero", "estimate"}
         What stands for the samples before the first of a stretch.
     norm : {2, 1, "inf"}
@@ -79,6 +89,7 @@ class FitOptions(TypedDict, total=False):
     split: tuple[float, float, float]
     detrend: str
     offset: Mapping[str, float]
+    prefilter: Band
     initial: str
     norm: Union[float, str]
     bound: Mapping[str, Bound]
@@ -130,8 +141,9 @@ class ReadOptions(TypedDict, total=False):
         The column that holds the times: seconds, or dates.
     sample_time : float or timedelta
         Time from one row to the next, where no column holds it.
-    resample : (float or timedelta, {"linear", "hold"})
-        Make an irregular log uniform: time between the new rows, and how to read between the old ones.
+    resample : (float or timedelta, {"linear", "hold"}) or (…, "unfiltered")
+        Put the log on another clock: time between the new rows, and how to read between the old ones. A step of two recorded
+        ones or more is filtered against aliasing first, unless "unfiltered" is added or the clock is irregular.
     time_format : str
         How times are written, in strftime's notation.
     delimiter, comment, encoding : str
@@ -148,7 +160,7 @@ class ReadOptions(TypedDict, total=False):
 
     time: str
     sample_time: Duration
-    resample: tuple[Duration, str]
+    resample: Resample
     time_format: str
     delimiter: str
     comment: str
@@ -264,11 +276,13 @@ def text(name: str, value: Any) -> str:
     return value
 
 
-def resampling(name: str, value: Any) -> tuple[float, str]:
-    """The step in seconds, and how to read between rows."""
-    if not isinstance(value, (tuple, list)) or len(value) != 2:
+def resampling(name: str, value: Any) -> tuple[float, str, bool]:
+    """The step in seconds, how to read between rows, and whether to filter against aliasing."""
+    if not isinstance(value, (tuple, list)) or len(value) not in (2, 3):
         raise TypeError(f"{name}: expected (seconds, 'linear' or 'hold'), found {value!r}")
-    return seconds(name, value[0]), text(name, value[1])
+    if len(value) == 3 and value[2] != "unfiltered":
+        raise ValueError(f"{name}: {value[2]!r} is not 'unfiltered'; leave it out for a filter")
+    return seconds(name, value[0]), text(name, value[1]), len(value) == 2
 
 
 def _flag(name: str, value: Any) -> bool:
@@ -345,6 +359,8 @@ def _texts(name: str, value: Any, rows: int | None) -> list[str]:
         if isinstance(value, Mapping):
             return [f"{key}={_bound(name, of)}" for key, of in value.items()]
         return [_bound(name, value)]
+    if name == "prefilter":
+        return [value if isinstance(value, str) else _bound(name, value)]
     if name == "split":
         if isinstance(value, str):
             return [value]
@@ -354,8 +370,8 @@ def _texts(name: str, value: Any, rows: int | None) -> list[str]:
     if name == "norm":
         return [{"1.0": "1", "2.0": "2"}.get(str(value), str(value))]
     if name == "resample":
-        step, how = resampling(name, value)
-        return [f"{number(name, step)}:{how}"]
+        step, how, filtered = resampling(name, value)
+        return [f"{number(name, step)}:{how}{'' if filtered else ':unfiltered'}"]
     if name == "missing":
         return [value] if isinstance(value, str) else [text(name, one) for one in value]
     if name in ("max_iterations", "starts", "seed", "lags", "skip_rows"):

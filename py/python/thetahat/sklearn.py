@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-    from thetahat._options import Bound, Rows
+    from thetahat._options import Band, Bound, Rows
 
 __all__ = ["EXPECTED_FAILED_CHECKS", "ARXRegressor"]
 
@@ -49,6 +49,7 @@ _OPTIONS = (
     "split",
     "detrend",
     "offset",
+    "prefilter",
     "initial",
     "norm",
     "bound",
@@ -74,7 +75,7 @@ class ARXRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         How many samples ahead `predict` and `score` predict. None: the free run, which sees no outputs.
     sample_time : float, default=1.0
         Seconds from one sample to the next.
-    estimate, validate, split, detrend, offset, initial, norm, bound, dc_gain, ridge, noise_bound : default=None
+    estimate, validate, split, detrend, offset, prefilter, initial, norm, bound, dc_gain, ridge, noise_bound : default=None
         What to fit to and how, as for `thetahat.arx`, see `thetahat.FitOptions`. Channels are called as the columns of a data
         frame, else u, or u1, u2, …, and y.
 
@@ -128,6 +129,7 @@ class ARXRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         split: tuple[float, float, float] | None = None,
         detrend: str | None = None,
         offset: Mapping[str, float] | None = None,
+        prefilter: Band | None = None,
         initial: str | None = None,
         norm: float | str | None = None,
         bound: Mapping[str, Bound] | None = None,
@@ -145,6 +147,7 @@ class ARXRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         self.split = split
         self.detrend = detrend
         self.offset = offset
+        self.prefilter = prefilter
         self.initial = initial
         self.norm = norm
         self.bound = bound

@@ -13,8 +13,6 @@ use crate::figures::short;
 pub(crate) const GAP: f64 = 1.5;
 /// Steps may differ from their median by this fraction.
 pub(crate) const JITTER: f64 = 0.1;
-/// Rows that resampling may give: beyond them a step was mistyped.
-const MOST_ROWS: f64 = 1e8;
 
 /// One named signal of a log. NaN means that the sample is missing.
 #[derive(Debug, Clone, PartialEq)]
@@ -173,64 +171,17 @@ impl Log {
         })
     }
 
-    /// A uniform log read off one with an irregular clock, every `step` seconds from its first sample on.
-    ///
-    /// A value is missing where a sample that it is read off is missing. Every interval between two
-    /// samples is bridged, however long.
-    ///
-    /// # Errors
-    /// As for [`Log::with_time`], but for uniformity; [`Error::Argument`] for a step that is not positive or
-    /// gives more than 10^8 rows.
-    pub fn resampled(
-        channels: Vec<Channel>,
-        time: &[f64],
-        step: f64,
-        interpolation: Interpolation,
-    ) -> Result<Self, Error> {
-        if !(step.is_finite() && step > 0.0) {
-            return Err(Error::argument("resample", format!("{step} is not a positive number of seconds")));
-        }
-        let rows = check(&channels)?;
-        median_step(time, rows)?;
-        let (Some(first), Some(last)) = (time.first(), time.last()) else {
-            return Err(Error::data("the log has no rows"));
-        };
-        // Samples on the grid are not missed by rounding: of decimal steps, and of large times (seconds since 1970
-        // have seven decimals).
-        let rounding = 5e-7 * step + 2.0 * f64::EPSILON * first.abs().max(last.abs());
-        let count = ((last - first + rounding) / step).floor() + 1.0;
-        if count > MOST_ROWS {
-            return Err(Error::argument(
-                "resample",
-                format!("a step of {step} s would give {} rows; take a longer one", short(count)),
-            ));
-        }
-        let instants: Vec<f64> = (0..count as usize).map(|k| first + k as f64 * step).collect();
-        let channels = channels
-            .into_iter()
-            .map(|channel| {
-                let mut left = 0;
-                let values = instants
-                    .iter()
-                    .map(|&instant| {
-                        while time.get(left + 1).is_some_and(|&next| next <= instant + rounding) {
-                            left += 1;
-                        }
-                        interpolation.read(time, &channel.values, left, instant)
-                    })
-                    .collect();
-                Channel { name: channel.name, values }
-            })
-            .collect();
-        Ok(Self {
+    /// A log on a clock that is known to be uniform.
+    pub(super) fn on_clock(channels: Vec<Channel>, time: Vec<f64>, sample_time: f64) -> Self {
+        Self {
             channels,
-            rows: instants.len(),
-            sample_time: step,
-            time: Some(instants),
+            rows: time.len(),
+            sample_time,
+            time: Some(time),
             jumps: Vec::new(),
             borders: Vec::new(),
             before: 0.0,
-        })
+        }
     }
 
     /// Several logs as one: experiments with the same plant, one after the other. Rows are counted through all of them, and
@@ -374,6 +325,11 @@ impl Log {
         self.before
     }
 
+    /// The same, to be changed in place.
+    pub(super) fn channels_mut(&mut self) -> &mut [Channel] {
+        &mut self.channels
+    }
+
     /// The channels in their order.
     pub fn channels(&self) -> &[Channel] {
         &self.channels
@@ -496,7 +452,7 @@ impl Log {
 
 impl Interpolation {
     /// The value at `instant`, which lies at or after sample `left` and before the next.
-    fn read(self, time: &[f64], values: &[f64], left: usize, instant: f64) -> f64 {
+    pub(super) fn read(self, time: &[f64], values: &[f64], left: usize, instant: f64) -> f64 {
         let value = values[left];
         match (self, time.get(left + 1), values.get(left + 1)) {
             (Self::Linear, Some(next_time), Some(next)) if instant > time[left] => {
@@ -539,12 +495,12 @@ fn misses(values: &[f64]) -> bool {
     values.chunks(1024).any(|block| block.iter().fold(false, |missing, value| missing | value.is_nan()))
 }
 
-fn steps(time: &[f64]) -> impl Iterator<Item = f64> {
+pub(super) fn steps(time: &[f64]) -> impl Iterator<Item = f64> {
     time.windows(2).map(|pair| pair[1] - pair[0])
 }
 
 /// The median time step of a clock that runs forward.
-fn median_step(time: &[f64], rows: usize) -> Result<f64, Error> {
+pub(super) fn median_step(time: &[f64], rows: usize) -> Result<f64, Error> {
     let at = |row: usize, message: String| Error::Data { channel: None, row: Some(row), message };
     if time.len() != rows {
         return Err(Error::data(format!("there are {} time stamps for {rows} rows", time.len())));

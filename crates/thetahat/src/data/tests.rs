@@ -1,6 +1,6 @@
 //! Logs and what is done to them, against definitions.
 
-use super::{Channel, Detrend, Interpolation, Log, Offset, Rows};
+use super::{Channel, Detrend, Interpolation, Log, Offset, Resample, Rows};
 use crate::Error;
 use crate::regression::noise::Noise;
 
@@ -83,7 +83,8 @@ fn channels_are_checked() {
 fn a_resampled_log_reads_between_samples() {
     let time = [0.0, 1.0, 1.5, 4.0];
     let read = |values: [f64; 4], interpolation| {
-        let log = Log::resampled(vec![channel("y", &values)], &time, 0.5, interpolation).unwrap();
+        let log =
+            Log::resampled(vec![channel("y", &values)], &time, &Resample::new(0.5, interpolation)).unwrap();
         assert_eq!((log.rows(), log.sample_time(), log.jumps()), (9, 0.5, 0));
         log.channels()[0].values.clone()
     };
@@ -108,7 +109,9 @@ fn resampling_a_uniform_log_changes_nothing() {
         let written: Vec<f64> = time.iter().map(|t| format!("{t:.6}").parse().unwrap()).collect();
         for time in [&time, &written] {
             for interpolation in [Interpolation::Hold, Interpolation::Linear] {
-                let log = Log::resampled(vec![channel("y", &values)], time, step, interpolation).unwrap();
+                let log =
+                    Log::resampled(vec![channel("y", &values)], time, &Resample::new(step, interpolation))
+                        .unwrap();
                 let found = &log.channels()[0].values;
                 assert_eq!(found.len(), 5000, "{first} {step}");
                 let worst = found.iter().zip(&values).map(|(f, v)| (f - v).abs()).fold(0.0, f64::max);
@@ -116,7 +119,13 @@ fn resampling_a_uniform_log_changes_nothing() {
             }
         }
     }
-    let two = |step| Log::resampled(vec![channel("y", &[1.0, 2.0])], &[0.0, 1.0], step, Interpolation::Hold);
+    let two = |step| {
+        Log::resampled(
+            vec![channel("y", &[1.0, 2.0])],
+            &[0.0, 1.0],
+            &Resample::new(step, Interpolation::Hold),
+        )
+    };
     assert!(two(1e-9).is_err() && two(0.0).is_err() && two(-1.0).is_err() && two(NAN).is_err());
     assert_eq!(two(10.0).unwrap().rows(), 1);
 }

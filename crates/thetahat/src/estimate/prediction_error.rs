@@ -12,11 +12,11 @@ use super::optimize::{
 use super::predictor::{Begin, Predictor, Unusable};
 use super::restart::restarts;
 use super::start::candidates;
-use super::uncertainty::{autoregression, coloured};
+use super::uncertainty::{autoregression, backward_filtered_products, coloured};
 use super::{Estimate, Initial, Procedure};
 use crate::data::Record;
 use crate::model::{cancel, near_cancellation};
-use crate::regression::{condition, sum_of_squares};
+use crate::regression::{Taps, condition, sum_of_squares};
 use crate::{Error, Model, Orders, Structure};
 
 /// A sum of squared errors below this fraction of the output's is rounding.
@@ -372,6 +372,38 @@ fn uncertainty(predictor: &Predictor<'_>, orders: &Orders, noise_variance: f64) 
         inverse *= noise_variance;
     }
     Some(Uncertainty { covariance: rows(&inverse), condition })
+}
+
+/// The covariance of an estimate of least squares whose errors are coloured, whatever its structure: of `uncertainty` with
+/// psi filtered backwards in time by an autoregression of the errors. None where it cannot be had.
+pub(super) fn coloured_covariance(
+    record: &Record<'_>,
+    orders: &Orders,
+    estimate: &Estimate,
+) -> Option<Vec<Vec<f64>>> {
+    let begin = if estimate.initial() == Initial::Zero { Begin::Zero } else { Begin::Unknown };
+    let mut predictor = Predictor::new(record, orders, begin);
+    best_free(&mut predictor, estimate.parameters()).ok()?;
+    predictor.linearize();
+    let (inverse, _) = inverse(&predictor)?;
+    let (residuals, segments) = predictor.residuals();
+    let taken = orders.parameters() + predictor.initial_conditions();
+    let colour = autoregression(&residuals, &segments, taken);
+    let products = backward_products(&predictor.columns(), &colour.monic);
+    Some(rows(&coloured(&inverse, colour.variance, &products)))
+}
+
+/// sum zeta zeta' over all segments, zeta being psi filtered backwards in time by 1/A(q^+1), A = `monic`.
+pub(super) fn backward_products(segments: &[Vec<Vec<f64>>], monic: &[f64]) -> DMatrix<f64> {
+    let size = segments.first().map_or(0, Vec::len);
+    let taps: Vec<Taps> = (0..size).map(|signal| Taps { signal, first: 0, count: 1, sign: 1.0 }).collect();
+    let mut sum = DMatrix::zeros(size, size);
+    for columns in segments {
+        let signals: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+        let all = 0..signals.first().map_or(0, |column| column.len());
+        sum += backward_filtered_products(&signals, &taps, &all, &all, None, monic);
+    }
+    sum
 }
 
 /// Whether the errors tell the parameters apart, where the predictor stands.

@@ -27,6 +27,7 @@
 //!
 //! so that shifts of g complete the Gram matrix exactly.
 
+mod columns;
 mod section;
 #[cfg(test)]
 mod tests;

@@ -2,9 +2,10 @@ use std::ops::{ControlFlow, Range};
 
 use super::schema::{Data, Estimation, Missing, Parts, Report, Source};
 use super::warnings::{at_the_border, unstable_plant, warnings};
-use crate::data::{Detrend, Log, Offset, Record, Rows, Split, between, checked};
+use crate::data::{Detrend, Log, Offset, Prefilter, Prefiltered, Record, Rows, Split, between, checked};
 use crate::estimate::{Estimate, Method, Monitor, enough, estimate_of_channels};
-use crate::respond::Start;
+use crate::regression::sum_of_squares;
+use crate::respond::{Start, innovations};
 use crate::select::{self, Choice, Found, Grid, Select, Task};
 use crate::validate::{Fit, Horizon, Part};
 use crate::{Error, Initial, Model, Orders, Signal};
@@ -30,6 +31,9 @@ pub struct Plan {
     pub detrend: Detrend,
     /// Channels whose offset is set by hand.
     pub offsets: Vec<(String, f64)>,
+    /// The band of frequencies whose errors the fit, and a choice, make small. The model describes the signals as they
+    /// are, its figures and its noise variance are those of unfiltered errors. None: all frequencies.
+    pub prefilter: Option<Prefilter>,
     /// The orders, which say the structure too; or among which to choose.
     pub choice: Choice,
     /// What makes one model better than another, where there is a choice.
@@ -51,6 +55,7 @@ impl Plan {
             split: None,
             detrend: Detrend::Mean,
             offsets: Vec::new(),
+            prefilter: None,
             choice: choice.into(),
             select: Select::default(),
             method: Method::default(),
@@ -221,12 +226,18 @@ fn fit(
     let signals = names.iter().map(|name| deviations(&mut log, name, plan, &segments));
     let signals: Vec<Signal> = signals.collect::<Result<_, Error>>()?;
     let (output, inputs) = signals.split_last().ok_or_else(|| Error::data("there is no output"))?;
+    let band =
+        plan.prefilter.map(|band| Prefiltered::new(&band, &log, &plan.inputs, &plan.output)).transpose()?;
+    let record = |rows: &[Rows]| match &band {
+        Some(band) => band.record(rows),
+        None => log.record(&plan.inputs, &plan.output, rows),
+    };
     let mut method = plan.method.clone();
     let (selection, orders) = match &plan.choice {
         Choice::Known(orders) => (None, orders.clone()),
         Choice::Grid(_) | Choice::Automatic(_) => {
             let Found { selection, guess } =
-                selected(&log, plan, &estimation, &validation, parts.as_ref(), monitor)?;
+                selected(&record, plan, &estimation, &validation, parts.as_ref(), monitor)?;
             if let Method::PredictionError(search) = &mut method {
                 search.guess = guess;
             }
@@ -234,8 +245,12 @@ fn fit(
             (Some(selection), orders)
         }
     };
-    let record = log.record(&plan.inputs, &plan.output, &estimation)?;
-    let estimate = estimate_of_channels(&record, &plan.inputs, &orders, &method, plan.initial, monitor)?;
+    let seen = record(&estimation)?;
+    let mut estimate = estimate_of_channels(&seen, &plan.inputs, &orders, &method, plan.initial, monitor)?;
+    if band.is_some() {
+        let variance = unfiltered_variance(&estimate, &orders, &log, plan, &estimation)?;
+        estimate = estimate.of_prefiltered(&seen, &orders, variance);
+    }
     let model = Model::new(&orders, &estimate, log.sample_time(), inputs.to_vec(), output.clone())?;
 
     let mut report = Report {
@@ -246,6 +261,7 @@ fn fit(
             rows: log.rows(),
             sample_time: log.sample_time(),
             detrend: plan.detrend.to_string(),
+            prefilter: plan.prefilter,
             estimation: estimation.clone(),
             validation: validation.clone(),
             split: parts,
@@ -260,6 +276,9 @@ fn fit(
         model,
     };
     report.warnings = warnings(&report);
+    if let Some(band) = &band {
+        report.warnings.extend(band.warning(&estimation)?);
+    }
     let grid = if let Choice::Grid(grid) = &plan.choice { Some(grid.clone()) } else { None };
     Ok((Unjudged { report, grid }, log))
 }
@@ -295,8 +314,8 @@ impl Shares {
 }
 
 /// The choice among several models.
-fn selected(
-    log: &Log,
+fn selected<'a>(
+    record: &impl Fn(&[Rows]) -> Result<Record<'a>, Error>,
     plan: &Plan,
     estimation: &[Rows],
     validation: &[Rows],
@@ -311,7 +330,6 @@ fn selected(
     };
     let (fitted, unseen) = parts
         .map_or((estimation, validation), |parts| (parts.estimation.as_slice(), parts.validation.as_slice()));
-    let record = |rows| log.record(&plan.inputs, &plan.output, rows);
     let unseen = if unseen.is_empty() { None } else { Some(record(unseen)?) };
     let task = Task {
         estimation: &record(fitted)?,
@@ -323,6 +341,30 @@ fn selected(
         monitor,
     };
     select::choose(&task, &plan.choice)
+}
+
+/// The variance of the errors one step ahead of the unfiltered signals, sum e^2/(N - p) over the estimation rows.
+fn unfiltered_variance(
+    estimate: &Estimate,
+    orders: &Orders,
+    log: &Log,
+    plan: &Plan,
+    rows: &[Rows],
+) -> Result<f64, Error> {
+    let model = Model::new(
+        orders,
+        estimate,
+        log.sample_time(),
+        vec![Signal::default(); orders.inputs()],
+        Signal::default(),
+    )?;
+    let record = log.record(&plan.inputs, &plan.output, rows)?;
+    let start = Start::natural(&model, Horizon::Steps { steps: 1 });
+    let found = innovations(&model, &record, 1, start)?;
+    let errors = || found.iter().map(|found| &found.errors[found.counted.start - found.rows.start..]);
+    let samples: usize = errors().map(<[f64]>::len).sum();
+    let squares: f64 = errors().map(sum_of_squares).sum();
+    Ok(squares / samples.saturating_sub(orders.parameters()).max(1) as f64)
 }
 
 /// The largest size of some values.
@@ -467,6 +509,34 @@ mod tests {
             assert!(unjudged.report().fit.is_empty() && unjudged.report().model == whole.model);
             assert_eq!(unjudged.judged(log.clone()).unwrap(), whole);
         }
+    }
+
+    #[test]
+    fn a_fit_in_a_band_knows_how_sure_it_is_and_what_noise_there_is() {
+        let mut noise = Noise(7);
+        let orders = Orders::oe(&[1], &[1], &[1]).unwrap();
+        let truth = [0.5, -0.8];
+        let channel = |name: &str, values: Vec<f64>| Channel { name: name.into(), values };
+        let (runs, samples) = (100, 500);
+        let (mut squares, mut variance) = ([0.0; 2], 0.0);
+        for _ in 0..runs {
+            let u = noise.take(samples);
+            let mut x = vec![0.0];
+            (1..samples).for_each(|t| x.push(0.8 * x[t - 1] + 0.5 * u[t - 1]));
+            let y = x.iter().map(|x| x + 0.3 * noise.normal()).collect();
+            let log = Log::new(vec![channel("u", u), channel("y", y)], 1.0).unwrap();
+            let prefilter = Some("0.01..0.2".parse().unwrap());
+            let plan = Plan { prefilter, detrend: Detrend::None, ..Plan::new(&["u"], "y", orders.clone()) };
+            let model = identify(log, &[], &plan).unwrap().model;
+            for ((square, parameter), truth) in squares.iter_mut().zip(&model.parameters).zip(truth) {
+                *square +=
+                    ((parameter.value - truth) / parameter.standard_error.unwrap()).powi(2) / f64::from(runs);
+            }
+            variance += model.noise_variance / f64::from(runs);
+        }
+        // chi-square of 100 degrees over 100 has a deviation of 0.14.
+        assert!(squares.iter().all(|square| (0.65..1.45).contains(square)), "{squares:?}");
+        assert!((variance / 0.09 - 1.0).abs() < 0.05, "{variance}");
     }
 
     #[test]

@@ -2,7 +2,10 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::data::Rows;
-use crate::{Criteria, Error, Fit, Initial, Interpolation, Model, Procedure, Selection, document, text};
+use crate::{
+    AntiAlias, Criteria, Error, Fit, Initial, Interpolation, Model, Prefilter, Procedure, Resample,
+    Selection, document, text,
+};
 
 /// The schema that this version writes.
 const SCHEMA: &str = "thetahat.report/1";
@@ -42,6 +45,10 @@ pub struct Data {
     pub sample_time: f64,
     /// How the offsets were found: `none`, `mean`, `linear` or `start:K`.
     pub detrend: String,
+    /// The band of frequencies in which the model was fitted: errors that the estimation counts are filtered ones, by a
+    /// Butterworth filter of order 4 at each end. None: no filter.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub prefilter: Option<Prefilter>,
     /// The rows asked for to estimate on.
     pub estimation: Vec<Rows>,
     /// The rows asked for to validate on.
@@ -83,7 +90,7 @@ pub struct Source {
     pub resampled: Option<Resampling>,
 }
 
-/// How an irregular log was made uniform.
+/// How a log was put on another clock.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Resampling {
     /// Seconds between the new rows.
@@ -92,6 +99,20 @@ pub struct Resampling {
     pub interpolation: Interpolation,
     /// The number of rows before.
     pub rows: usize,
+    /// The filter that took out what the new clock cannot show; none where it does not apply, or was not wanted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub anti_alias: Option<AntiAlias>,
+}
+
+impl Resampling {
+    /// What becomes of a log with these times.
+    ///
+    /// # Errors
+    /// As for [`Resample::filter_for`].
+    pub fn new(how: &Resample, time: &[f64]) -> Result<Self, Error> {
+        let Resample { step, interpolation, .. } = *how;
+        Ok(Self { step, interpolation, rows: time.len(), anti_alias: how.filter_for(time)? })
+    }
 }
 
 /// How many values a channel misses.

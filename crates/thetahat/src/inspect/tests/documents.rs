@@ -71,12 +71,13 @@ fn an_irregular_clock_is_resampled() {
     assert_eq!((found.rows, found.channels[0].repeated), (600, quality(u.clone()).repeated));
     assert!((600..620).contains(&found.log.rows.len()));
     // As it was asked for.
-    let asked = InspectionPlan { resample: Some((1.0, Interpolation::Hold)), ..plan(&["u"], Some("y")) };
+    let asked =
+        InspectionPlan { resample: Some(Resample::new(1.0, Interpolation::Hold)), ..plan(&["u"], Some("y")) };
     let found = inspected(record(), &asked);
     assert_eq!(found.log.resampled.as_ref().map(|resampled| resampled.step), Some(1.0));
     assert!(!says(&found, "irregular") && (300..310).contains(&found.log.rows.len()));
     // The same as inspecting what it was resampled to.
-    let log = Log::resampled(record().channels, &time, 1.0, Interpolation::Hold).unwrap();
+    let log = Log::resampled(record().channels, &time, &Resample::new(1.0, Interpolation::Hold)).unwrap();
     let again = inspected(
         Recording { channels: log.channels().to_vec(), times: Times::Uniform(1.0) },
         &plan(&["u"], Some("y")),
@@ -231,7 +232,7 @@ fn what_is_no_log_is_refused() {
         (
             vec![("u", &ok[..])],
             Times::Measured(vec![0.0, 1.0, 2.0]),
-            InspectionPlan { resample: Some((-1.0, Interpolation::Hold)), ..plan(&["u"], None) },
+            InspectionPlan { resample: Some(Resample::new(-1.0, Interpolation::Hold)), ..plan(&["u"], None) },
             "positive",
         ),
     ] {

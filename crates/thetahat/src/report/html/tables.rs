@@ -27,7 +27,7 @@ pub(super) fn parameters(model: &Model) -> Table {
 
 pub(super) fn fits(fits: &[Fit]) -> Table {
     let parts = fits.iter().any(|fit| fit.part.is_some());
-    let head = ["part", "horizon", "start", "fit [%]", "RMSE", "samples", "rows"];
+    let head = ["part", "horizon", "start", "fit [%]", "RMSE", "mean |e|", "largest |e|", "samples", "rows"];
     let mut table = Table::new("Fit", if parts { &head } else { &head[1..] });
     for fit in fits {
         let mut cells = if parts { vec![or_dash(fit.part, |own| part(own).to_owned())] } else { vec![] };
@@ -36,6 +36,8 @@ pub(super) fn fits(fits: &[Fit]) -> Table {
             start(fit.initial).to_owned(),
             or_dash(fit.percent, |percent| fixed(percent, 3)),
             or_dash(fit.rmse, number),
+            or_dash(fit.mean_absolute_error, number),
+            or_dash(fit.largest_error, number),
             fit.samples.to_string(),
             rows(&fit.rows),
         ]);
@@ -224,10 +226,12 @@ pub(super) fn noise(who: &str, parts: &[(String, &Validation)]) -> Table {
 pub(super) fn logs(sources: &[Source]) -> Table {
     let mut table = Table::new("Logs", &["file", "rows", "time column", "start", "resampled"]);
     for source in sources {
-        let resampled = source
-            .resampled
-            .as_ref()
-            .map(|resampling| format!("to {} s, from {} rows", short(resampling.step), resampling.rows));
+        let resampled = source.resampled.as_ref().map(|resampling| {
+            let filter = resampling.anti_alias.map_or_else(String::new, |filter| {
+                format!(", low-pass filtered at {} Hz", short(filter.cutoff))
+            });
+            format!("to {} s, from {} rows{filter}", short(resampling.step), resampling.rows)
+        });
         table.row([
             source.file.clone(),
             source.rows.to_string(),
@@ -247,6 +251,9 @@ pub(super) fn data(report: &Report) -> Table {
     add("rows", data.rows.to_string());
     add("sample time", format!("{} s", short(data.sample_time)));
     add("detrend", data.detrend.clone());
+    if let Some(band) = data.prefilter {
+        add("fitted in the band", format!("{band} Hz"));
+    }
     add("estimation rows", parts(&data.estimation));
     add("validation rows", parts(&data.validation));
     if let Some(split) = &data.split {

@@ -1,0 +1,60 @@
+//! psi itself, column by column: for sums over its rows that no lagged products give.
+
+use std::ops::Range;
+
+use super::section::Section;
+use super::{Layout, Predictor};
+
+/// `target += weight x`.
+fn add_scaled(target: &mut [f64], weight: f64, x: &[f64]) {
+    target.iter_mut().zip(x).for_each(|(target, x)| *target += weight * x);
+}
+
+impl Predictor<'_> {
+    /// For each segment the columns of psi with respect to the parameters over the samples that count, the best changes of the
+    /// free responses taken out, at the current point. O(N p (n + 1)) for n free responses, and memory for N p numbers.
+    pub(in crate::estimate) fn columns(&self) -> Vec<Vec<Vec<f64>>> {
+        self.sections.iter().map(|section| section.columns(&self.layout)).collect()
+    }
+}
+
+impl Section<'_> {
+    /// The columns of the parameters without the free responses.
+    fn columns(&self, layout: &Layout) -> Vec<Vec<f64>> {
+        let (parameters, free) = (layout.parameters, layout.free);
+        let mut columns = self.raw_columns(layout);
+        let responses = columns.split_off(parameters);
+        for (index, column) in columns.iter_mut().enumerate() {
+            let steps = &self.free_steps[(index + 1) * free..][..free];
+            for (step, response) in steps.iter().zip(&responses) {
+                add_scaled(column, -step, response);
+            }
+        }
+        columns
+    }
+
+    /// The columns of the parameters, then of the free responses, over the samples that count.
+    pub(super) fn raw_columns(&self, layout: &Layout) -> Vec<Vec<f64>> {
+        let count = layout.parameters + layout.free;
+        let (columns, shifts) = layout.columns.split_at(count);
+        let rows = layout.counted..self.output.len();
+        let column = |(index, column): (usize, &super::Column)| {
+            let mut values = vec![0.0; rows.len()];
+            add_shifted(&mut values, &rows, column.sign, &self.signals[column.signal], column.lag);
+            let weights = &self.corrections[index * shifts.len()..][..shifts.len()];
+            for (shift, weight) in shifts.iter().zip(weights).filter(|(_, weight)| **weight != 0.0) {
+                add_shifted(&mut values, &rows, *weight, &self.signals[shift.signal], shift.lag);
+            }
+            values
+        };
+        columns.iter().enumerate().map(column).collect()
+    }
+}
+
+/// `target += weight s(t - lag)` over some rows, s being zero before the first.
+fn add_shifted(target: &mut [f64], rows: &Range<usize>, weight: f64, signal: &[f64], lag: usize) {
+    let from = lag.max(rows.start);
+    if from < rows.end {
+        add_scaled(&mut target[from - rows.start..], weight, &signal[from - lag..rows.end - lag]);
+    }
+}

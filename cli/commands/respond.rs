@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::path::Path;
 
-use thetahat::{Applied, Detrend, Horizon, Log, Start, apply};
+use thetahat::{Applied, Detrend, Drawn, Draws, Horizon, Log, Start, apply, sample};
 
 use super::{stored, summary};
 use crate::args::{PredictArguments, RespondArguments, SimulateArguments};
@@ -24,14 +24,29 @@ pub(crate) fn predict(arguments: &PredictArguments) -> Result<(), Failure> {
             }
         },
     };
-    respond(&arguments.respond, horizon, arguments.initial.given())
+    respond(&arguments.respond, horizon, arguments.initial.given(), None)
 }
 
 pub(crate) fn simulate(arguments: &SimulateArguments) -> Result<(), Failure> {
-    respond(&arguments.respond, Horizon::FreeRun, arguments.initial.given())
+    let asked = arguments.draws.map(|count| Asked {
+        draws: Draws { count: count as usize, seed: arguments.seed.unwrap_or(0) },
+        file: arguments.draws_file.as_deref(),
+    });
+    respond(&arguments.respond, Horizon::FreeRun, arguments.initial.given(), asked)
 }
 
-fn respond(arguments: &RespondArguments, horizon: Horizon, initial: Option<Start>) -> Result<(), Failure> {
+/// Draws, and where they go.
+struct Asked<'a> {
+    draws: Draws,
+    file: Option<&'a Path>,
+}
+
+fn respond(
+    arguments: &RespondArguments,
+    horizon: Horizon,
+    initial: Option<Start>,
+    draws: Option<Asked<'_>>,
+) -> Result<(), Failure> {
     let job = LogJob::resolve(&arguments.log, &arguments.clock)?;
     let asked = rows("--rows", &arguments.rows)?;
     let detrend: Option<Detrend> = match arguments.detrend.as_str() {
@@ -55,9 +70,32 @@ fn respond(arguments: &RespondArguments, horizon: Horizon, initial: Option<Start
     let initial =
         initial.unwrap_or_else(|| if measured { Start::natural(&model, horizon) } else { Start::Zero });
     let clock = RowClock::of(&log);
-    let applied = apply(&model, log, &asked, detrend, horizon, initial).map_err(log::failure(&[source]))?;
+    let kept = draws.is_some().then(|| log.clone());
+    let sources = [source];
+    let failed = log::failure(&sources);
+    let applied = apply(&model, log, &asked, detrend, horizon, initial).map_err(&failed)?;
+    let drawn = draws
+        .as_ref()
+        .zip(kept)
+        .map(|(draws, log)| sample(&model, log, &asked, detrend, initial, &draws.draws).map_err(&failed));
+    let drawn = drawn.transpose()?;
+    let bands = drawn.as_ref().map(|drawn| drawn.bands(&QUANTILES));
 
-    output::write_csv(&arguments.out, |csv| rows_as_csv(csv, &applied, &clock))?;
+    if let (Some(drawn), Some(Asked { file: Some(file), .. })) = (&drawn, &draws) {
+        output::write_csv(file, |csv| runs_as_csv(csv, drawn, &applied, &clock))?;
+    }
+    output::write_csv(&arguments.out, |csv| rows_as_csv(csv, &applied, bands.as_ref(), &clock))?;
+    if let Some(Drawn { unstable, varied, values, .. }) = &drawn {
+        if !varied {
+            warn("the covariance of the parameters is not known: the draws differ in their noise alone");
+        }
+        if *unstable > 0 {
+            warn(&format!(
+                "parameters of an unstable model were drawn {unstable} times beside {} stable ones, and drawn again",
+                values.len()
+            ));
+        }
+    }
     match &applied.fit {
         Some(_) if !applied.predicted.iter().any(|value| value.is_finite()) => {
             warn("no row could be predicted: the stretches without a gap are too short")
@@ -87,30 +125,61 @@ impl RowClock {
     }
 }
 
-/// Time or row, measured, predicted, and the deviation where there is one; what is missing is empty.
+/// The levels of the bands.
+const QUANTILES: [f64; 2] = [0.025, 0.975];
+
+/// Time or row, measured, predicted, the deviation or the bands where there are any; what is missing is empty.
 fn rows_as_csv(
     csv: &mut csv::Writer<&mut dyn Write>,
+    applied: &Applied,
+    bands: Option<&(Vec<f64>, Vec<Vec<f64>>)>,
+    clock: &RowClock,
+) -> Result<(), csv::Error> {
+    let mut columns: Vec<(String, Option<&[f64]>)> = vec![
+        ("measured".to_owned(), applied.measured.as_deref()),
+        ("predicted".to_owned(), Some(&applied.predicted)),
+    ];
+    if let Some(deviations) = &applied.standard_deviations {
+        columns.push(("standard_deviation".to_owned(), Some(deviations)));
+    }
+    if let Some((mean, quantiles)) = bands {
+        columns.push(("mean".to_owned(), Some(mean)));
+        let named = QUANTILES.iter().map(|level| format!("quantile_{level}"));
+        columns.extend(named.zip(quantiles).map(|(name, values)| (name, Some(values.as_slice()))));
+    }
+    columns_as_csv(csv, &columns, applied, clock)
+}
+
+/// Time or row, and each run.
+fn runs_as_csv(
+    csv: &mut csv::Writer<&mut dyn Write>,
+    drawn: &Drawn,
+    applied: &Applied,
+    clock: &RowClock,
+) -> Result<(), csv::Error> {
+    let runs =
+        drawn.values.iter().zip(1..).map(|(run, number)| (format!("draw_{number}"), Some(run.as_slice())));
+    columns_as_csv(csv, &runs.collect::<Vec<_>>(), applied, clock)
+}
+
+/// Time or row, and some columns by their names.
+fn columns_as_csv(
+    csv: &mut csv::Writer<&mut dyn Write>,
+    columns: &[(String, Option<&[f64]>)],
     applied: &Applied,
     clock: &RowClock,
 ) -> Result<(), csv::Error> {
     let name = if clock.time.is_some() { "time" } else { "row" };
-    let deviations = applied.standard_deviations.as_deref();
-    csv.write_record(
-        [name, "measured", "predicted"].into_iter().chain(deviations.map(|_| "standard_deviation")),
-    )?;
+    csv.write_record(std::iter::once(name).chain(columns.iter().map(|(name, _)| name.as_str())))?;
     let value = |values: Option<&[f64]>, position: usize| {
         values.and_then(|values| values.get(position).copied()).filter(|value| value.is_finite())
     };
     let asked = applied.rows.iter().flat_map(|range| range.first() - 1..range.last());
     for position in asked.chain(clock.rows..clock.rows + applied.beyond) {
-        let measured = value(applied.measured.as_deref(), position);
-        let predicted = value(Some(&applied.predicted), position);
-        let deviation = deviations.map(|deviations| value(Some(deviations), position));
-        match (clock.at(position), deviation) {
-            (Some(time), Some(deviation)) => csv.serialize((time, measured, predicted, deviation))?,
-            (Some(time), None) => csv.serialize((time, measured, predicted))?,
-            (None, Some(deviation)) => csv.serialize((position + 1, measured, predicted, deviation))?,
-            (None, None) => csv.serialize((position + 1, measured, predicted))?,
+        let values: Vec<Option<f64>> = columns.iter().map(|(_, values)| value(*values, position)).collect();
+        match clock.at(position) {
+            Some(time) => csv.serialize((time, values))?,
+            None => csv.serialize((position + 1, values))?,
         }
     }
     Ok(())

@@ -7,8 +7,8 @@ use numpy::{PyArray1, PyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use thetahat::{
-    Channel, Horizon, Procedure, Quantity, Report, Source, Start, StateSpace, Unjudged, apply,
-    frequency_response, logarithmic_frequencies, step_response,
+    Channel, Draws, Horizon, Procedure, Quantity, Report, Source, Start, StateSpace, TransientResponse,
+    Unjudged, apply, frequency_response, impulse_response, logarithmic_frequencies, sample, step_response,
 };
 
 use crate::array::{from_matrix, matrix, vector};
@@ -144,23 +144,46 @@ impl Model {
 
     /// The free run from rest on inputs, one column for each.
     fn simulate<'py>(&self, py: Python<'py>, inputs: &Bound<'py, PyAny>) -> PyResult<Column<'py>> {
-        if self.model.inputs.is_empty() {
-            return Err(PyValueError::new_err(
-                "u: the model has no inputs, so there is nothing to simulate; forecast it",
-            ));
-        }
-        let channels = self.inputs_of("u", inputs, None)?;
-        if let Some(channel) =
-            channels.iter().find(|channel| !channel.values.iter().all(|value| value.is_finite()))
-        {
-            return Err(PyValueError::new_err(format!("u: input '{}' holds NaN or infinity", channel.name)));
-        }
+        let channels = self.driving(inputs)?;
         let model = Arc::clone(&self.model);
         let applied = interruptible(py, move |_| {
             let log = thetahat::Log::new(channels, model.sample_time)?;
             apply(&model, log, &[], None, Horizon::FreeRun, Start::Zero)
         })?;
         Ok(PyArray1::from_vec(py, applied.predicted))
+    }
+
+    /// Free runs drawn from what the estimate leaves open, on a log or on inputs, one column for each: a row for each draw. Also
+    /// how often parameters were unstable, and whether they vary.
+    #[pyo3(signature = (log, inputs, draws, seed, initial))]
+    fn sample<'py>(
+        &self,
+        py: Python<'py>,
+        log: Option<&Bound<'py, Log>>,
+        inputs: Option<&Bound<'py, PyAny>>,
+        draws: usize,
+        seed: u64,
+        initial: &str,
+    ) -> PyResult<(Bound<'py, PyArray2<f64>>, usize, bool)> {
+        let model = Arc::clone(&self.model);
+        let (log, start) = match (log, inputs) {
+            (Some(log), _) => {
+                let start = self.start(initial, log.get(), Horizon::FreeRun)?;
+                let known = &log.get().log;
+                (copy(known, &channels(&model, known)), start)
+            }
+            (None, Some(inputs)) => {
+                let channels = self.driving(inputs)?;
+                (thetahat::Log::new(channels, model.sample_time), Start::Zero)
+            }
+            (None, None) => return Err(PyValueError::new_err("u: give inputs, or a log")),
+        };
+        let log = log.map_err(|error| error::batch(py, error))?;
+        let draws = Draws { count: draws, seed };
+        let drawn = interruptible(py, move |_| sample(&model, log, &[], None, start, &draws))?;
+        let runs = PyArray2::from_vec2(py, &drawn.values)
+            .map_err(|error| PyValueError::new_err(format!("draws: {error}")))?;
+        Ok((runs, drawn.unstable, drawn.varied))
     }
 
     /// What comes after the end of a log, and its standard deviations.
@@ -260,14 +283,19 @@ impl Model {
         samples: Option<usize>,
     ) -> PyResult<[Column<'py>; 3]> {
         let model = Arc::clone(&self.model);
-        let response = interruptible(py, move |_| step_response(&model, input, samples))?;
-        let values = response.values.iter().map(|quantity| quantity.value).collect();
-        let errors = response.values.iter().map(or_nan).collect();
-        Ok([
-            PyArray1::from_vec(py, response.time),
-            PyArray1::from_vec(py, values),
-            PyArray1::from_vec(py, errors),
-        ])
+        Ok(transient(py, interruptible(py, move |_| step_response(&model, input, samples))?))
+    }
+
+    /// The same for an impulse.
+    #[pyo3(signature = (input, samples))]
+    fn impulse_response<'py>(
+        &self,
+        py: Python<'py>,
+        input: usize,
+        samples: Option<usize>,
+    ) -> PyResult<[Column<'py>; 3]> {
+        let model = Arc::clone(&self.model);
+        Ok(transient(py, interruptible(py, move |_| impulse_response(&model, input, samples))?))
     }
 
     /// F, G, H, D and K of the innovations form.
@@ -307,6 +335,22 @@ impl Model {
             other => Err(PyValueError::new_err(format!(
                 "initial: '{other}' is none of 'auto', 'drop', 'zero', 'estimate'"
             ))),
+        }
+    }
+
+    /// The inputs of a free run, which misses none of them.
+    fn driving(&self, inputs: &Bound<'_, PyAny>) -> PyResult<Vec<Channel>> {
+        if self.model.inputs.is_empty() {
+            return Err(PyValueError::new_err(
+                "u: the model has no inputs, so there is nothing to simulate; forecast it",
+            ));
+        }
+        let channels = self.inputs_of("u", inputs, None)?;
+        match channels.iter().find(|channel| !channel.values.iter().all(|value| value.is_finite())) {
+            Some(channel) => {
+                Err(PyValueError::new_err(format!("u: input '{}' holds NaN or infinity", channel.name)))
+            }
+            None => Ok(channels),
         }
     }
 
@@ -356,6 +400,13 @@ fn extended(log: &thetahat::Log, future: &[Channel], steps: usize) -> Result<the
         log.borders().to_vec(),
         log.before(),
     )
+}
+
+/// Times, values and their standard errors.
+fn transient(py: Python<'_>, response: TransientResponse) -> [Column<'_>; 3] {
+    let values = response.values.iter().map(|quantity| quantity.value).collect();
+    let errors = response.values.iter().map(or_nan).collect();
+    [response.time, values, errors].map(|column| PyArray1::from_vec(py, column))
 }
 
 fn or_nan(quantity: &Quantity) -> f64 {

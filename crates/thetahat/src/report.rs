@@ -5,6 +5,7 @@ mod apply;
 mod html;
 mod identify;
 mod requirement;
+mod sample;
 mod schema;
 mod validation;
 mod warnings;
@@ -14,6 +15,7 @@ pub use apply::{Applied, apply};
 pub use html::{comparison_page, fit_page, inspection_page, validation_page};
 pub use identify::{Plan, Unjudged, identify, identify_monitored};
 pub use requirement::Requirement;
+pub use sample::sample;
 pub use schema::{Data, Estimation, Missing, Parts, Report, Resampling, Source};
 pub use validation::{
     Comparison, Coverage, NoiseLevel, Seen, Signals, Validated, Validation, ValidationPlan, compare, validate,

@@ -45,45 +45,10 @@ pub fn apply(
     horizon: Horizon,
     initial: Start,
 ) -> Result<Applied, Error> {
-    check_sample_time(model, &log)?;
-    let all = vec![Rows::new(1, log.rows())?];
-    let rows = checked("--rows", if rows.is_empty() { &all } else { rows }, log.rows())?;
-    let names: Vec<String> = model.inputs.iter().map(|input| input.name.clone()).collect();
-    let output = &model.output.name;
-    // A copy, as what is taken off and put back on again is no longer the same to the bit.
-    let measured = log.channel(output).ok().map(|channel| channel.values.clone());
+    let Prepared { rows, measured, level } = prepared(model, &mut log, rows, detrend, (horizon, initial))?;
     let has_output = measured.is_some();
-    if !has_output && (horizon != Horizon::FreeRun || initial != Start::Zero) {
-        return Err(Error::data(format!(
-            "the log has no output '{output}': only a free run from zero can do without it"
-        )));
-    }
-    let used: Vec<&str> = names.iter().chain(has_output.then_some(output)).map(String::as_str).collect();
-    let segments = log.segments(&used, &rows)?;
-    let mut level = model.output.offset;
-    for signal in
-        model.inputs.iter().chain([&model.output]).filter(|signal| used.contains(&signal.name.as_str()))
-    {
-        let offset = match detrend {
-            None => signal.offset,
-            Some(_) if segments.is_empty() => Offset::default(),
-            Some(detrend) => Offset::estimate(detrend, &log, &signal.name, &segments)?,
-        };
-        log.remove(&signal.name, &offset);
-        if signal.name == *output {
-            level = offset;
-        }
-    }
-
-    let absent;
-    let record = if has_output {
-        log.record(&names, output, &rows)?
-    } else {
-        absent = vec![0.0; log.rows()];
-        let inputs = names.iter().map(|name| Ok(log.channel(name)?.values.as_slice()));
-        let past = vec![0; segments.len()];
-        Record { output: &absent, inputs: inputs.collect::<Result<_, Error>>()?, segments, past }
-    };
+    let absent = vec![0.0; if has_output { 0 } else { log.rows() }];
+    let record = record(model, &log, &rows, (!has_output).then_some(absent.as_slice()))?;
     let (fit, response) = if has_output {
         let (fit, response) = Fit::of(model, &record, &rows, None, horizon, initial)?;
         (Some(fit), response)
@@ -113,6 +78,71 @@ pub fn apply(
     }
     let beyond = predicted.len() - log.rows();
     Ok(Applied { measured, predicted, standard_deviations, beyond, rows, fit })
+}
+
+/// A log of which the offsets were taken.
+pub(super) struct Prepared {
+    /// The rows to respond to.
+    pub(super) rows: Vec<Rows>,
+    /// The output as it was, if there is one.
+    pub(super) measured: Option<Vec<f64>>,
+    /// What was taken from it.
+    pub(super) level: Offset,
+}
+
+/// Takes the offsets from the channels of a model, in place.
+pub(super) fn prepared(
+    model: &Model,
+    log: &mut Log,
+    rows: &[Rows],
+    detrend: Option<Detrend>,
+    (horizon, initial): (Horizon, Start),
+) -> Result<Prepared, Error> {
+    check_sample_time(model, log)?;
+    let all = vec![Rows::new(1, log.rows())?];
+    let rows = checked("--rows", if rows.is_empty() { &all } else { rows }, log.rows())?;
+    let output = &model.output.name;
+    // A copy, as what is taken off and put back on again is no longer the same to the bit.
+    let measured = log.channel(output).ok().map(|channel| channel.values.clone());
+    if measured.is_none() && (horizon != Horizon::FreeRun || initial != Start::Zero) {
+        return Err(Error::data(format!(
+            "the log has no output '{output}': only a free run from zero can do without it"
+        )));
+    }
+    let names = model.inputs.iter().map(|input| &input.name);
+    let used: Vec<&str> = names.chain(measured.is_some().then_some(output)).map(String::as_str).collect();
+    let segments = log.segments(&used, &rows)?;
+    let mut level = model.output.offset;
+    for signal in
+        model.inputs.iter().chain([&model.output]).filter(|signal| used.contains(&signal.name.as_str()))
+    {
+        let offset = match detrend {
+            None => signal.offset,
+            Some(_) if segments.is_empty() => Offset::default(),
+            Some(detrend) => Offset::estimate(detrend, log, &signal.name, &segments)?,
+        };
+        log.remove(&signal.name, &offset);
+        if signal.name == *output {
+            level = offset;
+        }
+    }
+    Ok(Prepared { rows, measured, level })
+}
+
+/// The signals of a model over some rows; `absent` stands for an output that the log does not have.
+pub(super) fn record<'a>(
+    model: &Model,
+    log: &'a Log,
+    rows: &[Rows],
+    absent: Option<&'a [f64]>,
+) -> Result<Record<'a>, Error> {
+    let names: Vec<String> = model.inputs.iter().map(|input| input.name.clone()).collect();
+    let Some(output) = absent else { return log.record(&names, &model.output.name, rows) };
+    let used: Vec<&str> = names.iter().map(String::as_str).collect();
+    let segments = log.segments(&used, rows)?;
+    let inputs = names.iter().map(|name| Ok(log.channel(name)?.values.as_slice()));
+    let past = vec![0; segments.len()];
+    Ok(Record { output, inputs: inputs.collect::<Result<_, Error>>()?, segments, past })
 }
 
 /// The log must have the model's sample time.

@@ -1,0 +1,51 @@
+use super::apply::{Prepared, prepared, record};
+use crate::data::{Detrend, Log, Rows};
+use crate::respond::{Drawn, Draws, Start, draw};
+use crate::validate::Horizon;
+use crate::{Error, Model};
+
+/// Free runs of a model on a log, drawn from what the estimate leaves open.
+///
+/// They are in the log's own units, with a value for each row of the log; NaN outside the rows asked for, in gaps, and before
+/// a start. `rows` are those to respond to; none: all. Offsets are as for [`apply`](crate::apply), and a log without the output
+/// does for [`Start::Zero`]. [`Drawn::bands`] gives the mean and quantiles of each row.
+///
+/// # Errors
+/// As for [`apply`](crate::apply) and [`draw`].
+///
+/// ```
+/// use thetahat::{Channel, Draws, Log, Orders, Plan, Start, identify, sample};
+///
+/// let u: Vec<f64> = (0..200).map(|t| f64::from(t * t % 7)).collect();
+/// let mut y = vec![20.0];
+/// for t in 1..200 {
+///     y.push(4.0 + 0.8 * y[t - 1] + 0.5 * u[t - 1] + 0.01 * f64::from((t * t * t) as u32 % 11));
+/// }
+/// let channel = |name: &str, values| Channel { name: name.into(), values };
+/// let log = Log::new(vec![channel("u", u), channel("y", y)], 0.1)?;
+/// let model = identify(log.clone(), &[], &Plan::new(&["u"], "y", Orders::arx(1, &[1], &[1])?))?.model;
+/// let runs = sample(&model, log, &[], None, Start::Estimate, &Draws { count: 200, seed: 0 })?;
+/// let (mean, bands) = runs.bands(&[0.025, 0.975]);
+/// assert!(bands[0][150] < mean[150] && mean[150] < bands[1][150]);
+/// # Ok::<(), thetahat::Error>(())
+/// ```
+pub fn sample(
+    model: &Model,
+    mut log: Log,
+    rows: &[Rows],
+    detrend: Option<Detrend>,
+    initial: Start,
+    draws: &Draws,
+) -> Result<Drawn, Error> {
+    let Prepared { rows, measured, level } =
+        prepared(model, &mut log, rows, detrend, (Horizon::FreeRun, initial))?;
+    let absent = vec![0.0; if measured.is_some() { 0 } else { log.rows() }];
+    let record = record(model, &log, &rows, measured.is_none().then_some(absent.as_slice()))?;
+    let mut drawn = draw(model, &record, initial, draws)?;
+    for run in &mut drawn.values {
+        for (row, value) in run.iter_mut().enumerate() {
+            *value += level.at(log.elapsed(row));
+        }
+    }
+    Ok(drawn)
+}

@@ -1,0 +1,130 @@
+//! Draws against what they are drawn from.
+
+use crate::data::Record;
+use crate::regression::noise::Noise;
+use crate::respond::{Draws, Start, draw, simulate};
+use crate::{Error, Model, Orders};
+
+fn diagonal(variances: &[f64]) -> Vec<Vec<f64>> {
+    let row = |i: usize| (0..variances.len()).map(|j| if i == j { variances[i] } else { 0.0 }).collect();
+    (0..variances.len()).map(row).collect()
+}
+
+fn moments(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
+    let count = values.clone().count() as f64;
+    let mean = values.clone().sum::<f64>() / count;
+    (mean, values.map(|value| (value - mean).powi(2)).sum::<f64>() / (count - 1.0))
+}
+
+#[test]
+fn noise_goes_through_its_model_and_is_stationary_unless_it_starts_at_rest() {
+    // y = 2 u(t - 1) + e/(1 - 0.8 q^-1), e of variance 0.36: v has the variance 1 and r(1) = 0.8.
+    let orders = Orders::bj(&[1], 0, 1, &[0], &[1]).unwrap();
+    let model = Model::from_parameters(&orders, &[2.0, -0.8], None, 0.36, 1.0).unwrap();
+    let u = Noise(1).take(40);
+    let y = vec![0.0; 40];
+    let record = Record::new(&y, vec![&u]).unwrap();
+    let draws = Draws { count: 4000, seed: 3 };
+    for (start, first) in [(Start::Zero, 0.36), (Start::Drop, 1.0)] {
+        let drawn = draw(&model, &record, start, &draws).unwrap();
+        let run = simulate(&model, &record, start).unwrap();
+        assert_eq!((drawn.counted.clone(), drawn.varied, drawn.unstable), (run.counted.clone(), false, 0));
+        let noise = |row: usize| drawn.values.iter().map(move |values| values[row]);
+        let beginning = run.counted[0].start;
+        for (row, expected) in [(beginning, first), (39, 1.0)] {
+            let (mean, variance) = moments(noise(row));
+            // Four deviations of 4000 draws.
+            assert!((mean - run.values[row]).abs() < 0.07, "{start:?} {row}: {mean}");
+            assert!((variance / expected - 1.0).abs() < 0.09, "{start:?} {row}: {variance}");
+        }
+        let product =
+            drawn.values.iter().map(|values| (values[38] - run.values[38]) * (values[39] - run.values[39]));
+        assert!((product.sum::<f64>() / 4000.0 - 0.8).abs() < 0.08);
+    }
+}
+
+#[test]
+fn parameters_vary_as_their_covariance_says() {
+    // A gain alone: y = b u, without noise.
+    let orders = Orders::arx(0, &[2], &[0]).unwrap();
+    let covariance = vec![vec![0.04, 0.018], vec![0.018, 0.09]];
+    let model = Model::from_parameters(&orders, &[1.0, -2.0], Some(&covariance), 0.0, 1.0).unwrap();
+    // u = 1, 0, 0 gives b0, then b1.
+    let u = [1.0, 0.0, 0.0];
+    let record = Record::new(&[0.0; 3], vec![&u]).unwrap();
+    let drawn = draw(&model, &record, Start::Zero, &Draws { count: 5000, seed: 0 }).unwrap();
+    assert!(drawn.varied);
+    let (mean, variance) = moments(drawn.values.iter().map(|values| values[0]));
+    assert!((mean - 1.0).abs() < 0.012 && (variance / 0.04 - 1.0).abs() < 0.08, "{mean} {variance}");
+    let (mean, variance) = moments(drawn.values.iter().map(|values| values[1]));
+    assert!((mean + 2.0).abs() < 0.018 && (variance / 0.09 - 1.0).abs() < 0.08, "{mean} {variance}");
+    let product =
+        drawn.values.iter().map(|values| (values[0] - 1.0) * (values[1] + 2.0)).sum::<f64>() / 5000.0;
+    assert!((product - 0.018).abs() < 0.004, "{product}");
+    // The bands are their quantiles: +- 1.96 deviations.
+    let (mean, quantiles) = drawn.bands(&[0.025, 0.975]);
+    assert!((mean[0] - 1.0).abs() < 0.012);
+    assert!((quantiles[0][0] - (1.0 - 1.96 * 0.2)).abs() < 0.025, "{}", quantiles[0][0]);
+    assert!((quantiles[1][0] - (1.0 + 1.96 * 0.2)).abs() < 0.025);
+}
+
+#[test]
+fn the_same_seed_gives_the_same_bits_on_any_number_of_threads() {
+    let orders = Orders::armax(1, &[1], 1, &[1]).unwrap();
+    let model =
+        Model::from_parameters(&orders, &[-0.7, 1.0, 0.3], Some(&diagonal(&[1e-3, 1e-3, 1e-2])), 0.1, 1.0)
+            .unwrap();
+    let u = Noise(1).take(300);
+    let y = Noise(2).take(300);
+    let mut record = Record::new(&y, vec![&u]).unwrap();
+    record.segments = vec![0..120, 150..300];
+    record.past = vec![0, 0];
+    let draws = Draws { count: 64, seed: 9 };
+    let of = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let drawn = pool.install(|| draw(&model, &record, Start::Estimate, &draws).unwrap());
+        let bits: Vec<u64> = drawn.values.iter().flatten().map(|value| value.to_bits()).collect();
+        (bits, drawn.counted)
+    };
+    let (bits, counted) = of(1);
+    assert_eq!((bits.clone(), counted.clone()), of(3));
+    assert_eq!(counted, [0..120, 150..300]);
+    let other = draw(&model, &record, Start::Estimate, &Draws { seed: 10, ..draws }).unwrap();
+    assert!(other.values[0][0] != f64::from_bits(bits[0]));
+    // The first draws of more are the same ones.
+    let fewer = draw(&model, &record, Start::Estimate, &Draws { count: 5, seed: 9 }).unwrap();
+    let first: Vec<u64> = fewer.values.iter().flatten().map(|value| value.to_bits()).collect();
+    assert_eq!(first, bits[..5 * 300]);
+}
+
+#[test]
+fn unstable_parameters_are_drawn_again_and_counted() {
+    let orders = Orders::arx(1, &[1], &[1]).unwrap();
+    let drawn = |pole: f64, variance: f64| {
+        let model =
+            Model::from_parameters(&orders, &[-pole, 1.0], Some(&diagonal(&[variance, 0.0])), 1.0, 1.0)
+                .unwrap();
+        let u = [1.0; 200];
+        draw(&model, &Record::new(&u, vec![&u]).unwrap(), Start::Zero, &Draws { count: 500, seed: 1 })
+    };
+    // P(pole > 1) = 0.159, so that each draw is repeated 0.19 times on average.
+    let some = drawn(0.99, 1e-4).unwrap();
+    assert!((70..120).contains(&some.unstable), "{}", some.unstable);
+    assert!(some.values.iter().flatten().all(|value| value.abs() < 210.0));
+    // An estimate that is unstable stays one.
+    let all = drawn(1.02, 1e-4).unwrap();
+    assert_eq!(all.unstable, 0);
+    assert!(matches!(drawn(0.99, 1e9), Err(Error::Data { .. })));
+}
+
+#[test]
+fn what_cannot_be_drawn_is_refused() {
+    let orders = Orders::arx(1, &[1], &[1]).unwrap();
+    let model = Model::from_parameters(&orders, &[-0.5, 1.0], None, 1.0, 1.0).unwrap();
+    let u = vec![0.0; 2000];
+    let record = Record::new(&u, vec![&u]).unwrap();
+    for count in [0, 100_001, 100_000] {
+        let error = draw(&model, &record, Start::Zero, &Draws { count, seed: 0 }).unwrap_err();
+        assert!(matches!(&error, Error::Argument { argument, .. } if argument == "draws"), "{error}");
+    }
+}

@@ -74,10 +74,12 @@ Examples:
     /// Simulate a fitted model on a log's inputs (free run)
     ///
     /// Writes CSV: time or row, measured, predicted, in the log's own units. The fit figures go to standard error.
-    /// Without the output column, the run starts from zero.
+    /// Without the output column, the run starts from zero. With --draws there are three more columns: mean, quantile_0.025 and
+    /// quantile_0.975 of runs with noise and with parameters drawn from their covariance.
     #[command(after_help = "\
-Example:
-  thetahat simulate model.json log.csv --rows 501..1000 > simulated.csv")]
+Examples:
+  thetahat simulate model.json log.csv --rows 501..1000 > simulated.csv
+  thetahat simulate model.json log.csv --draws 1000 --seed 1 > bands.csv")]
     Simulate(SimulateArguments),
     /// Say how a fitted model does on a log, and whether anything is left in its residuals
     ///
@@ -151,6 +153,23 @@ since the first row) and, in [next], dt (seconds of this step). The process nois
 Example:
   thetahat bode model.json --frequencies 0.01..3 --points 200 > bode.csv")]
     Bode(BodeArguments),
+    /// The step response of a fitted model
+    ///
+    /// Writes CSV with a row for each input and time: input, time [s], value [units of the output per unit of the input] and its
+    /// standard error. The input is 1 from time 0 on; all is at rest before.
+    #[command(after_help = "\
+Example:
+  thetahat step model.json --samples 200 > step.csv")]
+    Step(TransientArguments),
+    /// The impulse response of a fitted model
+    ///
+    /// Writes CSV with a row for each input and time: input, time [s], value [units of the output per unit of the input] and its
+    /// standard error. The input is 1 in the sample at time 0 and 0 afterwards; all is at rest before. The values are the
+    /// coefficients g_i of B(q)/(A(q) F(q)) = g_0 + g_1 q^-1 + …
+    #[command(after_help = "\
+Example:
+  thetahat impulse model.json --samples 50 > impulse.csv")]
+    Impulse(TransientArguments),
     /// Fit a sample log of a DC motor, carried inside the program
     ///
     /// Writes the log and the report of its fit into a folder and prints the table.
@@ -209,6 +228,10 @@ pub(crate) struct FitArguments {
     /// Set a channel's offset by hand
     #[arg(long, value_name = "NAME=VALUE", help_heading = "Channels")]
     pub(crate) offset: Vec<String>,
+    /// Fit in a band of frequencies in Hz, either end of which may be left out: inputs and output go through one Butterworth
+    /// filter; the model and its figures are of the signals as they are
+    #[arg(long, value_name = "LOW..HIGH", allow_hyphen_values = true, help_heading = "Channels")]
+    pub(crate) prefilter: Option<String>,
 
     /// Fit the unknown parameters of a model in equations (TOML, see filter) by prediction error; channels go by name
     #[arg(
@@ -217,7 +240,7 @@ pub(crate) struct FitArguments {
         help_heading = "Model",
         conflicts_with_all = [
             "ModelArguments", "ChoiceArguments", "SearchArguments", "CriterionArguments", "input", "output", "validate",
-            "detrend", "offset", "html", "resample",
+            "detrend", "offset", "prefilter", "html", "resample",
         ]
     )]
     pub(crate) grey: Option<PathBuf>,
@@ -393,6 +416,15 @@ pub(crate) struct PredictArguments {
 
 #[derive(Debug, Args)]
 pub(crate) struct SimulateArguments {
+    /// Draw so many runs of what the model leaves open: its noise, and its parameters within their covariance
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub(crate) draws: Option<u32>,
+    /// Which draws [default: 0]
+    #[arg(long, value_name = "S", requires = "draws")]
+    pub(crate) seed: Option<u64>,
+    /// Write the drawn runs themselves to a file: CSV with a row for each row of the log, and a column for each draw
+    #[arg(long, value_name = "FILE", requires = "draws")]
+    pub(crate) draws_file: Option<PathBuf>,
     /// What stands before the first sample of a stretch
     #[arg(long, value_enum, default_value = "auto")]
     pub(crate) initial: StartArgument,
@@ -409,6 +441,7 @@ pub(crate) struct ValidateArguments {
     #[arg(value_name = "LOG")]
     pub(crate) path: PathBuf,
     /// What the model must be or do: white, independent, stable, fit>=P (percent, free run), fit@K>=P (K steps ahead),
+    /// mean-error<=E and largest-error<=E (of |e| in units of the output, free run), mean-error@K<=E, largest-error@K<=E,
     /// coverage>=P (of the 95 % intervals); exit code 6 if it does not
     #[arg(long, value_name = "WHAT[,WHAT…]", value_delimiter = ',', help_heading = "Tests")]
     pub(crate) require: Vec<String>,
@@ -681,6 +714,20 @@ pub(crate) struct BodeArguments {
     pub(crate) out: PathBuf,
 }
 
+/// What step and impulse share.
+#[derive(Debug, Args)]
+pub(crate) struct TransientArguments {
+    /// The report that fit wrote (- for standard input)
+    #[arg(value_name = "REPORT")]
+    pub(crate) report: PathBuf,
+    /// How many samples, the one at time 0 included [default: until it has settled]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub(crate) samples: Option<u32>,
+    /// Write the CSV to a file instead of standard output
+    #[arg(short = 'o', long, value_name = "FILE", default_value = "-", hide_default_value = true)]
+    pub(crate) out: PathBuf,
+}
+
 /// What predict and simulate share.
 #[derive(Debug, Args)]
 pub(crate) struct RespondArguments {
@@ -776,8 +823,14 @@ pub(crate) struct ClockArguments {
     /// Seconds from one row to the next [default: 1, so that times count rows]
     #[arg(long, value_name = "SECONDS", allow_hyphen_values = true, help_heading = "Clock")]
     pub(crate) sample_time: Option<f64>,
-    /// Make a log with an irregular clock uniform: a step in seconds, and how values between samples are read
-    #[arg(long, value_name = "STEP:hold|linear", allow_hyphen_values = true, help_heading = "Clock")]
+    /// Put a log on another clock: a step in seconds, and how values between samples are read. A step of two recorded ones or
+    /// more is filtered against aliasing first, unless :unfiltered is added or the clock is irregular
+    #[arg(
+        long,
+        value_name = "STEP:hold|linear[:unfiltered]",
+        allow_hyphen_values = true,
+        help_heading = "Clock"
+    )]
     pub(crate) resample: Option<String>,
 }
 

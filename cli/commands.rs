@@ -12,6 +12,7 @@ mod respond;
 mod stored;
 pub(crate) mod summary;
 mod track;
+mod transient;
 mod validate;
 
 pub(crate) use fit::{Channels, Experiments, experiments};
@@ -33,6 +34,8 @@ pub(crate) fn dispatch(arguments: Arguments, line: &str) -> Result<(), Failure> 
         Command::Track(arguments) => track::track(&arguments),
         Command::Filter(arguments) => filter::filter(&arguments),
         Command::Bode(arguments) => bode::bode(&arguments),
+        Command::Step(arguments) => transient::step(&arguments),
+        Command::Impulse(arguments) => transient::impulse(&arguments),
         Command::Demo(arguments) => demo::demo(&arguments),
         Command::Schema { document } => help::schema(document),
         Command::Completions { shell } => help::completions(shell),

@@ -3,7 +3,7 @@
 use crate::harness::Folder;
 use crate::signals::{Experiment, csv};
 
-const VERBS: [&str; 13] = [
+const VERBS: [&str; 15] = [
     "fit",
     "inspect",
     "predict",
@@ -13,6 +13,8 @@ const VERBS: [&str; 13] = [
     "track",
     "filter",
     "bode",
+    "step",
+    "impulse",
     "demo",
     "schema",
     "completions",

@@ -205,6 +205,12 @@ impl Answer {
         (pairs.iter().map(|(y, x)| (y - x).powi(2)).sum::<f64>() / pairs.len() as f64).sqrt()
     }
 
+    /// The mean and the largest |y - y^|.
+    pub(crate) fn absolute_errors(&self) -> (f64, f64) {
+        let errors: Vec<f64> = self.pairs().iter().map(|(y, x)| (y - x).abs()).collect();
+        (errors.iter().sum::<f64>() / errors.len() as f64, errors.iter().copied().fold(0.0, f64::max))
+    }
+
     /// 100 (1 - |y - y^| / |y - mean(y)|).
     pub(crate) fn percent(&self) -> f64 {
         let pairs = self.pairs();

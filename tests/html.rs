@@ -117,8 +117,8 @@ fn a_fit_is_shown_with_its_names_as_they_are() {
     let folder = hostile();
     let again = || fs::read(fit_page_of(&folder, "--split 60/20/20")).expect("the case is sound");
     assert!(again() == again(), "the same input gives the same bytes");
-    // Output, two times two correlations, search and delays, Bode of input and noise, step, roots.
-    opened(&mut browser, &folder.path("page.html"), 11);
+    // Output, two times two correlations, search and delays, Bode of input and noise, step, impulse, roots.
+    opened(&mut browser, &folder.path("page.html"), 12);
     stands(&mut browser, "h1", OUTPUT);
     stands(&mut browser, "h1", FILE);
     stands(&mut browser, "figure h3", INPUT);
@@ -175,8 +175,8 @@ fn other_pages_are_shown() {
     }
 
     let path = page(&folder, "validate --time t", &[models[0], FILE]);
-    // Output, two correlations, Bode, step, roots: the noise is taken as white.
-    opened(&mut browser, &path, 6);
+    // Output, two correlations, Bode, step, impulse, roots: the noise is taken as white.
+    opened(&mut browser, &path, 7);
     stands(&mut browser, "h1", models[0]);
     stands(&mut browser, "figure h3", INPUT);
     // Output error says nothing of the noise.
@@ -188,12 +188,12 @@ fn other_pages_are_shown() {
     stands(&mut browser, "main p", "no step response");
 
     let path = page(&folder, "compare --time t", &[models[0], models[1], models[2], FILE]);
-    // Free run, one step, autocorrelations, Bode of input and noise, step.
-    opened(&mut browser, &path, 6);
+    // Free run, one step, autocorrelations, Bode of input and noise, step, impulse.
+    opened(&mut browser, &path, 7);
     stands(&mut browser, ".legend text", models[1]);
     // One model twice.
     let path = page(&folder, "compare --time t", &[models[1], models[1], FILE]);
-    opened(&mut browser, &path, 6);
+    opened(&mut browser, &path, 7);
     stands(&mut browser, ".legend text", &format!("{} (2)", models[1]));
 
     let folder = logged(FILE, [INPUT, OUTPUT], 900, 25.0);
@@ -210,8 +210,8 @@ fn a_page_fits_a_phone_the_dark_and_paper() {
     let Some(mut browser) = Browser::start("a_page_fits_a_phone_the_dark_and_paper") else { return };
     let folder = hostile();
     let path = fit_page_of(&folder, &format!("--model bj --nb 2 --nc 1 --nd 2 --nf 2 --nk 1 {PARTS}"));
-    // Output, two times two correlations, Bode of input and noise, step, roots.
-    opened(&mut browser, &path, 9);
+    // Output, two times two correlations, Bode of input and noise, step, impulse, roots.
+    opened(&mut browser, &path, 10);
 
     browser.open(&path, 390);
     assert_eq!(browser.value("document.documentElement.scrollWidth <= innerWidth"), json!(true));
@@ -255,7 +255,7 @@ fn a_million_samples_open_at_once() {
     let size = fs::metadata(&path).expect("the case is sound").len();
     assert!(size < 8_000_000, "{size} bytes");
     // One chart more than of a short log: some rows one by one.
-    opened(&mut browser, &path, 10);
+    opened(&mut browser, &path, 11);
     // The peak stays.
     let peak = "Math.max(...document.querySelector('.chart').data.flatMap((trace) => trace.yaxis === 'y' ? trace.y : []))";
     assert!(browser.value(peak).as_f64().expect("the case is sound") > 40.0);
@@ -327,7 +327,7 @@ fn inspected() -> Inspection {
 fn pages_do_without_what_is_missing() {
     let (complete_report, complete) = modelled(Orders::oe(&[2], &[2], &[1]).expect("the case is sound"));
     let page = validation_page(&complete_report, &complete, "");
-    assert_eq!(charts(&page).len(), 6);
+    assert_eq!(charts(&page).len(), 7);
     // Nothing to load, whatever reads the page.
     let (own, _) = page.split_once("* plotly.js (basic").expect("the case is sound");
     assert!(!["http:", "https:", "src=\"", "@import", "url("].iter().any(|outside| own.contains(outside)));
@@ -347,7 +347,7 @@ fn pages_do_without_what_is_missing() {
     poor.signals.predicted.fill(f64::NAN);
     poor.signals.simulated = None;
     let page = validation_page(&report, &poor, "");
-    assert_eq!(charts(&page).len(), 4);
+    assert_eq!(charts(&page).len(), 5);
     assert!(page.contains("There are no residuals to test") && page.contains("The uncertainty is not known"));
     assert!(!page.contains("95 % band"));
 
@@ -364,7 +364,7 @@ fn pages_do_without_what_is_missing() {
         residuals.independence[0].correlation.fill(f64::NAN);
     }
     let page = validation_page(&report, &poor, "");
-    assert_eq!(charts(&page).len(), 5);
+    assert_eq!(charts(&page).len(), 6);
     assert!(page.contains("unstable") && page.contains("grows without bound"));
 
     // A pole on the unit circle, where the frequency response has none.

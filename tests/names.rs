@@ -41,6 +41,8 @@ fn nothing_that_is_printed_holds_what_is_not_seen() {
         "validate model.json log.csv --format json".to_owned(),
         "compare model.json model.json log.csv".to_owned(),
         "bode model.json".to_owned(),
+        "step model.json".to_owned(),
+        "impulse model.json".to_owned(),
         track.clone(),
         format!("{track} --format csv"),
         "filter model.json log.csv".to_owned(),

@@ -9,7 +9,7 @@ use crate::harness::{Folder, Run};
 use crate::signals::plain_log;
 
 /// Every verb with every option that names an output, as OUT, and what it reads.
-const LINES: [(&str, &[&str]); 21] = [
+const LINES: [(&str, &[&str]); 24] = [
     ("fit log.csv --na 2 --nb 2 --report OUT", &["log.csv"]),
     ("fit log.csv --na 2 --nb 2 --html OUT", &["log.csv"]),
     ("fit --grey model.json log.csv --report OUT", &["log.csv", "model.json"]),
@@ -17,6 +17,7 @@ const LINES: [(&str, &[&str]); 21] = [
     ("inspect log.csv --html OUT", &["log.csv"]),
     ("predict model.json log.csv -o OUT", &["log.csv", "model.json"]),
     ("simulate model.json log.csv -o OUT", &["log.csv", "model.json"]),
+    ("simulate model.json log.csv --draws 2 --draws-file OUT", &["log.csv", "model.json"]),
     ("validate model.json log.csv -o OUT", &["log.csv", "model.json"]),
     ("validate model.json log.csv --html OUT", &["log.csv", "model.json"]),
     ("compare model.json model.json log.csv -o OUT", &["log.csv", "model.json"]),
@@ -30,6 +31,8 @@ const LINES: [(&str, &[&str]); 21] = [
     ("filter model.json log.csv -o states --summary OUT", &["log.csv", "model.json"]),
     ("filter model.json log.csv --smooth -o OUT", &["log.csv", "model.json"]),
     ("bode model.json -o OUT", &["model.json"]),
+    ("step model.json -o OUT", &["model.json"]),
+    ("impulse model.json -o OUT", &["model.json"]),
     ("bode model.json --frequencies 0.1..1 -o OUT", &["model.json"]),
 ];
 

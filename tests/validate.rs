@@ -48,6 +48,9 @@ fn the_figures_are_those_that_predict_and_simulate_give() {
             let answer = Answer::read(&run.stdout);
             assert!((number(fit, "/percent") - answer.percent()).abs() < 1e-9, "{model} {verb}");
             assert!((number(fit, "/rmse") - answer.rmse()).abs() < 1e-12);
+            let (mean, largest) = answer.absolute_errors();
+            assert!((number(fit, "/mean_absolute_error") - mean).abs() < 1e-12);
+            assert!((number(fit, "/largest_error") - largest).abs() < 1e-12);
             assert_eq!(fit["samples"], answer.samples());
             assert!(run.stderr.contains(&format!("initial {}", fit["initial"].as_str().unwrap())));
         }
@@ -106,6 +109,7 @@ fn the_table_says_what_the_document_says() {
         "1 step ahead   drop",
         "5 steps ahead  drop",
         "free run       estimate",
+        "\nerrors          mean |e|  largest |e|\n",
         "errors one step ahead: mean square ",
         "residuals: 300 samples, fresh",
         "white (Ljung-Box)        25",
@@ -137,6 +141,19 @@ fn a_gate_names_what_failed() {
         assert!(line.contains(part), "{part}: {line}");
     }
     assert!(!line.contains("stable") && !line.contains("fit@1"), "{line}");
+    let errors = "mean-error<=1e9,largest-error@1<=1e9,mean-error@3<=1e-9,largest-error<=0";
+    let run = folder.run(&format!("validate arx.json log.csv --require {errors}"));
+    assert_eq!(run.code, 6, "{}", run.stderr);
+    let line = run.stderr.lines().last().unwrap();
+    for part in [
+        "mean-error@3<=0.000000001: the mean |e| is ",
+        "(3 steps ahead)",
+        "largest-error<=0: the largest |e| is ",
+        "(free run)",
+    ] {
+        assert!(line.contains(part), "{part}: {line}");
+    }
+    assert!(!line.contains("mean-error<=") && !line.contains("largest-error@1"), "{line}");
     // The document is there all the same.
     let run = folder.run("validate wrong.json log.csv --require white --format json");
     assert_eq!((run.code, document(&run)["stable"].as_bool()), (6, Some(true)));

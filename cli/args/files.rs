@@ -19,10 +19,13 @@ impl Command {
                 read.push(inspect.path.clone());
                 written.extend([&inspect.out].into_iter().chain(&inspect.html).cloned());
             }
-            Self::Predict(PredictArguments { respond, .. })
-            | Self::Simulate(SimulateArguments { respond, .. }) => {
+            Self::Predict(PredictArguments { respond, .. }) => {
                 read.extend([respond.report.clone(), respond.path.clone()]);
                 written.push(respond.out.clone());
+            }
+            Self::Simulate(SimulateArguments { respond, draws_file, .. }) => {
+                read.extend([respond.report.clone(), respond.path.clone()]);
+                written.extend([&respond.out].into_iter().chain(draws_file).cloned());
             }
             Self::Validate(validate) => {
                 read.extend([validate.report.clone(), validate.path.clone()]);
@@ -46,6 +49,10 @@ impl Command {
             Self::Bode(bode) => {
                 read.push(bode.report.clone());
                 written.push(bode.out.clone());
+            }
+            Self::Step(transient) | Self::Impulse(transient) => {
+                read.push(transient.report.clone());
+                written.push(transient.out.clone());
             }
             Self::Demo(_) | Self::Schema { .. } | Self::Completions { .. } | Self::Man { .. } => {}
         }

@@ -41,10 +41,7 @@ impl LookJob {
     pub(crate) fn requirements(&mut self, texts: &[String]) -> Result<Vec<Requirement>, Failure> {
         let requirements: Vec<Requirement> =
             texts.iter().map(|text| parsed("--require", text)).collect::<Result<_, _>>()?;
-        self.plan.horizons.extend(requirements.iter().filter_map(|requirement| match requirement {
-            Requirement::Fit { steps, .. } => *steps,
-            _ => None,
-        }));
+        self.plan.horizons.extend(requirements.iter().filter_map(Requirement::steps));
         self.plan.check().map_err(|error| Failure::option(&error))?;
         Ok(requirements)
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import control
@@ -101,6 +102,9 @@ def test_responses_are_those_of_the_polynomials(motor: th.Log) -> None:
     step = model.step_response()
     assert np.isclose(step.values[-1], model.dc_gain()[0], rtol=0.02)
     assert np.allclose(step.values, scipy.signal.dlsim(model.to_scipy(), np.ones(len(step.values)))[1][:, 0])
+    impulse = model.impulse_response("u")
+    assert np.allclose(impulse.values, scipy.signal.dimpulse(model.to_scipy(), n=len(impulse.time))[1][0][:, 0])
+    assert np.array_equal(impulse.time, step.time) and (impulse.standard_errors[3:] > 0).all()
 
 
 def test_other_packages_simulate_the_same(motor: th.Log) -> None:
@@ -153,12 +157,43 @@ def test_validations_say_what_was_required(motor: th.Log) -> None:
     assert validation.fit(7) < validation.fit(1) and validation.independence["u"] > 0.05
     with pytest.raises(ValueError, match="horizon: 4 was not looked at"):
         validation.fit(4)
+    errors = np.abs(model.residuals(motor[700:], None, initial="estimate"))
+    assert np.isclose(validation.mean_absolute_error(None), errors.mean())
+    assert np.isclose(validation.largest_error(None), errors.max())
+    with pytest.raises(ValueError, match="horizon: 4 was not looked at"):
+        validation.largest_error(4)
     assert model.validate(motor, rows=slice(700, 1000)).document["rows"] == [[701, 1000]]
     for wrong in ({"require": "fast"}, {"lags": 0}, {"alpha": 2.0}, {"horizon": 0}, {"rows": "0..5"}):
         with pytest.raises(ValueError, match=next(iter(wrong))):
             model.validate(motor, **wrong)
     with pytest.raises(ValueError, match="white"):
         th.oe(motor, 2, 2).validate(motor, require="white")
+
+
+def test_samples_are_runs_with_noise_and_other_parameters(motor: th.Log) -> None:
+    model = th.bj(motor[:700], 2, 0, 1, 2)
+    runs = model.sample(motor[700:], 200, seed=3)
+    assert runs.shape == (200, 300) and np.array_equal(runs, model.sample(motor[700:], 200, seed=3))
+    assert np.array_equal(runs[:5], model.sample(motor[700:], 5, seed=3))
+    assert not np.array_equal(runs, model.sample(motor[700:], 200, seed=4))
+    error = np.abs(runs.mean(axis=0) - model.simulate(motor[700:]))
+    assert (error < 5 * runs.std(axis=0) / np.sqrt(200) + 0.1).all()
+    low, high = np.quantile(runs, [0.025, 0.975], axis=0)
+    assert np.mean((low <= motor.y[700:]) & (motor.y[700:] <= high)) > 0.8
+    assert model.sample(motor.u[700:], 3).shape == model.sample({"u": motor.u[700:, 0]}, 3).shape == (3, 300)
+    series = th.ar(motor, 2)
+    assert series.sample(motor, 2).shape == (2, 1000)
+    with pytest.warns(th.EstimationWarning, match="differ in their noise alone"):
+        th.arx(motor, 2, 2, norm="inf").sample(motor, 2)
+    cases: list[tuple[Callable[[], object], str]] = [
+        (lambda: model.sample(motor, 0), "draws: 0 is outside"),
+        (lambda: model.sample(motor, 2, seed=-1), "seed: -1 is outside"),
+        (lambda: model.sample(motor.u, 2, initial="estimate"), "initial"),
+        (lambda: series.sample([1.0], 2), "no inputs"),
+    ]
+    for call, words in cases:
+        with pytest.raises(ValueError, match=words):
+            call()
 
 
 def test_models_stand_side_by_side(motor: th.Log) -> None:
@@ -217,6 +252,8 @@ def test_what_a_model_cannot_answer_is_refused(motor: th.Log) -> None:
         (lambda: model.frequency_response(points=2**40), "points"),
         (lambda: model.step_response(1), "input"),
         (lambda: model.step_response(samples=0), "samples"),
+        (lambda: model.impulse_response("w"), "input"),
+        (lambda: model.impulse_response(samples=0), "samples"),
         (lambda: model.zeros(5), "input: there is no input 5"),
         (lambda: model.confidence_interval(1.0), "level"),
         (lambda: series.to_control(), "no inputs"),

@@ -379,6 +379,17 @@ def test_step_is_the_step_response(model: th.Model, uncertain: th.Model, plain: 
     assert is_inked(ax)
 
 
+def test_impulse_is_the_impulse_response(model: th.Model, uncertain: th.Model) -> None:
+    ax = plot.impulse([model, uncertain], samples=40)
+    response = model.impulse_response(samples=40)
+    line = lines(ax)["ARMAX(2, 2, 1, 1)"]
+    np.testing.assert_array_equal(line.get_ydata(), response.values)
+    _, low, high = edges(bands(ax)[0])
+    np.testing.assert_allclose((high - low) / 2, HALF * response.standard_errors, rtol=1e-9, atol=1e-12)
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("time since the impulse [s]", "y per unit of u")
+    assert is_inked(ax)
+
+
 def test_step_of_an_input_by_name(two_inputs: th.Log) -> None:
     model = th.arx(two_inputs, na=1, nb=[1, 2])
     ax = plot.step({"room": model}, "fan")

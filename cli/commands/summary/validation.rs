@@ -2,13 +2,18 @@
 
 use thetahat::figures::{chance, fixed, number, short, three};
 use thetahat::text::harmless;
-use thetahat::{Comparison, Coverage, Horizon, Independence, Requirement, Seen, Test, Validation};
+use thetahat::{Comparison, Coverage, Fit, Horizon, Independence, Requirement, Seen, Test, Validation};
 
 use super::text::{Text, columns, or_dash, some};
-use super::{MOST, fits, orders_legend, rows};
+use super::{MOST, NO_FIT, fits, orders_legend, rows};
 
 /// The level of the intervals of which a comparison says the coverage.
 const LEVEL: f64 = 0.95;
+
+/// The figures of the absolute errors.
+type ErrorFigure = (&'static str, fn(&Fit) -> Option<f64>);
+const ERRORS: [ErrorFigure; 2] =
+    [("mean |e|", |fit| fit.mean_absolute_error), ("largest |e|", |fit| fit.largest_error)];
 
 /// How a model does on a log, and what was required of it, so many columns wide.
 pub fn validation(found: &Validation, requirements: &[Requirement], alpha: f64, width: usize) -> String {
@@ -26,6 +31,7 @@ pub fn validation(found: &Validation, requirements: &[Requirement], alpha: f64, 
     text.line(stable(found.stable));
     text.line("");
     fits(&mut text, &found.fit);
+    errors(&mut text, &found.fit);
     let noise = &found.noise;
     text.line(&format!(
         "errors one step ahead: mean square {}, expected {}, ratio {}",
@@ -91,6 +97,12 @@ pub fn comparison(comparison: &Comparison, width: usize) -> String {
             or_dash(fit.and_then(|fit| fit.percent), |percent| fixed(percent, 3))
         });
     }
+    for (what, of) in ERRORS {
+        row(&format!("{what}, 1 step ahead"), &|model| {
+            let fit = model.fit.iter().find(|fit| fit.horizon == (Horizon::Steps { steps: 1 }));
+            or_dash(fit.and_then(of), number)
+        });
+    }
     row("mean square error", &|model| or_dash(model.noise.mse, number));
     row("  of that expected", &|model| or_dash(model.noise.ratio, three));
     let p = |p: Option<f64>| or_dash(p, chance);
@@ -130,6 +142,17 @@ pub fn comparison(comparison: &Comparison, width: usize) -> String {
         ));
     }
     text.finish()
+}
+
+/// The mean and the largest of the errors.
+fn errors(text: &mut Text, fits: &[Fit]) {
+    let header: Vec<&str> = std::iter::once("errors").chain(ERRORS.map(|(what, _)| what)).collect();
+    let mut table = columns(&header).none(NO_FIT);
+    for fit in fits {
+        let figures = ERRORS.map(|(_, of)| or_dash(of(fit), number));
+        table.row(std::iter::once(fit.horizon.to_string()).chain(figures));
+    }
+    text.table(table);
 }
 
 fn seen(seen: Seen) -> &'static str {

@@ -49,7 +49,9 @@ pub mod text;
 mod track;
 mod validate;
 
-pub use data::{Channel, Detrend, Interpolation, Log, Offset, Record, Rows, Split};
+pub use data::{
+    AntiAlias, Channel, Detrend, Interpolation, Log, Offset, Prefilter, Record, Resample, Rows, Split,
+};
 pub use error::Error;
 pub use estimate::{
     Algorithm, Bound, Criterion, CriterionOutcome, Estimate, GainBound, Initial, Method, Monitor, Norm,
@@ -69,13 +71,14 @@ pub use model::{Model, Orders, Parameter, Quantity, Root, Signal, StateSpace, St
 pub use report::{
     Applied, Comparison, Coverage, Data, Estimation, Missing, NoiseLevel, Parts, Plan, Report, Requirement,
     Resampling, Seen, Signals, Source, Unjudged, Validated, Validation, ValidationPlan, apply, compare,
-    identify, identify_monitored, validate,
+    identify, identify_monitored, sample, validate,
 };
 #[cfg(feature = "html")]
 pub use report::{comparison_page, fit_page, inspection_page, validation_page};
 pub use respond::{
-    Forecast, FrequencyPoint, FrequencyResponse, Response, Start, StepResponse, forecast, frequency_response,
-    logarithmic_frequencies, predict, prediction_deviation, simulate, step_response,
+    Drawn, Draws, Forecast, FrequencyPoint, FrequencyResponse, Response, Start, TransientResponse, draw,
+    forecast, frequency_response, impulse_response, logarithmic_frequencies, predict, prediction_deviation,
+    simulate, step_response,
 };
 pub use select::{
     Automatic, Choice, Criteria, Delay, Grid, OrderRange, Path, Scan, Scored, Select, Selection,

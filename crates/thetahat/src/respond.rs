@@ -1,14 +1,15 @@
 //! What a model says: driven by its inputs alone, or by what was measured, and what it is to each frequency.
 
+mod draws;
 mod forecast;
 mod free_response;
 mod frequency;
 mod innovations;
 mod predict;
 mod simulate;
-mod step;
 #[cfg(test)]
 mod tests;
+mod transient;
 
 use std::ops::Range;
 
@@ -18,6 +19,7 @@ use serde::{Deserialize, Serialize};
 use crate::data::Record;
 use crate::{Error, Model};
 
+pub use draws::{Drawn, Draws, draw};
 pub(crate) use forecast::forecast_if_possible;
 pub use forecast::{Forecast, forecast};
 pub use frequency::{FrequencyPoint, FrequencyResponse, frequency_response, logarithmic_frequencies};
@@ -25,7 +27,7 @@ pub(crate) use innovations::{Innovations, innovations};
 pub(crate) use predict::{check_steps, deviations, longest};
 pub use predict::{predict, prediction_deviation};
 pub use simulate::simulate;
-pub use step::{StepResponse, step_response};
+pub use transient::{TransientResponse, impulse_response, step_response};
 
 /// What a response starts from, in the words of [`Initial`](crate::Initial) for fits.
 ///

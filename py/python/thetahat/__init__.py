@@ -22,7 +22,7 @@ from thetahat._judgement import Comparison, Inspection, Validation, compare, ins
 from thetahat._log import Log, dc_motor, read_csv
 from thetahat._model import Model
 from thetahat._options import FitOptions, ReadOptions, ValidationOptions
-from thetahat._responses import Forecast, FrequencyResponse, StateSpace, StepResponse
+from thetahat._responses import Forecast, FrequencyResponse, StateSpace, TransientResponse
 from thetahat._thetahat import (
     EstimationError,
     ExtendedKalmanFilter,
@@ -74,7 +74,7 @@ __all__ = [
     "SmoothedTrajectory",
     "StateSpace",
     "SteadyState",
-    "StepResponse",
+    "TransientResponse",
     "Validation",
     "ValidationOptions",
     "__version__",

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from thetahat import _options, _thetahat
 from thetahat._log import Log, handle
-from thetahat._options import Duration, ReadOptions, Rows, ValidationOptions
+from thetahat._options import Duration, ReadOptions, Resample, Rows, ValidationOptions
 
 if TYPE_CHECKING:
     from thetahat._model import Model
@@ -87,9 +87,40 @@ class Validation(_Document):
         ValueError
             If the validation did not look so far ahead.
         """
+        return self._figure("percent", horizon)
+
+    def mean_absolute_error(self, horizon: int | None = 1) -> float:
+        """The mean of ``|e|`` so many steps ahead, or in a free run (None), in units of the output; NaN where there is none.
+
+        Raises
+        ------
+        ValueError
+            If the validation did not look so far ahead.
+
+        Examples
+        --------
+        >>> import thetahat as th
+        >>> log = th.dc_motor()
+        >>> validation = th.arx(log[:700], na=2, nb=2).validate(log[700:])
+        >>> validation.mean_absolute_error() < validation.largest_error()
+        True
+        """
+        return self._figure("mean_absolute_error", horizon)
+
+    def largest_error(self, horizon: int | None = 1) -> float:
+        """The largest ``|e|`` so many steps ahead, or in a free run (None), in units of the output; NaN where there is none.
+
+        Raises
+        ------
+        ValueError
+            If the validation did not look so far ahead.
+        """
+        return self._figure("largest_error", horizon)
+
+    def _figure(self, name: str, horizon: int | None) -> float:
         for fit in self.document["fit"]:
             if fit["horizon"].get("steps") == horizon:
-                return float("nan" if fit["percent"] is None else fit["percent"])
+                return float("nan" if fit[name] is None else fit[name])
         if horizon is None:
             raise ValueError("horizon: a model without inputs has no free run; give a number of steps")
         raise ValueError(f"horizon: {horizon} was not looked at; validate with horizon={horizon}")
@@ -219,7 +250,7 @@ def inspect(
     output: str | None = None,
     time: str | None = None,
     sample_time: Duration | None = None,
-    resample: tuple[Duration, str] | None = None,
+    resample: Resample | None = None,
     time_format: str | None = None,
     delimiter: str | None = None,
     comment: str | None = None,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from html import escape
@@ -16,7 +17,7 @@ from thetahat import _files, _numbers, _options, _picture, _thetahat
 from thetahat._judgement import Validation
 from thetahat._log import Log, handle
 from thetahat._options import Rows, ValidationOptions
-from thetahat._responses import Forecast, FrequencyResponse, StateSpace, StepResponse
+from thetahat._responses import Forecast, FrequencyResponse, StateSpace, TransientResponse
 
 if TYPE_CHECKING:
     import os
@@ -464,6 +465,69 @@ class Model:
             raise ValueError(f"initial: inputs alone start from zero, not '{initial}'; give a Log to start from its output")
         return self._model.simulate(self._inputs_of(u))
 
+    def sample(
+        self, u: _numbers.Columns | Log, draws: int = 100, *, seed: int = 0, initial: str = "auto"
+    ) -> Array:
+        """Free runs drawn from what the estimate leaves open: its noise, and its parameters within their covariance.
+
+        Parameters
+        ----------
+        u : array_like, shape (N,) or (N, inputs), or data frame, dict of str to array_like, or Log
+            The inputs, as for `simulate`; of a model without inputs a Log, whose rows say how long the runs are.
+        draws : int, default 100
+            How many runs, up to 100000.
+        seed : int, default 0
+            Which ones: the same seed gives the same runs.
+        initial : {"auto", "drop", "zero", "estimate"}, default "auto"
+            What stands before the first sample, as for `simulate`. From zero the noise starts at rest too; else it has run
+            before.
+
+        Returns
+        -------
+        ndarray, shape (draws, N)
+            In the units of the log; NaN where `simulate` gives NaN.
+
+        Warns
+        -----
+        EstimationWarning
+            If parameters that were drawn made an unstable model of a stable one, and were drawn again; if the covariance of
+            the parameters is not known, so that the runs differ in their noise alone.
+
+        Notes
+        -----
+        Each run is B/(A F) u + C/(A D) e with parameters from a normal distribution of the covariance of the estimate, and e
+        of its noise variance.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import thetahat as th
+        >>> log = th.dc_motor()
+        >>> model = th.bj(log[:700], nb=2, nc=0, nd=1, nf=2)
+        >>> low, high = np.quantile(model.sample(log[700:], draws=200), [0.025, 0.975], axis=0)
+        >>> bool(np.mean((low < log.y[700:]) & (log.y[700:] < high)) > 0.8)
+        True
+        """
+        from thetahat._fit import EstimationWarning
+
+        draws = _options.count("draws", draws, 100_000)
+        seed = _options.integer("seed", seed)
+        if not 0 <= seed < 2**64:
+            raise ValueError(f"seed: {seed} is outside 0..2^64 - 1")
+        if isinstance(u, Log):
+            runs, unstable, varied = self._model.sample(handle("log", u), None, draws, seed, initial)
+        else:
+            if initial not in ("auto", "zero"):
+                raise ValueError(f"initial: inputs alone start from zero, not '{initial}'; give a Log to start from its output")
+            runs, unstable, varied = self._model.sample(None, self._inputs_of(u), draws, seed, "zero")
+        if not varied:
+            message = "the covariance of the parameters is not known: the runs differ in their noise alone"
+            warnings.warn(message, EstimationWarning, stacklevel=2)
+        if unstable:
+            message = f"parameters of an unstable model were drawn {unstable} times, and drawn again"
+            warnings.warn(message, EstimationWarning, stacklevel=2)
+        return runs
+
     def forecast(
         self, log: Log, steps: int, u: _numbers.Columns | None = None, *, initial: str = "auto"
     ) -> Forecast:
@@ -547,7 +611,8 @@ class Model:
             The data, best those that the model was not fitted to.
         require : str or sequence of str, optional
             What the model must be or do: ``white``, ``independent``, ``stable``, ``fit>=80``, ``fit@5>=80``,
-            ``coverage>=90``. `Validation.unmet` says what it is not.
+            ``mean-error<=0.5``, ``largest-error@5<=2`` (of ``|e|``, in units of the output), ``coverage>=90``.
+            `Validation.unmet` says what it is not.
         rows, detrend, horizon, lags, alpha, alphas
             What to validate on and how, see `thetahat.ValidationOptions`.
 
@@ -597,7 +662,7 @@ class Model:
         points = _options.count("points", points)
         return FrequencyResponse(self._model.frequency_response(w, points))
 
-    def step_response(self, input: int | str = 0, samples: int | None = None) -> StepResponse:
+    def step_response(self, input: int | str = 0, samples: int | None = None) -> TransientResponse:
         """The response of the output to a unit step of an input, from rest, counted from 0.
 
         Parameters
@@ -609,7 +674,7 @@ class Model:
 
         Returns
         -------
-        StepResponse
+        TransientResponse
 
         Examples
         --------
@@ -618,10 +683,41 @@ class Model:
         >>> response.time
         array([0.  , 0.01, 0.02])
         """
-        index = self._input(input)
-        if samples is not None:
-            samples = _options.count("samples", samples)
-        return StepResponse(*self._model.step_response(index, samples))
+        return TransientResponse(*self._model.step_response(*self._source(input, samples)))
+
+    def impulse_response(self, input: int | str = 0, samples: int | None = None) -> TransientResponse:
+        """The impulse response from an input: the coefficients g_i of B/(A F) = g_0 + g_1 q^-1 + …
+
+        The input is 1 in the sample at time 0 and 0 afterwards. The sums of the response are the step response.
+
+        Parameters
+        ----------
+        input : int or str, default 0
+            Which input: its position, or its name.
+        samples : int, optional
+            How many; until it has settled, unless said otherwise.
+
+        Returns
+        -------
+        TransientResponse
+
+        References
+        ----------
+        Ljung, System Identification, 2nd ed. 1999, sections 2.1 and 9.4.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import thetahat as th
+        >>> model = th.arx(th.dc_motor(), na=2, nb=2)
+        >>> impulse, step = model.impulse_response(samples=50), model.step_response(samples=50)
+        >>> bool(np.allclose(np.cumsum(impulse.values), step.values))
+        True
+        """
+        return TransientResponse(*self._model.impulse_response(*self._source(input, samples)))
+
+    def _source(self, input: int | str, samples: int | None) -> tuple[int, int | None]:
+        return self._input(input), None if samples is None else _options.count("samples", samples)
 
     def to_state_space(self) -> StateSpace:
         """The innovations form, x(t+1) = F x(t) + G u(t) + K e(t), y(t) = H x(t) + D u(t) + e(t), in deviations.

@@ -113,13 +113,13 @@ class FrequencyResponse:
         return f"FrequencyResponse({len(self.frequencies)} frequencies, {', '.join(self.sources)})"
 
 
-class StepResponse:
-    """The response of an output to a unit step, from rest.
+class TransientResponse:
+    """The response of an output to a unit step or impulse of an input, from rest.
 
     Attributes
     ----------
     time : ndarray, shape (K,)
-        Seconds since the step.
+        Seconds since it happened.
     values : ndarray, shape (K,)
         Units of the output per unit of the input.
     standard_errors : ndarray, shape (K,)
@@ -132,7 +132,7 @@ class StepResponse:
         self.standard_errors = standard_errors
 
     def __repr__(self) -> str:
-        return f"StepResponse({len(self.time)} samples, {self.values[-1]:g} at the end)"
+        return f"TransientResponse({len(self.time)} samples, {self.values[-1]:g} at the end)"
 
 
 class StateSpace(NamedTuple):

@@ -14,7 +14,7 @@ that hold the truth with the probability ``level``; there is no band where no th
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import isfinite, log as ln
 from statistics import NormalDist
 from typing import Any, Union
@@ -35,9 +35,9 @@ from thetahat import _options
 from thetahat._judgement import Inspection, Validation
 from thetahat._log import Log
 from thetahat._model import Model
-from thetahat._responses import FrequencyResponse
+from thetahat._responses import FrequencyResponse, TransientResponse
 
-__all__ = ["bode", "fit", "inspection", "log", "poles_zeros", "residuals", "selection", "step"]
+__all__ = ["bode", "fit", "impulse", "inspection", "log", "poles_zeros", "residuals", "selection", "step"]
 
 Array = npt.NDArray[np.float64]
 
@@ -349,13 +349,58 @@ def step(
     >>> ax.get_ylabel()
     'y per unit of u'
     """
+    return _transient("step", Model.step_response, models, input, samples, ax, level)
+
+
+def impulse(
+    models: Models, input: int | str = 0, samples: int | None = None, ax: Axes | None = None, *, level: float = 0.95
+) -> Axes:
+    """The impulse responses of models, with their bands.
+
+    Parameters
+    ----------
+    models : Model, or a sequence of them, or dict of str to Model
+        What to draw.
+    input : int or str, default 0
+        Which input, by its place or name.
+    samples : int, optional
+        How many; until each has settled, unless said otherwise.
+    ax : Axes, optional
+        Where to draw.
+    level : float, default 0.95
+        The probability with which the band holds the response at a time.
+
+    Returns
+    -------
+    Axes
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> from thetahat import plot
+    >>> ax = plot.impulse(th.arx(th.dc_motor(), na=2, nb=2))
+    >>> ax.get_xlabel()
+    'time since the impulse [s]'
+    """
+    return _transient("impulse", Model.impulse_response, models, input, samples, ax, level)
+
+
+def _transient(
+    what: str,
+    respond: Callable[[Model, int, Union[int, None]], TransientResponse],
+    models: Models,
+    input: int | str,
+    samples: int | None,
+    ax: Axes | None,
+    level: float,
+) -> Axes:
     half = _quantile(level)
     found = []
     for name, model in _named(models, (Model,)):
         if isinstance(input, str) and input not in model.inputs:
             raise ValueError(f"input: {name} has no input {input}; there are: {', '.join(model.inputs) or 'none'}")
         index = model.inputs.index(input) if isinstance(input, str) else input
-        response = model.step_response(index, samples)
+        response = respond(model, index, samples)
         found.append((name, response, f"{model.output} per unit of {model.inputs[index]}"))
     ax = _one(ax)
     bands = []
@@ -366,7 +411,7 @@ def step(
             _band(ax, response.time, response.values - spread, response.values + spread, line.get_color())
         )
     _label_one(bands, level)
-    ax.set_xlabel("time since the step [s]")
+    ax.set_xlabel(f"time since the {what} [s]")
     ax.set_ylabel(_shown(", ".join(dict.fromkeys(unit for _, _, unit in found))))
     ax.legend()
     return ax

@@ -507,19 +507,19 @@ fn of_model(report: &Report) -> Vec<Section> {
     sections
 }
 
-/// Bode plots and step responses.
+/// Bode plots, step and impulse responses.
 fn responses(models: &[(String, &Model)], inputs: &[&str]) -> Vec<Section> {
     let mut frequency = Section::new("Frequency response");
-    let mut step = Section::new("Step response");
+    let mut transient = Section::new("Step and impulse response");
     for input in inputs {
         frequency.chart(charts::bode(models, Some(input)));
-        step.chart(charts::step(models, input));
+        charts::transients(models, input).into_iter().for_each(|drawn| transient.chart(drawn));
     }
     frequency.chart(charts::bode(models, None));
     if inputs.is_empty() {
-        step.text("Without inputs there is no step response.");
+        transient.text("Without inputs there is no step response.");
     }
-    vec![frequency, step]
+    vec![frequency, transient]
 }
 
 fn provenance(report: &Report) -> Section {

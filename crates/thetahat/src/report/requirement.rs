@@ -2,13 +2,13 @@ use std::fmt;
 use std::str::FromStr;
 
 use super::{Report, Validation};
-use crate::figures::{chance, fixed};
-use crate::validate::Horizon;
+use crate::figures::{chance, fixed, number};
+use crate::validate::{Fit, Horizon};
 use crate::{Error, Procedure, Structure};
 
 /// What there is to ask for.
-const WORDS: &str =
-    "white, independent, stable, fit>=P, fit@K>=P and coverage>=P (P in percent, K steps ahead)";
+const WORDS: &str = "white, independent, stable, fit>=P, fit@K>=P, coverage>=P (P in percent, K steps ahead), mean-error<=E, \
+     largest-error<=E, mean-error@K<=E and largest-error@K<=E (E in units of the output)";
 /// The level of the intervals of which the coverage is asked.
 const LEVEL: f64 = 0.95;
 
@@ -37,6 +37,20 @@ pub enum Requirement {
         /// 100 is perfect.
         percent: f64,
     },
+    /// `mean-error<=E`, `mean-error@K<=E`: the mean of |e| is at most so large.
+    MeanError {
+        /// As for a fit.
+        steps: Option<usize>,
+        /// In units of the output.
+        limit: f64,
+    },
+    /// `largest-error<=E`, `largest-error@K<=E`: no |e| is larger.
+    LargestError {
+        /// As for a fit.
+        steps: Option<usize>,
+        /// In units of the output.
+        limit: f64,
+    },
     /// `coverage>=P`: the 95 % intervals one step ahead hold at least so many of the measured outputs.
     Coverage {
         /// Of all samples.
@@ -53,6 +67,19 @@ impl FromStr for Requirement {
             Error::argument("require", format!("'{shown}' is none of {WORDS}"))
         };
         let text = text.trim();
+        if let Some((what, limit)) = text.split_once("<=") {
+            let limit = limit.trim().parse().ok().filter(|limit: &f64| limit.is_finite() && *limit >= 0.0);
+            let limit = limit.ok_or_else(wrong)?;
+            let (what, steps) = match what.trim().split_once('@') {
+                Some((what, steps)) => (what, Some(ahead(steps).ok_or_else(wrong)?)),
+                None => (what.trim(), None),
+            };
+            return match what {
+                "mean-error" => Ok(Self::MeanError { steps, limit }),
+                "largest-error" => Ok(Self::LargestError { steps, limit }),
+                _ => Err(wrong()),
+            };
+        }
         let Some((what, percent)) = text.split_once(">=") else {
             return match text {
                 "white" => Ok(Self::White),
@@ -72,12 +99,16 @@ impl FromStr for Requirement {
             "fit" => Ok(Self::Fit { steps: None, percent }),
             "coverage" => Ok(Self::Coverage { percent }),
             what => {
-                let steps = what.strip_prefix("fit@").and_then(|steps| steps.parse().ok());
-                let steps = steps.filter(|steps| *steps > 0).ok_or_else(wrong)?;
+                let steps = what.strip_prefix("fit@").and_then(ahead).ok_or_else(wrong)?;
                 Ok(Self::Fit { steps: Some(steps), percent })
             }
         }
     }
+}
+
+/// A number of steps ahead.
+fn ahead(text: &str) -> Option<usize> {
+    text.parse().ok().filter(|steps| *steps > 0)
 }
 
 impl fmt::Display for Requirement {
@@ -88,12 +119,26 @@ impl fmt::Display for Requirement {
             Self::Stable => f.write_str("stable"),
             Self::Fit { steps: None, percent } => write!(f, "fit>={percent}"),
             Self::Fit { steps: Some(steps), percent } => write!(f, "fit@{steps}>={percent}"),
+            Self::MeanError { steps: None, limit } => write!(f, "mean-error<={limit}"),
+            Self::MeanError { steps: Some(steps), limit } => write!(f, "mean-error@{steps}<={limit}"),
+            Self::LargestError { steps: None, limit } => write!(f, "largest-error<={limit}"),
+            Self::LargestError { steps: Some(steps), limit } => write!(f, "largest-error@{steps}<={limit}"),
             Self::Coverage { percent } => write!(f, "coverage>={percent}"),
         }
     }
 }
 
 impl Requirement {
+    /// How many steps ahead it looks, where it says so.
+    pub fn steps(&self) -> Option<usize> {
+        match self {
+            Self::Fit { steps, .. } | Self::MeanError { steps, .. } | Self::LargestError { steps, .. } => {
+                *steps
+            }
+            _ => None,
+        }
+    }
+
     /// Whether it can be asked of a model at all.
     ///
     /// # Errors
@@ -153,17 +198,20 @@ impl Requirement {
             }
             Self::Stable => (!validation.stable).then(|| format!("{self}: the model has a pole outside")),
             Self::Fit { steps, percent } => {
-                let driven = validation.orders.nb.iter().any(|&nb| nb > 0);
-                let horizon = match steps {
-                    None if driven => Horizon::FreeRun,
-                    steps => Horizon::Steps { steps: steps.unwrap_or(1) },
-                };
-                let fit = validation.fit.iter().find(|fit| fit.horizon == horizon);
+                let (fit, horizon) = figures(validation, steps);
                 match fit.and_then(|fit| fit.percent) {
                     Some(found) if found >= percent => None,
                     Some(found) => Some(format!("{self}: the fit is {} % ({horizon})", fixed(found, 3))),
                     None => Some(format!("{self}: there is no fit figure ({horizon})")),
                 }
+            }
+            Self::MeanError { steps, limit } => {
+                let (fit, horizon) = figures(validation, steps);
+                self.above(limit, "mean |e|", fit.and_then(|fit| fit.mean_absolute_error), horizon)
+            }
+            Self::LargestError { steps, limit } => {
+                let (fit, horizon) = figures(validation, steps);
+                self.above(limit, "largest |e|", fit.and_then(|fit| fit.largest_error), horizon)
             }
             Self::Coverage { percent } => {
                 let one = validation.coverage.iter().find(|one| one.steps == 1 && one.level == LEVEL);
@@ -178,4 +226,23 @@ impl Requirement {
             }
         }
     }
+
+    /// The same for an error that has a limit.
+    fn above(&self, limit: f64, what: &str, found: Option<f64>, horizon: Horizon) -> Option<String> {
+        match found {
+            Some(found) if found <= limit => None,
+            Some(found) => Some(format!("{self}: the {what} is {} ({horizon})", number(found))),
+            None => Some(format!("{self}: there is no {what} ({horizon})")),
+        }
+    }
+}
+
+/// The figures so many steps ahead; without a number of the free run, or one step ahead of a model without inputs.
+fn figures(validation: &Validation, steps: Option<usize>) -> (Option<&Fit>, Horizon) {
+    let driven = validation.orders.nb.iter().any(|&nb| nb > 0);
+    let horizon = match steps {
+        None if driven => Horizon::FreeRun,
+        steps => Horizon::Steps { steps: steps.unwrap_or(1) },
+    };
+    (validation.fit.iter().find(|fit| fit.horizon == horizon), horizon)
 }

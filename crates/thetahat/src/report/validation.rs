@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::apply::check_sample_time;
 use super::{Report, Source};
-use crate::data::{Detrend, Log, Offset, Record, Rows, checked};
+use crate::data::{Detrend, Log, Offset, Prefiltered, Record, Rows, checked};
 use crate::figures::{chance, fixed, number};
 use crate::regression::sum;
 use crate::respond::{Innovations, Response, check_steps, deviations, innovations};
@@ -322,9 +322,14 @@ fn is_of_fit(report: &Report, log: &Log, inputs: &[String]) -> bool {
     {
         return false;
     }
-    let Ok(mut record) = log.record(inputs, &model.output.name, &report.data.estimation) else {
-        return false;
+    let (output, rows) = (&model.output.name, &report.data.estimation);
+    let band = report.data.prefilter.map(|band| Prefiltered::new(&band, log, inputs, output));
+    let record = match &band {
+        Some(Ok(band)) => band.record(rows),
+        Some(Err(_)) => return false,
+        None => log.record(inputs, output, rows),
     };
+    let Ok(mut record) = record else { return false };
     record.past.fill(0);
     let (start, tolerance) = match estimation.initial {
         Initial::Zero => (Start::Zero, SAME),

@@ -1,9 +1,10 @@
 //! Responses against their definitions, sample by sample. Here those of ARX models, in `general` those of all others.
 
+mod draws;
 mod forecast;
 mod frequency;
 mod general;
-mod step;
+mod transient;
 
 use std::ops::Range;
 

@@ -45,7 +45,8 @@ pub enum Part {
 
 /// How close a model comes to measured outputs.
 ///
-/// percent = 100 (1 - |y - y^| / |y - mean(y)|), rmse = |y - y^| / sqrt(N), over the N samples that the response covers.
+/// With e = y - y^: percent = 100 (1 - |e| / |y - mean(y)|), rmse = |e| / sqrt(N), |.| being the root of the sum of squares,
+/// and the mean and the largest of the absolute errors |e(t)|, all over the N samples that the response covers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Fit {
     /// The rows looked at, 1-based and inclusive.
@@ -64,6 +65,12 @@ pub struct Fit {
     pub percent: Option<f64>,
     /// Root mean square error in units of y; none where there are no samples or the response overflows.
     pub rmse: Option<f64>,
+    /// The mean of |e(t)| in units of y; none as for `rmse`, and in reports of before it was there.
+    #[serde(default)]
+    pub mean_absolute_error: Option<f64>,
+    /// The largest |e(t)| in units of y; none likewise.
+    #[serde(default)]
+    pub largest_error: Option<f64>,
 }
 
 impl Start {
@@ -99,8 +106,23 @@ impl Fit {
         };
         let counted = || response.counted.iter().cloned().flatten();
         let samples = response.counted.iter().map(|rows| rows.len()).sum::<usize>();
-        let (percent, rmse) = closeness(counted().map(|t| (record.output[t], response.values[t])));
-        Ok((Self { rows: rows.to_vec(), part, horizon, initial, samples, percent, rmse }, response))
+        let pairs = || counted().map(|t| (record.output[t], response.values[t]));
+        let (percent, rmse) = closeness(pairs());
+        let errors = || pairs().map(|(measured, said)| (measured - said).abs());
+        let known = |figure: f64| Some(figure).filter(|figure| samples > 0 && figure.is_finite());
+        let fit = Self {
+            rows: rows.to_vec(),
+            part,
+            horizon,
+            initial,
+            samples,
+            percent,
+            rmse,
+            mean_absolute_error: known(sum(errors()) / samples as f64),
+            // One that is not a number stays one.
+            largest_error: known(errors().fold(0.0, |largest, e| if e <= largest { largest } else { e })),
+        };
+        Ok((fit, response))
     }
 }
 
@@ -152,6 +174,10 @@ mod tests {
         assert_eq!(figures.samples, 102);
         assert!((figures.rmse.unwrap() - (error / 102.0).sqrt()).abs() < 1e-14);
         assert!((figures.percent.unwrap() - 100.0 * (1.0 - (error / spread).sqrt())).abs() < 1e-11);
+        let errors: Vec<f64> = rows().map(|t| (y[t] - response.values[t]).abs()).collect();
+        let mean = errors.iter().sum::<f64>() / 102.0;
+        assert!((figures.mean_absolute_error.unwrap() - mean).abs() < 1e-14);
+        assert_eq!(figures.largest_error, errors.iter().copied().reduce(f64::max));
 
         // What starts naturally counts as much as it can.
         assert_eq!(Start::natural(&model, Horizon::Steps { steps: 3 }), Start::Drop);
@@ -168,6 +194,7 @@ mod tests {
         // No sample is far enough from a start; nothing to explain.
         let (figures, _) = fit(&record, Horizon::Steps { steps: 300 }, Start::Drop);
         assert_eq!((figures.samples, figures.percent, figures.rmse), (0, None, None));
+        assert_eq!((figures.mean_absolute_error, figures.largest_error), (None, None));
         let constant = [1.0; 10];
         let (figures, _) =
             fit(&Record::new(&constant, vec![&constant]).unwrap(), Horizon::FreeRun, Start::Zero);

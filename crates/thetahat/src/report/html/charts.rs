@@ -7,7 +7,7 @@ mod signals;
 mod spectrum;
 
 pub(super) use correlation::{autocorrelation, compared_autocorrelations, cross_correlation, prewhitened};
-pub(super) use dynamics::{bode, roots, step};
+pub(super) use dynamics::{bode, roots, transients};
 pub(super) use search::{delays, score, search};
 pub(super) use signals::{Marked, Shade, Stack, outputs};
 pub(super) use spectrum::spectrum;

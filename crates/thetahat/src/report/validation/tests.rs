@@ -194,8 +194,24 @@ fn what_is_wrong_is_said() {
 #[test]
 fn requirements_are_read_and_refused() {
     for wrong in [
-        "", "blue", "White", "fit", "fit>=", "fit>=x", "fit>=nan", "fit>=101", "fit@0>=5", "fit@x>=5",
+        "",
+        "blue",
+        "White",
+        "fit",
+        "fit>=",
+        "fit>=x",
+        "fit>=nan",
+        "fit>=101",
+        "fit@0>=5",
+        "fit@x>=5",
         "fit=5",
+        "mean-error",
+        "mean-error>=1",
+        "mean-error<=",
+        "mean-error<=-1",
+        "mean-error@0<=1",
+        "error<=1",
+        "largest-error<=inf",
     ] {
         let error = wrong.parse::<Requirement>().unwrap_err();
         assert!(
@@ -204,6 +220,11 @@ fn requirements_are_read_and_refused() {
         );
     }
     assert_eq!(" fit@3 >= 80 ".parse(), Ok(Requirement::Fit { steps: Some(3), percent: 80.0 }));
+    let mean = Requirement::MeanError { steps: None, limit: 0.5 };
+    let largest = Requirement::LargestError { steps: Some(2), limit: 0.0 };
+    assert_eq!("mean-error<=0.5".parse(), Ok(mean));
+    assert_eq!("largest-error@2 <= 0".parse(), Ok(largest));
+    assert_eq!([mean, largest].map(|one| one.to_string()), ["mean-error<=0.5", "largest-error@2<=0"]);
     let (u, y) = signals(300);
     let log = log(&u, &y);
     let oe = fitted(&log, "1..300", Orders::oe(&[2], &[2], &[1]).unwrap(), Initial::Auto);

@@ -1,4 +1,4 @@
-//! What models are to frequencies and steps, and their roots.
+//! What models are to frequencies, steps and impulses, and their roots.
 
 use std::f64::consts::{PI, TAU};
 
@@ -12,14 +12,14 @@ use super::super::figure::{
 use super::super::object::{Object, marker, scatter, stroke};
 use super::super::text;
 use crate::{
-    FrequencyResponse, Model, Quantity, Root, figures, frequency_response, logarithmic_frequencies,
-    step_response,
+    Error, FrequencyResponse, Model, Quantity, Root, TransientResponse, figures, frequency_response,
+    impulse_response, logarithmic_frequencies, step_response,
 };
 
 /// Frequencies of a Bode plot.
 const FREQUENCIES: usize = 200;
-/// A step response is drawn with no more samples.
-const STEP_POINTS: usize = 400;
+/// A step or impulse response is drawn with no more samples.
+const TRANSIENT_POINTS: usize = 400;
 /// 95 % of chi-square for two degrees of freedom.
 const CHI_SQUARE: f64 = 5.991_465;
 /// Roots farther out than this are named, not shown.
@@ -138,19 +138,32 @@ fn interval(values: &[Quantity], lowest: f64) -> Option<(Vec<f64>, Vec<f64>)> {
     high.iter().any(|end| end.is_finite()).then_some((low, high))
 }
 
-/// What a unit step of an input does in several models.
-pub(crate) fn step(models: &[(String, &Model)], input: &str) -> Drawn {
+/// What a unit step of an input does in several models, and what an impulse that lasts one sample does.
+pub(crate) fn transients(models: &[(String, &Model)], input: &str) -> [Drawn; 2] {
+    let step = "The output after a step of the input by one unit at time 0, from rest.";
+    let impulse = "The output after an input of one unit in the sample at time 0 alone, from rest.";
+    [
+        transient(models, input, ("Step response", step), step_response),
+        transient(models, input, ("Impulse response", impulse), impulse_response),
+    ]
+}
+
+fn transient(
+    models: &[(String, &Model)],
+    input: &str,
+    (what, happens): (&str, &str),
+    respond: impl Fn(&Model, usize, Option<usize>) -> Result<TransientResponse, Error>,
+) -> Drawn {
     let single = models.len() == 1;
     let mut traces: Vec<Object> = Vec::new();
     let mut unstable = false;
     let mut certain = true;
-    let title = format!("Step response from {input}");
+    let title = format!("{what} from {input}");
     for (position, (name, model)) in models.iter().enumerate() {
         let Some(number) = model.inputs.iter().position(|signal| signal.name == input) else { continue };
-        let response =
-            step_response(model, number, None).map_err(|error| format!("{title}: none, {error}."))?;
+        let response = respond(model, number, None).map_err(|error| format!("{title}: none, {error}."))?;
         unstable |= !model.stable;
-        let width = response.time.len().div_ceil(STEP_POINTS);
+        let width = response.time.len().div_ceil(TRANSIENT_POINTS);
         let thin = |values: &[f64]| -> Vec<f64> { values.iter().step_by(width.max(1)).copied().collect() };
         let x = rounded(&thin(&response.time));
         let name = if single { "estimate".to_owned() } else { text::plain(name) };
@@ -169,7 +182,7 @@ pub(crate) fn step(models: &[(String, &Model)], input: &str) -> Drawn {
     if traces.is_empty() {
         return Err(format!("{title}: none, no model has this input."));
     }
-    let mut words = "The output after a step of the input by one unit at time 0, from rest.".to_owned();
+    let mut words = happens.to_owned();
     words.push_str(if certain { " The uncertainty is not known." } else { " Shaded: 95 % intervals." });
     if unstable {
         words.push_str(" An unstable model grows without bound: only its beginning is shown.");

@@ -15,12 +15,12 @@ const LASTING: f64 = 1e-9;
 /// The fewest and the most samples that are chosen.
 const SAMPLES: [usize; 2] = [20, 20_000];
 
-/// What a model's output does after a unit step of one input at time 0, from rest.
+/// What a model's output does, from rest, after something that happens at one input at time 0: a step or an impulse.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct StepResponse {
+pub struct TransientResponse {
     /// The input's name.
     pub input: String,
-    /// Seconds since the step: 0, T, 2 T, …
+    /// Seconds since it happened: 0, T, 2 T, …
     pub time: Vec<f64>,
     /// The output at these times in units of y per unit of u, with its standard error.
     pub values: Vec<Quantity>,
@@ -28,7 +28,7 @@ pub struct StepResponse {
 
 /// The response of a model to a unit step of one of its inputs, counted from 0.
 ///
-/// With 1(t) the step and s = 1/(A F_j) 1(t):
+/// With v the input, here 1 from time 0 on, and s = 1/(A F_j) v:
 ///
 /// ```text
 /// y = B_j s,   dy/db_k = q^-k s,   dy/da_k = -q^-k (1/A) y,   dy/df_k = -q^-k (1/F_j) y
@@ -64,7 +64,57 @@ pub struct StepResponse {
 /// assert!((step.time[3] - 0.3).abs() < 1e-15);
 /// # Ok::<(), thetahat::Error>(())
 /// ```
-pub fn step_response(model: &Model, input: usize, samples: Option<usize>) -> Result<StepResponse, Error> {
+pub fn step_response(
+    model: &Model,
+    input: usize,
+    samples: Option<usize>,
+) -> Result<TransientResponse, Error> {
+    response(model, input, samples, |v| v.fill(1.0))
+}
+
+/// The impulse response of a model from one of its inputs, counted from 0: the coefficients g_i of
+/// B_j/(A F_j) = sum_i g_i q^-i (Ljung, System Identification, 2nd ed. 1999, section 2.1).
+///
+/// It is the response to an input of 1 at time 0 and 0 afterwards, in units of y per unit of u; the input holds for one
+/// sample, so g_i over the sample time tends to the impulse response in continuous time. Its sums are the
+/// [step response](step_response), whose equations for values and standard errors, length, cost and errors are its own
+/// too: only v is 1 at time 0 alone.
+///
+/// # Errors
+/// As for [`step_response`].
+///
+/// ```
+/// use thetahat::{Initial, Model, Orders, Record, Signal, arx, impulse_response};
+///
+/// let u: Vec<f64> = (0..100).map(|t| f64::from(t * t % 7)).collect();
+/// let mut y = vec![1.0];
+/// for t in 1..u.len() {
+///     y.push(0.8 * y[t - 1] + 0.5 * u[t - 1]);
+/// }
+/// let orders = Orders::arx(1, &[1], &[1])?;
+/// let estimate = arx(&Record::new(&y, vec![&u])?, &orders, Initial::Drop)?;
+/// let model = Model::new(&orders, &estimate, 0.1, vec![Signal::default()], Signal::default())?;
+/// let impulse = impulse_response(&model, 0, Some(4))?;
+/// for (g, expected) in impulse.values.iter().zip([0.0, 0.5, 0.5 * 0.8, 0.5 * 0.64]) {
+///     assert!((g.value - expected).abs() < 1e-9);
+/// }
+/// # Ok::<(), thetahat::Error>(())
+/// ```
+pub fn impulse_response(
+    model: &Model,
+    input: usize,
+    samples: Option<usize>,
+) -> Result<TransientResponse, Error> {
+    response(model, input, samples, |v| v[0] = 1.0)
+}
+
+/// The response to what `happens` at an input that is zero otherwise.
+fn response(
+    model: &Model,
+    input: usize,
+    samples: Option<usize>,
+    happens: impl FnOnce(&mut [f64]),
+) -> Result<TransientResponse, Error> {
     let blocks = Blocks::of(model);
     let (Some(signal), Some(b), Some(f)) =
         (model.inputs.get(input), blocks.b.get(input), blocks.f.get(input))
@@ -80,7 +130,8 @@ pub fn step_response(model: &Model, input: usize, samples: Option<usize>) -> Res
         None => lasting(b.coefficients.len(), &[blocks.a.zeros()?, f.zeros()?].concat()),
     };
 
-    let mut source = vec![1.0; samples];
+    let mut source = vec![0.0; samples];
+    happens(&mut source);
     divide(&model.a, &mut source);
     divide(f.coefficients, &mut source);
     let mut values = vec![0.0; samples];
@@ -100,7 +151,7 @@ pub fn step_response(model: &Model, input: usize, samples: Option<usize>) -> Res
             .and_then(|parameters| covariance(parameters, &gradient(&columns, t)))
             .map(|[[variance, _], _]| variance.sqrt()),
     };
-    Ok(StepResponse {
+    Ok(TransientResponse {
         input: signal.name.clone(),
         time: (0..finite).map(|t| t as f64 * model.sample_time).collect(),
         values: (0..finite).map(quantity).collect(),

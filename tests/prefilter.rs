@@ -26,10 +26,10 @@ fn drifting() -> String {
 }
 
 const FIT: &str =
-    "fit log.csv --sample-time 0.1 --model oe --nb 1 --nf 1 --estimate 1..3000 --validate 3001..4000";
+    "log.csv --sample-time 0.1 --model oe --nb 1 --nf 1 --estimate 1..3000 --validate 3001..4000";
 
 fn fitted(folder: &Folder, options: &str) -> Value {
-    folder.fit(&format!("{} {options}", FIT.strip_prefix("fit ").unwrap()))
+    folder.fit(&format!("{FIT} {options}"))
 }
 
 #[test]

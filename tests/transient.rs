@@ -8,7 +8,10 @@ fn rows(folder: &Folder, line: &str) -> Vec<(String, f64, f64, Option<f64>)> {
     let run = folder.done(line);
     assert_eq!(run.stderr, "");
     let mut reader = csv::Reader::from_reader(run.stdout.as_bytes());
-    assert_eq!(reader.headers().unwrap(), &["input", "time", "value", "standard_error"][..]);
+    assert_eq!(
+        reader.headers().expect("there is a header"),
+        &["input", "time", "value", "standard_error"][..]
+    );
     reader.deserialize().map(|row| row.expect("a name and numbers")).collect()
 }
 

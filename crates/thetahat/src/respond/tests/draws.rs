@@ -110,7 +110,8 @@ fn unstable_parameters_are_drawn_again_and_counted() {
     // P(pole > 1) = 0.159, so that each draw is repeated 0.19 times on average.
     let some = drawn(0.99, 1e-4).unwrap();
     assert!((70..120).contains(&some.unstable), "{}", some.unstable);
-    assert!(some.values.iter().flatten().all(|value| value.abs() < 210.0));
+    // At most 199 without noise, of which the deviation is at most 14.2.
+    assert!(some.values.iter().flatten().all(|value| value.abs() < 285.0));
     // An estimate that is unstable stays one.
     let all = drawn(1.02, 1e-4).unwrap();
     assert_eq!(all.unstable, 0);

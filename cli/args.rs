@@ -222,7 +222,8 @@ pub(crate) struct FitArguments {
     /// Rows to validate on
     #[arg(long, value_name = "A..B[,C..D]", value_delimiter = ',', help_heading = "Channels")]
     pub(crate) validate: Vec<String>,
-    /// What to take from each channel: none, mean, linear, or start:K (the mean of the first K rows)
+    /// What to take from each channel before the fit: none, mean, linear, or start:K (the mean of the first K rows); what is
+    /// left of the output's level and slope --constant and --trend estimate
     #[arg(long, default_value = "mean", value_name = "WHAT", help_heading = "Channels")]
     pub(crate) detrend: String,
     /// Set a channel's offset by hand
@@ -336,6 +337,13 @@ pub(crate) struct ModelArguments {
     /// What stands before the first sample of a stretch
     #[arg(long, value_enum, default_value = "auto", help_heading = "Model")]
     pub(crate) initial: InitialArgument,
+    /// Estimate the level of the output with the parameters, beside the mean that is taken off: for step tests and other logs
+    /// of which the mean is not where the plant rests
+    #[arg(long, value_enum, default_value = "auto", help_heading = "Model")]
+    pub(crate) constant: ConstantArgument,
+    /// Estimate a slope of the output with the parameters too, and its level with it: for drift
+    #[arg(long, help_heading = "Model")]
+    pub(crate) trend: bool,
 }
 
 /// How to choose, where orders are ranges or are not given.
@@ -904,6 +912,16 @@ pub(crate) enum InitialArgument {
     Zero,
     /// What fits best, found with the parameters
     Estimate,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ConstantArgument {
+    /// Where it lowers MDL
+    Auto,
+    /// Always
+    Yes,
+    /// Never
+    No,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

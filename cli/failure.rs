@@ -12,7 +12,7 @@ use crate::table;
 
 /// The option that an argument of the library is here, if it is one.
 fn option_of(argument: &str) -> Option<&str> {
-    const SAME: [&str; 31] = [
+    const SAME: [&str; 32] = [
         "alarm",
         "alpha",
         "alphas",
@@ -44,6 +44,7 @@ fn option_of(argument: &str) -> Option<&str> {
         "start",
         "step",
         "tolerance",
+        "trend",
     ];
     match argument {
         // One at a time.

@@ -8,6 +8,7 @@ mod browser;
 mod choice;
 mod clock;
 mod compare;
+mod constant;
 mod criterion;
 mod csv_dialects;
 mod demo_and_help;

@@ -90,6 +90,16 @@ fn estimation(text: &mut Text, estimation: &Estimation, model: &Model) {
     ));
     let criteria = &estimation.criteria;
     let four = |value: f64| fixed(value, 4);
+    if let Some(level) = estimation.level {
+        let slope = estimation.slope.map_or_else(String::new, |slope| {
+            format!(" in the middle of the rows, slope {} a second", quantity(slope))
+        });
+        text.line(&format!(
+            "level of {} estimated with them: {}{slope}",
+            harmless(&model.output.name),
+            quantity(level)
+        ));
+    }
     text.line(&format!(
         "FPE {}; for each sample AIC {}, AICc {}, MDL {}",
         number(criteria.fpe),

@@ -1,10 +1,10 @@
 use std::path::{Path, PathBuf};
 
-use thetahat::{Detrend, Initial, Method, Plan, Prefilter, Rows, Select, Split};
+use thetahat::{Constant, Detrend, Initial, Method, Plan, Prefilter, Rows, Select, Split};
 
 use super::orders::OrderJob;
 use super::{LogJob, method, parsed, rows};
-use crate::args::{FitArguments, InitialArgument, Names, SelectArgument};
+use crate::args::{ConstantArgument, FitArguments, InitialArgument, Names, SelectArgument};
 use crate::failure::Failure;
 use crate::memory::PerValue;
 
@@ -29,6 +29,8 @@ pub(crate) struct FitJob {
     pub(crate) select: Select,
     pub(crate) method: Method,
     pub(crate) initial: Initial,
+    pub(crate) constant: Constant,
+    pub(crate) trend: bool,
 }
 
 impl FitJob {
@@ -48,6 +50,12 @@ impl FitJob {
             select: select(arguments.choice.select, &orders)?,
             method: method::method(arguments, &orders)?,
             initial: initial(arguments.model.initial, &orders)?,
+            constant: match arguments.model.constant {
+                ConstantArgument::Auto => Constant::Auto,
+                ConstantArgument::Yes => Constant::Yes,
+                ConstantArgument::No => Constant::No,
+            },
+            trend: arguments.model.trend,
             orders,
         };
         if !job.orders.is_linear() || job.orders.is_choice() || !job.is_plain() || arguments.html.is_some() {
@@ -57,6 +65,11 @@ impl FitJob {
         if job.select == Select::Validation && !validates {
             return Err(Failure::usage(
                 "--select validation needs rows for it: give --split 60/20/20, or --estimate and --validate",
+            ));
+        }
+        if job.trend && job.constant == Constant::No {
+            return Err(Failure::usage(
+                "--trend is a line with a level, which is the constant; leave it or --constant no out",
             ));
         }
         if job.paths.iter().filter(|path| *path == Path::new("-")).count() > 1 {
@@ -93,6 +106,8 @@ impl FitJob {
             prefilter: self.prefilter,
             method: self.method.clone(),
             initial: self.initial,
+            constant: self.constant,
+            trend: self.trend,
         })
     }
 }

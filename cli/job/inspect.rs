@@ -8,6 +8,10 @@ use crate::failure::Failure;
 use crate::shell::quoted;
 use crate::table;
 
+/// Delays that are tried where none was found, and at least.
+const LONGEST: usize = 20;
+const FEWEST: usize = 10;
+
 /// A log to look at.
 #[derive(Debug)]
 pub(crate) struct InspectJob {
@@ -35,8 +39,10 @@ impl InspectJob {
     }
 
     /// The line of `thetahat fit` that goes with what was found, ready for a POSIX shell. It names the log as it was named
-    /// here, how it is read, its channels without inputs that excite nothing or repeat another, and a resampling where the clock needs one. None
-    /// where a fit would refuse: without an output that changes, or a clock that can be used.
+    /// here, how it is read, its channels without inputs that excite nothing or repeat another, and a resampling where the clock
+    /// needs one. For a step test that begins at rest it takes the offsets from there, and asks for a time constant, a gain and
+    /// a delay from each input: what steps show, by the whole of each response. None where a fit would refuse: without an
+    /// output that changes, or a clock that can be used.
     pub(crate) fn command(&self, arguments: &InspectArguments, inspection: &Inspection) -> Option<String> {
         let output = inspection.channels.iter().find(|channel| channel.role.as_deref() == Some("output"))?;
         if output.minimum == output.maximum {
@@ -81,6 +87,13 @@ impl InspectJob {
             option("-u", &table::list(&inputs));
         }
         option("-y", &output.name);
+        if let (Some(rest), false) = (inspection.rest, inputs.is_empty()) {
+            option("--detrend", &format!("start:{rest}"));
+            let delays = delays(inspection, &inputs);
+            for (name, value) in [("--model", "oe"), ("--nb", "1"), ("--nf", "1"), ("--nk", &delays)] {
+                option(name, value);
+            }
+        }
         let log = &arguments.log;
         for (name, value) in
             [("--delimiter", &log.delimiter), ("--comment", &log.comment), ("--encoding", &log.encoding)]
@@ -97,6 +110,22 @@ impl InspectJob {
         let flags = [("--decimal-comma", log.decimal_comma), ("--no-header", log.no_header)];
         words.extend(flags.iter().filter(|(_, given)| *given).map(|(name, _)| (*name).to_owned()));
         Some(words.join(" "))
+    }
+}
+
+/// Delays to try: of one input up to twice that which was found, or 20; of several those that were found, as all combinations
+/// would be many.
+fn delays(inspection: &Inspection, inputs: &[&str]) -> String {
+    let found = |name: &str| inspection.delays.iter().find(|of| of.input == name).and_then(|of| of.nk);
+    match inputs {
+        [one] => {
+            let (first, last) = found(one).map_or((1, LONGEST), |nk| (nk.min(1), (2 * nk).max(FEWEST)));
+            format!("{first}..{last}")
+        }
+        several => {
+            let each: Vec<String> = several.iter().map(|name| found(name).unwrap_or(1).to_string()).collect();
+            each.join(",")
+        }
     }
 }
 

@@ -101,6 +101,21 @@ def test_options_reach_the_engine(log: th.Log) -> None:
     assert th.arx(log, 2, 2, ridge=10.0) != th.arx(log, 2, 2)
 
 
+def test_level_and_slope_of_the_output_are_estimated(log: th.Log) -> None:
+    rows = np.arange(len(log))
+    drifting = th.Log(log["y"] + 20.0 + 0.01 * rows, np.column_stack([log["u1"], log["u2"]]))
+    model = th.oe(drifting, 2, 2, constant="yes")
+    found = model.document["estimation"]["level"]
+    assert found["standard_error"] > 0 and model.offsets["y"] == (found["value"], 0.0)
+    model = th.arx(drifting, 2, 2, trend=True)
+    level, slope = model.offsets["y"]
+    found = model.document["estimation"]["slope"]
+    assert found["value"] == slope and abs(slope - 0.01) < 5 * found["standard_error"]
+    assert abs(level - 20.0) < 1.0
+    assert "level" not in th.arx(drifting, 2, 2, constant="no").document["estimation"]
+    assert th.arx(drifting, 2, 2, trend=False) == th.arx(drifting, 2, 2)
+
+
 def test_a_search_chooses(log: th.Log) -> None:
     model = th.search(log, na=range(1, 4), nb=range(1, 4), nk=[range(1, 4), range(2, 5)], select="mdl")
     assert model.orders == {"na": 2, "nb": [2, 2], "nc": 0, "nd": 0, "nf": [0, 0], "nk": model.orders["nk"]}
@@ -132,6 +147,10 @@ BAD: list[tuple[Callable[[th.Log], Any], type[Exception], str]] = [
     (lambda log: th.arx(log, 2, 2, estimate=5), TypeError, "estimate: expected a slice"),  # type: ignore[arg-type]
     (lambda log: th.arx(log, 2, 2, detrend="cubic"), ValueError, "detrend"),
     (lambda log: th.arx(log, 2, 2, initial="cold"), ValueError, "initial"),
+    (lambda log: th.arx(log, 2, 2, constant="perhaps"), ValueError, "constant"),
+    (lambda log: th.arx(log, 2, 2, constant="no", trend=True), ValueError, "trend"),
+    (lambda log: th.arx(log, 2, 2, constant="yes", initial="zero"), ValueError, "constant"),
+    (lambda log: th.arx(log, 2, 2, trend=1), TypeError, "trend: expected True or False"),  # type: ignore[arg-type]
     (lambda log: th.arx(log, 2, 2, norm=3), ValueError, "norm"),
     (lambda log: th.arx(log, 2, 2, ridge=-1.0), ValueError, "ridge"),
     (lambda log: th.arx(log, 2, 2, ridge=np.nan), ValueError, "ridge: nan is not a finite"),

@@ -5,6 +5,7 @@ mod common;
 mod criterion;
 mod instrumental;
 mod normal;
+mod offset;
 mod optimize;
 mod prediction_error;
 mod predictor;
@@ -26,6 +27,8 @@ pub(crate) use arx::enough;
 pub use arx::{arx, arx_factor};
 pub(crate) use common::{Common, Point, Window, extended};
 pub use criterion::{Bound, Criterion, CriterionOutcome, GainBound, Norm};
+pub use offset::Constant;
+pub(crate) use offset::{Beside, Fitted, OutputOffset, Task, pays, with_constants, with_inputs};
 pub use optimize::{Algorithm, Monitor, Progress, Search, SearchOutcome, StartOutcome, Step, Stopped};
 pub(crate) use optimize::{FIRST_DAMPING, LARGEST_DAMPING, ROUNDING, SMALLEST_DAMPING};
 pub(crate) use prediction_error::{drop_is_not_for_f, stretches};
@@ -150,7 +153,8 @@ pub fn estimate_monitored(
     estimate_of_channels(record, &inputs, orders, method, initial, monitor)
 }
 
-/// The same with the inputs' names, which bounds on their static gains use.
+/// The same with the inputs' names, which bounds on their static gains use. The last inputs may have none: those of a constant
+/// and a trend.
 pub(crate) fn estimate_of_channels(
     record: &Record<'_>,
     inputs: &[String],

@@ -10,6 +10,7 @@ mod inspection;
 mod moments;
 mod outliers;
 mod quantization;
+mod rest;
 mod saturation;
 mod spectrum;
 mod warnings;
@@ -212,6 +213,7 @@ fn of_the_rows(
         excitation: Vec::new(),
         delays: Vec::new(),
         feedback: Vec::new(),
+        rest: None,
         command: None,
         warnings: Vec::new(),
     };
@@ -296,6 +298,7 @@ fn dynamics(inspection: &mut Inspection, log: &Log, plan: &InspectionPlan) -> Re
     inspection.delays = plan.inputs.par_iter().zip(&inputs).map(of_input).collect();
     let signals: Vec<&[f64]> = inputs.iter().copied().chain([output]).collect();
     let segments = log.segments_of(&signals, &all);
+    inspection.rest = rest::rest(&inputs, output, &segments);
     let mut signals: Vec<Vec<f64>> =
         signals.iter().map(|values| moments::deviations(values, &segments)).collect();
     // One that repeats another would leave the model open.

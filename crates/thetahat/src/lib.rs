@@ -54,8 +54,8 @@ pub use data::{
 };
 pub use error::Error;
 pub use estimate::{
-    Algorithm, Bound, Criterion, CriterionOutcome, Estimate, GainBound, Initial, Method, Monitor, Norm,
-    Procedure, Progress, Search, SearchOutcome, Solver, StartOutcome, Step, Stopped, arx, arx_factor,
+    Algorithm, Bound, Constant, Criterion, CriterionOutcome, Estimate, GainBound, Initial, Method, Monitor,
+    Norm, Procedure, Progress, Search, SearchOutcome, Solver, StartOutcome, Step, Stopped, arx, arx_factor,
     estimate, estimate_monitored,
 };
 pub use filter::{

@@ -21,9 +21,10 @@ mod unseen;
 
 use std::ops::ControlFlow;
 
-use crate::Error;
 use crate::data::Record;
-use crate::estimate::{Initial, Monitor, Search};
+use crate::estimate::{Initial, Monitor, Search, with_constants};
+use crate::{Error, Orders};
+pub(crate) use automatic::constant_pays;
 pub use choice::{Automatic, Choice, Grid, OrderRange, Path, Select};
 pub use criteria::Criteria;
 pub use selection::{Delay, Scan, Scored, Selection};
@@ -33,7 +34,7 @@ pub use selection::{Delay, Scan, Scored, Selection};
 pub(crate) struct Task<'a> {
     pub(crate) estimation: &'a Record<'a>,
     pub(crate) validation: Option<&'a Record<'a>>,
-    /// The inputs' names.
+    /// The inputs' names. Both records have further inputs behind these where a constant or a trend is part of every model.
     pub(crate) inputs: &'a [String],
     pub(crate) select: Select,
     pub(crate) initial: Initial,
@@ -41,11 +42,34 @@ pub(crate) struct Task<'a> {
     pub(crate) monitor: Monitor<'a>,
 }
 
+impl<'a> Task<'a> {
+    /// Orders with those of the inputs that have no name.
+    fn with_constants(&self, orders: &Orders) -> Orders {
+        with_constants(orders, self.estimation.inputs.len() - self.inputs.len())
+    }
+
+    /// The same without them.
+    fn named(&self, orders: &Orders) -> Orders {
+        let mut orders = orders.clone();
+        [&mut orders.nb, &mut orders.nf, &mut orders.nk]
+            .into_iter()
+            .for_each(|each| each.truncate(self.inputs.len()));
+        orders
+    }
+
+    /// The record to estimate on without these inputs.
+    fn named_record(&self) -> Record<'a> {
+        let inputs = self.estimation.inputs[..self.inputs.len()].to_vec();
+        Record { inputs, ..self.estimation.clone() }
+    }
+}
+
 /// What was chosen.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Found {
     pub(crate) selection: Selection,
-    /// The parameters of the chosen model, where a search found them: a start for the search on all samples.
+    /// The parameters of the chosen model, with a constant and a trend where the records have them, if a search found them: a
+    /// start for the search on all samples.
     pub(crate) guess: Option<Vec<f64>>,
 }
 
@@ -115,9 +139,9 @@ pub(crate) fn choose(task: &Task<'_>, choice: &Choice) -> Result<Found, Error> {
             "validation needs rows that the models are not fitted to; name them (--validate), or select by cv",
         ));
     }
-    let inputs = task.estimation.inputs.len();
+    let inputs = task.inputs.len();
     if let Some(validation) = task.validation
-        && validation.inputs.len() != inputs
+        && validation.inputs.len() != task.estimation.inputs.len()
     {
         let other = validation.inputs.len();
         return Err(Error::argument(

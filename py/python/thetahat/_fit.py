@@ -29,6 +29,8 @@ def arx(
     offset: Mapping[str, float] | None = None,
     prefilter: Band | None = None,
     initial: str | None = None,
+    constant: str | None = None,
+    trend: bool | None = None,
     norm: float | str | None = None,
     bound: Mapping[str, Bound] | None = None,
     dc_gain: Bound | Mapping[str, Bound] | None = None,
@@ -47,7 +49,7 @@ def arx(
         Coefficients of B.
     nk : int, or one for each input
         Samples from input to first effect.
-    estimate, validate, split, detrend, offset, prefilter, initial, norm, bound, dc_gain, ridge, noise_bound
+    estimate, validate, split, detrend, offset, prefilter, initial, constant, trend, norm, bound, dc_gain, ridge, noise_bound
         What to fit to and how, see `thetahat.FitOptions`.
 
     Returns
@@ -97,6 +99,8 @@ def armax(
     offset: Mapping[str, float] | None = None,
     prefilter: Band | None = None,
     initial: str | None = None,
+    constant: str | None = None,
+    trend: bool | None = None,
     search: str | None = None,
     max_iterations: int | None = None,
     tolerance: float | None = None,
@@ -115,8 +119,8 @@ def armax(
         Coefficients of A, B and C; nb may be one for each input.
     nk : int, or one for each input
         Samples from input to first effect.
-    estimate, validate, split, detrend, offset, prefilter, initial, search, max_iterations, tolerance, step, starts, seed,
-    time_limit
+    estimate, validate, split, detrend, offset, prefilter, initial, constant, trend, search, max_iterations, tolerance, step,
+    starts, seed, time_limit
         What to fit to and how to search, see `thetahat.FitOptions`.
 
     Returns
@@ -151,6 +155,8 @@ def oe(
     offset: Mapping[str, float] | None = None,
     prefilter: Band | None = None,
     initial: str | None = None,
+    constant: str | None = None,
+    trend: bool | None = None,
     search: str | None = None,
     max_iterations: int | None = None,
     tolerance: float | None = None,
@@ -171,8 +177,8 @@ def oe(
         Coefficients of B and F.
     nk : int, or one for each input
         Samples from input to first effect.
-    estimate, validate, split, detrend, offset, prefilter, initial, search, max_iterations, tolerance, step, starts, seed,
-    time_limit
+    estimate, validate, split, detrend, offset, prefilter, initial, constant, trend, search, max_iterations, tolerance, step,
+    starts, seed, time_limit
         What to fit to and how to search, see `thetahat.FitOptions`.
 
     Returns
@@ -208,6 +214,8 @@ def bj(
     offset: Mapping[str, float] | None = None,
     prefilter: Band | None = None,
     initial: str | None = None,
+    constant: str | None = None,
+    trend: bool | None = None,
     search: str | None = None,
     max_iterations: int | None = None,
     tolerance: float | None = None,
@@ -226,8 +234,8 @@ def bj(
         Coefficients of B, C, D and F; nb and nf may be one for each input.
     nk : int, or one for each input
         Samples from input to first effect.
-    estimate, validate, split, detrend, offset, prefilter, initial, search, max_iterations, tolerance, step, starts, seed,
-    time_limit
+    estimate, validate, split, detrend, offset, prefilter, initial, constant, trend, search, max_iterations, tolerance, step,
+    starts, seed, time_limit
         What to fit to and how to search, see `thetahat.FitOptions`.
 
     Returns
@@ -260,6 +268,8 @@ def ar(
     offset: Mapping[str, float] | None = None,
     prefilter: Band | None = None,
     initial: str | None = None,
+    constant: str | None = None,
+    trend: bool | None = None,
     norm: float | str | None = None,
     bound: Mapping[str, Bound] | None = None,
     dc_gain: Bound | Mapping[str, Bound] | None = None,
@@ -274,7 +284,7 @@ def ar(
         The data.
     na : int
         Coefficients of A.
-    estimate, validate, split, detrend, offset, prefilter, initial, norm, bound, dc_gain, ridge, noise_bound
+    estimate, validate, split, detrend, offset, prefilter, initial, constant, trend, norm, bound, dc_gain, ridge, noise_bound
         What to fit to and how, see `thetahat.FitOptions`.
 
     Returns
@@ -309,6 +319,8 @@ def arma(
     offset: Mapping[str, float] | None = None,
     prefilter: Band | None = None,
     initial: str | None = None,
+    constant: str | None = None,
+    trend: bool | None = None,
     search: str | None = None,
     max_iterations: int | None = None,
     tolerance: float | None = None,
@@ -325,8 +337,8 @@ def arma(
         The data.
     na, nc : int
         Coefficients of A and C.
-    estimate, validate, split, detrend, offset, prefilter, initial, search, max_iterations, tolerance, step, starts, seed,
-    time_limit
+    estimate, validate, split, detrend, offset, prefilter, initial, constant, trend, search, max_iterations, tolerance, step,
+    starts, seed, time_limit
         What to fit to and how to search, see `thetahat.FitOptions`.
 
     Returns
@@ -363,6 +375,8 @@ def pem(
     offset: Mapping[str, float] | None = None,
     prefilter: Band | None = None,
     initial: str | None = None,
+    constant: str | None = None,
+    trend: bool | None = None,
     norm: float | str | None = None,
     bound: Mapping[str, Bound] | None = None,
     dc_gain: Bound | Mapping[str, Bound] | None = None,
@@ -386,8 +400,8 @@ def pem(
         Coefficients of the polynomials; nb and nf may be one for each input.
     nk : int, or one for each input
         Samples from input to first effect: 1, unless said otherwise.
-    estimate, validate, split, detrend, offset, prefilter, initial, norm, bound, dc_gain, ridge, noise_bound, search,
-    max_iterations, tolerance, step, starts, seed, time_limit
+    estimate, validate, split, detrend, offset, prefilter, initial, constant, trend, norm, bound, dc_gain, ridge, noise_bound,
+    search, max_iterations, tolerance, step, starts, seed, time_limit
         What to fit to and how to search, see `thetahat.FitOptions`.
 
     Returns
@@ -421,6 +435,8 @@ def iv(
     offset: Mapping[str, float] | None = None,
     prefilter: Band | None = None,
     initial: str | None = None,
+    constant: str | None = None,
+    trend: bool | None = None,
 ) -> Model:
     """Fit A and B of an ARX model by instrumental variables in four stages: right about the plant whatever the noise.
 
@@ -430,7 +446,7 @@ def iv(
         The data.
     na, nb, nk
         As for `arx`.
-    estimate, validate, split, detrend, offset, prefilter, initial
+    estimate, validate, split, detrend, offset, prefilter, initial, constant, trend
         What to fit to, see `thetahat.FitOptions`.
 
     Returns
@@ -468,6 +484,8 @@ def sriv(
     offset: Mapping[str, float] | None = None,
     prefilter: Band | None = None,
     initial: str | None = None,
+    constant: str | None = None,
+    trend: bool | None = None,
 ) -> Model:
     """Fit B and F of an output error model by refined instrumental variables: right about the plant whatever the noise.
 
@@ -477,7 +495,7 @@ def sriv(
         The data.
     nb, nf, nk
         As for `oe`.
-    estimate, validate, split, detrend, offset, prefilter, initial
+    estimate, validate, split, detrend, offset, prefilter, initial, constant, trend
         What to fit to, see `thetahat.FitOptions`.
 
     Returns
@@ -521,6 +539,8 @@ def search(
     offset: Mapping[str, float] | None = None,
     prefilter: Band | None = None,
     initial: str | None = None,
+    constant: str | None = None,
+    trend: bool | None = None,
     norm: float | str | None = None,
     bound: Mapping[str, Bound] | None = None,
     dc_gain: Bound | Mapping[str, Bound] | None = None,
@@ -550,8 +570,8 @@ def search(
         What makes one model better than another: MDL, unless said otherwise.
     path : {"all", "alternate"}
         Which are tried: all of them, or one order up at a time.
-    estimate, validate, split, detrend, offset, prefilter, initial, norm, bound, dc_gain, ridge, noise_bound, search,
-    max_iterations, tolerance, step, starts, seed, time_limit
+    estimate, validate, split, detrend, offset, prefilter, initial, constant, trend, norm, bound, dc_gain, ridge, noise_bound,
+    search, max_iterations, tolerance, step, starts, seed, time_limit
         What to fit to and how to search, see `thetahat.FitOptions`.
 
     Returns

@@ -57,6 +57,11 @@ class FitOptions(TypedDict, total=False):
         Butterworth filter. The model and its figures are of the signals as they are.
     initial : {"auto", "drop", "zero", "estimate"}
         What stands for the samples before the first of a stretch.
+    constant : {"auto", "yes", "no"}
+        Whether the level of the output is estimated with the parameters, beside the mean that is taken off: where it lowers
+        MDL, always or never. It is part of ``model.offsets``, and stands with its standard error in the report.
+    trend : bool
+        Whether a slope of the output is estimated with the parameters too, and its level with it.
     norm : {2, 1, "inf"}
         What to make small, where the model is linear in its parameters: squared errors, absolute ones or the largest.
     bound : dict of str to float or (float, float)
@@ -91,6 +96,8 @@ class FitOptions(TypedDict, total=False):
     offset: Mapping[str, float]
     prefilter: Band
     initial: str
+    constant: str
+    trend: bool
     norm: Union[float, str]
     bound: Mapping[str, Bound]
     dc_gain: Union[Bound, Mapping[str, Bound]]
@@ -190,8 +197,8 @@ def words(allowed: type, arguments: Mapping[str, Any], rows: int | None = None) 
         if name == "header":
             # The command line says it the other way round.
             found += [] if _flag(name, value) else ["--no-header"]
-        elif name == "decimal_comma":
-            found += ["--decimal-comma"] if _flag(name, value) else []
+        elif name in ("decimal_comma", "trend"):
+            found += [f"--{name.replace('_', '-')}"] if _flag(name, value) else []
         else:
             found += [f"--{name.replace('_', '-')}={text}" for text in _texts(name, value, rows)]
     return found

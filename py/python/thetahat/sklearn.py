@@ -51,6 +51,8 @@ _OPTIONS = (
     "offset",
     "prefilter",
     "initial",
+    "constant",
+    "trend",
     "norm",
     "bound",
     "dc_gain",
@@ -75,7 +77,8 @@ class ARXRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         How many samples ahead `predict` and `score` predict. None: the free run, which sees no outputs.
     sample_time : float, default=1.0
         Seconds from one sample to the next.
-    estimate, validate, split, detrend, offset, prefilter, initial, norm, bound, dc_gain, ridge, noise_bound : default=None
+    estimate, validate, split, detrend, offset, prefilter, initial, constant, trend, norm, bound, dc_gain, ridge,
+    noise_bound : default=None
         What to fit to and how, as for `thetahat.arx`, see `thetahat.FitOptions`. Channels are called as the columns of a data
         frame, else u, or u1, u2, …, and y.
 
@@ -131,6 +134,8 @@ class ARXRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         offset: Mapping[str, float] | None = None,
         prefilter: Band | None = None,
         initial: str | None = None,
+        constant: str | None = None,
+        trend: bool | None = None,
         norm: float | str | None = None,
         bound: Mapping[str, Bound] | None = None,
         dc_gain: Bound | Mapping[str, Bound] | None = None,
@@ -149,6 +154,8 @@ class ARXRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         self.offset = offset
         self.prefilter = prefilter
         self.initial = initial
+        self.constant = constant
+        self.trend = trend
         self.norm = norm
         self.bound = bound
         self.dc_gain = dc_gain

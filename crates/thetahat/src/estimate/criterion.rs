@@ -253,7 +253,8 @@ fn check_range(argument: &str, words: &str, low: f64, high: f64) -> Result<(), E
     Err(Error::argument(argument, format!("{words}: {wrong}")))
 }
 
-/// Fits A(q) y(t) = sum_j B_j(q) u_j(t - nk_j) + e(t) under a [`Criterion`]. `inputs` are the names of the channels.
+/// Fits A(q) y(t) = sum_j B_j(q) u_j(t - nk_j) + e(t) under a [`Criterion`]. `inputs` are the names of the channels; nothing is
+/// asked of the last inputs if they have none.
 ///
 /// The covariance is, with sigma^2 = sum e^2 / (N - q) and q the number of parameters that the data determine
 /// (p less the active demands; with a ridge the trace of M G):
@@ -286,7 +287,7 @@ pub(crate) fn constrained(
 ) -> Result<Constrained, Error> {
     linear(orders)?;
     let signals = signals(record, orders)?;
-    if inputs.len() != orders.inputs() {
+    if inputs.len() > orders.inputs() {
         return Err(Error::argument(
             "inputs",
             format!("there are {} names for {} inputs; give one for each", inputs.len(), orders.inputs()),

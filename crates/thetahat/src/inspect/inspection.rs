@@ -32,6 +32,10 @@ pub struct Inspection {
     pub delays: Vec<DelayEstimate>,
     /// One entry for each input.
     pub feedback: Vec<Feedback>,
+    /// How many rows a step test is at rest before its first step: no input changes, and the output hardly does. None for other
+    /// logs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rest: Option<usize>,
     /// The command that would fit a model to it; none without an output.
     pub command: Option<String>,
     /// What a careful reader should know, in plain words.
@@ -207,6 +211,7 @@ impl Inspection {
             excitation: only(&self.excitation, |of| names.contains(of.input.as_str())),
             delays: only(&self.delays, |of| names.contains(of.input.as_str())),
             feedback: only(&self.feedback, |of| names.contains(of.input.as_str())),
+            rest: self.rest,
             command: self.command.clone(),
             warnings: self.warnings[..shown(self.warnings.len())].to_vec(),
         }

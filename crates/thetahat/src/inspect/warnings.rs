@@ -157,6 +157,12 @@ pub(super) fn of_the_dynamics(inspection: &Inspection, plan: &InspectionPlan) ->
             excitation.input
         ));
     }
+    if let Some(rest) = inspection.rest {
+        words.push(format!(
+            "the log is a step test that begins at rest for {rest} rows: its means are no level of the plant; take the offsets \
+             from there (--detrend start:{rest})"
+        ));
+    }
     if plan.output.is_none() && !plan.inputs.is_empty() {
         words.push("there is no output (y): name it with -y to learn of delay and feedback".to_owned());
     }

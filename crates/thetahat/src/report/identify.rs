@@ -3,12 +3,14 @@ use std::ops::{ControlFlow, Range};
 use super::schema::{Data, Estimation, Missing, Parts, Report, Source};
 use super::warnings::{at_the_border, unstable_plant, warnings};
 use crate::data::{Detrend, Log, Offset, Prefilter, Prefiltered, Record, Rows, Split, between, checked};
-use crate::estimate::{Estimate, Method, Monitor, enough, estimate_of_channels};
+use crate::estimate::{
+    self, Beside, Constant, Estimate, Fitted, Method, Monitor, OutputOffset, enough, with_inputs,
+};
 use crate::regression::sum_of_squares;
 use crate::respond::{Start, innovations};
 use crate::select::{self, Choice, Found, Grid, Select, Task};
 use crate::validate::{Fit, Horizon, Part};
-use crate::{Error, Initial, Model, Orders, Signal};
+use crate::{Error, Initial, Model, Orders, Quantity, Signal, Structure};
 
 /// Below this fraction of a channel's size, what detrending leaves is rounding.
 const ROUNDING: f64 = 1e-13;
@@ -42,6 +44,11 @@ pub struct Plan {
     pub method: Method,
     /// What stands for the samples before a segment.
     pub initial: Initial,
+    /// Whether the level of the output is estimated with the parameters: where the output would stay if the inputs stayed at
+    /// their offsets. A mean is not it where a log begins or ends far from there, as that of a step test.
+    pub constant: Constant,
+    /// Whether a slope of the output is estimated with the parameters, and the level with it.
+    pub trend: bool,
 }
 
 impl Plan {
@@ -60,7 +67,34 @@ impl Plan {
             select: Select::default(),
             method: Method::default(),
             initial: Initial::default(),
+            constant: Constant::default(),
+            trend: false,
         }
+    }
+
+    /// Refuses a constant or a trend that does not go with the rest, whatever the data.
+    fn check(&self) -> Result<(), Error> {
+        if self.trend && self.constant == Constant::No {
+            return Err(Error::argument(
+                "trend",
+                "it is a line with a slope and a level, which is the constant; leave out one of the two",
+            ));
+        }
+        let mixed = match &self.choice {
+            Choice::Known(_) => false,
+            Choice::Grid(grid) => grid.na.last() > 0,
+            Choice::Automatic(automatic) => {
+                !matches!(automatic.structure, Some(Structure::Oe | Structure::Bj))
+            }
+        };
+        if mixed && self.initial == Initial::Zero && (self.trend || self.constant == Constant::Yes) {
+            return Err(Error::argument(
+                "constant",
+                "zeros before the first sample are not at the level that is to be found, and A of some of the models reaches \
+                 back to them; take another initial condition, or leave the constant out",
+            ));
+        }
+        Ok(())
     }
 }
 
@@ -128,6 +162,8 @@ pub fn identify_monitored(
 pub struct Unjudged {
     report: Report,
     grid: Option<Grid>,
+    /// What was taken from the output before the fit, and after it.
+    taken: [Offset; 2],
 }
 
 impl Unjudged {
@@ -150,15 +186,19 @@ impl Unjudged {
     /// [`Error::Data`] for channels or rows that are not there.
     pub fn judged(self, mut log: Log) -> Result<Report, Error> {
         let model = &self.report.model;
-        for signal in model.inputs.iter().chain([&model.output]) {
+        for signal in &model.inputs {
             log.remove(&signal.name, &signal.offset);
+        }
+        // One after the other as the fit did: their sum has another rounding.
+        for offset in self.taken.iter().filter(|offset| **offset != Offset::default()) {
+            log.remove(&model.output.name, offset);
         }
         self.judged_on(&log)
     }
 
     /// The same on deviations.
     fn judged_on(self, log: &Log) -> Result<Report, Error> {
-        let Self { mut report, grid } = self;
+        let Self { mut report, grid, .. } = self;
         let initial = report.estimation.initial;
         let inputs: Vec<String> = report.model.inputs.iter().map(|input| input.name.clone()).collect();
         let output = report.model.output.name.clone();
@@ -187,6 +227,7 @@ fn fit(
     plan: &Plan,
     monitor: Monitor<'_>,
 ) -> Result<(Unjudged, Log), Error> {
+    plan.check()?;
     let names: Vec<&str> = plan.inputs.iter().chain([&plan.output]).map(String::as_str).collect();
     for (position, name) in names.iter().enumerate() {
         log.channel(name)?;
@@ -226,6 +267,7 @@ fn fit(
     let signals = names.iter().map(|name| deviations(&mut log, name, plan, &segments));
     let signals: Vec<Signal> = signals.collect::<Result<_, Error>>()?;
     let (output, inputs) = signals.split_last().ok_or_else(|| Error::data("there is no output"))?;
+    let beside = Beside::new(&log, &segments, plan.trend)?;
     let band =
         plan.prefilter.map(|band| Prefiltered::new(&band, &log, &plan.inputs, &plan.output)).transpose()?;
     let record = |rows: &[Rows]| match &band {
@@ -233,25 +275,47 @@ fn fit(
         None => log.record(&plan.inputs, &plan.output, rows),
     };
     let mut method = plan.method.clone();
-    let (selection, orders) = match &plan.choice {
-        Choice::Known(orders) => (None, orders.clone()),
+    let (selection, orders, guess) = match &plan.choice {
+        Choice::Known(orders) => (None, orders.clone(), None),
         Choice::Grid(_) | Choice::Automatic(_) => {
-            let Found { selection, guess } =
-                selected(&record, plan, &estimation, &validation, parts.as_ref(), monitor)?;
-            if let Method::PredictionError(search) = &mut method {
-                search.guess = guess;
+            let compared = Compared {
+                estimation: parts.as_ref().map_or(&estimation, |parts| &parts.estimation),
+                validation: parts.as_ref().map_or(&validation, |parts| &parts.validation),
+            };
+            let Chosen { found: Found { selection, mut guess }, with_constant } =
+                selected(&record, plan, &compared, &beside, monitor)?;
+            if let (Method::PredictionError(search), false) = (&mut method, with_constant) {
+                search.guess = guess.take();
             }
             let orders = selection.chosen.orders.clone();
-            (Some(selection), orders)
+            (Some(selection), orders, guess)
         }
     };
     let seen = record(&estimation)?;
-    let mut estimate = estimate_of_channels(&seen, &plan.inputs, &orders, &method, plan.initial, monitor)?;
+    let task = estimate::Task {
+        record: &seen,
+        inputs: &plan.inputs,
+        orders: &orders,
+        method: &method,
+        initial: plan.initial,
+        monitor,
+    };
+    let mut fitted = task.fit(plan.constant, &beside, guess)?;
     if band.is_some() {
-        let variance = unfiltered_variance(&estimate, &orders, &log, plan, &estimation)?;
-        estimate = estimate.of_prefiltered(&seen, &orders, variance);
+        let variance = unfiltered_variance(&fitted.estimate, &orders, &log, plan, &estimation)?;
+        fitted.estimate = fitted.estimate.of_prefiltered(&seen, &orders, variance);
+        fitted.criteria = fitted.estimate.criteria();
     }
-    let model = Model::new(&orders, &estimate, log.sample_time(), inputs.to_vec(), output.clone())?;
+    let Fitted { estimate, offset, .. } = &fitted;
+    let mut model = Model::new(&orders, estimate, log.sample_time(), inputs.to_vec(), output.clone())?;
+    let taken = [output.offset, offset.map_or_else(Offset::default, |found| found.offset)];
+    if let Some(found) = offset {
+        log.remove(&output.name, &found.offset);
+        model.output.offset = Offset {
+            level: output.offset.level + found.offset.level,
+            slope: output.offset.slope + found.offset.slope,
+        };
+    }
 
     let mut report = Report {
         schema: Report::schema_name(),
@@ -270,7 +334,7 @@ fn fit(
             time_gaps: log.jumps(),
         },
         selection,
-        estimation: estimation_of(&estimate),
+        estimation: estimation_of(&fitted, output.offset),
         fit: Vec::new(),
         warnings: Vec::new(),
         model,
@@ -280,7 +344,7 @@ fn fit(
         report.warnings.extend(band.warning(&estimation)?);
     }
     let grid = if let Choice::Grid(grid) = &plan.choice { Some(grid.clone()) } else { None };
-    Ok((Unjudged { report, grid }, log))
+    Ok((Unjudged { report, grid, taken }, log))
 }
 
 /// What rows serve for.
@@ -313,26 +377,47 @@ impl Shares {
     }
 }
 
-/// The choice among several models.
+/// The rows on which models are compared.
+struct Compared<'a> {
+    estimation: &'a [Rows],
+    validation: &'a [Rows],
+}
+
+/// A choice, and whether all models had a constant.
+struct Chosen {
+    found: Found,
+    with_constant: bool,
+}
+
+/// The choice among several models. Where a constant is asked for or pays, all of them have one.
 fn selected<'a>(
     record: &impl Fn(&[Rows]) -> Result<Record<'a>, Error>,
     plan: &Plan,
-    estimation: &[Rows],
-    validation: &[Rows],
-    parts: Option<&Parts>,
+    compared: &Compared<'_>,
+    beside: &Beside,
     monitor: Monitor<'_>,
-) -> Result<Found, Error> {
+) -> Result<Chosen, Error> {
     let Method::PredictionError(search) = &plan.method else {
         return Err(Error::argument(
             "method",
             "a choice among models compares prediction errors; give the orders for another method or criterion",
         ));
     };
-    let (fitted, unseen) = parts
-        .map_or((estimation, validation), |parts| (parts.estimation.as_slice(), parts.validation.as_slice()));
+    let unseen = compared.validation;
     let unseen = if unseen.is_empty() { None } else { Some(record(unseen)?) };
+    let estimation = record(compared.estimation)?;
+    let with_constant = match plan.constant {
+        _ if plan.trend => true,
+        Constant::Yes => true,
+        Constant::No => false,
+        // What is measured from a rest is at its level already, but for what the chosen model finds.
+        Constant::Auto if matches!(plan.detrend, Detrend::Start(_)) => false,
+        Constant::Auto => plan.initial != Initial::Zero && select::constant_pays(&estimation),
+    };
+    let signals = if with_constant { beside.signals() } else { Vec::new() };
+    let unseen = unseen.map(|unseen| with_inputs(&unseen, &signals));
     let task = Task {
-        estimation: &record(fitted)?,
+        estimation: &with_inputs(&estimation, &signals),
         validation: unseen.as_ref(),
         inputs: &plan.inputs,
         select: plan.select,
@@ -340,7 +425,12 @@ fn selected<'a>(
         search,
         monitor,
     };
-    select::choose(&task, &plan.choice)
+    let mut found = select::choose(&task, &plan.choice)?;
+    if with_constant {
+        let what = if plan.trend { "a constant and a trend" } else { "a constant" };
+        found.selection.steps.push(format!("All models were compared with {what} beside them."));
+    }
+    Ok(Chosen { found, with_constant })
 }
 
 /// The variance of the errors one step ahead of the unfiltered signals, sum e^2/(N - p) over the estimation rows.
@@ -422,13 +512,18 @@ fn parameters_of(input: Option<usize>, orders: &Orders) -> Vec<String> {
     [&names[b..b + orders.nb[input]], &names[f..f + orders.nf[input]]].concat()
 }
 
-fn estimation_of(estimate: &Estimate) -> Estimation {
+/// How the parameters were found, and what was found beside them: as it is measured from zero, where `taken` was taken before.
+fn estimation_of(fitted: &Fitted, taken: Offset) -> Estimation {
+    let Fitted { estimate, criteria, offset } = fitted;
+    let above = |base: f64, found: Quantity| Quantity { value: base + found.value, ..found };
     Estimation {
+        level: offset.map(|OutputOffset { level, middle, .. }| above(taken.at(middle), level)),
+        slope: offset.and_then(|found| Some(above(taken.slope, found.slope?))),
         procedure: estimate.procedure().clone(),
         initial: estimate.initial(),
         samples: estimate.samples(),
         mse: estimate.mse(),
-        criteria: estimate.criteria(),
+        criteria: criteria.clone(),
         condition: estimate.condition(),
     }
 }
@@ -470,6 +565,9 @@ fn judge(report: &mut Report, record: &Record<'_>, rows: &[Rows], part: Part, in
         }
     }
 }
+
+#[cfg(test)]
+mod offset_tests;
 
 #[cfg(test)]
 mod tests {

@@ -3,7 +3,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::data::Rows;
 use crate::{
-    AntiAlias, Criteria, Error, Fit, Initial, Interpolation, Model, Prefilter, Procedure, Resample,
+    AntiAlias, Criteria, Error, Fit, Initial, Interpolation, Model, Prefilter, Procedure, Quantity, Resample,
     Selection, document, text,
 };
 
@@ -132,6 +132,14 @@ pub struct Estimation {
     pub procedure: Procedure,
     /// What stood for the samples before the first of a segment.
     pub initial: Initial,
+    /// The output's level in its own units where the inputs are at their offsets, if it was estimated with the parameters; with
+    /// a trend that in the middle of the estimation rows. It is part of the model's offset of the output, and one of the
+    /// parameters that the criteria count.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub level: Option<Quantity>,
+    /// The output's slope in its units per second, if it was estimated with the parameters.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub slope: Option<Quantity>,
     /// N, the samples that count.
     pub samples: usize,
     /// The mean of e^2 over these samples.

@@ -7,7 +7,7 @@ use super::delay;
 use super::ranking::ranked;
 use super::{Automatic, Found, Selection, Task};
 use crate::data::Record;
-use crate::estimate::Initial;
+use crate::estimate::{Initial, pays};
 use crate::{Error, Orders, Structure};
 
 /// The highest order of ARX and AR models, and of the others.
@@ -17,10 +17,13 @@ const HIGHEST: usize = 3;
 const MOST_INPUTS: usize = 100;
 /// So many samples for each parameter at least.
 const SAMPLES: usize = 4;
+/// Orders of ARX models that say whether a constant is worth a parameter.
+const CONSTANT_ORDERS: [usize; 2] = [2, LONGEST];
+
 /// # Errors
 /// As for [`choose`](super::choose).
 pub(super) fn choose(task: &Task<'_>, automatic: &Automatic) -> Result<Found, Error> {
-    let inputs = task.estimation.inputs.len();
+    let inputs = task.inputs.len();
     if inputs > MOST_INPUTS {
         return Err(Error::argument(
             "inputs",
@@ -50,10 +53,22 @@ pub(super) fn choose(task: &Task<'_>, automatic: &Automatic) -> Result<Found, Er
     Ok(Found { selection: Selection { steps, delays, ..selection }, guess })
 }
 
+/// Whether a constant lowers the MDL of ARX models of few or of many coefficients: then it is part of every model that is
+/// compared, and the chosen one says whether it keeps it.
+pub(crate) fn constant_pays(record: &Record<'_>) -> bool {
+    let inputs = record.inputs.len();
+    inputs <= MOST_INPUTS
+        && CONSTANT_ORDERS.into_iter().any(|order| {
+            are_enough(record, order * (1 + inputs), order)
+                && Orders::arx(order, &vec![order; inputs], &vec![1; inputs])
+                    .is_ok_and(|orders| pays(record, &orders))
+        })
+}
+
 /// Which structures are tried.
 fn structures(task: &Task<'_>, automatic: &Automatic) -> Result<Vec<Structure>, Error> {
     use Structure::{Ar, Arma, Armax, Arx, Bj, Oe, Pem};
-    let driven = !task.estimation.inputs.is_empty();
+    let driven = !task.inputs.is_empty();
     match automatic.structure {
         Some(Pem) => Err(Error::argument(
             "structure",

@@ -81,6 +81,7 @@ impl Samples {
 /// As for [`choose`](super::choose).
 pub(super) fn compare(task: &Task<'_>, models: Vec<Orders>) -> Result<Outcome, Error> {
     let mut remarks = Vec::new();
+    let models: Vec<Orders> = models.iter().map(|orders| task.with_constants(orders)).collect();
     let searched = models.iter().any(|orders| !orders.is_linear());
     let all = total(task.estimation);
     let thin = if searched && all > LONG { stretches(task.estimation, STRETCHES, STRETCH) } else { None };
@@ -95,7 +96,7 @@ pub(super) fn compare(task: &Task<'_>, models: Vec<Orders>) -> Result<Outcome, E
     let samples = Samples::new(record, task.initial, &models)?;
     let count = samples.count(record);
     let with_unseen = matches!(task.select, Select::Validation | Select::Cv);
-    let smallest = models.first().cloned();
+    let smallest = models.first().map(|orders| task.named(orders));
     let mut tried: Vec<Tried> = models.into_iter().map(|orders| Tried { orders, point: None }).collect();
     fit_linear(record, &samples, &mut tried, searched || with_unseen)?;
     // Those of linear models are zero already where they are rounding.
@@ -109,7 +110,7 @@ pub(super) fn compare(task: &Task<'_>, models: Vec<Orders>) -> Result<Outcome, E
             let score = score(Select::Mdl, mse, size, point.initial, count, None);
             score.unwrap_or(f64::NEG_INFINITY)
         };
-        Family::new(&tried).fit(&common, &mut tried, &score)?;
+        Family::new(&tried, task.inputs.len()).fit(&common, &mut tried, &score)?;
     }
     let looks = unseen::costs(task, record, &tried)?;
     let models = tried.len();
@@ -117,15 +118,16 @@ pub(super) fn compare(task: &Task<'_>, models: Vec<Orders>) -> Result<Outcome, E
         let Point { parameters, cost, initial } = point?;
         let unseen = if with_unseen { Some(unseen?) } else { None };
         let (mse, size) = (exact(cost) / count as f64, orders.parameters());
+        let guess = (!orders.is_linear()).then_some(parameters);
+        let orders = task.named(&orders);
         let scored = Scored {
             structure: orders.structure(),
-            parameters: size,
+            parameters: orders.parameters(),
             mse,
             unseen,
             score: score(task.select, mse, size, initial, count, unseen),
             orders,
         };
-        let guess = (!scored.orders.is_linear()).then_some(parameters);
         Some((scored, guess))
     });
     let scored: Vec<(Scored, Option<Vec<f64>>)> = scored.collect();

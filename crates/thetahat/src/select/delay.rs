@@ -42,13 +42,15 @@ struct Long<'r> {
     scaled: Scaled,
 }
 
-/// The lags of each input's B: none where it has no effect.
+/// The lags of each input's B: none where it has no effect. Those of a constant and a trend come last.
 type Windows = Vec<Range<usize>>;
 
 impl<'r> Long<'r> {
-    fn new(record: &'r Record<'r>, na: usize, lags: usize, end: usize) -> Result<Self, Error> {
+    fn new(task: &Task<'r>, na: usize, lags: usize, end: usize) -> Result<Self, Error> {
+        let record = task.estimation;
         let inputs = record.inputs.len();
-        let largest = Orders::arx(na, &vec![end; inputs], &vec![0; inputs])?;
+        let named = task.inputs.len();
+        let largest = task.with_constants(&Orders::arx(na, &vec![end; named], &vec![0; named])?);
         let columns = Columns::new(std::iter::once(&largest), inputs);
         let rows = rows(record, &columns, &Samples::unknown(record, std::iter::once(&largest)))?;
         let scaled = Scaled::new(&rows);
@@ -149,7 +151,7 @@ impl<'r> Long<'r> {
 /// The delays, and what there is to say of them.
 pub(super) fn found(task: &Task<'_>, steps: &mut Vec<String>) -> Result<(Vec<Delay>, Vec<usize>), Error> {
     let record = task.estimation;
-    let inputs = record.inputs.len();
+    let inputs = task.inputs.len();
     let lags = |order: usize| order * DELAY_LAGS / DELAY_ORDER;
     let fits = |order: &usize| are_enough(record, order + inputs * lags(*order), (lags(*order)).max(*order));
     let Some(na) = (1..=DELAY_ORDER).rev().find(fits) else {
@@ -157,15 +159,17 @@ pub(super) fn found(task: &Task<'_>, steps: &mut Vec<String>) -> Result<(Vec<Del
         return Ok((Vec::new(), vec![1; inputs]));
     };
     let lags = lags(na);
-    let mut long = Long::new(record, na, lags, 1 + lags)?;
+    let mut long = Long::new(task, na, lags, 1 + lags)?;
     let mut firsts = vec![1; inputs];
-    let mut windows = long.descend(&firsts, vec![1..1 + lags; inputs])?;
+    // A constant and a trend have one coefficient, whatever the others have.
+    let constants = vec![0..1; record.inputs.len() - inputs];
+    let mut windows = long.descend(&firsts, [vec![1..1 + lags; inputs], constants].concat())?;
     // A delay in the second half, or no effect: it may be a longer one.
-    if windows.iter().any(|window| 2 * window.start > lags + 1) {
+    if windows[..inputs].iter().any(|window| 2 * window.start > lags + 1) {
         let fits = |end: &usize| are_enough(record, na + inputs * lags, *end);
         let end = (2 + lags..=MOST_LAGS).rev().find(fits);
         if let Some(end) = end {
-            long = Long::new(record, na, lags, end)?;
+            long = Long::new(task, na, lags, end)?;
             windows = long.descend(&firsts, windows)?;
         }
     }

@@ -25,8 +25,8 @@ pub(super) fn ranked(task: &Task<'_>, outcome: Outcome, path: Option<Path>) -> R
     let (Some(&first), count) = (order.first(), scored.len()) else {
         if let Some(orders) = smallest {
             let method = Method::PredictionError(task.search.clone());
-            let Task { estimation, inputs, initial, monitor, .. } = *task;
-            estimate_of_channels(estimation, inputs, &orders, &method, initial, monitor)?;
+            let Task { inputs, initial, monitor, .. } = *task;
+            estimate_of_channels(&task.named_record(), inputs, &orders, &method, initial, monitor)?;
         }
         return Err(Error::undetermined(
             Vec::new(),

@@ -29,13 +29,13 @@ pub(super) struct Family {
 }
 
 impl Family {
-    /// Of models that are sorted by their number of parameters.
-    pub(super) fn new(models: &[Tried]) -> Self {
+    /// Of models that are sorted by their number of parameters. The coefficients of inputs after the first `inputs` are in all.
+    pub(super) fn new(models: &[Tried], inputs: usize) -> Self {
         let places: BTreeMap<Vec<usize>, usize> =
             models.iter().map(|model| key(&model.orders)).zip(0..).collect();
         let place = |orders: Orders| places.get(&key(&orders)).copied();
         let neighbours: Vec<Vec<usize>> =
-            models.iter().map(|model| smaller(&model.orders).filter_map(place).collect()).collect();
+            models.iter().map(|model| smaller(&model.orders, inputs).filter_map(place).collect()).collect();
         let searched = |k: usize| !models[k].orders.is_linear();
         let mut levels: Vec<Vec<usize>> = Vec::new();
         let mut of = vec![0; models.len()];
@@ -122,16 +122,17 @@ impl Family {
     }
 }
 
-/// Orders with one step less: of one polynomial, or of the same polynomial of all inputs.
-fn smaller(orders: &Orders) -> impl Iterator<Item = Orders> {
+/// Orders with one step less: of one polynomial, or of the same polynomial of all of the first inputs.
+fn smaller(orders: &Orders, inputs: usize) -> impl Iterator<Item = Orders> {
     let less = |values: &[usize]| -> Vec<Vec<usize>> {
-        let one = (0..values.len()).filter(|&j| values[j] > 0).map(|j| {
+        let (own, rest) = values.split_at(inputs);
+        let one = (0..inputs).filter(|&j| own[j] > 0).map(|j| {
             let mut less = values.to_vec();
             less[j] -= 1;
             less
         });
-        let all = (values.len() > 1 && values.iter().all(|&value| value > 0))
-            .then(|| values.iter().map(|value| value - 1).collect());
+        let all = (inputs > 1 && own.iter().all(|&value| value > 0))
+            .then(|| own.iter().map(|value| value - 1).chain(rest.iter().copied()).collect());
         one.chain(all).collect()
     };
     let of_one = |value: usize| value.checked_sub(1);

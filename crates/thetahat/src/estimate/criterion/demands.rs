@@ -45,7 +45,11 @@ impl Demands {
                 format!("{bound} is not a size of e; give a positive number in units of the output"),
             ));
         }
-        let names = orders.names();
+        let named = inputs.len();
+        let (nb, nk) = (orders.nb[..named].to_vec(), orders.nk[..named].to_vec());
+        let named = Orders { nb, nk, nf: vec![0; named], ..orders.clone() };
+        // The others have their parameters behind these.
+        let (names, size) = (named.names(), orders.parameters());
         let mut demands = Self { demands: Vec::new(), limits: Vec::new() };
         for bound in &criterion.bounds {
             let words = bound.to_string();
@@ -60,7 +64,7 @@ impl Demands {
                     ),
                 )
             })?;
-            let mut coefficients = DVector::zeros(names.len());
+            let mut coefficients = DVector::zeros(size);
             coefficients[parameter] = 1.0;
             let limit = Limit { coefficients, low: bound.low, high: bound.high };
             demands.add(words, [limit], Some(parameter));

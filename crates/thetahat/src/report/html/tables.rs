@@ -254,6 +254,12 @@ pub(super) fn data(report: &Report) -> Table {
     if let Some(band) = data.prefilter {
         add("fitted in the band", format!("{band} Hz"));
     }
+    if let Some(level) = report.estimation.level {
+        add("level of the output", quantity(level));
+    }
+    if let Some(slope) = report.estimation.slope {
+        add("slope of the output, a second", quantity(slope));
+    }
     add("estimation rows", parts(&data.estimation));
     add("validation rows", parts(&data.validation));
     if let Some(split) = &data.split {

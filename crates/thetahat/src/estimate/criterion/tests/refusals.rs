@@ -62,8 +62,14 @@ fn options_that_make_no_sense_are_refused() {
     let expected = "dc-gain: dc-gain 1: say of which input, as in u=1; there are: u, v";
     assert_eq!(of(gain(None, 1.0, 1.0)), expected);
     assert!(of(gain(Some("v"), 1.0, 1.0)).ends_with("input 'v' has no B (nb = 0), so that its gain is 0"));
-    let one = constrained(&record, &names[..1], &two, Presample::Drop, &Criterion::default());
-    assert_eq!(message(one), "inputs: there are 1 names for 2 inputs; give one for each");
+    let three = [&names[..], &["w".to_owned()]].concat();
+    let result = constrained(&record, &three, &two, Presample::Drop, &Criterion::default());
+    assert_eq!(message(result), "inputs: there are 3 names for 2 inputs; give one for each");
+    // Nothing is asked of an input without a name, whose coefficient comes last.
+    let constant = Orders::arx(1, &[1, 1], &[1, 0]).unwrap();
+    let of = |criterion| message(constrained(&record, &names[..1], &constant, Presample::Drop, &criterion));
+    let bound = Criterion { bounds: vec!["b2_0=0..1".parse().unwrap()], ..Criterion::default() };
+    assert!(of(bound).ends_with("there is no parameter 'b2_0'; there are: a1, b1"));
     // Models without an input, and those that are not linear in their parameters.
     let alone = super::record(&y, &[], &whole(50));
     let autoregression = Orders::arx(2, &[], &[]).unwrap();

@@ -1,0 +1,503 @@
+//! An offset of the output that is estimated with the parameters: a constant, and a trend.
+//!
+//! ```text
+//! A(q) y(t) = sum_j B_j(q)/F_j(q) u_j(t) + k + m r(t) + C(q)/D(q) e(t),   r(t) = (t - t_m)/h
+//! ```
+//!
+//! (Ljung, System Identification, 2nd ed. 1999, section 14.1: the offset as a parameter). 1 and r are two more inputs with one
+//! coefficient, no delay and no F: every way to estimate has them at no further cost in concepts. t_m is the middle of the
+//! estimation rows and h half their length in time. As an offset of the output, A(q) (y(t) - l(t)) = ..., this is the line
+//!
+//! ```text
+//! l(t) = level + slope (t - t_m):   slope = m/(h A(1)),   level = k/A(1) + m T S/(h A(1)^2),   S = sum_i i a_i,
+//! ```
+//!
+//! T being the sample time, as A(q) t = A(1) t - T S. So predictions and simulations know nothing of it: they see deviations.
+//! Standard errors are those of the parameters to first order (see `model::dynamics`). An integrator, A(1) = 0, has no level.
+//!
+//! Whether a constant is worth its parameter is decided by MDL (Rissanen, Automatica 14, 1978): N ln(V_0/V_1) > ln N. For
+//! models that are linear in their parameters V_1 follows from V_0, the residuals' sum and the normal equations; for others
+//! the decrease that one Gauss-Newton step foretells (Rao's score test, Proc. Cambridge Philosophical Society 44, 1948) says
+//! whether a second search can change the answer. The errors of an output-error model may have any colour, and slow ones look
+//! like an offset: there k^2/var k > ln N is asked for too, with the variance that knows of the colour (Wald's test, which is
+//! the same as the first one where errors are white).
+
+use std::ops::Range;
+use std::time::Instant;
+
+use super::optimize::best_free;
+use super::predictor::{Begin, Predictor};
+use super::{
+    Criterion, Estimate, Initial, Method, Monitor, Norm, Procedure, Search, arx, estimate_of_channels,
+};
+use crate::data::{Log, Offset, Record};
+use crate::model::Quantity;
+use crate::regression::sum;
+use crate::{Criteria, Error, Orders, Structure};
+
+/// A search for a constant begins where a step foretells this fraction of what it must be worth.
+const PROMISING: f64 = 0.5;
+/// A constant that is worth this many times its price needs no comparison with a model without it.
+const CERTAIN: f64 = 2.0;
+/// Of A(1) nothing but rounding is left below this fraction of the sum of |a_i|: there is no level.
+const INTEGRATOR: f64 = 1e-9;
+/// Of a column of ones less than this fraction of its square is left beside the regressors: they hold a constant already.
+const DEPENDENT: f64 = 1e-9;
+
+/// Whether a constant is estimated with the parameters: the level of the output where the inputs are at their offsets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Constant {
+    /// Where it lowers MDL.
+    #[default]
+    Auto,
+    /// Always.
+    Yes,
+    /// Never.
+    No,
+}
+
+/// The constant and the trend that may be estimated beside the parameters of some rows.
+#[derive(Debug, Clone)]
+pub(crate) struct Beside {
+    rows: usize,
+    /// r, one value for each row, where there is a trend.
+    ramp: Option<Vec<f64>>,
+    /// t_m and h, in seconds.
+    middle: f64,
+    half: f64,
+    sample_time: f64,
+}
+
+impl Beside {
+    /// # Errors
+    /// [`Error::Argument`] for a trend through several logs.
+    pub(crate) fn new(log: &Log, segments: &[Range<usize>], trend: bool) -> Result<Self, Error> {
+        if trend && log.is_joined() {
+            return Err(Error::argument(
+                "trend",
+                "several logs have no common clock for a line; leave it out, or fit one log",
+            ));
+        }
+        let first = segments.first().map_or(0.0, |segment| log.elapsed(segment.start));
+        let last = segments.last().map_or(0.0, |segment| log.elapsed(segment.end - 1));
+        let (middle, half) = (f64::midpoint(first, last), 0.5 * (last - first));
+        let half = if half > 0.0 { half } else { 1.0 };
+        let at = |row: usize| (log.elapsed(row) - middle) / half;
+        let ramp = trend.then(|| (0..log.rows()).map(at).collect());
+        Ok(Self { rows: log.rows(), ramp, middle, half, sample_time: log.sample_time() })
+    }
+
+    /// How many inputs these are.
+    pub(crate) fn count(&self) -> usize {
+        1 + usize::from(self.ramp.is_some())
+    }
+
+    /// 1 and r.
+    pub(crate) fn signals(&self) -> Vec<Vec<f64>> {
+        std::iter::once(vec![1.0; self.rows]).chain(self.ramp.clone()).collect()
+    }
+
+    /// Where their coefficients stand among the parameters of a model of these orders with them.
+    fn places(&self, orders: &Orders) -> Range<usize> {
+        let first = orders.na + orders.nb.iter().sum::<usize>();
+        first..first + self.count()
+    }
+
+    /// The parameters of a model with them, of one without: both are zero.
+    fn with_zeros(&self, orders: &Orders, parameters: &[f64]) -> Vec<f64> {
+        let (before, after) = parameters.split_at(self.places(orders).start);
+        [before, &vec![0.0; self.count()], after].concat()
+    }
+
+    /// The parameters of a model without them, of one with them.
+    fn without(&self, orders: &Orders, parameters: &[f64]) -> Vec<f64> {
+        let places = self.places(orders);
+        [&parameters[..places.start], &parameters[places.end..]].concat()
+    }
+}
+
+/// A record with further inputs behind its own.
+pub(crate) fn with_inputs<'a>(record: &Record<'a>, signals: &'a [Vec<f64>]) -> Record<'a> {
+    let inputs = record.inputs.iter().copied().chain(signals.iter().map(Vec::as_slice)).collect();
+    Record { inputs, ..record.clone() }
+}
+
+/// Orders with so many further inputs behind their own, of one coefficient each that acts at once.
+pub(crate) fn with_constants(orders: &Orders, count: usize) -> Orders {
+    let mut orders = orders.clone();
+    orders.nb.extend(vec![1; count]);
+    orders.nf.extend(vec![0; count]);
+    orders.nk.extend(vec![0; count]);
+    orders
+}
+
+/// What to estimate, beside the constant.
+#[derive(Clone, Copy)]
+pub(crate) struct Task<'a> {
+    pub(crate) record: &'a Record<'a>,
+    /// The inputs' names.
+    pub(crate) inputs: &'a [String],
+    pub(crate) orders: &'a Orders,
+    pub(crate) method: &'a Method,
+    pub(crate) initial: Initial,
+    pub(crate) monitor: Monitor<'a>,
+}
+
+/// An estimate, and the offset that was found with it.
+#[derive(Debug)]
+pub(crate) struct Fitted {
+    /// The model's own parameters.
+    pub(crate) estimate: Estimate,
+    /// Those of all parameters.
+    pub(crate) criteria: Criteria,
+    pub(crate) offset: Option<OutputOffset>,
+}
+
+/// The line that is to be taken from the output, beside what was taken before.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct OutputOffset {
+    pub(crate) offset: Offset,
+    /// Its value in the middle of the estimation rows.
+    pub(crate) level: Quantity,
+    /// In the output's units per second, where there is a trend.
+    pub(crate) slope: Option<Quantity>,
+    /// That middle, in seconds from the log's first row.
+    pub(crate) middle: f64,
+}
+
+impl Task<'_> {
+    /// The estimate with a constant, if that is asked for or worth it, and with a trend, if `beside` has one. `guess` has the
+    /// parameters of a model with both, where a choice among models has found some.
+    ///
+    /// # Errors
+    /// As for [`estimate`](super::estimate()); [`Error::Argument`] where the constant does not go with method or initial
+    /// condition; [`Error::Undetermined`] where the data do not tell it, or there is no level.
+    pub(crate) fn fit(
+        &self,
+        constant: Constant,
+        beside: &Beside,
+        guess: Option<Vec<f64>>,
+    ) -> Result<Fitted, Error> {
+        let wanted = constant == Constant::Yes || beside.ramp.is_some();
+        match self.refusal() {
+            Some(why) if wanted => return Err(Error::argument("constant", why)),
+            Some(_) => return self.plain(guess.map(|guess| beside.without(self.orders, &guess))),
+            None if constant == Constant::No && !wanted => return self.plain(guess),
+            None => {}
+        }
+        if wanted {
+            return self.wanted(beside, guess);
+        }
+        match self.method {
+            // These have no sum of squares that is least: the constant's own error says what it is worth.
+            Method::InstrumentalVariables | Method::RefinedInstrumentalVariables => {
+                return match self.beside(beside, None) {
+                    Ok(Some((fitted, Some(worth)))) if worth > 1.0 => Ok(fitted),
+                    _ => self.plain(None),
+                };
+            }
+            // All parameters within a bound: a set, and no likelihood.
+            Method::Constrained(Criterion { noise_bound: Some(_), .. }) => return self.plain(None),
+            Method::Constrained(_) | Method::PredictionError(_) => {}
+        }
+        let started = Instant::now();
+        // What a choice found with a constant comes close to the end.
+        let with = guess.as_ref().map(|guess| self.beside(beside, Some(guess.clone())));
+        let with = match with {
+            Some(Err(Error::Interrupted)) => return Err(Error::Interrupted),
+            Some(Ok(Some((fitted, Some(worth))))) if worth > CERTAIN => return Ok(fitted),
+            Some(Ok(found)) => found,
+            _ => None,
+        };
+        let without = self.plain(guess.map(|guess| beside.without(self.orders, &guess)))?;
+        let (with, worth) = match with {
+            Some(found) => found,
+            None if self.promises(beside, &without.estimate) => {
+                let from = beside.with_zeros(self.orders, without.estimate.parameters());
+                let method = self.method_within(started);
+                match (Task { method: &method, ..*self }).beside(beside, Some(from)) {
+                    Err(Error::Interrupted) => return Err(Error::Interrupted),
+                    Ok(Some(found)) => found,
+                    Ok(None) | Err(_) => return Ok(without),
+                }
+            }
+            None => return Ok(without),
+        };
+        let coloured = self.orders.structure() == Structure::Oe;
+        let is_certain = !coloured || worth.is_none_or(|worth| worth > 1.0);
+        Ok(if is_certain && is_worth(&without.estimate, &with.estimate) { with } else { without })
+    }
+
+    /// Why there can be no constant.
+    fn refusal(&self) -> Option<&'static str> {
+        if self.initial == Initial::Zero && self.orders.na > 0 {
+            return Some(
+                "zeros before the first sample are not at the level that is to be found, and A reaches back to them; take \
+                 another initial condition, or leave the constant out",
+            );
+        }
+        match self.method {
+            Method::Constrained(Criterion { ridge, .. }) if *ridge > 0.0 => {
+                Some("a ridge would pull the level towards zero; leave one of the two out")
+            }
+            _ => None,
+        }
+    }
+
+    /// The method with the time that is left since then.
+    fn method_within(&self, started: Instant) -> Method {
+        let mut method = self.method.clone();
+        if let Method::PredictionError(Search { time_limit: Some(limit), .. }) = &mut method {
+            *limit = limit.saturating_sub(started.elapsed());
+        }
+        method
+    }
+
+    /// Without a constant.
+    fn plain(&self, guess: Option<Vec<f64>>) -> Result<Fitted, Error> {
+        let method = with_guess(self.method, guess);
+        let Self { record, inputs, orders, initial, monitor, .. } = *self;
+        let estimate = estimate_of_channels(record, inputs, orders, &method, initial, monitor)?;
+        Ok(Fitted { criteria: estimate.criteria(), estimate, offset: None })
+    }
+
+    /// With a constant, whatever it is worth.
+    fn wanted(&self, beside: &Beside, guess: Option<Vec<f64>>) -> Result<Fitted, Error> {
+        let missing = |message: &str| Error::undetermined(vec!["constant".to_owned()], message);
+        match self.beside(beside, guess) {
+            Ok(Some((fitted, _))) => Ok(fitted),
+            Ok(None) => Err(missing(
+                "the model has an integrator, A(1) = 0: its output has no level to be estimated; leave the constant out, or \
+                 fit differences of the output",
+            )),
+            // What the data leave open without a constant has its own words.
+            Err(Error::Undetermined { .. }) => Err(self.plain(None).err().unwrap_or_else(|| {
+                missing(
+                    "the data cannot tell the constant or the trend from the other parameters, or have too few rows for both; \
+                     leave it out, or give more rows",
+                )
+            })),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// With a constant, and what it is worth in units of its price: (k/its standard error)^2 over ln N, where that is known.
+    /// None where there is no level.
+    fn beside(
+        &self,
+        beside: &Beside,
+        guess: Option<Vec<f64>>,
+    ) -> Result<Option<(Fitted, Option<f64>)>, Error> {
+        let signals = beside.signals();
+        let record = with_inputs(self.record, &signals);
+        let orders = with_constants(self.orders, beside.count());
+        // A guess of the model alone is one of it with zeros.
+        let own = match self.method {
+            Method::PredictionError(Search { guess: Some(own), .. })
+                if own.len() == self.orders.parameters() =>
+            {
+                Some(beside.with_zeros(self.orders, own))
+            }
+            _ => None,
+        };
+        let method = with_guess(self.method, guess.or(own));
+        let all = estimate_of_channels(&record, self.inputs, &orders, &method, self.initial, self.monitor)?;
+        let place = beside.places(self.orders).start;
+        let variance = all.covariance().map(|covariance| covariance[place][place]);
+        let worth =
+            variance.map(|variance| all.parameters()[place].powi(2) / variance / (all.samples() as f64).ln());
+        Ok(beside.apart(self.orders, all).map(|fitted| (fitted, worth)))
+    }
+
+    /// Whether a constant beside the parameters of this estimate may be worth its price.
+    fn promises(&self, beside: &Beside, without: &Estimate) -> bool {
+        if without.mse() == 0.0 {
+            return false;
+        }
+        if self.orders.is_linear() {
+            // Of another norm least squares says it: a constant takes the mean off the errors in either.
+            let squares = match self.method {
+                Method::Constrained(_) => {
+                    let Ok(squares) = arx(self.record, self.orders, self.initial) else { return false };
+                    squares
+                }
+                _ => without.clone(),
+            };
+            return lowers_mdl(self.record, self.orders, &squares);
+        }
+        let samples = without.samples() as f64;
+        let signals = beside.signals();
+        let record = with_inputs(self.record, &signals);
+        let orders = with_constants(self.orders, beside.count());
+        let parameters = beside.with_zeros(self.orders, without.parameters());
+        let known = conditions(without) as f64;
+        let from = |begin| {
+            let mut predictor = Predictor::new(&record, &orders, begin);
+            let price = (1.0 + predictor.initial_conditions() as f64 - known) * samples.ln();
+            let count = predictor.samples() as f64;
+            let Ok(cost) = best_free(&mut predictor, &parameters) else { return false };
+            let left = (cost - predictor.foretold()).max(0.0);
+            samples * (without.mse() * count / left).ln() > PROMISING * price
+        };
+        let rests = without.initial() == Initial::Zero;
+        // What seemed to begin at rest may have begun elsewhere.
+        let open = !rests || self.initial == Initial::Auto && orders.nf.iter().any(|&nf| nf > 0);
+        rests && from(Begin::Zero) || open && from(Begin::Unknown)
+    }
+}
+
+/// A search begins from a guess too.
+fn with_guess(method: &Method, guess: Option<Vec<f64>>) -> Method {
+    match (method, guess) {
+        (Method::PredictionError(search), Some(guess)) => {
+            Method::PredictionError(Search { guess: Some(guess), ..search.clone() })
+        }
+        _ => method.clone(),
+    }
+}
+
+/// Whether the errors become smaller by what one parameter and further initial conditions cost: MDL, with the likelihood of
+/// Gaussian errors; where other norms were made small, of errors with Laplace's distribution or a uniform one.
+fn is_worth(without: &Estimate, with: &Estimate) -> bool {
+    let samples = with.samples() as f64;
+    let price = 1.0 + conditions(with) as f64 - conditions(without) as f64;
+    let size = |estimate: &Estimate| match estimate.procedure() {
+        Procedure::Constrained(outcome) if outcome.norm != Norm::Two => outcome.objective.powi(2),
+        _ => estimate.mse(),
+    };
+    without.mse() > 0.0 && samples * (size(without) / size(with)).ln() > price * samples.ln()
+}
+
+/// The initial conditions that were estimated.
+fn conditions(estimate: &Estimate) -> usize {
+    match estimate.procedure() {
+        Procedure::PredictionError(outcome) => outcome.initial_conditions,
+        Procedure::RefinedInstrumentalVariables { initial_conditions, .. } => *initial_conditions,
+        _ => 0,
+    }
+}
+
+/// Whether a constant lowers the MDL of a linear model of a record.
+pub(crate) fn pays(record: &Record<'_>, orders: &Orders) -> bool {
+    arx(record, orders, Initial::Drop).is_ok_and(|without| lowers_mdl(record, orders, &without))
+}
+
+/// Whether a constant lowers the MDL of a linear model, given its least squares.
+fn lowers_mdl(record: &Record<'_>, orders: &Orders, without: &Estimate) -> bool {
+    let samples = without.samples() as f64;
+    let cost = without.mse() * samples;
+    let left = (cost - constant_decrease(record, orders, without)).max(0.0);
+    cost > 0.0 && samples * (cost / left).ln() > samples.ln()
+}
+
+/// By how much a constant lowers the sum of squared errors of a linear model, exactly: with z = 1
+///
+/// ```text
+/// (z'e)^2 / (z'z - z'Phi (Phi'Phi)^-1 Phi'z),
+/// ```
+///
+/// the sums z'Phi being those of the signals, moved by one sample from lag to lag: O(N + p).
+fn constant_decrease(record: &Record<'_>, orders: &Orders, estimate: &Estimate) -> f64 {
+    let (Some(covariance), true) = (estimate.covariance(), estimate.noise_variance() > 0.0) else {
+        return 0.0;
+    };
+    let skipped = if estimate.initial() == Initial::Zero { 0 } else { orders.reach() };
+    let sums = |signal: &[f64], first: usize, count: usize| {
+        let mut sums = vec![0.0; count];
+        for segment in record.segments.iter().filter(|segment| segment.len() > skipped) {
+            // Samples before a segment are zero, or none is looked at.
+            let rows = |lag: usize| {
+                let begin = (segment.start + skipped).saturating_sub(lag).max(segment.start);
+                begin..segment.end.saturating_sub(lag).max(begin)
+            };
+            let mut known = rows(first);
+            let mut total = sum(signal[known.clone()].iter().copied());
+            for (lag, all) in (first..).zip(&mut sums) {
+                let next = rows(lag);
+                total += sum(signal[next.start..known.start].iter().copied());
+                total -= sum(signal[next.end..known.end].iter().copied());
+                known = next;
+                *all += total;
+            }
+        }
+        sums
+    };
+    let mut columns: Vec<f64> = sums(record.output, 1, orders.na).iter().map(|sum| -sum).collect();
+    for (input, (&nb, &nk)) in record.inputs.iter().zip(orders.nb.iter().zip(&orders.nk)) {
+        columns.extend(sums(input, nk, nb));
+    }
+    let output: f64 = sums(record.output, 0, 1).iter().sum();
+    let errors = output - sum(columns.iter().zip(estimate.parameters()).map(|(sum, value)| sum * value));
+    let explained: f64 = covariance
+        .iter()
+        .zip(&columns)
+        .map(|(row, sum)| sum * row.iter().zip(&columns).map(|(entry, other)| entry * other).sum::<f64>())
+        .sum();
+    let samples = estimate.samples() as f64;
+    let left = samples - explained / estimate.noise_variance();
+    if left > DEPENDENT * samples { errors * errors / left } else { 0.0 }
+}
+
+impl Beside {
+    /// The model's own estimate of one with a constant, and the offset. None where there is no level.
+    fn apart(&self, orders: &Orders, all: Estimate) -> Option<Fitted> {
+        let places = self.places(orders);
+        let a = &all.parameters[..orders.na];
+        let gain = 1.0 + a.iter().sum::<f64>();
+        if gain.abs() <= INTEGRATOR * (1.0 + a.iter().map(|a| a.abs()).sum::<f64>()) {
+            return None;
+        }
+        let delay: f64 = a.iter().zip(1_u32..).map(|(a, lag)| f64::from(lag) * a).sum();
+        let (constant, ramp) = (all.parameters[places.start], self.ramp.is_some());
+        // In units of the output over one sample.
+        let trend = if ramp { all.parameters[places.start + 1] / self.half } else { 0.0 };
+        let drift = self.sample_time * trend;
+        let slope = trend / gain;
+        let level = (constant + drift * delay / gain) / gain;
+        let mut of_level = vec![0.0; all.parameters.len()];
+        let mut of_slope = of_level.clone();
+        for (lag, (level, slope)) in (1_u32..).zip(of_level.iter_mut().zip(&mut of_slope)).take(orders.na) {
+            *level = (-constant + drift * (f64::from(lag) - 2.0 * delay / gain)) / (gain * gain);
+            *slope = -trend / (gain * gain);
+        }
+        of_level[places.start] = 1.0 / gain;
+        if ramp {
+            of_level[places.start + 1] = self.sample_time * delay / (self.half * gain * gain);
+            of_slope[places.start + 1] = 1.0 / (self.half * gain);
+        }
+        let error = |gradient: &[f64]| {
+            let row = |row: &Vec<f64>| row.iter().zip(gradient).map(|(entry, g)| entry * g).sum::<f64>();
+            let variance = |covariance: &[Vec<f64>]| {
+                covariance.iter().zip(gradient).map(|(entries, g)| g * row(entries)).sum::<f64>()
+            };
+            all.covariance().map(variance).filter(|variance| *variance >= 0.0).map(f64::sqrt)
+        };
+        let level = Quantity { value: level, standard_error: error(&of_level) };
+        let slope = ramp.then(|| Quantity { value: slope, standard_error: error(&of_slope) });
+        let rise = slope.map_or(0.0, |slope| slope.value);
+        let offset = OutputOffset {
+            offset: Offset { level: level.value - rise * self.middle, slope: rise },
+            level,
+            slope,
+            middle: self.middle,
+        };
+        let finite = [offset.offset.level, offset.offset.slope].into_iter().all(f64::is_finite);
+        let criteria = all.criteria();
+        let own = |values: &Vec<f64>| self.without(orders, values);
+        let covariance = all.covariance.as_ref().map(|rows| {
+            let rows = rows.iter().enumerate().filter(|(row, _)| !places.contains(row));
+            rows.map(|(_, row)| own(row)).collect()
+        });
+        let mut procedure = all.procedure.clone();
+        if let Procedure::Constrained(outcome) = &mut procedure
+            && let Some(extents) = &mut outcome.box_
+        {
+            extents.truncate(places.start);
+        }
+        let estimate = Estimate { parameters: own(&all.parameters), covariance, procedure, ..all };
+        finite.then_some(Fitted { estimate, criteria, offset: Some(offset) })
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,96 @@
+//! The level and the slope of the output that are estimated with the parameters.
+
+use serde_json::Value;
+
+use crate::fit_reference::folder_with;
+use crate::harness::{Folder, number};
+use crate::signals::{Random, csv};
+
+/// Steps from rest, two seconds a row: y is 300 and half of what u has been, with a time constant of 19 s and noise; it drifts
+/// by so much a row.
+fn steps(drift: f64) -> Folder {
+    let u: Vec<f64> = [0.0, 40.0, 10.0, 60.0].into_iter().flat_map(|u| vec![u; 40]).collect();
+    let noise = Random::new(91).signal(u.len());
+    let mut x = 0.0;
+    let y: Vec<f64> = (0..u.len())
+        .map(|row| {
+            let value = 300.0 + x + drift * row as f64 + 0.3 * noise[row];
+            x = 0.9 * x + 0.05 * u[row];
+            value
+        })
+        .collect();
+    Folder::with_log(csv(&[("u", &u), ("y", &y)]))
+}
+
+/// The text of a value and its standard error.
+fn near(report: &Value, at: &str, truth: f64) {
+    let value = number(report, &format!("{at}/value"));
+    let error = number(report, &format!("{at}/standard_error"));
+    assert!((value - truth).abs() < 4.0 * error, "{at}: {value} ± {error}, not {truth}");
+}
+
+const OE: &str = "log.csv --sample-time 2 --model oe --nb 1 --nf 1";
+
+#[test]
+fn a_step_test_is_right_without_a_word() {
+    let folder = steps(0.0);
+    for line in [OE, "log.csv --sample-time 2 --na 1 --nb 1", "log.csv --sample-time 2 --model oe"] {
+        let report = folder.fit(line);
+        near(&report, "/model/dc_gain/0", 0.5);
+        near(&report, "/estimation/level", 313.75);
+        assert_eq!(report["model"]["output"]["offset"]["level"], report["estimation"]["level"]["value"]);
+        assert_eq!(report["estimation"].get("slope"), None);
+    }
+    let table = folder.done(&format!("fit {OE}")).stdout;
+    assert!(table.contains("level of y estimated with them: 313."), "{table}");
+    let without = folder.fit(&format!("{OE} --constant no"));
+    assert_eq!(without["estimation"].get("level"), None);
+    let wrong = number(&without, "/model/dc_gain/0/value");
+    assert!((wrong - 0.5).abs() > 0.05, "{wrong}");
+}
+
+#[test]
+fn a_slope_is_found_and_told() {
+    let folder = steps(0.1);
+    let report = folder.fit(&format!("{OE} --trend"));
+    near(&report, "/estimation/slope", 0.05);
+    near(&report, "/model/dc_gain/0", 0.5);
+    let table = folder.done(&format!("fit {OE} --trend")).stdout;
+    assert!(table.replace("\n  ", " ").contains("in the middle of the rows, slope 0.0"), "{table}");
+    // What is predicted has both.
+    folder.done(&format!("fit {OE} --trend --report model.json"));
+    let figure = folder.done("validate model.json log.csv --sample-time 2 --format json").stdout;
+    let figure: Value = serde_json::from_str(&figure).expect("the validation is JSON");
+    assert!(number(&figure, "/fit/0/percent") > 96.0, "{figure}");
+}
+
+#[test]
+fn what_does_not_go_together_is_refused() {
+    let folder = steps(0.0);
+    let line = folder.refused(&format!("fit {OE} --trend --constant no"), 2);
+    assert!(line.contains("--trend is a line with a level"), "{line}");
+    let arx = "fit log.csv --sample-time 2 --na 1 --nb 1 --constant yes";
+    let line = folder.refused(&format!("{arx} --initial zero"), 2);
+    assert!(line.contains("--constant: zeros before the first sample"), "{line}");
+    let line = folder.refused(&format!("{arx} --ridge 1"), 2);
+    assert!(line.contains("--constant") && line.contains("ridge"), "{line}");
+    let line = folder.refused(&format!("fit log.csv log.csv {} --trend", &OE[8..]), 2);
+    assert!(line.contains("--trend: several logs"), "{line}");
+}
+
+#[test]
+fn inspect_tells_how_to_fit_the_public_step_test() {
+    let folder = folder_with("tclab_siso_step.csv");
+    let inspection = folder.done("inspect log.csv --time t -u q1 -y t1 --format json").stdout;
+    let inspection: Value = serde_json::from_str(&inspection).expect("the inspection is JSON");
+    assert_eq!(inspection["rest"], 11);
+    let command = inspection["command"].as_str().expect("there is a command");
+    let line = command.strip_prefix("thetahat fit ").expect("it is a fit");
+    assert!(line.contains("--detrend start:11 --model oe --nb 1 --nf 1 --nk 1..26"), "{line}");
+    let report = folder.fit(line);
+    // An independent least-squares fit of first order and delay has a gain of 0.3636 and a time constant of 139.05 s.
+    let gain = number(&report, "/model/dc_gain/0/value");
+    assert!((0.361..0.364).contains(&gain), "{gain}");
+    let time = number(&report, "/model/time_constants/0/value");
+    assert!((138.0..140.0).contains(&time), "{time}");
+}

@@ -916,7 +916,7 @@ pub(crate) enum InitialArgument {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum ConstantArgument {
-    /// Where it lowers MDL
+    /// Where it lowers MDL, unless the output's offset is given (--detrend none, --offset)
     Auto,
     /// Always
     Yes,

@@ -126,7 +126,8 @@ fn offsets_are_those_of_the_estimation_rows() {
         ("--detrend none", (0.0, 0.0)),
         ("--offset u=4.5", (4.5, mean(&y[20..150]))),
     ] {
-        let report = folder.fit(&format!("log.csv --estimate 21..150 --na 2 --nb 2 {options}"));
+        let line = format!("log.csv --estimate 21..150 --na 2 --nb 2 --constant no {options}");
+        let report = folder.fit(&line);
         let level = |pointer: &str| number(&report, pointer);
         assert!((level("/model/inputs/0/offset/level") - expected.0).abs() < 1e-12, "{options}");
         assert!((level("/model/output/offset/level") - expected.1).abs() < 1e-12, "{options}");

@@ -59,7 +59,7 @@ class FitOptions(TypedDict, total=False):
         What stands for the samples before the first of a stretch.
     constant : {"auto", "yes", "no"}
         Whether the level of the output is estimated with the parameters, beside the mean that is taken off: where it lowers
-        MDL, always or never. It is part of ``model.offsets``, and stands with its standard error in the report.
+        MDL, always or never. With ``detrend="none"``, or an offset of the output by hand, "auto" is "no". It is part of ``model.offsets``, and stands with its standard error in the report.
     trend : bool
         Whether a slope of the output is estimated with the parameters too, and its level with it.
     norm : {2, 1, "inf"}

@@ -301,7 +301,12 @@ impl Task<'_> {
             _ => None,
         };
         let method = with_guess(self.method, guess.or(own));
-        let all = estimate_of_channels(&record, self.inputs, &orders, &method, self.initial, self.monitor)?;
+        // Zeros before the first sample, to which A reaches back, are not at the level.
+        let initial = match self.initial {
+            Initial::Auto if self.orders.na > 0 && orders.nf.iter().any(|&nf| nf > 0) => Initial::Estimate,
+            initial => initial,
+        };
+        let all = estimate_of_channels(&record, self.inputs, &orders, &method, initial, self.monitor)?;
         let place = beside.places(self.orders).start;
         let variance = all.covariance().map(|covariance| covariance[place][place]);
         let worth =
@@ -342,7 +347,7 @@ impl Task<'_> {
         let rests = without.initial() == Initial::Zero;
         // What seemed to begin at rest may have begun elsewhere.
         let open = !rests || self.initial == Initial::Auto && orders.nf.iter().any(|&nf| nf > 0);
-        rests && from(Begin::Zero) || open && from(Begin::Unknown)
+        rests && orders.na == 0 && from(Begin::Zero) || open && from(Begin::Unknown)
     }
 }
 

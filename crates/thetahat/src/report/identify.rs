@@ -45,7 +45,8 @@ pub struct Plan {
     /// What stands for the samples before a segment.
     pub initial: Initial,
     /// Whether the level of the output is estimated with the parameters: where the output would stay if the inputs stayed at
-    /// their offsets. A mean is not it where a log begins or ends far from there, as that of a step test.
+    /// their offsets. A mean is not it where a log begins or ends far from there, as that of a step test. Auto leaves alone what
+    /// was given: nothing is taken with [`Detrend::None`], and what is set by hand stays.
     pub constant: Constant,
     /// Whether a slope of the output is estimated with the parameters, and the level with it.
     pub trend: bool,
@@ -70,6 +71,13 @@ impl Plan {
             constant: Constant::default(),
             trend: false,
         }
+    }
+
+    /// Whether a constant is estimated: auto leaves alone the output of which the offset was given, as nothing or by hand.
+    fn constant(&self) -> Constant {
+        let given =
+            self.detrend == Detrend::None || self.offsets.iter().any(|(name, _)| *name == self.output);
+        if self.constant == Constant::Auto && given { Constant::No } else { self.constant }
     }
 
     /// Refuses a constant or a trend that does not go with the rest, whatever the data.
@@ -300,12 +308,16 @@ fn fit(
         initial: plan.initial,
         monitor,
     };
+<<<<<<< HEAD
     let mut fitted = task.fit(plan.constant, &beside, guess)?;
     if band.is_some() {
         let variance = unfiltered_variance(&fitted.estimate, &orders, &log, plan, &estimation)?;
         fitted.estimate = fitted.estimate.of_prefiltered(&seen, &orders, variance);
         fitted.criteria = fitted.estimate.criteria();
     }
+=======
+    let fitted = task.fit(plan.constant(), &beside, guess)?;
+>>>>>>> 1e3a0b2 (Auto leaves alone an output whose offset is given; zeros before the first sample do not go with A and a level)
     let Fitted { estimate, offset, .. } = &fitted;
     let mut model = Model::new(&orders, estimate, log.sample_time(), inputs.to_vec(), output.clone())?;
     let taken = [output.offset, offset.map_or_else(Offset::default, |found| found.offset)];
@@ -406,7 +418,7 @@ fn selected<'a>(
     let unseen = compared.validation;
     let unseen = if unseen.is_empty() { None } else { Some(record(unseen)?) };
     let estimation = record(compared.estimation)?;
-    let with_constant = match plan.constant {
+    let with_constant = match plan.constant() {
         _ if plan.trend => true,
         Constant::Yes => true,
         Constant::No => false,
@@ -523,7 +535,7 @@ fn estimation_of(fitted: &Fitted, taken: Offset) -> Estimation {
         initial: estimate.initial(),
         samples: estimate.samples(),
         mse: estimate.mse(),
-        criteria: criteria.clone(),
+        criteria: *criteria,
         condition: estimate.condition(),
     }
 }

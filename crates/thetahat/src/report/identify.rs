@@ -73,10 +73,11 @@ impl Plan {
         }
     }
 
-    /// Whether a constant is estimated: auto leaves alone the output of which the offset was given, as nothing or by hand.
+    /// Whether a constant is estimated: auto leaves alone the output of which the offset was given, as nothing or by hand, and one
+    /// of which a band is looked at.
     fn constant(&self) -> Constant {
-        let given =
-            self.detrend == Detrend::None || self.offsets.iter().any(|(name, _)| *name == self.output);
+        let by_hand = self.offsets.iter().any(|(name, _)| *name == self.output);
+        let given = self.detrend == Detrend::None || by_hand || self.prefilter.is_some();
         if self.constant == Constant::Auto && given { Constant::No } else { self.constant }
     }
 
@@ -86,6 +87,12 @@ impl Plan {
             return Err(Error::argument(
                 "trend",
                 "it is a line with a slope and a level, which is the constant; leave out one of the two",
+            ));
+        }
+        if self.prefilter.is_some() && (self.trend || self.constant == Constant::Yes) {
+            return Err(Error::argument(
+                "constant",
+                "a level is not in a band of frequencies: take either the band or the constant",
             ));
         }
         let mixed = match &self.choice {
@@ -308,16 +315,12 @@ fn fit(
         initial: plan.initial,
         monitor,
     };
-<<<<<<< HEAD
-    let mut fitted = task.fit(plan.constant, &beside, guess)?;
+    let mut fitted = task.fit(plan.constant(), &beside, guess)?;
     if band.is_some() {
         let variance = unfiltered_variance(&fitted.estimate, &orders, &log, plan, &estimation)?;
         fitted.estimate = fitted.estimate.of_prefiltered(&seen, &orders, variance);
         fitted.criteria = fitted.estimate.criteria();
     }
-=======
-    let fitted = task.fit(plan.constant(), &beside, guess)?;
->>>>>>> 1e3a0b2 (Auto leaves alone an output whose offset is given; zeros before the first sample do not go with A and a level)
     let Fitted { estimate, offset, .. } = &fitted;
     let mut model = Model::new(&orders, estimate, log.sample_time(), inputs.to_vec(), output.clone())?;
     let taken = [output.offset, offset.map_or_else(Offset::default, |found| found.offset)];

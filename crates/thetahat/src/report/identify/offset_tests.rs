@@ -270,6 +270,8 @@ fn what_cannot_be_had_is_refused_by_name() {
     assert_eq!(report.estimation.level, None);
     let no = Plan { trend: true, constant: Constant::No, ..plan(&arx) };
     assert!(of(&no).starts_with("trend: "), "{}", of(&no));
+    let band = Plan { prefilter: Some("0.01..0.2".parse().unwrap()), ..plan(&arx) };
+    assert!(of(&band).starts_with("constant: a level is not in a band"), "{}", of(&band));
     let ridge = Criterion { ridge: 1.0, ..Criterion::default() };
     let ridge = Plan { method: Method::Constrained(ridge), ..plan(&arx) };
     assert!(of(&ridge).contains("ridge"), "{}", of(&ridge));

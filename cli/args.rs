@@ -84,7 +84,7 @@ Examples:
     /// Say how a fitted model does on a log, and whether anything is left in its residuals
     ///
     /// Fits 1 step ahead, some steps ahead and in a free run; whiteness of the residuals by Ljung and Box's test and by
-    /// Anderson's; their independence of past inputs, and a word on feedback; the noise beside the model's own; how often its
+    /// Anderson's, whose count decides by its p-value; their independence of past inputs, and a word on feedback; the noise beside the model's own; how often its
     /// prediction intervals hold. With --require it is a gate: exit code 6 if the model does not meet it.
     #[command(after_help = "\
 Examples:
@@ -94,8 +94,8 @@ Examples:
     Validate(ValidateArguments),
     /// Put several fitted models side by side on a log
     ///
-    /// The figures of validate, a column for each model, and the alpha at which each stops passing Anderson's test of
-    /// whiteness.
+    /// The figures of validate, a column for each model, and the alpha from which on a fraction alpha of the correlations, or
+    /// more, lies outside the band of that level (Anderson): it orders models by how white they are, and is no verdict.
     #[command(after_help = "\
 Example:
   thetahat compare model.json model.json log.csv --rows 501..1000")]
@@ -499,7 +499,7 @@ pub(crate) struct LookArguments {
         help_heading = "Tests"
     )]
     pub(crate) alpha: f64,
-    /// The levels of Anderson's test
+    /// The levels of the bands of which Anderson's test counts what lies outside
     #[arg(
         long,
         value_name = "LEVEL[,LEVEL…]",

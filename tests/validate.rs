@@ -89,6 +89,10 @@ fn residuals_are_tested() {
     let alphas: Vec<f64> =
         (0..5).map(|k| number(residuals, &format!("/anderson/levels/{k}/alpha"))).collect();
     assert_eq!(alphas, [0.01, 0.02, 0.05, 0.1, 0.2]);
+    for k in 0..5 {
+        let p_value = number(residuals, &format!("/anderson/levels/{k}/p_value"));
+        assert_eq!(residuals["anderson"]["levels"][k]["white"], p_value >= 0.05);
+    }
 
     let run = folder.done("validate wrong.json log.csv --rows 301..600");
     assert!(run.stderr.contains("warning: the residuals are not white"), "{}", run.stderr);
@@ -116,7 +120,8 @@ fn the_table_says_what_the_document_says() {
         "independent of past u    25",
         "no feedback to u         25",
         "Anderson: alpha",
-        "Anderson stops passing at alpha ",
+        "of  fraction  p-value (mid)  at 0.05",
+        "\nthe fraction outside is below alpha up to alpha ",
     ] {
         assert!(table.contains(part), "{part}:\n{table}");
     }

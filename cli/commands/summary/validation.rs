@@ -237,17 +237,22 @@ fn residuals(text: &mut Text, found: &Validation, alpha: f64) {
     }
     text.table(table);
     let anderson = &residuals.anderson;
-    let mut table = columns(&["Anderson: alpha", "outside", "of", "verdict", "p-value"]).words(&[3]);
+    let head = ["Anderson: alpha", "outside", "of", "fraction", "p-value (mid)", &level];
+    let mut table = columns(&head).words(&[5]);
     for level in &anderson.levels {
         table.row([
             short(level.alpha),
             level.outside.to_string(),
             anderson.lags.to_string(),
-            if level.white { "white" } else { "not white" }.to_owned(),
+            three(level.outside as f64 / anderson.lags as f64),
             chance(level.p_value),
+            if level.white { "white" } else { "not white" }.to_owned(),
         ]);
     }
     text.table(table);
-    text.line(&format!("Anderson stops passing at alpha {}", stops(anderson.stops_at)));
+    text.line(&match anderson.stops_at {
+        Some(alpha) => format!("the fraction outside is below alpha up to alpha {}", fixed(alpha, 3)),
+        None => "the fraction outside is below alpha up to alpha 0.5 and beyond".to_owned(),
+    });
     text.line("");
 }

@@ -133,6 +133,17 @@ class Validation(_Document):
         return float("nan" if value is None else value)
 
     @property
+    def anderson(self) -> dict[float, float]:
+        """How likely so many autocorrelations of white residuals lie outside their band, by the level of the band.
+
+        The mid-p-value of the count, which is about binomial (Anderson's test); below `alpha` the residuals are not white.
+        Empty where they could not be tested.
+        """
+        residuals = self.document["residuals"]
+        levels = [] if residuals is None else residuals["anderson"]["levels"]
+        return {level["alpha"]: level["p_value"] for level in levels}
+
+    @property
     def independence(self) -> dict[str, float]:
         """The p-values that the residuals do not depend on past inputs, by input; NaN where they could not be tested."""
         residuals = self.document["residuals"]

@@ -127,8 +127,8 @@ pub fn comparison_page(reports: &[Report], validated: &[Validated], command: &st
 
     let mut section = Section::new("Side by side");
     section.table(tables::comparison(&named));
-    section.text("No longer white at alpha: the smallest alpha at which too many correlations of the residuals lie outside their \
-                  band. The larger, the better.");
+    section.text("Too many outside from alpha on: the smallest alpha at which a fraction alpha of the correlations of the residuals, \
+                  or more, lies outside the band of that level. The larger, the better; it is no verdict.");
     if validated.iter().any(|validated| !validated.validation.white_expected) {
         section.text(UNASKED);
     }
@@ -462,16 +462,17 @@ fn residuals(parts: &[(String, &Validated)]) -> Section {
     let levels = tables::anderson("rows", &all);
     if !levels.rows.is_empty() {
         section.text(
-            "Anderson calls residuals white if less than a fraction alpha of their correlations lies outside the band of that \
-             level. The p-value says how often as many of white residuals do.",
+            "Of white residuals about a fraction alpha of the correlations lies outside the band of that level. The p-value says \
+             how likely more than that many are, with half of how likely just as many are (mid-p-value of the binomial \
+             distribution); residuals are called white where it is not below the level of the validation.",
         );
     }
     for (name, residuals) in residuals_of(parts) {
         section.text(match residuals.anderson.stops_at {
             Some(alpha) => {
-                format!("The smallest alpha at which too many do ({name}): {}.", figures::short(alpha))
+                format!("The smallest alpha at which the fraction outside is not below alpha ({name}): {}.", figures::short(alpha))
             }
-            None => format!("At no alpha up to 0.5 too many do ({name})."),
+            None => format!("At every alpha up to 0.5 the fraction outside is below alpha ({name})."),
         });
     }
     section.table(levels);

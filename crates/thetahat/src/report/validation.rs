@@ -152,7 +152,7 @@ pub struct ValidationPlan {
     pub horizons: Vec<usize>,
     /// L, the lags of the tests of residuals: 1 … 1000. Short logs have fewer.
     pub lags: usize,
-    /// Below this p-value there is a word of warning.
+    /// Below this p-value there is a word of warning, and Anderson's count is not that of white residuals.
     pub alpha: f64,
     /// The levels of Anderson's test.
     pub alphas: Vec<f64>,
@@ -452,7 +452,7 @@ fn test_residuals(report: &Report, record: &Record<'_>, plan: &ValidationPlan, v
     let mut alphas = plan.alphas.clone();
     alphas.sort_unstable_by(f64::total_cmp);
     alphas.dedup();
-    match Residuals::of(model, record, &found, relation, plan.lags, &alphas) {
+    match Residuals::of(model, record, &found, relation, plan.lags, &alphas, plan.alpha) {
         Ok(residuals) => {
             validation.residuals = Some(residuals);
             validation.warnings.extend(off_center(&found));

@@ -21,9 +21,17 @@ pub(crate) fn two_sided(alpha: f64) -> f64 {
     Normal::standard().inverse_cdf(1.0 - (alpha / 2.0).clamp(0.0, 0.5))
 }
 
+/// How often more than `count` of `of` events happen, and half of how often just as many do, each with probability `p` in
+/// 0 … 1: the mid-p-value of a count (Lancaster, Significance tests in discrete distributions, JASA 56 (1961)). The
+/// probability of as many or more is above the level that it is compared with wherever the count jumps past it; the mid-p-value
+/// is so on average.
+pub(super) fn binomial_mid_p(count: usize, of: usize, p: f64) -> f64 {
+    0.5 * (binomial_tail(count, of, p) + binomial_tail(count + 1, of, p))
+}
+
 /// How often at least `count` of `of` events happen, each with probability `p` in 0 … 1: by the incomplete beta function
 /// (Abramowitz and Stegun 1964, 26.5.24).
-pub(super) fn binomial_tail(count: usize, of: usize, p: f64) -> f64 {
+fn binomial_tail(count: usize, of: usize, p: f64) -> f64 {
     if count == 0 {
         return 1.0;
     }
@@ -62,6 +70,8 @@ mod tests {
             let mut below = 0.0;
             for count in 0..=of {
                 assert!((binomial_tail(count, of, p) - (1.0 - below)).abs() < 1e-12, "{count} of {of}, {p}");
+                let mid = 1.0 - below - 0.5 * term;
+                assert!((binomial_mid_p(count, of, p) - mid).abs() < 1e-12, "{count} of {of}, {p}");
                 below += term;
                 term *= (of - count) as f64 / (count + 1) as f64 * p / (1.0 - p);
             }

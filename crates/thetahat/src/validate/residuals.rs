@@ -61,15 +61,15 @@ pub struct Test {
 }
 
 /// Anderson's test of whiteness: white residuals have about a fraction alpha of their correlations outside the band of
-/// that level.
+/// that level. The count of those is about binomial, and its mid-p-value decides.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Anderson {
     /// How many lags are counted.
     pub lags: usize,
     /// One line for each alpha, in rising order.
     pub levels: Vec<AndersonLevel>,
-    /// The smallest alpha of a fine scale (0.001, 0.002, …, 0.5) at which the plain verdict is no longer white; none if it
-    /// is white at all of them.
+    /// The smallest alpha of a fine scale (0.001, 0.002, …, 0.5) at which the fraction of lags outside is not below alpha; none
+    /// if it is below at all of them. It orders models, and is no verdict: correct models stop early too.
     pub stops_at: Option<f64>,
 }
 
@@ -80,11 +80,12 @@ pub struct AndersonLevel {
     pub alpha: f64,
     /// Half the width of the band.
     pub band: f64,
-    /// The lags outside of it.
+    /// The lags outside of it; divided by all lags, the fraction that is expected to be alpha.
     pub outside: usize,
-    /// The plain verdict: the fraction outside is below alpha.
+    /// Whether as many outside are no surprise: whether `p_value` is not below the level of the validation.
     pub white: bool,
-    /// How often as many are outside for white residuals, the count taken as binomial.
+    /// How often more are outside for white residuals, and half of how often as many are, the count taken as binomial: its
+    /// mid-p-value.
     pub p_value: f64,
 }
 
@@ -159,7 +160,8 @@ impl fmt::Display for Untestable {
 }
 
 impl Residuals {
-    /// The tests of the innovations of a model over a record: `lags` of the autocorrelation, Anderson's test at `alphas`.
+    /// The tests of the innovations of a model over a record: `lags` of the autocorrelation, Anderson's test at `alphas` with
+    /// its verdicts at `level`.
     ///
     /// There are lags up to a tenth of the samples, of inputs to a fifth, and as far as a quarter of the samples have
     /// a partner. O(N (L + p)), and O(N (L + p)^2) where the residuals are coloured.
@@ -170,6 +172,7 @@ impl Residuals {
         relation: Relation,
         lags: usize,
         alphas: &[f64],
+        level: f64,
     ) -> Result<Self, Untestable> {
         let fitted = if relation == Relation::Fresh { 0 } else { model.orders.parameters() };
         let traces = Traces::new(model, record, innovations, relation == Relation::Instrumental);
@@ -258,7 +261,7 @@ impl Residuals {
             autocorrelation: std::iter::once(1.0).chain(correlation.values.iter().copied()).collect(),
             band: two_sided(0.05) / count.sqrt(),
             ljung_box,
-            anderson: anderson(&correlation, &covariance, anderson_lags(samples, lags), alphas),
+            anderson: anderson(&correlation, &covariance, anderson_lags(samples, lags), alphas, level),
             independence,
         })
     }

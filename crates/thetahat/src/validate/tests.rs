@@ -46,7 +46,7 @@ fn truth() -> Model {
 
 fn tested(model: &Model, record: &Record<'_>, relation: Relation) -> Result<Residuals, Untestable> {
     let found = innovations(model, record, 1, Start::Drop).unwrap();
-    Residuals::of(model, record, &found, relation, 25, &[0.05, 0.2])
+    Residuals::of(model, record, &found, relation, 25, &[0.05, 0.2], 0.05)
 }
 
 fn close(found: f64, expected: f64, tolerance: f64) -> bool {
@@ -107,27 +107,33 @@ fn anderson_counts_lags_outside_their_bands() {
         values: vec![0.3 * 0.99, -0.2 * 0.98, 0.1 * 0.97, 0.05 * 0.96],
         pairs: vec![99, 98, 97, 96],
     };
-    let found = anderson(&correlation, &DMatrix::identity(4, 4), 4, &[0.001, 0.05, 0.32, 0.7]);
+    let found = anderson(&correlation, &DMatrix::identity(4, 4), 4, &[0.001, 0.05, 0.32, 0.7], 0.05);
     let outside: Vec<usize> = found.levels.iter().map(|level| level.outside).collect();
     // Bands at 3.29, 1.96, 0.99, 0.39 standard deviations.
     assert_eq!(outside, [0, 2, 3, 4]);
     let white: Vec<bool> = found.levels.iter().map(|level| level.white).collect();
-    assert_eq!(white, [true, false, false, false]);
+    // Two of four at 0.05 are a surprise; three of four at 0.32 are none.
+    assert_eq!(white, [true, false, true, true]);
     // 3 standard deviations are outside from alpha = 0.0027 on.
     assert_eq!((found.lags, found.stops_at), (4, Some(0.003)));
     assert!(close(found.levels[1].band, 0.1959964, 1e-6));
-    // At least two of four at 0.05.
-    let expected = 1.0 - 0.95_f64.powi(4) - 4.0 * 0.05 * 0.95_f64.powi(3);
+    // More than two of four at 0.05, and half of two.
+    let two = 6.0 * 0.05_f64.powi(2) * 0.95_f64.powi(2);
+    let expected = 1.0 - 0.95_f64.powi(4) - 4.0 * 0.05 * 0.95_f64.powi(3) - 0.5 * two;
     assert!(close(found.levels[1].p_value, expected, 1e-12));
     // Four times the variance, half as far outside.
-    let found = anderson(&correlation, &(DMatrix::identity(4, 4) * 4.0), 4, &[0.05]);
+    let found = anderson(&correlation, &(DMatrix::identity(4, 4) * 4.0), 4, &[0.05], 0.05);
     assert_eq!((found.levels[0].outside, found.stops_at), (0, Some(0.134)));
-    // A fraction that is alpha is not below it.
+    // One of four at 0.01 is a surprise at 0.05, not at 0.01.
     let one = Autocorrelation { values: vec![0.3, 0.0, 0.0, 0.0], ..correlation.clone() };
-    let found = anderson(&one, &DMatrix::identity(4, 4), 4, &[0.25, 0.26]);
-    assert_eq!((found.levels[0].outside, found.levels[0].white, found.levels[1].white), (1, false, true));
+    for (level, white) in [(0.05, false), (0.01, true)] {
+        let found = anderson(&one, &DMatrix::identity(4, 4), 4, &[0.01], level);
+        assert_eq!((found.levels[0].outside, found.levels[0].white), (1, white));
+        // Where the fraction outside is not below alpha any more does not depend on the level.
+        assert_eq!(found.stops_at, Some(0.003));
+    }
     let white = Autocorrelation { values: vec![1e-9; 4], ..correlation };
-    assert_eq!(anderson(&white, &DMatrix::identity(4, 4), 4, &[]).stops_at, None);
+    assert_eq!(anderson(&white, &DMatrix::identity(4, 4), 4, &[], 0.05).stops_at, None);
     assert_eq!((anderson_lags(10, 25), anderson_lags(300, 25), anderson_lags(10_000, 25)), (1, 15, 25));
 }
 
@@ -321,7 +327,7 @@ fn coloured_residuals_have_the_variance_of_their_colour() {
     let y: Vec<f64> = x.iter().zip(&e).map(|(x, e)| x + e).collect();
     let record = Record::new(&y, vec![&u]).unwrap();
     let innovations = innovations(&model, &record, 1, Start::Zero).unwrap();
-    let found = Residuals::of(&model, &record, &innovations, Relation::Fresh, 25, &[]).unwrap();
+    let found = Residuals::of(&model, &record, &innovations, Relation::Fresh, 25, &[], 0.05).unwrap();
     let mean = e.iter().sum::<f64>() / samples as f64;
     let e: Vec<f64> = e.iter().map(|e| e - mean).collect();
     let all = 0..samples;

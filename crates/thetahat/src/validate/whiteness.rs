@@ -27,7 +27,7 @@ use std::ops::Range;
 
 use thetahat_core::nalgebra::{DMatrix, DVector};
 
-use super::distribution::{binomial_tail, chi_square_tail, two_sided};
+use super::distribution::{binomial_mid_p, chi_square_tail, two_sided};
 use super::moments::eigen;
 use super::residuals::{Anderson, AndersonLevel, Test};
 use crate::Model;
@@ -146,11 +146,18 @@ pub(super) fn chi_square(
 /// Anderson's test (Anderson 1942): chi(tau) = R(tau)/R(0) with R(tau) = sum e(t) e(t - tau)/N_tau is outside its band where
 /// |sqrt(N) chi(tau)| exceeds the normal quantile of alpha/2; white residuals have about a fraction alpha outside. Where the
 /// parameters' errors make chi(tau) more variable than that, C_tau,tau above 1, the band is as much wider.
+///
+/// The plain rule calls residuals white if a fraction below alpha is outside. Of 20 lags and alpha = 0.05 that is none, and
+/// white residuals are so in 36 of 100 logs: as a scale that orders models it serves (`stops_at`), as a verdict it does not.
+/// So the verdict asks how likely the count is: it is about binomial, and residuals are not white where its mid-p-value is below
+/// `level`. At a level of 0.05 that calls white residuals something else in 1 to 10 % of logs, depending on how the
+/// jumps of the count lie (2 to 8 % with 11 lags or more at alpha = 0.05).
 pub(super) fn anderson(
     correlation: &Autocorrelation,
     covariance: &DMatrix<f64>,
     lags: usize,
     alphas: &[f64],
+    level: f64,
 ) -> Anderson {
     let samples = correlation.samples as f64;
     let size = |lag: usize| {
@@ -160,21 +167,22 @@ pub(super) fn anderson(
     let mut sizes: Vec<f64> = (0..lags).map(size).collect();
     sizes.sort_unstable_by(f64::total_cmp);
     let outside = |alpha: f64| lags - sizes.partition_point(|size| *size <= two_sided(alpha));
-    let white = |outside: usize, alpha: f64| (outside as f64) < alpha * lags as f64;
-    let level = |&alpha: &f64| {
+    let passes = |alpha: f64| (outside(alpha) as f64) < alpha * lags as f64;
+    let at = |&alpha: &f64| {
         let outside = outside(alpha);
+        let p_value = binomial_mid_p(outside, lags, alpha);
         AndersonLevel {
             alpha,
             band: two_sided(alpha) / samples.sqrt(),
             outside,
-            white: white(outside, alpha),
-            p_value: binomial_tail(outside, lags, alpha),
+            white: p_value >= level,
+            p_value,
         }
     };
     let scale = (1..=500).map(|thousandths| f64::from(thousandths) / 1000.0);
     Anderson {
         lags,
-        levels: alphas.iter().map(level).collect(),
-        stops_at: scale.into_iter().find(|&alpha| !white(outside(alpha), alpha)),
+        levels: alphas.iter().map(at).collect(),
+        stops_at: scale.into_iter().find(|&alpha| !passes(alpha)),
     }
 }

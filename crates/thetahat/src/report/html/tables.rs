@@ -161,7 +161,7 @@ fn asked(validation: &Validation) -> &'static str {
 pub(super) fn anderson(who: &str, parts: &[(String, &Validation)]) -> Table {
     let mut table = Table::new(
         "Correlations outside of their band (Anderson)",
-        &["alpha", who, "band", "lags", "outside", "white", "p-value"],
+        &["alpha", who, "band", "lags", "outside", "fraction", "p-value", "white"],
     );
     for (name, validation) in parts {
         let Some(residuals) = &validation.residuals else { continue };
@@ -172,8 +172,9 @@ pub(super) fn anderson(who: &str, parts: &[(String, &Validation)]) -> Table {
                 format!("± {}", three(level.band)),
                 residuals.anderson.lags.to_string(),
                 level.outside.to_string(),
-                format!("{}{}", yes(level.white), asked(validation)),
+                three(level.outside as f64 / residuals.anderson.lags as f64),
                 chance(level.p_value),
+                format!("{}{}", yes(level.white), asked(validation)),
             ]);
         }
     }
@@ -331,7 +332,7 @@ pub(super) fn comparison(models: &[(String, &Validated)]) -> Table {
         "white, p-value",
         "past inputs, p-value",
         "feedback, p-value",
-        "no longer white at alpha",
+        "too many outside from alpha on",
     ];
     head.extend(tests.map(str::to_owned));
     let head: Vec<&str> = head.iter().map(String::as_str).collect();
@@ -363,7 +364,7 @@ pub(super) fn comparison(models: &[(String, &Validated)]) -> Table {
         cells.push(or_dash(least(|independence| independence.feedback.p_value), chance));
         cells.push(match residuals {
             Some(residuals) => {
-                let stops = residuals.anderson.stops_at.map_or_else(|| "white at all".to_owned(), short);
+                let stops = residuals.anderson.stops_at.map_or_else(|| "none up to 0.5".to_owned(), short);
                 format!("{stops}{asked}")
             }
             None => "–".to_owned(),

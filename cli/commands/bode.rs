@@ -34,7 +34,7 @@ pub(crate) fn bode(arguments: &BodeArguments) -> Result<(), Failure> {
                 // What is not a number is left empty.
                 let known = |value: f64| Some(value).filter(|value| value.is_finite());
                 let degrees = |radians: f64| known(radians.to_degrees());
-                let Quantity { value: magnitude, standard_error } = point.magnitude;
+                let Quantity { value: magnitude, standard_error, .. } = point.magnitude;
                 let (magnitude, spread) = (known(magnitude), standard_error.and_then(known));
                 let (phase, turn) =
                     (degrees(point.phase.value), point.phase.standard_error.and_then(degrees));

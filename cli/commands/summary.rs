@@ -11,8 +11,8 @@ mod validation;
 use thetahat::figures::{error, fixed, number, scientific, short};
 use thetahat::text::harmless;
 use thetahat::{
-    Algorithm, CriterionOutcome, Estimation, Fit, Initial, Model, Norm, Orders, Part, Procedure, Quantity,
-    Report, Root, Rows, SearchOutcome, Signal, Solver, Start, Stopped, Structure,
+    Algorithm, CriterionOutcome, Estimation, Fit, Initial, Interval, Model, Norm, Orders, Part, Procedure,
+    Quantity, Report, Root, Rows, SearchOutcome, Signal, Solver, Start, Stopped, Structure,
 };
 
 pub(crate) use filtered::filtered;
@@ -197,20 +197,23 @@ fn criterion(text: &mut Text, outcome: &CriterionOutcome, model: &Model, start: 
 
 /// Roots, gains and time constants.
 fn dynamics(text: &mut Text, model: &Model) {
-    let mut roots = columns(&["root", "value", "standard error", "time constant [s]"]).none(NO_ROOT_ERROR);
+    let head = ["root", "value", "standard error", "time constant [s]", "95 % interval"];
+    let mut roots = columns(&head).words(&[4]).none(NO_ROOT_ERROR);
     let mut count = 0;
-    let mut add = |role: &str, root: &Root, time: Option<String>| {
+    let mut add = |role: &str, root: &Root, time: Option<Option<Quantity>>| {
         // What one letter says elsewhere.
         let row = [
             format!("{role} of {}", root.polynomial.to_uppercase()),
             text::complex(root),
             text::spread(root),
         ];
-        roots.row(row.into_iter().chain([time.unwrap_or_default()]));
+        let value = time.map(|time| or_dash(time, |time| number(time.value)));
+        let interval = time.map(|time| or_dash(time.and_then(|time| time.interval), interval));
+        roots.row(row.into_iter().chain([value, interval].map(Option::unwrap_or_default)));
         count += 1;
     };
     for (pole, time) in model.poles.iter().zip(&model.time_constants) {
-        add("pole", pole, Some(or_dash(*time, quantity)));
+        add("pole", pole, Some(*time));
     }
     model.zeros.iter().flatten().for_each(|zero| add("zero", zero, None));
     model.noise_poles.iter().for_each(|pole| add("noise pole", pole, None));
@@ -225,8 +228,16 @@ fn dynamics(text: &mut Text, model: &Model) {
     text.line(if model.stable { "stable" } else { "unstable" });
 }
 
-/// A figure and its standard error.
+/// The ends of an interval.
+fn interval(interval: Interval) -> String {
+    interval.shown(number)
+}
+
+/// A figure and its interval, or its standard error where there is none.
 fn quantity(quantity: Quantity) -> String {
+    if let Some(known) = quantity.interval {
+        return format!("{}, 95 % interval {}", number(quantity.value), interval(known));
+    }
     let spread = quantity.standard_error.map_or_else(String::new, |spread| format!(" ± {}", error(spread)));
     format!("{}{spread}", number(quantity.value))
 }

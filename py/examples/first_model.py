@@ -99,7 +99,8 @@ plot.fit({"ARX": arx, "chosen": model}, test)
 # ## What the model knows of the motor
 #
 # Two real poles are two time constants. The slow one is the inertia against the friction, the fast one the winding. Each
-# comes with a standard error, and so does the gain: how many units of speed a volt makes in the end.
+# comes with a standard error, and so does the gain: how many units of speed a volt makes in the end. Their 95 % intervals
+# (`time_constant_intervals`, `dc_gain_interval`) hold near an integrator too, where standard errors say little.
 
 # %%
 for constant in model.document["model"]["time_constants"]:

@@ -222,6 +222,13 @@ impl Estimate {
         self.noise_variance
     }
 
+    /// By how much the sum of squared errors was divided to give sigma^2: N less the parameters and the initial conditions that
+    /// were estimated. None where sigma^2 is zero.
+    pub fn degrees_of_freedom(&self) -> Option<usize> {
+        let degrees = (self.mse * self.samples as f64 / self.noise_variance).round();
+        (degrees >= 1.0 && degrees <= self.samples as f64).then_some(degrees as usize)
+    }
+
     /// N, the samples that count.
     pub fn samples(&self) -> usize {
         self.samples

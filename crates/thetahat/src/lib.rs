@@ -33,6 +33,7 @@
 //! [`Tracker`] and a [`StateFilter`] are made of.
 
 mod data;
+mod distribution;
 mod document;
 mod error;
 mod estimate;
@@ -67,7 +68,7 @@ pub use inspect::{
     ChannelQuality, Clock, DelayEstimate, Excitation, Feedback, Inspection, InspectionPlan, Recording,
     Saturation, SpectrumPoint, Times, inspect, inspect_log,
 };
-pub use model::{Model, Orders, Parameter, Quantity, Root, Signal, StateSpace, Structure};
+pub use model::{Interval, Model, Orders, Parameter, Quantity, Root, Signal, StateSpace, Structure};
 pub use report::{
     Applied, Comparison, Coverage, Data, Estimation, Missing, NoiseLevel, Parts, Plan, Report, Requirement,
     Resampling, Seen, Signals, Source, Unjudged, Validated, Validation, ValidationPlan, apply, compare,
@@ -78,7 +79,7 @@ pub use report::{comparison_page, fit_page, inspection_page, validation_page};
 pub use respond::{
     Drawn, Draws, Forecast, FrequencyPoint, FrequencyResponse, Response, Start, TransientResponse, draw,
     forecast, frequency_response, impulse_response, logarithmic_frequencies, predict, prediction_deviation,
-    simulate, step_response,
+    prediction_deviations, simulate, step_response,
 };
 pub use select::{
     Automatic, Choice, Criteria, Delay, Grid, OrderRange, Path, Scan, Scored, Select, Selection,

@@ -7,7 +7,7 @@ pub(crate) mod polynomial;
 mod state_space;
 
 pub(crate) use dynamics::{Block, Blocks, Gradient, cancel, covariance, near_cancellation};
-pub use dynamics::{Quantity, Root};
+pub use dynamics::{Interval, Quantity, Root};
 pub use fitted::{Model, Parameter, Signal};
 pub(crate) use orders::LARGEST;
 pub use orders::{Orders, Structure};

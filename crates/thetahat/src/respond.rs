@@ -6,6 +6,7 @@ mod free_response;
 mod frequency;
 mod innovations;
 mod predict;
+mod sensitivities;
 mod simulate;
 #[cfg(test)]
 mod tests;
@@ -24,8 +25,9 @@ pub(crate) use forecast::forecast_if_possible;
 pub use forecast::{Forecast, forecast};
 pub use frequency::{FrequencyPoint, FrequencyResponse, frequency_response, logarithmic_frequencies};
 pub(crate) use innovations::{Innovations, innovations};
-pub(crate) use predict::{check_steps, deviations, longest};
+pub(crate) use predict::check_steps;
 pub use predict::{predict, prediction_deviation};
+pub use sensitivities::prediction_deviations;
 pub use simulate::simulate;
 pub use transient::{TransientResponse, impulse_response, step_response};
 

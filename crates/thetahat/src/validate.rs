@@ -1,6 +1,5 @@
 //! How good a model is on a record.
 
-mod distribution;
 mod fit;
 mod independence;
 mod moments;
@@ -10,7 +9,6 @@ mod residuals;
 mod tests;
 mod whiteness;
 
-pub(crate) use distribution::{chi_square_interval, chi_square_tail, two_sided};
 pub(crate) use fit::closeness;
 pub use fit::{Fit, Horizon, Part};
 pub(crate) use nis::NisCount;

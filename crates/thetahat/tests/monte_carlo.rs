@@ -5,6 +5,8 @@
 
 #[path = "monte_carlo/grey.rs"]
 mod grey;
+#[path = "monte_carlo/intervals.rs"]
+mod intervals;
 #[path = "monte_carlo/simulated.rs"]
 mod simulated;
 

@@ -255,7 +255,10 @@ class Model:
         return _roots(self._own["noise_zeros"])
 
     def dc_gain(self, input: int | str = 0) -> tuple[float, float]:
-        """The static gain from an input and its standard error; NaN at an integrator."""
+        """The static gain from an input and its standard error; NaN at an integrator.
+
+        Near an integrator the gain is far from normal; `dc_gain_interval` holds there too.
+        """
         gain = self._own["dc_gain"][self._input(input)]
         if gain is None:
             return (np.nan, np.nan)
@@ -265,6 +268,26 @@ class Model:
         """-T/ln|p| in seconds for each of `poles`, T being the sample time; NaN for |p| >= 1."""
         constants = self._own["time_constants"]
         return _array([None if constant is None else constant["value"] for constant in constants])
+
+    def dc_gain_interval(self, input: int | str = 0) -> Array:
+        """The interval that holds the static gain with a probability of 95 %, shape (2,), by Fieller's theorem.
+
+        Infinite where it has no end, as near an integrator; NaN where there is no gain or no standard error.
+
+        Examples
+        --------
+        >>> import thetahat as th
+        >>> th.arx(th.dc_motor(), na=2, nb=2).dc_gain_interval().round(1)
+        array([18.2, 19.8])
+        """
+        return _interval(self._own["dc_gain"][self._input(input)])
+
+    def time_constant_intervals(self) -> Array:
+        """The intervals that hold the `time_constants` with a probability of 95 % each, shape (n, 2).
+
+        From the intervals of the poles' moduli; infinite where a pole may be an integrator, NaN where nothing is known.
+        """
+        return np.array([_interval(constant) for constant in self._own["time_constants"]]).reshape(-1, 2)
 
     def _input(self, input: int | str) -> int:
         """The position of an input."""
@@ -411,6 +434,8 @@ class Model:
         self, log: Log, horizon: int = 1, *, level: float = 0.95, initial: str = "auto"
     ) -> tuple[Array, Array]:
         """Intervals that hold the output, as far as one knows some steps before.
+
+        They count what the noise does and how uncertain the parameters are, on a log that the model was not fitted to.
 
         Parameters
         ----------
@@ -791,6 +816,15 @@ class Model:
 
 def _array(values: Sequence[float | None]) -> Array:
     return np.array([np.nan if value is None else value for value in values], dtype=np.float64)
+
+
+def _interval(quantity: dict[str, Any] | None) -> Array:
+    """The ends of a figure's interval: infinite where there is none, NaN where nothing is known."""
+    known = None if quantity is None else quantity.get("interval")
+    if known is None:
+        return np.array([np.nan, np.nan])
+    lower, upper = known["lower"], known["upper"]
+    return np.array([-np.inf if lower is None else lower, np.inf if upper is None else upper])
 
 
 def _roots(roots: Sequence[dict[str, Any]]) -> npt.NDArray[np.complex128]:

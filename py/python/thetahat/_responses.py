@@ -25,7 +25,7 @@ class Forecast:
     values : ndarray, shape (steps,)
         The expected outputs, in the units of the log.
     standard_deviations : ndarray, shape (steps,)
-        Those of their errors.
+        Those of their errors: what the noise does, and what the uncertainty of the parameters and of the initial states adds.
     """
 
     def __init__(self, time: Array, values: Array, standard_deviations: Array, clock: Clock | None = None) -> None:

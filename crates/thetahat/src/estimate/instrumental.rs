@@ -13,7 +13,7 @@ use super::start::plant::{
 };
 use super::start::reduced::Reduced;
 use super::start::{candidates, stable};
-use super::uncertainty::{autoregression, backward_filtered_products, coloured};
+use super::uncertainty::{autoregression, backward_filtered_products, coloured, columns, restricted};
 use super::{Estimate, Initial, Procedure};
 use crate::data::Record;
 use crate::regression::{Lagged, Presample, Taps};
@@ -356,29 +356,37 @@ fn refined_from(
     let unit = DMatrix::identity(parameters, parameters);
     let root = factor.factor().solve_upper_triangular(&unit).ok_or_else(undetermined)?;
     let left = &root * root.transpose();
-    let colour = autoregression(&point.errors, &record.segments, parameters + conditions);
+    // Signals of a segment alone, so that those of the free responses stand beside them.
+    let all_taps = [&taps[..], &point.free.taps(signals.len())].concat();
+    let alone = |segment: &Range<usize>| -> Vec<Vec<f64>> {
+        let own = signals.iter().map(|signal| signal[segment.clone()].to_vec());
+        own.chain(point.free.padded(segment.len())).collect()
+    };
+    let each = || record.segments.iter().map(alone).enumerate();
+    let psi = || {
+        let mut psi = vec![vec![0.0; point.errors.len()]; parameters];
+        for ((position, own), segment) in each().zip(&record.segments) {
+            let views: Vec<&[f64]> = own.iter().map(Vec::as_slice).collect();
+            let (rows, combination) = (0..segment.len(), reduced.combination(position));
+            let found = columns(&views, &all_taps, &rows, &rows, combination.as_ref());
+            psi.iter_mut().zip(found).for_each(|(all, own)| all[segment.clone()].copy_from_slice(&own));
+        }
+        psi
+    };
+    let taken = parameters + conditions;
+    let colour = restricted(&point.errors, psi, &record.segments, taken);
     let mut products = DMatrix::zeros(parameters, parameters);
-    for (position, segment) in record.segments.iter().enumerate() {
-        // Signals of this segment alone, so that those of the free responses stand beside them.
-        let own = 0..segment.len();
-        let frees = point.free.padded(own.end);
-        let of_segment = signals.iter().map(|signal| &signal[segment.clone()]);
-        let of_segment: Vec<&[f64]> = of_segment.chain(frees.iter().map(Vec::as_slice)).collect();
-        let columns = [&taps[..], &point.free.taps(signals.len())].concat();
-        let combination = reduced.combination(position);
-        products += backward_filtered_products(
-            &of_segment,
-            &columns,
-            &own,
-            &own,
-            combination.as_ref(),
-            &colour.monic,
-        );
+    for ((position, own), segment) in each().zip(&record.segments) {
+        let views: Vec<&[f64]> = own.iter().map(Vec::as_slice).collect();
+        let (rows, combination) = (0..segment.len(), reduced.combination(position));
+        products +=
+            backward_filtered_products(&views, &all_taps, &rows, &rows, combination.as_ref(), &colour.monic);
     }
+    let variance = colour.variance * colour.inflation(samples, taken);
     let f = point.denominators.iter().flat_map(|monic| &monic[1..]);
     Ok(Estimate {
         parameters: point.numerators.iter().flatten().chain(f).copied().collect(),
-        covariance: Some(rows(&coloured(&left, colour.variance, &products))),
+        covariance: Some(rows(&coloured(&left, variance, &products))),
         noise_variance: point.cost / (samples - parameters - conditions) as f64,
         samples,
         mse: point.cost / samples as f64,

@@ -12,7 +12,7 @@ use super::optimize::{
 use super::predictor::{Begin, Predictor, Unusable};
 use super::restart::restarts;
 use super::start::candidates;
-use super::uncertainty::{autoregression, backward_filtered_products, coloured};
+use super::uncertainty::{autoregression, backward_filtered_products, coloured, restricted};
 use super::{Estimate, Initial, Procedure};
 use crate::data::Record;
 use crate::model::{cancel, near_cancellation};
@@ -365,9 +365,10 @@ fn uncertainty(predictor: &Predictor<'_>, orders: &Orders, noise_variance: f64) 
     if orders.structure() == Structure::Oe {
         let (residuals, segments) = predictor.residuals();
         let taken = orders.parameters() + predictor.initial_conditions();
-        let colour = autoregression(&residuals, &segments, taken);
+        let colour = restricted(&residuals, || predictor.sensitivities(), &segments, taken);
         let products = predictor.backward_filtered_products(&colour.monic);
-        inverse = coloured(&inverse, colour.variance, &products);
+        let variance = colour.variance * colour.inflation(residuals.len(), taken);
+        inverse = coloured(&inverse, variance, &products);
     } else {
         inverse *= noise_variance;
     }

@@ -38,7 +38,7 @@ use rayon::prelude::*;
 use thetahat_core::LeastSquares;
 use thetahat_core::nalgebra::{Cholesky, DMatrix, Dyn};
 
-use super::uncertainty::backward_filtered_products;
+use super::uncertainty::{backward_filtered_products, columns};
 use crate::Orders;
 use crate::data::Record;
 use crate::model::polynomial::is_stable;
@@ -360,19 +360,28 @@ impl<'a> Predictor<'a> {
         (residuals, segments)
     }
 
+    /// psi without the free responses over the samples that count, a list for each parameter. For models of output error, at the
+    /// current point.
+    pub(super) fn sensitivities(&self) -> Vec<Vec<f64>> {
+        let (parameters, free) = (self.layout.parameters, self.layout.free);
+        let mut all = vec![Vec::with_capacity(self.samples); parameters];
+        for section in &self.sections {
+            let signals: Vec<&[f64]> = section.signals.iter().map(Vec::as_slice).collect();
+            let (whole, rows) = (0..section.output.len(), self.layout.counted..section.output.len());
+            let combination = section.without_free(parameters, free);
+            let own = columns(&signals, &self.layout.taps, &whole, &rows, Some(&combination));
+            all.iter_mut().zip(own).for_each(|(all, own)| all.extend(own));
+        }
+        all
+    }
+
     /// sum zeta zeta' over all samples, zeta being psi without the free responses, filtered backwards in time by
     /// 1/A(q^+1), A = `monic`. For models of output error, at the current point.
     pub(super) fn backward_filtered_products(&self, monic: &[f64]) -> DMatrix<f64> {
         let (parameters, free) = (self.layout.parameters, self.layout.free);
         let mut sum = DMatrix::zeros(parameters, parameters);
         for section in &self.sections {
-            let combination = DMatrix::from_fn(parameters, parameters + free, |row, column| {
-                if column >= parameters {
-                    -section.free_steps[(row + 1) * free + column - parameters]
-                } else {
-                    f64::from(u8::from(row == column))
-                }
-            });
+            let combination = section.without_free(parameters, free);
             let signals: Vec<&[f64]> = section.signals.iter().map(Vec::as_slice).collect();
             let all = 0..section.output.len();
             let taps = &self.layout.taps;

@@ -10,19 +10,40 @@
 //! (Ljung, System Identification, 2nd ed. 1999, section 9.3); for instrumental variables z are the instruments and L =
 //! (sum z phi')^-1 (Söderström and Stoica, Instrumental Variable Methods for System Identification, 1983, chapter 5).
 //! A is an autoregression of the residuals, its order chosen by MDL.
+//!
+//! Of short logs the fit takes a part of v with it, that in the directions of psi: v^ = v - psi'(theta-hat - theta) has too little
+//! there, and the intervals were too short. For output errors A is that of v instead, by the restricted likelihood of Patterson
+//! and Thompson (Biometrika 58 (1971)), found by expectation and maximisation (Dempster, Laird and Rubin, J. Royal Statistical
+//! Society B 39 (1977)). Given A, v^ + psi'delta has the weights delta ~ (delta^, C) of a regression filtered by A, and the next A
+//! is that of the expected products
+//!
+//! ```text
+//! E v(t - k) v(t - l) = v~(t - k) v~(t - l) + psi(t - k)' C psi(t - l),   v~ = v^ - psi'delta^
+//! ```
+//!
+//! sigma^2 is then as uncertain as a spectrum of few independent samples is: N/s of them, s = sum_k rho_k^2 over all lags (Bayley and
+//! Hammersley, J. Royal Statistical Society, Supplement 8 (1946)), where white errors have N. The covariance is as much larger as
+//! the variance of Student's distribution of these degrees of freedom.
 
 use std::ops::Range;
 
-use thetahat_core::nalgebra::DMatrix;
+use thetahat_core::nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::start::reduced::Factor;
 use super::start::stable;
-use crate::regression::{Lagged, Presample, Taps, divide_from, sum};
+use crate::model::polynomial::product;
+use crate::regression::{Lagged, Presample, Taps, divide_from, sum, sum_of_squares};
 
 /// The highest order of an autoregression of residuals.
 const HIGHEST: usize = 10;
 /// Rows in memory at once.
 const ROWS: usize = 1024;
+/// From so many samples on, what the fit takes of v is nothing beside what is left.
+const MANY: usize = 20_000;
+/// How often expected products are formed; four digits of A stand after as many.
+const ROUNDS: usize = 6;
+/// The least degrees of freedom that Student's distribution is taken with.
+const FEWEST_DEGREES: f64 = 4.0;
 /// Below this fraction of sum v^2, what an autoregression leaves is rounding.
 const ROUNDING: f64 = 1e-14;
 
@@ -40,26 +61,74 @@ impl Autoregression {
     pub(super) fn order(&self) -> usize {
         self.monic.len() - 1
     }
+
+    /// By how much the variance of an estimate from `samples` is larger than that of white errors would be, `taken` degrees of
+    /// freedom being used, as their variance is less certain.
+    pub(super) fn inflation(&self, samples: usize, taken: usize) -> f64 {
+        // sum rho_k^2 = int S^2/(int S)^2, the first that of 1/A^2.
+        let spread = power(&product(&self.monic, &self.monic)) / power(&self.monic).powi(2);
+        let student = |degrees: f64| {
+            let degrees = degrees.max(FEWEST_DEGREES);
+            degrees / (degrees - 2.0)
+        };
+        let all = samples as f64;
+        let inflation = student(all / spread - taken as f64) / student(all - taken as f64);
+        if inflation.is_finite() { inflation } else { 1.0 }
+    }
+}
+
+/// The power of white noise of variance 1 behind 1/A, by the reflection coefficients of A; infinite for an unstable one.
+fn power(monic: &[f64]) -> f64 {
+    let mut rest = monic.get(1..).unwrap_or(&[]).to_vec();
+    let mut power = 1.0;
+    while let Some(reflection) = rest.pop() {
+        let left = 1.0 - reflection * reflection;
+        if left.is_nan() || left <= 0.0 {
+            return f64::INFINITY;
+        }
+        power /= left;
+        let down = |k: usize| (rest[k] - reflection * rest[rest.len() - 1 - k]) / left;
+        rest = (0..rest.len()).map(down).collect();
+    }
+    power
 }
 
 /// The autoregression of order 0 … 10 with the least MDL = k ln(N)/N + ln(sum e^2/N), all orders on the same samples.
 ///
 /// `taken` degrees of freedom were used by what left the residuals: sigma^2 = sum e^2/(N - k - taken). O(N).
 pub(crate) fn autoregression(residuals: &[f64], segments: &[Range<usize>], taken: usize) -> Autoregression {
-    let samples: usize = segments.iter().map(Range::len).sum();
-    let lagged = |count| {
-        let taps = vec![Taps { signal: 0, first: 1, count, sign: -1.0 }];
-        Lagged::new(&[residuals], taps, segments, Presample::Drop)
-    };
-    // Of short segments not too much is left out.
-    let enough = |count: &usize| 2 * lagged(*count).rows() >= samples && samples > 4 * count + taken;
-    let highest = (1..=HIGHEST).rev().find(enough).unwrap_or(0);
-    let lagged = lagged(highest);
+    let highest = highest(residuals, segments, taken);
+    let lagged = lagged(residuals, segments, highest);
     let (matrix, right, square) = lagged.normal_equations();
-    let rows = lagged.rows();
+    chosen(&matrix, right, square, lagged.rows(), taken)
+}
+
+fn lagged<'a>(residuals: &'a [f64], segments: &'a [Range<usize>], count: usize) -> Lagged<'a> {
+    let taps = vec![Taps { signal: 0, first: 1, count, sign: -1.0 }];
+    Lagged::new(&[residuals], taps, segments, Presample::Drop)
+}
+
+/// The highest order for so many samples: of short segments not too much is left out.
+fn highest(residuals: &[f64], segments: &[Range<usize>], taken: usize) -> usize {
+    let samples: usize = segments.iter().map(Range::len).sum();
+    let enough = |count: &usize| {
+        2 * lagged(residuals, segments, *count).rows() >= samples && samples > 4 * count + taken
+    };
+    (1..=HIGHEST).rev().find(enough).unwrap_or(0)
+}
+
+/// The order of the least MDL and its autoregression, from the normal equations of the highest over `rows`.
+fn chosen(
+    matrix: &DMatrix<f64>,
+    right: DVector<f64>,
+    square: f64,
+    rows: usize,
+    taken: usize,
+) -> Autoregression {
+    let highest = right.len();
     let variance = |squares: f64, order: usize| squares / rows.saturating_sub(order + taken).max(1) as f64;
     let white = Autoregression { monic: vec![1.0], variance: variance(square, 0) };
-    let Some(factor) = Factor::new(&matrix) else { return white };
+    let Some(factor) = Factor::new(matrix) else { return white };
     let mut rotated = right;
     factor.forward(rotated.as_mut_slice());
     // What each order leaves: the factor of a lower order is a part of that of the highest.
@@ -79,6 +148,95 @@ pub(crate) fn autoregression(residuals: &[f64], segments: &[Range<usize>], taken
         Some((monic, _)) => Autoregression { monic, variance: variance(left[order], order) },
         None => white,
     }
+}
+
+/// The autoregression of the errors v of which a fit has left `residuals` (see above), `psi` giving the derivatives of the fitted
+/// values, a list for each parameter, of the same samples. For very many samples, or if they do not determine the
+/// parameters, that of the residuals. O(N n^2 p^2) for p parameters and n = 11 lags.
+pub(super) fn restricted(
+    residuals: &[f64],
+    psi: impl FnOnce() -> Vec<Vec<f64>>,
+    segments: &[Range<usize>],
+    taken: usize,
+) -> Autoregression {
+    let mut found = autoregression(residuals, segments, taken);
+    let highest = highest(residuals, segments, taken);
+    let samples: usize = segments.iter().map(Range::len).sum();
+    if samples > MANY || highest == 0 {
+        return found;
+    }
+    let psi = psi();
+    // Columns as large as the residuals, so that nothing is lost in their products.
+    let size = |values: &[f64]| sum_of_squares(values).sqrt();
+    let whole = size(residuals);
+    let scaled = psi.iter().map(|column| {
+        let scale = whole / size(column);
+        column.iter().map(|value| if scale.is_finite() { scale * value } else { 0.0 }).collect::<Vec<f64>>()
+    });
+    let scaled: Vec<Vec<f64>> = scaled.collect();
+    let signals: Vec<&[f64]> = std::iter::once(residuals).chain(scaled.iter().map(Vec::as_slice)).collect();
+    let lags = highest + 1;
+    let taps = (0..signals.len()).map(|signal| Taps { signal, first: 0, count: lags, sign: 1.0 }).collect();
+    let lagged = Lagged::new(&signals, taps, segments, Presample::Drop);
+    let (products, _, _) = lagged.normal_equations();
+    let (rows, size) = (lagged.rows(), psi.len());
+    let entry = |(i, k): (usize, usize), (j, l): (usize, usize)| products[(i * lags + k, j * lags + l)];
+    for _ in 0..ROUNDS {
+        let filtered = |i: usize, j: usize| -> f64 {
+            let each = found.monic.iter().enumerate();
+            let row = |(k, a): (usize, &f64)| {
+                a * found.monic.iter().enumerate().map(|(l, b)| b * entry((i, k), (j, l))).sum::<f64>()
+            };
+            each.map(row).sum()
+        };
+        let gram = DMatrix::from_fn(size, size, |i, j| filtered(i + 1, j + 1));
+        let Some(factor) = Cholesky::new(gram) else { return found };
+        let weights = factor.solve(&DVector::from_fn(size, |i, _| filtered(i + 1, 0)));
+        let spread = factor.inverse() * found.variance;
+        let weight = |i: usize, j: usize| match (i.checked_sub(1), j.checked_sub(1)) {
+            (None, None) => 1.0,
+            (Some(i), None) | (None, Some(i)) => -weights[i],
+            (Some(i), Some(j)) => weights[i] * weights[j] + spread[(i, j)],
+        };
+        let all = DMatrix::from_fn(size + 1, size + 1, weight);
+        let expected = DMatrix::from_fn(lags, lags, |k, l| {
+            let row = |i: usize| (0..=size).map(|j| all[(i, j)] * entry((i, k), (j, l))).sum::<f64>();
+            (0..=size).map(row).sum::<f64>()
+        });
+        let right = DVector::from_fn(highest, |k, _| -expected[(k + 1, 0)]);
+        let matrix = expected.view((1, 1), (highest, highest)).into_owned();
+        let next = chosen(&matrix, right, expected[(0, 0)], rows, 0);
+        if !next.variance.is_finite() {
+            return found;
+        }
+        found = next;
+    }
+    found
+}
+
+/// Columns of psi over `rows`, as [`backward_filtered_products`] has them before the filter.
+pub(super) fn columns(
+    signals: &[&[f64]],
+    taps: &[Taps],
+    segment: &Range<usize>,
+    rows: &Range<usize>,
+    combination: Option<&DMatrix<f64>>,
+) -> Vec<Vec<f64>> {
+    let shifted = |(signal, lag, sign): (usize, usize, f64)| -> Vec<f64> {
+        let at = |row: usize| if row < segment.start + lag { 0.0 } else { sign * signals[signal][row - lag] };
+        rows.clone().map(at).collect()
+    };
+    let each = taps.iter().flat_map(|taps| (0..taps.count).map(|i| (taps.signal, taps.first + i, taps.sign)));
+    let raw: Vec<Vec<f64>> = each.map(shifted).collect();
+    let Some(combination) = combination else { return raw };
+    let combined = combination.row_iter().map(|weights| {
+        let mut sum = vec![0.0; rows.len()];
+        for (weight, column) in weights.iter().zip(&raw).filter(|(weight, _)| **weight != 0.0) {
+            sum.iter_mut().zip(column).for_each(|(sum, value)| *sum += weight * value);
+        }
+        sum
+    });
+    combined.collect()
 }
 
 /// sum zeta zeta' over the samples `rows`, where zeta = `combination` psi filtered backwards in time by 1/A(q^+1):

@@ -6,7 +6,7 @@ use thetahat_core::{Action, Error, Innovation};
 use super::estimate::{StateEstimate, StateValues};
 use super::kind::{Filter, Kind, Moment};
 use super::model::StateModel;
-use crate::validate::chi_square_interval;
+use crate::distribution::chi_square_interval;
 
 /// The numbers of one row.
 #[derive(Debug, Clone)]

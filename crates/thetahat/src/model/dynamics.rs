@@ -14,6 +14,22 @@
 //! tau = -T/ln|z|:              dtau = T/(|z| ln^2|z|) d|z|,   |z| d|z| = re dre + im dim
 //! g = B(1)/(A(1) F(1)):        dg/db_k = 1/(A(1) F(1)),   dg/da_k = -g/A(1),   dg/df_k = -g/F(1)
 //! ```
+//!
+//! Near an integrator tau and g are far from normal, and plus or minus some standard errors of them says nothing. What they are
+//! made of is nearly normal, |z|, B(1) and A(1) F(1), and their intervals are taken from there: tau rises with |z|, so that the
+//! ends of the interval of |z| are those of tau, without an upper one where 1 is inside; and g lies where
+//!
+//! ```text
+//! (n - g d)^2 <= q^2 var(n - g d),   n = B(1),   d = A(1) F(1)
+//! ```
+//!
+//! with the quantile q of the normal or Student's distribution (Fieller, Some problems in interval estimation, J. Royal
+//! Statistical Society B 16 (1954)). That is an interval while d differs from 0 with the same confidence; beyond, g has no upper
+//! end, and the sign of n as far as that is certain: d is positive for a stable model.
+//!
+//! Poles that are estimated near 1 come out too small, and more so where a level is taken off: there the t-statistic of d = 0 has
+//! the distribution of Dickey and Fuller (J. American Statistical Association 74 (1979)), and not the normal one. So an upper
+//! end is given only where that rejects an integrator.
 
 #[cfg(test)]
 mod tests;
@@ -32,6 +48,11 @@ use crate::{Error, Model};
 const APART: f64 = 4.0;
 /// A pole and a zero farther apart than this do not cancel, however uncertain they are.
 const NEAR: f64 = 0.1;
+/// How often an interval holds its figure.
+const LEVEL: f64 = 0.95;
+/// Where the t-statistic of a root at 1 lies below in 2.5 % of logs, a constant being estimated too (Fuller, Introduction to
+/// Statistical Time Series, 1976, table 8.5.2). The normal distribution has 1.96 there.
+const UNIT_ROOT: f64 = 3.12;
 /// 95 % of chi-square for one and two degrees of freedom.
 const CHI_SQUARE: [f64; 2] = [3.841, 5.991];
 
@@ -64,6 +85,48 @@ pub struct Quantity {
     /// The square root of its variance to first order; none where that of the parameters is unknown, or of a pole
     /// whose own is.
     pub standard_error: Option<f64>,
+    /// An interval that holds it with a probability of 95 %. Of a time constant it comes from the interval of the pole's modulus,
+    /// of a static gain from Fieller's theorem: near an integrator it is right where plus or minus two standard errors is not.
+    /// None where the standard error is none, and for figures of which the standard error says enough.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub interval: Option<Interval>,
+}
+
+impl Quantity {
+    /// A figure without an interval of its own.
+    pub(crate) fn new(value: f64, standard_error: Option<f64>) -> Self {
+        Self { value, standard_error, interval: None }
+    }
+}
+
+/// Between which values a figure lies; none where it has no end.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Interval {
+    /// The least value; none where there is none.
+    pub lower: Option<f64>,
+    /// The largest value; none where there is none.
+    pub upper: Option<f64>,
+}
+
+impl Interval {
+    /// In words, the ends written by a function: `1.2 to 3.4`, `1.2 and more`, `3.4 and less`, `anything`.
+    ///
+    /// ```
+    /// use thetahat::Interval;
+    ///
+    /// let shown = |lower, upper| Interval { lower, upper }.shown(|value| value.to_string());
+    /// assert_eq!(shown(Some(1.5), Some(2.5)), "1.5 to 2.5");
+    /// assert_eq!(shown(Some(1.5), None), "1.5 and more");
+    /// assert_eq!([shown(None, Some(2.5)), shown(None, None)], ["2.5 and less", "anything"]);
+    /// ```
+    pub fn shown(&self, number: impl Fn(f64) -> String) -> String {
+        match (self.lower, self.upper) {
+            (Some(lower), Some(upper)) => format!("{} to {}", number(lower), number(upper)),
+            (Some(lower), None) => format!("{} and more", number(lower)),
+            (None, Some(upper)) => format!("{} and less", number(upper)),
+            (None, None) => "anything".to_owned(),
+        }
+    }
 }
 
 /// A polynomial of a model, and where its coefficients stand among the parameters.
@@ -219,10 +282,13 @@ pub(super) fn describe(model: &mut Model) -> Result<(), Error> {
     let zeros = blocks.b.iter().map(|b| b.roots(parameters)).collect::<Result<Vec<_>, Error>>()?;
     let (noise_poles, noise_zeros) = (blocks.d.roots(parameters)?, blocks.c.roots(parameters)?);
     let inputs = blocks.b.iter().zip(&blocks.f);
-    let dc_gain = inputs.map(|(b, f)| static_gain(&blocks.a, b, f, parameters)).collect();
-    let time_constants = poles.iter().map(|pole| time_constant(pole, model.sample_time)).collect();
+    let stable = poles.iter().all(|pole| pole.value().modulus() < 1.0);
+    let quantile = model.quantile(LEVEL);
+    let gain = |(b, f)| static_gain(&blocks.a, b, f, parameters, stable, quantile);
+    let dc_gain = inputs.map(gain).collect();
+    let time_constants = poles.iter().map(|pole| time_constant(pole, model.sample_time, quantile)).collect();
 
-    model.stable = poles.iter().all(|pole| pole.value().modulus() < 1.0);
+    model.stable = stable;
     model.poles = poles;
     model.zeros = zeros;
     model.noise_poles = noise_poles;
@@ -238,27 +304,74 @@ fn static_gain(
     b: &Block<'_>,
     f: &Block<'_>,
     parameters: Option<&[Vec<f64>]>,
+    stable: bool,
+    quantile: f64,
 ) -> Option<Quantity> {
     let (a_one, f_one) = (a.at_one()?, f.at_one()?);
-    let value = b.coefficients.iter().sum::<f64>() / a_one / f_one;
+    let numerator = b.coefficients.iter().sum::<f64>();
+    let value = numerator / a_one / f_one;
     let real = |value: f64| Complex::new(value, 0.0);
     let gradient = a.gradient(|_| real(-value / a_one));
     let gradient = gradient.chain(b.gradient(|_| real(1.0 / a_one / f_one)));
     let gradient = gradient.chain(f.gradient(|_| real(-value / f_one))).collect();
-    value.is_finite().then(|| Quantity { value, standard_error: standard_error(parameters, &gradient) })
+    // Of n and d, as a complex number of which they are the parts.
+    let parts = b.gradient(|_| real(1.0));
+    let parts = parts.chain(a.gradient(|_| Complex::new(0.0, f_one)));
+    let parts: Gradient = parts.chain(f.gradient(|_| Complex::new(0.0, a_one))).collect();
+    let spread = parameters.and_then(|parameters| covariance(parameters, &parts));
+    let interval = spread.map(|spread| ratio([numerator, a_one * f_one], spread, quantile, stable));
+    let standard_error = standard_error(parameters, &gradient);
+    // Without B there is nothing to divide.
+    let interval = interval.filter(|_| b.coefficients.len() > b.power);
+    value.is_finite().then_some(Quantity { value, standard_error, interval })
+}
+
+/// Fieller's interval for n/d of two figures with a covariance matrix. `positive` says that d is known to be so.
+fn ratio([n, d]: [f64; 2], [[nn, nd], [_, dd]]: [[f64; 2]; 2], quantile: f64, positive: bool) -> Interval {
+    let square = quantile * quantile;
+    // a g^2 - 2 b g + c <= 0.
+    let (a, b, c) = (d * d - square * dd, n * d - square * nd, n * n - square * nn);
+    let root = (b * b - a * c).max(0.0).sqrt();
+    // Without cancellation: one root by the sum, the other by the product.
+    let sum = b + root.copysign(b);
+    let (first, second) = (sum / a, if sum == 0.0 { 0.0 } else { c / sum });
+    let (low, high) = (first.min(second), first.max(second));
+    let known = |value: f64| Some(value).filter(|value| value.is_finite());
+    let bounded = d * d > UNIT_ROOT * UNIT_ROOT * dd;
+    if a > 0.0 && bounded {
+        return Interval { lower: known(low), upper: known(high) };
+    }
+    // Only n differs from 0: g lies beyond one end, and the sign of d says beyond which. That is the one nearest to 0, or the one
+    // of its sign.
+    match (positive && c > 0.0, n > 0.0) {
+        (true, true) => Interval { lower: known(if a > 0.0 { low } else { high }), upper: None },
+        (true, false) => Interval { lower: None, upper: known(if a > 0.0 { high } else { low }) },
+        (false, _) => Interval { lower: None, upper: None },
+    }
 }
 
 /// -T/ln|z|, none outside the unit circle.
-fn time_constant(pole: &Root, sample_time: f64) -> Option<Quantity> {
+fn time_constant(pole: &Root, sample_time: f64, quantile: f64) -> Option<Quantity> {
     let modulus = pole.value().modulus();
     let value = -sample_time / modulus.ln();
-    let standard_error = pole.covariance.and_then(|[[rr, ri], [_, ii]]| {
+    let known = pole.covariance.filter(|_| modulus > 0.0);
+    let deviation = known.map(|[[rr, ri], [_, ii]]| {
         let (re, im) = (pole.re / modulus, pole.im / modulus);
-        let variance = re * re * rr + 2.0 * re * im * ri + im * im * ii;
-        let slope = value / modulus / modulus.ln();
-        Some(slope.abs() * variance.max(0.0).sqrt()).filter(|error| error.is_finite())
+        (re * re * rr + 2.0 * re * im * ri + im * im * ii).max(0.0).sqrt()
     });
-    (modulus < 1.0 && value.is_finite()).then_some(Quantity { value, standard_error })
+    let slope = (value / modulus / modulus.ln()).abs();
+    let standard_error = deviation.map(|deviation| slope * deviation).filter(|error| error.is_finite());
+    let real = pole.im == 0.0 && pole.re > 0.0;
+    let bounded = |deviation: &f64| !real || 1.0 - modulus > UNIT_ROOT * deviation;
+    let interval = deviation.filter(|deviation| deviation.is_finite()).map(|deviation| {
+        let (low, high) = (modulus - quantile * deviation, modulus + quantile * deviation);
+        let end = |modulus: f64| -sample_time / modulus.ln();
+        Interval {
+            lower: Some(if low > 0.0 { end(low) } else { 0.0 }),
+            upper: (high < 1.0 && bounded(&deviation)).then(|| end(high)),
+        }
+    });
+    (modulus < 1.0 && value.is_finite()).then_some(Quantity { value, standard_error, interval })
 }
 
 /// The pole and the zero of a model that come closest to cancelling each other, if they nearly do; the pole first.

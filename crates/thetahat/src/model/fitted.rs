@@ -3,6 +3,7 @@ use serde::{Deserialize, Serialize};
 
 use super::dynamics::{self, Quantity, Root};
 use crate::data::Offset;
+use crate::distribution::student_two_sided;
 use crate::estimate::Estimate;
 use crate::{Error, Orders, Structure};
 
@@ -54,6 +55,10 @@ pub struct Model {
     pub f: Vec<Vec<f64>>,
     /// The variance of e: the sum of squared residuals over N - p.
     pub noise_variance: f64,
+    /// N - p, less the initial conditions that were estimated: the degrees of freedom of `noise_variance`. None where it was
+    /// not estimated so, and in reports that do not say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub degrees_of_freedom: Option<usize>,
     /// The coefficients with their standard errors, in the order of `covariance`.
     pub parameters: Vec<Parameter>,
     /// The covariance matrix of the parameters, row by row; none where no theory gives one.
@@ -86,13 +91,16 @@ impl Model {
         inputs: Vec<Signal>,
         output: Signal,
     ) -> Result<Self, Error> {
-        let model = Self::from_parameters(
+        let mut model = Self::from_parameters(
             orders,
             estimate.parameters(),
             estimate.covariance(),
             estimate.noise_variance(),
             sample_time,
         )?;
+        // Their intervals are those of Student's distribution.
+        model.degrees_of_freedom = estimate.degrees_of_freedom();
+        dynamics::describe(&mut model)?;
         if !estimate.criteria().fpe.is_finite() {
             return Err(Error::data("the noise variance overflows; scale the output towards one"));
         }
@@ -150,6 +158,7 @@ impl Model {
             d,
             f,
             noise_variance,
+            degrees_of_freedom: None,
             parameters,
             covariance: covariance.map(<[_]>::to_vec),
             poles: Vec::new(),
@@ -162,6 +171,20 @@ impl Model {
         };
         dynamics::describe(&mut model)?;
         Ok(model)
+    }
+
+    /// sqrt(nu/(nu - 2)), the standard deviation of Student's distribution with the degrees of freedom of the noise variance;
+    /// 1 where they are not known. With fewer than three it has none, and that of three serves.
+    pub(crate) fn student_factor(&self) -> f64 {
+        self.degrees_of_freedom.map_or(1.0, |degrees| {
+            let degrees = degrees.max(3) as f64;
+            (degrees / (degrees - 2.0)).sqrt()
+        })
+    }
+
+    /// How many standard errors from an estimate the end of an interval lies that holds its truth with probability `level`.
+    pub(crate) fn quantile(&self, level: f64) -> f64 {
+        student_two_sided(1.0 - level, self.degrees_of_freedom)
     }
 
     /// Checks a model that was read: that its parts fit together, so that it can be computed with.

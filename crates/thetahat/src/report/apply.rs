@@ -1,7 +1,5 @@
 use crate::data::{Detrend, Log, Offset, Record, Rows, checked};
-use crate::respond::{
-    Forecast, Response, Start, check_steps, deviations, forecast_if_possible, longest, simulate,
-};
+use crate::respond::{Forecast, Start, check_steps, forecast_if_possible, prediction_deviations, simulate};
 use crate::validate::{Fit, Horizon};
 use crate::{Error, Model};
 
@@ -13,8 +11,9 @@ pub struct Applied {
     /// The response, one value for each row of the log and then for each of the `beyond` rows behind it; NaN outside the
     /// rows asked for, in gaps, and before a start.
     pub predicted: Vec<f64>,
-    /// The standard deviations of the errors of `predicted`, as [`prediction_deviation`](crate::prediction_deviation) has
-    /// them for the steps that each value looks ahead; NaN where there is none. None for a free run.
+    /// The standard deviations of the errors of `predicted`, those of the parameters among them, for the steps that each value
+    /// looks ahead, as [`prediction_deviations`](crate::prediction_deviations) and [`forecast`](crate::forecast) have them;
+    /// NaN where there is none. None for a free run.
     pub standard_deviations: Option<Vec<f64>>,
     /// How many rows behind the end of the log are forecast.
     pub beyond: usize,
@@ -58,8 +57,7 @@ pub fn apply(
     let (mut predicted, mut standard_deviations) = match horizon {
         Horizon::FreeRun => (response.values, None),
         Horizon::Steps { steps } => {
-            let deviations = spread(model, &record, &response, steps, initial);
-            (response.values, Some(deviations))
+            (response.values, Some(prediction_deviations(model, &record, steps, initial)?))
         }
     };
     if let (Horizon::Steps { steps }, Some(deviations)) = (horizon, &mut standard_deviations)
@@ -155,20 +153,6 @@ pub(super) fn check_sample_time(model: &Model, log: &Log) -> Result<(), Error> {
         )));
     }
     Ok(())
-}
-
-/// The standard deviations of predictions: from zero, the first samples of a segment look fewer steps ahead.
-fn spread(model: &Model, record: &Record<'_>, response: &Response, steps: usize, initial: Start) -> Vec<f64> {
-    let steps = steps.min(longest(record) + 1);
-    let known = deviations(model, steps);
-    let mut spread = vec![f64::NAN; response.values.len()];
-    for counted in &response.counted {
-        for row in counted.clone() {
-            let ahead = if initial == Start::Zero { steps.min(row + 1 - counted.start) } else { steps };
-            spread[row] = known[ahead - 1];
-        }
-    }
-    spread
 }
 
 /// The forecast behind the last usable row, and the row (0-based) that it begins with.

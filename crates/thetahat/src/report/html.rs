@@ -470,7 +470,10 @@ fn residuals(parts: &[(String, &Validated)]) -> Section {
     for (name, residuals) in residuals_of(parts) {
         section.text(match residuals.anderson.stops_at {
             Some(alpha) => {
-                format!("The smallest alpha at which the fraction outside is not below alpha ({name}): {}.", figures::short(alpha))
+                format!(
+                    "The smallest alpha at which the fraction outside is not below alpha ({name}): {}.",
+                    figures::short(alpha)
+                )
             }
             None => format!("At every alpha up to 0.5 the fraction outside is below alpha ({name})."),
         });

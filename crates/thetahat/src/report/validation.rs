@@ -7,8 +7,8 @@ use super::{Report, Source};
 use crate::data::{Detrend, Log, Offset, Prefiltered, Record, Rows, checked};
 use crate::figures::{chance, fixed, number};
 use crate::regression::sum;
-use crate::respond::{Innovations, Response, check_steps, deviations, innovations};
-use crate::validate::{Fit, Horizon, Relation, Residuals, two_sided};
+use crate::respond::{Innovations, Response, check_steps, innovations, prediction_deviations};
+use crate::validate::{Fit, Horizon, Relation, Residuals};
 use crate::{Error, Initial, Model, Orders, Procedure, Start, Structure, document, text};
 
 /// The schemas that this version writes.
@@ -405,7 +405,7 @@ fn looks(
             validation.noise = NoiseLevel { mse, ratio, ..validation.noise };
         }
         if let Horizon::Steps { steps } = horizon {
-            validation.coverage.extend(coverage(model, record, &response, steps));
+            validation.coverage.extend(coverage(model, record, &response, steps, start));
         }
         validation.fit.push(fit);
         match horizon {
@@ -417,25 +417,32 @@ fn looks(
     (one_step, free_run)
 }
 
-/// How often the output lies in the intervals around predictions so many steps ahead: +- z times their deviation.
-fn coverage<'c>(
+/// How often the output lies in the intervals around predictions so many steps ahead, as wide as their deviations say.
+fn coverage(
     model: &Model,
-    record: &'c Record<'_>,
-    response: &'c Response,
+    record: &Record<'_>,
+    response: &Response,
     steps: usize,
-) -> impl Iterator<Item = Coverage> + use<'c> {
-    let deviation = deviations(model, steps).get(steps - 1).copied();
-    let deviation = deviation.filter(|deviation| deviation.is_finite() && *deviation > 0.0);
-    let samples: usize = response.counted.iter().map(ExactSizeIterator::len).sum();
-    LEVELS.into_iter().map(move |level| {
-        let inside = |deviation: f64| {
-            let half = two_sided(1.0 - level) * deviation;
-            let rows = response.counted.iter().cloned().flatten();
-            rows.filter(|&t| (record.output[t] - response.values[t]).abs() <= half).count()
-        };
-        let actual = deviation.filter(|_| samples > 0).map(|d| inside(d) as f64 / samples as f64);
-        Coverage { steps, level, actual, samples }
-    })
+    start: Start,
+) -> Vec<Coverage> {
+    // Where that fails, the prediction has failed too.
+    let deviations = prediction_deviations(model, record, steps, start).unwrap_or_default();
+    let errors: Vec<(f64, f64)> = response
+        .counted
+        .iter()
+        .cloned()
+        .flatten()
+        .filter_map(|t| Some(((record.output[t] - response.values[t]).abs(), *deviations.get(t)?)))
+        .collect();
+    let samples = errors.len();
+    let known = samples > 0 && errors.iter().all(|(_, deviation)| deviation.is_finite() && *deviation > 0.0);
+    let each = LEVELS.into_iter().map(|level| {
+        // The deviations are those of Student's distribution, the quantiles are in units of its scale.
+        let width = model.quantile(level) / model.student_factor();
+        let inside = errors.iter().filter(|(error, deviation)| *error <= width * deviation).count();
+        Coverage { steps, level, actual: known.then(|| inside as f64 / samples as f64), samples }
+    });
+    each.collect()
 }
 
 /// The tests of what is left one step ahead.

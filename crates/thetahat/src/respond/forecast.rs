@@ -1,5 +1,6 @@
-use super::innovations::{Innovations, driven, of_segment};
+use super::innovations::{driven, of_segment};
 use super::predict::{check_start, check_steps, deviations};
+use super::sensitivities::{Paths, student};
 use super::{Start, check_inputs};
 use crate::data::Record;
 use crate::regression::divide_from;
@@ -10,7 +11,9 @@ use crate::{Error, Model};
 pub struct Forecast {
     /// y^(N+1 | N), y^(N+2 | N), …, in deviations like the record.
     pub values: Vec<f64>,
-    /// The standard deviations of their errors, as [`prediction_deviation`](crate::prediction_deviation) has them.
+    /// The standard deviations of their errors: what the noise does, as [`prediction_deviation`](crate::prediction_deviation)
+    /// has it, and what the uncertainty of the parameters and of the initial states adds to first order, with the factor
+    /// sqrt(nu/(nu - 2)) of Student's distribution where the noise variance was estimated with nu degrees of freedom.
     pub standard_deviations: Vec<f64>,
 }
 
@@ -26,7 +29,7 @@ pub struct Forecast {
 /// section 3.2). `inputs[j][i]` is u_j(N+1+i). With nk samples of delay the last nk are not needed, and an input
 /// without B needs none; what is there beyond them is not read. The start is as for [`predict`](crate::predict).
 ///
-/// Cost: that of a prediction of the last segment, and O(steps (na + nb + nd + nf)).
+/// Cost: p + 1 times that of a prediction of the last segment, and O(steps p (na + nb + nc + nd + nf)), for p parameters.
 ///
 /// # Errors
 /// [`Error::Argument`] if there are fewer future inputs than needed, one is not finite, the record or `inputs` do not
@@ -78,7 +81,7 @@ pub(crate) fn forecast_if_possible(
     check_future(model, inputs, steps)?;
     let (Some(segment), Some(past)) = (record.segments.last(), record.past.last()) else { return Ok(None) };
     let Some(found) = of_segment(model, record, segment, *past, 1, start)? else { return Ok(None) };
-    let Innovations { rows, impulses, disturbance, errors, .. } = found;
+    let rows = found.rows.clone();
 
     let whole = |(measured, future): (&&[f64], &&[f64])| {
         let mut whole = measured[rows.clone()].to_vec();
@@ -89,10 +92,19 @@ pub(crate) fn forecast_if_possible(
     };
     let whole: Vec<Vec<f64>> = record.inputs.iter().zip(inputs).map(whole).collect();
     let views: Vec<&[f64]> = whole.iter().map(Vec::as_slice).collect();
-    let mut values = driven(model, &views, rows.len() + steps, &impulses).split_off(rows.len());
-    let known = Known { output: &record.output[rows], disturbance: &disturbance, errors: &errors };
-    continuation(model, &known, &mut values);
-    Ok(Some(Forecast { values, standard_deviations: deviations(model, steps) }))
+    let mut values = driven(model, &views, rows.len() + steps, &found.impulses).split_off(rows.len());
+    let measured = &record.output[rows];
+    let known = Known { output: measured, disturbance: &found.disturbance, errors: &found.errors };
+    let disturbance = continuation(model, &known, &mut values);
+    let mut errors = found.errors.clone();
+    errors.resize(measured.len() + steps, 0.0);
+    let (output, disturbance) =
+        ([measured, &values].concat(), [found.disturbance.as_slice(), &disturbance].concat());
+    let paths = Paths::new(model, &found, whole, output, disturbance, errors);
+    let others = paths.of_forecast(model, start)?;
+    let each = deviations(model, steps).into_iter().zip(others);
+    let standard_deviations = each.map(|(noise, other)| student(model, noise, other)).collect();
+    Ok(Some(Forecast { values, standard_deviations }))
 }
 
 /// What is known of a stretch of samples: y, w and e.
@@ -103,8 +115,8 @@ pub(super) struct Known<'a> {
     pub(super) errors: &'a [f64],
 }
 
-/// Goes on from what is known with e = 0: `values` holds x and becomes y.
-pub(super) fn continuation(model: &Model, known: &Known<'_>, values: &mut [f64]) {
+/// Goes on from what is known with e = 0: `values` holds x and becomes y. Gives w.
+pub(super) fn continuation(model: &Model, known: &Known<'_>, values: &mut [f64]) -> Vec<f64> {
     // Of D w = C e only what e was before is left.
     let mut disturbance = vec![0.0; values.len()];
     for (t, value) in disturbance.iter_mut().take(model.orders.nc).enumerate() {
@@ -114,6 +126,7 @@ pub(super) fn continuation(model: &Model, known: &Known<'_>, values: &mut [f64])
     divide_from(&model.d[1..], known.disturbance, &mut disturbance);
     values.iter_mut().zip(&disturbance).for_each(|(value, w)| *value += w);
     divide_from(&model.a[1..], known.output, values);
+    disturbance
 }
 
 /// Future inputs must be there as far as they have an effect.

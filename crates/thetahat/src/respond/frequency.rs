@@ -210,8 +210,8 @@ impl<'a> Transfer<'a> {
             re,
             im,
             covariance,
-            magnitude: Quantity { value: magnitude, standard_error: along },
-            phase: Quantity { value: self.phase(response, angle), standard_error: across },
+            magnitude: Quantity::new(magnitude, along),
+            phase: Quantity::new(self.phase(response, angle), across),
         })
     }
 

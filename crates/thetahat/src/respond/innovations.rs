@@ -29,6 +29,8 @@ pub(crate) struct Innovations {
     pub(crate) rows: Range<usize>,
     /// The samples of the segment that count.
     pub(crate) counted: Range<usize>,
+    /// How many of the first of them have e = 0 for want of what was before.
+    pub(super) silent: usize,
     /// What x starts from.
     pub(super) impulses: Impulses,
     /// w, one value for each of `rows`.
@@ -39,11 +41,16 @@ pub(crate) struct Innovations {
 
 /// Impulses into 1/F at the first samples of a stretch, for each input.
 #[derive(Debug)]
-pub(super) struct Impulses(Vec<Vec<f64>>);
+pub(super) struct Impulses(pub(super) Vec<Vec<f64>>);
 
 impl Impulses {
     pub(super) fn none(model: &Model) -> Self {
         Self(vec![Vec::new(); model.f.len()])
+    }
+
+    /// Whether there are none.
+    pub(super) fn is_empty(&self) -> bool {
+        self.0.iter().all(Vec::is_empty)
     }
 }
 
@@ -101,7 +108,7 @@ pub(super) fn of_segment(
             (disturbance, errors) = residuals(model, record, &rows, silent, &impulses);
         }
     }
-    Ok(Some(Innovations { rows, counted, impulses, disturbance, errors }))
+    Ok(Some(Innovations { rows, counted, silent, impulses, disturbance, errors }))
 }
 
 /// x over stretches of the inputs, zeros before them, all as long as one another.
@@ -162,16 +169,26 @@ fn unknowns(model: &Model) -> usize {
 }
 
 /// The impulses that make the errors smallest, given those without impulses.
-fn best(model: &Model, errors: &[f64], silent: usize) -> Result<Impulses, Error> {
+pub(super) fn best(model: &Model, errors: &[f64], silent: usize) -> Result<Impulses, Error> {
+    let orders = &model.orders;
+    let (length, columns) = free_columns(model, errors.len(), silent);
+    let mut weights = closest_of(&errors[..length], &columns)?.into_iter();
+    let each =
+        (0..orders.inputs()).map(|input| weights.by_ref().take(orders.free_responses(input)).collect());
+    Ok(Impulses(each.collect()))
+}
+
+/// What unit impulses do to the errors of a stretch, and how many samples of it say something of them.
+pub(super) fn free_columns(model: &Model, samples: usize, silent: usize) -> (usize, Vec<Column>) {
     let orders = &model.orders;
     let order = orders.nc + orders.nd;
     // As far as what any of them does has not died away, and there are more samples than impulses.
     let lasting = |f: &Vec<f64>| {
         let compute = |length| impulse_response(&[f, &model.c], length);
-        until_negligible(errors.len(), order + f.len(), compute).len() + f.len()
+        until_negligible(samples, order + f.len(), compute).len() + f.len()
     };
     let lasting = model.f.iter().map(lasting).max().unwrap_or(0);
-    let length = (lasting + silent + orders.nd).max(unknowns(model) + silent + 1).min(errors.len());
+    let length = (lasting + silent + orders.nd).max(unknowns(model) + silent + 1).min(samples);
 
     let gain: f64 = model.d.iter().map(|d| d.abs()).sum();
     let column = |response: &[f64], delay: usize| {
@@ -187,8 +204,5 @@ fn best(model: &Model, errors: &[f64], silent: usize) -> Result<Impulses, Error>
         let response = impulse_response(&[f], length);
         columns.extend((0..orders.free_responses(input)).map(|delay| column(&response, delay)));
     }
-    let mut weights = closest_of(&errors[..length], &columns)?.into_iter();
-    let each =
-        (0..orders.inputs()).map(|input| weights.by_ref().take(orders.free_responses(input)).collect());
-    Ok(Impulses(each.collect()))
+    (length, columns)
 }

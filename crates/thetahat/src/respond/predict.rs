@@ -82,7 +82,7 @@ pub fn predict(model: &Model, record: &Record<'_>, horizon: usize, start: Start)
 /// impulse response of C/(A D) and sigma^2 the variance of e.
 ///
 /// It is that of a true model that started long ago: the uncertainty of the parameters and of the initial condition comes
-/// on top. Infinite where h overflows. Cost: O(k (na + nc + nd)), up to where h has died away.
+/// on top, as [`prediction_deviations`](crate::prediction_deviations) have it. Infinite where h overflows. Cost: O(k (na + nc + nd)), up to where h has died away.
 ///
 /// # Errors
 /// [`Error::Argument`] if `horizon` is 0 or above 10^6.
@@ -121,7 +121,7 @@ pub(crate) fn deviations(model: &Model, steps: usize) -> Vec<f64> {
 }
 
 /// sqrt(sum_{i<k} h_i^2) for k = 1, 2, …, at least `length` of them.
-fn accumulated(response: &[f64], length: usize) -> Vec<f64> {
+pub(super) fn accumulated(response: &[f64], length: usize) -> Vec<f64> {
     let mut size = 0.0_f64;
     let mut sizes: Vec<f64> = Vec::with_capacity(length);
     for h in response {
@@ -134,7 +134,7 @@ fn accumulated(response: &[f64], length: usize) -> Vec<f64> {
 }
 
 /// The impulse response h of C/(A D), `length` samples at most: what e does to y.
-fn disturbance_response(model: &Model, length: usize) -> Vec<f64> {
+pub(super) fn disturbance_response(model: &Model, length: usize) -> Vec<f64> {
     let order = model.orders.na + model.orders.nc + model.orders.nd;
     until_negligible(length, order, |length| {
         let mut response = vec![0.0; length];

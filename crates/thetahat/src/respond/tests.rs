@@ -1,5 +1,6 @@
 //! Responses against their definitions, sample by sample. Here those of ARX models, in `general` those of all others.
 
+mod deviations;
 mod draws;
 mod forecast;
 mod frequency;

@@ -145,11 +145,9 @@ fn response(
         [(b, 1.0, source), (&blocks.a, -1.0, divided(&model.a)), (f, -1.0, divided(f.coefficients))];
     let parameters = model.covariance.as_deref();
     let finite = values.iter().take_while(|value| value.is_finite()).count();
-    let quantity = |t: usize| Quantity {
-        value: values[t],
-        standard_error: parameters
-            .and_then(|parameters| covariance(parameters, &gradient(&columns, t)))
-            .map(|[[variance, _], _]| variance.sqrt()),
+    let quantity = |t: usize| {
+        let variance = parameters.and_then(|parameters| covariance(parameters, &gradient(&columns, t)));
+        Quantity::new(values[t], variance.map(|[[variance, _], _]| variance.sqrt()))
     };
     Ok(TransientResponse {
         input: signal.name.clone(),

@@ -26,10 +26,10 @@
 
 use thetahat_core::nalgebra::{DMatrix, DVector};
 
-use super::distribution::{chi_square_tail, two_sided};
 use super::moments::{Column, Moments, Traces, columns, eigen};
 use super::residuals::{Independence, Test};
 use super::whiteness::chi_square;
+use crate::distribution::{chi_square_tail, two_sided};
 use crate::estimate::{Autoregression, backward_filtered_products};
 use crate::regression::{Lagged, Presample, Taps, sum_of_squares};
 

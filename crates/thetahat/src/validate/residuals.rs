@@ -5,12 +5,12 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::{DMatrix, DVector};
 
-use super::distribution::two_sided;
 use super::independence::{Parameters, Setting, independence};
 use super::moments::{Moments, Traces, columns, pseudo_inverse};
 use super::whiteness::{Autocorrelation, anderson, anderson_lags, ljung_box, pairs, past_errors};
 use crate::Model;
 use crate::data::Record;
+use crate::distribution::two_sided;
 use crate::estimate::autoregression;
 use crate::regression::{Taps, sum_of_squares};
 use crate::respond::Innovations;
@@ -84,8 +84,8 @@ pub struct AndersonLevel {
     pub outside: usize,
     /// Whether as many outside are no surprise: whether `p_value` is not below the level of the validation.
     pub white: bool,
-    /// How often more are outside for white residuals, and half of how often as many are, the count taken as binomial: its
-    /// mid-p-value.
+    /// How often more are outside for white residuals, and half of how often as many are: the mid-p-value of the count, which
+    /// is about binomial.
     pub p_value: f64,
 }
 

@@ -27,10 +27,10 @@ use std::ops::Range;
 
 use thetahat_core::nalgebra::{DMatrix, DVector};
 
-use super::distribution::{binomial_mid_p, chi_square_tail, two_sided};
 use super::moments::eigen;
 use super::residuals::{Anderson, AndersonLevel, Test};
 use crate::Model;
+use crate::distribution::{binomial_mid_p, chi_square_tail, outside, two_sided};
 use crate::model::polynomial::is_stable;
 use crate::regression::{Lagged, Presample, Taps, divide};
 
@@ -39,6 +39,8 @@ const FREE: f64 = 0.05;
 /// Anderson's test counts lags up to a twentieth of the samples: R(tau) has a variance of N/(N - tau), and with more lags
 /// more than a fraction alpha of them lies outside.
 const SAMPLES_PER_ANDERSON_LAG: usize = 20;
+/// The deviation of a correlation that the fit has left none.
+const CERTAIN: f64 = 1e-9;
 
 /// The autocorrelation of errors over stretches without a gap.
 #[derive(Debug, Clone)]
@@ -149,9 +151,16 @@ pub(super) fn chi_square(
 ///
 /// The plain rule calls residuals white if a fraction below alpha is outside. Of 20 lags and alpha = 0.05 that is none, and
 /// white residuals are so in 36 of 100 logs: as a scale that orders models it serves (`stops_at`), as a verdict it does not.
-/// So the verdict asks how likely the count is: it is about binomial, and residuals are not white where its mid-p-value is below
-/// `level`. At a level of 0.05 that calls white residuals something else in 1 to 10 % of logs, depending on how the
-/// jumps of the count lie (2 to 8 % with 11 lags or more at alpha = 0.05).
+/// So the verdict asks how likely the count is: residuals are not white where its mid-p-value is below `level`. The count is
+/// about binomial, with the mean of what each lag is outside with: sqrt(N) chi(tau) has the variance N C_tau,tau/N_tau. Where C has
+/// correlations r_ij, lags are outside together, to second order of the events' Hermite series (Mehler's formula: Cramér,
+/// Mathematical Methods of Statistics, 1946, section 21.12)
+///
+/// ```text
+/// cov = sum_{m = 2, 4} c_m,i c_m,j r_ij^m/m!
+/// ```
+///
+/// and the count is of as many fewer lags as its variance is larger.
 pub(super) fn anderson(
     correlation: &Autocorrelation,
     covariance: &DMatrix<f64>,
@@ -166,11 +175,37 @@ pub(super) fn anderson(
     };
     let mut sizes: Vec<f64> = (0..lags).map(size).collect();
     sizes.sort_unstable_by(f64::total_cmp);
-    let outside = |alpha: f64| lags - sizes.partition_point(|size| *size <= two_sided(alpha));
-    let passes = |alpha: f64| (outside(alpha) as f64) < alpha * lags as f64;
+    let count = |alpha: f64| lags - sizes.partition_point(|size| *size <= two_sided(alpha));
+    let deviations: Vec<f64> = (0..lags)
+        .map(|lag| {
+            let own = covariance[(lag, lag)];
+            (samples / correlation.pairs[lag] as f64 * own / own.max(1.0)).max(0.0).sqrt().max(CERTAIN)
+        })
+        .collect();
+    // The mean probability of being outside, and the variance of the count beside that of a binomial one.
+    let expected = |alpha: f64| {
+        let band = two_sided(alpha);
+        let events: Vec<(f64, [f64; 2])> =
+            deviations.iter().map(|deviation| outside(band / deviation)).collect();
+        let mean = events.iter().map(|(p, _)| p).sum::<f64>() / lags as f64;
+        let mut variance = events.iter().map(|(p, _)| p * (1.0 - p)).sum::<f64>();
+        for i in 0..lags {
+            for j in 0..i {
+                let size = covariance[(i, i)] * covariance[(j, j)];
+                let square = covariance[(i, j)].powi(2) / size;
+                if square.is_finite() {
+                    let [second, fourth] = [0, 1].map(|m| events[i].1[m] * events[j].1[m]);
+                    variance += 2.0 * (second * square / 2.0 + fourth * square * square / 24.0);
+                }
+            }
+        }
+        (mean, (variance / (lags as f64 * mean * (1.0 - mean))).max(1.0))
+    };
+    let passes = |alpha: f64| (count(alpha) as f64) < alpha * lags as f64;
     let at = |&alpha: &f64| {
-        let outside = outside(alpha);
-        let p_value = binomial_mid_p(outside, lags, alpha);
+        let outside = count(alpha);
+        let (mean, design) = expected(alpha);
+        let p_value = binomial_mid_p(outside, lags, mean, design);
         AndersonLevel {
             alpha,
             band: two_sided(alpha) / samples.sqrt(),

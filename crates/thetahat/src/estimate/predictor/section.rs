@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use thetahat_core::nalgebra::DMatrix;
+
 use super::{Column, Layout, Polynomials};
 use crate::data::Record;
 use crate::estimate::normal;
@@ -352,6 +354,17 @@ impl<'a> Section<'a> {
         }
         let best = &self.free_steps[..free];
         self.free_gain = best.iter().zip(&self.right[parameters..]).map(|(step, right)| step * right).sum();
+    }
+
+    /// What makes psi without the free responses of psi and of these.
+    pub(super) fn without_free(&self, parameters: usize, free: usize) -> DMatrix<f64> {
+        DMatrix::from_fn(parameters, parameters + free, |row, column| {
+            if column >= parameters {
+                -self.free_steps[(row + 1) * free + column - parameters]
+            } else {
+                f64::from(u8::from(row == column))
+            }
+        })
     }
 
     /// Adds the part of the normal equations that is left without the free responses.

@@ -108,3 +108,51 @@ fn white_residuals_have_the_covariance_of_least_squares() {
     let left = products.clone().try_inverse().unwrap();
     assert!((coloured(&left, 0.3, &products) - &left * 0.3).amax() < 1e-12 * left.amax());
 }
+
+#[test]
+fn the_colour_of_errors_is_found_behind_a_fit_that_took_some() {
+    // Slow errors, and slow columns that explain a part of them: the residuals look too fast.
+    let mut noise = Noise(3);
+    let (mut residual, mut found) = (0.0, 0.0);
+    let (samples, runs) = (50, 200);
+    for _ in 0..runs {
+        let mut v = noise.take(samples + 100);
+        divide(&[1.0, -0.8], &mut v);
+        let v = DVector::from_column_slice(&v[100..]);
+        let mut psi: Vec<Vec<f64>> = (0..4).map(|_| noise.take(samples + 100)).collect();
+        psi.iter_mut().for_each(|column| {
+            divide(&[1.0, -0.8], column);
+            column.drain(..100);
+        });
+        let matrix = DMatrix::from_fn(samples, 4, |t, k| psi[k][t]);
+        let weights = (matrix.transpose() * &matrix).try_inverse().unwrap() * matrix.transpose() * &v;
+        let left: Vec<f64> = (v - matrix * weights).iter().copied().collect();
+        let whole = 0..samples;
+        let segments = std::slice::from_ref(&whole);
+        let pole = |colour: &Autoregression| -colour.monic.get(1).copied().unwrap_or(0.0);
+        residual += pole(&autoregression(&left, segments, 4)) / f64::from(runs);
+        found += pole(&restricted(&left, || psi.clone(), segments, 4)) / f64::from(runs);
+        // Without parameters there is nothing to make up for.
+        assert_eq!(
+            restricted(&left, Vec::new, segments, 4).order(),
+            autoregression(&left, segments, 0).order()
+        );
+    }
+    assert!(residual < 0.7 && found > residual + 0.05 && found < 0.85, "{residual} {found}");
+}
+
+#[test]
+fn coloured_errors_are_fewer_than_their_number() {
+    let colour = |monic: &[f64]| Autoregression { monic: monic.to_vec(), variance: 1.0 };
+    assert_eq!(colour(&[1.0]).inflation(50, 4), 1.0);
+    // rho_k = a^|k|: (1 + a^2)/(1 - a^2) times fewer.
+    let degrees = 200.0 * (1.0 - 0.64) / (1.0 + 0.64) - 4.0;
+    let expected = degrees / (degrees - 2.0) * 194.0 / 196.0;
+    assert!((colour(&[1.0, -0.8]).inflation(200, 4) - expected).abs() < 1e-12);
+    assert!(
+        (power(&[1.0, -1.2, 0.7])
+            - inverse_series(&[1.0, -1.2, 0.7], 500).iter().map(|h| h * h).sum::<f64>())
+        .abs()
+            < 1e-9
+    );
+}

@@ -5,7 +5,8 @@ use super::document::{GreyFit, GreyOutput};
 use super::experiment::Experiment;
 use super::free_run::free_run;
 use super::predictor::Predictor;
-use crate::validate::{NisCount, chi_square_interval, chi_square_tail, closeness};
+use crate::distribution::{chi_square_interval, chi_square_tail};
+use crate::validate::{NisCount, closeness};
 use crate::{GreyBox, NisSummary, Test};
 
 /// Lags of the test of whiteness, as far as there are so many readings for each.

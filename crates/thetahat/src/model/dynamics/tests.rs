@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::Orders;
+use crate::distribution::two_sided;
 use crate::model::polynomial::product;
 use crate::regression::noise::Noise;
 
@@ -183,7 +184,7 @@ fn roots_that_may_meet_have_no_covariance() {
     // A single pole at the origin has one; its time constant, 0, has not.
     let origin = autoregression(&[0.0], 0.01);
     assert!((origin.poles[0].covariance.unwrap()[0][0] - 1e-4).abs() < 1e-18);
-    assert_eq!(origin.time_constants[0], Some(Quantity { value: 0.0, standard_error: None }));
+    assert_eq!(origin.time_constants[0], Some(Quantity::new(0.0, None)));
 }
 
 #[test]
@@ -217,7 +218,7 @@ fn integrators_in_a_and_in_f_have_no_gain() {
     // An input without B has the gain 0.
     let orders = Orders::new(1, &[0], 0, 0, &[0], &[1]).unwrap();
     let model = Model::from_parameters(&orders, &[-0.5], Some(&[vec![1.0]]), 1.0, 1.0).unwrap();
-    assert_eq!(model.dc_gain, [Some(Quantity { value: 0.0, standard_error: Some(0.0) })]);
+    assert_eq!(model.dc_gain, [Some(Quantity::new(0.0, Some(0.0)))]);
     assert!(model.zeros == [vec![]]);
 }
 
@@ -302,4 +303,68 @@ fn noise_zeros_are_compared_with_noise_poles_and_pairs_with_pairs() {
     assert!(pole.im > 0.0 && zero.im > 0.0);
     assert_eq!(near_cancellation(&with([-1.2, 0.72], [-1.2, 0.82])), None);
     assert_eq!(near_cancellation(&with([0.0; 2], [-1.2, 0.72])), None);
+}
+
+/// A model of first order, y = b/(1 + a q^-1) u(t - 1), and the covariance of (a, b).
+fn first_order(pole: f64, b: f64, covariance: [[f64; 2]; 2]) -> Model {
+    let rows: Vec<Vec<f64>> = covariance.iter().map(|row| row.to_vec()).collect();
+    let orders = Orders::arx(1, &[1], &[1]).unwrap();
+    Model::from_parameters(&orders, &[-pole, b], Some(&rows), 1.0, 2.0).unwrap()
+}
+
+#[test]
+fn gains_lie_where_fieller_says() {
+    let covariance = [[1e-4, 4e-5], [4e-5, 9e-4]];
+    let square = two_sided(0.05).powi(2);
+    // (n - g d)^2 = q^2 var(n - g d), with n = b and d = 1 + a.
+    let on_border = |d: f64, n: f64, g: f64| {
+        let variance = covariance[1][1] - 2.0 * g * covariance[0][1] + g * g * covariance[0][0];
+        let distance = (n - g * d).powi(2) / (square * variance);
+        assert!((distance - 1.0).abs() < 1e-9, "{d} {n} {g}: {distance}");
+    };
+    for b in [0.5, -0.5] {
+        let gain = first_order(0.9, b, covariance).dc_gain[0].unwrap();
+        let Interval { lower: Some(lower), upper: Some(upper) } = gain.interval.unwrap() else {
+            unreachable!("it has both")
+        };
+        assert!(lower < gain.value && gain.value < upper);
+        on_border(0.1, b, lower);
+        on_border(0.1, b, upper);
+    }
+    // The gain 0 is not certain of its sign, and bounded.
+    let interval = first_order(0.9, 0.0, covariance).dc_gain[0].unwrap().interval.unwrap();
+    assert!(interval.lower.unwrap() < 0.0 && interval.upper.unwrap() > 0.0);
+    // Near an integrator the end that is there has the sign of b, and there is no other.
+    let near = |pole, b| first_order(pole, b, covariance).dc_gain[0].unwrap().interval.unwrap();
+    let Interval { lower: Some(lower), upper: None } = near(0.99, 0.5) else { unreachable!("it has one") };
+    on_border(0.01, 0.5, lower);
+    assert!(lower > 0.0 && lower < 50.0);
+    let Interval { lower: None, upper: Some(upper) } = near(0.99, -0.5) else { unreachable!("it has one") };
+    on_border(0.01, -0.5, upper);
+    // Nothing is known of a gain of which neither part is, and of that of an unstable model.
+    let nothing = Interval { lower: None, upper: None };
+    assert_eq!([near(0.99, 0.01), near(1.001, 0.5)], [nothing; 2]);
+    // Far from an integrator it is what the standard error says.
+    let exact = [[1e-10, 0.0], [0.0, 1e-10]];
+    let gain = first_order(0.5, 1.0, exact).dc_gain[0].unwrap();
+    let half = two_sided(0.05) * gain.standard_error.unwrap();
+    assert!((gain.interval.unwrap().upper.unwrap() - gain.value - half).abs() < 1e-3 * half);
+}
+
+#[test]
+fn time_constants_lie_where_their_poles_do() {
+    let covariance = |deviation: f64| [[deviation * deviation, 0.0], [0.0, 1e-4]];
+    let interval = |pole, deviation| {
+        first_order(pole, 1.0, covariance(deviation)).time_constants[0].unwrap().interval.unwrap()
+    };
+    let quantile = two_sided(0.05);
+    let Interval { lower: Some(lower), upper: Some(upper) } = interval(0.9, 0.01) else {
+        unreachable!("it has both")
+    };
+    assert!((lower + 2.0 / (0.9 - 0.01 * quantile).ln()).abs() < 1e-9);
+    assert!((upper + 2.0 / (0.9 + 0.01 * quantile).ln()).abs() < 1e-9);
+    // It may be an integrator, and it may be no pole at all.
+    let open = interval(0.99, 0.01);
+    assert!(open.lower.is_some() && open.upper.is_none());
+    assert_eq!(interval(0.1, 0.1).lower, Some(0.0));
 }

@@ -19,8 +19,11 @@ pub(super) fn or_dash<T>(value: Option<T>, shown: impl FnOnce(T) -> String) -> S
     value.map_or_else(|| NONE.to_owned(), shown)
 }
 
-/// A figure and its standard error.
+/// A figure and its interval, or its standard error where there is none.
 pub(super) fn quantity(quantity: Quantity) -> String {
+    if let Some(interval) = quantity.interval {
+        return format!("{}, 95 %: {}", number(quantity.value), interval.shown(number));
+    }
     let error = quantity.standard_error.map_or_else(String::new, |error| format!(" ± {}", three(error)));
     format!("{}{error}", number(quantity.value))
 }

@@ -46,10 +46,10 @@ fn a_forecast_is_the_prediction_of_samples_that_are_still_to_come() {
         for &start in starts {
             let found = forecast(&model, &part(100), &future, 20, start).unwrap();
             for steps in [1, 2, 20] {
-                assert_eq!(
-                    found.standard_deviations[steps - 1],
-                    prediction_deviation(&model, steps).unwrap()
-                );
+                // Of a known model only what was before its first error makes it larger.
+                let (deviation, known) =
+                    (found.standard_deviations[steps - 1], prediction_deviation(&model, steps).unwrap());
+                assert!(deviation == known || (deviation > known && !model.orders.is_linear()));
                 // From an estimated start the later samples have a say in it.
                 if start == Start::Drop {
                     let predicted = predict(&model, &part(120), steps, start).unwrap().values[99 + steps];

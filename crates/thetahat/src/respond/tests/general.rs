@@ -6,8 +6,8 @@ use super::{cut, difference, signals, views, with_poles};
 use crate::data::Record;
 use crate::model::polynomial::{inverse_series, product};
 use crate::regression::noise::Noise;
-use crate::respond::deviations;
 use crate::respond::innovations::innovations;
+use crate::respond::predict::deviations;
 use crate::{
     Error, Initial, Method, Model, Orders, Signal, Start, estimate, predict, prediction_deviation, simulate,
 };

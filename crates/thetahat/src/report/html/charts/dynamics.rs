@@ -123,6 +123,7 @@ fn degrees(radians: Quantity) -> Quantity {
     Quantity {
         value: radians.value.to_degrees(),
         standard_error: radians.standard_error.map(f64::to_degrees),
+        interval: None,
     }
 }
 

@@ -1,0 +1,177 @@
+//! How often intervals hold: of predictions and forecasts, of gains and time constants near an integrator, and of output-error
+//! parameters in short logs.
+
+use std::ops::RangeInclusive;
+
+use thetahat::{
+    Horizon, Initial, Interval, Method, Model, Orders, Quantity, Record, Signal, Start, estimate, forecast,
+    predict, prediction_deviations,
+};
+
+use super::{filtered, runs};
+use crate::simulated::Random;
+
+/// Half of 95 % of the normal distribution.
+const QUANTILE: f64 = 1.959964;
+
+struct Case {
+    name: &'static str,
+    orders: Orders,
+    plant: [Vec<f64>; 2],
+    noise: [Vec<f64>; 2],
+}
+
+fn cases() -> Vec<Case> {
+    let (one, b, f) = (vec![1.0], vec![0.0, 1.0, 0.5], vec![1.0, -1.5, 0.7]);
+    // Poles at 0.999 and 0.5.
+    let slow = vec![1.0, -1.499, 0.4995];
+    let case = |name, orders: Result<Orders, _>, f: &Vec<f64>, noise| Case {
+        name,
+        orders: orders.expect("the case is sound"),
+        plant: [b.clone(), f.clone()],
+        noise,
+    };
+    let armax = vec![1.0, 0.6, 0.3];
+    vec![
+        case("ARX", Orders::arx(2, &[2], &[1]), &f, [one.clone(), f.clone()]),
+        case("ARMAX", Orders::armax(2, &[2], 2, &[1]), &f, [armax, f.clone()]),
+        case("OE", Orders::oe(&[2], &[2], &[1]), &f, [one.clone(), one.clone()]),
+        case("BJ", Orders::bj(&[2], 1, 2, &[2], &[1]), &f, [vec![1.0, 0.7], vec![1.0, -0.9, 0.5]]),
+        case("ARX, 0.999", Orders::arx(2, &[2], &[1]), &slow, [one.clone(), slow.clone()]),
+        case("ARMAX, 0.999", Orders::armax(2, &[2], 1, &[1]), &slow, [vec![1.0, 0.5], slow.clone()]),
+        case("OE, 0.999", Orders::oe(&[2], &[2], &[1]), &slow, [one.clone(), one.clone()]),
+    ]
+}
+
+/// What an identified model says, without a covariance of its offsets.
+fn fitted(record: &Record<'_>, orders: &Orders) -> Model {
+    let found = estimate(record, orders, &Method::default(), Initial::Auto).expect("the case is sound");
+    let inputs = vec![Signal::default(); orders.inputs()];
+    Model::new(orders, &found, 1.0, inputs, Signal::default()).expect("the case is sound")
+}
+
+/// How often the 95 % intervals hold the outputs that follow the log of the fit, in percent: forecasts, and predictions of a
+/// fresh log; 1, 5 and 20 steps ahead.
+fn held(case: &Case, samples: usize, runs: usize) -> [[f64; 3]; 2] {
+    const STEPS: [usize; 3] = [1, 5, 20];
+    let (mut held, mut counts) = ([[0_usize; 3]; 2], [[0_usize; 3]; 2]);
+    for seed in 0..runs as u64 {
+        let mut random = Random(11 + 7919 * seed);
+        let before = 3000;
+        let (u, e) = (random.normals(before + 2 * samples), random.normals(before + 2 * samples));
+        let (x, v) =
+            (filtered(&case.plant[0], &case.plant[1], &u), filtered(&case.noise[0], &case.noise[1], &e));
+        let y: Vec<f64> = x.iter().zip(&v).map(|(x, v)| x + v).skip(before).collect();
+        let u = &u[before..];
+        let record = Record::new(&y[..samples], vec![&u[..samples]]).expect("the case is sound");
+        let model = fitted(&record, &case.orders);
+        let start = Start::natural(&model, Horizon::Steps { steps: 1 });
+        let future = &u[samples..samples + 20];
+        let ahead = forecast(&model, &record, &[future], 20, start).expect("the case is sound");
+        let fresh = Record::new(&y[samples..], vec![&u[samples..]]).expect("the case is sound");
+        for (at, &steps) in STEPS.iter().enumerate() {
+            let error = ahead.values[steps - 1] - y[samples + steps - 1];
+            held[0][at] += usize::from(error.abs() <= QUANTILE * ahead.standard_deviations[steps - 1]);
+            counts[0][at] += 1;
+            let found = predict(&model, &fresh, steps, start).expect("the case is sound");
+            let deviations = prediction_deviations(&model, &fresh, steps, start).expect("the case is sound");
+            for t in found.counted.iter().cloned().flatten() {
+                let error = found.values[t] - fresh.output[t];
+                held[1][at] += usize::from(error.abs() <= QUANTILE * deviations[t]);
+                counts[1][at] += 1;
+            }
+        }
+    }
+    [0, 1].map(|which| [0, 1, 2].map(|at| 100.0 * held[which][at] as f64 / counts[which][at] as f64))
+}
+
+/// Whether a rate is inside, to three standard deviations of a count of `runs` more.
+fn assert_inside(what: &str, rate: f64, range: RangeInclusive<f64>, runs: usize) {
+    let more = 300.0 * (0.05_f64 * 0.95 / runs as f64).sqrt();
+    assert!(
+        (range.start() - more..=range.end() + more).contains(&rate),
+        "{what}: {rate:.1} % outside {range:?}"
+    );
+}
+
+#[test]
+fn intervals_of_predictions_hold_the_outputs() {
+    let runs = runs(60);
+    for (samples, range) in [(200, 93.0..=97.0), (50, 90.0..=97.0)] {
+        for case in cases() {
+            let [ahead, fresh] = held(&case, samples, runs);
+            eprintln!("{}, N = {samples}: forecast {ahead:.1?} %, fresh log {fresh:.1?} %", case.name);
+            for (what, rates) in [("forecast", ahead), ("fresh log", fresh)] {
+                for rate in rates {
+                    assert_inside(&format!("{}, {samples}, {what}", case.name), rate, range.clone(), runs);
+                }
+            }
+        }
+    }
+}
+
+fn holds(quantity: Option<Quantity>, truth: f64) -> bool {
+    // Without a gain there is an integrator, and nothing is said.
+    quantity.and_then(|quantity| quantity.interval).is_none_or(|Interval { lower, upper }| {
+        lower.is_none_or(|lower| lower <= truth) && upper.is_none_or(|upper| truth <= upper)
+    })
+}
+
+/// y(t) = 0.999 y(t - 1) + 0.5 u(t - 1) + e(t) around a level, which a constant input stands for.
+#[test]
+fn intervals_of_gains_hold_near_an_integrator() {
+    let (runs, samples, before) = (runs(100), 500, 3000);
+    let orders = Orders::arx(1, &[1, 1], &[1, 0]).expect("the case is sound");
+    let (mut gains, mut times) = (0, 0);
+    for seed in 0..runs as u64 {
+        let mut random = Random(5 + 7919 * seed);
+        let (u, e) = (random.normals(before + samples), random.normals(before + samples));
+        let (x, v) = (filtered(&[0.0, 0.5], &[1.0, -0.999], &u), filtered(&[1.0], &[1.0, -0.999], &e));
+        let y: Vec<f64> = x.iter().zip(&v).map(|(x, v)| 3.0 + x + v).skip(before).collect();
+        let ones = vec![1.0; samples];
+        let record = Record::new(&y, vec![&u[before..], &ones]).expect("the case is sound");
+        let model = fitted(&record, &orders);
+        gains += usize::from(holds(model.dc_gain[0], 500.0));
+        times += usize::from(holds(model.time_constants[0], -1.0 / 0.999_f64.ln()));
+    }
+    let percent = |count: usize| 100.0 * count as f64 / runs as f64;
+    eprintln!("near an integrator: gain {:.1} %, time constant {:.1} %", percent(gains), percent(times));
+    assert_inside("gain", percent(gains), 90.0..=100.0, runs);
+    assert_inside("time constant", percent(times), 90.0..=100.0, runs);
+}
+
+/// Output error in short logs: with noise of some colours, and resonant noise.
+#[test]
+fn intervals_of_output_error_hold_in_short_logs() {
+    let (runs, truth) = (runs(200), [1.0, 0.5, -1.5, 0.7]);
+    let orders = Orders::oe(&[2], &[2], &[1]).expect("the case is sound");
+    let resonant = [1.0, -2.0 * 0.95 * 0.46_f64.cos(), 0.95 * 0.95];
+    for (name, samples, noise, size, least) in [
+        ("white", 50, &[1.0][..], 1.0, 92.0),
+        ("coloured", 50, &[1.0, -0.8], 0.3, 92.0),
+        ("resonant", 200, &resonant, 0.1, 90.0),
+    ] {
+        let mut held = [0_usize; 4];
+        for seed in 0..runs as u64 {
+            let mut random = Random(1 + 7919 * seed);
+            let before = 300;
+            let u = random.normals(samples);
+            let e: Vec<f64> = random.normals(before + samples).iter().map(|e| size * e).collect();
+            let (x, v) = (filtered(&[0.0, 1.0, 0.5], &[1.0, -1.5, 0.7], &u), filtered(&[1.0], noise, &e));
+            let y: Vec<f64> = x.iter().zip(&v[before..]).map(|(x, v)| x + v).collect();
+            let record = Record::new(&y, vec![&u]).expect("the case is sound");
+            let found =
+                estimate(&record, &orders, &Method::default(), Initial::Zero).expect("the case is sound");
+            let covariance = found.covariance().expect("the case is sound");
+            for (k, held) in held.iter_mut().enumerate() {
+                let error = (found.parameters()[k] - truth[k]).abs();
+                *held += usize::from(error <= QUANTILE * covariance[k][k].sqrt());
+            }
+        }
+        let rates = held.map(|count| 100.0 * count as f64 / runs as f64);
+        eprintln!("output error, {name}, N = {samples}: {rates:.1?} %");
+        for rate in rates {
+            assert_inside(name, rate, least..=98.0, runs);
+        }
+    }
+}

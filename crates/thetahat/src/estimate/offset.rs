@@ -477,8 +477,8 @@ impl Beside {
             };
             all.covariance().map(variance).filter(|variance| *variance >= 0.0).map(f64::sqrt)
         };
-        let level = Quantity { value: level, standard_error: error(&of_level) };
-        let slope = ramp.then(|| Quantity { value: slope, standard_error: error(&of_slope) });
+        let level = Quantity::new(level, error(&of_level));
+        let slope = ramp.then(|| Quantity::new(slope, error(&of_slope)));
         let rise = slope.map_or(0.0, |slope| slope.value);
         let offset = OutputOffset {
             offset: Offset { level: level.value - rise * self.middle, slope: rise },

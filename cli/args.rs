@@ -48,7 +48,8 @@ Examples:
   thetahat fit monday.csv tuesday.csv --model oe --nb 2 --nf 2 --report model.json
   thetahat fit sunspots.csv -y count --model arma --na 2 --nc 1
   thetahat fit --grey spring.toml log.csv --report spring.json
-  thetahat fit log.csv --na 2 --nb 2 --norm 1 --bound a1=-1.9..0 --dc-gain 1..20")]
+  thetahat fit log.csv --na 2 --nb 2 --norm 1 --bound a1=-1.9..0 --dc-gain 1..20
+  thetahat fit log.csv --model oe --nb 2 --nf 2 --norm huber")]
     Fit(Box<FitArguments>),
     /// Look at a log before any fit
     ///
@@ -389,13 +390,15 @@ pub(crate) struct SearchArguments {
     pub(crate) time_limit: Option<f64>,
 }
 
-/// What to make small and what to respect, where the model is linear in its parameters.
+/// What to make small; and what to respect, where the model is linear in its parameters.
 #[derive(Debug, Args)]
-#[command(next_help_heading = "Criterion (models without C, D and F)")]
+#[command(next_help_heading = "Criterion (all but --norm for models without C, D and F)")]
 pub(crate) struct CriterionArguments {
-    /// What to make small [default: 2]
-    #[arg(long, value_enum)]
-    pub(crate) norm: Option<NormArgument>,
+    /// What to make small: 2, the sum of squared errors; 1, of absolute ones, which wild samples do not rule; huber[:K], of squares
+    /// up to K times the scale of the errors and of absolute values beyond (K = 1.345 if not said); inf, the largest error, for
+    /// models without C, D and F [default: 2]
+    #[arg(long, value_name = "2|1|huber[:K]|inf", allow_hyphen_values = true)]
+    pub(crate) norm: Option<String>,
     /// Keep a parameter in a range, either end of which may be left out, or at a value (a1=0.5)
     #[arg(long, value_name = "NAME=LOW..HIGH")]
     pub(crate) bound: Vec<String>,
@@ -932,19 +935,6 @@ pub(crate) enum MethodArgument {
     Iv,
     /// Refined instrumental variables: B and F of an oe model, whatever the noise
     Sriv,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum NormArgument {
-    /// The sum of squared errors
-    #[value(name = "2")]
-    Two,
-    /// The sum of absolute errors, which wild samples do not rule
-    #[value(name = "1")]
-    One,
-    /// The largest absolute error
-    #[value(name = "inf")]
-    Infinity,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

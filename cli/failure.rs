@@ -31,6 +31,7 @@ fn option_of(argument: &str) -> Option<&str> {
         "method",
         "nf",
         "noise-bound",
+        "norm",
         "offset",
         "poles",
         "prefilter",

@@ -173,7 +173,11 @@ fn instrumental_variables_are_not_misled_by_coloured_noise() {
 fn criteria_that_do_not_go_with_the_model_or_the_method() {
     let folder = Folder::new();
     for (options, parts) in [
-        ("--model oe --nb 2 --nf 2 --norm 1", &["--norm", "not linear"][..]),
+        ("--model oe --nb 2 --nf 2 --norm inf", &["--norm", "not linear", "--norm huber"][..]),
+        ("--model oe --nb 2 --nf 2 --norm 1 --ridge 2", &["--ridge", "not linear"]),
+        ("--na 2 --nb 2 --norm huber --ridge 2", &["--ridge", "goes with --norm 2, 1 and inf"]),
+        ("--na 2 --nb 2 --norm huber:0", &["--norm", "huber:K"]),
+        ("--na 2 --nb 2 --norm 3", &["--norm", "huber:K"]),
         ("--model armax --na 2 --nb 2 --nc 1 --bound a1=0..1", &["--bound", "not linear"]),
         ("--model armax --na 2 --nb 2 --nc 1 --dc-gain 1", &["--dc-gain", "not linear"]),
         ("--model armax --na 2 --nb 2 --nc 1 --ridge 1", &["--ridge", "not linear"]),

@@ -29,6 +29,7 @@ mod prefilter;
 mod pseudo_terminal;
 mod public_logs;
 mod report;
+mod robust;
 mod same_file;
 mod several_logs;
 mod signals;

@@ -12,7 +12,7 @@ use thetahat::figures::{error, fixed, number, scientific, short};
 use thetahat::text::harmless;
 use thetahat::{
     Algorithm, CriterionOutcome, Estimation, Fit, Initial, Interval, Model, Norm, Orders, Part, Procedure,
-    Quantity, Report, Root, Rows, SearchOutcome, Signal, Solver, Start, Stopped, Structure,
+    Quantity, Report, RobustOutcome, Root, Rows, SearchOutcome, Signal, Solver, Start, Stopped, Structure,
 };
 
 pub(crate) use filtered::filtered;
@@ -126,6 +126,7 @@ fn estimation(text: &mut Text, estimation: &Estimation, model: &Model) {
                 initial(estimation.initial, *initial_conditions)
             ));
         }
+        Procedure::Robust(found) => robust(text, found, estimation.initial),
         Procedure::Constrained(outcome) => criterion(text, outcome, model, estimation.initial),
         Procedure::PredictionError(search) => {
             text.line(&format!(
@@ -170,6 +171,26 @@ fn stopped(stopped: Stopped) -> &'static str {
         Stopped::MaxIterations => "stopped at the most iterations",
         Stopped::TimeLimit => "stopped by the time limit",
     }
+}
+
+/// What was made small where wild samples do not rule.
+fn robust(text: &mut Text, found: &RobustOutcome, start: Initial) {
+    let loss = found.k.map_or_else(
+        || "mean absolute error".to_owned(),
+        |k| format!("mean of Huber's loss with k = {}", short(k)),
+    );
+    text.line(&format!(
+        "criterion: {loss} {}; scale of the errors {}, {} % beyond {}",
+        number(found.objective),
+        number(found.scale),
+        fixed(100.0 * found.beyond, 2),
+        number(found.bound)
+    ));
+    text.line(&format!(
+        "robust prediction error, {}, {}",
+        outcome(&found.search),
+        initial(start, found.search.initial_conditions)
+    ));
 }
 
 /// What was made small and respected, and the box of all that respects it.

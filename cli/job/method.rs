@@ -1,8 +1,8 @@
-use thetahat::{Criterion, Method, Norm};
+use thetahat::{Criterion, Loss, Method, Norm, Robust};
 
 use super::orders::OrderJob;
 use super::{parsed, positive, search};
-use crate::args::{CriterionArguments, FitArguments, MethodArgument, NormArgument};
+use crate::args::{CriterionArguments, FitArguments, MethodArgument};
 use crate::failure::Failure;
 
 /// How to estimate a model of these orders.
@@ -10,21 +10,39 @@ pub(super) fn method(arguments: &FitArguments, orders: &OrderJob) -> Result<Meth
     let FitArguments { search: of_search, criterion: of_criterion, .. } = arguments;
     let method = arguments.model.method;
     let refused = |option: &str, why: &str| Err(Failure::usage(format!("{option} {why}, so leave it out")));
-    let alone = (method != MethodArgument::Pem).then_some("--method").or(given(of_criterion));
+    let norm = norm(of_criterion.norm.as_deref())?;
+    let other_norm = (norm != Asked::Convex(Norm::Two)).then_some("--norm");
+    let given = other_norm.or(given(of_criterion));
+    let alone = (method != MethodArgument::Pem).then_some("--method").or(given);
     if let Some(option) = alone.filter(|_| orders.is_choice()) {
         return Err(Failure::usage(format!(
             "{option} is for one model, and there is a choice among several; give each order one value"
         )));
     }
-    match (search::given(of_search), given(of_criterion)) {
+    let loss = match norm {
+        Asked::Loss(loss) => Some(loss),
+        Asked::Convex(Norm::One) if !orders.is_linear() => Some(Loss::Absolute),
+        Asked::Convex(_) => None,
+    };
+    match (search::given(of_search), given) {
         (Some(option), _) if method != MethodArgument::Pem => refused(option, "is for --method pem"),
         (_, Some(option)) if method != MethodArgument::Pem => refused(option, "is for --method pem"),
-        (Some(option), _) if orders.is_linear() => {
+        (Some(option), _) if orders.is_linear() && loss.is_none() => {
             refused(option, "is for models with C, D or F; this one is solved in one step")
         }
-        (_, Some(option)) if !orders.is_linear() => {
+        _ => Ok(()),
+    }?;
+    if !orders.is_linear() && norm == Asked::Convex(Norm::Infinity) {
+        return Err(Failure::usage(
+            "--norm inf is for models without C, D and F: this one is not linear in its parameters, and the criterion not \
+             convex; use --norm 1 or --norm huber",
+        ));
+    }
+    match self::given(of_criterion) {
+        Some(option) if !orders.is_linear() => {
             refused(option, "is for models without C, D and F; this one is not linear in its parameters")
         }
+        Some(option) if loss.is_some() => refused(option, "goes with --norm 2, 1 and inf"),
         _ => Ok(()),
     }?;
     let wrong = |message: &str| Err(Failure::usage(message));
@@ -38,7 +56,11 @@ pub(super) fn method(arguments: &FitArguments, orders: &OrderJob) -> Result<Meth
         }
         MethodArgument::Sriv => Ok(Method::RefinedInstrumentalVariables),
         MethodArgument::Pem => {
-            let criterion = criterion(of_criterion)?;
+            if let Some(loss) = loss {
+                return Ok(Method::Robust(Robust { loss, search: search::search(of_search)? }));
+            }
+            let Asked::Convex(norm) = norm else { return wrong("--norm: give 2, 1, huber, huber:K or inf") };
+            let criterion = criterion(of_criterion, norm)?;
             if criterion.is_plain() {
                 return Ok(Method::PredictionError(search::search(of_search)?));
             }
@@ -47,10 +69,34 @@ pub(super) fn method(arguments: &FitArguments, orders: &OrderJob) -> Result<Meth
     }
 }
 
-/// An option of the criterion that was given and is not what all models have.
+/// What to make small.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Asked {
+    Convex(Norm),
+    Loss(Loss),
+}
+
+/// 2, 1, inf, huber or huber:K.
+fn norm(text: Option<&str>) -> Result<Asked, Failure> {
+    let wrong = |text: &str| {
+        Failure::usage(format!("--norm {text}: give 2, 1, huber, huber:K with K above 0, or inf"))
+    };
+    Ok(match text {
+        None | Some("2") => Asked::Convex(Norm::Two),
+        Some("1") => Asked::Convex(Norm::One),
+        Some("inf") => Asked::Convex(Norm::Infinity),
+        Some("huber") => Asked::Loss(Loss::Huber { k: Loss::K }),
+        Some(text) => {
+            let k = text.strip_prefix("huber:").and_then(|k| k.trim().parse().ok());
+            let k = k.filter(|k: &f64| k.is_finite() && *k > 0.0).ok_or_else(|| wrong(text))?;
+            Asked::Loss(Loss::Huber { k })
+        }
+    })
+}
+
+/// An option of the criterion beside its norm that was given.
 fn given(arguments: &CriterionArguments) -> Option<&'static str> {
     let options = [
-        ("--norm", arguments.norm.is_some_and(|norm| norm != NormArgument::Two)),
         ("--bound", !arguments.bound.is_empty()),
         ("--dc-gain", !arguments.dc_gain.is_empty()),
         ("--ridge", arguments.ridge.is_some()),
@@ -59,17 +105,13 @@ fn given(arguments: &CriterionArguments) -> Option<&'static str> {
     options.into_iter().find_map(|(option, given)| given.then_some(option))
 }
 
-fn criterion(arguments: &CriterionArguments) -> Result<Criterion, Failure> {
+fn criterion(arguments: &CriterionArguments, norm: Norm) -> Result<Criterion, Failure> {
     let positive =
         |argument, value: Option<f64>| value.map(|value| positive(argument, value, "number")).transpose();
     let bounds = arguments.bound.iter().map(|text| parsed("--bound", text));
     let gains = arguments.dc_gain.iter().map(|text| parsed("--dc-gain", text));
     Ok(Criterion {
-        norm: match arguments.norm {
-            None | Some(NormArgument::Two) => Norm::Two,
-            Some(NormArgument::One) => Norm::One,
-            Some(NormArgument::Infinity) => Norm::Infinity,
-        },
+        norm,
         ridge: positive("--ridge", arguments.ridge)?.unwrap_or(0.0),
         bounds: bounds.collect::<Result<_, _>>()?,
         dc_gain: gains.collect::<Result<_, _>>()?,

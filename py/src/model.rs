@@ -94,7 +94,10 @@ impl Model {
         let known = self.unjudged.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let waits = |report: &Report| {
             report.selection.is_none()
-                && !matches!(report.estimation.procedure, Procedure::PredictionError(_))
+                && !matches!(
+                    report.estimation.procedure,
+                    Procedure::PredictionError(_) | Procedure::Robust(_)
+                )
         };
         let stored;
         let report = match &known {

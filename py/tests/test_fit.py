@@ -95,6 +95,11 @@ def test_options_reach_the_engine(log: th.Log) -> None:
     assert abs(th.arx(log, 2, 2, dc_gain={"u1": 5}).dc_gain(0)[0] - 5) < 1e-6
     for norm, said in ((1, "1"), ("1", "1"), ("inf", "inf"), (2, None), (2.0, None)):
         assert th.arx(log, 2, 2, norm=norm).document["estimation"].get("norm") == said
+    for norm, k in (("huber", 1.345), ("huber:2", 2.0), (1, None)):
+        robust = th.oe(log, 2, 2, norm=norm).document["estimation"]
+        assert (robust["method"], robust.get("k")) == ("robust", k)
+    for band, ends in (((0.01, 0.4), (0.01, 0.4)), ("..0.4", (None, 0.4)), ((0.01, None), (0.01, None))):
+        assert th.oe(log, 2, 2, prefilter=band).document["data"]["prefilter"] == dict(zip(("low", "high"), ends))
     search = th.oe(log, 2, 2, search="gauss-newton", max_iterations=50, starts=2, seed=7, tolerance=1e-10)
     assert search.document["estimation"]["algorithm"] == "gauss-newton"
     assert th.oe(log, 2, 2, initial="zero").document["estimation"]["initial"] == "zero"
@@ -152,6 +157,9 @@ BAD: list[tuple[Callable[[th.Log], Any], type[Exception], str]] = [
     (lambda log: th.arx(log, 2, 2, constant="yes", initial="zero"), ValueError, "constant"),
     (lambda log: th.arx(log, 2, 2, trend=1), TypeError, "trend: expected True or False"),  # type: ignore[arg-type]
     (lambda log: th.arx(log, 2, 2, norm=3), ValueError, "norm"),
+    (lambda log: th.oe(log, 2, 2, norm="inf"), ValueError, "norm inf is for models without C, D and F"),
+    (lambda log: th.oe(log, 2, 2, prefilter="0.4"), ValueError, "prefilter: '0.4' is no band"),
+    (lambda log: th.oe(log, 2, 2, prefilter=(0.1, 0.6)), ValueError, "prefilter: 0.6 Hz is not below 0.5 Hz"),
     (lambda log: th.arx(log, 2, 2, ridge=-1.0), ValueError, "ridge"),
     (lambda log: th.arx(log, 2, 2, ridge=np.nan), ValueError, "ridge: nan is not a finite"),
     (lambda log: th.arx(log, 2, 2, bound={"z9": 1.0}), ValueError, "z9"),

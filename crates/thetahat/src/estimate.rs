@@ -10,6 +10,7 @@ mod optimize;
 mod prediction_error;
 mod predictor;
 mod restart;
+mod robust;
 mod start;
 #[cfg(test)]
 mod tests;
@@ -32,6 +33,7 @@ pub(crate) use offset::{Beside, Fitted, OutputOffset, Task, pays, with_constants
 pub use optimize::{Algorithm, Monitor, Progress, Search, SearchOutcome, StartOutcome, Step, Stopped};
 pub(crate) use optimize::{FIRST_DAMPING, LARGEST_DAMPING, ROUNDING, SMALLEST_DAMPING};
 pub(crate) use prediction_error::{drop_is_not_for_f, stretches};
+pub use robust::{Loss, Robust, RobustOutcome};
 pub(crate) use uncertainty::{Autoregression, autoregression, backward_filtered_products};
 
 /// What stands for the samples before the first of a segment.
@@ -82,6 +84,8 @@ pub enum Procedure {
     PredictionError(SearchOutcome),
     /// By convex optimization.
     Constrained(CriterionOutcome),
+    /// By a search for the least sum of a loss that does not follow wild samples.
+    Robust(RobustOutcome),
 }
 
 /// How to estimate.
@@ -95,6 +99,8 @@ pub enum Method {
     RefinedInstrumentalVariables,
     /// Another norm of the errors, or bounds on what the parameters may be, for models that are linear in their parameters.
     Constrained(Criterion),
+    /// A loss of the prediction errors that grows like |e|, for any structure (Huber 1981).
+    Robust(Robust),
 }
 
 impl Default for Method {
@@ -167,6 +173,7 @@ pub(crate) fn estimate_of_channels(
         Method::PredictionError(search) => {
             prediction_error::prediction_error(record, orders, initial, search, monitor)
         }
+        Method::Robust(how) => robust::robust(record, orders, initial, how, monitor),
         Method::InstrumentalVariables => instrumental::instrumental_variables(record, orders, initial),
         Method::RefinedInstrumentalVariables => {
             instrumental::refined_instrumental_variables(record, orders, initial)
@@ -255,13 +262,15 @@ impl Estimate {
     }
 
     /// What the estimate from prefiltered signals says of those that are not: their noise variance, and the covariance of the
-    /// parameters with filtered errors, which have a colour where e is white. None for convex criteria.
+    /// parameters with filtered errors, which have a colour where e is white. None for convex criteria and robust
+    /// ones, but of output error.
     pub(crate) fn of_prefiltered(self, record: &Record<'_>, orders: &Orders, noise_variance: f64) -> Self {
         let covariance = match &self.procedure {
             Procedure::LeastSquares { .. } | Procedure::PredictionError(_) => {
                 prediction_error::coloured_covariance(record, orders, &self)
             }
-            Procedure::Constrained(_) => None,
+            Procedure::Robust(_) if orders.structure() == crate::Structure::Oe => self.covariance,
+            Procedure::Constrained(_) | Procedure::Robust(_) => None,
             Procedure::InstrumentalVariables { .. } | Procedure::RefinedInstrumentalVariables { .. } => {
                 self.covariance
             }

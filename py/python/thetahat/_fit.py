@@ -101,6 +101,7 @@ def armax(
     initial: str | None = None,
     constant: str | None = None,
     trend: bool | None = None,
+    norm: float | str | None = None,
     search: str | None = None,
     max_iterations: int | None = None,
     tolerance: float | None = None,
@@ -119,8 +120,8 @@ def armax(
         Coefficients of A, B and C; nb may be one for each input.
     nk : int, or one for each input
         Samples from input to first effect.
-    estimate, validate, split, detrend, offset, prefilter, initial, constant, trend, search, max_iterations, tolerance, step,
-    starts, seed, time_limit
+    estimate, validate, split, detrend, offset, prefilter, initial, constant, trend, norm, search, max_iterations, tolerance,
+    step, starts, seed, time_limit
         What to fit to and how to search, see `thetahat.FitOptions`.
 
     Returns
@@ -157,6 +158,7 @@ def oe(
     initial: str | None = None,
     constant: str | None = None,
     trend: bool | None = None,
+    norm: float | str | None = None,
     search: str | None = None,
     max_iterations: int | None = None,
     tolerance: float | None = None,
@@ -177,8 +179,8 @@ def oe(
         Coefficients of B and F.
     nk : int, or one for each input
         Samples from input to first effect.
-    estimate, validate, split, detrend, offset, prefilter, initial, constant, trend, search, max_iterations, tolerance, step,
-    starts, seed, time_limit
+    estimate, validate, split, detrend, offset, prefilter, initial, constant, trend, norm, search, max_iterations, tolerance,
+    step, starts, seed, time_limit
         What to fit to and how to search, see `thetahat.FitOptions`.
 
     Returns
@@ -216,6 +218,7 @@ def bj(
     initial: str | None = None,
     constant: str | None = None,
     trend: bool | None = None,
+    norm: float | str | None = None,
     search: str | None = None,
     max_iterations: int | None = None,
     tolerance: float | None = None,
@@ -234,8 +237,8 @@ def bj(
         Coefficients of B, C, D and F; nb and nf may be one for each input.
     nk : int, or one for each input
         Samples from input to first effect.
-    estimate, validate, split, detrend, offset, prefilter, initial, constant, trend, search, max_iterations, tolerance, step,
-    starts, seed, time_limit
+    estimate, validate, split, detrend, offset, prefilter, initial, constant, trend, norm, search, max_iterations, tolerance,
+    step, starts, seed, time_limit
         What to fit to and how to search, see `thetahat.FitOptions`.
 
     Returns
@@ -321,6 +324,7 @@ def arma(
     initial: str | None = None,
     constant: str | None = None,
     trend: bool | None = None,
+    norm: float | str | None = None,
     search: str | None = None,
     max_iterations: int | None = None,
     tolerance: float | None = None,
@@ -337,8 +341,8 @@ def arma(
         The data.
     na, nc : int
         Coefficients of A and C.
-    estimate, validate, split, detrend, offset, prefilter, initial, constant, trend, search, max_iterations, tolerance, step,
-    starts, seed, time_limit
+    estimate, validate, split, detrend, offset, prefilter, initial, constant, trend, norm, search, max_iterations, tolerance,
+    step, starts, seed, time_limit
         What to fit to and how to search, see `thetahat.FitOptions`.
 
     Returns

@@ -62,8 +62,9 @@ class FitOptions(TypedDict, total=False):
         MDL, always or never. With ``detrend="none"``, or an offset of the output by hand, "auto" is "no". It is part of ``model.offsets``, and stands with its standard error in the report.
     trend : bool
         Whether a slope of the output is estimated with the parameters too, and its level with it.
-    norm : {2, 1, "inf"}
-        What to make small, where the model is linear in its parameters: squared errors, absolute ones or the largest.
+    norm : {2, 1, "huber", "huber:K", "inf"}
+        What to make small: squared errors; absolute ones, which wild samples do not rule; squares up to K times the scale of
+        the errors and absolute values beyond (1.345); or, where the model is linear in its parameters, the largest error.
     bound : dict of str to float or (float, float)
         Ranges or values that parameters keep to, such as ``{"a1": (-1.9, 0)}``.
     dc_gain : float, (float, float) or dict

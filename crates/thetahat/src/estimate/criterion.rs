@@ -482,7 +482,7 @@ fn squares(residuals: &[f64]) -> f64 {
 
 /// s = 1/f(0) of the residuals, p of which are zero: the quotient of the difference of two quantiles and that of their
 /// levels. None if more residuals are zero than between these levels.
-fn sparsity(residuals: &[f64], parameters: usize) -> Option<f64> {
+pub(super) fn sparsity(residuals: &[f64], parameters: usize) -> Option<f64> {
     let count = residuals.len() as f64;
     let density = 1.5 / (2.0 * std::f64::consts::PI);
     let bandwidth = count.powf(-1.0 / 3.0) * NORMAL_QUANTILE.powf(2.0 / 3.0) * density.cbrt();

@@ -290,24 +290,10 @@ impl Job<'_> {
             return Err(flat(orders, &found.parameters));
         }
         let (covariance, condition) = known.map(|known| (known.covariance, known.condition)).unzip();
-        let options = self.options;
         let outcome = SearchOutcome {
-            algorithm: options.algorithm,
-            tolerance: options.tolerance,
-            max_iterations: options.max_iterations,
-            step: (options.algorithm == Algorithm::Gradient).then_some(options.step),
-            seed: (options.starts > 0).then_some(options.seed),
-            iterations: found.costs.len() - 1,
-            costs: found.costs.iter().map(|cost| cost / samples as f64).collect(),
-            gradient_norm: found.gradient_norm,
-            stopped: found.stopped,
-            stability_bound: found.stability_bound,
-            unstable_steps: found.unstable_steps,
-            initial_conditions,
             start_samples: beginning.samples,
-            start: beginning.starts.first().map(|start| start.name.clone()).unwrap_or_default(),
-            starts: beginning.starts,
             unstable_pole: beginning.unstable_pole,
+            ..search_outcome(self.options, &found, predictor, beginning.starts)
         };
         Ok(Estimate {
             parameters: found.parameters,
@@ -319,6 +305,33 @@ impl Job<'_> {
             initial,
             procedure: Procedure::PredictionError(outcome),
         })
+    }
+}
+
+/// How a search on the whole record went.
+pub(super) fn search_outcome(
+    options: &Search,
+    found: &Found,
+    predictor: &Predictor<'_>,
+    starts: Vec<StartOutcome>,
+) -> SearchOutcome {
+    SearchOutcome {
+        algorithm: options.algorithm,
+        tolerance: options.tolerance,
+        max_iterations: options.max_iterations,
+        step: (options.algorithm == Algorithm::Gradient).then_some(options.step),
+        seed: (options.starts > 0).then_some(options.seed),
+        iterations: found.costs.len() - 1,
+        costs: found.costs.iter().map(|cost| cost / predictor.samples() as f64).collect(),
+        gradient_norm: found.gradient_norm,
+        stopped: found.stopped,
+        stability_bound: found.stability_bound,
+        unstable_steps: found.unstable_steps,
+        initial_conditions: predictor.initial_conditions(),
+        start_samples: None,
+        start: starts.first().map(|start| start.name.clone()).unwrap_or_default(),
+        starts,
+        unstable_pole: None,
     }
 }
 
@@ -413,7 +426,7 @@ pub(super) fn is_determined(predictor: &Predictor<'_>) -> bool {
 }
 
 /// G^-1, and the condition number of psi. By Cholesky of the Gram matrix, or by QR where that is not exact enough.
-fn inverse(predictor: &Predictor<'_>) -> Option<(DMatrix<f64>, f64)> {
+pub(super) fn inverse(predictor: &Predictor<'_>) -> Option<(DMatrix<f64>, f64)> {
     let size = predictor.right.len();
     let matrix = DMatrix::from_row_slice(size, size, &predictor.matrix);
     let scales = matrix.diagonal().map(f64::sqrt);

@@ -31,6 +31,7 @@ mod columns;
 mod section;
 #[cfg(test)]
 mod tests;
+mod weighted;
 
 use std::ops::Range;
 
@@ -117,6 +118,8 @@ struct Layout {
     masked: usize,
     /// The first sample that counts, r or later.
     counted: usize,
+    /// From where on errors count linearly; none: they count by their squares.
+    bound: Option<f64>,
     /// Whether there are free responses that begin before it, beside the mask.
     faded: bool,
     output: usize,
@@ -201,6 +204,7 @@ impl Layout {
             products,
             masked,
             counted: counted.max(masked),
+            bound: None,
             faded: counted > masked && (0..inputs).any(|input| free(input) > 0),
             output,
             inputs: own,
@@ -215,7 +219,7 @@ impl Layout {
 }
 
 /// The prediction errors of a record as a function of the parameters. Memory is taken when it is made; nothing that it
-/// does afterwards takes more.
+/// does afterwards takes more, unless errors count linearly from somewhere on.
 #[derive(Debug)]
 pub(super) struct Predictor<'a> {
     layout: Layout,

@@ -39,8 +39,10 @@ pub(super) fn warnings(report: &Report) -> Vec<String> {
             number(largest)
         ));
     }
-    if let Procedure::PredictionError(search) = &report.estimation.procedure {
-        warnings.extend(search_warnings(search));
+    match &report.estimation.procedure {
+        Procedure::PredictionError(search) => warnings.extend(search_warnings(search)),
+        Procedure::Robust(outcome) => warnings.extend(search_warnings(&outcome.search)),
+        _ => {}
     }
     if let Some((pole, zero)) = near_cancellation(model) {
         // What A shares with C alone is in the plant all the same.

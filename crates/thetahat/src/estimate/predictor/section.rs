@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use thetahat_core::nalgebra::DMatrix;
 
-use super::{Column, Layout, Polynomials};
+use super::{Column, Layout, Polynomials, weighted};
 use crate::data::Record;
 use crate::estimate::normal;
 use crate::regression::{Interior, add_filtered, divide, divide_together, product, sum_of_squares};
@@ -175,7 +175,9 @@ impl<'a> Section<'a> {
         let (head, tail) = error.split_at_mut(layout.masked);
         head.fill(0.0);
         divide(&polynomials.c, tail);
-        self.cost = sum_of_squares(&tail[layout.counted - layout.masked..]);
+        let counted = &tail[layout.counted - layout.masked..];
+        self.cost =
+            layout.bound.map_or_else(|| sum_of_squares(counted), |bound| weighted::cost(counted, bound));
     }
 
     /// psi's signals, their Gram matrix and psi'e, at what was evaluated last.
@@ -229,6 +231,9 @@ impl<'a> Section<'a> {
             self.respond(layout, polynomials, layout.impulse, None);
         }
         self.add_up(layout);
+        if let Some(bound) = layout.bound {
+            self.weigh(layout, bound);
+        }
         self.eliminate(layout);
     }
 

@@ -121,6 +121,13 @@ fn procedure(procedure: &Procedure) -> String {
         Procedure::PredictionError(search) => {
             format!("prediction error, iterations: {}, {}", search.iterations, stopped(&search.stopped))
         }
+        Procedure::Robust(outcome) => {
+            let loss = outcome
+                .k
+                .map_or_else(|| "absolute errors".to_owned(), |k| format!("Huber's loss, k = {}", short(k)));
+            let search = &outcome.search;
+            format!("{loss}, iterations: {}, {}", search.iterations, stopped(&search.stopped))
+        }
         Procedure::Constrained(outcome) => format!("convex optimization, norm {}", outcome.norm),
     }
 }

@@ -13,8 +13,9 @@
 //! - [`Log`] holds channels on a common clock, [`Record`] the signals that an estimate sees.
 //! - [`estimate`] gives an [`Estimate`] from a [`Record`], [`Orders`] and a [`Method`]. [`arx`] is its short form for models
 //!   that are linear in their parameters; [`arx_factor`] gives a triangular factor that merges with others.
-//! - [`predict`], [`simulate`] and [`forecast`] say what a [`Model`] says, [`frequency_response`] what it is to each
-//!   frequency; [`Fit`] says how close that is.
+//! - [`predict`], [`simulate`] and [`forecast`] say what a [`Model`] says, [`draw`] what it leaves open;
+//!   [`frequency_response`], [`step_response`] and [`impulse_response`] what it is to sines, steps and impulses; [`Fit`] says
+//!   how close that is.
 //! - [`Model::state_space`] writes a model as a recursion of first order, for filters and controllers.
 //! - [`StateFilter`] estimates the state of a [`StateModel`] row by row: of a report, of matrices, or of a model in equations,
 //!   a [`GreyBox`], of which parameters may be unknown.

@@ -12,7 +12,7 @@ use crate::table;
 
 /// The option that an argument of the library is here, if it is one.
 fn option_of(argument: &str) -> Option<&str> {
-    const SAME: [&str; 32] = [
+    const SAME: [&str; 33] = [
         "alarm",
         "alpha",
         "alphas",

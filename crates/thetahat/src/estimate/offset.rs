@@ -190,7 +190,7 @@ impl Task<'_> {
         }
         match self.method {
             // These have no sum of squares that is least: the constant's own error says what it is worth.
-            Method::InstrumentalVariables | Method::RefinedInstrumentalVariables => {
+            Method::InstrumentalVariables | Method::RefinedInstrumentalVariables | Method::Robust(_) => {
                 return match self.beside(beside, None) {
                     Ok(Some((fitted, Some(worth)))) if worth > 1.0 => Ok(fitted),
                     _ => self.plain(None),

@@ -154,6 +154,12 @@ fn initial(argument: InitialArgument, orders: &OrderJob) -> Result<Initial, Fail
                 "--initial drop is for models without F, whose errors depend on few samples; use zero, estimate or auto",
             ));
         }
+        InitialArgument::Estimate if orders.is_never_filtered() => {
+            return Err(Failure::usage(
+                "--initial estimate is for models with F: without it, unknown samples reach no further than a few errors, which \
+                 drop leaves out; use drop, zero or auto",
+            ));
+        }
         InitialArgument::Auto => Initial::Auto,
         InitialArgument::Drop => Initial::Drop,
         InitialArgument::Zero => Initial::Zero,

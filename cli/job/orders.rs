@@ -164,6 +164,11 @@ impl OrderJob {
         matches!(self, Self::Given(grid) if grid.nf.iter().any(|nf| nf.first() > 0))
     }
 
+    /// Whether no model among them has F.
+    pub(crate) fn is_never_filtered(&self) -> bool {
+        matches!(self, Self::Given(grid) if grid.nf.iter().all(|nf| nf.last() == 0))
+    }
+
     /// Whether there are B and F, and nothing else.
     pub(crate) fn is_output_error(&self) -> bool {
         let alone = |grid: &Grid| [grid.na, grid.nc, grid.nd].iter().all(|range| range.last() == 0);

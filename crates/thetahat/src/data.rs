@@ -10,7 +10,7 @@ mod split;
 mod tests;
 
 pub use log::{Channel, Interpolation, Log, Record};
-pub(crate) use log::{GAP, JITTER, check, shortest};
+pub(crate) use log::{GAP, JITTER, check, measured, shortest};
 pub use prefilter::Prefilter;
 pub(crate) use prefilter::Prefiltered;
 pub use prepare::{Detrend, Offset};

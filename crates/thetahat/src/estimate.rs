@@ -24,8 +24,8 @@ use serde::{Deserialize, Serialize};
 use crate::data::Record;
 pub use crate::regression::Solver;
 use crate::{Criteria, Error, Orders};
-pub(crate) use arx::enough;
 pub use arx::{arx, arx_factor};
+pub(crate) use arx::{enough, estimate_is_for_f};
 pub(crate) use common::{Common, Point, Window, extended};
 pub use criterion::{Bound, Criterion, CriterionOutcome, GainBound, Norm};
 pub use offset::Constant;
@@ -179,7 +179,7 @@ pub(crate) fn estimate_of_channels(
             instrumental::refined_instrumental_variables(record, orders, initial)
         }
         Method::Constrained(demands) => {
-            let (initial, presample) = arx::resolved(initial);
+            let (initial, presample) = arx::resolved(initial)?;
             let found = criterion::constrained(record, inputs, orders, presample, demands)?;
             let unknown = (found.samples - found.parameters.len()) as f64;
             Ok(Estimate {

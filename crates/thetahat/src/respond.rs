@@ -34,7 +34,8 @@ pub use transient::{TransientResponse, impulse_response, step_response};
 /// What a response starts from, in the words of [`Initial`](crate::Initial) for fits.
 ///
 /// In the first r = max(na, nb + nk - 1 of the inputs without F) + nd samples of a stretch, A, B and D reach back to
-/// samples that are not there. Unless these are taken as zero, e is, and the r samples do not count.
+/// samples that are not there. Unless these are taken as zero, e is, and the r samples do not count. What [`Initial`](crate::Initial)
+/// says of them holds here too.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Start {
@@ -45,9 +46,10 @@ pub enum Start {
     /// before the segment warm them up, and without such samples their first outputs are wrong where they were not at
     /// rest.
     Drop,
-    /// The initial condition that fits best in the least-squares sense, found from the segment alone: the segment's
-    /// output in a free run, of which all samples count; the one-step predictions otherwise, and there the first r do
-    /// not count.
+    /// The initial condition that fits best in the least-squares sense: to the segment's output in a free run, of which all
+    /// samples count; to the one-step errors otherwise. The inputs that were measured directly before the segment are used, and for
+    /// predictions the outputs, as far as errors reach back to them: max(na, nb + nk - 1) + nd samples. Where there are
+    /// fewer, the first r of all these do not count in predictions.
     Estimate,
 }
 
@@ -67,12 +69,22 @@ fn history(model: &Model, segment: &Range<usize>, past: usize, ahead: usize) -> 
     segment.start - past.min(wanted)
 }
 
+/// A sum of squared errors below this fraction of the output's is rounding.
+pub(crate) const NOTHING_LEFT: f64 = 1e-28;
+
+/// Whether `more` initial conditions are worth it that lower the sum of squared errors over so many samples:
+/// N ln(V_without/V_with) > n ln N. The same rule for estimates and for what is made of them. `nothing` is a sum that is rounding.
+pub(crate) fn are_worth(samples: usize, without: f64, with: f64, more: usize, nothing: f64) -> bool {
+    let samples = samples as f64;
+    without > nothing && samples * (without / with).ln() > more as f64 * samples.ln()
+}
+
 /// A response to a record.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Response {
-    /// One value for each sample, in deviations like the record; NaN outside `counted`.
+    /// One value for each sample, in deviations like the record; NaN where there is none.
     pub values: Vec<f64>,
-    /// The samples that the response covers, as 0-based ranges.
+    /// The samples that the response covers and that have a measured output, as 0-based ranges.
     pub counted: Vec<Range<usize>>,
 }
 

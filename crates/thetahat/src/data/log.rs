@@ -25,8 +25,8 @@ pub struct Channel {
 
 /// Channels on a common, uniform clock.
 ///
-/// Time is in seconds. Where the clock jumps, or a sample is missing, a new segment starts; no method of
-/// this crate reaches across the border of two segments.
+/// Time is in seconds. Where the clock jumps, or a sample is missing, a new segment starts; no method of this crate reaches
+/// across such a border. A missing output alone is no border to models that do not need past outputs.
 ///
 /// ```
 /// use thetahat::{Channel, Log};
@@ -64,7 +64,8 @@ pub enum Interpolation {
 
 /// The signals of one experiment as estimators see them.
 ///
-/// Every segment is a range of 0-based samples inside all of the signals, without a missing value.
+/// Every segment is a range of 0-based samples inside all of the signals, without a missing value; in a record of
+/// [`Log::driven_record`] the output alone may miss some (NaN).
 #[derive(Debug, Clone)]
 pub struct Record<'a> {
     /// y(t), N values.
@@ -403,16 +404,50 @@ impl Log {
         segments
     }
 
-    /// The signals of some channels over some rows.
+    /// The signals of some channels over some rows. Segments end where a sample of any of them is missing.
     ///
     /// # Errors
     /// [`Error::Data`] for a name or rows that are not there; [`Error::Argument`] for rows that overlap.
     pub fn record(&self, inputs: &[String], output: &str, rows: &[Rows]) -> Result<Record<'_>, Error> {
-        let names: Vec<&str> = inputs.iter().map(String::as_str).chain([output]).collect();
+        self.record_between(inputs, output, rows, true)
+    }
+
+    /// The same with segments that end only where a sample of an input is missing: where the output misses one, it is NaN.
+    ///
+    /// For models of which the errors do not depend on past outputs, A = C = D = 1: they go on through such a hole, and the
+    /// errors in it do not count. And for free runs of any model.
+    ///
+    /// # Errors
+    /// As for [`record`](Self::record).
+    ///
+    /// ```
+    /// use thetahat::{Channel, Log};
+    ///
+    /// let u = Channel { name: "u".into(), values: vec![0.0, 1.0, 1.0, 2.0] };
+    /// let y = Channel { name: "y".into(), values: vec![0.0, f64::NAN, 0.5, 0.5] };
+    /// let log = Log::new(vec![u, y], 0.1)?;
+    /// let rows = ["1..4".parse()?];
+    /// assert_eq!(log.record(&["u".into()], "y", &rows)?.segments, [0..1, 2..4]);
+    /// assert_eq!(log.driven_record(&["u".into()], "y", &rows)?.segments, [0..4]);
+    /// # Ok::<(), thetahat::Error>(())
+    /// ```
+    pub fn driven_record(&self, inputs: &[String], output: &str, rows: &[Rows]) -> Result<Record<'_>, Error> {
+        self.record_between(inputs, output, rows, false)
+    }
+
+    fn record_between(
+        &self,
+        inputs: &[String],
+        output: &str,
+        rows: &[Rows],
+        measured: bool,
+    ) -> Result<Record<'_>, Error> {
         let signal = |name: &str| Ok(self.channel(name)?.values.as_slice());
-        let segments = self.segments(&names, &checked("rows", rows, self.rows)?)?;
-        let signals: Vec<&[f64]> = names.iter().map(|name| signal(name)).collect::<Result<_, Error>>()?;
-        let usable = |row: usize| signals.iter().all(|values| !values[row].is_nan());
+        let output = signal(output)?;
+        let inputs: Vec<&[f64]> = inputs.iter().map(|name| signal(name)).collect::<Result<_, Error>>()?;
+        let needed: Vec<&[f64]> = inputs.iter().copied().chain(measured.then_some(output)).collect();
+        let segments = self.segments_of(&needed, &checked("rows", rows, self.rows)?);
+        let usable = |row: usize| needed.iter().all(|values| !values[row].is_nan());
         // In one pass: the row behind the last missing sample before each segment.
         let (mut first, mut seen) = (0, 0);
         let past = segments.iter().map(|segment| {
@@ -426,10 +461,6 @@ impl Log {
             segment.start - first.max(jump)
         });
         let past = past.collect();
-        let (output, inputs) = match signals.split_last() {
-            Some((output, inputs)) => (*output, inputs.to_vec()),
-            None => return Err(Error::data("there is no output")),
-        };
         Ok(Record { output, inputs, segments, past })
     }
 
@@ -487,6 +518,20 @@ pub(crate) fn check(channels: &[Channel]) -> Result<usize, Error> {
         }
     }
     Ok(rows)
+}
+
+/// The runs of samples among `rows` in which no value is missing.
+pub(crate) fn measured(values: &[f64], rows: &Range<usize>) -> Vec<Range<usize>> {
+    let own = &values[rows.clone()];
+    if !misses(own) {
+        return if own.is_empty() { Vec::new() } else { vec![rows.clone()] };
+    }
+    let mut next = rows.start;
+    let runs = own.chunk_by(|a, b| a.is_nan() == b.is_nan()).map(|run| {
+        next += run.len();
+        (run[0].is_nan(), next - run.len()..next)
+    });
+    runs.filter(|(missing, _)| !missing).map(|(_, run)| run).collect()
 }
 
 /// Whether a value is missing.

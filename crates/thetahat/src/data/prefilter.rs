@@ -228,6 +228,15 @@ impl Prefiltered {
         Ok(record)
     }
 
+    /// The same without what stands before its segments.
+    ///
+    /// # Errors
+    /// As for [`Log::record`].
+    pub(crate) fn record_alone(&self, rows: &[Rows]) -> Result<Record<'_>, Error> {
+        let record = self.record(rows)?;
+        Ok(Record { past: vec![0; record.segments.len()], ..record })
+    }
+
     /// A word where the transient of the filter is longer than what is left out for it, in some of these rows.
     ///
     /// # Errors

@@ -1,7 +1,10 @@
+use std::borrow::Cow;
+use std::ops::Range;
+
 use thetahat_core::LeastSquares;
 use thetahat_core::nalgebra::{DMatrix, Dyn};
 
-use crate::data::Record;
+use crate::data::{Record, measured};
 use crate::estimate::{Estimate, Initial, Procedure};
 use crate::regression::{Lagged, Presample, Regression, Taps, Unsolved};
 use crate::{Error, Orders};
@@ -76,8 +79,9 @@ impl Estimate {
 pub fn arx(record: &Record<'_>, orders: &Orders, initial: Initial) -> Result<Estimate, Error> {
     linear(orders)?;
     let signals = signals(record, orders)?;
-    let (initial, presample) = resolved(initial);
-    let lagged = Lagged::new(&signals, taps(orders), &record.segments, presample);
+    let (initial, presample) = resolved(initial)?;
+    let segments = with_past(record, orders, presample);
+    let lagged = Lagged::new(&signals, taps(orders), &segments, presample);
     enough(lagged.rows(), orders)?;
     let solved = lagged.solve().map_err(|why| unsolved(why, orders))?;
     Estimate::of_regression(solved, lagged.rows(), initial)
@@ -108,7 +112,8 @@ pub fn arx_factor(
 ) -> Result<LeastSquares<f64, Dyn>, Error> {
     linear(orders)?;
     let signals = signals(record, orders)?;
-    Lagged::new(&signals, taps(orders), &record.segments, resolved(initial).1)
+    let (_, presample) = resolved(initial)?;
+    Lagged::new(&signals, taps(orders), &with_past(record, orders, presample), presample)
         .factor()
         .map_err(|error| Error::data(format!("the record cannot be factored: {error}")))
 }
@@ -125,11 +130,44 @@ pub(super) fn linear(orders: &Orders) -> Result<(), Error> {
 }
 
 /// What an initial condition means for a model without F.
-pub(super) fn resolved(initial: Initial) -> (Initial, Presample) {
+pub(super) fn resolved(initial: Initial) -> Result<(Initial, Presample), Error> {
     match initial {
-        Initial::Zero => (Initial::Zero, Presample::Zero),
-        Initial::Auto | Initial::Drop | Initial::Estimate => (Initial::Drop, Presample::Drop),
+        Initial::Zero => Ok((Initial::Zero, Presample::Zero)),
+        Initial::Auto | Initial::Drop => Ok((Initial::Drop, Presample::Drop)),
+        Initial::Estimate => Err(estimate_is_for_f()),
     }
+}
+
+pub(crate) fn estimate_is_for_f() -> Error {
+    Error::argument(
+        "initial",
+        "estimate is for models with F: without it, unknown samples reach no further than a few errors, which drop leaves \
+         out; use drop, zero or auto",
+    )
+}
+
+/// The segments with as many of the measured samples before them as a regressor reaches back to: their first row with a full
+/// regressor is then the segment's own first, if so many are there.
+///
+/// Without A a row needs no past output, and a segment ends where an output is missing only to go on behind it.
+pub(super) fn with_past<'r>(
+    record: &'r Record<'_>,
+    orders: &Orders,
+    presample: Presample,
+) -> Cow<'r, [Range<usize>]> {
+    let known = presample == Presample::Drop && record.past.iter().any(|past| *past > 0);
+    let pieces = |segment: &Range<usize>| {
+        if orders.na > 0 { vec![segment.clone()] } else { measured(record.output, segment) }
+    };
+    if orders.na > 0 && !known {
+        return Cow::Borrowed(&record.segments);
+    }
+    let reach = if presample == Presample::Drop { orders.reach() } else { 0 };
+    let each = record.segments.iter().zip(&record.past).flat_map(|(segment, past)| {
+        let first = segment.start - past;
+        pieces(segment).into_iter().map(move |piece| piece.start - reach.min(piece.start - first)..piece.end)
+    });
+    Cow::Owned(each.collect())
 }
 
 /// A matrix, row by row.

@@ -3,10 +3,11 @@
 use std::ops::Range;
 
 use super::optimize::{Deadline, Monitor, Search, best_free, search};
-use super::prediction_error::{NOTHING_LEFT, energy, is_determined};
+use super::prediction_error::{energy, is_determined};
 use super::predictor::{Begin, Polynomials, Predictor};
 use super::start::candidates;
 use crate::data::Record;
+use crate::respond::NOTHING_LEFT;
 use crate::{Error, Orders};
 
 /// A step that raises the log-likelihood by less than this fraction of one is not done.

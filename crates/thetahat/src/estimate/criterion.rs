@@ -9,7 +9,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::DVector;
 
-use super::arx::{linear, out_of_range, rows, signals, taps, unsolved};
+use super::arx::{linear, out_of_range, rows, signals, taps, unsolved, with_past};
 use super::enough;
 use crate::data::Record;
 pub use crate::regression::convex::Norm;
@@ -294,7 +294,8 @@ pub(crate) fn constrained(
         ));
     }
     let demands = Demands::new(criterion, inputs, orders)?;
-    let lagged = Lagged::new(&signals, taps(orders), &record.segments, presample);
+    let segments = with_past(record, orders, presample);
+    let lagged = Lagged::new(&signals, taps(orders), &segments, presample);
     enough(lagged.rows(), orders)?;
     let samples = lagged.rows();
 

@@ -1,6 +1,7 @@
 //! Estimates by instrumental variables: signals that go with the regressors, but not with the noise.
 
 use std::ops::Range;
+use std::slice::from_ref;
 
 use thetahat_core::LeastSquares;
 use thetahat_core::nalgebra::{DMatrix, DVector, Dyn};
@@ -61,8 +62,10 @@ pub(super) fn instrumental_variables(
             "instrumental variables are made of inputs, and this model has none; fit it by least squares",
         ));
     }
+    // Instruments begin with the segment, and so does all that is compared with them.
+    let record = &Record { past: vec![0; record.segments.len()], ..record.clone() };
     let first = arx(record, orders, initial)?;
-    let (initial, presample) = resolved(initial);
+    let (initial, presample) = resolved(initial)?;
     let data = signals(record, orders)?;
     let undetermined = || undetermined(orders);
 
@@ -91,8 +94,14 @@ pub(super) fn instrumental_variables(
     let mut products = DMatrix::zeros(parameters, parameters);
     let instruments = last.instrument_taps(0);
     for (segment, counted) in record.segments.iter().zip(&last.counted()) {
-        products +=
-            backward_filtered_products(&last.signals, &instruments, segment, counted, None, &colour.monic);
+        products += backward_filtered_products(
+            &last.signals,
+            &instruments,
+            segment,
+            from_ref(counted),
+            None,
+            &colour.monic,
+        );
     }
     let errors = stage.residuals(&theta);
     let squares = energy(&errors, &record.segments);
@@ -380,7 +389,7 @@ fn refined_from(
         let views: Vec<&[f64]> = own.iter().map(Vec::as_slice).collect();
         let (rows, combination) = (0..segment.len(), reduced.combination(position));
         products +=
-            backward_filtered_products(&views, &all_taps, &rows, &rows, combination.as_ref(), &colour.monic);
+            backward_filtered_products(&views, &all_taps, &rows, from_ref(&rows), combination.as_ref(), &colour.monic);
     }
     let variance = colour.variance * colour.inflation(samples, taken);
     let f = point.denominators.iter().flat_map(|monic| &monic[1..]);

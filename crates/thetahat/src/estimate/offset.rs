@@ -338,6 +338,9 @@ impl Task<'_> {
         let known = conditions(without) as f64;
         let from = |begin| {
             let mut predictor = Predictor::new(&record, &orders, begin);
+            if begin == Begin::Unknown && known > predictor.initial_conditions() as f64 {
+                predictor = Predictor::new(&record, &orders, Begin::UnknownInputs);
+            }
             let price = (1.0 + predictor.initial_conditions() as f64 - known) * samples.ln();
             let count = predictor.samples() as f64;
             let Ok(cost) = best_free(&mut predictor, &parameters) else { return false };
@@ -406,10 +409,14 @@ fn constant_decrease(record: &Record<'_>, orders: &Orders, estimate: &Estimate) 
     let (Some(covariance), true) = (estimate.covariance(), estimate.noise_variance() > 0.0) else {
         return 0.0;
     };
-    let skipped = if estimate.initial() == Initial::Zero { 0 } else { orders.reach() };
+    let (skipped, presample) = match estimate.initial() {
+        Initial::Zero => (0, Presample::Zero),
+        _ => (orders.reach(), Presample::Drop),
+    };
+    let segments = with_past(record, orders, presample);
     let sums = |signal: &[f64], first: usize, count: usize| {
         let mut sums = vec![0.0; count];
-        for segment in record.segments.iter().filter(|segment| segment.len() > skipped) {
+        for segment in segments.iter().filter(|segment| segment.len() > skipped) {
             // Samples before a segment are zero, or none is looked at.
             let rows = |lag: usize| {
                 let begin = (segment.start + skipped).saturating_sub(lag).max(segment.start);

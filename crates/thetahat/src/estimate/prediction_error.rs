@@ -5,22 +5,21 @@ use std::ops::Range;
 use rayon::prelude::*;
 use thetahat_core::nalgebra::{Cholesky, DMatrix, DVector};
 
-use super::arx::{arx, out_of_range, rows, signals};
+use super::arx::{arx, estimate_is_for_f, out_of_range, rows, signals};
 use super::optimize::{
     Algorithm, Deadline, Found, Monitor, Search, SearchOutcome, StartOutcome, Stopped, best_free, search,
 };
 use super::predictor::{Begin, Predictor, Unusable};
 use super::restart::restarts;
-use super::start::candidates;
+use super::start::{Candidate, candidates};
 use super::uncertainty::{autoregression, backward_filtered_products, coloured, restricted};
 use super::{Estimate, Initial, Procedure};
-use crate::data::Record;
+use crate::data::{Record, measured};
 use crate::model::{cancel, near_cancellation};
 use crate::regression::{Taps, condition, sum_of_squares};
+use crate::respond::{NOTHING_LEFT, are_worth};
 use crate::{Error, Model, Orders, Structure};
 
-/// A sum of squared errors below this fraction of the output's is rounding.
-pub(super) const NOTHING_LEFT: f64 = 1e-28;
 /// From so many samples on, starts see stretches of the record only.
 const LONG: usize = 1 << 18;
 const STRETCHES: usize = 8;
@@ -36,13 +35,16 @@ pub(crate) fn drop_is_not_for_f() -> Error {
 }
 
 /// How the initial conditions are treated.
-fn begins(orders: &Orders, initial: Initial) -> Result<(Begin, bool), Error> {
-    let filtered = orders.nf.iter().any(|&nf| nf > 0);
+fn begins(record: &Record<'_>, orders: &Orders, initial: Initial) -> Result<(Begin, bool), Error> {
+    let filtered = orders.has_f();
+    // In the middle of a log nothing is at rest.
+    let measured = record.past.iter().any(|past| *past > 0);
     match initial {
         Initial::Drop if filtered => Err(drop_is_not_for_f()),
         Initial::Zero => Ok((Begin::Zero, false)),
+        Initial::Estimate if !filtered => Err(estimate_is_for_f()),
         Initial::Drop | Initial::Estimate => Ok((Begin::Unknown, false)),
-        Initial::Auto => Ok((Begin::Unknown, filtered)),
+        Initial::Auto => Ok((Begin::Unknown, filtered && !measured)),
     }
 }
 
@@ -60,7 +62,7 @@ pub(super) fn prediction_error(
     }
     options.check(orders)?;
     signals(record, orders)?;
-    let (begin, choose) = begins(orders, initial)?;
+    let (begin, choose) = begins(record, orders, initial)?;
     let mut predictor = Predictor::new(record, orders, begin);
     enough(&predictor, orders)?;
     let energy = energy(record);
@@ -70,17 +72,30 @@ pub(super) fn prediction_error(
     let deadline = Deadline::after(options.time_limit);
     let job = Job { options, smallest: NOTHING_LEFT * energy, deadline, monitor };
     let mut beginning = job.beginning(record, orders, begin, &mut predictor)?;
-    if choose {
-        return job.choose(record, orders, predictor, beginning);
-    }
-    let initial = match begin {
-        Begin::Zero => Initial::Zero,
-        Begin::Unknown if orders.nf.iter().any(|&nf| nf > 0) => Initial::Estimate,
-        Begin::Unknown => Initial::Drop,
+    let mut reached = if choose {
+        job.choose(record, orders, predictor, &beginning)?
+    } else {
+        let initial = match begin {
+            Begin::Zero => Initial::Zero,
+            Begin::Unknown | Begin::UnknownInputs if orders.has_f() => Initial::Estimate,
+            Begin::Unknown | Begin::UnknownInputs => Initial::Drop,
+        };
+        let found = job.search_from(&mut predictor, &beginning)?.ok_or_else(|| hopeless(orders))?;
+        Reached { predictor, found, initial }
     };
-    let found = job.search_from(&mut predictor, &beginning)?.ok_or_else(|| hopeless(orders))?;
+    if begin != Begin::Zero && Predictor::has_unknown_inputs(record, orders) {
+        reached = job.with_inputs(record, orders, reached, &beginning.parameters)?;
+    }
+    let Reached { predictor, found, initial } = reached;
     beginning.reached(found.cost() / predictor.samples() as f64);
     job.finish(orders, &predictor, found, beginning, initial)
+}
+
+/// Where a search has ended. The predictor stands there.
+struct Reached<'r> {
+    predictor: Predictor<'r>,
+    found: Found,
+    initial: Initial,
 }
 
 /// What all searches of an estimate share.
@@ -142,39 +157,38 @@ impl Job<'_> {
     /// Estimates the initial conditions where that is worth its parameters: N ln(V_zero/V_estimate) > n ln N.
     ///
     /// One of the two searches is done, where a step of the other foretells that it cannot change the answer.
-    fn choose(
+    fn choose<'r>(
         &self,
-        record: &Record<'_>,
+        record: &Record<'r>,
         orders: &Orders,
-        mut estimated: Predictor<'_>,
-        mut beginning: Beginning,
-    ) -> Result<Estimate, Error> {
+        mut estimated: Predictor<'r>,
+        beginning: &Beginning,
+    ) -> Result<Reached<'r>, Error> {
         let mut resting = Predictor::new(record, orders, Begin::Zero);
-        let samples = estimated.samples() as f64;
-        let price = estimated.initial_conditions() as f64 * samples.ln();
+        let samples = estimated.samples();
         let rows = resting.samples() as f64;
+        let more = estimated.initial_conditions();
         // Costs of both kinds as means; an exact fit from rest needs no better one.
         let worth = |zero: f64, estimate: f64| {
-            zero > self.smallest && samples * ((zero / rows) / (estimate / samples)).ln() > price
+            are_worth(samples, zero / rows, estimate / samples as f64, more, self.smallest / rows)
         };
         let start = beginning.parameters.clone();
         let costs = (best_free(&mut resting, &start), best_free(&mut estimated, &start));
         let at_rest_first =
             beginning.found.is_none() && matches!(costs, (Ok(zero), Ok(free)) if !worth(zero, free));
         let mut at_rest = None;
-        if at_rest_first && let Some(found) = self.search_from(&mut resting, &beginning)? {
+        if at_rest_first && let Some(found) = self.search_from(&mut resting, beginning)? {
             let foretold = best_free(&mut estimated, &found.parameters)
                 .map_or(f64::INFINITY, |cost| cost - estimated.foretold());
             if !worth(found.cost(), foretold) {
-                beginning.reached(found.cost() / rows);
-                return self.finish(orders, &resting, found, beginning, Initial::Zero);
+                return Ok(Reached { predictor: resting, found, initial: Initial::Zero });
             }
             at_rest = Some(found);
         }
-        let free = self.search_from(&mut estimated, &beginning)?;
+        let free = self.search_from(&mut estimated, beginning)?;
         let Some(free) = free else {
             let found = at_rest.ok_or_else(|| hopeless(orders))?;
-            return self.finish(orders, &resting, found, beginning, Initial::Zero);
+            return Ok(Reached { predictor: resting, found, initial: Initial::Zero });
         };
         if at_rest.is_none() {
             let foretold = best_free(&mut resting, &free.parameters)
@@ -184,11 +198,59 @@ impl Job<'_> {
             }
         }
         if let Some(found) = at_rest.filter(|found| !worth(found.cost(), free.cost())) {
-            beginning.reached(found.cost() / rows);
-            return self.finish(orders, &resting, found, beginning, Initial::Zero);
+            return Ok(Reached { predictor: resting, found, initial: Initial::Zero });
         }
-        beginning.reached(free.cost() / samples);
-        self.finish(orders, &estimated, free, beginning, Initial::Estimate)
+        Ok(Reached { predictor: estimated, found: free, initial: Initial::Estimate })
+    }
+
+    /// Estimates what inputs before the record have done where that is worth its parameters, beside the other initial conditions.
+    ///
+    /// No search is done where a step foretells that it cannot change the answer.
+    fn with_inputs<'r>(
+        &self,
+        record: &Record<'r>,
+        orders: &Orders,
+        reached: Reached<'r>,
+        start: &[f64],
+    ) -> Result<Reached<'r>, Error> {
+        let mut wide = Predictor::new(record, orders, Begin::UnknownInputs);
+        let samples = wide.samples();
+        let mean = |cost: f64, predictor: &Predictor<'_>| cost / predictor.samples() as f64;
+        let (given, few) =
+            (mean(reached.found.cost(), &reached.predictor), reached.predictor.initial_conditions());
+        let unknown = wide.initial_conditions();
+        let worth = |without: f64, with: f64, few: usize| {
+            unknown > few
+                && samples > orders.parameters() + unknown
+                && are_worth(samples, without, with, unknown - few, self.smallest / samples as f64)
+        };
+        let mut best: Option<(f64, &[f64])> = None;
+        for parameters in [&reached.found.parameters, start] {
+            let foretold = best_free(&mut wide, parameters).map(|cost| cost - wide.foretold());
+            if let Ok(foretold) = foretold
+                && best.is_none_or(|(least, _)| foretold < least)
+            {
+                best = Some((foretold, parameters));
+            }
+        }
+        let Some((_, start)) = best.filter(|(foretold, _)| worth(given, mean(*foretold, &wide), few)) else {
+            return Ok(reached);
+        };
+        let Ok(found) = self.search(&mut wide, start)? else { return Ok(reached) };
+        let with = mean(found.cost(), &wide);
+        if !worth(given, with, few) {
+            return Ok(reached);
+        }
+        // Not a better place alone.
+        let mut narrow = Predictor::new(record, orders, Begin::Unknown);
+        let same_place = best_free(&mut narrow, &found.parameters);
+        if let Ok(cost) = same_place
+            && !worth(mean(cost, &narrow), with, narrow.initial_conditions())
+            && let Ok(found) = self.search(&mut narrow, &found.parameters)?
+        {
+            return Ok(Reached { predictor: narrow, found, initial: Initial::Estimate });
+        }
+        Ok(Reached { predictor: wide, found, initial: Initial::Estimate })
     }
 
     fn search(
@@ -211,7 +273,7 @@ impl Job<'_> {
         let samples = predictor.samples() as f64;
         let mut starts = Vec::new();
         let guess = self.options.guess.iter().map(|guess| ("guess", guess.clone()));
-        let found = match candidates(record, orders, self.deadline) {
+        let found = match filled_candidates(record, orders, self.deadline) {
             Err(error) if self.options.guess.is_none() => return Err(error),
             found => found.unwrap_or_default(),
         };
@@ -397,6 +459,11 @@ pub(super) fn coloured_covariance(
 ) -> Option<Vec<Vec<f64>>> {
     let begin = if estimate.initial() == Initial::Zero { Begin::Zero } else { Begin::Unknown };
     let mut predictor = Predictor::new(record, orders, begin);
+    if let Procedure::PredictionError(outcome) = estimate.procedure()
+        && outcome.initial_conditions > predictor.initial_conditions()
+    {
+        predictor = Predictor::new(record, orders, Begin::UnknownInputs);
+    }
     best_free(&mut predictor, estimate.parameters()).ok()?;
     predictor.linearize();
     let (inverse, _) = inverse(&predictor)?;
@@ -415,7 +482,7 @@ pub(super) fn backward_products(segments: &[Vec<Vec<f64>>], monic: &[f64]) -> DM
     for columns in segments {
         let signals: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
         let all = 0..signals.first().map_or(0, |column| column.len());
-        sum += backward_filtered_products(&signals, &taps, &all, &all, None, monic);
+        sum += backward_filtered_products(&signals, &taps, &all, std::slice::from_ref(&all), None, monic);
     }
     sum
 }
@@ -485,7 +552,48 @@ pub(crate) fn stretches<'a>(record: &Record<'a>, count: usize, length: usize) ->
 
 /// The sum of squares of the output over all segments.
 pub(super) fn energy(record: &Record<'_>) -> f64 {
-    record.segments.iter().map(|segment| sum_of_squares(&record.output[segment.clone()])).sum()
+    let square = |rows: &Range<usize>| sum_of_squares(&record.output[rows.clone()]);
+    let whole: f64 = record.segments.iter().map(square).sum();
+    if !whole.is_nan() {
+        return whole;
+    }
+    record
+        .segments
+        .iter()
+        .flat_map(|segment| measured(record.output, segment))
+        .map(|rows| square(&rows))
+        .sum()
+}
+
+/// The starts for a record of which outputs may be missing: on lines from one measured output to the next. They need to lead
+/// near the minimum, no more.
+fn filled_candidates(
+    record: &Record<'_>,
+    orders: &Orders,
+    deadline: Deadline,
+) -> Result<Vec<Candidate>, Error> {
+    let runs = |segment: &Range<usize>| measured(record.output, segment);
+    let whole = |segment: &Range<usize>| runs(segment).first() == Some(segment);
+    if orders.needs_past_outputs() || record.segments.iter().all(whole) {
+        return candidates(record, orders, deadline);
+    }
+    let mut output = record.output.to_vec();
+    let mut segments = Vec::new();
+    for segment in &record.segments {
+        let runs = runs(segment);
+        for pair in runs.windows(2) {
+            let (left, right) = (pair[0].end - 1, pair[1].start);
+            let slope = (output[right] - output[left]) / (right - left) as f64;
+            for row in left + 1..right {
+                output[row] = output[left] + slope * (row - left) as f64;
+            }
+        }
+        if let (Some(first), Some(last)) = (runs.first(), runs.last()) {
+            segments.push(first.start..last.end);
+        }
+    }
+    let past = vec![0; segments.len()];
+    candidates(&Record { output: &output, inputs: record.inputs.clone(), segments, past }, orders, deadline)
 }
 
 /// There must be more samples that count than parameters and initial conditions.

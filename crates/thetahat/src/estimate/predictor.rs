@@ -15,17 +15,23 @@
 //! So an iteration filters once for each polynomial, and the Gram matrix of psi comes from lagged products of these
 //! signals: O(N p), and no matrix of N rows.
 //!
-//! A segment starts with samples that nothing is known of. What they do to x_j is a combination of free responses
-//! q^-i (1/F_j) delta, i = 0, 1, …, with weights that are estimated too, apart for each segment: they enter e linearly and are
-//! eliminated from the normal equations. For the other polynomials v = D w is set to zero in the first r samples, which
-//! do not count; nor need some after them, while what 1/C makes of that dies away. Then psi is a shifted copy only up to what the mask cuts off. With z the signal before the mask and g the impulse
-//! response of 1/C from sample r on,
+//! A section is a segment with the measured samples directly before it that its errors reach back to, as far as they are
+//! there. Samples before the section are unknown, and zero in all that follows. What they do to x_j is a combination of free
+//! responses q^-i (1/F_j) delta, i = s, s + 1, …, with weights that are estimated too, apart for each section: they enter e
+//! linearly and are eliminated from the normal equations. The first error that counts needs x_j from sample s on: nf of them are
+//! enough where the inputs from nb + nk - 1 samples before s on are known or taken to be zero, and one more for each unknown
+//! one is needed where not. The other polynomials reach back to nothing unknown in the samples that count; where there is C,
+//! v = D w is set to zero in the r samples before these. Then psi is a shifted copy only up to what the mask cuts off. With z the
+//! signal before the mask and g the impulse response of 1/C from sample r on,
 //!
 //! ```text
 //! (1/C) mask(q^-i z) = q^-i (1/C) mask(z) + sum_{k < i} z(r + k - i) q^-k g,
 //! ```
 //!
 //! so that shifts of g complete the Gram matrix exactly.
+//!
+//! Without A, C and D an error depends on the output of its own sample only. A section goes on through missing outputs then: the
+//! samples that count are several runs, with a part of the Gram matrix each.
 
 mod columns;
 mod section;
@@ -41,7 +47,7 @@ use thetahat_core::nalgebra::{Cholesky, DMatrix, Dyn};
 
 use super::uncertainty::{backward_filtered_products, columns};
 use crate::Orders;
-use crate::data::Record;
+use crate::data::{Record, measured};
 use crate::model::polynomial::is_stable;
 use crate::regression::{Products, Taps, factor_rows};
 use section::Section;
@@ -114,13 +120,16 @@ struct Layout {
     products: Products,
     parameters: usize,
     free: usize,
-    /// r, the first samples in which e = 0.
+    /// How many of the free responses each input has, and the sample of the section that the first begins at.
+    own_free: Vec<usize>,
+    origin: usize,
+    /// r, the first samples of the section in which v = 0; none without C.
     masked: usize,
     /// The first sample that counts, r or later.
     counted: usize,
     /// From where on errors count linearly; none: they count by their squares.
     bound: Option<f64>,
-    /// Whether there are free responses that begin before it, beside the mask.
+    /// Whether there are free responses that begin long before it.
     faded: bool,
     output: usize,
     inputs: Vec<usize>,
@@ -148,16 +157,38 @@ struct Column {
 pub(super) enum Begin {
     /// All earlier samples are zero, and all samples count.
     Zero,
-    /// Nothing is known of earlier samples.
+    /// Nothing is known of earlier samples but those that were measured; inputs before these are zero.
     Unknown,
+    /// The same, and inputs before those that were measured are unknown too.
+    UnknownInputs,
+}
+
+/// Samples that are left out in each segment, whatever the model and what is known of its past: the first ones in which v = 0, and
+/// the first that counts.
+#[derive(Debug, Clone, Copy)]
+struct Common {
+    silent: usize,
+    counted: usize,
 }
 
 impl Layout {
-    fn new(orders: &Orders, begin: Begin, silent: usize, counted: usize) -> Self {
+    /// That of sections that begin `past` samples before their segment.
+    fn new(orders: &Orders, begin: Begin, past: usize, common: Option<Common>) -> Self {
         let inputs = orders.inputs();
-        let unknown = begin == Begin::Unknown;
-        let masked = if unknown { silent.max(orders.conditioned()) } else { 0 };
-        let free = |input: usize| if unknown { orders.free_responses(input) } else { 0 };
+        let unknown = begin != Begin::Zero;
+        let silent = common.map_or(past, |common| common.silent);
+        let skipped = if unknown { silent.max(orders.conditioned()) } else { 0 };
+        let masked = if orders.nc > 0 { skipped } else { 0 };
+        let counted = common.map_or(skipped, |common| common.counted.max(skipped));
+        // Responses begin with the section where nothing is known of it; models on common samples have responses of the same age.
+        let at_rest = begin == Begin::Unknown && past == 0;
+        let origin = if unknown && common.is_none() && !at_rest { skipped - orders.nd } else { 0 };
+        let free = |input: usize| match begin {
+            Begin::Zero => 0,
+            Begin::Unknown => orders.free_responses(input),
+            Begin::UnknownInputs => orders.free_responses_and_inputs(input, origin),
+        };
+        let own_free: Vec<usize> = (0..inputs).map(free).collect();
         let mut signals = 1;
         let mut next = || {
             signals += 1;
@@ -176,8 +207,8 @@ impl Layout {
         taps.push(Taps { signal: disturbance, first: 1, count: orders.nd, sign: -1.0 });
         let f = responses.iter().zip(&orders.nf);
         taps.extend(f.map(|(&signal, &count)| Taps { signal, first: 1, count, sign: -1.0 }));
-        let zero = frees.iter().enumerate();
-        taps.extend(zero.map(|(input, &signal)| Taps { signal, first: 0, count: free(input), sign: 1.0 }));
+        let zero = frees.iter().zip(&own_free);
+        taps.extend(zero.map(|(&signal, &count)| Taps { signal, first: 0, count, sign: 1.0 }));
         let used = taps.iter().filter(|taps| taps.count > 0);
         let longest = used.map(|taps| taps.first + taps.count - 1).max().unwrap_or(0);
         let corrections = if masked > 0 { longest } else { 0 };
@@ -198,14 +229,16 @@ impl Layout {
             with_noise_denominator: all().filter(used).collect(),
             columns: columns.collect(),
             parameters: orders.parameters(),
-            free: (0..inputs).map(free).sum(),
+            free: own_free.iter().sum(),
+            faded: counted > skipped && own_free.iter().any(|&free| free > 0),
+            own_free,
+            origin,
             orders: orders.clone(),
             taps,
             products,
             masked,
-            counted: counted.max(masked),
+            counted,
             bound: None,
-            faded: counted > masked && (0..inputs).any(|input| free(input) > 0),
             output,
             inputs: own,
             error,
@@ -222,7 +255,8 @@ impl Layout {
 /// does afterwards takes more, unless errors count linearly from somewhere on.
 #[derive(Debug)]
 pub(super) struct Predictor<'a> {
-    layout: Layout,
+    /// One for each past that sections have; mostly one.
+    layouts: Vec<Layout>,
     polynomials: Polynomials,
     /// -B, for the inputs without F.
     negative: Vec<Vec<f64>>,
@@ -235,12 +269,44 @@ pub(super) struct Predictor<'a> {
 }
 
 impl<'a> Predictor<'a> {
-    /// Segments without a sample that counts, or with no more than the free responses need, are left out.
+    /// Segments without more samples that count than they have free responses are left out.
     pub(super) fn new(record: &Record<'a>, orders: &Orders, begin: Begin) -> Self {
-        Self::counting(record, orders, begin, 0, 0)
+        let mut layouts = Vec::new();
+        let mut sections = Vec::with_capacity(record.segments.len());
+        for (segment, past) in record.segments.iter().zip(&record.past) {
+            let past = if begin == Begin::Zero { 0 } else { orders.history().min(*past) };
+            let rows = segment.start - past..segment.end;
+            // Where earlier inputs would be too many unknowns they are zero.
+            for begin in [begin, Begin::Unknown] {
+                let index = layout_of(&mut layouts, orders, begin, past);
+                let (_, layout) = &layouts[index];
+                let runs = runs(record, orders, &rows, layout.counted);
+                if runs.iter().map(Range::len).sum::<usize>() > layout.free {
+                    sections.push(Section::new(record, &rows, runs, layout, index));
+                    break;
+                }
+                if begin != Begin::UnknownInputs {
+                    break;
+                }
+            }
+        }
+        Self::of_sections(orders, layouts.into_iter().map(|(_, layout)| layout).collect(), sections)
     }
 
-    /// The same with e = 0 in so many first samples of each segment, or more; and so many of them, or more, do not count.
+    /// Whether there are more initial conditions where inputs before those that were measured are unknown.
+    pub(super) fn has_unknown_inputs(record: &Record<'_>, orders: &Orders) -> bool {
+        let mut pasts = record.past.clone();
+        pasts.iter_mut().for_each(|past| *past = orders.history().min(*past));
+        pasts.sort_unstable();
+        pasts.dedup();
+        let free = |begin, past| Layout::new(orders, begin, past, None).free;
+        orders.has_f()
+            && pasts.iter().any(|past| free(Begin::UnknownInputs, *past) > free(Begin::Unknown, *past))
+    }
+
+    /// The samples that are the same for all models: in so many first samples of each segment, or more, e = 0, and so many of them,
+    /// or more, do not count. Segments without a sample that counts, or with no more than the free responses need, are left out.
+    /// What was measured before a segment is not used.
     pub(super) fn counting(
         record: &Record<'a>,
         orders: &Orders,
@@ -248,20 +314,27 @@ impl<'a> Predictor<'a> {
         silent: usize,
         counted: usize,
     ) -> Self {
-        let layout = Layout::new(orders, begin, silent, counted);
+        let layout = Layout::new(orders, begin, 0, Some(Common { silent, counted }));
         let needed = layout.counted.max(layout.free);
         let usable = record.segments.iter().filter(|segment| segment.len() > needed);
-        let sections: Vec<Section<'a>> =
-            usable.clone().map(|segment| Section::new(record, segment, &layout)).collect();
-        let parameters = layout.parameters;
+        let section = |segment: &Range<usize>| {
+            let runs = std::iter::once(layout.counted..segment.len()).collect();
+            Section::new(record, segment, runs, &layout, 0)
+        };
+        let sections = usable.map(section).collect();
+        Self::of_sections(orders, vec![layout], sections)
+    }
+
+    fn of_sections(orders: &Orders, layouts: Vec<Layout>, sections: Vec<Section<'a>>) -> Self {
+        let parameters = orders.parameters();
         Self {
-            samples: usable.map(|segment| segment.len() - layout.counted).sum(),
+            samples: sections.iter().flat_map(|section| &section.runs).map(Range::len).sum(),
             polynomials: Polynomials::new(orders, &vec![0.0; parameters]),
             negative: orders.nb.iter().map(|&nb| vec![0.0; nb]).collect(),
             stability: Vec::with_capacity(orders.nf.iter().copied().fold(orders.nc, usize::max)),
             matrix: vec![0.0; parameters * parameters],
             right: vec![0.0; parameters],
-            layout,
+            layouts,
             sections,
         }
     }
@@ -273,13 +346,14 @@ impl<'a> Predictor<'a> {
 
     /// The initial conditions of all segments.
     pub(super) fn initial_conditions(&self) -> usize {
-        self.layout.free * self.sections.len()
+        self.sections.iter().map(|section| section.free.len()).sum()
     }
 
     /// ln det(I + `ratio` G) of the free responses' part G of the Gram matrix, at the current point, over all segments.
     pub(super) fn free_information(&self, ratio: f64) -> f64 {
-        let (parameters, free) = (self.layout.parameters, self.layout.free);
+        let parameters = self.right.len();
         let of = |section: &Section<'_>| {
+            let free = section.free.len();
             let entry =
                 |i: usize, j: usize| section.gram[(parameters + i) * (parameters + free) + parameters + j];
             let one = DMatrix::identity(free, free);
@@ -304,8 +378,9 @@ impl<'a> Predictor<'a> {
     /// Where samples after the mask do not count, at the weights that are best.
     pub(super) fn evaluate(&mut self, parameters: &[f64]) -> Result<f64, Unusable> {
         self.set(parameters)?;
-        let (layout, polynomials, negative) = (&self.layout, &self.polynomials, &self.negative);
+        let (layouts, polynomials, negative) = (&self.layouts, &self.polynomials, &self.negative);
         let each = |section: &mut Section<'_>| {
+            let layout = &layouts[section.layout];
             if layout.faded {
                 section.project(layout, polynomials, negative);
             }
@@ -334,8 +409,9 @@ impl<'a> Predictor<'a> {
     /// Takes what was evaluated last as the current point, and forms the normal equations there. Gives by how much the
     /// free responses alone can lower the cost.
     pub(super) fn linearize(&mut self) -> f64 {
-        let (layout, polynomials) = (&self.layout, &self.polynomials);
+        let (layouts, polynomials) = (&self.layouts, &self.polynomials);
         let each = |section: &mut Section<'_>| {
+            let layout = &layouts[section.layout];
             section.free.copy_from_slice(&section.trial);
             section.linearize(layout, polynomials);
         };
@@ -347,7 +423,7 @@ impl<'a> Predictor<'a> {
         self.matrix.fill(0.0);
         self.right.fill(0.0);
         for section in &self.sections {
-            section.add_normal(layout, &mut self.matrix, &mut self.right);
+            section.add_normal(&self.layouts[section.layout], &mut self.matrix, &mut self.right);
         }
         self.sections.iter().map(|section| section.free_gain).sum()
     }
@@ -355,9 +431,11 @@ impl<'a> Predictor<'a> {
     /// The errors that count, and the stretches of them that follow one another.
     pub(super) fn residuals(&self) -> (Vec<f64>, Vec<Range<usize>>) {
         let mut residuals = Vec::with_capacity(self.samples);
-        let segments = self.sections.iter().map(|section| {
+        let runs =
+            self.sections.iter().flat_map(|section| section.runs.iter().map(move |run| (section, run)));
+        let segments = runs.map(|(section, run)| {
             let first = residuals.len();
-            residuals.extend_from_slice(&section.signals[0][self.layout.counted..]);
+            residuals.extend_from_slice(&section.signals[0][run.clone()]);
             first..residuals.len()
         });
         let segments = segments.collect();
@@ -367,29 +445,31 @@ impl<'a> Predictor<'a> {
     /// psi without the free responses over the samples that count, a list for each parameter. For models of output error, at the
     /// current point.
     pub(super) fn sensitivities(&self) -> Vec<Vec<f64>> {
-        let (parameters, free) = (self.layout.parameters, self.layout.free);
+        let parameters = self.right.len();
         let mut all = vec![Vec::with_capacity(self.samples); parameters];
         for section in &self.sections {
             let signals: Vec<&[f64]> = section.signals.iter().map(Vec::as_slice).collect();
-            let (whole, rows) = (0..section.output.len(), self.layout.counted..section.output.len());
-            let combination = section.without_free(parameters, free);
-            let own = columns(&signals, &self.layout.taps, &whole, &rows, Some(&combination));
-            all.iter_mut().zip(own).for_each(|(all, own)| all.extend(own));
+            let (whole, taps) = (0..section.output.len(), &self.layouts[section.layout].taps);
+            let combination = section.without_free(parameters, section.free.len());
+            for run in &section.runs {
+                let own = columns(&signals, taps, &whole, run, Some(&combination));
+                all.iter_mut().zip(own).for_each(|(all, own)| all.extend(own));
+            }
         }
         all
     }
 
-    /// sum zeta zeta' over all samples, zeta being psi without the free responses, filtered backwards in time by
-    /// 1/A(q^+1), A = `monic`. For models of output error, at the current point.
+    /// sum zeta zeta' over all samples, zeta being psi without the free responses, zero where samples do not count, filtered
+    /// backwards in time by 1/A(q^+1), A = `monic`. For models of output error, at the current point.
     pub(super) fn backward_filtered_products(&self, monic: &[f64]) -> DMatrix<f64> {
-        let (parameters, free) = (self.layout.parameters, self.layout.free);
+        let parameters = self.right.len();
         let mut sum = DMatrix::zeros(parameters, parameters);
         for section in &self.sections {
-            let combination = section.without_free(parameters, free);
+            let combination = section.without_free(parameters, section.free.len());
             let signals: Vec<&[f64]> = section.signals.iter().map(Vec::as_slice).collect();
             let all = 0..section.output.len();
-            let taps = &self.layout.taps;
-            sum += backward_filtered_products(&signals, taps, &all, &all, Some(&combination), monic);
+            let taps = &self.layouts[section.layout].taps;
+            sum += backward_filtered_products(&signals, taps, &all, &section.runs, Some(&combination), monic);
         }
         sum
     }
@@ -400,12 +480,13 @@ impl<'a> Predictor<'a> {
     /// # Errors
     /// If an entry is not finite, or too large for squares to be summed without overflow.
     pub(super) fn factor(&self) -> Result<LeastSquares<f64, Dyn>, thetahat_core::Error> {
-        let layout = &self.layout;
-        let (parameters, free) = (layout.parameters, layout.free);
-        let count = parameters + free;
-        let (columns, shifts) = layout.columns.split_at(count);
+        let parameters = self.right.len();
         let mut whole = LeastSquares::with_size(Dyn(parameters));
         for section in &self.sections {
+            let layout = &self.layouts[section.layout];
+            let free = layout.free;
+            let count = parameters + free;
+            let (columns, shifts) = layout.columns.split_at(count);
             let entry = |row: usize, column: usize| {
                 // The free responses come first: what is left of the parameters stands below them in the factor.
                 let index = if column < free { parameters + column } else { column - free };
@@ -420,8 +501,8 @@ impl<'a> Predictor<'a> {
                     shifts.iter().zip(weights).map(|(shift, weight)| weight * at(shift.signal, shift.lag));
                 sign * at(*signal, *lag) + corrections.sum::<f64>()
             };
-            let rows = layout.counted..section.output.len();
-            let own = factor_rows(rows.clone(), entry, count + 1)?;
+            let rows: Vec<usize> = section.runs.iter().cloned().flatten().collect();
+            let own = factor_rows(0..rows.len(), |number, column| entry(rows[number], column), count + 1)?;
             let triangle = own.factor().view((free, free), (parameters, parameters)).into_owned();
             let rotated = own.rotated_output().rows(free, parameters).into_owned();
             whole.merge(&LeastSquares::from_factor(
@@ -443,6 +524,27 @@ impl<'a> Predictor<'a> {
     pub(super) fn keep_free(&mut self) {
         self.sections.iter_mut().for_each(|section| section.trial.copy_from_slice(&section.free));
     }
+}
+
+/// Where the layout of sections with this past stands; it is made where there is none yet.
+fn layout_of(
+    layouts: &mut Vec<((Begin, usize), Layout)>,
+    orders: &Orders,
+    begin: Begin,
+    past: usize,
+) -> usize {
+    let known = layouts.iter().position(|(key, _)| *key == (begin, past));
+    known.unwrap_or_else(|| {
+        layouts.push(((begin, past), Layout::new(orders, begin, past, None)));
+        layouts.len() - 1
+    })
+}
+
+/// The samples of a section that count, from one on: those with a measured output.
+fn runs(record: &Record<'_>, orders: &Orders, rows: &Range<usize>, first: usize) -> Vec<Range<usize>> {
+    let counted = (rows.start + first).min(rows.end)..rows.end;
+    let runs = if orders.needs_past_outputs() { vec![counted] } else { measured(record.output, &counted) };
+    runs.into_iter().map(|run| run.start - rows.start..run.end - rows.start).collect()
 }
 
 /// Why parameters have no cost.

@@ -239,7 +239,8 @@ pub(super) fn columns(
     combined.collect()
 }
 
-/// sum zeta zeta' over the samples `rows`, where zeta = `combination` psi filtered backwards in time by 1/A(q^+1):
+/// sum zeta zeta' over the samples from the first to the last of `runs`, where zeta = `combination` psi, zero outside the runs,
+/// filtered backwards in time by 1/A(q^+1):
 ///
 /// ```text
 /// zeta(t) = M psi(t) - a1 zeta(t + 1) - … - an zeta(t + n),   zeta = 0 behind the last sample
@@ -251,7 +252,7 @@ pub(crate) fn backward_filtered_products(
     signals: &[&[f64]],
     taps: &[Taps],
     segment: &Range<usize>,
-    rows: &Range<usize>,
+    runs: &[Range<usize>],
     combination: Option<&DMatrix<f64>>,
     monic: &[f64],
 ) -> DMatrix<f64> {
@@ -262,19 +263,25 @@ pub(crate) fn backward_filtered_products(
     let size = combination.map_or(columns.len(), DMatrix::nrows);
     let weights = monic.get(1..).unwrap_or(&[]);
     let mut products = DMatrix::zeros(size, size);
+    let (Some(start), Some(last)) = (runs.first(), runs.last()) else { return products };
+    let (start, mut end) = (start.start, last.end);
     let mut raw = vec![Vec::with_capacity(ROWS); columns.len()];
     let mut combined = vec![Vec::with_capacity(ROWS); size];
     // The zeta behind each block, the earliest last.
     let mut behind: Vec<Vec<f64>> = vec![Vec::new(); size];
-    let mut end = rows.end;
-    while end > rows.start {
-        let first = end.saturating_sub(ROWS).max(rows.start);
+    while end > start {
+        let first = end.saturating_sub(ROWS).max(start);
         for (values, &(signal, lag, sign)) in raw.iter_mut().zip(&columns) {
             values.clear();
             // Backwards, so that the recursion runs forwards.
             let known = (segment.start + lag).clamp(first, end);
             values.extend((known..end).rev().map(|row| sign * signal[row - lag]));
             values.resize(end - first, 0.0);
+            let next = runs.partition_point(|run| run.end <= first);
+            let gaps = runs[next..].windows(2).map(|pair| pair[0].end..pair[1].start);
+            for gap in gaps.take_while(|gap| gap.start < end) {
+                values[end - gap.end.min(end)..end - gap.start].fill(0.0);
+            }
         }
         let filtered = match combination {
             None => &mut raw,

@@ -227,11 +227,32 @@ impl Orders {
         direct.map(|input| self.input_reach(input)).fold(self.na, usize::max) + self.nd
     }
 
+    /// How many samples before a segment its errors reach back to: max(na, nb + nk - 1 of all inputs) + nd. With so many known,
+    /// all samples of the segment have an error.
+    pub(crate) fn history(&self) -> usize {
+        self.reach() + self.nd
+    }
+
+    /// Whether errors depend on past outputs. If not, A = C = D = 1, a missing output is a missing error and nothing more.
+    pub(crate) fn needs_past_outputs(&self) -> bool {
+        self.na + self.nc + self.nd > 0
+    }
+
+    /// Whether an input has F.
+    pub(crate) fn has_f(&self) -> bool {
+        self.nf.iter().any(|&nf| nf > 0)
+    }
+
     /// The number of free responses of 1/F for an input: what unknown samples before a segment do to B/F u is, from sample
-    /// nb + nk - 1 on, a combination of nf of them. Before that earlier inputs are taken to be zero, the mean: one more
-    /// unknown for each would cost more than it explains.
+    /// nb + nk - 1 on, a combination of nf of them. Before that earlier inputs are taken to be zero, the mean.
     pub(crate) fn free_responses(&self, input: usize) -> usize {
         self.nf[input]
+    }
+
+    /// The same where earlier inputs are not taken to be zero: max(nf, nb + nk - 1), the first `known` inputs being known.
+    pub(crate) fn free_responses_and_inputs(&self, input: usize, known: usize) -> usize {
+        let nf = self.nf[input];
+        if nf == 0 { 0 } else { nf.max(self.input_reach(input).saturating_sub(known)) }
     }
 
     /// The parameters' names in their order: a, b of each input, c, d, f of each input.

@@ -9,7 +9,8 @@ pub struct Applied {
     /// The measured output, one value for each row of the log; NaN where it is missing. None if the log has no output.
     pub measured: Option<Vec<f64>>,
     /// The response, one value for each row of the log and then for each of the `beyond` rows behind it; NaN outside the
-    /// rows asked for, in gaps, and before a start.
+    /// rows asked for, in gaps, and before a start. Gaps of the output alone are none for free runs, and for models without A,
+    /// C and D.
     pub predicted: Vec<f64>,
     /// The standard deviations of the errors of `predicted`, those of the parameters among them, for the steps that each value
     /// looks ahead, as [`prediction_deviations`](crate::prediction_deviations) and [`forecast`](crate::forecast) have them;
@@ -31,7 +32,8 @@ pub struct Applied {
 /// A prediction k steps ahead is also a forecast of the k samples behind the last usable row, each as many steps
 /// ahead as it lies behind that row: of rows asked for that have the inputs but not the output, and, for a model that
 /// no input drives and if the log's last row was asked for, of rows behind the log's end, in its own time step. There
-/// is no forecast where the last stretch without a gap is too short to start from.
+/// is no forecast where the last stretch without a gap is too short to start from. A model without A, C and D needs no past
+/// output: it has a value in every row that its inputs reach.
 ///
 /// # Errors
 /// [`Error::Data`] for channels or rows that are not there, or a sample time that differs from the model's by more than
@@ -47,7 +49,11 @@ pub fn apply(
     let Prepared { rows, measured, level } = prepared(model, &mut log, rows, detrend, (horizon, initial))?;
     let has_output = measured.is_some();
     let absent = vec![0.0; if has_output { 0 } else { log.rows() }];
-    let record = record(model, &log, &rows, (!has_output).then_some(absent.as_slice()))?;
+    let record = if has_output {
+        record_for(model, &log, &rows, horizon, initial)?
+    } else {
+        record(model, &log, &rows, Some(&absent))?
+    };
     let (fit, response) = if has_output {
         let (fit, response) = Fit::of(model, &record, &rows, None, horizon, initial)?;
         (Some(fit), response)
@@ -141,6 +147,23 @@ pub(super) fn record<'a>(
     let inputs = names.iter().map(|name| Ok(log.channel(name)?.values.as_slice()));
     let past = vec![0; segments.len()];
     Ok(Record { output, inputs: inputs.collect::<Result<_, Error>>()?, segments, past })
+}
+
+/// The record that a response of a model looks at. It goes on through missing outputs where no past one is needed.
+pub(super) fn record_for<'l>(
+    model: &Model,
+    log: &'l Log,
+    rows: &[Rows],
+    horizon: Horizon,
+    start: Start,
+) -> Result<Record<'l>, Error> {
+    let inputs: Vec<String> = model.inputs.iter().map(|input| input.name.clone()).collect();
+    let needed = match horizon {
+        Horizon::Steps { .. } => model.orders.needs_past_outputs(),
+        Horizon::FreeRun => start == Start::Drop,
+    };
+    let output = &model.output.name;
+    if needed { log.record(&inputs, output, rows) } else { log.driven_record(&inputs, output, rows) }
 }
 
 /// The log must have the model's sample time.

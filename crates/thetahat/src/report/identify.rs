@@ -1,12 +1,14 @@
 use std::ops::{ControlFlow, Range};
 
+use super::apply::record_for;
 use super::schema::{Data, Estimation, Missing, Parts, Report, Source};
+use super::validation::{estimation_record, estimation_start, goes_through};
 use super::warnings::{at_the_border, unstable_plant, warnings};
 use crate::data::{Detrend, Log, Offset, Prefilter, Prefiltered, Record, Rows, Split, between, checked};
 use crate::estimate::{
     self, Beside, Constant, Estimate, Fitted, Method, Monitor, OutputOffset, enough, with_inputs,
 };
-use crate::regression::sum_of_squares;
+use crate::regression::sum;
 use crate::respond::{Start, innovations};
 use crate::select::{self, Choice, Found, Grid, Select, Task};
 use crate::validate::{Fit, Horizon, Part};
@@ -214,9 +216,7 @@ impl Unjudged {
     /// The same on deviations.
     fn judged_on(self, log: &Log) -> Result<Report, Error> {
         let Self { mut report, grid, .. } = self;
-        let initial = report.estimation.initial;
         let inputs: Vec<String> = report.model.inputs.iter().map(|input| input.name.clone()).collect();
-        let output = report.model.output.name.clone();
         let test = report.data.split.as_ref().map_or_else(Vec::new, |parts| parts.test.clone());
         let parts = [
             (Part::Estimation, report.data.estimation.clone()),
@@ -224,8 +224,7 @@ impl Unjudged {
             (Part::Test, test),
         ];
         for (part, rows) in parts.into_iter().filter(|(_, rows)| !rows.is_empty()) {
-            let record = log.record(&inputs, &output, &rows)?;
-            judge(&mut report, &record, &rows, part, initial);
+            judge(&mut report, log, &inputs, &rows, part)?;
         }
         if let Some(grid) = grid {
             report.warnings.extend(at_the_border(&report.model.orders, &grid));
@@ -267,8 +266,13 @@ fn fit(
         ));
     }
     if let Choice::Known(orders) = &plan.choice {
+        let record = estimation_rows(&log, plan, orders, &estimation)?;
         let left_out = if plan.initial == Initial::Zero { 0 } else { orders.conditioned() };
-        enough(segments.iter().map(|segment| segment.len().saturating_sub(left_out)).sum(), orders)?;
+        let rows = record.segments.iter().zip(&record.past);
+        enough(
+            rows.map(|(rows, past)| rows.len().saturating_sub(left_out.saturating_sub(*past))).sum(),
+            orders,
+        )?;
     }
     let missing = names.iter().map(|name| {
         let values = &log.channel(name)?.values;
@@ -306,7 +310,10 @@ fn fit(
             (Some(selection), orders, guess)
         }
     };
-    let seen = record(&estimation)?;
+    let seen = match &band {
+        Some(band) => band.record_alone(&estimation)?,
+        None => estimation_rows(&log, plan, &orders, &estimation)?,
+    };
     let task = estimate::Task {
         record: &seen,
         inputs: &plan.inputs,
@@ -321,6 +328,8 @@ fn fit(
         fitted.estimate = fitted.estimate.of_prefiltered(&seen, &orders, variance);
         fitted.criteria = fitted.estimate.criteria();
     }
+    // A prefilter leaves rows out, but cuts nothing.
+    let stretches = if band.is_some() { segments } else { seen.segments };
     let Fitted { estimate, offset, .. } = &fitted;
     let mut model = Model::new(&orders, estimate, log.sample_time(), inputs.to_vec(), output.clone())?;
     let taken = [output.offset, offset.map_or_else(Offset::default, |found| found.offset)];
@@ -344,7 +353,7 @@ fn fit(
             estimation: estimation.clone(),
             validation: validation.clone(),
             split: parts,
-            segments: segments.iter().map(Rows::from_positions).collect(),
+            segments: stretches.iter().map(Rows::from_positions).collect(),
             missing,
             time_gaps: log.jumps(),
         },
@@ -360,6 +369,20 @@ fn fit(
     }
     let grid = if let Choice::Grid(grid) = &plan.choice { Some(grid.clone()) } else { None };
     Ok((Unjudged { report, grid, taken }, log))
+}
+
+/// The record that models of these orders are fitted to: it goes on through missing outputs where no past one is needed.
+fn estimation_rows<'l>(
+    log: &'l Log,
+    plan: &Plan,
+    orders: &Orders,
+    rows: &[Rows],
+) -> Result<Record<'l>, Error> {
+    let squares = matches!(plan.method, Method::PredictionError(_) | Method::Constrained(_));
+    if squares && goes_through(orders, plan.initial) {
+        return log.driven_record(&plan.inputs, &plan.output, rows);
+    }
+    log.record(&plan.inputs, &plan.output, rows)
 }
 
 /// What rows serve for.
@@ -466,9 +489,8 @@ fn unfiltered_variance(
     let record = log.record(&plan.inputs, &plan.output, rows)?;
     let start = Start::natural(&model, Horizon::Steps { steps: 1 });
     let found = innovations(&model, &record, 1, start)?;
-    let errors = || found.iter().map(|found| &found.errors[found.counted.start - found.rows.start..]);
-    let samples: usize = errors().map(<[f64]>::len).sum();
-    let squares: f64 = errors().map(sum_of_squares).sum();
+    let errors = || found.iter().flat_map(|found| found.counted_errors());
+    let (samples, squares) = (errors().count(), sum(errors().map(|e| e * e)));
     Ok(squares / samples.saturating_sub(orders.parameters()).max(1) as f64)
 }
 
@@ -544,25 +566,27 @@ fn estimation_of(fitted: &Fitted, taken: Offset) -> Estimation {
 }
 
 /// Adds the figures of one part of the log: one step ahead, and driven by the inputs alone where there are any.
-fn judge(report: &mut Report, record: &Record<'_>, rows: &[Rows], part: Part, initial: Initial) {
+fn judge(report: &mut Report, log: &Log, inputs: &[String], rows: &[Rows], part: Part) -> Result<(), Error> {
     // What the estimate started from; other rows begin in the middle of a run.
-    let first = match initial {
-        _ if part != Part::Estimation => Start::natural(&report.model, Horizon::Steps { steps: 1 }),
-        Initial::Zero => Start::Zero,
-        Initial::Estimate => Start::Estimate,
-        Initial::Auto | Initial::Drop => Start::Drop,
+    let one = Horizon::Steps { steps: 1 };
+    let (first, record) = if part == Part::Estimation {
+        (estimation_start(report), estimation_record(report, log, inputs)?)
+    } else {
+        let start = Start::natural(&report.model, one);
+        (start, record_for(&report.model, log, rows, one, start)?)
     };
-    let mut looks = vec![(Horizon::Steps { steps: 1 }, first)];
+    let mut looks = vec![(one, first, record)];
     if report.model.orders.nb.iter().any(|&nb| nb > 0) {
-        looks.push((Horizon::FreeRun, Start::Estimate));
+        let record = record_for(&report.model, log, rows, Horizon::FreeRun, Start::Estimate)?;
+        looks.push((Horizon::FreeRun, Start::Estimate, record));
     }
-    for (horizon, start) in looks {
+    for (horizon, start, record) in looks {
         let name = match part {
             Part::Estimation => "estimation",
             Part::Validation => "validation",
             Part::Test => "test",
         };
-        match Fit::of(&report.model, record, rows, Some(part), horizon, start) {
+        match Fit::of(&report.model, &record, rows, Some(part), horizon, start) {
             Ok((fit, _)) => {
                 if fit.percent.is_none() {
                     let why = if fit.samples == 0 {
@@ -579,6 +603,7 @@ fn judge(report: &mut Report, record: &Record<'_>, rows: &[Rows], part: Part, in
             }
         }
     }
+    Ok(())
 }
 
 #[cfg(test)]

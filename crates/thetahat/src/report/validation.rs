@@ -2,7 +2,7 @@ use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use super::apply::check_sample_time;
+use super::apply::{check_sample_time, record_for};
 use super::{Report, Source};
 use crate::data::{Detrend, Log, Offset, Prefiltered, Record, Rows, checked};
 use crate::figures::{chance, fixed, number};
@@ -273,7 +273,9 @@ pub fn validate(
             }
         }
     }
-    let record = log.record(&inputs, output, &rows)?;
+    let record = |horizon| record_for(model, &log, &rows, horizon, Start::natural(model, horizon));
+    let records =
+        Records { ahead: record(Horizon::Steps { steps: 1 })?, free_run: record(Horizon::FreeRun)? };
 
     let white_expected = model.structure != Structure::Oe
         && !matches!(
@@ -297,7 +299,7 @@ pub fn validate(
         warnings: Vec::new(),
         rows,
     };
-    let (one_step, free_run) = looks(model, &record, plan, &mut validation);
+    let (one_step, free_run) = looks(model, &records, plan, &mut validation);
     // Back in the log's own units.
     let whole = |response: &Response| -> Vec<f64> {
         let offset = |row: usize| {
@@ -310,39 +312,83 @@ pub fn validate(
     let nothing = || vec![f64::NAN; log.rows()];
     signals.predicted = one_step.as_ref().map_or_else(nothing, whole);
     signals.simulated = driven.then(|| free_run.as_ref().map_or_else(nothing, whole));
-    test_residuals(report, &record, plan, &mut validation);
+    test_residuals(report, &records.ahead, plan, &mut validation);
     warn(plan, &mut validation);
     Ok(Validated { validation, signals })
 }
 
 /// Whether the log, as deviations from the model's offsets, is the one that the model was fitted to.
 fn is_of_fit(report: &Report, log: &Log, inputs: &[String]) -> bool {
-    let (model, estimation) = (&report.model, &report.estimation);
     if report.data.estimation.is_empty() || report.data.estimation.iter().any(|rows| rows.last() > log.rows())
     {
         return false;
     }
-    let (output, rows) = (&model.output.name, &report.data.estimation);
-    let band = report.data.prefilter.map(|band| Prefiltered::new(&band, log, inputs, output));
-    let record = match &band {
-        Some(Ok(band)) => band.record(rows),
-        Some(Err(_)) => return false,
-        None => log.record(inputs, output, rows),
-    };
-    let Ok(mut record) = record else { return false };
+    let start = estimation_start(report);
+    let (output, rows) = (&report.model.output.name, &report.data.estimation);
+    if let Some(band) = report.data.prefilter {
+        let band = Prefiltered::new(&band, log, inputs, output);
+        return band.is_ok_and(|band| {
+            band.record_alone(rows).is_ok_and(|record| gives(report, &record, start))
+        });
+    }
+    let Ok(record) = estimation_record(report, log, inputs) else { return false };
+    if gives(report, &record, start) {
+        return true;
+    }
+    // Estimates by older versions begin with their segments, and end where an output is missing.
+    let Ok(mut record) = log.record(inputs, output, rows) else { return false };
     record.past.fill(0);
-    let (start, tolerance) = match estimation.initial {
-        Initial::Zero => (Start::Zero, SAME),
-        Initial::Estimate if !model.orders.is_linear() => (Start::Estimate, NEARLY_SAME),
-        _ => (Start::Drop, SAME),
-    };
-    let Ok(found) = innovations(model, &record, 1, start) else { return false };
+    gives(report, &record, start)
+}
+
+/// What the responses on the rows of the fit start from, as the estimate did.
+pub(super) fn estimation_start(report: &Report) -> Start {
+    match report.estimation.initial {
+        Initial::Zero => Start::Zero,
+        // Without F there is nothing to estimate, and C begins from e = 0 where it does in the fit.
+        _ if !report.model.orders.is_linear() => Start::Estimate,
+        _ => Start::Drop,
+    }
+}
+
+/// The rows of the fit as the estimate saw them.
+pub(super) fn estimation_record<'l>(
+    report: &Report,
+    log: &'l Log,
+    inputs: &[String],
+) -> Result<Record<'l>, Error> {
+    let (output, rows) = (&report.model.output.name, &report.data.estimation);
+    let by_instruments = matches!(
+        report.estimation.procedure,
+        Procedure::InstrumentalVariables { .. } | Procedure::RefinedInstrumentalVariables { .. }
+    );
+    if by_instruments {
+        // They begin with their segments.
+        let record = log.record(inputs, output, rows)?;
+        return Ok(Record { past: vec![0; record.segments.len()], ..record });
+    }
+    if goes_through(&report.model.orders, report.estimation.initial) {
+        return log.driven_record(inputs, output, rows);
+    }
+    log.record(inputs, output, rows)
+}
+
+/// Whether an estimate of least squared errors goes on through missing outputs. From zeros, rows of least squares begin anew.
+pub(super) fn goes_through(orders: &Orders, initial: Initial) -> bool {
+    !orders.needs_past_outputs() && (orders.has_f() || initial != Initial::Zero)
+}
+
+/// Whether the errors one step ahead on a record give the mean square of the estimate again.
+fn gives(report: &Report, record: &Record<'_>, start: Start) -> bool {
+    let (model, estimation) = (&report.model, &report.estimation);
+    let tolerance = if start == Start::Estimate { NEARLY_SAME } else { SAME };
+    let Ok(found) = innovations(model, record, 1, start) else { return false };
     let (mut samples, mut square, mut size) = (0, 0.0, 0.0);
     for found in &found {
-        let errors = &found.errors[found.counted.start - found.rows.start..];
-        samples += found.counted.len();
-        square += errors.iter().map(|e| e * e).sum::<f64>();
-        size += record.output[found.counted.clone()].iter().map(|y| y * y).sum::<f64>();
+        samples += found.counted_errors().count();
+        square += found.counted_errors().map(|e| e * e).sum::<f64>();
+        let outputs = found.counted.iter().cloned().flatten().map(|t| record.output[t]);
+        size += outputs.map(|y| y * y).sum::<f64>();
     }
     let (mse, size) = (square / samples as f64, size / samples as f64);
     samples == estimation.samples
@@ -368,10 +414,16 @@ fn overlap(rows: &[Rows], fitted: &[Rows]) -> Seen {
     }
 }
 
+/// What predictions and free runs look at.
+struct Records<'l> {
+    ahead: Record<'l>,
+    free_run: Record<'l>,
+}
+
 /// Fits, noise level and coverage; gives the prediction one step ahead and the free run.
 fn looks(
     model: &Model,
-    record: &Record<'_>,
+    records: &Records<'_>,
     plan: &ValidationPlan,
     validation: &mut Validation,
 ) -> (Option<Response>, Option<Response>) {
@@ -384,6 +436,7 @@ fn looks(
     let mut free_run = None;
     for horizon in ahead.chain(driven.then_some(Horizon::FreeRun)) {
         let start = Start::natural(model, horizon);
+        let record = if horizon == Horizon::FreeRun { &records.free_run } else { &records.ahead };
         let (fit, response) = match Fit::of(model, record, &validation.rows, None, horizon, start) {
             Ok(found) => found,
             Err(error) => {
@@ -470,7 +523,7 @@ fn test_residuals(report: &Report, record: &Record<'_>, plan: &ValidationPlan, v
 
 /// A word on errors that are not centered, which the tests take as an offset and no matter of dynamics.
 fn off_center(found: &[Innovations]) -> Option<String> {
-    let errors = || found.iter().flat_map(|found| &found.errors[found.counted.start - found.rows.start..]);
+    let errors = || found.iter().flat_map(Innovations::counted_errors);
     let samples = errors().count() as f64;
     let mean = sum(errors().copied()) / samples;
     let deviation = (sum(errors().map(|e| (e - mean).powi(2))) / samples).sqrt();

@@ -1,4 +1,4 @@
-use super::innovations::{driven, of_segment};
+use super::innovations::{driven, of_segments};
 use super::predict::{check_start, check_steps, deviations};
 use super::sensitivities::{Paths, student};
 use super::{Start, check_inputs};
@@ -80,7 +80,8 @@ pub(crate) fn forecast_if_possible(
     check_steps("steps", steps)?;
     check_future(model, inputs, steps)?;
     let (Some(segment), Some(past)) = (record.segments.last(), record.past.last()) else { return Ok(None) };
-    let Some(found) = of_segment(model, record, segment, *past, 1, start)? else { return Ok(None) };
+    let found = of_segments(model, record, &[(segment.clone(), *past)], 1, start)?.pop();
+    let Some(found) = found else { return Ok(None) };
     let rows = found.rows.clone();
 
     let whole = |(measured, future): (&&[f64], &&[f64])| {

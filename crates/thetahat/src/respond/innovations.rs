@@ -8,44 +8,58 @@
 //!
 //! (Ljung, System Identification, 2nd ed. 1999, sections 3.2 and 4.2). In the first r samples of a stretch of which
 //! the past is unknown, v = D w is set to zero, and with it e = v/C; r = max(na, nb + nk - 1) + nd, over the inputs
-//! without F. F begins from rest, or with impulses at the first samples: nf free responses of 1/F, the combination of which
-//! makes up for any x before, inputs before being zero. This is what estimates make of their first samples.
+//! without F. F begins from rest, or with impulses: nf free responses of 1/F, the combination of which makes up for any x
+//! before, inputs before being zero; or max(nf, nb + nk - 1) of them, which makes up for any such inputs too. This is what estimates
+//! make of their first samples.
 
 use std::ops::Range;
 
-use super::free_response::{Column, closest_of, impulse_response, until_negligible};
-use super::{Start, check_inputs, history};
-use crate::data::Record;
-use crate::regression::{add_filtered, divide};
+use super::free_response::{Column, UNSEEN, closest_of, impulse_response, until_negligible};
+use super::{NOTHING_LEFT, Start, are_worth, check_inputs, history};
+use crate::data::{Record, measured};
+use crate::regression::{add_filtered, divide, sum_of_squares};
 use crate::{Error, Model};
-
-/// An initial condition of which D and C leave less than this fraction is not seen: what is left of it is rounding.
-const UNSEEN: f64 = 1e-11;
 
 /// The innovations of one segment.
 #[derive(Debug)]
 pub(crate) struct Innovations {
     /// The samples looked at: the segment, and before it those that it starts from.
     pub(crate) rows: Range<usize>,
-    /// The samples of the segment that count.
-    pub(crate) counted: Range<usize>,
-    /// How many of the first of them have e = 0 for want of what was before.
+    /// How many of the first of the rows have e = 0 for want of what was before.
     pub(super) silent: usize,
+    /// The samples of the segment that count, if their output was measured.
+    pub(crate) span: Range<usize>,
+    /// Those that count: the span, but where outputs are missing.
+    pub(crate) counted: Vec<Range<usize>>,
     /// What x starts from.
     pub(super) impulses: Impulses,
-    /// w, one value for each of `rows`.
+    /// w, one value for each of `rows`; -x where the output is missing.
     pub(crate) disturbance: Vec<f64>,
     /// e, one value for each of `rows`; zero where it is not known.
     pub(crate) errors: Vec<f64>,
+    /// The sum of squares of all errors that are known, and how many these are.
+    square: f64,
+    known: usize,
 }
 
-/// Impulses into 1/F at the first samples of a stretch, for each input.
+impl Innovations {
+    /// The errors that count.
+    pub(crate) fn counted_errors(&self) -> impl Iterator<Item = &f64> + Clone {
+        let first = self.rows.start;
+        self.counted.iter().flat_map(move |rows| &self.errors[rows.start - first..rows.end - first])
+    }
+}
+
+/// Impulses into 1/F from a sample of a stretch on, for each input.
 #[derive(Debug)]
-pub(super) struct Impulses(pub(super) Vec<Vec<f64>>);
+pub(super) struct Impulses {
+    pub(super) first: usize,
+    pub(super) weights: Vec<Vec<f64>>,
+}
 
 impl Impulses {
     pub(super) fn none(model: &Model) -> Self {
-        Self(vec![Vec::new(); model.f.len()])
+        Self { first: 0, weights: vec![Vec::new(); model.f.len()] }
     }
 
     /// Whether there are none.
@@ -56,6 +70,9 @@ impl Impulses {
 
 /// The innovations of each segment that has samples with a prediction `horizon` steps ahead. Only these count: those with
 /// a measured output to look from, for a start from anything but zero.
+///
+/// Where the inputs before the record are unknown and matter, their effect is estimated with the initial conditions if that is
+/// worth its parameters, for all segments or none, by the rule of [`Initial::Auto`](crate::Initial::Auto).
 ///
 /// O(N (na + nb + nc + nd + nf)), and O(N n^2) more for n initial conditions, as far as their responses do not die away.
 ///
@@ -69,58 +86,128 @@ pub(crate) fn innovations(
     start: Start,
 ) -> Result<Vec<Innovations>, Error> {
     check_inputs(model, record)?;
-    let each = record.segments.iter().zip(&record.past);
-    each.filter_map(|(segment, past)| of_segment(model, record, segment, *past, horizon, start).transpose())
-        .collect()
+    let segments = record.segments.iter().zip(&record.past);
+    let segments: Vec<_> = segments.map(|(segment, past)| (segment.clone(), *past)).collect();
+    of_segments(model, record, &segments, horizon, start)
+}
+
+/// The same of some segments, each with the number of measured samples before it.
+pub(super) fn of_segments(
+    model: &Model,
+    record: &Record<'_>,
+    segments: &[(Range<usize>, usize)],
+    horizon: usize,
+    start: Start,
+) -> Result<Vec<Innovations>, Error> {
+    let all = |with_inputs: bool| -> Result<Vec<Innovations>, Error> {
+        let each = segments.iter().filter_map(|(segment, past)| {
+            of_segment(model, record, segment, *past, horizon, start, with_inputs).transpose()
+        });
+        each.collect()
+    };
+    let found = all(false)?;
+    let matters = |(_, past): &(Range<usize>, usize)| {
+        let count = |with_inputs| unknowns(model, estimated(model, *past, with_inputs).1, with_inputs);
+        count(true) > count(false)
+    };
+    if start != Start::Estimate || !segments.iter().any(matters) {
+        return Ok(found);
+    }
+    let Ok(more) = all(true) else { return Ok(found) };
+    let square = |found: &[Innovations]| found.iter().map(|found| found.square).sum::<f64>();
+    let unknown = |found: &[Innovations]| {
+        found.iter().flat_map(|found| &found.impulses.weights).map(Vec::len).sum::<usize>()
+    };
+    let samples = found.iter().map(|found| found.known).sum::<usize>();
+    let outputs = found.iter().flat_map(|found| measured(record.output, &found.span));
+    let nothing = NOTHING_LEFT * outputs.map(|rows| sum_of_squares(&record.output[rows])).sum::<f64>();
+    let extra = unknown(&more).saturating_sub(unknown(&found));
+    let worth = extra > 0 && are_worth(samples, square(&found), square(&more), extra, nothing);
+    Ok(if worth { more } else { found })
+}
+
+/// For a start from estimated initial conditions: how many samples of a stretch have no e, and where impulses begin. The stretch
+/// begins with the past that the errors of its segment reach back to.
+fn estimated(model: &Model, past: usize, with_inputs: bool) -> (usize, usize) {
+    let silent = past.min(model.orders.history()).max(model.orders.conditioned());
+    (silent, if past > 0 || with_inputs { silent - model.orders.nd } else { 0 })
 }
 
 /// The innovations of one segment, if it has enough samples.
-pub(super) fn of_segment(
+fn of_segment(
     model: &Model,
     record: &Record<'_>,
     segment: &Range<usize>,
     past: usize,
     horizon: usize,
     start: Start,
+    with_inputs: bool,
 ) -> Result<Option<Innovations>, Error> {
     let conditioned = model.orders.conditioned();
     let ahead = horizon.saturating_sub(1);
     let (first, silent, skipped) = match start {
         Start::Zero => (segment.start, 0, 0),
         Start::Drop => (history(model, segment, past, ahead), conditioned, conditioned.saturating_add(ahead)),
-        Start::Estimate => (segment.start, conditioned, conditioned.saturating_add(ahead)),
+        Start::Estimate => {
+            let (silent, _) = estimated(model, past, with_inputs);
+            let first = segment.start - past.min(model.orders.history());
+            (first, silent, silent.saturating_add(ahead))
+        }
     };
     let rows = first..segment.end;
-    let counted = first.saturating_add(skipped).clamp(segment.start, segment.end)..segment.end;
+    let span = first.saturating_add(skipped).clamp(segment.start, segment.end)..segment.end;
+    let counted = measured_runs(model, record, &span);
     if counted.is_empty() {
         return Ok(None);
     }
+    let after = measured_runs(model, record, &(first.saturating_add(silent).min(segment.end)..segment.end));
+    let known = after.iter().map(Range::len).sum::<usize>();
     let mut impulses = Impulses::none(model);
     let (mut disturbance, mut errors) = residuals(model, record, &rows, silent, &impulses);
     if start == Start::Estimate {
-        let unknown = unknowns(model);
         // Numbers that as many samples determine fit them, whatever they are.
-        if rows.len() - silent <= unknown {
+        let (_, origin) = estimated(model, past, with_inputs);
+        let with_inputs = with_inputs && known > unknowns(model, origin, true);
+        let (_, origin) = estimated(model, past, with_inputs);
+        let unknown = unknowns(model, origin, with_inputs);
+        if known <= unknown {
             return Ok(None);
         }
         if unknown > 0 {
-            impulses = best(model, &errors, silent)?;
+            let gaps: Vec<Range<usize>> =
+                gaps(&after).map(|gap| gap.start - first..gap.end - first).collect();
+            let counts = (0..model.orders.inputs()).map(|input| count(model, input, origin, with_inputs));
+            impulses = best(model, &errors, silent, &gaps, origin, &counts.collect::<Vec<_>>())?;
             (disturbance, errors) = residuals(model, record, &rows, silent, &impulses);
         }
     }
-    Ok(Some(Innovations { rows, counted, silent, impulses, disturbance, errors }))
+    let square = sum_of_squares(&errors[silent.min(rows.len())..]);
+    Ok(Some(Innovations { rows, silent, basis, span, counted, impulses, disturbance, errors, square, known }))
+}
+
+/// The runs of samples that have a measured output: one for models that need past outputs, as their segments miss none.
+fn measured_runs(model: &Model, record: &Record<'_>, rows: &Range<usize>) -> Vec<Range<usize>> {
+    if model.orders.needs_past_outputs() && !rows.is_empty() {
+        return vec![rows.clone()];
+    }
+    measured(record.output, rows)
+}
+
+/// What lies between runs of samples.
+pub(super) fn gaps(runs: &[Range<usize>]) -> impl Iterator<Item = Range<usize>> {
+    runs.windows(2).map(|pair| pair[0].end..pair[1].start)
 }
 
 /// x over stretches of the inputs, zeros before them, all as long as one another.
 pub(super) fn driven(model: &Model, inputs: &[&[f64]], length: usize, impulses: &Impulses) -> Vec<f64> {
     let mut sum = vec![0.0; length];
-    for ((b, u), (f, impulses)) in model.b.iter().zip(inputs).zip(model.f.iter().zip(&impulses.0)) {
+    for ((b, u), (f, weights)) in model.b.iter().zip(inputs).zip(model.f.iter().zip(&impulses.weights)) {
         if f.len() == 1 {
             add_filtered(&mut sum, &(0..length), b, u, 0);
         } else {
             let mut own = vec![0.0; length];
             add_filtered(&mut own, &(0..length), b, u, 0);
-            add(&mut own, impulses);
+            add(&mut own[impulses.first.min(length)..], weights);
             divide(f, &mut own);
             add(&mut sum, &own);
         }
@@ -132,7 +219,7 @@ fn add(sum: &mut [f64], values: &[f64]) {
     sum.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
 }
 
-/// w and e over some rows, zeros before them.
+/// w and e over some rows, zeros before them. Where the output is missing, w = -x and e = 0.
 pub(super) fn residuals(
     model: &Model,
     record: &Record<'_>,
@@ -143,8 +230,18 @@ pub(super) fn residuals(
     let inputs: Vec<&[f64]> = record.inputs.iter().map(|u| &u[rows.clone()]).collect();
     let mut disturbance = driven(model, &inputs, rows.len(), impulses);
     disturbance.iter_mut().for_each(|value| *value = -*value);
-    add_filtered(&mut disturbance, rows, &model.a, record.output, rows.start);
-    let errors = whitened(model, &disturbance, silent);
+    if model.orders.needs_past_outputs() {
+        add_filtered(&mut disturbance, rows, &model.a, record.output, rows.start);
+        let errors = whitened(model, &disturbance, silent);
+        return (disturbance, errors);
+    }
+    let mut errors = vec![0.0; rows.len()];
+    for (t, y) in record.output[rows.clone()].iter().enumerate().filter(|(_, y)| !y.is_nan()) {
+        disturbance[t] += y;
+        if t >= silent {
+            errors[t] = disturbance[t];
+        }
+    }
     (disturbance, errors)
 }
 
@@ -163,46 +260,57 @@ fn whitened(model: &Model, disturbance: &[f64], silent: usize) -> Vec<f64> {
     errors
 }
 
-/// How many impulses there are: nf for each input.
-fn unknowns(model: &Model) -> usize {
-    (0..model.orders.inputs()).map(|input| model.orders.free_responses(input)).sum()
+/// How many impulses an input has: nf, or as many more as there are unknown inputs that x depends on from sample `first` on.
+fn count(model: &Model, input: usize, first: usize, with_inputs: bool) -> usize {
+    let orders = &model.orders;
+    if with_inputs { orders.free_responses_and_inputs(input, first) } else { orders.free_responses(input) }
+}
+
+/// How many all inputs have.
+fn unknowns(model: &Model, first: usize, with_inputs: bool) -> usize {
+    (0..model.orders.inputs()).map(|input| count(model, input, first, with_inputs)).sum()
 }
 
 /// The impulses that make the errors smallest, given those without impulses.
-pub(super) fn best(model: &Model, errors: &[f64], silent: usize) -> Result<Impulses, Error> {
-    let orders = &model.orders;
-    let (length, columns) = free_columns(model, errors.len(), silent);
+pub(super) fn best(model: &Model, errors: &[f64], basis: &Basis) -> Result<Impulses, Error> {
+    let (length, columns) = free_columns(model, errors.len(), basis);
     let mut weights = closest_of(&errors[..length], &columns)?.into_iter();
-    let each =
-        (0..orders.inputs()).map(|input| weights.by_ref().take(orders.free_responses(input)).collect());
-    Ok(Impulses(each.collect()))
+    let each = basis.counts.iter().map(|count| weights.by_ref().take(*count).collect());
+    Ok(Impulses { first: basis.first, weights: each.collect() })
 }
 
 /// What unit impulses do to the errors of a stretch, and how many samples of it say something of them.
-pub(super) fn free_columns(model: &Model, samples: usize, silent: usize) -> (usize, Vec<Column>) {
+pub(super) fn free_columns(model: &Model, samples: usize, basis: &Basis) -> (usize, Vec<Column>) {
+    let Basis { silent, first, counts, gaps } = basis;
+    let (silent, first) = (*silent, *first);
+    let orders = &model.orders;
     let orders = &model.orders;
     let order = orders.nc + orders.nd;
+    let (unknown, most) = (counts.iter().sum::<usize>(), counts.iter().copied().max().unwrap_or(0));
     // As far as what any of them does has not died away, and there are more samples than impulses.
     let lasting = |f: &Vec<f64>| {
         let compute = |length| impulse_response(&[f, &model.c], length);
         until_negligible(samples, order + f.len(), compute).len() + f.len()
     };
-    let lasting = model.f.iter().map(lasting).max().unwrap_or(0);
-    let length = (lasting + silent + orders.nd).max(unknowns(model) + silent + 1).min(samples);
+    let lasting = model.f.iter().map(lasting).max().unwrap_or(0) + most;
+    let length = (lasting + silent + orders.nd).max(unknown + silent + 1).min(samples);
 
     let gain: f64 = model.d.iter().map(|d| d.abs()).sum();
     let column = |response: &[f64], delay: usize| {
-        let mut delayed = vec![0.0; delay.min(length)];
+        let mut delayed = vec![0.0; (first + delay).min(length)];
         delayed.extend_from_slice(&response[..length - delayed.len()]);
-        let values = whitened(model, &delayed, silent);
+        let mut values = whitened(model, &delayed, silent);
+        for gap in gaps {
+            values[gap.start.min(length)..gap.end.min(length)].fill(0.0);
+        }
         let size = |values: &[f64]| values.iter().fold(0.0_f64, |size, value| size.hypot(*value));
         let rounding = UNSEEN * (gain * size(&delayed)).max(size(&values));
         Column { values, rounding }
     };
     let mut columns: Vec<Column> = Vec::new();
-    for (input, f) in model.f.iter().enumerate().filter(|(_, f)| f.len() > 1) {
+    for (f, count) in model.f.iter().zip(counts).filter(|(f, _)| f.len() > 1) {
         let response = impulse_response(&[f], length);
-        columns.extend((0..orders.free_responses(input)).map(|delay| column(&response, delay)));
+        columns.extend((0..*count).map(|delay| column(&response, delay)));
     }
     (length, columns)
 }

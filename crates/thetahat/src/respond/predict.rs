@@ -23,13 +23,16 @@ pub(super) const MOST_STEPS: usize = 1_000_000;
 ///
 /// [`Start::Zero`] takes zeros before each segment, and every sample has a prediction. [`Start::Drop`] and
 /// [`Start::Estimate`] leave out the samples without an output k steps before them to look from: the first r + k - 1
-/// of those they look at (for r see [`Start`]). What unknown inputs have done to B/F u is nothing to the first two; the
+/// of those they look at (for r see [`Start`]). What unknown samples have done to B/F u is nothing to the first two; the
 /// last estimates it from the one-step errors, whatever k is, as estimates with
 /// [`Initial::Estimate`](crate::Initial::Estimate) do. It leaves out segments with no more samples than there are numbers
 /// to estimate.
 ///
 /// Signals are deviations from the model's offsets. Cost: O(N (na + nb + nc + nd + nf + k)), the k up to where h has died
 /// away; for n initial conditions to be estimated O(N n^2) more, up to where their responses have.
+///
+/// Models without A, C and D have predictions where an output is missing too, as they need no past one (see
+/// [`Log::driven_record`](crate::Log::driven_record)); these samples do not count.
 ///
 /// # Errors
 /// [`Error::Argument`] if `horizon` is 0, the record does not have the model's inputs, or [`Start::Estimate`] is
@@ -68,12 +71,18 @@ pub fn predict(model: &Model, record: &Record<'_>, horizon: usize, start: Start)
     let weights: Vec<f64> = response.iter().map(|h| -h).collect();
     let mut predicted = Response::empty(record.output.len());
     for found in innovations(model, record, horizon, start)? {
-        let counted = found.counted;
-        let values = &mut predicted.values[counted.clone()];
-        values.copy_from_slice(&record.output[counted.clone()]);
-        let rows = counted.start - found.rows.start..counted.end - found.rows.start;
-        add_filtered(values, &rows, &weights, &found.errors, 0);
-        predicted.counted.push(counted);
+        for counted in &found.counted {
+            let values = &mut predicted.values[counted.clone()];
+            values.copy_from_slice(&record.output[counted.clone()]);
+            let rows = counted.start - found.rows.start..counted.end - found.rows.start;
+            add_filtered(values, &rows, &weights, &found.errors, 0);
+        }
+        if !model.orders.needs_past_outputs() {
+            for row in found.span.clone().filter(|row| record.output[*row].is_nan()) {
+                predicted.values[row] = -found.disturbance[row - found.rows.start];
+            }
+        }
+        predicted.counted.extend(found.counted);
     }
     Ok(predicted)
 }

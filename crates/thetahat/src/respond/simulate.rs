@@ -1,30 +1,35 @@
 use std::ops::Range;
 
 use super::forecast::{Known, continuation};
-use super::free_response::{Delays, closest, impulse_response, until_negligible};
+use super::free_response::{Column, Delays, UNSEEN, closest, closest_of, impulse_response, until_negligible};
 use super::innovations::{Impulses, driven, residuals};
-use super::{Response, Start, check_inputs, history};
-use crate::data::Record;
-use crate::regression::{add_filtered, divide};
+use super::{NOTHING_LEFT, Response, Start, are_worth, check_inputs, history};
+use crate::data::{Record, measured};
+use crate::regression::{add_filtered, divide, sum};
 use crate::{Error, Model};
 
 /// The free run of a model: A(q) y^(t) = sum_j (B_j(q)/F_j(q)) u_j(t), driven by the inputs alone.
 ///
 /// [`Start::Zero`] takes zeros before each segment. [`Start::Drop`] goes on from measured samples, with e = 0
 /// from the first sample that counts: what they say of the disturbance, which C and D give a memory, dies away from
-/// there. For ARX it is the difference equation run from measured outputs and inputs. [`Start::Estimate`] adds the
-/// combination of free responses
+/// there. For ARX it is the difference equation run from measured outputs and inputs. [`Start::Estimate`] takes the inputs
+/// that were measured directly before the segment, and adds the combination of free responses
 ///
 /// ```text
-/// q^-i (1/A) delta,   i < max(na, nb + nk - 1 of the inputs without F)
-/// q^-i (1/(A F_j)) delta,   i < nf_j
+/// q^-i (1/A) delta,   i < max(na, n of the inputs without F)
+/// q^-i (1/(A F_j)) delta,   i < nf_j, or max(nf_j, n_j)
 /// ```
 ///
 /// that brings y^ closest to the output in the least-squares sense: everything that unknown samples before the segment
-/// can do, but for earlier values of inputs with F, which are taken to be zero. Segments too short for a start are left out.
+/// can do. n is how many earlier inputs B reaches back to that are not known, nb + nk - 1 at most. Those of inputs with F
+/// are taken to be zero, unless estimating them is worth its parameters by the rule of
+/// [`Initial::Auto`](crate::Initial::Auto). Segments too short for a start are left out.
+///
+/// But for [`Start::Drop`], the run goes on where an output is missing (see
+/// [`Log::driven_record`](crate::Log::driven_record)); these samples do not count.
 ///
 /// Signals are deviations from the model's offsets. The output of the record is not read for [`Start::Zero`].
-/// Cost: O(N (na + nb + nf)), and O(N n) more for n free responses that do not die away.
+/// Cost: O(N (na + nb + nf)), and O(N n) more for n free responses that do not die away, O(N n^2) where outputs are missing.
 ///
 /// # Errors
 /// [`Error::Argument`] if the record does not have the model's inputs; [`Error::Undetermined`] if an initial condition
@@ -53,76 +58,190 @@ use crate::{Error, Model};
 pub fn simulate(model: &Model, record: &Record<'_>, start: Start) -> Result<Response, Error> {
     check_inputs(model, record)?;
     let conditioned = model.orders.conditioned();
-    let longest = record.segments.iter().map(Range::len).max().unwrap_or(0);
-    let free = (start == Start::Estimate).then(|| Free::of(model, longest));
     let mut response = Response::empty(record.output.len());
+    let mut free = Free::new(model, record);
     for (segment, past) in record.segments.iter().zip(&record.past) {
-        let first = if start == Start::Drop { history(model, segment, *past, 0) } else { segment.start };
-        let known = if start == Start::Drop { conditioned } else { 0 };
-        let counted = (first + known).clamp(segment.start, segment.end)..segment.end;
-        // An initial condition of n numbers needs more than n samples to be estimated from.
-        if counted.is_empty() || free.as_ref().is_some_and(|free| counted.len() <= free.count) {
+        let reach =
+            (0..model.orders.inputs()).map(|input| model.orders.input_reach(input)).max().unwrap_or(0);
+        let (before, known) = match start {
+            Start::Zero => (0, 0),
+            Start::Drop => (segment.start - history(model, segment, *past, 0), conditioned),
+            Start::Estimate => (reach.min(*past), reach.min(*past)),
+        };
+        let first = segment.start - before;
+        let run = (first + known).clamp(segment.start, segment.end)..segment.end;
+        if run.is_empty() {
             continue;
         }
         let rows = first..segment.end;
         let inputs: Vec<&[f64]> = record.inputs.iter().map(|u| &u[rows.clone()]).collect();
         let mut x = driven(model, &inputs, rows.len(), &Impulses::none(model));
-        let x = x.split_off(counted.start - first);
-        let values = &mut response.values[counted.clone()];
-        values.copy_from_slice(&x);
+        let mut values = x.split_off(run.start - first);
         if start == Start::Drop {
-            let before = first..counted.start;
+            let before = first..run.start;
             let (disturbance, errors) =
                 residuals(model, record, &before, conditioned, &Impulses::none(model));
             let output = &record.output[before];
-            continuation(model, &Known { output, disturbance: &disturbance, errors: &errors }, values);
+            continuation(model, &Known { output, disturbance: &disturbance, errors: &errors }, &mut values);
         } else {
-            divide(&model.a, values);
+            divide(&model.a, &mut values);
         }
-        if let Some(free) = &free {
-            free.add_closest(&record.output[segment.clone()], values)?;
+        if start == Start::Estimate {
+            free.runs.push(Run { rows: run, past: *past, values });
+            continue;
         }
-        response.counted.push(counted);
+        response.values[run.clone()].copy_from_slice(&values);
+        response.counted.extend(measured(record.output, &run));
+    }
+    for Run { rows, values, .. } in free.completed()? {
+        response.values[rows.clone()].copy_from_slice(&values);
+        response.counted.extend(measured(record.output, &rows));
     }
     Ok(response)
 }
 
-/// What unknown samples before a segment can do to a free run.
-struct Free {
-    count: usize,
-    basis: Vec<Delays>,
+/// The free run of a segment.
+#[derive(Debug, Clone)]
+struct Run {
+    rows: Range<usize>,
+    /// How many measured samples stand before it.
+    past: usize,
+    values: Vec<f64>,
 }
 
-impl Free {
-    fn of(model: &Model, length: usize) -> Self {
-        let orders = &model.orders;
-        let response = |denominators: &[&[f64]], count| {
-            let order: usize = denominators.iter().map(|monic| monic.len()).sum();
-            let signal = until_negligible(length, order, |length| impulse_response(denominators, length));
-            Delays { signal, count }
-        };
-        let direct = response(&[&model.a], orders.conditioned() - orders.nd);
-        let filtered = model.f.iter().enumerate().filter(|(_, f)| f.len() > 1);
-        let filtered = filtered.map(|(input, f)| response(&[&model.a, f], orders.free_responses(input)));
-        let basis: Vec<Delays> = std::iter::once(direct).chain(filtered).collect();
-        Self { count: basis.iter().map(|delays| delays.count).sum(), basis }
+/// What unknown samples before segments can do to free runs.
+struct Free<'a> {
+    model: &'a Model,
+    output: &'a [f64],
+    /// Free runs from zero but for known inputs.
+    runs: Vec<Run>,
+    /// The responses of 1/A, and of 1/(A F_j) for each input with F.
+    responses: Vec<Vec<f64>>,
+}
+
+impl<'a> Free<'a> {
+    fn new(model: &'a Model, record: &Record<'a>) -> Self {
+        Self { model, output: record.output, runs: Vec::new(), responses: Vec::new() }
     }
 
-    /// Adds the combination of free responses that brings `values` closest to `output`.
-    fn add_closest(&self, output: &[f64], values: &mut [f64]) -> Result<(), Error> {
-        if self.count == 0 {
-            return Ok(());
+    /// How many free responses of 1/A, and of each 1/(A F_j), make up for what is unknown before a segment.
+    fn counts(&self, past: usize, with_inputs: bool) -> Vec<usize> {
+        let orders = &self.model.orders;
+        let inputs = 0..orders.inputs();
+        let unknown = |input: usize| orders.input_reach(input).saturating_sub(past);
+        let direct = inputs.clone().filter(|&input| orders.nf[input] == 0).map(unknown);
+        let filtered = inputs
+            .filter(|&input| orders.nf[input] > 0)
+            .map(|input| if with_inputs { orders.nf[input].max(unknown(input)) } else { orders.nf[input] });
+        std::iter::once(direct.fold(orders.na, usize::max)).chain(filtered).collect()
+    }
+
+    /// The runs with the initial conditions that fit best.
+    fn completed(mut self) -> Result<Vec<Run>, Error> {
+        let longest = self.runs.iter().map(|run| run.rows.len()).max().unwrap_or(0);
+        let response = |denominators: &[&[f64]]| {
+            let order: usize = denominators.iter().map(|monic| monic.len()).sum();
+            until_negligible(longest, order, |length| impulse_response(denominators, length))
+        };
+        let a = &self.model.a;
+        let filtered = self.model.f.iter().filter(|f| f.len() > 1).map(|f| response(&[a, f]));
+        self.responses = std::iter::once(response(&[a])).chain(filtered).collect();
+        let all = |with_inputs: bool| -> Result<Vec<Completed>, Error> {
+            self.runs.iter().filter_map(|run| self.complete(run, with_inputs).transpose()).collect()
+        };
+        let found = all(false)?;
+        let matters = |run: &Run| self.counts(run.past, true) != self.counts(run.past, false);
+        let more = if self.runs.iter().any(matters) { all(true).ok() } else { None };
+        let square = |found: &[Completed]| found.iter().map(|run| run.square).sum::<f64>();
+        let unknown = |found: &[Completed]| found.iter().map(|run| run.unknown).sum::<usize>();
+        let samples = found.iter().map(|run| run.samples).sum::<usize>();
+        let nothing = NOTHING_LEFT * found.iter().map(|run| run.output).sum::<f64>();
+        let worth = |more: &Vec<Completed>| {
+            let extra = unknown(more).saturating_sub(unknown(&found));
+            extra > 0 && are_worth(samples, square(&found), square(more), extra, nothing)
+        };
+        let best = more.filter(worth).unwrap_or(found);
+        Ok(best.into_iter().map(|completed| completed.run).collect())
+    }
+
+    /// A run with its initial conditions, if it has more measured samples than these are.
+    fn complete(&self, run: &Run, with_inputs: bool) -> Result<Option<Completed>, Error> {
+        let measured = measured(self.output, &run.rows);
+        let samples: usize = measured.iter().map(Range::len).sum();
+        let mut counts = self.counts(run.past, with_inputs);
+        if samples <= counts.iter().sum() {
+            counts = self.counts(run.past, false);
         }
+        let unknown: usize = counts.iter().sum();
+        if samples <= unknown {
+            return Ok(None);
+        }
+        let mut values = run.values.clone();
+        if unknown > 0 {
+            self.add_closest(&self.output[run.rows.clone()], &counts, samples < run.rows.len(), &mut values)?;
+        }
+        let first = run.rows.start;
+        let rows = || measured.iter().cloned().flatten();
+        let square = sum(rows().map(|row| (self.output[row] - values[row - first]).powi(2)));
+        let output = sum(rows().map(|row| self.output[row].powi(2)));
+        let run = Run { values, ..run.clone() };
+        Ok(Some(Completed { run, samples, unknown, square, output }))
+    }
+
+    /// Adds the combination of free responses that brings `values` closest to `output`, which may have gaps.
+    fn add_closest(
+        &self,
+        output: &[f64],
+        counts: &[usize],
+        gaps: bool,
+        values: &mut [f64],
+    ) -> Result<(), Error> {
         // Behind the last free response there is nothing to fit.
-        let ends = self.basis.iter().filter(|delays| delays.count > 0);
-        let ends = ends.map(|delays| delays.signal.len() + delays.count);
-        let length = ends.max().unwrap_or(0).max(self.count + 1).min(output.len());
-        let target: Vec<f64> = output.iter().zip(&*values).take(length).map(|(y, x)| y - x).collect();
-        for (weights, delays) in closest(&target, &self.basis)?.iter().zip(&self.basis) {
-            let mut response = delays.signal[..delays.signal.len().min(length)].to_vec();
-            response.resize(length, 0.0);
-            add_filtered(&mut values[..length], &(0..length), weights, &response, 0);
+        let used = || self.responses.iter().zip(counts).filter(|(_, count)| **count > 0);
+        let ends = used().map(|(response, count)| response.len() + count);
+        let length = ends.max().unwrap_or(0).max(counts.iter().sum::<usize>() + 1).min(output.len());
+        let error = |(y, x): (&f64, &f64)| if y.is_nan() { 0.0 } else { y - x };
+        let target: Vec<f64> = output.iter().zip(&*values).take(length).map(error).collect();
+        let fitted = |response: &[f64]| {
+            let mut fitted = response[..response.len().min(length)].to_vec();
+            fitted.resize(length, 0.0);
+            fitted
+        };
+        let weights = if gaps {
+            let columns = used().flat_map(|(response, count)| {
+                let response = fitted(response);
+                (0..*count).map(move |delay| {
+                    let mut values = vec![0.0; delay.min(length)];
+                    values.extend_from_slice(&response[..length - delay.min(length)]);
+                    let whole = values.iter().fold(0.0_f64, |size, value| size.hypot(*value));
+                    values
+                        .iter_mut()
+                        .zip(output)
+                        .filter(|(_, y)| y.is_nan())
+                        .for_each(|(value, _)| *value = 0.0);
+                    Column { values, rounding: UNSEEN * whole }
+                })
+            });
+            let mut weights = closest_of(&target, &columns.collect::<Vec<_>>())?.into_iter();
+            counts.iter().map(|count| weights.by_ref().take(*count).collect()).collect()
+        } else {
+            let delays =
+                |(signal, count): (&Vec<f64>, &usize)| Delays { signal: signal.clone(), count: *count };
+            closest(&target, &self.responses.iter().zip(counts).map(delays).collect::<Vec<_>>())?
+        };
+        for (weights, response) in weights.iter().zip(&self.responses) {
+            add_filtered(&mut values[..length], &(0..length), weights, &fitted(response), 0);
         }
         Ok(())
     }
+}
+
+/// A run with its initial conditions: over how many samples they were estimated, how many they are, and the sums of squares of
+/// what they leave and of the output.
+struct Completed {
+    run: Run,
+    samples: usize,
+    unknown: usize,
+    square: f64,
+    output: f64,
 }

@@ -83,8 +83,9 @@ fn structures(task: &Task<'_>, automatic: &Automatic) -> Result<Vec<Structure>, 
         )),
         Some(structure) => Ok(vec![structure]),
         None if !driven => Ok(vec![Ar, Arma]),
-        // Models with F take no dropped samples.
+        // Models with F take no dropped samples, and others no estimated initial conditions.
         None if task.initial == Initial::Drop => Ok(vec![Arx, Armax]),
+        None if task.initial == Initial::Estimate => Ok(vec![Oe, Bj]),
         None => Ok(vec![Arx, Armax, Oe, Bj]),
     }
 }

@@ -4,7 +4,7 @@ use super::linear::{Columns, Fitted, Kept, Rows, Scaled};
 use super::search::Family;
 use super::{EXACT, Scored, Select, Task, unseen};
 use crate::data::Record;
-use crate::estimate::{Common, Initial, Point, Window, drop_is_not_for_f, stretches};
+use crate::estimate::{Common, Initial, Point, Window, drop_is_not_for_f, estimate_is_for_f, stretches};
 use crate::regression::{Presample, sum_of_squares};
 use crate::{Criteria, Error, Orders};
 
@@ -46,11 +46,13 @@ pub(super) struct Tried {
 
 impl Samples {
     /// # Errors
-    /// [`Error::Argument`] if samples are to be dropped and a model has F.
+    /// [`Error::Argument`] if samples are to be dropped and a model has F, or the other way round.
     pub(super) fn new(record: &Record<'_>, initial: Initial, models: &[Orders]) -> Result<Self, Error> {
-        let filtered = |orders: &Orders| orders.nf.iter().any(|&nf| nf > 0);
-        if initial == Initial::Drop && models.iter().any(filtered) {
+        if initial == Initial::Drop && models.iter().any(Orders::has_f) {
             return Err(drop_is_not_for_f());
+        }
+        if initial == Initial::Estimate && !models.iter().all(Orders::has_f) {
+            return Err(estimate_is_for_f());
         }
         if initial == Initial::Zero {
             return Ok(Self { window: Window::default(), presample: Presample::Zero });

@@ -79,7 +79,7 @@ pub(super) fn independence(
     // sum u(t) e(t - k), k = 0 … M.
     let signals = [traces.signal(signal), traces.signal(Traces::ERROR)];
     let delayed = vec![Taps { signal: 1, first: 0, count: lags + 1, sign: 1.0 }];
-    let (_, future, _) = Lagged::new(&signals, delayed, &counted, Presample::Zero).normal_equations();
+    let (_, future, _) = Lagged::new(&signals, delayed, &traces.spans(), Presample::Zero).normal_equations();
 
     // sqrt(N) s: its covariance for a known model, and what its parameters do to it.
     let all = [&past[..], psi].concat();

@@ -37,7 +37,8 @@ pub(super) struct Column {
 #[derive(Debug, Clone)]
 pub(super) struct Stretch {
     pub(super) known: Range<usize>,
-    pub(super) counted: Range<usize>,
+    /// One range, but where outputs are missing.
+    pub(super) counted: Vec<Range<usize>>,
 }
 
 /// e, the inputs, and the signals of psi, as long as the record.
@@ -64,8 +65,10 @@ impl<'a> Traces<'a> {
         let mut error = vec![0.0; length];
         let mut stretches = Vec::with_capacity(innovations.len());
         for found in innovations {
-            let own = found.counted.start - found.rows.start..found.counted.end - found.rows.start;
-            error[found.counted.clone()].copy_from_slice(&found.errors[own]);
+            for counted in &found.counted {
+                let own = counted.start - found.rows.start..counted.end - found.rows.start;
+                error[counted.clone()].copy_from_slice(&found.errors[own]);
+            }
             stretches.push(Stretch { known: found.rows.clone(), counted: found.counted.clone() });
         }
         let inputs = record.inputs.iter().map(|input| Cow::Borrowed(*input));
@@ -181,7 +184,18 @@ impl<'a> Traces<'a> {
 
     /// The samples that count.
     pub(super) fn counted(&self) -> Vec<Range<usize>> {
-        self.stretches.iter().map(|stretch| stretch.counted.clone()).collect()
+        self.stretches.iter().flat_map(|stretch| stretch.counted.iter().cloned()).collect()
+    }
+
+    /// The same, stretch by stretch.
+    pub(super) fn stretches(&self) -> Vec<&[Range<usize>]> {
+        self.stretches.iter().map(|stretch| stretch.counted.as_slice()).collect()
+    }
+
+    /// The samples of each stretch from the first to the last that counts.
+    pub(super) fn spans(&self) -> Vec<Range<usize>> {
+        let span = |stretch: &Stretch| Some(stretch.counted.first()?.start..stretch.counted.last()?.end);
+        self.stretches.iter().filter_map(span).collect()
     }
 }
 
@@ -215,9 +229,14 @@ impl Moments {
         let size = products.size();
         let mut entries = vec![0.0; size * size];
         for stretch in &traces.stretches {
-            products.add_ends(&signals, stretch.known.start, &stretch.counted, &mut entries);
+            for counted in &stretch.counted {
+                products.add_ends(&signals, stretch.known.start, counted, &mut entries);
+            }
         }
-        let counted = traces.stretches.iter().map(|stretch| (stretch.known.start, stretch.counted.clone()));
+        let counted = traces
+            .stretches
+            .iter()
+            .flat_map(|stretch| stretch.counted.iter().map(|counted| (stretch.known.start, counted.clone())));
         let mut interior = products.interior(counted);
         products.add_interior(&signals, &vec![usize::MAX; signals.len()], &mut interior, &mut entries);
         Self { products, entries }

@@ -183,12 +183,13 @@ impl Residuals {
             return Err(Untestable::Few { samples, needed });
         }
         let outputs: f64 = counted.iter().map(|rows| sum_of_squares(&record.output[rows.clone()])).sum();
-        let usable = |lag: &usize| PAIRS * pairs(&counted, *lag) >= samples;
+        let stretches = traces.stretches();
+        let usable = |lag: &usize| PAIRS * pairs(&stretches, *lag) >= samples;
         let Some(longest) = (1..=samples / SAMPLES_PER_INPUT_LAG).take_while(usable).last() else {
-            return Err(Untestable::Apart { samples, pairs: pairs(&counted, 1) });
+            return Err(Untestable::Apart { samples, pairs: pairs(&stretches, 1) });
         };
         let lags = lags.min(samples / SAMPLES_PER_LAG).clamp(1, longest);
-        let correlation = Autocorrelation::new(traces.signal(Traces::ERROR), &counted, lags);
+        let correlation = Autocorrelation::new(traces.signal(Traces::ERROR), &stretches, lags);
         let square = correlation.square;
         if !square.is_finite() {
             return Err(Untestable::Range);

@@ -59,7 +59,8 @@ fn correlations_are_those_of_pairs_inside_stretches() {
     let error = Noise(1).take(90);
     // Two of them touch: no pair reaches from one into the other.
     let counted: [Range<usize>; 4] = [2..30, 30..45, 50..53, 60..90];
-    let found = Autocorrelation::new(&error, &counted, 12);
+    let stretches: Vec<&[Range<usize>]> = counted.iter().map(std::slice::from_ref).collect();
+    let found = Autocorrelation::new(&error, &stretches, 12);
     let square: f64 = counted.iter().cloned().flatten().map(|t| error[t] * error[t]).sum();
     assert_eq!(found.samples, 76);
     assert!(close(found.square, square, 1e-14));
@@ -78,7 +79,7 @@ fn correlations_are_those_of_pairs_inside_stretches() {
 fn without_parameters_the_test_is_that_of_ljung_and_box() {
     let error = Noise(5).take(200);
     let counted = [0..120, 130..200];
-    let found = Autocorrelation::new(&error, &counted, 10);
+    let found = Autocorrelation::new(&error, &[&counted], 10);
     let test = ljung_box(&found, &DVector::zeros(10), &DMatrix::identity(10, 10)).unwrap();
     let each = (0..10).map(|k| found.values[k].powi(2) / found.pairs[k] as f64);
     let expected = 190.0 * 192.0 * each.sum::<f64>();

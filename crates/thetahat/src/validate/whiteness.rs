@@ -56,22 +56,39 @@ pub(super) struct Autocorrelation {
 }
 
 impl Autocorrelation {
-    /// O(N K) for K lags; none of them pairs samples of two stretches.
-    pub(super) fn new(error: &[f64], counted: &[Range<usize>], lags: usize) -> Self {
+    /// O(N K) for K lags; none of them pairs samples of two stretches. `error` is zero where it does not count.
+    pub(super) fn new(error: &[f64], stretches: &[&[Range<usize>]], lags: usize) -> Self {
         let taps = vec![Taps { signal: 0, first: 1, count: lags, sign: 1.0 }];
-        let (_, sums, square) = Lagged::new(&[error], taps, counted, Presample::Zero).normal_equations();
+        let span = |runs: &&[Range<usize>]| Some(runs.first()?.start..runs.last()?.end);
+        let spans: Vec<Range<usize>> = stretches.iter().filter_map(span).collect();
+        let (_, sums, square) = Lagged::new(&[error], taps, &spans, Presample::Zero).normal_equations();
         Self {
-            samples: counted.iter().map(Range::len).sum(),
+            samples: stretches.iter().copied().flatten().map(Range::len).sum(),
             square,
             values: sums.iter().map(|sum| sum / square).collect(),
-            pairs: (1..=lags).map(|lag| pairs(counted, lag)).collect(),
+            pairs: (1..=lags).map(|lag| pairs(stretches, lag)).collect(),
         }
     }
 }
 
-/// How many pairs of samples are so many steps apart.
-pub(super) fn pairs(stretches: &[Range<usize>], lag: usize) -> usize {
-    stretches.iter().map(|stretch| stretch.len().saturating_sub(lag)).sum()
+/// How many pairs of samples of one stretch are so many steps apart. A stretch is a list of runs of samples.
+pub(super) fn pairs(stretches: &[&[Range<usize>]], lag: usize) -> usize {
+    let of = |runs: &[Range<usize>]| {
+        // Each run against itself and those from which it is so many steps away: both lists rise.
+        let (mut count, mut first) = (0, 0);
+        for run in runs {
+            while runs[first].end + lag <= run.start {
+                first += 1;
+            }
+            let near = runs[first..].iter().take_while(|earlier| earlier.start + lag < run.end);
+            let shared = near.map(|earlier| {
+                run.end.min(earlier.end + lag).saturating_sub(run.start.max(earlier.start + lag))
+            });
+            count += shared.sum::<usize>();
+        }
+        count
+    };
+    stretches.iter().copied().map(of).sum()
 }
 
 /// X, a row for each lag 1 … L and a column for each parameter. Zero for an unstable A or D, which has no such response.

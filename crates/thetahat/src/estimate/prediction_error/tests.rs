@@ -211,7 +211,12 @@ fn what_cannot_be_estimated_is_refused_in_words() {
         Orders::bj(&[2], 2, 2, &[2], &[1]).unwrap(),
     ];
     for orders in &orders {
-        for initial in [Initial::Zero, Initial::Estimate, Initial::Auto] {
+        let other = if orders.has_f() { Initial::Estimate } else { Initial::Drop };
+        let of_others = if orders.has_f() { Initial::Drop } else { Initial::Estimate };
+        let whole = Record::new(&y, vec![&u]).unwrap();
+        let refused = found(&whole, orders, of_others, &Search::default()).unwrap_err();
+        assert!(matches!(refused, Error::Argument { argument, .. } if argument == "initial"));
+        for initial in [Initial::Zero, other, Initial::Auto] {
             let fit = |y: &[f64], u: &[f64]| {
                 let record = Record::new(y, vec![u]).unwrap();
                 found(&record, orders, initial, &Search::default())

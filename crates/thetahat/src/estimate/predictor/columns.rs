@@ -14,7 +14,7 @@ impl Predictor<'_> {
     /// For each segment the columns of psi with respect to the parameters over the samples that count, the best changes of the
     /// free responses taken out, at the current point. O(N p (n + 1)) for n free responses, and memory for N p numbers.
     pub(in crate::estimate) fn columns(&self) -> Vec<Vec<Vec<f64>>> {
-        self.sections.iter().map(|section| section.columns(&self.layout)).collect()
+        self.sections.iter().map(|section| section.columns(&self.layouts[section.layout])).collect()
     }
 }
 
@@ -33,7 +33,7 @@ impl Section<'_> {
         columns
     }
 
-    /// The columns of the parameters, then of the free responses, over the samples that count.
+    /// The columns of the parameters, then of the free responses, from the first sample that may count on; zero where one does not.
     pub(super) fn raw_columns(&self, layout: &Layout) -> Vec<Vec<f64>> {
         let count = layout.parameters + layout.free;
         let (columns, shifts) = layout.columns.split_at(count);
@@ -44,6 +44,11 @@ impl Section<'_> {
             let weights = &self.corrections[index * shifts.len()..][..shifts.len()];
             for (shift, weight) in shifts.iter().zip(weights).filter(|(_, weight)| **weight != 0.0) {
                 add_shifted(&mut values, &rows, *weight, &self.signals[shift.signal], shift.lag);
+            }
+            let starts = std::iter::once(rows.start).chain(self.runs.iter().map(|run| run.end));
+            let ends = self.runs.iter().map(|run| run.start).chain([rows.end]);
+            for (start, end) in starts.zip(ends) {
+                values[start - rows.start..end - rows.start].fill(0.0);
             }
             values
         };

@@ -16,9 +16,15 @@ const NEGLIGIBLE: f64 = 1e-20;
 /// Samples of a response that are computed at first.
 const FIRST_PIECE: usize = 256;
 
-/// One segment: its signals, and its part of the normal equations.
+/// One segment and what is known before it: its signals, and its part of the normal equations.
 #[derive(Debug)]
 pub(super) struct Section<'a> {
+    /// Which layout it has.
+    pub(super) layout: usize,
+    /// The sample of the record that it begins with.
+    pub(super) first: usize,
+    /// The samples that count.
+    pub(super) runs: Vec<Range<usize>>,
     pub(super) output: &'a [f64],
     pub(super) inputs: Vec<&'a [f64]>,
     /// The filtered signals, e first.
@@ -56,8 +62,15 @@ pub(super) struct Section<'a> {
 }
 
 impl<'a> Section<'a> {
-    pub(super) fn new(record: &Record<'a>, segment: &Range<usize>, layout: &Layout) -> Self {
-        let length = segment.len();
+    /// The samples `rows` of a record, of which the `runs` count.
+    pub(super) fn new(
+        record: &Record<'a>,
+        rows: &Range<usize>,
+        runs: Vec<Range<usize>>,
+        layout: &Layout,
+        index: usize,
+    ) -> Self {
+        let length = rows.len();
         let used = |signal: usize| {
             signal == 0 || layout.taps.iter().any(|taps| taps.signal == signal && taps.count > 0)
         };
@@ -65,17 +78,19 @@ impl<'a> Section<'a> {
         let (parameters, free) = (layout.parameters, layout.free);
         let columns = parameters + free;
         let size = layout.products.size();
-        let rows = layout.counted..length;
+        let counted = runs.iter().map(|run| (layout.masked, run.clone()));
         Self {
-            output: &record.output[segment.clone()],
-            inputs: record.inputs.iter().map(|input| &input[segment.clone()]).collect(),
+            layout: index,
+            first: rows.start,
+            output: &record.output[rows.clone()],
+            inputs: record.inputs.iter().map(|input| &input[rows.clone()]).collect(),
             signals: (0..layout.signals).map(|signal| room(used(signal))).collect(),
             supports: vec![usize::MAX; layout.signals],
             responses: layout.orders.nf.iter().map(|&nf| room(nf > 0)).collect(),
             disturbance: room(layout.orders.nd > 0),
             scratch: room(layout.orders.nd > 0),
             heads: vec![0.0; layout.signals * layout.masked],
-            interior: layout.products.interior(std::iter::once((layout.masked, rows))),
+            interior: layout.products.interior(counted),
             entries: vec![0.0; size * size],
             gram: vec![0.0; columns * columns],
             right: vec![0.0; columns],
@@ -89,6 +104,7 @@ impl<'a> Section<'a> {
             faded_lengths: vec![0; free],
             cost: 0.0,
             free_gain: 0.0,
+            runs,
         }
     }
 
@@ -104,14 +120,14 @@ impl<'a> Section<'a> {
         let gain: f64 = polynomials.d.iter().map(|d| d.abs()).sum();
         let mut own = 0;
         for (j, &order) in layout.orders.nf.iter().enumerate() {
-            for delay in 0..layout.orders.free_responses(j) {
+            for delay in 0..layout.own_free[j] {
                 let memory = 1 + order + layout.orders.nc + layout.orders.nd;
                 let column = &mut self.faded[own * length..][..length];
                 let mut known = (FIRST_PIECE + layout.counted + 2 * memory).min(length);
                 let size = loop {
                     let piece = &mut column[..known];
                     piece.fill(0.0);
-                    piece[delay] = 1.0;
+                    piece[layout.origin + delay] = 1.0;
                     divide(&polynomials.f[j], piece);
                     let size = sum_of_squares(piece);
                     if layout.orders.nd > 0 {
@@ -162,10 +178,9 @@ impl<'a> Section<'a> {
             let x = &mut self.responses[j];
             x.fill(0.0);
             delayed(x, layout.orders.nk[j], &polynomials.b[j], u);
-            let own = if layout.free > 0 { layout.orders.free_responses(j) } else { 0 };
-            let (weights, rest) = free.split_at(own);
+            let (weights, rest) = free.split_at(layout.own_free[j]);
             free = rest;
-            x.iter_mut().zip(weights).for_each(|(x, weight)| *x += weight);
+            x.iter_mut().skip(layout.origin).zip(weights).for_each(|(x, weight)| *x += weight);
             divide(&polynomials.f[j], x);
             w.iter_mut().zip(&*x).for_each(|(w, x)| *w -= x);
         }
@@ -175,9 +190,11 @@ impl<'a> Section<'a> {
         let (head, tail) = error.split_at_mut(layout.masked);
         head.fill(0.0);
         divide(&polynomials.c, tail);
-        let counted = &tail[layout.counted - layout.masked..];
-        self.cost =
-            layout.bound.map_or_else(|| sum_of_squares(counted), |bound| weighted::cost(counted, bound));
+        let each = self.runs.iter().map(|run| {
+            let errors = &error[run.clone()];
+            layout.bound.map_or_else(|| sum_of_squares(errors), |bound| weighted::cost(errors, bound))
+        });
+        self.cost = each.sum();
     }
 
     /// psi's signals, their Gram matrix and psi'e, at what was evaluated last.
@@ -222,7 +239,7 @@ impl<'a> Section<'a> {
             let mut next = 0;
             for j in (0..orders.inputs()).filter(|&j| orders.nf[j] > 0) {
                 let size = self.respond(layout, polynomials, layout.frees[j], Some(j));
-                let own = next..next + orders.free_responses(j);
+                let own = next..next + layout.own_free[j];
                 next = own.end;
                 self.free_floors[own].fill(UNSEEN * gain * gain * size);
             }
@@ -237,7 +254,7 @@ impl<'a> Section<'a> {
         self.eliminate(layout);
     }
 
-    /// The response of (D/(C F_j)) to an impulse at the first sample, or of 1/C to one at the first that counts, until it has
+    /// The response of (D/(C F_j)) to an impulse where free responses begin, or of 1/C to one at the first that counts, until it has
     /// died away. Gives the sum of squares of what 1/F_j alone makes of it.
     fn respond(
         &mut self,
@@ -249,11 +266,12 @@ impl<'a> Section<'a> {
         let (values, masked) = (&mut self.signals[signal], layout.masked);
         let orders = &layout.orders;
         let memory = 1 + orders.nc + orders.nd + input.map_or(0, |input| orders.nf[input]);
-        let mut known = (FIRST_PIECE + masked + 2 * memory).min(values.len());
+        let first = if input.is_some() { layout.origin } else { masked };
+        let mut known = (FIRST_PIECE + masked.max(first) + 2 * memory).min(values.len());
         let size = loop {
             let piece = &mut values[..known];
             piece.fill(0.0);
-            piece[if input.is_some() { 0 } else { masked }] = 1.0;
+            piece[first] = 1.0;
             let mut size = 1.0;
             if let Some(input) = input {
                 divide(&polynomials.f[input], piece);
@@ -284,7 +302,9 @@ impl<'a> Section<'a> {
     fn add_up(&mut self, layout: &Layout) {
         let (products, masked) = (&layout.products, layout.masked);
         self.entries.fill(0.0);
-        products.add_ends(&self.signals, masked, &(layout.counted..self.output.len()), &mut self.entries);
+        for run in &self.runs {
+            products.add_ends(&self.signals, masked, run, &mut self.entries);
+        }
         products.add_interior(&self.signals, &self.supports, &mut self.interior, &mut self.entries);
         let size = products.size();
         let entry = |a: &Column, b: &Column| {

@@ -39,81 +39,148 @@ fn record<'a>(output: &'a [f64], inputs: &'a [Vec<f64>]) -> Record<'a> {
     Record { output, inputs: inputs.iter().map(Vec::as_slice).collect(), past: vec![0; 3], segments }
 }
 
-/// Beginnings of segments, and in how many first samples e = 0, and how many do not count, whatever the model.
-const BEGINNINGS: [(Begin, usize, usize); 5] = [
-    (Begin::Zero, 0, 0),
-    (Begin::Zero, 0, 9),
-    (Begin::Unknown, 0, 0),
-    (Begin::Unknown, 0, 9),
-    (Begin::Unknown, 7, 9),
-];
+/// Predictors of models on common samples, and on all samples with what is known before their segments.
+fn predictors<'a>(record: &Record<'a>, orders: &Orders) -> Vec<Predictor<'a>> {
+    let common = [
+        (Begin::Zero, 0, 0),
+        (Begin::Zero, 0, 9),
+        (Begin::Unknown, 0, 0),
+        (Begin::Unknown, 0, 9),
+        (Begin::Unknown, 7, 9),
+    ];
+    // Models are compared on samples of which none is missing.
+    let complete = record.output.iter().all(|y| !y.is_nan());
+    let common = common.into_iter().filter(|_| complete);
+    let common =
+        common.map(|(begin, silent, counted)| Predictor::counting(record, orders, begin, silent, counted));
+    let known = Record { past: vec![0, 1, 5], ..record.clone() };
+    let own = [Begin::Zero, Begin::Unknown, Begin::UnknownInputs]
+        .map(|begin| Predictor::new(&known, orders, begin));
+    common.chain(own).collect()
+}
+
+/// An output with some samples missing, if the model allows it.
+fn output(orders: &Orders, noise: &mut Noise) -> Vec<f64> {
+    let mut y = noise.take(140);
+    if !orders.needs_past_outputs() {
+        for t in [0, 1, 20, 40, 41, 45, 62, 100, 102, 139] {
+            y[t] = f64::NAN;
+        }
+    }
+    y
+}
 
 /// All errors that count, segment by segment, of parameters followed by the free responses' weights of each segment.
 fn errors(predictor: &mut Predictor<'_>, unknowns: &[f64]) -> Vec<f64> {
-    let (parameters, mut weights) = unknowns.split_at(predictor.layout.parameters);
+    let (parameters, mut weights) = unknowns.split_at(predictor.right.len());
     for section in &mut predictor.sections {
         let (own, rest) = weights.split_at(section.trial.len());
         section.trial.copy_from_slice(own);
         weights = rest;
     }
     predictor.set(parameters).unwrap();
-    let Predictor { layout, polynomials, negative, sections, .. } = &mut *predictor;
-    sections.iter_mut().for_each(|section| section.evaluate(layout, polynomials, negative));
+    let Predictor { layouts, polynomials, negative, sections, .. } = &mut *predictor;
+    sections.iter_mut().for_each(|section| section.evaluate(&layouts[section.layout], polynomials, negative));
     predictor.residuals().0
 }
 
 #[test]
 fn errors_are_those_of_the_difference_equations() {
     let mut noise = Noise(1);
+    let mut through = 0;
     for _ in 0..100 {
         let (orders, parameters) = random(&mut noise);
         let u: Vec<Vec<f64>> = (0..orders.inputs()).map(|_| noise.take(140)).collect();
-        let y = noise.take(140);
+        let y = output(&orders, &mut noise);
+        through += usize::from(y[1].is_nan());
         let record = record(&y, &u);
-        for (begin, silent, counted) in BEGINNINGS {
-            let mut predictor = Predictor::counting(&record, &orders, begin, silent, counted);
-            let unknowns = predictor.layout.parameters + predictor.initial_conditions();
-            let weights = noise.take(unknowns - parameters.len());
+        for mut predictor in predictors(&record, &orders) {
+            let weights = noise.take(predictor.initial_conditions());
             let found = errors(&mut predictor, &[parameters.clone(), weights.clone()].concat());
             let Polynomials { a, b, c, d, f } = Polynomials::new(&orders, &parameters);
-            let Layout { masked, counted, free, .. } = predictor.layout;
-            let (mut expected, mut weights) = (Vec::new(), weights.as_slice());
-            for segment in record.segments.iter().filter(|s| s.len() > counted.max(free)) {
-                // Before the segment everything is zero.
+            let (mut expected, mut weights): (Vec<f64>, &[f64]) = (Vec::new(), &weights);
+            for section in &predictor.sections {
+                let Layout { masked, counted, origin, own_free, .. } = &predictor.layouts[section.layout];
+                // Before the section everything is zero.
                 let at = |x: &[f64], t: usize, lag: usize| if t < lag { 0.0 } else { x[t - lag] };
                 let past =
                     |p: &[f64], x: &[f64], t: usize| (1..p.len()).map(|i| p[i] * at(x, t, i)).sum::<f64>();
                 let mut w: Vec<f64> = Vec::new();
                 let (mut x, mut e) = (vec![Vec::new(); u.len()], Vec::new());
                 let mut free = Vec::new();
-                for j in 0..u.len() {
-                    let count = if begin == Begin::Zero { 0 } else { orders.free_responses(j) };
-                    let (own, rest) = weights.split_at(count);
+                for count in own_free {
+                    let (own, rest) = weights.split_at(*count);
                     free.push(own);
                     weights = rest;
                 }
-                for t in 0..segment.len() {
-                    let y = &y[segment.clone()];
-                    let mut value = y[t] + past(&a, y, t);
+                for t in 0..section.output.len() {
+                    let mut value = section.output[t] + past(&a, section.output, t);
                     for j in 0..u.len() {
-                        let u = &u[j][segment.clone()];
-                        let driven: f64 =
-                            b[j].iter().enumerate().map(|(i, b)| b * at(u, t, orders.nk[j] + i)).sum();
-                        let now = driven + free[j].get(t).unwrap_or(&0.0) - past(&f[j], &x[j], t);
+                        let own = |i: usize| b[j][i] * at(section.inputs[j], t, orders.nk[j] + i);
+                        let driven: f64 = (0..b[j].len()).map(own).sum();
+                        let impulse = t.checked_sub(*origin).and_then(|i| free[j].get(i)).unwrap_or(&0.0);
+                        let now = driven + impulse - past(&f[j], &x[j], t);
                         x[j].push(now);
                         value -= now;
                     }
                     w.push(value);
                     let error = value + past(&d, &w, t) - past(&c, &e, t);
-                    e.push(if t < masked { 0.0 } else { error });
+                    e.push(if t < *masked { 0.0 } else { error });
                 }
-                expected.extend_from_slice(&e[counted..]);
+                expected.extend(e[*counted..].iter().filter(|e| !e.is_nan()));
             }
             assert_eq!(found.len(), expected.len());
+            assert_eq!(found.len(), predictor.samples());
             let size = expected.iter().fold(0.0_f64, |size, e| size.max(e.abs()));
             assert!(found.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-11 * size), "{orders:?}");
         }
     }
+    assert!(through > 3);
+}
+
+#[test]
+fn sections_begin_with_the_past_that_their_errors_reach_back_to() {
+    let mut noise = Noise(5);
+    let (u, y) = ([noise.take(140)], noise.take(140));
+    // B reaches back 4 samples, D one more.
+    let orders = Orders::bj(&[2], 1, 1, &[1], &[3]).unwrap();
+    let record = Record { past: vec![0, 3, 5], ..record(&y, &u) };
+    let of = |begin| {
+        let predictor = Predictor::new(&record, &orders, begin);
+        let each = predictor.sections.iter().map(|section| (section.output.len(), section.free.len()));
+        (predictor.samples(), each.collect::<Vec<_>>())
+    };
+    assert_eq!(of(Begin::Zero), (134, vec![(60, 0), (14, 0), (60, 0)]));
+    // Without a past the first sample of D w is not there.
+    assert_eq!(of(Begin::Unknown), (133, vec![(60, 1), (17, 1), (65, 1)]));
+    assert_eq!(of(Begin::UnknownInputs), (133, vec![(60, 4), (17, 2), (65, 1)]));
+    assert!(Predictor::has_unknown_inputs(&record, &orders));
+    assert!(!Predictor::has_unknown_inputs(&Record { past: vec![5; 3], ..record.clone() }, &orders));
+}
+
+#[test]
+fn what_was_before_a_segment_is_known_or_estimated() {
+    let mut noise = Noise(6);
+    let orders = Orders::oe(&[2], &[2], &[4]).unwrap();
+    let parameters = [1.0, 0.5, -1.5, 0.7];
+    let u = noise.take(200);
+    let mut y = vec![0.0; 200];
+    for t in 5..200 {
+        y[t] = u[t - 4] + 0.5 * u[t - 5] + 1.5 * y[t - 1] - 0.7 * y[t - 2];
+    }
+    let whole = Record::new(&y, vec![&u]).unwrap();
+    let of = |past: usize, begin| {
+        let record = Record { segments: vec![100..200], past: vec![past], ..whole.clone() };
+        let mut predictor = Predictor::new(&record, &orders, begin);
+        assert_eq!(predictor.samples(), 100);
+        predictor.evaluate(&parameters).unwrap();
+        predictor.linearize();
+        predictor.try_free(&[]);
+        predictor.evaluate(&parameters).unwrap()
+    };
+    assert!(of(5, Begin::Unknown) < 1e-20 && of(100, Begin::Unknown) < 1e-20);
+    assert!(of(0, Begin::UnknownInputs) < 1e-20 && of(3, Begin::UnknownInputs) < 1e-20);
+    assert!(of(0, Begin::Unknown) > 1e-3 && of(2, Begin::Unknown) > 1e-3);
 }
 
 #[test]
@@ -122,15 +189,15 @@ fn gradients_and_gram_matrices_are_those_of_central_differences() {
     for _ in 0..200 {
         let (orders, parameters) = random(&mut noise);
         let u: Vec<Vec<f64>> = (0..orders.inputs()).map(|_| noise.take(140)).collect();
-        let y = noise.take(140);
+        let y = output(&orders, &mut noise);
         let record = record(&y, &u);
-        for (begin, silent, counted) in BEGINNINGS {
-            let mut predictor = Predictor::counting(&record, &orders, begin, silent, counted);
+        for mut predictor in predictors(&record, &orders) {
             let free = predictor.initial_conditions();
             let unknowns = [parameters.clone(), noise.take(free)].concat();
-            let step = 1e-5;
             let psi: Vec<Vec<f64>> = (0..unknowns.len())
                 .map(|index| {
+                    // Errors are linear in the weights.
+                    let step = if index < parameters.len() { 1e-5 } else { 1.0 };
                     let mut moved = |by: f64| {
                         let mut unknowns = unknowns.clone();
                         unknowns[index] += by;
@@ -145,34 +212,29 @@ fn gradients_and_gram_matrices_are_those_of_central_differences() {
             let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
             let norm = |a: &[f64]| dot(a, a).sqrt();
             let count = parameters.len();
-            // What the parameters and the weights of one segment have, in the list of all unknowns.
-            let own = predictor.layout.free;
-            let place = |section: usize, index: usize| {
-                if index < count { index } else { index + section * own }
-            };
-            let all = count + own;
-            let counted = predictor.layout.counted;
-            let lengths = predictor.sections.iter().map(|section| section.output.len() - counted);
-            let lengths: Vec<usize> = lengths.collect();
-            let mut from = 0;
-            for (number, section) in predictor.sections.iter().enumerate() {
-                let rows = from..from + lengths[number];
+            let (mut from, mut before) = (0, count);
+            for section in &predictor.sections {
+                let rows = from..from + section.runs.iter().map(Range::len).sum::<usize>();
                 from = rows.end;
+                // What the parameters and the weights of this section have, in the list of all unknowns.
+                let place = |index: usize| if index < count { index } else { index - count + before };
+                let all = count + section.free.len();
                 for i in 0..all {
-                    let left = &psi[place(number, i)][rows.clone()];
+                    let left = &psi[place(i)][rows.clone()];
                     let length = norm(&e[rows.clone()]);
                     // Differences have rounding of some 1e-10.
                     let size = norm(left).max(1e-3) * length;
                     let right = dot(left, &e[rows.clone()]);
-                    assert!((section.right[i] - right).abs() <= 1e-6 * size, "{orders:?} {begin:?} {i}");
+                    assert!((section.right[i] - right).abs() <= 1e-6 * size, "{orders:?} {i}");
                     for j in 0..all {
-                        let other = &psi[place(number, j)][rows.clone()];
+                        let other = &psi[place(j)][rows.clone()];
                         let difference = section.gram[i * all + j] - dot(left, other);
                         let rounding = 1e-3 * norm(left).max(norm(other)).max(1.0);
                         let size = (norm(left) * norm(other)).max(rounding);
-                        assert!(difference.abs() <= 1e-6 * size, "{orders:?} {begin:?} {counted} {i} {j}");
+                        assert!(difference.abs() <= 1e-6 * size, "{orders:?} {i} {j}");
                     }
                 }
+                before += section.free.len();
             }
         }
     }

@@ -52,7 +52,14 @@ fn products_of_backward_filtered_columns_are_those_of_the_matrix() {
     ] {
         for monic in [&[1.0][..], &[1.0, -0.9], &[1.0, -1.6, 0.8, 0.1, -0.05]] {
             for combination in [None, Some(&combination)] {
-                let found = backward_filtered_products(&signals, &taps, &segment, &rows, combination, monic);
+                let found = backward_filtered_products(
+                    &signals,
+                    &taps,
+                    &segment,
+                    std::slice::from_ref(&rows),
+                    combination,
+                    monic,
+                );
                 let expected = dense(&signals, &taps, &segment, &rows, combination, monic);
                 assert!(
                     (&found - &expected).amax() <= 1e-12 * expected.amax(),
@@ -104,7 +111,8 @@ fn white_residuals_have_the_covariance_of_least_squares() {
     let x = noise.take(1500);
     let taps = [Taps { signal: 0, first: 0, count: 3, sign: 1.0 }];
     let whole = 0..1500;
-    let products = backward_filtered_products(&[&x], &taps, &whole, &whole, None, &[1.0]);
+    let products =
+        backward_filtered_products(&[&x], &taps, &whole, std::slice::from_ref(&whole), None, &[1.0]);
     let left = products.clone().try_inverse().unwrap();
     assert!((coloured(&left, 0.3, &products) - &left * 0.3).amax() < 1e-12 * left.amax());
 }

@@ -220,7 +220,7 @@ fn the_innovations_of_a_models_own_output_come_back() {
         let y = output(&model, &u, &e);
         let record = Record::new(&y, views(&u)).unwrap();
         let found = innovations(&model, &record, 1, Start::Zero).unwrap();
-        assert_eq!(found[0].counted, 0..400);
+        assert_eq!(found[0].counted, [0..400]);
         let worst = found[0].errors.iter().zip(&e).fold(0.0_f64, |worst, (a, b)| worst.max((a - b).abs()));
         let largest = y.iter().fold(1.0_f64, |largest, y| largest.max(y.abs()));
         assert!(worst < 1e-12 * largest, "{:?} {worst}", model.structure);
@@ -244,22 +244,22 @@ fn innovations_are_the_residuals_of_the_estimate() {
         Orders::new(1, &[3], 1, 1, &[1], &[1]),
     ] {
         let orders = orders.unwrap();
+        let dropped = if orders.is_linear() { Start::Drop } else { Start::Estimate };
         for (initial, start) in
-            [(Initial::Zero, Start::Zero), (Initial::Drop, Start::Drop), (Initial::Estimate, Start::Estimate)]
+            [(Initial::Zero, Start::Zero), (Initial::Drop, dropped), (Initial::Estimate, Start::Estimate)]
         {
-            let Ok(found) = estimate(&record, &orders, &Method::default(), initial) else {
-                assert!(initial == Initial::Drop && orders.nf != [0], "{:?} {initial:?}", orders.structure());
-                continue;
-            };
+            let found = estimate(&record, &orders, &Method::default(), initial);
+            assert_eq!(
+                found.is_ok(),
+                initial != if orders.has_f() { Initial::Drop } else { Initial::Estimate }
+            );
+            let Ok(found) = found else { continue };
             let signal = Signal::default;
             let model = Model::new(&orders, &found, 1.0, vec![signal()], signal()).unwrap();
-            // What the fit did not look at.
-            let alone = Record { past: vec![0; 2], ..record.clone() };
             let (mut squares, mut samples) = (0.0, 0);
-            for segment in innovations(&model, &alone, 1, start).unwrap() {
-                let counted = segment.counted.start - segment.rows.start..;
-                squares += segment.errors[counted].iter().map(|e| e * e).sum::<f64>();
-                samples += segment.counted.len();
+            for segment in innovations(&model, &record, 1, start).unwrap() {
+                squares += segment.counted_errors().map(|e| e * e).sum::<f64>();
+                samples += segment.counted_errors().count();
             }
             assert_eq!(samples, found.samples(), "{:?} {initial:?}", orders.structure());
             let ratio = squares / samples as f64 / found.mse();
@@ -292,6 +292,24 @@ fn effects_of_the_past(model: &Model, length: usize) -> Vec<Vec<f64>> {
         effects.extend((1..f.len()).map(|lag| respond(&|t| -behind(f, t + lag))));
     }
     effects
+}
+
+/// What each single value of an input with F before a segment does to x, and how many more initial conditions it takes to make
+/// up for all of them where x counts from sample `first` on.
+fn effects_of_inputs(model: &Model, length: usize, first: usize) -> (Vec<Vec<f64>>, usize) {
+    let (mut effects, mut more) = (Vec::new(), 0);
+    for (b, f) in model.b.iter().zip(&model.f).filter(|(_, f)| f.len() > 1) {
+        let respond = |lag: usize| {
+            let mut x = vec![0.0; length];
+            for t in 0..length {
+                x[t] = b.get(t + lag).copied().unwrap_or(0.0) - earlier(f, &x, t);
+            }
+            x
+        };
+        effects.extend((1..b.len()).map(respond));
+        more += (b.len() - 1).saturating_sub(first).saturating_sub(f.len() - 1);
+    }
+    (effects, more)
 }
 
 /// The sum of squares that is left of a signal by the best combination of others: what is left of these is taken off in
@@ -329,14 +347,44 @@ fn an_estimated_start_leaves_the_least_errors_that_any_past_can() {
             output: &y,
             inputs: views(&u),
             segments: vec![40..240, 245..252, 260..300],
-            past: vec![0, 3, 3],
+            past: vec![0; 3],
         };
         let silent = model.orders.conditioned();
         let found = innovations(&model, &record, 1, Start::Estimate).unwrap();
         assert!(found.len() >= 2, "{:?}", model.structure);
-        for found in found {
+        // With what earlier inputs do where that is worth it, in all segments that are long enough, or none.
+        let first = silent - model.orders.nd;
+        let lefts = found.iter().map(|found| {
             let segment = found.rows.clone();
-            assert_eq!(found.counted, segment.start + silent..segment.end);
+            let mut known = y[..segment.end].to_vec();
+            let from_rest =
+                Recursion::new(&model, &record.inputs, segment.start, silent).run(&mut known, segment.end);
+            let seen = |x: &Vec<f64>| effect(&model, x, silent);
+            let mut effects: Vec<Vec<f64>> =
+                effects_of_the_past(&model, segment.len()).iter().map(seen).collect();
+            let narrow = left(&from_rest, &effects);
+            let (inputs, more) = effects_of_inputs(&model, segment.len(), first);
+            let all = model.orders.nf.iter().sum::<usize>() + more;
+            let fits = segment.len() - silent > all;
+            if fits {
+                effects.extend(inputs.iter().map(seen));
+            }
+            (segment.len() - silent, narrow, left(&from_rest, &effects), if fits { more } else { 0 })
+        });
+        let lefts: Vec<_> = lefts.collect();
+        let samples = lefts.iter().map(|left| left.0).sum::<usize>() as f64;
+        let ratio =
+            lefts.iter().map(|left| left.1).sum::<f64>() / lefts.iter().map(|left| left.2).sum::<f64>();
+        let more = lefts.iter().map(|left| left.3).sum::<usize>();
+        let wide = more > 0 && samples * ratio.ln() > more as f64 * samples.ln();
+        for (found, (_, narrow, least, _)) in found.into_iter().zip(lefts) {
+            if wide {
+                let cost = found.errors.iter().map(|e| e * e).sum::<f64>();
+                assert!((cost / least - 1.0).abs() < 1e-9, "{:?} {cost} {least}", model.structure);
+                continue;
+            }
+            let segment = found.rows.clone();
+            assert_eq!(found.counted, [segment.start + silent..segment.end]);
             let mut known = y[..segment.end].to_vec();
             let from_rest =
                 Recursion::new(&model, &record.inputs, segment.start, silent).run(&mut known, segment.end);
@@ -344,9 +392,8 @@ fn an_estimated_start_leaves_the_least_errors_that_any_past_can() {
                 .iter()
                 .map(|x| effect(&model, x, silent))
                 .collect();
-            let best = left(&from_rest, &effects);
             let cost = found.errors.iter().map(|e| e * e).sum::<f64>();
-            assert!((cost / best - 1.0).abs() < 1e-9, "{:?} {cost} {best}", model.structure);
+            assert!((cost / narrow - 1.0).abs() < 1e-9, "{:?} {cost} {narrow}", model.structure);
             // And it is one of these starts that leaves them.
             let change: Vec<f64> = found.errors.iter().zip(&from_rest).map(|(a, b)| a - b).collect();
             let size = from_rest.iter().map(|x| x * x).sum::<f64>();
@@ -420,13 +467,20 @@ fn an_estimated_start_is_the_best_there_is_for_a_free_run() {
         effects.extend((1..model.a.len()).map(|lag| {
             past(lag).map(|(t, lag)| -model.a.get(t + lag).copied().unwrap_or(0.0)).collect::<Vec<f64>>()
         }));
-        for effect in &mut effects {
+        let (mut inputs, more) = effects_of_inputs(&model, 200, 0);
+        for effect in effects.iter_mut().chain(&mut inputs) {
             for t in 0..200 {
                 effect[t] -= earlier(&model.a, effect, t);
             }
         }
         let cost = errors.iter().map(|e| e * e).sum::<f64>();
-        let best = left(&from_rest, &effects);
+        let mut best = left(&from_rest, &effects);
+        // With what earlier inputs do where that is worth it.
+        let least = left(&from_rest, &[&effects[..], &inputs].concat());
+        if more > 0 && 200.0 * (best / least).ln() > more as f64 * 200_f64.ln() {
+            best = least;
+            effects.extend(inputs);
+        }
         assert!((cost / best - 1.0).abs() < 1e-9, "{:?} {cost} {best}", model.structure);
         let change: Vec<f64> = errors.iter().zip(&from_rest).map(|(a, b)| a - b).collect();
         let size = from_rest.iter().map(|x| x * x).sum::<f64>();

@@ -907,13 +907,13 @@ pub(crate) enum SelectArgument {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum InitialArgument {
-    /// drop without F; with F estimate where it is worth its parameters, else zero
+    /// drop without F; with F estimate where rows stand before, or it is worth its parameters, else zero
     Auto,
-    /// Nothing: samples without a full regressor are left out (models without F)
+    /// What was measured before; where nothing was, samples without a full regressor are left out (models without F)
     Drop,
     /// Zeros
     Zero,
-    /// What fits best, found with the parameters
+    /// What was measured before, and what fits best, found with the parameters (models with F)
     Estimate,
 }
 

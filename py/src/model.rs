@@ -215,10 +215,11 @@ impl Model {
             Some(_) => return Err(PyValueError::new_err("u: the model has no inputs; leave it out")),
             None => Vec::new(),
         };
-        let horizon = Horizon::Steps { steps };
-        let start = self.start(initial, log.get(), horizon)?;
+        let start = self.start(initial, log.get(), Horizon::Steps { steps })?;
         let log = Arc::clone(&log.get().log);
         let rows = log.rows();
+        // From the last measured sample on: as many more steps as rows are missing at the end.
+        let horizon = Horizon::Steps { steps: steps + missing_at_the_end(&model, &log) };
         let applied = interruptible(py, move |_| {
             let mut known = copy(&log, &channels(&model, &log))?;
             if driven {
@@ -378,6 +379,14 @@ pub(crate) fn channels<'a>(model: &'a thetahat::Model, log: &thetahat::Log) -> V
     let inputs = model.inputs.iter().map(|input| input.name.as_str());
     let output = Some(model.output.name.as_str()).filter(|output| log.has(output));
     inputs.chain(output).collect()
+}
+
+/// How many rows at the end of a log miss a channel of the model.
+fn missing_at_the_end(model: &thetahat::Model, log: &thetahat::Log) -> usize {
+    let names = channels(model, log);
+    let used: Vec<&[f64]> =
+        names.iter().filter_map(|name| Some(&log.channel(name).ok()?.values[..])).collect();
+    (0..log.rows()).rev().take_while(|&row| used.iter().any(|values| values[row].is_nan())).count()
 }
 
 /// A log that goes on with known inputs and no output.

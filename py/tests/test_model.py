@@ -88,6 +88,44 @@ def test_a_forecast_goes_on_where_the_log_ends(motor: th.Log) -> None:
     assert repr(ahead) == "Forecast(4 steps from 9 s)"
 
 
+def test_a_forecast_goes_on_from_the_last_measured_sample(motor: th.Log) -> None:
+    speed = motor["speed"].copy()
+    speed[895:900] = np.nan
+    cut = th.Log(motor.u, speed, sample_time=0.01)
+    future = motor.u[900:904]
+    for model in (th.arx(motor, 2, 2), th.armax(motor, 2, 2, 1), th.bj(motor, 2, 1, 1, 2)):
+        ahead = model.forecast(cut[:900], 4, future)
+        # Five rows are missing: the same as a longer forecast from where they begin.
+        longer = model.forecast(cut[:895], 9, motor.u[895:904])
+        assert np.allclose(ahead.values, longer.values[5:], rtol=1e-9)
+        assert np.allclose(ahead.standard_deviations, longer.standard_deviations[5:], rtol=1e-9)
+    series = th.ar(motor, 2)
+    assert np.allclose(series.forecast(cut[:900], 3).values, series.forecast(cut[:895], 8).values[5:])
+    # Output errors need no past output, and are as sure of all steps.
+    model = th.oe(motor, 2, 2)
+    ahead = model.forecast(cut[:900], 4, future)
+    assert np.allclose(ahead.values, model.predict(cut[:904], None)[900:904], rtol=1e-6)
+    assert np.allclose(ahead.standard_deviations, np.sqrt(model.noise_variance))
+
+
+def test_missing_outputs_do_not_cut_an_output_error_model(motor: th.Log) -> None:
+    speed = motor["speed"].copy()
+    speed[np.random.default_rng(1).random(speed.size) < 0.3] = np.nan
+    log = th.Log(motor.u, speed, sample_time=0.01)
+    whole, cut = th.oe(motor, 2, 2), th.oe(log, 2, 2)
+    assert cut.samples == np.isfinite(speed).sum()
+    assert np.allclose(cut.parameters, whole.parameters, atol=0.2) and np.isclose(cut.noise_variance, whole.noise_variance, rtol=0.2)
+    # Predictions go on where the output is missing.
+    assert np.isfinite(cut.predict(log)).all() and np.isfinite(cut.predict(log, None)).all()
+
+
+def test_initial_conditions_are_for_models_that_have_some(motor: th.Log) -> None:
+    with pytest.raises(ValueError, match="estimate is for models with F"):
+        th.armax(motor, 2, 2, 1, initial="estimate")
+    with pytest.raises(ValueError, match="estimate is for models with F"):
+        th.arx(motor, 2, 2, initial="estimate")
+
+
 def test_responses_are_those_of_the_polynomials(motor: th.Log) -> None:
     model = th.bj(motor, 2, 1, 1, 2)
     w = np.array([0.5, 5.0, 50.0])

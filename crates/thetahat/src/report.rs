@@ -7,6 +7,8 @@ mod identify;
 mod requirement;
 mod sample;
 mod schema;
+#[cfg(test)]
+mod tests;
 mod validation;
 mod warnings;
 

@@ -413,7 +413,8 @@ class Model:
         Returns
         -------
         ndarray, shape (N,)
-            NaN where there is no prediction: in gaps, and before a start.
+            NaN where there is no prediction: in gaps, and before a start. Free runs, and predictions of models without A, C
+            and D, go on where the output alone is missing.
 
         Raises
         ------
@@ -557,6 +558,9 @@ class Model:
         self, log: Log, steps: int, u: _numbers.Columns | None = None, *, initial: str = "auto"
     ) -> Forecast:
         """What comes after the end of a log.
+
+        Where the log ends in missing outputs it goes on from the last measured one, with as many more steps: the deviations
+        grow accordingly. The inputs of these rows must be in the log.
 
         Parameters
         ----------

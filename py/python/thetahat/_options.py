@@ -56,7 +56,10 @@ class FitOptions(TypedDict, total=False):
         The band of frequencies in Hz whose errors the fit makes small, such as ``(0.1, 5)``: inputs and output go through one
         Butterworth filter. The model and its figures are of the signals as they are.
     initial : {"auto", "drop", "zero", "estimate"}
-        What stands for the samples before the first of a stretch.
+        What stands for the samples before the first of a stretch. Rows that the log has before those to fit to are used as
+        past inputs and outputs in all cases but "zero". Without them, "drop" leaves out the first rows, for models without F;
+        "estimate" finds what they did to B/F u with the parameters, for models with F. "auto" is "drop" without F; with F it
+        is "estimate" where there is a past or where that is worth its parameters, else "zero".
     constant : {"auto", "yes", "no"}
         Whether the level of the output is estimated with the parameters, beside the mean that is taken off: where it lowers
         MDL, always or never. With ``detrend="none"``, or an offset of the output by hand, "auto" is "no". It is part of ``model.offsets``, and stands with its standard error in the report.

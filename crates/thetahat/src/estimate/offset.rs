@@ -25,6 +25,7 @@
 use std::ops::Range;
 use std::time::Instant;
 
+use super::arx::with_past;
 use super::optimize::best_free;
 use super::predictor::{Begin, Predictor};
 use super::{
@@ -32,7 +33,7 @@ use super::{
 };
 use crate::data::{Log, Offset, Record};
 use crate::model::Quantity;
-use crate::regression::sum;
+use crate::regression::{Presample, sum};
 use crate::{Criteria, Error, Orders, Structure};
 
 /// A search for a constant begins where a step foretells this fraction of what it must be worth.

@@ -283,7 +283,14 @@ fn fit(
     });
     let missing = missing.collect::<Result<Vec<_>, Error>>()?;
 
-    let signals = names.iter().map(|name| deviations(&mut log, name, plan, &segments));
+    // What an input has done while the output was missing is in the output after it.
+    let driven = match &plan.choice {
+        Choice::Known(orders) => estimation_rows(&log, plan, orders, &estimation)?.segments,
+        Choice::Grid(_) | Choice::Automatic(_) => segments.clone(),
+    };
+    let signals = names
+        .iter()
+        .map(|name| deviations(&mut log, name, plan, if *name == plan.output { &segments } else { &driven }));
     let signals: Vec<Signal> = signals.collect::<Result<_, Error>>()?;
     let (output, inputs) = signals.split_last().ok_or_else(|| Error::data("there is no output"))?;
     let beside = Beside::new(&log, &segments, plan.trend)?;

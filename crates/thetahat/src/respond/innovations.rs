@@ -31,8 +31,9 @@ pub(crate) struct Innovations {
     pub(crate) span: Range<usize>,
     /// Those that count: the span, but where outputs are missing.
     pub(crate) counted: Vec<Range<usize>>,
-    /// What x starts from.
+    /// What x starts from, and what that was found among.
     pub(super) impulses: Impulses,
+    pub(super) basis: Basis,
     /// w, one value for each of `rows`; -x where the output is missing.
     pub(crate) disturbance: Vec<f64>,
     /// e, one value for each of `rows`; zero where it is not known.
@@ -64,8 +65,20 @@ impl Impulses {
 
     /// Whether there are none.
     pub(super) fn is_empty(&self) -> bool {
-        self.0.iter().all(Vec::is_empty)
+        self.weights.iter().all(Vec::is_empty)
     }
+}
+
+/// Which impulses are estimated for a stretch.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Basis {
+    /// The first samples of the stretch have no e.
+    silent: usize,
+    /// The sample that the first impulse is at, and how many there are for each input.
+    pub(super) first: usize,
+    pub(super) counts: Vec<usize>,
+    /// Where no error is known.
+    gaps: Vec<Range<usize>>,
 }
 
 /// The innovations of each segment that has samples with a prediction `horizon` steps ahead. Only these count: those with
@@ -163,6 +176,7 @@ fn of_segment(
     let after = measured_runs(model, record, &(first.saturating_add(silent).min(segment.end)..segment.end));
     let known = after.iter().map(Range::len).sum::<usize>();
     let mut impulses = Impulses::none(model);
+    let mut basis = Basis { silent, first: 0, counts: vec![0; model.orders.inputs()], gaps: Vec::new() };
     let (mut disturbance, mut errors) = residuals(model, record, &rows, silent, &impulses);
     if start == Start::Estimate {
         // Numbers that as many samples determine fit them, whatever they are.
@@ -174,10 +188,13 @@ fn of_segment(
             return Ok(None);
         }
         if unknown > 0 {
-            let gaps: Vec<Range<usize>> =
-                gaps(&after).map(|gap| gap.start - first..gap.end - first).collect();
+            // Where no error is known.
+            let starts = std::iter::once(0).chain(after.iter().map(|run| run.end - first));
+            let ends = after.iter().map(|run| run.start - first).chain([rows.len()]);
+            let gaps: Vec<Range<usize>> = starts.zip(ends).map(|(start, end)| start..end).collect();
             let counts = (0..model.orders.inputs()).map(|input| count(model, input, origin, with_inputs));
-            impulses = best(model, &errors, silent, &gaps, origin, &counts.collect::<Vec<_>>())?;
+            basis = Basis { silent, first: origin, counts: counts.collect(), gaps };
+            impulses = best(model, &errors, &basis)?;
             (disturbance, errors) = residuals(model, record, &rows, silent, &impulses);
         }
     }
@@ -191,11 +208,6 @@ fn measured_runs(model: &Model, record: &Record<'_>, rows: &Range<usize>) -> Vec
         return vec![rows.clone()];
     }
     measured(record.output, rows)
-}
-
-/// What lies between runs of samples.
-pub(super) fn gaps(runs: &[Range<usize>]) -> impl Iterator<Item = Range<usize>> {
-    runs.windows(2).map(|pair| pair[0].end..pair[1].start)
 }
 
 /// x over stretches of the inputs, zeros before them, all as long as one another.
@@ -283,7 +295,6 @@ pub(super) fn best(model: &Model, errors: &[f64], basis: &Basis) -> Result<Impul
 pub(super) fn free_columns(model: &Model, samples: usize, basis: &Basis) -> (usize, Vec<Column>) {
     let Basis { silent, first, counts, gaps } = basis;
     let (silent, first) = (*silent, *first);
-    let orders = &model.orders;
     let orders = &model.orders;
     let order = orders.nc + orders.nd;
     let (unknown, most) = (counts.iter().sum::<usize>(), counts.iter().copied().max().unwrap_or(0));

@@ -30,7 +30,7 @@
 
 use thetahat_core::nalgebra::{DMatrix, SymmetricEigen};
 
-use super::innovations::{Impulses, Innovations, best, free_columns, innovations};
+use super::innovations::{Basis, Impulses, Innovations, best, free_columns, innovations};
 use super::predict::{accumulated, disturbance_response, longest};
 use super::{Start, check_inputs};
 use crate::data::Record;
@@ -113,6 +113,7 @@ fn roots(matrix: DMatrix<f64>) -> Vec<(f64, Vec<f64>)> {
 pub(super) struct Paths {
     pub(super) known: usize,
     pub(super) silent: usize,
+    basis: Basis,
     pub(super) inputs: Vec<Vec<f64>>,
     pub(super) output: Vec<f64>,
     pub(super) disturbance: Vec<f64>,
@@ -146,12 +147,17 @@ impl Paths {
             let length = if f.len() > 1 { u.len() } else { 0 };
             let mut own = vec![0.0; length];
             add_filtered(&mut own, &(0..length), &model.b[input], u, 0);
-            own.iter_mut().zip(&found.impulses.0[input]).for_each(|(x, impulse)| *x += impulse);
+            let impulses = &found.impulses;
+            let begin = own.iter_mut().skip(impulses.first);
+            begin.zip(&impulses.weights[input]).for_each(|(x, impulse)| *x += impulse);
             divide(f, &mut own);
             own
         };
         let responses = (0..inputs.len()).map(response).collect();
-        Self { known: found.rows.len(), silent: found.silent, inputs, output, disturbance, errors, responses }
+        // Where the output is missing, A is 1.
+        let output = output.into_iter().map(|y| if y.is_nan() { 0.0 } else { y }).collect();
+        let (known, silent, basis) = (found.rows.len(), found.silent, found.basis.clone());
+        Self { known, silent, basis, inputs, output, disturbance, errors, responses }
     }
 
     /// The derivative along a change, of impulses into 1/F, and of the errors before the first that is known: of the one
@@ -164,7 +170,8 @@ impl Paths {
             add_filtered(&mut response, &all, &change.b[j], u, 0);
             if model.f[j].len() > 1 {
                 add_filtered(&mut response, &all, &change.negative_f[j], own, 0);
-                response.iter_mut().zip(&impulses.0[j]).for_each(|(x, impulse)| *x += impulse);
+                let begin = response.iter_mut().skip(impulses.first);
+                begin.zip(&impulses.weights[j]).for_each(|(x, impulse)| *x += impulse);
                 divide(&model.f[j], &mut response);
             }
             x.iter_mut().zip(&response).for_each(|(sum, value)| *sum += value);
@@ -197,7 +204,7 @@ impl Paths {
         if !estimated {
             return Ok(moved);
         }
-        let impulses = best(model, &moved.errors, self.silent)?;
+        let impulses = best(model, &moved.errors, &self.basis)?;
         Ok(self.moved(model, change, &impulses, 0))
     }
 
@@ -249,7 +256,7 @@ impl Paths {
 
     /// Impulses whose outer products sum to (Phi'Phi)^-1.
     fn uncertain_impulses(&self, model: &Model) -> Vec<Impulses> {
-        let (_, columns) = free_columns(model, self.known, self.silent);
+        let (_, columns) = free_columns(model, self.known, &self.basis);
         let scales: Vec<f64> =
             columns.iter().map(|column| product(&column.values, &column.values).sqrt()).collect();
         let entry = |i: usize, j: usize| {
@@ -260,15 +267,15 @@ impl Paths {
         let gram = DMatrix::from_fn(columns.len(), columns.len(), entry);
         let found = roots(gram);
         let largest = found.iter().fold(0.0_f64, |largest, (size, _)| largest.max(*size));
-        let counts = (0..model.orders.inputs()).map(|input| model.orders.free_responses(input));
-        let counts: Vec<usize> = counts.collect();
+        let Basis { first, counts, .. } = &self.basis;
         found
             .iter()
             .filter(|(size, _)| size * size > UNSEEN * largest * largest)
             .map(|(size, vector)| {
                 let each = vector.iter().zip(&scales);
                 let mut each = each.map(|(v, scale)| if *v == 0.0 { 0.0 } else { v / size / scale });
-                Impulses(counts.iter().map(|&count| each.by_ref().take(count).collect()).collect())
+                let weights = counts.iter().map(|&count| each.by_ref().take(count).collect()).collect();
+                Impulses { first: *first, weights }
             })
             .collect()
     }
@@ -338,7 +345,8 @@ pub fn prediction_deviations(
         let output = record.output[rows.clone()].to_vec();
         let (disturbance, errors) = (found.disturbance.clone(), found.errors.clone());
         let paths = Paths::new(model, &found, inputs, output, disturbance, errors);
-        let counted = found.counted.start - rows.start..found.counted.end - rows.start;
+        // Where the output is missing there is a prediction too, if no past one is needed.
+        let counted = found.span.start - rows.start..found.span.end - rows.start;
         let mut variances = vec![0.0; counted.len()];
         let mut add = |moved: &Moved, response_moved: &[f64], scale: f64| {
             let mut values = vec![0.0; counted.len()];
@@ -354,7 +362,7 @@ pub fn prediction_deviations(
         for earlier in paths.earlier_errors(model, start) {
             add(&paths.moved(model, &fixed, &none, earlier), &[], model.noise_variance);
         }
-        for (position, (row, variance)) in found.counted.clone().zip(&variances).enumerate() {
+        for (position, (row, variance)) in found.span.clone().zip(&variances).enumerate() {
             // From zero the first samples look fewer steps ahead.
             let ahead = if start == Start::Zero { horizon.min(position + 1) } else { horizon };
             deviations[row] = student(model, sigma * sizes[ahead - 1], *variance);

@@ -16,13 +16,13 @@ use crate::{Error, Model};
 /// that were measured directly before the segment, and adds the combination of free responses
 ///
 /// ```text
-/// q^-i (1/A) delta,   i < max(na, n of the inputs without F)
+/// q^-i (1/A) delta,   i < max(na, nb + nk - 1 of the inputs without F)
 /// q^-i (1/(A F_j)) delta,   i < nf_j, or max(nf_j, n_j)
 /// ```
 ///
 /// that brings y^ closest to the output in the least-squares sense: everything that unknown samples before the segment
-/// can do. n is how many earlier inputs B reaches back to that are not known, nb + nk - 1 at most. Those of inputs with F
-/// are taken to be zero, unless estimating them is worth its parameters by the rule of
+/// can do. n is how many earlier inputs B reaches back to that are not known, nb + nk - 1 at most. They are
+/// taken to be zero, unless estimating them is worth its parameters by the rule of
 /// [`Initial::Auto`](crate::Initial::Auto). Segments too short for a start are left out.
 ///
 /// But for [`Start::Drop`], the run goes on where an output is missing (see
@@ -129,11 +129,10 @@ impl<'a> Free<'a> {
         let orders = &self.model.orders;
         let inputs = 0..orders.inputs();
         let unknown = |input: usize| orders.input_reach(input).saturating_sub(past);
-        let direct = inputs.clone().filter(|&input| orders.nf[input] == 0).map(unknown);
         let filtered = inputs
             .filter(|&input| orders.nf[input] > 0)
             .map(|input| if with_inputs { orders.nf[input].max(unknown(input)) } else { orders.nf[input] });
-        std::iter::once(direct.fold(orders.na, usize::max)).chain(filtered).collect()
+        std::iter::once(orders.conditioned() - orders.nd).chain(filtered).collect()
     }
 
     /// The runs with the initial conditions that fit best.

@@ -327,9 +327,8 @@ fn is_of_fit(report: &Report, log: &Log, inputs: &[String]) -> bool {
     let (output, rows) = (&report.model.output.name, &report.data.estimation);
     if let Some(band) = report.data.prefilter {
         let band = Prefiltered::new(&band, log, inputs, output);
-        return band.is_ok_and(|band| {
-            band.record_alone(rows).is_ok_and(|record| gives(report, &record, start))
-        });
+        return band
+            .is_ok_and(|band| band.record_alone(rows).is_ok_and(|record| gives(report, &record, start)));
     }
     let Ok(record) = estimation_record(report, log, inputs) else { return false };
     if gives(report, &record, start) {

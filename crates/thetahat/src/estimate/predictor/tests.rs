@@ -170,7 +170,8 @@ fn what_was_before_a_segment_is_known_or_estimated() {
     }
     let whole = Record::new(&y, vec![&u]).unwrap();
     let of = |past: usize, begin| {
-        let record = Record { segments: vec![100..200], past: vec![past], ..whole.clone() };
+        let segments = std::iter::once(100..200).collect();
+        let record = Record { segments, past: vec![past], ..whole.clone() };
         let mut predictor = Predictor::new(&record, &orders, begin);
         assert_eq!(predictor.samples(), 100);
         predictor.evaluate(&parameters).unwrap();

@@ -220,7 +220,7 @@ fn the_innovations_of_a_models_own_output_come_back() {
         let y = output(&model, &u, &e);
         let record = Record::new(&y, views(&u)).unwrap();
         let found = innovations(&model, &record, 1, Start::Zero).unwrap();
-        assert_eq!(found[0].counted, [0..400]);
+        assert_eq!(found[0].counted, std::slice::from_ref(&(0..400)));
         let worst = found[0].errors.iter().zip(&e).fold(0.0_f64, |worst, (a, b)| worst.max((a - b).abs()));
         let largest = y.iter().fold(1.0_f64, |largest, y| largest.max(y.abs()));
         assert!(worst < 1e-12 * largest, "{:?} {worst}", model.structure);
@@ -384,7 +384,7 @@ fn an_estimated_start_leaves_the_least_errors_that_any_past_can() {
                 continue;
             }
             let segment = found.rows.clone();
-            assert_eq!(found.counted, [segment.start + silent..segment.end]);
+            assert_eq!(found.counted, std::slice::from_ref(&(segment.start + silent..segment.end)));
             let mut known = y[..segment.end].to_vec();
             let from_rest =
                 Recursion::new(&model, &record.inputs, segment.start, silent).run(&mut known, segment.end);

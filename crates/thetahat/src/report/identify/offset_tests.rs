@@ -132,7 +132,8 @@ fn the_errors_of_the_fit_are_those_of_the_model() {
     for orders in structures() {
         let filtered = orders.nf.iter().any(|&nf| nf > 0);
         for initial in [Initial::Auto, Initial::Drop, Initial::Zero, Initial::Estimate] {
-            if initial == Initial::Drop && filtered || initial == Initial::Zero && orders.na > 0 {
+            let of_others = if filtered { Initial::Drop } else { Initial::Estimate };
+            if initial == of_others || initial == Initial::Zero && orders.na > 0 {
                 continue;
             }
             for trend in [false, true] {

@@ -106,7 +106,7 @@ def test_a_forecast_goes_on_from_the_last_measured_sample(motor: th.Log) -> None
     model = th.oe(motor, 2, 2)
     ahead = model.forecast(cut[:900], 4, future)
     assert np.allclose(ahead.values, model.predict(cut[:904], None)[900:904], rtol=1e-6)
-    assert np.allclose(ahead.standard_deviations, np.sqrt(model.noise_variance))
+    assert np.allclose(ahead.standard_deviations, np.sqrt(model.noise_variance), rtol=0.05)
 
 
 def test_missing_outputs_do_not_cut_an_output_error_model(motor: th.Log) -> None:

@@ -388,8 +388,14 @@ fn refined_from(
     for ((position, own), segment) in each().zip(&record.segments) {
         let views: Vec<&[f64]> = own.iter().map(Vec::as_slice).collect();
         let (rows, combination) = (0..segment.len(), reduced.combination(position));
-        products +=
-            backward_filtered_products(&views, &all_taps, &rows, from_ref(&rows), combination.as_ref(), &colour.monic);
+        products += backward_filtered_products(
+            &views,
+            &all_taps,
+            &rows,
+            from_ref(&rows),
+            combination.as_ref(),
+            &colour.monic,
+        );
     }
     let variance = colour.variance * colour.inflation(samples, taken);
     let f = point.denominators.iter().flat_map(|monic| &monic[1..]);

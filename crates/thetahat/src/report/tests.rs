@@ -222,7 +222,7 @@ fn responses_go_on_through_missing_outputs() {
         let first = if orders.has_f() { 0 } else { 20 };
         assert!(predicted.predicted[first..].iter().all(|value| value.is_finite()));
         let deviation = report.model.noise_variance.sqrt();
-        assert!(predicted.standard_deviations.unwrap()[first..].iter().all(|own| *own == deviation));
+        assert!(predicted.standard_deviations.unwrap()[first..].iter().all(|own| *own >= deviation));
         assert_eq!(predicted.fit.unwrap().samples, y[first..].iter().filter(|y| !y.is_nan()).count());
         // What is said of the holes is close to what was there.
         let far = |t: usize| (predicted.predicted[t] - complete[t]).abs() > 4.0 * deviation;

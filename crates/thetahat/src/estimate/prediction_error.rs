@@ -1,8 +1,11 @@
-//! The estimate of least squared prediction errors for the general family: starts, search, initial conditions, covariance.
+//! The estimate of least squared prediction errors for the general family: search, initial conditions, covariance; where the
+//! search begins is in `ranking`, and what it takes from smaller models in `nested`.
+
+mod nested;
+mod ranking;
 
 use std::ops::Range;
 
-use rayon::prelude::*;
 use thetahat_core::nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::arx::{arx, estimate_is_for_f, out_of_range, rows, signals};
@@ -10,8 +13,6 @@ use super::optimize::{
     Algorithm, Deadline, Found, Monitor, Search, SearchOutcome, StartOutcome, Stopped, best_free, search,
 };
 use super::predictor::{Begin, Predictor, Unusable};
-use super::restart::restarts;
-use super::start::{Candidate, candidates};
 use super::uncertainty::{autoregression, backward_filtered_products, coloured, restricted};
 use super::{Estimate, Initial, Procedure};
 use crate::data::{Record, measured};
@@ -24,6 +25,8 @@ use crate::{Error, Model, Orders, Structure};
 const LONG: usize = 1 << 18;
 const STRETCHES: usize = 8;
 const STRETCH: usize = 1 << 12;
+/// A search from the best start has ended after so many iterations, where there is nothing to be found elsewhere.
+const EASY_ITERATIONS: usize = 5;
 /// Above this condition number the Gram matrix does not give the covariance to a thousandth.
 const MAXIMUM_CONDITION: f64 = 5e6;
 
@@ -73,14 +76,15 @@ pub(super) fn prediction_error(
     let job = Job { options, smallest: NOTHING_LEFT * energy, deadline, monitor };
     let mut beginning = job.beginning(record, orders, begin, &mut predictor)?;
     let mut reached = if choose {
-        job.choose(record, orders, predictor, &beginning)?
+        job.choose(record, orders, predictor, &mut beginning)?
     } else {
         let initial = match begin {
             Begin::Zero => Initial::Zero,
             Begin::Unknown | Begin::UnknownInputs if orders.has_f() => Initial::Estimate,
             Begin::Unknown | Begin::UnknownInputs => Initial::Drop,
         };
-        let found = job.search_from(&mut predictor, &beginning)?.ok_or_else(|| hopeless(orders))?;
+        let found = job.search_from((record, orders, begin), &mut predictor, &mut beginning)?;
+        let found = found.ok_or_else(|| hopeless(orders))?;
         Reached { predictor, found, initial }
     };
     if begin != Begin::Zero && Predictor::has_unknown_inputs(record, orders) {
@@ -122,7 +126,9 @@ impl Job<'_> {
             // In the middle of a log nothing is at rest.
             let mut small = Predictor::new(&thin, orders, Begin::Unknown);
             let near = self.ranked(&thin, orders, Begin::Unknown, &mut small).and_then(|beginning| {
-                Ok(self.search_from(&mut small, &beginning)?.map(|found| (found, beginning)))
+                let task = (&thin, orders, Begin::Unknown);
+                let mut beginning = beginning;
+                Ok(self.search_from(task, &mut small, &mut beginning)?.map(|found| (found, beginning)))
             });
             match near {
                 Err(Error::Interrupted) => return Err(Error::Interrupted),
@@ -131,7 +137,14 @@ impl Job<'_> {
                     starts[0].reached = Some(found.cost() / small.samples() as f64);
                     let parameters = found.parameters;
                     let samples = Some(small.samples());
-                    return Ok(Beginning { parameters, starts, unstable_pole, samples, found: None });
+                    return Ok(Beginning {
+                        parameters,
+                        starts,
+                        unstable_pole,
+                        samples,
+                        compared: true,
+                        found: None,
+                    });
                 }
             }
         }
@@ -139,19 +152,40 @@ impl Job<'_> {
     }
 
     /// Searches from the beginning, if that was not done before. The predictor is left at what was found.
+    ///
+    /// A search that is not soon at its end may be on the way to a minimum of its own: then starts from nested models are
+    /// compared with what it found.
     fn search_from(
         &self,
+        (record, orders, begin): (&Record<'_>, &Orders, Begin),
         predictor: &mut Predictor<'_>,
-        beginning: &Beginning,
+        beginning: &mut Beginning,
     ) -> Result<Option<Found>, Error> {
-        match &beginning.found {
-            Some(found) => {
-                let _ = best_free(predictor, &found.parameters);
-                predictor.linearize();
-                Ok(Some(found.clone()))
+        let mut found = match &beginning.found {
+            Some(found) => Some(found.clone()),
+            None => self.search(predictor, &beginning.parameters)?.ok(),
+        };
+        let easy =
+            |found: &Found| found.stopped == Stopped::Converged && found.costs.len() <= EASY_ITERATIONS + 1;
+        if !beginning.compared && !found.as_ref().is_some_and(easy) && !self.deadline.is_over() {
+            beginning.compared = true;
+            let lowest = found.as_ref().map_or(f64::INFINITY, Found::cost);
+            if let Some((outcome, parameters)) =
+                self.nested_below(record, orders, begin, predictor, lowest)?
+            {
+                if let Ok(better) = self.search(predictor, &parameters)? {
+                    beginning.starts.insert(0, outcome);
+                    return Ok(Some(better));
+                }
             }
-            None => Ok(self.search(predictor, &beginning.parameters)?.ok()),
+        } else if beginning.found.is_none() {
+            return Ok(found);
         }
+        if let Some(found) = &mut found {
+            let _ = best_free(predictor, &found.parameters);
+            predictor.linearize();
+        }
+        Ok(found)
     }
 
     /// Estimates the initial conditions where that is worth its parameters: N ln(V_zero/V_estimate) > n ln N.
@@ -162,7 +196,7 @@ impl Job<'_> {
         record: &Record<'r>,
         orders: &Orders,
         mut estimated: Predictor<'r>,
-        beginning: &Beginning,
+        beginning: &mut Beginning,
     ) -> Result<Reached<'r>, Error> {
         let mut resting = Predictor::new(record, orders, Begin::Zero);
         let samples = estimated.samples();
@@ -177,7 +211,9 @@ impl Job<'_> {
         let at_rest_first =
             beginning.found.is_none() && matches!(costs, (Ok(zero), Ok(free)) if !worth(zero, free));
         let mut at_rest = None;
-        if at_rest_first && let Some(found) = self.search_from(&mut resting, beginning)? {
+        if at_rest_first
+            && let Some(found) = self.search_from((record, orders, Begin::Zero), &mut resting, beginning)?
+        {
             let foretold = best_free(&mut estimated, &found.parameters)
                 .map_or(f64::INFINITY, |cost| cost - estimated.foretold());
             if !worth(found.cost(), foretold) {
@@ -185,7 +221,7 @@ impl Job<'_> {
             }
             at_rest = Some(found);
         }
-        let free = self.search_from(&mut estimated, beginning)?;
+        let free = self.search_from((record, orders, Begin::Unknown), &mut estimated, beginning)?;
         let Some(free) = free else {
             let found = at_rest.ok_or_else(|| hopeless(orders))?;
             return Ok(Reached { predictor: resting, found, initial: Initial::Zero });
@@ -258,78 +294,16 @@ impl Job<'_> {
         predictor: &mut Predictor<'_>,
         parameters: &[f64],
     ) -> Result<Result<Found, Unusable>, Error> {
-        search(predictor, parameters, self.options, self.smallest, self.deadline, self.monitor)
+        self.search_with(predictor, parameters, self.options)
     }
 
-    /// The candidates by their cost. If more than one start is asked for, searches from so many and takes what the best
-    /// search found.
-    fn ranked(
+    fn search_with(
         &self,
-        record: &Record<'_>,
-        orders: &Orders,
-        begin: Begin,
         predictor: &mut Predictor<'_>,
-    ) -> Result<Beginning, Error> {
-        let samples = predictor.samples() as f64;
-        let mut starts = Vec::new();
-        let guess = self.options.guess.iter().map(|guess| ("guess", guess.clone()));
-        let found = match filled_candidates(record, orders, self.deadline) {
-            Err(error) if self.options.guess.is_none() => return Err(error),
-            found => found.unwrap_or_default(),
-        };
-        let unstable_pole = found.iter().filter_map(|candidate| candidate.unstable_pole).reduce(f64::max);
-        let candidates = found.into_iter().map(|candidate| (candidate.name, candidate.parameters));
-        for (name, parameters) in guess.chain(candidates) {
-            if self.deadline.is_over()
-                && starts.iter().any(|(start, _): &(StartOutcome, _)| start.cost.is_some())
-            {
-                break;
-            }
-            let cost = best_free(predictor, &parameters).ok();
-            starts.push((
-                StartOutcome { name: name.to_owned(), cost: cost.map(|c| c / samples), reached: None },
-                parameters,
-            ));
-        }
-        // Stable: of equal ones the first stays first; those without a cost come last.
-        let cost = |start: &StartOutcome| start.cost.unwrap_or(f64::INFINITY);
-        starts.sort_by(|(a, _), (b, _)| cost(a).total_cmp(&cost(b)));
-        if let Some((_, best)) = starts.first().filter(|_| !self.deadline.is_over()) {
-            let missing = (self.options.starts + 1).saturating_sub(starts.len());
-            let more: Vec<_> = restarts(orders, best, self.options.seed, missing).collect();
-            for (number, parameters) in more.into_iter().enumerate() {
-                let cost = best_free(predictor, &parameters).ok().map(|cost| cost / samples);
-                starts.push((
-                    StartOutcome { name: format!("random-{}", number + 1), cost, reached: None },
-                    parameters,
-                ));
-            }
-        }
-        let first =
-            starts.first().map(|(_, parameters)| parameters.clone()).ok_or_else(|| hopeless(orders))?;
-        if self.options.starts == 0 {
-            let starts = starts.into_iter().map(|(start, _)| start).collect();
-            return Ok(Beginning { parameters: first, starts, unstable_pole, samples: None, found: None });
-        }
-        let searched = starts.len().min(self.options.starts + 1);
-        let results = starts[..searched].par_iter().enumerate().map(|(number, (_, parameters))| {
-            if number > 0 && self.deadline.is_over() {
-                return Ok(None);
-            }
-            Ok(self.search(&mut Predictor::new(record, orders, begin), parameters)?.ok())
-        });
-        let mut results = results.collect::<Result<Vec<_>, Error>>()?;
-        for ((start, _), found) in starts.iter_mut().zip(&results) {
-            start.reached = found.as_ref().map(|found| found.cost() / samples);
-        }
-        let costs =
-            results.iter().enumerate().filter_map(|(index, found)| Some((index, found.as_ref()?.cost())));
-        let (winner, _) = costs.min_by(|(_, a), (_, b)| a.total_cmp(b)).ok_or_else(|| hopeless(orders))?;
-        let mut starts: Vec<StartOutcome> = starts.into_iter().map(|(start, _)| start).collect();
-        starts[..=winner].rotate_right(1);
-        let found = results.swap_remove(winner);
-        let parameters = found.as_ref().map_or(first, |found| found.parameters.clone());
-        Ok(Beginning { parameters, starts, unstable_pole, samples: None, found })
+        parameters: &[f64],
+        options: &Search,
+    ) -> Result<Result<Found, Unusable>, Error> {
+        search(predictor, parameters, options, self.smallest, self.deadline, self.monitor)
     }
 
     /// The estimate of a search.
@@ -406,6 +380,8 @@ struct Beginning {
     unstable_pole: Option<f64>,
     /// How many samples they were compared on, if not on all.
     samples: Option<usize>,
+    /// Whether starts from nested models were looked at, or are not worth it.
+    compared: bool,
     /// What a search on the whole record has found already.
     found: Option<Found>,
 }
@@ -436,18 +412,19 @@ struct Uncertainty {
 /// sigma^2 G^-1, or its form for coloured errors where there is no model of the noise; none where G is singular to
 /// rounding.
 fn uncertainty(predictor: &Predictor<'_>, orders: &Orders, noise_variance: f64) -> Option<Uncertainty> {
-    let (mut inverse, condition) = inverse(predictor)?;
-    if orders.structure() == Structure::Oe {
+    let (root, condition) = inverse_root(predictor)?;
+    let covariance = if orders.structure() == Structure::Oe {
         let (residuals, segments) = predictor.residuals();
         let taken = orders.parameters() + predictor.initial_conditions();
         let colour = restricted(&residuals, || predictor.sensitivities(), &segments, taken);
-        let products = predictor.backward_filtered_products(&colour.monic);
-        let variance = colour.variance * colour.inflation(residuals.len(), taken);
-        inverse = coloured(&inverse, variance, &products);
+        // On columns that are orthogonal: where parameters can hardly be told apart, the sums over psi itself would lose them
+        // in rounding twice, and variances could come out negative.
+        let products = predictor.backward_filtered_products(&root.transpose(), &colour.monic);
+        coloured(&root, colour.variance * colour.inflation(residuals.len(), taken), &products)
     } else {
-        inverse *= noise_variance;
-    }
-    Some(Uncertainty { covariance: rows(&inverse), condition })
+        &root * root.transpose() * noise_variance
+    };
+    Some(Uncertainty { covariance: rows(&covariance), condition })
 }
 
 /// The covariance of an estimate of least squares whose errors are coloured, whatever its structure: of `uncertainty` with
@@ -466,12 +443,13 @@ pub(super) fn coloured_covariance(
     }
     best_free(&mut predictor, estimate.parameters()).ok()?;
     predictor.linearize();
-    let (inverse, _) = inverse(&predictor)?;
+    let (root, _) = inverse_root(&predictor)?;
     let (residuals, segments) = predictor.residuals();
     let taken = orders.parameters() + predictor.initial_conditions();
     let colour = autoregression(&residuals, &segments, taken);
     let products = backward_products(&predictor.columns(), &colour.monic);
-    Some(rows(&coloured(&inverse, colour.variance, &products)))
+    let products = root.transpose() * products * &root;
+    Some(rows(&coloured(&root, colour.variance, &products)))
 }
 
 /// sum zeta zeta' over all segments, zeta being psi filtered backwards in time by 1/A(q^+1), A = `monic`.
@@ -489,29 +467,29 @@ pub(super) fn backward_products(segments: &[Vec<Vec<f64>>], monic: &[f64]) -> DM
 
 /// Whether the errors tell the parameters apart, where the predictor stands.
 pub(super) fn is_determined(predictor: &Predictor<'_>) -> bool {
-    inverse(predictor).is_some()
+    inverse_root(predictor).is_some()
 }
 
-/// G^-1, and the condition number of psi. By Cholesky of the Gram matrix, or by QR where that is not exact enough.
-pub(super) fn inverse(predictor: &Predictor<'_>) -> Option<(DMatrix<f64>, f64)> {
+/// R^-1 with R'R = G, so that psi R^-1 has orthonormal columns, and the condition number of psi. By Cholesky of the Gram
+/// matrix, or by QR where that is not exact enough.
+pub(super) fn inverse_root(predictor: &Predictor<'_>) -> Option<(DMatrix<f64>, f64)> {
     let size = predictor.right.len();
     let matrix = DMatrix::from_row_slice(size, size, &predictor.matrix);
     let scales = matrix.diagonal().map(f64::sqrt);
-    let scaled = |mut inverse: DMatrix<f64>, scales: &DVector<f64>| {
-        for (mut column, scale) in inverse.column_iter_mut().zip(scales) {
-            column.component_div_assign(scales);
-            column.unscale_mut(*scale);
-        }
-        inverse
+    let inverted = |triangle: &DMatrix<f64>, scales: &DVector<f64>| {
+        let mut inverse = triangle.solve_upper_triangular(&DMatrix::identity(size, size))?;
+        inverse.column_iter_mut().for_each(|mut column| column.component_div_assign(scales));
+        Some(inverse)
     };
     let unit = DMatrix::from_fn(size, size, |i, j| matrix[(i, j)] / scales[i] / scales[j]);
     // What the free responses leave of a column may be nothing but rounding, and its square negative.
     if scales.iter().all(|scale| *scale > 0.0)
         && let Some(factor) = Cholesky::new(unit)
-        && let Some(condition) = condition(&factor.l().transpose(), predictor.samples())
+        && let triangle = factor.l().transpose()
+        && let Some(condition) = condition(&triangle, predictor.samples())
         && condition <= MAXIMUM_CONDITION
     {
-        return Some((scaled(factor.inverse(), &scales), condition));
+        return Some((inverted(&triangle, &scales)?, condition));
     }
     let factor = predictor.factor().ok().filter(|factor| factor.rank().is_full())?;
     let mut triangle = factor.factor();
@@ -519,8 +497,7 @@ pub(super) fn inverse(predictor: &Predictor<'_>) -> Option<(DMatrix<f64>, f64)> 
     for (mut column, scale) in triangle.column_iter_mut().zip(&scales) {
         column.unscale_mut(*scale);
     }
-    let inverse = triangle.solve_upper_triangular(&DMatrix::identity(size, size))?;
-    Some((scaled(&inverse * inverse.transpose(), &scales), factor.condition()))
+    Some((inverted(&triangle, &scales)?, factor.condition()))
 }
 
 /// Stretches of a long record, spread evenly over its samples; none for a record that is not long.
@@ -565,17 +542,13 @@ pub(super) fn energy(record: &Record<'_>) -> f64 {
         .sum()
 }
 
-/// The starts for a record of which outputs may be missing: on lines from one measured output to the next. They need to lead
-/// near the minimum, no more.
-fn filled_candidates(
-    record: &Record<'_>,
-    orders: &Orders,
-    deadline: Deadline,
-) -> Result<Vec<Candidate>, Error> {
+/// Gives `starts` a record without missing outputs: these are put on lines from one measured output to the next. Starts need to
+/// lead near the minimum, no more.
+fn filled<T>(record: &Record<'_>, orders: &Orders, starts: impl FnOnce(&Record<'_>) -> T) -> T {
     let runs = |segment: &Range<usize>| measured(record.output, segment);
     let whole = |segment: &Range<usize>| runs(segment).first() == Some(segment);
     if orders.needs_past_outputs() || record.segments.iter().all(whole) {
-        return candidates(record, orders, deadline);
+        return starts(record);
     }
     let mut output = record.output.to_vec();
     let mut segments = Vec::new();
@@ -593,7 +566,7 @@ fn filled_candidates(
         }
     }
     let past = vec![0; segments.len()];
-    candidates(&Record { output: &output, inputs: record.inputs.clone(), segments, past }, orders, deadline)
+    starts(&Record { output: &output, inputs: record.inputs.clone(), segments, past })
 }
 
 /// There must be more samples that count than parameters and initial conditions.

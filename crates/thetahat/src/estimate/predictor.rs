@@ -255,6 +255,7 @@ impl Layout {
 /// does afterwards takes more, unless errors count linearly from somewhere on.
 #[derive(Debug)]
 pub(super) struct Predictor<'a> {
+    orders: Orders,
     /// One for each past that sections have; mostly one.
     layouts: Vec<Layout>,
     polynomials: Polynomials,
@@ -328,6 +329,7 @@ impl<'a> Predictor<'a> {
     fn of_sections(orders: &Orders, layouts: Vec<Layout>, sections: Vec<Section<'a>>) -> Self {
         let parameters = orders.parameters();
         Self {
+            orders: orders.clone(),
             samples: sections.iter().flat_map(|section| &section.runs).map(Range::len).sum(),
             polynomials: Polynomials::new(orders, &vec![0.0; parameters]),
             negative: orders.nb.iter().map(|&nb| vec![0.0; nb]).collect(),
@@ -337,6 +339,10 @@ impl<'a> Predictor<'a> {
             layouts,
             sections,
         }
+    }
+
+    pub(super) fn orders(&self) -> &Orders {
+        &self.orders
     }
 
     /// N, the samples that count.
@@ -459,13 +465,13 @@ impl<'a> Predictor<'a> {
         all
     }
 
-    /// sum zeta zeta' over all samples, zeta being psi without the free responses, zero where samples do not count, filtered
-    /// backwards in time by 1/A(q^+1), A = `monic`. For models of output error, at the current point.
-    pub(super) fn backward_filtered_products(&self, monic: &[f64]) -> DMatrix<f64> {
+    /// sum zeta zeta' over all samples, zeta being `weights` psi without the free responses, zero where samples do not count,
+    /// filtered backwards in time by 1/A(q^+1), A = `monic`. For models of output error, at the current point.
+    pub(super) fn backward_filtered_products(&self, weights: &DMatrix<f64>, monic: &[f64]) -> DMatrix<f64> {
         let parameters = self.right.len();
         let mut sum = DMatrix::zeros(parameters, parameters);
         for section in &self.sections {
-            let combination = section.without_free(parameters, section.free.len());
+            let combination = weights * section.without_free(parameters, section.free.len());
             let signals: Vec<&[f64]> = section.signals.iter().map(Vec::as_slice).collect();
             let all = 0..section.output.len();
             let taps = &self.layouts[section.layout].taps;

@@ -1,81 +1,94 @@
-//! Random starts near a given one.
+//! Random starts.
+
+use std::f64::consts::PI;
 
 use oorandom::Rand64;
+use thetahat_core::nalgebra::{Complex, ComplexField};
 
 use super::predictor::Polynomials;
 use crate::Orders;
+use crate::model::polynomial::{product, roots};
 
-/// The spread of random starts: of reflection coefficients on the scale of atanh, and of other coefficients in their own
-/// sizes.
+/// The standard deviation of a change of a root: of the logarithms of its distance from the unit circle and of its angle.
 const SPREAD: f64 = 0.7;
+/// Of a new root: its least distance from the unit circle, and its least angle.
+const NEAREST: f64 = 1e-3;
+const SMALLEST_ANGLE: f64 = 1e-3 * PI;
 
-/// So many parameter vectors around `best`, C and F stable. The same seed gives the same ones.
+/// So many parameter vectors, with C, D and every F drawn at random, A and B as they are in `best`. The same seed gives the
+/// same ones.
 ///
-/// C and F vary in their reflection coefficients k, atanh k being shifted at random: every stable polynomial can come, and
-/// no other.
-pub(super) fn restarts<'a>(
-    orders: &'a Orders,
-    best: &'a [f64],
+/// C, D and F are drawn by their roots: every second vector has all of them moved from where they are in `best`, by factors
+/// on the distance 1 - |z| from the unit circle and on the angle; the others have new ones, these two numbers being
+/// uniform on a logarithmic scale, as the time constants and frequencies of plants are. A and B, which are linear
+/// once C, D and F are given, are left to [`best_linear`](super::optimize::best_linear).
+pub(super) fn restarts(
+    orders: &Orders,
+    best: &[f64],
     seed: u64,
     count: usize,
-) -> impl Iterator<Item = Vec<f64>> + 'a {
+) -> impl Iterator<Item = Vec<f64>> {
     let mut random = Rand64::new(u128::from(seed));
-    (0..count).map(move |_| {
+    (0..count).map(move |number| {
         let mut polynomials = Polynomials::new(orders, best);
-        let mut normal = || (0..12).map(|_| random.rand_float()).sum::<f64>() - 6.0;
-        let scale = |value: &mut f64, normal: &mut dyn FnMut() -> f64| *value *= 1.0 + SPREAD * normal();
-        polynomials.a[1..]
-            .iter_mut()
-            .chain(&mut polynomials.d[1..])
-            .for_each(|value| scale(value, &mut normal));
-        polynomials.b.iter_mut().flatten().for_each(|value| scale(value, &mut normal));
-        for monic in std::iter::once(&mut polynomials.c).chain(&mut polynomials.f) {
-            let mut reflections = step_down(monic);
-            reflections
-                .iter_mut()
-                .for_each(|k| *k = (k.atanh() + SPREAD * normal()).tanh().clamp(-0.9999, 0.9999));
-            *monic = step_up(&reflections);
+        let Polynomials { c, d, f, .. } = &mut polynomials;
+        for monic in [c, d].into_iter().chain(f) {
+            let known = if number % 2 == 0 { roots(monic) } else { None };
+            *monic = match known {
+                Some(known) => near(&known, monic.len(), &mut random),
+                None => anywhere(monic.len() - 1, &mut random),
+            };
         }
         polynomials.parameters()
     })
 }
 
-/// The reflection coefficients k_1 … k_n of a stable monic polynomial (Kay, Modern Spectral Estimation, 1988, section 6.3).
-fn step_down(monic: &[f64]) -> Vec<f64> {
-    let mut polynomial = monic[1..].to_vec();
-    let mut reflections = vec![0.0; polynomial.len()];
-    while let Some(last) = polynomial.pop() {
-        reflections[polynomial.len()] = last;
-        let reversed: Vec<f64> = polynomial.iter().rev().copied().collect();
-        for (value, other) in polynomial.iter_mut().zip(reversed) {
-            *value = (*value - last * other) / (1.0 - last * last);
+/// A monic polynomial with roots near some others. Of a conjugate pair the one in the upper half plane is given.
+fn near(roots: &[Complex<f64>], length: usize, random: &mut Rand64) -> Vec<f64> {
+    let mut normal = || (0..12).map(|_| random.rand_float()).sum::<f64>() - 6.0;
+    let upper = roots.iter().filter(|root| root.im >= 0.0);
+    let mut monic = upper.fold(vec![1.0], |monic, root| {
+        let distance = ((1.0 - root.modulus()).max(NEAREST) * (SPREAD * normal()).exp()).min(1.0);
+        let factor = (SPREAD * normal()).exp();
+        let from_one = root.im == 0.0 && root.re < 0.0;
+        match root.im {
+            0.0 if from_one => product(&monic, &[1.0, 1.0 - distance]),
+            0.0 => product(&monic, &[1.0, distance - 1.0]),
+            _ => product(&monic, &pair(1.0 - distance, (root.im.atan2(root.re) * factor).min(PI))),
         }
-    }
-    reflections
+    });
+    // Roots at the origin that the degree does not show.
+    monic.resize(length, 0.0);
+    monic
 }
 
-/// The monic polynomial of reflection coefficients.
-fn step_up(reflections: &[f64]) -> Vec<f64> {
-    let mut polynomial: Vec<f64> = Vec::new();
-    for &k in reflections {
-        let reversed: Vec<f64> = polynomial.iter().rev().copied().collect();
-        polynomial.iter_mut().zip(reversed).for_each(|(value, other)| *value += k * other);
-        polynomial.push(k);
+/// A stable monic polynomial: conjugate pairs, and two real roots in a quarter of their places.
+fn anywhere(order: usize, random: &mut Rand64) -> Vec<f64> {
+    let mut logarithmic = |least: f64, most: f64| least * (most / least).powf(random.rand_float());
+    let mut monic = vec![1.0];
+    while monic.len() <= order {
+        let left = order + 1 - monic.len();
+        let distance = logarithmic(NEAREST, 1.0);
+        let angle = logarithmic(SMALLEST_ANGLE, 4.0 * PI);
+        let next = if left > 1 && angle <= PI {
+            pair(1.0 - distance, angle)
+        } else {
+            vec![1.0, if angle <= 3.5 * PI { distance - 1.0 } else { 1.0 - distance }]
+        };
+        monic = product(&monic, &next);
     }
-    std::iter::once(1.0).chain(polynomial).collect()
+    monic
+}
+
+/// (1 - z q^-1)(1 - z* q^-1) for z of this modulus and angle.
+fn pair(modulus: f64, angle: f64) -> Vec<f64> {
+    vec![1.0, -2.0 * modulus * angle.cos(), modulus * modulus]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::model::polynomial::is_stable;
-
-    #[test]
-    fn steps_down_and_up_are_inverse() {
-        let monic = [1.0, -1.6, 0.9, -0.1];
-        let back = step_up(&step_down(&monic));
-        assert!(monic.iter().zip(back).all(|(a, b)| (a - b).abs() < 1e-14));
-    }
 
     #[test]
     fn random_starts_are_stable_differ_and_come_again() {
@@ -85,10 +98,21 @@ mod tests {
         assert_eq!(starts, restarts(&orders, &best, 7, 50).collect::<Vec<_>>());
         assert!(starts.windows(2).all(|pair| pair[0] != pair[1]));
         for start in starts {
+            assert_eq!(start[..2], best[..2]);
             let polynomials = Polynomials::new(&orders, &start);
-            assert!(
-                is_stable(&polynomials.f[0], &mut Vec::new()) && is_stable(&polynomials.c, &mut Vec::new())
-            );
+            for monic in [&polynomials.f[0], &polynomials.c, &polynomials.d] {
+                assert!(is_stable(monic, &mut Vec::new()), "{monic:?}");
+            }
         }
+    }
+
+    #[test]
+    fn moved_roots_stay_on_their_side_and_new_ones_come_near_the_circle() {
+        let orders = Orders::oe(&[1], &[1], &[1]).unwrap();
+        let starts: Vec<f64> = restarts(&orders, &[1.0, 0.9], 1, 400).map(|start| start[1]).collect();
+        assert!(starts.iter().step_by(2).all(|f| (0.0..1.0).contains(f)));
+        let close = starts.iter().skip(1).step_by(2).filter(|f| f.abs() > 0.97).count();
+        // Uniform on a logarithmic scale: half of them are within the square root of 0.001.
+        assert!((60..140).contains(&close), "{close}");
     }
 }

@@ -69,6 +69,32 @@ pub(super) fn candidates(
     Ok(candidates)
 }
 
+/// What plants are found for the orders of B and F of a model without A, whatever its noise.
+pub(super) struct Plants(Vec<output_error::Start>);
+
+impl Plants {
+    /// None where the data are degenerate. O(N p), some dozen passes over the data.
+    pub(super) fn new(record: &Record<'_>, orders: &Orders, deadline: Deadline) -> Self {
+        Self(data(record, orders, deadline).output_error().starts())
+    }
+
+    /// [`candidates`] with these plants, for orders that have the same B and F, and C and D too: a few passes more.
+    pub(super) fn with_noise(
+        &self,
+        record: &Record<'_>,
+        orders: &Orders,
+        deadline: Deadline,
+    ) -> Vec<Vec<f64>> {
+        let found = data(record, orders, deadline).box_jenkins(&self.0);
+        found.into_iter().map(|candidate| candidate.parameters).collect()
+    }
+}
+
+fn data<'a>(record: &'a Record<'a>, orders: &'a Orders, deadline: Deadline) -> mixed::Data<'a> {
+    let Record { output, inputs, segments, .. } = record;
+    mixed::Data { output, inputs, segments, orders, deadline }
+}
+
 /// Why there is no start.
 fn undetermined(signals: &[&[f64]], record: &Record<'_>, orders: &Orders) -> Error {
     let largest = |signal: &&[f64]| {
@@ -109,6 +135,29 @@ fn undetermined(signals: &[&[f64]], record: &Record<'_>, orders: &Orders) -> Err
     Error::undetermined(concerned, message)
 }
 
+/// A monic polynomial with the roots that are further out than `radius` moved onto that circle. None if a coefficient is not
+/// finite.
+pub(super) fn inside(monic: &[f64], radius: f64) -> Option<Vec<f64>> {
+    let roots = roots(monic)?;
+    let moved = roots.iter().map(|root| *root * (radius / root.modulus()).min(1.0));
+    Some(of_roots(moved, monic.len()))
+}
+
+/// The monic polynomial of some roots, and of others at the origin up to a length.
+fn of_roots(roots: impl Iterator<Item = Complex<f64>>, length: usize) -> Vec<f64> {
+    let mut product = vec![Complex::new(1.0, 0.0)];
+    for root in roots {
+        product.push(Complex::new(0.0, 0.0));
+        for k in (1..product.len()).rev() {
+            let before = product[k - 1];
+            product[k] -= before * root;
+        }
+    }
+    let mut monic: Vec<f64> = product.iter().map(|value| value.re).collect();
+    monic.resize(length, 0.0);
+    monic
+}
+
 /// A monic polynomial with its unstable roots reflected at the unit circle, z to 1/z*, and the largest modulus above 1
 /// that there was. None if a coefficient is not finite.
 pub(super) fn stable(monic: &[f64]) -> Option<(Vec<f64>, Option<f64>)> {
@@ -121,18 +170,11 @@ pub(super) fn stable(monic: &[f64]) -> Option<(Vec<f64>, Option<f64>)> {
     }
     let roots = roots(monic)?;
     let largest = roots.iter().map(|root| root.modulus()).fold(0.0, f64::max);
-    let mut product = vec![Complex::new(1.0, 0.0)];
-    for root in &roots {
-        let root = if root.modulus() > 1.0 { *root / root.modulus_squared() } else { *root };
-        product.push(Complex::new(0.0, 0.0));
-        for k in (1..product.len()).rev() {
-            let before = product[k - 1];
-            product[k] -= before * root;
-        }
-    }
-    let mut reflected: Vec<f64> = product.iter().map(|value| value.re).collect();
+    let reflect = |root: &Complex<f64>| {
+        if root.modulus() > 1.0 { *root / root.modulus_squared() } else { *root }
+    };
     // Roots beyond the range of numbers are reflected into the origin.
-    reflected.resize(monic.len(), 0.0);
+    let mut reflected = of_roots(roots.iter().map(reflect), monic.len());
     // On the circle, or so close that rounding decides.
     while !is_stable(&reflected, &mut scratch) {
         let mut factor = 1.0;

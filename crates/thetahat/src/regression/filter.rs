@@ -53,7 +53,10 @@ fn divide_by<const K: usize, const N: usize>(mut signals: [&mut [f64]; K], weigh
             for k in (0..N).rev() {
                 sum -= weights[k] * past[k];
             }
-            past.rotate_right(1);
+            // By hand: `rotate_right` moves memory, which the next sample would wait for.
+            for k in (1..N).rev() {
+                past[k] = past[k - 1];
+            }
             past[0] = sum;
             values[t] = sum;
         }

@@ -120,10 +120,12 @@ fn candidates(record: &Record<'_>, structures: &[Structure], nk: &[usize]) -> Re
             Structure::Bj => (true, true),
         };
         let second = !matches!(structure, Structure::Ar | Structure::Arma);
+        // Noise of Box and Jenkins that is white is that of an output-error model.
+        let noise = |used: bool| if *structure == Structure::Bj { 0..=highest } else { each(used) };
         for first in each(true) {
             for second in each(second) {
-                for third in each(third) {
-                    for fourth in each(fourth) {
+                for third in noise(third) {
+                    for fourth in noise(fourth).filter(|fourth| third + fourth > 0) {
                         models.push(of_structure(*structure, [first, second, third, fourth], nk)?);
                     }
                 }

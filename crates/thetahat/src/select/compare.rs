@@ -101,15 +101,23 @@ pub(super) fn compare(task: &Task<'_>, models: Vec<Orders>) -> Result<Outcome, E
     let smallest = models.first().map(|orders| task.named(orders));
     let mut tried: Vec<Tried> = models.into_iter().map(|orders| Tried { orders, point: None }).collect();
     fit_linear(record, &samples, &mut tried, searched || with_unseen)?;
+    // A stretch of a segment begins where the log knows what came before. Its initial conditions are not what the model has to
+    // tell in the whole log: they cost no more than what they take of the noise, one each.
+    let own = task.estimation.segments.len() as f64 / record.segments.len().max(1) as f64;
+    let price = |orders: &Orders, initial: f64| {
+        let free: usize = (0..orders.inputs()).map(|input| orders.free_responses(input)).sum();
+        let taken = if initial > 0.0 { (free * record.segments.len()) as f64 } else { 0.0 };
+        own.min(1.0) * initial + (1.0 - own.min(1.0)) * taken
+    };
     // Those of linear models are zero already where they are rounding.
     let nothing = if searched { EXACT * energy(record) } else { 0.0 };
     let exact = |cost: f64| if cost <= nothing { 0.0 } else { cost };
     if searched {
         let free = task.initial != Initial::Zero;
         let common = Common::new(record, free, samples.window, task.search, task.monitor)?;
-        let score = |point: &Point| {
+        let score = |orders: &Orders, point: &Point| {
             let (size, mse) = (point.parameters.len(), exact(point.cost) / count as f64);
-            let score = score(Select::Mdl, mse, size, point.initial, count, None);
+            let score = score(Select::Mdl, mse, size, price(orders, point.initial), count, None);
             score.unwrap_or(f64::NEG_INFINITY)
         };
         Family::new(&tried, task.inputs.len()).fit(&common, &mut tried, &score)?;
@@ -127,7 +135,7 @@ pub(super) fn compare(task: &Task<'_>, models: Vec<Orders>) -> Result<Outcome, E
             parameters: orders.parameters(),
             mse,
             unseen,
-            score: score(task.select, mse, size, initial, count, unseen),
+            score: score(task.select, mse, size, price(&orders, initial), count, unseen),
             orders,
         };
         Some((scored, guess))

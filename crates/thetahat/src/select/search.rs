@@ -56,7 +56,7 @@ impl Family {
         &self,
         common: &Common<'_>,
         tried: &mut [Tried],
-        score: &(dyn Fn(&Point) -> f64 + Sync),
+        score: &(dyn Fn(&Orders, &Point) -> f64 + Sync),
     ) -> Result<(), Error> {
         for (number, level) in self.levels.iter().enumerate() {
             let fitted = level.par_iter().map(|&k| {
@@ -70,7 +70,10 @@ impl Family {
         self.levels.first().into_iter().flatten().for_each(|&k| begun[k] = true);
         for _ in 0..ROUNDS {
             let mut order: Vec<usize> = (0..tried.len()).collect();
-            let of = |k: usize| tried[k].point.as_ref().map_or(f64::INFINITY, score);
+            let of = |k: usize| {
+                let Tried { orders, point } = &tried[k];
+                point.as_ref().map_or(f64::INFINITY, |point| score(orders, point))
+            };
             order.sort_by(|&a, &b| of(a).total_cmp(&of(b)));
             order.truncate(BEST);
             order.retain(|&k| !begun[k] && !tried[k].orders.is_linear());

@@ -243,3 +243,59 @@ fn what_cannot_be_estimated_is_refused_in_words() {
         assert!(matches!(refused, Error::Argument { .. }), "{refused}");
     }
 }
+
+/// A log of tests/data/public without its mean: input and output.
+fn public(file: &str) -> (Vec<f64>, Vec<f64>) {
+    let path = format!("{}/../../tests/data/public/{file}", env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(path).unwrap();
+    let rows = text.lines().skip(1).map(|line| line.split_once(',').unwrap());
+    let (u, y): (Vec<f64>, Vec<f64>) =
+        rows.map(|(u, y)| (u.parse::<f64>().unwrap(), y.parse::<f64>().unwrap())).unzip();
+    let centred = |values: Vec<f64>| {
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        values.iter().map(|value| value - mean).collect()
+    };
+    (centred(u), centred(y))
+}
+
+/// Plants of a log are not in the model set, and costs have many minima.
+#[test]
+fn a_larger_model_does_not_fit_a_log_worse_than_a_nested_one() {
+    let noises = [(0, 0), (0, 1), (1, 1), (0, 2)];
+    for file in ["gas_furnace.csv", "hair_dryer.csv"] {
+        let (u, y) = public(file);
+        let record = Record::new(&y, vec![&u]).unwrap();
+        let mut fitted: Vec<([usize; 4], f64)> = Vec::new();
+        for (nb, nf) in [(1, 1), (2, 1), (1, 2), (2, 2), (3, 1), (3, 2)] {
+            for (nc, nd) in noises {
+                let orders = Orders::bj(&[nb], nc, nd, &[nf], &[3]).unwrap();
+                let own = found(&record, &orders, Initial::Zero, &Search::default()).unwrap().mse();
+                fitted.push(([nb, nf, nc, nd], own));
+            }
+        }
+        for (orders, mse) in &fitted {
+            for (smaller, least) in &fitted {
+                let nested = smaller.iter().zip(orders).all(|(smaller, order)| smaller <= order);
+                assert!(!nested || *mse <= least * 1.001, "{file} {orders:?} {mse} {smaller:?} {least}");
+            }
+        }
+    }
+}
+
+/// The plant's pole is on the unit circle: a search comes to the border, and goes on along it.
+#[test]
+fn a_search_goes_on_along_the_border_of_stability() {
+    let mut noise = Noise(11);
+    let (u, e) = (noise.take(600), noise.take(600));
+    let x = filtered(&[0.0, 1.0, 0.5], &[1.0, -1.6, 0.6], &u);
+    let y: Vec<f64> = x.iter().zip(&e).map(|(x, e)| x + 2.0 * e).collect();
+    let record = Record::new(&y, vec![&u]).unwrap();
+    let orders = Orders::oe(&[2], &[2], &[1]).unwrap();
+    // Far from the plant in all parameters, with a pole from which the steps lead out of the circle.
+    let search = Search { guess: Some(vec![0.5, 0.0, -1.2, 0.25]), ..Search::default() };
+    let estimate = found(&record, &orders, Initial::Zero, &search).unwrap();
+    let [b1, b2, f1, f2] = estimate.parameters() else { panic!("four parameters") };
+    assert!((b1 - 1.0).abs() < 0.1 && (b2 - 0.5).abs() < 0.2, "{b1} {b2}");
+    assert!((f1 + 1.6).abs() < 0.01 && (f2 - 0.6).abs() < 0.01, "{f1} {f2}");
+    assert!(estimate.mse() < 4.5);
+}

@@ -5,12 +5,14 @@ use std::ops::Range;
 use thetahat_core::LeastSquares;
 use thetahat_core::nalgebra::{DMatrix, DVector, Dyn};
 
-use crate::regression::{Lagged, Presample, Taps};
+use crate::regression::{Lagged, Presample, Taps, divide_from};
 
 /// Of a column as a fraction of its square: less than this is rounding, once the columns before it are taken out.
 const ROUNDING: f64 = 1e-14;
 /// Where a free response is below this fraction of its peak, it has died away.
 const DIED_AWAY: f64 = 1e-10;
+/// Samples of a response that are computed at once.
+const PIECE: usize = 128;
 
 /// L L' = G for a positive semidefinite G: a column that depends on those before it is left out, and its unknown is zero.
 #[derive(Debug, Clone)]
@@ -124,13 +126,24 @@ fn impulse_response(monic: &[f64], count: usize, longest: usize) -> Vec<f64> {
     if count == 0 {
         return response;
     }
+    let order = monic.len() - 1;
     let (mut peak, mut quiet): (f64, usize) = (0.0, 0);
-    while response.len() < longest && quiet < monic.len() + count {
-        let past: f64 = monic.iter().skip(1).zip(response.iter().rev()).map(|(f, h)| f * h).sum();
-        let value = if response.is_empty() { 1.0 } else { 0.0 } - past;
-        peak = peak.max(value.abs());
-        quiet = if value.abs() > DIED_AWAY * peak { 0 } else { quiet + 1 };
-        response.push(value);
+    while response.len() < longest {
+        // A piece at a time, driven by the one before; the first by an impulse.
+        let known = response.len();
+        let mut piece = vec![0.0; PIECE.min(longest - known)];
+        if known == 0 {
+            piece[0] = 1.0;
+        }
+        divide_from(&monic[1..], &response[known.saturating_sub(order)..], &mut piece);
+        for value in piece {
+            peak = peak.max(value.abs());
+            quiet = if value.abs() > DIED_AWAY * peak { 0 } else { quiet + 1 };
+            response.push(value);
+            if quiet >= monic.len() + count {
+                return response;
+            }
+        }
     }
     response
 }

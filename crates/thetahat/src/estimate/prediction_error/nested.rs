@@ -1,0 +1,170 @@
+//! Starts from the optima of nested models, so that a larger model does not fit worse than a smaller one.
+//!
+//! The parameters of a smaller model, padded with zeros, have the same cost in a larger one, and a search never ends above
+//! the cost that it begins from. So where every model of a lattice begins from the best of those with one coefficient
+//! fewer in A, in every B, in C, in D or in every F, no model ends above any that is nested in it, by induction.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use super::{Job, filled};
+use crate::data::Record;
+use crate::estimate::common::extended;
+use crate::estimate::optimize::{Search, best_free};
+use crate::estimate::prediction_error::stretches;
+use crate::estimate::predictor::{Begin, Predictor};
+use crate::estimate::start::Plants;
+use crate::{Error, Orders};
+
+/// How many starts of a smaller model are followed for how many iterations: near enough to its optimum.
+const ROUNDS: [(usize, usize); 2] = [(3, 3), (1, 8)];
+const SAME_COST: f64 = 1e-6;
+const TOLERANCE: f64 = 1e-5;
+/// Models of a lattice at most.
+const MOST_MODELS: usize = 96;
+/// Of a longer record the smaller models see stretches.
+const LONG: usize = 1 << 12;
+const STRETCHES: usize = 4;
+
+/// How many coefficients there are of A, of the longest B, of C, of D and of the longest F.
+type Levels = [usize; 5];
+
+impl Job<'_> {
+    /// The optima of the models with one coefficient fewer in A, every B, C, D or every F, as parameters of this model. None
+    /// without F, where the starts leave little to chance.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`].
+    pub(super) fn nested(
+        &self,
+        record: &Record<'_>,
+        orders: &Orders,
+        begin: Begin,
+    ) -> Result<Vec<Vec<f64>>, Error> {
+        if orders.nf.iter().all(|&nf| nf == 0) {
+            return Ok(Vec::new());
+        }
+        let samples: usize = record.segments.iter().map(Range::len).sum();
+        let thin = if samples > LONG { stretches(record, STRETCHES, LONG / STRETCHES) } else { None };
+        // In the middle of a log nothing is at rest.
+        let (record, begin) = thin.as_ref().map_or((record, begin), |thin| (thin, Begin::Unknown));
+        let top = levels(orders);
+        let bottom = bottom(&top);
+        let mut known: BTreeMap<Levels, Vec<f64>> = BTreeMap::new();
+        let mut plants: BTreeMap<[usize; 2], Plants> = BTreeMap::new();
+        let mut next = Some(bottom);
+        while let Some(at) = next {
+            next = following(&at, &bottom, &top);
+            if at == top || self.deadline.is_over() {
+                continue;
+            }
+            let own = lowered(orders, &top, &at);
+            let mut predictor = Predictor::new(record, &own, begin);
+            if predictor.samples() <= own.parameters() + predictor.initial_conditions() {
+                continue;
+            }
+            let padded = smaller(&at)
+                .filter_map(|less| Some(extended(&lowered(orders, &top, &less), known.get(&less)?, &own)));
+            let mut starts: Vec<Vec<f64>> = padded.collect();
+            if has_recipes(&at, &top, &bottom) {
+                starts.extend(filled(record, &own, |record| {
+                    let plants = plants.entry([at[1], at[4]]);
+                    let plants = plants.or_insert_with(|| Plants::new(record, &own, self.deadline));
+                    plants.with_noise(record, &own, self.deadline)
+                }));
+            }
+            if let Some(parameters) = self.optimum(&mut predictor, starts)? {
+                known.insert(at, parameters);
+            }
+        }
+        let last = smaller(&top)
+            .filter_map(|less| Some(extended(&lowered(orders, &top, &less), known.get(&less)?, orders)));
+        Ok(last.collect())
+    }
+
+    /// Where a search leads from the best of some starts: best after a few iterations of those that cost least.
+    fn optimum(
+        &self,
+        predictor: &mut Predictor<'_>,
+        starts: Vec<Vec<f64>>,
+    ) -> Result<Option<Vec<f64>>, Error> {
+        let costs = starts.into_iter().filter_map(|start| Some((best_free(predictor, &start).ok()?, start)));
+        let mut starts: Vec<(f64, Vec<f64>)> = costs.collect();
+        for (kept, iterations) in ROUNDS {
+            starts.sort_by(|(one, _), (other, _)| one.total_cmp(other));
+            starts.dedup_by(|(later, _), (first, _)| *later - *first <= SAME_COST * *first);
+            starts.truncate(kept);
+            let search = Search { max_iterations: iterations, tolerance: TOLERANCE, ..Search::default() };
+            for (cost, start) in &mut starts {
+                let Ok(found) = self.search_with(predictor, start, &search)? else { continue };
+                (*cost, *start) = (found.cost(), found.parameters);
+            }
+        }
+        let best = starts.into_iter().min_by(|(one, _), (other, _)| one.total_cmp(other));
+        Ok(best.map(|(_, parameters)| parameters))
+    }
+}
+
+/// Recipes are for models without A of which the plant is nearly that of the top, with all of its noise or none; for those
+/// with its plant; and for the smallest.
+fn has_recipes(at: &Levels, top: &Levels, bottom: &Levels) -> bool {
+    let plant = at[1] == top[1] && at[4] == top[4];
+    let close = at[1] + 1 >= top[1] && at[4] + 2 >= top[4];
+    let noise = at[2..4] == top[2..4] || at[2..4] == [0, 0];
+    at == bottom || at[0] == 0 && (plant || close && noise)
+}
+
+fn levels(orders: &Orders) -> Levels {
+    let most = |orders: &[usize]| orders.iter().copied().max().unwrap_or(0);
+    [orders.na, most(&orders.nb), orders.nc, orders.nd, most(&orders.nf)]
+}
+
+/// The lowest levels: B and F keep a coefficient, and there are not too many models above them.
+fn bottom(top: &Levels) -> Levels {
+    let least = [0, 1, 0, 0, 1];
+    let depth = |depth: usize| -> Levels {
+        std::array::from_fn(|k| top[k].saturating_sub(depth).max(least[k].min(top[k])))
+    };
+    let models =
+        |bottom: &Levels| top.iter().zip(bottom).map(|(top, bottom)| top - bottom + 1).product::<usize>();
+    let deepest = top.iter().copied().max().unwrap_or(0);
+    (0..=deepest).rev().map(depth).find(|bottom| models(bottom) <= MOST_MODELS).unwrap_or(*top)
+}
+
+/// The next levels, the last one counted up first.
+fn following(at: &Levels, bottom: &Levels, top: &Levels) -> Option<Levels> {
+    let mut next = *at;
+    for k in (0..next.len()).rev() {
+        if next[k] < top[k] {
+            next[k] += 1;
+            return Some(next);
+        }
+        next[k] = bottom[k];
+    }
+    None
+}
+
+/// The levels with one coefficient fewer.
+fn smaller(at: &Levels) -> impl Iterator<Item = Levels> {
+    let at = *at;
+    (0..at.len()).filter(move |&k| at[k] > 0).map(move |k| {
+        let mut less = at;
+        less[k] -= 1;
+        less
+    })
+}
+
+/// The orders at some levels below the top. A B or F that is there keeps a coefficient.
+fn lowered(orders: &Orders, top: &Levels, at: &Levels) -> Orders {
+    let less = |orders: &[usize], k: usize| {
+        orders.iter().map(|&order| order.saturating_sub(top[k] - at[k]).max(order.min(1))).collect()
+    };
+    Orders {
+        na: at[0],
+        nb: less(&orders.nb, 1),
+        nc: at[2],
+        nd: at[3],
+        nf: less(&orders.nf, 4),
+        nk: orders.nk.clone(),
+    }
+}

@@ -1,0 +1,217 @@
+//! Where a search begins.
+//!
+//! The recipes of `start` lead to the same place where the plant is in the model set. Where they do not, the sum of squares
+//! has several minima or long valleys, and costs at the starts say little about where a search from them ends. Then optima
+//! of nested models are further starts (see `nested`), and all starts are compared after a few steps of Levenberg and
+//! Marquardt, the promising ones after some more.
+
+use rayon::prelude::*;
+
+use super::{Beginning, Job, filled, hopeless};
+use crate::data::Record;
+use crate::estimate::optimize::{Found, Search, StartOutcome, best_free, best_linear};
+use crate::estimate::predictor::{Begin, Predictor};
+use crate::estimate::restart::restarts;
+use crate::estimate::start::candidates;
+use crate::{Error, Orders};
+
+/// Starts of which the costs differ by more than this fraction of the lowest may lead to different minima.
+const DISAGREEMENT: f64 = 1e-3;
+/// A search that may lower the cost by more than this fraction may lead anywhere.
+const FAR: f64 = 1e-2;
+/// Starts of which the costs differ by less than this fraction are one.
+const SAME_COST: f64 = 1e-6;
+/// Rounds of a comparison: iterations of each start, and of what it reaches in them the largest ratio to the lowest cost
+/// with which a start goes on.
+const ROUNDS: [(usize, f64); 2] = [(4, 1.2), (10, 1.05)];
+
+/// A start and how far it was followed.
+#[derive(Debug, Clone)]
+struct Start {
+    outcome: StartOutcome,
+    parameters: Vec<f64>,
+    /// sum e^2 there; infinite where it cannot be computed.
+    cost: f64,
+}
+
+impl Job<'_> {
+    /// The starts, the best first. If more than one is asked for, searches from so many and takes what the best search found.
+    pub(super) fn ranked(
+        &self,
+        record: &Record<'_>,
+        orders: &Orders,
+        begin: Begin,
+        predictor: &mut Predictor<'_>,
+    ) -> Result<Beginning, Error> {
+        let guess = self.options.guess.iter().map(|guess| ("guess", guess.clone()));
+        let recipes = filled(record, orders, |record| candidates(record, orders, self.deadline));
+        let found = match recipes {
+            Err(error) if self.options.guess.is_none() => return Err(error),
+            found => found.unwrap_or_default(),
+        };
+        let unstable_pole = found.iter().filter_map(|candidate| candidate.unstable_pole).reduce(f64::max);
+        let recipes = found.into_iter().map(|candidate| (candidate.name, candidate.parameters));
+        let mut starts: Vec<Start> = Vec::new();
+        for (name, parameters) in guess.chain(recipes) {
+            if self.deadline.is_over() && starts.iter().any(|start| start.cost.is_finite()) {
+                break;
+            }
+            starts.push(Start::new(name, parameters, predictor));
+        }
+        sort(&mut starts);
+        let has_f = orders.nf.iter().any(|&nf| nf > 0);
+        let mut compared = !has_f || self.options.starts > 0;
+        if !self.deadline.is_over() && is_doubtful(&starts, predictor) {
+            starts.extend(self.nested_starts(record, orders, begin, predictor)?);
+            self.compare(predictor, &mut starts)?;
+            compared = true;
+        }
+        let Some(best) = starts.first() else { return Err(hopeless(orders)) };
+        if !self.deadline.is_over() {
+            let missing = (self.options.starts + 1).saturating_sub(starts.len());
+            let more: Vec<_> = restarts(orders, &best.parameters, self.options.seed, missing).collect();
+            let more = more.into_iter().enumerate().map(|(number, mut parameters)| {
+                // A start that has no cost is judged by that.
+                let _ = best_linear(predictor, &mut parameters);
+                Start::new(&format!("random-{}", number + 1), parameters, predictor)
+            });
+            let more: Vec<Start> = more.collect();
+            starts.extend(more);
+        }
+        let samples = None;
+        if self.options.starts == 0 {
+            let parameters = starts[0].parameters.clone();
+            let starts = starts.into_iter().map(|start| start.outcome).collect();
+            return Ok(Beginning { parameters, starts, unstable_pole, samples, compared, found: None });
+        }
+        let (winner, found) = self.searched(record, orders, begin, &mut starts)?;
+        starts[..=winner].rotate_right(1);
+        let parameters =
+            found.as_ref().map_or_else(|| starts[0].parameters.clone(), |f| f.parameters.clone());
+        let starts = starts.into_iter().map(|start| start.outcome).collect();
+        Ok(Beginning { parameters, starts, unstable_pole, samples, compared, found })
+    }
+
+    fn nested_starts(
+        &self,
+        record: &Record<'_>,
+        orders: &Orders,
+        begin: Begin,
+        predictor: &mut Predictor<'_>,
+    ) -> Result<Vec<Start>, Error> {
+        let nested = self.nested(record, orders, begin)?;
+        Ok(nested.into_iter().map(|parameters| Start::new("nested", parameters, predictor)).collect())
+    }
+
+    /// The best start from nested models after some iterations, if they lead below a cost.
+    pub(super) fn nested_below(
+        &self,
+        record: &Record<'_>,
+        orders: &Orders,
+        begin: Begin,
+        predictor: &mut Predictor<'_>,
+        lowest: f64,
+    ) -> Result<Option<(StartOutcome, Vec<f64>)>, Error> {
+        let mut starts = self.nested_starts(record, orders, begin, predictor)?;
+        self.compare(predictor, &mut starts)?;
+        let best = starts.into_iter().next().filter(|start| start.cost < lowest);
+        Ok(best.map(|start| (start.outcome, start.parameters)))
+    }
+
+    /// Follows the starts for a few iterations, and those that are close to the best of them for some more; sorts them by
+    /// what they reach.
+    fn compare(&self, predictor: &mut Predictor<'_>, starts: &mut Vec<Start>) -> Result<(), Error> {
+        let samples = predictor.samples() as f64;
+        for (iterations, within) in ROUNDS {
+            sort(starts);
+            starts.dedup_by(|later, first| (later.cost - first.cost).abs() <= SAME_COST * first.cost);
+            let lowest = starts.first().map_or(f64::INFINITY, |start| start.cost);
+            let search = Search { max_iterations: iterations, ..Search::default() };
+            let mut reached = lowest;
+            for start in starts.iter_mut().filter(|start| start.cost.is_finite()) {
+                if self.deadline.is_over() {
+                    break;
+                }
+                let Ok(found) = self.search_with(predictor, &start.parameters, &search)? else { continue };
+                start.cost = found.cost();
+                start.parameters = found.parameters;
+                start.outcome.reached = Some(start.cost / samples);
+                reached = reached.min(start.cost);
+            }
+            sort(starts);
+            starts.retain(|start| start.cost <= within * reached);
+        }
+        Ok(())
+    }
+
+    /// Searches from as many starts as are asked for, in parallel. Gives the one that won, and what it found.
+    fn searched(
+        &self,
+        record: &Record<'_>,
+        orders: &Orders,
+        begin: Begin,
+        starts: &mut [Start],
+    ) -> Result<(usize, Option<Found>), Error> {
+        let searched = starts.len().min(self.options.starts + 1);
+        let results = starts[..searched].par_iter().enumerate().map(|(number, start)| {
+            if number > 0 && self.deadline.is_over() {
+                return Ok(None);
+            }
+            let mut predictor = Predictor::new(record, orders, begin);
+            let samples = predictor.samples() as f64;
+            Ok(self.search(&mut predictor, &start.parameters)?.ok().map(|found| (found, samples)))
+        });
+        let results = results.collect::<Result<Vec<_>, Error>>()?;
+        let mut winner: Option<(usize, Found)> = None;
+        for (number, (start, result)) in starts.iter_mut().zip(results).enumerate() {
+            let Some((found, samples)) = result else { continue };
+            start.outcome.reached = Some(found.cost() / samples);
+            if winner.as_ref().is_none_or(|(_, best)| found.cost() < best.cost()) {
+                winner = Some((number, found));
+            }
+        }
+        winner.map(|(number, found)| (number, Some(found))).ok_or_else(|| hopeless(orders))
+    }
+}
+
+impl Start {
+    fn new(name: &str, parameters: Vec<f64>, predictor: &mut Predictor<'_>) -> Self {
+        let cost = best_free(predictor, &parameters).ok();
+        let outcome = StartOutcome {
+            name: name.to_owned(),
+            cost: cost.map(|cost| cost / predictor.samples() as f64),
+            reached: None,
+        };
+        Self { outcome, parameters, cost: cost.unwrap_or(f64::INFINITY) }
+    }
+}
+
+/// By their costs. Stable: of equal ones the first stays first; those without a cost come last.
+fn sort(starts: &mut [Start]) {
+    starts.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+}
+
+/// Whether searches from these sorted starts may end in different places, or far from where they begin: where they lead is
+/// predicted by a step of Gauss and Newton.
+fn is_doubtful(starts: &[Start], predictor: &mut Predictor<'_>) -> bool {
+    let mut recipes: Vec<(&str, &Start)> = Vec::new();
+    for start in starts.iter().filter(|start| start.cost.is_finite()) {
+        let recipe = start.outcome.name.trim_end_matches("-refined");
+        if recipes.iter().all(|(other, _)| *other != recipe) {
+            recipes.push((recipe, start));
+        }
+    }
+    let Some((_, first)) = recipes.first() else { return true };
+    let alone = starts.len() == 1 && predictor.orders().nf.iter().any(|&nf| nf > 0);
+    let mut reached = |start: &Start| {
+        let at = best_free(predictor, &start.parameters);
+        at.map_or(f64::NEG_INFINITY, |cost| cost - predictor.foretold())
+    };
+    let lowest = reached(first);
+    alone
+        || lowest < (1.0 - FAR) * first.cost
+        || recipes[1..].iter().any(|(_, start)| {
+            let same = start.cost <= (1.0 + DISAGREEMENT) * first.cost;
+            !same && (reached(start) / lowest - 1.0).abs() > DISAGREEMENT
+        })
+}

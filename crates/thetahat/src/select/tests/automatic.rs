@@ -38,7 +38,7 @@ fn delay_structure_and_orders_are_found() {
         assert_eq!((least.nk, delay.mdl[0].nk, delay.mdl.len()), (3, 1, 14));
         assert!(selection.steps[0].starts_with("Delay of u1: 3 samples (MDL -"), "{:?}", selection.steps);
         assert!(selection.steps.iter().any(|step| step.starts_with("Second: ")), "{:?}", selection.steps);
-        assert_eq!(selection.models + selection.failed, 100 + 27 + 9 + 81);
+        assert_eq!(selection.models + selection.failed, 100 + 27 + 9 + 9 * 15);
     }
 }
 

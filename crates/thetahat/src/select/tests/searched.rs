@@ -25,7 +25,7 @@ fn fitted(record: &Record<'_>, grid: &Grid) -> (Vec<Tried>, usize) {
             .unwrap();
     let mut tried: Vec<Tried> =
         models.iter().map(|orders| Tried { orders: orders.clone(), point: None }).collect();
-    let score = |point: &Point| point.cost.ln() * 1e3 + 7.0 * point.parameters.len() as f64;
+    let score = |_: &Orders, point: &Point| point.cost.ln() * 1e3 + 7.0 * point.parameters.len() as f64;
     Family::new(&tried, 1).fit(&common, &mut tried, &score).unwrap();
     (tried, samples.window.counted)
 }

@@ -170,13 +170,12 @@ impl Job<'_> {
         if !beginning.compared && !found.as_ref().is_some_and(easy) && !self.deadline.is_over() {
             beginning.compared = true;
             let lowest = found.as_ref().map_or(f64::INFINITY, Found::cost);
-            if let Some((outcome, parameters)) =
-                self.nested_below(record, orders, begin, predictor, lowest)?
+            let nested = self.nested_below(record, orders, begin, predictor, lowest)?;
+            if let Some((outcome, parameters)) = nested
+                && let Ok(better) = self.search(predictor, &parameters)?
             {
-                if let Ok(better) = self.search(predictor, &parameters)? {
-                    beginning.starts.insert(0, outcome);
-                    return Ok(Some(better));
-                }
+                beginning.starts.insert(0, outcome);
+                return Ok(Some(better));
             }
         } else if beginning.found.is_none() {
             return Ok(found);

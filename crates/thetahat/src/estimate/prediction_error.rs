@@ -426,6 +426,18 @@ fn uncertainty(predictor: &Predictor<'_>, orders: &Orders, noise_variance: f64) 
     Some(Uncertainty { covariance: rows(&covariance), condition })
 }
 
+/// The prediction errors of a record with the initial conditions that an estimate from it has.
+pub(super) fn predictor_of<'r>(record: &Record<'r>, orders: &Orders, estimate: &Estimate) -> Predictor<'r> {
+    let begin = if estimate.initial() == Initial::Zero { Begin::Zero } else { Begin::Unknown };
+    let predictor = Predictor::new(record, orders, begin);
+    if let Procedure::PredictionError(outcome) = estimate.procedure()
+        && outcome.initial_conditions > predictor.initial_conditions()
+    {
+        return Predictor::new(record, orders, Begin::UnknownInputs);
+    }
+    predictor
+}
+
 /// The covariance of an estimate of least squares whose errors are coloured, whatever its structure: of `uncertainty` with
 /// psi filtered backwards in time by an autoregression of the errors. None where it cannot be had.
 pub(super) fn coloured_covariance(
@@ -433,13 +445,7 @@ pub(super) fn coloured_covariance(
     orders: &Orders,
     estimate: &Estimate,
 ) -> Option<Vec<Vec<f64>>> {
-    let begin = if estimate.initial() == Initial::Zero { Begin::Zero } else { Begin::Unknown };
-    let mut predictor = Predictor::new(record, orders, begin);
-    if let Procedure::PredictionError(outcome) = estimate.procedure()
-        && outcome.initial_conditions > predictor.initial_conditions()
-    {
-        predictor = Predictor::new(record, orders, Begin::UnknownInputs);
-    }
+    let mut predictor = predictor_of(record, orders, estimate);
     best_free(&mut predictor, estimate.parameters()).ok()?;
     predictor.linearize();
     let (root, _) = inverse_root(&predictor)?;

@@ -46,12 +46,13 @@ use super::arx::rows;
 use super::criterion::sparsity;
 use super::optimize::{Deadline, Found, Monitor, Search, SearchOutcome, StartOutcome, best_free, search};
 use super::prediction_error::{
-    NOTHING_LEFT, backward_products, energy, inverse, prediction_error, search_outcome,
+    backward_products, energy, inverse_root, prediction_error, predictor_of, search_outcome,
 };
-use super::predictor::{Begin, Predictor};
+use super::predictor::Predictor;
 use super::uncertainty::{autoregression, coloured};
 use super::{Estimate, Initial, Procedure};
 use crate::data::Record;
+use crate::respond::NOTHING_LEFT;
 use crate::{Error, Orders, Structure};
 
 /// The median of |e| of normal errors, in standard deviations.
@@ -132,8 +133,7 @@ pub(super) fn robust(
     let options = &how.search;
     options.check_numbers()?;
     let squares = prediction_error(record, orders, initial, options, monitor)?;
-    let begin = if squares.initial() == Initial::Zero { Begin::Zero } else { Begin::Unknown };
-    let mut predictor = Predictor::new(record, orders, begin);
+    let mut predictor = predictor_of(record, orders, &squares);
     let unusable = || {
         Error::undetermined(
             orders.names(),
@@ -217,7 +217,7 @@ fn finish(
     let overflow = || Error::data("the errors overflow; scale the channels towards one");
     let cost = best_free(predictor, &found.parameters).map_err(|_| overflow())?;
     predictor.linearize();
-    let known = inverse(predictor);
+    let known = inverse_root(predictor);
     let influence: Vec<f64> = match how.loss {
         Loss::Absolute => errors.iter().map(|e| e.signum()).collect(),
         Loss::Huber { .. } => errors.iter().map(|e| e.clamp(-bound, bound)).collect(),
@@ -230,12 +230,12 @@ fn finish(
             (m > 0.0).then(|| (1.0 + taken as f64 / count * beyond / m) / m)
         }
     };
-    let covariance = known.as_ref().zip(factor).map(|((inverse, _), factor)| {
+    let covariance = known.as_ref().zip(factor).map(|((root, _), factor)| {
         let squared = factor * factor;
         let covariance: DMatrix<f64> = if orders.structure() == Structure::Oe {
             let colour = autoregression(&influence, &segments, taken);
             let products = backward_products(&predictor.columns(), &colour.monic);
-            coloured(inverse, colour.variance, &products) * squared
+            coloured(root, colour.variance, &(root.transpose() * products * root)) * squared
         } else {
             let variance = match how.loss {
                 Loss::Absolute => 1.0,
@@ -243,7 +243,7 @@ fn finish(
                     influence.iter().map(|psi| psi * psi).sum::<f64>() / (count - taken as f64)
                 }
             };
-            inverse * (variance * squared)
+            root * root.transpose() * (variance * squared)
         };
         rows(&covariance)
     });

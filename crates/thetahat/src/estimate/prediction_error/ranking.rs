@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::{Beginning, Job, filled, hopeless};
 use crate::data::Record;
-use crate::estimate::optimize::{Found, Search, StartOutcome, best_free, best_linear};
+use crate::estimate::optimize::{Algorithm, Found, Search, StartOutcome, best_free, best_linear};
 use crate::estimate::predictor::{Begin, Predictor};
 use crate::estimate::restart::restarts;
 use crate::estimate::start::candidates;
@@ -24,6 +24,9 @@ const SAME_COST: f64 = 1e-6;
 /// Rounds of a comparison: iterations of each start, and of what it reaches in them the largest ratio to the lowest cost
 /// with which a start goes on.
 const ROUNDS: [(usize, f64); 2] = [(4, 1.2), (10, 1.05)];
+
+/// The name of the start that was given.
+const GUESS: &str = "guess";
 
 /// A start and how far it was followed.
 #[derive(Debug, Clone)]
@@ -43,7 +46,7 @@ impl Job<'_> {
         begin: Begin,
         predictor: &mut Predictor<'_>,
     ) -> Result<Beginning, Error> {
-        let guess = self.options.guess.iter().map(|guess| ("guess", guess.clone()));
+        let guess = self.options.guess.iter().map(|guess| (GUESS, guess.clone()));
         let recipes = filled(record, orders, |record| candidates(record, orders, self.deadline));
         let found = match recipes {
             Err(error) if self.options.guess.is_none() => return Err(error),
@@ -60,10 +63,15 @@ impl Job<'_> {
         }
         sort(&mut starts);
         let has_f = orders.nf.iter().any(|&nf| nf > 0);
-        let mut compared = !has_f || self.options.starts > 0;
-        if !self.deadline.is_over() && is_doubtful(&starts, predictor) {
+        // Who asks for another algorithm wants to see it at work.
+        let default = self.options.algorithm == Algorithm::LevenbergMarquardt;
+        let mut compared = !has_f || !default || self.options.starts > 0;
+        if default && !self.deadline.is_over() && is_doubtful(&starts, predictor) {
             starts.extend(self.nested_starts(record, orders, begin, predictor)?);
-            self.compare(predictor, &mut starts)?;
+            if self.options.starts == 0 {
+                self.compare(predictor, &mut starts)?;
+            }
+            sort(&mut starts);
             compared = true;
         }
         let Some(best) = starts.first() else { return Err(hopeless(orders)) };
@@ -120,27 +128,29 @@ impl Job<'_> {
 
     /// Follows the starts for a few iterations, and those that are close to the best of them for some more; sorts them by
     /// what they reach.
-    fn compare(&self, predictor: &mut Predictor<'_>, starts: &mut Vec<Start>) -> Result<(), Error> {
+    fn compare(&self, predictor: &mut Predictor<'_>, starts: &mut [Start]) -> Result<(), Error> {
         let samples = predictor.samples() as f64;
+        let mut limit = f64::INFINITY;
         for (iterations, within) in ROUNDS {
             sort(starts);
-            starts.dedup_by(|later, first| (later.cost - first.cost).abs() <= SAME_COST * first.cost);
-            let lowest = starts.first().map_or(f64::INFINITY, |start| start.cost);
-            let search = Search { max_iterations: iterations, ..Search::default() };
-            let mut reached = lowest;
-            for start in starts.iter_mut().filter(|start| start.cost.is_finite()) {
-                if self.deadline.is_over() {
-                    break;
+            let max_iterations = iterations.min(self.options.max_iterations);
+            let search = Search { max_iterations, ..Search::default() };
+            let (mut before, mut lowest) = (f64::NEG_INFINITY, f64::INFINITY);
+            for start in starts.iter_mut().filter(|start| start.cost.is_finite() && start.cost <= limit) {
+                let same = start.cost - before <= SAME_COST * start.cost;
+                before = start.cost;
+                if same || self.deadline.is_over() {
+                    continue;
                 }
                 let Ok(found) = self.search_with(predictor, &start.parameters, &search)? else { continue };
                 start.cost = found.cost();
                 start.parameters = found.parameters;
                 start.outcome.reached = Some(start.cost / samples);
-                reached = reached.min(start.cost);
+                lowest = lowest.min(start.cost);
             }
-            sort(starts);
-            starts.retain(|start| start.cost <= within * reached);
+            limit = within * lowest;
         }
+        sort(starts);
         Ok(())
     }
 
@@ -152,9 +162,10 @@ impl Job<'_> {
         begin: Begin,
         starts: &mut [Start],
     ) -> Result<(usize, Option<Found>), Error> {
-        let searched = starts.len().min(self.options.starts + 1);
-        let results = starts[..searched].par_iter().enumerate().map(|(number, start)| {
-            if number > 0 && self.deadline.is_over() {
+        let results = starts.par_iter().enumerate().map(|(number, start)| {
+            // A start that was given is not left out for others that cost less.
+            let chosen = number <= self.options.starts || start.outcome.name == GUESS;
+            if !chosen || number > 0 && self.deadline.is_over() {
                 return Ok(None);
             }
             let mut predictor = Predictor::new(record, orders, begin);

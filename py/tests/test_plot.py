@@ -172,7 +172,8 @@ def test_fit_of_several_models_and_a_level(log: th.Log, model: th.Model, plain: 
     assert legend(ax).count("50 % band") == 1
     _, low, high = edges(bands(ax)[0])
     expected = 2 * NormalDist().inv_cdf(0.75) * np.sqrt(model.noise_variance)
-    np.testing.assert_allclose(high - low, expected, rtol=1e-9)
+    # The noise, and what is not known of the parameters and of the first state.
+    assert np.all(high - low > expected) and np.all((high - low)[20:] < 1.02 * expected)
 
 
 def test_fit_breaks_at_gaps_and_keeps_lone_samples(log: th.Log, model: th.Model) -> None:
@@ -457,7 +458,7 @@ def test_far_roots_are_named_and_do_not_hide_the_others(two_inputs: th.Log) -> N
 
 
 def test_selection_by_mdl(log: th.Log) -> None:
-    model = quietly(th.search, log[:700], na=range(1, 6), nb=range(1, 6))
+    model = quietly(th.search, log[:700], na=range(1, 6), nb=range(1, 6), constant="no")
     ax = plot.selection(model)
     found = model.selection
     assert found is not None

@@ -14,7 +14,7 @@ Estimators that run with the process take a sample at a time, or a whole array: 
 >>> log = th.dc_motor()
 >>> model = th.search(log[:700])
 >>> model
-Model(ARMAX(2, 2, 1, 1), 1-step fit 98.35 % on rows 1..700)
+Model(ARMAX(2, 2, 1, 1), 1-step fit 98.37 % on rows 1..700)
 """
 
 from thetahat._fit import EstimationWarning, ar, arma, armax, arx, bj, iv, oe, pem, search, sriv

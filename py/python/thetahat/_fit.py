@@ -138,7 +138,7 @@ def armax(
     >>> import thetahat as th
     >>> model = th.armax(th.dc_motor(), na=2, nb=2, nc=1)
     >>> model.c.round(3)
-    array([ 1.  , -0.55])
+    array([ 1.   , -0.628])
     """
     return _fit("armax", locals())
 
@@ -593,7 +593,7 @@ def search(
     >>> import thetahat as th
     >>> model = th.search(th.dc_motor(), model="oe", nb=range(1, 4), nf=range(1, 4), nk=range(1, 3))
     >>> model.selection["models"]
-    18
+    17
     """
     more = [f"--{name}={_options.text(name, value)}" for name, value in (("select", select), ("path", path)) if value is not None]
     return _fit(model, locals(), *more)

@@ -172,8 +172,8 @@ class Model:
         --------
         >>> import thetahat as th
         >>> th.arx(th.dc_motor(), na=2, nb=2).confidence_interval().round(2)
-        array([[-1.57, -1.53],
-               [ 0.57,  0.6 ],
+        array([[-1.56, -1.53],
+               [ 0.56,  0.6 ],
                [ 0.34,  0.38],
                [ 0.28,  0.34]])
         """
@@ -278,7 +278,7 @@ class Model:
         --------
         >>> import thetahat as th
         >>> th.arx(th.dc_motor(), na=2, nb=2).dc_gain_interval().round(1)
-        array([18.2, 19.8])
+        array([18.3, 19.6])
         """
         return _interval(self._own["dc_gain"][self._input(input)])
 
@@ -360,6 +360,8 @@ class Model:
     def aic(self) -> float:
         """Akaike's information criterion as statsmodels counts it, -2 ln L + 2 (p + 1), with the p parameters and V.
 
+        A level and a slope that were estimated count among them.
+
         It is on another scale than ``criteria["aic"]``, which is ln V + 2 p/N: N (AIC + ln 2 pi + 1) + 2. Both order models
         that were fitted to the same samples in the same way.
 
@@ -371,7 +373,7 @@ class Model:
         >>> bool(np.isclose(model.aic, model.samples * (model.criteria["aic"] + np.log(2 * np.pi) + 1) + 2))
         True
         """
-        return -2 * self.log_likelihood + 2 * (len(self.parameters) + 1)
+        return -2 * self.log_likelihood + 2 * (self._estimated + 1)
 
     @property
     def bic(self) -> float:
@@ -379,7 +381,12 @@ class Model:
 
         It is N (MDL + ln 2 pi + 1) + ln N, where MDL, ``criteria["mdl"]``, is ln V + p ln(N)/N.
         """
-        return -2 * self.log_likelihood + (len(self.parameters) + 1) * float(np.log(self.samples))
+        return -2 * self.log_likelihood + (self._estimated + 1) * float(np.log(self.samples))
+
+    @property
+    def _estimated(self) -> int:
+        levels = [self._estimation.get(name) for name in ("level", "slope")]
+        return len(self.parameters) + sum(level is not None for level in levels)
 
     @property
     def fits(self) -> list[dict[str, Any]]:
@@ -686,7 +693,7 @@ class Model:
         >>> import thetahat as th
         >>> response = th.arx(th.dc_motor(), na=2, nb=2).frequency_response([0.1, 1.0, 10.0])
         >>> abs(response.values[0]).round(1)
-        array([18.9, 18.9, 13.4])
+        array([19. , 18.9, 13.4])
         """
         points = _options.count("points", points)
         return FrequencyResponse(self._model.frequency_response(w, points))

@@ -204,7 +204,7 @@ def residuals(of: Validation | Model, log: Log | None = None, axes: Any = None) 
     >>> log = th.dc_motor()
     >>> axes = plot.residuals(th.armax(log[:700], na=2, nb=2, nc=1), log[700:])
     >>> [ax.get_title() for ax in axes]
-    ['residuals: white, p = 0.59', 'residuals and u: independent, p = 0.87']
+    ['residuals: white, p = 0.54', 'residuals and u: independent, p = 0.87']
     """
     if isinstance(of, Model):
         if log is None:

@@ -65,8 +65,10 @@ impl Job<'_> {
         let has_f = orders.nf.iter().any(|&nf| nf > 0);
         // Who asks for another algorithm wants to see it at work.
         let default = self.options.algorithm == Algorithm::LevenbergMarquardt;
-        let mut compared = !has_f || !default || self.options.starts > 0;
-        if default && !self.deadline.is_over() && is_doubtful(&starts, predictor) {
+        // What was given and costs least comes from a search.
+        let known = starts.first().is_some_and(|start| start.outcome.name == GUESS);
+        let mut compared = !has_f || !default || known || self.options.starts > 0;
+        if default && !known && !self.deadline.is_over() && is_doubtful(&starts, predictor) {
             starts.extend(self.nested_starts(record, orders, begin, predictor)?);
             if self.options.starts == 0 {
                 self.compare(predictor, &mut starts)?;

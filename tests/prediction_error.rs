@@ -263,7 +263,10 @@ fn the_report_says_how_the_search_went() {
     assert_eq!(search["stability_bound"], false);
     let starts = search["starts"].as_array().unwrap();
     assert_eq!(starts[0]["name"], search["start"]);
-    assert!(starts.len() >= 5 && starts.iter().filter(|start| start["reached"].is_number()).count() == 5);
+    // Those of smaller models are searched from beside so many others.
+    let nested = starts.iter().filter(|start| start["name"] == "nested").count();
+    let reached = starts.iter().filter(|start| start["reached"].is_number()).count();
+    assert!(starts.len() >= 5 && (5..=5 + nested).contains(&reached), "{starts:?}");
 
     let gradient = folder.fit(&format!("{line} --search gradient --step 0.5,2 --max-iterations 3"));
     assert_eq!(gradient["estimation"]["step"], json!({"c1": 0.5, "c2": 2.0}));

@@ -499,6 +499,7 @@ pub(super) fn search(
                     refused_unstable = true;
                     unstable_steps += 1;
                     if tries == 0
+                        && matches!(rule, Rule::Damped)
                         && drawn_in < DRAWN_IN
                         && draw_in(predictor.orders(), &parameters, &mut room.trial)
                     {

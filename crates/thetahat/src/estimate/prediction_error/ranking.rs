@@ -27,6 +27,8 @@ const ROUNDS: [(usize, f64); 2] = [(4, 1.2), (10, 1.05)];
 
 /// The name of the start that was given.
 const GUESS: &str = "guess";
+/// The name of those from smaller models.
+const NESTED: &str = "nested";
 
 /// A start and how far it was followed.
 #[derive(Debug, Clone)]
@@ -64,13 +66,18 @@ impl Job<'_> {
         sort(&mut starts);
         let has_f = orders.nf.iter().any(|&nf| nf > 0);
         // Who asks for another algorithm wants to see it at work.
-        let default = self.options.algorithm == Algorithm::LevenbergMarquardt;
+        let comparison: usize = ROUNDS.iter().map(|(iterations, _)| iterations).sum();
+        let default = self.options.algorithm == Algorithm::LevenbergMarquardt
+            && self.options.max_iterations > comparison;
         // What was given and costs least comes from a search.
-        let known = starts.first().is_some_and(|start| start.outcome.name == GUESS);
-        let mut compared = !has_f || !default || known || self.options.starts > 0;
-        if default && !known && !self.deadline.is_over() && is_doubtful(&starts, predictor) {
+        let several = self.options.starts > 0;
+        let known = !several && starts.first().is_some_and(|start| start.outcome.name == GUESS);
+        let mut compared = !has_f || !default || known || several;
+        let may_compare = has_f && default && !known && !self.deadline.is_over();
+        let doubtful = may_compare && is_doubtful(&starts, predictor);
+        if doubtful || may_compare && several {
             starts.extend(self.nested_starts(record, orders, begin, predictor)?);
-            if self.options.starts == 0 {
+            if doubtful {
                 self.compare(predictor, &mut starts)?;
             }
             sort(&mut starts);
@@ -110,7 +117,7 @@ impl Job<'_> {
         predictor: &mut Predictor<'_>,
     ) -> Result<Vec<Start>, Error> {
         let nested = self.nested(record, orders, begin)?;
-        Ok(nested.into_iter().map(|parameters| Start::new("nested", parameters, predictor)).collect())
+        Ok(nested.into_iter().map(|parameters| Start::new(NESTED, parameters, predictor)).collect())
     }
 
     /// The best start from nested models after some iterations, if they lead below a cost.
@@ -135,8 +142,7 @@ impl Job<'_> {
         let mut limit = f64::INFINITY;
         for (iterations, within) in ROUNDS {
             sort(starts);
-            let max_iterations = iterations.min(self.options.max_iterations);
-            let search = Search { max_iterations, ..Search::default() };
+            let search = Search { max_iterations: iterations, ..Search::default() };
             let (mut before, mut lowest) = (f64::NEG_INFINITY, f64::INFINITY);
             for start in starts.iter_mut().filter(|start| start.cost.is_finite() && start.cost <= limit) {
                 let same = start.cost - before <= SAME_COST * start.cost;
@@ -165,8 +171,9 @@ impl Job<'_> {
         starts: &mut [Start],
     ) -> Result<(usize, Option<Found>), Error> {
         let results = starts.par_iter().enumerate().map(|(number, start)| {
-            // A start that was given is not left out for others that cost less.
-            let chosen = number <= self.options.starts || start.outcome.name == GUESS;
+            // Those that were given or come from smaller models are not left out for others that cost less.
+            let chosen =
+                number <= self.options.starts || [GUESS, NESTED].contains(&start.outcome.name.as_str());
             if !chosen || number > 0 && self.deadline.is_over() {
                 return Ok(None);
             }

@@ -1,6 +1,7 @@
 //! From a record and orders to parameters.
 
 mod arx;
+mod border;
 mod common;
 mod criterion;
 mod instrumental;

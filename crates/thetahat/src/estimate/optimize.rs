@@ -21,12 +21,10 @@ use std::time::{Duration, Instant};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use thetahat_core::nalgebra::ComplexField;
 
+use super::border::Border;
 use super::normal;
-use super::predictor::{Polynomials, Predictor, Unusable};
-use super::start::inside;
-use crate::model::polynomial::{is_stable, roots};
+use super::predictor::{Predictor, Unusable};
 use crate::{Error, Orders};
 
 /// The first damping of Levenberg and Marquardt. A larger one wastes iterations on fast-sampled plants.
@@ -40,9 +38,7 @@ const WORTH_TAKING: f64 = 0.01;
 const HALVINGS: usize = 40;
 /// A damped step is halved so often before it is damped more.
 const SHORTER: usize = 3;
-/// A root that a step takes out of the unit circle is moved back to this fraction of the distance that there was before.
-const NEARER: f64 = 0.2;
-/// So often that may fail in a search.
+/// So often roots may be moved back to the border of stability in vain, in a search.
 const DRAWN_IN: usize = 3;
 const MOST_ITERATIONS: usize = 10_000;
 /// The first perturbation of a Hessian that is not positive definite, beside a diagonal near 1.
@@ -285,9 +281,15 @@ struct Room {
     /// The Hessian of Newton's method.
     hessian: Vec<f64>,
     center: Vec<f64>,
+    border: Border,
 }
 
 impl Room {
+    /// The cost of the trial with A and B solved for.
+    fn best_linear(&mut self, predictor: &mut Predictor<'_>) -> Result<f64, Unusable> {
+        solve_linear(predictor, &mut self.trial, &mut self.factor, &mut self.moved)
+    }
+
     /// Scales the normal equations so that the matrix has a unit diagonal, and solves them. Gives the decrease of the cost
     /// that the solution foretells.
     fn scale(&mut self, predictor: &Predictor<'_>) -> f64 {
@@ -420,6 +422,7 @@ pub(super) fn search(
         right: line(),
         hessian: if newton { square() } else { Vec::new() },
         center: line(),
+        border: Border::new(predictor.orders()),
     };
     let mut parameters = start.to_vec();
     let mut cost = match best_free(predictor, &parameters) {
@@ -498,13 +501,9 @@ pub(super) fn search(
                 Err(Unusable::Unstable) => {
                     refused_unstable = true;
                     unstable_steps += 1;
-                    if tries == 0
-                        && matches!(rule, Rule::Damped)
-                        && drawn_in < DRAWN_IN
-                        && draw_in(predictor.orders(), &parameters, &mut room.trial)
+                    if tries == 0 && drawn_in < DRAWN_IN && room.border.draw_in(&parameters, &mut room.trial)
                     {
-                        // In a shorter step, or a damped one, all parameters wait for the root that is at the border.
-                        let value = best_linear(predictor, &mut room.trial);
+                        let value = room.best_linear(predictor);
                         if let Ok(value) = value
                             && value < cost
                         {
@@ -560,32 +559,6 @@ pub(super) fn search(
     Ok(Ok(Found { parameters, costs, gradient_norm, stopped, stability_bound, unstable_steps }))
 }
 
-/// Moves the roots of C and F that a step would take out of the unit circle back into it, nearer to the border than the
-/// roots are from where the step began. Whether there are such roots.
-fn draw_in(orders: &Orders, from: &[f64], trial: &mut [f64]) -> bool {
-    let before = Polynomials::new(orders, from);
-    let mut after = Polynomials::new(orders, trial);
-    let mut scratch = Vec::new();
-    let all = |polynomials: Polynomials| std::iter::once(polynomials.c).chain(polynomials.f);
-    let Polynomials { c, f, .. } = &mut after;
-    for (monic, before) in std::iter::once(c).chain(f).zip(all(before)) {
-        if is_stable(monic, &mut scratch) {
-            continue;
-        }
-        let Some(outermost) = roots(&before).map(|roots| roots.first().map_or(0.0, |root| root.modulus()))
-        else {
-            return false;
-        };
-        let radius = 1.0 - NEARER * (1.0 - outermost);
-        match inside(monic, radius).filter(|monic| is_stable(monic, &mut scratch)) {
-            Some(moved) => *monic = moved,
-            None => return false,
-        }
-    }
-    trial.copy_from_slice(&after.parameters());
-    true
-}
-
 /// The cost of parameters with the free responses that are best for them.
 pub(super) fn best_free(predictor: &mut Predictor<'_>, parameters: &[f64]) -> Result<f64, Unusable> {
     predictor.restart();
@@ -601,20 +574,31 @@ pub(super) fn best_free(predictor: &mut Predictor<'_>, parameters: &[f64]) -> Re
 
 /// The same with A and B solved for as well: e is linear in them where C, D and F are given. Writes them into `parameters`.
 pub(super) fn best_linear(predictor: &mut Predictor<'_>, parameters: &mut [f64]) -> Result<f64, Unusable> {
+    let size = parameters.len();
+    solve_linear(predictor, parameters, &mut vec![0.0; size * size], &mut vec![0.0; size])
+}
+
+/// The same in memory for a matrix and a step.
+fn solve_linear(
+    predictor: &mut Predictor<'_>,
+    parameters: &mut [f64],
+    matrix: &mut [f64],
+    step: &mut [f64],
+) -> Result<f64, Unusable> {
     best_free(predictor, parameters)?;
     predictor.linearize();
     let orders = predictor.orders();
     let (size, linear) = (parameters.len(), orders.na + orders.nb.iter().sum::<usize>());
-    let mut matrix = vec![0.0; linear * linear];
+    let matrix = &mut matrix[..linear * linear];
     for (own, whole) in matrix.chunks_exact_mut(linear.max(1)).zip(predictor.matrix.chunks_exact(size)) {
         own.copy_from_slice(&whole[..linear]);
     }
-    let mut step = vec![0.0; size];
+    step.fill(0.0);
     step[..linear].copy_from_slice(&predictor.right[..linear]);
-    normal::factor(&mut matrix, linear);
-    normal::solve(&matrix, linear, &mut step[..linear]);
-    parameters.iter_mut().zip(&step).for_each(|(value, step)| *value += step);
-    predictor.try_free(&step);
+    normal::factor(matrix, linear);
+    normal::solve(matrix, linear, &mut step[..linear]);
+    parameters.iter_mut().zip(&*step).for_each(|(value, step)| *value += step);
+    predictor.try_free(step);
     predictor.evaluate(parameters)
 }
 

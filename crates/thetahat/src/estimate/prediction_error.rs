@@ -74,7 +74,8 @@ pub(super) fn prediction_error(
     }
     let deadline = Deadline::after(options.time_limit);
     let job = Job { options, smallest: NOTHING_LEFT * energy, deadline, monitor };
-    let mut beginning = job.beginning(record, orders, begin, &mut predictor)?;
+    let problem = Problem { record, orders, begin };
+    let mut beginning = job.beginning(problem, &mut predictor)?;
     let mut reached = if choose {
         job.choose(record, orders, predictor, &mut beginning)?
     } else {
@@ -83,7 +84,7 @@ pub(super) fn prediction_error(
             Begin::Unknown | Begin::UnknownInputs if orders.has_f() => Initial::Estimate,
             Begin::Unknown | Begin::UnknownInputs => Initial::Drop,
         };
-        let found = job.search_from((record, orders, begin), &mut predictor, &mut beginning)?;
+        let found = job.search_from(problem, &mut predictor, &mut beginning)?;
         let found = found.ok_or_else(|| hopeless(orders))?;
         Reached { predictor, found, initial }
     };
@@ -102,6 +103,20 @@ struct Reached<'r> {
     initial: Initial,
 }
 
+/// What a search is for: the samples, the orders, and what stands before a segment.
+#[derive(Clone, Copy)]
+struct Problem<'p, 'r> {
+    record: &'p Record<'r>,
+    orders: &'p Orders,
+    begin: Begin,
+}
+
+impl<'r> Problem<'_, 'r> {
+    fn predictor(&self) -> Predictor<'r> {
+        Predictor::new(self.record, self.orders, self.begin)
+    }
+}
+
 /// What all searches of an estimate share.
 struct Job<'a> {
     options: &'a Search,
@@ -115,20 +130,14 @@ impl Job<'_> {
     ///
     /// Of a long record the starts see stretches that are spread over it: what they lead to is close to the end, and a few
     /// iterations on all samples are left.
-    fn beginning(
-        &self,
-        record: &Record<'_>,
-        orders: &Orders,
-        begin: Begin,
-        predictor: &mut Predictor<'_>,
-    ) -> Result<Beginning, Error> {
-        if let Some(thin) = thinned(record) {
+    fn beginning(&self, problem: Problem<'_, '_>, predictor: &mut Predictor<'_>) -> Result<Beginning, Error> {
+        if let Some(thin) = thinned(problem.record) {
             // In the middle of a log nothing is at rest.
-            let mut small = Predictor::new(&thin, orders, Begin::Unknown);
-            let near = self.ranked(&thin, orders, Begin::Unknown, &mut small).and_then(|beginning| {
-                let task = (&thin, orders, Begin::Unknown);
-                let mut beginning = beginning;
-                Ok(self.search_from(task, &mut small, &mut beginning)?.map(|found| (found, beginning)))
+            let problem = Problem { record: &thin, begin: Begin::Unknown, ..problem };
+            let mut small = problem.predictor();
+            let near = self.ranked(problem, &mut small).and_then(|mut beginning| {
+                let found = self.search_from(problem, &mut small, &mut beginning)?;
+                Ok(found.map(|found| (found, beginning)))
             });
             match near {
                 Err(Error::Interrupted) => return Err(Error::Interrupted),
@@ -148,7 +157,7 @@ impl Job<'_> {
                 }
             }
         }
-        self.ranked(record, orders, begin, predictor)
+        self.ranked(problem, predictor)
     }
 
     /// Searches from the beginning, if that was not done before. The predictor is left at what was found.
@@ -157,7 +166,7 @@ impl Job<'_> {
     /// compared with what it found.
     fn search_from(
         &self,
-        (record, orders, begin): (&Record<'_>, &Orders, Begin),
+        problem: Problem<'_, '_>,
         predictor: &mut Predictor<'_>,
         beginning: &mut Beginning,
     ) -> Result<Option<Found>, Error> {
@@ -170,7 +179,7 @@ impl Job<'_> {
         if !beginning.compared && !found.as_ref().is_some_and(easy) && !self.deadline.is_over() {
             beginning.compared = true;
             let lowest = found.as_ref().map_or(f64::INFINITY, Found::cost);
-            let nested = self.nested_below(record, orders, begin, predictor, lowest)?;
+            let nested = self.nested_below(problem, predictor, lowest)?;
             if let Some((outcome, parameters)) = nested
                 && let Ok(better) = self.search(predictor, &parameters)?
             {
@@ -197,7 +206,8 @@ impl Job<'_> {
         mut estimated: Predictor<'r>,
         beginning: &mut Beginning,
     ) -> Result<Reached<'r>, Error> {
-        let mut resting = Predictor::new(record, orders, Begin::Zero);
+        let problem = |begin| Problem { record, orders, begin };
+        let mut resting = problem(Begin::Zero).predictor();
         let samples = estimated.samples();
         let rows = resting.samples() as f64;
         let more = estimated.initial_conditions();
@@ -211,7 +221,7 @@ impl Job<'_> {
             beginning.found.is_none() && matches!(costs, (Ok(zero), Ok(free)) if !worth(zero, free));
         let mut at_rest = None;
         if at_rest_first
-            && let Some(found) = self.search_from((record, orders, Begin::Zero), &mut resting, beginning)?
+            && let Some(found) = self.search_from(problem(Begin::Zero), &mut resting, beginning)?
         {
             let foretold = best_free(&mut estimated, &found.parameters)
                 .map_or(f64::INFINITY, |cost| cost - estimated.foretold());
@@ -220,7 +230,7 @@ impl Job<'_> {
             }
             at_rest = Some(found);
         }
-        let free = self.search_from((record, orders, Begin::Unknown), &mut estimated, beginning)?;
+        let free = self.search_from(problem(Begin::Unknown), &mut estimated, beginning)?;
         let Some(free) = free else {
             let found = at_rest.ok_or_else(|| hopeless(orders))?;
             return Ok(Reached { predictor: resting, found, initial: Initial::Zero });

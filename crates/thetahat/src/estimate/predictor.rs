@@ -45,7 +45,7 @@ use rayon::prelude::*;
 use thetahat_core::LeastSquares;
 use thetahat_core::nalgebra::{Cholesky, DMatrix, Dyn};
 
-use super::uncertainty::{backward_filtered_products, columns};
+use super::uncertainty::backward_filtered_products;
 use crate::Orders;
 use crate::data::{Record, measured};
 use crate::model::polynomial::is_stable;
@@ -80,7 +80,7 @@ impl Polynomials {
         polynomials
     }
 
-    fn set(&mut self, mut parameters: &[f64]) {
+    pub(super) fn set(&mut self, mut parameters: &[f64]) {
         let mut fill = |values: &mut [f64]| {
             let (own, rest) = parameters.split_at(values.len());
             values.copy_from_slice(own);
@@ -95,12 +95,17 @@ impl Polynomials {
 
     /// The parameters in their order.
     pub(super) fn parameters(&self) -> Vec<f64> {
-        let mut parameters = self.a[1..].to_vec();
-        self.b.iter().for_each(|b| parameters.extend(b));
-        parameters.extend(&self.c[1..]);
-        parameters.extend(&self.d[1..]);
-        self.f.iter().for_each(|f| parameters.extend(&f[1..]));
-        parameters
+        self.coefficients().copied().collect()
+    }
+
+    /// Writes the parameters in their order.
+    pub(super) fn write(&self, parameters: &mut [f64]) {
+        parameters.iter_mut().zip(self.coefficients()).for_each(|(parameter, value)| *parameter = *value);
+    }
+
+    fn coefficients(&self) -> impl Iterator<Item = &f64> {
+        let f = self.f.iter().flat_map(|f| &f[1..]);
+        self.a[1..].iter().chain(self.b.iter().flatten()).chain(&self.c[1..]).chain(&self.d[1..]).chain(f)
     }
 
     /// Whether the predictor is stable: C and every F are.
@@ -451,15 +456,13 @@ impl<'a> Predictor<'a> {
     /// psi without the free responses over the samples that count, a list for each parameter. For models of output error, at the
     /// current point.
     pub(super) fn sensitivities(&self) -> Vec<Vec<f64>> {
-        let parameters = self.right.len();
-        let mut all = vec![Vec::with_capacity(self.samples); parameters];
-        for section in &self.sections {
-            let signals: Vec<&[f64]> = section.signals.iter().map(Vec::as_slice).collect();
-            let (whole, taps) = (0..section.output.len(), &self.layouts[section.layout].taps);
-            let combination = section.without_free(parameters, section.free.len());
-            for run in &section.runs {
-                let own = columns(&signals, taps, &whole, run, Some(&combination));
-                all.iter_mut().zip(own).for_each(|(all, own)| all.extend(own));
+        let mut all = vec![Vec::with_capacity(self.samples); self.right.len()];
+        for (section, columns) in self.sections.iter().zip(self.columns()) {
+            let first = self.layouts[section.layout].counted;
+            for (all, column) in all.iter_mut().zip(columns) {
+                for run in &section.runs {
+                    all.extend_from_slice(&column[run.start - first..run.end - first]);
+                }
             }
         }
         all

@@ -24,6 +24,7 @@ use std::ops::Range;
 use thetahat_core::nalgebra::{Complex, ComplexField};
 
 use super::arx::{enough, out_of_range, signals};
+use super::border::multiply_out;
 use super::optimize::Deadline;
 use crate::data::Record;
 use crate::model::polynomial::{is_stable, roots};
@@ -135,29 +136,6 @@ fn undetermined(signals: &[&[f64]], record: &Record<'_>, orders: &Orders) -> Err
     Error::undetermined(concerned, message)
 }
 
-/// A monic polynomial with the roots that are further out than `radius` moved onto that circle. None if a coefficient is not
-/// finite.
-pub(super) fn inside(monic: &[f64], radius: f64) -> Option<Vec<f64>> {
-    let roots = roots(monic)?;
-    let moved = roots.iter().map(|root| *root * (radius / root.modulus()).min(1.0));
-    Some(of_roots(moved, monic.len()))
-}
-
-/// The monic polynomial of some roots, and of others at the origin up to a length.
-fn of_roots(roots: impl Iterator<Item = Complex<f64>>, length: usize) -> Vec<f64> {
-    let mut product = vec![Complex::new(1.0, 0.0)];
-    for root in roots {
-        product.push(Complex::new(0.0, 0.0));
-        for k in (1..product.len()).rev() {
-            let before = product[k - 1];
-            product[k] -= before * root;
-        }
-    }
-    let mut monic: Vec<f64> = product.iter().map(|value| value.re).collect();
-    monic.resize(length, 0.0);
-    monic
-}
-
 /// A monic polynomial with its unstable roots reflected at the unit circle, z to 1/z*, and the largest modulus above 1
 /// that there was. None if a coefficient is not finite.
 pub(super) fn stable(monic: &[f64]) -> Option<(Vec<f64>, Option<f64>)> {
@@ -173,8 +151,11 @@ pub(super) fn stable(monic: &[f64]) -> Option<(Vec<f64>, Option<f64>)> {
     let reflect = |root: &Complex<f64>| {
         if root.modulus() > 1.0 { *root / root.modulus_squared() } else { *root }
     };
+    let mut product = Vec::new();
+    multiply_out(roots.iter().map(reflect), &mut product);
+    let mut reflected: Vec<f64> = product.iter().map(|value| value.re).collect();
     // Roots beyond the range of numbers are reflected into the origin.
-    let mut reflected = of_roots(roots.iter().map(reflect), monic.len());
+    reflected.resize(monic.len(), 0.0);
     // On the circle, or so close that rounding decides.
     while !is_stable(&reflected, &mut scratch) {
         let mut factor = 1.0;

@@ -27,38 +27,70 @@ const NEWTON_STEPS: usize = 2;
 /// Largest first; of a conjugate pair the positive imaginary part first. O(n^2) for each sweep.
 /// `None` if a coefficient is not finite, or the iteration does not converge, which no polynomial is known to cause.
 pub(crate) fn roots(polynomial: &[f64]) -> Option<Vec<Complex<f64>>> {
-    if !polynomial.iter().all(|value| value.is_finite()) {
-        return None;
-    }
-    let (unit, mut rising) = scaled(polynomial);
-    // Constants that are zero are roots at the origin.
-    let at_origin = rising.iter().take_while(|value| **value == 0.0).count();
-    rising.drain(..at_origin);
-    let mut roots = starts(&rising);
-    let mut moving: Vec<usize> = (0..roots.len()).collect();
-    for _ in 0..MAXIMUM_SWEEPS {
-        moving.retain(|&index| improve(&rising, &mut roots, index));
-    }
-    if !moving.is_empty() {
-        return None;
-    }
-    let mut roots = in_pairs(&rising, roots);
-    roots.extend(std::iter::repeat_n(Complex::new(0.0, 0.0), at_origin));
-    roots.iter_mut().for_each(|root| *root *= unit);
-    roots.retain(|root| root.modulus().is_finite());
-    roots.sort_by(|a, b| {
-        b.modulus().total_cmp(&a.modulus()).then(b.re.total_cmp(&a.re)).then(b.im.total_cmp(&a.im))
-    });
-    Some(roots)
+    Roots::default().of(polynomial).map(<[_]>::to_vec)
 }
 
-/// The unit of z in which the roots have a geometric mean near 1, and the coefficients of z / unit, lowest power
+/// Memory for the roots of one polynomial after another.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Roots {
+    rising: Vec<f64>,
+    hull: Vec<usize>,
+    moving: Vec<usize>,
+    unpaired: Vec<Complex<f64>>,
+    roots: Vec<Complex<f64>>,
+}
+
+impl Roots {
+    /// With memory for polynomials of so many coefficients.
+    pub(crate) fn with_capacity(coefficients: usize) -> Self {
+        Self {
+            rising: Vec::with_capacity(coefficients),
+            hull: Vec::with_capacity(coefficients),
+            moving: Vec::with_capacity(coefficients),
+            unpaired: Vec::with_capacity(coefficients),
+            roots: Vec::with_capacity(coefficients),
+        }
+    }
+
+    /// As [`roots`].
+    pub(crate) fn of(&mut self, polynomial: &[f64]) -> Option<&[Complex<f64>]> {
+        if !polynomial.iter().all(|value| value.is_finite()) {
+            return None;
+        }
+        let Self { rising, hull, moving, unpaired, roots } = self;
+        let unit = scale(polynomial, rising);
+        // Constants that are zero are roots at the origin.
+        let at_origin = rising.iter().take_while(|value| **value == 0.0).count();
+        rising.drain(..at_origin);
+        start(rising, hull, unpaired);
+        moving.clear();
+        moving.extend(0..unpaired.len());
+        for _ in 0..MAXIMUM_SWEEPS {
+            moving.retain(|&index| improve(rising, unpaired, index));
+        }
+        if !moving.is_empty() {
+            return None;
+        }
+        roots.clear();
+        pair(rising, unpaired, roots);
+        roots.extend(std::iter::repeat_n(Complex::new(0.0, 0.0), at_origin));
+        roots.iter_mut().for_each(|root| *root *= unit);
+        roots.retain(|root| root.modulus().is_finite());
+        roots.sort_by(|a, b| {
+            b.modulus().total_cmp(&a.modulus()).then(b.re.total_cmp(&a.re)).then(b.im.total_cmp(&a.im))
+        });
+        Some(roots)
+    }
+}
+
+/// The unit of z in which the roots have a geometric mean near 1; writes the coefficients of z / unit, lowest power
 /// first, none far above 1. All factors are powers of two. What overflows or underflows is left to the ends, as zeros.
-fn scaled(polynomial: &[f64]) -> (f64, Vec<f64>) {
+fn scale(polynomial: &[f64], rising: &mut Vec<f64>) -> f64 {
     let size = |value: f64| value.abs().log2();
     let used = || polynomial.iter().enumerate().filter(|(_, value)| **value != 0.0);
+    rising.clear();
     let (Some((first, lead)), Some((last, constant))) = (used().next(), used().next_back()) else {
-        return (1.0, Vec::new());
+        return 1.0;
     };
     let unit =
         ((size(*constant) - size(*lead)) / (last - first).max(1) as f64).round().clamp(-1000.0, 1000.0);
@@ -71,19 +103,19 @@ fn scaled(polynomial: &[f64]) -> (f64, Vec<f64>) {
         let value = value * third.exp2() * third.exp2() * (shift - 2.0 * third).exp2();
         if value.abs() < NEGLIGIBLE { 0.0 } else { value }
     };
-    let mut rising: Vec<f64> = polynomial.iter().enumerate().map(shifted).collect();
+    rising.extend(polynomial.iter().enumerate().map(shifted));
     rising.reverse();
     // Leading zeros are a delay.
     rising.truncate(rising.iter().rposition(|value| *value != 0.0).map_or(0, |last| last + 1));
-    (unit.exp2(), rising)
+    unit.exp2()
 }
 
 /// Points near the roots: as many on each circle as the Newton polygon, the upper convex hull of (k, log |c_k|), has
 /// steps on the edge of that slope.
-fn starts(rising: &[f64]) -> Vec<Complex<f64>> {
+fn start(rising: &[f64], hull: &mut Vec<usize>, points: &mut Vec<Complex<f64>>) {
     let height = |k: usize| rising[k].abs().log2();
     let slope = |from: usize, to: usize| (height(to) - height(from)) / (to - from) as f64;
-    let mut hull: Vec<usize> = Vec::new();
+    hull.clear();
     for k in (0..rising.len()).filter(|&k| rising[k] != 0.0) {
         while let [.., before, last] = hull[..]
             && slope(before, last) <= slope(last, k)
@@ -92,18 +124,16 @@ fn starts(rising: &[f64]) -> Vec<Complex<f64>> {
         }
         hull.push(k);
     }
-    let edges = hull.windows(2).enumerate();
-    edges
-        .flat_map(|(edge, ends)| {
-            let (count, radius) = (ends[1] - ends[0], (-slope(ends[0], ends[1])).exp2());
-            // Turned from the real axis, so that no symmetry holds two roots together.
-            let turn = 0.7 + TAU * edge as f64 / rising.len() as f64;
-            (0..count).map(move |k| {
-                let (sine, cosine) = (turn + TAU * k as f64 / count as f64).sin_cos();
-                Complex::new(radius * cosine, radius * sine)
-            })
-        })
-        .collect()
+    points.clear();
+    for (edge, ends) in hull.windows(2).enumerate() {
+        let (count, radius) = (ends[1] - ends[0], (-slope(ends[0], ends[1])).exp2());
+        // Turned from the real axis, so that no symmetry holds two roots together.
+        let turn = 0.7 + TAU * edge as f64 / rising.len() as f64;
+        points.extend((0..count).map(|k| {
+            let (sine, cosine) = (turn + TAU * k as f64 / count as f64).sin_cos();
+            Complex::new(radius * cosine, radius * sine)
+        }));
+    }
 }
 
 /// 1/z without overflow of |z|^2.
@@ -173,8 +203,7 @@ fn polished(rising: &[f64], mut root: Complex<f64>) -> Complex<f64> {
 }
 
 /// Roots of a real polynomial are real or conjugate: each joins the mirror image that is nearest, which may be its own.
-fn in_pairs(rising: &[f64], mut roots: Vec<Complex<f64>>) -> Vec<Complex<f64>> {
-    let mut paired = Vec::with_capacity(roots.len());
+fn pair(rising: &[f64], roots: &mut Vec<Complex<f64>>, paired: &mut Vec<Complex<f64>>) {
     roots.sort_by(|a, b| a.im.abs().total_cmp(&b.im.abs()));
     while let Some(root) = roots.pop() {
         let distance = |other: &Complex<f64>| (other.conj() - root).modulus();
@@ -188,7 +217,6 @@ fn in_pairs(rising: &[f64], mut roots: Vec<Complex<f64>>) -> Vec<Complex<f64>> {
             _ => paired.push(Complex::new(polished(rising, Complex::new(root.re, 0.0)).re, 0.0)),
         }
     }
-    paired
 }
 
 /// Whether all roots of a monic polynomial lie inside the unit circle, by the step-down recursion

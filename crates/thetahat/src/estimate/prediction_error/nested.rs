@@ -7,11 +7,9 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use super::{Job, filled};
-use crate::data::Record;
+use super::{Job, Problem, filled, stretches};
 use crate::estimate::common::extended;
 use crate::estimate::optimize::{Search, best_free};
-use crate::estimate::prediction_error::stretches;
 use crate::estimate::predictor::{Begin, Predictor};
 use crate::estimate::start::Plants;
 use crate::{Error, Orders};
@@ -35,13 +33,9 @@ impl Job<'_> {
     ///
     /// # Errors
     /// [`Error::Interrupted`].
-    pub(super) fn nested(
-        &self,
-        record: &Record<'_>,
-        orders: &Orders,
-        begin: Begin,
-    ) -> Result<Vec<Vec<f64>>, Error> {
-        if orders.nf.iter().all(|&nf| nf == 0) {
+    pub(super) fn nested(&self, problem: Problem<'_, '_>) -> Result<Vec<Vec<f64>>, Error> {
+        let Problem { record, orders, begin } = problem;
+        if !orders.has_f() {
             return Ok(Vec::new());
         }
         let samples: usize = record.segments.iter().map(Range::len).sum();
@@ -59,7 +53,7 @@ impl Job<'_> {
                 continue;
             }
             let own = lowered(orders, &top, &at);
-            let mut predictor = Predictor::new(record, &own, begin);
+            let mut predictor = Problem { record, orders: &own, begin }.predictor();
             if predictor.samples() <= own.parameters() + predictor.initial_conditions() {
                 continue;
             }

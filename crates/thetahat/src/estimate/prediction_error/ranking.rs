@@ -7,13 +7,12 @@
 
 use rayon::prelude::*;
 
-use super::{Beginning, Job, filled, hopeless};
-use crate::data::Record;
+use super::{Beginning, Job, Problem, filled, hopeless};
+use crate::Error;
 use crate::estimate::optimize::{Algorithm, Found, Search, StartOutcome, best_free, best_linear};
-use crate::estimate::predictor::{Begin, Predictor};
+use crate::estimate::predictor::Predictor;
 use crate::estimate::restart::restarts;
 use crate::estimate::start::candidates;
-use crate::{Error, Orders};
 
 /// Starts of which the costs differ by more than this fraction of the lowest may lead to different minima.
 const DISAGREEMENT: f64 = 1e-3;
@@ -43,11 +42,10 @@ impl Job<'_> {
     /// The starts, the best first. If more than one is asked for, searches from so many and takes what the best search found.
     pub(super) fn ranked(
         &self,
-        record: &Record<'_>,
-        orders: &Orders,
-        begin: Begin,
+        problem: Problem<'_, '_>,
         predictor: &mut Predictor<'_>,
     ) -> Result<Beginning, Error> {
+        let Problem { record, orders, .. } = problem;
         let guess = self.options.guess.iter().map(|guess| (GUESS, guess.clone()));
         let recipes = filled(record, orders, |record| candidates(record, orders, self.deadline));
         let found = match recipes {
@@ -64,7 +62,7 @@ impl Job<'_> {
             starts.push(Start::new(name, parameters, predictor));
         }
         sort(&mut starts);
-        let has_f = orders.nf.iter().any(|&nf| nf > 0);
+        let has_f = orders.has_f();
         // Who asks for another algorithm wants to see it at work.
         let comparison: usize = ROUNDS.iter().map(|(iterations, _)| iterations).sum();
         let default = self.options.algorithm == Algorithm::LevenbergMarquardt
@@ -76,7 +74,7 @@ impl Job<'_> {
         let may_compare = has_f && default && !known && !self.deadline.is_over();
         let doubtful = may_compare && is_doubtful(&starts, predictor);
         if doubtful || may_compare && several {
-            starts.extend(self.nested_starts(record, orders, begin, predictor)?);
+            starts.extend(self.nested_starts(problem, predictor)?);
             if doubtful {
                 self.compare(predictor, &mut starts)?;
             }
@@ -101,7 +99,7 @@ impl Job<'_> {
             let starts = starts.into_iter().map(|start| start.outcome).collect();
             return Ok(Beginning { parameters, starts, unstable_pole, samples, compared, found: None });
         }
-        let (winner, found) = self.searched(record, orders, begin, &mut starts)?;
+        let (winner, found) = self.searched(problem, &mut starts)?;
         starts[..=winner].rotate_right(1);
         let parameters =
             found.as_ref().map_or_else(|| starts[0].parameters.clone(), |f| f.parameters.clone());
@@ -111,25 +109,21 @@ impl Job<'_> {
 
     fn nested_starts(
         &self,
-        record: &Record<'_>,
-        orders: &Orders,
-        begin: Begin,
+        problem: Problem<'_, '_>,
         predictor: &mut Predictor<'_>,
     ) -> Result<Vec<Start>, Error> {
-        let nested = self.nested(record, orders, begin)?;
+        let nested = self.nested(problem)?;
         Ok(nested.into_iter().map(|parameters| Start::new(NESTED, parameters, predictor)).collect())
     }
 
     /// The best start from nested models after some iterations, if they lead below a cost.
     pub(super) fn nested_below(
         &self,
-        record: &Record<'_>,
-        orders: &Orders,
-        begin: Begin,
+        problem: Problem<'_, '_>,
         predictor: &mut Predictor<'_>,
         lowest: f64,
     ) -> Result<Option<(StartOutcome, Vec<f64>)>, Error> {
-        let mut starts = self.nested_starts(record, orders, begin, predictor)?;
+        let mut starts = self.nested_starts(problem, predictor)?;
         self.compare(predictor, &mut starts)?;
         let best = starts.into_iter().next().filter(|start| start.cost < lowest);
         Ok(best.map(|start| (start.outcome, start.parameters)))
@@ -165,9 +159,7 @@ impl Job<'_> {
     /// Searches from as many starts as are asked for, in parallel. Gives the one that won, and what it found.
     fn searched(
         &self,
-        record: &Record<'_>,
-        orders: &Orders,
-        begin: Begin,
+        problem: Problem<'_, '_>,
         starts: &mut [Start],
     ) -> Result<(usize, Option<Found>), Error> {
         let results = starts.par_iter().enumerate().map(|(number, start)| {
@@ -177,7 +169,7 @@ impl Job<'_> {
             if !chosen || number > 0 && self.deadline.is_over() {
                 return Ok(None);
             }
-            let mut predictor = Predictor::new(record, orders, begin);
+            let mut predictor = problem.predictor();
             let samples = predictor.samples() as f64;
             Ok(self.search(&mut predictor, &start.parameters)?.ok().map(|found| (found, samples)))
         });
@@ -190,7 +182,7 @@ impl Job<'_> {
                 winner = Some((number, found));
             }
         }
-        winner.map(|(number, found)| (number, Some(found))).ok_or_else(|| hopeless(orders))
+        winner.map(|(number, found)| (number, Some(found))).ok_or_else(|| hopeless(problem.orders))
     }
 }
 
@@ -222,7 +214,7 @@ fn is_doubtful(starts: &[Start], predictor: &mut Predictor<'_>) -> bool {
         }
     }
     let Some((_, first)) = recipes.first() else { return true };
-    let alone = starts.len() == 1 && predictor.orders().nf.iter().any(|&nf| nf > 0);
+    let alone = starts.len() == 1 && predictor.orders().has_f();
     let mut reached = |start: &Start| {
         let at = best_free(predictor, &start.parameters);
         at.map_or(f64::NEG_INFINITY, |cost| cost - predictor.foretold())

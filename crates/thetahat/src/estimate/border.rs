@@ -1,0 +1,97 @@
+//! Steps that come to the border of stability.
+//!
+//! A step of Gauss and Newton often takes a root of C or F out of the unit circle: the data want a slower mode than there is,
+//! or an unstable one. In a shorter step, or a damped one, all parameters would wait for that root, and a search would
+//! crawl. So the root alone is moved back, to a fraction of the distance from the circle that there was before, and A and B,
+//! which are linear once C, D and F are given, are solved for (Golub and Pereyra, SIAM J. Numerical Analysis 10, 1973).
+
+use thetahat_core::nalgebra::{Complex, ComplexField};
+
+use super::predictor::Polynomials;
+use crate::Orders;
+use crate::model::polynomial::{Roots, is_stable};
+
+/// The fraction of the distance from the circle.
+const NEARER: f64 = 0.2;
+
+/// Memory for such steps, taken once.
+#[derive(Debug)]
+pub(super) struct Border {
+    before: Polynomials,
+    after: Polynomials,
+    roots: Roots,
+    product: Vec<Complex<f64>>,
+    scratch: Vec<f64>,
+}
+
+impl Border {
+    pub(super) fn new(orders: &Orders) -> Self {
+        let zero = vec![0.0; orders.parameters()];
+        let longest = orders.nf.iter().copied().fold(orders.nc, usize::max) + 1;
+        Self {
+            before: Polynomials::new(orders, &zero),
+            after: Polynomials::new(orders, &zero),
+            roots: Roots::with_capacity(longest),
+            product: Vec::with_capacity(longest + 1),
+            scratch: Vec::with_capacity(longest),
+        }
+    }
+
+    /// Moves the roots of C and F at `trial` that are outside the unit circle back into it, on a circle that is nearer to it than
+    /// the roots at `from`. Says whether that gave a stable C and F. O(n^2) for each sweep over n roots.
+    pub(super) fn draw_in(&mut self, from: &[f64], trial: &mut [f64]) -> bool {
+        let Self { before, after, roots, product, scratch } = self;
+        before.set(from);
+        after.set(trial);
+        let all_before = std::iter::once(&before.c).chain(&before.f);
+        for (monic, before) in std::iter::once(&mut after.c).chain(&mut after.f).zip(all_before) {
+            if is_stable(monic, scratch) {
+                continue;
+            }
+            let Some(found) = roots.of(before) else { return false };
+            let outermost = found.first().map_or(0.0, |root| root.modulus());
+            let radius = 1.0 - NEARER * (1.0 - outermost);
+            let Some(found) = roots.of(monic) else { return false };
+            let moved = found.iter().map(|root| *root * (radius / root.modulus()).min(1.0));
+            multiply_out(moved, product);
+            monic.iter_mut().zip(product.iter()).for_each(|(value, product)| *value = product.re);
+            if !is_stable(monic, scratch) {
+                return false;
+            }
+        }
+        after.write(trial);
+        true
+    }
+}
+
+/// Writes the monic polynomial of some roots.
+pub(super) fn multiply_out(roots: impl Iterator<Item = Complex<f64>>, product: &mut Vec<Complex<f64>>) {
+    product.clear();
+    product.push(Complex::new(1.0, 0.0));
+    for root in roots {
+        product.push(Complex::new(0.0, 0.0));
+        for k in (1..product.len()).rev() {
+            let before = product[k - 1];
+            product[k] -= before * root;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::polynomial::roots;
+
+    #[test]
+    fn a_root_outside_comes_back_and_the_others_stay() {
+        // F: roots 0.5 and 0.9 before; 0.4 and 1.3 after the step. C: stable before and after.
+        let orders = Orders::bj(&[1], 1, 0, &[2], &[1]).unwrap();
+        let from = [2.0, 0.3, -1.4, 0.45];
+        let mut trial = [3.0, 0.5, -1.7, 0.52];
+        assert!(Border::new(&orders).draw_in(&from, &mut trial));
+        assert_eq!(trial[..2], [3.0, 0.5]);
+        let found = roots(&[1.0, trial[2], trial[3]]).unwrap();
+        // A fifth of the distance of 0.1.
+        assert!((found[0].re - 0.98).abs() < 1e-12 && (found[1].re - 0.4).abs() < 1e-12, "{found:?}");
+    }
+}

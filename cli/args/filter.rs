@@ -1,0 +1,68 @@
+//! The arguments of filter.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+
+use super::{LineArguments, LiveClockArguments, LogArguments};
+
+#[derive(Debug, Args)]
+pub(crate) struct FilterArguments {
+    /// The model: a report of fit, or a TOML file with matrices or equations (- for standard input)
+    #[arg(value_name = "MODEL")]
+    pub(crate) model: PathBuf,
+    /// The log: a CSV file, gzip-compressed or not (- for standard input)
+    #[arg(value_name = "LOG")]
+    pub(crate) path: PathBuf,
+
+    /// How to estimate [default: kalman for a linear model, else ekf]
+    #[arg(long, value_enum, help_heading = "Estimator")]
+    pub(crate) estimator: Option<EstimatorArgument>,
+    /// Where the model of a report starts [default: unknown]
+    #[arg(long, value_enum, value_name = "START", help_heading = "Estimator")]
+    pub(crate) initial: Option<FilterStartArgument>,
+    /// Where the error of the observer is to have its poles in the z plane, such as 0.4+0.3i,0.4-0.3i
+    #[arg(
+        long,
+        value_name = "POLE[,POLE…]",
+        value_delimiter = ',',
+        allow_hyphen_values = true,
+        conflicts_with = "gain",
+        help_heading = "Estimator"
+    )]
+    pub(crate) poles: Vec<String>,
+    /// The gain of the observer: a row for each state, a column for each output, such as 0.5,0;0.1,0.2
+    #[arg(long, value_name = "ROW[;ROW…]", allow_hyphen_values = true, help_heading = "Estimator")]
+    pub(crate) gain: Option<String>,
+    /// Rows to go through, 1-based and inclusive [default: all]
+    #[arg(long, value_name = "A..B", help_heading = "Channels")]
+    pub(crate) rows: Option<String>,
+    /// Add each state given the whole log, later rows too: nothing is written before the log ends, or if Ctrl-C comes first
+    #[arg(long, help_heading = "Output")]
+    pub(crate) smooth: bool,
+
+    #[command(flatten)]
+    pub(crate) lines: LineArguments,
+    #[command(flatten)]
+    pub(crate) clock: LiveClockArguments,
+    #[command(flatten)]
+    pub(crate) log: LogArguments,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum FilterStartArgument {
+    /// At rest: the channels are at their offsets
+    Zero,
+    /// Anywhere: the first rows tell
+    Unknown,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum EstimatorArgument {
+    /// The Kalman filter (linear models)
+    Kalman,
+    /// The extended Kalman filter; unknown parameters are estimated with the state
+    Ekf,
+    /// The Luenberger observer, with --poles or --gain
+    Luenberger,
+}

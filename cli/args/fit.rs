@@ -1,0 +1,265 @@
+//! The arguments of fit.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+
+use super::{ClockArguments, FormatArgument, LogArguments, Names};
+
+#[derive(Debug, Args)]
+pub(crate) struct FitArguments {
+    /// The logs: CSV files, gzip-compressed or not (- for standard input)
+    #[arg(value_name = "LOG", required = true)]
+    pub(crate) logs: Vec<PathBuf>,
+
+    /// Input columns; a name that holds a comma stands between double quotes, as in CSV [default: u, u1, u2, …]
+    #[arg(short = 'u', long, value_name = "NAME[,NAME…]", help_heading = "Channels")]
+    pub(crate) input: Vec<Names>,
+    /// Output column [default: y]
+    #[arg(short = 'y', long, value_name = "NAME", help_heading = "Channels")]
+    pub(crate) output: Option<String>,
+    /// Rows to estimate on, 1-based and inclusive, counted through all logs [default: all]
+    #[arg(long, value_name = "A..B[,C..D]", value_delimiter = ',', help_heading = "Channels")]
+    pub(crate) estimate: Vec<String>,
+    /// Rows to validate on
+    #[arg(long, value_name = "A..B[,C..D]", value_delimiter = ',', help_heading = "Channels")]
+    pub(crate) validate: Vec<String>,
+    /// What to take from each channel before the fit: none, mean, linear, or start:K (the mean of the first K rows); what is
+    /// left of the output's level and slope --constant and --trend estimate
+    #[arg(long, default_value = "mean", value_name = "WHAT", help_heading = "Channels")]
+    pub(crate) detrend: String,
+    /// Set a channel's offset by hand
+    #[arg(long, value_name = "NAME=VALUE", help_heading = "Channels")]
+    pub(crate) offset: Vec<String>,
+    /// Fit in a band of frequencies in Hz, either end of which may be left out: inputs and output go through one Butterworth
+    /// filter; the model and its figures are of the signals as they are
+    #[arg(long, value_name = "LOW..HIGH", allow_hyphen_values = true, help_heading = "Channels")]
+    pub(crate) prefilter: Option<String>,
+
+    /// Fit the unknown parameters of a model in equations (TOML, see filter) by prediction error; channels go by name
+    #[arg(
+        long,
+        value_name = "MODEL",
+        help_heading = "Model",
+        conflicts_with_all = [
+            "ModelArguments", "ChoiceArguments", "SearchArguments", "CriterionArguments", "input", "output", "validate",
+            "detrend", "offset", "prefilter", "html", "resample",
+        ]
+    )]
+    pub(crate) grey: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) model: ModelArguments,
+    #[command(flatten)]
+    pub(crate) choice: ChoiceArguments,
+    #[command(flatten)]
+    pub(crate) search: SearchArguments,
+    #[command(flatten)]
+    pub(crate) criterion: CriterionArguments,
+
+    /// Write a page with charts to a file: one file of HTML that needs nothing else (- for standard output)
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    pub(crate) html: Option<PathBuf>,
+    /// Write the JSON report to a file (- for standard output, instead of the table)
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    pub(crate) report: Option<PathBuf>,
+    /// What to print: a table for people, or the JSON report
+    #[arg(long, value_enum, default_value = "table", help_heading = "Output")]
+    pub(crate) format: FormatArgument,
+
+    #[command(flatten)]
+    pub(crate) clock: ClockArguments,
+    #[command(flatten)]
+    pub(crate) log: LogArguments,
+}
+
+/// Which model, and what its estimate starts from.
+#[derive(Debug, Args)]
+pub(crate) struct ModelArguments {
+    /// The model structure [default: arx; without orders the data choose]
+    #[arg(long, value_enum, help_heading = "Model")]
+    pub(crate) model: Option<ModelArgument>,
+    /// Coefficients of A: past outputs
+    #[arg(long, value_name = "N|A..B", help_heading = "Model")]
+    pub(crate) na: Option<String>,
+    /// Coefficients of B: inputs; one value for each input or one for all, 0 for a model without inputs
+    #[arg(long, value_name = "N|A..B[,…]", value_delimiter = ',', help_heading = "Model")]
+    pub(crate) nb: Vec<String>,
+    /// Coefficients of C: past disturbances
+    #[arg(long, value_name = "N|A..B", help_heading = "Model")]
+    pub(crate) nc: Option<String>,
+    /// Coefficients of D, the denominator of the noise
+    #[arg(long, value_name = "N|A..B", help_heading = "Model")]
+    pub(crate) nd: Option<String>,
+    /// Coefficients of F, the denominator from an input alone; one value for each input or one for all
+    #[arg(long, value_name = "N|A..B[,…]", value_delimiter = ',', help_heading = "Model")]
+    pub(crate) nf: Vec<String>,
+    /// Samples from input to first effect, one value for each input or one for all; 0: the input acts at once [default: 1;
+    /// without orders the data choose]
+    #[arg(long, value_name = "N|A..B[,…]", value_delimiter = ',', help_heading = "Model")]
+    pub(crate) nk: Vec<String>,
+    /// How to estimate
+    #[arg(long, value_enum, default_value = "pem", help_heading = "Model")]
+    pub(crate) method: MethodArgument,
+    /// What stands before the first sample of a stretch
+    #[arg(long, value_enum, default_value = "auto", help_heading = "Model")]
+    pub(crate) initial: InitialArgument,
+    /// Estimate the level of the output with the parameters, beside the mean that is taken off: for step tests and other logs
+    /// of which the mean is not where the plant rests
+    #[arg(long, value_enum, default_value = "auto", help_heading = "Model")]
+    pub(crate) constant: ConstantArgument,
+    /// Estimate a slope of the output with the parameters too, and its level with it: for drift
+    #[arg(long, help_heading = "Model")]
+    pub(crate) trend: bool,
+}
+
+/// How to choose, where orders are ranges or are not given.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Choice (orders that are ranges, or not given)")]
+pub(crate) struct ChoiceArguments {
+    /// Which models of the ranges are tried [default: all]
+    #[arg(long, value_enum)]
+    pub(crate) path: Option<PathArgument>,
+    /// What makes one model better than another [default: mdl]
+    #[arg(long, value_enum, value_name = "CRITERION")]
+    pub(crate) select: Option<SelectArgument>,
+    /// Cut the rows in time order into parts: models are fitted to the first and compared, the chosen one is fitted again to
+    /// the first two and judged on the third; 0 for a part that is not wanted
+    #[arg(long, value_name = "E/V/T", conflicts_with = "validate", allow_hyphen_values = true)]
+    pub(crate) split: Option<String>,
+}
+
+/// How to search, where the model is not linear in its parameters.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Search (models with C, D or F)")]
+pub(crate) struct SearchArguments {
+    /// How steps are chosen [default: lm]
+    #[arg(long, value_enum, value_name = "HOW")]
+    pub(crate) search: Option<SearchArgument>,
+    /// Iterations at most, from each start [default: 100]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub(crate) max_iterations: Option<u32>,
+    /// Stop where the next step would lower the cost by less than this fraction [default: 1e-8]
+    #[arg(long, value_name = "FRACTION", allow_hyphen_values = true)]
+    pub(crate) tolerance: Option<f64>,
+    /// Step length of the gradient search: C1, or C1/(C2 + l) in iteration l [default: 1]
+    #[arg(long, value_name = "C1[,C2]", allow_hyphen_values = true)]
+    pub(crate) step: Option<String>,
+    /// Search from so many further starts [default: 0]
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(..=10_000))]
+    pub(crate) starts: Option<u32>,
+    /// Which random starts [default: 0]
+    #[arg(long, value_name = "S", requires = "starts")]
+    pub(crate) seed: Option<u64>,
+    /// After so long begin no iteration, and look for no further start
+    #[arg(long, value_name = "SECONDS", allow_hyphen_values = true)]
+    pub(crate) time_limit: Option<f64>,
+}
+
+/// What to make small; and what to respect, where the model is linear in its parameters.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Criterion (all but --norm for models without C, D and F)")]
+pub(crate) struct CriterionArguments {
+    /// What to make small: 2, the sum of squared errors; 1, of absolute ones, which wild samples do not rule; huber[:K], of squares
+    /// up to K times the scale of the errors and of absolute values beyond (K = 1.345 if not said); inf, the largest error, for
+    /// models without C, D and F [default: 2]
+    #[arg(long, value_name = "2|1|huber[:K]|inf", allow_hyphen_values = true)]
+    pub(crate) norm: Option<String>,
+    /// Keep a parameter in a range, either end of which may be left out, or at a value (a1=0.5)
+    #[arg(long, value_name = "NAME=LOW..HIGH")]
+    pub(crate) bound: Vec<String>,
+    /// Keep the static gain from an input in a range, or at a value
+    #[arg(long, value_name = "[INPUT=]G|LOW..HIGH", allow_hyphen_values = true)]
+    pub(crate) dc_gain: Vec<String>,
+    /// Keep parameters small: weighs like so many more samples in which the output is 0 [default: 0]
+    #[arg(long, value_name = "SAMPLES", allow_hyphen_values = true)]
+    pub(crate) ridge: Option<f64>,
+    /// Let no error exceed this, in units of the output, and find the box of all parameters that keep to it
+    #[arg(long, value_name = "E", allow_hyphen_values = true)]
+    pub(crate) noise_bound: Option<f64>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ModelArgument {
+    /// A y = B u + e
+    Arx,
+    /// A y = B u + C e
+    Armax,
+    /// A y = C e: a time series
+    Arma,
+    /// A y = e: a time series
+    Ar,
+    /// Output error: y = B/F u + e
+    Oe,
+    /// Box and Jenkins: y = B/F u + C/D e
+    Bj,
+    /// A y = B/F u + C/D e, with any of them
+    Pem,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum PathArgument {
+    /// Every combination of orders
+    All,
+    /// One order up at a time, each in its turn
+    Alternate,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum SelectArgument {
+    /// Rissanen's minimum description length
+    Mdl,
+    /// Akaike's information criterion
+    Aic,
+    /// The same, corrected for few samples
+    Aicc,
+    /// Akaike's final prediction error
+    Fpe,
+    /// The smallest model within 1 % of the least cost on the validation rows
+    Validation,
+    /// The same by cross-validation over five blocks in time
+    Cv,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum InitialArgument {
+    /// drop without F; with F estimate where rows stand before, or it is worth its parameters, else zero
+    Auto,
+    /// What was measured before; where nothing was, samples without a full regressor are left out (models without F)
+    Drop,
+    /// Zeros
+    Zero,
+    /// What was measured before, and what fits best, found with the parameters (models with F)
+    Estimate,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ConstantArgument {
+    /// Where it lowers MDL, unless the output's offset is given (--detrend none, --offset)
+    Auto,
+    /// Always
+    Yes,
+    /// Never
+    No,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum MethodArgument {
+    /// Least squared prediction errors: in one step where that is least squares, else by a search
+    Pem,
+    /// Instrumental variables in four stages: A and B of an arx model, whatever the noise
+    Iv,
+    /// Refined instrumental variables: B and F of an oe model, whatever the noise
+    Sriv,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum SearchArgument {
+    /// Levenberg and Marquardt
+    Lm,
+    /// Gauss and Newton, the step halved until the cost falls
+    GaussNewton,
+    /// Newton and Raphson with the full Hessian
+    Newton,
+    /// Steepest descent
+    Gradient,
+}

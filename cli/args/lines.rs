@@ -1,0 +1,37 @@
+//! The arguments of output that grows line by line: that of track and filter.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+
+/// Output that grows line by line.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Output")]
+pub(crate) struct LineArguments {
+    /// Write a line for each N-th row only; alarms and gaps of track always have theirs
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..))]
+    pub(crate) every: u64,
+    /// What a line is
+    #[arg(long, value_enum, default_value = "jsonl")]
+    pub(crate) format: LineFormatArgument,
+    /// Write to a file instead of standard output
+    #[arg(short = 'o', long, value_name = "FILE", default_value = "-", hide_default_value = true)]
+    pub(crate) out: PathBuf,
+    /// A line that is no row of numbers ends the run; without it, it counts as a row of missing values
+    #[arg(long)]
+    pub(crate) strict: bool,
+    /// Write what stands at the end to a file, as JSON
+    #[arg(long, value_name = "FILE")]
+    pub(crate) summary: Option<PathBuf>,
+    /// No table at the end
+    #[arg(short, long)]
+    pub(crate) quiet: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum LineFormatArgument {
+    /// JSON Lines: an object a line
+    Jsonl,
+    /// CSV: a row a line, below a header
+    Csv,
+}

@@ -1,0 +1,96 @@
+//! The arguments that say how a log is read: its channels, format and clock.
+
+use std::str::FromStr;
+
+use clap::Args;
+
+use crate::table;
+
+/// The clock of a log that is read as it comes.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Clock")]
+pub(crate) struct LiveClockArguments {
+    /// The column of times: seconds, or ISO 8601 dates
+    #[arg(long, value_name = "NAME")]
+    pub(crate) time: Option<String>,
+    /// How times are written, in the manner of strptime, such as %d.%m.%Y %H:%M:%S
+    #[arg(long, value_name = "FORMAT", requires = "time")]
+    pub(crate) time_format: Option<String>,
+    /// Seconds from one row to the next [default: that of the model; for track with --time, the first step]
+    #[arg(long, value_name = "SECONDS", allow_hyphen_values = true)]
+    pub(crate) sample_time: Option<f64>,
+}
+
+/// A list of names, written as the header of a CSV with commas is.
+#[derive(Debug, Clone)]
+pub(crate) struct Names(Vec<String>);
+
+impl FromStr for Names {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        table::names(text).map(Self)
+    }
+}
+
+impl Names {
+    /// The names of all lists; none if there is no list.
+    pub(crate) fn all(lists: &[Self]) -> Option<Vec<String>> {
+        (!lists.is_empty()).then(|| lists.iter().flat_map(|Self(names)| names).cloned().collect())
+    }
+}
+
+/// How a log is written.
+#[derive(Debug, Args)]
+pub(crate) struct LogArguments {
+    /// What separates fields: a character, or tab [default: recognised among comma, semicolon and tab]
+    #[arg(long, value_name = "CHAR", help_heading = "Log format")]
+    pub(crate) delimiter: Option<String>,
+    /// Numbers have a decimal comma
+    #[arg(long, help_heading = "Log format")]
+    pub(crate) decimal_comma: bool,
+    /// The first row is data; columns are called 1, 2, …
+    #[arg(long, help_heading = "Log format")]
+    pub(crate) no_header: bool,
+    /// Leave out so many rows below the header, such as a row of units
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 0,
+        hide_default_value = true,
+        help_heading = "Log format"
+    )]
+    pub(crate) skip_rows: usize,
+    /// Lines that start with this character are comments
+    #[arg(long, value_name = "CHAR", help_heading = "Log format")]
+    pub(crate) comment: Option<String>,
+    /// One more word that stands for a missing value, besides empty fields, NaN, NA, N/A and null
+    #[arg(long, value_name = "TOKEN", allow_hyphen_values = true, help_heading = "Log format")]
+    pub(crate) missing: Vec<String>,
+    /// The text's encoding, such as latin1 [default: UTF-8, or what a byte-order mark says]
+    #[arg(long, value_name = "NAME", help_heading = "Log format")]
+    pub(crate) encoding: Option<String>,
+}
+
+/// The log's clock.
+#[derive(Debug, Args)]
+pub(crate) struct ClockArguments {
+    /// The column of times: seconds, or ISO 8601 dates
+    #[arg(long, value_name = "NAME", conflicts_with = "sample_time", help_heading = "Clock")]
+    pub(crate) time: Option<String>,
+    /// How times are written, in the manner of strptime, such as %d.%m.%Y %H:%M:%S
+    #[arg(long, value_name = "FORMAT", help_heading = "Clock")]
+    pub(crate) time_format: Option<String>,
+    /// Seconds from one row to the next [default: 1, so that times count rows]
+    #[arg(long, value_name = "SECONDS", allow_hyphen_values = true, help_heading = "Clock")]
+    pub(crate) sample_time: Option<f64>,
+    /// Put a log on another clock: a step in seconds, and how values between samples are read. A step of two recorded ones or
+    /// more is filtered against aliasing first, unless :unfiltered is added or the clock is irregular
+    #[arg(
+        long,
+        value_name = "STEP:hold|linear[:unfiltered]",
+        allow_hyphen_values = true,
+        help_heading = "Clock"
+    )]
+    pub(crate) resample: Option<String>,
+}

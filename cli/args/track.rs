@@ -1,0 +1,134 @@
+//! The arguments of track.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+
+use super::{LineArguments, LiveClockArguments, LogArguments, Names};
+
+#[derive(Debug, Args)]
+pub(crate) struct TrackArguments {
+    /// The log: a CSV file, gzip-compressed or not (- for standard input)
+    #[arg(value_name = "LOG")]
+    pub(crate) path: PathBuf,
+
+    /// Input columns; a name that holds a comma stands between double quotes, as in CSV [default: u, u1, u2, …; those of --warm]
+    #[arg(short = 'u', long, value_name = "NAME[,NAME…]", help_heading = "Channels")]
+    pub(crate) input: Vec<Names>,
+    /// Output column [default: y; that of --warm]
+    #[arg(short = 'y', long, value_name = "NAME", help_heading = "Channels")]
+    pub(crate) output: Option<String>,
+    /// Subtract this from a channel [default: 0; the offsets of --warm]
+    #[arg(long, value_name = "NAME=VALUE", help_heading = "Channels")]
+    pub(crate) offset: Vec<String>,
+    /// The typical magnitude of a channel; a factor of 3 does not matter [default: the largest of the first rows, from which
+    /// then nothing is predicted]
+    #[arg(long, value_name = "NAME=VALUE", help_heading = "Channels")]
+    pub(crate) scale: Vec<String>,
+
+    /// The model structure [default: arx; that of --warm]
+    #[arg(long, value_enum, help_heading = "Model")]
+    pub(crate) model: Option<TrackModelArgument>,
+    /// Coefficients of A: past outputs
+    #[arg(long, value_name = "N", help_heading = "Model")]
+    pub(crate) na: Option<usize>,
+    /// Coefficients of B: inputs; one value for each input or one for all, 0 for a model without inputs
+    #[arg(long, value_name = "N[,…]", value_delimiter = ',', help_heading = "Model")]
+    pub(crate) nb: Vec<usize>,
+    /// Coefficients of C: past disturbances
+    #[arg(long, value_name = "N", help_heading = "Model")]
+    pub(crate) nc: Option<usize>,
+    /// Samples from input to first effect, one value for each input or one for all [default: 1]
+    #[arg(long, value_name = "N[,…]", value_delimiter = ',', help_heading = "Model")]
+    pub(crate) nk: Vec<usize>,
+    /// Estimate a constant too, for channels of which the offsets are not known; without --offset the first value of each is
+    /// taken off
+    #[arg(long, help_heading = "Model")]
+    pub(crate) constant: bool,
+
+    /// How to estimate [default: rls; with C rpem]
+    #[arg(long, value_enum, help_heading = "Adaptation")]
+    pub(crate) method: Option<TrackMethodArgument>,
+    /// What is forgotten, several side by side: none, LAMBDA or exponential:LAMBDA, selective:LAMBDA,
+    /// random-walk:VARIANCE, variable:LAMBDA:MINIMUM:NOISE
+    #[arg(
+        long,
+        value_name = "HOW[,HOW…]",
+        value_delimiter = ',',
+        default_value = "exponential:0.99",
+        help_heading = "Adaptation"
+    )]
+    pub(crate) forgetting: Vec<String>,
+    /// How to start: standard (from a wide prior), exact (without prior, once the samples determine the parameters), or
+    /// mixed[:SAMPLES] (standard, then blended into exact)
+    #[arg(long, value_name = "HOW", help_heading = "Adaptation")]
+    pub(crate) start: Option<String>,
+    /// Start from a batch fit: the report's orders, parameters, covariance, noise and offsets
+    #[arg(
+        long,
+        value_name = "REPORT",
+        conflicts_with_all = ["model", "na", "nb", "nc", "nk"],
+        help_heading = "Adaptation"
+    )]
+    pub(crate) warm: Option<PathBuf>,
+    /// Do not adapt where the innovation is smaller than this, in units of the output
+    #[arg(long, value_name = "WIDTH", allow_hyphen_values = true, help_heading = "Adaptation")]
+    pub(crate) dead_zone: Option<f64>,
+
+    /// Add to each row a forecast of the output so many rows later, inputs held at their last value
+    #[arg(long, value_name = "T", value_parser = clap::value_parser!(u32).range(1..=10_000), help_heading = "Watch")]
+    pub(crate) horizon: Option<u32>,
+    /// Watch the innovations for changes of their mean and variance (CUSUM), with so many samples between two false alarms on
+    /// average
+    #[arg(long, value_name = "SAMPLES", allow_hyphen_values = true, help_heading = "Watch")]
+    pub(crate) alarm: Option<f64>,
+    /// End at the first alarm, with exit code 7
+    #[arg(long, requires = "alarm", help_heading = "Watch")]
+    pub(crate) stop_on_alarm: bool,
+    #[command(flatten)]
+    pub(crate) lines: LineArguments,
+
+    /// Keep the estimator's whole state in a file, and go on from it if it is there
+    #[arg(long, value_name = "FILE", help_heading = "State")]
+    pub(crate) state: Option<PathBuf>,
+    /// Write the state every so many rows, besides at the end, and within 10 s where rows are slow to come
+    #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u64).range(1..),
+        requires = "state", help_heading = "State")]
+    pub(crate) save_every: u64,
+    /// Where the log stands when the state is taken up again
+    #[arg(long, value_enum, default_value = "auto", requires = "state", help_heading = "State")]
+    pub(crate) resume: ResumeArgument,
+
+    #[command(flatten)]
+    pub(crate) clock: LiveClockArguments,
+    #[command(flatten)]
+    pub(crate) log: LogArguments,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum TrackModelArgument {
+    /// A y = B u + e
+    Arx,
+    /// A y = B u + C e
+    Armax,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum TrackMethodArgument {
+    /// Recursive least squares (arx)
+    Rls,
+    /// Extended least squares (armax): quick, and not always right
+    Els,
+    /// Recursive prediction error method (armax)
+    Rpem,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ResumeArgument {
+    /// A file from its start; standard input from its start if its first row is the first one of the state, else now
+    Auto,
+    /// From the start: rows that the state has absorbed are skipped
+    Start,
+    /// A live pipe that has moved on: what came in between is a gap
+    Now,
+}

@@ -1,0 +1,92 @@
+//! The arguments of validate and compare.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::{ClockArguments, FormatArgument, LogArguments};
+
+#[derive(Debug, Args)]
+pub(crate) struct ValidateArguments {
+    /// The report that fit wrote (- for standard input)
+    #[arg(value_name = "REPORT")]
+    pub(crate) report: PathBuf,
+    /// The log: a CSV file, gzip-compressed or not (- for standard input)
+    #[arg(value_name = "LOG")]
+    pub(crate) path: PathBuf,
+    /// What the model must be or do: white, independent, stable, fit>=P (percent, free run), fit@K>=P (K steps ahead),
+    /// mean-error<=E and largest-error<=E (of |e| in units of the output, free run), mean-error@K<=E, largest-error@K<=E,
+    /// coverage>=P (of the 95 % intervals); exit code 6 if it does not
+    #[arg(long, value_name = "WHAT[,WHAT…]", value_delimiter = ',', help_heading = "Tests")]
+    pub(crate) require: Vec<String>,
+    #[command(flatten)]
+    pub(crate) look: LookArguments,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct CompareArguments {
+    /// The reports that fit wrote (- for standard input)
+    #[arg(value_name = "REPORT", required = true, num_args = 1..)]
+    pub(crate) reports: Vec<PathBuf>,
+    /// The log: a CSV file, gzip-compressed or not (- for standard input)
+    #[arg(value_name = "LOG", required = true)]
+    pub(crate) path: PathBuf,
+    #[command(flatten)]
+    pub(crate) look: LookArguments,
+}
+
+/// What validate and compare share.
+#[derive(Debug, Args)]
+pub(crate) struct LookArguments {
+    /// Rows to look at, 1-based and inclusive [default: all]
+    #[arg(long, value_name = "A..B[,C..D]", value_delimiter = ',')]
+    pub(crate) rows: Vec<String>,
+    /// Offsets: the model's own, or none, mean, linear, start:K of the rows looked at
+    #[arg(long, default_value = "model", value_name = "WHAT")]
+    pub(crate) detrend: String,
+    /// How many steps ahead to look besides 1
+    #[arg(
+        long,
+        value_name = "K[,K…]",
+        default_value = "5",
+        value_delimiter = ',',
+        allow_hyphen_values = true
+    )]
+    pub(crate) horizon: Vec<String>,
+    /// Lags of the tests of residuals; short logs have fewer
+    #[arg(long, value_name = "L", default_value_t = 25, help_heading = "Tests")]
+    pub(crate) lags: usize,
+    /// Reject where less than this chance is left
+    #[arg(
+        long,
+        value_name = "LEVEL",
+        default_value_t = 0.05,
+        allow_hyphen_values = true,
+        help_heading = "Tests"
+    )]
+    pub(crate) alpha: f64,
+    /// The levels of the bands of which Anderson's test counts what lies outside
+    #[arg(
+        long,
+        value_name = "LEVEL[,LEVEL…]",
+        value_delimiter = ',',
+        default_value = "0.01,0.02,0.05,0.1,0.2",
+        allow_hyphen_values = true,
+        help_heading = "Tests"
+    )]
+    pub(crate) alphas: Vec<f64>,
+    /// What to print: a table for people, or the JSON document
+    #[arg(long, value_enum, default_value = "table", help_heading = "Output")]
+    pub(crate) format: FormatArgument,
+    /// Write the JSON document to a file (- for standard output, instead of the table)
+    #[arg(short = 'o', long, value_name = "FILE", help_heading = "Output")]
+    pub(crate) out: Option<PathBuf>,
+    /// Write a page with charts to a file
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    pub(crate) html: Option<PathBuf>,
+
+    #[command(flatten)]
+    pub(crate) clock: ClockArguments,
+    #[command(flatten)]
+    pub(crate) log: LogArguments,
+}

@@ -286,8 +286,7 @@ impl Model {
         input: usize,
         samples: Option<usize>,
     ) -> PyResult<[Column<'py>; 3]> {
-        let model = Arc::clone(&self.model);
-        Ok(transient(py, interruptible(py, move |_| step_response(&model, input, samples))?))
+        self.transient(py, move |model| step_response(model, input, samples))
     }
 
     /// The same for an impulse.
@@ -298,8 +297,7 @@ impl Model {
         input: usize,
         samples: Option<usize>,
     ) -> PyResult<[Column<'py>; 3]> {
-        let model = Arc::clone(&self.model);
-        Ok(transient(py, interruptible(py, move |_| impulse_response(&model, input, samples))?))
+        self.transient(py, move |model| impulse_response(model, input, samples))
     }
 
     /// F, G, H, D and K of the innovations form.
@@ -311,6 +309,19 @@ impl Model {
 }
 
 impl Model {
+    /// The times, the values and their standard errors of a response to an input.
+    fn transient<'py>(
+        &self,
+        py: Python<'py>,
+        respond: impl FnOnce(&thetahat::Model) -> Result<TransientResponse, thetahat::Error> + Send + 'static,
+    ) -> PyResult<[Column<'py>; 3]> {
+        let model = Arc::clone(&self.model);
+        let response = interruptible(py, move |_| respond(&model))?;
+        let values = response.values.iter().map(|quantity| quantity.value).collect();
+        let errors = response.values.iter().map(or_nan).collect();
+        Ok([response.time, values, errors].map(|column| PyArray1::from_vec(py, column)))
+    }
+
     /// The whole report.
     pub(crate) fn report(&self, py: Python<'_>) -> PyResult<Arc<Report>> {
         // The lock is not held while others compute: they may wait for the interpreter, and its owner for the lock.
@@ -412,13 +423,6 @@ fn extended(log: &thetahat::Log, future: &[Channel], steps: usize) -> Result<the
         log.borders().to_vec(),
         log.before(),
     )
-}
-
-/// Times, values and their standard errors.
-fn transient(py: Python<'_>, response: TransientResponse) -> [Column<'_>; 3] {
-    let values = response.values.iter().map(|quantity| quantity.value).collect();
-    let errors = response.values.iter().map(or_nan).collect();
-    [response.time, values, errors].map(|column| PyArray1::from_vec(py, column))
 }
 
 fn or_nan(quantity: &Quantity) -> f64 {

@@ -92,10 +92,7 @@ class Validation(_Document):
     def mean_absolute_error(self, horizon: int | None = 1) -> float:
         """The mean of ``|e|`` so many steps ahead, or in a free run (None), in units of the output; NaN where there is none.
 
-        Raises
-        ------
-        ValueError
-            If the validation did not look so far ahead.
+        It raises as `fit` does.
 
         Examples
         --------
@@ -110,10 +107,7 @@ class Validation(_Document):
     def largest_error(self, horizon: int | None = 1) -> float:
         """The largest ``|e|`` so many steps ahead, or in a free run (None), in units of the output; NaN where there is none.
 
-        Raises
-        ------
-        ValueError
-            If the validation did not look so far ahead.
+        It raises as `fit` does.
         """
         return self._figure("largest_error", horizon)
 

@@ -89,6 +89,11 @@ def series(argument: str, values: nw.Series[Any]) -> Array:
     return np.asarray(values.to_numpy(), dtype=np.float64, order="C")
 
 
+def of_document(values: Sequence[float | None]) -> Array:
+    """The numbers of a document, in which what is not known is None, and NaN here."""
+    return np.array([np.nan if value is None else value for value in values], dtype=np.float64)
+
+
 def named(argument: str, value: Any) -> list[tuple[str, Any]] | None:
     """The columns of a mapping or of a frame with names, or a series with its own; None of what has no names.
 

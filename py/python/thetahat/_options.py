@@ -8,6 +8,7 @@ import math
 import operator
 import os
 from collections.abc import Mapping, Sequence
+from statistics import NormalDist
 from typing import Any, Optional, TypedDict, Union
 
 import numpy as np
@@ -278,6 +279,13 @@ def seconds(name: str, value: Any) -> float:
     if isinstance(value, str):
         raise TypeError(f"{name}: expected seconds or a timedelta, found {value!r}")
     return float(number(name, value))
+
+
+def quantile(level: float) -> float:
+    """How many standard deviations to either side of the mean a normal variable lies with the probability ``level``."""
+    if not 0 < level < 1:
+        raise ValueError(f"level: {level} is not between 0 and 1; give one such as 0.95")
+    return NormalDist().inv_cdf((1 + level) / 2)
 
 
 def text(name: str, value: Any) -> str:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from statistics import NormalDist
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from thetahat import _clock
+from thetahat import _clock, _options
 from thetahat._clock import Clock
 
 Array = npt.NDArray[np.float64]
@@ -36,9 +35,7 @@ class Forecast:
 
     def interval(self, level: float = 0.95) -> tuple[Array, Array]:
         """The lower and the upper ends of intervals that hold the output with this probability."""
-        if not 0 < level < 1:
-            raise ValueError(f"level: {level} is not between 0 and 1; give one such as 0.95")
-        half = NormalDist().inv_cdf((1 + level) / 2) * self.standard_deviations
+        half = _options.quantile(level) * self.standard_deviations
         return self.values - half, self.values + half
 
     def to_pandas(self, level: float = 0.95) -> Any:

@@ -15,31 +15,27 @@ that hold the truth with the probability ``level``; there is no band where no th
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from math import isfinite, log as ln
-from statistics import NormalDist
+from math import isfinite
 from typing import Any, Union
 
 import numpy as np
 import numpy.typing as npt
 
 try:
-    from matplotlib import pyplot as plt
+    from matplotlib.axes import Axes
 except ImportError as error:
     raise ImportError("thetahat.plot draws with matplotlib: pip install thetahat[plot]") from error
 
-from matplotlib.axes import Axes
-from matplotlib.patches import Circle, Ellipse
+from matplotlib.patches import Circle
 from matplotlib.ticker import MaxNLocator
 
-from thetahat import _options
+from thetahat import _drawing, _numbers, _options
 from thetahat._judgement import Inspection, Validation
 from thetahat._log import Log
 from thetahat._model import Model
 from thetahat._responses import FrequencyResponse, TransientResponse
 
 __all__ = ["bode", "fit", "impulse", "inspection", "log", "poles_zeros", "residuals", "selection", "step"]
-
-Array = npt.NDArray[np.float64]
 
 Grid = npt.NDArray[Any]
 """An array of matplotlib axes."""
@@ -89,15 +85,15 @@ def log(log: Log, axes: Any = None) -> Grid:
     >>> [ax.get_ylabel() for ax in plot.log(th.dc_motor())]
     ['y', 'u']
     """
-    _expect("log", log, Log)
+    _drawing.expect("log", log, Log)
     signals = [(log.output, log.y, "default")]
     signals += [(name, values, "steps-post") for name, values in zip(log.inputs, log.u.T)]
-    grid = _grid(axes, len(signals), 1)[:, 0]
+    grid = _drawing.grid(axes, len(signals), 1)[:, 0]
     for ax, (name, values, style) in zip(grid, signals):
-        time, values = _broken(log, values)
-        ax.plot(time, values, drawstyle=style, **_lone(values))
-        ax.set_ylabel(_shown(name))
-        _borders(ax, log)
+        time, values = _drawing.broken(log, values)
+        ax.plot(time, values, drawstyle=style, **_drawing.lone(values))
+        ax.set_ylabel(_drawing.shown(name))
+        _drawing.borders(ax, log)
     grid[-1].set_xlabel("time [s]")
     return grid
 
@@ -140,33 +136,33 @@ def fit(
     >>> [text.get_text() for text in ax.get_legend().get_texts()]
     ['measured', 'ARX(2, 2, 1), 5 steps ahead: 95.86 %', '95 % band']
     """
-    _expect("log", log, Log)
-    named = _named(models, (Model,))
+    _drawing.expect("log", log, Log)
+    named = _drawing.named(models, (Model,))
     # A channel of the log is found by its name, as a prediction finds it.
     measured = {model.output: log[model.output] for _, model in named}
-    ax = _one(ax)
+    ax = _drawing.one(ax)
     for name, values in measured.items():
-        time, values = _broken(log, values)
-        label = "measured" if len(measured) == 1 else _shown(f"measured {name}")
-        ax.plot(time, values, color="0.4", linewidth=1.0, label=label, **_lone(values))
+        time, values = _drawing.broken(log, values)
+        label = "measured" if len(measured) == 1 else _drawing.shown(f"measured {name}")
+        ax.plot(time, values, color="0.4", linewidth=1.0, label=label, **_drawing.lone(values))
     far = "free run" if horizon is None else "1 step ahead" if horizon == 1 else f"{horizon} steps ahead"
     bands = []
     drawn_all = []
     for name, model in named:
         values = model.predict(log, horizon)
-        percent = _percent(measured[model.output], values)
-        time, drawn = _broken(log, values)
+        percent = _drawing.percent(measured[model.output], values)
+        time, drawn = _drawing.broken(log, values)
         drawn_all.append(drawn)
-        label = _shown(f"{name}, {far}" + (f": {_fixed(percent, 2)} %" if isfinite(percent) else ""))
-        (line,) = ax.plot(time, drawn, linewidth=1.0, label=label, **_lone(drawn))
+        label = _drawing.shown(f"{name}, {far}" + (f": {_drawing.fixed(percent, 2)} %" if isfinite(percent) else ""))
+        (line,) = ax.plot(time, drawn, linewidth=1.0, label=label, **_drawing.lone(drawn))
         if horizon is not None:
-            low, high = (_broken(log, end)[1] for end in model.predict_interval(log, horizon, level=level))
-            bands.append(_band(ax, time, low, high, line.get_color()))
-    _label_one(bands, level)
-    _borders(ax, log)
-    _scale_to(ax, list(measured.values()), drawn_all)
+            low, high = (_drawing.broken(log, end)[1] for end in model.predict_interval(log, horizon, level=level))
+            bands.append(_drawing.band(ax, time, low, high, line.get_color()))
+    _drawing.label_one(bands, level)
+    _drawing.borders(ax, log)
+    _drawing.scale_to(ax, list(measured.values()), drawn_all)
     ax.set_xlabel("time [s]")
-    ax.set_ylabel(_shown(", ".join(measured)))
+    ax.set_ylabel(_drawing.shown(", ".join(measured)))
     # To find the best place takes long in a long log.
     ax.legend(loc="best" if len(log) <= 20_000 else "upper right")
     return ax
@@ -212,22 +208,23 @@ def residuals(of: Validation | Model, log: Log | None = None, axes: Any = None) 
         of = of.validate(log)
     elif log is not None:
         raise TypeError("log: the validation has looked at its own; leave it out")
-    _expect("of", of, Validation)
+    _drawing.expect("of", of, Validation)
     tests = of.document["residuals"]
     if tests is None:
         raise ValueError("of: the residuals could not be tested; there are too few samples")
     inputs = tests["independence"]
-    grid = _grid(axes, 1 + len(inputs), 1, sharex=False)[:, 0]
+    grid = _drawing.grid(axes, 1 + len(inputs), 1, sharex=False)[:, 0]
 
-    values = _array(tests["autocorrelation"])[1:]
-    _correlation(grid[0], np.arange(1, len(values) + 1), values, np.full(len(values), tests["band"]))
-    grid[0].set_title("residuals" + _verdict("white", of.whiteness, of.alpha))
+    values = _numbers.of_document(tests["autocorrelation"])[1:]
+    _drawing.correlation(grid[0], np.arange(1, len(values) + 1), values, np.full(len(values), tests["band"]))
+    grid[0].set_title("residuals" + _drawing.verdict("white", of.whiteness, of.alpha))
     grid[0].set_ylabel("autocorrelation")
     for ax, test in zip(grid[1:], inputs):
-        values = _array(test["correlation"])
-        _correlation(ax, np.arange(len(values)) - len(values) // 2, values, _array(test["band"]))
+        values = _numbers.of_document(test["correlation"])
+        _drawing.correlation(ax, np.arange(len(values)) - len(values) // 2, values, _numbers.of_document(test["band"]))
         name = test["input"]
-        ax.set_title(_shown(f"residuals and {name}" + _verdict("independent", of.independence[name], of.alpha)))
+        verdict = _drawing.verdict("independent", of.independence[name], of.alpha)
+        ax.set_title(_drawing.shown(f"residuals and {name}{verdict}"))
         ax.set_ylabel("correlation")
     return grid
 
@@ -273,7 +270,7 @@ def bode(
     'frequency [rad/s]'
     """
     found: list[tuple[str, FrequencyResponse]] = []
-    for name, one in _named(models, (Model, FrequencyResponse)):
+    for name, one in _drawing.named(models, (Model, FrequencyResponse)):
         if w is not None and not isinstance(one, Model):
             raise TypeError("w: a FrequencyResponse has its own frequencies; leave it out")
         found.append((name, one.frequency_response(w, points=300) if isinstance(one, Model) else one))
@@ -283,8 +280,8 @@ def bode(
     for source in wanted:
         if source not in there_are:
             raise ValueError(f"sources: there is no {source}; there are: {', '.join(there_are)}")
-    half = _quantile(level)
-    grid = _grid(axes, 2, len(wanted))
+    half = _options.quantile(level)
+    grid = _drawing.grid(axes, 2, len(wanted))
     for column, source in enumerate(wanted):
         above, below = grid[:, column]
         bands = []
@@ -293,17 +290,17 @@ def bode(
                 continue
             row = response.sources.index(source)
             x, magnitude, phase = response.frequencies, response.magnitude[row], np.degrees(response.phase[row])
-            (line,) = above.plot(x, magnitude, label=_shown(name), **_lone(magnitude))
-            below.plot(x, phase, label=_shown(name), color=line.get_color(), **_lone(phase))
+            (line,) = above.plot(x, magnitude, label=_drawing.shown(name), **_drawing.lone(magnitude))
+            below.plot(x, phase, label=_drawing.shown(name), color=line.get_color(), **_drawing.lone(phase))
             spread = half * response.magnitude_errors[row]
             # The logarithm of what is not above zero has no place.
             lowest = np.min(magnitude[magnitude > 0], initial=np.inf) / 10
             low = np.maximum(magnitude - spread, lowest)
-            bands.append(_band(above, x, low, magnitude + spread, line.get_color()))
+            bands.append(_drawing.band(above, x, low, magnitude + spread, line.get_color()))
             spread = half * np.degrees(response.phase_errors[row])
-            _band(below, x, phase - spread, phase + spread, line.get_color())
-        _label_one(bands, level)
-        above.set_title(_shown(f"from {source}"))
+            _drawing.band(below, x, phase - spread, phase + spread, line.get_color())
+        _drawing.label_one(bands, level)
+        above.set_title(_drawing.shown(f"from {source}"))
         above.set_xscale("log")
         above.set_yscale("log")
         below.set_xscale("log")
@@ -359,16 +356,8 @@ def impulse(
 
     Parameters
     ----------
-    models : Model, or a sequence of them, or dict of str to Model
-        What to draw.
-    input : int or str, default 0
-        Which input, by its place or name.
-    samples : int, optional
-        How many; until each has settled, unless said otherwise.
-    ax : Axes, optional
-        Where to draw.
-    level : float, default 0.95
-        The probability with which the band holds the response at a time.
+    models, input, samples, ax, level
+        As for `step`.
 
     Returns
     -------
@@ -394,25 +383,25 @@ def _transient(
     ax: Axes | None,
     level: float,
 ) -> Axes:
-    half = _quantile(level)
+    half = _options.quantile(level)
     found = []
-    for name, model in _named(models, (Model,)):
+    for name, model in _drawing.named(models, (Model,)):
         if isinstance(input, str) and input not in model.inputs:
             raise ValueError(f"input: {name} has no input {input}; there are: {', '.join(model.inputs) or 'none'}")
         index = model.inputs.index(input) if isinstance(input, str) else input
         response = respond(model, index, samples)
         found.append((name, response, f"{model.output} per unit of {model.inputs[index]}"))
-    ax = _one(ax)
+    ax = _drawing.one(ax)
     bands = []
     for name, response, _ in found:
-        (line,) = ax.plot(response.time, response.values, label=_shown(name), **_lone(response.values))
+        (line,) = ax.plot(response.time, response.values, label=_drawing.shown(name), **_drawing.lone(response.values))
         spread = half * response.standard_errors
         bands.append(
-            _band(ax, response.time, response.values - spread, response.values + spread, line.get_color())
+            _drawing.band(ax, response.time, response.values - spread, response.values + spread, line.get_color())
         )
-    _label_one(bands, level)
+    _drawing.label_one(bands, level)
     ax.set_xlabel(f"time since the {what} [s]")
-    ax.set_ylabel(_shown(", ".join(dict.fromkeys(unit for _, _, unit in found))))
+    ax.set_ylabel(_drawing.shown(", ".join(dict.fromkeys(unit for _, _, unit in found))))
     ax.legend()
     return ax
 
@@ -450,13 +439,13 @@ def poles_zeros(model: Model, ax: Axes | None = None, *, level: float = 0.95) ->
     >>> [text.get_text() for text in ax.get_legend().get_texts()]
     ['poles', 'zeros from u', 'noise zeros']
     """
-    _expect("model", model, Model)
-    half = _quantile(level)
+    _drawing.expect("model", model, Model)
+    half = _options.quantile(level)
     own = model.document["model"]
     groups = [("poles", own["poles"], "x")]
     groups += [(f"zeros from {name}", roots, "o") for name, roots in zip(model.inputs, own["zeros"])]
     groups += [("noise poles", own["noise_poles"], "+"), ("noise zeros", own["noise_zeros"], "D")]
-    ax = _one(ax)
+    ax = _drawing.one(ax)
     ax.add_patch(Circle((0, 0), 1, fill=False, color="0.6", linewidth=0.8))
     ax.axhline(0, color="0.85", linewidth=0.8, zorder=0)
     ax.axvline(0, color="0.85", linewidth=0.8, zorder=0)
@@ -468,10 +457,10 @@ def poles_zeros(model: Model, ax: Axes | None = None, *, level: float = 0.95) ->
         near = np.abs(places) <= _FARTHEST
         away = ", ".join(f"{place:.4g}" if place.imag else f"{place.real:.4g}" for place in places[~near])
         label = f"{name}, outside of the picture: {away}" if away else name
-        (line,) = ax.plot(places.real, places.imag, marker, fillstyle="none", label=_shown(label))
+        (line,) = ax.plot(places.real, places.imag, marker, fillstyle="none", label=_drawing.shown(label))
         reach = float(np.max([np.abs(places[near].real), np.abs(places[near].imag)], initial=reach))
         for root in roots:
-            _region(ax, root, half, level, line.get_color())
+            _drawing.region(ax, root, half, level, line.get_color())
     ax.set_xlim(-1.15 * reach, 1.15 * reach)
     ax.set_ylim(-1.15 * reach, 1.15 * reach)
     ax.set_aspect("equal")
@@ -512,19 +501,20 @@ def selection(model: Model, ax: Axes | None = None) -> Axes:
     >>> [text.get_text() for text in plot.selection(model).get_legend().get_texts()]
     ['ln of the mean of e² in the fit', 'MDL', 'chosen: ARMAX(2, 2, 1, 1)']
     """
-    _expect("model", model, Model)
+    _drawing.expect("model", model, Model)
     found = model.selection
     if found is None:
         raise ValueError("model: it was not chosen among others; thetahat.search chooses")
     by = found["select"]
     logarithmic = by in _LOGARITHMIC
     sizes = [one["parameters"] for one in found["of_size"]]
-    costs = _array([one["mse"] for one in found["of_size"]])
+    costs = _numbers.of_document([one["mse"] for one in found["of_size"]])
     costs = np.where(costs > 0, costs, np.nan)
-    ax = _one(ax)
+    ax = _drawing.one(ax)
     cost = "ln of the mean of e² in the fit" if logarithmic else "mean of e² in the fit"
     ax.plot(sizes, np.log(costs) if logarithmic else costs, ".--", color="0.5", label=cost)
-    ax.plot(sizes, _array([one["score"] for one in found["of_size"]]), "o-", markersize=4, label=_CRITERIA[by])
+    scores = _numbers.of_document([one["score"] for one in found["of_size"]])
+    ax.plot(sizes, scores, "o-", markersize=4, label=_CRITERIA[by])
     chosen = found["chosen"]
     least = found.get("least")
     if least is not None and least != chosen:
@@ -572,13 +562,13 @@ def inspection(inspection: Inspection, axes: Any = None) -> Grid:
     >>> plot.inspection(th.inspect(th.dc_motor()))[0, 1].get_title()
     'from u to y: a delay of 1 sample'
     """
-    _expect("inspection", inspection, Inspection)
+    _drawing.expect("inspection", inspection, Inspection)
     document = inspection.document
     delays = {delay["input"]: delay for delay in document["delays"]}
     if not document["excitation"]:
         raise ValueError("inspection: the log has no inputs; there is nothing to draw")
     output = next((channel["name"] for channel in document["channels"] if channel["role"] == "output"), "the output")
-    grid = _grid(axes, len(document["excitation"]), 2, sharex=False)
+    grid = _drawing.grid(axes, len(document["excitation"]), 2, sharex=False)
     for (left, right), excitation in zip(grid, document["excitation"]):
         name = excitation["input"]
         # Frequency 0 has no place on a logarithmic axis.
@@ -588,190 +578,15 @@ def inspection(inspection: Inspection, axes: Any = None) -> Grid:
         left.set_yscale("log")
         left.set_xlabel("frequency [rad/s]")
         left.set_ylabel("power density")
-        left.set_title(_shown(f"spectrum of {name}"))
+        left.set_title(_drawing.shown(f"spectrum of {name}"))
         title = f"from {name} to {output}"
         delay = delays.get(name)
         if delay is not None:
-            values = _array(delay["correlation"])
-            _correlation(right, np.arange(len(values)), values, np.full(len(values), delay["band"], dtype=np.float64))
+            values = _numbers.of_document(delay["correlation"])
+            band = np.full(len(values), delay["band"], dtype=np.float64)
+            _drawing.correlation(right, np.arange(len(values)), values, band)
             nk = delay["nk"]
             title += ": no delay found" if nk is None else f": a delay of {nk} sample{'' if nk == 1 else 's'}"
         right.set_ylabel("prewhitened correlation")
-        right.set_title(_shown(title))
+        right.set_title(_drawing.shown(title))
     return grid
-
-
-def _expect(argument: str, value: object, kind: type) -> None:
-    if not isinstance(value, kind):
-        raise TypeError(f"{argument}: expected a {kind.__name__}, found {type(value).__name__}")
-
-
-def _named(models: Any, kinds: tuple[type, ...]) -> list[tuple[str, Any]]:
-    """What to draw, with names for a legend: those given, or what each is."""
-    if isinstance(models, kinds):
-        models = [models]
-    if isinstance(models, Mapping):
-        named = [(_options.text("models", name), one) for name, one in models.items()]
-    elif isinstance(models, Sequence) and not isinstance(models, str):
-        named = [(one.name if isinstance(one, Model) else "response", one) for one in models]
-        names = [name for name, _ in named]
-        if len(set(names)) < len(names):
-            named = [(f"{index}: {name}", one) for index, (name, one) in enumerate(named, 1)]
-    else:
-        raise TypeError(f"models: expected a Model, several or a dict of them, found {type(models).__name__}")
-    if not named:
-        raise ValueError("models: there is none; give at least one")
-    for _, one in named:
-        if not isinstance(one, kinds):
-            expected = " or ".join(kind.__name__ for kind in kinds)
-            raise TypeError(f"models: expected a {expected}, found {type(one).__name__}")
-    return named
-
-
-def _one(ax: Axes | None) -> Axes:
-    """The axes to draw into."""
-    if ax is None:
-        made: Axes = plt.subplots(layout="constrained")[1]
-        return made
-    _expect("ax", ax, Axes)
-    return ax
-
-
-def _grid(axes: Any, rows: int, columns: int, sharex: bool = True) -> Grid:
-    """Rows and columns of axes to draw into; of one column or row, or one alone, fewer dimensions do too."""
-    if axes is None:
-        size = (max(6.4, 4.8 * columns), max(4.8, 2.2 * rows))
-        made: Grid = plt.subplots(
-            rows, columns, squeeze=False, sharex="col" if sharex else False, figsize=size, layout="constrained"
-        )[1]
-        return made
-    given: Grid = np.asarray(axes, dtype=np.object_)
-    line = (max(rows, columns),)
-    if given.shape != (rows, columns) and not (1 in (rows, columns) and given.size == line[0] and given.ndim < 2):
-        expected = (rows, columns) if 1 not in (rows, columns) else line
-        raise ValueError(f"axes: expected shape {expected}, found {given.shape}")
-    for ax in given.flat:
-        _expect("axes", ax, Axes)
-    return given.reshape(rows, columns)
-
-
-def _band(ax: Axes, x: Array, low: Array, high: Array, colour: Any) -> Any:
-    """An area between two curves; None where none is known."""
-    if not np.isfinite(high - low).any():
-        return None
-    return ax.fill_between(x, low, high, color=colour, alpha=0.2, linewidth=0)
-
-
-def _label_one(bands: Sequence[Any], level: float) -> None:
-    """Puts the first band into the legend."""
-    for band in [band for band in bands if band is not None][:1]:
-        band.set_label(f"{100 * level:g} % band")
-
-
-def _correlation(ax: Axes, lags: npt.NDArray[np.int_], values: Array, half: Array) -> None:
-    """A correlation with its band."""
-    ax.axhline(0, color="0.6", linewidth=0.8)
-    # A value's band is as wide as its place.
-    edges = np.ravel(np.column_stack([lags - 0.5, lags + 0.5]))
-    wide = np.repeat(half, 2)
-    ax.fill_between(edges, -wide, wide, color="0.5", alpha=0.25, linewidth=0, label="95 % band")
-    ax.vlines(lags, 0, values)
-    ax.plot(lags, values, "o", markersize=3)
-    ax.set_xlabel("lag [samples]")
-    ax.xaxis.set_major_locator(MaxNLocator(integer=True))
-    ax.legend()
-
-
-def _region(ax: Axes, root: Mapping[str, Any], half: float, level: float, colour: Any) -> None:
-    """Where a root lies with this probability: an ellipse, of a real root an interval."""
-    if root["covariance"] is None:
-        return
-    covariance = np.array(root["covariance"], dtype=np.float64)
-    if not np.isfinite(covariance).all():
-        return
-    if covariance[1, 1] == 0:
-        spread = half * float(np.sqrt(covariance[0, 0]))
-        ax.plot([root["re"] - spread, root["re"] + spread], [root["im"]] * 2, color=colour, linewidth=1.2)
-        return
-    variances, directions = np.linalg.eigh(covariance)
-    width, height = 2 * np.sqrt(-2 * ln(1 - level) * np.maximum(variances, 0))
-    angle = float(np.degrees(np.arctan2(directions[1, 0], directions[0, 0])))
-    ax.add_patch(Ellipse((root["re"], root["im"]), width, height, angle=angle, fill=False, color=colour))
-
-
-def _time(log: Log) -> Array:
-    """The time of each row: that of the log; of several experiments, each begins one sample after the one before it."""
-    time = log.time.copy()
-    for rows in log.experiments[1:]:
-        time[rows.start : rows.stop] += time[rows.start - 1] + log.sample_time - time[rows.start]
-    return time
-
-
-def _broken(log: Log, values: Array) -> tuple[Array, Array]:
-    """Time and values, with a break of the line where the clock jumps, and where an experiment begins."""
-    time = _time(log)
-    jumps = np.flatnonzero(np.diff(time) > 1.5 * log.sample_time) + 1
-    breaks = np.union1d(jumps, [rows.start for rows in log.experiments[1:]]).astype(np.intp)
-    return np.insert(time, breaks, np.nan), np.insert(values, breaks, np.nan)
-
-
-def _borders(ax: Axes, log: Log) -> None:
-    """A line between each experiment and the one before it."""
-    time = _time(log)
-    for rows in log.experiments[1:]:
-        ax.axvline(time[rows.start] - log.sample_time / 2, color="0.7", linewidth=0.8, linestyle=":")
-
-
-def _lone(values: Array) -> dict[str, Any]:
-    """Dots for values that have no neighbour to draw a line to."""
-    there = np.concatenate([[False], np.isfinite(values), [False]])
-    lone = there[1:-1] & ~there[:-2] & ~there[2:]
-    return {"marker": ".", "markevery": lone} if lone.any() else {}
-
-
-def _scale_to(ax: Axes, measured: Sequence[Array], modelled: Sequence[Array]) -> None:
-    """What diverges leaves the chart, which shows as much again above and below what was measured."""
-    there = np.concatenate([values[np.isfinite(values)] for values in measured])
-    if there.size == 0:
-        return
-    low, high = there.min(), there.max()
-    span = high - low or abs(high) or 1.0
-    low, high = low - span, high + span
-    if any(np.any((values < low) | (values > high)) for values in modelled):
-        ax.set_ylim(low, high)
-
-
-def _fixed(value: float, decimals: int) -> str:
-    """So many decimals, or powers of ten where that is wider than twelve characters."""
-    text = f"{value:.{decimals}f}"
-    return text if len(text) <= 12 else f"{value:.4e}"
-
-
-def _percent(measured: Array, values: Array) -> float:
-    """The fit where both are there; NaN where there is none."""
-    both = np.isfinite(measured) & np.isfinite(values)
-    measured = measured[both]
-    spread = float(np.linalg.norm(measured - measured.mean())) if both.any() else 0.0
-    return 100 * (1 - float(np.linalg.norm(measured - values[both])) / spread) if spread > 0 else np.nan
-
-
-def _quantile(level: float) -> float:
-    """Standard deviations to either side of the middle."""
-    if not 0 < level < 1:
-        raise ValueError(f"level: {level} is not between 0 and 1")
-    return NormalDist().inv_cdf((1 + level) / 2)
-
-
-def _verdict(null: str, p: float, alpha: float) -> str:
-    """What a test finds of its null hypothesis at the level alpha; nothing where it could not be made."""
-    return f": {null if p >= alpha else f'not {null}'}, p = {p:.2g}" if isfinite(p) else ""
-
-
-def _array(values: Sequence[float | None]) -> Array:
-    return np.array([np.nan if value is None else value for value in values], dtype=np.float64)
-
-
-def _shown(text: str) -> str:
-    """A text that matplotlib shows as it is: no formula between dollars, and no label left out for an underscore."""
-    text = text.replace("$", r"\$")
-    return f" {text}" if text.startswith("_") else text

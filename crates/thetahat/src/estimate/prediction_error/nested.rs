@@ -12,6 +12,7 @@ use crate::estimate::common::extended;
 use crate::estimate::optimize::{Search, best_free};
 use crate::estimate::predictor::{Begin, Predictor};
 use crate::estimate::start::Plants;
+use crate::data::Record;
 use crate::{Error, Orders};
 
 /// How many starts of a smaller model are followed for how many iterations: near enough to its optimum.
@@ -38,8 +39,7 @@ impl Job<'_> {
         if !orders.has_f() {
             return Ok(Vec::new());
         }
-        let samples: usize = record.segments.iter().map(Range::len).sum();
-        let thin = if samples > LONG { stretches(record, STRETCHES, LONG / STRETCHES) } else { None };
+        let thin = thinned(record);
         // In the middle of a log nothing is at rest.
         let (record, begin) = thin.as_ref().map_or((record, begin), |thin| (thin, Begin::Unknown));
         let top = levels(orders);
@@ -97,6 +97,12 @@ impl Job<'_> {
         let best = starts.into_iter().min_by(|(one, _), (other, _)| one.total_cmp(other));
         Ok(best.map(|(_, parameters)| parameters))
     }
+}
+
+/// Stretches of a longer record: enough to see where searches lead.
+pub(super) fn thinned<'a>(record: &Record<'a>) -> Option<Record<'a>> {
+    let samples: usize = record.segments.iter().map(Range::len).sum();
+    if samples > LONG { stretches(record, STRETCHES, LONG / STRETCHES) } else { None }
 }
 
 /// Recipes are for models without A of which the plant is nearly that of the top, with all of its noise or none; for those

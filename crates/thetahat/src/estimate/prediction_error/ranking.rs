@@ -7,10 +7,11 @@
 
 use rayon::prelude::*;
 
+use super::nested::thinned;
 use super::{Beginning, Job, Problem, filled, hopeless};
 use crate::Error;
 use crate::estimate::optimize::{Algorithm, Found, Search, StartOutcome, best_free, best_linear};
-use crate::estimate::predictor::Predictor;
+use crate::estimate::predictor::{Begin, Predictor};
 use crate::estimate::restart::restarts;
 use crate::estimate::start::candidates;
 
@@ -72,7 +73,7 @@ impl Job<'_> {
         let known = !several && starts.first().is_some_and(|start| start.outcome.name == GUESS);
         let mut compared = !has_f || !default || known || several;
         let may_compare = has_f && default && !known && !self.deadline.is_over();
-        let doubtful = may_compare && is_doubtful(&starts, predictor);
+        let doubtful = may_compare && is_doubtful(problem, &starts, predictor);
         if doubtful || may_compare && several {
             starts.extend(self.nested_starts(problem, predictor)?);
             if doubtful {
@@ -204,8 +205,8 @@ fn sort(starts: &mut [Start]) {
 }
 
 /// Whether searches from these sorted starts may end in different places, or far from where they begin: where they lead is
-/// predicted by a step of Gauss and Newton.
-fn is_doubtful(starts: &[Start], predictor: &mut Predictor<'_>) -> bool {
+/// predicted by a step of Gauss and Newton, for a long record on stretches of it.
+fn is_doubtful(problem: Problem<'_, '_>, starts: &[Start], predictor: &mut Predictor<'_>) -> bool {
     let mut recipes: Vec<(&str, &Start)> = Vec::new();
     for start in starts.iter().filter(|start| start.cost.is_finite()) {
         let recipe = start.outcome.name.trim_end_matches("-refined");
@@ -213,17 +214,30 @@ fn is_doubtful(starts: &[Start], predictor: &mut Predictor<'_>) -> bool {
             recipes.push((recipe, start));
         }
     }
-    let Some((_, first)) = recipes.first() else { return true };
-    let alone = starts.len() == 1 && predictor.orders().has_f();
-    let mut reached = |start: &Start| {
-        let at = best_free(predictor, &start.parameters);
-        at.map_or(f64::NEG_INFINITY, |cost| cost - predictor.foretold())
+    if recipes.is_empty() || starts.len() == 1 && problem.orders.has_f() {
+        return true;
+    }
+    let recipes: Vec<&Start> = recipes.into_iter().map(|(_, start)| start).collect();
+    match thinned(problem.record) {
+        Some(thin) => {
+            let problem = Problem { record: &thin, begin: Begin::Unknown, ..problem };
+            lead_apart(&recipes, &mut problem.predictor())
+        }
+        None => lead_apart(&recipes, predictor),
+    }
+}
+
+fn lead_apart(recipes: &[&Start], predictor: &mut Predictor<'_>) -> bool {
+    // The cost at a start, and where it leads.
+    let mut followed = |start: &Start| {
+        let cost = best_free(predictor, &start.parameters).ok()?;
+        Some((cost, cost - predictor.foretold()))
     };
-    let lowest = reached(first);
-    alone
-        || lowest < (1.0 - FAR) * first.cost
-        || recipes[1..].iter().any(|(_, start)| {
-            let same = start.cost <= (1.0 + DISAGREEMENT) * first.cost;
-            !same && (reached(start) / lowest - 1.0).abs() > DISAGREEMENT
+    let Some((cost, lowest)) = followed(recipes[0]) else { return true };
+    lowest < (1.0 - FAR) * cost
+        || recipes[1..].iter().any(|start| {
+            start.cost > (1.0 + DISAGREEMENT) * recipes[0].cost
+                && followed(start)
+                    .is_none_or(|(_, reached)| (reached / lowest - 1.0).abs() > DISAGREEMENT)
         })
 }

@@ -75,3 +75,18 @@ fn what_the_draws_cannot_say_is_told() {
     }
     folder.done("predict model.json log.csv");
 }
+
+#[test]
+fn bands_go_on_where_an_output_is_missing() {
+    let folder = folder();
+    let mut rows: Vec<String> = plain_log().lines().map(str::to_owned).collect();
+    for row in &mut rows[120..130] {
+        let (u, _) = row.split_once(',').unwrap();
+        *row = format!("{u},");
+    }
+    folder.write("holes.csv", rows.join("\n") + "\n");
+    let (_, bands) = columns(&folder.done("simulate model.json holes.csv --rows 101..200 --draws 50").stdout);
+    let inside = |row: usize| bands[3][row].is_finite() && bands[4][row] < bands[5][row];
+    assert!(bands[1][19].is_nan() && bands[1][28].is_nan(), "{:?}", &bands[1][15..35]);
+    assert!((0..100).all(inside), "{:?}", &bands[3][10..35]);
+}

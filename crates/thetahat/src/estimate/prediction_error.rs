@@ -329,8 +329,9 @@ impl Job<'_> {
         let initial_conditions = predictor.initial_conditions();
         let noise_variance = cost / (samples - size - initial_conditions) as f64;
         let known = uncertainty(predictor, orders, noise_variance);
-        // At a minimum only a flat cost has none; elsewhere it may be a matter of the place.
-        let settled = matches!(found.stopped, Stopped::Converged | Stopped::NoDescent);
+        // At a minimum only a flat cost has none; elsewhere, and at the border of stability, it may be a matter of the place.
+        let settled =
+            matches!(found.stopped, Stopped::Converged | Stopped::NoDescent) && !found.stability_bound;
         if known.is_none() && settled {
             return Err(flat(orders, &found.parameters));
         }
@@ -423,13 +424,13 @@ struct Uncertainty {
 fn uncertainty(predictor: &Predictor<'_>, orders: &Orders, noise_variance: f64) -> Option<Uncertainty> {
     let (root, condition) = inverse_root(predictor)?;
     let covariance = if orders.structure() == Structure::Oe {
-        let (residuals, segments) = predictor.residuals();
+        let (residuals, segments) = predictor.stretches();
         let taken = orders.parameters() + predictor.initial_conditions();
         let colour = restricted(&residuals, || predictor.sensitivities(), &segments, taken);
         // On columns that are orthogonal: where parameters can hardly be told apart, the sums over psi itself would lose them
         // in rounding twice, and variances could come out negative.
         let products = predictor.backward_filtered_products(&root.transpose(), &colour.monic);
-        coloured(&root, colour.variance * colour.inflation(residuals.len(), taken), &products)
+        coloured(&root, colour.variance * colour.inflation(predictor.samples(), taken), &products)
     } else {
         &root * root.transpose() * noise_variance
     };
@@ -486,7 +487,8 @@ pub(super) fn is_determined(predictor: &Predictor<'_>) -> bool {
 }
 
 /// R^-1 with R'R = G, so that psi R^-1 has orthonormal columns, and the condition number of psi. By Cholesky of the Gram
-/// matrix, or by QR where that is not exact enough.
+/// matrix, or by QR where that is not exact enough: what is left of a column beside free responses that are nearly the same has
+/// lost as many digits as a condition number would take.
 pub(super) fn inverse_root(predictor: &Predictor<'_>) -> Option<(DMatrix<f64>, f64)> {
     let size = predictor.right.len();
     let matrix = DMatrix::from_row_slice(size, size, &predictor.matrix);
@@ -502,7 +504,7 @@ pub(super) fn inverse_root(predictor: &Predictor<'_>) -> Option<(DMatrix<f64>, f
         && let Some(factor) = Cholesky::new(unit)
         && let triangle = factor.l().transpose()
         && let Some(condition) = condition(&triangle, predictor.samples())
-        && condition <= MAXIMUM_CONDITION
+        && condition * predictor.cancellation() <= MAXIMUM_CONDITION
     {
         return Some((inverted(&triangle, &scales)?, condition));
     }

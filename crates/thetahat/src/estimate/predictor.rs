@@ -375,6 +375,18 @@ impl<'a> Predictor<'a> {
         self.sections.iter().map(of).sum()
     }
 
+    /// By how much a column of psi is at most larger than what the free responses leave of it, at the current point.
+    pub(super) fn cancellation(&self) -> f64 {
+        let parameters = self.right.len();
+        let whole = |k: usize| {
+            let squares =
+                self.sections.iter().map(|section| section.gram[k * (parameters + section.free.len()) + k]);
+            squares.sum::<f64>()
+        };
+        let ratio = |k: usize| whole(k) / self.matrix[k * parameters + k];
+        (0..parameters).map(ratio).fold(1.0, f64::max).sqrt()
+    }
+
     /// Forgets the weights of the free responses.
     pub(super) fn restart(&mut self) {
         for section in &mut self.sections {
@@ -453,16 +465,30 @@ impl<'a> Predictor<'a> {
         (residuals, segments)
     }
 
-    /// psi without the free responses over the samples that count, a list for each parameter. For models of output error, at the
-    /// current point.
+    /// The errors from the first to the last that counts in each section, NaN where an output is missing between them.
+    pub(super) fn stretches(&self) -> (Vec<f64>, Vec<Range<usize>>) {
+        let mut errors = Vec::with_capacity(self.samples);
+        let each = self.sections.iter().map(|section| {
+            let (rows, first) = (section.span(), errors.len());
+            errors.resize(first + rows.len(), f64::NAN);
+            for run in &section.runs {
+                let at = first + run.start - rows.start;
+                errors[at..at + run.len()].copy_from_slice(&section.signals[0][run.clone()]);
+            }
+            first..errors.len()
+        });
+        let segments = each.collect();
+        (errors, segments)
+    }
+
+    /// psi without the free responses for the same samples, a list for each parameter, zero where an output is missing. For models
+    /// of output error, at the current point.
     pub(super) fn sensitivities(&self) -> Vec<Vec<f64>> {
         let mut all = vec![Vec::with_capacity(self.samples); self.right.len()];
         for (section, columns) in self.sections.iter().zip(self.columns()) {
-            let first = self.layouts[section.layout].counted;
+            let (first, rows) = (self.layouts[section.layout].counted, section.span());
             for (all, column) in all.iter_mut().zip(columns) {
-                for run in &section.runs {
-                    all.extend_from_slice(&column[run.start - first..run.end - first]);
-                }
+                all.extend_from_slice(&column[rows.start - first..rows.end - first]);
             }
         }
         all

@@ -21,16 +21,23 @@
 //! E v(t - k) v(t - l) = v~(t - k) v~(t - l) + psi(t - k)' C psi(t - l),   v~ = v^ - psi'delta^
 //! ```
 //!
+//! Where outputs are missing, A is found in the same way, their errors being among what is not known (see `holes`).
+//!
 //! sigma^2 is then as uncertain as a spectrum of few independent samples is: N/s of them, s = sum_k rho_k^2 over all lags (Bayley and
 //! Hammersley, J. Royal Statistical Society, Supplement 8 (1946)), where white errors have N. The covariance is as much larger as
 //! the variance of Student's distribution of these degrees of freedom.
+
+mod holes;
 
 use std::ops::Range;
 
 use thetahat_core::nalgebra::{Cholesky, DMatrix, DVector};
 
+use holes::Holes;
+
 use super::start::reduced::Factor;
 use super::start::stable;
+use crate::data::measured;
 use crate::model::polynomial::product;
 use crate::regression::{Lagged, Presample, Taps, divide_from, sum, sum_of_squares};
 
@@ -40,7 +47,7 @@ const HIGHEST: usize = 10;
 const ROWS: usize = 1024;
 /// From so many samples on, what the fit takes of v is nothing beside what is left.
 const MANY: usize = 20_000;
-/// How often expected products are formed; four digits of A stand after as many.
+/// How often expected products are formed; four digits of A stand after as many, or after twice as many where outputs are missing.
 const ROUNDS: usize = 6;
 /// The least degrees of freedom that Student's distribution is taken with.
 const FEWEST_DEGREES: f64 = 4.0;
@@ -100,7 +107,7 @@ pub(crate) fn autoregression(residuals: &[f64], segments: &[Range<usize>], taken
     let highest = highest(residuals, segments, taken);
     let lagged = lagged(residuals, segments, highest);
     let (matrix, right, square) = lagged.normal_equations();
-    chosen(&matrix, right, square, lagged.rows(), taken)
+    chosen(&matrix, right, square, [lagged.rows(); 2], taken)
 }
 
 fn lagged<'a>(residuals: &'a [f64], segments: &'a [Range<usize>], count: usize) -> Lagged<'a> {
@@ -111,18 +118,20 @@ fn lagged<'a>(residuals: &'a [f64], segments: &'a [Range<usize>], count: usize) 
 /// The highest order for so many samples: of short segments not too much is left out.
 fn highest(residuals: &[f64], segments: &[Range<usize>], taken: usize) -> usize {
     let samples: usize = segments.iter().map(Range::len).sum();
+    let known = residuals.iter().filter(|error| !error.is_nan()).count();
     let enough = |count: &usize| {
-        2 * lagged(residuals, segments, *count).rows() >= samples && samples > 4 * count + taken
+        2 * lagged(residuals, segments, *count).rows() >= samples && known.min(samples) > 4 * count + taken
     };
     (1..=HIGHEST).rev().find(enough).unwrap_or(0)
 }
 
-/// The order of the least MDL and its autoregression, from the normal equations of the highest over `rows`.
+/// The order of the least MDL and its autoregression, from the normal equations of the highest over `rows`, `samples` errors being
+/// known.
 fn chosen(
     matrix: &DMatrix<f64>,
     right: DVector<f64>,
     square: f64,
-    rows: usize,
+    [rows, samples]: [usize; 2],
     taken: usize,
 ) -> Autoregression {
     let highest = right.len();
@@ -138,8 +147,8 @@ fn chosen(
             Some(*left)
         }))
         .collect();
-    let count = rows as f64;
-    let length = |order: usize| order as f64 * count.ln() / count + (left[order] / count).ln();
+    let count = samples as f64;
+    let length = |order: usize| order as f64 * count.ln() / count + (left[order] / rows as f64).ln();
     let order = (0..=highest).min_by(|&i, &j| length(i).total_cmp(&length(j))).unwrap_or(0);
     let mut coefficients = rotated.as_slice()[..order].to_vec();
     factor.backward(&mut coefficients);
@@ -151,37 +160,48 @@ fn chosen(
 }
 
 /// The autoregression of the errors v of which a fit has left `residuals` (see above), `psi` giving the derivatives of the fitted
-/// values, a list for each parameter, of the same samples. For very many samples, or if they do not determine the
-/// parameters, that of the residuals. O(N n^2 p^2) for p parameters and n = 11 lags.
+/// values, a list for each parameter, of the same samples. Residuals are NaN and psi is zero where an output is missing. For very
+/// many samples, or if they do not determine the parameters, that of the residuals. O(N n^2 p^2) for p parameters and n = 11 lags.
 pub(super) fn restricted(
     residuals: &[f64],
     psi: impl FnOnce() -> Vec<Vec<f64>>,
     segments: &[Range<usize>],
     taken: usize,
 ) -> Autoregression {
-    let mut found = autoregression(residuals, segments, taken);
+    let runs: Vec<Range<usize>> = segments.iter().flat_map(|segment| measured(residuals, segment)).collect();
+    let mut found = autoregression(residuals, &runs, taken);
     let highest = highest(residuals, segments, taken);
-    let samples: usize = segments.iter().map(Range::len).sum();
-    if samples > MANY || highest == 0 {
+    let samples: usize = runs.iter().map(Range::len).sum();
+    let mut holes = Holes::new(residuals, segments, highest);
+    let many = samples > MANY;
+    if many && holes.is_empty() || highest == 0 {
         return found;
     }
-    let psi = psi();
+    let psi = if many { Vec::new() } else { psi() };
+    let residuals: Vec<f64> =
+        residuals.iter().map(|error| if error.is_nan() { 0.0 } else { *error }).collect();
     // Columns as large as the residuals, so that nothing is lost in their products.
     let size = |values: &[f64]| sum_of_squares(values).sqrt();
-    let whole = size(residuals);
+    let whole = size(&residuals);
     let scaled = psi.iter().map(|column| {
         let scale = whole / size(column);
         column.iter().map(|value| if scale.is_finite() { scale * value } else { 0.0 }).collect::<Vec<f64>>()
     });
-    let scaled: Vec<Vec<f64>> = scaled.collect();
-    let signals: Vec<&[f64]> = std::iter::once(residuals).chain(scaled.iter().map(Vec::as_slice)).collect();
+    let mut signals: Vec<Vec<f64>> = std::iter::once(residuals.clone()).chain(scaled).collect();
     let lags = highest + 1;
-    let taps = (0..signals.len()).map(|signal| Taps { signal, first: 0, count: lags, sign: 1.0 }).collect();
-    let lagged = Lagged::new(&signals, taps, segments, Presample::Drop);
-    let (products, _, _) = lagged.normal_equations();
-    let (rows, size) = (lagged.rows(), psi.len());
-    let entry = |(i, k): (usize, usize), (j, l): (usize, usize)| products[(i * lags + k, j * lags + l)];
-    for _ in 0..ROUNDS {
+    let products_of = |signals: &[Vec<f64>]| {
+        let views: Vec<&[f64]> = signals.iter().map(Vec::as_slice).collect();
+        let taps = (0..views.len()).map(|signal| Taps { signal, first: 0, count: lags, sign: 1.0 });
+        Lagged::new(&views, taps.collect(), segments, Presample::Drop).normal_equations().0
+    };
+    let mut products = products_of(&signals);
+    let (rows, size) = (lagged(&residuals, segments, highest).rows(), psi.len());
+    for _ in 0..if holes.is_empty() { ROUNDS } else { 2 * ROUNDS } {
+        if !holes.is_empty() {
+            holes.fill(&mut signals, &found.monic);
+            products = products_of(&signals);
+        }
+        let entry = |(i, k): (usize, usize), (j, l): (usize, usize)| products[(i * lags + k, j * lags + l)];
         let filtered = |i: usize, j: usize| -> f64 {
             let each = found.monic.iter().enumerate();
             let row = |(k, a): (usize, &f64)| {
@@ -201,11 +221,11 @@ pub(super) fn restricted(
         let all = DMatrix::from_fn(size + 1, size + 1, weight);
         let expected = DMatrix::from_fn(lags, lags, |k, l| {
             let row = |i: usize| (0..=size).map(|j| all[(i, j)] * entry((i, k), (j, l))).sum::<f64>();
-            (0..=size).map(row).sum::<f64>()
+            (0..=size).map(row).sum::<f64>() + found.variance * holes.spread()[(k, l)]
         });
         let right = DVector::from_fn(highest, |k, _| -expected[(k + 1, 0)]);
         let matrix = expected.view((1, 1), (highest, highest)).into_owned();
-        let next = chosen(&matrix, right, expected[(0, 0)], rows, 0);
+        let next = chosen(&matrix, right, expected[(0, 0)], [rows, rows.min(samples)], 0);
         if !next.variance.is_finite() {
             return found;
         }

@@ -250,18 +250,29 @@ fn reciprocal(z: Complex<f64>) -> Complex<f64> {
     z.conj() / modulus / modulus
 }
 
-/// The covariance matrix of (re, im) of a quantity: J P J'. None where it is not finite.
+/// The covariance matrix of (re, im) of a quantity: J P J'. None where it cannot be had: where it is not finite, and where a
+/// variance is below zero, so that P is none of a covariance.
+///
+/// Rounding may leave a variance that is zero below it: |P_kl| <= s_k s_l, and a sum of products of n numbers with errors of eps
+/// is off by at most 4 n eps (sum_k |j_k| s_k)^2 (Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed. 2002, section
+/// 3.1). What is not further below is zero.
 pub(crate) fn covariance(parameters: &[Vec<f64>], gradient: &Gradient) -> Option<[[f64; 2]; 2]> {
     let [mut rr, mut ri, mut ii] = [0.0; 3];
+    let [mut re_size, mut im_size] = [0.0; 2];
     for (row, left) in gradient {
         let of = &parameters[*row];
         let weighted: Complex<f64> = gradient.iter().map(|(column, right)| right * of[*column]).sum();
         rr += left.re * weighted.re;
         ri += left.re * weighted.im;
         ii += left.im * weighted.im;
+        // Not a number for a variance below zero.
+        let deviation = of[*row].sqrt();
+        re_size += left.re.abs() * deviation;
+        im_size += left.im.abs() * deviation;
     }
-    // Rounding may leave a variance below zero.
-    let covariance = [[rr.max(0.0), ri], [ri, ii.max(0.0)]];
+    let rounding = 4.0 * gradient.len() as f64 * f64::EPSILON;
+    let variance = |sum: f64, size: f64| (sum >= -rounding * size * size).then(|| sum.max(0.0));
+    let covariance = [[variance(rr, re_size)?, ri], [ri, variance(ii, im_size)?]];
     // An infinite or undefined sum is kept by none of these.
     (rr.is_finite() && ri.is_finite() && ii.is_finite()).then_some(covariance)
 }
@@ -430,7 +441,7 @@ fn indistinct(apart: Complex<f64>, parameters: &[Vec<f64>], gradient: &Gradient)
     let Some([[rr, ri], [_, ii]]) = covariance(parameters, gradient) else { return true };
     // What rounding may make of a sum of large terms that cancel.
     let size = |part: fn(&Complex<f64>) -> f64| -> f64 {
-        let spread = gradient.iter().map(|(k, slope)| part(slope).abs() * parameters[*k][*k].max(0.0).sqrt());
+        let spread = gradient.iter().map(|(k, slope)| part(slope).abs() * parameters[*k][*k].sqrt());
         spread.sum::<f64>().powi(2) * 4.0 * f64::EPSILON
     };
     let (rr, ii) = (rr + size(|slope| slope.re), ii + size(|slope| slope.im));

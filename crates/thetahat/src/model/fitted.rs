@@ -1,5 +1,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use thetahat_core::nalgebra::DMatrix;
 
 use super::dynamics::{self, Quantity, Root};
 use crate::data::Offset;
@@ -61,7 +62,8 @@ pub struct Model {
     pub degrees_of_freedom: Option<usize>,
     /// The coefficients with their standard errors, in the order of `covariance`.
     pub parameters: Vec<Parameter>,
-    /// The covariance matrix of the parameters, row by row; none where no theory gives one.
+    /// The covariance matrix of the parameters, row by row; none where no theory gives one, and where it cannot be computed, as
+    /// at the border of stability.
     pub covariance: Option<Vec<Vec<f64>>>,
     /// The roots of A, then of each F, in the z plane, the largest of each polynomial first.
     pub poles: Vec<Root>,
@@ -107,7 +109,8 @@ impl Model {
         Ok(Self { inputs, output, ..model })
     }
 
-    /// The model of some parameters, in the order of [`Orders::names`]. Its signals have no names and no offsets.
+    /// The model of some parameters, in the order of [`Orders::names`]. Its signals have no names and no offsets. A matrix that
+    /// cannot be a covariance says nothing: that of the parameters is unknown then.
     pub(crate) fn from_parameters(
         orders: &Orders,
         values: &[f64],
@@ -115,6 +118,7 @@ impl Model {
         noise_variance: f64,
         sample_time: f64,
     ) -> Result<Self, Error> {
+        let covariance = covariance.filter(|rows| is_covariance(rows));
         let variance = |position: usize| covariance.map(|rows| rows[position][position]);
         let named = orders.names().into_iter().zip(values).enumerate();
         let parameters: Vec<Parameter> = named
@@ -240,6 +244,27 @@ impl Model {
     }
 }
 
+/// Whether a matrix may be a covariance: no variance is below zero, and no combination's by more than rounding.
+///
+/// On the scale of the standard errors the rounding of P = L S L' is of the size n eps kappa(S), kappa(S) being the ratio of the
+/// largest to the least power density of the errors: up to 1e6.
+pub(crate) fn is_covariance(rows: &[Vec<f64>]) -> bool {
+    const ROUNDING: f64 = 1e-9;
+    let size = rows.len();
+    let scale = |k: usize| rows[k][k].sqrt();
+    if (0..size).any(|k| scale(k).is_nan()) {
+        return false;
+    }
+    let entry = |i: usize, j: usize| {
+        let scale = scale(i) * scale(j);
+        if scale > 0.0 { rows[i][j] / scale } else { 0.0 }
+    };
+    let scaled = DMatrix::from_fn(size, size, entry);
+    // An overflow has words of its own.
+    !scaled.iter().all(|value| value.is_finite())
+        || (scaled + DMatrix::identity(size, size) * (ROUNDING * size as f64)).cholesky().is_some()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -280,6 +305,33 @@ mod tests {
         assert_eq!(fitted(&[-1.0], &[1.0]).dc_gain, [None]);
         let unstable = fitted(&[-1.3], &[1.0]);
         assert!(!unstable.stable && unstable.time_constants == [None]);
+    }
+
+    #[test]
+    fn a_covariance_that_cannot_be_is_unknown() {
+        let orders = Orders::arx(1, &[1], &[1]).unwrap();
+        let model = |covariance: [[f64; 2]; 2]| {
+            let rows = covariance.map(Vec::from).to_vec();
+            Model::from_parameters(&orders, &[-0.5, 1.0], Some(&rows), 1.0, 1.0).unwrap()
+        };
+        let errors = |model: &Model| {
+            let quantities = model.dc_gain.iter().chain(&model.time_constants).flatten();
+            let derived = quantities.map(|quantity| quantity.standard_error);
+            let roots = model.poles.iter().map(|root| root.covariance.map(|rows| rows[0][0]));
+            let own = model.parameters.iter().map(|parameter| parameter.standard_error);
+            own.chain(derived).chain(roots).collect::<Vec<_>>()
+        };
+        // A variance below zero, none at all, and a correlation above 1.
+        for wrong in [[[-1e-9, 0.0], [0.0, 1.0]], [[f64::NAN, 0.0], [0.0, 1.0]], [[1.0, 1.1], [1.1, 1.0]]] {
+            let model = model(wrong);
+            assert_eq!(model.covariance, None);
+            assert!(errors(&model).iter().all(Option::is_none), "{model:?}");
+        }
+        // Two that move together, and one that is certain.
+        for right in [[[1.0, 1.0], [1.0, 1.0]], [[0.0, 0.0], [0.0, 1.0]]] {
+            let model = model(right);
+            assert!(model.covariance.is_some() && errors(&model).iter().all(Option::is_some), "{model:?}");
+        }
     }
 
     #[test]

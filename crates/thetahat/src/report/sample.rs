@@ -1,4 +1,4 @@
-use super::apply::{Prepared, prepared, record};
+use super::apply::{Prepared, prepared, record, record_for};
 use crate::data::{Detrend, Log, Rows};
 use crate::respond::{Drawn, Draws, Start, draw};
 use crate::validate::Horizon;
@@ -7,7 +7,7 @@ use crate::{Error, Model};
 /// Free runs of a model on a log, drawn from what the estimate leaves open.
 ///
 /// They are in the log's own units, with a value for each row of the log; NaN outside the rows asked for, in gaps, and before
-/// a start. `rows` are those to respond to; none: all. Offsets are as for [`apply`](crate::apply), and a log without the output
+/// a start. But for [`Start::Drop`], which begins anew from measured outputs, they go on where the output alone is missing. `rows` are those to respond to; none: all. Offsets are as for [`apply`](crate::apply), and a log without the output
 /// does for [`Start::Zero`]. [`Drawn::bands`] gives the mean and quantiles of each row.
 ///
 /// # Errors
@@ -40,7 +40,11 @@ pub fn sample(
     let Prepared { rows, measured, level } =
         prepared(model, &mut log, rows, detrend, (Horizon::FreeRun, initial))?;
     let absent = vec![0.0; if measured.is_some() { 0 } else { log.rows() }];
-    let record = record(model, &log, &rows, measured.is_none().then_some(absent.as_slice()))?;
+    let record = if measured.is_some() {
+        record_for(model, &log, &rows, Horizon::FreeRun, initial)?
+    } else {
+        record(model, &log, &rows, Some(&absent))?
+    };
     let mut drawn = draw(model, &record, initial, draws)?;
     for run in &mut drawn.values {
         for (row, value) in run.iter_mut().enumerate() {

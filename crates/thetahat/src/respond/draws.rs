@@ -33,9 +33,9 @@ pub struct Draws {
 /// Free runs with noise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Drawn {
-    /// A run for each draw, with a value for each sample of the record; NaN outside `counted`.
+    /// A run for each draw, with a value for each sample of the record that it covers, and NaN elsewhere.
     pub values: Vec<Vec<f64>>,
-    /// The samples that the runs cover, as 0-based ranges.
+    /// The samples that the runs cover and that have a measured output, as 0-based ranges.
     pub counted: Vec<Range<usize>>,
     /// How often parameters were drawn again, as those drawn were of an unstable model.
     pub unstable: usize,
@@ -101,7 +101,10 @@ pub fn draw(model: &Model, record: &Record<'_>, start: Start, draws: &Draws) -> 
         let (own, unstable) = spread.draw(model, &mut random)?;
         let own = own.as_ref().unwrap_or(model);
         let Response { mut values, counted } = simulate(own, record, start)?;
-        for rows in &counted {
+        for segment in &record.segments {
+            // Through missing outputs as well.
+            let first = segment.clone().find(|row| !values[*row].is_nan());
+            let rows = first.unwrap_or(segment.end)..segment.end;
             let noise = noise(own, rows.len(), start, &mut random);
             values[rows.clone()].iter_mut().zip(noise).for_each(|(value, noise)| *value += noise);
         }
@@ -116,7 +119,7 @@ pub fn draw(model: &Model, record: &Record<'_>, start: Start, draws: &Draws) -> 
 
 impl Drawn {
     /// The mean of the runs at each sample, and their quantiles for each of the `levels`, such as 0.025: between the two
-    /// neighbours in rank on a straight line (Hyndman and Fan 1996, definition 7). NaN outside `counted`, and where a run
+    /// neighbours in rank on a straight line (Hyndman and Fan 1996, definition 7). NaN where there is no run, and where one
     /// overflows. O(N n log n) for n draws.
     pub fn bands(&self, levels: &[f64]) -> (Vec<f64>, Vec<Vec<f64>>) {
         let samples = self.values.first().map_or(0, Vec::len);
@@ -178,7 +181,7 @@ impl Spread {
     fn of(model: &Model) -> Self {
         let root = model.covariance.as_ref().map(|rows| {
             let size = rows.len();
-            let scales = DVector::from_fn(size, |k, _| rows[k][k].max(0.0).sqrt());
+            let scales = DVector::from_fn(size, |k, _| rows[k][k].sqrt());
             // On a common scale, what is below zero is rounding.
             let entry = |i: usize, j: usize| {
                 let scale = scales[i] * scales[j];

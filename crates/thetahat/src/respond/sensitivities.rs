@@ -84,7 +84,7 @@ impl Change {
 /// l_1, l_2, … of the parameters; none where their covariance is not known.
 fn changes(model: &Model) -> Vec<Change> {
     let Some(rows) = &model.covariance else { return Vec::new() };
-    let scales: Vec<f64> = (0..rows.len()).map(|i| rows[i][i].max(0.0).sqrt()).collect();
+    let scales: Vec<f64> = (0..rows.len()).map(|i| rows[i][i].sqrt()).collect();
     let entry = |i: usize, j: usize| {
         if scales[i] * scales[j] > 0.0 { rows[i][j] / scales[i] / scales[j] } else { 0.0 }
     };

@@ -4,8 +4,8 @@
 use std::ops::RangeInclusive;
 
 use thetahat::{
-    Horizon, Initial, Interval, Method, Model, Orders, Quantity, Record, Signal, Start, estimate, forecast,
-    predict, prediction_deviations,
+    Channel, Constant, Horizon, Initial, Interval, Log, Method, Model, Orders, Plan, Quantity, Record,
+    Signal, Start, estimate, forecast, identify, predict, prediction_deviations,
 };
 
 use super::{filtered, runs};
@@ -41,6 +41,11 @@ fn cases() -> Vec<Case> {
         case("ARMAX, 0.999", Orders::armax(2, &[2], 1, &[1]), &slow, [vec![1.0, 0.5], slow.clone()]),
         case("OE, 0.999", Orders::oe(&[2], &[2], &[1]), &slow, [one.clone(), one.clone()]),
     ]
+}
+
+fn log(u: &[f64], y: &[f64]) -> Log {
+    let channel = |name: &str, values: &[f64]| Channel { name: name.into(), values: values.to_vec() };
+    Log::new(vec![channel("u", u), channel("y", y)], 1.0).expect("the case is sound")
 }
 
 /// What an identified model says, without a covariance of its offsets.
@@ -117,27 +122,40 @@ fn holds(quantity: Option<Quantity>, truth: f64) -> bool {
     })
 }
 
-/// y(t) = 0.999 y(t - 1) + 0.5 u(t - 1) + e(t) around a level, which a constant input stands for.
+/// A pole of 0.999 around a level that is estimated: y(t) = 3 + 0.5/(q - 0.999) u(t) + noise.
 #[test]
 fn intervals_of_gains_hold_near_an_integrator() {
     let (runs, samples, before) = (runs(100), 500, 3000);
-    let orders = Orders::arx(1, &[1, 1], &[1, 0]).expect("the case is sound");
-    let (mut gains, mut times) = (0, 0);
-    for seed in 0..runs as u64 {
-        let mut random = Random(5 + 7919 * seed);
-        let (u, e) = (random.normals(before + samples), random.normals(before + samples));
-        let (x, v) = (filtered(&[0.0, 0.5], &[1.0, -0.999], &u), filtered(&[1.0], &[1.0, -0.999], &e));
-        let y: Vec<f64> = x.iter().zip(&v).map(|(x, v)| 3.0 + x + v).skip(before).collect();
-        let ones = vec![1.0; samples];
-        let record = Record::new(&y, vec![&u[before..], &ones]).expect("the case is sound");
-        let model = fitted(&record, &orders);
-        gains += usize::from(holds(model.dc_gain[0], 500.0));
-        times += usize::from(holds(model.time_constants[0], -1.0 / 0.999_f64.ln()));
+    let pole = vec![1.0, -0.999];
+    let one = vec![1.0];
+    let cases = [
+        (Orders::arx(1, &[1], &[1]), [one.clone(), pole.clone()]),
+        (Orders::armax(1, &[1], 1, &[1]), [vec![1.0, 0.5], pole.clone()]),
+        (Orders::oe(&[1], &[1], &[1]), [one.clone(), one.clone()]),
+        (Orders::bj(&[1], 1, 1, &[1], &[1]), [vec![1.0, 0.5], vec![1.0, -0.8]]),
+    ];
+    for (orders, noise) in cases {
+        let orders = orders.expect("the case is sound");
+        let (mut gains, mut times) = (0, 0);
+        for seed in 0..runs as u64 {
+            let mut random = Random(5 + 7919 * seed);
+            let (u, e) = (random.normals(before + samples), random.normals(before + samples));
+            let (x, v) = (filtered(&[0.0, 0.5], &pole, &u), filtered(&noise[0], &noise[1], &e));
+            let y: Vec<f64> = x.iter().zip(&v).map(|(x, v)| 3.0 + x + v).skip(before).collect();
+            let plan = Plan { constant: Constant::Yes, ..Plan::new(&["u"], "y", orders.clone()) };
+            let model = identify(log(&u[before..], &y), &[], &plan).expect("the case is sound").model;
+            gains += usize::from(holds(model.dc_gain[0], 500.0));
+            times += usize::from(holds(model.time_constants[0], -1.0 / 0.999_f64.ln()));
+        }
+        let percent = |count: usize| 100.0 * count as f64 / runs as f64;
+        eprintln!(
+            "{orders} near an integrator: gain {:.1} %, time constant {:.1} %",
+            percent(gains),
+            percent(times)
+        );
+        assert_inside("gain", percent(gains), 90.0..=100.0, runs);
+        assert_inside("time constant", percent(times), 90.0..=100.0, runs);
     }
-    let percent = |count: usize| 100.0 * count as f64 / runs as f64;
-    eprintln!("near an integrator: gain {:.1} %, time constant {:.1} %", percent(gains), percent(times));
-    assert_inside("gain", percent(gains), 90.0..=100.0, runs);
-    assert_inside("time constant", percent(times), 90.0..=100.0, runs);
 }
 
 /// Output error in short logs: with noise of some colours, and resonant noise.
@@ -173,5 +191,40 @@ fn intervals_of_output_error_hold_in_short_logs() {
         for rate in rates {
             assert_inside(name, rate, least..=98.0, runs);
         }
+    }
+}
+
+/// Output error with 30 % of the outputs missing: standard errors are as large as the spread over runs, whatever the colour.
+#[test]
+fn standard_errors_are_right_with_missing_outputs() {
+    let (runs, samples, before) = (runs(150), 500, 300);
+    let orders = Orders::oe(&[1], &[1], &[1]).expect("the case is sound");
+    let all = [("white", vec![1.0]), ("slow", vec![1.0, -0.8]), ("resonant", vec![1.0, -1.5, 0.8])];
+    for (name, noise) in all {
+        let (mut values, mut errors) = (vec![Vec::new(); 2], vec![0.0; 2]);
+        for seed in 0..runs as u64 {
+            let mut random = Random(3 + 7919 * seed);
+            let u = random.normals(samples);
+            let (x, e) = (filtered(&[0.0, 0.5], &[1.0, -0.8], &u), random.normals(before + samples));
+            let v = filtered(&[0.2], &noise, &e);
+            let y = x.iter().zip(&v[before..]).map(|(x, v)| x + v);
+            let y: Vec<f64> = y.map(|y| if random.uniform() < 0.3 { f64::NAN } else { y }).collect();
+            let plan = Plan::new(&["u"], "y", orders.clone());
+            let model = identify(log(&u, &y), &[], &plan).expect("the case is sound").model;
+            for ((values, sum), parameter) in values.iter_mut().zip(&mut errors).zip(&model.parameters) {
+                values.push(parameter.value);
+                *sum += parameter.standard_error.expect("the case is sound");
+            }
+        }
+        let ratio = |(values, sum): (&Vec<f64>, &f64)| {
+            let mean = values.iter().sum::<f64>() / runs as f64;
+            let spread = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (runs - 1) as f64;
+            sum / runs as f64 / spread.sqrt()
+        };
+        let ratios: Vec<f64> = values.iter().zip(&errors).map(ratio).collect();
+        eprintln!("{name} noise, 30 % missing: standard errors over the spread {ratios:.3?}");
+        // A spread of n runs is known to 1/sqrt(2 n).
+        let more = 2.5 / (2.0 * runs as f64).sqrt();
+        assert!(ratios.iter().all(|ratio| (ratio - 1.0).abs() < 0.08 + more), "{name}: {ratios:.3?}");
     }
 }

@@ -108,6 +108,12 @@ impl<'a> Section<'a> {
         }
     }
 
+    /// From the first to the last sample that counts.
+    pub(super) fn span(&self) -> Range<usize> {
+        let ends = self.runs.first().zip(self.runs.last());
+        ends.map_or(0..0, |(first, last)| first.start..last.end)
+    }
+
     /// Sets the trial weights to those that are best for the polynomials.
     ///
     /// For free responses that begin before the samples that count: a small change of F changes a faded response many times

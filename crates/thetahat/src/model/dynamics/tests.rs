@@ -208,6 +208,22 @@ fn large_roots_do_not_overflow() {
 }
 
 #[test]
+fn a_variance_below_zero_is_unknown_and_one_within_rounding_is_zero() {
+    let one = |slope: f64| Complex::new(slope, 0.0);
+    let gradient: Gradient = vec![(0, one(1.0)), (1, one(-1.0))];
+    let found = |correlation: f64| {
+        let rows = [vec![2.0, 2.0 * correlation], vec![2.0 * correlation, 2.0]];
+        covariance(&rows, &gradient).map(|rows| rows[0][0])
+    };
+    // 4 - 4 rho; the sum of sizes is 8, and two terms have 64 eps.
+    assert_eq!(found(1.0), Some(0.0));
+    assert_eq!(found(1.0 + 4.0 * f64::EPSILON), Some(0.0));
+    assert_eq!(found(1.0 + 1e-12), None);
+    assert!(found(1.0 - 1e-12).is_some_and(|variance| variance > 0.0));
+    assert_eq!(covariance(&[vec![-1e-30]], &vec![(0, one(1.0))]), None);
+}
+
+#[test]
 fn integrators_in_a_and_in_f_have_no_gain() {
     for (na, nf, pole) in [(1, 0, -1.0), (0, 1, -1.0), (1, 0, -1.0 + 1e-16), (0, 1, -1.0 + 1e-16)] {
         let orders = Orders::new(na, &[1], 0, 0, &[nf], &[1]).unwrap();

@@ -51,8 +51,8 @@ pub(super) fn roots(model: &Model) -> Table {
     let mut table = Table::new("Roots", &["root", "value", "standard error", "modulus", "time constant [s]"]);
     let mut add = |role: &str, root: &Root, time: Option<String>| {
         let spread = root.covariance.map(|[[re, _], [_, im]]| {
-            let re_error = three(re.max(0.0).sqrt());
-            if root.im == 0.0 { re_error } else { format!("{re_error}, {}i", three(im.max(0.0).sqrt())) }
+            let re_error = three(re.sqrt());
+            if root.im == 0.0 { re_error } else { format!("{re_error}, {}i", three(im.sqrt())) }
         });
         table.row([
             format!("{role} of {}", root.polynomial.to_uppercase()),

@@ -3,7 +3,7 @@
 use crate::data::Record;
 use crate::regression::noise::Noise;
 use crate::respond::{Draws, Start, draw, simulate};
-use crate::{Error, Model, Orders};
+use crate::{Channel, Error, Log, Model, Orders, Rows};
 
 fn diagonal(variances: &[f64]) -> Vec<Vec<f64>> {
     let row = |i: usize| (0..variances.len()).map(|j| if i == j { variances[i] } else { 0.0 }).collect();
@@ -127,5 +127,34 @@ fn what_cannot_be_drawn_is_refused() {
     for count in [0, 100_001, 100_000] {
         let error = draw(&model, &record, Start::Zero, &Draws { count, seed: 0 }).unwrap_err();
         assert!(matches!(&error, Error::Argument { argument, .. } if argument == "draws"), "{error}");
+    }
+}
+
+#[test]
+fn runs_go_on_where_an_output_is_missing() {
+    // Noise of an output-error model and of one with a memory: as certain in a hole as beside it.
+    for (orders, parameters) in [
+        (Orders::oe(&[1], &[1], &[1]).unwrap(), &[1.0, -0.5][..]),
+        (Orders::bj(&[1], 0, 1, &[1], &[1]).unwrap(), &[1.0, -0.8, -0.5]),
+    ] {
+        let model = Model::from_parameters(&orders, parameters, None, 1.0, 1.0).unwrap();
+        let channel = |name: &str, values: Vec<f64>| Channel { name: name.to_owned(), values };
+        let mut y = Noise(5).take(30);
+        y[10..14].fill(f64::NAN);
+        y[20] = f64::NAN;
+        let log = Log::new(vec![channel("u", Noise(4).take(30)), channel("y", y)], 1.0).unwrap();
+        let record = log.driven_record(&["u".to_owned()], "y", &[Rows::new(1, 30).unwrap()]).unwrap();
+        let draws = Draws { count: 2000, seed: 5 };
+        let drawn = draw(&model, &record, Start::Estimate, &draws).unwrap();
+        assert_eq!(drawn.counted, [0..10, 14..20, 21..30], "{orders}");
+        let run = simulate(&model, &record, Start::Estimate).unwrap();
+        let deviation = |row: usize| moments(drawn.values.iter().map(|values| values[row])).1.sqrt();
+        // 1/sqrt(1 - 0.64)
+        let stationary = if orders.nd > 0 { 1.0 / 0.6 } else { 1.0 };
+        for row in [9, 10, 12, 14, 20] {
+            assert!((deviation(row) / stationary - 1.0).abs() < 0.08, "{orders} {row}: {}", deviation(row));
+            let mean = moments(drawn.values.iter().map(|values| values[row])).0;
+            assert!((mean - run.values[row]).abs() < 0.15, "{orders} {row}: {mean} {}", run.values[row]);
+        }
     }
 }

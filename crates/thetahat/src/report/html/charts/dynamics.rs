@@ -273,11 +273,12 @@ fn outline(root: &Root) -> Vec<(f64, f64)> {
     let Some([[rr, ri], [_, ii]]) = root.covariance else { return Vec::new() };
     let (re, im) = (root.re, root.im);
     if im == 0.0 {
-        let half = NORMAL_95 * rr.max(0.0).sqrt();
+        let half = NORMAL_95 * rr.sqrt();
         return vec![(re - half, 0.0), (re + half, 0.0), (f64::NAN, f64::NAN)];
     }
-    let first = rr.max(0.0).sqrt();
+    let first = rr.sqrt();
     let across = if first > 0.0 { ri / first } else { 0.0 };
+    // Of parts that move together rounding is left.
     let second = (ii - across * across).max(0.0).sqrt();
     let radius = CHI_SQUARE.sqrt();
     let at = |k: usize| {

@@ -50,6 +50,30 @@ fn a_step_test_is_right_without_a_word() {
 }
 
 #[test]
+fn an_integrator_has_a_level_that_is_not_sure_of_itself() {
+    let noise = Random::new(7).signal(500);
+    let u: Vec<f64> = (0..500).map(|row| if row / 25 % 3 == 1 { 1.0 } else { -0.3 }).collect();
+    let mut x = 0.0;
+    let y: Vec<f64> = u
+        .iter()
+        .zip(&noise)
+        .map(|(u, e)| {
+            let value = x + 0.05 * e;
+            x += 0.1 * u;
+            value
+        })
+        .collect();
+    let folder = Folder::with_log(csv(&[("u", &u), ("y", &y)]));
+    let line = "log.csv --model oe --nb 1 --nf 1";
+    let variance = noise.iter().map(|e| (0.05 * e).powi(2)).sum::<f64>() / 500.0;
+    let report = folder.fit(line);
+    assert!(number(&report, "/estimation/mse") < 1.1 * variance, "{report}");
+    assert!(number(&report, "/estimation/level/standard_error") > 0.0);
+    near(&report, "/model/parameters/0", 0.1);
+    assert!(number(&folder.fit(&format!("{line} --constant no")), "/estimation/mse") > 2.0 * variance);
+}
+
+#[test]
 fn a_slope_is_found_and_told() {
     let folder = steps(0.1);
     let report = folder.fit(&format!("{OE} --trend"));

@@ -190,6 +190,12 @@ fn missing_values_in_all_their_spellings() {
         warnings.contains("'u' misses 1 of 200") && warnings.contains("'y' misses 1 of 200"),
         "{warnings}"
     );
+    let simulated = folder.fit("log.csv --model oe --nb 2 --nf 2")["warnings"].to_string();
+    for word in
+        ["'u' misses 1 of 200 values; the log is cut", "'y' misses 1 of 200 values; these rows do not count"]
+    {
+        assert!(simulated.contains(word), "{simulated}");
+    }
     for (token, option) in [
         ("NaN", ""),
         ("nan", ""),

@@ -145,7 +145,11 @@ fn assert_minimum(case: &Value, log: &str, theta: &[f64], mse: f64) {
     let method = Method::PredictionError(search);
     let found = estimate(&record, &orders, &method, Initial::Zero).expect("there is a fit");
     let Procedure::PredictionError(outcome) = found.procedure() else { unreachable!("it was a search") };
-    let guess = outcome.starts.iter().find(|start| start.name == "guess").expect("it is one of the starts");
+    let guess = outcome
+        .starts
+        .iter()
+        .find(|start| start.name == "initial-parameters")
+        .expect("it is one of the starts");
     for cost in [guess.cost, guess.reached] {
         assert!(cost.is_some_and(|cost| (cost / mse - 1.0).abs() < 1e-7), "{cost:?} {mse}");
     }

@@ -24,6 +24,8 @@ pub use validation::{comparison, validation};
 
 /// So many of a list are written.
 const MOST: usize = 8;
+/// Costs that differ by less than this fraction are one.
+const ROUNDING: f64 = 1e-9;
 /// Why there may be no figure.
 const NO_ERROR: &str = "the way it was estimated gives no standard error";
 const NO_ROOT_ERROR: &str =
@@ -142,7 +144,9 @@ fn estimation(text: &mut Text, estimation: &Estimation, model: &Model) {
 fn initial(initial: Initial, conditions: usize) -> String {
     match initial {
         Initial::Zero => "zeros before the first sample".to_owned(),
-        Initial::Estimate if conditions > 0 => format!("{conditions} initial conditions estimated"),
+        Initial::Estimate if conditions > 0 => {
+            format!("{conditions} initial condition{} estimated", if conditions == 1 { "" } else { "s" })
+        }
         _ => "samples without a full past left out".to_owned(),
     }
 }
@@ -157,7 +161,13 @@ fn outcome(search: &SearchOutcome) -> String {
     };
     let border = if search.stability_bound { " at the border of stability" } else { "" };
     let (iterations, stopped) = (counted(search.iterations), stopped(search.stopped));
-    format!("{iterations} ({algorithm}) from {}, {stopped}{border}", search.start)
+    // A comparison follows several starts; costs on fewer samples are others.
+    let costs = search.starts.first().and_then(|start| start.cost).zip(search.costs.first());
+    let followed = search.start_samples.is_none()
+        && search.starts.iter().skip(1).any(|start| start.reached.is_some())
+        && costs.is_some_and(|(start, first)| *first < (1.0 - ROUNDING) * start);
+    let compared = if followed { " after a comparison of starts" } else { "" };
+    format!("{iterations} ({algorithm}) from {}{compared}, {stopped}{border}", search.start)
 }
 
 fn counted(iterations: usize) -> String {

@@ -20,14 +20,19 @@
 //! the decrease that one Gauss-Newton step foretells (Rao's score test, Proc. Cambridge Philosophical Society 44, 1948) says
 //! whether a second search can change the answer. The errors of an output-error model may have any colour, and slow ones look
 //! like an offset: there k^2/var k > ln N is asked for too, with the variance that knows of the colour (Wald's test, which is
-//! the same as the first one where errors are white).
+//! the same as the first one where errors are white). Near an integrator a level may be anything beside an initial condition
+//! and a pole, and k^2/var k says nothing: there N_e ln(V_0/V_1) > 2 ln N does as well, where N_e = N var e/S(0) white samples
+//! tell a mean as well as N errors e of spectral density S do (Kent, Biometrika 69, 1982, on likelihood ratios of models that
+//! do not hold).
 
 use std::ops::Range;
 use std::time::Instant;
 
 use super::arx::with_past;
 use super::optimize::best_free;
+use super::prediction_error::predictor_of;
 use super::predictor::{Begin, Predictor};
+use super::uncertainty::autoregression;
 use super::{
     Criterion, Estimate, Initial, Method, Monitor, Norm, Procedure, Search, arx, estimate_of_channels,
 };
@@ -154,6 +159,15 @@ pub(crate) struct Fitted {
     pub(crate) offset: Option<OutputOffset>,
 }
 
+/// An estimate with a constant, and what that is worth.
+struct Found {
+    fitted: Fitted,
+    /// In units of its price: (k/its standard error)^2 over ln N, where that is known.
+    worth: Option<f64>,
+    /// N_e/N, where the errors may have a colour.
+    white_samples: Option<f64>,
+}
+
 /// The line that is to be taken from the output, beside what was taken before.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct OutputOffset {
@@ -193,7 +207,7 @@ impl Task<'_> {
             // These have no sum of squares that is least: the constant's own error says what it is worth.
             Method::InstrumentalVariables | Method::RefinedInstrumentalVariables | Method::Robust(_) => {
                 return match self.beside(beside, None) {
-                    Ok(Some((fitted, Some(worth)))) if worth > 1.0 => Ok(fitted),
+                    Ok(Some(Found { fitted, worth: Some(worth), .. })) if worth > 1.0 => Ok(fitted),
                     _ => self.plain(None),
                 };
             }
@@ -206,12 +220,12 @@ impl Task<'_> {
         let with = guess.as_ref().map(|guess| self.beside(beside, Some(guess.clone())));
         let with = match with {
             Some(Err(Error::Interrupted)) => return Err(Error::Interrupted),
-            Some(Ok(Some((fitted, Some(worth))))) if worth > CERTAIN => return Ok(fitted),
+            Some(Ok(Some(Found { fitted, worth: Some(worth), .. }))) if worth > CERTAIN => return Ok(fitted),
             Some(Ok(found)) => found,
             _ => None,
         };
         let without = self.plain(guess.map(|guess| beside.without(self.orders, &guess)))?;
-        let (with, worth) = match with {
+        let Found { fitted: with, worth, white_samples } = match with {
             Some(found) => found,
             None if self.promises(beside, &without.estimate) => {
                 let from = beside.with_zeros(self.orders, without.estimate.parameters());
@@ -224,9 +238,11 @@ impl Task<'_> {
             }
             None => return Ok(without),
         };
-        let coloured = self.orders.structure() == Structure::Oe;
-        let is_certain = !coloured || worth.is_none_or(|worth| worth > 1.0);
-        Ok(if is_certain && is_worth(&without.estimate, &with.estimate) { with } else { without })
+        let is_certain = white_samples.is_none_or(|share| {
+            worth.is_none_or(|worth| worth > 1.0)
+                || is_worth(&without.estimate, &with.estimate, share / CERTAIN)
+        });
+        Ok(if is_certain && is_worth(&without.estimate, &with.estimate, 1.0) { with } else { without })
     }
 
     /// Why there can be no constant.
@@ -266,7 +282,7 @@ impl Task<'_> {
     fn wanted(&self, beside: &Beside, guess: Option<Vec<f64>>) -> Result<Fitted, Error> {
         let missing = |message: &str| Error::undetermined(vec!["constant".to_owned()], message);
         match self.beside(beside, guess) {
-            Ok(Some((fitted, _))) => Ok(fitted),
+            Ok(Some(found)) => Ok(found.fitted),
             Ok(None) => Err(missing(
                 "the model has an integrator, A(1) = 0: its output has no level to be estimated; leave the constant out, or \
                  fit differences of the output",
@@ -282,13 +298,8 @@ impl Task<'_> {
         }
     }
 
-    /// With a constant, and what it is worth in units of its price: (k/its standard error)^2 over ln N, where that is known.
-    /// None where there is no level.
-    fn beside(
-        &self,
-        beside: &Beside,
-        guess: Option<Vec<f64>>,
-    ) -> Result<Option<(Fitted, Option<f64>)>, Error> {
+    /// With a constant, and what it is worth. None where there is no level.
+    fn beside(&self, beside: &Beside, guess: Option<Vec<f64>>) -> Result<Option<Found>, Error> {
         let signals = beside.signals();
         let record = with_inputs(self.record, &signals);
         let orders = with_constants(self.orders, beside.count());
@@ -312,7 +323,9 @@ impl Task<'_> {
         let variance = all.covariance().map(|covariance| covariance[place][place]);
         let worth =
             variance.map(|variance| all.parameters()[place].powi(2) / variance / (all.samples() as f64).ln());
-        Ok(beside.apart(self.orders, all).map(|fitted| (fitted, worth)))
+        let white_samples = (self.orders.structure() == Structure::Oe)
+            .then(|| white_samples(&record, &orders, &all).unwrap_or(0.0));
+        Ok(beside.apart(self.orders, all).map(|fitted| Found { fitted, worth, white_samples }))
     }
 
     /// Whether a constant beside the parameters of this estimate may be worth its price.
@@ -365,16 +378,27 @@ fn with_guess(method: &Method, guess: Option<Vec<f64>>) -> Method {
     }
 }
 
+/// var e/S(0), at most 1: the variance of the errors over their spectral density at frequency zero, by their autoregression.
+/// None where they cannot be computed.
+fn white_samples(record: &Record<'_>, orders: &Orders, estimate: &Estimate) -> Option<f64> {
+    let mut predictor = predictor_of(record, orders, estimate);
+    best_free(&mut predictor, estimate.parameters()).ok()?;
+    let (residuals, segments) = predictor.residuals();
+    let taken = orders.parameters() + predictor.initial_conditions();
+    Some(1.0 / autoregression(&residuals, &segments, taken).at_zero().max(1.0))
+}
+
 /// Whether the errors become smaller by what one parameter and further initial conditions cost: MDL, with the likelihood of
-/// Gaussian errors; where other norms were made small, of errors with Laplace's distribution or a uniform one.
-fn is_worth(without: &Estimate, with: &Estimate) -> bool {
+/// Gaussian errors; where other norms were made small, of errors with Laplace's distribution or a uniform one. `share` of the
+/// samples counts.
+fn is_worth(without: &Estimate, with: &Estimate, share: f64) -> bool {
     let samples = with.samples() as f64;
     let price = 1.0 + conditions(with) as f64 - conditions(without) as f64;
     let size = |estimate: &Estimate| match estimate.procedure() {
         Procedure::Constrained(outcome) if outcome.norm != Norm::Two => outcome.objective.powi(2),
         _ => estimate.mse(),
     };
-    without.mse() > 0.0 && samples * (size(without) / size(with)).ln() > price * samples.ln()
+    without.mse() > 0.0 && share * samples * (size(without) / size(with)).ln() > price * samples.ln()
 }
 
 /// The initial conditions that were estimated.

@@ -69,6 +69,12 @@ impl Autoregression {
         self.monic.len() - 1
     }
 
+    /// S(0)/var v, the spectral density at frequency zero over its mean: by so much the mean of many v is less certain than that
+    /// of white noise.
+    pub(super) fn at_zero(&self) -> f64 {
+        1.0 / (self.monic.iter().sum::<f64>().powi(2) * power(&self.monic))
+    }
+
     /// By how much the variance of an estimate from `samples` is larger than that of white errors would be, `taken` degrees of
     /// freedom being used, as their variance is less certain.
     pub(super) fn inflation(&self, samples: usize, taken: usize) -> f64 {

@@ -4,13 +4,13 @@ use std::ops::Range;
 
 /// An input that changes so many times at most is one of a step test.
 const FEW_CHANGES: usize = 5;
-/// An output is at rest while it stays within this part of its range.
+/// At rest the standard deviation of an output is no more than this part of its range, and neither is what it moves by: the
+/// difference between the means of the first and the second half.
 const STAYS: f64 = 0.05;
 /// Fewer rows do not show that the output stays.
 const FEWEST: usize = 5;
 
-/// How many first rows a step test is at rest: all inputs hold their first value, and so does the output but for a twentieth of
-/// its range. None where it is no step test, that is if an input changes more than five times or none changes at all, or if
+/// How many first rows a step test is at rest: all inputs hold their first value, and so does the output but for noise. None where it is no step test, that is if an input changes more than five times or none changes at all, or if
 /// that is not seen in five rows. O(N).
 pub(super) fn rest(inputs: &[&[f64]], output: &[f64], segments: &[Range<usize>]) -> Option<usize> {
     let first = segments.first()?;
@@ -23,19 +23,24 @@ pub(super) fn rest(inputs: &[&[f64]], output: &[f64], segments: &[Range<usize>])
     if rows == first.len() || rows < FEWEST {
         return None;
     }
-    let range = |rows: &mut dyn Iterator<Item = usize>| {
-        let (low, high) = rows.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), row| {
-            (output[row].min(low), output[row].max(high))
-        });
-        high - low
-    };
-    let whole = range(&mut segments.iter().cloned().flatten());
-    let stays = range(&mut (first.start..first.start + rows)) <= STAYS * whole;
-    (stays && whole > 0.0).then_some(rows)
+    let all = segments.iter().cloned().flatten().map(|row| output[row]);
+    let (low, high) =
+        all.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (value.min(low), value.max(high)));
+    let limit = STAYS * (high - low);
+    let at_rest = &output[first.start..first.start + rows];
+    let (earlier, later) = at_rest.split_at(rows / 2);
+    let moves = (mean(later) - mean(earlier)).abs();
+    let centre = mean(at_rest);
+    let variance = at_rest.iter().map(|value| (value - centre).powi(2)).sum::<f64>() / rows as f64;
+    (limit > 0.0 && moves <= limit && variance.sqrt() <= limit).then_some(rows)
 }
 
 /// How often a signal leaves a value that it held: a step that takes several rows is one.
 fn changes(values: &[f64]) -> usize {
     let moves = |row: usize| values[row] != values[row - 1];
     (1..values.len()).filter(|&row| moves(row) && (row == 1 || !moves(row - 1))).count()
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
 }

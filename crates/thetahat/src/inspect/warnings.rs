@@ -27,7 +27,11 @@ pub(super) fn of_the_rows(
 ) -> Vec<String> {
     let mut words = clock(inspection, ticks, times, plan);
     if inspection.rows < FEW_ROWS {
-        words.push(format!("the log has {} rows only: record more", inspection.rows));
+        words.push(format!(
+            "the log has {} row{} only: record more",
+            inspection.rows,
+            plural(inspection.rows)
+        ));
     }
     for channel in &inspection.channels {
         words.extend(of_channel(channel, inspection.rows));
@@ -72,7 +76,9 @@ fn of_channel(channel: &ChannelQuality, rows: usize) -> Vec<String> {
     if channel.missing == rows {
         say("has no values: leave it out".to_owned());
     } else if channel.missing > 0 {
-        say(format!("misses {} of {rows} values: a fit cuts the log there", channel.missing));
+        let simulated = channel.role.as_deref() == Some("output");
+        let but = if simulated { ", but for an output-error model" } else { "" };
+        say(format!("misses {} of {rows} values: a fit cuts the log there{but}", channel.missing));
     }
     if channel.minimum.is_some() && channel.minimum == channel.maximum {
         say("is constant: it tells nothing".to_owned());
@@ -108,14 +114,6 @@ fn of_channel(channel: &ChannelQuality, rows: usize) -> Vec<String> {
             short(channel.standard_deviation.unwrap_or(0.0))
         ));
     }
-    let trend =
-        channel.trend_share.filter(|share| *share >= TREND && channel.role.as_deref() == Some("output"));
-    if let Some(share) = trend {
-        say(format!(
-            "has a trend that explains {} % of it: if that is drift and no answer to an input, fit with --detrend linear",
-            fixed(100.0 * share, 0)
-        ));
-    }
     words
 }
 
@@ -145,8 +143,9 @@ pub(super) fn of_the_dynamics(inspection: &Inspection, plan: &InspectionPlan) ->
             ));
         } else if excitation.order <= POOR.min(excitation.highest) && excitation.order < excitation.highest {
             words.push(format!(
-                "input '{name}' excites order {0} only: a model can have {0} parameters from it at most",
-                excitation.order
+                "input '{name}' excites order {0} only: a model can have {0} parameter{1} from it at most",
+                excitation.order,
+                plural(excitation.order)
             ));
         }
     }
@@ -157,10 +156,22 @@ pub(super) fn of_the_dynamics(inspection: &Inspection, plan: &InspectionPlan) ->
             excitation.input
         ));
     }
+    let trends = inspection.channels.iter().filter(|channel| channel.role.as_deref() == Some("output"));
+    for (channel, share) in trends.filter_map(|channel| Some((channel, channel.trend_share?))) {
+        // The answer to steps has one by itself.
+        if share >= TREND && inspection.rest.is_none() {
+            words.push(format!(
+                "channel '{}' has a trend that explains {} % of it: if that is drift and no answer to an input, fit with \
+                 --detrend linear",
+                channel.name,
+                fixed(100.0 * share, 0)
+            ));
+        }
+    }
     if let Some(rest) = inspection.rest {
         words.push(format!(
             "the log is a step test that begins at rest for {rest} rows: its means are no level of the plant; take the offsets \
-             from there (--detrend start:{rest})"
+             from there (--detrend start:{rest}), and estimate the output's slope with the parameters if it drifts (--trend)"
         ));
     }
     if plan.output.is_none() && !plan.inputs.is_empty() {

@@ -531,7 +531,7 @@ fn deviations(log: &mut Log, name: &str, plan: &Plan, segments: &[Range<usize>])
     let known = if let Choice::Known(orders) = &plan.choice { Some(orders) } else { None };
     let used = |input: usize| known.is_none_or(|orders| orders.nb.get(input).is_some_and(|&nb| nb > 0));
     if position.is_none_or(used) && largest_of(log)? <= ROUNDING * before {
-        let role = if position.is_some() { "input" } else { "output" };
+        let (role, or) = if position.is_some() { ("input", ", or leave it out") } else { ("output", "") };
         let what = if plan.detrend == Detrend::Linear { "is a straight line" } else { "is constant" };
         let concerned = known.map_or_else(Vec::new, |orders| parameters_of(position, orders));
         let parameters =
@@ -540,7 +540,7 @@ fn deviations(log: &mut Log, name: &str, plan: &Plan, segments: &[Range<usize>])
             concerned,
             format!(
                 "{role} '{name}' {what} over the estimation rows: it cannot determine {parameters}; name rows in which it \
-                 changes, or leave it out"
+                 changes{or}"
             ),
         ));
     }

@@ -1,11 +1,11 @@
 //! What a careful reader of a report should know, in plain words.
 
 use super::schema::Report;
-use crate::Orders;
 use crate::estimate::{Procedure, SearchOutcome, Stopped};
 use crate::figures::{fixed, number, scientific};
 use crate::model::{cancel, near_cancellation};
 use crate::select::{Grid, OrderRange};
+use crate::{Orders, Structure};
 
 /// Condition numbers above this one are worth a word.
 const ILL_CONDITIONED: f64 = 1e6;
@@ -17,9 +17,13 @@ pub(super) fn warnings(report: &Report) -> Vec<String> {
     let (data, model) = (&report.data, &report.model);
     let mut warnings = Vec::new();
     for missing in data.missing.iter().filter(|missing| missing.rows > 0) {
+        let simulated = model.structure == Structure::Oe && missing.channel == model.output.name;
         warnings.push(format!(
-            "channel '{}' misses {} of {} values; the log is cut there",
-            missing.channel, missing.rows, data.rows
+            "channel '{}' misses {} of {} values; {}",
+            missing.channel,
+            missing.rows,
+            data.rows,
+            if simulated { "these rows do not count" } else { "the log is cut there" }
         ));
     }
     if data.time_gaps > 0 {

@@ -8,11 +8,11 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use super::{Job, Problem, filled, stretches};
+use crate::data::Record;
 use crate::estimate::common::extended;
 use crate::estimate::optimize::{Search, best_free};
 use crate::estimate::predictor::{Begin, Predictor};
 use crate::estimate::start::Plants;
-use crate::data::Record;
 use crate::{Error, Orders};
 
 /// How many starts of a smaller model are followed for how many iterations: near enough to its optimum.

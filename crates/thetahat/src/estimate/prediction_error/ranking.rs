@@ -26,7 +26,7 @@ const SAME_COST: f64 = 1e-6;
 const ROUNDS: [(usize, f64); 2] = [(4, 1.2), (10, 1.05)];
 
 /// The name of the start that was given.
-const GUESS: &str = "guess";
+const GUESS: &str = "initial-parameters";
 /// The name of those from smaller models.
 const NESTED: &str = "nested";
 
@@ -237,7 +237,6 @@ fn lead_apart(recipes: &[&Start], predictor: &mut Predictor<'_>) -> bool {
     lowest < (1.0 - FAR) * cost
         || recipes[1..].iter().any(|start| {
             start.cost > (1.0 + DISAGREEMENT) * recipes[0].cost
-                && followed(start)
-                    .is_none_or(|(_, reached)| (reached / lowest - 1.0).abs() > DISAGREEMENT)
+                && followed(start).is_none_or(|(_, reached)| (reached / lowest - 1.0).abs() > DISAGREEMENT)
         })
 }

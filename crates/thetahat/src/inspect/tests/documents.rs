@@ -203,7 +203,7 @@ fn odd_values_do_no_harm() {
     }
     let found =
         inspected(recording(&[("u", &[1.0]), ("y", &[2.0])], Times::Uniform(1.0)), &plan(&["u"], Some("y")));
-    assert!(says(&found, "1 rows only"));
+    assert!(says(&found, "1 row only"));
     for rows in 2..40 {
         inspected(
             recording(&[("u", &u[..rows]), ("y", &u[50..50 + rows])], Times::Uniform(1.0)),

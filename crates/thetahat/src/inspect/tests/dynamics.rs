@@ -1,6 +1,16 @@
 //! Excitation, delay and feedback against definitions, and how often they are right.
 
 use super::*;
+
+#[test]
+fn noise_and_no_drift_is_rest() {
+    let u = [vec![0.0; 50], vec![1.0; 350]].concat();
+    let x = divided(&[-0.95], &late(&u, 1));
+    let noisy = sum_of(&x, 0.3, &normal(3, 400));
+    assert_eq!(rest::rest(&[&u], &noisy, &whole(&u)), Some(50));
+    let drifting = [(0..50).map(|row| 0.1 * f64::from(row) - 5.0).collect(), noisy[50..].to_vec()].concat();
+    assert_eq!(rest::rest(&[&u], &drifting, &whole(&u)), None);
+}
 use crate::regression::Lagged;
 
 fn order(values: &[f64]) -> usize {

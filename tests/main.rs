@@ -28,6 +28,7 @@ mod prediction_error;
 mod prefilter;
 mod pseudo_terminal;
 mod public_logs;
+mod readme;
 mod report;
 mod robust;
 mod same_file;

@@ -21,7 +21,7 @@
 //! whether a second search can change the answer. The errors of an output-error model may have any colour, and slow ones look
 //! like an offset: there k^2/var k > ln N is asked for too, with the variance that knows of the colour (Wald's test, which is
 //! the same as the first one where errors are white). Near an integrator a level may be anything beside an initial condition
-//! and a pole, and k^2/var k says nothing: there N_e ln(V_0/V_1) > 2 ln N does as well, where N_e = N var e/S(0) white samples
+//! and a pole, and k^2/var k says nothing: there N_e ln(V_0/V_1) > 8 ln N does as well, where N_e = N var e/S(0) white samples
 //! tell a mean as well as N errors e of spectral density S do (Kent, Biometrika 69, 1982, on likelihood ratios of models that
 //! do not hold).
 
@@ -45,6 +45,8 @@ use crate::{Criteria, Error, Orders, Structure};
 const PROMISING: f64 = 0.5;
 /// A constant that is worth this many times its price needs no comparison with a model without it.
 const CERTAIN: f64 = 2.0;
+/// The same of a constant that is not sure by its own error: the colour of slow errors is seen poorly in short logs.
+const CLEAR: f64 = 8.0;
 /// Of A(1) nothing but rounding is left below this fraction of the sum of |a_i|: there is no level.
 const INTEGRATOR: f64 = 1e-9;
 /// Of a column of ones less than this fraction of its square is left beside the regressors: they hold a constant already.
@@ -240,7 +242,7 @@ impl Task<'_> {
         };
         let is_certain = white_samples.is_none_or(|share| {
             worth.is_none_or(|worth| worth > 1.0)
-                || is_worth(&without.estimate, &with.estimate, share / CERTAIN)
+                || is_worth(&without.estimate, &with.estimate, share / CLEAR)
         });
         Ok(if is_certain && is_worth(&without.estimate, &with.estimate, 1.0) { with } else { without })
     }

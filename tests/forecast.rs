@@ -109,18 +109,21 @@ fn a_series_is_forecast_beyond_the_end_of_its_log() {
     let mut past: Vec<f64> = y.iter().map(|y| y - mean).collect();
     let variance = number(&report, "/model/noise_variance");
     let response = noise_response(&report, 6);
+    let open = &report["model"]["offset_covariance"]["covariance"];
     for step in 0..6 {
         let next = -a[1] * past[199 + step] - a[2] * past[198 + step];
         past.push(next);
         assert!((answer.predicted[200 + step].unwrap() - (next + mean)).abs() < 1e-9, "{step}");
-        let deviation = (variance * response[..=step].iter().map(|h| h * h).sum::<f64>()).sqrt();
+        // The level is open too: a constant that goes through 1/A.
+        let level = open[2][2].as_f64().unwrap() * response[..=step].iter().sum::<f64>().powi(2);
+        let noise = variance * response[..=step].iter().map(|h| h * h).sum::<f64>();
+        let deviation = (noise + level).sqrt();
         assert!((1.0..1.08).contains(&(answer.deviation[200 + step].unwrap() / deviation)), "{step}");
     }
     // One step ahead: sigma^2 + phi' P phi, with Student's degrees of freedom.
-    let covariance = &report["model"]["covariance"];
-    let phi = [-past[199], -past[198]];
-    let entry = |i: usize, j: usize| phi[i] * phi[j] * covariance[i][j].as_f64().unwrap();
-    let parameters = entry(0, 0) + entry(0, 1) + entry(1, 0) + entry(1, 1);
+    let phi = [-past[199], -past[198], 1.0];
+    let entry = |i: usize, j: usize| phi[i] * phi[j] * open[i][j].as_f64().unwrap();
+    let parameters: f64 = (0..3).flat_map(|i| (0..3).map(move |j| (i, j))).map(|(i, j)| entry(i, j)).sum();
     let degrees = number(&report, "/model/degrees_of_freedom");
     let expected = ((variance + parameters) * degrees / (degrees - 2.0)).sqrt();
     assert!((answer.deviation[200].unwrap() / expected - 1.0).abs() < 1e-9);

@@ -30,7 +30,7 @@ pub(crate) use arx::{enough, estimate_is_for_f};
 pub(crate) use common::{Common, Point, Window, extended};
 pub use criterion::{Bound, Criterion, CriterionOutcome, GainBound, Norm};
 pub use offset::Constant;
-pub(crate) use offset::{Beside, Fitted, OutputOffset, Task, pays, with_constants, with_inputs};
+pub(crate) use offset::{Beside, Fitted, OutputOffset, Task, pays};
 pub use optimize::{Algorithm, Monitor, Progress, Search, SearchOutcome, StartOutcome, Step, Stopped};
 pub(crate) use optimize::{FIRST_DAMPING, LARGEST_DAMPING, ROUNDING, SMALLEST_DAMPING};
 pub(crate) use prediction_error::{drop_is_not_for_f, stretches};

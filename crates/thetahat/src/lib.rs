@@ -69,7 +69,9 @@ pub use inspect::{
     ChannelQuality, Clock, DelayEstimate, Excitation, Feedback, Inspection, InspectionPlan, Recording,
     Saturation, SpectrumPoint, Times, inspect, inspect_log,
 };
-pub use model::{Interval, Model, Orders, Parameter, Quantity, Root, Signal, StateSpace, Structure};
+pub use model::{
+    Interval, Model, OffsetCovariance, Orders, Parameter, Quantity, Root, Signal, StateSpace, Structure,
+};
 pub use report::{
     Applied, Comparison, Coverage, Data, Estimation, Missing, NoiseLevel, Parts, Plan, Report, Requirement,
     Resampling, Seen, Signals, Source, Unjudged, Validated, Validation, ValidationPlan, apply, compare,

@@ -22,7 +22,7 @@ mod unseen;
 use std::ops::ControlFlow;
 
 use crate::data::Record;
-use crate::estimate::{Initial, Monitor, Search, with_constants};
+use crate::estimate::{Initial, Monitor, Search};
 use crate::{Error, Orders};
 pub(crate) use automatic::constant_pays;
 pub use choice::{Automatic, Choice, Grid, OrderRange, Path, Select};
@@ -45,7 +45,7 @@ pub(crate) struct Task<'a> {
 impl<'a> Task<'a> {
     /// Orders with those of the inputs that have no name.
     fn with_constants(&self, orders: &Orders) -> Orders {
-        with_constants(orders, self.estimation.inputs.len() - self.inputs.len())
+        orders.with_constants(self.estimation.inputs.len() - self.inputs.len())
     }
 
     /// The same without them.

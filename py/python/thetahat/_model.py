@@ -214,8 +214,8 @@ class Model(ReportedModel):
 
         Notes
         -----
-        Each run is B/(A F) u + C/(A D) e with parameters from a normal distribution of the covariance of the estimate, and e
-        of its noise variance.
+        Each run is B/(A F) u + C/(A D) e with parameters, and the output's level, from a normal distribution of the
+        covariance of the estimate, and e of its noise variance.
 
         Examples
         --------

@@ -24,7 +24,8 @@ class Forecast:
     values : ndarray, shape (steps,)
         The expected outputs, in the units of the log.
     standard_deviations : ndarray, shape (steps,)
-        Those of their errors: what the noise does, and what the uncertainty of the parameters and of the initial states adds.
+        Those of their errors: what the noise does, and what the uncertainty of the parameters, of the output's offset
+        and of the initial states adds.
     """
 
     def __init__(self, time: Array, values: Array, standard_deviations: Array, clock: Clock | None = None) -> None:

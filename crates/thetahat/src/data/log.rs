@@ -107,6 +107,12 @@ impl<'a> Record<'a> {
         }
         Ok(Self { output, inputs, segments: std::iter::once(0..length).collect(), past: vec![0] })
     }
+
+    /// The same with further inputs after its own.
+    pub(crate) fn with_inputs(&self, signals: &'a [Vec<f64>]) -> Self {
+        let inputs = self.inputs.iter().copied().chain(signals.iter().map(Vec::as_slice)).collect();
+        Self { inputs, ..self.clone() }
+    }
 }
 
 impl Log {

@@ -15,6 +15,9 @@
 //! T being the sample time, as A(q) t = A(1) t - T S. So predictions and simulations know nothing of it: they see deviations.
 //! Standard errors are those of the parameters to first order (see `model::dynamics`). An integrator, A(1) = 0, has no level.
 //!
+//! An offset that is taken off before, as a mean or a line, is an estimate too, and mostly not the best one. What all this leaves
+//! open of the output, together with the parameters, goes with the model (see [`OffsetCovariance`]).
+//!
 //! Whether a constant is worth its parameter is decided by MDL (Rissanen, Automatica 14, 1978): N ln(V_0/V_1) > ln N. For
 //! models that are linear in their parameters V_1 follows from V_0, the residuals' sum and the normal equations; for others
 //! the decrease that one Gauss-Newton step foretells (Rao's score test, Proc. Cambridge Philosophical Society 44, 1948) says
@@ -35,9 +38,10 @@ use super::predictor::{Begin, Predictor};
 use super::uncertainty::autoregression;
 use super::{
     Criterion, Estimate, Initial, Method, Monitor, Norm, Procedure, Search, arx, estimate_of_channels,
+    prediction_error,
 };
 use crate::data::{Log, Offset, Record};
-use crate::model::Quantity;
+use crate::model::{OffsetCovariance, Quantity, is_covariance};
 use crate::regression::{Presample, sum};
 use crate::{Criteria, Error, Orders, Structure};
 
@@ -124,21 +128,6 @@ impl Beside {
     }
 }
 
-/// A record with further inputs behind its own.
-pub(crate) fn with_inputs<'a>(record: &Record<'a>, signals: &'a [Vec<f64>]) -> Record<'a> {
-    let inputs = record.inputs.iter().copied().chain(signals.iter().map(Vec::as_slice)).collect();
-    Record { inputs, ..record.clone() }
-}
-
-/// Orders with so many further inputs behind their own, of one coefficient each that acts at once.
-pub(crate) fn with_constants(orders: &Orders, count: usize) -> Orders {
-    let mut orders = orders.clone();
-    orders.nb.extend(vec![1; count]);
-    orders.nf.extend(vec![0; count]);
-    orders.nk.extend(vec![0; count]);
-    orders
-}
-
 /// What to estimate, beside the constant.
 #[derive(Clone, Copy)]
 pub(crate) struct Task<'a> {
@@ -159,6 +148,8 @@ pub(crate) struct Fitted {
     /// Those of all parameters.
     pub(crate) criteria: Criteria,
     pub(crate) offset: Option<OutputOffset>,
+    /// What is open of the offset that was found.
+    pub(crate) open: Option<OffsetCovariance>,
 }
 
 /// An estimate with a constant, and what that is worth.
@@ -277,7 +268,7 @@ impl Task<'_> {
         let method = with_guess(self.method, guess);
         let Self { record, inputs, orders, initial, monitor, .. } = *self;
         let estimate = estimate_of_channels(record, inputs, orders, &method, initial, monitor)?;
-        Ok(Fitted { criteria: estimate.criteria(), estimate, offset: None })
+        Ok(Fitted { criteria: estimate.criteria(), estimate, offset: None, open: None })
     }
 
     /// With a constant, whatever it is worth.
@@ -302,9 +293,25 @@ impl Task<'_> {
 
     /// With a constant, and what it is worth. None where there is no level.
     fn beside(&self, beside: &Beside, guess: Option<Vec<f64>>) -> Result<Option<Found>, Error> {
+        let all = self.all(beside, guess)?;
+        let place = beside.places(self.orders).start;
+        let variance = all.covariance().map(|covariance| covariance[place][place]);
+        let worth =
+            variance.map(|variance| all.parameters()[place].powi(2) / variance / (all.samples() as f64).ln());
+        let white_samples = (self.orders.structure() == Structure::Oe).then(|| {
+            let signals = beside.signals();
+            let (record, orders) =
+                (self.record.with_inputs(&signals), self.orders.with_constants(beside.count()));
+            white_samples(&record, &orders, &all).unwrap_or(0.0)
+        });
+        Ok(beside.apart(self.orders, all).map(|fitted| Found { fitted, worth, white_samples }))
+    }
+
+    /// The estimate of all parameters, the constant and the trend among them.
+    fn all(&self, beside: &Beside, guess: Option<Vec<f64>>) -> Result<Estimate, Error> {
         let signals = beside.signals();
-        let record = with_inputs(self.record, &signals);
-        let orders = with_constants(self.orders, beside.count());
+        let record = self.record.with_inputs(&signals);
+        let orders = self.orders.with_constants(beside.count());
         // A guess of the model alone is one of it with zeros.
         let own = match self.method {
             Method::PredictionError(Search { guess: Some(own), .. })
@@ -320,14 +327,51 @@ impl Task<'_> {
             Initial::Auto if self.orders.na > 0 && orders.nf.iter().any(|&nf| nf > 0) => Initial::Estimate,
             initial => initial,
         };
-        let all = estimate_of_channels(&record, self.inputs, &orders, &method, initial, self.monitor)?;
-        let place = beside.places(self.orders).start;
-        let variance = all.covariance().map(|covariance| covariance[place][place]);
-        let worth =
-            variance.map(|variance| all.parameters()[place].powi(2) / variance / (all.samples() as f64).ln());
-        let white_samples = (self.orders.structure() == Structure::Oe)
-            .then(|| white_samples(&record, &orders, &all).unwrap_or(0.0));
-        Ok(beside.apart(self.orders, all).map(|fitted| Found { fitted, worth, white_samples }))
+        estimate_of_channels(&record, self.inputs, &orders, &method, initial, self.monitor)
+    }
+
+    /// What an estimate without a constant leaves open of an offset that was taken off before, as a mean or a line: the covariance
+    /// that all parameters would have if it were estimated with them, and the square of what that would change, as it was not.
+    /// None where the covariance of the parameters is not known.
+    ///
+    /// With d = (d theta, k, m) the step from (theta, 0, 0) to the estimate of all, whose error has the covariance P,
+    ///
+    /// ```text
+    /// E (error of (theta, 0, 0)) (…)' = P + d d'.
+    /// ```
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`].
+    pub(crate) fn left_open(
+        &self,
+        beside: &Beside,
+        without: &Estimate,
+    ) -> Result<Option<OffsetCovariance>, Error> {
+        if without.covariance().is_none() || without.noise_variance() <= 0.0 {
+            return Ok(None);
+        }
+        let found = match without.procedure() {
+            Procedure::LeastSquares { .. } | Procedure::Constrained(_) if beside.ramp.is_none() => {
+                OfConstant::new(self.record, self.orders, without).map(|of| of.joint(without))
+            }
+            Procedure::InstrumentalVariables { .. } | Procedure::Robust(_) => match self.all(beside, None) {
+                Err(Error::Interrupted) => return Err(Error::Interrupted),
+                Ok(all) => all.covariance().map(|rows| {
+                    let from = beside.with_zeros(self.orders, without.parameters());
+                    let step = all.parameters().iter().zip(from).map(|(to, from)| to - from);
+                    (rows.to_vec(), step.collect())
+                }),
+                Err(_) => None,
+            },
+            _ => {
+                let signals = beside.signals();
+                let (record, orders) =
+                    (self.record.with_inputs(&signals), self.orders.with_constants(beside.count()));
+                let parameters = beside.with_zeros(self.orders, without.parameters());
+                prediction_error::beside(&record, &orders, without, &parameters)
+            }
+        };
+        Ok(found.and_then(|(rows, step)| beside.open(self.orders, &rows, &step, [0.0; 2])))
     }
 
     /// Whether a constant beside the parameters of this estimate may be worth its price.
@@ -348,8 +392,8 @@ impl Task<'_> {
         }
         let samples = without.samples() as f64;
         let signals = beside.signals();
-        let record = with_inputs(self.record, &signals);
-        let orders = with_constants(self.orders, beside.count());
+        let record = self.record.with_inputs(&signals);
+        let orders = self.orders.with_constants(beside.count());
         let parameters = beside.with_zeros(self.orders, without.parameters());
         let known = conditions(without) as f64;
         let from = |begin| {
@@ -421,21 +465,55 @@ pub(crate) fn pays(record: &Record<'_>, orders: &Orders) -> bool {
 fn lowers_mdl(record: &Record<'_>, orders: &Orders, without: &Estimate) -> bool {
     let samples = without.samples() as f64;
     let cost = without.mse() * samples;
-    let left = (cost - constant_decrease(record, orders, without)).max(0.0);
+    let decrease = OfConstant::new(record, orders, without).map_or(0.0, |of| of.errors * of.errors / of.left);
+    let left = (cost - decrease).max(0.0);
     cost > 0.0 && samples * (cost / left).ln() > samples.ln()
 }
 
-/// By how much a constant lowers the sum of squared errors of a linear model, exactly: with z = 1
+/// What a constant beside the parameters of a linear model does, exactly: with z = 1 it lowers the sum of squared errors by
 ///
 /// ```text
 /// (z'e)^2 / (z'z - z'Phi (Phi'Phi)^-1 Phi'z),
 /// ```
 ///
 /// the sums z'Phi being those of the signals, moved by one sample from lag to lag: O(N + p).
-fn constant_decrease(record: &Record<'_>, orders: &Orders, estimate: &Estimate) -> f64 {
-    let (Some(covariance), true) = (estimate.covariance(), estimate.noise_variance() > 0.0) else {
-        return 0.0;
-    };
+struct OfConstant {
+    /// z'e, the denominator, and (Phi'Phi)^-1 Phi'z.
+    errors: f64,
+    left: f64,
+    taken: Vec<f64>,
+}
+
+impl OfConstant {
+    /// None where z depends on Phi, or where there is no noise.
+    fn new(record: &Record<'_>, orders: &Orders, estimate: &Estimate) -> Option<Self> {
+        let (columns, errors) = sums(record, orders, estimate);
+        let covariance = estimate.covariance().filter(|_| estimate.noise_variance() > 0.0)?;
+        let product = |row: &Vec<f64>| {
+            row.iter().zip(&columns).map(|(entry, sum)| entry * sum).sum::<f64>() / estimate.noise_variance()
+        };
+        let taken: Vec<f64> = covariance.iter().map(product).collect();
+        let samples = estimate.samples() as f64;
+        let left = samples - columns.iter().zip(&taken).map(|(sum, taken)| sum * taken).sum::<f64>();
+        (left > DEPENDENT * samples).then_some(Self { errors, left, taken })
+    }
+
+    /// The covariance of the parameters and of the constant after them, both being estimated, and the step that leads there.
+    fn joint(&self, estimate: &Estimate) -> (Vec<Vec<f64>>, Vec<f64>) {
+        // By the constant, 1.
+        let along: Vec<f64> = self.taken.iter().map(|taken| -taken).chain([1.0]).collect();
+        let own = estimate.covariance().unwrap_or(&[]);
+        let variance = estimate.noise_variance() / self.left;
+        let entry = |i: usize, j: usize| {
+            own.get(i).and_then(|row| row.get(j)).copied().unwrap_or(0.0) + variance * along[i] * along[j]
+        };
+        let rows = (0..along.len()).map(|i| (0..along.len()).map(|j| entry(i, j)).collect());
+        (rows.collect(), along.iter().map(|value| value * self.errors / self.left).collect())
+    }
+}
+
+/// z'Phi and z'e.
+fn sums(record: &Record<'_>, orders: &Orders, estimate: &Estimate) -> (Vec<f64>, f64) {
     let (skipped, presample) = match estimate.initial() {
         Initial::Zero => (0, Presample::Zero),
         _ => (orders.reach(), Presample::Drop),
@@ -467,17 +545,45 @@ fn constant_decrease(record: &Record<'_>, orders: &Orders, estimate: &Estimate) 
     }
     let output: f64 = sums(record.output, 0, 1).iter().sum();
     let errors = output - sum(columns.iter().zip(estimate.parameters()).map(|(sum, value)| sum * value));
-    let explained: f64 = covariance
-        .iter()
-        .zip(&columns)
-        .map(|(row, sum)| sum * row.iter().zip(&columns).map(|(entry, other)| entry * other).sum::<f64>())
-        .sum();
-    let samples = estimate.samples() as f64;
-    let left = samples - explained / estimate.noise_variance();
-    if left > DEPENDENT * samples { errors * errors / left } else { 0.0 }
+    (columns, errors)
 }
 
 impl Beside {
+    /// The covariance of all parameters, and what they would change, as those of a line l(t) = level + slope (t - t_m) beside which
+    /// nothing is left:
+    ///
+    /// ```text
+    /// d kappa = dk - sum_i da_i (level - slope i T),   d mu = dm/h - slope sum_i da_i
+    /// ```
+    ///
+    /// as A(q) (y - l) changes by them.
+    fn open(
+        &self,
+        orders: &Orders,
+        rows: &[Vec<f64>],
+        step: &[f64],
+        [level, slope]: [f64; 2],
+    ) -> Option<OffsetCovariance> {
+        let places = self.places(orders);
+        let own = (0..rows.len()).filter(|k| !places.contains(k)).map(|k| vec![(k, 1.0)]);
+        let lags = || (0..orders.na).zip(1_u32..);
+        let constant = lags().map(|(k, lag)| (k, f64::from(lag) * self.sample_time * slope - level));
+        let constant: Vec<(usize, f64)> = constant.chain([(places.start, 1.0)]).collect();
+        let trend =
+            || lags().map(|(k, _)| (k, -slope)).chain([(places.start + 1, 1.0 / self.half)]).collect();
+        let more = std::iter::once(constant).chain(self.ramp.is_some().then(trend));
+        let gradients: Vec<Vec<(usize, f64)>> = own.chain(more).collect();
+        let along = |gradient: &[(usize, f64)]| gradient.iter().map(|(k, g)| g * step[*k]).sum::<f64>();
+        let entry = |left: &[(usize, f64)], right: &[(usize, f64)]| {
+            let row = |row: &[f64]| right.iter().map(|(k, g)| g * row[*k]).sum::<f64>();
+            left.iter().map(|(k, g)| g * row(&rows[*k])).sum::<f64>() + along(left) * along(right)
+        };
+        let line = |left: &Vec<(usize, f64)>| gradients.iter().map(|right| entry(left, right)).collect();
+        let covariance: Vec<Vec<f64>> = gradients.iter().map(line).collect();
+        let middle = self.ramp.is_some().then_some(self.middle);
+        is_covariance(&covariance).then_some(OffsetCovariance { covariance, middle })
+    }
+
     /// The model's own estimate of one with a constant, and the offset. None where there is no level.
     fn apart(&self, orders: &Orders, all: Estimate) -> Option<Fitted> {
         let places = self.places(orders);
@@ -521,6 +627,8 @@ impl Beside {
             middle: self.middle,
         };
         let finite = [offset.offset.level, offset.offset.slope].into_iter().all(f64::is_finite);
+        let still = vec![0.0; all.parameters.len()];
+        let open = all.covariance().and_then(|rows| self.open(orders, rows, &still, [level.value, rise]));
         let criteria = all.criteria();
         let own = |values: &Vec<f64>| self.without(orders, values);
         let covariance = all.covariance.as_ref().map(|rows| {
@@ -534,7 +642,7 @@ impl Beside {
             extents.truncate(places.start);
         }
         let estimate = Estimate { parameters: own(&all.parameters), covariance, procedure, ..all };
-        finite.then_some(Fitted { estimate, criteria, offset: Some(offset) })
+        finite.then_some(Fitted { estimate, criteria, offset: Some(offset), open })
     }
 }
 

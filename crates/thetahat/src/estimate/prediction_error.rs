@@ -437,13 +437,33 @@ fn uncertainty(predictor: &Predictor<'_>, orders: &Orders, noise_variance: f64) 
     Some(Uncertainty { covariance: rows(&covariance), condition })
 }
 
+/// The covariance of all parameters of a model of which some were not estimated, those of a constant and a trend, if they were,
+/// and the Gauss-Newton step to their estimate. None where they cannot be told from the others.
+pub(super) fn beside(
+    record: &Record<'_>,
+    orders: &Orders,
+    estimate: &Estimate,
+    parameters: &[f64],
+) -> Option<(Vec<Vec<f64>>, Vec<f64>)> {
+    let mut predictor = predictor_of(record, orders, estimate);
+    best_free(&mut predictor, parameters).ok()?;
+    predictor.linearize();
+    let known = uncertainty(&predictor, orders, estimate.noise_variance())?;
+    let (root, _) = inverse_root(&predictor)?;
+    let step = &root * (root.transpose() * DVector::from_column_slice(&predictor.right));
+    Some((known.covariance, step.as_slice().to_vec()))
+}
+
 /// The prediction errors of a record with the initial conditions that an estimate from it has.
 pub(super) fn predictor_of<'r>(record: &Record<'r>, orders: &Orders, estimate: &Estimate) -> Predictor<'r> {
     let begin = if estimate.initial() == Initial::Zero { Begin::Zero } else { Begin::Unknown };
     let predictor = Predictor::new(record, orders, begin);
-    if let Procedure::PredictionError(outcome) = estimate.procedure()
-        && outcome.initial_conditions > predictor.initial_conditions()
-    {
+    let conditions = match estimate.procedure() {
+        Procedure::PredictionError(outcome) => outcome.initial_conditions,
+        Procedure::RefinedInstrumentalVariables { initial_conditions, .. } => *initial_conditions,
+        _ => 0,
+    };
+    if conditions > predictor.initial_conditions() {
         return Predictor::new(record, orders, Begin::UnknownInputs);
     }
     predictor

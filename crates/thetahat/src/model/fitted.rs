@@ -28,6 +28,31 @@ pub struct Parameter {
     pub standard_error: Option<f64>,
 }
 
+/// What is open of the output's offset, which is an estimate as the parameters are: found with them, or taken off before as a mean
+/// or a line. Beside it the model is, in deviations,
+///
+/// ```text
+/// A(q) y(t) = sum_j B_j(q)/F_j(q) u_j(t) + k + m (t - t_m) + C(q)/D(q) e(t)
+/// ```
+///
+/// where k and m are zero as estimated, and uncertain. The offset of an input is part of what y's offset means, and is not.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct OffsetCovariance {
+    /// The covariance matrix of the parameters, of k, and of m in units of y per second where a slope was taken, as all of them are
+    /// unknown, row by row. Where the offset was taken before the fit, with the square of what its estimate would have changed.
+    pub covariance: Vec<Vec<f64>>,
+    /// t_m, in seconds from a log's first row, where a slope was taken.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub middle: Option<f64>,
+}
+
+impl OffsetCovariance {
+    /// How many numbers there are beside the parameters.
+    fn count(&self) -> usize {
+        1 + usize::from(self.middle.is_some())
+    }
+}
+
 /// An estimated model: A(q) y(t) = sum_j B_j(q)/F_j(q) u_j(t) + C(q)/D(q) e(t), var e = `noise_variance`.
 ///
 /// Polynomials are written in rising powers of q^-1: `b[j][i]` multiplies u_j(t - i), so B begins with nk zeros.
@@ -65,6 +90,10 @@ pub struct Model {
     /// The covariance matrix of the parameters, row by row; none where no theory gives one, and where it cannot be computed, as
     /// at the border of stability.
     pub covariance: Option<Vec<Vec<f64>>>,
+    /// What is open of the output's offset together with the parameters; none where it was given, where it is not known, and in
+    /// reports that do not say. Predictions, forecasts and drawn runs count it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub offset_covariance: Option<OffsetCovariance>,
     /// The roots of A, then of each F, in the z plane, the largest of each polynomial first.
     pub poles: Vec<Root>,
     /// The finite roots of B in the z plane, for each input.
@@ -165,6 +194,7 @@ impl Model {
             degrees_of_freedom: None,
             parameters,
             covariance: covariance.map(<[_]>::to_vec),
+            offset_covariance: None,
             poles: Vec::new(),
             zeros: Vec::new(),
             noise_poles: Vec::new(),
@@ -175,6 +205,30 @@ impl Model {
         };
         dynamics::describe(&mut model)?;
         Ok(model)
+    }
+
+    /// The model with what is open of its output's offset as further inputs, of which the coefficients are zero and uncertain;
+    /// and those inputs over so many rows. None where nothing is said of it.
+    pub(crate) fn with_open_offset(&self, rows: usize) -> Option<(Self, Vec<Vec<f64>>)> {
+        let open = self.offset_covariance.as_ref()?;
+        let (count, place) = (open.count(), self.orders.na + self.orders.nb.iter().sum::<usize>());
+        // They stand after B among the parameters, and at the end of the matrix.
+        let own = self.parameters.len();
+        let order: Vec<usize> = (0..place).chain(own..own + count).chain(place..own).collect();
+        let row = |k: &usize| order.iter().map(|l| open.covariance[*k][*l]).collect();
+        let mut model = self.clone();
+        model.covariance = Some(order.iter().map(row).collect());
+        model.offset_covariance = None;
+        model.orders = self.orders.with_constants(count);
+        model.structure = model.orders.structure();
+        let zero = Parameter { name: String::new(), value: 0.0, standard_error: None };
+        model.parameters.splice(place..place, vec![zero; count]);
+        model.inputs.extend(vec![Signal::default(); count]);
+        model.b.extend(vec![vec![0.0]; count]);
+        model.f.extend(vec![vec![1.0]; count]);
+        let line = |middle: f64| (0..rows).map(move |row| row as f64 * self.sample_time - middle).collect();
+        let signals = std::iter::once(vec![1.0; rows]).chain(open.middle.map(line)).collect();
+        Some((model, signals))
     }
 
     /// sqrt(nu/(nu - 2)), the standard deviation of Student's distribution with the degrees of freedom of the noise variance;
@@ -239,6 +293,19 @@ impl Model {
         let square = |rows: &Vec<Vec<f64>>| rows.len() == count && rows.iter().all(|row| row.len() == count);
         if !self.covariance.as_ref().is_none_or(square) {
             return wrong("covariance does not have a row and a column for each parameter");
+        }
+        if let Some(open) = &self.offset_covariance {
+            let count = count + open.count();
+            let rows = &open.covariance;
+            let values = rows.iter().flatten().chain(&open.middle);
+            if rows.len() != count || rows.iter().any(|row| row.len() != count) {
+                return wrong(
+                    "offset_covariance does not have a row and a column for each parameter and the offset",
+                );
+            }
+            if !values.copied().all(f64::is_finite) {
+                return wrong("offset_covariance is not finite");
+            }
         }
         Ok(())
     }
@@ -338,6 +405,15 @@ mod tests {
     fn a_damaged_model_is_refused() {
         let good = fitted(&[-0.5], &[1.0, 2.0]);
         assert!(good.check().is_ok());
+        let open = |model: &mut Model, rows: usize| {
+            let covariance = vec![vec![1.0; rows]; rows];
+            model.offset_covariance = Some(OffsetCovariance { covariance, middle: None });
+        };
+        let mut right = good.clone();
+        open(&mut right, 4);
+        assert!(right.check().is_ok());
+        open(&mut right, 3);
+        assert!(right.check().is_err());
         let damages: [fn(&mut Model); 13] = [
             |model| model.orders.na = usize::MAX,
             |model| model.orders.nk = vec![usize::MAX],

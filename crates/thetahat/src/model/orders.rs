@@ -215,6 +215,12 @@ impl Orders {
         (0..self.inputs()).map(|input| self.input_reach(input)).fold(self.na, usize::max)
     }
 
+    /// With so many further inputs after their own, of one coefficient each that acts at once: those of a constant and a trend.
+    pub(crate) fn with_constants(&self, count: usize) -> Self {
+        let more = |values: &[usize], value| [values, &vec![value; count]].concat();
+        Self { nb: more(&self.nb, 1), nf: more(&self.nf, 0), nk: more(&self.nk, 0), ..self.clone() }
+    }
+
     /// How many past samples of an input B reaches back: nb + nk - 1, or 0 without B.
     pub(crate) fn input_reach(&self, input: usize) -> usize {
         if self.nb[input] == 0 { 0 } else { self.nb[input] + self.nk[input] - 1 }

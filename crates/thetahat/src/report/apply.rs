@@ -1,3 +1,5 @@
+use std::borrow::Cow;
+
 use crate::data::{Detrend, Log, Offset, Record, Rows, checked};
 use crate::respond::{Forecast, Start, check_steps, forecast_if_possible, prediction_deviations, simulate};
 use crate::validate::{Fit, Horizon};
@@ -47,6 +49,7 @@ pub fn apply(
     initial: Start,
 ) -> Result<Applied, Error> {
     let Prepared { rows, measured, level } = prepared(model, &mut log, rows, detrend, (horizon, initial))?;
+    let model = &of_offsets(model, detrend);
     let has_output = measured.is_some();
     let absent = vec![0.0; if has_output { 0 } else { log.rows() }];
     let record = if has_output {
@@ -82,6 +85,14 @@ pub fn apply(
     }
     let beyond = predicted.len() - log.rows();
     Ok(Applied { measured, predicted, standard_deviations, beyond, rows, fit })
+}
+
+/// The model as it is beside offsets that are its own, or that were found elsewhere: of those it says nothing.
+pub(super) fn of_offsets(model: &Model, detrend: Option<Detrend>) -> Cow<'_, Model> {
+    match detrend {
+        None => Cow::Borrowed(model),
+        Some(_) => Cow::Owned(Model { offset_covariance: None, ..model.clone() }),
+    }
 }
 
 /// A log of which the offsets were taken.

@@ -5,9 +5,7 @@ use super::schema::{Data, Estimation, Missing, Parts, Report, Source};
 use super::validation::{estimation_record, estimation_start, goes_through};
 use super::warnings::{at_the_border, unstable_plant, warnings};
 use crate::data::{Detrend, Log, Offset, Prefilter, Prefiltered, Record, Rows, Split, between, checked};
-use crate::estimate::{
-    self, Beside, Constant, Estimate, Fitted, Method, Monitor, OutputOffset, enough, with_inputs,
-};
+use crate::estimate::{self, Beside, Constant, Estimate, Fitted, Method, Monitor, OutputOffset, enough};
 use crate::regression::sum;
 use crate::respond::{Start, innovations};
 use crate::select::{self, Choice, Found, Grid, Select, Task};
@@ -75,11 +73,15 @@ impl Plan {
         }
     }
 
+    /// Whether the output's offset is found in the data before the fit.
+    fn takes_output_offset(&self) -> bool {
+        self.detrend != Detrend::None && !self.offsets.iter().any(|(name, _)| *name == self.output)
+    }
+
     /// Whether a constant is estimated: auto leaves alone the output of which the offset was given, as nothing or by hand, and one
     /// of which a band is looked at.
     fn constant(&self) -> Constant {
-        let by_hand = self.offsets.iter().any(|(name, _)| *name == self.output);
-        let given = self.detrend == Detrend::None || by_hand || self.prefilter.is_some();
+        let given = !self.takes_output_offset() || self.prefilter.is_some();
         if self.constant == Constant::Auto && given { Constant::No } else { self.constant }
     }
 
@@ -330,6 +332,10 @@ fn fit(
         monitor,
     };
     let mut fitted = task.fit(plan.constant(), &beside, guess)?;
+    if band.is_none() && fitted.offset.is_none() && plan.takes_output_offset() {
+        let taken = Beside::new(&log, &segments, plan.detrend == Detrend::Linear)?;
+        fitted.open = task.left_open(&taken, &fitted.estimate)?;
+    }
     if band.is_some() {
         let variance = unfiltered_variance(&fitted.estimate, &orders, &log, plan, &estimation)?;
         fitted.estimate = fitted.estimate.of_prefiltered(&seen, &orders, variance);
@@ -337,8 +343,9 @@ fn fit(
     }
     // A prefilter leaves rows out, but cuts nothing.
     let stretches = if band.is_some() { segments } else { seen.segments };
-    let Fitted { estimate, offset, .. } = &fitted;
+    let Fitted { estimate, offset, open, .. } = &fitted;
     let mut model = Model::new(&orders, estimate, log.sample_time(), inputs.to_vec(), output.clone())?;
+    model.offset_covariance.clone_from(open);
     let taken = [output.offset, offset.map_or_else(Offset::default, |found| found.offset)];
     if let Some(found) = offset {
         log.remove(&output.name, &found.offset);
@@ -460,9 +467,9 @@ fn selected<'a>(
         Constant::Auto => plan.initial != Initial::Zero && select::constant_pays(&estimation),
     };
     let signals = if with_constant { beside.signals() } else { Vec::new() };
-    let unseen = unseen.map(|unseen| with_inputs(&unseen, &signals));
+    let unseen = unseen.map(|unseen| unseen.with_inputs(&signals));
     let task = Task {
-        estimation: &with_inputs(&estimation, &signals),
+        estimation: &estimation.with_inputs(&signals),
         validation: unseen.as_ref(),
         inputs: &plan.inputs,
         select: plan.select,
@@ -558,7 +565,7 @@ fn parameters_of(input: Option<usize>, orders: &Orders) -> Vec<String> {
 
 /// How the parameters were found, and what was found beside them: as it is measured from zero, where `taken` was taken before.
 fn estimation_of(fitted: &Fitted, taken: Offset) -> Estimation {
-    let Fitted { estimate, criteria, offset } = fitted;
+    let Fitted { estimate, criteria, offset, .. } = fitted;
     let above = |base: f64, found: Quantity| Quantity { value: base + found.value, ..found };
     Estimation {
         level: offset.map(|OutputOffset { level, middle, .. }| above(taken.at(middle), level)),

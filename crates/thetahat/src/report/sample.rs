@@ -1,4 +1,4 @@
-use super::apply::{Prepared, prepared, record, record_for};
+use super::apply::{Prepared, of_offsets, prepared, record, record_for};
 use crate::data::{Detrend, Log, Rows};
 use crate::respond::{Drawn, Draws, Start, draw};
 use crate::validate::Horizon;
@@ -39,6 +39,7 @@ pub fn sample(
 ) -> Result<Drawn, Error> {
     let Prepared { rows, measured, level } =
         prepared(model, &mut log, rows, detrend, (Horizon::FreeRun, initial))?;
+    let model = &of_offsets(model, detrend);
     let absent = vec![0.0; if measured.is_some() { 0 } else { log.rows() }];
     let record = if measured.is_some() {
         record_for(model, &log, &rows, Horizon::FreeRun, initial)?

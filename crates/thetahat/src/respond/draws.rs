@@ -49,7 +49,8 @@ pub struct Drawn {
 /// y = sum_j B_j/(A F_j) u_j + C/(A D) e,   theta ~ N(theta-hat, P),   e ~ N(0, sigma^2)
 /// ```
 ///
-/// in deviations, from a [start](simulate) that is found for each draw. The spread of the runs is that of outputs that the
+/// in deviations, those of the output from an offset that is drawn with theta, and from a [start](simulate) that is found for each
+/// draw. The spread of the runs is that of outputs that the
 /// plant may give to these inputs, as far as the estimate knows, to all orders in the parameters (Ljung, System Identification,
 /// 2nd ed. 1999, section 9.6, gives the first). Parameters stay where P is unknown. Those of an unstable model, where the
 /// estimate is stable, are drawn again: the normal distribution, cut off where it says what cannot be.
@@ -94,6 +95,9 @@ pub fn draw(model: &Model, record: &Record<'_>, start: Start, draws: &Draws) -> 
                 "{count} of {samples} rows are more than {MOST_VALUES} values; ask for fewer, or for fewer rows"
             ),
         ));
+    }
+    if let Some((model, signals)) = model.with_open_offset(samples) {
+        return draw(&model, &record.with_inputs(&signals), start, draws);
     }
     let spread = Spread::of(model);
     let runs = (0..count).into_par_iter().map(|number| {

@@ -12,7 +12,7 @@ pub struct Forecast {
     /// y^(N+1 | N), y^(N+2 | N), …, in deviations like the record.
     pub values: Vec<f64>,
     /// The standard deviations of their errors: what the noise does, as [`prediction_deviation`](crate::prediction_deviation)
-    /// has it, and what the uncertainty of the parameters and of the initial states adds to first order, with the factor
+    /// has it, and what the uncertainty of the parameters, the output's offset and the initial states adds to first order, with the factor
     /// sqrt(nu/(nu - 2)) of Student's distribution where the noise variance was estimated with nu degrees of freedom.
     pub standard_deviations: Vec<f64>,
 }
@@ -79,6 +79,17 @@ pub(crate) fn forecast_if_possible(
     check_start(model, start)?;
     check_steps("steps", steps)?;
     check_future(model, inputs, steps)?;
+    if let Some((model, signals)) = model.with_open_offset(record.output.len() + steps) {
+        let (past, future): (Vec<_>, Vec<_>) = signals
+            .iter()
+            .map(|signal| {
+                let next = record.segments.last().map_or(0, |segment| segment.end);
+                (signal[..record.output.len()].to_vec(), &signal[next..next + steps])
+            })
+            .unzip();
+        let inputs = [inputs, &future].concat();
+        return forecast_if_possible(&model, &record.with_inputs(&past), &inputs, steps, start);
+    }
     let (Some(segment), Some(past)) = (record.segments.last(), record.past.last()) else { return Ok(None) };
     let found = of_segments(model, record, &[(segment.clone(), *past)], 1, start)?.pop();
     let Some(found) = found else { return Ok(None) };

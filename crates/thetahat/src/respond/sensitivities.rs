@@ -25,6 +25,10 @@
 //! impulses into 1/F have the covariance sigma^2 (Phi'Phi)^-1 of a regression; that counts in forecasts. On the samples they
 //! were estimated from errors are smaller for it, not larger, and nothing is added.
 //!
+//! The output's offset is an estimate as well. What is open of it is a constant k and a trend m on the right side of the equation,
+//! two more inputs whose coefficients are zero and uncertain: their directions are among the l_i (see
+//! [`OffsetCovariance`](crate::OffsetCovariance)).
+//!
 //! With sigma^2 estimated with nu degrees of freedom, the error over its scale is Student's t, whose standard deviation is
 //! sqrt(nu/(nu - 2)) of the scale.
 
@@ -289,7 +293,7 @@ pub(super) fn student(model: &Model, noise: f64, other: f64) -> f64 {
 }
 
 /// The standard deviations of the errors of k-step predictions of a record, one for each sample, in units of y: what the noise
-/// does, and what the uncertainty of the parameters and of the first errors adds.
+/// does, and what the uncertainty of the parameters, of the output's offset and of the first errors adds.
 ///
 /// ```text
 /// sigma^2 sum_{i<k} h_i^2 + g' P g,   g = dy^(t | t-k)/dtheta
@@ -331,6 +335,9 @@ pub fn prediction_deviations(
     start: Start,
 ) -> Result<Vec<f64>, Error> {
     check_inputs(model, record)?;
+    if let Some((model, signals)) = model.with_open_offset(record.output.len()) {
+        return prediction_deviations(&model, &record.with_inputs(&signals), horizon, start);
+    }
     let horizon = horizon.min(longest(record) + 1);
     let response = disturbance_response(model, horizon);
     let sigma = model.noise_variance.sqrt();

@@ -27,10 +27,28 @@ fn a_linear_model_says_exactly_what_a_constant_is_worth() {
     for orders in all.map(Result::unwrap) {
         for initial in [Initial::Drop, Initial::Zero] {
             let without = arx(&record, &orders, initial).unwrap();
-            let with = arx(&with_inputs(&record, &ones), &with_constants(&orders, 1), initial).unwrap();
+            let with = arx(&record.with_inputs(&ones), &orders.with_constants(1), initial).unwrap();
             let samples = without.samples() as f64;
             let decrease = samples * (without.mse() - with.mse());
-            let found = constant_decrease(&record, &orders, &without);
+            let of = OfConstant::new(&record, &orders, &without).unwrap();
+            let found = of.errors * of.errors / of.left;
+            // What all parameters would be, and how certain, to the noise variance of either.
+            let (rows, step) = of.joint(&without);
+            let beside = Beside { ramp: None, ..beside(200) };
+            let place = beside.places(&orders).start;
+            let ratio = with.noise_variance() / without.noise_variance();
+            let last = with.parameters()[place];
+            assert!((step[step.len() - 1] - last).abs() < 1e-9 * last.abs(), "{orders}");
+            for (k, (found, start)) in step.iter().zip(without.parameters()).enumerate() {
+                assert!((start + found - with.parameters()[k]).abs() < 1e-9, "{orders} {k}");
+                for (l, entry) in rows[k].iter().enumerate() {
+                    let expected = with.covariance().unwrap()[k][l];
+                    assert!(
+                        (entry * ratio - expected).abs() < 1e-7 * with.noise_variance(),
+                        "{orders} {k} {l}"
+                    );
+                }
+            }
             assert!(
                 (found - decrease).abs() < 1e-9 * samples * without.mse(),
                 "{orders}: {found} {decrease}"
@@ -43,7 +61,7 @@ fn a_linear_model_says_exactly_what_a_constant_is_worth() {
 fn with_line(orders: &Orders, beside: &Beside) -> Estimate {
     let (u, y) = signals(2, 200);
     let signals = beside.signals();
-    arx(&with_inputs(&record(&u, &y), &signals), &with_constants(orders, 2), Initial::Drop).unwrap()
+    arx(&record(&u, &y).with_inputs(&signals), &orders.with_constants(2), Initial::Drop).unwrap()
 }
 
 fn beside(count: usize) -> Beside {

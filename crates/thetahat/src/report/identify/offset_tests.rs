@@ -299,3 +299,78 @@ fn what_cannot_be_had_is_refused_by_name() {
     let error = identify(log(&u[..4], &sum[..4]), &[], &plan).unwrap_err().to_string();
     assert!(error.contains("constant"), "{error}");
 }
+
+#[test]
+fn what_is_open_of_the_offset_goes_with_the_model() {
+    let u = Noise(11).take(400);
+    let y = driven(&u, 0.3, 12);
+    let raised: Vec<f64> = y.iter().map(|y| y + 20.0).collect();
+    let method = Method::PredictionError(Search { tolerance: 1e-12, ..Search::default() });
+    for orders in structures() {
+        let open =
+            |y: &[f64], plan: &Plan| fitted(&u, y, plan).model.offset_covariance.map(|open| open.covariance);
+        // Estimated, around zero and around another level: the matrix is the same, and that of the parameters is a part of it.
+        let yes = Plan { detrend: Detrend::None, method: method.clone(), ..plan(&orders) };
+        let (low, high) = (open(&y, &yes).unwrap(), open(&raised, &yes).unwrap());
+        let count = orders.parameters();
+        let own = fitted(&u, &y, &yes).model.covariance.unwrap();
+        assert_eq!(low.len(), count + 1);
+        for (i, j) in (0..=count).flat_map(|i| (0..=count).map(move |j| (i, j))) {
+            let size = (low[i][i] * low[j][j]).sqrt();
+            assert!((low[i][j] - high[i][j]).abs() < 1e-3 * size, "{orders} {i} {j}");
+            assert!(i == count || j == count || (low[i][j] - own[i][j]).abs() < 1e-9 * size, "{orders}");
+        }
+        // Taken as a mean it is as uncertain, and as far off as its estimate.
+        let found = fitted(&u, &raised, &plan(&orders));
+        let mean = Plan { constant: Constant::No, method: method.clone(), ..plan(&orders) };
+        let report = fitted(&u, &raised, &mean);
+        let gain: f64 = report.model.a.iter().sum();
+        let off = gain * (level(&found).value - report.model.output.offset.level);
+        let taken = open(&raised, &mean).unwrap();
+        let expected = low[count][count] + off * off;
+        assert!(
+            (taken[count][count] / expected - 1.0).abs() < 0.1,
+            "{orders} {} {expected}",
+            taken[count][count]
+        );
+        let line = open(&raised, &Plan { detrend: Detrend::Linear, ..mean.clone() }).unwrap();
+        assert_eq!(line.len(), count + 2, "{orders}");
+        // What is given is certain, and old reports do not say.
+        let given = Plan { offsets: vec![("y".to_owned(), 20.0)], ..mean.clone() };
+        assert_eq!(open(&raised, &given), None);
+        assert_eq!(open(&raised, &Plan { detrend: Detrend::None, ..mean.clone() }), None);
+        let mut document: serde_json::Value = serde_json::from_str(&report.to_json().unwrap()).unwrap();
+        assert_eq!(Report::from_json(&document.to_string()).unwrap(), report);
+        document["model"].as_object_mut().unwrap().remove("offset_covariance");
+        assert_eq!(Report::from_json(&document.to_string()).unwrap().model.offset_covariance, None);
+    }
+    let instruments =
+        Plan { method: Method::InstrumentalVariables, constant: Constant::No, ..plan(&structures()[0]) };
+    assert!(fitted(&u, &raised, &instruments).model.offset_covariance.is_some());
+    let refined = Plan {
+        method: Method::RefinedInstrumentalVariables,
+        constant: Constant::No,
+        ..plan(&structures()[2])
+    };
+    assert!(fitted(&u, &raised, &refined).model.offset_covariance.is_some());
+}
+
+#[test]
+fn forecasts_count_the_level() {
+    // A short log with a slow pole: the mean is far from known.
+    let mut noise = Noise(13);
+    let u = noise.take(60);
+    let mut y = vec![0.0];
+    (1..60).for_each(|t| y.push(0.97 * y[t - 1] + 0.5 * u[t - 1] + noise.normal()));
+    let orders = Orders::arx(1, &[1], &[1]).unwrap();
+    let model = fitted(&u, &y, &Plan { constant: Constant::No, ..plan(&orders) }).model;
+    let given = Model { offset_covariance: None, ..model.clone() };
+    let last = |model: &Model, detrend: Option<Detrend>| {
+        let start = crate::Start::Drop;
+        let applied = crate::apply(model, log(&u, &y), &[], detrend, Horizon::Steps { steps: 20 }, start);
+        applied.unwrap().standard_deviations.unwrap()[59]
+    };
+    assert!(last(&model, None) > 1.05 * last(&given, None), "{} {}", last(&model, None), last(&given, None));
+    // An offset of other rows is not that of the model.
+    assert_eq!(last(&model, Some(Detrend::Mean)), last(&given, Some(Detrend::Mean)));
+}

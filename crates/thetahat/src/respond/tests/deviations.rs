@@ -4,7 +4,10 @@ use super::general::{model, models, output};
 use super::{signals, views, with_poles};
 use crate::data::Record;
 use crate::regression::noise::Noise;
-use crate::{Model, Start, forecast, predict, prediction_deviation, prediction_deviations};
+use crate::{
+    Draws, Model, OffsetCovariance, Orders, Start, draw, forecast, predict, prediction_deviation,
+    prediction_deviations,
+};
 
 /// A covariance matrix of full rank, small enough that the first order is exact.
 fn covariance(count: usize, noise: &mut Noise) -> Vec<Vec<f64>> {
@@ -156,4 +159,59 @@ fn degrees_of_freedom_make_intervals_wider() {
     assert!((of(Some(10)) / of(None) - 1.25_f64.sqrt()).abs() < 1e-14);
     // Student's distribution has a variance from three degrees on.
     assert!((of(Some(1)) / of(None) - 3.0_f64.sqrt()).abs() < 1e-14);
+}
+
+/// A matrix of zeros but for the variances of what is open of the offset.
+fn open(model: &mut Model, variances: &[f64], middle: Option<f64>) {
+    let own = model.parameters.len();
+    let size = own + variances.len();
+    let entry = |i: usize, j: usize| if i == j && i >= own { variances[i - own] } else { 0.0 };
+    let covariance = (0..size).map(|i| (0..size).map(|j| entry(i, j)).collect()).collect();
+    model.offset_covariance = Some(OffsetCovariance { covariance, middle });
+}
+
+#[test]
+fn an_open_offset_adds_what_a_constant_and_a_trend_do() {
+    let mut noise = Noise(31);
+    let (u, y) = (noise.take(60), noise.take(60));
+    let record = Record::new(&y, vec![&u]).unwrap();
+    let near = |found: f64, variance: f64| (found / variance.sqrt() - 1.0).abs() < 1e-12;
+    let of = |orders: Orders, parameters: &[f64]| {
+        Model::from_parameters(&orders, parameters, None, 0.25, 0.5).unwrap()
+    };
+    // Without A the constant is the level.
+    let mut oe = of(Orders::oe(&[1], &[1], &[1]).unwrap(), &[1.0, -0.5]);
+    open(&mut oe, &[0.04], None);
+    let found = prediction_deviations(&oe, &record, 3, Start::Zero).unwrap();
+    assert!(found.iter().all(|found| near(*found, 0.29)), "{found:?}");
+    let ahead = forecast(&oe, &record, &[&[1.0; 4]], 4, Start::Zero).unwrap();
+    assert!(ahead.standard_deviations.iter().all(|found| near(*found, 0.29)));
+    // An error of the equation goes through 1/A for as long as the horizon is.
+    let mut arx = of(Orders::arx(1, &[1], &[1]).unwrap(), &[-0.5, 1.0]);
+    open(&mut arx, &[0.04], None);
+    let (sums, squares) = ([1.0, 1.5, 1.75], [1.0, 1.25, 1.3125]);
+    for steps in 1..=3 {
+        let variance = 0.25 * squares[steps - 1] + 0.04 * sums[steps - 1] * sums[steps - 1];
+        let found = prediction_deviations(&arx, &record, steps, Start::Drop).unwrap();
+        assert!(found[steps..].iter().all(|found| near(*found, variance)), "{steps}");
+        let ahead = forecast(&arx, &record, &[&[1.0; 3]], 3, Start::Drop).unwrap();
+        assert!(near(ahead.standard_deviations[steps - 1], variance), "{steps}");
+    }
+    // A trend counts from the middle on, in seconds.
+    open(&mut oe, &[0.0, 0.01], Some(10.0));
+    let found = prediction_deviations(&oe, &record, 1, Start::Zero).unwrap();
+    let variance = |row: usize| 0.25 + 0.01 * (0.5 * row as f64 - 10.0).powi(2);
+    assert!(found.iter().enumerate().all(|(row, found)| near(*found, variance(row))));
+    let ahead = forecast(&oe, &record, &[&[1.0; 4]], 4, Start::Zero).unwrap();
+    for (step, found) in ahead.standard_deviations.iter().enumerate() {
+        assert!(near(*found, variance(60 + step)), "{step}");
+    }
+    // Draws have it too.
+    open(&mut oe, &[0.75], None);
+    let runs = draw(&oe, &record, Start::Zero, &Draws { count: 4000, seed: 1 }).unwrap();
+    let errors = |row: usize| {
+        let mean = runs.values.iter().map(|run| run[row]).sum::<f64>() / 4000.0;
+        runs.values.iter().map(|run| (run[row] - mean).powi(2)).sum::<f64>() / 3999.0
+    };
+    assert!(runs.varied && (errors(7) - 1.0).abs() < 0.09 && (errors(50) - 1.0).abs() < 0.09);
 }

@@ -16,8 +16,8 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 pub(crate) use filter::{EstimatorArgument, FilterArguments, FilterStartArgument};
 pub(crate) use fit::{
-    ConstantArgument, CriterionArguments, FitArguments, InitialArgument, MethodArgument, ModelArgument,
-    ModelArguments, PathArgument, SearchArgument, SearchArguments, SelectArgument,
+    ConstantArgument, CriterionArguments, FitArguments, InitialArgument, LikelihoodArgument, MethodArgument,
+    ModelArgument, ModelArguments, PathArgument, SearchArgument, SearchArguments, SelectArgument,
 };
 pub(crate) use inspect::InspectArguments;
 pub(crate) use lines::{LineArguments, LineFormatArgument};

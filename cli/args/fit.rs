@@ -100,6 +100,10 @@ pub(crate) struct ModelArguments {
     /// How to estimate
     #[arg(long, value_enum, default_value = "pem", help_heading = "Model")]
     pub(crate) method: MethodArgument,
+    /// Which likelihood to make large, given the first samples or of all of them: exact goes on through missing outputs (models
+    /// without D and F)
+    #[arg(long, value_enum, default_value = "conditional", help_heading = "Model")]
+    pub(crate) likelihood: LikelihoodArgument,
     /// What stands before the first sample of a stretch
     #[arg(long, value_enum, default_value = "auto", help_heading = "Model")]
     pub(crate) initial: InitialArgument,
@@ -228,8 +232,16 @@ pub(crate) enum InitialArgument {
     Drop,
     /// Zeros
     Zero,
-    /// What was measured before, and what fits best, found with the parameters (models with F)
+    /// What was measured before, and what fits best, found with the parameters (models with F, or --likelihood exact with inputs)
     Estimate,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum LikelihoodArgument {
+    /// Given the samples that the first error needs: least squared prediction errors
+    Conditional,
+    /// Of all measured outputs, by the Kalman filter (ar, arma, arx, armax)
+    Exact,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

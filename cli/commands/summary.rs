@@ -129,6 +129,18 @@ fn estimation(text: &mut Text, estimation: &Estimation, model: &Model) {
             ));
         }
         Procedure::Robust(found) => robust(text, found, estimation.initial),
+        Procedure::ExactLikelihood(found) => {
+            text.line(&format!(
+                "exact likelihood, ln L {}, {}, {}",
+                or_dash(found.log_likelihood, four),
+                outcome(&found.search),
+                match estimation.initial {
+                    Initial::Estimate => initial(Initial::Estimate, found.search.initial_conditions),
+                    _ if model.inputs.is_empty() => "stationary from the first sample on".to_owned(),
+                    _ => "stationary, and inputs at rest before the first sample".to_owned(),
+                }
+            ));
+        }
         Procedure::Constrained(outcome) => criterion(text, outcome, model, estimation.initial),
         Procedure::PredictionError(search) => {
             text.line(&format!(

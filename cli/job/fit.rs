@@ -4,7 +4,10 @@ use thetahat::{Constant, Detrend, Initial, Method, Plan, Prefilter, Rows, Select
 
 use super::orders::OrderJob;
 use super::{LogJob, method, parsed, rows};
-use crate::args::{ConstantArgument, FitArguments, InitialArgument, Names, SelectArgument};
+use crate::args::{
+    ConstantArgument, FitArguments, InitialArgument, LikelihoodArgument, ModelArguments, Names,
+    SelectArgument,
+};
 use crate::failure::Failure;
 use crate::memory::PerValue;
 
@@ -49,7 +52,7 @@ impl FitJob {
             split: arguments.choice.split.as_deref().map(|text| parsed("--split", text)).transpose()?,
             select: select(arguments.choice.select, &orders)?,
             method: method::method(arguments, &orders)?,
-            initial: initial(arguments.model.initial, &orders)?,
+            initial: initial(&arguments.model, &orders)?,
             constant: match arguments.model.constant {
                 ConstantArgument::Auto => Constant::Auto,
                 ConstantArgument::Yes => Constant::Yes,
@@ -147,8 +150,20 @@ fn select(argument: Option<SelectArgument>, orders: &OrderJob) -> Result<Select,
     })
 }
 
-fn initial(argument: InitialArgument, orders: &OrderJob) -> Result<Initial, Failure> {
-    Ok(match argument {
+fn initial(arguments: &ModelArguments, orders: &OrderJob) -> Result<Initial, Failure> {
+    let exact = arguments.likelihood == LikelihoodArgument::Exact;
+    Ok(match arguments.initial {
+        InitialArgument::Drop if exact => {
+            return Err(Failure::usage(
+                "--initial drop leaves samples out, and --likelihood exact is that of all of them; use auto, zero or estimate",
+            ));
+        }
+        InitialArgument::Estimate if exact && !orders.has_inputs() => {
+            return Err(Failure::usage(
+                "--initial estimate finds what inputs did before the first row, and this model has none; leave it out",
+            ));
+        }
+        InitialArgument::Estimate if exact => Initial::Estimate,
         InitialArgument::Drop if orders.is_filtered() => {
             return Err(Failure::usage(
                 "--initial drop is for models without F, whose errors depend on few samples; use zero, estimate or auto",

@@ -2,7 +2,7 @@ use thetahat::{Criterion, Loss, Method, Norm, Robust};
 
 use super::orders::OrderJob;
 use super::{parsed, positive, search};
-use crate::args::{CriterionArguments, FitArguments, MethodArgument};
+use crate::args::{CriterionArguments, FitArguments, LikelihoodArgument, MethodArgument};
 use crate::failure::Failure;
 
 /// How to estimate a model of these orders.
@@ -18,6 +18,9 @@ pub(super) fn method(arguments: &FitArguments, orders: &OrderJob) -> Result<Meth
         return Err(Failure::usage(format!(
             "{option} is for one model, and there is a choice among several; give each order one value"
         )));
+    }
+    if arguments.model.likelihood == LikelihoodArgument::Exact {
+        return exact(arguments, orders, alone);
     }
     let loss = match norm {
         Asked::Loss(loss) => Some(loss),
@@ -67,6 +70,34 @@ pub(super) fn method(arguments: &FitArguments, orders: &OrderJob) -> Result<Meth
             Ok(Method::Constrained(criterion))
         }
     }
+}
+
+/// The largest exact likelihood; `other` is an option that asks for another method or criterion.
+fn exact(arguments: &FitArguments, orders: &OrderJob, other: Option<&str>) -> Result<Method, Failure> {
+    let wrong = |message: String| Err(Failure::usage(message));
+    if let Some(option) = other {
+        return wrong(format!(
+            "{option} does not go with --likelihood exact, which is that of Gaussian errors and of nothing else; leave one of the \
+             two out"
+        ));
+    }
+    if orders.is_choice() {
+        return wrong(
+            "--likelihood exact is for one model, and there is a choice among several; give each order one value".to_owned(),
+        );
+    }
+    if !orders.is_armax() {
+        return wrong(
+            "--likelihood exact is for ar, arma, arx and armax, A y = B u + C e, and not for models with D or F; leave it out"
+                .to_owned(),
+        );
+    }
+    if arguments.prefilter.is_some() {
+        return wrong(
+            "--prefilter does not go with --likelihood exact: errors in a band are not white; leave one of the two out".to_owned(),
+        );
+    }
+    Ok(Method::ExactLikelihood(search::search(&arguments.search)?))
 }
 
 /// What to make small.

@@ -175,6 +175,12 @@ impl OrderJob {
         matches!(self, Self::Given(grid) if self.is_filtered() && alone(grid))
     }
 
+    /// Whether it is one model without D and F: A y = B u + C e.
+    pub(crate) fn is_armax(&self) -> bool {
+        let without = |grid: &Grid| grid.nf.iter().chain([&grid.nd]).all(|range| range.last() == 0);
+        matches!(self, Self::Given(grid) if without(grid))
+    }
+
     /// Whether the predictor is linear in the parameters: C = D = F = 1.
     pub(crate) fn is_linear(&self) -> bool {
         match self {

@@ -96,7 +96,7 @@ impl Model {
             report.selection.is_none()
                 && !matches!(
                     report.estimation.procedure,
-                    Procedure::PredictionError(_) | Procedure::Robust(_)
+                    Procedure::PredictionError(_) | Procedure::Robust(_) | Procedure::ExactLikelihood(_)
                 )
         };
         let stored;

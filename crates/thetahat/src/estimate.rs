@@ -4,8 +4,10 @@ mod arx;
 mod border;
 mod common;
 mod criterion;
+mod exact;
 mod instrumental;
 mod normal;
+mod objective;
 mod offset;
 mod optimize;
 mod prediction_error;
@@ -29,6 +31,8 @@ pub use arx::{arx, arx_factor};
 pub(crate) use arx::{enough, estimate_is_for_f};
 pub(crate) use common::{Common, Point, Window, extended};
 pub use criterion::{Bound, Criterion, CriterionOutcome, GainBound, Norm};
+pub use exact::LikelihoodOutcome;
+pub(crate) use exact::exact_mean;
 pub use offset::Constant;
 pub(crate) use offset::{Beside, Fitted, OutputOffset, Task, pays};
 pub use optimize::{Algorithm, Monitor, Progress, Search, SearchOutcome, StartOutcome, Step, Stopped};
@@ -51,6 +55,9 @@ pub(crate) use uncertainty::{Autoregression, autoregression, backward_filtered_p
 /// | auto | drop | estimate with a past, or where it is worth it; else zero |
 ///
 /// n more initial conditions are worth it if N ln(V_without/V_with) > n ln N. C begins with e = 0.
+///
+/// [`Method::ExactLikelihood`] takes no past output, and leaves no sample out: drop is refused, and the response to the inputs is
+/// treated as with F, A standing for F.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Initial {
@@ -100,6 +107,8 @@ pub enum Procedure {
     Constrained(CriterionOutcome),
     /// By a search for the least sum of a loss that does not follow wild samples.
     Robust(RobustOutcome),
+    /// By a search for the largest likelihood of all measured outputs.
+    ExactLikelihood(LikelihoodOutcome),
 }
 
 /// How to estimate.
@@ -115,6 +124,32 @@ pub enum Method {
     Constrained(Criterion),
     /// A loss of the prediction errors that grows like |e|, for any structure (Huber 1981).
     Robust(Robust),
+    /// The largest likelihood of all measured outputs, by the Kalman filter, for A y = B u + C e with a stable A: through missing
+    /// outputs, and without a first sample left out (Harvey 1989). The covariance is that of the information of the parameters.
+    ///
+    /// The response to the inputs begins at rest ([`Initial::Zero`]), or in a state that is estimated ([`Initial::Estimate`]);
+    /// auto takes the second where samples were measured before a segment, or it is worth its parameters. The process C/A e begins
+    /// with its stationary covariance. An iteration takes O(N (m^2 (na + nc) + m p + p^2)), m = max(na, nc); without missing outputs
+    /// the first term is soon over.
+    ///
+    /// ```
+    /// use thetahat::{Channel, Initial, Log, Method, Orders, Procedure, Search, estimate};
+    ///
+    /// let mut y = vec![0.0];
+    /// for t in 1..200_u32 {
+    ///     y.push(0.8 * y[y.len() - 1] + f64::from(t * t * 7 % 23) - 11.0);
+    /// }
+    /// (0..200).filter(|t| t * 3 % 10 < 3).for_each(|t| y[t] = f64::NAN);
+    /// let log = Log::new(vec![Channel { name: "y".into(), values: y }], 1.0)?;
+    /// let record = log.driven_record(&[], "y", &["1..200".parse()?])?;
+    /// let method = Method::ExactLikelihood(Search::default());
+    /// let found = estimate(&record, &Orders::arx(1, &[], &[])?, &method, Initial::Auto)?;
+    /// assert_eq!(found.samples(), 140);
+    /// assert!((found.parameters()[0] + 0.8).abs() < 0.1); // a1
+    /// assert!(matches!(found.procedure(), Procedure::ExactLikelihood(found) if found.log_likelihood.is_some()));
+    /// # Ok::<(), thetahat::Error>(())
+    /// ```
+    ExactLikelihood(Search),
 }
 
 impl Default for Method {
@@ -188,6 +223,10 @@ pub(crate) fn estimate_of_channels(
             prediction_error::prediction_error(record, orders, initial, search, monitor)
         }
         Method::Robust(how) => robust::robust(record, orders, initial, how, monitor),
+        Method::ExactLikelihood(search) => {
+            let lines = orders.inputs().saturating_sub(inputs.len());
+            exact::exact(record, lines, orders, initial, search, monitor)
+        }
         Method::InstrumentalVariables => instrumental::instrumental_variables(record, orders, initial),
         Method::RefinedInstrumentalVariables => {
             instrumental::refined_instrumental_variables(record, orders, initial)
@@ -255,9 +294,18 @@ impl Estimate {
         self.samples
     }
 
-    /// The mean of e^2 over these samples.
+    /// The mean of e^2 over these samples; for exact likelihood that of v^2/f, innovations over their variances in units of
+    /// var e: the estimate of var e that makes the likelihood largest.
     pub fn mse(&self) -> f64 {
         self.mse
+    }
+
+    /// The mean of e^2 of an estimate of least squared errors that has the same likelihood, in which every f is 1.
+    pub(crate) fn cost(&self) -> f64 {
+        match &self.procedure {
+            Procedure::ExactLikelihood(outcome) => outcome.cost().unwrap_or(self.mse),
+            _ => self.mse,
+        }
     }
 
     /// The condition number of psi, its columns scaled to unit norm; none where they are dependent.
@@ -284,7 +332,7 @@ impl Estimate {
                 prediction_error::coloured_covariance(record, orders, &self)
             }
             Procedure::Robust(_) if orders.structure() == crate::Structure::Oe => self.covariance,
-            Procedure::Constrained(_) | Procedure::Robust(_) => None,
+            Procedure::Constrained(_) | Procedure::Robust(_) | Procedure::ExactLikelihood(_) => None,
             Procedure::InstrumentalVariables { .. } | Procedure::RefinedInstrumentalVariables { .. } => {
                 self.covariance
             }
@@ -292,8 +340,8 @@ impl Estimate {
         Self { covariance, noise_variance, ..self }
     }
 
-    /// FPE, AIC, AICc and MDL.
+    /// FPE, AIC, AICc and MDL; of the exact likelihood where that was made large: AIC = (2 p - 2 ln L)/N - ln 2 pi - 1, and MDL alike.
     pub fn criteria(&self) -> Criteria {
-        Criteria::new(self.mse, self.parameters.len(), self.samples)
+        Criteria::new(self.cost(), self.parameters.len(), self.samples)
     }
 }

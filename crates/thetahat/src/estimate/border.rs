@@ -17,6 +17,7 @@ const NEARER: f64 = 0.2;
 /// Memory for such steps, taken once.
 #[derive(Debug)]
 pub(super) struct Border {
+    stable_a: bool,
     before: Polynomials,
     after: Polynomials,
     roots: Roots,
@@ -25,10 +26,13 @@ pub(super) struct Border {
 }
 
 impl Border {
-    pub(super) fn new(orders: &Orders) -> Self {
+    /// For models whose A has to be stable too, or need not be.
+    pub(super) fn new(orders: &Orders, stable_a: bool) -> Self {
         let zero = vec![0.0; orders.parameters()];
-        let longest = orders.nf.iter().copied().fold(orders.nc, usize::max) + 1;
+        let na = if stable_a { orders.na } else { 0 };
+        let longest = orders.nf.iter().copied().fold(orders.nc.max(na), usize::max) + 1;
         Self {
+            stable_a,
             before: Polynomials::new(orders, &zero),
             after: Polynomials::new(orders, &zero),
             roots: Roots::with_capacity(longest),
@@ -37,14 +41,16 @@ impl Border {
         }
     }
 
-    /// Moves the roots of C and F at `trial` that are outside the unit circle back into it, on a circle that is nearer to it than
-    /// the roots at `from`. Says whether that gave a stable C and F. O(n^2) for each sweep over n roots.
+    /// Moves the roots of C and F at `trial`, and of A if need be, that are outside the unit circle back into it, on a circle that
+    /// is nearer to it than the roots at `from`. Says whether that made all of them stable. O(n^2) for each sweep over n roots.
     pub(super) fn draw_in(&mut self, from: &[f64], trial: &mut [f64]) -> bool {
-        let Self { before, after, roots, product, scratch } = self;
+        let Self { stable_a, before, after, roots, product, scratch } = self;
         before.set(from);
         after.set(trial);
-        let all_before = std::iter::once(&before.c).chain(&before.f);
-        for (monic, before) in std::iter::once(&mut after.c).chain(&mut after.f).zip(all_before) {
+        let a = usize::from(!*stable_a);
+        let all_before = [&before.a, &before.c].into_iter().skip(a).chain(&before.f);
+        let all_after = [&mut after.a, &mut after.c].into_iter().skip(a).chain(&mut after.f);
+        for (monic, before) in all_after.zip(all_before) {
             if is_stable(monic, scratch) {
                 continue;
             }
@@ -88,10 +94,17 @@ mod tests {
         let orders = Orders::bj(&[1], 1, 0, &[2], &[1]).unwrap();
         let from = [2.0, 0.3, -1.4, 0.45];
         let mut trial = [3.0, 0.5, -1.7, 0.52];
-        assert!(Border::new(&orders).draw_in(&from, &mut trial));
+        assert!(Border::new(&orders, false).draw_in(&from, &mut trial));
         assert_eq!(trial[..2], [3.0, 0.5]);
         let found = roots(&[1.0, trial[2], trial[3]]).unwrap();
         // A fifth of the distance of 0.1.
         assert!((found[0].re - 0.98).abs() < 1e-12 && (found[1].re - 0.4).abs() < 1e-12, "{found:?}");
+        // A may be unstable, or may not.
+        let orders = Orders::armax(1, &[], 1, &[]).unwrap();
+        let (from, mut trial) = ([-0.9, 0.3], [-1.2, 0.4]);
+        assert!(Border::new(&orders, false).draw_in(&from, &mut trial));
+        assert_eq!(trial, [-1.2, 0.4]);
+        assert!(Border::new(&orders, true).draw_in(&from, &mut trial));
+        assert!((trial[0] + 0.98).abs() < 1e-12 && trial[1] == 0.4, "{trial:?}");
     }
 }

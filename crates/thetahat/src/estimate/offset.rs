@@ -204,6 +204,7 @@ impl Task<'_> {
                     _ => self.plain(None),
                 };
             }
+            Method::ExactLikelihood(_) => return self.by_likelihood(beside),
             // All parameters within a bound: a set, and no likelihood.
             Method::Constrained(Criterion { noise_bound: Some(_), .. }) => return self.plain(None),
             Method::Constrained(_) | Method::PredictionError(_) => {}
@@ -238,9 +239,25 @@ impl Task<'_> {
         Ok(if is_certain && is_worth(&without.estimate, &with.estimate, 1.0) { with } else { without })
     }
 
+    /// With a constant if that raises the exact likelihood by its price.
+    fn by_likelihood(&self, beside: &Beside) -> Result<Fitted, Error> {
+        let started = Instant::now();
+        let without = self.plain(None)?;
+        let from = beside.with_zeros(self.orders, without.estimate.parameters());
+        let method = self.method_within(started);
+        match (Task { method: &method, ..*self }).beside(beside, Some(from)) {
+            Err(Error::Interrupted) => Err(Error::Interrupted),
+            Ok(Some(Found { fitted: with, .. })) if is_worth(&without.estimate, &with.estimate, 1.0) => {
+                Ok(with)
+            }
+            _ => Ok(without),
+        }
+    }
+
     /// Why there can be no constant.
     fn refusal(&self) -> Option<&'static str> {
-        if self.initial == Initial::Zero && self.orders.na > 0 {
+        let exact = matches!(self.method, Method::ExactLikelihood(_));
+        if self.initial == Initial::Zero && self.orders.na > 0 && !exact {
             return Some(
                 "zeros before the first sample are not at the level that is to be found, and A reaches back to them; take \
                  another initial condition, or leave the constant out",
@@ -257,7 +274,9 @@ impl Task<'_> {
     /// The method with the time that is left since then.
     fn method_within(&self, started: Instant) -> Method {
         let mut method = self.method.clone();
-        if let Method::PredictionError(Search { time_limit: Some(limit), .. }) = &mut method {
+        if let Method::PredictionError(search) | Method::ExactLikelihood(search) = &mut method
+            && let Some(limit) = &mut search.time_limit
+        {
             *limit = limit.saturating_sub(started.elapsed());
         }
         method
@@ -315,6 +334,7 @@ impl Task<'_> {
         // A guess of the model alone is one of it with zeros.
         let own = match self.method {
             Method::PredictionError(Search { guess: Some(own), .. })
+            | Method::ExactLikelihood(Search { guess: Some(own), .. })
                 if own.len() == self.orders.parameters() =>
             {
                 Some(beside.with_zeros(self.orders, own))
@@ -420,6 +440,9 @@ fn with_guess(method: &Method, guess: Option<Vec<f64>>) -> Method {
         (Method::PredictionError(search), Some(guess)) => {
             Method::PredictionError(Search { guess: Some(guess), ..search.clone() })
         }
+        (Method::ExactLikelihood(search), Some(guess)) => {
+            Method::ExactLikelihood(Search { guess: Some(guess), ..search.clone() })
+        }
         _ => method.clone(),
     }
 }
@@ -442,7 +465,7 @@ fn is_worth(without: &Estimate, with: &Estimate, share: f64) -> bool {
     let price = 1.0 + conditions(with) as f64 - conditions(without) as f64;
     let size = |estimate: &Estimate| match estimate.procedure() {
         Procedure::Constrained(outcome) if outcome.norm != Norm::Two => outcome.objective.powi(2),
-        _ => estimate.mse(),
+        _ => estimate.cost(),
     };
     without.mse() > 0.0 && share * samples * (size(without) / size(with)).ln() > price * samples.ln()
 }
@@ -452,6 +475,7 @@ fn conditions(estimate: &Estimate) -> usize {
     match estimate.procedure() {
         Procedure::PredictionError(outcome) => outcome.initial_conditions,
         Procedure::RefinedInstrumentalVariables { initial_conditions, .. } => *initial_conditions,
+        Procedure::ExactLikelihood(outcome) => outcome.search.initial_conditions,
         _ => 0,
     }
 }

@@ -24,6 +24,7 @@ use serde::{Deserialize, Serialize};
 
 use super::border::Border;
 use super::normal;
+use super::objective::Objective;
 use super::predictor::{Predictor, Unusable};
 use crate::{Error, Orders};
 
@@ -285,25 +286,25 @@ struct Room {
 }
 
 impl Room {
-    /// The cost of the trial with A and B solved for.
-    fn best_linear(&mut self, predictor: &mut Predictor<'_>) -> Result<f64, Unusable> {
+    /// The cost of the trial, with the parameters solved for that e is linear in.
+    fn best_linear(&mut self, predictor: &mut impl Objective) -> Result<f64, Unusable> {
         solve_linear(predictor, &mut self.trial, &mut self.factor, &mut self.moved)
     }
 
     /// Scales the normal equations so that the matrix has a unit diagonal, and solves them. Gives the decrease of the cost
     /// that the solution foretells.
-    fn scale(&mut self, predictor: &Predictor<'_>) -> f64 {
+    fn scale(&mut self, predictor: &impl Objective) -> f64 {
         let size = self.scales.len();
         for (index, scale) in self.scales.iter_mut().enumerate() {
-            let diagonal = predictor.matrix[index * size + index];
+            let diagonal = predictor.matrix()[index * size + index];
             // A column of zeros stays one.
             *scale = if diagonal > 0.0 { diagonal.sqrt() } else { 1.0 };
-            self.right[index] = predictor.right[index] / *scale;
+            self.right[index] = predictor.right()[index] / *scale;
         }
         for row in 0..size {
             for column in 0..size {
                 self.scaled[row * size + column] =
-                    predictor.matrix[row * size + column] / self.scales[row] / self.scales[column];
+                    predictor.matrix()[row * size + column] / self.scales[row] / self.scales[column];
             }
         }
         self.solve_damped(SMALLEST_DAMPING);
@@ -323,9 +324,9 @@ impl Room {
     /// `(H + damping I) step = g` with the least damping, in tenfold steps, that makes the matrix positive definite.
     ///
     /// H comes from central differences of g, one-sided ones beside the border of stability: 2 p linearizations.
-    fn newton_step(&mut self, predictor: &mut Predictor<'_>, parameters: &[f64], cost: f64) {
+    fn newton_step(&mut self, predictor: &mut impl Objective, parameters: &[f64], cost: f64) {
         let size = self.scales.len();
-        self.center.copy_from_slice(&predictor.right);
+        self.center.copy_from_slice(predictor.right());
         for column in 0..size {
             // A change of sqrt(cost)/scale changes the errors by their own size.
             let apart = DIFFERENCE * (parameters[column].abs() + 100.0 * cost.sqrt() / self.scales[column]);
@@ -341,7 +342,7 @@ impl Room {
                     width += apart;
                 }
                 // g is minus half the gradient.
-                let gradient = if usable { &predictor.right } else { &self.center };
+                let gradient = if usable { predictor.right() } else { &self.center };
                 for (row, value) in gradient.iter().enumerate() {
                     self.hessian[row * size + column] -= side * value;
                 }
@@ -401,7 +402,7 @@ enum Rule {
 /// # Errors
 /// [`Error::Interrupted`]; the [`Unusable`] of a start that has no cost.
 pub(super) fn search(
-    predictor: &mut Predictor<'_>,
+    predictor: &mut impl Objective,
     start: &[f64],
     search: &Search,
     smallest: f64,
@@ -422,7 +423,7 @@ pub(super) fn search(
         right: line(),
         hessian: if newton { square() } else { Vec::new() },
         center: line(),
-        border: Border::new(predictor.orders()),
+        border: Border::new(predictor.orders(), predictor.needs_stable_a()),
     };
     let mut parameters = start.to_vec();
     let mut cost = match best_free(predictor, &parameters) {
@@ -560,7 +561,7 @@ pub(super) fn search(
 }
 
 /// The cost of parameters with the free responses that are best for them.
-pub(super) fn best_free(predictor: &mut Predictor<'_>, parameters: &[f64]) -> Result<f64, Unusable> {
+pub(super) fn best_free(predictor: &mut impl Objective, parameters: &[f64]) -> Result<f64, Unusable> {
     predictor.restart();
     let cost = predictor.evaluate(parameters)?;
     if predictor.initial_conditions() == 0 {
@@ -572,31 +573,32 @@ pub(super) fn best_free(predictor: &mut Predictor<'_>, parameters: &[f64]) -> Re
     predictor.evaluate(parameters)
 }
 
-/// The same with A and B solved for as well: e is linear in them where C, D and F are given. Writes them into `parameters`.
-pub(super) fn best_linear(predictor: &mut Predictor<'_>, parameters: &mut [f64]) -> Result<f64, Unusable> {
+/// The same with the parameters solved for that e is linear in where the others are given. Writes them into `parameters`.
+pub(super) fn best_linear(predictor: &mut impl Objective, parameters: &mut [f64]) -> Result<f64, Unusable> {
     let size = parameters.len();
     solve_linear(predictor, parameters, &mut vec![0.0; size * size], &mut vec![0.0; size])
 }
 
 /// The same in memory for a matrix and a step.
 fn solve_linear(
-    predictor: &mut Predictor<'_>,
+    predictor: &mut impl Objective,
     parameters: &mut [f64],
     matrix: &mut [f64],
     step: &mut [f64],
 ) -> Result<f64, Unusable> {
     best_free(predictor, parameters)?;
     predictor.linearize();
-    let orders = predictor.orders();
-    let (size, linear) = (parameters.len(), orders.na + orders.nb.iter().sum::<usize>());
-    let matrix = &mut matrix[..linear * linear];
-    for (own, whole) in matrix.chunks_exact_mut(linear.max(1)).zip(predictor.matrix.chunks_exact(size)) {
-        own.copy_from_slice(&whole[..linear]);
+    let (size, linear) = (parameters.len(), predictor.linear());
+    let count = linear.len();
+    let matrix = &mut matrix[..count * count];
+    let whole = predictor.matrix().chunks_exact(size).skip(linear.start);
+    for (own, whole) in matrix.chunks_exact_mut(count.max(1)).zip(whole) {
+        own.copy_from_slice(&whole[linear.clone()]);
     }
     step.fill(0.0);
-    step[..linear].copy_from_slice(&predictor.right[..linear]);
-    normal::factor(matrix, linear);
-    normal::solve(matrix, linear, &mut step[..linear]);
+    step[linear.clone()].copy_from_slice(&predictor.right()[linear.clone()]);
+    normal::factor(matrix, count);
+    normal::solve(matrix, count, &mut step[linear]);
     parameters.iter_mut().zip(&*step).for_each(|(value, step)| *value += step);
     predictor.try_free(step);
     predictor.evaluate(parameters)

@@ -9,6 +9,7 @@ use std::ops::Range;
 use thetahat_core::nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::arx::{arx, estimate_is_for_f, out_of_range, rows, signals};
+use super::objective::Objective;
 use super::optimize::{
     Algorithm, Deadline, Found, Monitor, Search, SearchOutcome, StartOutcome, Stopped, best_free, search,
 };
@@ -358,7 +359,7 @@ impl Job<'_> {
 pub(super) fn search_outcome(
     options: &Search,
     found: &Found,
-    predictor: &Predictor<'_>,
+    predictor: &impl Objective,
     starts: Vec<StartOutcome>,
 ) -> SearchOutcome {
     SearchOutcome {
@@ -581,10 +582,10 @@ pub(super) fn energy(record: &Record<'_>) -> f64 {
 
 /// Gives `starts` a record without missing outputs: these are put on lines from one measured output to the next. Starts need to
 /// lead near the minimum, no more.
-fn filled<T>(record: &Record<'_>, orders: &Orders, starts: impl FnOnce(&Record<'_>) -> T) -> T {
+pub(super) fn filled<T>(record: &Record<'_>, starts: impl FnOnce(&Record<'_>) -> T) -> T {
     let runs = |segment: &Range<usize>| measured(record.output, segment);
     let whole = |segment: &Range<usize>| runs(segment).first() == Some(segment);
-    if orders.needs_past_outputs() || record.segments.iter().all(whole) {
+    if record.segments.iter().all(whole) {
         return starts(record);
     }
     let mut output = record.output.to_vec();
@@ -625,7 +626,7 @@ fn enough(predictor: &Predictor<'_>, orders: &Orders) -> Result<(), Error> {
 }
 
 /// The error of a cost that does not depend on some combination of the parameters.
-fn flat(orders: &Orders, parameters: &[f64]) -> Error {
+pub(super) fn flat(orders: &Orders, parameters: &[f64]) -> Error {
     let model = Model::from_parameters(orders, parameters, None, 0.0, 1.0);
     let advice = model.ok().as_ref().and_then(near_cancellation).map_or_else(
         || "lower the orders, or excite the input more".to_owned(),

@@ -93,6 +93,12 @@ impl Plan {
                 "it is a line with a slope and a level, which is the constant; leave out one of the two",
             ));
         }
+        if self.prefilter.is_some() && matches!(self.method, Method::ExactLikelihood(_)) {
+            return Err(Error::argument(
+                "prefilter",
+                "the exact likelihood is that of errors that are white, and those in a band are not; leave one of the two out",
+            ));
+        }
         if self.prefilter.is_some() && (self.trend || self.constant == Constant::Yes) {
             return Err(Error::argument(
                 "constant",
@@ -269,7 +275,8 @@ fn fit(
     }
     if let Choice::Known(orders) = &plan.choice {
         let record = estimation_rows(&log, plan, orders, &estimation)?;
-        let left_out = if plan.initial == Initial::Zero { 0 } else { orders.conditioned() };
+        let exact = matches!(plan.method, Method::ExactLikelihood(_));
+        let left_out = if exact || plan.initial == Initial::Zero { 0 } else { orders.conditioned() };
         let rows = record.segments.iter().zip(&record.past);
         enough(
             rows.map(|(rows, past)| rows.len().saturating_sub(left_out.saturating_sub(*past))).sum(),
@@ -393,7 +400,8 @@ fn estimation_rows<'l>(
     rows: &[Rows],
 ) -> Result<Record<'l>, Error> {
     let squares = matches!(plan.method, Method::PredictionError(_) | Method::Constrained(_));
-    if squares && goes_through(orders, plan.initial) {
+    let exact = matches!(plan.method, Method::ExactLikelihood(_));
+    if exact || squares && goes_through(orders, plan.initial) {
         return log.driven_record(&plan.inputs, &plan.output, rows);
     }
     log.record(&plan.inputs, &plan.output, rows)

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::apply::{check_sample_time, record_for};
 use super::{Report, Source};
 use crate::data::{Detrend, Log, Offset, Prefiltered, Record, Rows, checked};
+use crate::estimate::exact_mean;
 use crate::figures::{chance, fixed, number};
 use crate::regression::sum;
 use crate::respond::{Innovations, Response, check_steps, innovations, prediction_deviations};
@@ -325,6 +326,10 @@ fn is_of_fit(report: &Report, log: &Log, inputs: &[String]) -> bool {
     }
     let start = estimation_start(report);
     let (output, rows) = (&report.model.output.name, &report.data.estimation);
+    if is_exact(report) {
+        let record = log.driven_record(inputs, output, rows);
+        return record.is_ok_and(|record| gives_likelihood(report, &record));
+    }
     if let Some(band) = report.data.prefilter {
         let band = Prefiltered::new(&band, log, inputs, output);
         return band
@@ -343,6 +348,8 @@ fn is_of_fit(report: &Report, log: &Log, inputs: &[String]) -> bool {
 /// What the responses on the rows of the fit start from, as the estimate did.
 pub(super) fn estimation_start(report: &Report) -> Start {
     match report.estimation.initial {
+        // Its filter begins with a covariance: predictions have none.
+        _ if is_exact(report) => Start::natural(&report.model, Horizon::Steps { steps: 1 }),
         Initial::Zero => Start::Zero,
         // Without F there is nothing to estimate, and C begins from e = 0 where it does in the fit.
         _ if !report.model.orders.is_linear() => Start::Estimate,
@@ -366,7 +373,7 @@ pub(super) fn estimation_record<'l>(
         let record = log.record(inputs, output, rows)?;
         return Ok(Record { past: vec![0; record.segments.len()], ..record });
     }
-    if goes_through(&report.model.orders, report.estimation.initial) {
+    if !is_exact(report) && goes_through(&report.model.orders, report.estimation.initial) {
         return log.driven_record(inputs, output, rows);
     }
     log.record(inputs, output, rows)
@@ -375,6 +382,21 @@ pub(super) fn estimation_record<'l>(
 /// Whether an estimate of least squared errors goes on through missing outputs. From zeros, rows of least squares begin anew.
 pub(super) fn goes_through(orders: &Orders, initial: Initial) -> bool {
     !orders.needs_past_outputs() && (orders.has_f() || initial != Initial::Zero)
+}
+
+/// Whether the estimate is that of largest exact likelihood.
+pub(super) fn is_exact(report: &Report) -> bool {
+    matches!(report.estimation.procedure, Procedure::ExactLikelihood(_))
+}
+
+/// Whether the Kalman filter on a record gives the variance of such an estimate again.
+fn gives_likelihood(report: &Report, record: &Record<'_>) -> bool {
+    let (model, estimation) = (&report.model, &report.estimation);
+    let parameters: Vec<f64> = model.parameters.iter().map(|parameter| parameter.value).collect();
+    let found = exact_mean(record, &model.orders, &parameters, estimation.initial);
+    found.is_some_and(|(samples, mse)| {
+        samples == estimation.samples && (mse - estimation.mse).abs() <= NEARLY_SAME * estimation.mse
+    })
 }
 
 /// Whether the errors one step ahead on a record give the mean square of the estimate again.

@@ -1,6 +1,7 @@
 //! What a careful reader of a report should know, in plain words.
 
 use super::schema::Report;
+use super::validation::is_exact;
 use crate::estimate::{Procedure, SearchOutcome, Stopped};
 use crate::figures::{fixed, number, scientific};
 use crate::model::{cancel, near_cancellation};
@@ -17,13 +18,19 @@ pub(super) fn warnings(report: &Report) -> Vec<String> {
     let (data, model) = (&report.data, &report.model);
     let mut warnings = Vec::new();
     for missing in data.missing.iter().filter(|missing| missing.rows > 0) {
-        let simulated = model.structure == Structure::Oe && missing.channel == model.output.name;
+        let output = missing.channel == model.output.name;
         warnings.push(format!(
             "channel '{}' misses {} of {} values; {}",
             missing.channel,
             missing.rows,
             data.rows,
-            if simulated { "these rows do not count" } else { "the log is cut there" }
+            if output && model.structure == Structure::Oe {
+                "these rows do not count"
+            } else if output && is_exact(report) {
+                "the fit goes on through them, its figures do not"
+            } else {
+                "the log is cut there"
+            }
         ));
     }
     if data.time_gaps > 0 {
@@ -46,6 +53,17 @@ pub(super) fn warnings(report: &Report) -> Vec<String> {
     match &report.estimation.procedure {
         Procedure::PredictionError(search) => warnings.extend(search_warnings(search)),
         Procedure::Robust(outcome) => warnings.extend(search_warnings(&outcome.search)),
+        Procedure::ExactLikelihood(outcome) => {
+            warnings
+                .extend(search_warnings(&SearchOutcome { stability_bound: false, ..outcome.search.clone() }));
+            if outcome.search.stability_bound {
+                warnings.push(
+                    "the search ended at the border of stability: A or C has a root on the unit circle; take differences of an \
+                     output that wanders without a level, and of one that was differenced too often none; or lower na or nc"
+                        .to_owned(),
+                );
+            }
+        }
         _ => {}
     }
     if let Some((pole, zero)) = near_cancellation(model) {

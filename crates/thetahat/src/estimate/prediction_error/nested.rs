@@ -61,7 +61,7 @@ impl Job<'_> {
                 .filter_map(|less| Some(extended(&lowered(orders, &top, &less), known.get(&less)?, &own)));
             let mut starts: Vec<Vec<f64>> = padded.collect();
             if has_recipes(&at, &top, &bottom) {
-                starts.extend(filled(record, &own, |record| {
+                starts.extend(filled(record, |record| {
                     let plants = plants.entry([at[1], at[4]]);
                     let plants = plants.or_insert_with(|| Plants::new(record, &own, self.deadline));
                     plants.with_noise(record, &own, self.deadline)

@@ -48,7 +48,7 @@ impl Job<'_> {
     ) -> Result<Beginning, Error> {
         let Problem { record, orders, .. } = problem;
         let guess = self.options.guess.iter().map(|guess| (GUESS, guess.clone()));
-        let recipes = filled(record, orders, |record| candidates(record, orders, self.deadline));
+        let recipes = filled(record, |record| candidates(record, orders, self.deadline));
         let found = match recipes {
             Err(error) if self.options.guess.is_none() => return Err(error),
             found => found.unwrap_or_default(),

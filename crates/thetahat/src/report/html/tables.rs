@@ -128,6 +128,15 @@ fn procedure(procedure: &Procedure) -> String {
             let search = &outcome.search;
             format!("{loss}, iterations: {}, {}", search.iterations, stopped(&search.stopped))
         }
+        Procedure::ExactLikelihood(outcome) => {
+            let search = &outcome.search;
+            format!(
+                "exact likelihood, ln L = {}, iterations: {}, {}",
+                or_dash(outcome.log_likelihood, |value| fixed(value, 4)),
+                search.iterations,
+                stopped(&search.stopped)
+            )
+        }
         Procedure::Constrained(outcome) => format!("convex optimization, norm {}", outcome.norm),
     }
 }

@@ -21,6 +21,7 @@ mod html;
 mod identities;
 mod inspect;
 mod interrupt;
+mod likelihood;
 mod names;
 mod output_files;
 mod predict_simulate;

@@ -75,6 +75,33 @@ def test_information_criteria_are_those_of_statsmodels() -> None:
     assert np.isnan(exact.aic) == (exact.mse == 0)
 
 
+@pytest.mark.filterwarnings("ignore:channel 'y' misses")
+@pytest.mark.parametrize("holes", [False, True])
+def test_the_exact_likelihood_is_that_of_statsmodels(holes: bool) -> None:
+    random = np.random.default_rng(8)
+    y, e = np.zeros(300), random.standard_normal(300)
+    for t in range(2, 300):
+        y[t] = 1.2 * y[t - 1] - 0.5 * y[t - 2] + e[t] + 0.4 * e[t - 1]
+    if holes:
+        y[random.choice(300, 90, replace=False)] = np.nan
+    ours = th.arma(th.Log(y), 2, 1, detrend="none", likelihood="exact", tolerance=1e-15)
+    assert (ours.method, ours.samples) == ("exact-likelihood", 210 if holes else 300)
+    theirs = sm.tsa.SARIMAX(y, order=(2, 0, 1))
+    a1, a2, c1 = ours.parameters
+    # The same function, and no place near ours where it is larger.
+    at = np.array([-a1, -a2, c1, ours.mse])
+    assert np.isclose(theirs.loglike(at), ours.log_likelihood, rtol=1e-12)
+    assert np.abs(theirs.score(at, approx_complex_step=False, approx_centered=True)).max() < 1e-3
+    found = theirs.fit(disp=0)
+    assert found.llf <= ours.log_likelihood + 1e-9
+    assert np.allclose(found.params, at, atol=1e-3)
+    found = theirs.smooth(at)
+    assert np.allclose([ours.aic, ours.bic], [found.aic, found.bic], rtol=1e-10)
+    # Of p = 3 parameters, var e is estimated with N - 3.
+    known = ours.standard_errors * np.sqrt((ours.samples - 3) / ours.samples)
+    assert np.allclose(known, found.bse[:3], rtol=0.15)
+
+
 def test_a_forecast_goes_on_where_the_log_ends(motor: th.Log) -> None:
     model = th.armax(motor, 2, 2, 1)
     ahead = model.forecast(motor[:900], 4, motor.u[900:904])

@@ -29,6 +29,7 @@ def arx(
     offset: Mapping[str, float] | None = None,
     prefilter: Band | None = None,
     initial: str | None = None,
+    likelihood: str | None = None,
     constant: str | None = None,
     trend: bool | None = None,
     norm: float | str | None = None,
@@ -49,7 +50,8 @@ def arx(
         Coefficients of B.
     nk : int, or one for each input
         Samples from input to first effect.
-    estimate, validate, split, detrend, offset, prefilter, initial, constant, trend, norm, bound, dc_gain, ridge, noise_bound
+    estimate, validate, split, detrend, offset, prefilter, initial, likelihood, constant, trend, norm, bound, dc_gain, ridge,
+    noise_bound
         What to fit to and how, see `thetahat.FitOptions`.
 
     Returns
@@ -99,6 +101,7 @@ def armax(
     offset: Mapping[str, float] | None = None,
     prefilter: Band | None = None,
     initial: str | None = None,
+    likelihood: str | None = None,
     constant: str | None = None,
     trend: bool | None = None,
     norm: float | str | None = None,
@@ -120,8 +123,8 @@ def armax(
         Coefficients of A, B and C; nb may be one for each input.
     nk : int, or one for each input
         Samples from input to first effect.
-    estimate, validate, split, detrend, offset, prefilter, initial, constant, trend, norm, search, max_iterations, tolerance,
-    step, starts, seed, time_limit
+    estimate, validate, split, detrend, offset, prefilter, initial, likelihood, constant, trend, norm, search, max_iterations,
+    tolerance, step, starts, seed, time_limit
         What to fit to and how to search, see `thetahat.FitOptions`.
 
     Returns
@@ -271,6 +274,7 @@ def ar(
     offset: Mapping[str, float] | None = None,
     prefilter: Band | None = None,
     initial: str | None = None,
+    likelihood: str | None = None,
     constant: str | None = None,
     trend: bool | None = None,
     norm: float | str | None = None,
@@ -287,7 +291,8 @@ def ar(
         The data.
     na : int
         Coefficients of A.
-    estimate, validate, split, detrend, offset, prefilter, initial, constant, trend, norm, bound, dc_gain, ridge, noise_bound
+    estimate, validate, split, detrend, offset, prefilter, initial, likelihood, constant, trend, norm, bound, dc_gain, ridge,
+    noise_bound
         What to fit to and how, see `thetahat.FitOptions`.
 
     Returns
@@ -322,6 +327,7 @@ def arma(
     offset: Mapping[str, float] | None = None,
     prefilter: Band | None = None,
     initial: str | None = None,
+    likelihood: str | None = None,
     constant: str | None = None,
     trend: bool | None = None,
     norm: float | str | None = None,
@@ -341,8 +347,8 @@ def arma(
         The data.
     na, nc : int
         Coefficients of A and C.
-    estimate, validate, split, detrend, offset, prefilter, initial, constant, trend, norm, search, max_iterations, tolerance,
-    step, starts, seed, time_limit
+    estimate, validate, split, detrend, offset, prefilter, initial, likelihood, constant, trend, norm, search, max_iterations,
+    tolerance, step, starts, seed, time_limit
         What to fit to and how to search, see `thetahat.FitOptions`.
 
     Returns
@@ -359,6 +365,15 @@ def arma(
     >>> import thetahat as th
     >>> th.arma(th.dc_motor(), na=2, nc=1).orders["nc"]
     1
+
+    Missing outputs are no gaps to the exact likelihood, and no sample is left out:
+
+    >>> import numpy as np
+    >>> y = th.dc_motor()["y"].copy()
+    >>> y[::4] = np.nan
+    >>> model = th.arma(th.Log(y), na=2, nc=1, likelihood="exact")
+    >>> model.method, model.samples
+    ('exact-likelihood', 750)
     """
     return _fit("arma", locals())
 
@@ -379,6 +394,7 @@ def pem(
     offset: Mapping[str, float] | None = None,
     prefilter: Band | None = None,
     initial: str | None = None,
+    likelihood: str | None = None,
     constant: str | None = None,
     trend: bool | None = None,
     norm: float | str | None = None,
@@ -404,8 +420,8 @@ def pem(
         Coefficients of the polynomials; nb and nf may be one for each input.
     nk : int, or one for each input
         Samples from input to first effect: 1, unless said otherwise.
-    estimate, validate, split, detrend, offset, prefilter, initial, constant, trend, norm, bound, dc_gain, ridge, noise_bound,
-    search, max_iterations, tolerance, step, starts, seed, time_limit
+    estimate, validate, split, detrend, offset, prefilter, initial, likelihood, constant, trend, norm, bound, dc_gain, ridge,
+    noise_bound, search, max_iterations, tolerance, step, starts, seed, time_limit
         What to fit to and how to search, see `thetahat.FitOptions`.
 
     Returns
@@ -543,6 +559,7 @@ def search(
     offset: Mapping[str, float] | None = None,
     prefilter: Band | None = None,
     initial: str | None = None,
+    likelihood: str | None = None,
     constant: str | None = None,
     trend: bool | None = None,
     norm: float | str | None = None,
@@ -574,8 +591,8 @@ def search(
         What makes one model better than another: MDL, unless said otherwise.
     path : {"all", "alternate"}
         Which are tried: all of them, or one order up at a time.
-    estimate, validate, split, detrend, offset, prefilter, initial, constant, trend, norm, bound, dc_gain, ridge, noise_bound,
-    search, max_iterations, tolerance, step, starts, seed, time_limit
+    estimate, validate, split, detrend, offset, prefilter, initial, likelihood, constant, trend, norm, bound, dc_gain, ridge,
+    noise_bound, search, max_iterations, tolerance, step, starts, seed, time_limit
         What to fit to and how to search, see `thetahat.FitOptions`.
 
     Returns

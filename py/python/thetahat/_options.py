@@ -61,6 +61,11 @@ class FitOptions(TypedDict, total=False):
         past inputs and outputs in all cases but "zero". Without them, "drop" leaves out the first rows, for models without F;
         "estimate" finds what they did to B/F u with the parameters, for models with F. "auto" is "drop" without F; with F it
         is "estimate" where there is a past or where that is worth its parameters, else "zero".
+    likelihood : {"conditional", "exact"}
+        Which likelihood is made large: that given the first samples, which least squared errors do, or that of all measured
+        outputs, by the Kalman filter, through missing ones, as statsmodels' SARIMAX counts it. For models without D and F, one at
+        a time. With "exact" the response to the inputs begins at rest (``initial="zero"``) or in a state that is estimated
+        ("estimate"); "auto" takes the latter where rows stand before, or where it is worth its parameters.
     constant : {"auto", "yes", "no"}
         Whether the level of the output is estimated with the parameters, beside the mean that is taken off: where it lowers
         MDL, always or never. With ``detrend="none"``, or an offset of the output by hand, "auto" is "no". It is part of ``model.offsets``, and stands with its standard error in the report.
@@ -101,6 +106,7 @@ class FitOptions(TypedDict, total=False):
     offset: Mapping[str, float]
     prefilter: Band
     initial: str
+    likelihood: str
     constant: str
     trend: bool
     norm: Union[float, str]

@@ -236,7 +236,8 @@ class ReportedModel:
 
     @property
     def mse(self) -> float:
-        """The mean of e^2 over these samples."""
+        """The mean of e^2 over these samples; with ``likelihood="exact"`` that of v^2/f, f being the variances of the innovations v
+        over that of e."""
         return float(self._estimation["mse"])
 
     @property
@@ -258,12 +259,20 @@ class ReportedModel:
             ln L = -N/2 (ln 2 pi + ln V + 1)
 
         It is the likelihood given the samples that do not count (the conditional one), of a fit by least squared errors of
-        which V is the least. NaN for an exact fit.
+        which V is the least. With ``likelihood="exact"`` it is that of all measured outputs, in which the variances of the
+        innovations differ by factors f, and half the sum of their logarithms is taken off::
+
+            ln L = -N/2 (ln 2 pi + ln V + 1) - 1/2 sum ln f
+
+        NaN where no error is left.
 
         References
         ----------
         Akaike, A new look at the statistical model identification, 1974. Schwarz, Estimating the dimension of a model, 1978.
         """
+        if self.method == "exact-likelihood":
+            known = self._estimation["log_likelihood"]
+            return np.nan if known is None else float(known)
         return -self.samples / 2 * (np.log(2 * np.pi) + np.log(self.mse) + 1) if self.mse > 0 else np.nan
 
     @property

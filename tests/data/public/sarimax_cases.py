@@ -15,11 +15,11 @@ HERE = Path(__file__).parent
 
 
 def measured(name, holes, mean):
-    """The output of a log, with every sample t missing for which 7 t^2 mod 23 < 7 where there are to be holes."""
+    """The output of a log, with every sample t missing for which 7 t^3 mod 23 < 7 where there are to be holes."""
     y = np.genfromtxt(HERE / f"{name}.csv", delimiter=",", names=True)["y"]
     t = np.arange(len(y))
     if holes:
-        y[7 * t * t % 23 < 7] = np.nan
+        y[7 * t**3 % 23 < 7] = np.nan
     return y - np.nanmean(y) if mean else y
 
 

@@ -5,6 +5,7 @@ use std::ops::ControlFlow;
 use thetahat_core::nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::*;
+use crate::Algorithm;
 use crate::regression::noise::Noise;
 use crate::{Channel, Constant, Detrend, Log, Method, Plan, identify};
 
@@ -137,8 +138,9 @@ fn public(name: &str, holes: bool) -> Log {
     Log::new(vec![Channel { name: "y".to_owned(), values: y }], 1.0).unwrap()
 }
 
+/// Newton's method, as the information is not the Hessian where the model is not true.
 fn tight() -> Search {
-    Search { tolerance: 1e-15, ..Search::default() }
+    Search { tolerance: 1e-15, algorithm: Algorithm::Newton, ..Search::default() }
 }
 
 fn outcome(procedure: &Procedure) -> &LikelihoodOutcome {
@@ -331,17 +333,23 @@ fn the_gradient_is_that_of_differences() {
 
 #[test]
 fn standard_errors_are_as_large_as_the_errors() {
-    let (runs, mut squares) = (100, [0.0; 5]);
+    let (runs, mut squares, mut at_the_border) = (100, [0.0; 5], 0);
     for seed in 0..runs {
         let experiment = Experiment::new(250, 100 + seed);
         let record = experiment.record(0);
         let found = fit(&record, &orders(), Initial::Auto).unwrap();
-        let covariance = found.covariance().unwrap();
+        let Some(covariance) = found.covariance() else {
+            // The likelihood is largest at a root of C on the unit circle, as in some short logs.
+            assert!(outcome(found.procedure()).search.stability_bound);
+            at_the_border += 1;
+            continue;
+        };
         for (place, square) in squares.iter_mut().enumerate() {
             let error = found.parameters()[place] - TRUTH[place];
             *square += error * error / covariance[place][place] / runs as f64;
         }
     }
+    assert!(at_the_border <= 4, "{at_the_border}");
     // chi-square of 100 degrees over 100 has a deviation of 0.14.
     assert!(squares.iter().all(|square| (0.6..1.5).contains(square)), "{squares:?}");
 }

@@ -35,7 +35,7 @@ use std::time::Instant;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use thetahat_core::nalgebra::ComplexField;
+use thetahat_core::nalgebra::{ComplexField, DVector};
 
 use super::arx::{out_of_range, rows, signals};
 use super::border::multiply_out;
@@ -129,6 +129,25 @@ pub(crate) fn exact_mean(
     best_free(&mut likelihood, parameters).ok()?;
     let samples = likelihood.samples();
     (samples > 0).then(|| (samples, likelihood.squares() / samples as f64))
+}
+
+/// As [`beside`](super::prediction_error::beside) of an estimate of least squared errors: `lines` of the inputs are a constant and a
+/// trend.
+pub(super) fn beside(
+    record: &Record<'_>,
+    lines: usize,
+    orders: &Orders,
+    estimate: &Estimate,
+    parameters: &[f64],
+) -> Option<(Vec<Vec<f64>>, Vec<f64>)> {
+    let begin = if estimate.initial() == Initial::Zero { Begin::Rest } else { Begin::Free };
+    let mut likelihood = Likelihood::new(record, orders, lines, begin);
+    let cost = best_free(&mut likelihood, parameters).ok()?;
+    likelihood.linearize();
+    let (inverse, _) = likelihood.inverse()?;
+    let step = &inverse * DVector::from_column_slice(likelihood.right());
+    let covariance = inverse * (estimate.noise_variance() * cost / likelihood.squares());
+    Some((rows(&covariance), step.as_slice().to_vec()))
 }
 
 fn check(orders: &Orders, driven: bool, initial: Initial) -> Result<(), Error> {

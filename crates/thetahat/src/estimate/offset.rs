@@ -37,7 +37,7 @@ use super::prediction_error::predictor_of;
 use super::predictor::{Begin, Predictor};
 use super::uncertainty::autoregression;
 use super::{
-    Criterion, Estimate, Initial, Method, Monitor, Norm, Procedure, Search, arx, estimate_of_channels,
+    Criterion, Estimate, Initial, Method, Monitor, Norm, Procedure, Search, arx, estimate_of_channels, exact,
     prediction_error,
 };
 use crate::data::{Log, Offset, Record};
@@ -383,12 +383,16 @@ impl Task<'_> {
                 }),
                 Err(_) => None,
             },
-            _ => {
+            procedure => {
                 let signals = beside.signals();
                 let (record, orders) =
                     (self.record.with_inputs(&signals), self.orders.with_constants(beside.count()));
                 let parameters = beside.with_zeros(self.orders, without.parameters());
-                prediction_error::beside(&record, &orders, without, &parameters)
+                if matches!(procedure, Procedure::ExactLikelihood(_)) {
+                    exact::beside(&record, beside.count(), &orders, without, &parameters)
+                } else {
+                    prediction_error::beside(&record, &orders, without, &parameters)
+                }
             }
         };
         Ok(found.and_then(|(rows, step)| beside.open(self.orders, &rows, &step, [0.0; 2])))

@@ -468,6 +468,8 @@ fn the_report_is_that_of_its_log_and_criteria_decide_about_a_level() {
     assert_eq!(report.data.segments.len(), 1);
     let validation = crate::validate(&report, None, log.clone(), &[], &crate::ValidationPlan::default());
     assert_eq!(validation.unwrap().validation.seen, crate::Seen::Yes);
+    // What the mean leaves open of the level: as much as the error of a level that is estimated.
+    assert!(report.model.offset_covariance.is_some());
     // The mean is the level but for its error.
     assert_eq!(report.estimation.level, None);
     let raw = Plan { detrend: Detrend::None, constant: Constant::Auto, ..plan.clone() };

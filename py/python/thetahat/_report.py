@@ -298,7 +298,8 @@ class ReportedModel:
     def bic(self) -> float:
         """Schwarz's Bayesian information criterion as statsmodels counts it, -2 ln L + (p + 1) ln N.
 
-        It is N (MDL + ln 2 pi + 1) + ln N, where MDL, ``criteria["mdl"]``, is ln V + p ln(N)/N.
+        It is N (MDL + ln 2 pi + 1) + ln N, where MDL, ``criteria["mdl"]``, is ln V + p ln(N)/N. N counts the outputs that were
+        measured; statsmodels' SARIMAX counts missing ones too.
         """
         return -2 * self.log_likelihood + (self._estimated + 1) * float(np.log(self.samples))
 

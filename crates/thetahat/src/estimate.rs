@@ -135,9 +135,10 @@ pub enum Method {
     /// ```
     /// use thetahat::{Channel, Initial, Log, Method, Orders, Procedure, Search, estimate};
     ///
-    /// let mut y = vec![0.0];
-    /// for t in 1..200_u32 {
-    ///     y.push(0.8 * y[y.len() - 1] + f64::from(t * t * 7 % 23) - 11.0);
+    /// let (mut y, mut noise) = (vec![0.0], 1_u32);
+    /// for t in 1..200 {
+    ///     noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+    ///     y.push(0.8 * y[t - 1] + f64::from(noise >> 16) / 32_768.0 - 1.0);
     /// }
     /// (0..200).filter(|t| t * 3 % 10 < 3).for_each(|t| y[t] = f64::NAN);
     /// let log = Log::new(vec![Channel { name: "y".into(), values: y }], 1.0)?;

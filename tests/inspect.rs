@@ -58,7 +58,7 @@ fn the_document_says_what_the_log_is() {
     }
     assert_eq!(document["excitation"][0]["order"], 50);
     assert_eq!((&document["delays"][0]["nk"], &document["feedback"][0]["found"]), (&json!(1), &json!(false)));
-    assert!(number(&document, "/delays/0/confidence") > 0.99);
+    assert!(number(&document, "/delays/0/confidence") > 0.9);
     let correlation = numbers(&document["delays"][0]["correlation"]);
     assert!(correlation[1].abs() > 3.0 * number(&document, "/delays/0/band"));
     assert_eq!(document["command"], "thetahat fit log.csv --sample-time 0.5 -u u -y y --report model.json");
@@ -280,7 +280,7 @@ fn a_closed_loop_is_pointed_out() {
     }
     let document = inspected(&Folder::with_log(csv(&[("u", &u), ("y", &y)])), "log.csv");
     assert_eq!(document["feedback"][0]["found"], true);
-    assert!(number(&document, "/feedback/0/p_value") < 0.01 && says(&document, "follows the output"));
+    assert!(number(&document, "/feedback/0/p_value") < 0.01 && says(&document, "feedback is suspected"));
     let open = response(&[1.0, -0.9], &[(&[0.0, 0.5], &r)], &e);
     let document = inspected(&Folder::with_log(csv(&[("u", &r), ("y", &open)])), "log.csv");
     assert_eq!(document["feedback"][0]["found"], false);

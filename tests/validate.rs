@@ -188,7 +188,7 @@ fn a_model_in_a_loop_is_told() {
     let folder = Folder::with_log(csv(&[("u", &u), ("y", &y)]));
     folder.done("fit log.csv --na 1 --nb 1 --report model.json");
     let run = folder.done("validate model.json log.csv --require independent,white");
-    assert!(run.stderr.contains("warning: input 'u' follows the residuals"), "{}", run.stderr);
+    assert!(run.stderr.contains("warning: input 'u' follows past residuals"), "{}", run.stderr);
 }
 
 #[test]

@@ -279,7 +279,8 @@ def test_models_stand_side_by_side(motor: th.Log) -> None:
 def test_a_log_is_inspected(motor: th.Log) -> None:
     inspection = th.inspect(motor)
     assert inspection.delays == {"u": 1} and inspection.document["rows"] == 1000
-    assert inspection.excitation["u"] > 10
+    assert inspection.excitation["u"] > 10 and inspection.feedback == {"u": False}
+    assert 0.9 < (inspection.confidence["u"] or 0) <= 1
     with pytest.raises(TypeError, match="for files"):
         th.inspect(motor, time="t")
 

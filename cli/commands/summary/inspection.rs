@@ -126,7 +126,8 @@ fn inputs(text: &mut Text, inspection: &Inspection) {
         "half its power below [rad/s]",
         "delay [rows]",
         "confidence [%]",
-        "feedback p-value",
+        "feedback",
+        "p-value",
     ])
     .none("nothing stands out, or there are too few rows");
     for excitation in &inspection.excitation {
@@ -141,6 +142,9 @@ fn inputs(text: &mut Text, inspection: &Inspection) {
             or_dash(delay.and_then(|delay| delay.confidence), |confidence| {
                 // No rounding up to certainty.
                 fixed((1e4 * confidence).floor() / 100.0, 2)
+            }),
+            or_dash(feedback.filter(|feedback| feedback.p_value.is_some()), |feedback| {
+                (if feedback.found { "suspected" } else { "none seen" }).to_owned()
             }),
             or_dash(feedback.and_then(|feedback| feedback.p_value), chance),
         ]);

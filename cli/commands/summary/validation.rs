@@ -218,8 +218,9 @@ fn residuals(text: &mut Text, found: &Validation, alpha: f64) {
     let mut table = columns(&["test", "lags", "statistic", "degrees", "p-value", &level])
         .words(&[5])
         .none("the test has no degree of freedom left");
-    let mut add = |what: String, test: &Test, verdict: [&str; 2]| {
-        let word = or_dash(test.p_value, |p| verdict[usize::from(p < alpha)].to_owned());
+    let rejected = |test: &Test| test.p_value.is_some_and(|p| p < alpha);
+    let mut add = |what: String, test: &Test, verdict: &str| {
+        let word = or_dash(test.p_value, |_| verdict.to_owned());
         table.row([
             what,
             test.lags.to_string(),
@@ -229,11 +230,19 @@ fn residuals(text: &mut Text, found: &Validation, alpha: f64) {
             word,
         ]);
     };
-    add("white (Ljung-Box)".to_owned(), &residuals.ljung_box, ["white", "not white"]);
-    for Independence { input, past, feedback, .. } in &residuals.independence {
+    add(
+        "white (Ljung-Box)".to_owned(),
+        &residuals.ljung_box,
+        ["white", "not white"][usize::from(rejected(&residuals.ljung_box))],
+    );
+    for Independence { input, past, feedback, suspected, .. } in &residuals.independence {
         let input = harmless(input);
-        add(format!("independent of past {input}"), past, ["independent", "dependent"]);
-        add(format!("no feedback to {input}"), feedback, ["none seen", "feedback"]);
+        add(
+            format!("independent of past {input}"),
+            past,
+            ["independent", "dependent"][usize::from(rejected(past))],
+        );
+        add(format!("no feedback to {input}"), feedback, ["none seen", "suspected"][usize::from(*suspected)]);
     }
     text.table(table);
     let anderson = &residuals.anderson;

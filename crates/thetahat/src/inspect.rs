@@ -4,7 +4,6 @@ mod channel;
 mod clock;
 mod delay;
 mod excitation;
-mod feedback;
 mod fourier;
 mod inspection;
 mod moments;
@@ -27,6 +26,7 @@ use rayon::prelude::*;
 use crate::Error;
 use crate::data::{Channel, Interpolation, Log, Regular, Resample, Rows, check, checked};
 use crate::report::{Resampling, Source};
+use crate::validate::feedback::feedback;
 use clock::Ticks;
 
 pub use inspection::{
@@ -293,7 +293,7 @@ fn dynamics(inspection: &mut Inspection, log: &Log, plan: &InspectionPlan) -> Re
     let of_input = |(name, input): (&String, &&[f64])| {
         let segments = log.segments_of(&[input, output], &all);
         let (input, output) = (moments::deviations(input, &segments), moments::deviations(output, &segments));
-        delay::delay(name, &input, &output, &segments)
+        delay::correlation(name, &input, &output, &segments)
     };
     inspection.delays = plan.inputs.par_iter().zip(&inputs).map(of_input).collect();
     let signals: Vec<&[f64]> = inputs.iter().copied().chain([output]).collect();
@@ -307,8 +307,17 @@ fn dynamics(inspection: &mut Inspection, log: &Log, plan: &InspectionPlan) -> Re
         signal.fill(0.0);
     }
     if let Some((output, inputs)) = signals.split_last() {
-        let p_values = feedback::feedback(inputs, output, &segments);
-        inspection.feedback = plan.inputs.iter().zip(p_values).map(feedback::verdict).collect();
+        delay::estimate(&mut inspection.delays, inputs, output, &segments)?;
+        let verdicts = plan.inputs.iter().zip(feedback(inputs, output, &segments));
+        inspection.feedback = verdicts.map(|(input, found)| Feedback::new(input, found)).collect();
+    }
+    for of in inspection.excitation.iter() {
+        let Some(first) = &of.same_as else { continue };
+        let of_first = inspection.delays.iter().find(|delay| delay.input == *first).cloned();
+        let own = inspection.delays.iter_mut().find(|delay| delay.input == of.input);
+        if let (Some(first), Some(own)) = (of_first, own) {
+            (own.nk, own.confidence) = (first.nk, first.confidence);
+        }
     }
     Ok(())
 }

@@ -27,6 +27,7 @@ use crate::{Error, Orders};
 pub(crate) use automatic::constant_pays;
 pub use choice::{Automatic, Choice, Grid, OrderRange, Path, Select};
 pub use criteria::Criteria;
+pub(crate) use delay::delays;
 pub use selection::{Delay, Scan, Scored, Selection};
 
 /// What a choice is made from.

@@ -1,5 +1,6 @@
 //! How good a model is on a record.
 
+pub(crate) mod feedback;
 mod fit;
 mod independence;
 mod moments;

@@ -177,14 +177,24 @@ class Inspection(_Document):
     --------
     >>> import thetahat as th
     >>> inspection = th.inspect(th.dc_motor())
-    >>> inspection.delays
-    {'u': 1}
+    >>> inspection.delays, inspection.feedback
+    ({'u': 1}, {'u': False})
     """
 
     @property
     def delays(self) -> dict[str, int | None]:
-        """The delay of each input in samples; None where none could be told."""
+        """The delay of each input in samples, as a fit without orders takes it; None where no effect is seen."""
         return {delay["input"]: delay["nk"] for delay in self.document["delays"]}
+
+    @property
+    def confidence(self) -> dict[str, float | None]:
+        """How sure each delay is: its posterior probability among all that were compared."""
+        return {delay["input"]: delay["confidence"] for delay in self.document["delays"]}
+
+    @property
+    def feedback(self) -> dict[str, bool]:
+        """Whether feedback from the output to each input is suspected."""
+        return {one["input"]: one["found"] for one in self.document["feedback"]}
 
     @property
     def excitation(self) -> dict[str, int]:

@@ -1,24 +1,56 @@
-//! The delay from an input to the output.
+//! The delay from an input to the output, and how the two go together.
 
 use std::ops::Range;
 
-use statrs::distribution::{ContinuousCDF, Normal};
-
 use super::{DelayEstimate, samples, whitening};
+use crate::Error;
+use crate::data::Record;
 use crate::regression::{Lagged, Presample, Taps, sum_of_squares};
+use crate::select::{constant_pays, delays};
 
 /// The highest lag looked at.
 const HIGHEST: usize = 50;
 /// Samples for each lag looked at.
 const SAMPLES: usize = 10;
-/// How often data without a relation give a delay.
-const LEVEL: f64 = 0.01;
 /// Below this fraction of the square of a signal, what is left of it by its past is rounding.
 const ROUNDING: f64 = 1e-8;
 /// Half the width of the band that holds 95 % of a standard normal variable.
 const BAND: f64 = 1.959_963_984_540_054;
 
-/// The first lag at which the output follows the input, from the correlation of the prewhitened signals:
+/// Puts in the delays of all inputs together, as a fit without orders finds them: see `select::delay`. Inputs that never change
+/// have none.
+///
+/// The signals are deviations.
+pub(super) fn estimate(
+    found: &mut [DelayEstimate],
+    inputs: &[Vec<f64>],
+    output: &[f64],
+    segments: &[Range<usize>],
+) -> Result<(), Error> {
+    let moving: Vec<usize> =
+        (0..inputs.len()).filter(|&input| inputs[input].iter().any(|value| *value != 0.0)).collect();
+    if segments.is_empty() || output.iter().all(|value| *value == 0.0) {
+        return Ok(());
+    }
+    let mut record = Record {
+        output,
+        inputs: moving.iter().map(|&input| inputs[input].as_slice()).collect(),
+        segments: segments.to_vec(),
+        past: vec![0; segments.len()],
+    };
+    let ones = vec![1.0; output.len()];
+    if constant_pays(&record) {
+        record.inputs.push(&ones);
+    }
+    let names: Vec<String> = moving.iter().map(|&input| found[input].input.clone()).collect();
+    for (input, delay) in moving.into_iter().zip(delays(&record, &names)?) {
+        found[input].confidence = delay.confidence;
+        found[input].nk = delay.confidence.map(|_| delay.nk);
+    }
+    Ok(())
+}
+
+/// The correlation of the prewhitened signals:
 ///
 /// ```text
 /// a(t) = A_u(q) u(t),   b(t) = A_y(q) y(t),   r(k) = sum a(t - k) b(t) / sqrt(sum a^2 sum b^2)
@@ -30,12 +62,16 @@ const BAND: f64 = 1.959_963_984_540_054;
 /// both are monic in q^-1: b = A_y/A_u B/F a + noise, which begins at q^-nk.
 ///
 /// As a is white, r(k) has the variance 1/N at lags before the delay, whatever the noise (Bartlett's formula: its sum over
-/// the products of both autocorrelations has one term left). nk is the first lag with |r(k)| beyond the band that
-/// white noise leaves at any of the M lags in 1 % of records (Bonferroni), and the confidence is 1 - M p(k).
-/// Another input that is correlated with this one can show in its place. O(N M).
+/// the products of both autocorrelations has one term left). O(N M).
 ///
-/// The signals are deviations, zero outside of the segments.
-pub(super) fn delay(name: &str, input: &[f64], output: &[f64], segments: &[Range<usize>]) -> DelayEstimate {
+/// The signals are deviations, zero outside of the segments. The delay itself is left open: the first correlation that stands out
+/// is often too late where the input is slow.
+pub(super) fn correlation(
+    name: &str,
+    input: &[f64],
+    output: &[f64],
+    segments: &[Range<usize>],
+) -> DelayEstimate {
     let mut found = DelayEstimate {
         input: name.to_owned(),
         nk: None,
@@ -66,12 +102,6 @@ pub(super) fn delay(name: &str, input: &[f64], output: &[f64], segments: &[Range
     let (_, products, _) = Lagged::new(&[&b, &a], taps, &kept, Presample::Zero).normal_equations();
     found.correlation = products.iter().map(|product| (product / size).clamp(-1.0, 1.0)).collect();
     found.band = BAND / (count as f64).sqrt();
-    let looks = found.correlation.len() as f64;
-    let chance = |r: f64| looks * 2.0 * Normal::standard().sf((count as f64).sqrt() * r.abs());
-    if let Some((lag, &r)) = found.correlation.iter().enumerate().find(|(_, r)| chance(**r) < LEVEL) {
-        found.nk = Some(lag);
-        found.confidence = Some(1.0 - chance(r));
-    }
     found
 }
 

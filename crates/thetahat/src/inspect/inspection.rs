@@ -3,6 +3,7 @@ use std::collections::HashSet;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::validate::feedback;
 use crate::{Error, Source, document};
 
 /// The schema that this version writes.
@@ -139,14 +140,14 @@ pub struct SpectrumPoint {
     pub density: f64,
 }
 
-/// The delay from an input, from its prewhitened correlation with the output.
+/// The delay from an input, as a fit without orders estimates it, and its prewhitened correlation with the output.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct DelayEstimate {
     /// The input channel.
     pub input: String,
-    /// The first lag at which the output follows the input; none if there is no such lag.
+    /// Samples from a change of the input to its first effect; none if no effect is seen, or there are too few rows.
     pub nk: Option<usize>,
-    /// How sure that is: one minus the probability that white noise has a correlation as large at any of the lags.
+    /// How sure that is: the posterior probability of this delay among 0, 1, …, by the MDL of long ARX models.
     pub confidence: Option<f64>,
     /// The correlation of the prewhitened signals at lags 0, 1, …
     pub correlation: Vec<f64>,
@@ -159,10 +160,25 @@ pub struct DelayEstimate {
 pub struct Feedback {
     /// The input channel.
     pub input: String,
-    /// How often data without feedback look as much like it; none where it cannot be said.
+    /// How often past errors of the output help as much to predict an input that does not follow it; none where it cannot be
+    /// said.
     pub p_value: Option<f64>,
-    /// Whether that is below 1 %.
+    /// The fraction of what is new in the input that they predict on rows left out; negative where they mislead.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub explained: Option<f64>,
+    /// Whether feedback is suspected: the p-value is below 1 %, and they explain more than 0.5 %.
     pub found: bool,
+}
+
+impl Feedback {
+    pub(super) fn new(input: &str, found: Option<feedback::Feedback>) -> Self {
+        Self {
+            input: input.to_owned(),
+            p_value: found.map(|found| found.p_value),
+            explained: found.map(|found| found.explained),
+            found: found.is_some_and(|found| found.is_suspected()),
+        }
+    }
 }
 
 fn only<T: Clone>(all: &[T], wanted: impl Fn(&T) -> bool) -> Vec<T> {

@@ -15,6 +15,8 @@ const POOR: usize = 10;
 const FEW_CHANGES: f64 = 5.0;
 /// Rows that a sentence lists.
 const LISTED: usize = 5;
+/// Below this confidence a delay is worth a word.
+const UNSURE: f64 = 0.5;
 /// Rows from which a fit has a chance.
 const FEW_ROWS: usize = 50;
 
@@ -184,24 +186,37 @@ pub(super) fn of_the_dynamics(inspection: &Inspection, plan: &InspectionPlan) ->
         // Of an input that excites nothing that was said.
         if inspection.excitation.iter().any(|of| of.input == delay.input && of.order > 0) {
             words.push(format!(
-                "no delay from input '{}' stands out: what is new in it from row to row is little, or its effect is slow or \
-                 lost in noise",
+                "no effect of input '{}' is seen, and so no delay: it is small, slow or lost in noise, or there are too few rows to \
+                 tell",
                 delay.input
             ));
         }
     }
     for feedback in inspection.feedback.iter().filter(|feedback| feedback.found) {
         words.push(format!(
-            "input '{}' follows the output: the log seems to be from a closed loop; fit a model with noise (arx, armax, bj), \
-             as oe and --method iv or sriv are biased there",
+            "input '{}' follows past errors of the output: feedback is suspected; fit a model with noise (arx, armax, bj), \
+             as oe and --method iv or sriv are biased in a closed loop",
             feedback.input
         ));
     }
+    for delay in inspection.delays.iter().filter(|delay| delay.nk.is_some()) {
+        if let Some(confidence) = delay.confidence.filter(|confidence| *confidence < UNSURE) {
+            words.push(format!(
+                "the delay of input '{}' is uncertain: {} has {} %; try others (--nk), or excite it faster",
+                delay.input,
+                delay.nk.unwrap_or(0),
+                fixed((100.0 * confidence).floor(), 0)
+            ));
+        }
+    }
+    let suspected =
+        |input: &str| inspection.feedback.iter().any(|feedback| feedback.found && feedback.input == input);
     for delay in inspection.delays.iter().filter(|delay| delay.nk == Some(0)) {
         words.push(format!(
-            "the output follows input '{}' within the same row: it acts at once (--nk 0), its rows are shifted, or it is computed \
-             from the output",
-            delay.input
+            "the output follows input '{}' within the same row: it acts at once (a fit takes --nk 0), its rows are shifted, or it \
+             is computed from the output{}",
+            delay.input,
+            if suspected(&delay.input) { "; as feedback is suspected, --nk 1 keeps that out" } else { "" }
         ));
     }
     words

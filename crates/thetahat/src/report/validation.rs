@@ -605,15 +605,9 @@ fn warn(plan: &ValidationPlan, validation: &mut Validation) {
                     chance(p)
                 ));
             }
-            if let Some(p) = rejected(independence.feedback.p_value) {
-                let doubt = if past.is_some() {
-                    " (or foretells itself, so that what the model lacks shows here too)"
-                } else {
-                    ""
-                };
+            if independence.suspected {
                 words.push(format!(
-                    "input '{input}' follows the residuals (p-value {}): there is feedback from the output to the input{doubt}",
-                    chance(p)
+                    "input '{input}' follows past residuals: feedback from the output to the input is suspected"
                 ));
             }
         }

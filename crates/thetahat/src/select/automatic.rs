@@ -14,7 +14,7 @@ use crate::{Error, Orders, Structure};
 const LONGEST: usize = 10;
 const HIGHEST: usize = 3;
 /// So many inputs at most: a Gram matrix of all their lags has to fit.
-const MOST_INPUTS: usize = 100;
+pub(super) const MOST_INPUTS: usize = 100;
 /// So many samples for each parameter at least.
 const SAMPLES: usize = 4;
 /// Orders of ARX models that say whether a constant is worth a parameter.

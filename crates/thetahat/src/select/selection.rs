@@ -58,9 +58,13 @@ pub struct Scored {
 pub struct Delay {
     /// The input channel.
     pub input: String,
-    /// Samples from a change to its first effect.
+    /// Samples from a change to its first effect; 1 where no effect is seen.
     pub nk: usize,
-    /// The MDL of models with a delay of 0, 1, … samples, or from 1 on.
+    /// How sure that is: the posterior probability of this delay among those that were compared. None where no effect is
+    /// seen.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub confidence: Option<f64>,
+    /// The MDL of models with a delay of 1, 2, … samples; of 0 too where that was taken.
     pub mdl: Vec<Scan>,
 }
 

@@ -22,10 +22,12 @@
 //! (sum u psi'/N) cov (sum u psi'/N)'. An input that is not rich has a P of less than full rank: as many directions count, two
 //! for a sinusoid.
 //!
-//! Future inputs, k < 0, depend on e where there is feedback; each of M lags has M times the chance.
+//! Future inputs, k < 0, depend on e where there is feedback; each of M lags has M times the chance. They do so too where the model
+//! lacks dynamics and the input foretells itself: what speaks for feedback alone is in `feedback`.
 
 use thetahat_core::nalgebra::{DMatrix, DVector};
 
+use super::feedback::follows;
 use super::moments::{Column, Moments, Traces, columns, eigen};
 use super::residuals::{Independence, Test};
 use super::whiteness::chi_square;
@@ -122,6 +124,8 @@ pub(super) fn independence(
         band: before.chain((0..lags).map(|k| band(spread(k)))).collect(),
         past: standardized(&values, samples, &covariance, &left)?,
         feedback: feedback(future.rows(1, lags).as_slice(), samples * typical),
+        suspected: follows(traces.signal(signal), traces.signal(Traces::ERROR), &counted)
+            .is_some_and(|found| found.is_suspected()),
     };
     let finite = result.correlation.iter().chain(&result.band).all(|value| value.is_finite());
     finite.then_some(result)

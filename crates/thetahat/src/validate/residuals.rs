@@ -102,6 +102,10 @@ pub struct Independence {
     pub past: Test,
     /// Future inputs, k = -M … -1: where they follow the residuals, there is feedback. Bonferroni's bound over the lags.
     pub feedback: Test,
+    /// Whether feedback is suspected: past residuals predict the input beyond its own past, on rows left out too. A model that lacks
+    /// dynamics, and an input that foretells itself, make `feedback` small without that.
+    #[serde(default)]
+    pub suspected: bool,
 }
 
 /// What the parameters have to do with the samples that are looked at.

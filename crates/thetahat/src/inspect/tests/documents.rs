@@ -150,11 +150,11 @@ fn every_fault_has_its_word() {
         "'dead' excites nothing",
         "'dead' is constant",
         "'empty' has no values",
-        "no delay from input 'sine'",
+        "no effect of input 'sine'",
     ] {
         assert!(says(&found, word), "{word}: {:?}", found.warnings);
     }
-    assert!(!says(&found, "no delay from input 'dead'"));
+    assert!(!says(&found, "no effect of input 'dead'"));
 
     let other: Vec<f64> = coarse.iter().map(|x| 3.0 - 2.0 * x).collect();
     let both = recording(&[("u1", &coarse), ("u2", &other), ("y", &y)], Times::Uniform(1.0));
@@ -172,7 +172,7 @@ fn every_fault_has_its_word() {
     }
     let found = inspected(recording(&[("u", &u), ("y", &y)], Times::Uniform(1.0)), &plan(&["u"], Some("y")));
     assert!(found.feedback[0].found);
-    assert!(says(&found, "'u' follows the output") && says(&found, "within the same row"));
+    assert!(says(&found, "'u' follows past errors of the output") && says(&found, "within the same row"));
 }
 
 #[test]

@@ -167,12 +167,19 @@ fn an_autoregression_is_least_squares() {
     assert!(whitening::autoregression(&deviations(&sines(2, 500)), &one(0..500)).len() <= 6);
 }
 
+fn correlation_of(input: &[f64], output: &[f64]) -> DelayEstimate {
+    delay::correlation("u", &deviations(input), &deviations(output), &whole(input))
+}
+
 fn delay_of(input: &[f64], output: &[f64]) -> DelayEstimate {
-    delay::delay("u", &deviations(input), &deviations(output), &whole(input))
+    let mut found = [correlation_of(input, output)];
+    delay::estimate(&mut found, &[deviations(input)], &deviations(output), &whole(input)).unwrap();
+    let [found] = found;
+    found
 }
 
 #[test]
-fn the_delay_is_the_first_lag_with_an_effect() {
+fn the_delay_is_found() {
     // N = 1000, noise of 10 %.
     for (seed, nk) in [(1, 0), (2, 1), (3, 4), (4, 9)] {
         for (name, u) in [
@@ -185,11 +192,41 @@ fn the_delay_is_the_first_lag_with_an_effect() {
             let size = (sum_of_squares(&clean) / sum_of_squares(&noise)).sqrt();
             let found = delay_of(&u, &sum_of(&clean, 0.1 * size, &noise));
             assert_eq!(found.nk, Some(nk), "{name}");
-            assert!(found.confidence.unwrap() > 0.99 && found.correlation.len() == 51);
+            assert!(
+                found.confidence.unwrap() > 0.9 && found.correlation.len() == 51,
+                "{name} {nk} {found:?}"
+            );
             // N less the samples that the filters need.
             assert!((found.band * 1000.0_f64.sqrt() - 1.96).abs() < 0.05);
         }
     }
+}
+
+/// Of delays that are said to be as sure as 0.9, so many are right, and so many are as sure.
+#[test]
+fn a_sure_delay_is_right() {
+    let (mut sure, mut right, mut all) = (0.0, 0.0, 0.0);
+    for samples in [200, 1000] {
+        for nk in 0..6 {
+            for (kind, poles) in [&[-0.8][..], &[-0.95], &[-1.5, 0.7], &[-1.6, 0.63]].into_iter().enumerate()
+            {
+                for slow in [&[-0.9][..], &[-0.98], &[-1.8, 0.81]] {
+                    let seed = 1000 * nk as u64 + 10 * kind as u64 + slow.len() as u64 + samples as u64;
+                    let u = divided(slow, &normal(seed, samples));
+                    let clean = divided(poles, &sum_of(&late(&u, nk), 0.5, &late(&u, nk + 1)));
+                    let noise = divided(poles, &normal(seed + 500, samples));
+                    let size = (sum_of_squares(&clean) / sum_of_squares(&noise)).sqrt();
+                    let found = delay_of(&u, &sum_of(&clean, 0.1 * size, &noise));
+                    all += 1.0;
+                    if found.confidence.is_some_and(|confidence| confidence >= 0.9) {
+                        sure += 1.0;
+                        right += if found.nk == Some(nk) { 1.0 } else { 0.0 };
+                    }
+                }
+            }
+        }
+    }
+    assert!(right >= 0.85 * sure && sure >= 0.4 * all, "{right} right of {sure} sure of {all}");
 }
 
 #[test]
@@ -197,7 +234,7 @@ fn a_correlation_is_that_of_its_definition() {
     let (u, y) = (deviations(&normal(11, 100)), deviations(&normal(12, 100)));
     // White both: the filters do nothing. Two stretches, which no product crosses.
     let segments = [0..60, 65..100];
-    let found = delay::delay("u", &u, &y, &segments);
+    let found = delay::correlation("u", &u, &y, &segments);
     let inside = |x: &[f64]| segments.iter().flat_map(|s| x[s.clone()].to_vec()).map(|x| x * x).sum::<f64>();
     for (lag, r) in found.correlation.iter().enumerate() {
         let products = |s: &Range<usize>| (s.start + lag..s.end).map(|t| u[t - lag] * y[t]).sum::<f64>();
@@ -210,50 +247,34 @@ fn a_correlation_is_that_of_its_definition() {
 
 #[test]
 fn without_a_relation_there_is_no_delay() {
-    // One of a hundred records has one by chance.
     let found = (0..60).filter(|&seed| {
         let u = divided(&[-0.9], &normal(seed, 300));
         let y = divided(&[-1.8, 0.82], &normal(seed + 1000, 300));
-        delay_of(&u, &y).nk.is_some()
+        delay_of(&u, &y).confidence.is_some_and(|confidence| confidence >= 0.9)
     });
-    assert!(found.count() <= 3);
-    for (u, y) in [
-        (vec![1.0; 300], normal(1, 300)),
-        (normal(1, 300), vec![1.0; 300]),
-        // What its past determines cannot be found again.
-        (sines(2, 300), late(&sines(2, 300), 3)),
-        (normal(1, 5), normal(2, 5)),
-    ] {
+    assert_eq!(found.count(), 0);
+    for (u, y) in
+        [(vec![1.0; 300], normal(1, 300)), (normal(1, 300), vec![1.0; 300]), (normal(1, 5), normal(2, 5))]
+    {
         let found = delay_of(&u, &y);
         assert_eq!((found.nk, found.confidence), (None, None));
         assert!(found.correlation.iter().all(|r| r.is_finite()) && found.band.is_finite());
     }
 }
 
-#[test]
-fn the_confidence_is_that_of_the_most_of_all_lags() {
-    let u = normal(21, 400);
-    let found = delay_of(&u, &sum_of(&normal(22, 400), 0.25, &late(&u, 2)));
-    assert_eq!(found.nk, Some(2));
-    let z = found.correlation[2].abs() * 400.0_f64.sqrt();
-    // The normal tail by integration; 41 lags.
-    let steps = 200_000;
-    let density = |x: f64| (-0.5 * x * x).exp() / (2.0 * PI).sqrt();
-    let tail: f64 = (0..steps)
-        .map(|k| density(z + 8.0 * (f64::from(k) + 0.5) / f64::from(steps)) * 8.0 / f64::from(steps))
-        .sum();
-    assert!((found.confidence.unwrap() - (1.0 - 41.0 * 2.0 * tail)).abs() < 1e-8);
+fn feedback_of(input: &[f64], output: &[f64]) -> Option<crate::validate::feedback::Feedback> {
+    feedback(&[input], output, &whole(input))[0]
 }
 
-fn p_value(input: &[f64], output: &[f64]) -> Option<f64> {
-    feedback::feedback(&[deviations(input)], &deviations(output), &whole(input))[0]
+fn is_suspected(input: &[f64], output: &[f64]) -> bool {
+    feedback_of(input, output).is_some_and(|found| found.is_suspected())
 }
 
 /// y = 0.9 y(t-1) + 0.5 u(t-1) + e under u = gain (r - y), which sees y of the same row or of the one before.
-fn loop_of(seed: u64, samples: usize, gain: f64, past: usize, noise: f64) -> (Vec<f64>, Vec<f64>) {
-    let (r, e) = (telegraph(seed, samples, 0.3), normal(seed + 500, samples));
+fn loop_of(r: &[f64], seed: u64, gain: f64, past: usize, noise: f64) -> (Vec<f64>, Vec<f64>) {
+    let e = normal(seed + 500, r.len());
     let (mut u, mut y): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
-    for t in 0..samples {
+    for t in 0..r.len() {
         let before = |signal: &[f64]| signal.last().copied().unwrap_or(0.0);
         y.push(0.9 * before(&y) + 0.5 * before(&u) + noise * e[t]);
         u.push(gain * (r[t] - if t >= past { y[t - past] } else { 0.0 }));
@@ -264,89 +285,135 @@ fn loop_of(seed: u64, samples: usize, gain: f64, past: usize, noise: f64) -> (Ve
 #[test]
 fn a_closed_loop_is_found() {
     for seed in 0..10 {
-        for (gain, past, noise) in [(0.5, 0, 0.3), (0.5, 0, 0.1), (0.5, 1, 0.3), (1.0, 0, 1.0), (0.2, 1, 0.3)]
-        {
-            let (u, y) = loop_of(seed, 1000, gain, past, noise);
-            assert!(p_value(&u, &y).unwrap() < 0.01, "seed {seed}, gain {gain}, past {past}, noise {noise}");
+        for (gain, past, noise) in [(0.5, 0, 0.3), (0.5, 1, 0.3), (1.0, 0, 1.0), (0.2, 1, 0.3)] {
+            let (u, y) = loop_of(&telegraph(seed, 1000, 0.3), seed, gain, past, noise);
+            assert!(is_suspected(&u, &y), "seed {seed}, gain {gain}, past {past}, noise {noise}");
         }
+        // Rare steps of the set-point are all that a sum of squares would see.
+        let (u, y) = loop_of(&telegraph(seed, 1000, 0.02), seed, 0.5, 1, 0.05);
+        assert!(is_suspected(&u, &y), "seed {seed}");
     }
 }
 
 #[test]
 fn an_open_loop_is_not() {
-    // One of a hundred is found by chance; half of the p-values are below 0.5. Also where the input acts at once, and the
-    // noise is slow: the b of the model are then differences of the impulse response.
-    for direct in [0.0, 1.0] {
-        let p_values: Vec<f64> = (0..70)
-            .map(|seed| {
-                let u = normal(seed, 400);
-                let drive = sum_of(&late(&u, 1), direct, &u);
-                let slow = divided(&[-0.99], &normal(seed + 900, 400));
-                p_value(&u, &sum_of(&divided(&[-0.8], &drive), 0.5, &slow)).unwrap()
-            })
-            .collect();
-        assert!(p_values.iter().filter(|p| **p < 0.01).count() <= 3, "{direct}");
-        assert!(p_values.iter().filter(|p| **p < 0.5).count() <= 48, "{direct}");
+    let slow = |seed: u64| divided(&[-0.9], &normal(seed, 600));
+    let held = |seed: u64| telegraph(seed, 600, 0.05);
+    let periodic = |seed: u64| -> Vec<f64> {
+        let phases = normal(seed, 12);
+        let at = |t: usize| {
+            let wave =
+                |(k, phase): (usize, &f64)| ((k + 1) as f64 * t as f64 * PI / 60.0 + 6.0 * phase).cos();
+            phases.iter().enumerate().map(wave).sum::<f64>() / 12.0_f64.sqrt()
+        };
+        (0..600).map(at).collect()
+    };
+    let bent = |x: &[f64]| x.iter().map(|x| (1.5 * x).tanh()).collect::<Vec<f64>>();
+    let (mut suspected, mut all) = (0, 0);
+    for seed in 0..12 {
+        for u in [normal(seed, 600), slow(seed), held(seed), periodic(seed)] {
+            let linear = divided(&[-1.5, 0.7], &late(&u, 1));
+            // At once, and the other way first, as a boost converter does.
+            let inverse = sum_of(&linear, -0.5, &u);
+            let cubes: Vec<f64> = u.iter().map(|u| u * u * u).collect();
+            for y in [linear.clone(), inverse, bent(&linear), divided(&[-0.8], &late(&cubes, 1))] {
+                let size = 0.01 * (sum_of_squares(&y) / 600.0).sqrt();
+                all += 1;
+                suspected += usize::from(is_suspected(&u, &sum_of(&y, size, &normal(seed + 900, 600))));
+            }
+        }
     }
+    assert!(100 * suspected <= 2 * all, "{suspected} of {all}");
 }
 
 #[test]
-fn the_tests_are_those_of_plain_regressions() {
-    use statrs::distribution::{ContinuousCDF, FisherSnedecor, Normal};
+fn the_test_is_that_of_plain_regressions() {
+    use statrs::distribution::{ChiSquared, ContinuousCDF};
     use thetahat_core::nalgebra::{DMatrix, DVector};
 
-    /// Parameters, their standard errors, and residuals, from normal equations.
-    fn regression(rows: &[Vec<f64>], target: &[f64]) -> (DVector<f64>, DVector<f64>, DVector<f64>) {
+    /// Parameters and residuals, from normal equations.
+    fn regression(rows: &[Vec<f64>], target: &[f64]) -> (DVector<f64>, Vec<f64>) {
         let x = DMatrix::from_fn(rows.len(), rows[0].len(), |i, j| rows[i][j]);
-        let inverse = (x.transpose() * &x).try_inverse().unwrap();
         let target = DVector::from_column_slice(target);
-        let theta = &inverse * (x.transpose() * &target);
-        let left = target - &x * &theta;
-        let variance = left.norm_squared() / (rows.len() - rows[0].len()) as f64;
-        (theta, inverse.diagonal().map(|entry| (variance * entry).sqrt()), left)
+        let theta = (x.transpose() * &x).try_inverse().unwrap() * (x.transpose() * &target);
+        let left = &target - &x * &theta;
+        (theta, left.as_slice().to_vec())
     }
 
     let samples = 300;
-    for effect in [0.0, 1.0, -1.0] {
-        let (e, w) = (normal(31, samples), divided(&[-0.5], &normal(32, samples)));
-        let u = sum_of(&w, 0.1, &late(&e, 1));
-        let y = sum_of(&e, effect, &divided(&[-0.5], &late(&u, 1)));
-        let (u, y) = (deviations(&u), deviations(&y));
-        let found = feedback::feedback(std::slice::from_ref(&u), &y, &whole(&u))[0].unwrap();
+    let e = normal(31, samples);
+    let u = sum_of(&divided(&[-0.5], &normal(32, samples)), 0.1, &late(&e, 1));
+    let y = sum_of(&e, 1.0, &divided(&[-0.5], &late(&u, 1)));
+    let (u, y) = (deviations(&u), deviations(&y));
+    let found = feedback_of(&u, &y).unwrap();
 
-        let row =
-            |t: usize| -> Vec<f64> { (1..=10).map(|k| y[t - k]).chain((0..=10).map(|k| u[t - k])).collect() };
-        let times = 10..samples;
-        let (theta, error, e) = regression(&times.map(row).collect::<Vec<_>>(), &y[10..]);
-        let now = Normal::standard().cdf(theta[10] / error[10] * effect);
-
-        let own = |t: usize| (1..=10).map(|k| u[t - k]).collect::<Vec<f64>>();
-        let both = |t: usize| [own(t), (1..=5).map(|k| e[t - 10 - k]).collect()].concat();
-        let times = 20..samples;
-        let (_, _, restricted) = regression(&times.clone().map(own).collect::<Vec<_>>(), &u[20..]);
-        let (_, _, full) = regression(&times.map(both).collect::<Vec<_>>(), &u[20..]);
-        let (restricted, full) = (restricted.norm_squared(), full.norm_squared());
-        let free = (samples - 20 - 15) as f64;
-        let past = FisherSnedecor::new(5.0, free).unwrap().sf((restricted - full) / 5.0 / (full / free));
-
-        // A plant without effect has no sign.
-        let least = past.min(now);
-        let expected = if effect == 0.0 { past } else { 1.0 - (1.0 - least) * (1.0 - least) };
-        assert!((found / expected - 1.0).abs() < 1e-9, "{effect}: {found} {expected}");
+    let row =
+        |t: usize| -> Vec<f64> { (1..=10).map(|k| y[t - k]).chain((0..=10).map(|k| u[t - k])).collect() };
+    let (_, e) = regression(&(10..samples).map(row).collect::<Vec<_>>(), &y[10..]);
+    // The mean of the rows that have innovations is taken off again.
+    let mean = u[10..].iter().sum::<f64>() / 290.0;
+    let u: Vec<f64> = u[10..].iter().map(|u| u - mean).collect();
+    // One past value for 20 of 290 samples.
+    let times = || 14..samples - 10;
+    let past: Vec<Vec<f64>> = times().map(|t| (1..=14).map(|k| u[t - k]).collect()).collect();
+    let left = |signal: Vec<f64>| regression(&past, &signal).1;
+    let w = left(times().map(|t| u[t]).collect());
+    let z: Vec<Vec<f64>> = (1..=5).map(|k| left(times().map(|t| e[t - k]).collect())).collect();
+    // Pseudo-values.
+    let (mut new, mut bounded) = (w, Vec::new());
+    for _ in 0..4 {
+        let mut sizes: Vec<f64> = new.iter().map(|w| w.abs()).collect();
+        sizes.sort_by(f64::total_cmp);
+        let bound = 2.0 * 1.482_602_218_505_602 * sizes[new.len() / 2];
+        bounded = new.iter().map(|w| w.clamp(-bound, bound)).collect();
+        let target = times().zip(&new).zip(&bounded).map(|((t, w), psi)| u[t] - w + psi).collect();
+        let change = left(target);
+        new = new.iter().zip(&bounded).zip(&change).map(|((w, psi), left)| w - psi + left).collect();
     }
+    let bounded = left(bounded);
+    let rows: Vec<Vec<f64>> = (0..bounded.len()).map(|t| z.iter().map(|z| z[t]).collect()).collect();
+    let (d, rest) = regression(&rows, &bounded);
+    let matrix = |weights: &dyn Fn(usize) -> f64, range: Range<usize>| {
+        DMatrix::from_fn(5, 5, |i, j| {
+            range.clone().map(|t| weights(t) * rows[t][i] * rows[t][j]).sum::<f64>()
+        })
+    };
+    let count = bounded.len();
+    let (g, m) = (matrix(&|_| 1.0, 0..count), matrix(&|t| rest[t] * rest[t], 0..count));
+    let m = m * count as f64 / (count - 19) as f64;
+    let statistic = (&g * &d).dot(&(m.try_inverse().unwrap() * (&g * &d)));
+    let p_value = ChiSquared::new(5.0).unwrap().sf(statistic);
+    assert!((found.p_value / p_value - 1.0).abs() < 1e-6, "{} {p_value}", found.p_value);
+    let part = |part: usize| -> f64 {
+        let inside = |t: &usize| t * 5 / count == part;
+        let others: Vec<usize> = (0..count).filter(|t| !inside(t)).collect();
+        let target: Vec<f64> = others.iter().map(|&t| bounded[t]).collect();
+        let (d, _) = regression(&others.iter().map(|&t| rows[t].clone()).collect::<Vec<_>>(), &target);
+        let gain = |t: usize| {
+            let predicted: f64 = rows[t].iter().zip(d.iter()).map(|(z, d)| z * d).sum();
+            bounded[t].powi(2) - (bounded[t] - predicted).powi(2)
+        };
+        (0..count).filter(inside).map(gain).sum()
+    };
+    let explained = (0..5).map(part).sum::<f64>() / bounded.iter().map(|psi| psi * psi).sum::<f64>();
+    assert!((found.explained - explained).abs() < 1e-9, "{} {explained}", found.explained);
 }
 
 #[test]
 fn where_feedback_cannot_be_said_there_is_none() {
     let u = normal(41, 300);
     // No noise; no samples; constants; an input that its past determines.
-    assert_eq!(p_value(&u, &divided(&[-0.5], &late(&u, 1))), None);
-    assert_eq!(p_value(&u[..20], &normal(42, 20)), None);
-    assert_eq!(p_value(&[3.0; 300], &normal(42, 300)), None);
-    assert_eq!(p_value(&u, &[3.0; 300]), None);
-    assert_eq!(p_value(&sines(2, 300), &normal(42, 300)), None);
+    assert_eq!(feedback_of(&u, &divided(&[-0.5], &late(&u, 1))), None);
+    assert_eq!(feedback_of(&u[..20], &normal(42, 20)), None);
+    assert_eq!(feedback_of(&[3.0; 300], &normal(42, 300)), None);
+    assert_eq!(feedback_of(&u, &[3.0; 300]), None);
+    assert_eq!(feedback_of(&sines(2, 300), &normal(42, 300)), None);
+    // One that repeats itself, behind a plant that is not linear.
+    let period = normal(43, 100).repeat(3);
+    let cubes: Vec<f64> = late(&period, 1).iter().map(|u| u * u * u).collect();
+    assert_eq!(feedback_of(&period, &sum_of(&cubes, 0.01, &normal(44, 300))), None);
     // A constant input beside a good one does not spoil it.
     let inputs = [vec![0.0; 300], deviations(&u)];
-    let both = feedback::feedback(&inputs, &deviations(&normal(42, 300)), &one(0..300));
+    let both = feedback(&inputs, &deviations(&normal(42, 300)), &one(0..300));
     assert!(both[0].is_none() && both[1].is_some());
 }

@@ -60,11 +60,47 @@ fn an_input_that_acts_at_once_is_seen() {
     let selection = automatic(&Record::new(&y, vec![&u]).unwrap(), Some(Structure::Arx), None).unwrap();
     assert_eq!(selection.chosen.orders.nk, [0], "{:?}", selection.steps);
     assert_eq!(selection.delays[0].mdl[0].nk, 0);
+    let says = |what: &str| selection.steps.iter().any(|step| step.contains(what));
+    assert!(says("it acts within the same sample") && !says("feedback"), "{:?}", selection.steps);
 }
 
-/// u(t) = K (r(t) - y(t)) explains y(t) at once, but does not act so.
+/// The confidence from a regression for each window of lags.
 #[test]
-fn feedback_is_not_taken_for_an_effect_at_once() {
+fn the_confidence_is_the_posterior_weight_of_the_delay() {
+    use thetahat_core::nalgebra::{DMatrix, DVector};
+    let mut noise = Noise(41);
+    let (u, e) = (noise.take(40), noise.take(40));
+    let y = sum(&filtered(&[0.0, 0.0, 1.0], &[1.0, -0.5], &u), &e, 0.3);
+    let found = delays(&Record::new(&y, vec![&u]).unwrap(), &["u".to_owned()]).unwrap();
+    // Of 40 samples there are ARX models of order 3 with 4 lags; 5 samples are before all of them.
+    let (mut own, mut all) = (0.0, 0.0);
+    for (start, end) in
+        (0..5).flat_map(|start| (start + 1..=5.min(start + 4)).map(move |end| (start, end))).chain([(0, 0)])
+    {
+        let lags = 3 + end - start;
+        let at = |t: usize, column: usize| {
+            if column < 3 { -y[t - 1 - column] } else { u[t - (start + column - 3)] }
+        };
+        let x = DMatrix::from_fn(36, lags, |row, column| at(row + 4, column));
+        let target = DVector::from_column_slice(&y[4..]);
+        let theta = (x.transpose() * &x).try_inverse().unwrap() * (x.transpose() * &target);
+        let mdl = ((target - x * theta).norm_squared() / 36.0).ln() + lags as f64 * 36.0_f64.ln() / 36.0;
+        // Lag 0 costs one more ln(N)/N.
+        let weight = (-18.0 * mdl).exp() * if start == 0 && end > 0 { 1.0 / 6.0 } else { 1.0 };
+        all += weight;
+        own += if start == found[0].nk && end > 0 { weight } else { 0.0 };
+    }
+    assert!(
+        (found[0].confidence.unwrap() - own / all).abs() < 1e-9,
+        "{:?} {}",
+        found[0].confidence,
+        own / all
+    );
+}
+
+/// u(t) = K (r(t) - y(t)) explains y(t) at once, but does not act so: no data tell the two apart, words do.
+#[test]
+fn an_effect_at_once_that_may_be_feedback_is_said_to_be_one() {
     for (gain, held) in [(0.25, 1), (0.25, 300), (0.1, 20)] {
         let mut noise = Noise(83);
         let (mut y, mut u, mut x): (Vec<f64>, Vec<f64>, Vec<f64>) = Default::default();
@@ -81,9 +117,9 @@ fn feedback_is_not_taken_for_an_effect_at_once() {
             u.push(gain * (wanted - now));
         }
         let selection = automatic(&Record::new(&y, vec![&u]).unwrap(), Some(Structure::Arx), None).unwrap();
-        assert!(selection.chosen.orders.nk[0] >= 1, "{gain} {held} {:?}", selection.steps);
+        assert_eq!(selection.chosen.orders.nk, [0], "{gain} {held} {:?}", selection.steps);
         assert!(
-            selection.steps.iter().any(|step| step.contains("feedback")),
+            selection.steps.iter().any(|step| step.contains("may be feedback; --nk 1 keeps it out")),
             "{gain} {held} {:?}",
             selection.steps
         );

@@ -157,7 +157,9 @@ fn every_fault_has_its_word() {
     assert!(!says(&found, "no effect of input 'dead'"));
 
     let other: Vec<f64> = coarse.iter().map(|x| 3.0 - 2.0 * x).collect();
-    let both = recording(&[("u1", &coarse), ("u2", &other), ("y", &y)], Times::Uniform(1.0));
+    // Without noise nothing can be said of feedback.
+    let noisy = sum_of(&y, 0.1, &normal(4, 600));
+    let both = recording(&[("u1", &coarse), ("u2", &other), ("y", &noisy)], Times::Uniform(1.0));
     let found = inspected(both, &plan(&["u1", "u2"], Some("y")));
     assert!(says(&found, "'u1' and 'u2' are the same"));
     assert_eq!((&found.excitation[0].same_as, found.excitation[1].same_as.as_deref()), (&None, Some("u1")));

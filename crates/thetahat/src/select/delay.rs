@@ -23,7 +23,6 @@ use super::linear::{Columns, Fitted, Rows, Scaled};
 use super::ranking::number;
 use super::{Delay, Scan, Task};
 use crate::data::Record;
-use crate::estimate::with_constants;
 use crate::figures::fixed;
 use crate::validate::feedback;
 use crate::{Criteria, Error, Orders};
@@ -57,7 +56,7 @@ type Windows = Vec<Range<usize>>;
 impl Long {
     fn new(record: &Record<'_>, named: usize, na: usize, lags: usize, end: usize) -> Result<Self, Error> {
         let inputs = record.inputs.len();
-        let largest = with_constants(&Orders::arx(na, &vec![end; named], &vec![0; named])?, inputs - named);
+        let largest = Orders::arx(na, &vec![end; named], &vec![0; named])?.with_constants(inputs - named);
         let columns = Columns::new(std::iter::once(&largest), inputs);
         let rows = rows(record, &columns, &Samples::unknown(record, std::iter::once(&largest)))?;
         let scaled = Scaled::new(&rows);
@@ -244,7 +243,7 @@ pub(super) fn found(task: &Task<'_>, steps: &mut Vec<String>) -> Result<(Vec<Del
 
 /// A confidence in percent, without rounding up to certainty.
 fn percent(confidence: f64) -> String {
-    fixed((1e3 * confidence).floor() / 10.0, 1)
+    fixed((1e3 * confidence).floor().min(999.0) / 10.0, 1)
 }
 
 /// An MDL, as far as it is defined.

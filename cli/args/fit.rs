@@ -107,6 +107,10 @@ pub(crate) struct ModelArguments {
     /// What stands before the first sample of a stretch
     #[arg(long, value_enum, default_value = "auto", help_heading = "Model")]
     pub(crate) initial: InitialArgument,
+    /// What the model is for: prediction (errors one step ahead), simulation (free runs, driven by the inputs alone), or a number
+    /// of steps ahead. auto: prediction, unless without orders another model simulates rows held out from it clearly better
+    #[arg(long, value_name = "auto|prediction|simulation|K", default_value = "auto", help_heading = "Model")]
+    pub(crate) focus: String,
     /// Estimate the level of the output with the parameters, beside the mean that is taken off: for step tests and other logs
     /// of which the mean is not where the plant rests
     #[arg(long, value_enum, default_value = "auto", help_heading = "Model")]

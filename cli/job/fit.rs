@@ -1,6 +1,6 @@
 use std::path::{Path, PathBuf};
 
-use thetahat::{Constant, Detrend, Initial, Method, Plan, Prefilter, Rows, Select, Split};
+use thetahat::{Constant, Detrend, Focus, Initial, Method, Plan, Prefilter, Rows, Select, Split};
 
 use super::orders::OrderJob;
 use super::{LogJob, method, parsed, rows};
@@ -30,6 +30,7 @@ pub(crate) struct FitJob {
     pub(crate) prefilter: Option<Prefilter>,
     pub(crate) orders: OrderJob,
     pub(crate) select: Select,
+    pub(crate) focus: Focus,
     pub(crate) method: Method,
     pub(crate) initial: Initial,
     pub(crate) constant: Constant,
@@ -51,6 +52,7 @@ impl FitJob {
             prefilter: arguments.prefilter.as_deref().map(|text| parsed("--prefilter", text)).transpose()?,
             split: arguments.choice.split.as_deref().map(|text| parsed("--split", text)).transpose()?,
             select: select(arguments.choice.select, &orders)?,
+            focus: parsed("--focus", &arguments.model.focus)?,
             method: method::method(arguments, &orders)?,
             initial: initial(&arguments.model, &orders)?,
             constant: match arguments.model.constant {
@@ -99,6 +101,7 @@ impl FitJob {
         Ok(Plan {
             choice: self.orders.of(inputs.len())?,
             select: self.select,
+            focus: self.focus,
             inputs,
             output,
             estimate: self.estimate.clone(),

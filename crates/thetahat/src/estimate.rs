@@ -10,6 +10,7 @@ mod normal;
 mod objective;
 mod offset;
 mod optimize;
+mod plant_first;
 mod prediction_error;
 mod predictor;
 mod restart;
@@ -26,7 +27,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::data::Record;
 pub use crate::regression::Solver;
-use crate::{Criteria, Error, Orders};
+use crate::{Criteria, Error, Orders, Structure};
 pub use arx::{arx, arx_factor};
 pub(crate) use arx::{enough, estimate_is_for_f};
 pub(crate) use common::{Common, Point, Window, extended};
@@ -36,7 +37,8 @@ pub(crate) use exact::exact_mean;
 pub use offset::Constant;
 pub(crate) use offset::{Beside, Fitted, OutputOffset, Task, pays};
 pub use optimize::{Algorithm, Monitor, Progress, Search, SearchOutcome, StartOutcome, Step, Stopped};
-pub(crate) use optimize::{FIRST_DAMPING, LARGEST_DAMPING, ROUNDING, SMALLEST_DAMPING};
+pub(crate) use optimize::{Deadline, FIRST_DAMPING, LARGEST_DAMPING, ROUNDING, SMALLEST_DAMPING};
+pub(crate) use plant_first::noise_order;
 pub(crate) use prediction_error::{drop_is_not_for_f, stretches};
 pub use robust::{Loss, Robust, RobustOutcome};
 pub(crate) use uncertainty::{Autoregression, autoregression, backward_filtered_products};
@@ -220,6 +222,9 @@ pub(crate) fn estimate_of_channels(
     monitor: Monitor<'_>,
 ) -> Result<Estimate, Error> {
     match method {
+        Method::PredictionError(search) if search.plant_first && orders.structure() != Structure::Oe => {
+            plant_first::plant_first(record, inputs.len(), orders, initial, search, monitor)
+        }
         Method::PredictionError(search) => {
             prediction_error::prediction_error(record, orders, initial, search, monitor)
         }
@@ -332,7 +337,7 @@ impl Estimate {
             Procedure::LeastSquares { .. } | Procedure::PredictionError(_) => {
                 prediction_error::coloured_covariance(record, orders, &self)
             }
-            Procedure::Robust(_) if orders.structure() == crate::Structure::Oe => self.covariance,
+            Procedure::Robust(_) if orders.structure() == Structure::Oe => self.covariance,
             Procedure::Constrained(_) | Procedure::Robust(_) | Procedure::ExactLikelihood(_) => None,
             Procedure::InstrumentalVariables { .. } | Procedure::RefinedInstrumentalVariables { .. } => {
                 self.covariance

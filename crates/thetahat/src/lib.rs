@@ -85,8 +85,8 @@ pub use respond::{
     prediction_deviations, simulate, step_response,
 };
 pub use select::{
-    Automatic, Choice, Criteria, Delay, Grid, OrderRange, Path, Scan, Scored, Select, Selection,
-    choose_orders,
+    Automatic, Best, Choice, Criteria, Delay, Focus, Grid, HeldOut, OrderRange, Path, Scan, Scored, Select,
+    Selection, choose_orders,
 };
 pub use thetahat_core;
 pub use track::{

@@ -10,7 +10,9 @@ mod choice;
 mod compare;
 mod criteria;
 mod delay;
+mod focus;
 mod grid;
+mod held_out;
 mod linear;
 mod ranking;
 mod search;
@@ -22,13 +24,15 @@ mod unseen;
 use std::ops::ControlFlow;
 
 use crate::data::Record;
-use crate::estimate::{Initial, Monitor, Search};
+use crate::estimate::{Deadline, Initial, Monitor, Search};
 use crate::{Error, Orders};
 pub(crate) use automatic::constant_pays;
 pub use choice::{Automatic, Choice, Grid, OrderRange, Path, Select};
 pub use criteria::Criteria;
 pub(crate) use delay::delays;
-pub use selection::{Delay, Scan, Scored, Selection};
+pub use focus::Focus;
+pub use held_out::HeldOut;
+pub use selection::{Best, Delay, Scan, Scored, Selection};
 
 /// What a choice is made from.
 #[derive(Clone, Copy)]
@@ -38,8 +42,11 @@ pub(crate) struct Task<'a> {
     /// The inputs' names. Both records have further inputs behind these where a constant or a trend is part of every model.
     pub(crate) inputs: &'a [String],
     pub(crate) select: Select,
+    pub(crate) focus: Focus,
     pub(crate) initial: Initial,
     pub(crate) search: &'a Search,
+    /// Of all its searches.
+    pub(crate) deadline: Deadline,
     pub(crate) monitor: Monitor<'a>,
 }
 
@@ -47,6 +54,11 @@ impl<'a> Task<'a> {
     /// Orders with those of the inputs that have no name.
     fn with_constants(&self, orders: &Orders) -> Orders {
         orders.with_constants(self.estimation.inputs.len() - self.inputs.len())
+    }
+
+    /// Whether models are judged by more than errors one step ahead.
+    fn looks_further(&self) -> bool {
+        !self.inputs.is_empty() && self.focus.looks_further()
     }
 
     /// The same without them.
@@ -123,9 +135,17 @@ pub fn choose_orders(
     let inputs: Vec<String> = (1..=record.inputs.len()).map(|number| format!("u{number}")).collect();
     let search = Search::default();
     let monitor: Monitor<'_> = &|_| ControlFlow::Continue(());
-    let initial = Initial::Auto;
-    let task =
-        Task { estimation: record, validation, inputs: &inputs, select, initial, search: &search, monitor };
+    let task = Task {
+        estimation: record,
+        validation,
+        inputs: &inputs,
+        select,
+        focus: Focus::Auto,
+        initial: Initial::Auto,
+        search: &search,
+        deadline: Deadline::after(search.time_limit),
+        monitor,
+    };
     Ok(choose(&task, choice)?.selection)
 }
 
@@ -150,6 +170,10 @@ pub(crate) fn choose(task: &Task<'_>, choice: &Choice) -> Result<Found, Error> {
             format!("its record has {other} inputs, that of the estimation {inputs}"),
         ));
     }
+    // Who gives ranges asks for the criterion.
+    let gated = matches!(choice, Choice::Automatic(_)) && inputs > 0;
+    let focus = if task.focus == Focus::Auto && !gated { Focus::Prediction } else { task.focus };
+    let task = &Task { focus, ..*task };
     match choice {
         Choice::Known(orders) => {
             let outcome = compare::compare(task, vec![orders.clone()])?;

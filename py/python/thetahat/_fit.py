@@ -32,6 +32,7 @@ def arx(
     likelihood: str | None = None,
     constant: str | None = None,
     trend: bool | None = None,
+    focus: str | int | None = None,
     norm: float | str | None = None,
     bound: Mapping[str, Bound] | None = None,
     dc_gain: Bound | Mapping[str, Bound] | None = None,
@@ -50,8 +51,8 @@ def arx(
         Coefficients of B.
     nk : int, or one for each input
         Samples from input to first effect.
-    estimate, validate, split, detrend, offset, prefilter, initial, likelihood, constant, trend, norm, bound, dc_gain, ridge,
-    noise_bound
+    estimate, validate, split, detrend, offset, prefilter, initial, likelihood, constant, trend, focus, norm, bound, dc_gain,
+    ridge, noise_bound
         What to fit to and how, see `thetahat.FitOptions`.
 
     Returns
@@ -104,6 +105,7 @@ def armax(
     likelihood: str | None = None,
     constant: str | None = None,
     trend: bool | None = None,
+    focus: str | int | None = None,
     norm: float | str | None = None,
     search: str | None = None,
     max_iterations: int | None = None,
@@ -123,8 +125,8 @@ def armax(
         Coefficients of A, B and C; nb may be one for each input.
     nk : int, or one for each input
         Samples from input to first effect.
-    estimate, validate, split, detrend, offset, prefilter, initial, likelihood, constant, trend, norm, search, max_iterations,
-    tolerance, step, starts, seed, time_limit
+    estimate, validate, split, detrend, offset, prefilter, initial, likelihood, constant, trend, focus, norm, search,
+    max_iterations, tolerance, step, starts, seed, time_limit
         What to fit to and how to search, see `thetahat.FitOptions`.
 
     Returns
@@ -161,6 +163,7 @@ def oe(
     initial: str | None = None,
     constant: str | None = None,
     trend: bool | None = None,
+    focus: str | int | None = None,
     norm: float | str | None = None,
     search: str | None = None,
     max_iterations: int | None = None,
@@ -182,7 +185,7 @@ def oe(
         Coefficients of B and F.
     nk : int, or one for each input
         Samples from input to first effect.
-    estimate, validate, split, detrend, offset, prefilter, initial, constant, trend, norm, search, max_iterations, tolerance,
+    estimate, validate, split, detrend, offset, prefilter, initial, constant, trend, focus, norm, search, max_iterations, tolerance,
     step, starts, seed, time_limit
         What to fit to and how to search, see `thetahat.FitOptions`.
 
@@ -221,6 +224,7 @@ def bj(
     initial: str | None = None,
     constant: str | None = None,
     trend: bool | None = None,
+    focus: str | int | None = None,
     norm: float | str | None = None,
     search: str | None = None,
     max_iterations: int | None = None,
@@ -240,7 +244,7 @@ def bj(
         Coefficients of B, C, D and F; nb and nf may be one for each input.
     nk : int, or one for each input
         Samples from input to first effect.
-    estimate, validate, split, detrend, offset, prefilter, initial, constant, trend, norm, search, max_iterations, tolerance,
+    estimate, validate, split, detrend, offset, prefilter, initial, constant, trend, focus, norm, search, max_iterations, tolerance,
     step, starts, seed, time_limit
         What to fit to and how to search, see `thetahat.FitOptions`.
 
@@ -397,6 +401,7 @@ def pem(
     likelihood: str | None = None,
     constant: str | None = None,
     trend: bool | None = None,
+    focus: str | int | None = None,
     norm: float | str | None = None,
     bound: Mapping[str, Bound] | None = None,
     dc_gain: Bound | Mapping[str, Bound] | None = None,
@@ -420,8 +425,8 @@ def pem(
         Coefficients of the polynomials; nb and nf may be one for each input.
     nk : int, or one for each input
         Samples from input to first effect: 1, unless said otherwise.
-    estimate, validate, split, detrend, offset, prefilter, initial, likelihood, constant, trend, norm, bound, dc_gain, ridge,
-    noise_bound, search, max_iterations, tolerance, step, starts, seed, time_limit
+    estimate, validate, split, detrend, offset, prefilter, initial, likelihood, constant, trend, focus, norm, bound, dc_gain,
+    ridge, noise_bound, search, max_iterations, tolerance, step, starts, seed, time_limit
         What to fit to and how to search, see `thetahat.FitOptions`.
 
     Returns
@@ -562,6 +567,7 @@ def search(
     likelihood: str | None = None,
     constant: str | None = None,
     trend: bool | None = None,
+    focus: str | int | None = None,
     norm: float | str | None = None,
     bound: Mapping[str, Bound] | None = None,
     dc_gain: Bound | Mapping[str, Bound] | None = None,
@@ -591,8 +597,8 @@ def search(
         What makes one model better than another: MDL, unless said otherwise.
     path : {"all", "alternate"}
         Which are tried: all of them, or one order up at a time.
-    estimate, validate, split, detrend, offset, prefilter, initial, likelihood, constant, trend, norm, bound, dc_gain, ridge,
-    noise_bound, search, max_iterations, tolerance, step, starts, seed, time_limit
+    estimate, validate, split, detrend, offset, prefilter, initial, likelihood, constant, trend, focus, norm, bound, dc_gain,
+    ridge, noise_bound, search, max_iterations, tolerance, step, starts, seed, time_limit
         What to fit to and how to search, see `thetahat.FitOptions`.
 
     Returns

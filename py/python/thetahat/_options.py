@@ -71,6 +71,11 @@ class FitOptions(TypedDict, total=False):
         MDL, always or never. With ``detrend="none"``, or an offset of the output by hand, "auto" is "no". It is part of ``model.offsets``, and stands with its standard error in the report.
     trend : bool
         Whether a slope of the output is estimated with the parameters too, and its level with it.
+    focus : {"auto", "prediction", "simulation"} or int
+        What the model is for: errors one step ahead, free runs that the inputs alone drive, or so many steps ahead. With
+        orders, "simulation" finds the plant with the least errors of its free run and the noise behind it, and a number
+        is the horizon of the figure on held-out rows. In a choice it says what models are compared by on rows that were held
+        out from them; "auto" is "prediction", unless without orders another model simulates these clearly better.
     norm : {2, 1, "huber", "huber:K", "inf"}
         What to make small: squared errors; absolute ones, which wild samples do not rule; squares up to K times the scale of
         the errors and absolute values beyond (1.345); or, where the model is linear in its parameters, the largest error.
@@ -109,6 +114,7 @@ class FitOptions(TypedDict, total=False):
     likelihood: str
     constant: str
     trend: bool
+    focus: Union[str, int]
     norm: Union[float, str]
     bound: Mapping[str, Bound]
     dc_gain: Union[Bound, Mapping[str, Bound]]

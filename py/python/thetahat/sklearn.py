@@ -54,6 +54,7 @@ _OPTIONS = (
     "likelihood",
     "constant",
     "trend",
+    "focus",
     "norm",
     "bound",
     "dc_gain",
@@ -78,7 +79,7 @@ class ARXRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         How many samples ahead `predict` and `score` predict. None: the free run, which sees no outputs.
     sample_time : float, default=1.0
         Seconds from one sample to the next.
-    estimate, validate, split, detrend, offset, prefilter, initial, likelihood, constant, trend, norm, bound, dc_gain,
+    estimate, validate, split, detrend, offset, prefilter, initial, likelihood, constant, trend, focus, norm, bound, dc_gain,
     ridge, noise_bound : default=None
         What to fit to and how, as for `thetahat.arx`, see `thetahat.FitOptions`. Channels are called as the columns of a data
         frame, else u, or u1, u2, …, and y.
@@ -138,6 +139,7 @@ class ARXRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         likelihood: str | None = None,
         constant: str | None = None,
         trend: bool | None = None,
+        focus: str | int | None = None,
         norm: float | str | None = None,
         bound: Mapping[str, Bound] | None = None,
         dc_gain: Bound | Mapping[str, Bound] | None = None,
@@ -159,6 +161,7 @@ class ARXRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         self.likelihood = likelihood
         self.constant = constant
         self.trend = trend
+        self.focus = focus
         self.norm = norm
         self.bound = bound
         self.dc_gain = dc_gain

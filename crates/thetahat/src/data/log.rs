@@ -9,6 +9,8 @@ use crate::Error;
 use crate::data::{Offset, Regular, Rows, checked};
 use crate::figures::short;
 
+/// So many rows at the end that repeat one value in all channels are told.
+const PADDING: usize = 20;
 /// A step longer than so many medians starts a new segment.
 pub(crate) const GAP: f64 = 1.5;
 /// Steps may differ from their median by this fraction.
@@ -360,6 +362,23 @@ impl Log {
     /// Whether the log has a channel of this name.
     pub fn has(&self, name: &str) -> bool {
         self.channels.iter().any(|channel| channel.name == name)
+    }
+
+    /// The last rows of which all named channels repeat one value, as padding does: at least [`PADDING`] and a hundredth of all.
+    ///
+    /// # Errors
+    /// [`Error::Data`] for a name that is not there.
+    pub(crate) fn padding(&self, names: &[&str]) -> Result<Option<Rows>, Error> {
+        let mut last = self.rows;
+        for name in names {
+            let values = &self.channel(name)?.values;
+            let same = values.iter().rev().take_while(|value| Some(*value) == values.last()).count();
+            last = last.min(same);
+        }
+        if last < PADDING.max(self.rows / 100) || last == self.rows {
+            return Ok(None);
+        }
+        Rows::new(self.rows - last + 1, self.rows).map(Some)
     }
 
     /// How often the clock jumps, not counting where another log begins.

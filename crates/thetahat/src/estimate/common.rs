@@ -61,24 +61,16 @@ impl<'a> Common<'a> {
         free: bool,
         window: Window,
         options: &Search,
+        deadline: Deadline,
         monitor: Monitor<'a>,
     ) -> Result<Self, Error> {
         options.check_numbers()?;
         let samples: usize = record.segments.iter().map(Range::len).sum();
         let tolerance = options.tolerance.max(SETTLED / samples.max(1) as f64);
         let options = Search { guess: None, starts: 0, tolerance, ..options.clone() };
-        let deadline = Deadline::after(options.time_limit);
         let smallest = NOTHING_LEFT * energy(record);
         let begin = if free { Begin::Unknown } else { Begin::Zero };
         Ok(Self { record, begin, window, options, smallest, deadline, monitor })
-    }
-
-    /// The same for other samples, with the time that is left.
-    pub(crate) fn on<'b>(&self, record: &'b Record<'b>) -> Common<'b>
-    where
-        'a: 'b,
-    {
-        Common { record, smallest: NOTHING_LEFT * energy(record), options: self.options.clone(), ..*self }
     }
 
     fn predictor(&self, orders: &Orders) -> Predictor<'a> {

@@ -99,6 +99,9 @@ pub struct Search {
     pub time_limit: Option<Duration>,
     /// One more start: parameters in their order, such as those of a model that is known to be close.
     pub guess: Option<Vec<f64>>,
+    /// Whether the plant is found first, with the least errors of its free run, and the noise behind it: for models that
+    /// simulate. Else all parameters together have the least errors one step ahead.
+    pub plant_first: bool,
 }
 
 impl Search {
@@ -148,21 +151,22 @@ impl Default for Search {
             seed: 0,
             time_limit: None,
             guess: None,
+            plant_first: false,
         }
     }
 }
 
 /// When to begin nothing more; never, unless there is a limit.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Deadline(Option<Instant>);
+pub(crate) struct Deadline(Option<Instant>);
 
 impl Deadline {
     /// So long from now. A limit beyond the end of the clock is none.
-    pub(super) fn after(limit: Option<Duration>) -> Self {
+    pub(crate) fn after(limit: Option<Duration>) -> Self {
         Self(limit.and_then(|limit| Instant::now().checked_add(limit)))
     }
 
-    pub(super) fn is_over(self) -> bool {
+    pub(crate) fn is_over(self) -> bool {
         self.0.is_some_and(|deadline| Instant::now() >= deadline)
     }
 }
@@ -233,6 +237,9 @@ pub struct SearchOutcome {
     /// The largest modulus of a pole that a start had outside the unit circle, before it was reflected into it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unstable_pole: Option<f64>,
+    /// Whether this search was for the least errors of a free run, and the noise was found behind it.
+    #[serde(default)]
+    pub plant_first: bool,
 }
 
 /// Where a search is, told before each iteration. An answer of [`ControlFlow::Break`] ends the estimation with

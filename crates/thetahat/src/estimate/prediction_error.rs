@@ -379,6 +379,7 @@ pub(super) fn search_outcome(
         start: starts.first().map(|start| start.name.clone()).unwrap_or_default(),
         starts,
         unstable_pole: None,
+        plant_first: false,
     }
 }
 

@@ -3,12 +3,14 @@ use std::ops::{ControlFlow, Range};
 use super::apply::record_for;
 use super::schema::{Data, Estimation, Missing, Parts, Report, Source};
 use super::validation::{estimation_record, estimation_start, goes_through};
-use super::warnings::{at_the_border, unstable_plant, warnings};
+use super::warnings::{at_the_border, padded, unstable_plant, warnings};
 use crate::data::{Detrend, Log, Offset, Prefilter, Prefiltered, Record, Rows, Split, between, checked};
-use crate::estimate::{self, Beside, Constant, Estimate, Fitted, Method, Monitor, OutputOffset, enough};
+use crate::estimate::{
+    self, Beside, Constant, Deadline, Estimate, Fitted, Method, Monitor, OutputOffset, Search, enough,
+};
 use crate::regression::sum;
 use crate::respond::{Start, innovations};
-use crate::select::{self, Choice, Found, Grid, Select, Task};
+use crate::select::{self, Automatic, Choice, Focus, Found, Grid, Select, Selection, Task};
 use crate::validate::{Fit, Horizon, Part};
 use crate::{Error, Initial, Model, Orders, Quantity, Signal, Structure};
 
@@ -40,6 +42,8 @@ pub struct Plan {
     pub choice: Choice,
     /// What makes one model better than another, where there is a choice.
     pub select: Select,
+    /// What the model is for: it decides among several, and what a fit makes small.
+    pub focus: Focus,
     /// How to estimate.
     pub method: Method,
     /// What stands for the samples before a segment.
@@ -66,6 +70,7 @@ impl Plan {
             prefilter: None,
             choice: choice.into(),
             select: Select::default(),
+            focus: Focus::default(),
             method: Method::default(),
             initial: Initial::default(),
             constant: Constant::default(),
@@ -83,6 +88,39 @@ impl Plan {
     fn constant(&self) -> Constant {
         let given = !self.takes_output_offset() || self.prefilter.is_some();
         if self.constant == Constant::Auto && given { Constant::No } else { self.constant }
+    }
+
+    /// Whether the noise of a chosen model is found behind it: of one that simulates, without a description of its own.
+    fn puts_noise_behind(&self, selection: &Selection) -> bool {
+        let simulates = selection.winners.as_ref().is_some_and(|best| {
+            selection.chosen.orders == best.simulation.orders
+                && best.simulation.orders != best.prediction.orders
+        });
+        let free_run = matches!(self.focus, Focus::Auto | Focus::Simulation);
+        simulates
+            && free_run
+            && selection.chosen.structure == Structure::Oe
+            && matches!(&self.choice, Choice::Automatic(Automatic { structure: None, .. }))
+    }
+
+    /// Refuses a focus that does not go with orders or method.
+    fn check_focus(&self, orders: &Orders) -> Result<(), Error> {
+        if !matches!(self.focus, Focus::Simulation | Focus::Steps(_)) {
+            return Ok(());
+        }
+        if self.focus == Focus::Simulation && orders.nb.iter().all(|&nb| nb == 0) {
+            return Err(Error::argument(
+                "focus",
+                "simulation needs inputs that drive the model; take prediction",
+            ));
+        }
+        if self.focus == Focus::Simulation && !matches!(self.method, Method::PredictionError(_)) {
+            return Err(Error::argument(
+                "focus",
+                "a fit for simulation minimises the squared errors of the free run; leave out the other method or criterion",
+            ));
+        }
+        Ok(())
     }
 
     /// Refuses a constant or a trend that does not go with the rest, whatever the data.
@@ -187,6 +225,7 @@ pub fn identify_monitored(
 pub struct Unjudged {
     report: Report,
     grid: Option<Grid>,
+    focus: Focus,
     /// What was taken from the output before the fit, and after it.
     taken: [Offset; 2],
 }
@@ -223,7 +262,7 @@ impl Unjudged {
 
     /// The same on deviations.
     fn judged_on(self, log: &Log) -> Result<Report, Error> {
-        let Self { mut report, grid, .. } = self;
+        let Self { mut report, grid, focus, .. } = self;
         let inputs: Vec<String> = report.model.inputs.iter().map(|input| input.name.clone()).collect();
         let test = report.data.split.as_ref().map_or_else(Vec::new, |parts| parts.test.clone());
         let parts = [
@@ -232,7 +271,7 @@ impl Unjudged {
             (Part::Test, test),
         ];
         for (part, rows) in parts.into_iter().filter(|(_, rows)| !rows.is_empty()) {
-            judge(&mut report, log, &inputs, &rows, part)?;
+            judge(&mut report, log, &inputs, &rows, part, focus)?;
         }
         if let Some(grid) = grid {
             report.warnings.extend(at_the_border(&report.model.orders, &grid));
@@ -292,6 +331,7 @@ fn fit(
     });
     let missing = missing.collect::<Result<Vec<_>, Error>>()?;
 
+    let padding = log.padding(&names)?;
     // What an input has done while the output was missing is in the output after it.
     let driven = match &plan.choice {
         Choice::Known(orders) => estimation_rows(&log, plan, orders, &estimation)?.segments,
@@ -310,7 +350,7 @@ fn fit(
         None => log.record(&plan.inputs, &plan.output, rows),
     };
     let mut method = plan.method.clone();
-    let (selection, orders, guess) = match &plan.choice {
+    let (mut selection, mut orders, guess) = match &plan.choice {
         Choice::Known(orders) => (None, orders.clone(), None),
         Choice::Grid(_) | Choice::Automatic(_) => {
             let compared = Compared {
@@ -326,10 +366,15 @@ fn fit(
             (Some(selection), orders, guess)
         }
     };
-    let seen = match &band {
-        Some(band) => band.record_alone(&estimation)?,
-        None => estimation_rows(&log, plan, &orders, &estimation)?,
+    plan.check_focus(&orders)?;
+    if let Method::PredictionError(search) = &mut method {
+        search.plant_first = plan.focus == Focus::Simulation && !matches!(plan.choice, Choice::Automatic(_));
+    }
+    let rows = |orders: &Orders| match &band {
+        Some(band) => band.record_alone(&estimation),
+        None => estimation_rows(&log, plan, orders, &estimation),
     };
+    let mut seen = rows(&orders)?;
     let task = estimate::Task {
         record: &seen,
         inputs: &plan.inputs,
@@ -339,6 +384,38 @@ fn fit(
         monitor,
     };
     let mut fitted = task.fit(plan.constant(), &beside, guess)?;
+    if let Some(selection) = selection.as_mut().filter(|selection| plan.puts_noise_behind(selection)) {
+        let order = estimate::noise_order(&seen, &orders, &fitted.estimate)?;
+        if order > 0 {
+            let Orders { nb, nf, nk, .. } = &orders;
+            let with_noise = Orders::bj(nb, 0, order, nf, nk)?;
+            let plant = fitted.estimate.parameters();
+            let method = match &method {
+                Method::PredictionError(search) => Method::PredictionError(Search {
+                    plant_first: true,
+                    guess: Some(plant.to_vec()),
+                    ..search.clone()
+                }),
+                other => other.clone(),
+            };
+            let record = rows(&with_noise)?;
+            let constant = if fitted.offset.is_some() { Constant::Yes } else { Constant::No };
+            let task = estimate::Task { record: &record, orders: &with_noise, method: &method, ..task };
+            fitted = task.fit(constant, &beside, None)?;
+            selection.steps.push(format!(
+                "Behind it an autoregression of order {order} describes what its free run leaves, for predictions: {with_noise}."
+            ));
+            (seen, orders) = (record, with_noise);
+        }
+    }
+    let task = estimate::Task {
+        record: &seen,
+        orders: &orders,
+        inputs: &plan.inputs,
+        method: &method,
+        initial: plan.initial,
+        monitor,
+    };
     if band.is_none() && fitted.offset.is_none() && plan.takes_output_offset() {
         let taken = Beside::new(&log, &segments, plan.detrend == Detrend::Linear)?;
         fitted.open = task.left_open(&taken, &fitted.estimate)?;
@@ -385,11 +462,12 @@ fn fit(
         model,
     };
     report.warnings = warnings(&report);
+    report.warnings.extend(padding.and_then(|padding| padded(&padding, &report.data.estimation)));
     if let Some(band) = &band {
         report.warnings.extend(band.warning(&estimation)?);
     }
     let grid = if let Choice::Grid(grid) = &plan.choice { Some(grid.clone()) } else { None };
-    Ok((Unjudged { report, grid, taken }, log))
+    Ok((Unjudged { report, grid, focus: plan.focus, taken }, log))
 }
 
 /// The record that models of these orders are fitted to: it goes on through missing outputs where no past one is needed.
@@ -481,8 +559,10 @@ fn selected<'a>(
         validation: unseen.as_ref(),
         inputs: &plan.inputs,
         select: plan.select,
+        focus: plan.focus,
         initial: plan.initial,
         search,
+        deadline: Deadline::after(search.time_limit),
         monitor,
     };
     let mut found = select::choose(&task, &plan.choice)?;
@@ -587,8 +667,16 @@ fn estimation_of(fitted: &Fitted, taken: Offset) -> Estimation {
     }
 }
 
-/// Adds the figures of one part of the log: one step ahead, and driven by the inputs alone where there are any.
-fn judge(report: &mut Report, log: &Log, inputs: &[String], rows: &[Rows], part: Part) -> Result<(), Error> {
+/// Adds the figures of one part of the log: one step ahead, as many as the focus says on rows that the fit did not see, and driven by
+/// the inputs alone where there are any.
+fn judge(
+    report: &mut Report,
+    log: &Log,
+    inputs: &[String],
+    rows: &[Rows],
+    part: Part,
+    focus: Focus,
+) -> Result<(), Error> {
     // What the estimate started from; other rows begin in the middle of a run.
     let one = Horizon::Steps { steps: 1 };
     let (first, record) = if part == Part::Estimation {
@@ -598,6 +686,11 @@ fn judge(report: &mut Report, log: &Log, inputs: &[String], rows: &[Rows], part:
         (start, record_for(&report.model, log, rows, one, start)?)
     };
     let mut looks = vec![(one, first, record)];
+    if let (Focus::Steps(steps @ 2..), Part::Validation | Part::Test) = (focus, part) {
+        let horizon = Horizon::Steps { steps };
+        let start = Start::natural(&report.model, horizon);
+        looks.push((horizon, start, record_for(&report.model, log, rows, horizon, start)?));
+    }
     if report.model.orders.nb.iter().any(|&nb| nb > 0) {
         let record = record_for(&report.model, log, rows, Horizon::FreeRun, Start::Estimate)?;
         looks.push((Horizon::FreeRun, Start::Estimate, record));

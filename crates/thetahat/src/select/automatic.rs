@@ -2,8 +2,11 @@
 //!
 //! Delays come first (see `delay`); then all structures with these delays are compared.
 
+use std::collections::BTreeSet;
+
 use super::compare::{compare, total};
 use super::delay;
+use super::grid::key;
 use super::ranking::ranked;
 use super::{Automatic, Found, Selection, Task};
 use crate::data::Record;
@@ -13,6 +16,29 @@ use crate::{Error, Orders, Structure};
 /// The highest order of ARX and AR models, and of the others.
 const LONGEST: usize = 10;
 const HIGHEST: usize = 3;
+/// Orders of A or F, of B, of C and of D in models that are looked at for their free runs.
+const DIAGONAL_ARX: [[usize; 4]; 8] = [
+    [1, 1, 0, 0],
+    [2, 2, 0, 0],
+    [3, 3, 0, 0],
+    [4, 4, 0, 0],
+    [6, 6, 0, 0],
+    [8, 8, 0, 0],
+    [10, 10, 0, 0],
+    [20, 20, 0, 0],
+];
+const DIAGONAL_ARMAX: [[usize; 4]; 4] = [[1, 1, 1, 0], [2, 2, 2, 0], [3, 3, 3, 0], [4, 4, 4, 0]];
+const DIAGONAL_OE: [[usize; 4]; 8] = [
+    [1, 1, 0, 0],
+    [1, 2, 0, 0],
+    [2, 2, 0, 0],
+    [2, 3, 0, 0],
+    [3, 3, 0, 0],
+    [4, 4, 0, 0],
+    [5, 5, 0, 0],
+    [6, 6, 0, 0],
+];
+const DIAGONAL_BJ: [[usize; 4]; 5] = [[1, 1, 1, 1], [2, 2, 1, 1], [2, 2, 2, 2], [3, 3, 1, 1], [4, 4, 1, 1]];
 /// So many inputs at most: a Gram matrix of all their lags has to fit.
 pub(super) const MOST_INPUTS: usize = 100;
 /// So many samples for each parameter at least.
@@ -46,11 +72,50 @@ pub(super) fn choose(task: &Task<'_>, automatic: &Automatic) -> Result<Found, Er
         None if driven => delay::found(task, &mut steps)?,
         None => (Vec::new(), vec![1; inputs]),
     };
-    let models = candidates(task.estimation, &structures, &nk)?;
+    let mut models = candidates(task.estimation, &structures, &nk)?;
+    if task.looks_further() && automatic.nk.is_none() {
+        for delay in [1, 0] {
+            models.extend(diagonal(task.estimation, &structures, &vec![delay; inputs])?);
+        }
+    }
+    if task.looks_further() {
+        models.extend(diagonal(task.estimation, &structures, &nk)?);
+    }
+    let mut seen = BTreeSet::new();
+    models.retain(|orders| seen.insert(key(orders)));
+    models.sort_by_key(Orders::parameters);
+    let tried = models.clone();
     let outcome = compare(task, models)?;
     let Found { mut selection, guess } = ranked(task, outcome, None)?;
+    selection.steps.extend(at_the_edge(&selection.chosen.orders, &tried));
     steps.append(&mut selection.steps);
     Ok(Found { selection: Selection { steps, delays, ..selection }, guess })
+}
+
+/// A word on orders that are the highest that were tried of their structure.
+fn at_the_edge(chosen: &Orders, tried: &[Orders]) -> Option<String> {
+    let most = |values: &[usize]| values.iter().copied().max().unwrap_or(0);
+    let of = |orders: &Orders| [orders.na, most(&orders.nb), orders.nc, orders.nd, most(&orders.nf)];
+    let own = of(chosen);
+    let others = || tried.iter().filter(|other| other.structure() == chosen.structure()).map(of);
+    let names: Vec<&str> = ["na", "nb", "nc", "nd", "nf"]
+        .into_iter()
+        .enumerate()
+        .filter(|(k, _)| {
+            let highest = others().map(|orders| orders[*k]).max().unwrap_or(0);
+            let lowest = others().map(|orders| orders[*k]).min().unwrap_or(0);
+            lowest < highest && own[*k] == highest
+        })
+        .map(|(_, name)| name)
+        .collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "The chosen {} {} the highest that {} tried: ranges of orders look further.",
+            names.join(", "),
+            if names.len() == 1 { "is" } else { "are" },
+            if names.len() == 1 { "was" } else { "were" }
+        )
+    })
 }
 
 /// Whether a constant lowers the MDL of ARX models of few or of many coefficients: then it is part of every model that is
@@ -96,6 +161,29 @@ pub(super) fn are_enough(record: &Record<'_>, parameters: usize, masked: usize) 
     let left = |segment: &std::ops::Range<usize>| segment.len().saturating_sub(masked);
     let count: usize = record.segments.iter().map(left).sum();
     count >= SAMPLES * parameters && 2 * count >= total(record)
+}
+
+/// Models of some structures in which all polynomials of the plant have one order: those that may simulate well although their
+/// delays or their noise are wrong.
+fn diagonal(record: &Record<'_>, structures: &[Structure], nk: &[usize]) -> Result<Vec<Orders>, Error> {
+    let mut models = Vec::new();
+    for structure in structures {
+        let all: &[[usize; 4]] = match structure {
+            Structure::Arx => &DIAGONAL_ARX,
+            Structure::Armax => &DIAGONAL_ARMAX,
+            Structure::Oe => &DIAGONAL_OE,
+            Structure::Bj => &DIAGONAL_BJ,
+            Structure::Ar | Structure::Arma | Structure::Pem => &[],
+        };
+        for orders in all {
+            let orders = of_structure(*structure, *orders, nk)?;
+            let masked = (0..nk.len()).map(|input| orders.input_reach(input)).fold(orders.na, usize::max);
+            if are_enough(record, orders.parameters(), masked) {
+                models.push(orders);
+            }
+        }
+    }
+    Ok(models)
 }
 
 /// The models of some structures with given delays, the smallest first.

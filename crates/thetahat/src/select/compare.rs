@@ -2,7 +2,7 @@
 
 use super::linear::{Columns, Fitted, Kept, Rows, Scaled};
 use super::search::Family;
-use super::{EXACT, Scored, Select, Task, unseen};
+use super::{EXACT, Scored, Select, Task, held_out, unseen};
 use crate::data::Record;
 use crate::estimate::{Common, Initial, Point, Window, drop_is_not_for_f, estimate_is_for_f, stretches};
 use crate::regression::{Presample, sum_of_squares};
@@ -12,6 +12,9 @@ use crate::{Criteria, Error, Orders};
 const LONG: usize = 1 << 16;
 const STRETCHES: usize = 16;
 const STRETCH: usize = 1 << 11;
+/// Of records with more samples, blocks are held out of stretches only: few, so that free runs are long.
+const MOST_IN_BLOCKS: usize = 1 << 14;
+const STRETCHES_OF_BLOCKS: usize = 4;
 /// So many samples behind those that models reach back to do not count where there is C: what 1/C makes of e = 0 before
 /// them fades there. It would be tens of times the price of a parameter.
 const FADING: usize = 50;
@@ -20,8 +23,8 @@ const LEAST_OF_PIECE: usize = 20;
 
 /// Models that were compared.
 pub(super) struct Outcome {
-    /// Those that the data determine, and of each that was searched for its parameters.
-    pub(super) scored: Vec<(Scored, Option<Vec<f64>>)>,
+    /// Those that the data determine.
+    pub(super) models: Vec<Compared>,
     pub(super) failed: usize,
     /// The smallest model of all.
     pub(super) smallest: Option<Orders>,
@@ -29,6 +32,16 @@ pub(super) struct Outcome {
     pub(super) samples: usize,
     /// What there is to say of the samples, in sentences.
     pub(super) remarks: Vec<String>,
+}
+
+/// A model that was compared.
+#[derive(Debug, Clone)]
+pub(super) struct Compared {
+    pub(super) scored: Scored,
+    /// The parameters, if they were searched for.
+    pub(super) guess: Option<Vec<f64>>,
+    /// The largest modulus of a pole of the plant; infinite where that is not known.
+    pub(super) radius: f64,
 }
 
 /// What all models share.
@@ -100,7 +113,9 @@ pub(super) fn compare(task: &Task<'_>, models: Vec<Orders>) -> Result<Outcome, E
     let with_unseen = matches!(task.select, Select::Validation | Select::Cv);
     let smallest = models.first().map(|orders| task.named(orders));
     let mut tried: Vec<Tried> = models.into_iter().map(|orders| Tried { orders, point: None }).collect();
-    fit_linear(record, &samples, &mut tried, searched || with_unseen)?;
+    // Blocks are left where time is up: the answer so far stands.
+    let with_blocks = !with_unseen && task.looks_further();
+    fit_linear(record, &samples, &mut tried, searched || with_unseen || with_blocks)?;
     // A stretch of a segment begins where the log knows what came before. Its initial conditions are not what the model has to
     // tell in the whole log: they cost no more than what they take of the noise, one each.
     let own = task.estimation.segments.len() as f64 / record.segments.len().max(1) as f64;
@@ -114,7 +129,7 @@ pub(super) fn compare(task: &Task<'_>, models: Vec<Orders>) -> Result<Outcome, E
     let exact = |cost: f64| if cost <= nothing { 0.0 } else { cost };
     if searched {
         let free = task.initial != Initial::Zero;
-        let common = Common::new(record, free, samples.window, task.search, task.monitor)?;
+        let common = Common::new(record, free, samples.window, task.search, task.deadline, task.monitor)?;
         let score = |orders: &Orders, point: &Point| {
             let (size, mse) = (point.parameters.len(), exact(point.cost) / count as f64);
             let score = score(Select::Mdl, mse, size, price(orders, point.initial), count, None);
@@ -123,25 +138,54 @@ pub(super) fn compare(task: &Task<'_>, models: Vec<Orders>) -> Result<Outcome, E
         Family::new(&tried, task.inputs.len()).fit(&common, &mut tried, &score)?;
     }
     let looks = unseen::costs(task, record, &tried)?;
-    let models = tried.len();
-    let scored = tried.into_iter().zip(looks).filter_map(|(Tried { orders, point }, unseen)| {
-        let Point { parameters, cost, initial } = point?;
-        let unseen = if with_unseen { Some(unseen?) } else { None };
-        let (mse, size) = (exact(cost) / count as f64, orders.parameters());
-        let guess = (!orders.is_linear()).then_some(parameters);
-        let orders = task.named(&orders);
-        let scored = Scored {
-            structure: orders.structure(),
-            parameters: orders.parameters(),
-            mse,
-            unseen,
-            score: score(task.select, mse, size, price(&orders, initial), count, unseen),
-            orders,
+    let scores: Vec<Option<f64>> = tried
+        .iter()
+        .zip(&looks)
+        .map(|(Tried { orders, point }, unseen)| {
+            let Point { cost, initial, .. } = point.as_ref()?;
+            let mse = exact(*cost) / count as f64;
+            score(task.select, mse, orders.parameters(), price(orders, *initial), count, *unseen)
+        })
+        .collect();
+    let held_out = if with_blocks && !task.deadline.is_over() {
+        // An exact model has no criterion, and is the best.
+        let place = |k: usize| {
+            let exact = tried[k].point.as_ref().is_some_and(|point| exact(point.cost) == 0.0);
+            if exact { f64::NEG_INFINITY } else { scores[k].unwrap_or(f64::INFINITY) }
         };
-        Some((scored, guess))
-    });
-    let scored: Vec<(Scored, Option<Vec<f64>>)> = scored.collect();
-    Ok(Outcome { failed: models - scored.len(), scored, samples: count, smallest, remarks })
+        let mut order: Vec<usize> = (0..tried.len()).filter(|&k| tried[k].point.is_some()).collect();
+        order.sort_by(|&a, &b| place(a).total_cmp(&place(b)));
+        let most = total(record) > MOST_IN_BLOCKS;
+        let few = if most { stretches(task.estimation, STRETCHES_OF_BLOCKS, STRETCH) } else { None };
+        let record = few.as_ref().unwrap_or(record);
+        let samples = Samples::unknown(record, tried.iter().map(|model| &model.orders));
+        held_out::figures(task, record, &samples, &tried, &held_out::promising(&order, &tried))?
+    } else {
+        vec![None; tried.len()]
+    };
+    let total = tried.len();
+    let figures = looks.into_iter().zip(scores).zip(held_out);
+    let models = tried.into_iter().zip(figures).filter_map(
+        |(Tried { orders, point }, ((unseen, score), held_out))| {
+            let Point { parameters, cost, .. } = point?;
+            let unseen = if with_unseen { Some(unseen?) } else { None };
+            let radius = held_out.map_or(f64::INFINITY, |_| held_out::radius(&orders, &parameters));
+            let guess = (!orders.is_linear()).then_some(parameters);
+            let orders = task.named(&orders);
+            let scored = Scored {
+                structure: orders.structure(),
+                parameters: orders.parameters(),
+                mse: exact(cost) / count as f64,
+                unseen,
+                held_out,
+                score,
+                orders,
+            };
+            Some(Compared { scored, guess, radius })
+        },
+    );
+    let models: Vec<Compared> = models.collect();
+    Ok(Outcome { failed: total - models.len(), models, samples: count, smallest, remarks })
 }
 
 /// What a model is chosen by.

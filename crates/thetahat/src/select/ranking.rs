@@ -2,11 +2,12 @@
 
 use std::cmp::Ordering;
 
-use super::compare::Outcome;
-use super::{Found, Path, Scored, Select, Selection, Task};
-use crate::Error;
+use super::compare::{Compared, Outcome, total};
+use super::focus::{Winners, winners};
+use super::{Best, Focus, Found, Path, Scored, Select, Selection, Task};
 use crate::estimate::{Method, estimate_of_channels};
 use crate::figures::{fixed, scientific};
+use crate::{Error, Horizon};
 
 /// Models of a table.
 const BEST: usize = 50;
@@ -18,11 +19,12 @@ const CLOSE: f64 = 0.01;
 /// # Errors
 /// What a fit of the smallest model says, if the data determine none.
 pub(super) fn ranked(task: &Task<'_>, outcome: Outcome, path: Option<Path>) -> Result<Found, Error> {
-    let Outcome { scored, failed, samples, remarks, smallest } = outcome;
+    let Outcome { models: compared, failed, samples, remarks, smallest } = outcome;
     let by_unseen = matches!(task.select, Select::Validation | Select::Cv);
-    let mut order: Vec<&Scored> = scored.iter().map(|(scored, _)| scored).collect();
-    order.sort_by(|a, b| better(a, b, by_unseen));
-    let (Some(&first), count) = (order.first(), scored.len()) else {
+    let mut compared: Vec<&Compared> = compared.iter().collect();
+    compared.sort_by(|a, b| better(&a.scored, &b.scored, by_unseen));
+    let order: Vec<&Scored> = compared.iter().map(|model| &model.scored).collect();
+    let (Some(&first), count) = (order.first(), compared.len()) else {
         if let Some(orders) = smallest {
             let method = Method::PredictionError(task.search.clone());
             let Task { inputs, initial, monitor, .. } = *task;
@@ -43,6 +45,10 @@ pub(super) fn ranked(task: &Task<'_>, outcome: Outcome, path: Option<Path>) -> R
         // The best of equal size comes first.
         chosen = close.min_by_key(|model| model.parameters).unwrap_or(&first);
     }
+    let winners = winners(task.focus, &compared, total(task.estimation));
+    if let Some(winners) = winners {
+        chosen = order[winners.chosen];
+    }
     let second = order.iter().find(|model| model.orders != chosen.orders);
     let mut of_size: Vec<Scored> = Vec::new();
     let mut by_size = order.clone();
@@ -61,14 +67,16 @@ pub(super) fn ranked(task: &Task<'_>, outcome: Outcome, path: Option<Path>) -> R
         steps.push(format!("Least: {}.", described(first, task.select)));
     }
     let why = if by_unseen { ", the smallest within 1 % of the least" } else { "" };
+    steps.extend(winners.iter().flat_map(|winners| both(winners, &order, task)));
     steps.push(format!("Chosen: {}{why}.", described(chosen, task.select)));
     if let Some(second) = second {
         steps.push(format!("Second: {}.", described(second, task.select)));
     }
-    let guess = scored.iter().find(|(scored, _)| scored.orders == chosen.orders);
-    let guess = guess.and_then(|(_, parameters)| parameters.clone());
+    let guess = compared.iter().find(|model| model.scored.orders == chosen.orders);
+    let guess = guess.and_then(|model| model.guess.clone());
     let selection = Selection {
         select: task.select,
+        focus: task.focus,
         path,
         steps,
         samples,
@@ -77,11 +85,54 @@ pub(super) fn ranked(task: &Task<'_>, outcome: Outcome, path: Option<Path>) -> R
         delays: Vec::new(),
         chosen: chosen.clone(),
         second: second.copied().cloned(),
+        winners: winners.map(|winners| Best {
+            prediction: order[winners.prediction].clone(),
+            simulation: order[winners.simulation].clone(),
+        }),
         least: by_unseen.then(|| first.clone()),
         best: order.iter().take(BEST).copied().cloned().collect(),
         of_size,
     };
     Ok(Found { selection, guess })
+}
+
+/// What both winners are, how they differ, and which was taken why.
+fn both(winners: &Winners, order: &[&Scored], task: &Task<'_>) -> Vec<String> {
+    let Winners { prediction, simulation, chosen } = *winners;
+    let figure = |k: usize| {
+        order[k].held_out.map_or_else(|| "-".to_owned(), |seen| format!("{} %", fixed(seen.percent(), 1)))
+    };
+    let how = match task.focus.horizon() {
+        Horizon::FreeRun => "in free runs".to_owned(),
+        horizon => horizon.to_string(),
+    };
+    let mut words = vec![format!(
+        "For prediction: {}; it fits {} of blocks held out, {how}.",
+        described(order[prediction], task.select),
+        figure(prediction)
+    )];
+    if simulation == prediction {
+        words.push(format!("No other model does better on held-out blocks, {how}."));
+    } else {
+        words.push(format!(
+            "Best on held-out blocks, {how}: {}, {}.",
+            order[simulation].orders,
+            figure(simulation)
+        ));
+    }
+    words.push(match task.focus {
+        _ if chosen != prediction && chosen != simulation => {
+            "Taken: a model that is unstable however the rows are cut; none that is stable comes near it."
+                .to_owned()
+        }
+        Focus::Auto if chosen != prediction => "Taken: the second, as the difference is clear.".to_owned(),
+        Focus::Auto if simulation != prediction => {
+            "Taken: the first, as the difference is not clear; --focus simulation takes the second."
+                .to_owned()
+        }
+        _ => return words,
+    });
+    words
 }
 
 /// Exact models first, the smallest of them first; then by score. Of equal ones the smaller, then the one that was made first.

@@ -1,7 +1,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Path, Select};
+use super::{Focus, HeldOut, Path, Select};
 use crate::{Orders, Structure};
 
 /// How a model was chosen among others.
@@ -9,6 +9,9 @@ use crate::{Orders, Structure};
 pub struct Selection {
     /// What made one better than another.
     pub select: Select,
+    /// What the model is for.
+    #[serde(default = "before")]
+    pub focus: Focus,
     /// Which were tried; none: delay, structure and orders were left to the data.
     pub path: Option<Path>,
     /// What was done, in plain words, one sentence each.
@@ -26,6 +29,9 @@ pub struct Selection {
     pub chosen: Scored,
     /// The best of the others; none if there was one only.
     pub second: Option<Scored>,
+    /// The best models for prediction and for simulation, where both were looked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub winners: Option<Best>,
     /// The least cost itself, where the smallest model close to it was chosen.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub least: Option<Scored>,
@@ -49,8 +55,25 @@ pub struct Scored {
     /// The mean of e^2 on samples that the model was not fitted to: with a validation part, or cross-validation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unseen: Option<f64>,
+    /// What it does on blocks that it was not fitted to, where that was looked at.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub held_out: Option<HeldOut>,
     /// What it was chosen by, the smaller the better: a criterion, or `unseen`. None where it is not defined.
     pub score: Option<f64>,
+}
+
+/// The best models for two purposes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Best {
+    /// The stable model with the least criterion.
+    pub prediction: Scored,
+    /// The stable model with the least error on held-out blocks, in free runs or so many steps ahead as the focus says.
+    pub simulation: Scored,
+}
+
+/// What choices were for before there was a focus.
+fn before() -> Focus {
+    Focus::Prediction
 }
 
 /// The delay of an input, as it was found.

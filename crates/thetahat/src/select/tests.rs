@@ -1,6 +1,7 @@
 //! Choices against loops over single fits, and against truths that made the data.
 
 mod automatic;
+mod focus;
 mod grid;
 mod linear;
 mod searched;
@@ -44,11 +45,37 @@ fn chosen(
     initial: Initial,
 ) -> Result<Found, Error> {
     let inputs: Vec<String> = (1..=record.inputs.len()).map(|number| format!("u{number}")).collect();
-    let (search, monitor): (Search, Monitor<'_>) = (Search::default(), &|_| ControlFlow::Continue(()));
-    choose(
-        &Task { estimation: record, validation, inputs: &inputs, select, initial, search: &search, monitor },
-        choice,
-    )
+    let search = Search::default();
+    let task = Task {
+        estimation: record,
+        validation,
+        inputs: &inputs,
+        select,
+        focus: Focus::Auto,
+        initial,
+        search: &search,
+        deadline: Deadline::default(),
+        monitor: &|_| ControlFlow::Continue(()),
+    };
+    choose(&task, choice)
+}
+
+/// A choice by MDL for some purpose.
+fn focused(record: &Record<'_>, choice: &Choice, focus: Focus) -> Result<Found, Error> {
+    let inputs: Vec<String> = (1..=record.inputs.len()).map(|number| format!("u{number}")).collect();
+    let search = Search::default();
+    let task = Task {
+        estimation: record,
+        validation: None,
+        inputs: &inputs,
+        select: Select::Mdl,
+        focus,
+        initial: Initial::Auto,
+        search: &search,
+        deadline: Deadline::default(),
+        monitor: &|_| ControlFlow::Continue(()),
+    };
+    choose(&task, choice)
 }
 
 fn close(a: f64, b: f64, relative: f64) -> bool {

@@ -4,7 +4,8 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::compare::{Samples, Tried, energy, rows};
+use super::compare::{Samples, Tried, energy, rows, total};
+use super::held_out::mean_square;
 use super::linear::{Columns, Kept, Rows, Scaled};
 use super::{EXACT, Select, Task};
 use crate::data::Record;
@@ -55,6 +56,13 @@ fn validated(
         return Err(nothing_to_see("validation", samples));
     }
     let (linear, searched) = parted(tried);
+    if task.looks_further() {
+        let mean = |model: &Tried| {
+            let parameters = &model.point.as_ref()?.parameters;
+            mean_square(&model.orders, parameters, validation, task.focus.horizon())
+        };
+        return Ok(tried.par_iter().map(mean).collect());
+    }
     let mut costs = vec![None; tried.len()];
     if !linear.is_empty() {
         let columns = columns_of(tried, &linear, validation.inputs.len());
@@ -64,7 +72,7 @@ fn validated(
             costs[k] = point.as_ref().map(|point| scaled.cost_of(&columns, orders, &point.parameters));
         }
     }
-    let common = Common::new(validation, true, samples.window, task.search, task.monitor)?;
+    let common = Common::new(validation, true, samples.window, task.search, task.deadline, task.monitor)?;
     let others = searched.par_iter().map(|&k| {
         let Tried { orders, point } = &tried[k];
         point
@@ -100,53 +108,45 @@ fn cross_validated(
     samples: &Samples,
     tried: &[Tried],
 ) -> Result<Vec<Option<f64>>, Error> {
-    let blocks = blocks(record);
-    let tests: Vec<Record<'_>> = blocks.iter().map(|block| part(record, joined(block.iter()))).collect();
+    let folds = Folds::new(record, BLOCKS);
+    let tests: Vec<Record<'_>> = (0..BLOCKS).map(|fold| folds.test(fold)).collect();
     let counts: Vec<usize> = tests.iter().map(|test| samples.count(test)).collect();
     if counts.contains(&0) {
         return Err(nothing_to_see("cross-validated", samples));
     }
     let (linear, searched) = parted(tried);
+    let columns = columns_of(tried, &linear, record.inputs.len());
     let mut costs: Vec<Option<f64>> = tried.iter().map(|model| model.point.as_ref().map(|_| 0.0)).collect();
-    if !linear.is_empty() {
-        let columns = columns_of(tried, &linear, record.inputs.len());
-        let orders: Vec<&Orders> = linear.iter().map(|&k| &tried[k].orders).collect();
-        let exact = rows(record, &columns, samples)?;
-        let kept = if matches!(exact, Rows::Products(..)) { Kept::Products } else { Kept::Factor };
-        let parts =
-            tests.iter().map(|test| Rows::new(test, &columns, Presample::Drop, samples.window.counted, kept));
-        let parts = parts.collect::<Result<Vec<_>, Error>>()?;
-        for left_out in 0..BLOCKS {
-            let mut others = parts.iter().enumerate().filter(|(k, _)| *k != left_out).map(|(_, part)| part);
-            let Some(mut training) = others.next().cloned() else { continue };
-            others.try_for_each(|part| training.add(part))?;
-            let fitted = Scaled::new(&training).fit(&columns, &orders, true);
-            let test = Scaled::new(&parts[left_out]);
-            for ((&k, orders), fitted) in linear.iter().zip(&orders).zip(fitted) {
-                let enough = orders.parameters() < training.count();
-                let cost = fitted
-                    .filter(|_| enough)
-                    .map(|fitted| test.cost_of(&columns, orders, &fitted.parameters));
-                costs[k] = costs[k].and_then(|sum| Some(sum + cost?));
+    let refits = folds.refitted(task, samples, tried)?;
+    for (fold, ((test, refits), count)) in tests.iter().zip(&refits).zip(&counts).enumerate() {
+        let add = |costs: &mut [Option<f64>], k: usize, cost: Option<f64>| {
+            costs[k] = costs[k].and_then(|sum| Some(sum + cost?));
+        };
+        if task.looks_further() {
+            let seen = folds.test_with_past(fold);
+            let mean = |k: usize| {
+                let refit = refits[k].as_ref()?;
+                mean_square(&tried[k].orders, refit, &seen, task.focus.horizon())
+            };
+            let means: Vec<Option<f64>> = (0..tried.len()).into_par_iter().map(mean).collect();
+            means
+                .into_iter()
+                .enumerate()
+                .for_each(|(k, mean)| add(&mut costs, k, mean.map(|mean| mean * *count as f64)));
+            continue;
+        }
+        if !linear.is_empty() {
+            let scaled = Scaled::new(&rows(test, &columns, samples)?);
+            for &k in &linear {
+                let cost = refits[k].as_ref().map(|refit| scaled.cost_of(&columns, &tried[k].orders, refit));
+                add(&mut costs, k, cost);
             }
         }
-    }
-    for (left_out, test) in tests.iter().enumerate() {
-        let count = counts[left_out] as f64;
-        let others = blocks.iter().enumerate().filter(|(k, _)| *k != left_out).flat_map(|(_, block)| block);
-        let training = part(record, joined(others));
-        let training = Common::new(&training, true, samples.window, task.search, task.monitor)?;
-        let test = training.on(test);
-        let found = searched.par_iter().map(|&k| {
-            let Tried { orders, point } = &tried[k];
-            let Some(Point { parameters, .. }) = point else { return Ok(None) };
-            let fitted = training.fit(orders, std::slice::from_ref(parameters), false)?;
-            Ok(fitted.and_then(|fitted| test.mean(orders, &fitted.parameters)).map(|mean| mean * count))
-        });
-        let found = found.collect::<Result<Vec<_>, Error>>()?;
-        for (&k, cost) in searched.iter().zip(found) {
-            costs[k] = costs[k].and_then(|sum| Some(sum + cost?));
-        }
+        let test = Common::new(test, true, samples.window, task.search, task.deadline, task.monitor)?;
+        let mean = |&k: &usize| test.mean(&tried[k].orders, refits[k].as_ref()?);
+        let means: Vec<Option<f64>> = searched.par_iter().map(mean).collect();
+        let sums = means.into_iter().map(|mean| mean.map(|mean| mean * *count as f64));
+        searched.iter().zip(sums).for_each(|(&k, sum)| add(&mut costs, k, sum));
     }
     Ok(means(costs, EXACT * energy(record), counts.iter().sum()))
 }
@@ -154,22 +154,104 @@ fn cross_validated(
 /// Consecutive samples, and which segment they are of.
 type Piece = (usize, Range<usize>);
 
-/// Blocks of consecutive samples, as long as one another to within one.
-fn blocks(record: &Record<'_>) -> Vec<Vec<Piece>> {
-    let total: usize = record.segments.iter().map(Range::len).sum();
-    let mut blocks = vec![Vec::new(); BLOCKS];
-    let mut before = 0;
-    for (number, segment) in record.segments.iter().enumerate() {
-        for (k, block) in blocks.iter_mut().enumerate() {
-            let start = (k * total / BLOCKS).max(before);
-            let end = ((k + 1) * total / BLOCKS).min(before + segment.len());
-            if start < end {
-                block.push((number, segment.start + start - before..segment.start + end - before));
+/// A record cut into blocks of consecutive samples, as long as one another to within one, each of which is left out once.
+pub(super) struct Folds<'t, 'r> {
+    record: &'t Record<'r>,
+    blocks: Vec<Vec<Piece>>,
+}
+
+impl<'t, 'r> Folds<'t, 'r> {
+    pub(super) fn new(record: &'t Record<'r>, count: usize) -> Self {
+        let total = total(record);
+        let mut blocks = vec![Vec::new(); count];
+        let mut before = 0;
+        for (number, segment) in record.segments.iter().enumerate() {
+            for (k, block) in blocks.iter_mut().enumerate() {
+                let start = (k * total / count).max(before);
+                let end = ((k + 1) * total / count).min(before + segment.len());
+                if start < end {
+                    block.push((number, segment.start + start - before..segment.start + end - before));
+                }
+            }
+            before += segment.len();
+        }
+        Self { record, blocks }
+    }
+
+    pub(super) fn count(&self) -> usize {
+        self.blocks.len()
+    }
+
+    /// The block that is left out.
+    pub(super) fn test(&self, fold: usize) -> Record<'r> {
+        part(self.record, joined(self.blocks[fold].iter()))
+    }
+
+    /// The same, with what was measured directly before it.
+    pub(super) fn test_with_past(&self, fold: usize) -> Record<'r> {
+        let past = self.blocks[fold].iter().map(|(number, piece)| {
+            self.record.past[*number] + piece.start - self.record.segments[*number].start
+        });
+        Record { past: past.collect(), ..self.test(fold) }
+    }
+
+    /// The others.
+    fn training(&self, fold: usize) -> Record<'r> {
+        let others = self.blocks.iter().enumerate().filter(|(k, _)| *k != fold);
+        part(self.record, joined(others.flat_map(|(_, block)| block)))
+    }
+
+    /// The parameters of models fitted without a block, for each block: from those of all blocks, and for linear ones from
+    /// sums over blocks. None where the others do not determine them.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`].
+    pub(super) fn refitted(
+        &self,
+        task: &Task<'_>,
+        samples: &Samples,
+        tried: &[Tried],
+    ) -> Result<Vec<Vec<Option<Vec<f64>>>>, Error> {
+        let (linear, searched) = parted(tried);
+        let columns = columns_of(tried, &linear, self.record.inputs.len());
+        let orders: Vec<&Orders> = linear.iter().map(|&k| &tried[k].orders).collect();
+        let mut parts = Vec::new();
+        if !linear.is_empty() {
+            let exact = rows(self.record, &columns, samples)?;
+            let kept = if matches!(exact, Rows::Products(..)) { Kept::Products } else { Kept::Factor };
+            for fold in 0..self.count() {
+                let test = self.test(fold);
+                parts.push(Rows::new(&test, &columns, Presample::Drop, samples.window.counted, kept)?);
             }
         }
-        before += segment.len();
+        let mut all = Vec::new();
+        for fold in 0..self.count() {
+            let mut refits = vec![None; tried.len()];
+            let mut others = parts.iter().enumerate().filter(|(k, _)| *k != fold).map(|(_, part)| part);
+            if let Some(mut training) = others.next().cloned() {
+                others.try_for_each(|part| training.add(part))?;
+                let fitted = Scaled::new(&training).fit(&columns, &orders, true);
+                for ((&k, orders), fitted) in linear.iter().zip(&orders).zip(fitted) {
+                    let enough = orders.parameters() < training.count();
+                    refits[k] = fitted.filter(|_| enough).map(|fitted| fitted.parameters);
+                }
+            }
+            let training = self.training(fold);
+            let training =
+                Common::new(&training, true, samples.window, task.search, task.deadline, task.monitor)?;
+            let found = searched.par_iter().map(|&k| {
+                let Tried { orders, point } = &tried[k];
+                let Some(Point { parameters, .. }) = point else { return Ok(None) };
+                training.fit(orders, std::slice::from_ref(parameters), false)
+            });
+            let found = found.collect::<Result<Vec<_>, Error>>()?;
+            for (&k, fitted) in searched.iter().zip(found) {
+                refits[k] = fitted.map(|fitted| fitted.parameters);
+            }
+            all.push(refits);
+        }
+        Ok(all)
     }
-    blocks
 }
 
 /// Pieces of one segment that touch become one.

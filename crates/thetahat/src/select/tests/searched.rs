@@ -20,9 +20,10 @@ fn grid(na: OrderRange, nb: OrderRange, nc: OrderRange, nd: OrderRange, nf: Orde
 fn fitted(record: &Record<'_>, grid: &Grid) -> (Vec<Tried>, usize) {
     let models = grid.orders(1).unwrap();
     let samples = Samples::new(record, Initial::Auto, &models).unwrap();
-    let common =
-        Common::new(record, true, samples.window, &Search::default(), &|_| ControlFlow::Continue(()))
-            .unwrap();
+    let common = Common::new(record, true, samples.window, &Search::default(), Deadline::default(), &|_| {
+        ControlFlow::Continue(())
+    })
+    .unwrap();
     let mut tried: Vec<Tried> =
         models.iter().map(|orders| Tried { orders: orders.clone(), point: None }).collect();
     let score = |_: &Orders, point: &Point| point.cost.ln() * 1e3 + 7.0 * point.parameters.len() as f64;
@@ -105,8 +106,10 @@ fn a_search_for_each_finds_nothing_lower_among_the_best() {
     let Choice::Grid(grid) = choice else { panic!("a grid") };
     let window = Samples::new(&record, Initial::Auto, &grid.orders(1).unwrap()).unwrap().window;
     assert_eq!(window.counted, 33);
-    let common =
-        Common::new(&record, true, window, &Search::default(), &|_| ControlFlow::Continue(())).unwrap();
+    let common = Common::new(&record, true, window, &Search::default(), Deadline::default(), &|_| {
+        ControlFlow::Continue(())
+    })
+    .unwrap();
     for model in selection.best.iter().take(5).filter(|model| model.orders.nc > 0) {
         let alone = common.fit(&model.orders, &[], true).unwrap().unwrap();
         assert!(model.mse <= alone.cost / 567.0 * (1.0 + 1e-6), "{model:?}");
@@ -148,8 +151,10 @@ fn whoever_watches_can_end_it() {
         validation: None,
         inputs: &["u".to_owned()],
         select: Select::Mdl,
+        focus: Focus::Prediction,
         initial: Initial::Auto,
         search: &Search::default(),
+        deadline: Deadline::default(),
         monitor,
     };
     assert_eq!(choose(&task, &choice), Err(Error::Interrupted));

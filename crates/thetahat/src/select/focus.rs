@@ -1,0 +1,138 @@
+//! What a model is for, and the choice between the best for prediction and the best for simulation.
+//!
+//! The model with the least MDL predicts well one step ahead. Where the plant is not among the models, another may simulate
+//! far better: errors one step ahead hardly show slow dynamics (Ljung, System Identification, 2nd ed. 1999, section 8.5).
+//! Errors of free runs alone choose badly too: they have few degrees of freedom. So there is a gate:
+//!
+//! 1. P has the least criterion among stable models, S the least error on blocks that it was not fitted to (see `held_out`).
+//! 2. S is taken where the mean of two logarithms, of the mean square on all blocks and of that onward from the first row, is
+//!    lower by more than [`GATE`] than with P; else P.
+//! 3. An unstable model that has a lower criterion than P is taken where all its refits are unstable too and their errors
+//!    beat those of the choice by [`CLEARLY`] in the logarithm of the mean square: then the plant is unstable.
+
+use std::fmt;
+use std::str::FromStr;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::HeldOut;
+use super::compare::Compared;
+use crate::{Error, Horizon};
+
+/// By how much the logarithm of a mean square must fall.
+const GATE: f64 = 0.3;
+const CLEARLY: f64 = 0.1;
+/// A model that simulates has no time constant of more than so many times the samples.
+const SLOWEST: f64 = 2.0;
+/// Mean squares below this are rounding.
+const NOTHING: f64 = 1e-12;
+
+/// What a model is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Focus {
+    /// With inputs and without orders: prediction, unless another model simulates held-out blocks clearly better. Else prediction.
+    #[default]
+    Auto,
+    /// Errors one step ahead.
+    Prediction,
+    /// Free runs, driven by the inputs alone.
+    Simulation,
+    /// Predictions so many steps ahead.
+    Steps(usize),
+}
+
+impl Focus {
+    /// How far ahead held-out samples are looked at.
+    pub fn horizon(self) -> Horizon {
+        match self {
+            Self::Auto | Self::Simulation => Horizon::FreeRun,
+            Self::Prediction => Horizon::Steps { steps: 1 },
+            Self::Steps(steps) => Horizon::Steps { steps },
+        }
+    }
+
+    /// Whether models are judged by more than errors one step ahead.
+    pub(super) fn looks_further(self) -> bool {
+        !matches!(self, Self::Prediction | Self::Steps(1))
+    }
+}
+
+impl fmt::Display for Focus {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Auto => f.write_str("auto"),
+            Self::Prediction => f.write_str("prediction"),
+            Self::Simulation => f.write_str("simulation"),
+            Self::Steps(steps) => write!(f, "{steps}"),
+        }
+    }
+}
+
+impl FromStr for Focus {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        match text {
+            "auto" => Ok(Self::Auto),
+            "prediction" => Ok(Self::Prediction),
+            "simulation" => Ok(Self::Simulation),
+            _ => match text.parse() {
+                Ok(steps) if steps >= 1 => Ok(Self::Steps(steps)),
+                _ => Err(Error::argument(
+                    "focus",
+                    format!(
+                        "'{text}' is none; write auto, prediction, simulation, or a number of steps ahead"
+                    ),
+                )),
+            },
+        }
+    }
+}
+
+/// Which models are the best for what, as positions in a comparison.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Winners {
+    /// P.
+    pub(super) prediction: usize,
+    /// S.
+    pub(super) simulation: usize,
+    pub(super) chosen: usize,
+}
+
+/// The winners among models in the order of their criterion; none where no stable model simulates.
+pub(super) fn winners(focus: Focus, models: &[&Compared], samples: usize) -> Option<Winners> {
+    let logarithm = |square: f64| square.max(NOTHING).ln();
+    let held_out = |k: usize| models[k].scored.held_out.as_ref();
+    let known: Vec<usize> = (0..models.len()).filter(|&k| held_out(k).is_some()).collect();
+    let stable = |k: &&usize| models[**k].radius < 1.0;
+    let slow = |k: &&usize| models[**k].radius > (-1.0 / (SLOWEST * samples as f64)).exp();
+    let least = |of: &dyn Fn(&HeldOut) -> f64, among: &mut dyn Iterator<Item = usize>| {
+        let figures = among.filter_map(|k| Some((of(held_out(k)?), k)));
+        figures.min_by(|(one, _), (other, _)| one.total_cmp(other)).map(|(_, k)| k)
+    };
+    let simulation = least(
+        &|seen| seen.blocks.max(NOTHING),
+        &mut known.iter().filter(stable).filter(|k| !slow(k)).copied(),
+    )?;
+    let prediction = *known.iter().find(|k| stable(k))?;
+    let both = |k: usize| {
+        held_out(k)
+            .map_or(f64::INFINITY, |seen| f64::midpoint(logarithm(seen.blocks), logarithm(seen.onward)))
+    };
+    let mut chosen = match focus {
+        Focus::Auto if both(prediction) - both(simulation) > GATE => simulation,
+        Focus::Auto | Focus::Prediction => prediction,
+        Focus::Simulation | Focus::Steps(_) => simulation,
+    };
+    let raw = |k: usize| held_out(k).map_or(f64::INFINITY, |seen| logarithm(seen.unpunished));
+    let first = known[0];
+    if models[first].radius >= 1.0
+        && held_out(first).is_some_and(|seen| seen.unstable == seen.refits)
+        && raw(chosen) - raw(first) > CLEARLY
+    {
+        chosen = first;
+    }
+    Some(Winners { prediction, simulation, chosen })
+}

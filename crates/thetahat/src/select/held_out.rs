@@ -1,0 +1,233 @@
+//! How well models simulate samples that they were not fitted to, or predict them several steps ahead.
+//!
+//! The record is cut into thirds. Each model is fitted again to two of them and looked at on the third, with the initial state
+//! that fits best there. Errors are in standard deviations of the output and count up to five of them, so that a run that leaves the
+//! range of the data does not outweigh all others; a model that is unstable without a third counts as if it had left it.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::Task;
+use super::compare::{Samples, Tried, total};
+use super::unseen::Folds;
+use crate::data::Record;
+use crate::model::polynomial::{is_stable, roots};
+use crate::regression::sum;
+use crate::respond::{Response, Start, predict, simulate};
+use crate::{Error, Horizon, Model, Orders};
+
+/// A record is cut into so many blocks.
+const BLOCKS: usize = 3;
+/// Errors count up to so many standard deviations of the output.
+const LARGEST: f64 = 5.0;
+/// The error of an unstable refit counts so many times, and is this at least.
+const UNSTABLE: f64 = 1.5;
+
+/// How well a model does on samples that it was not fitted to: mean squares of errors, divided by the variance of the output.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct HeldOut {
+    /// On all blocks, each from the initial state that fits it best.
+    pub blocks: f64,
+    /// On the last block, simulated from the first row on with the initial state that fits the rows before the block; for a
+    /// number of steps ahead the same as `blocks`.
+    pub onward: f64,
+    /// As `blocks`, without what instability costs.
+    pub unpunished: f64,
+    /// How many models without a block are unstable.
+    pub unstable: usize,
+    /// Of so many.
+    pub refits: usize,
+}
+
+impl HeldOut {
+    /// 100 (1 - |e|/|y - mean(y)|) on all blocks.
+    pub fn percent(&self) -> f64 {
+        100.0 * (1.0 - self.blocks.sqrt())
+    }
+}
+
+/// The figures of some models; none of others, and where the data do not determine a model without a block.
+///
+/// # Errors
+/// [`Error::Interrupted`].
+pub(super) fn figures(
+    task: &Task<'_>,
+    record: &Record<'_>,
+    samples: &Samples,
+    tried: &[Tried],
+    which: &[usize],
+) -> Result<Vec<Option<HeldOut>>, Error> {
+    let mut figures = vec![None; tried.len()];
+    let deviation = deviation(record);
+    let folds = Folds::new(record, BLOCKS);
+    let some: Vec<Tried> = which.iter().map(|&k| tried[k].clone()).collect();
+    if some.is_empty() || deviation == 0.0 || (0..BLOCKS).any(|fold| total(&folds.test(fold)) == 0) {
+        return Ok(figures);
+    }
+    let refits = folds.refitted(task, samples, &some)?;
+    let tests: Vec<Record<'_>> = (0..BLOCKS).map(|fold| folds.test_with_past(fold)).collect();
+    let onward = Onward::new(record, &folds);
+    let horizon = task.focus.horizon();
+    let of_model = |k: usize| -> Option<HeldOut> {
+        let orders = &some[k].orders;
+        let (mut blocks, mut unpunished, mut samples, mut unstable) = (0.0, 0.0, 0, 0);
+        let mut last = None;
+        for (refits, test) in refits.iter().zip(&tests) {
+            let parameters = refits[k].as_ref()?;
+            let model = Model::from_parameters(orders, parameters, None, 1.0, 1.0).ok()?;
+            let stable = is_all_stable(&model);
+            let count = total(test);
+            let root = match response(&model, test, horizon) {
+                Ok(response) => root_mean_square(test, &response, deviation)?,
+                Err(_) => LARGEST,
+            };
+            let counted = if stable { root } else { punished(root) };
+            blocks += counted * counted * count as f64;
+            unpunished += root * root * count as f64;
+            samples += count;
+            unstable += usize::from(!stable);
+            last = Some((model, stable, counted));
+        }
+        let (model, stable, own) = last?;
+        let root = match horizon {
+            Horizon::FreeRun => {
+                let root = onward.root_mean_square(&model, deviation).unwrap_or(LARGEST);
+                if stable { root } else { punished(root) }
+            }
+            Horizon::Steps { .. } => own,
+        };
+        let mean = |sum: f64| sum / samples as f64;
+        let onward = if matches!(horizon, Horizon::FreeRun) { root * root } else { mean(blocks) };
+        Some(HeldOut { blocks: mean(blocks), onward, unpunished: mean(unpunished), unstable, refits: BLOCKS })
+    };
+    let found: Vec<Option<HeldOut>> = (0..some.len()).into_par_iter().map(of_model).collect();
+    which.iter().zip(found).for_each(|(&k, figure)| figures[k] = figure);
+    Ok(figures)
+}
+
+/// The models that are looked at: of each structure, delay and number of parameters the one with the least criterion, and the best
+/// of all. They stand in the order of their criterion.
+pub(super) fn promising(order: &[usize], tried: &[Tried]) -> Vec<usize> {
+    let mut seen: BTreeMap<(String, usize, Vec<usize>), ()> = BTreeMap::new();
+    let new = |&&k: &&usize| {
+        let orders = &tried[k].orders;
+        let key = (format!("{:?}", orders.structure()), orders.parameters(), orders.nk.clone());
+        seen.insert(key, ()).is_none()
+    };
+    order.iter().filter(new).copied().collect()
+}
+
+/// The mean of e^2 of given parameters, `horizon` ahead; none where the response overflows.
+pub(super) fn mean_square(
+    orders: &Orders,
+    parameters: &[f64],
+    record: &Record<'_>,
+    horizon: Horizon,
+) -> Option<f64> {
+    let model = Model::from_parameters(orders, parameters, None, 1.0, 1.0).ok()?;
+    let response = response(&model, record, horizon).ok()?;
+    let errors = || counted(record, &response).map(|(measured, said)| measured - said);
+    Some(sum(errors().map(|e| e * e)) / errors().count() as f64).filter(|mean| mean.is_finite())
+}
+
+fn response(model: &Model, record: &Record<'_>, horizon: Horizon) -> Result<Response, Error> {
+    match horizon {
+        Horizon::FreeRun => simulate(model, record, Start::Estimate),
+        Horizon::Steps { steps } => predict(model, record, steps, Start::natural(model, horizon)),
+    }
+}
+
+fn counted<'a>(
+    record: &'a Record<'_>,
+    response: &'a Response,
+) -> impl Iterator<Item = (f64, f64)> + Clone + 'a {
+    response.counted.iter().cloned().flatten().map(|t| (record.output[t], response.values[t]))
+}
+
+fn root_mean_square(record: &Record<'_>, response: &Response, deviation: f64) -> Option<f64> {
+    root(counted(record, response), deviation)
+}
+
+/// The root of the mean of squared errors, cut off; none without a sample.
+fn root(pairs: impl Iterator<Item = (f64, f64)> + Clone, deviation: f64) -> Option<f64> {
+    let count = pairs.clone().count();
+    // NaN is cut off too.
+    let cut = |(measured, said): (f64, f64)| ((measured - said).abs() / deviation).min(LARGEST);
+    (count > 0).then(|| (sum(pairs.map(|pair| cut(pair).powi(2))) / count as f64).sqrt())
+}
+
+fn punished(root: f64) -> f64 {
+    UNSTABLE * root.max(UNSTABLE)
+}
+
+fn is_all_stable(model: &Model) -> bool {
+    let mut scratch = Vec::new();
+    std::iter::once(&model.a).chain(&model.f).all(|polynomial| is_stable(polynomial, &mut scratch))
+}
+
+/// The largest modulus of a root of A or an F; infinite where it is not known.
+pub(super) fn radius(orders: &Orders, parameters: &[f64]) -> f64 {
+    let Ok(model) = Model::from_parameters(orders, parameters, None, 1.0, 1.0) else { return f64::INFINITY };
+    let largest = |polynomial: &Vec<f64>| {
+        let roots = roots(polynomial)?;
+        Some(roots.iter().map(|root| root.re.hypot(root.im)).fold(0.0, f64::max))
+    };
+    let largest = std::iter::once(&model.a).chain(&model.f).map(largest);
+    largest.map(|modulus| modulus.unwrap_or(f64::INFINITY)).fold(0.0, f64::max)
+}
+
+/// The standard deviation of the output.
+fn deviation(record: &Record<'_>) -> f64 {
+    let values = || record.segments.iter().flat_map(|segment| &record.output[segment.clone()]);
+    let count = total(record).max(1) as f64;
+    let mean = sum(values().copied()) / count;
+    (sum(values().map(|y| (y - mean).powi(2))) / count).sqrt()
+}
+
+/// The last block behind what comes before it in its segments.
+struct Onward<'r> {
+    record: Record<'r>,
+    /// The output without the last block.
+    known: Vec<f64>,
+    last: Record<'r>,
+}
+
+impl<'r> Onward<'r> {
+    fn new(record: &Record<'r>, folds: &Folds<'_, 'r>) -> Self {
+        let last = folds.test_with_past(folds.count() - 1);
+        let mut known = record.output.to_vec();
+        for piece in &last.segments {
+            known[piece.clone()].fill(f64::NAN);
+        }
+        Self { record: record.clone(), known, last }
+    }
+
+    /// A segment of which nothing is known before begins with the state that fits it.
+    fn root_mean_square(&self, model: &Model, deviation: f64) -> Option<f64> {
+        let begins = |segment: &std::ops::Range<usize>| self.known[segment.start].is_nan();
+        let (mut before, mut alone) = (self.record.clone(), self.last.clone());
+        let select = |record: &mut Record<'_>, keep: &dyn Fn(&std::ops::Range<usize>) -> bool| {
+            let kept = record.segments.iter().zip(&record.past).filter(|(segment, _)| keep(segment));
+            let (segments, past) = kept.map(|(segment, past)| (segment.clone(), *past)).unzip();
+            (record.segments, record.past) = (segments, past);
+        };
+        let whole: Vec<usize> = self.record.segments.iter().filter(|s| begins(s)).map(|s| s.start).collect();
+        select(&mut before, &|segment| !begins(segment));
+        select(&mut alone, &|segment| whole.contains(&segment.start));
+        let mut pairs = Vec::new();
+        if !before.segments.is_empty() {
+            let known = Record { output: &self.known, ..before };
+            let run = simulate(model, &known, Start::Estimate).ok()?;
+            let continued = self.last.segments.iter().filter(|piece| !whole.contains(&piece.start));
+            pairs.extend(continued.cloned().flatten().map(|t| (self.record.output[t], run.values[t])));
+        }
+        if !alone.segments.is_empty() {
+            let run = simulate(model, &alone, Start::Estimate).ok()?;
+            pairs.extend(counted(&alone, &run));
+        }
+        root(pairs.iter().copied(), deviation)
+    }
+}

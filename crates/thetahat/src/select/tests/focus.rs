@@ -1,0 +1,180 @@
+use super::super::compare::Compared;
+use super::super::focus::winners;
+use super::*;
+use crate::estimate::{Method, estimate};
+use crate::respond::simulate;
+use crate::{Horizon, Model, Start};
+
+const F: [f64; 3] = [1.0, -1.5, 0.7];
+
+fn compared(radius: f64, blocks: f64, onward: f64, unstable: usize) -> Compared {
+    let held_out = Some(HeldOut { blocks, onward, unpunished: blocks, unstable, refits: 3 });
+    let orders = Orders::arx(1, &[1], &[1]).unwrap();
+    let structure = Structure::Arx;
+    let scored = Scored { structure, orders, parameters: 2, mse: 1.0, unseen: None, held_out, score: None };
+    Compared { scored, guess: None, radius }
+}
+
+/// P, S and what is taken of models in the order of their criterion, for 100 samples.
+fn taken(focus: Focus, models: &[Compared]) -> Option<[usize; 3]> {
+    let models: Vec<&Compared> = models.iter().collect();
+    winners(focus, &models, 100).map(|won| [won.prediction, won.simulation, won.chosen])
+}
+
+#[test]
+fn the_gate_opens_for_a_clear_difference_only() {
+    // exp(-0.3) = 0.741: both logarithms fall by 0.29, then by 0.31.
+    let models = |factor: f64| [compared(0.9, 0.5, 0.5, 0), compared(0.9, 0.5 * factor, 0.5 * factor, 0)];
+    assert_eq!(taken(Focus::Auto, &models(0.748)), Some([0, 1, 0]));
+    assert_eq!(taken(Focus::Auto, &models(0.733)), Some([0, 1, 1]));
+    assert_eq!(taken(Focus::Simulation, &models(0.748)), Some([0, 1, 1]));
+    assert_eq!(taken(Focus::Steps(5), &models(0.748)), Some([0, 1, 1]));
+    assert_eq!(taken(Focus::Prediction, &models(0.1)), Some([0, 1, 0]));
+    // What the blocks gain and the run onward loses is no gain.
+    let apart = [compared(0.9, 0.5, 0.5, 0), compared(0.9, 0.25, 1.0, 0)];
+    assert_eq!(taken(Focus::Auto, &apart), Some([0, 1, 0]));
+}
+
+#[test]
+fn unstable_and_very_slow_models_do_not_simulate() {
+    let stable = compared(0.9, 0.5, 0.5, 0);
+    // A time constant of 200 samples has the modulus exp(-1/200).
+    let slow = compared(0.9951, 0.1, 0.1, 0);
+    assert_eq!(taken(Focus::Auto, &[stable.clone(), slow]), Some([0, 0, 0]));
+    assert_eq!(taken(Focus::Auto, &[compared(1.01, 0.4, 0.4, 1), stable.clone()]), Some([1, 1, 1]));
+    // Unstable however the rows are cut, and clearly better: so is the plant.
+    assert_eq!(taken(Focus::Auto, &[compared(1.01, 0.4, 0.4, 3), stable.clone()]), Some([1, 1, 0]));
+    assert_eq!(taken(Focus::Auto, &[compared(1.01, 0.49, 0.4, 3), stable]), Some([1, 1, 1]));
+    assert_eq!(taken(Focus::Auto, &[compared(1.01, 0.4, 0.4, 3)]), None);
+}
+
+#[test]
+fn figures_of_blocks_are_those_of_single_fits() {
+    let mut noise = Noise(11);
+    let (u, e) = (noise.take(330), noise.take(330));
+    let y = sum(&filtered(&[0.0, 1.0, 0.5], &F, &u), &e, 0.4);
+    let whole = Record::new(&y, vec![&u]).unwrap();
+    let orders = Orders::arx(2, &[2], &[1]).unwrap();
+    let choice = Choice::Grid(Grid {
+        na: 2.into(),
+        nb: vec![2.into()],
+        nc: 0.into(),
+        nd: 0.into(),
+        nf: vec![0.into()],
+        nk: vec![1.into()],
+        path: Path::All,
+    });
+    let found = focused(&whole, &choice, Focus::Simulation).unwrap().selection;
+    let seen = found.chosen.held_out.unwrap();
+    let mean = y.iter().sum::<f64>() / 330.0;
+    let variance = y.iter().map(|y| (y - mean).powi(2)).sum::<f64>() / 330.0;
+    let model = |segments: &[Range<usize>]| {
+        let estimate =
+            estimate(&record(&y, &[&u], segments), &orders, &Method::default(), Initial::Drop).unwrap();
+        Model::from_parameters(&orders, estimate.parameters(), None, 1.0, 1.0).unwrap()
+    };
+    let error = |model: &Model, record: &Record<'_>, rows: Range<usize>| {
+        let run = simulate(model, record, Start::Estimate).unwrap();
+        rows.map(|t| (y[t] - run.values[t]).powi(2)).sum::<f64>()
+    };
+    let blocks = [0..110, 110..220, 220..330];
+    let mut total = 0.0;
+    for (left_out, block) in blocks.iter().enumerate() {
+        let others: Vec<_> = (0..3).filter(|k| *k != left_out).map(|k| blocks[k].clone()).collect();
+        let test = Record { past: vec![block.start], ..record(&y, &[&u], std::slice::from_ref(block)) };
+        total += error(&model(&others), &test, block.clone());
+    }
+    assert!(close(seen.blocks, total / 330.0 / variance, 1e-9), "{seen:?} {total}");
+    // Onward: the initial state is that of the rows before the last block.
+    let mut known = y.clone();
+    known[220..].fill(f64::NAN);
+    let onward = error(&model(&blocks[..2]), &record(&known, &[&u], &[0..330]), 220..330);
+    assert!(close(seen.onward, onward / 110.0 / variance, 1e-9), "{seen:?} {onward}");
+    assert_eq!((seen.unstable, seen.refits, seen.unpunished), (0, 3, seen.blocks));
+    assert!((seen.percent() - 100.0 * (1.0 - seen.blocks.sqrt())).abs() < 1e-12);
+}
+
+/// A static curve in front of the plant and a drift: outside of the model set.
+#[test]
+fn what_simulates_is_taken_where_the_plant_is_not_among_the_models() {
+    let mut noise = Noise(17);
+    let (mut u, e) = (vec![0.0; 900], noise.take(900));
+    for t in 1..900 {
+        u[t] = if t % 30 == 0 { 2.0 * noise.next() } else { u[t - 1] };
+    }
+    let bent: Vec<f64> = u.iter().map(|u| u + 0.5 * u * u).collect();
+    let slow = [1.0, -1.93, 0.9312];
+    let x = filtered(&[0.0, 0.0006, 0.0006], &slow, &bent);
+    let drift = filtered(&[1.0], &[1.0, -0.995], &e);
+    let y = sum(&sum(&x, &drift, 0.01), &noise.take(900), 0.002);
+    let record = Record::new(&y, vec![&u]).unwrap();
+    let choice = Choice::Automatic(Automatic::default());
+    let of = |focus| focused(&record, &choice, focus).unwrap().selection;
+    let (auto, prediction, simulation) = (of(Focus::Auto), of(Focus::Prediction), of(Focus::Simulation));
+    let best = auto.winners.clone().unwrap();
+    assert_eq!(prediction.winners, None);
+    assert_eq!(simulation.winners.unwrap().simulation, simulation.chosen);
+    let (p, s) = (best.prediction.held_out.unwrap(), best.simulation.held_out.unwrap());
+    assert!(s.blocks <= p.blocks);
+    let clear = (p.blocks.ln() + p.onward.ln() - s.blocks.ln() - s.onward.ln()) / 2.0 > 0.3;
+    assert_eq!(auto.chosen, if clear { best.simulation } else { best.prediction }, "{:?}", auto.steps);
+    assert!(auto.steps.iter().any(|step| step.starts_with("For prediction: ")), "{:?}", auto.steps);
+}
+
+#[test]
+fn blocks_are_looked_at_as_far_ahead_as_the_focus_says() {
+    let mut noise = Noise(19);
+    let (u, e) = (noise.take(400), noise.take(400));
+    let y = sum(&filtered(&[0.0, 1.0], &F, &u), &filtered(&[1.0], &F, &e), 0.3);
+    let record = Record::new(&y, vec![&u]).unwrap();
+    let choice = Choice::Automatic(Automatic { structure: Some(Structure::Arx), nk: None });
+    let figure = |focus| {
+        let selection = focused(&record, &choice, focus).unwrap().selection;
+        let model = selection.best.into_iter().find(|model| model.orders.to_string() == "ARX(2, 1, 1)");
+        model.unwrap().held_out.unwrap().blocks
+    };
+    // Errors grow with the horizon, up to those of a free run.
+    let figures = [figure(Focus::Steps(2)), figure(Focus::Steps(5)), figure(Focus::Simulation)];
+    assert!(figures[0] < figures[1] && figures[1] < 1.05 * figures[2], "{figures:?}");
+    assert_eq!(Focus::Steps(5).horizon(), Horizon::Steps { steps: 5 });
+    for text in ["auto", "prediction", "simulation", "12"] {
+        assert_eq!(text.parse::<Focus>().unwrap().to_string(), text);
+    }
+    for text in ["", "0", "-1", "free", "1.5"] {
+        assert!(text.parse::<Focus>().is_err(), "{text}");
+    }
+}
+
+#[test]
+fn selection_on_unseen_rows_looks_at_the_horizon() {
+    let mut noise = Noise(23);
+    let (u, e) = (noise.take(500), noise.take(500));
+    let y = sum(&filtered(&[0.0, 1.0, 0.5], &F, &u), &e, 0.5);
+    let (first, second) = (record(&y, &[&u], &[0..350]), record(&y, &[&u], &[350..500]));
+    let orders = Orders::oe(&[2], &[2], &[1]).unwrap();
+    let inputs = ["u1".to_owned()];
+    for (select, focus) in [(Select::Validation, Focus::Simulation), (Select::Cv, Focus::Simulation)] {
+        let search = Search::default();
+        let task = Task {
+            estimation: &first,
+            validation: Some(&second),
+            inputs: &inputs,
+            select,
+            focus,
+            initial: Initial::Auto,
+            search: &search,
+            deadline: Deadline::default(),
+            monitor: &|_| ControlFlow::Continue(()),
+        };
+        let found = choose(&task, &Choice::Known(orders.clone())).unwrap();
+        let unseen = found.selection.chosen.unseen.unwrap();
+        // The noise that no model simulates: uniform within a half.
+        assert!((0.06..0.11).contains(&unseen), "{select:?} {unseen}");
+        if select == Select::Validation {
+            let model = Model::from_parameters(&orders, &found.guess.unwrap(), None, 1.0, 1.0).unwrap();
+            let run = simulate(&model, &second, Start::Estimate).unwrap();
+            let own = (350..500).map(|t| (y[t] - run.values[t]).powi(2)).sum::<f64>() / 150.0;
+            assert!(close(unseen, own, 1e-9), "{unseen} {own}");
+        }
+    }
+}

@@ -49,6 +49,27 @@ FITS: dict[str, Callable[[th.Log], th.Model]] = {
 
 
 @pytest.mark.filterwarnings("ignore::thetahat.EstimationWarning")
+def test_a_model_is_for_what_focus_says() -> None:
+    motor = th.dc_motor()
+    oe = th.oe(motor, nb=2, nf=2, estimate="1..700", constant="no")
+    bj = th.bj(motor, nb=2, nc=0, nd=1, nf=2, estimate="1..700", constant="no", focus="simulation")
+    assert bj.parameters[[0, 1, 3, 4]].tolist() == oe.parameters.tolist()
+    assert th.bj(motor, nb=2, nc=0, nd=1, nf=2, estimate="1..700", constant="no", focus="prediction") == th.bj(
+        motor, nb=2, nc=0, nd=1, nf=2, estimate="1..700", constant="no"
+    )
+    judged = th.arx(motor, 2, 2, estimate="1..700", validate="701..1000", focus=5)
+    horizons = [fit["horizon"].get("steps") for fit in judged.document["fit"] if fit["part"] == "validation"]
+    assert horizons == [1, 5, None]
+    chosen = th.search(motor, model="oe", focus="simulation").selection
+    assert chosen is not None and chosen["focus"] == "simulation"
+    assert chosen["chosen"] == chosen["winners"]["simulation"]
+    assert chosen["chosen"]["held_out"]["refits"] == 3
+    for wrong in ("free", 0, -1):
+        with pytest.raises(ValueError, match="focus"):
+            th.arx(motor, 2, 2, focus=wrong)
+
+
+@pytest.mark.filterwarnings("ignore::thetahat.EstimationWarning")
 @pytest.mark.parametrize("name", FITS)
 def test_every_structure_fits(log: th.Log, name: str) -> None:
     model = FITS[name](log)

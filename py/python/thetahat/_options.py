@@ -398,6 +398,8 @@ def _texts(name: str, value: Any, rows: int | None) -> list[str]:
         if not isinstance(value, Sequence):
             raise TypeError(f"{name}: expected three numbers such as (60, 20, 20), found {value!r}")
         return ["/".join(_plain(number(name, part)) for part in value)]
+    if name == "focus":
+        return [value if isinstance(value, str) else str(integer(name, value))]
     if name == "norm":
         return [{"1.0": "1", "2.0": "2"}.get(str(value), str(value))]
     if name == "resample":

@@ -73,6 +73,12 @@ pub(super) fn choose(task: &Task<'_>, automatic: &Automatic) -> Result<Found, Er
         None => (Vec::new(), vec![1; inputs]),
     };
     let mut models = candidates(task.estimation, &structures, &nk)?;
+    let idle: Vec<usize> = (0..delays.len()).filter(|&input| delays[input].confidence.is_none()).collect();
+    if !idle.is_empty() && idle.len() < inputs {
+        models = models.iter().map(|orders| without(orders, &idle)).collect();
+        let names: Vec<&str> = idle.iter().map(|&input| task.inputs[input].as_str()).collect();
+        steps.push(format!("Models without {} compete, as no effect is seen.", names.join(", ")));
+    }
     if task.looks_further() && automatic.nk.is_none() {
         for delay in [1, 0] {
             models.extend(diagonal(task.estimation, &structures, &vec![delay; inputs])?);
@@ -90,6 +96,15 @@ pub(super) fn choose(task: &Task<'_>, automatic: &Automatic) -> Result<Found, Er
     selection.steps.extend(at_the_edge(&selection.chosen.orders, &tried));
     steps.append(&mut selection.steps);
     Ok(Found { selection: Selection { steps, delays, ..selection }, guess })
+}
+
+/// Orders without some inputs.
+fn without(orders: &Orders, idle: &[usize]) -> Orders {
+    let mut orders = orders.clone();
+    for &input in idle {
+        (orders.nb[input], orders.nf[input]) = (0, 0);
+    }
+    orders
 }
 
 /// A word on orders that are the highest that were tried of their structure.

@@ -51,6 +51,7 @@ fn a_long_delay_is_found_and_an_input_without_effect_is_said_to_be_one() {
     let record = Record::new(&y, vec![&u, &v]).unwrap();
     let selection = automatic(&record, Some(Structure::Arx), None).unwrap();
     assert_eq!(selection.chosen.orders.nk, [30, 1], "{:?}", selection.steps);
+    assert_eq!(selection.chosen.orders.nb[1], 0, "{:?}", selection.steps);
     assert!(selection.steps[1].starts_with("Delay of u2: no effect"), "{:?}", selection.steps);
 }
 

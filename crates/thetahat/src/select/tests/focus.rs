@@ -88,7 +88,8 @@ fn figures_of_blocks_are_those_of_single_fits() {
     // Onward: the initial state is that of the rows before the last block.
     let mut known = y.clone();
     known[220..].fill(f64::NAN);
-    let onward = error(&model(&blocks[..2]), &record(&known, &[&u], &[0..330]), 220..330);
+    let onward =
+        error(&model(&blocks[..2]), &record(&known, &[&u], std::slice::from_ref(&(0..330))), 220..330);
     assert!(close(seen.onward, onward / 110.0 / variance, 1e-9), "{seen:?} {onward}");
     assert_eq!((seen.unstable, seen.refits, seen.unpunished), (0, 3, seen.blocks));
     assert!((seen.percent() - 100.0 * (1.0 - seen.blocks.sqrt())).abs() < 1e-12);
@@ -150,7 +151,10 @@ fn selection_on_unseen_rows_looks_at_the_horizon() {
     let mut noise = Noise(23);
     let (u, e) = (noise.take(500), noise.take(500));
     let y = sum(&filtered(&[0.0, 1.0, 0.5], &F, &u), &e, 0.5);
-    let (first, second) = (record(&y, &[&u], &[0..350]), record(&y, &[&u], &[350..500]));
+    let (first, second) = (
+        record(&y, &[&u], std::slice::from_ref(&(0..350))),
+        record(&y, &[&u], std::slice::from_ref(&(350..500))),
+    );
     let orders = Orders::oe(&[2], &[2], &[1]).unwrap();
     let inputs = ["u1".to_owned()];
     for (select, focus) in [(Select::Validation, Focus::Simulation), (Select::Cv, Focus::Simulation)] {

@@ -94,7 +94,8 @@ pub(crate) fn feedback<S: AsRef<[f64]>>(
     let Some((innovations, segments)) = innovations(&signals, segments) else {
         return vec![None; inputs.len()];
     };
-    inputs.iter().map(|input| follows(input, &innovations, &segments)).collect()
+    drop(output);
+    inputs.iter().map(|input| follows_centred(input, &innovations, &segments)).collect()
 }
 
 /// A signal less its mean over the segments, zero outside.
@@ -129,7 +130,11 @@ fn innovations(signals: &[&[f64]], segments: &[Range<usize>]) -> Option<(Vec<f64
 
 /// What past innovations, zero outside of the segments, tell of an input. None where they tell nothing.
 pub(crate) fn follows(input: &[f64], innovations: &[f64], segments: &[Range<usize>]) -> Option<Feedback> {
-    let input = &centred(input, segments);
+    follows_centred(&centred(input, segments), innovations, segments)
+}
+
+/// The same of an input without its mean.
+fn follows_centred(input: &[f64], innovations: &[f64], segments: &[Range<usize>]) -> Option<Feedback> {
     let samples: usize = segments.iter().map(Range::len).sum();
     let [fewest, most] = OWN_PAST;
     let own = (samples / SAMPLES_OF_OWN_PAST).clamp(fewest, most);
@@ -192,7 +197,7 @@ fn beyond(
         let (_, median, _) = sizes.select_nth_unstable_by(count / 2, f64::total_cmp);
         let deviation = OF_MEDIAN * *median;
         if deviation <= HELD * (square(&new) / count as f64).sqrt() {
-            bounded = new;
+            bounded = std::mem::take(&mut new);
             break;
         }
         let bound = BOUND * deviation;
@@ -203,20 +208,36 @@ fn beyond(
         let change = left(&target)?;
         new = new.iter().zip(&bounded).zip(&change).map(|((w, psi), left)| w - psi + left).collect();
     }
+    drop(new);
     let bounded = left(&bounded)?;
-    let late = |lag: usize| left(&[vec![0.0; lag], innovations[..innovations.len() - lag].to_vec()].concat());
-    let past: Vec<Vec<f64>> = (1..=PAST).map(late).collect::<Option<_>>()?;
-    Some(evaluated(&bounded, &past, &rows().collect::<Vec<_>>(), own))
+    // What the past of the input tells of e(t - k): five weights for each of its values, and no further signals.
+    let told = |lag: usize| {
+        let late = [&vec![0.0; lag], &innovations[..innovations.len() - lag]].concat();
+        Some(solved(&[&late, input], segments, &past, masked)?.parameters)
+    };
+    let told: Vec<_> = (1..=PAST).map(told).collect::<Option<_>>()?;
+    let regressor = |t: usize| {
+        Vector::from_fn(|k, _| {
+            let own = told[k].iter().zip(input[..t].iter().rev()).map(|(weight, u)| weight * u);
+            innovations[t - k - 1] - own.sum::<f64>()
+        })
+    };
+    Some(evaluated(&bounded, &regressor, rows, own))
 }
 
 /// W and what d predicts of rows left out.
-fn evaluated(bounded: &[f64], past: &[Vec<f64>], rows: &[usize], own: usize) -> Option<Feedback> {
-    let regressor = |t: usize| Vector::from_fn(|k, _| past[k][t]);
+fn evaluated<R: Iterator<Item = usize>>(
+    bounded: &[f64],
+    regressor: &dyn Fn(usize) -> Vector,
+    rows: impl Fn() -> R,
+    own: usize,
+) -> Option<Feedback> {
+    let count = rows().count();
     let mut parts = vec![(Matrix::zeros(), Vector::zeros()); PARTS];
     let mut square = 0.0;
-    for (position, &t) in rows.iter().enumerate() {
+    for (position, t) in rows().enumerate() {
         let z = regressor(t);
-        let (matrix, right) = &mut parts[position * PARTS / rows.len()];
+        let (matrix, right) = &mut parts[position * PARTS / count];
         matrix.ger(1.0, &z, &z, 1.0);
         right.axpy(bounded[t], &z, 1.0);
         square += bounded[t] * bounded[t];
@@ -225,12 +246,12 @@ fn evaluated(bounded: &[f64], past: &[Vec<f64>], rows: &[usize], own: usize) -> 
     let right: Vector = parts.iter().map(|(_, right)| right).sum();
     let effect = Cholesky::new(matrix)?.solve(&right);
     let mut spread = Matrix::zeros();
-    for &t in rows {
+    for t in rows() {
         let z = regressor(t);
         let rest = bounded[t] - z.dot(&effect);
         spread.ger(rest * rest, &z, &z, 1.0);
     }
-    spread *= rows.len() as f64 / (rows.len() - own - PAST) as f64;
+    spread *= count as f64 / (count - own - PAST) as f64;
     let statistic = right.dot(&Cholesky::new(spread)?.solve(&right));
     let predicted = |(own, toward): &(Matrix, Vector)| {
         let effect = Cholesky::new(matrix - own)?.solve(&(right - toward));

@@ -169,7 +169,7 @@ pub(super) fn compare(task: &Task<'_>, models: Vec<Orders>) -> Result<Outcome, E
         |(Tried { orders, point }, ((unseen, score), held_out))| {
             let Point { parameters, cost, .. } = point?;
             let unseen = if with_unseen { Some(unseen?) } else { None };
-            let radius = held_out.map_or(f64::INFINITY, |_| held_out::radius(&orders, &parameters));
+            let radius = if with_blocks { held_out::radius(&orders, &parameters) } else { f64::INFINITY };
             let guess = (!orders.is_linear()).then_some(parameters);
             let orders = task.named(&orders);
             let scored = Scored {

@@ -16,7 +16,6 @@ use std::str::FromStr;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::HeldOut;
 use super::compare::Compared;
 use crate::{Error, Horizon};
 
@@ -101,38 +100,29 @@ pub(super) struct Winners {
     pub(super) chosen: usize,
 }
 
-/// The winners among models in the order of their criterion; none where no stable model simulates.
+/// The winners among models in the order of their criterion; none where no model is stable, or none was looked at.
+///
+/// What has no figures on blocks, as the data without one do not determine it, may predict; it is not compared.
 pub(super) fn winners(focus: Focus, models: &[&Compared], samples: usize) -> Option<Winners> {
     let logarithm = |square: f64| square.max(NOTHING).ln();
     let held_out = |k: usize| models[k].scored.held_out.as_ref();
-    let known: Vec<usize> = (0..models.len()).filter(|&k| held_out(k).is_some()).collect();
-    let stable = |k: &&usize| models[**k].radius < 1.0;
-    let slow = |k: &&usize| models[**k].radius > (-1.0 / (SLOWEST * samples as f64)).exp();
-    let least = |of: &dyn Fn(&HeldOut) -> f64, among: &mut dyn Iterator<Item = usize>| {
-        let figures = among.filter_map(|k| Some((of(held_out(k)?), k)));
-        figures.min_by(|(one, _), (other, _)| one.total_cmp(other)).map(|(_, k)| k)
-    };
-    let simulation = least(
-        &|seen| seen.blocks.max(NOTHING),
-        &mut known.iter().filter(stable).filter(|k| !slow(k)).copied(),
-    )?;
-    let prediction = *known.iter().find(|k| stable(k))?;
-    let both = |k: usize| {
-        held_out(k)
-            .map_or(f64::INFINITY, |seen| f64::midpoint(logarithm(seen.blocks), logarithm(seen.onward)))
-    };
-    let mut chosen = match focus {
-        Focus::Auto if both(prediction) - both(simulation) > GATE => simulation,
+    let stable = |k: &usize| models[*k].radius < 1.0;
+    let fast = |k: &usize| models[*k].radius <= (-1.0 / (SLOWEST * samples as f64)).exp();
+    let prediction = (0..models.len()).find(stable)?;
+    let figures = (0..models.len()).filter(fast).filter_map(|k| Some((held_out(k)?.blocks.max(NOTHING), k)));
+    let least = figures.min_by(|(one, _), (other, _)| one.total_cmp(other));
+    let simulation = least.map_or(prediction, |(_, k)| k);
+    let both =
+        |k: usize| held_out(k).map(|seen| f64::midpoint(logarithm(seen.blocks), logarithm(seen.onward)));
+    let clear = both(prediction).zip(both(simulation)).is_some_and(|(one, other)| one - other > GATE);
+    let chosen = match focus {
+        Focus::Auto if clear => simulation,
         Focus::Auto | Focus::Prediction => prediction,
         Focus::Simulation | Focus::Steps(_) => simulation,
     };
     let raw = |k: usize| held_out(k).map_or(f64::INFINITY, |seen| logarithm(seen.unpunished));
-    let first = known[0];
-    if models[first].radius >= 1.0
-        && held_out(first).is_some_and(|seen| seen.unstable == seen.refits)
-        && raw(chosen) - raw(first) > CLEARLY
-    {
-        chosen = first;
-    }
-    Some(Winners { prediction, simulation, chosen })
+    let unstable = models[0].radius >= 1.0
+        && held_out(0).is_some_and(|seen| seen.unstable == seen.refits)
+        && raw(chosen) - raw(0) > CLEARLY;
+    Some(Winners { prediction, simulation, chosen: if unstable { 0 } else { chosen } })
 }

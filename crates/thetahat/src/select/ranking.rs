@@ -99,26 +99,26 @@ pub(super) fn ranked(task: &Task<'_>, outcome: Outcome, path: Option<Path>) -> R
 /// What both winners are, how they differ, and which was taken why.
 fn both(winners: &Winners, order: &[&Scored], task: &Task<'_>) -> Vec<String> {
     let Winners { prediction, simulation, chosen } = *winners;
-    let figure = |k: usize| {
-        order[k].held_out.map_or_else(|| "-".to_owned(), |seen| format!("{} %", fixed(seen.percent(), 1)))
-    };
     let how = match task.focus.horizon() {
         Horizon::FreeRun => "in free runs".to_owned(),
         horizon => horizon.to_string(),
     };
-    let mut words = vec![format!(
-        "For prediction: {}; it fits {} of blocks held out, {how}.",
-        described(order[prediction], task.select),
-        figure(prediction)
-    )];
-    if simulation == prediction {
-        words.push(format!("No other model does better on held-out blocks, {how}."));
-    } else {
-        words.push(format!(
-            "Best on held-out blocks, {how}: {}, {}.",
-            order[simulation].orders,
-            figure(simulation)
-        ));
+    let percent = |k: usize| order[k].held_out.map(|seen| fixed(seen.percent(), 1));
+    let on_blocks = match percent(prediction) {
+        Some(percent) => format!("it fits {percent} % of blocks held out, {how}"),
+        None => "it was not looked at without some of the rows, or these do not determine it".to_owned(),
+    };
+    let mut words =
+        vec![format!("For prediction: {}; {on_blocks}.", described(order[prediction], task.select))];
+    match percent(simulation) {
+        Some(_) if simulation == prediction => {
+            words.push(format!("No other model does better on held-out blocks, {how}."));
+        }
+        Some(percent) => {
+            let orders = &order[simulation].orders;
+            words.push(format!("Best on held-out blocks, {how}: {orders}, {percent} %."));
+        }
+        None => {}
     }
     words.push(match task.focus {
         _ if chosen != prediction && chosen != simulation => {
@@ -126,6 +126,9 @@ fn both(winners: &Winners, order: &[&Scored], task: &Task<'_>) -> Vec<String> {
                 .to_owned()
         }
         Focus::Auto if chosen != prediction => "Taken: the second, as the difference is clear.".to_owned(),
+        Focus::Auto if simulation != prediction && order[prediction].held_out.is_none() => {
+            "Taken: the first, as the two cannot be compared; --focus simulation takes the second.".to_owned()
+        }
         Focus::Auto if simulation != prediction => {
             "Taken: the first, as the difference is not clear; --focus simulation takes the second."
                 .to_owned()

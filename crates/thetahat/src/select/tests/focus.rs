@@ -46,6 +46,12 @@ fn unstable_and_very_slow_models_do_not_simulate() {
     assert_eq!(taken(Focus::Auto, &[compared(1.01, 0.4, 0.4, 3), stable.clone()]), Some([1, 1, 0]));
     assert_eq!(taken(Focus::Auto, &[compared(1.01, 0.49, 0.4, 3), stable]), Some([1, 1, 1]));
     assert_eq!(taken(Focus::Auto, &[compared(1.01, 0.4, 0.4, 3)]), None);
+    // What the data without a block do not determine predicts, and is not compared.
+    let mut open = compared(0.9, 0.5, 0.5, 0);
+    open.scored.held_out = None;
+    assert_eq!(taken(Focus::Auto, &[open.clone(), compared(0.9, 0.1, 0.1, 0)]), Some([0, 1, 0]));
+    assert_eq!(taken(Focus::Simulation, &[open.clone(), compared(0.9, 0.1, 0.1, 0)]), Some([0, 1, 1]));
+    assert_eq!(taken(Focus::Auto, &[open]), Some([0, 0, 0]));
 }
 
 #[test]

@@ -95,7 +95,7 @@ pub(crate) fn feedback<S: AsRef<[f64]>>(
         return vec![None; inputs.len()];
     };
     drop(output);
-    inputs.iter().map(|input| follows_centred(input, &innovations, &segments)).collect()
+    inputs.iter().map(|input| follows(input, &innovations, &segments)).collect()
 }
 
 /// A signal less its mean over the segments, zero outside.
@@ -130,11 +130,7 @@ fn innovations(signals: &[&[f64]], segments: &[Range<usize>]) -> Option<(Vec<f64
 
 /// What past innovations, zero outside of the segments, tell of an input. None where they tell nothing.
 pub(crate) fn follows(input: &[f64], innovations: &[f64], segments: &[Range<usize>]) -> Option<Feedback> {
-    follows_centred(&centred(input, segments), innovations, segments)
-}
-
-/// The same of an input without its mean.
-fn follows_centred(input: &[f64], innovations: &[f64], segments: &[Range<usize>]) -> Option<Feedback> {
+    let input = &centred(input, segments);
     let samples: usize = segments.iter().map(Range::len).sum();
     let [fewest, most] = OWN_PAST;
     let own = (samples / SAMPLES_OF_OWN_PAST).clamp(fewest, most);
@@ -193,20 +189,22 @@ fn beyond(
     }
     let mut bounded = new.clone();
     for _ in 0..ROUNDS {
-        let mut sizes: Vec<f64> = rows().map(|t| new[t].abs()).collect();
-        let (_, median, _) = sizes.select_nth_unstable_by(count / 2, f64::total_cmp);
-        let deviation = OF_MEDIAN * *median;
+        let deviation = {
+            let mut sizes: Vec<f64> = rows().map(|t| new[t].abs()).collect();
+            let (_, median, _) = sizes.select_nth_unstable_by(count / 2, f64::total_cmp);
+            OF_MEDIAN * *median
+        };
         if deviation <= HELD * (square(&new) / count as f64).sqrt() {
             bounded = std::mem::take(&mut new);
             break;
         }
         let bound = BOUND * deviation;
-        bounded = new.iter().map(|w| w.clamp(-bound, bound)).collect();
+        bounded.iter_mut().zip(&new).for_each(|(psi, w)| *psi = w.clamp(-bound, bound));
         // What the past predicts now, and the bounded residual beside it.
         let target: Vec<f64> =
             input.iter().zip(&new).zip(&bounded).map(|((u, w), psi)| u - w + psi).collect();
         let change = left(&target)?;
-        new = new.iter().zip(&bounded).zip(&change).map(|((w, psi), left)| w - psi + left).collect();
+        new.iter_mut().zip(&bounded).zip(&change).for_each(|((w, psi), left)| *w = *w - psi + left);
     }
     drop(new);
     let bounded = left(&bounded)?;

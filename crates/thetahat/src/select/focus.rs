@@ -20,7 +20,7 @@ use super::compare::Compared;
 use crate::{Error, Horizon};
 
 /// By how much the logarithm of a mean square must fall.
-const GATE: f64 = 0.3;
+const GATE: f64 = 0.1;
 const CLEARLY: f64 = 0.1;
 /// A model that simulates has no time constant of more than so many times the samples.
 const SLOWEST: f64 = 2.0;

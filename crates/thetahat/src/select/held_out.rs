@@ -4,8 +4,6 @@
 //! that fits best there. Errors are in standard deviations of the output and count up to five of them, so that a run that leaves the
 //! range of the data does not outweigh all others; a model that is unstable without a third counts as if it had left it.
 
-use std::collections::BTreeMap;
-
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -17,7 +15,7 @@ use crate::data::Record;
 use crate::model::polynomial::{is_stable, roots};
 use crate::regression::sum;
 use crate::respond::{Response, Start, predict, simulate};
-use crate::{Error, Horizon, Model, Orders};
+use crate::{Error, Horizon, Model, Orders, Structure};
 
 /// A record is cut into so many blocks.
 const BLOCKS: usize = 3;
@@ -89,18 +87,17 @@ pub(super) fn figures(
             unpunished += root * root * count as f64;
             samples += count;
             unstable += usize::from(!stable);
-            last = Some((model, stable, counted));
+            last = Some((model, stable));
         }
-        let (model, stable, own) = last?;
-        let root = match horizon {
+        let (model, stable) = last?;
+        let mean = |sum: f64| sum / samples as f64;
+        let onward = match horizon {
             Horizon::FreeRun => {
                 let root = onward.root_mean_square(&model, deviation).unwrap_or(LARGEST);
-                if stable { root } else { punished(root) }
+                if stable { root * root } else { punished(root).powi(2) }
             }
-            Horizon::Steps { .. } => own,
+            Horizon::Steps { .. } => mean(blocks),
         };
-        let mean = |sum: f64| sum / samples as f64;
-        let onward = if matches!(horizon, Horizon::FreeRun) { root * root } else { mean(blocks) };
         Some(HeldOut { blocks: mean(blocks), onward, unpunished: mean(unpunished), unstable, refits: BLOCKS })
     };
     let found: Vec<Option<HeldOut>> = (0..some.len()).into_par_iter().map(of_model).collect();
@@ -108,16 +105,20 @@ pub(super) fn figures(
     Ok(figures)
 }
 
-/// The models that are looked at: of each structure, delay and number of parameters the one with the least criterion, and the best
-/// of all. They stand in the order of their criterion.
+/// The models that are looked at: of each structure, delay and number of parameters the one with the least criterion, in the order
+/// of their criterion.
 pub(super) fn promising(order: &[usize], tried: &[Tried]) -> Vec<usize> {
-    let mut seen: BTreeMap<(String, usize, Vec<usize>), ()> = BTreeMap::new();
-    let new = |&&k: &&usize| {
+    let mut seen: Vec<(Structure, usize, &[usize])> = Vec::new();
+    let mut promising = Vec::new();
+    for &k in order {
         let orders = &tried[k].orders;
-        let key = (format!("{:?}", orders.structure()), orders.parameters(), orders.nk.clone());
-        seen.insert(key, ()).is_none()
-    };
-    order.iter().filter(new).copied().collect()
+        let kind = (orders.structure(), orders.parameters(), &orders.nk[..]);
+        if !seen.contains(&kind) {
+            seen.push(kind);
+            promising.push(k);
+        }
+    }
+    promising
 }
 
 /// The mean of e^2 of given parameters, `horizon` ahead; none where the response overflows.

@@ -1,5 +1,6 @@
 //! All models on the same samples.
 
+use super::held_out::Parts;
 use super::linear::{Columns, Fitted, Kept, Rows, Scaled};
 use super::search::Family;
 use super::{EXACT, Scored, Select, Task, held_out, unseen};
@@ -42,6 +43,8 @@ pub(super) struct Compared {
     pub(super) guess: Option<Vec<f64>>,
     /// The largest modulus of a pole of the plant; infinite where that is not known.
     pub(super) radius: f64,
+    /// What its held-out figure is made of.
+    pub(super) parts: Option<Parts>,
 }
 
 /// What all models share.
@@ -172,6 +175,7 @@ pub(super) fn compare(task: &Task<'_>, models: Vec<Orders>) -> Result<Outcome, E
             let radius = if with_blocks { held_out::radius(&orders, &parameters) } else { f64::INFINITY };
             let guess = (!orders.is_linear()).then_some(parameters);
             let orders = task.named(&orders);
+            let (held_out, parts) = held_out.unzip();
             let scored = Scored {
                 structure: orders.structure(),
                 parameters: orders.parameters(),
@@ -181,7 +185,7 @@ pub(super) fn compare(task: &Task<'_>, models: Vec<Orders>) -> Result<Outcome, E
                 score,
                 orders,
             };
-            Some(Compared { scored, guess, radius })
+            Some(Compared { scored, guess, radius, parts })
         },
     );
     let models: Vec<Compared> = models.collect();

@@ -6,7 +6,8 @@
 //!
 //! 1. P has the least criterion among stable models, S the least error on blocks that it was not fitted to (see `held_out`).
 //! 2. S is taken where the mean of two logarithms, of the mean square on all blocks and of that onward from the first row, is
-//!    lower by more than [`GATE`] than with P; else P.
+//!    lower by more than [`FAR`] than with P, or by more than [`GATE`] and the mean square on the blocks by more than
+//!    [`STANDARD_ERRORS`] of its difference's; else P.
 //! 3. An unstable model that has a lower criterion than P is taken where all its refits are unstable too and their errors
 //!    beat those of the choice by [`CLEARLY`] in the logarithm of the mean square: then the plant is unstable.
 
@@ -17,10 +18,14 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::compare::Compared;
+use super::held_out::standard_errors;
 use crate::{Error, Horizon};
 
-/// By how much the logarithm of a mean square must fall.
+/// By how much the logarithm of a mean square must fall, whatever its error.
+const FAR: f64 = 0.3;
+/// By how much where the fall is certain.
 const GATE: f64 = 0.1;
+const STANDARD_ERRORS: f64 = 2.0;
 const CLEARLY: f64 = 0.1;
 /// A model that simulates has no time constant of more than so many times the samples.
 const SLOWEST: f64 = 2.0;
@@ -114,7 +119,10 @@ pub(super) fn winners(focus: Focus, models: &[&Compared], samples: usize) -> Opt
     let simulation = least.map_or(prediction, |(_, k)| k);
     let both =
         |k: usize| held_out(k).map(|seen| f64::midpoint(logarithm(seen.blocks), logarithm(seen.onward)));
-    let clear = both(prediction).zip(both(simulation)).is_some_and(|(one, other)| one - other > GATE);
+    let fall = both(prediction).zip(both(simulation)).map_or(0.0, |(one, other)| one - other);
+    let parts = models[prediction].parts.as_ref().zip(models[simulation].parts.as_ref());
+    let certain = || parts.is_some_and(|(one, other)| standard_errors(one, other) > STANDARD_ERRORS);
+    let clear = fall > FAR || (fall > GATE && certain());
     let chosen = match focus {
         Focus::Auto if clear => simulation,
         Focus::Auto | Focus::Prediction => prediction,

@@ -3,8 +3,8 @@
 use serde_json::Value;
 
 use crate::fit_reference::folder_with;
-use crate::harness::{Folder, number, parameters};
-use crate::signals::plain_log;
+use crate::harness::{Folder, distance, number, parameters};
+use crate::signals::{Random, csv, plain_log, response};
 
 fn words(report: &Value) -> String {
     let steps = report["selection"]["steps"].as_array().into_iter().flatten();
@@ -37,6 +37,30 @@ fn a_fit_for_simulation_has_the_plant_of_output_error() {
     let arx = folder.fit(&format!("{rows} --na 2 --nb 2 --nk 3 --constant no --focus simulation"));
     let own = parameters(&arx);
     assert_eq!([own[2], own[3], own[0], own[1]], plant[..]);
+}
+
+#[test]
+fn several_inputs_share_the_poles_of_a_fit_for_simulation() {
+    let mut random = Random::new(7);
+    let (u1, u2, e) = (random.signal(900), random.signal(900), random.signal(900));
+    let noise = response(&[1.0, -0.95], &[], &e);
+    let plant = response(&[1.0, -1.5, 0.7], &[(&[0.0, 0.5], &u1), (&[0.0, 0.0, 1.0], &u2)], &vec![0.0; 900]);
+    let y: Vec<f64> = plant.iter().zip(&noise).map(|(x, v)| x + 0.5 * v).collect();
+    let folder = Folder::with_log(csv(&[("u1", &u1), ("u2", &u2), ("y", &y)]));
+    let rows = "log.csv --sample-time 1 -u u1,u2 -y y --estimate 1..600 --validate 601..900";
+    let arx = "--na 2 --nb 1,1 --nk 1,2";
+    let plain = folder.fit(&format!("{rows} {arx}"));
+    let run = folder.fit(&format!("{rows} {arx} --focus simulation"));
+    let of = |report: &Value, part: &str| {
+        let fits = report["fit"].as_array().into_iter().flatten();
+        let mut own = fits.filter(|fit| fit["part"] == part && fit["horizon"]["kind"] == "free-run");
+        number(own.next().expect("it is there"), "/percent")
+    };
+    assert!(of(&run, "estimation") > of(&plain, "estimation") + 1.0);
+    let error = |report: &Value| distance(&parameters(report)[..4], &[-1.5, 0.7, 0.5, 1.0]);
+    assert!(error(&run) < 0.1 && error(&plain) > 2.0 * error(&run), "{} {}", error(&run), error(&plain));
+    assert_eq!(run["estimation"]["plant_first"], true);
+    assert!(run["model"]["stable"] == true);
 }
 
 #[test]

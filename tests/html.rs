@@ -12,6 +12,7 @@ use thetahat::{
 };
 
 use crate::browser::Browser;
+use crate::fit_reference::folder_with;
 use crate::harness::{Folder, Run};
 
 /// Names that would do harm if they were taken for anything but names.
@@ -111,14 +112,34 @@ fn stands(browser: &mut Browser, selector: &str, text: &str) {
     assert!(found.iter().any(|found| found.contains(text)), "{text} is not in {selector}: {found:?}");
 }
 
+/// Where one model predicts best and another simulates best, both are drawn on rows that neither was fitted to.
+#[test]
+fn a_choice_between_two_purposes_is_shown() {
+    let folder = folder_with("hair_dryer.csv");
+    let page = |line: &str| {
+        folder.done(&format!("fit log.csv --estimate 1..600 {line} --html page.html --report report.json"));
+        folder.read("page.html")
+    };
+    let of_both = page("");
+    let report: Value = serde_json::from_str(&folder.read("report.json")).expect("a document");
+    let orders = |purpose: &str| report["selection"]["winners"][purpose]["orders"].clone();
+    assert_ne!(orders("prediction"), orders("simulation"));
+    assert!(of_both.contains("Free runs on rows held out"));
+    for purpose in ["for prediction: ", "for simulation: "] {
+        assert!(of_both.contains(purpose), "{purpose}");
+    }
+    assert!(!page("--focus prediction").contains("Free runs on rows held out"));
+    assert!(!page("--na 2 --nb 2 --nk 3").contains("Free runs on rows held out"));
+}
+
 #[test]
 fn a_fit_is_shown_with_its_names_as_they_are() {
     let Some(mut browser) = Browser::start("a_fit_is_shown_with_its_names_as_they_are") else { return };
     let folder = hostile();
     let again = || fs::read(fit_page_of(&folder, "--split 60/20/20")).expect("the case is sound");
     assert!(again() == again(), "the same input gives the same bytes");
-    // Output, two times two correlations, search and delays, Bode of input and noise, step, impulse, roots.
-    opened(&mut browser, &folder.path("page.html"), 12);
+    // Output, two times two correlations, search, delays and runs on rows held out, Bode of input and noise, step, impulse, roots.
+    opened(&mut browser, &folder.path("page.html"), 13);
     stands(&mut browser, "h1", OUTPUT);
     stands(&mut browser, "h1", FILE);
     stands(&mut browser, "figure h3", INPUT);
@@ -373,7 +394,7 @@ fn pages_do_without_what_is_missing() {
     assert!(page.contains("the model has a pole at"));
 
     // No signals, no models, no channels.
-    let page = fit_page(&complete_report, &[], "");
+    let page = fit_page(&complete_report, &[], &[], "");
     assert!(page.contains("no signals to show"));
     assert!(comparison_page(&[], &[], "").expect("the case is sound").contains("Comparison of 0 models"));
     assert!(comparison_page(&[complete_report], &[], "").is_err());

@@ -329,3 +329,19 @@ fn small_and_odd_logs() {
     }
     Folder::new().refused("inspect nowhere.csv", 5);
 }
+
+#[test]
+fn rows_that_repeat_at_the_end_are_told_by_inspect_and_fit() {
+    let Experiment { u, y, .. } = Experiment::new(300);
+    let padded = |values: &[f64]| [values, &[values[299]; 40][..]].concat();
+    let log = |u: &[f64], y: &[f64]| csv(&[("u", u), ("y", y)]);
+    let folder = Folder::with_log(log(&padded(&u), &padded(&y)));
+    let words = "from row 300 to the end (41 rows) no channel changes";
+    assert!(says(&inspected(&folder, "log.csv --sample-time 1"), words));
+    let fit = |line: &str| folder.done(&format!("fit log.csv --sample-time 1 --na 2 --nb 2 {line}")).stderr;
+    assert!(fit("").contains(words), "{}", fit(""));
+    assert!(!fit("--estimate 1..299").contains("no channel changes"));
+    // One channel that rests is none.
+    folder.write("log.csv", log(&padded(&u), &[&y[..], &Random::new(3).signal(40)].concat()));
+    assert!(!says(&inspected(&folder, "log.csv --sample-time 1"), "no channel changes"));
+}

@@ -4,7 +4,8 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use thetahat::{
-    Log, Report, Rows, Source, Validated, ValidationPlan, fit_page, identify_monitored, validate,
+    Log, Report, Rows, Source, Validated, ValidationPlan, fit_page, held_out_runs, identify_monitored,
+    validate,
 };
 
 use super::{grey, summary};
@@ -56,7 +57,8 @@ fn page(report: &Report, log: Log, sources: &[Source], line: &str) -> Result<Str
         validate(report, None, log.clone(), sources, &plan).map_err(log::failure(sources))
     };
     let looks: Vec<Validated> = parts.map(look).collect::<Result<_, _>>()?;
-    Ok(fit_page(report, &looks, line))
+    let held_out = held_out_runs(report, &log).map_err(log::failure(sources))?;
+    Ok(fit_page(report, &looks, &held_out, line))
 }
 
 /// Reads the logs and fits the model.

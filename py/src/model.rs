@@ -7,8 +7,8 @@ use numpy::{PyArray1, PyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use thetahat::{
-    Channel, Draws, Horizon, Procedure, Quantity, Report, Source, Start, StateSpace, TransientResponse,
-    Unjudged, apply, frequency_response, impulse_response, logarithmic_frequencies, sample, step_response,
+    Channel, Draws, Horizon, Procedure, Quantity, Report, Start, StateSpace, TransientResponse, Unjudged,
+    apply, frequency_response, impulse_response, logarithmic_frequencies, sample, step_response,
 };
 
 use crate::array::{from_matrix, matrix, vector};
@@ -116,12 +116,17 @@ impl Model {
         let (report, command) = (self.report(py)?, command.to_owned());
         interruptible(py, move |_| {
             let plan = thetahat::ValidationPlan::default();
-            let look = |(log, sources): (Arc<thetahat::Log>, Vec<Source>)| {
+            let (mut looks, mut held_out) = (Vec::new(), Vec::new());
+            if let Some((log, sources)) = log {
                 let channels = copy(&log, &channels(&report.model, &log))?;
-                thetahat::validate(&report, None, channels, &sources, &plan)
-            };
-            let looks: Vec<_> = log.map(look).transpose()?.into_iter().collect();
-            Ok(thetahat::fit_page(&report, &looks, &command))
+                let look = thetahat::validate(&report, None, channels.clone(), &sources, &plan)?;
+                // Another log has not the rows of the choice.
+                if look.validation.seen != thetahat::Seen::No {
+                    held_out = thetahat::held_out_runs(&report, &channels)?;
+                }
+                looks.push(look);
+            }
+            Ok(thetahat::fit_page(&report, &looks, &held_out, &command))
         })
     }
 

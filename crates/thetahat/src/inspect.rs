@@ -279,6 +279,8 @@ fn uniform(
 /// Excitation, delay and feedback of each input.
 fn dynamics(inspection: &mut Inspection, log: &Log, plan: &InspectionPlan) -> Result<(), Error> {
     let all = [Rows::new(1, log.rows())?];
+    let names: Vec<&str> = plan.inputs.iter().chain(&plan.output).map(String::as_str).collect();
+    inspection.warnings.extend(log.padding(&names)?.map(|padding| padding.to_string()));
     let values = |name: &str| Ok(log.channel(name)?.values.as_slice());
     let inputs: Vec<&[f64]> = plan.inputs.iter().map(|name| values(name)).collect::<Result<_, Error>>()?;
     let of_input = |(name, input): (&String, &&[f64])| {

@@ -75,7 +75,7 @@ pub use model::{
 pub use report::{
     Applied, Comparison, Coverage, Data, Estimation, Missing, NoiseLevel, Parts, Plan, Report, Requirement,
     Resampling, Seen, Signals, Source, Unjudged, Validated, Validation, ValidationPlan, apply, compare,
-    identify, identify_monitored, sample, validate,
+    held_out_runs, identify, identify_monitored, sample, validate,
 };
 #[cfg(feature = "html")]
 pub use report::{comparison_page, fit_page, inspection_page, validation_page};

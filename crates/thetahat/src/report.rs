@@ -1,6 +1,7 @@
 //! The document that a fit leaves behind, and the way there.
 
 mod apply;
+mod held_out_runs;
 #[cfg(feature = "html")]
 mod html;
 mod identify;
@@ -13,6 +14,7 @@ mod validation;
 mod warnings;
 
 pub use apply::{Applied, apply};
+pub use held_out_runs::held_out_runs;
 #[cfg(feature = "html")]
 pub use html::{comparison_page, fit_page, inspection_page, validation_page};
 pub use identify::{Plan, Unjudged, identify, identify_monitored};

@@ -1,4 +1,5 @@
 use std::collections::HashSet;
+use std::fmt;
 use std::ops::Range;
 
 use rayon::prelude::*;
@@ -114,6 +115,25 @@ impl<'a> Record<'a> {
     pub(crate) fn with_inputs(&self, signals: &'a [Vec<f64>]) -> Self {
         let inputs = self.inputs.iter().copied().chain(signals.iter().map(Vec::as_slice)).collect();
         Self { inputs, ..self.clone() }
+    }
+}
+
+/// Rows at the end of which all channels repeat one value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Padding {
+    pub(crate) rows: Rows,
+}
+
+impl fmt::Display for Padding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let first = self.rows.first();
+        write!(
+            f,
+            "from row {first} to the end ({} rows) no channel changes, as in a log that was padded: leave these rows out \
+             (--estimate 1..{}) unless the plant rested",
+            self.rows.len(),
+            first - 1
+        )
     }
 }
 
@@ -368,7 +388,7 @@ impl Log {
     ///
     /// # Errors
     /// [`Error::Data`] for a name that is not there.
-    pub(crate) fn padding(&self, names: &[&str]) -> Result<Option<Rows>, Error> {
+    pub(crate) fn padding(&self, names: &[&str]) -> Result<Option<Padding>, Error> {
         let mut last = self.rows;
         for name in names {
             let values = &self.channel(name)?.values;
@@ -378,7 +398,7 @@ impl Log {
         if last < PADDING.max(self.rows / 100) || last == self.rows {
             return Ok(None);
         }
-        Rows::new(self.rows - last + 1, self.rows).map(Some)
+        Ok(Some(Padding { rows: Rows::new(self.rows - last + 1, self.rows)? }))
     }
 
     /// How often the clock jumps, not counting where another log begins.

@@ -9,10 +9,12 @@
 //!
 //! (Ljung, System Identification, 2nd ed. 1999, sections 8.5 and 10.4: what is right for the true plant in any noise, and
 //! where the plant is not among the models closest to it in the frequencies that the input has). The least sum of e^2 over all parameters
-//! weighs the plant's errors by 1/H instead, which looks away from slow ones.
+//! weighs the plant's errors by 1/H instead, which looks away from slow ones. Several inputs share A (see `shared`).
 //!
 //! The covariance of the plant is that of output error, with coloured errors; that of the noise is its own. Estimates of the
 //! two do not correlate without feedback (Ljung 1999, section 9.4).
+
+mod shared;
 
 use std::ops::Range;
 
@@ -42,17 +44,27 @@ pub(super) fn plant_first(
     monitor: Monitor<'_>,
 ) -> Result<Estimate, Error> {
     let plant = plant(orders, named)?;
-    let guess = options.guess.as_ref().and_then(|guess| own_guess(guess, orders, &plant));
-    let search = Search { plant_first: false, guess, ..options.clone() };
-    let first = prediction_error(record, &plant, initial, &search, monitor)?;
-    let (v, segments) = free_run_errors(record, &plant, &first)?;
-    let mut polynomials = Polynomials::new(&plant, first.parameters());
-    // The F of the driven input, which is A.
-    let shared = if orders.na > 0 { plant.nf.iter().position(|nf| *nf > 0) } else { None };
-    let (errors, segments) = match shared {
-        Some(driven) => filtered(&v, &segments, &polynomials.f[driven]),
-        None => (v, segments),
+    let driven = plant.nf[..named].iter().filter(|&&nf| nf > 0).count();
+    let coefficients = orders.nb.iter().sum::<usize>();
+    let b = orders.na..orders.na + coefficients;
+    let (first, (v, segments), places) = if orders.na > 0 && driven > 1 {
+        let (first, errors) = shared::plant(record, orders, &plant, initial, options, monitor)?;
+        (first, errors, (0..b.end).collect())
+    } else {
+        let guess = options.guess.as_ref().and_then(|guess| own_guess(guess, orders, &plant));
+        let search = Search { plant_first: false, guess, ..options.clone() };
+        let first = prediction_error(record, &plant, initial, &search, monitor)?;
+        let errors = free_run_errors(record, &plant, &first)?;
+        // F, which is A where that is the denominator.
+        let f = if orders.na > 0 { 0..orders.na } else { b.end + orders.nc + orders.nd..orders.parameters() };
+        let places: Vec<usize> = b.clone().chain(f).collect();
+        (first, errors, places)
     };
+    let mut parameters = vec![0.0; orders.parameters()];
+    places.iter().zip(first.parameters()).for_each(|(&place, value)| parameters[place] = *value);
+    let mut polynomials = Polynomials::new(orders, &parameters);
+    let (errors, segments) =
+        if orders.na > 0 { filtered(&v, &segments, &polynomials.a) } else { (v, segments) };
     let noise = Orders::new(orders.nd, &[], orders.nc, 0, &[], &[]);
     let unknown = first.parameters().len() + conditions(&first);
     let (samples, cost, noise) = match noise {
@@ -72,8 +84,7 @@ pub(super) fn plant_first(
             "too few rows are left for the noise behind the plant; give more rows, or lower the orders",
         ));
     }
-    if let Some(driven) = shared {
-        polynomials.a = std::mem::replace(&mut polynomials.f[driven], vec![1.0]);
+    if orders.na > 0 {
         // The level of the output, and the constant beside A that makes it.
         let gain: f64 = polynomials.a.iter().sum();
         polynomials.b[named..].iter_mut().flatten().for_each(|constant| *constant *= gain);
@@ -83,7 +94,7 @@ pub(super) fn plant_first(
         polynomials.d = [&[1.0], d].concat();
         polynomials.c = [&[1.0], c].concat();
     }
-    let covariance = covariance(orders, named, &first, noise.as_ref(), &polynomials);
+    let covariance = covariance(orders, named, (&first, &places), noise.as_ref(), &polynomials);
     let procedure = match first.procedure() {
         Procedure::PredictionError(outcome) => {
             let mut outcome = outcome.clone();
@@ -154,12 +165,6 @@ fn plant(orders: &Orders, named: usize) -> Result<Orders, Error> {
             "the free run of a model with A and F or D has no plant of its own; leave out A, or F and D",
         ));
     }
-    if driven > 1 {
-        return Err(Error::argument(
-            "focus",
-            "several inputs of a model with A share its poles, and a free run is fitted with poles for each; take oe or bj",
-        ));
-    }
     if orders.inputs() > named + 1 {
         return Err(Error::argument(
             "focus",
@@ -183,12 +188,11 @@ fn own_guess(guess: &[f64], orders: &Orders, plant: &Orders) -> Option<Vec<f64>>
     })
 }
 
+/// Errors, and the stretches of them that follow one another.
+type Errors = (Vec<f64>, Vec<Range<usize>>);
+
 /// v of an estimated plant, and the stretches of it that follow one another.
-fn free_run_errors(
-    record: &Record<'_>,
-    plant: &Orders,
-    estimate: &Estimate,
-) -> Result<(Vec<f64>, Vec<Range<usize>>), Error> {
+fn free_run_errors(record: &Record<'_>, plant: &Orders, estimate: &Estimate) -> Result<Errors, Error> {
     let mut predictor = predictor_of(record, plant, estimate);
     if best_free(&mut predictor, estimate.parameters()).is_err() {
         return Err(Error::data("the free run overflows; scale the channels towards one"));
@@ -219,43 +223,38 @@ fn conditions(estimate: &Estimate) -> usize {
     }
 }
 
-/// The covariance of all parameters from those of plant and noise.
+/// The covariance of all parameters from those of plant and noise; those of the plant stand at `places` among them.
 fn covariance(
     orders: &Orders,
     named: usize,
-    first: &Estimate,
+    (first, places): (&Estimate, &[usize]),
     noise: Option<&Estimate>,
     all: &Polynomials,
 ) -> Option<Vec<Vec<f64>>> {
     let own = first.covariance()?;
-    let coefficients = orders.nb.iter().sum::<usize>();
-    // Where the parameters of the plant stand: B, then F, which is A where that is shared.
-    let b = orders.na..orders.na + coefficients;
-    let plant: Vec<usize> = if orders.na > 0 {
-        b.clone().chain(0..orders.na).collect()
-    } else {
-        b.clone().chain(coefficients + orders.nc + orders.nd..orders.parameters()).collect()
-    };
-    let mut jacobian = DMatrix::zeros(orders.parameters(), plant.len());
-    for (column, &row) in plant.iter().enumerate() {
+    let mut jacobian = DMatrix::zeros(orders.parameters(), places.len());
+    for (column, &row) in places.iter().enumerate() {
         jacobian[(row, column)] = 1.0;
     }
+    // Behind A and B.
+    let c = orders.na + orders.nb.iter().sum::<usize>();
     if orders.na > 0 && orders.inputs() > named {
         // k = A(1) l.
         let gain: f64 = all.a.iter().sum();
-        let (row, column) = (b.end - 1, coefficients - 1);
         let level = all.b[named][0] / gain;
-        jacobian[(row, column)] = gain;
-        for a in 0..orders.na {
-            jacobian[(row, coefficients + a)] = level;
+        for (column, &place) in places.iter().enumerate() {
+            if place < orders.na {
+                jacobian[(c - 1, column)] = level;
+            } else if place == c - 1 {
+                jacobian[(c - 1, column)] = gain;
+            }
         }
     }
-    let matrix = DMatrix::from_fn(plant.len(), plant.len(), |i, j| own[i][j]);
+    let matrix = DMatrix::from_fn(places.len(), places.len(), |i, j| own[i][j]);
     let mut covariance = &jacobian * matrix * jacobian.transpose();
     if let Some(noise) = noise {
         let own = noise.covariance()?;
         // D comes first in the noise as its A, C first in the model.
-        let c = b.end;
         let place = |k: usize| if k < orders.nd { c + orders.nc + k } else { c + k - orders.nd };
         for (i, row) in own.iter().enumerate() {
             for (j, entry) in row.iter().enumerate() {

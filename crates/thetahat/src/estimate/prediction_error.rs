@@ -6,7 +6,8 @@ mod ranking;
 
 use std::ops::Range;
 
-use thetahat_core::nalgebra::{Cholesky, DMatrix, DVector};
+use thetahat_core::LeastSquares;
+use thetahat_core::nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::arx::{arx, estimate_is_for_f, out_of_range, rows, signals};
 use super::objective::Objective;
@@ -515,11 +516,6 @@ pub(super) fn inverse_root(predictor: &Predictor<'_>) -> Option<(DMatrix<f64>, f
     let size = predictor.right.len();
     let matrix = DMatrix::from_row_slice(size, size, &predictor.matrix);
     let scales = matrix.diagonal().map(f64::sqrt);
-    let inverted = |triangle: &DMatrix<f64>, scales: &DVector<f64>| {
-        let mut inverse = triangle.solve_upper_triangular(&DMatrix::identity(size, size))?;
-        inverse.column_iter_mut().for_each(|mut column| column.component_div_assign(scales));
-        Some(inverse)
-    };
     let unit = DMatrix::from_fn(size, size, |i, j| matrix[(i, j)] / scales[i] / scales[j]);
     // What the free responses leave of a column may be nothing but rounding, and its square negative.
     if scales.iter().all(|scale| *scale > 0.0)
@@ -530,13 +526,28 @@ pub(super) fn inverse_root(predictor: &Predictor<'_>) -> Option<(DMatrix<f64>, f
     {
         return Some((inverted(&triangle, &scales)?, condition));
     }
-    let factor = predictor.factor().ok().filter(|factor| factor.rank().is_full())?;
+    root_of(&predictor.factor().ok()?)
+}
+
+/// The same from the factor of psi; none where it tells that psi is singular.
+pub(super) fn root_of(factor: &LeastSquares<f64, Dyn>) -> Option<(DMatrix<f64>, f64)> {
+    if !factor.rank().is_full() {
+        return None;
+    }
     let mut triangle = factor.factor();
-    let scales = DVector::from_iterator(size, triangle.column_iter().map(|column| column.norm()));
+    let scales = DVector::from_iterator(triangle.ncols(), triangle.column_iter().map(|column| column.norm()));
     for (mut column, scale) in triangle.column_iter_mut().zip(&scales) {
         column.unscale_mut(*scale);
     }
     Some((inverted(&triangle, &scales)?, factor.condition()))
+}
+
+/// The inverse of a triangle of which the columns were divided by `scales`.
+fn inverted(triangle: &DMatrix<f64>, scales: &DVector<f64>) -> Option<DMatrix<f64>> {
+    let size = triangle.ncols();
+    let mut inverse = triangle.solve_upper_triangular(&DMatrix::identity(size, size))?;
+    inverse.column_iter_mut().for_each(|mut column| column.component_div_assign(scales));
+    Some(inverse)
 }
 
 /// Stretches of a long record, spread evenly over its samples; none for a record that is not long.

@@ -177,8 +177,9 @@ struct Common {
 }
 
 impl Layout {
-    /// That of sections that begin `past` samples before their segment.
-    fn new(orders: &Orders, begin: Begin, past: usize, common: Option<Common>) -> Self {
+    /// That of sections that begin `past` samples before their segment. Where all F are one, their free responses are those of an
+    /// input.
+    fn new(orders: &Orders, begin: Begin, past: usize, common: Option<Common>, one: bool) -> Self {
         let inputs = orders.inputs();
         let unknown = begin != Begin::Zero;
         let silent = common.map_or(past, |common| common.silent);
@@ -193,7 +194,12 @@ impl Layout {
             Begin::Unknown => orders.free_responses(input),
             Begin::UnknownInputs => orders.free_responses_and_inputs(input, origin),
         };
-        let own_free: Vec<usize> = (0..inputs).map(free).collect();
+        let mut own_free: Vec<usize> = (0..inputs).map(free).collect();
+        if one && let Some(first) = own_free.iter().position(|&free| free > 0) {
+            let most = own_free.iter().copied().max().unwrap_or(0);
+            own_free.fill(0);
+            own_free[first] = most;
+        }
         let mut signals = 1;
         let mut next = || {
             signals += 1;
@@ -277,6 +283,15 @@ pub(super) struct Predictor<'a> {
 impl<'a> Predictor<'a> {
     /// Segments without more samples that count than they have free responses are left out.
     pub(super) fn new(record: &Record<'a>, orders: &Orders, begin: Begin) -> Self {
+        Self::with(record, orders, begin, false)
+    }
+
+    /// The same for parameters in which all F are one polynomial.
+    pub(super) fn with_one_denominator(record: &Record<'a>, orders: &Orders, begin: Begin) -> Self {
+        Self::with(record, orders, begin, true)
+    }
+
+    fn with(record: &Record<'a>, orders: &Orders, begin: Begin, one: bool) -> Self {
         let mut layouts = Vec::new();
         let mut sections = Vec::with_capacity(record.segments.len());
         for (segment, past) in record.segments.iter().zip(&record.past) {
@@ -284,7 +299,7 @@ impl<'a> Predictor<'a> {
             let rows = segment.start - past..segment.end;
             // Where earlier inputs would be too many unknowns they are zero.
             for begin in [begin, Begin::Unknown] {
-                let index = layout_of(&mut layouts, orders, begin, past);
+                let index = layout_of(&mut layouts, orders, begin, past, one);
                 let (_, layout) = &layouts[index];
                 let runs = runs(record, orders, &rows, layout.counted);
                 if runs.iter().map(Range::len).sum::<usize>() > layout.free {
@@ -305,7 +320,7 @@ impl<'a> Predictor<'a> {
         pasts.iter_mut().for_each(|past| *past = orders.history().min(*past));
         pasts.sort_unstable();
         pasts.dedup();
-        let free = |begin, past| Layout::new(orders, begin, past, None).free;
+        let free = |begin, past| Layout::new(orders, begin, past, None, false).free;
         orders.has_f()
             && pasts.iter().any(|past| free(Begin::UnknownInputs, *past) > free(Begin::Unknown, *past))
     }
@@ -320,7 +335,7 @@ impl<'a> Predictor<'a> {
         silent: usize,
         counted: usize,
     ) -> Self {
-        let layout = Layout::new(orders, begin, 0, Some(Common { silent, counted }));
+        let layout = Layout::new(orders, begin, 0, Some(Common { silent, counted }), false);
         let needed = layout.counted.max(layout.free);
         let usable = record.segments.iter().filter(|segment| segment.len() > needed);
         let section = |segment: &Range<usize>| {
@@ -498,7 +513,7 @@ impl<'a> Predictor<'a> {
     /// filtered backwards in time by 1/A(q^+1), A = `monic`. For models of output error, at the current point.
     pub(super) fn backward_filtered_products(&self, weights: &DMatrix<f64>, monic: &[f64]) -> DMatrix<f64> {
         let parameters = self.right.len();
-        let mut sum = DMatrix::zeros(parameters, parameters);
+        let mut sum = DMatrix::zeros(weights.nrows(), weights.nrows());
         for section in &self.sections {
             let combination = weights * section.without_free(parameters, section.free.len());
             let signals: Vec<&[f64]> = section.signals.iter().map(Vec::as_slice).collect();
@@ -567,10 +582,11 @@ fn layout_of(
     orders: &Orders,
     begin: Begin,
     past: usize,
+    one: bool,
 ) -> usize {
     let known = layouts.iter().position(|(key, _)| *key == (begin, past));
     known.unwrap_or_else(|| {
-        layouts.push(((begin, past), Layout::new(orders, begin, past, None)));
+        layouts.push(((begin, past), Layout::new(orders, begin, past, None, one)));
         layouts.len() - 1
     })
 }

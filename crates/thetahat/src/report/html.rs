@@ -38,8 +38,13 @@ const INPUTS: usize = 5;
 /// The page of a fit: what the model is, how it was found, and how it does on each part of the log.
 ///
 /// `validated` has one entry for each part: estimation, validation, test, as far as there are any, all on the whole log.
-/// `command` is shown as what made the page.
-pub fn fit_page(report: &Report, validated: &[Validated], command: &str) -> String {
+/// `held_out` is what [`held_out_runs`](crate::held_out_runs) gives, or nothing. `command` is shown as what made the page.
+pub fn fit_page(
+    report: &Report,
+    validated: &[Validated],
+    held_out: &[(String, Validated)],
+    command: &str,
+) -> String {
     let model = &report.model;
     let title = format!("Fit of {}{}", model.output.name, of(&report.data.logs));
     let mut page = Page::new(title, command, &report.generator);
@@ -67,6 +72,27 @@ pub fn fit_page(report: &Report, validated: &[Validated], command: &str) -> Stri
             section.chart(charts::delays(selection));
         }
         section.table(tables::best(selection));
+        if let Some((_, Validated { signals, .. })) = held_out.first() {
+            let runs =
+                held_out.iter().filter_map(|(name, run)| Some((name, run.signals.simulated.as_deref()?)));
+            let there = |run: &[f64]| {
+                let first = run.iter().position(|value| value.is_finite())?;
+                Some(first..run.iter().rposition(|value| value.is_finite())? + 1)
+            };
+            let rows = runs.clone().find_map(|(_, run)| there(run)).unwrap_or(0..0);
+            let runs: Vec<(String, &[f64])> =
+                runs.map(|(name, run)| (name.clone(), &run[rows.clone()])).collect();
+            let stack = Stack::new(&signals.time[rows.clone()], model.sample_time, points(1 + runs.len()));
+            section.chart(charts::outputs(
+                "Free runs on rows held out",
+                "Measured output, and what the best model for prediction and the best for simulation make of the inputs alone in \
+                 the last third of the rows. Both were fitted to the other two thirds for this picture.",
+                stack,
+                &signals.output,
+                &signals.measured[rows],
+                &runs,
+            ));
+        }
         page.sections.insert(2, section);
     }
     page.sections.push(provenance(report));

@@ -3,7 +3,7 @@ use std::ops::{ControlFlow, Range};
 use super::apply::record_for;
 use super::schema::{Data, Estimation, Missing, Parts, Report, Source};
 use super::validation::{estimation_record, estimation_start, goes_through};
-use super::warnings::{at_the_border, padded, unstable_plant, warnings};
+use super::warnings::{at_the_border, unstable_plant, warnings};
 use crate::data::{Detrend, Log, Offset, Prefilter, Prefiltered, Record, Rows, Split, between, checked};
 use crate::estimate::{
     self, Beside, Constant, Deadline, Estimate, Fitted, Method, Monitor, OutputOffset, Search, enough,
@@ -462,7 +462,10 @@ fn fit(
         model,
     };
     report.warnings = warnings(&report);
-    report.warnings.extend(padding.and_then(|padding| padded(&padding, &report.data.estimation)));
+    let fitted = |first: usize| estimation.iter().any(|rows| rows.last() >= first);
+    report
+        .warnings
+        .extend(padding.filter(|padding| fitted(padding.rows.first())).map(|padding| padding.to_string()));
     if let Some(band) = &band {
         report.warnings.extend(band.warning(&estimation)?);
     }

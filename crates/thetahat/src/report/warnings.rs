@@ -6,7 +6,7 @@ use crate::estimate::{Procedure, SearchOutcome, Stopped};
 use crate::figures::{fixed, number, scientific};
 use crate::model::{cancel, near_cancellation};
 use crate::select::{Grid, OrderRange};
-use crate::{Orders, Rows, Structure};
+use crate::{Orders, Structure};
 
 /// Condition numbers above this one are worth a word.
 const ILL_CONDITIONED: f64 = 1e6;
@@ -127,19 +127,6 @@ pub(super) fn unstable_plant(report: &Report) -> Option<String> {
              explains {} % only; an unstable plant needs A (arx or armax)",
             fixed(pole, 4),
             fixed(explained, 1)
-        )
-    })
-}
-
-/// A word on rows of the estimation that repeat one value.
-pub(super) fn padded(padding: &Rows, estimation: &[Rows]) -> Option<String> {
-    let first = padding.first();
-    estimation.iter().any(|rows| rows.last() >= first).then(|| {
-        format!(
-            "from row {first} to the end ({} rows) no channel changes, as in a log that was padded: leave these rows out \
-             (--estimate 1..{}) unless the plant rested",
-            padding.len(),
-            first - 1
         )
     })
 }

@@ -1,6 +1,8 @@
 use super::*;
+use crate::Model;
 use crate::estimate::{Method, estimate, estimate_of_channels};
 use crate::regression::noise::Noise;
+use crate::respond::{Start, simulate};
 
 fn method(plant_first: bool) -> Method {
     Method::PredictionError(Search { plant_first, tolerance: 1e-12, ..Search::default() })
@@ -133,16 +135,83 @@ fn an_autoregression_is_as_long_as_the_noise() {
 #[test]
 fn what_has_no_free_run_is_refused() {
     let (u, y) = log(200, 0.0, 9);
-    let two = Record::new(&y, vec![&u, &y]).unwrap();
     let one = Record::new(&y, vec![&u]).unwrap();
     let none = Record::new(&y, vec![]).unwrap();
     let pem = Orders::new(1, &[1], 0, 0, &[1], &[1]).unwrap();
-    for (record, orders, words) in [
-        (&none, Orders::arx(1, &[], &[]).unwrap(), "without inputs"),
-        (&two, Orders::arx(1, &[1, 1], &[1, 1]).unwrap(), "take oe or bj"),
-        (&one, pem, "leave out A"),
-    ] {
+    for (record, orders, words) in
+        [(&none, Orders::arx(1, &[], &[]).unwrap(), "without inputs"), (&one, pem, "leave out A")]
+    {
         let error = estimate(record, &orders, &method(true), Initial::Auto).unwrap_err().to_string();
         assert!(error.contains(words), "{error}");
+    }
+}
+
+/// y = (0.5 q^-1 u1 + (1 - 0.4 q^-1) q^-2 u2)/(1 - 1.5 q^-1 + 0.7 q^-2) + 0.3 v, v an autoregression.
+fn two_inputs(samples: usize, pole: f64, seed: u64) -> ([Vec<f64>; 2], Vec<f64>) {
+    let mut noise = Noise(seed);
+    let inputs = [noise.take(samples), noise.take(samples)];
+    let (mut x, mut v) = (vec![0.0; samples], 0.0);
+    let at = |signal: &[f64], t: usize, lag: usize| if t < lag { 0.0 } else { signal[t - lag] };
+    let mut y = Vec::new();
+    for t in 0..samples {
+        let driven = 0.5 * at(&inputs[0], t, 1) + at(&inputs[1], t, 2) - 0.4 * at(&inputs[1], t, 3);
+        x[t] = 1.5 * at(&x, t, 1) - 0.7 * at(&x, t, 2) + driven;
+        v = pole * v + noise.normal();
+        y.push(x[t] + 0.3 * v);
+    }
+    (inputs, y)
+}
+
+#[test]
+fn several_inputs_share_the_denominator_that_simulates() {
+    let truth = [-1.5, 0.7, 0.5, 1.0, -0.4];
+    let ([u1, u2], y) = two_inputs(1500, 0.9, 41);
+    let record = Record::new(&y, vec![&u1, &u2]).unwrap();
+    let orders = Orders::armax(2, &[1, 2], 2, &[1, 2]).unwrap();
+    let found = estimate(&record, &orders, &method(true), Initial::Auto).unwrap();
+    let deviations: Vec<f64> = (0..7).map(|k| found.covariance().unwrap()[k][k].sqrt()).collect();
+    for ((value, truth), deviation) in found.parameters().iter().zip(truth).zip(&deviations) {
+        assert!((value - truth).abs() < 3.5 * deviation, "{value} {truth} {deviation}");
+    }
+    // A stationary point of the free run's errors: a change of any parameter raises them.
+    let cost = |parameters: &[f64]| {
+        let model = Model::from_parameters(&orders, parameters, None, 1.0, 1.0).unwrap();
+        let run = simulate(&model, &record, Start::Estimate).unwrap();
+        (0..y.len()).map(|t| (y[t] - run.values[t]).powi(2)).sum::<f64>()
+    };
+    if found.initial() == Initial::Drop {
+        let least = cost(found.parameters());
+        for k in 0..5 {
+            for side in [-0.5, 0.5] {
+                let mut moved = found.parameters().to_vec();
+                moved[k] += side * deviations[k];
+                assert!(cost(&moved) > least * (1.0 - 1e-3), "{k}");
+            }
+        }
+    }
+}
+
+#[test]
+fn one_input_alone_has_the_same_plant_either_way() {
+    let (u, y) = log(600, 0.7, 43);
+    let record = Record::new(&y, vec![&u]).unwrap();
+    let orders = Orders::arx(1, &[2], &[1]).unwrap();
+    let oe = plant(&orders, 1).unwrap();
+    let Method::PredictionError(search) = method(false) else { unreachable!() };
+    let monitor: Monitor<'_> = &|_| std::ops::ControlFlow::Continue(());
+    for initial in [Initial::Zero, Initial::Estimate] {
+        let alone = prediction_error(&record, &oe, initial, &search, monitor).unwrap();
+        let (shared, (errors, _)) = shared::plant(&record, &orders, &oe, initial, &search, monitor).unwrap();
+        // b1, b2, f1 and a1, b1, b2.
+        let place = [1, 2, 0];
+        for (k, &at) in place.iter().enumerate() {
+            assert!((alone.parameters()[k] - shared.parameters()[at]).abs() < 1e-5);
+            for (l, &other) in place.iter().enumerate() {
+                let (one, two) = (alone.covariance().unwrap()[k][l], shared.covariance().unwrap()[at][other]);
+                assert!((one - two).abs() < 1e-5 * (one.abs() + two.abs()), "{one} {two}");
+            }
+        }
+        assert!((sum_of_squares(&errors) / 600.0 / alone.mse() - 1.0).abs() < 1e-9);
+        assert_eq!((shared.samples(), conditions(&shared)), (alone.samples(), conditions(&alone)));
     }
 }

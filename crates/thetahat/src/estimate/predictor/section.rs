@@ -243,7 +243,7 @@ impl<'a> Section<'a> {
         if layout.free > 0 {
             let gain = polynomials.d.iter().map(|d| d.abs()).sum::<f64>();
             let mut next = 0;
-            for j in (0..orders.inputs()).filter(|&j| orders.nf[j] > 0) {
+            for j in (0..orders.inputs()).filter(|&j| layout.own_free[j] > 0) {
                 let size = self.respond(layout, polynomials, layout.frees[j], Some(j));
                 let own = next..next + layout.own_free[j];
                 next = own.end;

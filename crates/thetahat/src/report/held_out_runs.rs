@@ -1,0 +1,60 @@
+//! The free runs of the two winners of a choice on rows that neither was fitted to.
+
+use super::identify::{Plan, identify};
+use super::schema::Report;
+use super::validation::{Validated, ValidationPlan, validate};
+use crate::Error;
+use crate::data::{Log, Rows, between};
+use crate::estimate::Constant;
+use crate::validate::Horizon;
+
+/// Of so many parts of the rows that a choice was made on the last is left out.
+const PARTS: usize = 3;
+
+/// Where a choice found one model for prediction and another for simulation: both, by name, fitted to the first two thirds of the
+/// rows that it was made on, and looked at on the last third of `log`. None where there was no such choice, and none of a model that
+/// these rows do not determine.
+///
+/// Cost: two fits.
+///
+/// # Errors
+/// [`Error::Argument`] and [`Error::Data`] if the log does not have the report's channels and rows.
+pub fn held_out_runs(report: &Report, log: &Log) -> Result<Vec<(String, Validated)>, Error> {
+    let Some(selection) = &report.selection else { return Ok(Vec::new()) };
+    let Some(winners) = &selection.winners else { return Ok(Vec::new()) };
+    let (prediction, simulation) = (&winners.prediction.orders, &winners.simulation.orders);
+    if prediction == simulation || selection.focus.horizon() != Horizon::FreeRun {
+        return Ok(Vec::new());
+    }
+    let data = &report.data;
+    let rows = data.split.as_ref().map_or(&data.estimation, |parts| &parts.estimation);
+    let count: usize = rows.iter().map(Rows::len).sum();
+    let last = (PARTS - 1) * count / PARTS;
+    let (fitted, left_out) = (between(rows, 0, last), between(rows, last, count));
+    let names: Vec<&str> = report.model.inputs.iter().map(|input| input.name.as_str()).collect();
+    let with_level = report.estimation.level.is_some();
+    let mut runs = Vec::new();
+    for (purpose, orders) in [("for prediction", prediction), ("for simulation", simulation)] {
+        let plan = Plan {
+            estimate: fitted.clone(),
+            detrend: data.detrend.parse()?,
+            prefilter: data.prefilter,
+            constant: if with_level { Constant::Yes } else { Constant::No },
+            trend: report.estimation.slope.is_some(),
+            ..Plan::new(&names, &report.model.output.name, orders.clone())
+        };
+        let refit = match identify(log.clone(), &[], &plan) {
+            Ok(refit) => refit,
+            Err(Error::Undetermined { .. }) => continue,
+            Err(error) => return Err(error),
+        };
+        let plan = ValidationPlan { rows: left_out.clone(), ..ValidationPlan::default() };
+        let validated = validate(&refit, None, log.clone(), &[], &plan)?;
+        let figure = validated.validation.fit.iter().find(|fit| fit.horizon == Horizon::FreeRun);
+        let percent = figure.and_then(|fit| fit.percent);
+        let percent =
+            percent.map_or_else(String::new, |value| format!(", {} %", crate::figures::fixed(value, 1)));
+        runs.push((format!("{purpose}: {orders}{percent}"), validated));
+    }
+    Ok(runs)
+}

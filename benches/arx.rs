@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use criterion::{BenchmarkId, Criterion, Throughput};
 use thetahat::{
-    Estimate, Initial, Model, Offset, Orders, Record, Signal, Start, arx, arx_factor, predict, simulate,
+    Estimate, Initial, Offset, Orders, Record, Signal, Start, arx, arx_factor, predict, simulate,
 };
 
 /// Samples of the longest signals.
@@ -57,7 +57,7 @@ fn responses(criterion: &mut Criterion, input: &[f64], output: &[f64]) -> Result
     let record = Record::new(output, vec![input])?;
     let estimate = arx(&record, &orders, Initial::Drop)?;
     let signal = |name: &str| Signal { name: name.to_owned(), offset: Offset::default() };
-    let model = Model::new(&orders, &estimate, 1.0, vec![signal("u")], signal("y"))?;
+    let model = estimate.to_model(&orders, 1.0, vec![signal("u")], signal("y"))?;
 
     let mut group = criterion.benchmark_group("respond");
     group.throughput(Throughput::Elements(SAMPLES as u64));

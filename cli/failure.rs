@@ -6,8 +6,6 @@ use std::path::Path;
 
 use thetahat::text;
 
-use crate::interrupt;
-use crate::output::{say, tell};
 use crate::table;
 
 /// The option that an argument of the library is here, if it is one.
@@ -177,28 +175,6 @@ impl Failure {
     /// The same, with the file that it is about in front.
     pub(crate) fn of(self, path: &Path) -> Self {
         Self::new(self.kind, format!("{}: {}", path.display(), self.message))
-    }
-
-    /// Says it on standard error and gives the exit code.
-    pub(crate) fn report(&self) -> u8 {
-        let code = match self.kind {
-            Kind::Closed => return 0,
-            Kind::Interrupted => {
-                say(interrupt::message(interrupt::has_written()));
-                return interrupt::exit_code();
-            }
-            Kind::Usage => 2,
-            Kind::Data => 3,
-            Kind::Undetermined => 4,
-            Kind::Io(_) => 5,
-            Kind::Unmet => 6,
-            Kind::Alarm => {
-                tell(&self.message);
-                return 7;
-            }
-        };
-        tell(&format!("\x1b[1;31merror:\x1b[0m {}", self.message));
-        code
     }
 }
 

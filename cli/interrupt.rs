@@ -19,7 +19,7 @@ use tempfile::NamedTempFile;
 use thetahat::Error;
 
 use crate::failure::Failure;
-use crate::output::say;
+use crate::messages::say;
 use crate::table::Waker;
 
 /// What a shell gives for a program that SIGINT ended, and for one that SIGTERM did.

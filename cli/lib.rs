@@ -19,6 +19,7 @@ mod line_writer;
 mod live;
 mod log;
 mod memory;
+mod messages;
 mod output;
 mod progress;
 mod replace;
@@ -29,6 +30,7 @@ mod wrap;
 use std::ffi::OsString;
 
 use clap::Parser;
+use messages::{say, tell};
 use thetahat::text;
 
 pub use binding::{Opened, inspect, plan, read, validation_plan, write};
@@ -53,8 +55,30 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     interrupt::listen();
     match commands::dispatch(arguments, &shell::line(&words)) {
         Ok(()) => 0,
-        Err(failure) => failure.report(),
+        Err(failure) => end(&failure),
     }
+}
+
+/// Says on standard error why the program ends, and gives its exit code.
+fn end(failure: &Failure) -> u8 {
+    let code = match failure.kind() {
+        Kind::Closed => return 0,
+        Kind::Interrupted => {
+            say(interrupt::message(interrupt::has_written()));
+            return interrupt::exit_code();
+        }
+        Kind::Usage => 2,
+        Kind::Data => 3,
+        Kind::Undetermined => 4,
+        Kind::Io(_) => 5,
+        Kind::Unmet => 6,
+        Kind::Alarm => {
+            tell(failure.message());
+            return 7;
+        }
+    };
+    tell(&format!("\x1b[1;31merror:\x1b[0m {}", failure.message()));
+    code
 }
 
 /// Prints what the syntax of a command line says. Nobody is left to tell if that fails.
@@ -62,7 +86,7 @@ fn print(error: &clap::Error) {
     let plain = error.render().to_string();
     if plain.lines().any(|line| line.contains(text::is_unseen)) {
         // A file's name, which may hold anything, stood for a pattern of the shell.
-        plain.lines().for_each(|line| output::say(&text::harmless(line)));
+        plain.lines().for_each(|line| say(&text::harmless(line)));
     } else {
         let _ = error.print();
     }

@@ -2,7 +2,7 @@
 
 use crate::failure::Failure;
 use crate::interrupt;
-use crate::output::warn;
+use crate::messages::warn;
 use crate::table::{Event, Stream};
 
 /// So many faults of a kind are told one by one.

@@ -1,30 +1,12 @@
-//! What the program writes: whole files or none, and text that a terminal cannot be harmed by.
+//! What the program writes: whole files or none, and standard output.
 
 use std::io::{self, Write};
 use std::path::Path;
 
-use thetahat::text::{harmless, message};
+use thetahat::text::harmless;
 
 use crate::failure::Failure;
-use crate::{interrupt, replace, wrap};
-
-/// Says something that the reader should know.
-pub(crate) fn warn(warning: &str) {
-    tell(&format!("\x1b[1;33mwarning:\x1b[0m {}", message(warning)));
-}
-
-/// Says something that may be long: on a terminal it is broken between words.
-pub(crate) fn tell(line: &str) {
-    match wrap::stderr_width() {
-        Some(width) => say(&wrap::wrapped(line, width)),
-        None => say(line),
-    }
-}
-
-/// Writes a line to standard error, in colour only on a terminal. Where that fails there is nobody left to tell.
-pub(crate) fn say(line: &str) {
-    let _ = writeln!(anstream::stderr().lock(), "{line}");
-}
+use crate::{interrupt, replace};
 
 /// Writes to standard output.
 pub(crate) fn print(text: &str) -> Result<(), Failure> {

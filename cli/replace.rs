@@ -14,7 +14,7 @@ use tempfile::NamedTempFile;
 
 use crate::failure::Failure;
 use crate::interrupt;
-use crate::output::warn;
+use crate::messages::warn;
 
 /// What a passing name begins and ends with; between the two are so many letters and digits.
 const BEFORE: &str = ".thetahat-";

@@ -280,11 +280,12 @@ fn a_million_samples_open_at_once() {
     // The peak stays.
     let peak = "Math.max(...document.querySelector('.chart').data.flatMap((trace) => trace.yaxis === 'y' ? trace.y : []))";
     assert!(browser.value(peak).as_f64().expect("the case is sound") > 40.0);
-    // Other tests run beside this one: what counts is how fast it can be.
-    let times: Vec<f64> = (0..5).map(|_| browser.open(&path, 1200)).collect();
-    let fastest = times.iter().copied().fold(f64::INFINITY, f64::min);
-    println!("{size} bytes, all charts drawn after {times:.0?} ms");
-    assert!(fastest < 2000.0, "{times:?} ms");
+    // Whatever else runs on the machine.
+    let before = browser.work();
+    browser.open(&path, 1200);
+    let work = browser.work() - before;
+    println!("{size} bytes, all charts drawn in {work:.2} s of processor time");
+    assert!(work > 0.05 && work < 2.0, "{work} s");
 }
 
 #[test]

@@ -15,6 +15,7 @@ mod demo_and_help;
 mod draws;
 mod filter;
 mod fit_reference;
+mod floors;
 mod focus;
 mod forecast;
 mod harness;

@@ -8,7 +8,8 @@ use crate::args::CompareArguments;
 use crate::failure::Failure;
 use crate::job::LookJob;
 use crate::log::Loaded;
-use crate::output::{self, warn};
+use crate::messages::warn;
+use crate::output;
 use crate::wrap::stdout_width;
 
 pub(crate) fn compare(arguments: &CompareArguments, line: &str) -> Result<(), Failure> {

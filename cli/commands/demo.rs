@@ -8,7 +8,8 @@ use super::{fit, summary};
 use crate::args::{Arguments, Command, DemoArguments};
 use crate::failure::Failure;
 use crate::job::FitJob;
-use crate::output::{self, warn};
+use crate::messages::warn;
+use crate::output;
 use crate::wrap::stdout_width;
 
 /// A log of a DC motor: its columns are t, u and y. Made by the program beside it.

@@ -13,7 +13,8 @@ use crate::job::FilterJob;
 use crate::line_writer::LineWriter;
 use crate::live::{Live, Next};
 use crate::log;
-use crate::output::{self, say, warn};
+use crate::messages::{say, warn};
+use crate::output;
 use crate::wrap::{WIDTH, stderr_width};
 use columns::Columns;
 

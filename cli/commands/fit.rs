@@ -14,7 +14,8 @@ use crate::failure::Failure;
 use crate::interrupt;
 use crate::job::FitJob;
 use crate::log::{self, Loaded};
-use crate::output::{self, warn};
+use crate::messages::warn;
+use crate::output;
 use crate::progress::Searching;
 use crate::wrap::stdout_width;
 

@@ -11,7 +11,8 @@ use crate::failure::Failure;
 use crate::interrupt;
 use crate::job::{Clock, GreyJob};
 use crate::log::{self, Recorded};
-use crate::output::{self, warn};
+use crate::messages::warn;
+use crate::output;
 use crate::progress::Searching;
 use crate::wrap::stdout_width;
 

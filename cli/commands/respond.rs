@@ -10,7 +10,8 @@ use crate::args::{PredictArguments, RespondArguments, SimulateArguments};
 use crate::failure::Failure;
 use crate::job::{LogJob, parsed, rows};
 use crate::log::{self, Loaded};
-use crate::output::{self, tell, warn};
+use crate::messages::{tell, warn};
+use crate::output;
 
 pub(crate) fn predict(arguments: &PredictArguments) -> Result<(), Failure> {
     let horizon = match arguments.horizon.as_str() {

@@ -9,7 +9,8 @@ use crate::args::{FormatArgument, LookArguments, ValidateArguments};
 use crate::failure::Failure;
 use crate::job::LookJob;
 use crate::log::{self, Loaded};
-use crate::output::{self, warn};
+use crate::messages::warn;
+use crate::output;
 use crate::wrap::stdout_width;
 
 pub(crate) fn validate(arguments: &ValidateArguments, line: &str) -> Result<(), Failure> {

@@ -15,7 +15,6 @@ use nalgebra::{OMatrix, OVector, Scalar};
 use serde::de::{DeserializeSeed, Error, SeqAccess, Unexpected, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use crate::lags::Line;
 use crate::triangle::Sum;
 use crate::{Dimension, Real};
 
@@ -86,19 +85,6 @@ impl<T: Real> Entry for T {
 
 /// Reads a number, or the word for one.
 struct Number<T>(PhantomData<T>);
-
-impl Entry for Line {
-    const BLANK: Line = Line { index: 0, nb: 0, nk: 0 };
-
-    fn write<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        (self.index, self.nb, self.nk).serialize(serializer)
-    }
-
-    fn read<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Line, D::Error> {
-        let (index, nb, nk) = Deserialize::deserialize(deserializer)?;
-        Ok(Line { index, nb, nk })
-    }
-}
 
 impl<T: Real> Entry for Sum<T> {
     const BLANK: Sum<T> = Sum { value: T::NAN, carry: T::NAN };

@@ -3,6 +3,7 @@
 mod arx;
 mod border;
 mod common;
+mod criteria;
 mod criterion;
 mod exact;
 mod instrumental;
@@ -11,6 +12,7 @@ mod objective;
 mod offset;
 mod optimize;
 mod plant_first;
+mod polynomials;
 mod prediction_error;
 mod predictor;
 mod restart;
@@ -26,11 +28,13 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::data::Record;
+use crate::model::{Model, Signal};
 pub use crate::regression::Solver;
-use crate::{Criteria, Error, Orders, Structure};
+use crate::{Error, Orders, Structure};
 pub use arx::{arx, arx_factor};
 pub(crate) use arx::{enough, estimate_is_for_f};
-pub(crate) use common::{Common, Point, Window, extended};
+pub(crate) use common::{Common, Point, Window};
+pub use criteria::Criteria;
 pub use criterion::{Bound, Criterion, CriterionOutcome, GainBound, Norm};
 pub use exact::LikelihoodOutcome;
 pub(crate) use exact::exact_mean;
@@ -39,6 +43,7 @@ pub(crate) use offset::{Beside, Fitted, OutputOffset, Task, pays};
 pub use optimize::{Algorithm, Monitor, Progress, Search, SearchOutcome, StartOutcome, Step, Stopped};
 pub(crate) use optimize::{Deadline, FIRST_DAMPING, LARGEST_DAMPING, ROUNDING, SMALLEST_DAMPING};
 pub(crate) use plant_first::noise_order;
+pub(crate) use polynomials::extended;
 pub(crate) use prediction_error::{drop_is_not_for_f, stretches};
 pub use robust::{Loss, Robust, RobustOutcome};
 pub(crate) use uncertainty::{Autoregression, autoregression, backward_filtered_products};
@@ -273,6 +278,27 @@ pub struct Estimate {
 }
 
 impl Estimate {
+    /// The model with these parameters.
+    ///
+    /// # Errors
+    /// [`Error::Data`] if a coefficient or the variance overflows, or roots do not converge.
+    pub fn to_model(
+        &self,
+        orders: &Orders,
+        sample_time: f64,
+        inputs: Vec<Signal>,
+        output: Signal,
+    ) -> Result<Model, Error> {
+        let Self { parameters, noise_variance, .. } = self;
+        let model =
+            Model::from_parameters(orders, parameters, self.covariance(), *noise_variance, sample_time)?
+                .with_degrees_of_freedom(self.degrees_of_freedom())?;
+        if !self.criteria().fpe.is_finite() {
+            return Err(Error::data("the noise variance overflows; scale the output towards one"));
+        }
+        Ok(Model { inputs, output, ..model })
+    }
+
     /// theta-hat, in the order of [`Orders::names`](crate::Orders::names).
     pub fn parameters(&self) -> &[f64] {
         &self.parameters

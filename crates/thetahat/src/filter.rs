@@ -13,10 +13,12 @@ mod step;
 mod summary;
 #[cfg(test)]
 mod tests;
+mod totals;
 
 pub use estimate::{StateEstimate, StateValues};
 pub use estimator::{Estimator, ObserverGain};
-pub use model::{InitialState, StateModel};
+pub use linear::InitialState;
+pub use model::StateModel;
 pub use smooth::SmoothedStates;
 pub use step::StateFilter;
 pub use summary::{EstimatedNumber, FilterSummary};

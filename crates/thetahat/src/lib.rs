@@ -52,13 +52,14 @@ mod track;
 mod validate;
 
 pub use data::{
-    AntiAlias, Channel, Detrend, Interpolation, Log, Offset, Prefilter, Record, Resample, Rows, Split,
+    AntiAlias, Channel, Detrend, Interpolation, Log, Offset, Prefilter, Record, Recording, Resample,
+    Resampling, Rows, Source, Split, Times,
 };
 pub use error::Error;
 pub use estimate::{
-    Algorithm, Bound, Constant, Criterion, CriterionOutcome, Estimate, GainBound, Initial, LikelihoodOutcome,
-    Loss, Method, Monitor, Norm, Procedure, Progress, Robust, RobustOutcome, Search, SearchOutcome, Solver,
-    StartOutcome, Step, Stopped, arx, arx_factor, estimate, estimate_monitored,
+    Algorithm, Bound, Constant, Criteria, Criterion, CriterionOutcome, Estimate, GainBound, Initial,
+    LikelihoodOutcome, Loss, Method, Monitor, Norm, Procedure, Progress, Robust, RobustOutcome, Search,
+    SearchOutcome, Solver, StartOutcome, Step, Stopped, arx, arx_factor, estimate, estimate_monitored,
 };
 pub use filter::{
     EstimatedNumber, Estimator, FilterSummary, InitialState, ObserverGain, SmoothedStates, StateEstimate,
@@ -66,16 +67,16 @@ pub use filter::{
 };
 pub use greybox::{GreyBox, GreyFit, GreyOutput, GreyParameter, GreyReport, GreySearch, GreyState, fit_grey};
 pub use inspect::{
-    ChannelQuality, Clock, DelayEstimate, Excitation, Feedback, Inspection, InspectionPlan, Recording,
-    Saturation, SpectrumPoint, Times, inspect, inspect_log,
+    ChannelQuality, Clock, DelayEstimate, Excitation, Feedback, Inspection, InspectionPlan, Saturation,
+    SpectrumPoint, inspect, inspect_log,
 };
 pub use model::{
     Interval, Model, OffsetCovariance, Orders, Parameter, Quantity, Root, Signal, StateSpace, Structure,
 };
 pub use report::{
     Applied, Comparison, Coverage, Data, Estimation, Missing, NoiseLevel, Parts, Plan, Report, Requirement,
-    Resampling, Seen, Signals, Source, Unjudged, Validated, Validation, ValidationPlan, apply, compare,
-    held_out_runs, identify, identify_monitored, sample, validate,
+    Seen, Signals, Unjudged, Validated, Validation, ValidationPlan, apply, compare, held_out_runs, identify,
+    identify_monitored, sample, validate,
 };
 #[cfg(feature = "html")]
 pub use report::{comparison_page, fit_page, inspection_page, validation_page};
@@ -85,8 +86,8 @@ pub use respond::{
     prediction_deviations, simulate, step_response,
 };
 pub use select::{
-    Automatic, Best, Choice, Criteria, Delay, Focus, Grid, HeldOut, OrderRange, Path, Scan, Scored, Select,
-    Selection, choose_orders,
+    Automatic, Best, Choice, Delay, Focus, Grid, HeldOut, OrderRange, Path, Scan, Scored, Select, Selection,
+    choose_orders,
 };
 pub use thetahat_core;
 pub use track::{

@@ -1,5 +1,5 @@
-//! Linear regression on lagged signals: `lagged` states the problem and solves it, `gram` forms its Gram
-//! matrix from lagged products, `qr` folds its rows into a triangle where that is not exact enough.
+//! Linear regression on lagged signals: `lagged` states the problem, `solve` solves it; `gram` forms its Gram matrix from lagged
+//! products, `qr` folds its rows into a triangle where that is not exact enough.
 
 mod blocks;
 pub(crate) mod convex;
@@ -8,6 +8,7 @@ mod gram;
 mod kernel;
 mod lagged;
 mod qr;
+mod solve;
 
 #[cfg(test)]
 pub(crate) mod noise;
@@ -17,6 +18,7 @@ mod tests;
 pub(crate) use filter::{add_filtered, divide, divide_from, divide_together};
 pub(crate) use gram::{Interior, Products};
 pub(crate) use kernel::{product, sum, sum_of_squares};
-pub use lagged::Solver;
-pub(crate) use lagged::{Lagged, Presample, Regression, SAFE_NORMS, Taps, Unsolved, condition};
+pub(crate) use lagged::{Lagged, Presample, Taps};
 pub(crate) use qr::factor_rows;
+pub use solve::Solver;
+pub(crate) use solve::{Regression, SAFE_NORMS, Unsolved, condition};

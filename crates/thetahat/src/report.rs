@@ -20,7 +20,7 @@ pub use html::{comparison_page, fit_page, inspection_page, validation_page};
 pub use identify::{Plan, Unjudged, identify, identify_monitored};
 pub use requirement::Requirement;
 pub use sample::sample;
-pub use schema::{Data, Estimation, Missing, Parts, Report, Resampling, Source};
+pub use schema::{Data, Estimation, Missing, Parts, Report};
 pub use validation::{
     Comparison, Coverage, NoiseLevel, Seen, Signals, Validated, Validation, ValidationPlan, compare, validate,
 };

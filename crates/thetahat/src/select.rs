@@ -6,11 +6,12 @@
 //! - `ranking`: which is the best.
 
 mod automatic;
+mod candidates;
 mod choice;
 mod compare;
-mod criteria;
 mod delay;
 mod focus;
+mod folds;
 mod grid;
 mod held_out;
 mod linear;
@@ -20,6 +21,7 @@ mod selection;
 #[cfg(test)]
 mod tests;
 mod unseen;
+mod winners;
 
 use std::ops::ControlFlow;
 
@@ -28,11 +30,9 @@ use crate::estimate::{Deadline, Initial, Monitor, Search};
 use crate::{Error, Orders};
 pub(crate) use automatic::constant_pays;
 pub use choice::{Automatic, Choice, Grid, OrderRange, Path, Select};
-pub use criteria::Criteria;
 pub(crate) use delay::delays;
 pub use focus::Focus;
-pub use held_out::HeldOut;
-pub use selection::{Best, Delay, Scan, Scored, Selection};
+pub use selection::{Best, Delay, HeldOut, Scan, Scored, Selection};
 
 /// What a choice is made from.
 #[derive(Clone, Copy)]

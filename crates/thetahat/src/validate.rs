@@ -8,6 +8,7 @@ mod nis;
 mod residuals;
 #[cfg(test)]
 mod tests;
+mod verdict;
 mod whiteness;
 
 pub(crate) use fit::closeness;
@@ -15,4 +16,5 @@ pub use fit::{Fit, Horizon, Part};
 pub(crate) use nis::NisCount;
 pub use nis::NisSummary;
 pub(crate) use residuals::Relation;
-pub use residuals::{Anderson, AndersonLevel, Independence, Residuals, Test};
+pub use residuals::Residuals;
+pub use verdict::{Anderson, AndersonLevel, Independence, Test};

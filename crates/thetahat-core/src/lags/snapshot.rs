@@ -1,12 +1,25 @@
 //! What is written, and how it is checked when it is read back.
 
 use nalgebra::OVector;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::{Line, Source, is_infinite};
 use crate::error::check_length;
-use crate::snapshot::vector;
+use crate::snapshot::{Entry, vector};
 use crate::{Dimension, Error, Lags, Real, SnapshotVersion};
+
+impl Entry for Line {
+    const BLANK: Line = Line { index: 0, nb: 0, nk: 0 };
+
+    fn write<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        (self.index, self.nb, self.nk).serialize(serializer)
+    }
+
+    fn read<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Line, D::Error> {
+        let (index, nb, nk) = Deserialize::deserialize(deserializer)?;
+        Ok(Line { index, nb, nk })
+    }
+}
 
 #[derive(Serialize, Deserialize)]
 #[serde(bound = "")]

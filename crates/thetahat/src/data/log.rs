@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
-use crate::data::{Offset, Regular, Rows, checked};
+use crate::data::{Offset, Regular, Rows, checked, shortest};
 use crate::figures::short;
 
 /// So many rows at the end that repeat one value in all channels are told.
@@ -619,13 +619,4 @@ pub(super) fn median_step(time: &[f64], rows: usize) -> Result<f64, Error> {
     let lower = if even { below.iter().copied().fold(f64::MIN, f64::max) } else { upper };
     let latest = time.iter().fold(0.0_f64, |latest, time| latest.max(time.abs()));
     Ok(shortest(f64::midpoint(lower, upper), 2.0 * f64::EPSILON * latest))
-}
-
-/// The number of fewest digits within `tolerance`: differences of times such as 0.3 and 0.29 have rounding at their end,
-/// which is not the clock's.
-pub(crate) fn shortest(value: f64, tolerance: f64) -> f64 {
-    (0..17)
-        .filter_map(|digits| format!("{value:.digits$e}").parse().ok())
-        .find(|rounded: &f64| (rounded - value).abs() <= tolerance)
-        .unwrap_or(value)
 }

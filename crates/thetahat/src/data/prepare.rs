@@ -2,11 +2,8 @@ use std::fmt;
 use std::ops::Range;
 use std::str::FromStr;
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-
 use crate::Error;
-use crate::data::Log;
+use crate::data::{Log, Offset};
 use crate::regression::sum;
 
 /// What is taken from each channel before a fit. A model speaks of deviations from it.
@@ -51,21 +48,7 @@ impl FromStr for Detrend {
     }
 }
 
-/// What a channel's values are measured from: `level + slope * t`, t in seconds from the log's first row.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
-pub struct Offset {
-    /// In the channel's own units.
-    pub level: f64,
-    /// In the channel's units per second.
-    pub slope: f64,
-}
-
 impl Offset {
-    /// The offset `t` seconds after the log's first row.
-    pub fn at(&self, t: f64) -> f64 {
-        self.level + self.slope * t
-    }
-
     /// The offset of a channel over segments of rows (0-based).
     ///
     /// # Errors

@@ -2,7 +2,6 @@
 
 use std::fmt;
 
-use super::shortest;
 use crate::figures::short;
 
 /// So many rows of a resampled log stand for each recorded one at most: with more, hardly anything in it was measured.
@@ -49,6 +48,15 @@ impl fmt::Display for Regular {
             if *rows < 1e9 { format!("{rows}") } else { short(*rows) }
         )
     }
+}
+
+/// The number of fewest digits within `tolerance`: differences of times such as 0.3 and 0.29 have rounding at their end,
+/// which is not the clock's.
+pub(crate) fn shortest(value: f64, tolerance: f64) -> f64 {
+    (0..17)
+        .filter_map(|digits| format!("{value:.digits$e}").parse().ok())
+        .find(|rounded: &f64| (rounded - value).abs() <= tolerance)
+        .unwrap_or(value)
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@
 
 use thetahat_core::nalgebra::{Complex, ComplexField};
 
-use super::predictor::Polynomials;
+use super::polynomials::Polynomials;
 use crate::Orders;
 use crate::model::polynomial::{Roots, is_stable};
 

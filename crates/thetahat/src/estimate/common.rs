@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::optimize::{Deadline, Monitor, Search, best_free, search};
 use super::prediction_error::{energy, is_determined};
-use super::predictor::{Begin, Polynomials, Predictor};
+use super::predictor::{Begin, Predictor};
 use super::start::candidates;
 use crate::data::Record;
 use crate::respond::NOTHING_LEFT;
@@ -151,16 +151,4 @@ impl<'a> Common<'a> {
             predictor.samples().checked_sub(predictor.initial_conditions()).filter(|left| *left > 0)?;
         Some(best_free(&mut predictor, parameters).ok()? / left as f64)
     }
-}
-
-/// The parameters of a model with the same delays and orders that are not above the others', as parameters of the latter:
-/// the polynomials end with zeros.
-pub(crate) fn extended(from: &Orders, parameters: &[f64], to: &Orders) -> Vec<f64> {
-    let mut polynomials = Polynomials::new(from, parameters);
-    polynomials.a.resize(to.na + 1, 0.0);
-    polynomials.b.iter_mut().zip(&to.nb).for_each(|(b, &nb)| b.resize(nb, 0.0));
-    polynomials.c.resize(to.nc + 1, 0.0);
-    polynomials.d.resize(to.nd + 1, 0.0);
-    polynomials.f.iter_mut().zip(&to.nf).for_each(|(f, &nf)| f.resize(nf + 1, 0.0));
-    polynomials.parameters()
 }

@@ -43,8 +43,8 @@ use super::objective::Objective;
 use super::optimize::{
     Deadline, Found, Monitor, Search, SearchOutcome, StartOutcome, Stopped, best_free, search,
 };
+use super::polynomials::Polynomials;
 use super::prediction_error::{energy, filled, flat, prediction_error, search_outcome};
-use super::predictor::Polynomials;
 use super::{Estimate, Initial, Procedure};
 use crate::data::{Record, measured};
 use crate::model::polynomial::{is_stable, roots};

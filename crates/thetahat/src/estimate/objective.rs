@@ -2,7 +2,6 @@
 
 use std::ops::Range;
 
-use super::predictor::{Predictor, Unusable};
 use crate::Orders;
 
 /// A cost of the parameters, and of the weights of free responses, which it keeps itself: [`evaluate`](Self::evaluate) takes
@@ -33,53 +32,11 @@ pub(super) trait Objective {
     fn right(&self) -> &[f64];
 }
 
-impl Objective for Predictor<'_> {
-    fn orders(&self) -> &Orders {
-        self.orders()
-    }
-
-    fn samples(&self) -> usize {
-        self.samples()
-    }
-
-    fn initial_conditions(&self) -> usize {
-        self.initial_conditions()
-    }
-
-    fn needs_stable_a(&self) -> bool {
-        false
-    }
-
-    fn linear(&self) -> Range<usize> {
-        let orders = self.orders();
-        0..orders.na + orders.nb.iter().sum::<usize>()
-    }
-
-    fn restart(&mut self) {
-        self.restart();
-    }
-
-    fn evaluate(&mut self, parameters: &[f64]) -> Result<f64, Unusable> {
-        self.evaluate(parameters)
-    }
-
-    fn linearize(&mut self) -> f64 {
-        self.linearize()
-    }
-
-    fn try_free(&mut self, step: &[f64]) {
-        self.try_free(step);
-    }
-
-    fn keep_free(&mut self) {
-        self.keep_free();
-    }
-
-    fn matrix(&self) -> &[f64] {
-        &self.matrix
-    }
-
-    fn right(&self) -> &[f64] {
-        &self.right
-    }
+/// Why parameters have no cost.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Unusable {
+    /// C or F has a root outside the unit circle.
+    Unstable,
+    /// The errors overflow.
+    Overflow,
 }

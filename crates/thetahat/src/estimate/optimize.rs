@@ -24,8 +24,7 @@ use serde::{Deserialize, Serialize};
 
 use super::border::Border;
 use super::normal;
-use super::objective::Objective;
-use super::predictor::{Predictor, Unusable};
+use super::objective::{Objective, Unusable};
 use crate::{Error, Orders};
 
 /// The first damping of Levenberg and Marquardt. A larger one wastes iterations on fast-sampled plants.
@@ -609,19 +608,6 @@ fn solve_linear(
     parameters.iter_mut().zip(&*step).for_each(|(value, step)| *value += step);
     predictor.try_free(step);
     predictor.evaluate(parameters)
-}
-
-impl Predictor<'_> {
-    /// By how much a full Gauss-Newton step from what was evaluated last would lower the cost, to first order.
-    pub(super) fn foretold(&mut self) -> f64 {
-        let size = self.right.len();
-        let free_gain = self.linearize();
-        let mut factor = self.matrix.clone();
-        let mut step = self.right.clone();
-        normal::factor(&mut factor, size);
-        normal::solve(&factor, size, &mut step);
-        free_gain + step.iter().zip(&self.right).map(|(step, right)| step * right).sum::<f64>()
-    }
 }
 
 impl Step {

@@ -22,8 +22,8 @@ use thetahat_core::nalgebra::DMatrix;
 
 use super::arx::rows;
 use super::optimize::{Monitor, Search, best_free};
+use super::polynomials::Polynomials;
 use super::prediction_error::{prediction_error, predictor_of};
-use super::predictor::Polynomials;
 use super::{Estimate, Initial, Procedure};
 use crate::data::Record;
 use crate::regression::{sum, sum_of_squares};

@@ -11,10 +11,11 @@ use thetahat_core::nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::arx::{arx, estimate_is_for_f, out_of_range, rows, signals};
 use super::objective::Objective;
+use super::objective::Unusable;
 use super::optimize::{
     Algorithm, Deadline, Found, Monitor, Search, SearchOutcome, StartOutcome, Stopped, best_free, search,
 };
-use super::predictor::{Begin, Predictor, Unusable};
+use super::predictor::{Begin, Predictor};
 use super::uncertainty::{autoregression, backward_filtered_products, coloured, restricted};
 use super::{Estimate, Initial, Procedure};
 use crate::data::{Record, measured};

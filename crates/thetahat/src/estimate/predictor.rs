@@ -34,6 +34,8 @@
 //! samples that count are several runs, with a part of the Gram matrix each.
 
 mod columns;
+mod loss;
+mod objective;
 mod section;
 #[cfg(test)]
 mod tests;
@@ -45,74 +47,16 @@ use rayon::prelude::*;
 use thetahat_core::LeastSquares;
 use thetahat_core::nalgebra::{Cholesky, DMatrix, Dyn};
 
+use super::objective::Unusable;
+use super::polynomials::Polynomials;
 use super::uncertainty::backward_filtered_products;
 use crate::Orders;
 use crate::data::{Record, measured};
-use crate::model::polynomial::is_stable;
 use crate::regression::{Products, Taps, factor_rows};
 use section::Section;
 
 /// Samples from which threads pay for themselves.
 const PARALLEL_FROM: usize = 1 << 15;
-
-/// The polynomials of a parameter vector.
-#[derive(Debug)]
-pub(super) struct Polynomials {
-    pub(super) a: Vec<f64>,
-    /// Without the leading zeros.
-    pub(super) b: Vec<Vec<f64>>,
-    pub(super) c: Vec<f64>,
-    pub(super) d: Vec<f64>,
-    pub(super) f: Vec<Vec<f64>>,
-}
-
-impl Polynomials {
-    pub(super) fn new(orders: &Orders, parameters: &[f64]) -> Self {
-        let monic = |order: usize| [vec![1.0], vec![0.0; order]].concat();
-        let mut polynomials = Self {
-            a: monic(orders.na),
-            b: orders.nb.iter().map(|&nb| vec![0.0; nb]).collect(),
-            c: monic(orders.nc),
-            d: monic(orders.nd),
-            f: orders.nf.iter().map(|&nf| monic(nf)).collect(),
-        };
-        polynomials.set(parameters);
-        polynomials
-    }
-
-    pub(super) fn set(&mut self, mut parameters: &[f64]) {
-        let mut fill = |values: &mut [f64]| {
-            let (own, rest) = parameters.split_at(values.len());
-            values.copy_from_slice(own);
-            parameters = rest;
-        };
-        fill(&mut self.a[1..]);
-        self.b.iter_mut().for_each(|b| fill(b));
-        fill(&mut self.c[1..]);
-        fill(&mut self.d[1..]);
-        self.f.iter_mut().for_each(|f| fill(&mut f[1..]));
-    }
-
-    /// The parameters in their order.
-    pub(super) fn parameters(&self) -> Vec<f64> {
-        self.coefficients().copied().collect()
-    }
-
-    /// Writes the parameters in their order.
-    pub(super) fn write(&self, parameters: &mut [f64]) {
-        parameters.iter_mut().zip(self.coefficients()).for_each(|(parameter, value)| *parameter = *value);
-    }
-
-    fn coefficients(&self) -> impl Iterator<Item = &f64> {
-        let f = self.f.iter().flat_map(|f| &f[1..]);
-        self.a[1..].iter().chain(self.b.iter().flatten()).chain(&self.c[1..]).chain(&self.d[1..]).chain(f)
-    }
-
-    /// Whether the predictor is stable: C and every F are.
-    fn are_stable(&self, scratch: &mut Vec<f64>) -> bool {
-        is_stable(&self.c, scratch) && self.f.iter().all(|f| is_stable(f, scratch))
-    }
-}
 
 /// Which signals there are, and which columns of psi are made of them.
 #[derive(Debug)]
@@ -596,13 +540,4 @@ fn runs(record: &Record<'_>, orders: &Orders, rows: &Range<usize>, first: usize)
     let counted = (rows.start + first).min(rows.end)..rows.end;
     let runs = if orders.needs_past_outputs() { vec![counted] } else { measured(record.output, &counted) };
     runs.into_iter().map(|run| run.start - rows.start..run.end - rows.start).collect()
-}
-
-/// Why parameters have no cost.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Unusable {
-    /// C or F has a root outside the unit circle.
-    Unstable,
-    /// The errors overflow.
-    Overflow,
 }

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use oorandom::Rand64;
 use thetahat_core::nalgebra::{Complex, ComplexField};
 
-use super::predictor::Polynomials;
+use super::polynomials::Polynomials;
 use crate::Orders;
 use crate::model::polynomial::{product, roots};
 

@@ -6,13 +6,22 @@ use thetahat_core::nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use thetahat_core::{Covariance, LinearObservation, LinearTransition};
 
 use crate::data::Offset;
-use crate::{Error, InitialState, Model};
+use crate::{Error, Model};
 
 type Transition = LinearTransition<f64, Dyn, Dyn>;
 
 /// The variance of a state of which nothing is known, in those of e. A millionth of it is what one row leaves: six digits are
 /// lost in a smoother, and none in a filter.
 const UNKNOWN: f64 = 1e6;
+
+/// What is known of the state in which the model of a report starts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum InitialState {
+    /// It is 0: the plant is at rest, the channels at their offsets.
+    Zero,
+    /// Nothing: each state, which is in units of the output, has a standard deviation of a thousand times that of the noise e.
+    Unknown,
+}
 
 /// A model in matrices, with its noises.
 #[derive(Debug, Clone)]

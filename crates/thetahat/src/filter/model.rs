@@ -1,5 +1,5 @@
 use super::kind::Kind;
-use super::linear::Linear;
+use super::linear::{InitialState, Linear};
 use super::matrices;
 use crate::greybox::Document;
 use crate::{Error, GreyBox, Report};
@@ -29,15 +29,6 @@ use crate::{Error, GreyBox, Report};
 #[derive(Debug, Clone)]
 pub struct StateModel {
     pub(super) kind: Kind,
-}
-
-/// What is known of the state in which the model of a report starts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum InitialState {
-    /// It is 0: the plant is at rest, the channels at their offsets.
-    Zero,
-    /// Nothing: each state, which is in units of the output, has a standard deviation of a thousand times that of the noise e.
-    Unknown,
 }
 
 impl From<GreyBox> for StateModel {

@@ -6,7 +6,7 @@ use super::kind::{Division, Moment};
 use super::linearization::Work;
 use super::model::StateModel;
 use super::row::{Row, Told};
-use super::summary::Totals;
+use super::totals::Totals;
 use crate::Error;
 use crate::data::Offset;
 

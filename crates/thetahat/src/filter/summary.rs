@@ -2,8 +2,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::StateFilter;
-use super::estimate::{StateEstimate, StateValues};
-use crate::validate::NisCount;
+use super::estimate::StateValues;
 use crate::{Error, NisSummary, document};
 
 /// The schema that this version writes.
@@ -43,29 +42,6 @@ pub struct EstimatedNumber {
     pub standard_deviation: Option<f64>,
     /// How a parameter is kept within its bounds, such as `mass = 0.1 + exp(z)`; none for one without, and for a state.
     pub change_of_variable: Option<String>,
-}
-
-/// What a filter has seen so far.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Totals {
-    pub(super) rows: usize,
-    /// The elements of measurements that were there.
-    measured: usize,
-    /// The sum of the log-likelihoods; 0 from an observer.
-    log_likelihood: f64,
-    nis: NisCount,
-}
-
-impl Totals {
-    /// One more row.
-    pub(super) fn add(&mut self, row: &StateEstimate<'_>) {
-        self.rows += 1;
-        self.measured += row.measured;
-        self.log_likelihood += row.log_likelihood.unwrap_or(0.0);
-        if let Some((nis, bounds)) = row.nis.zip(row.nis_bounds) {
-            self.nis.add(nis, row.measured, bounds);
-        }
-    }
 }
 
 impl StateFilter {

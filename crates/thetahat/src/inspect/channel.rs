@@ -1,7 +1,8 @@
 //! The quality of one channel.
 
-use super::{ChannelQuality, Times, moments, outliers, quantization, saturation};
+use super::{ChannelQuality, moments, outliers, quantization, saturation};
 use crate::Channel;
+use crate::data::Times;
 
 /// The first rows of outliers that are named.
 const NAMED: usize = 20;

@@ -1,8 +1,8 @@
 //! The steps of a clock.
 
-use super::{Clock, Times};
+use super::Clock;
 use crate::Error;
-use crate::data::{GAP, JITTER, shortest};
+use crate::data::{GAP, JITTER, Times, shortest};
 use crate::regression::sum;
 
 /// A clock and what is wrong with it.

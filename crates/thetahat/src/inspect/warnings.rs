@@ -1,8 +1,8 @@
 //! What a careful reader should know, in plain words.
 
 use super::clock::Ticks;
-use super::{ChannelQuality, Inspection, InspectionPlan, Times};
-use crate::data::Regular;
+use super::{ChannelQuality, Inspection, InspectionPlan};
+use crate::data::{Regular, Times};
 use crate::figures::{fixed, short};
 
 /// A trend that explains this much of an output is worth a word.

@@ -2,10 +2,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::DMatrix;
 
-use super::dynamics::{self, Quantity, Root};
+use super::quantity::{Quantity, Root};
 use crate::data::Offset;
 use crate::distribution::student_two_sided;
-use crate::estimate::Estimate;
 use crate::{Error, Orders, Structure};
 
 /// A channel as a model sees it: its name, and what its values are measured from.
@@ -111,102 +110,6 @@ pub struct Model {
 }
 
 impl Model {
-    /// The model of an estimate.
-    ///
-    /// # Errors
-    /// [`Error::Data`] if a coefficient or the variance overflows, or roots do not converge.
-    pub fn new(
-        orders: &Orders,
-        estimate: &Estimate,
-        sample_time: f64,
-        inputs: Vec<Signal>,
-        output: Signal,
-    ) -> Result<Self, Error> {
-        let mut model = Self::from_parameters(
-            orders,
-            estimate.parameters(),
-            estimate.covariance(),
-            estimate.noise_variance(),
-            sample_time,
-        )?;
-        // Their intervals are those of Student's distribution.
-        model.degrees_of_freedom = estimate.degrees_of_freedom();
-        dynamics::describe(&mut model)?;
-        if !estimate.criteria().fpe.is_finite() {
-            return Err(Error::data("the noise variance overflows; scale the output towards one"));
-        }
-        Ok(Self { inputs, output, ..model })
-    }
-
-    /// The model of some parameters, in the order of [`Orders::names`]. Its signals have no names and no offsets. A matrix that
-    /// cannot be a covariance says nothing: that of the parameters is unknown then.
-    pub(crate) fn from_parameters(
-        orders: &Orders,
-        values: &[f64],
-        covariance: Option<&[Vec<f64>]>,
-        noise_variance: f64,
-        sample_time: f64,
-    ) -> Result<Self, Error> {
-        let covariance = covariance.filter(|rows| is_covariance(rows));
-        let variance = |position: usize| covariance.map(|rows| rows[position][position]);
-        let named = orders.names().into_iter().zip(values).enumerate();
-        let parameters: Vec<Parameter> = named
-            .map(|(position, (name, &value))| Parameter {
-                name,
-                value,
-                standard_error: variance(position).map(f64::sqrt),
-            })
-            .collect();
-        let usable = |p: &Parameter| p.value.is_finite() && p.standard_error.is_none_or(f64::is_finite);
-        if let Some(parameter) = parameters.iter().find(|parameter| !usable(parameter)) {
-            return Err(Error::data(format!(
-                "parameter {} overflows ({}); scale the channels towards one",
-                parameter.name, parameter.value
-            )));
-        }
-        if !noise_variance.is_finite() {
-            return Err(Error::data("the noise variance overflows; scale the output towards one"));
-        }
-        let mut values = values.iter().copied();
-        let monic = |values: &mut dyn Iterator<Item = f64>, count| -> Vec<f64> {
-            std::iter::once(1.0).chain(values.take(count)).collect()
-        };
-        let a = monic(&mut values, orders.na);
-        let delays = orders.nb.iter().zip(&orders.nk);
-        let b: Vec<Vec<f64>> = delays
-            .map(|(&nb, &nk)| std::iter::repeat_n(0.0, nk).chain(values.by_ref().take(nb)).collect())
-            .collect();
-        let c = monic(&mut values, orders.nc);
-        let d = monic(&mut values, orders.nd);
-        let f: Vec<Vec<f64>> = orders.nf.iter().map(|&nf| monic(&mut values, nf)).collect();
-        let mut model = Self {
-            structure: orders.structure(),
-            orders: orders.clone(),
-            sample_time,
-            inputs: vec![Signal::default(); orders.inputs()],
-            output: Signal::default(),
-            a,
-            b,
-            c,
-            d,
-            f,
-            noise_variance,
-            degrees_of_freedom: None,
-            parameters,
-            covariance: covariance.map(<[_]>::to_vec),
-            offset_covariance: None,
-            poles: Vec::new(),
-            zeros: Vec::new(),
-            noise_poles: Vec::new(),
-            noise_zeros: Vec::new(),
-            dc_gain: Vec::new(),
-            stable: true,
-            time_constants: Vec::new(),
-        };
-        dynamics::describe(&mut model)?;
-        Ok(model)
-    }
-
     /// The model with what is open of its output's offset as further inputs, of which the coefficients are zero and uncertain;
     /// and those inputs over so many rows. None where nothing is said of it.
     pub(crate) fn with_open_offset(&self, rows: usize) -> Option<(Self, Vec<Vec<f64>>)> {
@@ -352,7 +255,7 @@ mod tests {
         let orders = Orders::arx(a.len(), &[b.len()], &[1]).unwrap();
         let estimate = arx(&Record::new(&y, vec![&u]).unwrap(), &orders, Initial::Drop).unwrap();
         let signal = |name: &str| Signal { name: name.to_owned(), offset: Offset::default() };
-        Model::new(&orders, &estimate, 0.5, vec![signal("u")], signal("y")).unwrap()
+        estimate.to_model(&orders, 0.5, vec![signal("u")], signal("y")).unwrap()
     }
 
     #[test]

@@ -71,7 +71,7 @@ impl Model {
     /// }
     /// let orders = Orders::arx(1, &[2], &[1])?;
     /// let estimate = arx(&Record::new(&y, vec![&u])?, &orders, Initial::Drop)?;
-    /// let model = Model::new(&orders, &estimate, 1.0, vec![Signal::default()], Signal::default())?;
+    /// let model = estimate.to_model(&orders, 1.0, vec![Signal::default()], Signal::default())?;
     ///
     /// let space = model.state_space();
     /// // x_1(t+1) = 0.8 x_1(t) + x_2(t) + 0.5 u(t), x_2(t+1) = 0.3 u(t), y(t) = x_1(t).

@@ -18,7 +18,7 @@ use thetahat_core::nalgebra::{DMatrix, DVector};
 
 use super::blocks::{Stretch, blocks, sum_blocks};
 use super::kernel::correlations;
-use super::lagged::{Lagged, Taps};
+use super::lagged::{Lagged, Taps, sample};
 
 /// The lags `low..=high` of one signal; they stand at `offset` in the list of all lags.
 #[derive(Debug, Clone, Copy)]
@@ -56,17 +56,6 @@ impl Diagonal {
         let right = self.right.offset + lag.saturating_add_signed(self.difference) - self.right.low;
         left * size + right
     }
-}
-
-/// Sample `row - lag` of a signal, zero before the segment's start.
-pub(super) fn sample<S: AsRef<[f64]>>(
-    signals: &[S],
-    signal: usize,
-    start: usize,
-    row: usize,
-    lag: usize,
-) -> f64 {
-    if row < start + lag { 0.0 } else { signals[signal].as_ref()[row - lag] }
 }
 
 /// Which products of lagged signals there are: those of all lags of the taps, and of the target `signals[0](t)`.
@@ -157,16 +146,16 @@ impl Products {
 
 /// `Phi' Phi`, `Phi' y` and `y' y` of a regression. O(N p) time, O(p^2) memory.
 pub(super) fn gram(lagged: &Lagged<'_>) -> (DMatrix<f64>, DVector<f64>, f64) {
-    let products = Products::new(lagged.taps());
+    let products = Products::new(&lagged.taps);
     let size = products.size();
-    let segments = || lagged.segments().iter().map(|segment| (segment.start, lagged.counted(segment)));
+    let segments = || lagged.segments.iter().map(|segment| (segment.start, lagged.counted(segment)));
     let mut entries = vec![0.0; size * size];
     for (start, rows) in segments() {
-        products.add_ends(lagged.signals(), start, &rows, &mut entries);
+        products.add_ends(&lagged.signals, start, &rows, &mut entries);
     }
     let mut interior = products.interior(segments().filter(|(_, rows)| !rows.is_empty()));
-    let supports = vec![usize::MAX; lagged.signals().len()];
-    products.add_interior(lagged.signals(), &supports, &mut interior, &mut entries);
+    let supports = vec![usize::MAX; lagged.signals.len()];
+    products.add_interior(&lagged.signals, &supports, &mut interior, &mut entries);
 
     let columns: Vec<(usize, f64)> =
         lagged.columns().map(|(signal, lag, sign)| (products.position(signal, lag), sign)).collect();

@@ -1,10 +1,12 @@
 use std::ops::{ControlFlow, Range};
 
 use super::apply::record_for;
-use super::schema::{Data, Estimation, Missing, Parts, Report, Source};
+use super::schema::{Data, Estimation, Missing, Parts, Report};
 use super::validation::{estimation_record, estimation_start, goes_through};
 use super::warnings::{at_the_border, unstable_plant, warnings};
-use crate::data::{Detrend, Log, Offset, Prefilter, Prefiltered, Record, Rows, Split, between, checked};
+use crate::data::{
+    Detrend, Log, Offset, Prefilter, Prefiltered, Record, Rows, Source, Split, between, checked,
+};
 use crate::estimate::{
     self, Beside, Constant, Deadline, Estimate, Fitted, Method, Monitor, OutputOffset, Search, enough,
 };
@@ -12,7 +14,7 @@ use crate::regression::sum;
 use crate::respond::{Start, innovations};
 use crate::select::{self, Automatic, Choice, Focus, Found, Grid, Select, Selection, Task};
 use crate::validate::{Fit, Horizon, Part};
-use crate::{Error, Initial, Model, Orders, Quantity, Signal, Structure};
+use crate::{Error, Initial, Orders, Quantity, Signal, Structure};
 
 /// Below this fraction of a channel's size, what detrending leaves is rounding.
 const ROUNDING: f64 = 1e-13;
@@ -428,7 +430,7 @@ fn fit(
     // A prefilter leaves rows out, but cuts nothing.
     let stretches = if band.is_some() { segments } else { seen.segments };
     let Fitted { estimate, offset, open, .. } = &fitted;
-    let mut model = Model::new(&orders, estimate, log.sample_time(), inputs.to_vec(), output.clone())?;
+    let mut model = estimate.to_model(&orders, log.sample_time(), inputs.to_vec(), output.clone())?;
     model.offset_covariance.clone_from(open);
     let taken = [output.offset, offset.map_or_else(Offset::default, |found| found.offset)];
     if let Some(found) = offset {
@@ -584,9 +586,8 @@ fn unfiltered_variance(
     plan: &Plan,
     rows: &[Rows],
 ) -> Result<f64, Error> {
-    let model = Model::new(
+    let model = estimate.to_model(
         orders,
-        estimate,
         log.sample_time(),
         vec![Signal::default(); orders.inputs()],
         Signal::default(),

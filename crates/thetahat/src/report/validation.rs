@@ -2,8 +2,9 @@ use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
+use super::Report;
 use super::apply::{check_sample_time, record_for};
-use super::{Report, Source};
+use crate::data::Source;
 use crate::data::{Detrend, Log, Offset, Prefiltered, Record, Rows, checked};
 use crate::estimate::exact_mean;
 use crate::figures::{chance, fixed, number};

@@ -75,7 +75,7 @@ pub struct Drawn {
 /// let record = Record::new(&y, vec![&u])?;
 /// let orders = Orders::arx(1, &[1], &[1])?;
 /// let estimate = arx(&record, &orders, Initial::Drop)?;
-/// let model = Model::new(&orders, &estimate, 1.0, vec![Signal::default()], Signal::default())?;
+/// let model = estimate.to_model(&orders, 1.0, vec![Signal::default()], Signal::default())?;
 /// let runs = draw(&model, &record, Start::Zero, &Draws { count: 50, seed: 1 })?;
 /// assert_eq!((runs.values.len(), runs.values[0].len(), runs.unstable), (50, 200, 0));
 /// assert_eq!(runs, draw(&model, &record, Start::Zero, &Draws { count: 50, seed: 1 })?);

@@ -47,7 +47,7 @@ pub struct Forecast {
 /// let record = Record::new(&y, vec![&u])?;
 /// let orders = Orders::arx(1, &[1], &[1])?;
 /// let estimate = arx(&record, &orders, Initial::Drop)?;
-/// let model = Model::new(&orders, &estimate, 1.0, vec![Signal::default()], Signal::default())?;
+/// let model = estimate.to_model(&orders, 1.0, vec![Signal::default()], Signal::default())?;
 /// // Two steps ahead; the second needs the input of the first.
 /// let ahead = forecast(&model, &record, &[&[3.0]], 2, Start::Drop)?;
 /// let first = 0.8 * y[99] + 0.5 * u[99];

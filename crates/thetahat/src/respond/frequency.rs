@@ -67,7 +67,7 @@ pub struct FrequencyPoint {
 /// }
 /// let orders = Orders::arx(1, &[1], &[1])?;
 /// let estimate = arx(&Record::new(&y, vec![&u])?, &orders, Initial::Drop)?;
-/// let model = Model::new(&orders, &estimate, 0.1, vec![Signal::default()], Signal::default())?;
+/// let model = estimate.to_model(&orders, 0.1, vec![Signal::default()], Signal::default())?;
 /// let responses = frequency_response(&model, &[0.0, std::f64::consts::PI / 0.1])?;
 /// // 0.5 q^-1/(1 - 0.8 q^-1) at q = 1 and at q = -1.
 /// let (low, high) = (responses[0].points[0], responses[0].points[1]);

@@ -50,7 +50,7 @@ pub(super) const MOST_STEPS: usize = 1_000_000;
 /// let record = Record::new(&y, vec![&u])?;
 /// let orders = Orders::arx(1, &[1], &[1])?;
 /// let estimate = arx(&record, &orders, Initial::Drop)?;
-/// let model = Model::new(&orders, &estimate, 1.0, vec![Signal::default()], Signal::default())?;
+/// let model = estimate.to_model(&orders, 1.0, vec![Signal::default()], Signal::default())?;
 /// // Two steps ahead: from y(48), and from the inputs that are known by then.
 /// let response = predict(&model, &record, 2, Start::Drop)?;
 /// let expected = 0.8 * (0.8 * y[48] + 0.5 * u[48]) + 0.5 * u[49];
@@ -105,7 +105,7 @@ pub fn predict(model: &Model, record: &Record<'_>, horizon: usize, start: Start)
 /// }
 /// let orders = Orders::arx(1, &[], &[])?;
 /// let estimate = arx(&Record::new(&y, vec![])?, &orders, Initial::Drop)?;
-/// let model = Model::new(&orders, &estimate, 1.0, vec![], Signal::default())?;
+/// let model = estimate.to_model(&orders, 1.0, vec![], Signal::default())?;
 /// // A = 1 + a q^-1: h = 1, -a, a^2, …
 /// let (sigma, a) = (model.noise_variance.sqrt(), model.a[1]);
 /// assert!((prediction_deviation(&model, 1)? - sigma).abs() < 1e-14);

@@ -319,7 +319,7 @@ pub(super) fn student(model: &Model, noise: f64, other: f64) -> f64 {
 /// let record = Record::new(&y, vec![])?;
 /// let orders = Orders::arx(1, &[], &[])?;
 /// let estimate = arx(&record, &orders, Initial::Drop)?;
-/// let model = Model::new(&orders, &estimate, 1.0, vec![], Signal::default())?;
+/// let model = estimate.to_model(&orders, 1.0, vec![], Signal::default())?;
 /// let found = prediction_deviations(&model, &record, 1, Start::Drop)?;
 /// // y^(t) = -a y(t - 1): its error has the variance sigma^2 + y(t - 1)^2 var a, with N - 1 degrees of freedom.
 /// let (variance, degrees) = (model.parameters[0].standard_error.unwrap().powi(2), 99.0 - 1.0);

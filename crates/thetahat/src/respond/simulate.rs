@@ -46,7 +46,7 @@ use crate::{Error, Model};
 /// let record = Record::new(&y, vec![&u])?;
 /// let orders = Orders::arx(1, &[1], &[1])?;
 /// let estimate = arx(&record, &orders, Initial::Drop)?;
-/// let model = Model::new(&orders, &estimate, 1.0, vec![Signal::default()], Signal::default())?;
+/// let model = estimate.to_model(&orders, 1.0, vec![Signal::default()], Signal::default())?;
 /// // What began at y = 1 is made up for.
 /// let run = simulate(&model, &record, Start::Estimate)?;
 /// assert!(run.values.iter().zip(&y).all(|(run, y)| (run - y).abs() < 1e-9));

@@ -57,7 +57,7 @@ pub struct TransientResponse {
 /// }
 /// let orders = Orders::arx(1, &[1], &[1])?;
 /// let estimate = arx(&Record::new(&y, vec![&u])?, &orders, Initial::Drop)?;
-/// let model = Model::new(&orders, &estimate, 0.1, vec![Signal::default()], Signal::default())?;
+/// let model = estimate.to_model(&orders, 0.1, vec![Signal::default()], Signal::default())?;
 /// let step = step_response(&model, 0, Some(4))?;
 /// // 0.5, then 0.5 + 0.8 * 0.5, …
 /// assert!((step.values[1].value - 0.5).abs() < 1e-9 && (step.values[2].value - 0.9).abs() < 1e-9);
@@ -93,7 +93,7 @@ pub fn step_response(
 /// }
 /// let orders = Orders::arx(1, &[1], &[1])?;
 /// let estimate = arx(&Record::new(&y, vec![&u])?, &orders, Initial::Drop)?;
-/// let model = Model::new(&orders, &estimate, 0.1, vec![Signal::default()], Signal::default())?;
+/// let model = estimate.to_model(&orders, 0.1, vec![Signal::default()], Signal::default())?;
 /// let impulse = impulse_response(&model, 0, Some(4))?;
 /// for (g, expected) in impulse.values.iter().zip([0.0, 0.5, 0.5 * 0.8, 0.5 * 0.64]) {
 ///     assert!((g.value - expected).abs() < 1e-9);

@@ -4,7 +4,8 @@
 
 use std::collections::BTreeSet;
 
-use super::compare::{compare, total};
+use super::candidates::{MOST_INPUTS, are_enough};
+use super::compare::compare;
 use super::delay;
 use super::grid::key;
 use super::ranking::ranked;
@@ -39,10 +40,6 @@ const DIAGONAL_OE: [[usize; 4]; 8] = [
     [6, 6, 0, 0],
 ];
 const DIAGONAL_BJ: [[usize; 4]; 5] = [[1, 1, 1, 1], [2, 2, 1, 1], [2, 2, 2, 2], [3, 3, 1, 1], [4, 4, 1, 1]];
-/// So many inputs at most: a Gram matrix of all their lags has to fit.
-pub(super) const MOST_INPUTS: usize = 100;
-/// So many samples for each parameter at least.
-const SAMPLES: usize = 4;
 /// Orders of ARX models that say whether a constant is worth a parameter.
 const CONSTANT_ORDERS: [usize; 2] = [2, LONGEST];
 
@@ -168,14 +165,6 @@ fn structures(task: &Task<'_>, automatic: &Automatic) -> Result<Vec<Structure>, 
         None if task.initial == Initial::Estimate => Ok(vec![Oe, Bj]),
         None => Ok(vec![Arx, Armax, Oe, Bj]),
     }
-}
-
-/// Whether a record has enough samples for so many parameters, and does not lose more than half of them to the start of its
-/// segments.
-pub(super) fn are_enough(record: &Record<'_>, parameters: usize, masked: usize) -> bool {
-    let left = |segment: &std::ops::Range<usize>| segment.len().saturating_sub(masked);
-    let count: usize = record.segments.iter().map(left).sum();
-    count >= SAMPLES * parameters && 2 * count >= total(record)
 }
 
 /// Models of some structures in which all polynomials of the plant have one order: those that may simulate well although their

@@ -1,12 +1,11 @@
 //! All models on the same samples.
 
-use super::held_out::Parts;
-use super::linear::{Columns, Fitted, Kept, Rows, Scaled};
+use super::candidates::{Compared, Samples, Tried, energy, rows, total};
+use super::linear::{Columns, Fitted, Scaled};
 use super::search::Family;
 use super::{EXACT, Scored, Select, Task, held_out, unseen};
 use crate::data::Record;
-use crate::estimate::{Common, Initial, Point, Window, drop_is_not_for_f, estimate_is_for_f, stretches};
-use crate::regression::{Presample, sum_of_squares};
+use crate::estimate::{Common, Initial, Point, stretches};
 use crate::{Criteria, Error, Orders};
 
 /// Of records with more samples, models of which some need a search see stretches only: so many, each so long.
@@ -16,12 +15,6 @@ const STRETCH: usize = 1 << 11;
 /// Of records with more samples, blocks are held out of stretches only: few, so that free runs are long.
 const MOST_IN_BLOCKS: usize = 1 << 14;
 const STRETCHES_OF_BLOCKS: usize = 4;
-/// So many samples behind those that models reach back to do not count where there is C: what 1/C makes of e = 0 before
-/// them fades there. It would be tens of times the price of a parameter.
-const FADING: usize = 50;
-/// Of a segment of mean length not more than this part is given to that.
-const LEAST_OF_PIECE: usize = 20;
-
 /// Models that were compared.
 pub(super) struct Outcome {
     /// Those that the data determine.
@@ -33,64 +26,6 @@ pub(super) struct Outcome {
     pub(super) samples: usize,
     /// What there is to say of the samples, in sentences.
     pub(super) remarks: Vec<String>,
-}
-
-/// A model that was compared.
-#[derive(Debug, Clone)]
-pub(super) struct Compared {
-    pub(super) scored: Scored,
-    /// The parameters, if they were searched for.
-    pub(super) guess: Option<Vec<f64>>,
-    /// The largest modulus of a pole of the plant; infinite where that is not known.
-    pub(super) radius: f64,
-    /// What its held-out figure is made of.
-    pub(super) parts: Option<Parts>,
-}
-
-/// What all models share.
-pub(super) struct Samples {
-    pub(super) window: Window,
-    pub(super) presample: Presample,
-}
-
-/// A model on the common samples.
-#[derive(Debug, Clone)]
-pub(super) struct Tried {
-    pub(super) orders: Orders,
-    pub(super) point: Option<Point>,
-}
-
-impl Samples {
-    /// # Errors
-    /// [`Error::Argument`] if samples are to be dropped and a model has F, or the other way round.
-    pub(super) fn new(record: &Record<'_>, initial: Initial, models: &[Orders]) -> Result<Self, Error> {
-        if initial == Initial::Drop && models.iter().any(Orders::has_f) {
-            return Err(drop_is_not_for_f());
-        }
-        if initial == Initial::Estimate && !models.iter().all(Orders::has_f) {
-            return Err(estimate_is_for_f());
-        }
-        if initial == Initial::Zero {
-            return Ok(Self { window: Window::default(), presample: Presample::Zero });
-        }
-        Ok(Self::unknown(record, models.iter()))
-    }
-
-    /// The samples behind those that some model reaches back to.
-    pub(super) fn unknown<'m>(record: &Record<'_>, models: impl Iterator<Item = &'m Orders> + Clone) -> Self {
-        // Segments that are too short for the free responses of one model are so for all.
-        let reach = |orders: &Orders| orders.conditioned().max(orders.nf.iter().sum());
-        let silent = models.clone().map(reach).max().unwrap_or(0);
-        let coloured = models.filter(|orders| orders.nc > 0).count() > 0;
-        let most = total(record) / record.segments.len().max(1) / LEAST_OF_PIECE;
-        let counted = silent + if coloured { FADING.min(most) } else { 0 };
-        Self { window: Window { silent, counted }, presample: Presample::Drop }
-    }
-
-    /// How many samples of a record count.
-    pub(super) fn count(&self, record: &Record<'_>) -> usize {
-        record.segments.iter().map(|segment| segment.len().saturating_sub(self.window.counted)).sum()
-    }
 }
 
 /// Fits all models to the same samples. Each model is there once.
@@ -236,23 +171,4 @@ fn fit_linear(
         model.point = fitted.map(point);
     }
     Ok(())
-}
-
-/// The rows of a record, kept so that costs are exact.
-pub(super) fn rows(record: &Record<'_>, columns: &Columns, samples: &Samples) -> Result<Rows, Error> {
-    let products = Rows::new(record, columns, samples.presample, samples.window.counted, Kept::Products)?;
-    if products.are_exact() {
-        return Ok(products);
-    }
-    Rows::new(record, columns, samples.presample, samples.window.counted, Kept::Factor)
-}
-
-/// All samples of a record.
-pub(super) fn total(record: &Record<'_>) -> usize {
-    record.segments.iter().map(std::ops::Range::len).sum()
-}
-
-/// The sum of squares of the output.
-pub(super) fn energy(record: &Record<'_>) -> f64 {
-    record.segments.iter().map(|segment| sum_of_squares(&record.output[segment.clone()])).sum()
 }

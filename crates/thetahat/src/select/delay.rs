@@ -17,8 +17,7 @@
 
 use std::ops::Range;
 
-use super::automatic::{MOST_INPUTS, are_enough};
-use super::compare::{Samples, rows};
+use super::candidates::{MOST_INPUTS, Samples, are_enough, rows};
 use super::linear::{Columns, Fitted, Rows, Scaled};
 use super::ranking::number;
 use super::{Delay, Scan, Task};

@@ -5,12 +5,10 @@
 //! range of the data does not outweigh all others; a model that is unstable without a third counts as if it had left it.
 
 use rayon::prelude::*;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
-use super::Task;
-use super::compare::{Samples, Tried, total};
-use super::unseen::Folds;
+use super::candidates::{Samples, Tried, total};
+use super::folds::Folds;
+use super::{HeldOut, Task};
 use crate::data::Record;
 use crate::model::polynomial::{is_stable, roots};
 use crate::regression::sum;
@@ -26,38 +24,12 @@ const LARGEST: f64 = 5.0;
 /// The error of an unstable refit counts so many times, and is this at least.
 const UNSTABLE: f64 = 1.5;
 
-/// How well a model does on samples that it was not fitted to: mean squares of errors, divided by the variance of the output.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct HeldOut {
-    /// On all blocks, each from the initial state that fits it best.
-    pub blocks: f64,
-    /// On the last block, simulated from the first row on with the initial state that fits the rows before the block; for a
-    /// number of steps ahead the same as `blocks`.
-    pub onward: f64,
-    /// As `blocks`, without what instability costs.
-    pub unpunished: f64,
-    /// How many models without a block are unstable.
-    pub unstable: usize,
-    /// Of so many.
-    pub refits: usize,
-}
-
-impl HeldOut {
-    /// 100 (1 - |e|/|y - mean(y)|) on all blocks.
-    pub fn percent(&self) -> f64 {
-        100.0 * (1.0 - self.blocks.sqrt())
-    }
-}
-
-/// The sums of e^2 on parts of the blocks, in order and as long as one another to within one sample.
-pub(super) type Parts = [f64; BLOCKS * PARTS];
-
 /// By how many of its standard errors the mean square of one model exceeds that of another on the same samples.
 ///
 /// Errors of neighbouring samples go together. Sums over parts hardly do, so their differences tell how certain the mean is: batch means
 /// (Schmeiser, Batch size effects in the analysis of simulation output, Operations Research 30, 1982) of the differences of two
 /// models' losses (Diebold and Mariano, Comparing predictive accuracy, J. Business and Economic Statistics 13, 1995).
-pub(super) fn standard_errors(one: &Parts, other: &Parts) -> f64 {
+pub(super) fn standard_errors(one: &[f64], other: &[f64]) -> f64 {
     let count = one.len() as f64;
     let differences = || one.iter().zip(other).map(|(one, other)| one - other);
     let mean = sum(differences()) / count;
@@ -66,7 +38,10 @@ pub(super) fn standard_errors(one: &Parts, other: &Parts) -> f64 {
     mean / (variance / count).sqrt()
 }
 
-/// The figures of some models, with their sums on parts; none of others, and where the data do not determine a model without a block.
+/// The figures of a model, and the sums of e^2 on parts of the blocks, in order and as long as one another to within one sample.
+pub(super) type Seen = (HeldOut, Vec<f64>);
+
+/// The figures of some models; none of others, and where the data do not determine a model without a block.
 ///
 /// # Errors
 /// [`Error::Interrupted`].
@@ -76,7 +51,7 @@ pub(super) fn figures(
     samples: &Samples,
     tried: &[Tried],
     which: &[usize],
-) -> Result<Vec<Option<(HeldOut, Parts)>>, Error> {
+) -> Result<Vec<Option<Seen>>, Error> {
     let mut figures = vec![None; tried.len()];
     let deviation = deviation(record);
     let folds = Folds::new(record, BLOCKS);
@@ -88,11 +63,11 @@ pub(super) fn figures(
     let tests: Vec<Record<'_>> = (0..BLOCKS).map(|fold| folds.test_with_past(fold)).collect();
     let onward = Onward::new(record, &folds);
     let horizon = task.focus.horizon();
-    let of_model = |k: usize| -> Option<(HeldOut, Parts)> {
+    let of_model = |k: usize| -> Option<Seen> {
         let orders = &some[k].orders;
         let (mut blocks, mut unpunished, mut samples, mut unstable) = (0.0, 0.0, 0, 0);
         let mut last = None;
-        let mut parts = [0.0; BLOCKS * PARTS];
+        let mut parts = vec![0.0; BLOCKS * PARTS];
         for ((refits, test), parts) in refits.iter().zip(&tests).zip(parts.chunks_mut(PARTS)) {
             let parameters = refits[k].as_ref()?;
             let model = Model::from_parameters(orders, parameters, None, 1.0, 1.0).ok()?;
@@ -130,7 +105,7 @@ pub(super) fn figures(
             HeldOut { blocks: mean(blocks), onward, unpunished: mean(unpunished), unstable, refits: BLOCKS };
         Some((seen, parts))
     };
-    let found: Vec<Option<(HeldOut, Parts)>> = (0..some.len()).into_par_iter().map(of_model).collect();
+    let found: Vec<Option<Seen>> = (0..some.len()).into_par_iter().map(of_model).collect();
     which.iter().zip(found).for_each(|(&k, figure)| figures[k] = figure);
     Ok(figures)
 }

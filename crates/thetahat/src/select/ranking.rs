@@ -2,8 +2,9 @@
 
 use std::cmp::Ordering;
 
-use super::compare::{Compared, Outcome, total};
-use super::focus::{Winners, winners};
+use super::candidates::{Compared, total};
+use super::compare::Outcome;
+use super::winners::{Winners, winners};
 use super::{Best, Focus, Found, Path, Scored, Select, Selection, Task};
 use crate::estimate::{Method, estimate_of_channels};
 use crate::figures::{fixed, scientific};

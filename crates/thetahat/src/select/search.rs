@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-use super::compare::Tried;
+use super::candidates::Tried;
 use super::grid::key;
 use crate::estimate::{Common, Point, extended};
 use crate::{Error, Orders};

@@ -1,7 +1,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Focus, HeldOut, Path, Select};
+use super::{Focus, Path, Select};
 use crate::{Orders, Structure};
 
 /// How a model was chosen among others.
@@ -98,4 +98,27 @@ pub struct Scan {
     pub nk: usize,
     /// MDL of the model with that delay.
     pub mdl: f64,
+}
+
+/// How well a model does on samples that it was not fitted to: mean squares of errors, divided by the variance of the output.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct HeldOut {
+    /// On all blocks, each from the initial state that fits it best.
+    pub blocks: f64,
+    /// On the last block, simulated from the first row on with the initial state that fits the rows before the block; for a
+    /// number of steps ahead the same as `blocks`.
+    pub onward: f64,
+    /// As `blocks`, without what instability costs.
+    pub unpunished: f64,
+    /// How many models without a block are unstable.
+    pub unstable: usize,
+    /// Of so many.
+    pub refits: usize,
+}
+
+impl HeldOut {
+    /// 100 (1 - |e|/|y - mean(y)|) on all blocks.
+    pub fn percent(&self) -> f64 {
+        100.0 * (1.0 - self.blocks.sqrt())
+    }
 }

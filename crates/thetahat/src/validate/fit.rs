@@ -154,7 +154,7 @@ mod tests {
         let orders = Orders::arx(1, &[1], &[1]).unwrap();
         let estimate = arx(&record, &orders, Initial::Drop).unwrap();
         let signal = || Signal { name: String::new(), offset: Offset::default() };
-        let model = Model::new(&orders, &estimate, 1.0, vec![signal()], signal()).unwrap();
+        let model = estimate.to_model(&orders, 1.0, vec![signal()], signal()).unwrap();
         let fit = |record: &Record<'_>, horizon, initial| {
             Fit::of(&model, record, &[], None, horizon, initial).unwrap()
         };

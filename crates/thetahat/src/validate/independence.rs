@@ -29,7 +29,7 @@ use thetahat_core::nalgebra::{DMatrix, DVector};
 
 use super::feedback::follows;
 use super::moments::{Column, Moments, Traces, columns, eigen};
-use super::residuals::{Independence, Test};
+use super::verdict::{Independence, Test};
 use super::whiteness::chi_square;
 use crate::distribution::{chi_square_tail, two_sided};
 use crate::estimate::{Autoregression, backward_filtered_products};

@@ -358,8 +358,7 @@ fn what_the_fit_took_has_no_degrees_of_freedom() {
     let (u, y) = experiment(400, 0.3);
     let record = Record::new(&y, vec![&u]).unwrap();
     let estimate = arx(&record, &orders(), Initial::Drop).unwrap();
-    let model =
-        named(Model::new(&orders(), &estimate, 1.0, vec![Signal::default()], Signal::default()).unwrap());
+    let model = named(estimate.to_model(&orders(), 1.0, vec![Signal::default()], Signal::default()).unwrap());
     let found = tested(&model, &record, Relation::Fitted).unwrap();
     assert_eq!((found.samples, found.fitted), (398, 4));
     let test = &found.independence[0];
@@ -379,7 +378,7 @@ fn what_the_fit_took_has_no_degrees_of_freedom() {
     let orders = Orders::arx(2, &[], &[]).unwrap();
     let noise = Record::new(&y, vec![]).unwrap();
     let estimate = arx(&noise, &orders, Initial::Drop).unwrap();
-    let model = Model::new(&orders, &estimate, 1.0, vec![], Signal::default()).unwrap();
+    let model = estimate.to_model(&orders, 1.0, vec![], Signal::default()).unwrap();
     let found = tested(&model, &noise, Relation::Fitted).unwrap();
     assert_eq!((found.ljung_box.degrees, found.independence.len()), (23.0, 0));
     // Two standard errors beside the least sum of squares, a known model is rejected by about four more; here that is
@@ -444,8 +443,7 @@ fn a_wrong_delay_is_seen_at_its_lag() {
     let record = Record::new(&y, vec![&u]).unwrap();
     let orders = Orders::arx(2, &[2], &[3]).unwrap();
     let estimate = arx(&record, &orders, Initial::Drop).unwrap();
-    let model =
-        named(Model::new(&orders, &estimate, 1.0, vec![Signal::default()], Signal::default()).unwrap());
+    let model = named(estimate.to_model(&orders, 1.0, vec![Signal::default()], Signal::default()).unwrap());
     let found = tested(&model, &record, Relation::Fitted).unwrap();
     let test = &found.independence[0];
     assert!(test.past.p_value.unwrap() < 1e-9);

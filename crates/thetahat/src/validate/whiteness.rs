@@ -28,7 +28,7 @@ use std::ops::Range;
 use thetahat_core::nalgebra::{DMatrix, DVector};
 
 use super::moments::eigen;
-use super::residuals::{Anderson, AndersonLevel, Test};
+use super::verdict::{Anderson, AndersonLevel, Test};
 use crate::Model;
 use crate::distribution::{binomial_mid_p, chi_square_tail, outside, two_sided};
 use crate::model::polynomial::is_stable;

@@ -62,7 +62,7 @@ fn log(u: &[f64], y: &[f64]) -> Log {
 fn fitted(record: &Record<'_>, orders: &Orders) -> Model {
     let found = estimate(record, orders, &Method::default(), Initial::Auto).expect("the case is sound");
     let inputs = vec![Signal::default(); orders.inputs()];
-    Model::new(orders, &found, 1.0, inputs, Signal::default()).expect("the case is sound")
+    found.to_model(orders, 1.0, inputs, Signal::default()).expect("the case is sound")
 }
 
 /// How often the 95 % intervals hold the outputs that follow the log of the fit, in percent: forecasts, and predictions of a

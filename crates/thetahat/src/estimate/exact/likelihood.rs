@@ -9,7 +9,8 @@ use crate::Orders;
 use crate::data::Record;
 use crate::estimate::normal;
 use crate::estimate::objective::Objective;
-use crate::estimate::predictor::{Polynomials, Unusable};
+use crate::estimate::objective::Unusable;
+use crate::estimate::polynomials::Polynomials;
 use crate::model::polynomial::is_stable;
 use crate::regression::{condition, divide, divide_from};
 

@@ -12,11 +12,12 @@ use super::super::arx::{arx, rows};
 use super::super::border::multiply_out;
 use super::super::instrumental::instrumental_variables;
 use super::super::objective::Objective;
+use super::super::objective::Unusable;
 use super::super::optimize::{
     Deadline, Found, Monitor, Search, StartOutcome, best_free, best_linear, search,
 };
 use super::super::prediction_error::{energy, filled, flat, prediction_error, root_of, search_outcome};
-use super::super::predictor::{Begin, Predictor, Unusable};
+use super::super::predictor::{Begin, Predictor};
 use super::super::uncertainty::{coloured, restricted};
 use super::super::{Estimate, Initial, Procedure, drop_is_not_for_f};
 use crate::data::Record;

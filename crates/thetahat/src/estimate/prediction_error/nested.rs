@@ -9,8 +9,8 @@ use std::ops::Range;
 
 use super::{Job, Problem, filled, stretches};
 use crate::data::Record;
-use crate::estimate::common::extended;
 use crate::estimate::optimize::{Search, best_free};
+use crate::estimate::polynomials::extended;
 use crate::estimate::predictor::{Begin, Predictor};
 use crate::estimate::start::Plants;
 use crate::{Error, Orders};

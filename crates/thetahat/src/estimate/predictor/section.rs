@@ -4,9 +4,10 @@ use std::ops::Range;
 
 use thetahat_core::nalgebra::DMatrix;
 
-use super::{Column, Layout, Polynomials, weighted};
+use super::{Column, Layout, loss};
 use crate::data::Record;
 use crate::estimate::normal;
+use crate::estimate::polynomials::Polynomials;
 use crate::regression::{Interior, add_filtered, divide, divide_together, product, sum_of_squares};
 
 /// The fraction of a free response, squared, below which what is left of it is rounding.
@@ -198,7 +199,7 @@ impl<'a> Section<'a> {
         divide(&polynomials.c, tail);
         let each = self.runs.iter().map(|run| {
             let errors = &error[run.clone()];
-            layout.bound.map_or_else(|| sum_of_squares(errors), |bound| weighted::cost(errors, bound))
+            layout.bound.map_or_else(|| sum_of_squares(errors), |bound| loss::cost(errors, bound))
         });
         self.cost = each.sum();
     }

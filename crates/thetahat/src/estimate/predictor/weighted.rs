@@ -1,9 +1,10 @@
 //! Errors that count by their squares up to a bound, and linearly beyond: sums with weights.
 
+use super::loss::weight;
 use super::section::Section;
 use super::{Layout, Predictor};
 use crate::data::Record;
-use crate::regression::{product, sum};
+use crate::regression::product;
 
 impl Predictor<'_> {
     /// Lets errors count linearly from a bound on: the cost is 2 sum rho(e), rho(e) = e^2/2 up to the bound d and
@@ -52,15 +53,4 @@ impl Section<'_> {
             }
         }
     }
-}
-
-/// 2 sum rho(e).
-pub(super) fn cost(errors: &[f64], bound: f64) -> f64 {
-    let twice = |e: &f64| if e.abs() <= bound { e * e } else { bound * (2.0 * e.abs() - bound) };
-    sum(errors.iter().map(twice))
-}
-
-/// psi(e)/e.
-fn weight(e: f64, bound: f64) -> f64 {
-    if e.abs() <= bound { 1.0 } else { bound / e.abs() }
 }

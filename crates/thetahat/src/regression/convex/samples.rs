@@ -36,7 +36,7 @@ impl<'a> Samples<'a> {
     pub(super) fn new(lagged: &'a Lagged<'a>) -> Self {
         let mut samples =
             Self { lagged, columns: lagged.columns().collect(), segments: vec![], peaks: vec![], count: 0 };
-        for segment in lagged.segments() {
+        for segment in lagged.segments {
             let rows = lagged.counted(segment);
             if !rows.is_empty() {
                 samples.segments.push(Segment {

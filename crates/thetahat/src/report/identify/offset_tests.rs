@@ -3,7 +3,7 @@
 use super::*;
 use crate::estimate::estimate;
 use crate::regression::noise::Noise;
-use crate::{Automatic, Channel, Criterion, OrderRange, Path, Record, Report, Search};
+use crate::{Automatic, Channel, Criterion, Model, OrderRange, Path, Record, Report, Search};
 
 fn channel(name: &str, values: &[f64]) -> Channel {
     Channel { name: name.into(), values: values.to_vec() }

@@ -255,7 +255,7 @@ fn innovations_are_the_residuals_of_the_estimate() {
             );
             let Ok(found) = found else { continue };
             let signal = Signal::default;
-            let model = Model::new(&orders, &found, 1.0, vec![signal()], signal()).unwrap();
+            let model = found.to_model(&orders, 1.0, vec![signal()], signal()).unwrap();
             let (mut squares, mut samples) = (0.0, 0);
             for segment in innovations(&model, &record, 1, start).unwrap() {
                 squares += segment.counted_errors().map(|e| e * e).sum::<f64>();

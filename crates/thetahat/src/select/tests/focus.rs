@@ -1,5 +1,5 @@
-use super::super::compare::Compared;
-use super::super::focus::winners;
+use super::super::candidates::Compared;
+use super::super::winners::winners;
 use super::*;
 use crate::estimate::{Method, estimate};
 use crate::respond::simulate;
@@ -17,7 +17,7 @@ fn compared(radius: f64, blocks: f64, onward: f64, unstable: usize) -> Compared 
         scored,
         guess: None,
         radius,
-        parts: Some(std::array::from_fn(|k| blocks * (1.0 + 0.01 * k as f64))),
+        parts: Some((0..30).map(|k| blocks * (1.0 + 0.01 * f64::from(k))).collect()),
     }
 }
 
@@ -39,8 +39,8 @@ fn the_gate_opens_for_a_clear_difference_only() {
     // Where the parts do not agree, the fall must be larger: exp(-0.3) = 0.741.
     let uncertain = |factor: f64| {
         let [one, mut other] = models(factor);
-        let parts = one.parts.unwrap();
-        other.parts = Some(std::array::from_fn(|k| parts[k] * if k == 0 { factor } else { 1.0 }));
+        let parts = other.parts.insert(one.parts.clone().unwrap());
+        parts[0] *= factor;
         [one, other]
     };
     assert_eq!(taken(Focus::Auto, &uncertain(0.76)), Some([0, 1, 0]));

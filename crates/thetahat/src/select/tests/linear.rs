@@ -1,5 +1,5 @@
 use super::*;
-use crate::{arx, estimate};
+use crate::{Criteria, arx, estimate};
 
 /// Two inputs, an output that follows them, and three segments, of which one is too short for the larger models.
 fn signals() -> ([Vec<f64>; 3], Vec<Range<usize>>) {

@@ -2,7 +2,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::*;
 use crate::estimate::{Common, Point};
-use crate::select::compare::{Samples, Tried};
+use crate::select::candidates::{Samples, Tried};
 use crate::select::search::Family;
 
 fn signals(seed: u64, length: usize) -> (Vec<f64>, Vec<f64>) {

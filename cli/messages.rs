@@ -1,0 +1,25 @@
+//! What the program says on standard error: text that a terminal cannot be harmed by.
+
+use std::io::Write;
+
+use thetahat::text::message;
+
+use crate::wrap;
+
+/// Says something that the reader should know.
+pub(crate) fn warn(warning: &str) {
+    tell(&format!("\x1b[1;33mwarning:\x1b[0m {}", message(warning)));
+}
+
+/// Says something that may be long: on a terminal it is broken between words.
+pub(crate) fn tell(line: &str) {
+    match wrap::stderr_width() {
+        Some(width) => say(&wrap::wrapped(line, width)),
+        None => say(line),
+    }
+}
+
+/// Writes a line to standard error, in colour only on a terminal. Where that fails there is nobody left to tell.
+pub(crate) fn say(line: &str) {
+    let _ = writeln!(anstream::stderr().lock(), "{line}");
+}

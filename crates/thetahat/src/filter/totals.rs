@@ -1,0 +1,27 @@
+//! What a filter has seen so far.
+
+use super::estimate::StateEstimate;
+use crate::validate::NisCount;
+
+/// What a filter has seen so far.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Totals {
+    pub(super) rows: usize,
+    /// The elements of measurements that were there.
+    pub(super) measured: usize,
+    /// The sum of the log-likelihoods; 0 from an observer.
+    pub(super) log_likelihood: f64,
+    pub(super) nis: NisCount,
+}
+
+impl Totals {
+    /// One more row.
+    pub(super) fn add(&mut self, row: &StateEstimate<'_>) {
+        self.rows += 1;
+        self.measured += row.measured;
+        self.log_likelihood += row.log_likelihood.unwrap_or(0.0);
+        if let Some((nis, bounds)) = row.nis.zip(row.nis_bounds) {
+            self.nis.add(nis, row.measured, bounds);
+        }
+    }
+}

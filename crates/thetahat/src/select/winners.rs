@@ -1,0 +1,67 @@
+//! The choice between the best for prediction and the best for simulation.
+//!
+//! The model with the least MDL predicts well one step ahead. Where the plant is not among the models, another may simulate
+//! far better: errors one step ahead hardly show slow dynamics (Ljung, System Identification, 2nd ed. 1999, section 8.5).
+//! Errors of free runs alone choose badly too: they have few degrees of freedom. So there is a gate:
+//!
+//! 1. P has the least criterion among stable models, S the least error on blocks that it was not fitted to (see `held_out`).
+//! 2. S is taken where the mean of two logarithms, of the mean square on all blocks and of that onward from the first row, is
+//!    lower by more than [`FAR`] than with P, or by more than [`GATE`] and the mean square on the blocks by more than
+//!    [`STANDARD_ERRORS`] of its difference's; else P.
+//! 3. An unstable model that has a lower criterion than P is taken where all its refits are unstable too and their errors
+//!    beat those of the choice by [`CLEARLY`] in the logarithm of the mean square: then the plant is unstable.
+
+use super::Focus;
+use super::candidates::Compared;
+use super::held_out::standard_errors;
+
+/// By how much the logarithm of a mean square must fall, whatever its error.
+const FAR: f64 = 0.3;
+/// By how much where the fall is certain.
+const GATE: f64 = 0.1;
+const STANDARD_ERRORS: f64 = 2.0;
+const CLEARLY: f64 = 0.1;
+/// A model that simulates has no time constant of more than so many times the samples.
+const SLOWEST: f64 = 2.0;
+/// Mean squares below this are rounding.
+const NOTHING: f64 = 1e-12;
+
+/// Which models are the best for what, as positions in a comparison.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Winners {
+    /// P.
+    pub(super) prediction: usize,
+    /// S.
+    pub(super) simulation: usize,
+    pub(super) chosen: usize,
+}
+
+/// The winners among models in the order of their criterion; none where no model is stable, or none was looked at.
+///
+/// What has no figures on blocks, as the data without one do not determine it, may predict; it is not compared.
+pub(super) fn winners(focus: Focus, models: &[&Compared], samples: usize) -> Option<Winners> {
+    let logarithm = |square: f64| square.max(NOTHING).ln();
+    let held_out = |k: usize| models[k].scored.held_out.as_ref();
+    let stable = |k: &usize| models[*k].radius < 1.0;
+    let fast = |k: &usize| models[*k].radius <= (-1.0 / (SLOWEST * samples as f64)).exp();
+    let prediction = (0..models.len()).find(stable)?;
+    let figures = (0..models.len()).filter(fast).filter_map(|k| Some((held_out(k)?.blocks.max(NOTHING), k)));
+    let least = figures.min_by(|(one, _), (other, _)| one.total_cmp(other));
+    let simulation = least.map_or(prediction, |(_, k)| k);
+    let both =
+        |k: usize| held_out(k).map(|seen| f64::midpoint(logarithm(seen.blocks), logarithm(seen.onward)));
+    let fall = both(prediction).zip(both(simulation)).map_or(0.0, |(one, other)| one - other);
+    let parts = models[prediction].parts.as_ref().zip(models[simulation].parts.as_ref());
+    let certain = || parts.is_some_and(|(one, other)| standard_errors(one, other) > STANDARD_ERRORS);
+    let clear = fall > FAR || (fall > GATE && certain());
+    let chosen = match focus {
+        Focus::Auto if clear => simulation,
+        Focus::Auto | Focus::Prediction => prediction,
+        Focus::Simulation | Focus::Steps(_) => simulation,
+    };
+    let raw = |k: usize| held_out(k).map_or(f64::INFINITY, |seen| logarithm(seen.unpunished));
+    let unstable = models[0].radius >= 1.0
+        && held_out(0).is_some_and(|seen| seen.unstable == seen.refits)
+        && raw(chosen) - raw(0) > CLEARLY;
+    Some(Winners { prediction, simulation, chosen: if unstable { 0 } else { chosen } })
+}

@@ -1,0 +1,299 @@
+//! Who may know whom: rooms stand on floors, and no two modules of a room know each other.
+//!
+//! The floors are those of CONTRIBUTING.md. What a module knows are the paths that it names, `crate::`, `super::` and those of its
+//! own children, each followed through re-exports to the module that has the item. A parent may know its children and they it.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::Path;
+
+use syn::visit::{self, Visit};
+use syn::{Attribute, Item, ItemUse, UseTree, Visibility};
+
+/// The modules of a crate from the ground up. Those of one floor do not know each other.
+struct House {
+    source: &'static str,
+    floors: &'static [&'static [&'static str]],
+}
+
+const CORE: House = House {
+    source: "crates/thetahat-core/src",
+    floors: &[
+        &["scalar", "textbook"],
+        &["dual", "error", "triangle"],
+        &["forgetting", "ud"],
+        &["dim"],
+        &["innovation", "snapshot", "solution"],
+        &["covariance", "detect", "lags", "least_squares"],
+        &["rls", "state_space"],
+        &["arx", "augmented", "differentiated", "kalman"],
+        &["armax", "ekf", "luenberger", "schedule"],
+        &["smoother"],
+    ],
+};
+
+const LIBRARY: House = House {
+    source: "crates/thetahat/src",
+    floors: &[
+        &["distribution", "figures", "text"],
+        &["error"],
+        &["document", "regression"],
+        &["data"],
+        &["model"],
+        &["respond"],
+        &["estimate"],
+        &["validate"],
+        &["greybox", "select"],
+        &["inspect"],
+        &["report"],
+        &["filter", "track"],
+    ],
+};
+
+const COMMAND_LINE: House = House {
+    source: "cli",
+    floors: &[
+        &["main", "memory", "shell", "wrap"],
+        &["messages", "table"],
+        &["failure"],
+        &["interrupt"],
+        &["live", "progress", "replace"],
+        &["files", "output"],
+        &["args", "line_writer"],
+        &["job"],
+        &["log"],
+        &["commands"],
+        &["binding"],
+    ],
+};
+
+const PYTHON: House = House {
+    source: "py/src",
+    floors: &[&["error"], &["work"], &["array"], &["log", "online"], &["model"], &["judgement"]],
+};
+
+/// A module by its path from the root of its crate, which is the empty one.
+type Module = Vec<String>;
+
+/// What a file says of modules.
+#[derive(Default)]
+struct Named {
+    /// Paths that it names, segment by segment.
+    paths: Vec<Vec<String>>,
+    /// Names that others may take from it, and where they come from.
+    given: BTreeMap<String, Vec<String>>,
+}
+
+impl Named {
+    fn of(source: &str, file: &Path) -> Self {
+        let parsed = syn::parse_file(source);
+        let parsed =
+            parsed.map_err(|error| format!("{}: {error}", file.display())).expect("a source that compiles");
+        let mut named = Self::default();
+        named.visit_file(&parsed);
+        named
+    }
+
+    fn take(&mut self, tree: &UseTree, mut before: Vec<String>, public: bool) {
+        match tree {
+            UseTree::Path(path) => {
+                before.push(path.ident.to_string());
+                self.take(&path.tree, before, public);
+            }
+            UseTree::Group(group) => {
+                group.items.iter().for_each(|tree| self.take(tree, before.clone(), public))
+            }
+            UseTree::Name(_) | UseTree::Rename(_) | UseTree::Glob(_) => {
+                let (name, known_as) = match tree {
+                    UseTree::Name(name) => (name.ident.to_string(), name.ident.to_string()),
+                    UseTree::Rename(name) => (name.ident.to_string(), name.rename.to_string()),
+                    _ => ("*".to_owned(), "*".to_owned()),
+                };
+                if name != "self" {
+                    before.push(name);
+                }
+                if public {
+                    self.given.insert(known_as, before.clone());
+                }
+                self.paths.push(before);
+            }
+        }
+    }
+}
+
+fn is_for_tests(attributes: &[Attribute]) -> bool {
+    let words = |attribute: &Attribute| attribute.meta.require_list().map(|list| list.tokens.to_string());
+    attributes.iter().any(|attribute| {
+        attribute.path().is_ident("test")
+            || attribute.path().is_ident("cfg") && words(attribute).is_ok_and(|words| words == "test")
+    })
+}
+
+impl<'ast> Visit<'ast> for Named {
+    fn visit_item(&mut self, item: &'ast Item) {
+        let attributes = match item {
+            Item::Mod(item) => &item.attrs,
+            Item::Use(item) => &item.attrs,
+            Item::Fn(item) => &item.attrs,
+            Item::Impl(item) => &item.attrs,
+            _ => &Vec::new(),
+        };
+        if !is_for_tests(attributes) {
+            visit::visit_item(self, item);
+        }
+    }
+
+    fn visit_item_use(&mut self, item: &'ast ItemUse) {
+        self.take(&item.tree, Vec::new(), !matches!(item.vis, Visibility::Inherited));
+    }
+
+    fn visit_path(&mut self, path: &'ast syn::Path) {
+        self.paths.push(path.segments.iter().map(|segment| segment.ident.to_string()).collect());
+        visit::visit_path(self, path);
+    }
+}
+
+/// All modules of a crate but those of tests.
+fn modules(source: &Path) -> BTreeMap<Module, Named> {
+    let mut found = BTreeMap::new();
+    let mut folders = vec![(source.to_owned(), Vec::new())];
+    while let Some((folder, parent)) = folders.pop() {
+        for entry in fs::read_dir(&folder).expect("a folder of sources") {
+            let path = entry.expect("an entry").path();
+            let name = path.file_stem().expect("a name").to_string_lossy().into_owned();
+            if name == "tests" || name == "noise" || name.ends_with("_tests") {
+                continue;
+            }
+            let module = [&parent[..], std::slice::from_ref(&name)].concat();
+            if path.is_dir() {
+                // A folder that is no module holds other things.
+                if path.with_extension("rs").exists() {
+                    folders.push((path, module));
+                }
+            } else if path.extension().is_some_and(|extension| extension == "rs") {
+                let text = fs::read_to_string(&path).expect("a source");
+                let module = if parent.is_empty() && name == "lib" { Vec::new() } else { module };
+                found.insert(module, Named::of(&text, &path));
+            }
+        }
+    }
+    found
+}
+
+/// The module that has what a path names in another; none for what other crates have.
+fn owner(modules: &BTreeMap<Module, Named>, from: &Module, path: &[String], depth: usize) -> Option<Module> {
+    let child = |parent: &Module, name: &String| [&parent[..], std::slice::from_ref(name)].concat();
+    let mut at = from.clone();
+    let mut rest = path;
+    match path.first()?.as_str() {
+        "crate" => (at, rest) = (Vec::new(), &path[1..]),
+        "self" => rest = &path[1..],
+        "super" => {
+            while rest.first().is_some_and(|word| word == "super") {
+                at.pop();
+                rest = &rest[1..];
+            }
+        }
+        _ if modules.contains_key(&child(from, &path[0])) => {}
+        _ => return None,
+    }
+    while let Some(name) = rest.first() {
+        let next = child(&at, name);
+        if modules.contains_key(&next) {
+            (at, rest) = (next, &rest[1..]);
+            continue;
+        }
+        let given = modules.get(&at).and_then(|named| named.given.get(name)).filter(|_| depth < 8);
+        return given.and_then(|given| owner(modules, &at, given, depth + 1)).or(Some(at));
+    }
+    Some(at)
+}
+
+/// For each room the modules in it that each of its modules knows, with who says so.
+type Rooms = BTreeMap<Module, BTreeMap<String, BTreeMap<String, String>>>;
+
+fn rooms(modules: &BTreeMap<Module, Named>) -> Rooms {
+    let mut rooms = Rooms::new();
+    for (from, named) in modules {
+        for path in &named.paths {
+            let Some(to) = owner(modules, from, path, 0) else { continue };
+            let shared = from.iter().zip(&to).take_while(|(one, other)| one == other).count();
+            if shared < from.len() && shared < to.len() {
+                let room = rooms.entry(from[..shared].to_vec()).or_default();
+                let who = format!("{} names {}", from.join("::"), path.join("::"));
+                room.entry(from[shared].clone()).or_default().insert(to[shared].clone(), who);
+            }
+        }
+    }
+    rooms
+}
+
+/// What is known from a module on, one step or several.
+fn reached<'r>(room: &'r BTreeMap<String, BTreeMap<String, String>>, from: &'r str) -> BTreeSet<&'r str> {
+    let mut seen = BTreeSet::new();
+    let mut next = vec![from];
+    while let Some(module) = next.pop() {
+        for to in room.get(module).into_iter().flat_map(BTreeMap::keys) {
+            if seen.insert(to.as_str()) {
+                next.push(to);
+            }
+        }
+    }
+    seen
+}
+
+/// What is wrong with the modules of a house.
+fn wrongs(modules: &BTreeMap<Module, Named>, floors: &[&[&str]]) -> Vec<String> {
+    let floor = |name: &str| floors.iter().position(|floor| floor.contains(&name));
+    let top = modules.keys().filter_map(|module| module.first()).collect::<BTreeSet<_>>();
+    let mut wrong: Vec<String> = top
+        .into_iter()
+        .filter(|name| floor(name).is_none())
+        .map(|name| format!("{name} has no floor"))
+        .collect();
+    for (room, knows) in &rooms(modules) {
+        for (from, others) in knows {
+            for (to, who) in others {
+                if room.is_empty() && floor(to) >= floor(from) {
+                    wrong.push(format!("{from} must not know {to}: {who}"));
+                }
+                if !room.is_empty() && reached(knows, to).contains(from.as_str()) {
+                    wrong.push(format!("a circle in {}: {who}", room.join("::")));
+                }
+            }
+        }
+    }
+    wrong
+}
+
+#[test]
+fn nobody_knows_who_stands_above() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    for House { source, floors } in [CORE, LIBRARY, COMMAND_LINE, PYTHON] {
+        let modules = modules(&root.join(source));
+        assert!(modules.len() > 5, "{source}");
+        assert_eq!(wrongs(&modules, floors), Vec::<String>::new(), "{source}");
+    }
+}
+
+#[test]
+fn what_is_turned_round_is_seen() {
+    let file = |text: &str| Named::of(text, Path::new("example.rs"));
+    let house = |data: &str, model: &str, one: &str| {
+        let path = |words: &[&str]| words.iter().map(|word| (*word).to_owned()).collect::<Module>();
+        BTreeMap::from([
+            (path(&[]), file("pub use model::Model; mod data; mod model;")),
+            (path(&["data"]), file(data)),
+            (path(&["model"]), file("mod one; mod two; pub use one::Model; pub(crate) use two::Root;")),
+            (path(&["model", "one"]), file(one)),
+            (path(&["model", "two"]), file(model)),
+        ])
+    };
+    let floors: &[&[&str]] = &[&["data"], &["model"]];
+    let of = |data, two, one| wrongs(&house(data, two, one), floors);
+    assert!(of("", "use crate::data::Log;", "use super::Root;").is_empty());
+    assert!(of("#[cfg(test)] mod tests { use crate::Model; }", "", "").is_empty());
+    assert_eq!(of("use crate::Model;", "", ""), ["data must not know model: data names crate::Model"]);
+    assert_eq!(of("fn f(m: &crate::model::Model) {}", "", "").len(), 1);
+    assert_eq!(of("", "use super::Model;", "use super::Root;").len(), 2);
+}

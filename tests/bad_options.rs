@@ -25,8 +25,8 @@ fn orders_that_a_model_needs() {
         ("--model arma --nc 1", &["--model arma needs --na"]),
         ("--model oe --nb 2", &["--model oe needs --nf"]),
         ("--model bj --nb 2 --nf 2", &["--model bj needs --nc, --nd"]),
-        ("--model pem", &["--model pem needs orders", "--na --nb --nc --nd --nf"]),
-        ("--model pem --na 0", &["no parameters"]),
+        ("--model general", &["--model general needs orders", "--na --nb --nc --nd --nf"]),
+        ("--model general --na 0", &["no parameters"]),
     ]);
 }
 
@@ -48,7 +48,7 @@ fn inputs_of_a_model_without_any() {
     refused(&[
         ("--model arma --na 2 --nc 1 -u u", &["without inputs", "--input"]),
         ("--na 2 --nb 0 -u u", &["without inputs", "--input"]),
-        ("--model pem --na 1 --nf 1", &["--nf", "--nb"]),
+        ("--model general --na 1 --nf 1", &["--nf", "--nb"]),
         ("--model oe --nb 0 --nf 1", &["--nf", "--nb"]),
     ]);
 }
@@ -75,7 +75,7 @@ fn a_search_where_there_is_none() {
         for model in [
             "--na 2 --nb 2",
             "--model ar --na 2",
-            "--model pem --na 1 --nb 1",
+            "--model general --na 1 --nb 1",
             "--model bj --nb 1 --nc 0 --nd 0 --nf 0",
         ] {
             refused(&[(&format!("{model} {option}"), &[name, "one step"])]);

@@ -118,7 +118,7 @@ fn what_makes_no_sense_is_refused() {
         ("--model ar --na 1 --focus simulation", "simulation needs inputs"),
         ("--na 1 --nb 1 --method iv --focus simulation", "leave out the other method"),
         ("--na 1 --nb 1 --norm 1 --focus simulation", "leave out the other method"),
-        ("--model pem --na 1 --nb 1 --nf 1 --focus simulation", "leave out A"),
+        ("--model general --na 1 --nb 1 --nf 1 --focus simulation", "leave out A"),
     ] {
         let run = folder.run(&format!("fit log.csv {options} --report out.json"));
         assert_eq!(run.code, 2, "{options}: {}", run.stderr);

@@ -11,7 +11,7 @@ const MODELS: [&str; 6] = [
     "--model armax --na 2 --nb 2 --nc 1",
     "--model oe --nb 2 --nf 2",
     "--model bj --nb 2 --nf 2 --nc 1 --nd 1",
-    "--model pem --na 1 --nb 2 --nf 1 --nc 1",
+    "--model general --na 1 --nb 2 --nf 1 --nc 1",
     "--model arma --na 2 --nc 1",
 ];
 

@@ -79,7 +79,7 @@ fn what_it_does_not_go_with_is_refused_in_a_sentence() {
     for (options, words) in [
         ("--model oe --nb 1 --nf 1", "for ar, arma, arx and armax"),
         ("--model bj --nb 1 --nc 1 --nd 1 --nf 1", "for ar, arma, arx and armax"),
-        ("--model pem --na 1 --nb 1 --nd 1", "for ar, arma, arx and armax"),
+        ("--model general --na 1 --nb 1 --nd 1", "for ar, arma, arx and armax"),
         ("--model arma --na 1..2 --nc 1", "for one model"),
         ("", "for one model"),
         ("--model arma --na 1 --nc 1 --norm huber", "--norm does not go with"),

@@ -142,9 +142,12 @@ fn cases(samples: usize, noise: f64) -> Vec<Case> {
         case(two, "--model bj --nb 2,1 --nc 1 --nd 1 --nf 2,1 --nk 1,2"),
         case(
             Polynomials::new(&[-0.7], &[1.0, 0.4], &[0.5], &[], &[0.5]),
-            "--model pem --na 1 --nb 2 --nc 1 --nf 1 --nk 0",
+            "--model general --na 1 --nb 2 --nc 1 --nf 1 --nk 0",
         ),
-        case(Polynomials::new(&[-0.7], &[0.0, 1.0], &[], &[0.6], &[]), "--model pem --na 1 --nb 1 --nd 1"),
+        case(
+            Polynomials::new(&[-0.7], &[0.0, 1.0], &[], &[0.6], &[]),
+            "--model general --na 1 --nb 1 --nd 1",
+        ),
     ]
 }
 

@@ -91,7 +91,7 @@ fn signs_and_orders_have_a_legend() {
     let table = folder.done("fit log.csv --na 1..3 --nb 1..3 --select aic --report a.json").stdout;
     assert!(table.contains("\norders: ARX(na, nb, nk)\n"), "{table}");
     assert!(table.contains("\nAIC: for each sample, on the "), "{table}");
-    assert!(table.contains("; for each sample AIC "), "{table}");
+    assert!(table.contains("; per sample AIC "), "{table}");
     let table = folder.done("validate a.json log.csv").stdout;
     assert!(table.contains("\norders: ARX(na, nb, nk)\n"), "{table}");
 }

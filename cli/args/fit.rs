@@ -2,7 +2,9 @@
 
 use std::path::PathBuf;
 
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
+use thetahat::Select;
 
 use super::{ClockArguments, FormatArgument, LogArguments, Names};
 
@@ -128,8 +130,8 @@ pub(crate) struct ChoiceArguments {
     #[arg(long, value_enum)]
     pub(crate) path: Option<PathArgument>,
     /// What makes one model better than another [default: mdl]
-    #[arg(long, value_enum, value_name = "CRITERION")]
-    pub(crate) select: Option<SelectArgument>,
+    #[arg(long, value_name = "CRITERION", value_parser = selects())]
+    pub(crate) select: Option<Select>,
     /// Cut the rows in time order into parts: models are fitted to the first and compared, the chosen one is fitted again to
     /// the first two and judged on the third; 0 for a part that is not wanted
     #[arg(long, value_name = "E/V/T", conflicts_with = "validate", allow_hyphen_values = true)]
@@ -201,7 +203,7 @@ pub(crate) enum ModelArgument {
     /// Box and Jenkins: y = B/F u + C/D e
     Bj,
     /// A y = B/F u + C/D e, with any of them
-    Pem,
+    General,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -210,22 +212,6 @@ pub(crate) enum PathArgument {
     All,
     /// One order up at a time, each in its turn
     Alternate,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum SelectArgument {
-    /// Rissanen's minimum description length
-    Mdl,
-    /// Akaike's information criterion
-    Aic,
-    /// The same, corrected for few samples
-    Aicc,
-    /// Akaike's final prediction error
-    Fpe,
-    /// The smallest model within 1 % of the least cost on the validation rows
-    Validation,
-    /// The same by cross-validation over five blocks in time
-    Cv,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -278,4 +264,10 @@ pub(crate) enum SearchArgument {
     Newton,
     /// Steepest descent
     Gradient,
+}
+
+/// What a choice may select by, each with what it is.
+fn selects() -> impl TypedValueParser<Value = Select> {
+    let values = Select::all().map(|select| PossibleValue::new(select.word()).help(select.says()));
+    PossibleValuesParser::new(values).try_map(|word| word.parse::<Select>())
 }

@@ -11,8 +11,9 @@ mod validation;
 use thetahat::figures::{error, fixed, number, scientific, short};
 use thetahat::text::harmless;
 use thetahat::{
-    Algorithm, CriterionOutcome, Estimation, Fit, Initial, Interval, Model, Norm, Orders, Part, Procedure,
-    Quantity, Report, RobustOutcome, Root, Rows, SearchOutcome, Signal, Solver, Start, Stopped, Structure,
+    Algorithm, CriterionOutcome, Estimation, Fit, InformationCriterion, Initial, Interval, Model, Norm,
+    Orders, Part, Procedure, Quantity, Report, RobustOutcome, Root, Rows, SearchOutcome, Signal, Solver,
+    Start, Stopped, Structure,
 };
 
 pub(crate) use filtered::filtered;
@@ -69,7 +70,7 @@ fn formula(orders: &Orders) -> String {
         Structure::Armax => "ARMAX",
         Structure::Oe => "Output error",
         Structure::Bj => "Box-Jenkins",
-        Structure::Pem => "General model",
+        Structure::General => "General model",
     };
     format!("{name}: {}", orders.equation())
 }
@@ -102,13 +103,13 @@ fn estimation(text: &mut Text, estimation: &Estimation, model: &Model) {
             quantity(level)
         ));
     }
-    text.line(&format!(
-        "FPE {}; for each sample AIC {}, AICc {}, MDL {}",
-        number(criteria.fpe),
-        or_dash(criteria.aic, four),
-        or_dash(criteria.aicc, four),
-        or_dash(criteria.mdl, four)
-    ));
+    let of = |logarithmic: bool, figure: fn(f64) -> String| {
+        let all = InformationCriterion::all().filter(|criterion| criterion.is_logarithmic() == logarithmic);
+        let all =
+            all.map(|criterion| format!("{} {}", criterion.name(), or_dash(criteria.of(criterion), figure)));
+        all.collect::<Vec<_>>().join(", ")
+    };
+    text.line(&format!("{}; per sample {}", of(false, number), of(true, four)));
     match &estimation.procedure {
         Procedure::LeastSquares { solver } => {
             let solver = match solver {

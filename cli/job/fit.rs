@@ -6,7 +6,6 @@ use super::orders::OrderJob;
 use super::{LogJob, method, parsed, rows};
 use crate::args::{
     ConstantArgument, FitArguments, InitialArgument, LikelihoodArgument, ModelArguments, Names,
-    SelectArgument,
 };
 use crate::failure::Failure;
 use crate::memory::PerValue;
@@ -137,20 +136,13 @@ pub(super) fn named_values(option: &str, texts: &[String]) -> Result<Vec<(String
     Ok(values)
 }
 
-fn select(argument: Option<SelectArgument>, orders: &OrderJob) -> Result<Select, Failure> {
+fn select(argument: Option<Select>, orders: &OrderJob) -> Result<Select, Failure> {
     if argument.is_some() && !orders.is_choice() {
         return Err(Failure::usage(
             "--select chooses among several models, and the orders say one; give ranges such as --na 1..10, or no orders",
         ));
     }
-    Ok(match argument {
-        None | Some(SelectArgument::Mdl) => Select::Mdl,
-        Some(SelectArgument::Aic) => Select::Aic,
-        Some(SelectArgument::Aicc) => Select::Aicc,
-        Some(SelectArgument::Fpe) => Select::Fpe,
-        Some(SelectArgument::Validation) => Select::Validation,
-        Some(SelectArgument::Cv) => Select::Cv,
-    })
+    Ok(argument.unwrap_or_default())
 }
 
 fn initial(arguments: &ModelArguments, orders: &OrderJob) -> Result<Initial, Failure> {

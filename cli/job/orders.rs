@@ -23,7 +23,7 @@ impl ModelArgument {
             Self::Ar => ("ar", &["--na"]),
             Self::Oe => ("oe", &["--nb", "--nf"]),
             Self::Bj => ("bj", &["--nb", "--nc", "--nd", "--nf"]),
-            Self::Pem => ("pem", &["--na", "--nb", "--nc", "--nd", "--nf"]),
+            Self::General => ("general", &["--na", "--nb", "--nc", "--nd", "--nf"]),
         }
     }
 
@@ -36,8 +36,8 @@ impl ModelArgument {
             Self::Ar => Ok(Structure::Ar),
             Self::Oe => Ok(Structure::Oe),
             Self::Bj => Ok(Structure::Bj),
-            Self::Pem => Err(Failure::usage(
-                "--model pem needs orders: it is any of the others; give --na --nb --nc --nd --nf, or no --model for a choice \
+            Self::General => Err(Failure::usage(
+                "--model general needs orders: it is any of the others; give --na --nb --nc --nd --nf, or no --model for a choice \
                  among the others",
             )),
         }
@@ -97,7 +97,7 @@ impl OrderJob {
             .filter(|(order, given)| !given && has.contains(order))
             .map(|(order, _)| *order)
             .collect();
-        if *model != Some(ModelArgument::Pem) && !missing.is_empty() {
+        if *model != Some(ModelArgument::General) && !missing.is_empty() {
             return wrong(format!("needs {}", missing.join(", ")));
         }
         let or = |ranges: Vec<OrderRange>, default: usize| {

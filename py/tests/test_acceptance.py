@@ -53,7 +53,7 @@ def test_every_reference_case(case: dict[str, Any]) -> None:
     options: th.FitOptions = {"estimate": rows, "initial": "zero" if np.any(nf) else "drop"}
     if nc or nd or np.any(nf):
         options["tolerance"] = 1e-12
-    model = th.pem(log, na, nb, nc, nd, nf, nk, **options)
+    model = th.general(log, na, nb, nc, nd, nf, nk, **options)
     if case["file"] == "evaporator" and case["model"] == "oe":
         # The reference stopped at a minimum that is not the lowest.
         assert model.mse < 0.99 * case["mse"]

@@ -42,7 +42,7 @@ FITS: dict[str, Callable[[th.Log], th.Model]] = {
     "bj": lambda log: th.bj(log, nb=[2, 1], nc=1, nd=1, nf=[2, 2], nk=(1, 3)),
     "ar": lambda log: th.ar(log, na=4),
     "arma": lambda log: th.arma(log, na=2, nc=1),
-    "pem": lambda log: th.pem(log, na=1, nb=[2, 1], nf=[1, 1], nd=1, nk=[1, 3]),
+    "general": lambda log: th.general(log, na=1, nb=[2, 1], nf=[1, 1], nd=1, nk=[1, 3]),
     "iv": lambda log: th.iv(log, 2, [2, 1], [1, 3]),
     "sriv": lambda log: th.sriv(log, [2, 1], 2, [1, 3]),
 }
@@ -78,7 +78,7 @@ def test_every_structure_fits(log: th.Log, name: str) -> None:
     if name not in ("ar", "arma"):
         poles = [0.75 + np.sqrt(0.7 - 0.75**2) * 1j, 0.75 - np.sqrt(0.7 - 0.75**2) * 1j]
         near = np.abs(model.poles()[:, None] - np.array(poles)).min(axis=0)
-        assert name == "pem" or (near < 0.02).all()
+        assert name == "general" or (near < 0.02).all()
         assert model.inputs == ["u1", "u2"] and model.b[1][:3].tolist() == [0, 0, 0]
     # The document is the model: it comes back whole, and so do copies.
     again = th.Model.from_json(model.to_json())
@@ -330,7 +330,7 @@ def test_the_document_is_json_with_a_line_break(log: th.Log) -> None:
     assert json.loads(text)["data"]["logs"][0]["file"] == "memory"
 
 
-EVERY_FIT = (th.ar, th.arma, th.armax, th.arx, th.bj, th.iv, th.oe, th.pem, th.search, th.sriv)
+EVERY_FIT = (th.ar, th.arma, th.armax, th.arx, th.bj, th.iv, th.oe, th.general, th.search, th.sriv)
 
 
 @pytest.mark.parametrize(
@@ -347,7 +347,7 @@ def test_options_are_keyword_parameters(function: Any, options: Any) -> None:
     assert not [one for one in parameters.values() if one.kind is inspect.Parameter.VAR_KEYWORD]
     shown = {name for name, one in parameters.items() if one.kind is inspect.Parameter.KEYWORD_ONLY}
     known = set(options.__annotations__)
-    assert shown >= known or (options is th.FitOptions and shown & known and function not in (th.pem, th.search))
+    assert shown >= known or (options is th.FitOptions and shown & known and function not in (th.general, th.search))
     # Their types are told once, and each is described where the options are.
     own, told = get_type_hints(function, localns={"Model": th.Model, "np": np}), get_type_hints(options)
     for name in shown & known:

@@ -109,7 +109,7 @@ fn grid(input: &[f64], output: &[f64], [na, nb, nk]: [usize; 3]) -> Result<Vec<f
         path: Walk::All,
     };
     let record = Record::new(output, vec![input])?;
-    let chosen = choose_orders(&record, None, &Choice::Grid(grid), Select::Mdl)?.chosen;
+    let chosen = choose_orders(&record, None, &Choice::Grid(grid), Select::MDL)?.chosen;
     arx(&record, &chosen.orders, Initial::Drop)?;
     let orders = [chosen.orders.na, chosen.orders.nb[0], chosen.orders.nk[0]];
     Ok(orders.iter().map(|&order| order as f64).chain([chosen.mse]).collect())

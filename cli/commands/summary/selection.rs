@@ -63,14 +63,12 @@ pub(super) fn selection(text: &mut Text, report: &Report) {
 /// The name of a score that has no column of its own.
 fn score(selection: &Selection) -> Option<&'static str> {
     match selection.select {
-        Select::Mdl => Some("MDL"),
-        Select::Aic => Some("AIC"),
-        Select::Aicc => Some("AICc"),
-        Select::Fpe => Some("FPE"),
+        Select::Criterion(criterion) => Some(criterion.name()),
         Select::Validation | Select::Cv => None,
     }
 }
 
 fn criterion(select: Select, scored: &Scored) -> String {
-    or_dash(scored.score, |score| if select == Select::Fpe { number(score) } else { fixed(score, 4) })
+    let logarithmic = matches!(select, Select::Criterion(criterion) if criterion.is_logarithmic());
+    or_dash(scored.score, |score| if logarithmic { fixed(score, 4) } else { number(score) })
 }

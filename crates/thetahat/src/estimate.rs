@@ -34,7 +34,7 @@ use crate::{Error, Orders, Structure};
 pub use arx::{arx, arx_factor};
 pub(crate) use arx::{enough, estimate_is_for_f};
 pub(crate) use common::{Common, Point, Window};
-pub use criteria::Criteria;
+pub use criteria::{Criteria, InformationCriterion};
 pub use criterion::{Bound, Criterion, CriterionOutcome, GainBound, Norm};
 pub use exact::LikelihoodOutcome;
 pub(crate) use exact::exact_mean;
@@ -293,7 +293,7 @@ impl Estimate {
         let model =
             Model::from_parameters(orders, parameters, self.covariance(), *noise_variance, sample_time)?
                 .with_degrees_of_freedom(self.degrees_of_freedom())?;
-        if !self.criteria().fpe.is_finite() {
+        if !self.criteria().of(InformationCriterion::FPE).is_some_and(f64::is_finite) {
             return Err(Error::data("the noise variance overflows; scale the output towards one"));
         }
         Ok(Model { inputs, output, ..model })
@@ -372,7 +372,7 @@ impl Estimate {
         Self { covariance, noise_variance, ..self }
     }
 
-    /// FPE, AIC, AICc and MDL; of the exact likelihood where that was made large: AIC = (2 p - 2 ln L)/N - ln 2 pi - 1, and MDL alike.
+    /// Those of the exact likelihood where that was made large: AIC = (2 p - 2 ln L)/N - ln 2 pi - 1, and the others alike.
     pub fn criteria(&self) -> Criteria {
         Criteria::new(self.cost(), self.parameters.len(), self.samples)
     }

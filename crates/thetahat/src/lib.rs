@@ -57,9 +57,10 @@ pub use data::{
 };
 pub use error::Error;
 pub use estimate::{
-    Algorithm, Bound, Constant, Criteria, Criterion, CriterionOutcome, Estimate, GainBound, Initial,
-    LikelihoodOutcome, Loss, Method, Monitor, Norm, Procedure, Progress, Robust, RobustOutcome, Search,
-    SearchOutcome, Solver, StartOutcome, Step, Stopped, arx, arx_factor, estimate, estimate_monitored,
+    Algorithm, Bound, Constant, Criteria, Criterion, CriterionOutcome, Estimate, GainBound,
+    InformationCriterion, Initial, LikelihoodOutcome, Loss, Method, Monitor, Norm, Procedure, Progress,
+    Robust, RobustOutcome, Search, SearchOutcome, Solver, StartOutcome, Step, Stopped, arx, arx_factor,
+    estimate, estimate_monitored,
 };
 pub use filter::{
     EstimatedNumber, Estimator, FilterSummary, InitialState, ObserverGain, SmoothedStates, StateEstimate,

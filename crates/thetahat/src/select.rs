@@ -122,7 +122,7 @@ const EXACT: f64 = 1e-20;
 ///     nk: vec![range(1, 5)?],
 ///     path: Path::All,
 /// };
-/// let found = choose_orders(&Record::new(&y, vec![&u])?, None, &Choice::Grid(grid), Select::Mdl)?;
+/// let found = choose_orders(&Record::new(&y, vec![&u])?, None, &Choice::Grid(grid), Select::MDL)?;
 /// assert_eq!(found.chosen.orders, Orders::arx(2, &[1], &[3])?);
 /// # Ok::<(), thetahat::Error>(())
 /// ```

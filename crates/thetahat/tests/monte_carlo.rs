@@ -215,7 +215,7 @@ fn assert_chosen(truth: &Orders, noise: impl Fn(&mut Random, &[f64], &[f64]) -> 
         let y: Vec<f64> = x.iter().zip(&v).map(|(x, v)| x + share * v).collect();
         let (log, fresh) = (BEFORE..BEFORE + samples, BEFORE + samples..u.len());
         let record = Record::new(&y[log.clone()], vec![&u[log]]).expect("the case is sound");
-        let found = choose_orders(&record, None, &Choice::Automatic(Automatic::default()), Select::Mdl)
+        let found = choose_orders(&record, None, &Choice::Automatic(Automatic::default()), Select::MDL)
             .expect("the case is sound");
         let fit = |orders: &Orders| {
             let estimate =

@@ -1,6 +1,6 @@
 """System identification: models of dynamic systems from logged data.
 
-A log holds measured signals (`Log`, `read_csv`). A fit makes a model of it (`arx`, `armax`, `oe`, `bj`, `ar`, `arma`, `pem`,
+A log holds measured signals (`Log`, `read_csv`). A fit makes a model of it (`arx`, `armax`, `oe`, `bj`, `ar`, `arma`, `general`,
 `iv`, `sriv`), `search` chooses one, `inspect` looks at a log before. A `Model` predicts, simulates, forecasts and is validated.
 `thetahat.plot` draws, and `thetahat.sklearn` fits into scikit-learn.
 
@@ -17,7 +17,7 @@ Estimators that run with the process take a sample at a time, or a whole array: 
 Model(ARMAX(2, 2, 1, 1), 1-step fit 98.37 % on rows 1..700)
 """
 
-from thetahat._fit import EstimationWarning, ar, arma, armax, arx, bj, iv, oe, pem, search, sriv
+from thetahat._fit import EstimationWarning, ar, arma, armax, arx, bj, general, iv, oe, search, sriv
 from thetahat._judgement import Comparison, Inspection, Validation, compare, inspect
 from thetahat._log import Log, dc_motor, read_csv
 from thetahat._model import Model
@@ -85,10 +85,10 @@ __all__ = [
     "bj",
     "compare",
     "dc_motor",
+    "general",
     "inspect",
     "iv",
     "oe",
-    "pem",
     "read_csv",
     "search",
     "sriv",

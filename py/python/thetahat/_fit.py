@@ -382,7 +382,7 @@ def arma(
     return _fit("arma", locals())
 
 
-def pem(
+def general(
     log: Log,
     na: int = 0,
     nb: Orders | None = None,
@@ -441,10 +441,10 @@ def pem(
     Examples
     --------
     >>> import thetahat as th
-    >>> th.pem(th.dc_motor(), na=1, nb=2, nf=1, nd=1).structure
-    'pem'
+    >>> th.general(th.dc_motor(), na=1, nb=2, nf=1, nd=1).structure
+    'general'
     """
-    return _fit("pem", locals())
+    return _fit("general", locals())
 
 
 def iv(
@@ -589,11 +589,11 @@ def search(
     ----------
     log : Log
         The data.
-    model : {"arx", "armax", "oe", "bj", "ar", "arma", "pem"}, optional
+    model : {"arx", "armax", "oe", "bj", "ar", "arma", "general"}, optional
         The structure: ARX where orders are given, unless said otherwise.
     na, nb, nc, nd, nf, nk : int or range
         Orders, or those among which to choose: ``range(1, 9)`` is 1 to 8. nb, nf and nk may be one for each input.
-    select : {"mdl", "aic", "aicc", "fpe", "validation", "cv"}
+    select : {"mdl", "aic", "aicc", "fpe", "hqc", "validation", "cv"}
         What makes one model better than another: MDL, unless said otherwise.
     path : {"all", "alternate"}
         Which are tried: all of them, or one order up at a time.

@@ -242,11 +242,11 @@ class ReportedModel:
 
     @property
     def criteria(self) -> dict[str, float]:
-        """FPE, AIC, AICc and MDL for each sample, as Ljung counts them; NaN where one is not defined. `aic` and `bic` are those
+        """FPE, AIC, AICc, MDL and HQC for each sample, as Ljung counts them; NaN where one is not defined. `aic` and `bic` are those
         of the whole log."""
         estimation = self._estimation
-        names = ("fpe", "aic", "aicc", "mdl")
-        return {name: float("nan" if estimation.get(name) is None else estimation[name]) for name in names}
+        words = (word for word, _, _ in _thetahat.CRITERIA)
+        return {word: float("nan" if estimation.get(word) is None else estimation[word]) for word in words}
 
     @property
     def log_likelihood(self) -> float:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
+    "CRITERIA",
     "DEMO_LOG",
     "EstimationError",
     "ExtendedKalmanFilter",
@@ -41,6 +42,7 @@ __all__ = [
 ]
 
 __version__: str
+CRITERIA: list[tuple[str, str, bool]]
 DEMO_LOG: str
 
 class EstimationError(Exception):

@@ -29,7 +29,7 @@ except ImportError as error:
 from matplotlib.patches import Circle
 from matplotlib.ticker import MaxNLocator
 
-from thetahat import _drawing, _numbers, _options
+from thetahat import _drawing, _numbers, _options, _thetahat
 from thetahat._judgement import Inspection, Validation
 from thetahat._log import Log
 from thetahat._model import Model
@@ -48,15 +48,11 @@ Responses = Union[
 ]
 """What has a frequency response, or several of them, or several by name."""
 
-_CRITERIA = {
-    "mdl": "MDL",
-    "aic": "AIC",
-    "aicc": "AICc",
-    "fpe": "FPE",
+_CRITERIA = {word: name for word, name, _ in _thetahat.CRITERIA} | {
     "validation": "mean of e² on the validation rows",
     "cv": "mean of e² in cross-validation",
 }
-_LOGARITHMIC = ("mdl", "aic", "aicc")
+_LOGARITHMIC = {word for word, _, logarithmic in _thetahat.CRITERIA if logarithmic}
 """Criteria that are the logarithm of the cost and a penalty."""
 
 _FARTHEST = 3.0

@@ -27,7 +27,7 @@ use super::prediction_error::{prediction_error, predictor_of};
 use super::{Estimate, Initial, Procedure};
 use crate::data::Record;
 use crate::regression::{sum, sum_of_squares};
-use crate::{Criteria, Error, Orders};
+use crate::{Error, InformationCriterion, Orders};
 
 /// Autoregressions behind a plant have so many coefficients at most.
 const LONGEST: usize = 10;
@@ -142,7 +142,9 @@ pub(crate) fn noise_order(record: &Record<'_>, orders: &Orders, estimate: &Estim
             let Ok(found) = super::arx(&record, &orders, Initial::Drop) else { break };
             found.mse() * found.samples() as f64
         };
-        let mdl = Criteria::new(cost / samples as f64, order, samples).mdl.unwrap_or(f64::NEG_INFINITY);
+        let mdl = InformationCriterion::MDL
+            .value(cost / samples as f64, order, samples)
+            .unwrap_or(f64::NEG_INFINITY);
         if mdl < best.0 {
             best = (mdl, order);
         }

@@ -53,7 +53,7 @@ pub enum Structure {
     /// Box and Jenkins: y(t) = sum_j B_j(q)/F_j(q) u_j(t) + C(q)/D(q) e(t).
     Bj,
     /// Any other combination.
-    Pem,
+    General,
 }
 
 impl Orders {
@@ -145,7 +145,7 @@ impl Orders {
             (true, false, _, true, false) => Structure::Armax,
             (true, true, false, false, false) => Structure::Oe,
             (true, _, false, _, _) => Structure::Bj,
-            _ => Structure::Pem,
+            _ => Structure::General,
         }
     }
 
@@ -163,7 +163,7 @@ impl Orders {
             Structure::Armax => "ARMAX(na, nb, nc, nk)",
             Structure::Oe => "OE(nb, nf, nk)",
             Structure::Bj => "BJ(nb, nc, nd, nf, nk)",
-            Structure::Pem => "PEM(na, nb, nc, nd, nf, nk)",
+            Structure::General => "General(na, nb, nc, nd, nf, nk)",
         }
     }
 
@@ -344,9 +344,9 @@ mod tests {
         assert_eq!(of(1, &[2], 1, 0, &[0]), Structure::Armax);
         assert_eq!(of(0, &[2, 1], 0, 0, &[0, 1]), Structure::Oe);
         assert_eq!(of(0, &[2], 0, 1, &[1]), Structure::Bj);
-        assert_eq!(of(1, &[2], 0, 1, &[0]), Structure::Pem);
-        assert_eq!(of(1, &[2], 0, 0, &[1]), Structure::Pem);
-        assert_eq!(of(1, &[], 1, 1, &[]), Structure::Pem);
+        assert_eq!(of(1, &[2], 0, 1, &[0]), Structure::General);
+        assert_eq!(of(1, &[2], 0, 0, &[1]), Structure::General);
+        assert_eq!(of(1, &[], 1, 1, &[]), Structure::General);
     }
 
     #[test]
@@ -357,6 +357,6 @@ mod tests {
         assert_eq!(written(Orders::arx(2, &[1, 1], &[3, 4])), "ARX(2, 1, [3 4])");
         assert_eq!(written(Orders::armax(2, &[3], 1, &[0])), "ARMAX(2, 3, 1, 0)");
         assert_eq!(written(Orders::bj(&[1], 2, 3, &[4], &[5])), "BJ(1, 2, 3, 4, 5)");
-        assert_eq!(written(Orders::new(1, &[2], 3, 4, &[5], &[6])), "PEM(1, 2, 3, 4, 5, 6)");
+        assert_eq!(written(Orders::new(1, &[2], 3, 4, &[5], &[6])), "General(1, 2, 3, 4, 5, 6)");
     }
 }

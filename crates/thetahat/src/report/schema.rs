@@ -103,7 +103,7 @@ pub struct Estimation {
     pub samples: usize,
     /// The mean of e^2 over these samples; for exact likelihood that of v^2/f, with f the variances of innovations over var e.
     pub mse: f64,
-    /// FPE, AIC, AICc and MDL; for exact likelihood of that.
+    /// Information criteria, those that are logarithms for each sample; for exact likelihood of that.
     #[serde(flatten)]
     pub criteria: Criteria,
     /// The condition number of the regressors, scaled to unit norm; for a search that of psi. None where they are dependent.

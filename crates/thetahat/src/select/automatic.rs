@@ -144,12 +144,12 @@ pub(crate) fn constant_pays(record: &Record<'_>) -> bool {
 
 /// Which structures are tried.
 fn structures(task: &Task<'_>, automatic: &Automatic) -> Result<Vec<Structure>, Error> {
-    use Structure::{Ar, Arma, Armax, Arx, Bj, Oe, Pem};
+    use Structure::{Ar, Arma, Armax, Arx, Bj, General, Oe};
     let driven = !task.inputs.is_empty();
     match automatic.structure {
-        Some(Pem) => Err(Error::argument(
+        Some(General) => Err(Error::argument(
             "structure",
-            "pem has no orders of its own to try; give those of its polynomials, or ranges of them",
+            "general has no orders of its own to try; give those of its polynomials, or ranges of them",
         )),
         Some(structure @ (Arx | Armax | Oe | Bj)) if !driven => Err(Error::argument(
             "structure",
@@ -177,7 +177,7 @@ fn diagonal(record: &Record<'_>, structures: &[Structure], nk: &[usize]) -> Resu
             Structure::Armax => &DIAGONAL_ARMAX,
             Structure::Oe => &DIAGONAL_OE,
             Structure::Bj => &DIAGONAL_BJ,
-            Structure::Ar | Structure::Arma | Structure::Pem => &[],
+            Structure::Ar | Structure::Arma | Structure::General => &[],
         };
         for orders in all {
             let orders = of_structure(*structure, *orders, nk)?;
@@ -207,7 +207,7 @@ fn candidates(record: &Record<'_>, structures: &[Structure], nk: &[usize]) -> Re
         let highest = (2..=most).rev().find(fits).unwrap_or(1);
         let each = |used: bool| if used { 1..=highest } else { 1..=1 };
         let (third, fourth) = match structure {
-            Structure::Arx | Structure::Ar | Structure::Oe | Structure::Pem => (false, false),
+            Structure::Arx | Structure::Ar | Structure::Oe | Structure::General => (false, false),
             Structure::Armax | Structure::Arma => (true, false),
             Structure::Bj => (true, true),
         };
@@ -235,7 +235,7 @@ fn of_structure(structure: Structure, orders: [usize; 4], nk: &[usize]) -> Resul
     match structure {
         Structure::Ar => Orders::new(poles, &none, 0, 0, &none, nk),
         Structure::Arma => Orders::new(poles, &none, nc, 0, &none, nk),
-        Structure::Arx | Structure::Pem => Orders::new(poles, &nb, 0, 0, &none, nk),
+        Structure::Arx | Structure::General => Orders::new(poles, &nb, 0, 0, &none, nk),
         Structure::Armax => Orders::new(poles, &nb, nc, 0, &none, nk),
         Structure::Oe => Orders::new(0, &nb, 0, 0, &nf, nk),
         Structure::Bj => Orders::new(0, &nb, nc, nd, &nf, nk),

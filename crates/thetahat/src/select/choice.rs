@@ -1,11 +1,12 @@
+use std::borrow::Cow;
 use std::fmt;
 use std::str::FromStr;
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::model::LARGEST;
-use crate::{Error, Orders, Structure};
+use crate::{Error, InformationCriterion, Orders, Structure};
 
 /// Which orders a model may have.
 #[derive(Debug, Clone, PartialEq)]
@@ -82,23 +83,95 @@ pub enum Path {
 }
 
 /// What makes one model better than another.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Select {
-    /// Rissanen's minimum description length.
-    #[default]
-    Mdl,
-    /// Akaike's information criterion.
-    Aic,
-    /// The same, corrected for few samples.
-    Aicc,
-    /// Akaike's final prediction error.
-    Fpe,
+    /// The least of a criterion on the rows that models are fitted to.
+    Criterion(InformationCriterion),
     /// The mean of e^2 on the validation rows: the smallest model within 1 % of the least.
     Validation,
     /// Cross-validation: the mean of e^2 over five blocks in time, each predicted by a model of the others; the smallest
     /// model within 1 % of the least.
     Cv,
+}
+
+impl Select {
+    /// Rissanen's minimum description length.
+    pub const MDL: Self = Self::Criterion(InformationCriterion::MDL);
+
+    /// All of them.
+    pub fn all() -> impl Iterator<Item = Self> + Clone {
+        InformationCriterion::all().map(Self::Criterion).chain([Self::Validation, Self::Cv])
+    }
+
+    /// The word for it in options and documents.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Criterion(criterion) => criterion.word(),
+            Self::Validation => "validation",
+            Self::Cv => "cv",
+        }
+    }
+
+    /// What it is, in a few words.
+    pub fn says(self) -> &'static str {
+        match self {
+            Self::Criterion(criterion) => criterion.says(),
+            Self::Validation => "The smallest model within 1 % of the least cost on the validation rows",
+            Self::Cv => "The same by cross-validation over five blocks in time",
+        }
+    }
+
+    /// Whether it looks at samples that models are not fitted to.
+    pub(super) fn is_held_out(self) -> bool {
+        !matches!(self, Self::Criterion(_))
+    }
+}
+
+/// MDL.
+impl Default for Select {
+    fn default() -> Self {
+        Self::MDL
+    }
+}
+
+impl fmt::Display for Select {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.word())
+    }
+}
+
+impl FromStr for Select {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        Self::all().find(|select| select.word() == text).ok_or_else(|| {
+            let words: Vec<&str> = Self::all().map(Self::word).collect();
+            Error::argument("select", format!("'{text}' is none; there are {}", words.join(", ")))
+        })
+    }
+}
+
+impl Serialize for Select {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.word())
+    }
+}
+
+impl<'de> Deserialize<'de> for Select {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        String::deserialize(deserializer)?.parse().map_err(serde::de::Error::custom)
+    }
+}
+
+impl JsonSchema for Select {
+    fn schema_name() -> Cow<'static, str> {
+        "Select".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        let of = |select: Select| json_schema!({ "const": select.word(), "description": select.says() });
+        json_schema!({ "oneOf": Self::all().map(of).collect::<Vec<_>>() })
+    }
 }
 
 impl OrderRange {

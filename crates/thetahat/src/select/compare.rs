@@ -6,7 +6,7 @@ use super::search::Family;
 use super::{EXACT, Scored, Select, Task, held_out, unseen};
 use crate::data::Record;
 use crate::estimate::{Common, Initial, Point, stretches};
-use crate::{Criteria, Error, Orders};
+use crate::{Error, Orders};
 
 /// Of records with more samples, models of which some need a search see stretches only: so many, each so long.
 const LONG: usize = 1 << 16;
@@ -48,7 +48,7 @@ pub(super) fn compare(task: &Task<'_>, models: Vec<Orders>) -> Result<Outcome, E
     let record = thin.as_ref().unwrap_or(task.estimation);
     let samples = Samples::new(record, task.initial, &models)?;
     let count = samples.count(record);
-    let with_unseen = matches!(task.select, Select::Validation | Select::Cv);
+    let with_unseen = task.select.is_held_out();
     let smallest = models.first().map(|orders| task.named(orders));
     let mut tried: Vec<Tried> = models.into_iter().map(|orders| Tried { orders, point: None }).collect();
     // Blocks are left where time is up: the answer so far stands.
@@ -70,7 +70,7 @@ pub(super) fn compare(task: &Task<'_>, models: Vec<Orders>) -> Result<Outcome, E
         let common = Common::new(record, free, samples.window, task.search, task.deadline, task.monitor)?;
         let score = |orders: &Orders, point: &Point| {
             let (size, mse) = (point.parameters.len(), exact(point.cost) / count as f64);
-            let score = score(Select::Mdl, mse, size, price(orders, point.initial), count, None);
+            let score = score(Select::MDL, mse, size, price(orders, point.initial), count, None);
             score.unwrap_or(f64::NEG_INFINITY)
         };
         Family::new(&tried, task.inputs.len()).fit(&common, &mut tried, &score)?;
@@ -139,12 +139,8 @@ fn score(
     unseen: Option<f64>,
 ) -> Option<f64> {
     let raised = mse * (initial / samples as f64).exp();
-    let criteria = Criteria::new(raised, parameters, samples);
     match select {
-        Select::Mdl => criteria.mdl,
-        Select::Aic => criteria.aic,
-        Select::Aicc => criteria.aicc,
-        Select::Fpe => Some(criteria.fpe),
+        Select::Criterion(criterion) => criterion.value(raised, parameters, samples),
         Select::Validation | Select::Cv => unseen,
     }
 }

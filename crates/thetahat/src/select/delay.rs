@@ -24,7 +24,7 @@ use super::{Delay, Scan, Task};
 use crate::data::Record;
 use crate::figures::fixed;
 use crate::validate::feedback;
-use crate::{Criteria, Error, Orders};
+use crate::{Error, InformationCriterion, Orders};
 
 /// Orders of the models: na, and input lags.
 const DELAY_ORDER: usize = 10;
@@ -75,9 +75,10 @@ impl Long {
         let fitted = self.scaled.fit(&self.columns, &models.iter().collect::<Vec<_>>(), false);
         let mdl = |(fitted, orders): (Option<Fitted>, &Orders)| {
             let Some(fitted) = fitted else { return f64::INFINITY };
-            let criteria = Criteria::new(fitted.cost / count as f64, orders.parameters(), count);
+            let size = orders.parameters();
+            let mdl = InformationCriterion::MDL.value(fitted.cost / count as f64, size, count);
             // Of exact models the one that has the fewest parameters.
-            criteria.mdl.unwrap_or(EXACT_MODEL + orders.parameters() as f64)
+            mdl.unwrap_or(EXACT_MODEL + size as f64)
         };
         Ok(fitted.into_iter().zip(&models).map(mdl).collect())
     }

@@ -21,7 +21,7 @@ const CLOSE: f64 = 0.01;
 /// What a fit of the smallest model says, if the data determine none.
 pub(super) fn ranked(task: &Task<'_>, outcome: Outcome, path: Option<Path>) -> Result<Found, Error> {
     let Outcome { models: compared, failed, samples, remarks, smallest } = outcome;
-    let by_unseen = matches!(task.select, Select::Validation | Select::Cv);
+    let by_unseen = task.select.is_held_out();
     let mut compared: Vec<&Compared> = compared.iter().collect();
     compared.sort_by(|a, b| better(&a.scored, &b.scored, by_unseen));
     let order: Vec<&Scored> = compared.iter().map(|model| &model.scored).collect();
@@ -153,10 +153,7 @@ pub(super) fn models(count: usize) -> String {
 
 fn named(select: Select) -> &'static str {
     match select {
-        Select::Mdl => "MDL",
-        Select::Aic => "AIC",
-        Select::Aicc => "AICc",
-        Select::Fpe => "FPE",
+        Select::Criterion(criterion) => criterion.name(),
         Select::Validation => "the mean of e^2 on the validation rows",
         Select::Cv => "cross-validation",
     }

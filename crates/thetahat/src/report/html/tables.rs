@@ -4,8 +4,8 @@ use super::page::Table;
 use super::text::{complex, or_dash, percent, quantity, rows};
 use crate::figures::{chance, fixed, number, scientific, short, three};
 use crate::{
-    Estimation, Fit, Inspection, Model, Orders, Part, Procedure, Report, Root, Rows, Scored, Seen, Selection,
-    Source, Start, Stopped, Validated, Validation,
+    Estimation, Fit, InformationCriterion, Inspection, Model, Orders, Part, Procedure, Report, Root, Rows,
+    Scored, Seen, Selection, Source, Start, Stopped, Validated, Validation,
 };
 
 /// The models of a search that are listed.
@@ -98,10 +98,11 @@ pub(super) fn estimation(estimation: &Estimation, model: &Model) -> Table {
     add("condition number", or_dash(estimation.condition, |condition| scientific(condition, 3)));
     let four = |value: f64| fixed(value, 4);
     let criteria = &estimation.criteria;
-    add("FPE", number(criteria.fpe));
-    add("AIC, for each sample", or_dash(criteria.aic, four));
-    add("AICc, for each sample", or_dash(criteria.aicc, four));
-    add("MDL, for each sample", or_dash(criteria.mdl, four));
+    for criterion in InformationCriterion::all() {
+        let each = if criterion.is_logarithmic() { ", for each sample" } else { "" };
+        let value = if criterion.is_logarithmic() { four } else { number };
+        add(&format!("{}{each}", criterion.name()), or_dash(criteria.of(criterion), value));
+    }
     table
 }
 

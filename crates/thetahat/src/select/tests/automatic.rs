@@ -8,7 +8,7 @@ fn automatic(
     nk: Option<Vec<usize>>,
 ) -> Result<Selection, Error> {
     let choice = Choice::Automatic(Automatic { structure, nk });
-    chosen(record, None, &choice, Select::Mdl, Initial::Auto).map(|found| found.selection)
+    chosen(record, None, &choice, Select::MDL, Initial::Auto).map(|found| found.selection)
 }
 
 /// A plant B/F with a disturbance (C/D) e of a tenth of its output.
@@ -137,7 +137,7 @@ fn what_is_known_is_kept() {
     let selection = automatic(&record, Some(Structure::Ar), None).unwrap();
     assert!(selection.best.iter().all(|model| model.structure == Structure::Ar));
     assert!(automatic(&record, None, Some(vec![1, 2])).is_err());
-    assert!(automatic(&record, Some(Structure::Pem), None).is_err());
+    assert!(automatic(&record, Some(Structure::General), None).is_err());
 }
 
 #[test]

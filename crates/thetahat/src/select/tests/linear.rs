@@ -1,5 +1,5 @@
 use super::*;
-use crate::{Criteria, arx, estimate};
+use crate::{Criteria, InformationCriterion, arx, estimate};
 
 /// Two inputs, an output that follows them, and three segments, of which one is too short for the larger models.
 fn signals() -> ([Vec<f64>; 3], Vec<Range<usize>>) {
@@ -36,7 +36,7 @@ fn costs_of_a_grid_are_those_of_single_fits_on_common_samples() {
     let record = record(&y, &[&u, &v], &segments);
     for initial in [Initial::Auto, Initial::Drop, Initial::Zero] {
         let Found { selection, guess } =
-            chosen(&record, None, &Choice::Grid(grid_of_two()), Select::Mdl, initial).unwrap();
+            chosen(&record, None, &Choice::Grid(grid_of_two()), Select::MDL, initial).unwrap();
         // The largest reaches back 4 samples; the short segment has two more.
         let samples = if initial == Initial::Zero { 286 } else { 274 };
         assert_eq!((selection.samples, selection.failed), (samples, 0));
@@ -46,7 +46,7 @@ fn costs_of_a_grid_are_those_of_single_fits_on_common_samples() {
             let expected = mse(&record, &model.orders, 4, initial).unwrap();
             assert!(close(model.mse, expected, 1e-9), "{model:?} {expected}");
             let criteria = Criteria::new(model.mse, model.parameters, samples);
-            assert_eq!(model.score, criteria.mdl);
+            assert_eq!(model.score, criteria.of(InformationCriterion::MDL));
         }
         assert_eq!(selection.chosen.orders, Orders::arx(2, &[2, 1], &[2, 1]).unwrap());
         assert_eq!(selection.best.len(), 50);
@@ -61,17 +61,12 @@ fn costs_of_a_grid_are_those_of_single_fits_on_common_samples() {
 fn each_criterion_ranks_by_itself() {
     let ([y, u, v], segments) = signals();
     let record = record(&y, &[&u, &v], &segments);
-    for select in [Select::Mdl, Select::Aic, Select::Aicc, Select::Fpe] {
+    for criterion in InformationCriterion::all() {
+        let select = Select::Criterion(criterion);
         let found = chosen(&record, None, &Choice::Grid(grid_of_two()), select, Initial::Auto).unwrap();
         let chosen = found.selection.chosen;
         let criteria = Criteria::new(chosen.mse, chosen.parameters, 274);
-        let own = match select {
-            Select::Mdl => criteria.mdl,
-            Select::Aic => criteria.aic,
-            Select::Aicc => criteria.aicc,
-            _ => Some(criteria.fpe),
-        };
-        assert_eq!(chosen.score, own);
+        assert_eq!(chosen.score, criteria.of(criterion));
         assert_eq!(found.selection.least, None);
     }
 }
@@ -93,7 +88,7 @@ fn costs_keep_their_digits_where_columns_are_nearly_dependent() {
         nf: vec![0.into()],
         path: Path::All,
     };
-    let found = chosen(&record, None, &Choice::Grid(grid), Select::Mdl, Initial::Auto).unwrap();
+    let found = chosen(&record, None, &Choice::Grid(grid), Select::MDL, Initial::Auto).unwrap();
     assert_eq!(found.selection.failed, 0);
     for model in &found.selection.best {
         let expected = mse(&record, &model.orders, 7, Initial::Drop).unwrap();
@@ -117,13 +112,14 @@ fn of_exact_models_the_smallest_is_chosen() {
         nf: vec![0.into()],
         path: Path::All,
     };
-    for select in [Select::Mdl, Select::Fpe, Select::Aicc, Select::Validation, Select::Cv] {
+    let all = ["mdl", "fpe", "aicc", "validation", "cv"];
+    for select in all.map(|word| word.parse().unwrap()) {
         let found =
             chosen(&record, Some(&record), &Choice::Grid(grid.clone()), select, Initial::Auto).unwrap();
         let chosen = &found.selection.chosen;
         assert_eq!(chosen.orders, Orders::arx(2, &[2], &[2]).unwrap(), "{select:?}");
         assert_eq!(chosen.mse, 0.0);
-        let undefined = matches!(select, Select::Mdl | Select::Aicc);
+        let undefined = matches!(select, Select::Criterion(criterion) if criterion.is_logarithmic());
         assert_eq!(chosen.score, if undefined { None } else { Some(0.0) });
         assert!(found.selection.steps.iter().all(|step| !step.contains("NaN") && !step.contains("inf")));
     }
@@ -146,13 +142,13 @@ fn models_that_the_data_leave_open_are_counted_apart() {
         path: Path::All,
     };
     let selection =
-        chosen(&record, None, &Choice::Grid(grid.clone()), Select::Mdl, Initial::Auto).unwrap().selection;
+        chosen(&record, None, &Choice::Grid(grid.clone()), Select::MDL, Initial::Auto).unwrap().selection;
     assert_eq!((selection.models, selection.failed), (2, 3));
     assert!(selection.steps.iter().any(|step| step.contains("could not determine 3 models")));
     // Nothing at all.
     let zero = vec![0.0; 100];
     let silent = Record::new(&y, vec![&zero]).unwrap();
-    let refused = chosen(&silent, None, &Choice::Grid(grid), Select::Mdl, Initial::Auto);
+    let refused = chosen(&silent, None, &Choice::Grid(grid), Select::MDL, Initial::Auto);
     assert!(matches!(refused, Err(Error::Undetermined { .. })));
 }
 
@@ -171,7 +167,7 @@ fn models_with_more_parameters_than_samples_are_left_out() {
         path: Path::All,
     };
     let selection =
-        chosen(&record, None, &Choice::Grid(grid), Select::Aicc, Initial::Auto).unwrap().selection;
+        chosen(&record, None, &Choice::Grid(grid), "aicc".parse().unwrap(), Initial::Auto).unwrap().selection;
     // Four samples have all eight before them.
     assert_eq!((selection.samples, selection.models, selection.failed), (4, 3, 5));
     assert!(selection.best.iter().all(|model| model.structure == Structure::Ar));
@@ -193,7 +189,7 @@ fn one_model_alone_has_no_second() {
     let record = record(&y, &[&u, &v], &segments);
     let orders = Orders::arx(2, &[2, 1], &[2, 1]).unwrap();
     let selection =
-        chosen(&record, None, &Choice::Known(orders.clone()), Select::Mdl, Initial::Auto).unwrap().selection;
+        chosen(&record, None, &Choice::Known(orders.clone()), Select::MDL, Initial::Auto).unwrap().selection;
     assert_eq!((selection.chosen.orders, selection.second, selection.models), (orders, None, 1));
 }
 

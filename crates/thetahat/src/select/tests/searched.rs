@@ -98,7 +98,7 @@ fn a_search_for_each_finds_nothing_lower_among_the_best() {
     let (y, u) = signals(41, 600);
     let record = record(&y, &[&u], std::slice::from_ref(&(0..600)));
     let choice = Choice::Grid(grid(range(1, 3), range(1, 3), range(0, 3), 0.into(), 0.into()));
-    let Found { selection, guess } = chosen(&record, None, &choice, Select::Mdl, Initial::Auto).unwrap();
+    let Found { selection, guess } = chosen(&record, None, &choice, Select::MDL, Initial::Auto).unwrap();
     assert_eq!(selection.chosen.orders, Orders::armax(2, &[2], 2, &[1]).unwrap());
     assert_eq!(guess.unwrap().len(), 6);
     // ARX models stand in the same table, on the same samples.
@@ -124,7 +124,7 @@ fn the_number_of_threads_does_not_change_a_bit() {
         Choice::Grid(grid(range(1, 2), range(1, 2), range(0, 2), 0.into(), 0.into())),
         Choice::Grid(grid(0.into(), range(1, 2), range(0, 1), range(0, 1), range(1, 2))),
     ];
-    for (choice, select) in grids.iter().zip([Select::Mdl, Select::Cv]) {
+    for (choice, select) in grids.iter().zip([Select::MDL, Select::Cv]) {
         let by = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| chosen(&record, None, choice, select, Initial::Auto).unwrap())
@@ -150,7 +150,7 @@ fn whoever_watches_can_end_it() {
         estimation: &record,
         validation: None,
         inputs: &["u".to_owned()],
-        select: Select::Mdl,
+        select: Select::MDL,
         focus: Focus::Prediction,
         initial: Initial::Auto,
         search: &Search::default(),
@@ -167,9 +167,9 @@ fn dropped_samples_are_not_for_models_with_f() {
     let (y, u) = signals(53, 200);
     let record = record(&y, &[&u], std::slice::from_ref(&(0..200)));
     let choice = Choice::Grid(grid(0.into(), range(1, 2), 0.into(), 0.into(), range(0, 1)));
-    let refused = chosen(&record, None, &choice, Select::Mdl, Initial::Drop);
+    let refused = chosen(&record, None, &choice, Select::MDL, Initial::Drop);
     assert!(matches!(refused, Err(Error::Argument { argument, .. }) if argument == "initial"));
-    assert!(chosen(&record, None, &choice, Select::Mdl, Initial::Zero).is_ok());
+    assert!(chosen(&record, None, &choice, Select::MDL, Initial::Zero).is_ok());
 }
 
 /// A plant with slow poles that is not at rest at first: without its initial state no model with F would explain the log.
@@ -180,7 +180,7 @@ fn models_with_f_need_not_begin_at_rest() {
     let y = sum(&filtered(&[0.0, 1.0], &[1.0, -0.99], &u), &e, 0.3);
     let record = record(&y, &[&u], std::slice::from_ref(&(1000..1400)));
     let choice = Choice::Grid(grid(0.into(), range(1, 2), 0.into(), 0.into(), range(1, 2)));
-    let found = chosen(&record, None, &choice, Select::Mdl, Initial::Auto).unwrap();
+    let found = chosen(&record, None, &choice, Select::MDL, Initial::Auto).unwrap();
     assert_eq!(found.selection.chosen.orders, Orders::oe(&[1], &[1], &[1]).unwrap());
     assert!(close(found.selection.chosen.mse, 0.03, 0.2));
 }
@@ -190,7 +190,7 @@ fn long_records_are_compared_on_stretches() {
     let (y, u) = signals(61, (1 << 16) + 2);
     let record = record(&y, &[&u], std::slice::from_ref(&(0..(1 << 16) + 2)));
     let small = |nc: OrderRange| Choice::Grid(grid(2.into(), 2.into(), nc, 0.into(), 0.into()));
-    let of = |choice: &Choice| chosen(&record, None, choice, Select::Mdl, Initial::Auto).unwrap().selection;
+    let of = |choice: &Choice| chosen(&record, None, choice, Select::MDL, Initial::Auto).unwrap().selection;
     let searched = of(&small(2.into()));
     assert_eq!(searched.samples, 16 * (2048 - 2 - 50));
     assert!(searched.steps[0].contains("16 stretches"), "{:?}", searched.steps);

@@ -9,10 +9,7 @@ use crate::{Scored, Select, Selection, figures};
 /// What models were chosen by.
 pub(crate) fn score(select: Select) -> &'static str {
     match select {
-        Select::Mdl => "MDL",
-        Select::Aic => "AIC",
-        Select::Aicc => "AICc",
-        Select::Fpe => "FPE",
+        Select::Criterion(criterion) => criterion.name(),
         Select::Validation => "mean of e² on the validation rows",
         Select::Cv => "mean of e² in cross-validation",
     }

@@ -1,7 +1,7 @@
 //! The JSON document and the table.
 
 use serde_json::{Value, json};
-use thetahat::Report;
+use thetahat::{Document, Report};
 
 use crate::harness::{Folder, number, numbers};
 use crate::signals::{Experiment, Random, csv, plain_log, response};

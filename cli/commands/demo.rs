@@ -1,6 +1,7 @@
 //! `thetahat demo`: the main job on a log carried inside the program.
 
 use std::fs;
+use thetahat::Document;
 
 use clap::Parser;
 

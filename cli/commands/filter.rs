@@ -3,7 +3,9 @@
 mod columns;
 
 use thetahat::figures::fixed;
-use thetahat::{FilterSummary, GreyReport, InitialState, Report, StateFilter, StateModel};
+use thetahat::{
+    Document, FilterSummary, GreyReport, InitialState, Report, StateFilter, StateModel, is_document,
+};
 
 use super::{stored, summary};
 use crate::args::FilterArguments;
@@ -67,7 +69,7 @@ fn read(job: &FilterJob) -> Result<StateModel, Failure> {
     let text = stored::text(path)?;
     // JSON begins with a brace, and TOML cannot.
     let is_json = text.trim_start().starts_with('{');
-    let is_grey = text.contains("\"thetahat.greybox/");
+    let is_grey = is_document::<GreyReport>(&text);
     if job.initial.is_some() && (!is_json || is_grey) {
         return Err(Failure::usage(
             "--initial is for reports; a model in a text says itself where it starts",

@@ -4,8 +4,8 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use thetahat::{
-    Log, Report, Rows, Source, Validated, ValidationPlan, fit_page, held_out_runs, identify_monitored,
-    validate,
+    Document, Log, Report, Rows, Source, Validated, ValidationPlan, fit_page, held_out_runs,
+    identify_monitored, validate,
 };
 
 use super::{grey, summary};

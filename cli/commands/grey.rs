@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use thetahat::{GreyBox, Recording, Rows, Source, Times, fit_grey};
+use thetahat::{Document, GreyBox, Recording, Rows, Source, Times, fit_grey};
 
 use super::{stored, summary};
 use crate::args::{FitArguments, FormatArgument};

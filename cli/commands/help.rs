@@ -1,7 +1,9 @@
 //! What the program says of itself: the report's schema, shell completions, manual pages.
 
 use clap::CommandFactory;
-use thetahat::{Comparison, FilterSummary, GreyReport, Inspection, Report, TrackSummary, Validation};
+use thetahat::{
+    Comparison, Document, FilterSummary, GreyReport, Inspection, Report, TrackSummary, Validation,
+};
 
 use crate::args::{Arguments, DocumentArgument};
 use crate::failure::Failure;

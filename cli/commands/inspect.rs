@@ -3,7 +3,7 @@
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
-use thetahat::{Inspection, InspectionPlan, Recording, Times, inspection_page, text};
+use thetahat::{Document, Inspection, InspectionPlan, Recording, Times, inspection_page, text};
 
 use super::fit::usual_inputs;
 use super::summary;

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
-use thetahat::{Model, Report};
+use thetahat::{Document, Model, Report};
 
 use crate::failure::{Failure, Kind};
 

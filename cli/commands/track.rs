@@ -8,7 +8,7 @@ mod state;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use thetahat::{Report, TrackSummary, Tracker};
+use thetahat::{Document, Report, TrackSummary, Tracker};
 
 use super::{stored, summary};
 use crate::args::TrackArguments;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use thetahat::{Report, Validated, ValidationPlan, validate as validated, validation_page};
+use thetahat::{Document, Report, Validated, ValidationPlan, validate as validated, validation_page};
 
 use super::{stored, summary};
 use crate::args::{FormatArgument, LookArguments, ValidateArguments};

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use thetahat::{Inspection, InspectionPlan, Report, Requirement, Validated};
+use thetahat::{Document, Inspection, InspectionPlan, Report, Requirement, Validated};
 
 use crate::error;
 use crate::log::{Log, copy};

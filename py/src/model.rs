@@ -7,8 +7,8 @@ use numpy::{PyArray1, PyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use thetahat::{
-    Channel, Draws, Horizon, Procedure, Quantity, Report, Start, StateSpace, TransientResponse, Unjudged,
-    apply, frequency_response, impulse_response, logarithmic_frequencies, sample, step_response,
+    Channel, Document, Draws, Horizon, Procedure, Quantity, Report, Start, StateSpace, TransientResponse,
+    Unjudged, apply, frequency_response, impulse_response, logarithmic_frequencies, sample, step_response,
 };
 
 use crate::array::{from_matrix, matrix, vector};

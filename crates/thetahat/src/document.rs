@@ -1,16 +1,89 @@
-//! How documents are written.
+//! Documents: how they are written, read and described.
 
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 
 use crate::{Error, text};
 
-/// A document as JSON, indented, with a line break at its end. `what` is its name.
+/// A JSON document of this program: a schema with a major version, in its field `schema`, and its fields.
 ///
-/// # Errors
-/// [`Error::Report`] if it cannot be written.
-pub(crate) fn written(what: &str, document: &impl Serialize) -> Result<String, Error> {
-    let mut json = serde_json::to_string_pretty(document)
-        .map_err(|error| Error::report(format!("the {what} cannot be written as JSON: {error}")))?;
-    json.push('\n');
-    Ok(text::escaped_json(json))
+/// ```
+/// use thetahat::{Document, Validation};
+///
+/// assert_eq!(Validation::SCHEMA, "thetahat.validation/1");
+/// assert!(Validation::json_schema()["properties"]["fit"].is_object());
+/// let error = Validation::from_json(r#"{"schema": "thetahat.report/1"}"#).unwrap_err();
+/// assert!(error.to_string().contains("'thetahat.report/1', this version reads 'thetahat.validation/1'"));
+/// ```
+pub trait Document: Serialize + DeserializeOwned + JsonSchema {
+    /// What messages call it.
+    const NAME: &'static str;
+    /// The schema that this version writes, and reads with any minor version behind it.
+    const SCHEMA: &'static str;
+    /// What to do where a text is none.
+    const REMEDY: &'static str;
+
+    /// What is wrong with the whole, where each field is right.
+    ///
+    /// # Errors
+    /// [`Error::Report`].
+    fn check(&self) -> Result<(), Error> {
+        Ok(())
+    }
+
+    /// What is said of a document of another schema.
+    fn refusal(schema: &str) -> String {
+        let (own, remedy) = (Self::SCHEMA, Self::REMEDY);
+        format!("its schema is '{}', this version reads '{own}'; {remedy}", text::brief(schema, 40))
+    }
+
+    /// The document, indented, with a line break at its end.
+    ///
+    /// # Errors
+    /// [`Error::Report`] if it cannot be written as JSON.
+    fn to_json(&self) -> Result<String, Error> {
+        let mut json = serde_json::to_string_pretty(self).map_err(|error| {
+            Error::report(format!("the {} cannot be written as JSON: {error}", Self::NAME))
+        })?;
+        json.push('\n');
+        Ok(text::escaped_json(json))
+    }
+
+    /// Reads a document back. Fields that are not known are left out.
+    ///
+    /// # Errors
+    /// [`Error::Report`] with line and column if it is not JSON or a field is missing; if it has another major schema; if its
+    /// parts do not fit together.
+    fn from_json(text: &str) -> Result<Self, Error> {
+        let malformed = |error: serde_json::Error| {
+            Error::report(format!("this is not a thetahat {}: {error}; {}", Self::NAME, Self::REMEDY))
+        };
+        let schema = schema(text).map_err(malformed)?;
+        if schema != Self::SCHEMA && !schema.starts_with(&format!("{}.", Self::SCHEMA)) {
+            return Err(Error::report(Self::refusal(&schema)));
+        }
+        let document: Self = serde_json::from_str(text).map_err(malformed)?;
+        document.check()?;
+        Ok(document)
+    }
+
+    /// The JSON Schema of the document.
+    fn json_schema() -> serde_json::Value {
+        schemars::schema_for!(Self).to_value()
+    }
+}
+
+fn schema(text: &str) -> serde_json::Result<String> {
+    #[derive(Deserialize)]
+    struct Head {
+        schema: String,
+    }
+    serde_json::from_str::<Head>(text).map(|head| head.schema)
+}
+
+/// Whether a text is a document of this kind, of whatever version.
+pub fn is_document<D: Document>(text: &str) -> bool {
+    let kind = |schema: &str| schema.split('/').next().map(str::to_owned);
+    schema(text).is_ok_and(|schema| kind(&schema) == kind(D::SCHEMA))
 }

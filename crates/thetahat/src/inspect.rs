@@ -23,11 +23,11 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use crate::Error;
 use crate::data::{
     Channel, Interpolation, Log, Recording, Regular, Resample, Resampling, Rows, Source, Times, check,
 };
 use crate::validate::feedback::feedback;
+use crate::{Document, Error};
 use clock::Ticks;
 
 pub use inspection::{
@@ -151,7 +151,7 @@ fn of_the_rows(
         .map(|channel| channel::quality(channel, roles.get(channel.name.as_str()).copied(), times))
         .collect();
     let mut inspection = Inspection {
-        schema: Inspection::schema_name(),
+        schema: Inspection::SCHEMA.to_owned(),
         generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
         log: Source { rows: Rows::new(1, rows)?, resampled: None, ..source.clone() },
         rows,

@@ -55,6 +55,7 @@ pub use data::{
     AntiAlias, Channel, Detrend, Interpolation, Log, Offset, Prefilter, Record, Recording, Resample,
     Resampling, Rows, Source, Split, Times,
 };
+pub use document::{Document, is_document};
 pub use error::Error;
 pub use estimate::{
     Algorithm, Bound, Constant, Criteria, Criterion, CriterionOutcome, Estimate, GainBound,

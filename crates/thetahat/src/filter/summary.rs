@@ -3,10 +3,7 @@ use serde::{Deserialize, Serialize};
 
 use super::StateFilter;
 use super::estimate::StateValues;
-use crate::{Error, NisSummary, document};
-
-/// The schema that this version writes.
-const SCHEMA: &str = "thetahat.filter/1";
+use crate::{Document, NisSummary};
 
 /// What a [`StateFilter`] has come to: the JSON document `thetahat.filter/1`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -51,7 +48,7 @@ impl StateFilter {
         let latest = self.latest();
         let states = latest.and_then(|latest| latest.filtered.or(Some(latest.predicted)));
         FilterSummary {
-            schema: SCHEMA.to_owned(),
+            schema: FilterSummary::SCHEMA.to_owned(),
             generator: format!("thetahat {}", env!("CARGO_PKG_VERSION")),
             estimator: self.estimator().to_owned(),
             rows: totals.rows,
@@ -86,17 +83,8 @@ fn estimated<'a>(
         .collect()
 }
 
-impl FilterSummary {
-    /// The document, indented, with a line break at its end.
-    ///
-    /// # Errors
-    /// [`Error::Report`] if it cannot be written as JSON.
-    pub fn to_json(&self) -> Result<String, Error> {
-        document::written("summary", self)
-    }
-
-    /// The JSON Schema of the document.
-    pub fn json_schema() -> serde_json::Value {
-        schemars::schema_for!(Self).to_value()
-    }
+impl Document for FilterSummary {
+    const NAME: &'static str = "summary";
+    const SCHEMA: &'static str = "thetahat.filter/1";
+    const REMEDY: &'static str = "give a file that filter wrote";
 }

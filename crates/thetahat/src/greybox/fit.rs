@@ -21,7 +21,7 @@ use uncertainty::covariance;
 
 use super::{GreyBox, Scale, Unknown};
 use crate::estimate::Monitor;
-use crate::{Error, Recording, Source};
+use crate::{Document, Error, Recording, Source};
 
 /// Iterations at most.
 const MAX_ITERATIONS: usize = 100;
@@ -152,7 +152,7 @@ pub fn fit_grey(
         starts: figures.starts.iter().map(|start| start.as_ref().map(|start| start[index])).collect(),
     });
     let mut report = GreyReport {
-        schema: GreyReport::schema_name(),
+        schema: GreyReport::SCHEMA.to_owned(),
         generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
         logs: sources.to_vec(),
         rows: experiments.iter().map(Experiment::rows).sum(),

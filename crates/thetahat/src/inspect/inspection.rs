@@ -4,10 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::validate::feedback;
-use crate::{Error, Source, document};
-
-/// The schema that this version writes.
-const SCHEMA: &str = "thetahat.inspection/1";
+use crate::{Document, Source};
 
 /// What a log is worth, before any fit. The JSON document `thetahat.inspection/1`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -195,10 +192,6 @@ impl ChannelQuality {
 }
 
 impl Inspection {
-    pub(super) fn schema_name() -> String {
-        SCHEMA.to_owned()
-    }
-
     /// The same about the channels that matter most, `most` at most, in the order of the log: the output comes before the inputs,
     /// these before the others, and among them those first with the most to say of. Warnings are cut to as many. A log of
     /// up to twice as many channels, or warnings, keeps all of them. O(M log M) for M channels.
@@ -232,17 +225,10 @@ impl Inspection {
             warnings: self.warnings[..shown(self.warnings.len())].to_vec(),
         }
     }
+}
 
-    /// The document, indented, with a line break at its end.
-    ///
-    /// # Errors
-    /// [`Error::Report`] if it cannot be written as JSON.
-    pub fn to_json(&self) -> Result<String, Error> {
-        document::written("inspection", self)
-    }
-
-    /// The JSON Schema of the document.
-    pub fn json_schema() -> serde_json::Value {
-        schemars::schema_for!(Self).to_value()
-    }
+impl Document for Inspection {
+    const NAME: &'static str = "inspection";
+    const SCHEMA: &'static str = "thetahat.inspection/1";
+    const REMEDY: &'static str = "give a file that inspect wrote";
 }

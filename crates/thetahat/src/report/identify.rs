@@ -14,7 +14,7 @@ use crate::regression::sum;
 use crate::respond::{Start, innovations};
 use crate::select::{self, Automatic, Choice, Focus, Found, Grid, Select, Selection, Task};
 use crate::validate::{Fit, Horizon, Part};
-use crate::{Error, Initial, Orders, Quantity, Signal, Structure};
+use crate::{Document, Error, Initial, Orders, Quantity, Signal, Structure};
 
 /// Below this fraction of a channel's size, what detrending leaves is rounding.
 const ROUNDING: f64 = 1e-13;
@@ -442,7 +442,7 @@ fn fit(
     }
 
     let mut report = Report {
-        schema: Report::schema_name(),
+        schema: Report::SCHEMA.to_owned(),
         generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
         data: Data {
             logs: sources.to_vec(),

@@ -3,11 +3,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::data::Rows;
 use crate::{
-    Criteria, Error, Fit, Initial, Model, Prefilter, Procedure, Quantity, Selection, Source, document, text,
+    Criteria, Document, Error, Fit, Initial, Model, Prefilter, Procedure, Quantity, Selection, Source, text,
 };
-
-/// The schema that this version writes.
-const SCHEMA: &str = "thetahat.report/1";
 
 /// What a fit found: data provenance, the model, its figures. The JSON document `thetahat.report/1`.
 ///
@@ -110,51 +107,20 @@ pub struct Estimation {
     pub condition: Option<f64>,
 }
 
-impl Report {
-    pub(super) fn schema_name() -> String {
-        SCHEMA.to_owned()
+impl Document for Report {
+    const NAME: &'static str = "report";
+    const SCHEMA: &'static str = "thetahat.report/1";
+    const REMEDY: &'static str = "give a file that fit wrote";
+
+    fn check(&self) -> Result<(), Error> {
+        self.model.check()
     }
 
-    /// The document, indented, with a line break at its end.
-    ///
-    /// # Errors
-    /// [`Error::Report`] if it cannot be written as JSON.
-    pub fn to_json(&self) -> Result<String, Error> {
-        document::written("report", self)
-    }
-
-    /// Reads a document back.
-    ///
-    /// # Errors
-    /// [`Error::Report`] with line and column if it is not JSON or a field is missing; if it has another major schema;
-    /// if the parts of the model do not fit together.
-    pub fn from_json(text: &str) -> Result<Self, Error> {
-        #[derive(Deserialize)]
-        struct Head {
-            schema: String,
+    fn refusal(schema: &str) -> String {
+        if schema.starts_with("thetahat.greybox/") {
+            return "this is the fit of a model in equations, which only `thetahat filter` reads; give a report of polynomials".to_owned();
         }
-        let malformed = |error: serde_json::Error| {
-            Error::report(format!("this is not a thetahat report: {error}; give a file that fit wrote"))
-        };
-        let head: Head = serde_json::from_str(text).map_err(malformed)?;
-        if head.schema != SCHEMA && !head.schema.starts_with(&format!("{SCHEMA}.")) {
-            if head.schema.starts_with("thetahat.greybox/") {
-                return Err(Error::report(
-                    "this is the fit of a model in equations, which only `thetahat filter` reads; give a report of polynomials",
-                ));
-            }
-            return Err(Error::report(format!(
-                "its schema is '{}', this version reads '{SCHEMA}'; fit the log again",
-                text::brief(&head.schema, 40)
-            )));
-        }
-        let report: Self = serde_json::from_str(text).map_err(malformed)?;
-        report.model.check()?;
-        Ok(report)
-    }
-
-    /// The JSON Schema of the document.
-    pub fn json_schema() -> serde_json::Value {
-        schemars::schema_for!(Self).to_value()
+        let own = Self::SCHEMA;
+        format!("its schema is '{}', this version reads '{own}'; fit the log again", text::brief(schema, 40))
     }
 }

@@ -1,21 +1,16 @@
 use schemars::JsonSchema;
-use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use super::Report;
 use super::apply::{check_sample_time, record_for};
-use crate::data::Source;
-use crate::data::{Detrend, Log, Offset, Prefiltered, Record, Rows, checked};
+use crate::data::{Detrend, Log, Offset, Prefiltered, Record, Rows, Source, checked};
 use crate::estimate::exact_mean;
 use crate::figures::{chance, fixed, number};
 use crate::regression::sum;
 use crate::respond::{Innovations, Response, check_steps, innovations, prediction_deviations};
 use crate::validate::{Fit, Horizon, Relation, Residuals};
-use crate::{Error, Initial, Model, Orders, Procedure, Start, Structure, document, text};
+use crate::{Document, Error, Initial, Model, Orders, Procedure, Start, Structure};
 
-/// The schemas that this version writes.
-const VALIDATION: &str = "thetahat.validation/1";
-const COMPARISON: &str = "thetahat.comparison/1";
 const GENERATOR: &str = concat!("thetahat ", env!("CARGO_PKG_VERSION"));
 /// The levels of the prediction intervals of which the coverage is counted.
 const LEVELS: [f64; 4] = [0.5, 0.8, 0.95, 0.99];
@@ -285,7 +280,7 @@ pub fn validate(
             Procedure::InstrumentalVariables { .. } | Procedure::RefinedInstrumentalVariables { .. }
         );
     let mut validation = Validation {
-        schema: VALIDATION.to_owned(),
+        schema: Validation::SCHEMA.to_owned(),
         generator: GENERATOR.to_owned(),
         report: name.map(str::to_owned),
         logs: sources.to_vec(),
@@ -646,71 +641,22 @@ pub fn compare(validated: &[Validated]) -> Result<Comparison, Error> {
         return Err(Error::argument("models", "they were validated on other rows; compare them on the same"));
     }
     Ok(Comparison {
-        schema: COMPARISON.to_owned(),
+        schema: Comparison::SCHEMA.to_owned(),
         generator: GENERATOR.to_owned(),
         models: validated.iter().map(|validated| validated.validation.clone()).collect(),
     })
 }
 
-impl Validation {
-    /// The document, indented, with a line break at its end.
-    ///
-    /// # Errors
-    /// [`Error::Report`] if it cannot be written as JSON.
-    pub fn to_json(&self) -> Result<String, Error> {
-        document::written("validation", self)
-    }
-
-    /// Reads a document back.
-    ///
-    /// # Errors
-    /// [`Error::Report`] with line and column if it is not JSON or a field is missing; if it has another major schema.
-    pub fn from_json(text: &str) -> Result<Self, Error> {
-        read("validation", VALIDATION, text)
-    }
-
-    /// The JSON Schema of the document.
-    pub fn json_schema() -> serde_json::Value {
-        schemars::schema_for!(Self).to_value()
-    }
+impl Document for Validation {
+    const NAME: &'static str = "validation";
+    const SCHEMA: &'static str = "thetahat.validation/1";
+    const REMEDY: &'static str = "give a file that validate wrote";
 }
 
-impl Comparison {
-    /// The document, indented, with a line break at its end.
-    ///
-    /// # Errors
-    /// [`Error::Report`] if it cannot be written as JSON.
-    pub fn to_json(&self) -> Result<String, Error> {
-        document::written("comparison", self)
-    }
-
-    /// Reads a document back.
-    ///
-    /// # Errors
-    /// [`Error::Report`] with line and column if it is not JSON or a field is missing; if it has another major schema.
-    pub fn from_json(text: &str) -> Result<Self, Error> {
-        read("comparison", COMPARISON, text)
-    }
-
-    /// The JSON Schema of the document.
-    pub fn json_schema() -> serde_json::Value {
-        schemars::schema_for!(Self).to_value()
-    }
-}
-
-fn read<T: DeserializeOwned>(what: &str, schema: &str, text: &str) -> Result<T, Error> {
-    #[derive(Deserialize)]
-    struct Head {
-        schema: String,
-    }
-    let malformed =
-        |error: serde_json::Error| Error::report(format!("this is not a thetahat {what}: {error}"));
-    let head: Head = serde_json::from_str(text).map_err(malformed)?;
-    if head.schema != schema && !head.schema.starts_with(&format!("{schema}.")) {
-        let found = text::brief(&head.schema, 40);
-        return Err(Error::report(format!("its schema is '{found}', this version reads '{schema}'")));
-    }
-    serde_json::from_str(text).map_err(malformed)
+impl Document for Comparison {
+    const NAME: &'static str = "comparison";
+    const SCHEMA: &'static str = "thetahat.comparison/1";
+    const REMEDY: &'static str = "give a file that compare wrote";
 }
 
 #[cfg(test)]

@@ -2,10 +2,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Tracker;
-use crate::{Error, Orders, Parameter, document};
-
-/// The schema that this version writes.
-const SCHEMA: &str = "thetahat.track/1";
+use crate::{Document, Orders, Parameter};
 
 /// What trackers of one log have come to, side by side: the JSON document `thetahat.track/1`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -88,19 +85,12 @@ impl TrackSummary {
     /// The document about these trackers.
     pub fn new(rows: u64, gaps: u64, trackers: Vec<TrackerSummary>) -> Self {
         let generator = format!("thetahat {}", env!("CARGO_PKG_VERSION"));
-        Self { schema: SCHEMA.to_owned(), generator, rows, gaps, trackers }
+        Self { schema: Self::SCHEMA.to_owned(), generator, rows, gaps, trackers }
     }
+}
 
-    /// The document, indented, with a line break at its end.
-    ///
-    /// # Errors
-    /// [`Error::Report`] if it cannot be written as JSON.
-    pub fn to_json(&self) -> Result<String, Error> {
-        document::written("summary", self)
-    }
-
-    /// The JSON Schema of the document.
-    pub fn json_schema() -> serde_json::Value {
-        schemars::schema_for!(Self).to_value()
-    }
+impl Document for TrackSummary {
+    const NAME: &'static str = "summary";
+    const SCHEMA: &'static str = "thetahat.track/1";
+    const REMEDY: &'static str = "give a file that track wrote";
 }

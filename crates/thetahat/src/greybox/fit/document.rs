@@ -3,10 +3,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{Error, GreyBox, NisSummary, Source, Stopped, Test, document, text};
-
-/// The schema that this version writes.
-const SCHEMA: &str = "thetahat.greybox/1";
+use crate::{Document, Error, GreyBox, NisSummary, Source, Stopped, Test, text};
 
 /// What a fit of a model in equations found. The JSON document `thetahat.greybox/1`.
 ///
@@ -125,42 +122,6 @@ pub struct GreySearch {
 }
 
 impl GreyReport {
-    pub(super) fn schema_name() -> String {
-        SCHEMA.to_owned()
-    }
-
-    /// The document, indented, with a line break at its end.
-    ///
-    /// # Errors
-    /// [`Error::Report`] if it cannot be written as JSON.
-    pub fn to_json(&self) -> Result<String, Error> {
-        document::written("report", self)
-    }
-
-    /// Reads a document back.
-    ///
-    /// # Errors
-    /// [`Error::Report`] with line and column if it is not JSON or a field is missing; if it has another schema.
-    pub fn from_json(text: &str) -> Result<Self, Error> {
-        #[derive(Deserialize)]
-        struct Head {
-            schema: String,
-        }
-        let malformed = |error: serde_json::Error| {
-            Error::report(format!(
-                "this is not a report on a model in equations: {error}; give a file that fit --grey wrote"
-            ))
-        };
-        let head: Head = serde_json::from_str(text).map_err(malformed)?;
-        if head.schema != SCHEMA && !head.schema.starts_with(&format!("{SCHEMA}.")) {
-            return Err(Error::report(format!(
-                "its schema is '{}', this version reads models in equations as '{SCHEMA}'; fit the log again",
-                text::brief(&head.schema, 40)
-            )));
-        }
-        serde_json::from_str(text).map_err(malformed)
-    }
-
     /// The model with the values that were found, for a filter: nothing of it is unknown.
     ///
     /// # Errors
@@ -179,9 +140,17 @@ impl GreyReport {
         }
         Ok(model)
     }
+}
 
-    /// The JSON Schema of the document.
-    pub fn json_schema() -> serde_json::Value {
-        schemars::schema_for!(Self).to_value()
+impl Document for GreyReport {
+    const NAME: &'static str = "report on a model in equations";
+    const SCHEMA: &'static str = "thetahat.greybox/1";
+    const REMEDY: &'static str = "give a file that fit --grey wrote";
+
+    fn refusal(schema: &str) -> String {
+        let (schema, own) = (text::brief(schema, 40), Self::SCHEMA);
+        format!(
+            "its schema is '{schema}', this version reads models in equations as '{own}'; fit the log again"
+        )
     }
 }

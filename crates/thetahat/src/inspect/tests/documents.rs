@@ -1,6 +1,7 @@
 //! The whole inspection: what it takes, what it refuses, and its document.
 
 use super::*;
+use crate::Document;
 
 /// A log of a plant with a delay of 3, a closed loop being far away.
 fn log() -> (Vec<f64>, Vec<f64>) {

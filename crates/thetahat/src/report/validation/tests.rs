@@ -94,7 +94,7 @@ fn figures_are_those_of_their_definitions() {
     let report = fitted(&log, "1..300", arx(), Initial::Auto);
     let plan = ValidationPlan { horizons: vec![3, 1, 3, 7], ..plan("301..600") };
     let Validated { validation: found, signals } = validate(&report, Some("m"), log, &[], &plan).unwrap();
-    assert_eq!((found.schema.as_str(), found.report.as_deref()), (VALIDATION, Some("m")));
+    assert_eq!((found.schema.as_str(), found.report.as_deref()), (Validation::SCHEMA, Some("m")));
     let horizons: Vec<String> = found.fit.iter().map(|fit| fit.horizon.to_string()).collect();
     assert_eq!(horizons, ["1 step ahead", "3 steps ahead", "7 steps ahead", "free run"]);
     assert_eq!(
@@ -292,8 +292,8 @@ fn models_are_compared_on_the_same_rows() {
     // Each document is known by its schema.
     assert!(Validation::from_json(&text).unwrap_err().to_string().contains("thetahat.comparison/1"));
     assert!(Comparison::from_json("{}").unwrap_err().to_string().contains("not a thetahat comparison"));
-    assert!(Validation::json_schema()["properties"]["noise"].is_object());
-    assert!(Comparison::json_schema()["properties"]["models"].is_object());
+    assert!(<Validation as Document>::json_schema()["properties"]["noise"].is_object());
+    assert!(<Comparison as Document>::json_schema()["properties"]["models"].is_object());
 }
 
 #[test]

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use super::models::experiment;
 use crate::greybox::fit::criterion::Criterion;
 use crate::{
-    Channel, Error, Estimator, GreyBox, GreyReport, NisSummary, Recording, Source, StateFilter, StateModel,
-    Stopped, Times, fit_grey,
+    Channel, Document, Error, Estimator, GreyBox, GreyReport, NisSummary, Recording, Source, StateFilter,
+    StateModel, Stopped, Times, fit_grey,
 };
 
 fn data(name: &str) -> PathBuf {
@@ -184,7 +184,7 @@ fn reports_go_there_and_back() {
     for (changed, words) in [
         (text.replace("thetahat.greybox/1", "thetahat.report/1"), "its schema is 'thetahat.report/1'"),
         (text.replace("\"model\"", "\"modell\""), "missing field `model`"),
-        ("t,u\n".to_owned(), "not a report on a model in equations"),
+        ("t,u\n".to_owned(), "not a thetahat report on a model in equations"),
     ] {
         let Err(Error::Report { message }) = GreyReport::from_json(&changed) else { panic!("{words}") };
         assert!(message.contains(words), "{message}");

@@ -202,7 +202,7 @@ Example:
 Example:
   thetahat schema > thetahat.report.schema.json")]
     Schema {
-        /// The document: what fit, validate, compare, inspect, fit --grey, track or filter writes
+        /// The document: what fit, validate, compare, inspect, track or filter writes
         #[arg(value_enum, default_value = "report")]
         document: DocumentArgument,
     },
@@ -245,8 +245,6 @@ pub(crate) enum DocumentArgument {
     Track,
     /// What filter writes at its end
     Filter,
-    /// What fit --grey writes
-    Greybox,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -5,12 +5,12 @@ use std::ffi::OsString;
 use std::path::Path;
 
 use clap::Args;
-use thetahat::{Inspection, Log, Plan, Requirement, Source, ValidationPlan};
+use thetahat::{EquationsPlan, Inspection, Log, Plan, Requirement, Source, ValidationPlan};
 
 use crate::args::{InspectArguments, ValidateArguments};
 use crate::commands::{Experiments, experiments, inspected};
 use crate::failure::Failure;
-use crate::job::{FitJob, InspectJob, LookJob};
+use crate::job::{FitJob, GreyJob, InspectJob, LookJob};
 use crate::replace::replace;
 
 /// Logs that were read as one.
@@ -28,14 +28,14 @@ pub struct Opened {
     pub warnings: Vec<String>,
 }
 
-/// Reads the logs that `thetahat fit` would with these options.
+/// Reads the logs that `thetahat fit` would with these options. Their clocks may be uneven unless they have to be uniform.
 ///
 /// # Errors
 /// A [`Failure`] as the program would report it.
-pub fn read(options: &[OsString]) -> Result<Opened, Failure> {
+pub fn read(options: &[OsString], uniform: bool) -> Result<Opened, Failure> {
     let mut job = FitJob::resolve(&arguments("fit", options)?)?;
     job.log.quiet = true;
-    let Experiments { log, sources, channels, words } = experiments(&job)?;
+    let Experiments { log, sources, channels, words } = experiments(&job, !uniform)?;
     Ok(Opened { log, sources, inputs: channels.inputs, output: channels.output, warnings: words })
 }
 
@@ -53,6 +53,16 @@ pub fn plan(options: &[OsString], inputs: Vec<String>, output: String) -> Result
         return Err(Failure::usage("--nb: the log has no inputs; give it some, or orders of a time series"));
     }
     job.plan(inputs, output)
+}
+
+/// The plan that `thetahat fit --grey` makes of these options.
+///
+/// # Errors
+/// A [`Failure`] as the program would report it.
+pub fn equations_plan(options: &[OsString]) -> Result<EquationsPlan, Failure> {
+    let log = OsString::from("log");
+    let words: Vec<OsString> = options.iter().cloned().chain([log]).collect();
+    Ok(GreyJob::resolve(&arguments("fit", &words)?, Path::new("model"))?.plan)
 }
 
 /// How `thetahat validate` looks at a log with these options, and what it requires.

@@ -9,6 +9,7 @@ mod grey;
 mod help;
 mod inspect;
 mod respond;
+mod search;
 mod stored;
 pub(crate) mod summary;
 mod track;

@@ -5,8 +5,14 @@
 //! file a verb. Only this crate opens files, prints, or knows about terminals.
 
 #[cfg(doctest)]
-#[doc = include_str!("../README.md")]
-mod readme {}
+mod pages {
+    #[doc = include_str!("../README.md")]
+    mod readme {}
+    #[doc = include_str!("../docs/firmware.md")]
+    mod firmware {}
+    #[doc = include_str!("../docs/rust.md")]
+    mod rust {}
+}
 
 mod args;
 mod binding;
@@ -33,7 +39,7 @@ use clap::Parser;
 use messages::{say, tell};
 use thetahat::text;
 
-pub use binding::{Opened, inspect, plan, read, validation_plan, write};
+pub use binding::{Opened, equations_plan, inspect, plan, read, validation_plan, write};
 pub use commands::demo::LOG as DEMO_LOG;
 pub use commands::summary::{comparison, inspection, table, validation};
 pub use failure::{Failure, Kind};

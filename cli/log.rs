@@ -1,9 +1,9 @@
 //! From a text table to a log: which columns, which clock, and on which line an error is.
 
 use std::collections::{HashMap, HashSet};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use thetahat::{Channel, Error, Log, Recording, Resampling, Rows, Source, Times, text};
+use thetahat::{Channel, Error, GreyBox, Log, Model, Recording, Resampling, Rows, Source, Times, text};
 
 use crate::failure::Failure;
 use crate::interrupt;
@@ -19,6 +19,57 @@ pub(crate) struct Loaded {
     pub(crate) source: Source,
     /// What the reader should know, in plain words.
     pub(crate) words: Vec<String>,
+}
+
+/// Which clocks what is done with a log can go by.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Clocks {
+    /// The sample time of a log without a clock of its own; one row a second if there is none.
+    pub(crate) sample_time: Option<f64>,
+    /// Whether an irregular one will do.
+    pub(crate) any: bool,
+}
+
+impl From<&Model> for Clocks {
+    fn from(model: &Model) -> Self {
+        Self { sample_time: Some(model.sample_time()), any: model.takes_any_clock() }
+    }
+}
+
+impl From<&GreyBox> for Clocks {
+    fn from(model: &GreyBox) -> Self {
+        Self { sample_time: Some(model.sample_time()), any: true }
+    }
+}
+
+/// Several logs as one, and where they came from, their rows counted through.
+#[derive(Debug)]
+pub(crate) struct Joined {
+    pub(crate) log: Log,
+    pub(crate) sources: Vec<Source>,
+    /// What the reader should know, in plain words.
+    pub(crate) words: Vec<String>,
+}
+
+/// Reads the columns of some logs that `choose` names of each, seeing those there are, one log behind the other.
+pub(crate) fn joined(
+    paths: &[PathBuf],
+    job: &LogJob,
+    clocks: Clocks,
+    mut choose: impl FnMut(&Path, &[String]) -> Result<Vec<String>, Failure>,
+) -> Result<Joined, Failure> {
+    let (mut logs, mut sources, mut words) = (Vec::new(), Vec::<Source>::new(), Vec::new());
+    for path in paths {
+        let Loaded { log, mut source, words: own } = load(path, job, clocks, |header| choose(path, header))?;
+        let before = sources.last().map_or(0, |source| source.rows.last());
+        source.rows = Rows::new(before + 1, before + log.rows())
+            .map_err(|error| Failure::data(format!("{}: {error}", path.display())))?;
+        logs.push(log);
+        words.extend(own);
+        sources.push(source);
+    }
+    let log = Log::join(logs).map_err(failure(&sources))?;
+    Ok(Joined { log, sources, words })
 }
 
 /// What the library says of some logs, with the file that has the row or, without a row, all of them.
@@ -45,12 +96,10 @@ pub(crate) fn failure(sources: &[Source]) -> impl Fn(Error) -> Failure {
 }
 
 /// Reads the columns of a log that `choose` names, seeing those there are.
-///
-/// Without a clock of its own the log gets `sample_time`, or one row a second if there is none.
 pub(crate) fn load(
     path: &Path,
     job: &LogJob,
-    sample_time: Option<f64>,
+    clocks: Clocks,
     choose: impl FnOnce(&[String]) -> Result<Vec<String>, Failure>,
 ) -> Result<Loaded, Failure> {
     let Columns { channels, table, mut source, words } = columns(path, job, |reader| choose(reader.names()))?;
@@ -60,9 +109,10 @@ pub(crate) fn load(
             source.resampled = Some(Resampling::new(how, &time).map_err(at_line(&file, &table.lines))?);
             Log::resampled(channels, &time, how)
         }
+        (_, Some(time)) if clocks.any => Log::recorded(channels, time),
         (_, Some(time)) => Log::with_time(channels, time),
         (Clock::Fixed(seconds), None) => Log::new(channels, *seconds),
-        (_, None) => Log::new(channels, sample_time.unwrap_or(1.0)),
+        (_, None) => Log::new(channels, clocks.sample_time.unwrap_or(1.0)),
     };
     let log = log.map_err(at_line(&file, &table.lines))?;
     source.rows = Rows::new(1, log.rows()).map_err(at_line(&file, &table.lines))?;

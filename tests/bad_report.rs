@@ -108,7 +108,7 @@ fn a_model_that_was_edited() {
 #[test]
 fn a_field_that_is_missing() {
     let whole: Value = serde_json::from_str(&folder().read("model.json")).unwrap();
-    for field in ["a", "b", "orders", "inputs", "output", "sample_time"] {
+    for field in ["a", "b", "orders", "inputs", "outputs", "sample_time"] {
         let mut report = whole.clone();
         report["model"].as_object_mut().unwrap().remove(field);
         refused(report.to_string(), 3, &["model.json: ", &format!("`{field}`")]);

@@ -52,7 +52,7 @@ fn the_table_has_a_column_for_each_model() {
         |start: &str| line(start)[start.len()..].split_whitespace().map(str::to_owned).collect::<Vec<_>>();
     assert_eq!(words(""), ["log.csv", "rows", "301..600"]);
     assert_eq!(words("arx.json"), ["wrong.json", "oe.json", "ar.json"]);
-    assert_eq!(line("orders")[6..].trim().split("  ").filter(|word| !word.is_empty()).count(), 4);
+    assert_eq!(line("model")[5..].trim().split("  ").filter(|word| !word.is_empty()).count(), 4);
     assert_eq!(words("parameters"), ["4", "2", "4", "2"]);
     assert_eq!(words("stable"), ["yes", "yes", "yes", "yes"]);
     assert_eq!(words("fitted to these rows"), ["no", "no", "no", "no"]);

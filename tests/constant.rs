@@ -38,7 +38,7 @@ fn a_step_test_is_right_without_a_word() {
         let report = folder.fit(line);
         near(&report, "/model/dc_gain/0", 0.5);
         near(&report, "/estimation/level", 313.75);
-        assert_eq!(report["model"]["output"]["offset"]["level"], report["estimation"]["level"]["value"]);
+        assert_eq!(report["model"]["outputs"][0]["offset"]["level"], report["estimation"]["level"]["value"]);
         assert_eq!(report["estimation"].get("slope"), None);
     }
     let table = folder.done(&format!("fit {OE}")).stdout;

@@ -203,8 +203,8 @@ fn unknown_parameters_are_found_with_the_state_and_by_a_fit() {
         let run = folder.done("fit --grey model.toml log.csv --time t --report report.json");
         let report: Value = serde_json::from_str(&folder.read("report.json")).expect("it is JSON");
         assert_eq!(
-            (&report["schema"], &report["model"]),
-            (&"thetahat.greybox/1".into(), &text.as_str().into())
+            (&report["schema"], &report["model"]["kind"], &report["model"]["equations"]),
+            (&"thetahat.report/1".into(), &"equations".into(), &text.as_str().into())
         );
         for &(parameter, value) in truth {
             assert!(text.contains(&format!("{parameter} = {{ start")), "{name}: {parameter}");
@@ -214,12 +214,16 @@ fn unknown_parameters_are_found_with_the_state_and_by_a_fit() {
                 (estimated - value).abs() < 4.0 * deviation,
                 "{name} {parameter}: {estimated} {deviation}"
             );
-            let all = report["parameters"].as_array().into_iter().flatten();
-            let one = all.into_iter().find(|one| one["name"] == parameter).expect("it was fitted");
-            let (fitted, error) = (number(one, "/value"), number(one, "/standard_error"));
+            let named = |list: &Value| -> Value {
+                let all = list.as_array().into_iter().flatten();
+                all.into_iter().find(|one| one["name"] == parameter).expect("it was fitted").clone()
+            };
+            let one = named(&report["model"]["parameters"]);
+            let known = named(&report["estimation"]["unknown"]);
+            let (fitted, error) = (number(&one, "/value"), number(&one, "/standard_error"));
             assert!((fitted - value).abs() < 3.0 * error && error < 0.1 * value, "{name}: {one}");
             assert!(
-                run.stdout.contains(one["change_of_variable"].as_str().expect("it is said")),
+                run.stdout.contains(known["change_of_variable"].as_str().expect("it is said")),
                 "{}",
                 run.stdout
             );
@@ -266,7 +270,7 @@ fn the_series_resistance_of_a_cell_from_its_first_pulse() {
     assert!((r0 / 0.00177 - 1.0).abs() < 0.1, "{r0} {deviation}");
     let run = folder.done(&format!("fit --grey cell.toml log.csv --time t --estimate {range} --format json"));
     let report: Value = serde_json::from_str(&run.stdout).expect("it is JSON");
-    let all = report["parameters"].as_array().into_iter().flatten();
+    let all = report["model"]["parameters"].as_array().into_iter().flatten();
     let one = all.into_iter().find(|one| one["name"] == "r0").expect("it was fitted");
     assert!((number(one, "/value") / 0.00177 - 1.0).abs() < 0.1, "{one}");
 }
@@ -357,7 +361,7 @@ fn a_parameter_that_wants_out_of_its_bounds_stays_at_one() {
     );
     let run = folder.done("fit --grey model.toml log.csv --time t --format json");
     let report: Value = serde_json::from_str(&run.stdout).expect("it is JSON");
-    close(number(&report, "/parameters/0/value"), 1.2, 1e-3);
+    close(number(&report, "/model/parameters/0/value"), 1.2, 1e-3);
     assert!(run.stderr.contains("'mass' is within its standard error of its bound 1.2"), "{}", run.stderr);
 }
 
@@ -477,8 +481,8 @@ fn models_that_make_no_sense_are_refused_where_they_do_not() {
     folder.refused("filter bad.toml log.csv", 3);
     folder.write("bad.toml", "{\"schema\": \"thetahat.report/1\"}");
     folder.refused("filter bad.toml log.csv", 3);
-    folder.write("bad.toml", "{\"schema\": \"thetahat.greybox/2\"}");
-    assert!(folder.refused("filter bad.toml log.csv", 3).contains("thetahat.greybox/2"));
+    folder.write("bad.toml", "{\"schema\": \"thetahat.report/2\"}");
+    assert!(folder.refused("filter bad.toml log.csv", 3).contains("thetahat.report/2"));
     folder.refused("filter nothing.toml log.csv", 5);
     assert!(folder.refused("filter model.toml log.csv --estimator kalman", 2).contains("--estimator"));
     assert!(folder.refused("filter - -", 2).contains("only one"));
@@ -493,7 +497,7 @@ fn models_that_make_no_sense_are_refused_where_they_do_not() {
     assert!(
         folder
             .refused("fit --grey model.toml log.csv --time t --estimate 700..900", 3)
-            .contains("there are 800 rows")
+            .contains("the log has 800 rows")
     );
     folder.write("other.csv", "force,position\n1,x\n1,2\n");
     assert_eq!(filtered(&folder, "model.toml other.csv").len(), 2);

@@ -43,7 +43,7 @@ const LIBRARY: House = House {
         &["respond"],
         &["estimate"],
         &["validate"],
-        &["greybox", "select"],
+        &["select"],
         &["inspect"],
         &["report"],
         &["filter", "track"],
@@ -69,7 +69,7 @@ const COMMAND_LINE: House = House {
 
 const PYTHON: House = House {
     source: "py/src",
-    floors: &[&["error"], &["work"], &["array"], &["log", "online"], &["model"], &["judgement"]],
+    floors: &[&["error"], &["work"], &["array"], &["grey_box", "log", "online"], &["model"], &["judgement"]],
 };
 
 /// A module by its path from the root of its crate, which is the empty one.

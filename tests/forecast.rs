@@ -35,7 +35,7 @@ fn the_deviation_is_that_of_the_noise_of_so_many_steps_and_of_the_parameters() {
     for model in MODELS {
         let report = folder.fit(&format!("log.csv {model} --report model.json"));
         let response = noise_response(&report, 12);
-        let variance = number(&report, "/model/noise_variance");
+        let variance = number(&report, "/model/noise_covariance/0/0");
         for horizon in [1, 2, 5, 12] {
             let answer = answer(&folder, &format!("predict model.json log.csv --horizon {horizon}"));
             let steps: f64 = response[..horizon].iter().map(|h| h * h).sum();
@@ -105,9 +105,9 @@ fn a_series_is_forecast_beyond_the_end_of_its_log() {
     assert_eq!(answer.time, (1..=206).map(f64::from).collect::<Vec<f64>>());
     assert_eq!(answer.measured[200..], [None; 6]);
     // The difference equation goes on without noise.
-    let (a, mean) = (numbers(&report["model"]["a"]), number(&report, "/model/output/offset/level"));
+    let (a, mean) = (numbers(&report["model"]["a"]), number(&report, "/model/outputs/0/offset/level"));
     let mut past: Vec<f64> = y.iter().map(|y| y - mean).collect();
-    let variance = number(&report, "/model/noise_variance");
+    let variance = number(&report, "/model/noise_covariance/0/0");
     let response = noise_response(&report, 6);
     let open = &report["model"]["offset_covariance"]["covariance"];
     for step in 0..6 {

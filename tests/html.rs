@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 use thetahat::{
-    Channel, Detrend, Inspection, InspectionPlan, Log, Orders, Plan, Recording, Report, Source, Times,
-    Validated, ValidationPlan, comparison_page, fit_page, identify, inspect, inspection_page, validate,
-    validation_page,
+    Channel, Detrend, Inspection, InspectionPlan, Log, Model, Orders, Plan, PolynomialModel, Recording,
+    Report, Source, Times, Validated, ValidationPlan, comparison_page, fit_page, identify, inspect,
+    inspection_page, validate, validation_page,
 };
 
 use crate::browser::Browser;
@@ -324,12 +324,20 @@ fn short() -> Vec<Channel> {
 
 /// A model of it, and how that does on all of it.
 fn modelled(orders: Orders) -> (Report, Validated) {
-    let log = || Log::new(short(), 0.1).expect("the case is sound");
+    let log = Log::new(short(), 0.1).expect("the case is sound");
     let plan = Plan { detrend: Detrend::Mean, ..Plan::new(&["u"], "y", orders) };
-    let report = identify(log(), &[], &plan).expect("the case is sound");
+    let report = identify(log.clone(), &[], &plan).expect("the case is sound");
     let validated =
-        validate(&report, None, log(), &[], &ValidationPlan::default()).expect("the case is sound");
+        validate(&report, None, &log, &[], &ValidationPlan::default()).expect("the case is sound");
     (report, validated)
+}
+
+fn polynomials(report: &mut Report) -> &mut PolynomialModel {
+    match &mut report.model {
+        Model::Polynomial(model) => Some(&mut **model),
+        Model::Equations(_) => None,
+    }
+    .expect("the case is sound")
 }
 
 fn inspected() -> Inspection {
@@ -356,18 +364,15 @@ fn pages_do_without_what_is_missing() {
 
     // No covariance, no residuals, no prediction, no free run.
     let mut report = complete_report.clone();
-    report.model.covariance = None;
-    report
-        .model
-        .poles
-        .iter_mut()
-        .chain(report.model.zeros.iter_mut().flatten())
-        .for_each(|root| root.covariance = None);
+    let model = polynomials(&mut report);
+    model.covariance = None;
+    let roots = model.poles.iter_mut().chain(model.zeros.iter_mut().flatten());
+    roots.for_each(|root| root.covariance = None);
     let mut poor = complete.clone();
-    poor.validation.residuals = None;
+    poor.validation.residuals.clear();
     poor.validation.fit.iter_mut().for_each(|fit| fit.percent = None);
-    poor.signals.predicted.fill(f64::NAN);
-    poor.signals.simulated = None;
+    poor.signals.outputs[0].predicted.fill(f64::NAN);
+    poor.signals.outputs[0].simulated = None;
     let page = validation_page(&report, &poor, "");
     assert_eq!(charts(&page).len(), 5);
     assert!(page.contains("There are no residuals to test") && page.contains("The uncertainty is not known"));
@@ -376,12 +381,13 @@ fn pages_do_without_what_is_missing() {
     // An unstable model, of which the free run overflows; residuals that are constant.
     let (mut report, mut poor) = modelled(Orders::arx(1, &[1], &[1]).expect("the case is sound"));
     let pole = -1.3;
-    report.model.a[1] = pole;
-    report.model.poles[0].re = -pole;
-    report.model.stable = false;
+    let model = polynomials(&mut report);
+    model.a[1] = pole;
+    model.poles[0].re = -pole;
+    model.stable = false;
     let overflow = |t: usize| if t < 200 { 1e308 } else { f64::INFINITY };
-    poor.signals.simulated = Some((0..300).map(overflow).collect());
-    if let Some(residuals) = &mut poor.validation.residuals {
+    poor.signals.outputs[0].simulated = Some((0..300).map(overflow).collect());
+    if let Some(residuals) = poor.validation.residuals.first_mut() {
         residuals.autocorrelation.iter_mut().skip(1).for_each(|value| *value = f64::NAN);
         residuals.independence[0].correlation.fill(f64::NAN);
     }
@@ -390,7 +396,7 @@ fn pages_do_without_what_is_missing() {
     assert!(page.contains("unstable") && page.contains("grows without bound"));
 
     // A pole on the unit circle, where the frequency response has none.
-    report.model.a[1] = 1.0;
+    polynomials(&mut report).a[1] = 1.0;
     let page = validation_page(&report, &poor, "");
     assert!(page.contains("the model has a pole at"));
 

@@ -105,7 +105,7 @@ fn the_estimate_is_the_least_squares_solution() {
     let variance = squares / (498.0 - 4.0);
     assert_eq!(number(&report, "/estimation/samples"), 498.0);
     assert!((number(&report, "/estimation/mse") / (squares / 498.0) - 1.0).abs() < 1e-10);
-    assert!((number(&report, "/model/noise_variance") / variance - 1.0).abs() < 1e-10);
+    assert!((number(&report, "/model/noise_covariance/0/0") / variance - 1.0).abs() < 1e-10);
     for (i, row) in inverse.iter().enumerate() {
         let covariance: Vec<f64> = row.iter().map(|value| variance * value).collect();
         assert!(distance(&numbers(&report["model"]["covariance"][i]), &covariance) < 1e-10 * variance);
@@ -205,7 +205,7 @@ fn by_definition(report: &Value, experiment: &Experiment, horizon: usize) -> Vec
     let a = numbers(&report["model"]["a"]);
     let b = numbers(&report["model"]["b"][0]);
     let (of_u, of_y) =
-        (number(report, "/model/inputs/0/offset/level"), number(report, "/model/output/offset/level"));
+        (number(report, "/model/inputs/0/offset/level"), number(report, "/model/outputs/0/offset/level"));
     let u: Vec<f64> = experiment.u.iter().map(|u| u - of_u).collect();
     let y: Vec<f64> = experiment.y.iter().map(|y| y - of_y).collect();
     let reach = (a.len() - 1).max(b.len() - 1);
@@ -313,7 +313,7 @@ fn a_straight_line_under_the_signals_is_taken_away_and_put_back() {
     folder.write("drift.csv", csv(&[("u", &experiment.u), ("y", &drift)]));
     let [plain, drifting] = ["log.csv", "drift.csv"].map(|log| {
         let report = folder.fit(&format!("{log} --detrend linear --sample-time 0.5 --na 2 --nb 2"));
-        let slope = number(&report, "/model/output/offset/slope");
+        let slope = number(&report, "/model/outputs/0/offset/slope");
         (parameters(&report), slope)
     });
     assert!(distance(&plain.0, &drifting.0) < 1e-8);

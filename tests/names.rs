@@ -73,7 +73,7 @@ fn documents_keep_the_names() {
     let folder = folder();
     let report: Value = serde_json::from_str(&folder.read("model.json")).unwrap();
     assert_eq!(
-        (&report["model"]["inputs"][0]["name"], &report["model"]["output"]["name"]),
+        (&report["model"]["inputs"][0]["name"], &report["model"]["outputs"][0]["name"]),
         (&json!(INPUT), &json!(OUTPUT))
     );
     let run = folder.done("filter model.json log.csv --every 100");

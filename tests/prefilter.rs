@@ -53,18 +53,18 @@ fn drift_does_no_harm_to_a_fit_above_its_frequencies() {
     assert_eq!(report["data"]["prefilter"], json!({"low": 0.05, "high": null}));
     assert!(whole["data"].get("prefilter").is_none());
     // Errors that were made small are filtered ones; figures and noise variance are of the log as it is.
-    assert!(number(&report, "/estimation/mse") < 0.1 * number(&report, "/model/noise_variance"));
+    assert!(number(&report, "/estimation/mse") < 0.1 * number(&report, "/model/noise_covariance/0/0"));
     let run = folder.done("predict model.json log.csv --rows 3001..4000");
     let rmse = Answer::read(&run.stdout).rmse();
     let fits = report["fit"].as_array().unwrap();
     assert!((number(&fits[2], "/rmse") - rmse).abs() < 1e-9);
     let mse = number(&fits[0], "/rmse").powi(2);
-    assert!((number(&report, "/model/noise_variance") / (mse * 3000.0 / 2998.0) - 1.0).abs() < 1e-6);
+    assert!((number(&report, "/model/noise_covariance/0/0") / (mse * 3000.0 / 2998.0) - 1.0).abs() < 1e-6);
     // The log of the fit is known again.
     let validation = folder.done("validate model.json log.csv --rows 1..3000 --format json").stdout;
     let validation: Value = serde_json::from_str(&validation).unwrap();
     assert_eq!(validation["seen"], "yes");
-    assert!((number(&validation, "/noise/ratio") - 1.0).abs() < 0.01);
+    assert!((number(&validation, "/noise/0/ratio") - 1.0).abs() < 0.01);
 }
 
 #[test]

@@ -57,7 +57,7 @@ fn the_skeleton_that_other_tools_rely_on_is_there() {
     assert_eq!(model["c"], json!([1.0]));
     assert_eq!(model["d"], json!([1.0]));
     assert_eq!(model["f"], json!([[1.0]]));
-    assert!(number(model, "/noise_variance") > 0.0);
+    assert!(number(model, "/noise_covariance/0/0") > 0.0);
     let parameters = model["parameters"].as_array().unwrap();
     for (parameter, (name, value)) in parameters.iter().zip([
         ("a1", &model["a"][1]),
@@ -130,7 +130,7 @@ fn offsets_are_those_of_the_estimation_rows() {
         let report = folder.fit(&line);
         let level = |pointer: &str| number(&report, pointer);
         assert!((level("/model/inputs/0/offset/level") - expected.0).abs() < 1e-12, "{options}");
-        assert!((level("/model/output/offset/level") - expected.1).abs() < 1e-12, "{options}");
+        assert!((level("/model/outputs/0/offset/level") - expected.1).abs() < 1e-12, "{options}");
     }
 }
 
@@ -145,7 +145,7 @@ fn criteria_follow_their_definitions() {
     assert!((of("aic") - (mse.ln() + 2.0 * p / n)).abs() < 1e-12);
     assert!((of("aicc") - (of("aic") + 2.0 * p * (p + 1.0) / (n * (n - p - 1.0)))).abs() < 1e-12);
     assert!((of("mdl") - (mse.ln() + p * n.ln() / n)).abs() < 1e-12);
-    assert!((number(&report, "/model/noise_variance") / (mse * n / (n - p)) - 1.0).abs() < 1e-12);
+    assert!((number(&report, "/model/noise_covariance/0/0") / (mse * n / (n - p)) - 1.0).abs() < 1e-12);
 }
 
 #[test]
@@ -265,8 +265,11 @@ fn branches<'a>(root: &'a Value, schema: &'a Value) -> Vec<&'a Value> {
 }
 
 /// The properties that a schema names, with those of its branches that the value agrees with.
-fn properties<'a>(root: &'a Value, schema: &'a Value, value: &Value) -> Vec<&'a String> {
+fn properties<'a>(root: &'a Value, schema: &'a Value, value: &'a Value) -> Vec<&'a String> {
     let own = schema["properties"].as_object().into_iter().flatten().map(|(name, _)| name);
+    // A map has whatever names it has.
+    let any = value.as_object().filter(|_| schema.get("additionalProperties").is_some());
+    let own = own.chain(any.into_iter().flatten().map(|(name, _)| name));
     let fitting =
         branches(root, schema).into_iter().filter(|branch| mismatches(root, branch, value, "").is_empty());
     own.chain(fitting.flat_map(|branch| properties(root, branch, value))).collect()
@@ -325,6 +328,11 @@ fn mismatches(root: &Value, schema: &Value, value: &Value, place: &str) -> Vec<S
                 for (name, value) in value.as_object().into_iter().flatten() {
                     parts.extend(rule.get(name).map(|rule| (rule, value, format!("{place}/{name}"))));
                 }
+            }
+            "additionalProperties" => {
+                let named = |name: &String| schema["properties"].get(name).is_some();
+                let others = value.as_object().into_iter().flatten().filter(|(name, _)| !named(name));
+                parts.extend(others.map(|(name, value)| (rule, value, format!("{place}/{name}"))));
             }
             "items" | "prefixItems" => {
                 for (position, value) in items.into_iter().flatten().enumerate() {

@@ -123,8 +123,8 @@ mod unix {
         terminal.wait_for("searching");
         terminal.press_control_c();
         let shown = terminal.end().stderr;
-        let last = shown.rfind("searching").unwrap_or_default();
-        assert!(last > 0 && shown[last..].contains("\u{1b}[2K"), "{shown:?}");
+        let last = shown.rfind("searching").expect("the bar was drawn");
+        assert!(shown[last..].contains("\u{1b}[2K"), "{shown:?}");
         assert!(shown.ends_with("interrupted; nothing was written\r\n"), "{shown:?}");
         assert_eq!(folder.names(), ["log.csv"]);
     }

@@ -38,14 +38,15 @@ pub(crate) struct FitArguments {
     #[arg(long, value_name = "LOW..HIGH", allow_hyphen_values = true, help_heading = "Channels")]
     pub(crate) prefilter: Option<String>,
 
-    /// Fit the unknown parameters of a model in equations (TOML, see filter) by prediction error; channels go by name
+    /// Fit the unknown parameters of a model in equations (TOML, see filter) by the largest likelihood; channels go by name, the clock may
+    /// be irregular
     #[arg(
         long,
         value_name = "MODEL",
         help_heading = "Model",
         conflicts_with_all = [
-            "ModelArguments", "ChoiceArguments", "SearchArguments", "CriterionArguments", "input", "output", "validate",
-            "detrend", "offset", "prefilter", "html", "resample",
+            "ModelArguments", "path", "select", "search", "step", "CriterionArguments", "input", "output", "detrend", "offset",
+            "prefilter",
         ]
     )]
     pub(crate) grey: Option<PathBuf>,
@@ -140,7 +141,7 @@ pub(crate) struct ChoiceArguments {
 
 /// How to search, where the model is not linear in its parameters.
 #[derive(Debug, Args)]
-#[command(next_help_heading = "Search (models with C, D or F)")]
+#[command(next_help_heading = "Search (models with C, D or F, and in equations)")]
 pub(crate) struct SearchArguments {
     /// How steps are chosen [default: lm]
     #[arg(long, value_enum, value_name = "HOW")]

@@ -12,12 +12,13 @@ use crate::output;
 pub(crate) fn bode(arguments: &BodeArguments) -> Result<(), Failure> {
     let asked = arguments.frequencies.as_deref().map(range).transpose()?;
     let model = stored::model(&arguments.report)?;
+    let model = stored::polynomials(&arguments.report, &model, "a frequency response")?;
     let nyquist = PI / model.sample_time;
     let (low, high) = asked.unwrap_or((nyquist / 1000.0, nyquist));
     // The ends first: an error then says them as they were given.
-    let responses = frequency_response(&model, &[low, high])
+    let responses = frequency_response(model, &[low, high])
         .and_then(|_| logarithmic_frequencies(low, high, arguments.points as usize))
-        .and_then(|frequencies| frequency_response(&model, &frequencies))
+        .and_then(|frequencies| frequency_response(model, &frequencies))
         .map_err(|error| Failure::option(&error))?;
     output::write_csv(&arguments.out, |csv| {
         csv.write_record([

@@ -7,7 +7,6 @@ use super::{stored, summary};
 use crate::args::CompareArguments;
 use crate::failure::Failure;
 use crate::job::LookJob;
-use crate::log::Loaded;
 use crate::messages::warn;
 use crate::output;
 use crate::wrap::stdout_width;
@@ -18,11 +17,10 @@ pub(crate) fn compare(arguments: &CompareArguments, line: &str) -> Result<(), Fa
     let job = LookJob::resolve(look, &read)?;
     let reports: Vec<Report> =
         arguments.reports.iter().map(|path| stored::report(path)).collect::<Result<_, _>>()?;
-    let Loaded { log, source, .. } = loaded(&arguments.path, &job, &reports.iter().collect::<Vec<_>>())?;
-    let each = arguments.reports.iter().zip(&reports).map(|(path, report)| {
-        let loaded = Loaded { log: log.clone(), source: source.clone(), words: Vec::new() };
-        one(path, report, loaded, &job.plan).map_err(|failure| failure.of(path))
-    });
+    let loaded = loaded(&arguments.path, &job, &reports.iter().collect::<Vec<_>>())?;
+    let each = arguments.reports.iter().zip(&reports);
+    let each =
+        each.map(|(path, report)| one(path, report, &loaded, &job.plan).map_err(|failure| failure.of(path)));
     let found: Vec<Validated> = each.collect::<Result<_, _>>()?;
     let comparison = compared(&found).map_err(|error| Failure::option(&error))?;
     let json = comparison.to_json().map_err(|error| Failure::data(error.to_string()))?;

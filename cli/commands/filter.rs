@@ -3,9 +3,7 @@
 mod columns;
 
 use thetahat::figures::fixed;
-use thetahat::{
-    Document, FilterSummary, GreyReport, InitialState, Report, StateFilter, StateModel, is_document,
-};
+use thetahat::{Document, FilterSummary, Report, StateFilter, StateModel};
 
 use super::{stored, summary};
 use crate::args::FilterArguments;
@@ -63,26 +61,24 @@ fn surprise(summary: &FilterSummary) -> Option<String> {
     Some(format!("squared innovations are {ratio} times as large as the model says, so {advice}"))
 }
 
-/// The model in a file: a report of one of the two kinds, or a text.
+/// The model in a file: a report, or a text.
 fn read(job: &FilterJob) -> Result<StateModel, Failure> {
     let path = &job.model;
     let text = stored::text(path)?;
     // JSON begins with a brace, and TOML cannot.
     let is_json = text.trim_start().starts_with('{');
-    let is_grey = is_document::<GreyReport>(&text);
-    if job.initial.is_some() && (!is_json || is_grey) {
+    let report = if is_json { Some(Report::from_json(&text)) } else { None };
+    let says_itself = || {
+        report.as_ref().is_none_or(|report| matches!(report, Ok(report) if report.model.takes_any_clock()))
+    };
+    if job.initial.is_some() && says_itself() {
         return Err(Failure::usage(
-            "--initial is for reports; a model in a text says itself where it starts",
+            "--initial is for reports of polynomials; a model in a text says itself where it starts",
         ));
     }
-    let model = match (is_json, is_grey) {
-        (true, true) => {
-            GreyReport::from_json(&text).and_then(|report| report.fitted_model()).map(StateModel::from)
-        }
-        (true, false) => Report::from_json(&text).and_then(|report| {
-            StateModel::from_report(&report, job.initial.unwrap_or(InitialState::Unknown))
-        }),
-        (false, _) => StateModel::from_toml(&text),
+    let model = match report {
+        Some(report) => report.and_then(|report| StateModel::from_report(&report, job.initial)),
+        None => StateModel::from_toml(&text),
     };
     model.map_err(|error| {
         let swapped =

@@ -1,6 +1,5 @@
 //! `thetahat fit`: from logs to a model and its report.
 
-use std::ops::ControlFlow;
 use std::path::Path;
 
 use thetahat::{
@@ -8,29 +7,25 @@ use thetahat::{
     identify_monitored, validate,
 };
 
+use super::search::{Found, watched};
 use super::{grey, summary};
 use crate::args::{FitArguments, FormatArgument};
 use crate::failure::Failure;
-use crate::interrupt;
-use crate::job::FitJob;
-use crate::log::{self, Loaded};
+use crate::job::{FitJob, GreyJob};
+use crate::log::{self, Clocks, Joined};
 use crate::messages::warn;
 use crate::output;
-use crate::progress::Searching;
 use crate::wrap::stdout_width;
 
 pub(crate) fn fit(arguments: &FitArguments, line: &str) -> Result<(), Failure> {
-    if let Some(model) = &arguments.grey {
-        return grey::fit(arguments, model);
-    }
-    let job = FitJob::resolve(arguments)?;
     let outputs = [&arguments.report, &arguments.html];
-    let logs = experiments(&job)?;
-    logs.words.iter().for_each(|word| warn(word));
-    let kept = arguments.html.is_some().then(|| logs.log.clone());
-    let (report, sources) = identified(&job, logs)?;
+    let Found { report, log, sources } = match &arguments.grey {
+        Some(model) => grey::found(&GreyJob::resolve(arguments, model)?)?,
+        None => found(&FitJob::resolve(arguments)?, arguments.html.is_some())?,
+    };
     let json = report.to_json().map_err(|error| Failure::data(error.to_string()))?;
-    let page = kept.map(|log| page(&report, log, &sources, line)).transpose()?;
+    let page =
+        arguments.html.as_ref().zip(log).map(|(_, log)| page(&report, &log, &sources, line)).transpose()?;
     if let Some(path) = &arguments.report {
         output::write(path, |file| file.write_all(json.as_bytes()))?;
     }
@@ -48,39 +43,33 @@ pub(crate) fn fit(arguments: &FitArguments, line: &str) -> Result<(), Failure> {
     }
 }
 
+/// Reads the logs and fits the model.
+fn found(job: &FitJob, keeps_log: bool) -> Result<Found, Failure> {
+    let Experiments { log, sources, channels, words } = experiments(job, false)?;
+    words.iter().for_each(|word| warn(word));
+    let kept = keeps_log.then(|| log.clone());
+    let plan = job.plan(channels.inputs, channels.output)?;
+    let report = watched(|monitor| identify_monitored(log, &sources, &plan, monitor))?;
+    Ok(Found { report: report.map_err(log::failure(&sources))?, log: kept, sources })
+}
+
 /// The page of a fit, with a look at each part of the log.
-fn page(report: &Report, log: Log, sources: &[Source], line: &str) -> Result<String, Failure> {
+fn page(report: &Report, log: &Log, sources: &[Source], line: &str) -> Result<String, Failure> {
     let data = &report.data;
     let test = data.split.as_ref().map_or(&[][..], |parts| &parts.test);
     let parts = [&data.estimation[..], &data.validation, test].into_iter().filter(|rows| !rows.is_empty());
     let look = |rows: &[Rows]| {
         let plan = ValidationPlan { rows: rows.to_vec(), ..ValidationPlan::default() };
-        validate(report, None, log.clone(), sources, &plan).map_err(log::failure(sources))
+        validate(report, None, log, sources, &plan).map_err(log::failure(sources))
     };
     let looks: Vec<Validated> = parts.map(look).collect::<Result<_, _>>()?;
-    let held_out = held_out_runs(report, &log).map_err(log::failure(sources))?;
+    let held_out = held_out_runs(report, log).map_err(log::failure(sources))?;
     Ok(fit_page(report, &looks, &held_out, line))
 }
 
 /// Reads the logs and fits the model.
 pub(super) fn fitted(job: &FitJob) -> Result<Report, Failure> {
-    let logs = experiments(job)?;
-    logs.words.iter().for_each(|word| warn(word));
-    Ok(identified(job, logs)?.0)
-}
-
-/// Fits the model.
-fn identified(job: &FitJob, experiments: Experiments) -> Result<(Report, Vec<Source>), Failure> {
-    let Experiments { log, sources, channels, .. } = experiments;
-    let plan = job.plan(channels.inputs, channels.output)?;
-    let progress = Searching::new();
-    let monitor = |now| {
-        progress.update(now);
-        if interrupt::asked() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    };
-    let found = interrupt::during(|| identify_monitored(log, &sources, &plan, &monitor));
-    drop(progress);
-    Ok((found?.map_err(log::failure(&sources))?, sources))
+    Ok(found(job, false)?.report)
 }
 
 /// All logs as one, where they came from, and the columns that the model is about.
@@ -99,13 +88,12 @@ pub(crate) struct Channels {
     pub(crate) output: String,
 }
 
-/// Reads all logs, one behind the other.
-pub(crate) fn experiments(job: &FitJob) -> Result<Experiments, Failure> {
+/// Reads all logs, one behind the other, with any clock or with an even one.
+pub(crate) fn experiments(job: &FitJob, any_clock: bool) -> Result<Experiments, Failure> {
     let mut channels: Option<Channels> = None;
-    let (mut logs, mut sources, mut words) = (Vec::new(), Vec::<Source>::new(), Vec::new());
-    for path in &job.paths {
-        let bad = |message: String| Failure::data(format!("{}: {message}", path.display()));
-        let Loaded { log, mut source, words: own } = log::load(path, &job.log, None, |header| {
+    let Joined { log, sources, words } =
+        log::joined(&job.paths, &job.log, Clocks { any: any_clock, sample_time: None }, |path, header| {
+            let bad = |message: String| Failure::data(format!("{}: {message}", path.display()));
             let own = Channels::choose(job, header).map_err(bad)?;
             let first = channels.get_or_insert_with(|| own.clone());
             if own != *first {
@@ -118,13 +106,6 @@ pub(crate) fn experiments(job: &FitJob) -> Result<Experiments, Failure> {
             job.orders.of(own.inputs.len())?;
             Ok(own.inputs.into_iter().chain([own.output]).collect())
         })?;
-        let before = sources.last().map_or(0, |source| source.rows.last());
-        source.rows = Rows::new(before + 1, before + log.rows()).map_err(|error| bad(error.to_string()))?;
-        logs.push(log);
-        words.extend(own);
-        sources.push(source);
-    }
-    let log = Log::join(logs).map_err(log::failure(&sources))?;
     Ok(Experiments { log, sources, channels: channels.unwrap_or_default(), words })
 }
 

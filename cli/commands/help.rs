@@ -1,9 +1,7 @@
 //! What the program says of itself: the report's schema, shell completions, manual pages.
 
 use clap::CommandFactory;
-use thetahat::{
-    Comparison, Document, FilterSummary, GreyReport, Inspection, Report, TrackSummary, Validation,
-};
+use thetahat::{Comparison, Document, FilterSummary, Inspection, Report, TrackSummary, Validation};
 
 use crate::args::{Arguments, DocumentArgument};
 use crate::failure::Failure;
@@ -18,7 +16,6 @@ pub(crate) fn schema(document: DocumentArgument) -> Result<(), Failure> {
         DocumentArgument::Inspection => Inspection::json_schema(),
         DocumentArgument::Track => TrackSummary::json_schema(),
         DocumentArgument::Filter => FilterSummary::json_schema(),
-        DocumentArgument::Greybox => GreyReport::json_schema(),
     };
     output::print(&format!("{schema:#}\n"))
 }

@@ -3,13 +3,13 @@
 use std::io::Write;
 use std::path::Path;
 
-use thetahat::{Applied, Detrend, Drawn, Draws, Horizon, Log, Start, apply, sample};
+use thetahat::{Applied, Detrend, Drawn, Draws, Horizon, Log, Start, sample};
 
 use super::{stored, summary};
 use crate::args::{PredictArguments, RespondArguments, SimulateArguments};
 use crate::failure::Failure;
 use crate::job::{LogJob, parsed, rows};
-use crate::log::{self, Loaded};
+use crate::log::{self, Clocks, Loaded};
 use crate::messages::{tell, warn};
 use crate::output;
 
@@ -57,28 +57,30 @@ fn respond(
     if arguments.report == Path::new("-") && arguments.path == Path::new("-") {
         return Err(Failure::usage("the report and the log cannot both come from standard input"));
     }
-    let model = stored::model(&arguments.report)?;
+    let report = stored::report(&arguments.report)?;
+    let model = &report.model;
 
-    let output = model.output.name.clone();
+    if draws.is_some() {
+        stored::polynomials(&arguments.report, model, "what is drawn from a fit's uncertainty")?;
+    }
     let mut measured = true;
-    let Loaded { log, source, words } =
-        log::load(&arguments.path, &job, Some(model.sample_time), |header| {
-            measured = header.contains(&output);
-            let inputs = model.inputs.iter().map(|input| input.name.clone());
-            Ok(inputs.chain(measured.then(|| output.clone())).collect())
-        })?;
+    let loaded = log::load(&arguments.path, &job, Clocks::from(model), |header| {
+        let outputs = || model.outputs().iter().map(|output| output.name.clone());
+        measured = outputs().all(|name| header.contains(&name));
+        let inputs = model.inputs().iter().map(|input| input.name.clone());
+        Ok(inputs.chain(outputs().filter(|name| header.contains(name))).collect())
+    });
+    let Loaded { log, source, words } = loaded?;
     words.iter().for_each(|word| warn(word));
-    let initial =
-        initial.unwrap_or_else(|| if measured { Start::natural(&model, horizon) } else { Start::Zero });
-    let clock = RowClock::of(&log);
-    let kept = draws.is_some().then(|| log.clone());
+    let natural = || if measured { model.natural_start(horizon) } else { Start::Zero };
+    let initial = initial.unwrap_or_else(natural);
+    let clock = RowClock { log: &log };
     let sources = [source];
     let failed = log::failure(&sources);
-    let applied = apply(&model, log, &asked, detrend, horizon, initial).map_err(&failed)?;
+    let applied = report.apply(&log, &asked, detrend, horizon, initial).map_err(&failed)?;
     let drawn = draws
         .as_ref()
-        .zip(kept)
-        .map(|(draws, log)| sample(&model, log, &asked, detrend, initial, &draws.draws).map_err(&failed));
+        .map(|draws| sample(model, &log, &asked, detrend, initial, &draws.draws).map_err(&failed));
     let drawn = drawn.transpose()?;
     let bands = drawn.as_ref().map(|drawn| drawn.bands(&QUANTILES));
 
@@ -97,32 +99,30 @@ fn respond(
             ));
         }
     }
-    match &applied.fit {
-        Some(_) if !applied.predicted.iter().any(|value| value.is_finite()) => {
-            warn("no row could be predicted: the stretches without a gap are too short")
+    for output in &applied.outputs {
+        let of = if applied.outputs.len() > 1 { format!("{}: ", output.name) } else { String::new() };
+        match &output.fit {
+            Some(_) if !output.predicted.iter().any(|value| value.is_finite()) => {
+                warn(&format!("{of}no row could be predicted: the stretches without a gap are too short"))
+            }
+            Some(fit) => tell(&format!("{of}{}", summary::figure(fit))),
+            None => {}
         }
-        Some(fit) => tell(&summary::figure(fit)),
-        None => {}
     }
     Ok(())
 }
 
-/// What the rows of an answer are called. It survives the log, which is used up.
-struct RowClock {
-    time: Option<Vec<f64>>,
-    rows: usize,
-    sample_time: f64,
+/// What the rows of an answer are called.
+struct RowClock<'l> {
+    log: &'l Log,
 }
 
-impl RowClock {
-    fn of(log: &Log) -> Self {
-        Self { time: log.time().map(<[f64]>::to_vec), rows: log.rows(), sample_time: log.sample_time() }
-    }
-
+impl RowClock<'_> {
     /// The time of a row (0-based), where there are times; those behind the end of the log go on in its own step.
     fn at(&self, position: usize) -> Option<f64> {
-        let beyond = (position + 1).saturating_sub(self.rows) as f64 * self.sample_time;
-        self.time.as_ref().map(|time| time[position.min(self.rows - 1)] + beyond)
+        let rows = self.log.rows();
+        let beyond = (position + 1).saturating_sub(rows) as f64 * self.log.sample_time();
+        self.log.time().map(|time| time[position.min(rows - 1)] + beyond)
     }
 }
 
@@ -134,14 +134,19 @@ fn rows_as_csv(
     csv: &mut csv::Writer<&mut dyn Write>,
     applied: &Applied,
     bands: Option<&(Vec<f64>, Vec<Vec<f64>>)>,
-    clock: &RowClock,
+    clock: &RowClock<'_>,
 ) -> Result<(), csv::Error> {
-    let mut columns: Vec<(String, Option<&[f64]>)> = vec![
-        ("measured".to_owned(), applied.measured.as_deref()),
-        ("predicted".to_owned(), Some(&applied.predicted)),
-    ];
-    if let Some(deviations) = &applied.standard_deviations {
-        columns.push(("standard_deviation".to_owned(), Some(deviations)));
+    let mut columns: Vec<(String, Option<&[f64]>)> = Vec::new();
+    for output in &applied.outputs {
+        let name = |what: &str| match applied.outputs.len() {
+            1 => what.to_owned(),
+            _ => format!("{what}_{}", output.name),
+        };
+        columns.push((name("measured"), output.measured.as_deref()));
+        columns.push((name("predicted"), Some(&output.predicted)));
+        if let Some(deviations) = &output.standard_deviations {
+            columns.push((name("standard_deviation"), Some(deviations)));
+        }
     }
     if let Some((mean, quantiles)) = bands {
         columns.push(("mean".to_owned(), Some(mean)));
@@ -156,7 +161,7 @@ fn runs_as_csv(
     csv: &mut csv::Writer<&mut dyn Write>,
     drawn: &Drawn,
     applied: &Applied,
-    clock: &RowClock,
+    clock: &RowClock<'_>,
 ) -> Result<(), csv::Error> {
     let runs =
         drawn.values.iter().zip(1..).map(|(run, number)| (format!("draw_{number}"), Some(run.as_slice())));
@@ -168,15 +173,15 @@ fn columns_as_csv(
     csv: &mut csv::Writer<&mut dyn Write>,
     columns: &[(String, Option<&[f64]>)],
     applied: &Applied,
-    clock: &RowClock,
+    clock: &RowClock<'_>,
 ) -> Result<(), csv::Error> {
-    let name = if clock.time.is_some() { "time" } else { "row" };
+    let name = if clock.log.time().is_some() { "time" } else { "row" };
     csv.write_record(std::iter::once(name).chain(columns.iter().map(|(name, _)| name.as_str())))?;
     let value = |values: Option<&[f64]>, position: usize| {
         values.and_then(|values| values.get(position).copied()).filter(|value| value.is_finite())
     };
     let asked = applied.rows.iter().flat_map(|range| range.first() - 1..range.last());
-    for position in asked.chain(clock.rows..clock.rows + applied.beyond) {
+    for position in asked.chain((0..applied.beyond).map(|beyond| clock.log.rows() + beyond)) {
         let values: Vec<Option<f64>> = columns.iter().map(|(_, values)| value(*values, position)).collect();
         match clock.at(position) {
             Some(time) => csv.serialize((time, values))?,

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
-use thetahat::{Document, Model, Report};
+use thetahat::{Document, Model, PolynomialModel, Report};
 
 use crate::failure::{Failure, Kind};
 
@@ -14,6 +14,15 @@ const LARGEST_REPORT: u64 = 1 << 30;
 /// The model of a stored report.
 pub(super) fn model(path: &Path) -> Result<Model, Failure> {
     Ok(report(path)?.model)
+}
+
+/// The polynomials of a stored model, of which alone `what` is known.
+pub(super) fn polynomials<'m>(
+    path: &Path,
+    model: &'m Model,
+    what: &str,
+) -> Result<&'m PolynomialModel, Failure> {
+    model.polynomials(what).map_err(|error| Failure::data(format!("{}: {error}", path.display())))
 }
 
 /// A stored report.

@@ -1,7 +1,7 @@
 //! A report as a table for people.
 
+mod equations;
 mod filtered;
-mod grey;
 mod inspection;
 mod selection;
 mod text;
@@ -11,13 +11,12 @@ mod validation;
 use thetahat::figures::{error, fixed, number, scientific, short};
 use thetahat::text::harmless;
 use thetahat::{
-    Algorithm, CriterionOutcome, Estimation, Fit, InformationCriterion, Initial, Interval, Model, Norm,
-    Orders, Part, Procedure, Quantity, Report, RobustOutcome, Root, Rows, SearchOutcome, Signal, Solver,
-    Start, Stopped, Structure,
+    Algorithm, Criteria, CriterionOutcome, Estimation, Fit, InformationCriterion, Initial, Interval, Model,
+    Norm, Orders, Part, PolynomialModel, Procedure, Quantity, Report, RobustOutcome, Root, Rows,
+    SearchOutcome, Signal, Solver, Start, Stopped, Structure,
 };
 
 pub(crate) use filtered::filtered;
-pub(crate) use grey::grey;
 pub use inspection::inspection;
 use text::{Text, columns, or_dash, some};
 pub(crate) use tracking::tracking;
@@ -35,7 +34,10 @@ const NO_FIT: &str = "the output is constant, no sample counts, or the response 
 
 /// The report's main figures, so many columns wide.
 pub fn table(report: &Report, width: usize) -> String {
-    let model = &report.model;
+    let model = match &report.model {
+        Model::Polynomial(model) => model,
+        Model::Equations(model) => return equations::table(report, model, width),
+    };
     let mut text = Text::new(width);
     selection::selection(&mut text, report);
     text.line(&format!("{}, sample time {} s", formula(&model.orders), short(model.sample_time)));
@@ -84,15 +86,13 @@ fn signal(role: &str, signal: &Signal) -> String {
 }
 
 /// How the parameters were found, and how well they are determined.
-fn estimation(text: &mut Text, estimation: &Estimation, model: &Model) {
+fn estimation(text: &mut Text, estimation: &Estimation, model: &PolynomialModel) {
     text.line(&format!(
         "{} samples, noise variance {}, condition number {}",
         estimation.samples,
         number(model.noise_variance),
         or_dash(estimation.condition, |condition| scientific(condition, 3))
     ));
-    let criteria = &estimation.criteria;
-    let four = |value: f64| fixed(value, 4);
     if let Some(level) = estimation.level {
         let slope = estimation.slope.map_or_else(String::new, |slope| {
             format!(" in the middle of the rows, slope {} a second", quantity(slope))
@@ -103,54 +103,66 @@ fn estimation(text: &mut Text, estimation: &Estimation, model: &Model) {
             quantity(level)
         ));
     }
-    let of = |logarithmic: bool, figure: fn(f64) -> String| {
-        let all = InformationCriterion::all().filter(|criterion| criterion.is_logarithmic() == logarithmic);
-        let all =
-            all.map(|criterion| format!("{} {}", criterion.name(), or_dash(criteria.of(criterion), figure)));
-        all.collect::<Vec<_>>().join(", ")
-    };
-    text.line(&format!("{}; per sample {}", of(false, number), of(true, four)));
+    text.line(&criteria(&estimation.criteria));
+    // Every polynomial model has one.
+    let start = estimation.initial.unwrap_or_default();
     match &estimation.procedure {
         Procedure::LeastSquares { solver } => {
             let solver = match solver {
                 Solver::NormalEquations => "normal equations",
                 Solver::Qr => "QR",
             };
-            text.line(&format!("least squares ({solver}), {}", initial(estimation.initial, 0)));
+            text.line(&format!("least squares ({solver}), {}", initial(start, 0)));
         }
         Procedure::InstrumentalVariables { .. } => {
-            text.line(&format!("instrumental variables in four stages, {}", initial(estimation.initial, 0)));
+            text.line(&format!("instrumental variables in four stages, {}", initial(start, 0)));
         }
         Procedure::RefinedInstrumentalVariables { iterations, stopped: why, initial_conditions, .. } => {
             text.line(&format!(
                 "refined instrumental variables, {}, {}, {}",
                 counted(*iterations),
                 stopped(*why),
-                initial(estimation.initial, *initial_conditions)
+                initial(start, *initial_conditions)
             ));
         }
-        Procedure::Robust(found) => robust(text, found, estimation.initial),
+        Procedure::Robust(found) => robust(text, found, start),
         Procedure::ExactLikelihood(found) => {
             text.line(&format!(
                 "exact likelihood, ln L {}, {}, {}",
                 or_dash(found.log_likelihood, four),
                 outcome(&found.search),
-                match estimation.initial {
+                match start {
                     Initial::Estimate => initial(Initial::Estimate, found.search.initial_conditions),
                     _ if model.inputs.is_empty() => "stationary from the first sample on".to_owned(),
                     _ => "stationary, and inputs at rest before the first sample".to_owned(),
                 }
             ));
         }
-        Procedure::Constrained(outcome) => criterion(text, outcome, model, estimation.initial),
+        Procedure::Constrained(outcome) => criterion(text, outcome, model, start),
+        Procedure::InnovationsLikelihood(_) => {}
         Procedure::PredictionError(search) => {
             text.line(&format!(
                 "prediction error, {}, {}",
                 outcome(search),
-                initial(estimation.initial, search.initial_conditions)
+                initial(start, search.initial_conditions)
             ));
         }
     }
+}
+
+/// The information criteria.
+fn criteria(criteria: &Criteria) -> String {
+    let of = |logarithmic: bool, figure: fn(f64) -> String| {
+        let all = InformationCriterion::all().filter(|criterion| criterion.is_logarithmic() == logarithmic);
+        let all =
+            all.map(|criterion| format!("{} {}", criterion.name(), or_dash(criteria.of(criterion), figure)));
+        all.collect::<Vec<_>>().join(", ")
+    };
+    format!("{}; per sample {}", of(false, number), of(true, four))
+}
+
+fn four(value: f64) -> String {
+    fixed(value, 4)
 }
 
 /// What stood for the samples before the first.
@@ -217,7 +229,7 @@ fn robust(text: &mut Text, found: &RobustOutcome, start: Initial) {
 }
 
 /// What was made small and respected, and the box of all that respects it.
-fn criterion(text: &mut Text, outcome: &CriterionOutcome, model: &Model, start: Initial) {
+fn criterion(text: &mut Text, outcome: &CriterionOutcome, model: &PolynomialModel, start: Initial) {
     let norm = match outcome.norm {
         Norm::Two => "sum of squared errors",
         Norm::One => "sum of absolute errors",
@@ -240,7 +252,7 @@ fn criterion(text: &mut Text, outcome: &CriterionOutcome, model: &Model, start: 
 }
 
 /// Roots, gains and time constants.
-fn dynamics(text: &mut Text, model: &Model) {
+fn dynamics(text: &mut Text, model: &PolynomialModel) {
     let head = ["root", "value", "standard error", "time constant [s]", "95 % interval"];
     let mut roots = columns(&head).words(&[4]).none(NO_ROOT_ERROR);
     let mut count = 0;
@@ -287,9 +299,11 @@ fn quantity(quantity: Quantity) -> String {
 }
 
 fn fits(text: &mut Text, fits: &[Fit]) {
-    let mut table = columns(&["part", "rows", "horizon", "initial", "samples", "fit [%]", "RMSE"])
-        .words(&[1, 2, 3])
-        .none(NO_FIT);
+    let several = fits.iter().any(|fit| fit.output != fits[0].output);
+    let head = ["output", "part", "rows", "horizon", "initial", "samples", "fit [%]", "RMSE"];
+    let head = if several { &head[..] } else { &head[1..] };
+    let words: &[usize] = if several { &[1, 2, 3, 4] } else { &[1, 2, 3] };
+    let mut table = columns(head).words(words).none(NO_FIT);
     for fit in fits {
         let part = match fit.part {
             Some(Part::Estimation) => "estimation",
@@ -297,7 +311,8 @@ fn fits(text: &mut Text, fits: &[Fit]) {
             Some(Part::Test) => "test",
             None => "",
         };
-        table.row([
+        let output = several.then(|| harmless(&fit.output));
+        table.row(output.into_iter().chain([
             part.to_owned(),
             rows(&fit.rows),
             fit.horizon.to_string(),
@@ -305,7 +320,7 @@ fn fits(text: &mut Text, fits: &[Fit]) {
             fit.samples.to_string(),
             or_dash(fit.percent, |percent| fixed(percent, 3)),
             or_dash(fit.rmse, number),
-        ]);
+        ]));
     }
     text.table(table);
 }

@@ -28,6 +28,9 @@ use state::{Place, RowPlace, State};
 pub(crate) fn track(arguments: &TrackArguments) -> Result<(), Failure> {
     let job = TrackJob::resolve(arguments)?;
     let report = job.warm.as_deref().map(stored::report).transpose()?;
+    if let (Some(path), Some(report)) = (&job.warm, &report) {
+        stored::polynomials(path, &report.model, "a tracker")?;
+    }
     let mut run = Run::start(&job, report.as_ref())?;
     // That it cannot be written is better known now than in a week.
     if job.state.is_some() {
@@ -107,7 +110,7 @@ impl<'a> Run<'a> {
         let state = match stored {
             Some(state) => state.checked(&setting, &trackers, job)?,
             None => {
-                let sample_time = job.sample_time.or(report.map(|report| report.model.sample_time));
+                let sample_time = job.sample_time.or(report.map(|report| report.model.sample_time()));
                 State::new(setting, trackers, stream.start().map(str::to_owned), sample_time)
             }
         };

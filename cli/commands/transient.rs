@@ -1,6 +1,6 @@
 //! `thetahat step` and `thetahat impulse`: what a stored model's output does after a step or an impulse of its inputs.
 
-use thetahat::{Error, Model, TransientResponse, impulse_response, step_response};
+use thetahat::{Error, PolynomialModel, TransientResponse, impulse_response, step_response};
 
 use super::stored;
 use crate::args::TransientArguments;
@@ -19,9 +19,11 @@ pub(crate) fn impulse(arguments: &TransientArguments) -> Result<(), Failure> {
 fn write(
     arguments: &TransientArguments,
     what: &str,
-    respond: impl Fn(&Model, usize, Option<usize>) -> Result<TransientResponse, Error>,
+    respond: impl Fn(&PolynomialModel, usize, Option<usize>) -> Result<TransientResponse, Error>,
 ) -> Result<(), Failure> {
     let model = stored::model(&arguments.report)?;
+    let article = if what.starts_with('i') { "an" } else { "a" };
+    let model = stored::polynomials(&arguments.report, &model, &format!("{article} {what} response"))?;
     let report = arguments.report.display();
     if model.inputs.is_empty() {
         return Err(Failure::data(format!(
@@ -29,7 +31,7 @@ fn write(
         )));
     }
     let samples = arguments.samples.map(|samples| samples as usize);
-    let responses = (0..model.inputs.len()).map(|input| respond(&model, input, samples));
+    let responses = (0..model.inputs.len()).map(|input| respond(model, input, samples));
     let responses = responses
         .collect::<Result<Vec<_>, _>>()
         .map_err(|error| Failure::data(format!("{report}: {error}")))?;

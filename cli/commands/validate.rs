@@ -8,7 +8,7 @@ use super::{stored, summary};
 use crate::args::{FormatArgument, LookArguments, ValidateArguments};
 use crate::failure::Failure;
 use crate::job::LookJob;
-use crate::log::{self, Loaded};
+use crate::log::{self, Clocks, Loaded};
 use crate::messages::warn;
 use crate::output;
 use crate::wrap::stdout_width;
@@ -22,7 +22,7 @@ pub(crate) fn validate(arguments: &ValidateArguments, line: &str) -> Result<(), 
     requirements.iter().try_for_each(|requirement| requirement.check(&report)).map_err(refused)?;
 
     let loaded = loaded(&arguments.path, &job, &[&report])?;
-    let found = one(&arguments.report, &report, loaded, &job.plan)?;
+    let found = one(&arguments.report, &report, &loaded, &job.plan)?;
     let validation = &found.validation;
     let json = validation.to_json().map_err(|error| Failure::data(error.to_string()))?;
     if let Some(path) = &look.html {
@@ -44,15 +44,18 @@ pub(crate) fn validate(arguments: &ValidateArguments, line: &str) -> Result<(), 
 /// Reads the channels of some models from a log.
 pub(super) fn loaded(path: &Path, job: &LookJob, reports: &[&Report]) -> Result<Loaded, Failure> {
     let mut names: Vec<String> = Vec::new();
-    for model in reports.iter().map(|report| &report.model) {
-        for signal in model.inputs.iter().chain([&model.output]) {
-            if !names.contains(&signal.name) {
-                names.push(signal.name.clone());
-            }
+    for name in reports.iter().flat_map(|report| report.model.channels()) {
+        if !names.iter().any(|known| known == name) {
+            names.push(name.to_owned());
         }
     }
-    let sample_time = reports.first().map(|report| report.model.sample_time);
-    let loaded = log::load(path, &job.log, sample_time, |_| Ok(names))?;
+    let all = || reports.iter().map(|report| Clocks::from(&report.model));
+    // A clock that one of them cannot follow is that model's to refuse.
+    let clocks = Clocks {
+        sample_time: all().find_map(|clocks| clocks.sample_time),
+        any: all().any(|clocks| clocks.any),
+    };
+    let loaded = log::load(path, &job.log, clocks, |_| Ok(names))?;
     loaded.words.iter().for_each(|word| warn(word));
     Ok(loaded)
 }
@@ -61,12 +64,12 @@ pub(super) fn loaded(path: &Path, job: &LookJob, reports: &[&Report]) -> Result<
 pub(super) fn one(
     path: &Path,
     report: &Report,
-    loaded: Loaded,
+    loaded: &Loaded,
     plan: &ValidationPlan,
 ) -> Result<Validated, Failure> {
     let name = path.display().to_string();
-    let sources = [loaded.source];
-    validated(report, Some(&name), loaded.log, &sources, plan).map_err(log::failure(&sources))
+    let sources = [loaded.source.clone()];
+    validated(report, Some(&name), &loaded.log, &sources, plan).map_err(log::failure(&sources))
 }
 
 /// Writes the document, and prints it or the table.

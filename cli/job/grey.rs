@@ -1,10 +1,11 @@
 use std::path::{Path, PathBuf};
 
-use thetahat::Rows;
+use thetahat::EquationsPlan;
 
-use super::{LogJob, rows};
+use super::{LogJob, parsed, rows, search};
 use crate::args::FitArguments;
 use crate::failure::Failure;
+use crate::memory::PerValue;
 
 /// A model in equations to fit.
 #[derive(Debug)]
@@ -14,8 +15,7 @@ pub(crate) struct GreyJob {
     pub(crate) paths: Vec<PathBuf>,
     /// How all of them are read.
     pub(crate) log: LogJob,
-    /// The rows asked for, counted through all logs; none: all.
-    pub(crate) estimate: Vec<Rows>,
+    pub(crate) plan: EquationsPlan,
 }
 
 impl GreyJob {
@@ -23,8 +23,13 @@ impl GreyJob {
         let job = Self {
             model: model.to_owned(),
             paths: arguments.logs.clone(),
-            log: LogJob::resolve(&arguments.log, &arguments.clock)?,
-            estimate: rows("--estimate", &arguments.estimate)?,
+            log: LogJob { per_value: PerValue::Search, ..LogJob::resolve(&arguments.log, &arguments.clock)? },
+            plan: EquationsPlan {
+                estimate: rows("--estimate", &arguments.estimate)?,
+                validate: rows("--validate", &arguments.validate)?,
+                split: arguments.choice.split.as_deref().map(|text| parsed("--split", text)).transpose()?,
+                search: search::search(&arguments.search)?,
+            },
         };
         if job.paths.iter().chain([&job.model]).filter(|path| *path == Path::new("-")).count() > 1 {
             return Err(Failure::usage(

@@ -136,8 +136,10 @@ impl TrackJob {
         output: &str,
         report: Option<&Report>,
     ) -> Result<Vec<Tracker>, Failure> {
-        let orders = match report {
-            Some(report) => report.model.orders.clone(),
+        let model = report.map(|report| report.model.polynomials("a tracker")).transpose();
+        let model = model.map_err(|error| Failure::data(error.to_string()))?;
+        let orders = match model {
+            Some(model) => model.orders.clone(),
             None => self.orders.of(inputs.len())?,
         };
         let method = match self.method {
@@ -155,7 +157,7 @@ impl TrackJob {
             values.iter().find(|(other, _)| other == name).map(|(_, value)| *value)
         };
         let offsets = (!self.offsets.is_empty()).then(|| {
-            let signals = report.map(|report| (&report.model.inputs[..], &report.model.output));
+            let signals = model.map(|model| (&model.inputs[..], &model.output));
             let level =
                 |name: &str, stored: Option<f64>| value(&self.offsets, name).or(stored).unwrap_or(0.0);
             let stored = |index: usize| {

@@ -123,7 +123,7 @@ large = th.arx(log[:1200], least["orders"]["na"], least["orders"]["nb"], least["
 errors: dict[str, float] = {}
 for name, model in {"chosen": by_rows, "least": large}.items():
     report = model.validate(test)
-    errors[name] = report.document["noise"]["mse"]
+    errors[name] = report.document["noise"][0]["mse"]
     print(
         f"{name}: mean square error {errors[name]:.5f}, fit one step ahead {report.fit(1):.2f} %, "
         f"free run {report.fit(None):.2f} % on {len(test)} rows"

@@ -8,8 +8,8 @@ use pyo3::prelude::*;
 use thetahat::{Document, Inspection, InspectionPlan, Report, Requirement, Validated};
 
 use crate::error;
-use crate::log::{Log, copy};
-use crate::model::{Model, channels};
+use crate::log::Log;
+use crate::model::Model;
 use crate::work::{awaited, interruptible};
 
 /// How a model does on a log: the document that `thetahat validate` writes.
@@ -37,9 +37,7 @@ pub(crate) fn validate(
         requirement.check(&report).map_err(|error| error::batch(py, error))?;
     }
     let (log, sources, alpha) = (Arc::clone(&log.log), log.sources.clone(), plan.alpha);
-    let found = interruptible(py, move |_| {
-        thetahat::validate(&report, None, copy(&log, &channels(&report.model, &log))?, &sources, &plan)
-    })?;
+    let found = interruptible(py, move |_| thetahat::validate(&report, None, &log, &sources, &plan))?;
     Ok(Validation { found, requirements, alpha })
 }
 
@@ -77,10 +75,8 @@ pub(crate) fn compare(
     let models = models.collect::<PyResult<Vec<(String, Arc<Report>)>>>()?;
     let (log, sources) = (Arc::clone(&log.log), log.sources.clone());
     let comparison = interruptible(py, move |_| {
-        let each = models.iter().map(|(name, report)| {
-            let channels = copy(&log, &channels(&report.model, &log))?;
-            thetahat::validate(report, Some(name), channels, &sources, &plan)
-        });
+        let each =
+            models.iter().map(|(name, report)| thetahat::validate(report, Some(name), &log, &sources, &plan));
         let found: Vec<Validated> = each.collect::<Result<_, _>>()?;
         thetahat::compare(&found)
     })?;
@@ -96,7 +92,7 @@ pub(crate) fn inspect(py: Python<'_>, log: &Bound<'_, Log>) -> PyResult<(String,
         return Err(PyValueError::new_err("log: it comes from nowhere; make another"));
     };
     let plan =
-        InspectionPlan { inputs: log.inputs.clone(), output: Some(log.output.clone()), resample: None };
+        InspectionPlan { inputs: log.inputs.clone(), output: log.outputs.first().cloned(), resample: None };
     let log = Arc::clone(&log.log);
     let found = interruptible(py, move |_| thetahat::inspect_log(&log, &source, &plan))?;
     written(py, &found)

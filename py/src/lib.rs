@@ -1,10 +1,11 @@
 //! The compiled module `thetahat._thetahat`: the engine behind the Python package `thetahat`.
 //!
-//! `log`, `model` and `judgement` are the batch half, `online` the steppers. `array` reads and makes NumPy arrays, `error` is
+//! `log`, `grey_box`, `model` and `judgement` are the batch half, `online` the steppers. `array` reads and makes NumPy arrays, `error` is
 //! the one map of errors, `work` runs what takes long.
 
 mod array;
 mod error;
+mod grey_box;
 mod judgement;
 mod log;
 mod model;
@@ -26,9 +27,11 @@ fn _thetahat(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("CRITERIA", criteria.collect::<Vec<_>>())?;
     module.add("EstimationError", module.py().get_type::<error::EstimationError>())?;
     module.add_class::<log::Log>()?;
+    module.add_class::<grey_box::GreyBox>()?;
     module.add_class::<model::Model>()?;
     module.add_class::<judgement::Validation>()?;
     module.add_function(wrap_pyfunction!(model::fit, module)?)?;
+    module.add_function(wrap_pyfunction!(model::fit_equations, module)?)?;
     module.add_function(wrap_pyfunction!(judgement::validate, module)?)?;
     module.add_function(wrap_pyfunction!(judgement::compare, module)?)?;
     module.add_function(wrap_pyfunction!(judgement::inspect, module)?)?;

@@ -13,15 +13,16 @@ use crate::array::vector;
 use crate::error;
 use crate::work::{awaited, interruptible};
 
-/// Channels on a common clock, where they came from, and which of them are inputs and output.
+/// Channels on a common clock, where they came from, and which of them are inputs and outputs.
 #[pyclass(frozen, module = "thetahat._thetahat")]
 pub(crate) struct Log {
     pub(crate) log: Arc<thetahat::Log>,
     pub(crate) sources: Vec<Source>,
     #[pyo3(get)]
     pub(crate) inputs: Vec<String>,
+    /// At least one.
     #[pyo3(get)]
-    pub(crate) output: String,
+    pub(crate) outputs: Vec<String>,
 }
 
 /// Channels by name.
@@ -33,17 +34,18 @@ type Clock<'py> = (Bound<'py, PyAny>, Option<(f64, String, bool)>, Option<String
 #[pymethods]
 impl Log {
     /// Channels by name with a fixed sample time, or with a clock: the times, how to resample, (step, "hold" or "linear", whether
-    /// to filter against aliasing),
-    /// the first time as it was written, and what the times are called.
+    /// to filter against aliasing), the first time as it was written, and what the times are called. Its steps may be uneven unless it
+    /// has to be uniform.
     #[new]
-    #[pyo3(signature = (channels, inputs, output, sample_time, clock=None))]
+    #[pyo3(signature = (channels, inputs, outputs, sample_time, clock=None, uniform=true))]
     fn new(
         py: Python<'_>,
         channels: Named<'_>,
         inputs: Vec<String>,
-        output: String,
+        outputs: Vec<String>,
         sample_time: f64,
         clock: Option<Clock<'_>>,
+        uniform: bool,
     ) -> PyResult<Self> {
         let channels = read(channels)?;
         let (time, resample, start, called) = match clock {
@@ -54,7 +56,9 @@ impl Log {
         let log = match (time, resample) {
             (None, _) => thetahat::Log::new(channels, sample_time),
             (Some(time), None) => {
-                thetahat::Log::with_time(channels, vector("time", &time, None)?.as_slice()?.to_vec())
+                let time = vector("time", &time, None)?.as_slice()?.to_vec();
+                let of = if uniform { thetahat::Log::with_time } else { thetahat::Log::recorded };
+                of(channels, time)
             }
             (Some(time), Some((step, how, anti_alias))) => {
                 let time = vector("time", &time, None)?;
@@ -75,17 +79,17 @@ impl Log {
         let log = log.map_err(|error| error::batch(py, error))?;
         let rows = Rows::new(1, log.rows()).map_err(|error| error::batch(py, error))?;
         let source = Source { file: "memory".to_owned(), rows, time: called, start, resampled };
-        Ok(Self { log: Arc::new(log), sources: vec![source], inputs, output })
+        Ok(Self { log: Arc::new(log), sources: vec![source], inputs, outputs })
     }
 
     /// Reads files with the options of `thetahat fit`; also what the reader should know.
     #[staticmethod]
-    fn read(py: Python<'_>, options: Vec<OsString>) -> PyResult<(Self, Vec<String>)> {
-        let opened = awaited(py, move |_| thetahat_cli::read(&options))?
+    fn read(py: Python<'_>, options: Vec<OsString>, uniform: bool) -> PyResult<(Self, Vec<String>)> {
+        let opened = awaited(py, move |_| thetahat_cli::read(&options, uniform))?
             .map_err(|failure| error::program(py, &failure))?;
         let thetahat_cli::Opened { log, sources, inputs, output, warnings } = opened;
         let warnings = warnings.iter().map(|warning| error::in_python(warning)).collect();
-        Ok((Self { log: Arc::new(log), sources, inputs, output }, warnings))
+        Ok((Self { log: Arc::new(log), sources, inputs, outputs: vec![output] }, warnings))
     }
 
     /// Several experiments as one log.
@@ -105,7 +109,7 @@ impl Log {
         }
         let copies = logs.iter().map(|log| (*log.log).clone()).collect();
         let log = thetahat::Log::join(copies).map_err(|error| error::batch(py, error))?;
-        Ok(Self { log: Arc::new(log), sources, inputs: first.inputs.clone(), output: first.output.clone() })
+        Ok(Self { log: Arc::new(log), sources, inputs: first.inputs.clone(), outputs: first.outputs.clone() })
     }
 
     /// Some rows (1-based, inclusive) as a log of its own.
@@ -131,7 +135,14 @@ impl Log {
                 Rows::new(begin + 1 - first, end + 1 - first).map_err(|error| error::batch(py, error))?;
             sources.push(Source { file, rows, ..source.clone() });
         }
-        Ok(Self { log: Arc::new(log), sources, inputs: self.inputs.clone(), output: self.output.clone() })
+        Ok(Self { log: Arc::new(log), sources, inputs: self.inputs.clone(), outputs: self.outputs.clone() })
+    }
+
+    /// The same log with other roles of its channels.
+    fn select(&self, py: Python<'_>, inputs: Vec<String>, outputs: Vec<String>) -> PyResult<Self> {
+        let names: Vec<&str> = inputs.iter().chain(&outputs).map(String::as_str).collect();
+        let log = copy(&self.log, &names).map_err(|error| error::batch(py, error))?;
+        Ok(Self { log: Arc::new(log), sources: self.sources.clone(), inputs, outputs })
     }
 
     #[getter]
@@ -178,7 +189,7 @@ impl Log {
         let sources =
             serde_json::to_string(&this.sources).map_err(|error| PyValueError::new_err(error.to_string()))?;
         let parts = (
-            (channels, &this.inputs, &this.output, this.log.sample_time()),
+            (channels, &this.inputs, &this.outputs, this.log.sample_time()),
             (this.time(py), this.log.breaks(), this.log.borders(), this.log.before(), sources),
         );
         let restore = slf.get_type().getattr("_restore")?;
@@ -189,10 +200,10 @@ impl Log {
     #[staticmethod]
     fn _restore(
         py: Python<'_>,
-        data: (Named<'_>, Vec<String>, String, f64),
+        data: (Named<'_>, Vec<String>, Vec<String>, f64),
         clock: (Option<Bound<'_, PyAny>>, Vec<usize>, Vec<usize>, f64, String),
     ) -> PyResult<Self> {
-        let (channels, inputs, output, sample_time) = data;
+        let (channels, inputs, outputs, sample_time) = data;
         let (time, breaks, borders, before, sources) = clock;
         let time =
             time.map(|time| PyResult::Ok(vector("time", &time, None)?.as_slice()?.to_vec())).transpose()?;
@@ -200,7 +211,21 @@ impl Log {
         let log = log.map_err(|error| error::batch(py, error))?;
         let sources =
             serde_json::from_str(&sources).map_err(|error| PyValueError::new_err(error.to_string()))?;
-        Ok(Self { log: Arc::new(log), sources, inputs, output })
+        Ok(Self { log: Arc::new(log), sources, inputs, outputs })
+    }
+}
+
+impl Log {
+    /// The output of a model that has one.
+    pub(crate) fn output(&self) -> PyResult<&String> {
+        match self.outputs.as_slice() {
+            [only] => Ok(only),
+            all => Err(PyValueError::new_err(format!(
+                "log: it has {} outputs ({}), and the model one; take it with log.select(output=...)",
+                all.len(),
+                all.join(", ")
+            ))),
+        }
     }
 }
 

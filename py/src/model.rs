@@ -7,12 +7,14 @@ use numpy::{PyArray1, PyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use thetahat::{
-    Channel, Document, Draws, Horizon, Procedure, Quantity, Report, Start, StateSpace, TransientResponse,
-    Unjudged, apply, frequency_response, impulse_response, logarithmic_frequencies, sample, step_response,
+    Channel, Document, Draws, Horizon, PolynomialModel, Procedure, Quantity, Report, Start, StateSpace,
+    TransientResponse, Unjudged, apply, frequency_response, impulse_response, logarithmic_frequencies,
+    sample, step_response,
 };
 
 use crate::array::{from_matrix, matrix, vector};
 use crate::error;
+use crate::grey_box::GreyBox;
 use crate::log::{Log, copy};
 use crate::work::interruptible;
 
@@ -22,6 +24,8 @@ use crate::work::interruptible;
 #[pyclass(frozen, module = "thetahat._thetahat")]
 pub(crate) struct Model {
     model: Arc<thetahat::Model>,
+    /// The report as far as it was known at once.
+    known: Arc<Report>,
     report: OnceLock<Arc<Report>>,
     /// What the figures are computed of, as long as they are not.
     unjudged: Mutex<Option<(Unjudged, Arc<thetahat::Log>)>>,
@@ -34,7 +38,7 @@ type Column<'py> = Bound<'py, PyArray1<f64>>;
 #[pyfunction]
 pub(crate) fn fit(py: Python<'_>, log: &Bound<'_, Log>, options: Vec<OsString>) -> PyResult<Model> {
     let log = log.get();
-    let plan = thetahat_cli::plan(&options, log.inputs.clone(), log.output.clone())
+    let plan = thetahat_cli::plan(&options, log.inputs.clone(), log.output()?.clone())
         .map_err(|failure| error::program(py, &failure))?;
     let (channels, sources) = (Arc::clone(&log.log), log.sources.clone());
     let unjudged = interruptible(py, move |monitor| {
@@ -43,9 +47,27 @@ pub(crate) fn fit(py: Python<'_>, log: &Bound<'_, Log>, options: Vec<OsString>) 
     })?;
     Ok(Model {
         model: unjudged.report().model.clone().into(),
+        known: unjudged.report().clone().into(),
         report: OnceLock::new(),
         unjudged: Mutex::new(Some((unjudged, Arc::clone(&log.log)))),
     })
+}
+
+/// Fits a model in equations to a log with the options of `thetahat fit --grey`.
+#[pyfunction]
+pub(crate) fn fit_equations(
+    py: Python<'_>,
+    log: &Bound<'_, Log>,
+    model: &Bound<'_, GreyBox>,
+    options: Vec<OsString>,
+) -> PyResult<Model> {
+    let plan = thetahat_cli::equations_plan(&options).map_err(|failure| error::program(py, &failure))?;
+    let log = log.get();
+    let (channels, sources, model) = (Arc::clone(&log.log), log.sources.clone(), model.get().0.clone());
+    let report = interruptible(py, move |monitor| {
+        thetahat::fit_equations(&model, &channels, &sources, &plan, monitor)
+    })?;
+    Ok(Model::of(report))
 }
 
 #[pymethods]
@@ -54,8 +76,7 @@ impl Model {
     #[staticmethod]
     fn from_json(py: Python<'_>, text: &str) -> PyResult<Self> {
         let report = Report::from_json(text).map_err(|error| error::batch(py, error))?;
-        let model = report.model.clone().into();
-        Ok(Self { model, report: Arc::new(report).into(), unjudged: Mutex::new(None) })
+        Ok(Self::of(report))
     }
 
     /// The document.
@@ -79,9 +100,9 @@ impl Model {
         Ok((model, serde_json::to_string(&report.estimation).map_err(malformed)?))
     }
 
-    /// Structure and orders, such as ARX(2, 2, 1).
+    /// Structure and orders, such as ARX(2, 2, 1), or what kind it is.
     fn name(&self) -> String {
-        self.model.orders.to_string()
+        self.model.name()
     }
 
     /// The table that `thetahat fit` prints.
@@ -118,11 +139,10 @@ impl Model {
             let plan = thetahat::ValidationPlan::default();
             let (mut looks, mut held_out) = (Vec::new(), Vec::new());
             if let Some((log, sources)) = log {
-                let channels = copy(&log, &channels(&report.model, &log))?;
-                let look = thetahat::validate(&report, None, channels.clone(), &sources, &plan)?;
+                let look = thetahat::validate(&report, None, &log, &sources, &plan)?;
                 // Another log has not the rows of the choice.
                 if look.validation.seen != thetahat::Seen::No {
-                    held_out = thetahat::held_out_runs(&report, &channels)?;
+                    held_out = thetahat::held_out_runs(&report, &log)?;
                 }
                 looks.push(look);
             }
@@ -130,7 +150,7 @@ impl Model {
         })
     }
 
-    /// The prediction of each row, its standard deviations if there are steps, and how many rows count.
+    /// Of each output, the prediction of each row, and its standard deviations if there are steps.
     #[pyo3(signature = (log, horizon, initial))]
     fn predict<'py>(
         &self,
@@ -138,27 +158,27 @@ impl Model {
         log: &Bound<'py, Log>,
         horizon: Option<usize>,
         initial: &str,
-    ) -> PyResult<(Column<'py>, Option<Column<'py>>)> {
+    ) -> PyResult<Vec<(Column<'py>, Option<Column<'py>>)>> {
         let horizon = horizon.map_or(Horizon::FreeRun, |steps| Horizon::Steps { steps });
         let start = self.start(initial, log.get(), horizon)?;
-        let (model, log) = (Arc::clone(&self.model), Arc::clone(&log.get().log));
+        let (known, log) = (Arc::clone(&self.known), Arc::clone(&log.get().log));
         let rows = log.rows();
-        let applied = interruptible(py, move |_| {
-            apply(&model, copy(&log, &channels(&model, &log))?, &[], None, horizon, start)
-        })?;
+        let applied = interruptible(py, move |_| known.apply(&log, &[], None, horizon, start))?;
         let column = |values: &[f64]| PyArray1::from_slice(py, &values[..rows.min(values.len())]);
-        Ok((column(&applied.predicted), applied.standard_deviations.as_deref().map(column)))
+        let each = applied.outputs.iter();
+        let each = each.map(|one| (column(&one.predicted), one.standard_deviations.as_deref().map(column)));
+        Ok(each.collect())
     }
 
-    /// The free run from rest on inputs, one column for each.
-    fn simulate<'py>(&self, py: Python<'py>, inputs: &Bound<'py, PyAny>) -> PyResult<Column<'py>> {
+    /// Of each output, the free run from rest on inputs, one column for each.
+    fn simulate<'py>(&self, py: Python<'py>, inputs: &Bound<'py, PyAny>) -> PyResult<Vec<Column<'py>>> {
         let channels = self.driving(inputs)?;
         let model = Arc::clone(&self.model);
         let applied = interruptible(py, move |_| {
-            let log = thetahat::Log::new(channels, model.sample_time)?;
-            apply(&model, log, &[], None, Horizon::FreeRun, Start::Zero)
+            let log = thetahat::Log::new(channels, model.sample_time())?;
+            apply(&model, &log, &[], None, Horizon::FreeRun, Start::Zero)
         })?;
-        Ok(PyArray1::from_vec(py, applied.predicted))
+        Ok(applied.outputs.into_iter().map(|one| PyArray1::from_vec(py, one.predicted)).collect())
     }
 
     /// Free runs drawn from what the estimate leaves open, on a log or on inputs, one column for each: a row for each draw. Also
@@ -177,24 +197,23 @@ impl Model {
         let (log, start) = match (log, inputs) {
             (Some(log), _) => {
                 let start = self.start(initial, log.get(), Horizon::FreeRun)?;
-                let known = &log.get().log;
-                (copy(known, &channels(&model, known)), start)
+                (Arc::clone(&log.get().log), start)
             }
             (None, Some(inputs)) => {
                 let channels = self.driving(inputs)?;
-                (thetahat::Log::new(channels, model.sample_time), Start::Zero)
+                let log = thetahat::Log::new(channels, model.sample_time());
+                (Arc::new(log.map_err(|error| error::batch(py, error))?), Start::Zero)
             }
             (None, None) => return Err(PyValueError::new_err("u: give inputs, or a log")),
         };
-        let log = log.map_err(|error| error::batch(py, error))?;
         let draws = Draws { count: draws, seed };
-        let drawn = interruptible(py, move |_| sample(&model, log, &[], None, start, &draws))?;
+        let drawn = interruptible(py, move |_| sample(&model, &log, &[], None, start, &draws))?;
         let runs = PyArray2::from_vec2(py, &drawn.values)
             .map_err(|error| PyValueError::new_err(format!("draws: {error}")))?;
         Ok((runs, drawn.unstable, drawn.varied))
     }
 
-    /// What comes after the end of a log, and its standard deviations.
+    /// Of each output, what comes after the end of a log, and its standard deviations.
     #[pyo3(signature = (log, steps, inputs, initial))]
     fn forecast<'py>(
         &self,
@@ -203,13 +222,13 @@ impl Model {
         steps: usize,
         inputs: Option<&Bound<'py, PyAny>>,
         initial: &str,
-    ) -> PyResult<(Column<'py>, Column<'py>)> {
+    ) -> PyResult<Vec<(Column<'py>, Column<'py>)>> {
         const MOST: usize = 1_000_000;
         if !(1..=MOST).contains(&steps) {
             return Err(PyValueError::new_err(format!("steps: {steps} is outside 1..{MOST}")));
         }
         let model = Arc::clone(&self.model);
-        let driven = model.orders.nb.iter().any(|&nb| nb > 0);
+        let driven = model.is_driven();
         let future = match inputs {
             Some(inputs) if driven => self.inputs_of("u", inputs, Some(steps))?,
             None if driven => {
@@ -230,20 +249,23 @@ impl Model {
             if driven {
                 known = extended(&known, &future, steps)?;
             }
-            apply(&model, known, &[], None, horizon, start)
+            apply(&model, &known, &[], None, horizon, start)
         })?;
         let end = rows + steps;
-        let ahead = applied.predicted.get(rows..end);
-        let deviations = applied.standard_deviations.as_deref().and_then(|values| values.get(rows..end));
-        match (ahead, deviations) {
-            (Some(ahead), Some(deviations)) if ahead.iter().all(|value| !value.is_nan()) => {
-                Ok((PyArray1::from_slice(py, ahead), PyArray1::from_slice(py, deviations)))
+        let each = applied.outputs.iter().map(|output| {
+            let ahead = output.predicted.get(rows..end);
+            let deviations = output.standard_deviations.as_deref().and_then(|values| values.get(rows..end));
+            match (ahead, deviations) {
+                (Some(ahead), Some(deviations)) if ahead.iter().all(|value| !value.is_nan()) => {
+                    Ok((PyArray1::from_slice(py, ahead), PyArray1::from_slice(py, deviations)))
+                }
+                _ => Err(PyValueError::new_err(
+                    "log: it ends in missing samples, or in a stretch too short to start from; give one that ends in more \
+                     samples",
+                )),
             }
-            _ => Err(PyValueError::new_err(
-                "log: it ends in missing samples, or in a stretch too short to start from; give one that ends in more \
-                 samples",
-            )),
-        }
+        });
+        each.collect()
     }
 
     /// For each input and the noise: its name, frequencies, real and imaginary parts, and magnitude and phase with their
@@ -256,15 +278,18 @@ impl Model {
         points: usize,
     ) -> PyResult<Vec<(Option<String>, [Column<'py>; 7])>> {
         let model = Arc::clone(&self.model);
+        let polynomials = self.polynomials(py, "a frequency response")?;
         let frequencies = match frequencies {
             Some(frequencies) => vector("w", frequencies, None)?.as_slice()?.to_vec(),
             None => {
-                let nyquist = std::f64::consts::PI / model.sample_time;
+                let nyquist = std::f64::consts::PI / polynomials.sample_time;
                 logarithmic_frequencies(nyquist / 1000.0, nyquist, points)
                     .map_err(|error| error::batch(py, error))?
             }
         };
-        let responses = interruptible(py, move |_| frequency_response(&model, &frequencies))?;
+        let responses = interruptible(py, move |_| {
+            frequency_response(model.polynomials("a frequency response")?, &frequencies)
+        })?;
         let columns = responses.into_iter().map(|response| {
             let column = |of: &dyn Fn(&thetahat::FrequencyPoint) -> f64| {
                 PyArray1::from_vec(py, response.points.iter().map(of).collect())
@@ -307,21 +332,32 @@ impl Model {
 
     /// F, G, H, D and K of the innovations form.
     fn state_space<'py>(&self, py: Python<'py>) -> PyResult<[Bound<'py, PyArray2<f64>>; 5]> {
-        let StateSpace { f, g, h, d, k, .. } = self.model.state_space();
+        let StateSpace { f, g, h, d, k, .. } = self.polynomials(py, "the innovations form")?.state_space();
         let array = |matrix| from_matrix(py, matrix);
         Ok([array(&f)?, array(&g)?, array(&h)?, array(&d)?, array(&k)?])
     }
 }
 
 impl Model {
+    fn of(report: Report) -> Self {
+        let known = Arc::new(report);
+        let model = known.model.clone().into();
+        Self { model, report: Arc::clone(&known).into(), known, unjudged: Mutex::new(None) }
+    }
+
+    /// The polynomials, of which alone `what` is known.
+    fn polynomials(&self, py: Python<'_>, what: &str) -> PyResult<&PolynomialModel> {
+        self.model.polynomials(what).map_err(|error| error::batch(py, error))
+    }
+
     /// The times, the values and their standard errors of a response to an input.
     fn transient<'py>(
         &self,
         py: Python<'py>,
-        respond: impl FnOnce(&thetahat::Model) -> Result<TransientResponse, thetahat::Error> + Send + 'static,
+        respond: impl FnOnce(&PolynomialModel) -> Result<TransientResponse, thetahat::Error> + Send + 'static,
     ) -> PyResult<[Column<'py>; 3]> {
         let model = Arc::clone(&self.model);
-        let response = interruptible(py, move |_| respond(&model))?;
+        let response = interruptible(py, move |_| respond(model.polynomials("a step or impulse response")?))?;
         let values = response.values.iter().map(|quantity| quantity.value).collect();
         let errors = response.values.iter().map(or_nan).collect();
         Ok([response.time, values, errors].map(|column| PyArray1::from_vec(py, column)))
@@ -347,8 +383,8 @@ impl Model {
     /// The start of this name, for a log that may have the output.
     fn start(&self, initial: &str, log: &Log, horizon: Horizon) -> PyResult<Start> {
         match initial {
-            "auto" if !log.log.has(&self.model.output.name) => Ok(Start::Zero),
-            "auto" => Ok(Start::natural(&self.model, horizon)),
+            "auto" if !self.model.outputs().iter().all(|output| log.log.has(&output.name)) => Ok(Start::Zero),
+            "auto" => Ok(self.model.natural_start(horizon)),
             "drop" => Ok(Start::Drop),
             "zero" => Ok(Start::Zero),
             "estimate" => Ok(Start::Estimate),
@@ -360,7 +396,7 @@ impl Model {
 
     /// The inputs of a free run, which misses none of them.
     fn driving(&self, inputs: &Bound<'_, PyAny>) -> PyResult<Vec<Channel>> {
-        if self.model.inputs.is_empty() {
+        if self.model.inputs().is_empty() {
             return Err(PyValueError::new_err(
                 "u: the model has no inputs, so there is nothing to simulate; forecast it",
             ));
@@ -381,7 +417,7 @@ impl Model {
         values: &Bound<'_, PyAny>,
         rows: Option<usize>,
     ) -> PyResult<Vec<Channel>> {
-        let names = self.model.inputs.iter().map(|input| input.name.clone());
+        let names = self.model.inputs().iter().map(|input| input.name.clone());
         let count = names.len();
         let array = matrix(argument, values, [rows, Some(count)])?;
         let (entries, rows) = (array.as_slice()?, array.shape()[0]);
@@ -390,11 +426,11 @@ impl Model {
     }
 }
 
-/// The channels of a log that a model is about; it may lack the output.
-pub(crate) fn channels<'a>(model: &'a thetahat::Model, log: &thetahat::Log) -> Vec<&'a str> {
-    let inputs = model.inputs.iter().map(|input| input.name.as_str());
-    let output = Some(model.output.name.as_str()).filter(|output| log.has(output));
-    inputs.chain(output).collect()
+/// The channels of a log that a model is about; it may lack outputs.
+fn channels<'a>(model: &'a thetahat::Model, log: &thetahat::Log) -> Vec<&'a str> {
+    let inputs = model.inputs().iter().map(|input| input.name.as_str());
+    let outputs = model.outputs().iter().map(|output| output.name.as_str());
+    inputs.chain(outputs.filter(|output| log.has(output))).collect()
 }
 
 /// How many rows at the end of a log miss a channel of the model.

@@ -61,11 +61,38 @@ def test_several_inputs_have_names() -> None:
     assert th.Log(Y).inputs == [] and th.Log(Y).u.shape == (5, 0)
 
 
+def test_several_outputs_have_names_and_roles() -> None:
+    pair = np.column_stack([Y, U])
+    by_number, by_name = th.Log(pair), th.Log({"a": Y, "b": U})
+    assert (by_number.outputs, by_name.outputs) == (["y1", "y2"], ["a", "b"])
+    assert th.Log(pd.DataFrame({"a": Y, "b": U})) == by_name == th.Log(pair, output_name=["a", "b"])
+    assert np.array_equal(by_name.y, pair) and "b" in by_name and by_name.select(output="b").output == "b"
+    assert by_name.select(inputs="a", output="b") == th.Log(U, {"a": Y}, output_name="b")
+    assert pickle.loads(pickle.dumps(by_name)) == by_name and by_name[1:3].outputs == ["a", "b"]
+    with pytest.raises(ValueError, match="output_name: expected 2, found 1"):
+        th.Log(pair, output_name="y")
+    with pytest.raises(ValueError, match=r"take one with select\(output"):
+        by_name.output  # noqa: B018
+    with pytest.raises(ValueError, match="it has 2 outputs"):
+        th.arx(by_name, na=1, nb=0)
+    with pytest.raises(ValueError, match="no channel 'c'"):
+        by_name.select(output="c")
+
+
+def test_a_clock_may_be_uneven_where_it_may() -> None:
+    time = [0.0, 1.0, 2.0, 2.7, 4.0]
+    log = th.Log(Y, U, time=time, uniform=False)
+    assert log.time.tolist() == time and log[:3].time.tolist() == time[:3]
+    assert pickle.loads(pickle.dumps(log)) == log
+    with pytest.raises(ValueError, match="the log is not uniform"):
+        th.arx(log, na=1, nb=1)
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
         ({"y": []}, "y: expected at least one entry"),
-        ({"y": [[1.0, 2.0]]}, r"y: expected one dimension, found shape \(1, 2\)"),
+        ({"y": [[1.0, 2.0]]}, r"y: expected one dimension, or a column for each output, found shape \(1, 2\)"),
         ({"y": 3.0}, "y: expected one dimension"),
         ({"y": Y, "u": U[:3]}, "channel 'y' has 5 rows, the others have 3"),
         ({"y": Y, "u": np.ones((5, 2, 2))}, r"u: expected shape \(rows,\) or \(rows, inputs\)"),

@@ -362,8 +362,8 @@ def test_columns_are_no_rows() -> None:
     for u in (TWO.T, pd.DataFrame(TWO.T), [[1.0], [1.0, 2.0]], 5.0, TWO[:, :, None]):
         with pytest.raises((ValueError, TypeError), match="^u: |rows"):
             th.Log(Y, u)
-    with pytest.raises(ValueError, match=r"y: expected one dimension, found shape \(60, 2\)"):
-        th.Log(pd.DataFrame(TWO))
+    with pytest.raises(ValueError, match=r"y: expected one dimension, or a column for each output, found shape \(2, 60\)"):
+        th.Log(TWO.T)
     with pytest.raises(ValueError, match=r"measurements: expected shape \(any, 1\), found shape \(60, 2\)"):
         kalman(pl.DataFrame(TWO), U, 1)
     with pytest.raises(ValueError, match="u: two columns have"):

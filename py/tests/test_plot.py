@@ -281,7 +281,7 @@ def test_residuals_are_those_of_the_validation(two_inputs: th.Log) -> None:
     model = th.arx(two_inputs[:300], na=1, nb=[1, 2])
     validation = model.validate(two_inputs[300:])
     axes = plot.residuals(validation)
-    tests = validation.document["residuals"]
+    [tests] = validation.document["residuals"]
     assert len(axes) == 3
     (line,) = [line for line in axes[0].get_lines() if line.get_marker() == "o"]
     np.testing.assert_array_equal(line.get_xdata(), np.arange(1, len(tests["autocorrelation"])))

@@ -2,7 +2,10 @@
 
 use thetahat::figures::{chance, fixed, number, short, three};
 use thetahat::text::harmless;
-use thetahat::{Comparison, Coverage, Fit, Horizon, Independence, Requirement, Seen, Test, Validation};
+use thetahat::{
+    Comparison, Coverage, Fit, Horizon, Independence, InformationCriterion, Orders, Requirement, Residuals,
+    Seen, Test, Validation,
+};
 
 use super::text::{Text, columns, or_dash, some};
 use super::{MOST, NO_FIT, fits, orders_legend, rows};
@@ -22,25 +25,31 @@ pub fn validation(found: &Validation, requirements: &[Requirement], alpha: f64, 
     text.line(&format!(
         "{}, {}, on {} rows {}: {}",
         or_dash(found.report.as_deref(), harmless),
-        found.orders,
+        found.model,
         some(&files, MOST, ", "),
         rows(&found.rows),
         seen(found.seen)
     ));
-    text.line(&orders_legend([&found.orders]));
-    text.line(stable(found.stable));
+    if let Some(orders) = &found.orders {
+        text.line(&orders_legend([orders]));
+    }
+    if let Some(is_stable) = found.stable {
+        text.line(stable(is_stable));
+    }
     text.line("");
     fits(&mut text, &found.fit);
     errors(&mut text, &found.fit);
-    let noise = &found.noise;
-    text.line(&format!(
-        "errors one step ahead: mean square {}, expected {}, ratio {}",
-        or_dash(noise.mse, number),
-        number(noise.model),
-        or_dash(noise.ratio, three)
-    ));
+    for noise in &found.noise {
+        text.line(&format!(
+            "errors{} one step ahead: mean square {}, expected {}, ratio {}",
+            of(found, &noise.output),
+            or_dash(noise.mse, number),
+            number(noise.model),
+            or_dash(noise.ratio, three)
+        ));
+    }
     text.line("");
-    coverage(&mut text, &found.coverage);
+    coverage(&mut text, found);
     residuals(&mut text, found, alpha);
     if !requirements.is_empty() {
         let mut table = columns(&["required", ""]).words(&[1]);
@@ -69,9 +78,9 @@ pub fn comparison(comparison: &Comparison, width: usize) -> String {
     let mut row = |what: &str, of: &dyn Fn(&Validation) -> String| {
         table.row(std::iter::once(what.to_owned()).chain(models.iter().map(of)));
     };
-    row("orders", &|model| model.orders.to_string());
-    row("parameters", &|model| model.orders.parameters().to_string());
-    row("stable", &|model| yes(model.stable));
+    row("model", &|model| model.model.clone());
+    row("parameters", &|model| model.parameters.to_string());
+    row("stable", &|model| or_dash(model.stable, yes));
     row("fitted to these rows", &|model| {
         match model.seen {
             Seen::No => "no",
@@ -91,44 +100,75 @@ pub fn comparison(comparison: &Comparison, width: usize) -> String {
         Horizon::Steps { steps } => *steps,
         Horizon::FreeRun => usize::MAX,
     });
-    for horizon in horizons {
-        row(&format!("fit [%], {horizon}"), &|model| {
-            let fit = model.fit.iter().find(|fit| fit.horizon == horizon);
-            or_dash(fit.and_then(|fit| fit.percent), |percent| fixed(percent, 3))
-        });
-    }
-    for (what, of) in ERRORS {
-        row(&format!("{what}, 1 step ahead"), &|model| {
-            let fit = model.fit.iter().find(|fit| fit.horizon == (Horizon::Steps { steps: 1 }));
-            or_dash(fit.and_then(of), number)
-        });
-    }
-    row("mean square error", &|model| or_dash(model.noise.mse, number));
-    row("  of that expected", &|model| or_dash(model.noise.ratio, three));
-    let p = |p: Option<f64>| or_dash(p, chance);
-    row("Ljung-Box p-value", &|model| {
-        p(model.residuals.as_ref().and_then(|residuals| residuals.ljung_box.p_value))
-    });
-    row("Anderson: stops at alpha", &|model| {
-        or_dash(model.residuals.as_ref(), |found| stops(found.anderson.stops_at))
-    });
-    let mut inputs: Vec<&str> = Vec::new();
-    for test in models.iter().filter_map(|model| model.residuals.as_ref()).flat_map(|r| &r.independence) {
-        if !inputs.contains(&test.input.as_str()) {
-            inputs.push(&test.input);
+    let mut outputs: Vec<&str> = Vec::new();
+    for noise in models.iter().flat_map(|model| &model.noise) {
+        if !outputs.contains(&noise.output.as_str()) {
+            outputs.push(&noise.output);
         }
     }
-    for input in inputs {
-        row(&format!("independence p-value, {}", harmless(input)), &|model| {
-            let tests = model.residuals.iter().flat_map(|residuals| &residuals.independence);
-            p(tests.filter(|test| test.input == input).find_map(|test| test.past.p_value))
+    for output in &outputs {
+        let of = if outputs.len() > 1 { format!("{}: ", harmless(output)) } else { String::new() };
+        let fit = |model: &Validation, horizon: Horizon| {
+            let same = |fit: &&Fit| fit.horizon == horizon && fit.output == **output;
+            model.fit.iter().find(same).cloned()
+        };
+        for horizon in &horizons {
+            row(&format!("{of}fit [%], {horizon}"), &|model| {
+                or_dash(fit(model, *horizon).and_then(|fit| fit.percent), |percent| fixed(percent, 3))
+            });
+        }
+        for (what, figure) in ERRORS {
+            row(&format!("{of}{what}, 1 step ahead"), &|model| {
+                or_dash(fit(model, Horizon::Steps { steps: 1 }).as_ref().and_then(figure), number)
+            });
+        }
+        let noise = |model: &Validation| model.noise.iter().find(|noise| noise.output == **output).cloned();
+        row(&format!("{of}mean square error"), &|model| {
+            or_dash(noise(model).and_then(|noise| noise.mse), number)
+        });
+        row(&format!("{of}  of that expected"), &|model| {
+            or_dash(noise(model).and_then(|noise| noise.ratio), three)
+        });
+        let p = |p: Option<f64>| or_dash(p, chance);
+        let residuals = |model: &Validation| {
+            model.residuals.iter().find(|residuals| residuals.output == **output).cloned()
+        };
+        row(&format!("{of}Ljung-Box p-value"), &|model| {
+            p(residuals(model).and_then(|residuals| residuals.ljung_box.p_value))
+        });
+        row(&format!("{of}Anderson: stops at alpha"), &|model| {
+            or_dash(residuals(model), |found| stops(found.anderson.stops_at))
+        });
+        let mut inputs: Vec<&str> = Vec::new();
+        for test in models.iter().flat_map(|model| &model.residuals).flat_map(|r| &r.independence) {
+            if !inputs.contains(&test.input.as_str()) {
+                inputs.push(&test.input);
+            }
+        }
+        for input in inputs {
+            row(&format!("{of}independence p-value, {}", harmless(input)), &|model| {
+                let tests = residuals(model).into_iter().flat_map(|residuals| residuals.independence);
+                p(tests.filter(|test| test.input == input).find_map(|test| test.past.p_value))
+            });
+        }
+        row(&format!("{of}95 % intervals hold [%]"), &|model| {
+            let same = |one: &&Coverage| one.steps == 1 && one.level == LEVEL && one.output == **output;
+            or_dash(model.coverage.iter().find(same).and_then(|one| one.actual), percent)
         });
     }
-    row("95 % intervals hold [%]", &|model| {
-        let one = model.coverage.iter().find(|one| one.steps == 1 && one.level == LEVEL);
-        or_dash(one.and_then(|one| one.actual), percent)
-    });
-    table.legend(orders_legend(models.iter().map(|model| &model.orders)));
+    if let Some(criteria) = &comparison.criteria {
+        for criterion in InformationCriterion::all() {
+            let each = criteria.iter().map(|criteria| {
+                let value = if criterion.is_logarithmic() { |value| fixed(value, 4) } else { number };
+                or_dash(criteria.of(criterion), value)
+            });
+            table.row(std::iter::once(format!("{} of the fit", criterion.name())).chain(each));
+        }
+    }
+    let orders: Vec<&Orders> = models.iter().filter_map(|model| model.orders.as_ref()).collect();
+    if !orders.is_empty() {
+        table.legend(orders_legend(orders));
+    }
     text.table(table);
     let silent: Vec<String> = models
         .iter()
@@ -144,13 +184,20 @@ pub fn comparison(comparison: &Comparison, width: usize) -> String {
     text.finish()
 }
 
+/// Of which output, where there are several.
+fn of(found: &Validation, output: &str) -> String {
+    if found.noise.len() > 1 { format!(" of {}", harmless(output)) } else { String::new() }
+}
+
 /// The mean and the largest of the errors.
 fn errors(text: &mut Text, fits: &[Fit]) {
+    let several = fits.iter().any(|fit| fit.output != fits[0].output);
     let header: Vec<&str> = std::iter::once("errors").chain(ERRORS.map(|(what, _)| what)).collect();
     let mut table = columns(&header).none(NO_FIT);
     for fit in fits {
         let figures = ERRORS.map(|(_, of)| or_dash(of(fit), number));
-        table.row(std::iter::once(fit.horizon.to_string()).chain(figures));
+        let of = if several { format!("{}, ", harmless(&fit.output)) } else { String::new() };
+        table.row(std::iter::once(format!("{of}{}", fit.horizon)).chain(figures));
     }
     text.table(table);
 }
@@ -180,7 +227,8 @@ fn stops(alpha: Option<f64>) -> String {
 }
 
 /// One line for each horizon, the levels side by side.
-fn coverage(text: &mut Text, coverage: &[Coverage]) {
+fn coverage(text: &mut Text, found: &Validation) {
+    let coverage = &found.coverage;
     let mut levels: Vec<f64> = Vec::new();
     for one in coverage {
         if !levels.contains(&one.level) {
@@ -192,9 +240,9 @@ fn coverage(text: &mut Text, coverage: &[Coverage]) {
         .collect();
     let mut table = columns(&header.iter().map(String::as_str).collect::<Vec<_>>())
         .none("no deviation of the prediction is known, or no sample counts");
-    for ahead in coverage.chunk_by(|a, b| a.steps == b.steps) {
+    for ahead in coverage.chunk_by(|a, b| (a.steps, &a.output) == (b.steps, &b.output)) {
         let Some(first) = ahead.first() else { continue };
-        let horizon = Horizon::Steps { steps: first.steps }.to_string();
+        let horizon = format!("{}{}", Horizon::Steps { steps: first.steps }, of(found, &first.output));
         let each = ahead.iter().map(|one| or_dash(one.actual, percent));
         table.row(std::iter::once(horizon).chain(each));
     }
@@ -203,17 +251,21 @@ fn coverage(text: &mut Text, coverage: &[Coverage]) {
 
 /// The tests of what is left.
 fn residuals(text: &mut Text, found: &Validation, alpha: f64) {
-    let Some(residuals) = &found.residuals else {
+    if found.residuals.is_empty() {
         text.line("residuals: not tested");
         text.line("");
-        return;
-    };
+    }
+    found.residuals.iter().for_each(|residuals| residuals_of(text, found, residuals, alpha));
+}
+
+fn residuals_of(text: &mut Text, found: &Validation, residuals: &Residuals, alpha: f64) {
     let fitted = match residuals.fitted {
         0 => "fresh".to_owned(),
         count => format!("{count} parameters fitted to them"),
     };
     let asked = if found.white_expected { "" } else { ", which need not be white" };
-    text.line(&format!("residuals: {} samples, {fitted}{asked}", residuals.samples));
+    let of = of(found, &residuals.output);
+    text.line(&format!("residuals{of}: {} samples, {fitted}{asked}", residuals.samples));
     let level = format!("at {}", short(alpha));
     let mut table = columns(&["test", "lags", "statistic", "degrees", "p-value", &level])
         .words(&[5])

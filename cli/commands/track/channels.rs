@@ -12,7 +12,7 @@ pub(super) fn choose(job: &TrackJob, report: Option<&Report>, header: &[String])
     let model = report.map(|report| &report.model);
     let output = match (&job.output, model) {
         (Some(name), _) => name.clone(),
-        (None, Some(model)) => model.output.name.clone(),
+        (None, Some(model)) => model.outputs().iter().map(|output| output.name.clone()).collect(),
         (None, None) if header.iter().any(|name| name == "y") => "y".to_owned(),
         (None, None) => {
             return Err(format!(
@@ -23,7 +23,7 @@ pub(super) fn choose(job: &TrackJob, report: Option<&Report>, header: &[String])
     };
     let inputs = match (&job.inputs, model) {
         (Some(names), _) => names.clone(),
-        (None, Some(model)) => model.inputs.iter().map(|input| input.name.clone()).collect(),
+        (None, Some(model)) => model.inputs().iter().map(|input| input.name.clone()).collect(),
         (None, None) if !job.has_inputs() => Vec::new(),
         (None, None) => usual_inputs(header),
     };

@@ -1,5 +1,6 @@
 //! Logs: channels on a common clock, cut into segments; and what is done to them before a fit.
 
+mod digest;
 mod log;
 mod offset;
 mod prefilter;
@@ -12,6 +13,7 @@ mod split;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use digest::{digest, digests, inside};
 pub use log::{Channel, Interpolation, Log, Record};
 pub(crate) use log::{GAP, JITTER, check, measured};
 pub use offset::Offset;

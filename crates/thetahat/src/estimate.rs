@@ -5,6 +5,7 @@ mod border;
 mod common;
 mod criteria;
 mod criterion;
+pub(crate) mod equations;
 mod exact;
 mod instrumental;
 mod normal;
@@ -28,7 +29,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::data::Record;
-use crate::model::{Model, Signal};
+use crate::model::{PolynomialModel, Signal};
 pub use crate::regression::Solver;
 use crate::{Error, Orders, Structure};
 pub use arx::{arx, arx_factor};
@@ -36,12 +37,12 @@ pub(crate) use arx::{enough, estimate_is_for_f};
 pub(crate) use common::{Common, Point, Window};
 pub use criteria::{Criteria, InformationCriterion};
 pub use criterion::{Bound, Criterion, CriterionOutcome, GainBound, Norm};
+pub use equations::{EquationsOutcome, LikelihoodSearch, UnknownParameter};
 pub use exact::LikelihoodOutcome;
-pub(crate) use exact::exact_mean;
 pub use offset::Constant;
 pub(crate) use offset::{Beside, Fitted, OutputOffset, Task, pays};
+pub(crate) use optimize::Deadline;
 pub use optimize::{Algorithm, Monitor, Progress, Search, SearchOutcome, StartOutcome, Step, Stopped};
-pub(crate) use optimize::{Deadline, FIRST_DAMPING, LARGEST_DAMPING, ROUNDING, SMALLEST_DAMPING};
 pub(crate) use plant_first::noise_order;
 pub(crate) use polynomials::extended;
 pub(crate) use prediction_error::{drop_is_not_for_f, stretches};
@@ -116,6 +117,8 @@ pub enum Procedure {
     Robust(RobustOutcome),
     /// By a search for the largest likelihood of all measured outputs.
     ExactLikelihood(LikelihoodOutcome),
+    /// The largest likelihood of the innovations of a model in equations.
+    InnovationsLikelihood(EquationsOutcome),
 }
 
 /// How to estimate.
@@ -288,15 +291,20 @@ impl Estimate {
         sample_time: f64,
         inputs: Vec<Signal>,
         output: Signal,
-    ) -> Result<Model, Error> {
+    ) -> Result<PolynomialModel, Error> {
         let Self { parameters, noise_variance, .. } = self;
-        let model =
-            Model::from_parameters(orders, parameters, self.covariance(), *noise_variance, sample_time)?
-                .with_degrees_of_freedom(self.degrees_of_freedom())?;
+        let model = PolynomialModel::from_parameters(
+            orders,
+            parameters,
+            self.covariance(),
+            *noise_variance,
+            sample_time,
+        )?
+        .with_degrees_of_freedom(self.degrees_of_freedom())?;
         if !self.criteria().of(InformationCriterion::FPE).is_some_and(f64::is_finite) {
             return Err(Error::data("the noise variance overflows; scale the output towards one"));
         }
-        Ok(Model { inputs, output, ..model })
+        Ok(PolynomialModel { inputs, output, ..model })
     }
 
     /// theta-hat, in the order of [`Orders::names`](crate::Orders::names).
@@ -364,7 +372,10 @@ impl Estimate {
                 prediction_error::coloured_covariance(record, orders, &self)
             }
             Procedure::Robust(_) if orders.structure() == Structure::Oe => self.covariance,
-            Procedure::Constrained(_) | Procedure::Robust(_) | Procedure::ExactLikelihood(_) => None,
+            Procedure::Constrained(_)
+            | Procedure::Robust(_)
+            | Procedure::ExactLikelihood(_)
+            | Procedure::InnovationsLikelihood(_) => None,
             Procedure::InstrumentalVariables { .. } | Procedure::RefinedInstrumentalVariables { .. } => {
                 self.covariance
             }

@@ -13,10 +13,10 @@
 //! - [`Log`] holds channels on a common clock, [`Record`] the signals that an estimate sees.
 //! - [`estimate`] gives an [`Estimate`] from a [`Record`], [`Orders`] and a [`Method`]. [`arx`] is its short form for models
 //!   that are linear in their parameters; [`arx_factor`] gives a triangular factor that merges with others.
-//! - [`predict`], [`simulate`] and [`forecast`] say what a [`Model`] says, [`draw`] what it leaves open;
+//! - [`predict`], [`simulate`] and [`forecast`] say what a [`PolynomialModel`] says, [`draw`] what it leaves open;
 //!   [`frequency_response`], [`step_response`] and [`impulse_response`] what it is to sines, steps and impulses; [`Fit`] says
 //!   how close that is.
-//! - [`Model::state_space`] writes a model as a recursion of first order, for filters and controllers.
+//! - [`PolynomialModel::state_space`] writes a model as a recursion of first order, for filters and controllers.
 //! - [`StateFilter`] estimates the state of a [`StateModel`] row by row: of a report, of matrices, or of a model in equations,
 //!   a [`GreyBox`], of which parameters may be unknown.
 //! - [`inspect`] says what a log is worth before any fit.
@@ -40,7 +40,6 @@ mod error;
 mod estimate;
 pub mod figures;
 mod filter;
-mod greybox;
 mod inspect;
 mod model;
 mod regression;
@@ -58,34 +57,35 @@ pub use data::{
 pub use document::{Document, is_document};
 pub use error::Error;
 pub use estimate::{
-    Algorithm, Bound, Constant, Criteria, Criterion, CriterionOutcome, Estimate, GainBound,
-    InformationCriterion, Initial, LikelihoodOutcome, Loss, Method, Monitor, Norm, Procedure, Progress,
-    Robust, RobustOutcome, Search, SearchOutcome, Solver, StartOutcome, Step, Stopped, arx, arx_factor,
-    estimate, estimate_monitored,
+    Algorithm, Bound, Constant, Criteria, Criterion, CriterionOutcome, EquationsOutcome, Estimate, GainBound,
+    InformationCriterion, Initial, LikelihoodOutcome, LikelihoodSearch, Loss, Method, Monitor, Norm,
+    Procedure, Progress, Robust, RobustOutcome, Search, SearchOutcome, Solver, StartOutcome, Step, Stopped,
+    UnknownParameter, arx, arx_factor, estimate, estimate_monitored,
 };
 pub use filter::{
     EstimatedNumber, Estimator, FilterSummary, InitialState, ObserverGain, SmoothedStates, StateEstimate,
     StateFilter, StateModel, StateValues,
 };
-pub use greybox::{GreyBox, GreyFit, GreyOutput, GreyParameter, GreyReport, GreySearch, GreyState, fit_grey};
 pub use inspect::{
     ChannelQuality, Clock, DelayEstimate, Excitation, Feedback, Inspection, InspectionPlan, Saturation,
     SpectrumPoint, inspect, inspect_log,
 };
 pub use model::{
-    Interval, Model, OffsetCovariance, Orders, Parameter, Quantity, Root, Signal, StateSpace, Structure,
+    EquationsModel, GreyBox, Interval, Model, OffsetCovariance, Orders, Parameter, PolynomialModel, Quantity,
+    Root, Signal, StateSpace, Structure,
 };
 pub use report::{
-    Applied, Comparison, Coverage, Data, Estimation, Missing, NoiseLevel, Parts, Plan, Report, Requirement,
-    Seen, Signals, Unjudged, Validated, Validation, ValidationPlan, apply, compare, held_out_runs, identify,
-    identify_monitored, sample, validate,
+    Applied, AppliedOutput, Comparison, Coverage, Data, EquationsPlan, Estimation, Missing, NoiseLevel,
+    OutputSignals, Parts, Plan, Report, Requirement, Seen, Signals, Unjudged, Validated, Validation,
+    ValidationPlan, apply, compare, fit_equations, held_out_runs, identify, identify_monitored, sample,
+    validate,
 };
 #[cfg(feature = "html")]
 pub use report::{comparison_page, fit_page, inspection_page, validation_page};
 pub use respond::{
-    Drawn, Draws, Forecast, FrequencyPoint, FrequencyResponse, Response, Start, TransientResponse, draw,
-    forecast, frequency_response, impulse_response, logarithmic_frequencies, predict, prediction_deviation,
-    prediction_deviations, simulate, step_response,
+    Drawn, Draws, Forecast, FrequencyPoint, FrequencyResponse, Horizon, NisSummary, Response, Start,
+    TransientResponse, draw, forecast, frequency_response, impulse_response, logarithmic_frequencies,
+    predict, prediction_deviation, prediction_deviations, simulate, step_response,
 };
 pub use select::{
     Automatic, Best, Choice, Delay, Focus, Grid, HeldOut, OrderRange, Path, Scan, Scored, Select, Selection,
@@ -96,4 +96,4 @@ pub use track::{
     Beginning, PerChannel, Policy, TrackMethod, TrackPlan, TrackScore, TrackSummary, Tracked, Tracker,
     TrackerSummary, change_detector,
 };
-pub use validate::{Anderson, AndersonLevel, Fit, Horizon, Independence, NisSummary, Part, Residuals, Test};
+pub use validate::{Anderson, AndersonLevel, Fit, Independence, Part, Residuals, Test};

@@ -2,15 +2,19 @@
 
 mod assembly;
 mod dynamics;
+pub(crate) mod equations;
 mod fitted;
+mod kind;
 mod orders;
 pub(crate) mod polynomial;
 mod quantity;
 mod state_space;
 
 pub(crate) use dynamics::{Block, Blocks, Gradient, cancel, covariance, near_cancellation};
+pub use equations::{EquationsModel, GreyBox};
 pub(crate) use fitted::is_covariance;
-pub use fitted::{Model, OffsetCovariance, Parameter, Signal};
+pub use fitted::{OffsetCovariance, Parameter, PolynomialModel, Signal};
+pub use kind::Model;
 pub(crate) use orders::LARGEST;
 pub use orders::{Orders, Structure};
 pub use quantity::{Interval, Quantity, Root};

@@ -1,10 +1,15 @@
 //! What a model says: driven by its inputs alone, or by what was measured, and what it is to each frequency.
 
 mod draws;
+pub(crate) mod equations;
 mod forecast;
 mod free_response;
 mod frequency;
+mod horizon;
 mod innovations;
+mod kinds;
+mod nis;
+mod on_log;
 mod predict;
 mod sensitivities;
 mod simulate;
@@ -18,13 +23,16 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::data::Record;
-use crate::{Error, Model};
+use crate::{Error, PolynomialModel};
 
 pub use draws::{Drawn, Draws, draw};
-pub(crate) use forecast::forecast_if_possible;
 pub use forecast::{Forecast, forecast};
 pub use frequency::{FrequencyPoint, FrequencyResponse, frequency_response, logarithmic_frequencies};
+pub use horizon::Horizon;
 pub(crate) use innovations::{Innovations, innovations};
+pub(crate) use nis::NisCount;
+pub use nis::NisSummary;
+pub(crate) use on_log::{OnLog, PolynomialOnLog, Tested, record_for};
 pub(crate) use predict::check_steps;
 pub use predict::{predict, prediction_deviation};
 pub use sensitivities::prediction_deviations;
@@ -54,7 +62,7 @@ pub enum Start {
 }
 
 /// A record must have as many inputs as the model.
-fn check_inputs(model: &Model, record: &Record<'_>) -> Result<(), Error> {
+fn check_inputs(model: &PolynomialModel, record: &Record<'_>) -> Result<(), Error> {
     let (expected, found) = (model.b.len(), record.inputs.len());
     if found == expected {
         return Ok(());
@@ -63,7 +71,7 @@ fn check_inputs(model: &Model, record: &Record<'_>) -> Result<(), Error> {
 }
 
 /// Where to look from for a start from measured samples, so that a response `ahead` steps ahead begins with the segment.
-fn history(model: &Model, segment: &Range<usize>, past: usize, ahead: usize) -> usize {
+fn history(model: &PolynomialModel, segment: &Range<usize>, past: usize, ahead: usize) -> usize {
     let forgets = model.c.len() == 1 && model.f.iter().all(|f| f.len() == 1);
     let wanted = if forgets { model.orders.conditioned() + ahead } else { usize::MAX };
     segment.start - past.min(wanted)

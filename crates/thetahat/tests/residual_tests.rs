@@ -88,7 +88,7 @@ fn fitted(log: &Log, orders: &Orders, method: &Method) -> Report {
 fn residuals(report: &Report, log: &Log, rows: [usize; 2], seen: Seen) -> Residuals {
     let rows = vec![Rows::new(rows[0], rows[1]).expect("the case is sound")];
     let plan = ValidationPlan { rows, ..ValidationPlan::default() };
-    let found = validate(report, None, log.clone(), &[], &plan).expect("the case is sound").validation;
+    let found = validate(report, None, log, &[], &plan).expect("the case is sound").validation;
     assert_eq!(found.seen, seen);
     found.residuals.expect("the case is sound")
 }

@@ -79,17 +79,17 @@ class Validation(_Document):
     unmet: list[str]
     alpha: float
 
-    def fit(self, horizon: int | None = 1) -> float:
+    def fit(self, horizon: int | None = 1, *, output: str | None = None) -> float:
         """The fit in percent so many steps ahead, or in a free run (None); NaN where there is none.
 
         Raises
         ------
         ValueError
-            If the validation did not look so far ahead.
+            If the validation did not look so far ahead, or there are several outputs and none is named.
         """
-        return self._figure("percent", horizon)
+        return self._figure("percent", horizon, output)
 
-    def mean_absolute_error(self, horizon: int | None = 1) -> float:
+    def mean_absolute_error(self, horizon: int | None = 1, *, output: str | None = None) -> float:
         """The mean of ``|e|`` so many steps ahead, or in a free run (None), in units of the output; NaN where there is none.
 
         It raises as `fit` does.
@@ -102,18 +102,23 @@ class Validation(_Document):
         >>> validation.mean_absolute_error() < validation.largest_error()
         True
         """
-        return self._figure("mean_absolute_error", horizon)
+        return self._figure("mean_absolute_error", horizon, output)
 
-    def largest_error(self, horizon: int | None = 1) -> float:
+    def largest_error(self, horizon: int | None = 1, *, output: str | None = None) -> float:
         """The largest ``|e|`` so many steps ahead, or in a free run (None), in units of the output; NaN where there is none.
 
         It raises as `fit` does.
         """
-        return self._figure("largest_error", horizon)
+        return self._figure("largest_error", horizon, output)
 
-    def _figure(self, name: str, horizon: int | None) -> float:
+    def _figure(self, name: str, horizon: int | None, output: str | None) -> float:
+        outputs = [noise["output"] for noise in self.document["noise"]]
+        if output is None and len(outputs) > 1:
+            raise ValueError(f"output: there are several; name one of: {', '.join(outputs)}")
+        if output is not None and output not in outputs:
+            raise ValueError(f"output: there is no output '{output}'; there are: {', '.join(outputs)}")
         for fit in self.document["fit"]:
-            if fit["horizon"].get("steps") == horizon:
+            if fit["horizon"].get("steps") == horizon and output in (None, fit["output"]):
                 return float("nan" if fit[name] is None else fit[name])
         if horizon is None:
             raise ValueError("horizon: a model without inputs has no free run; give a number of steps")
@@ -121,28 +126,35 @@ class Validation(_Document):
 
     @property
     def whiteness(self) -> float:
-        """The p-value of Ljung and Box's test that the residuals are white; NaN where they could not be tested."""
-        residuals = self.document["residuals"]
-        value = None if residuals is None else residuals["ljung_box"]["p_value"]
-        return float("nan" if value is None else value)
+        """The p-value of Ljung and Box's test that the residuals are white; NaN where they could not be tested. Of several outputs the
+        least."""
+        values = [residuals["ljung_box"]["p_value"] for residuals in self.document["residuals"]]
+        return min((float(value) for value in values if value is not None), default=float("nan"))
 
     @property
     def anderson(self) -> dict[float, float]:
         """How likely so many autocorrelations of white residuals lie outside their band, by the level of the band.
 
         The mid-p-value of the count, which is about binomial (Anderson's test); below `alpha` the residuals are not white.
-        Empty where they could not be tested.
+        Empty where they could not be tested. Of several outputs the least.
         """
-        residuals = self.document["residuals"]
-        levels = [] if residuals is None else residuals["anderson"]["levels"]
-        return {level["alpha"]: level["p_value"] for level in levels}
+        found: dict[float, float] = {}
+        for residuals in self.document["residuals"]:
+            for level in residuals["anderson"]["levels"]:
+                found[level["alpha"]] = min(level["p_value"], found.get(level["alpha"], 1.0))
+        return found
 
     @property
     def independence(self) -> dict[str, float]:
-        """The p-values that the residuals do not depend on past inputs, by input; NaN where they could not be tested."""
-        residuals = self.document["residuals"]
-        every = [] if residuals is None else residuals["independence"]
-        return {one["input"]: float("nan" if (p := _p_value(one)) is None else p) for one in every}
+        """The p-values that the residuals do not depend on past inputs, by input; NaN where they could not be tested. Of several outputs
+        the least."""
+        found: dict[str, float] = {}
+        for residuals in self.document["residuals"]:
+            for one in residuals["independence"]:
+                value = _p_value(one)
+                known = found.get(one["input"], float("nan"))
+                found[one["input"]] = known if value is None or value > known else value
+        return found
 
     def __repr__(self) -> str:
         rows = sum(last - first + 1 for first, last in self.document["rows"])

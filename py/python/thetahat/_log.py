@@ -17,16 +17,16 @@ from thetahat._options import Duration, ReadOptions, Resample
 
 
 class Log:
-    """Inputs and an output on a common clock.
+    """Inputs and outputs on a common clock.
 
     A log owns its data: arrays are copied once, here. NaN is a missing sample; it ends a stretch, and nothing reaches
     across. Rows are counted as Python does: ``log[:500]`` is the log of the first 500, and ``log["u"]`` is a channel.
 
     Parameters
     ----------
-    y : array_like, shape (N,) or (N, 1)
-        The measured output: an array or a list, or a series of pandas, Polars or PyArrow. What is None, NaN, NA, null or
-        masked is missing.
+    y : array_like, shape (N,) or (N, outputs), or dict of str to array_like
+        The measured output: an array or a list, or a series of pandas, Polars or PyArrow; of several outputs a column for each, or by
+        name; a data frame. What is None, NaN, NA, null or masked is missing.
     u : array_like, shape (N,) or (N, inputs), or dict of str to array_like, optional
         The inputs, a column for each, or by name; a data frame. Without them the log is a time series.
     sample_time : float or timedelta, optional
@@ -41,8 +41,10 @@ class Log:
         ones or more is filtered against aliasing first, unless "unfiltered" is added or the clock is irregular.
     input_names : sequence of str, optional
         The names of the inputs: those of the series or of the frame's columns, or ``u``, or ``u1``, ``u2``, …
-    output_name : str, optional
-        The name of the output: that of the series, or ``y``.
+    output_name : str or sequence of str, optional
+        The name of the output: that of the series, or ``y``; of several the names, or those of the frame's columns, or ``y1``, ``y2``, ….
+    uniform : bool, default True
+        Whether the steps of a clock have to be even. Models in equations take any.
 
     Raises
     ------
@@ -71,19 +73,23 @@ class Log:
 
     def __init__(
         self,
-        y: npt.ArrayLike,
+        y: npt.ArrayLike | _numbers.Columns,
         u: _numbers.Columns | None = None,
         *,
         sample_time: Duration | None = None,
         time: npt.ArrayLike | None = None,
         resample: Resample | None = None,
         input_names: Sequence[str] | None = None,
-        output_name: str | None = None,
+        output_name: str | Sequence[str] | None = None,
+        uniform: bool = True,
     ) -> None:
         channels = _inputs(u, input_names)
         names = [name for name, _ in channels]
-        name, values = _output(y, output_name)
-        of_pandas = [("y", y), *(u.items() if isinstance(u, Mapping) else [("u", u)])]
+        outputs = _outputs(y, output_name)
+        of_pandas = [
+            *(y.items() if isinstance(y, Mapping) else [("y", y)]),
+            *(u.items() if isinstance(u, Mapping) else [("u", u)]),
+        ]
         index = _clock.common_index(of_pandas if time is None else [*of_pandas, ("time", time)])
         clock = None
         if time is not None:
@@ -92,7 +98,10 @@ class Log:
                 # Seconds are what they are.
                 times = times._replace(name="time" if times.name is None else times.name)
             clock = Clock("by time" if times.are_times else "", times, _labels(index), column=True)
-        self._log, self._clock = _made([*channels, (name, values)], names, name, clock, index, sample_time, resample, "time")
+        roles = (names, [name for name, _ in outputs])
+        self._log, self._clock = _made(
+            [*channels, *outputs], roles, clock, index, sample_time, resample, "time", uniform=uniform
+        )
 
     @classmethod
     def from_dataframe(
@@ -100,10 +109,11 @@ class Log:
         frame: Any,
         *,
         inputs: Sequence[str] | str = (),
-        output: str,
+        output: str | Sequence[str],
         time: str | npt.ArrayLike | None = None,
         sample_time: Duration | None = None,
         resample: Resample | None = None,
+        uniform: bool = True,
     ) -> Log:
         """A log of some columns of a data frame.
 
@@ -113,12 +123,12 @@ class Log:
             Of pandas, Polars, PyArrow, or any library with their interchange protocols. Missing values become NaN.
         inputs : sequence of str, or str
             The columns that are inputs; none for a time series.
-        output : str
-            The column that is the output.
+        output : str or sequence of str
+            The column that is the output, or those that are.
         time : str or array_like, optional
             The column that holds the times, or the index of this name, or the times themselves, see `Log`. Without it an index
             of pandas is the clock if it holds times; one that counts rows is not.
-        sample_time, resample
+        sample_time, resample, uniform
             As for `Log`.
 
         Warns
@@ -147,17 +157,18 @@ class Log:
         from thetahat import _frames
 
         names = [_options.text("inputs", name) for name in ([inputs] if isinstance(inputs, str) else inputs)]
-        _options.text("output", output)
-        columns = _frames.columns(frame, [*names, output])
-        channels = [(name, columns[name]) for name in [*names, output]]
+        outputs = _names("output", output)
+        columns = _frames.columns(frame, [*names, *outputs])
+        channels = [(name, columns[name]) for name in [*names, *outputs]]
         index, clock, argument = _clock.common_index([("frame", frame)]), None, "time"
         if isinstance(time, str):
             clock, argument = _frames.clock(frame, time), f"time={time!r}"
         elif time is not None:
             clock = Clock("by time", _clock.read("time", time), _labels(index))
-        log, clock = _made(channels, names, output, clock, index, sample_time, resample, argument)
+        roles = (names, outputs)
+        log, clock = _made(channels, roles, clock, index, sample_time, resample, argument, uniform=uniform)
         if clock.said.startswith("assumed"):
-            for name in _frames.clocks(frame, [*names, output])[:1]:
+            for name in _frames.clocks(frame, [*names, *outputs])[:1]:
                 warnings.warn(f"column {name!r} looks like a clock; time={name!r} would use it; 1 s is assumed", stacklevel=2)
         return cls._of(log, clock)
 
@@ -192,9 +203,41 @@ class Log:
         return self._log.inputs
 
     @property
+    def outputs(self) -> list[str]:
+        """The names of the outputs."""
+        return self._log.outputs
+
+    @property
     def output(self) -> str:
-        """The name of the output."""
-        return self._log.output
+        """The name of the output, of a log that has one."""
+        if len(self.outputs) > 1:
+            raise ValueError(f"the log has several outputs: {', '.join(self.outputs)}; take one with select(output=...)")
+        return self.outputs[0]
+
+    def select(self, *, inputs: Sequence[str] | str | None = None, output: str | Sequence[str] | None = None) -> Log:
+        """The same log with other roles of its channels, and without those that have none.
+
+        Parameters
+        ----------
+        inputs : sequence of str, or str, optional
+            The channels that are inputs; those of the log, unless said otherwise.
+        output : str or sequence of str, optional
+            The channel that is the output, or those that are; those of the log, unless said otherwise.
+
+        Examples
+        --------
+        >>> import thetahat as th
+        >>> log = th.Log({"angle": [0.0, 0.1], "rate": [1.0, 0.9]}, sample_time=0.1)
+        >>> log.outputs
+        ['angle', 'rate']
+        >>> log.select(output="rate").y
+        array([1. , 0.9])
+        """
+        outputs = self.outputs if output is None else _names("output", output)
+        chosen = self.inputs if inputs is None else _names("inputs", inputs)
+        if inputs is None:
+            chosen = [name for name in chosen if name not in outputs]
+        return self._of(self._log.select(chosen, outputs), self._clock)
 
     @property
     def sample_time(self) -> float:
@@ -203,8 +246,9 @@ class Log:
 
     @property
     def y(self) -> npt.NDArray[np.float64]:
-        """The output, shape (N,); a copy."""
-        return self._log.values(self.output)
+        """The output, shape (N,), or (N, outputs) where there are several; a copy."""
+        columns = [self._log.values(name) for name in self.outputs]
+        return columns[0] if len(columns) == 1 else np.column_stack(columns)
 
     @property
     def u(self) -> npt.NDArray[np.float64]:
@@ -269,7 +313,7 @@ class Log:
         return _clock.to_polars(self._clock, self.time, self._columns(columns))
 
     def _columns(self, columns: Mapping[str, npt.ArrayLike]) -> dict[str, npt.NDArray[np.float64]]:
-        found = {name: self._log.values(name) for name in [*self.inputs, self.output]}
+        found = {name: self._log.values(name) for name in [*self.inputs, *self.outputs]}
         for name, column in columns.items():
             if name in found:
                 raise ValueError(f"{name}: the log has a channel of this name; give the column another")
@@ -304,7 +348,7 @@ class Log:
         [range(0, 2), range(3, 4)]
         """
         present = np.ones(len(self), dtype=bool)
-        for name in [*self.inputs, self.output]:
+        for name in [*self.inputs, *self.outputs]:
             present &= ~np.isnan(self._log.values(name))
         breaks = np.array(self._log.breaks, dtype=np.intp)
         first, last = present.copy(), present.copy()
@@ -323,14 +367,14 @@ class Log:
         >>> th.Log([1.0, 2.0, float("nan"), 4.0]).missing
         {'y': 1}
         """
-        names = [*self.inputs, self.output]
+        names = [*self.inputs, *self.outputs]
         return {name: int(np.count_nonzero(np.isnan(self._log.values(name)))) for name in names}
 
     def __len__(self) -> int:
         return self._log.rows
 
     def __contains__(self, name: object) -> bool:
-        return name == self.output or name in self.inputs
+        return name in self.outputs or name in self.inputs
 
     __iter__ = None
 
@@ -343,7 +387,7 @@ class Log:
     def __getitem__(self, rows: slice | range | str) -> Log | npt.NDArray[np.float64]:
         if isinstance(rows, str):
             if rows not in self:
-                raise KeyError(f"there is no channel '{rows}'; there are: {', '.join([*self.inputs, self.output])}")
+                raise KeyError(f"there is no channel '{rows}'; there are: {', '.join([*self.inputs, *self.outputs])}")
             return self._log.values(rows)
         if isinstance(rows, range):
             if not 0 <= rows.start <= rows.stop <= len(self):
@@ -362,9 +406,9 @@ class Log:
         if not isinstance(other, Log):
             return NotImplemented
         mine, yours = self._log, other._log
-        same = (mine.inputs, mine.output, mine.sample_time, mine.breaks, mine.borders) == (
+        same = (mine.inputs, mine.outputs, mine.sample_time, mine.breaks, mine.borders) == (
             yours.inputs,
-            yours.output,
+            yours.outputs,
             yours.sample_time,
             yours.breaks,
             yours.borders,
@@ -394,10 +438,11 @@ class Log:
             rows += f"{' and' if experiments > 1 else ' in'} {segments} segment{'' if segments == 1 else 's'}"
         if missing:
             rows += f", {missing} value{'' if missing == 1 else 's'} missing"
-        return f"Log({rows}, {inputs}, output {self.output}, sample time {self.sample_time} s{self._clock.text()})"
+        outputs = f"output{'' if len(self.outputs) == 1 else 's'} {', '.join(self.outputs)}"
+        return f"Log({rows}, {inputs}, {outputs}, sample time {self.sample_time} s{self._clock.text()})"
 
     def _repr_html_(self) -> str:
-        names = [self.output, *self.inputs]
+        names = [*self.outputs, *self.inputs]
         return _picture.rows(repr(self), [(name, [self._log.values(name)]) for name in names])
 
 
@@ -414,10 +459,11 @@ def read_csv(
     path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]],
     *,
     inputs: Sequence[str] | str | None = None,
-    output: str | None = None,
+    output: str | Sequence[str] | None = None,
     time: str | None = None,
     sample_time: Duration | None = None,
     resample: Resample | None = None,
+    uniform: bool = True,
     time_format: str | None = None,
     delimiter: str | None = None,
     comment: str | None = None,
@@ -435,8 +481,10 @@ def read_csv(
         The file, gzip-compressed or not. Several files are several experiments with one plant.
     inputs : sequence of str, or str, optional
         The columns that are inputs: those called u, u1, u2, …, unless said otherwise. An empty one makes a time series.
-    output : str, optional
-        The column that is the output: y, unless said otherwise.
+    output : str or sequence of str, optional
+        The column that is the output, or those that are: y, unless said otherwise.
+    uniform : bool, default True
+        Whether the steps of the clock have to be even. Models in equations take any.
     time, sample_time, resample, time_format, delimiter, comment, encoding, decimal_comma, header, skip_rows, missing
         How the file is read, see `thetahat.ReadOptions`.
 
@@ -467,14 +515,23 @@ def read_csv(
     >>> log
     Log(3 rows, inputs u, output y, sample time 0.5 s by column 't')
     """
-    words = [*_options.channels(inputs, output), *_options.words(ReadOptions, locals())]
+    outputs = None if output is None else _names("output", output)
+    if outputs is not None and len(outputs) > 1:
+        # Read as inputs, they get their role afterwards.
+        chosen = [] if inputs is None else _names("inputs", inputs)
+        words = [*_options.channels([*chosen, *outputs[:-1]], outputs[-1])]
+    else:
+        words = [*_options.channels(inputs, None if outputs is None else outputs[0])]
+    words += _options.words(ReadOptions, locals())
     paths: list[Any] = list(path) if isinstance(path, (list, tuple)) else [path]
     if not paths:
         raise ValueError("path: there is none; give at least one")
-    if inputs is not None and not isinstance(inputs, str) and not inputs:
+    if inputs is not None and not isinstance(inputs, str) and not inputs and (outputs is None or len(outputs) == 1):
         # The command line reads no inputs for a model without them.
         words += ["--na=1", "--nb=0"]
-    log, notes = _thetahat.Log.read([*words, "--", *map(_options.path_text, paths)])
+    log, notes = _thetahat.Log.read([*words, "--", *map(_options.path_text, paths)], uniform)
+    if outputs is not None and len(outputs) > 1:
+        log = log.select([] if inputs is None else _names("inputs", inputs), outputs)
     for note in notes:
         warnings.warn(note, stacklevel=2)
     said = "assumed" if time is None and sample_time is None else "" if time is None else f"by column {time!r}"
@@ -519,28 +576,58 @@ def _inputs(u: _numbers.Columns | None, names: Sequence[str] | None) -> list[tup
     return [(_options.text("u", name), _numbers.column(f"u: column {name!r}", values)) for name, values in columns]
 
 
-def _output(y: npt.ArrayLike, name: str | None) -> tuple[str, Any]:
-    """The output by its name: the one given, or that of a series or of the only column of a frame."""
-    columns = None if isinstance(y, Mapping) else _numbers.named("y", y)
-    own = columns[0][0] if columns is not None and len(columns) == 1 else "y"
-    return own if name is None else _options.text("output_name", name), _numbers.column("y", y)
+def _outputs(y: npt.ArrayLike | _numbers.Columns, names: str | Sequence[str] | None) -> list[tuple[str, Any]]:
+    """The outputs by name: those given, or those of series or of the columns of a frame."""
+    columns = _numbers.named("y", y)
+    if columns is not None and len(columns) > 1:
+        if names is not None:
+            raise ValueError("output_name: the outputs have names already; leave it out")
+        return [(_options.text("y", name), _numbers.column(f"y: column {name!r}", values)) for name, values in columns]
+    given = names if names is None or isinstance(names, str) else list(names)
+    array = None if columns is not None else _numbers.array("y", y)
+    if array is not None and array.ndim == 2 and array.shape[1] > 1:
+        rows, count = array.shape
+        if count > rows:
+            raise ValueError(f"y: expected one dimension, or a column for each output, found shape {array.shape}")
+        if given is None:
+            given = [f"y{index + 1}" for index in range(count)]
+        if isinstance(given, str) or len(given) != count:
+            raise ValueError(f"output_name: expected {count}, found {1 if isinstance(given, str) else len(given)}")
+        return [(_options.text("output_name", name), array[:, index]) for index, name in enumerate(given)]
+    if isinstance(given, list):
+        if len(given) != 1:
+            raise ValueError(f"output_name: expected 1, found {len(given)}")
+        given = given[0]
+    own = columns[0][0] if columns else "y"
+    values = columns[0][1] if columns and isinstance(y, Mapping) else y
+    return [(own if given is None else _options.text("output_name", given), _numbers.column("y", values))]
 
 
 def _labels(index: Any) -> _clock.Labels | None:
     return None if index is None else _clock.labels_of(index)
 
 
+def _names(argument: str, names: Sequence[str] | str) -> list[str]:
+    """One name, or several."""
+    found = [_options.text(argument, name) for name in ([names] if isinstance(names, str) else names)]
+    if argument == "output" and not found:
+        raise ValueError("output: there is none; name at least one")
+    return found
+
+
 def _made(
     channels: Sequence[tuple[str, Any]],
-    inputs: Sequence[str],
-    output: str,
+    roles: tuple[Sequence[str], Sequence[str]],
     clock: Clock | None,
     index: Any,
     sample_time: Duration | None,
     resample: Resample | None,
     argument: str,
+    *,
+    uniform: bool,
 ) -> tuple[_thetahat.Log, Clock]:
-    """The compiled log, and its clock: the one given, or an index of pandas; without one the sample time counts."""
+    """The compiled log of channels that are inputs and outputs, and its clock: the one given, or an index of pandas; without one the
+    sample time counts."""
     if clock is None and index is not None:
         clock = _clock.of_index(index)
         argument = "index"
@@ -554,10 +641,10 @@ def _made(
     if clock is None or clock.times is None:
         step = 1.0 if sample_time is None else _options.seconds("sample_time", sample_time)
         found = _clock.assumed(index) if sample_time is None else Clock("", None, _labels(index))
-        return _thetahat.Log(channels, inputs, output, step), found
+        return _thetahat.Log(channels, *roles, step), found
     times = clock.times
     seconds = times.seconds(argument)
     name = "time" if times.name is None else str(times.name)
-    log = _thetahat.Log(channels, inputs, output, 1.0, (seconds, resampling, times.start(), name))
+    log = _thetahat.Log(channels, *roles, 1.0, (seconds, resampling, times.start(), name), uniform)
     new = None if resample is None else log.time()
     return log, clock if new is None else clock.resampled(new)

@@ -106,7 +106,7 @@ class Model(ReportedModel):
 
         Returns
         -------
-        ndarray, shape (N,)
+        ndarray, shape (N,), or (N, outputs) where there are several
             NaN where there is no prediction: in gaps, and before a start. Free runs, and predictions of models without A, C
             and D, go on where the output alone is missing.
 
@@ -141,7 +141,7 @@ class Model(ReportedModel):
 
         Returns
         -------
-        lower, upper : ndarray, shape (N,)
+        lower, upper : ndarray, shape (N,), or (N, outputs) where there are several
             NaN where there is no prediction.
         """
         quantile = _options.quantile(level)
@@ -152,7 +152,9 @@ class Model(ReportedModel):
     def _predicted(self, log: Log, horizon: int | None, initial: str) -> tuple[Array, Array | None]:
         if horizon is not None:
             horizon = _options.count("horizon", horizon, 1_000_000)
-        return self._model.predict(handle("log", log), horizon, initial)
+        found = self._model.predict(handle("log", log), horizon, initial)
+        deviations = [deviations for _, deviations in found if deviations is not None]
+        return _beside([values for values, _ in found]), _beside(deviations) if deviations else None
 
     def simulate(self, u: _numbers.Columns | Log, *, initial: str = "auto") -> Array:
         """The free run on inputs, in the units of the log.
@@ -182,7 +184,7 @@ class Model(ReportedModel):
             return self._predicted(u, None, initial)[0]
         if initial not in ("auto", "zero"):
             raise ValueError(f"initial: inputs alone start from zero, not '{initial}'; give a Log to start from its output")
-        return self._model.simulate(self._inputs_of(u))
+        return _beside(self._model.simulate(self._inputs_of(u)))
 
     def sample(
         self, u: _numbers.Columns | Log, draws: int = 100, *, seed: int = 0, initial: str = "auto"
@@ -285,7 +287,8 @@ class Model(ReportedModel):
         """
         steps = _options.count("steps", steps, 1_000_000)
         future = None if u is None else self._inputs_of(u)
-        values, deviations = self._model.forecast(handle("log", log), steps, future, initial)
+        found = self._model.forecast(handle("log", log), steps, future, initial)
+        values, deviations = (_beside(columns) for columns in zip(*found))
         time = log.time[-1] + self.sample_time * np.arange(1, steps + 1)
         return Forecast(time, values, deviations, log._clock.after(steps, self.sample_time))
 
@@ -521,3 +524,8 @@ class Model(ReportedModel):
         steps = [(f"step of {name}", [self.step_response(index).values]) for index, name in enumerate(self.inputs)]
         table = _picture.rows(repr(self), steps)
         return f"{table}<pre>{escape(self.summary())}</pre>"
+
+
+def _beside(columns: Sequence[Array]) -> Array:
+    """One column as it is, several side by side."""
+    return columns[0] if len(columns) == 1 else np.column_stack(columns)

@@ -129,6 +129,35 @@ class FitOptions(TypedDict, total=False):
     time_limit: float
 
 
+class EquationsOptions(TypedDict, total=False):
+    """What a fit of a model in equations can be told.
+
+    Attributes
+    ----------
+    estimate, validate, split
+        Rows to fit to and to judge on, see `FitOptions`. In each log the model begins, as it says, with the first row to fit to.
+    max_iterations : int
+        Iterations at most, from each start: 100.
+    tolerance : float
+        Stop where the next step would raise the log-likelihood by no more than this fraction of half the measured values: 1e-8.
+    starts : int
+        Search from so many further starts, drawn from what the model knows of its parameters.
+    seed : int
+        Which random starts.
+    time_limit : float
+        After so many seconds begin no iteration.
+    """
+
+    estimate: Rows
+    validate: Rows
+    split: tuple[float, float, float]
+    max_iterations: int
+    tolerance: float
+    starts: int
+    seed: int
+    time_limit: float
+
+
 class ValidationOptions(TypedDict, total=False):
     """How to validate a model on a log.
 

@@ -57,18 +57,32 @@ class ReportedModel:
 
     @property
     def name(self) -> str:
-        """Structure and orders, such as ``ARX(2, 2, 1)``."""
+        """Structure and orders, such as ``ARX(2, 2, 1)``; of equations how many states they have."""
         return self._model.name()
+
+    @property
+    def kind(self) -> str:
+        """``"polynomial"``, or ``"equations"`` for a model in equations."""
+        return str(self._own["kind"])
+
+    def _polynomial(self, name: str) -> Any:
+        """A part that only models of polynomials have."""
+        if name not in self._own:
+            raise AttributeError(
+                f"{name} is of polynomial models, and this one is in {self.kind}: it predicts, simulates, validates, compares "
+                "and filters"
+            )
+        return self._own[name]
 
     @property
     def structure(self) -> str:
         """Which polynomials there are, such as ``"arx"``."""
-        return str(self._own["structure"])
+        return str(self._polynomial("structure"))
 
     @property
     def orders(self) -> dict[str, Any]:
         """na, nb, nc, nd, nf, nk; nb, nf and nk have one for each input."""
-        return dict(self._own["orders"])
+        return dict(self._polynomial("orders"))
 
     @property
     def parameters(self) -> Array:
@@ -109,32 +123,38 @@ class ReportedModel:
     @property
     def a(self) -> Array:
         """A, monic, in rising powers of q^-1."""
-        return np.array(self._own["a"])
+        return np.array(self._polynomial("a"))
 
     @property
     def b(self) -> list[Array]:
         """B of each input, with its nk leading zeros."""
-        return [np.array(b) for b in self._own["b"]]
+        return [np.array(b) for b in self._polynomial("b")]
 
     @property
     def c(self) -> Array:
         """C, monic."""
-        return np.array(self._own["c"])
+        return np.array(self._polynomial("c"))
 
     @property
     def d(self) -> Array:
         """D, monic."""
-        return np.array(self._own["d"])
+        return np.array(self._polynomial("d"))
 
     @property
     def f(self) -> list[Array]:
         """F of each input, monic."""
-        return [np.array(f) for f in self._own["f"]]
+        return [np.array(f) for f in self._polynomial("f")]
 
     @property
     def noise_variance(self) -> float:
-        """The variance of e: the sum of squared residuals over N - p."""
-        return float(self._own["noise_variance"])
+        """The variance of e: the sum of squared residuals over N - p. Of equations that of the measurement."""
+        [[variance]] = self._own["noise_covariance"] if len(self.outputs) == 1 else [[np.nan]]
+        return float(variance)
+
+    @property
+    def noise_covariance(self) -> Array:
+        """The covariance matrix of the noise of the outputs, shape (outputs, outputs)."""
+        return np.array(self._own["noise_covariance"])
 
     @property
     def sample_time(self) -> float:
@@ -147,50 +167,57 @@ class ReportedModel:
         return [signal["name"] for signal in self._own["inputs"]]
 
     @property
+    def outputs(self) -> list[str]:
+        """The names of the outputs."""
+        return [signal["name"] for signal in self._own["outputs"]]
+
+    @property
     def output(self) -> str:
-        """The name of the output."""
-        return str(self._own["output"]["name"])
+        """The name of the output, of a model that has one."""
+        if len(self.outputs) > 1:
+            raise AttributeError(f"the model has several outputs: {', '.join(self.outputs)}; see outputs")
+        return self.outputs[0]
 
     @property
     def offsets(self) -> dict[str, tuple[float, float]]:
         """What was taken from each channel before the fit: its level, and its slope per second."""
-        signals = [*self._own["inputs"], self._own["output"]]
+        signals = [*self._own["inputs"], *self._own["outputs"]]
         return {signal["name"]: (signal["offset"]["level"], signal["offset"]["slope"]) for signal in signals}
 
     @property
     def stable(self) -> bool:
         """Whether all poles lie inside the unit circle."""
-        return bool(self._own["stable"])
+        return bool(self._polynomial("stable"))
 
     def poles(self) -> npt.NDArray[np.complex128]:
         """The roots of A and of each F in the z plane."""
-        return _roots(self._own["poles"])
+        return _roots(self._polynomial("poles"))
 
     def zeros(self, input: int | str = 0) -> npt.NDArray[np.complex128]:
         """The finite roots of an input's B in the z plane."""
-        return _roots(self._own["zeros"][self._input(input)])
+        return _roots(self._polynomial("zeros")[self._input(input)])
 
     def noise_poles(self) -> npt.NDArray[np.complex128]:
         """The roots of D: what the noise has beside the roots of A."""
-        return _roots(self._own["noise_poles"])
+        return _roots(self._polynomial("noise_poles"))
 
     def noise_zeros(self) -> npt.NDArray[np.complex128]:
         """The roots of C."""
-        return _roots(self._own["noise_zeros"])
+        return _roots(self._polynomial("noise_zeros"))
 
     def dc_gain(self, input: int | str = 0) -> tuple[float, float]:
         """The static gain from an input and its standard error; NaN at an integrator.
 
         Near an integrator the gain is far from normal; `dc_gain_interval` holds there too.
         """
-        gain = self._own["dc_gain"][self._input(input)]
+        gain = self._polynomial("dc_gain")[self._input(input)]
         if gain is None:
             return (np.nan, np.nan)
         return (float(gain["value"]), float("nan" if gain["standard_error"] is None else gain["standard_error"]))
 
     def time_constants(self) -> Array:
         """-T/ln|p| in seconds for each of `poles`, T being the sample time; NaN for |p| >= 1."""
-        constants = self._own["time_constants"]
+        constants = self._polynomial("time_constants")
         return _numbers.of_document([None if constant is None else constant["value"] for constant in constants])
 
     def dc_gain_interval(self, input: int | str = 0) -> Array:
@@ -204,14 +231,14 @@ class ReportedModel:
         >>> th.arx(th.dc_motor(), na=2, nb=2).dc_gain_interval().round(1)
         array([18.3, 19.6])
         """
-        return _interval(self._own["dc_gain"][self._input(input)])
+        return _interval(self._polynomial("dc_gain")[self._input(input)])
 
     def time_constant_intervals(self) -> Array:
         """The intervals that hold the `time_constants` with a probability of 95 % each, shape (n, 2).
 
         From the intervals of the poles' moduli; infinite where a pole may be an integrator, NaN where nothing is known.
         """
-        return np.array([_interval(constant) for constant in self._own["time_constants"]]).reshape(-1, 2)
+        return np.array([_interval(constant) for constant in self._polynomial("time_constants")]).reshape(-1, 2)
 
     def _input(self, input: int | str) -> int:
         """The position of an input."""
@@ -270,7 +297,7 @@ class ReportedModel:
         ----------
         Akaike, A new look at the statistical model identification, 1974. Schwarz, Estimating the dimension of a model, 1978.
         """
-        if self.method == "exact-likelihood":
+        if self.method in ("exact-likelihood", "innovations-likelihood"):
             known = self._estimation["log_likelihood"]
             return np.nan if known is None else float(known)
         return -self.samples / 2 * (np.log(2 * np.pi) + np.log(self.mse) + 1) if self.mse > 0 else np.nan

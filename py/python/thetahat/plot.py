@@ -205,7 +205,9 @@ def residuals(of: Validation | Model, log: Log | None = None, axes: Any = None) 
     elif log is not None:
         raise TypeError("log: the validation has looked at its own; leave it out")
     _drawing.expect("of", of, Validation)
-    tests = of.document["residuals"]
+    if len(of.document["noise"]) > 1:
+        raise ValueError("of: there are several outputs; the page of the validation shows them all")
+    tests = next(iter(of.document["residuals"]), None)
     if tests is None:
         raise ValueError("of: the residuals could not be tested; there are too few samples")
     inputs = tests["independence"]

@@ -1,8 +1,9 @@
 //! Judges the firmware: the bits it printed, what the bare image holds, what each step cost, how large images are.
 //!
 //! `check FOLDER` reads, in Cargo's target folder, the images for each processor and level of optimisation and the output
-//! of the reporting one. It prints the tables of costs and sizes, and compares them with `budgets.md` and with the
-//! README. `--write` renews the README's tables instead. `--bits` compares the bits alone: for this program in its other build.
+//! of the reporting one. It prints the tables of costs and sizes, and compares them with `budgets.md` and with
+//! `docs/firmware.md`. `--write` renews the tables of that page instead. `--bits` compares the bits alone: for this program
+//! in its other build.
 
 mod image;
 mod log;
@@ -35,9 +36,9 @@ const ALONE: [(&str, &str); 3] = [
 ];
 
 const BUDGETS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/budgets.md");
-const README: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../README.md");
+const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/firmware.md");
 
-/// By how much the README may differ from what is measured: another compiler counts a little differently.
+/// By how much the page may differ from what is measured: another compiler counts a little differently.
 const MARGIN_PERCENT: u64 = 10;
 
 fn main() -> ExitCode {
@@ -113,15 +114,15 @@ fn images(folder: &Path) -> Result<Table, Box<dyn Error>> {
     Ok(measured)
 }
 
-/// Prints what was measured. Returns what is above its budget, or not as the README says; or renews the README.
+/// Prints what was measured. Returns what is above its budget, or not as the page says; or renews the page.
 fn judge(kind: &'static Kind, measured: &Table, write: bool) -> Result<Vec<String>, Box<dyn Error>> {
     println!("{measured}");
     let mut faults = measured.above(&Table::read(kind, &fs::read_to_string(BUDGETS)?)?);
-    let readme = fs::read_to_string(README)?;
+    let page = fs::read_to_string(PAGE)?;
     if write {
-        fs::write(README, table::replace(&readme, measured)?)?;
+        fs::write(PAGE, table::replace(&page, measured)?)?;
     } else {
-        match table::find(kind, &readme).and_then(|text| Table::read(kind, text)) {
+        match table::find(kind, &page).and_then(|text| Table::read(kind, text)) {
             Ok(written) => faults.extend(measured.apart(&written, MARGIN_PERCENT)),
             Err(error) => faults.push(error.to_string()),
         }

@@ -1,9 +1,9 @@
-//! Tables of costs, in Markdown: measured, as budgets, and in the README.
+//! Tables of costs, in Markdown: measured, as budgets, and in docs/firmware.md.
 
 use std::error::Error;
 use std::fmt;
 
-/// A table that is measured: where the README has it, and its columns.
+/// A table that is measured: where the page has it, and its columns.
 pub(crate) struct Kind {
     name: &'static str,
     /// The name of the row, then its figures.
@@ -92,7 +92,7 @@ impl Table {
     /// The figures that differ from what is written by more than some percent of it.
     pub(crate) fn apart(&self, written: &Table, percent: u64) -> Vec<String> {
         let near = |measured: u64, written: u64| 100 * measured.abs_diff(written) <= percent * written;
-        self.compare(written, "README (renew it: tests/embedded/run --write)", near)
+        self.compare(written, "page docs/firmware.md (renew it: tests/embedded/run --write)", near)
     }
 
     /// What is wrong with the figures that are not `fine` beside their counterparts.
@@ -151,26 +151,26 @@ impl fmt::Display for Table {
     }
 }
 
-/// What surrounds the table in the README.
+/// What surrounds the table in the page.
 fn markers(kind: &Kind) -> [String; 2] {
     let Kind { name, .. } = kind;
     [format!("<!-- {name}: written by tests/embedded/run --write -->\n"), format!("<!-- /{name} -->\n")]
 }
 
-/// The part of the README that holds the table of this kind.
-pub(crate) fn find<'a>(kind: &Kind, readme: &'a str) -> Result<&'a str, Box<dyn Error>> {
+/// The part of the page that holds the table of this kind.
+pub(crate) fn find<'a>(kind: &Kind, page: &'a str) -> Result<&'a str, Box<dyn Error>> {
     let [begin, end] = markers(kind);
-    let lacks = |line: &str| format!("README.md has no line {}", line.trim());
-    let (_, rest) = readme.split_once(&begin).ok_or_else(|| lacks(&begin))?;
+    let lacks = |line: &str| format!("docs/firmware.md has no line {}", line.trim());
+    let (_, rest) = page.split_once(&begin).ok_or_else(|| lacks(&begin))?;
     let (table, _) = rest.split_once(&end).ok_or_else(|| lacks(&end))?;
     Ok(table)
 }
 
-/// The README with another table of its kind.
-pub(crate) fn replace(readme: &str, table: &Table) -> Result<String, Box<dyn Error>> {
+/// The page with another table of its kind.
+pub(crate) fn replace(page: &str, table: &Table) -> Result<String, Box<dyn Error>> {
     let [begin, end] = markers(table.kind);
-    let old = find(table.kind, readme)?;
-    Ok(readme.replacen(&format!("{begin}{old}{end}"), &format!("{begin}{table}{end}"), 1))
+    let old = find(table.kind, page)?;
+    Ok(page.replacen(&format!("{begin}{old}{end}"), &format!("{begin}{table}{end}"), 1))
 }
 
 #[cfg(test)]
@@ -223,9 +223,9 @@ mod tests {
     #[test]
     fn only_what_is_between_the_markers_is_replaced() {
         let [begin, end] = markers(&STEPS);
-        let readme = |table: &str| format!("before\n{begin}{table}{end}after\n");
-        let renewed = replace(&readme("old\n"), &table(400)).unwrap();
-        assert_eq!(renewed, readme(&table(400).to_string()));
+        let page = |table: &str| format!("before\n{begin}{table}{end}after\n");
+        let renewed = replace(&page("old\n"), &table(400)).unwrap();
+        assert_eq!(renewed, page(&table(400).to_string()));
         assert_eq!(find(&STEPS, &renewed).unwrap(), table(400).to_string());
         assert!(replace("no markers", &table(400)).is_err());
     }

@@ -53,6 +53,8 @@ pub struct Log {
     borders: Vec<usize>,
     /// Seconds from the first row of the log that this one was cut from, from where slopes are counted.
     before: f64,
+    /// Why the clock is not uniform, if it is not.
+    irregular: Option<Error>,
 }
 
 /// How a log that is not uniform is read between its samples.
@@ -159,6 +161,7 @@ impl Log {
             jumps: Vec::new(),
             borders: Vec::new(),
             before: 0.0,
+            irregular: None,
         })
     }
 
@@ -169,26 +172,31 @@ impl Log {
     /// [`Error::Data`] as for [`Log::new`], if time is not finite, repeats or goes back, and if another step differs
     /// from the median by more than 10 % (then [`Log::resampled`] helps).
     pub fn with_time(channels: Vec<Channel>, time: Vec<f64>) -> Result<Self, Error> {
+        let log = Self::recorded(channels, time)?;
+        log.check_uniform()?;
+        Ok(log)
+    }
+
+    /// A log as it was recorded: its clock may be irregular. Models in equations take it as it is; what needs a uniform clock
+    /// refuses it with the error of [`with_time`](Self::with_time). Its sample time is the median step.
+    ///
+    /// # Errors
+    /// [`Error::Data`] as for [`Log::new`], and if time is not finite, repeats or goes back.
+    ///
+    /// ```
+    /// use thetahat::{Channel, Log};
+    ///
+    /// let y = Channel { name: "y".into(), values: vec![0.0, 1.0, 0.5] };
+    /// let log = Log::recorded(vec![y], vec![0.0, 1.0, 1.8])?;
+    /// assert!(log.record(&[], "y", &["1..3".parse()?]).unwrap_err().to_string().contains("the log is not uniform"));
+    /// # Ok::<(), thetahat::Error>(())
+    /// ```
+    pub fn recorded(channels: Vec<Channel>, time: Vec<f64>) -> Result<Self, Error> {
         let rows = check(&channels)?;
         let median = median_step(&time, rows)?;
-        let mut jumps = Vec::new();
-        for (position, step) in steps(&time).enumerate() {
-            if step > GAP * median {
-                jumps.push(position + 1);
-            } else if (step - median).abs() > JITTER * median {
-                return Err(Error::Data {
-                    channel: None,
-                    row: Some(position + 2),
-                    message: format!(
-                        "the time step is {} s where the median is {} s: more than {} % off, so the log is not uniform; {}",
-                        short(step),
-                        short(median),
-                        100.0 * JITTER,
-                        Regular::of(&time, median)
-                    ),
-                });
-            }
-        }
+        let long = steps(&time).enumerate().filter(|(_, step)| *step > GAP * median);
+        let jumps: Vec<usize> = long.map(|(position, _)| position + 1).collect();
+        let irregular = irregularity(&time, median, &jumps);
         Ok(Self {
             channels,
             rows,
@@ -197,7 +205,16 @@ impl Log {
             jumps,
             borders: Vec::new(),
             before: 0.0,
+            irregular,
         })
+    }
+
+    /// That the clock is uniform, but for gaps.
+    ///
+    /// # Errors
+    /// [`Error::Data`] with the first row whose step is another.
+    pub(crate) fn check_uniform(&self) -> Result<(), Error> {
+        self.irregular.clone().map_or(Ok(()), Err)
     }
 
     /// A log on a clock that is known to be uniform.
@@ -210,6 +227,7 @@ impl Log {
             jumps: Vec::new(),
             borders: Vec::new(),
             before: 0.0,
+            irregular: None,
         }
     }
 
@@ -249,6 +267,7 @@ impl Log {
                 }
                 _ => None,
             };
+            joined.irregular = joined.irregular.or(log.irregular);
             joined.rows += log.rows;
         }
         Ok(joined)
@@ -281,6 +300,7 @@ impl Log {
             jumps: inside(&self.jumps),
             borders: inside(&self.borders),
             before: self.elapsed(range.start),
+            irregular: self.irregular.clone(),
         })
     }
 
@@ -307,7 +327,8 @@ impl Log {
         if !(time.iter().all(finite) && rising(&breaks) && rising(&borders) && known && before.is_finite()) {
             return Err(Error::data("the parts of a stored log do not fit together; store it again"));
         }
-        Ok(Self { time, jumps: breaks, borders, before, ..log })
+        let irregular = time.as_ref().and_then(|time| irregularity(time, sample_time, &breaks));
+        Ok(Self { time, jumps: breaks, borders, before, irregular, ..log })
     }
 
     /// The rows (0-based) before which no segment reaches back: where the clock jumps, or another log begins.
@@ -318,6 +339,26 @@ impl Log {
     /// Those of the breaks at which another log begins.
     pub fn borders(&self) -> &[usize] {
         &self.borders
+    }
+
+    /// The rows (0-based) of each log of which this one is made.
+    pub(crate) fn logs(&self) -> impl Iterator<Item = Range<usize>> {
+        let starts = std::iter::once(0).chain(self.borders.iter().copied());
+        starts.zip(self.borders.iter().copied().chain([self.rows])).map(|(first, end)| first..end)
+    }
+
+    /// The log with offsets taken from some channels, and without the others. A channel that is not there is missing in every row.
+    pub(crate) fn deviations<'s>(
+        &self,
+        signals: impl Iterator<Item = (&'s str, Offset)>,
+    ) -> Result<Self, Error> {
+        let (here, absent): (Vec<_>, Vec<_>) = signals.partition(|(name, _)| self.has(name));
+        let names: Vec<&str> = here.iter().map(|(name, _)| *name).collect();
+        let mut log = self.part(&names, Rows::new(1, self.rows)?)?;
+        here.iter().for_each(|(name, offset)| log.remove(name, offset));
+        let missing = |name: &str| Channel { name: name.to_owned(), values: vec![f64::NAN; self.rows] };
+        log.channels.extend(absent.iter().map(|(name, _)| missing(name)));
+        Ok(log)
     }
 
     /// Whether it is several logs as one, which have no common clock.
@@ -412,6 +453,7 @@ impl Log {
     /// # Errors
     /// [`Error::Data`] for a name that is not there.
     pub(crate) fn segments(&self, names: &[&str], parts: &[Rows]) -> Result<Vec<Range<usize>>, Error> {
+        self.check_uniform()?;
         let channels: Vec<&[f64]> = names
             .iter()
             .map(|name| Ok(self.channel(name)?.values.as_slice()))
@@ -487,6 +529,7 @@ impl Log {
         rows: &[Rows],
         measured: bool,
     ) -> Result<Record<'_>, Error> {
+        self.check_uniform()?;
         let signal = |name: &str| Ok(self.channel(name)?.values.as_slice());
         let output = signal(output)?;
         let inputs: Vec<&[f64]> = inputs.iter().map(|name| signal(name)).collect::<Result<_, Error>>()?;
@@ -583,6 +626,25 @@ pub(crate) fn measured(values: &[f64], rows: &Range<usize>) -> Vec<Range<usize>>
 fn misses(values: &[f64]) -> bool {
     // Whole blocks at once: without a way out in between they are compared side by side.
     values.chunks(1024).any(|block| block.iter().fold(false, |missing, value| missing | value.is_nan()))
+}
+
+/// The first step that is neither the median nor one to a row before which the clock jumps.
+fn irregularity(time: &[f64], median: f64, jumps: &[usize]) -> Option<Error> {
+    let off = |(position, step): &(usize, f64)| {
+        (step - median).abs() > JITTER * median && jumps.binary_search(&(position + 1)).is_err()
+    };
+    let (position, step) = steps(time).enumerate().find(off)?;
+    Some(Error::Data {
+        channel: None,
+        row: Some(position + 2),
+        message: format!(
+            "the time step is {} s where the median is {} s: more than {} % off, so the log is not uniform; {}",
+            short(step),
+            short(median),
+            100.0 * JITTER,
+            Regular::of(time, median)
+        ),
+    })
 }
 
 pub(super) fn steps(time: &[f64]) -> impl Iterator<Item = f64> {

@@ -117,20 +117,6 @@ pub(super) fn exact(
     job.finish(reached)
 }
 
-/// S/N of a model on a record, and N, the initial conditions found anew if they were estimated.
-pub(crate) fn exact_mean(
-    record: &Record<'_>,
-    orders: &Orders,
-    parameters: &[f64],
-    initial: Initial,
-) -> Option<(usize, f64)> {
-    let begin = if initial == Initial::Zero { Begin::Rest } else { Begin::Free };
-    let mut likelihood = Likelihood::new(record, orders, 0, begin);
-    best_free(&mut likelihood, parameters).ok()?;
-    let samples = likelihood.samples();
-    (samples > 0).then(|| (samples, likelihood.squares() / samples as f64))
-}
-
 /// As [`beside`](super::prediction_error::beside) of an estimate of least squared errors: `lines` of the inputs are a constant and a
 /// trend.
 pub(super) fn beside(

@@ -22,7 +22,7 @@ use crate::data::{Record, measured};
 use crate::model::{cancel, near_cancellation};
 use crate::regression::{Taps, condition, sum_of_squares};
 use crate::respond::{NOTHING_LEFT, are_worth};
-use crate::{Error, Model, Orders, Structure};
+use crate::{Error, Orders, PolynomialModel, Structure};
 
 /// From so many samples on, starts see stretches of the record only.
 const LONG: usize = 1 << 18;
@@ -640,7 +640,7 @@ fn enough(predictor: &Predictor<'_>, orders: &Orders) -> Result<(), Error> {
 
 /// The error of a cost that does not depend on some combination of the parameters.
 pub(super) fn flat(orders: &Orders, parameters: &[f64]) -> Error {
-    let model = Model::from_parameters(orders, parameters, None, 0.0, 1.0);
+    let model = PolynomialModel::from_parameters(orders, parameters, None, 0.0, 1.0);
     let advice = model.ok().as_ref().and_then(near_cancellation).map_or_else(
         || "lower the orders, or excite the input more".to_owned(),
         |(pole, zero)| format!("{}; lower both orders by one", cancel(&pole, &zero)),

@@ -10,7 +10,7 @@ use super::linear::Linear;
 use super::linearization::{Linearization, Work};
 use crate::GreyBox;
 use crate::data::Offset;
-use crate::greybox::whole_steps;
+use crate::model::equations::whole_steps;
 
 pub(super) type Filter = ExtendedKalmanFilter<f64, Dyn>;
 pub(super) type Observer = LuenbergerObserver<f64, Dyn, Dyn>;

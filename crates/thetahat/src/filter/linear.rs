@@ -6,7 +6,7 @@ use thetahat_core::nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use thetahat_core::{Covariance, LinearObservation, LinearTransition};
 
 use crate::data::Offset;
-use crate::{Error, Model};
+use crate::{Error, PolynomialModel};
 
 type Transition = LinearTransition<f64, Dyn, Dyn>;
 
@@ -124,7 +124,7 @@ impl Linear {
     }
 
     /// A fitted model: Q = K R K', S = K R, R = var e.
-    pub(super) fn of_model(model: &Model, start: InitialState) -> Result<Self, Error> {
+    pub(super) fn of_model(model: &PolynomialModel, start: InitialState) -> Result<Self, Error> {
         let space = model.state_space();
         let variance = space.noise_variance;
         if variance <= 0.0 {

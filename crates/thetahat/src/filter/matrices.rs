@@ -5,7 +5,7 @@ use thetahat_core::nalgebra::{DMatrix, DVector, Dyn};
 
 use super::linear::{Linear, Matrices, Names};
 use crate::Error;
-use crate::greybox::{Entry, Section};
+use crate::model::equations::{Entry, Section};
 
 /// How large a matrix must be, and what its rows and columns are.
 type Shape<'a> = ((usize, &'a str), (usize, &'a str));

@@ -1,12 +1,12 @@
 use super::kind::Kind;
 use super::linear::{InitialState, Linear};
 use super::matrices;
-use crate::greybox::Document;
-use crate::{Error, GreyBox, Report};
+use crate::model::equations::Document;
+use crate::{Error, GreyBox, Model, Report};
 
 /// A model with a state, for a [`StateFilter`](super::StateFilter).
 ///
-/// It is a [`Report`] of a fit, in the form of [`Model::state_space`](crate::Model::state_space); or a TOML file with
+/// It is a [`Report`] of a fit, in the form of [`PolynomialModel::state_space`](crate::PolynomialModel::state_space); or a TOML file with
 /// equations (see [`GreyBox`]), or with matrices:
 ///
 /// ```text
@@ -62,12 +62,23 @@ impl StateModel {
         Ok(GreyBox::from_toml(text)?.into())
     }
 
-    /// The model of a report, in innovations form.
+    /// The model of a report: polynomials in innovations form, from what `start` says, [`InitialState::Unknown`] without; equations as they are, with the values that were found, from the start that
+    /// they say.
     ///
     /// # Errors
-    /// [`Error::Report`] if the noise variance is 0, or the numbers overflow.
-    pub fn from_report(report: &Report, start: InitialState) -> Result<Self, Error> {
-        Ok(Self { kind: Kind::Linear(Box::new(Linear::of_model(&report.model, start)?)) })
+    /// [`Error::Report`] if the noise variance is 0, or the numbers overflow; [`Error::Argument`] for a start of equations.
+    pub fn from_report(report: &Report, start: Option<InitialState>) -> Result<Self, Error> {
+        match &report.model {
+            Model::Polynomial(model) => {
+                let start = start.unwrap_or(InitialState::Unknown);
+                Ok(Self { kind: Kind::Linear(Box::new(Linear::of_model(model, start)?)) })
+            }
+            Model::Equations(_) if start.is_some() => Err(Error::argument(
+                "initial",
+                "a model in equations says itself where its states start; leave it out, or change its text",
+            )),
+            Model::Equations(model) => Ok(model.with_values()?.into()),
+        }
     }
 
     /// The names of the states.

@@ -1,7 +1,7 @@
 //! What a filter has seen so far.
 
 use super::estimate::StateEstimate;
-use crate::validate::NisCount;
+use crate::respond::NisCount;
 
 /// What a filter has seen so far.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -1,10 +1,10 @@
 //! The model of given parameters.
 
 use super::dynamics;
-use super::fitted::{Model, Parameter, Signal, is_covariance};
+use super::fitted::{Parameter, PolynomialModel, Signal, is_covariance};
 use crate::{Error, Orders};
 
-impl Model {
+impl PolynomialModel {
     /// The model of some parameters, in the order of [`Orders::names`]. Its signals have no names and no offsets. A matrix that
     /// cannot be a covariance says nothing: that of the parameters is unknown then.
     pub(crate) fn from_parameters(

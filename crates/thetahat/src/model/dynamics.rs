@@ -39,7 +39,7 @@ use thetahat_core::nalgebra::{Complex, ComplexField};
 use super::polynomial;
 use super::quantity::{Interval, Quantity, Root};
 use crate::figures::fixed;
-use crate::{Error, Model};
+use crate::{Error, PolynomialModel};
 
 /// A root this close to another one, in its own standard deviations, may not be simple as far as the data can tell.
 /// Of sampled polynomials of degree 2 one in six then has a pair where the others have real roots, or the other way
@@ -79,7 +79,7 @@ pub(crate) struct Blocks<'a> {
 }
 
 impl<'a> Blocks<'a> {
-    pub(crate) fn of(model: &'a Model) -> Self {
+    pub(crate) fn of(model: &'a PolynomialModel) -> Self {
         let several = model.b.len() > 1;
         let mut next = 0;
         let mut block =
@@ -209,7 +209,7 @@ pub(crate) fn standard_error(parameters: Option<&[Vec<f64>]>, gradient: &Gradien
 }
 
 /// Fills in what follows from the polynomials of a model and the covariance of its parameters.
-pub(super) fn describe(model: &mut Model) -> Result<(), Error> {
+pub(super) fn describe(model: &mut PolynomialModel) -> Result<(), Error> {
     let blocks = Blocks::of(model);
     let parameters = model.covariance.as_deref();
     let mut poles = blocks.a.roots(parameters)?;
@@ -322,7 +322,7 @@ fn time_constant(pole: &Root, sample_time: f64, quantile: f64) -> Option<Quantit
 ///
 /// The common part of their movement cancels in z - p. So a common factor of B and F shows even where the data leave open
 /// where it is.
-pub(crate) fn near_cancellation(model: &Model) -> Option<(Root, Root)> {
+pub(crate) fn near_cancellation(model: &PolynomialModel) -> Option<(Root, Root)> {
     let blocks = Blocks::of(model);
     let parameters = model.covariance.as_deref();
     let inputs = blocks.b.iter().zip(&blocks.f);

@@ -57,7 +57,7 @@ impl OffsetCovariance {
 /// Polynomials are written in rising powers of q^-1: `b[j][i]` multiplies u_j(t - i), so B begins with nk zeros.
 /// y and u are deviations from the signals' offsets.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Model {
+pub struct PolynomialModel {
     /// Which polynomials there are.
     pub structure: Structure,
     /// How long they are.
@@ -66,7 +66,9 @@ pub struct Model {
     pub sample_time: f64,
     /// The inputs, in the order of `b`.
     pub inputs: Vec<Signal>,
-    /// The output.
+    /// The output: a list of one in the document.
+    #[serde(rename = "outputs", with = "only")]
+    #[schemars(with = "[Signal; 1]")]
     pub output: Signal,
     /// A, monic.
     pub a: Vec<f64>,
@@ -78,7 +80,9 @@ pub struct Model {
     pub d: Vec<f64>,
     /// F, monic, one for each input.
     pub f: Vec<Vec<f64>>,
-    /// The variance of e: the sum of squared residuals over N - p.
+    /// The variance of e: the sum of squared residuals over N - p. A matrix of one row in the document.
+    #[serde(rename = "noise_covariance", with = "only_variance")]
+    #[schemars(with = "[[f64; 1]; 1]")]
     pub noise_variance: f64,
     /// N - p, less the initial conditions that were estimated: the degrees of freedom of `noise_variance`. None where it was
     /// not estimated so, and in reports that do not say.
@@ -109,7 +113,37 @@ pub struct Model {
     pub time_constants: Vec<Option<Quantity>>,
 }
 
-impl Model {
+/// One thing as a list of one.
+mod only {
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    pub(super) fn serialize<T: Serialize, S: Serializer>(only: &T, serializer: S) -> Result<S::Ok, S::Error> {
+        [only].serialize(serializer)
+    }
+
+    pub(super) fn deserialize<'de, T: Deserialize<'de>, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<T, D::Error> {
+        let [only] = <[T; 1]>::deserialize(deserializer)?;
+        Ok(only)
+    }
+}
+
+/// A variance as a matrix of one row.
+mod only_variance {
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    pub(super) fn serialize<S: Serializer>(variance: &f64, serializer: S) -> Result<S::Ok, S::Error> {
+        [[variance]].serialize(serializer)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+        let [[variance]] = <[[f64; 1]; 1]>::deserialize(deserializer)?;
+        Ok(variance)
+    }
+}
+
+impl PolynomialModel {
     /// The model with what is open of its output's offset as further inputs, of which the coefficients are zero and uncertain;
     /// and those inputs over so many rows. None where nothing is said of it.
     pub(crate) fn with_open_offset(&self, rows: usize) -> Option<(Self, Vec<Vec<f64>>)> {
@@ -190,7 +224,7 @@ impl Model {
             return wrong("a, b, c, d, f or an offset is not finite");
         }
         if !(self.noise_variance.is_finite() && self.noise_variance >= 0.0) {
-            return wrong("noise_variance is not a variance");
+            return wrong("noise_covariance is not a variance");
         }
         let count = orders.parameters();
         let square = |rows: &Vec<Vec<f64>>| rows.len() == count && rows.iter().all(|row| row.len() == count);
@@ -244,7 +278,7 @@ mod tests {
     use crate::{Initial, Offset};
 
     /// The model fitted to data that ARX with these parameters made without noise.
-    fn fitted(a: &[f64], b: &[f64]) -> Model {
+    fn fitted(a: &[f64], b: &[f64]) -> PolynomialModel {
         let mut noise = Noise(1);
         let u = noise.take(100);
         let mut y = vec![0.0; 100];
@@ -282,9 +316,9 @@ mod tests {
         let orders = Orders::arx(1, &[1], &[1]).unwrap();
         let model = |covariance: [[f64; 2]; 2]| {
             let rows = covariance.map(Vec::from).to_vec();
-            Model::from_parameters(&orders, &[-0.5, 1.0], Some(&rows), 1.0, 1.0).unwrap()
+            PolynomialModel::from_parameters(&orders, &[-0.5, 1.0], Some(&rows), 1.0, 1.0).unwrap()
         };
-        let errors = |model: &Model| {
+        let errors = |model: &PolynomialModel| {
             let quantities = model.dc_gain.iter().chain(&model.time_constants).flatten();
             let derived = quantities.map(|quantity| quantity.standard_error);
             let roots = model.poles.iter().map(|root| root.covariance.map(|rows| rows[0][0]));
@@ -308,7 +342,7 @@ mod tests {
     fn a_damaged_model_is_refused() {
         let good = fitted(&[-0.5], &[1.0, 2.0]);
         assert!(good.check().is_ok());
-        let open = |model: &mut Model, rows: usize| {
+        let open = |model: &mut PolynomialModel, rows: usize| {
             let covariance = vec![vec![1.0; rows]; rows];
             model.offset_covariance = Some(OffsetCovariance { covariance, middle: None });
         };
@@ -317,7 +351,7 @@ mod tests {
         assert!(right.check().is_ok());
         open(&mut right, 3);
         assert!(right.check().is_err());
-        let damages: [fn(&mut Model); 13] = [
+        let damages: [fn(&mut PolynomialModel); 13] = [
             |model| model.orders.na = usize::MAX,
             |model| model.orders.nk = vec![usize::MAX],
             |model| model.orders.nc = usize::MAX,

@@ -1,6 +1,6 @@
 use thetahat_core::nalgebra::DMatrix;
 
-use crate::Model;
+use crate::PolynomialModel;
 
 /// A model in innovations form, x of n states and u of m inputs:
 ///
@@ -10,7 +10,7 @@ use crate::Model;
 /// ```
 ///
 /// (Ljung, System Identification, 2nd ed. 1999, section 4.3). y and u are deviations from the model's offsets, so that the
-/// state at rest is zero. F and D here are matrices, not the polynomials of these letters. Made by [`Model::state_space`].
+/// state at rest is zero. F and D here are matrices, not the polynomials of these letters. Made by [`PolynomialModel::state_space`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct StateSpace {
     /// F, n x n: what becomes of the state.
@@ -32,7 +32,7 @@ pub struct StateSpace {
 /// What drives a model, an input or e: its numerator, and the denominator that it has beside A, empty without one.
 type Source<'a> = (&'a [f64], &'a [f64]);
 
-impl Model {
+impl PolynomialModel {
     /// The same model as a recursion of first order for a state.
     ///
     /// A quotient of polynomials of order n, v = N/P s, is a block of n states in observer canonical form:
@@ -62,7 +62,7 @@ impl Model {
     /// Cost: O(n (n + m)) to write the matrices.
     ///
     /// ```
-    /// use thetahat::{Initial, Model, Orders, Record, Signal, arx};
+    /// use thetahat::{Initial, PolynomialModel, Orders, Record, Signal, arx};
     ///
     /// let u: Vec<f64> = (0..100_u32).map(|t| f64::from(t * t % 7)).collect();
     /// let mut y = vec![0.0, 0.0];
@@ -172,7 +172,7 @@ mod tests {
     const WAVE: &[f64] = &[1.0, -1.6, 0.95];
 
     /// A y = sum_j B_j/F_j u_j + C/D e with var e = 0.25; an input is nk, the coefficients of B behind it, and F.
-    fn model(a: &[f64], inputs: &[(usize, &[f64], &[f64])], c: &[f64], d: &[f64]) -> Model {
+    fn model(a: &[f64], inputs: &[(usize, &[f64], &[f64])], c: &[f64], d: &[f64]) -> PolynomialModel {
         let nb: Vec<usize> = inputs.iter().map(|(_, b, _)| b.len()).collect();
         let nf: Vec<usize> = inputs.iter().map(|(_, _, f)| f.len() - 1).collect();
         let nk: Vec<usize> = inputs.iter().map(|(nk, _, _)| *nk).collect();
@@ -181,11 +181,11 @@ mod tests {
         inputs.iter().for_each(|(_, b, _)| parameters.extend_from_slice(b));
         parameters.extend(c[1..].iter().chain(&d[1..]));
         inputs.iter().for_each(|(_, _, f)| parameters.extend_from_slice(&f[1..]));
-        Model::from_parameters(&orders, &parameters, None, 0.25, 0.5).unwrap()
+        PolynomialModel::from_parameters(&orders, &parameters, None, 0.25, 0.5).unwrap()
     }
 
     /// Models of all structures with the number of states that they need.
-    fn models() -> Vec<(Model, usize)> {
+    fn models() -> Vec<(PolynomialModel, usize)> {
         let integrator: &[f64] = &[1.0, -1.5, 0.5];
         vec![
             // AR, ARMA and a moving average.

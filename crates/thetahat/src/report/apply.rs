@@ -1,97 +1,146 @@
 use std::borrow::Cow;
 
-use crate::data::{Detrend, Log, Offset, Record, Rows, checked};
-use crate::respond::{Forecast, Start, check_steps, forecast_if_possible, prediction_deviations, simulate};
-use crate::validate::{Fit, Horizon};
-use crate::{Error, Model};
+use super::schema::Report;
+use super::seen::rows_of_fit;
+use super::suited::{check_offsets, check_sample_time};
+use crate::data::{Detrend, Log, Offset, Rows, checked};
+use crate::respond::{Horizon, Response, Start};
+use crate::validate::Fit;
+use crate::{Error, Model, PolynomialModel};
 
 /// What a model says of a log, in the log's own units.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Applied {
-    /// The measured output, one value for each row of the log; NaN where it is missing. None if the log has no output.
+    /// What it says of each output.
+    pub outputs: Vec<AppliedOutput>,
+    /// How many rows behind the end of the log are forecast.
+    pub beyond: usize,
+    /// The rows asked for, in rising order.
+    pub rows: Vec<Rows>,
+}
+
+/// What a model says of an output.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AppliedOutput {
+    /// Its name.
+    pub name: String,
+    /// The measured output, one value for each row of the log; NaN where it is missing. None if the log does not have it.
     pub measured: Option<Vec<f64>>,
     /// The response, one value for each row of the log and then for each of the `beyond` rows behind it; NaN outside the
-    /// rows asked for, in gaps, and before a start. Gaps of the output alone are none for free runs, and for models without A,
-    /// C and D.
+    /// rows asked for, in gaps, and before a start. Gaps of the output alone are none for free runs, for models without A,
+    /// C and D, and for those in equations.
     pub predicted: Vec<f64>,
     /// The standard deviations of the errors of `predicted`, those of the parameters among them, for the steps that each value
     /// looks ahead, as [`prediction_deviations`](crate::prediction_deviations) and [`forecast`](crate::forecast) have them;
     /// NaN where there is none. None for a free run.
     pub standard_deviations: Option<Vec<f64>>,
-    /// How many rows behind the end of the log are forecast.
-    pub beyond: usize,
-    /// The rows asked for, in rising order.
-    pub rows: Vec<Rows>,
-    /// How close they are. None if the log has no output.
+    /// How close they are. None if the log does not have the output.
     pub fit: Option<Fit>,
 }
 
 /// Predicts or simulates a log with a model.
 ///
 /// `rows` are those to respond to; none: all. The model's own offsets are used unless `detrend` says how to find
-/// others on these rows. A free run also works on a log without the model's output, from [`Start::Zero`].
+/// others on these rows. A free run also works on a log without the model's outputs, from [`Start::Zero`].
 ///
 /// A prediction k steps ahead is also a forecast of the k samples behind the last usable row, each as many steps
 /// ahead as it lies behind that row: of rows asked for that have the inputs but not the output, and, for a model that
 /// no input drives and if the log's last row was asked for, of rows behind the log's end, in its own time step. There
 /// is no forecast where the last stretch without a gap is too short to start from. A model without A, C and D needs no past
-/// output: it has a value in every row that its inputs reach.
+/// output: it has a value in every row that its inputs reach. So has one in equations, of which every prediction starts from what its
+/// filter knows k rows before.
+///
+/// A model in equations begins in the state that it says in the first row of a log; [`Report::apply`] knows where it was fitted.
 ///
 /// # Errors
-/// [`Error::Data`] for channels or rows that are not there, or a sample time that differs from the model's by more than
-/// 1 %; and as for [`predict`](crate::predict), [`simulate`](crate::simulate) and [`forecast`](crate::forecast).
+/// [`Error::Data`] for channels or rows that are not there, a sample time that differs from the model's by more than
+/// 1 %, or a clock that the model cannot follow; and as for [`predict`](crate::predict), [`simulate`](crate::simulate) and
+/// [`forecast`](crate::forecast).
 pub fn apply(
     model: &Model,
-    mut log: Log,
+    log: &Log,
     rows: &[Rows],
     detrend: Option<Detrend>,
     horizon: Horizon,
     initial: Start,
 ) -> Result<Applied, Error> {
-    let Prepared { rows, measured, level } = prepared(model, &mut log, rows, detrend, (horizon, initial))?;
+    applied(model, log, rows, detrend, (horizon, initial), &[])
+}
+
+impl Report {
+    /// [`apply`] of its model to a log of which it may have been fitted to some rows: there a model in equations begins with the first
+    /// of them.
+    ///
+    /// # Errors
+    /// As for [`apply`].
+    pub fn apply(
+        &self,
+        log: &Log,
+        rows: &[Rows],
+        detrend: Option<Detrend>,
+        horizon: Horizon,
+        initial: Start,
+    ) -> Result<Applied, Error> {
+        applied(&self.model, log, rows, detrend, (horizon, initial), &rows_of_fit(self, log)?)
+    }
+}
+
+fn applied(
+    model: &Model,
+    log: &Log,
+    rows: &[Rows],
+    detrend: Option<Detrend>,
+    (horizon, initial): (Horizon, Start),
+    fitted: &[Rows],
+) -> Result<Applied, Error> {
+    let Prepared { rows, log: deviations, levels } = prepared(model, log, rows, detrend, (horizon, initial))?;
     let model = &of_offsets(model, detrend);
-    let has_output = measured.is_some();
-    let absent = vec![0.0; if has_output { 0 } else { log.rows() }];
-    let record = if has_output {
-        record_for(model, &log, &rows, horizon, initial)?
-    } else {
-        record(model, &log, &rows, Some(&absent))?
-    };
-    let (fit, response) = if has_output {
-        let (fit, response) = Fit::of(model, &record, &rows, None, horizon, initial)?;
-        (Some(fit), response)
-    } else {
-        (None, simulate(model, &record, initial)?)
-    };
-    let (mut predicted, mut standard_deviations) = match horizon {
-        Horizon::FreeRun => (response.values, None),
+    let on_log = model.on_log(&deviations, &rows, Some(initial), fitted)?;
+    let responses = on_log.respond(horizon, initial)?;
+    let (each, forecast) = match horizon {
+        Horizon::FreeRun => (None, None),
         Horizon::Steps { steps } => {
-            (response.values, Some(prediction_deviations(model, &record, steps, initial)?))
+            (Some(on_log.deviations(steps, initial)?), on_log.forecast(&deviations, &rows, steps, initial)?)
         }
     };
-    if let (Horizon::Steps { steps }, Some(deviations)) = (horizon, &mut standard_deviations)
-        && let Some((first, ahead)) = ahead(model, &log, &record, &rows, steps, initial)?
-    {
-        let end = first + ahead.values.len();
-        for (all, new) in [(&mut predicted, &ahead.values), (&mut *deviations, &ahead.standard_deviations)] {
-            all.resize(end.max(log.rows()), f64::NAN);
-            all[first..end].copy_from_slice(new);
-        }
-    }
     let last = log.rows() - 1;
-    for (row, value) in predicted.iter_mut().enumerate() {
-        let beyond = row.saturating_sub(last) as f64 * log.sample_time();
-        *value += level.at(log.elapsed(row.min(last)) + beyond);
-    }
-    let beyond = predicted.len() - log.rows();
-    Ok(Applied { measured, predicted, standard_deviations, beyond, rows, fit })
+    let mut each = each.map(Vec::into_iter);
+    let outputs = responses.into_iter().zip(on_log.outputs()).zip(&levels).enumerate();
+    let outputs = outputs.map(|(index, ((response, output), level))| {
+        let measured = log.channel(&output.name).ok().map(|channel| channel.values.clone());
+        let fit = measured.is_some().then(|| {
+            Fit::new(&output.name, on_log.measured(index), &response, &rows, None, (horizon, initial))
+        });
+        let Response { values: mut predicted, .. } = response;
+        let mut standard_deviations = each.as_mut().and_then(Iterator::next);
+        if let (Some(deviations), Some((first, ahead))) = (&mut standard_deviations, &forecast) {
+            let ahead = &ahead[index];
+            let end = first + ahead.values.len();
+            for (all, new) in
+                [(&mut predicted, &ahead.values), (&mut *deviations, &ahead.standard_deviations)]
+            {
+                all.resize(end.max(log.rows()), f64::NAN);
+                all[*first..end].copy_from_slice(new);
+            }
+        }
+        for (row, value) in predicted.iter_mut().enumerate() {
+            let beyond = row.saturating_sub(last) as f64 * log.sample_time();
+            *value += level.at(log.elapsed(row.min(last)) + beyond);
+        }
+        AppliedOutput { name: output.name.clone(), measured, predicted, standard_deviations, fit }
+    });
+    let outputs: Vec<AppliedOutput> = outputs.collect();
+    let beyond = outputs.first().map_or(0, |output| output.predicted.len() - log.rows());
+    Ok(Applied { outputs, beyond, rows })
 }
 
 /// The model as it is beside offsets that are its own, or that were found elsewhere: of those it says nothing.
 pub(super) fn of_offsets(model: &Model, detrend: Option<Detrend>) -> Cow<'_, Model> {
-    match detrend {
-        None => Cow::Borrowed(model),
-        Some(_) => Cow::Owned(Model { offset_covariance: None, ..model.clone() }),
+    match (model, detrend) {
+        (Model::Polynomial(model), Some(_)) => {
+            Cow::Owned(PolynomialModel { offset_covariance: None, ..(**model).clone() }.into())
+        }
+        _ => Cow::Borrowed(model),
     }
 }
 
@@ -99,16 +148,16 @@ pub(super) fn of_offsets(model: &Model, detrend: Option<Detrend>) -> Cow<'_, Mod
 pub(super) struct Prepared {
     /// The rows to respond to.
     pub(super) rows: Vec<Rows>,
-    /// The output as it was, if there is one.
-    pub(super) measured: Option<Vec<f64>>,
-    /// What was taken from it.
-    pub(super) level: Offset,
+    /// The channels of the model; an output that is not there is missing in every row.
+    pub(super) log: Log,
+    /// What was taken from each output.
+    pub(super) levels: Vec<Offset>,
 }
 
-/// Takes the offsets from the channels of a model, in place.
+/// Takes the offsets from the channels of a model.
 pub(super) fn prepared(
     model: &Model,
-    log: &mut Log,
+    log: &Log,
     rows: &[Rows],
     detrend: Option<Detrend>,
     (horizon, initial): (Horizon, Start),
@@ -116,106 +165,32 @@ pub(super) fn prepared(
     check_sample_time(model, log)?;
     let all = vec![Rows::new(1, log.rows())?];
     let rows = checked("--rows", if rows.is_empty() { &all } else { rows }, log.rows())?;
-    let output = &model.output.name;
-    // A copy, as what is taken off and put back on again is no longer the same to the bit.
-    let measured = log.channel(output).ok().map(|channel| channel.values.clone());
-    if measured.is_none() && (horizon != Horizon::FreeRun || initial != Start::Zero) {
+    for input in model.inputs() {
+        log.channel(&input.name)?;
+    }
+    let absent = model.outputs().iter().find(|output| !log.has(&output.name));
+    if let Some(output) = absent.filter(|_| horizon != Horizon::FreeRun || initial != Start::Zero) {
         return Err(Error::data(format!(
-            "the log has no output '{output}': only a free run from zero can do without it"
+            "the log has no output '{}': only a free run from zero can do without it",
+            output.name
         )));
     }
-    let names = model.inputs.iter().map(|input| &input.name);
-    let used: Vec<&str> = names.chain(measured.is_some().then_some(output)).map(String::as_str).collect();
-    let segments = log.segments(&used, &rows)?;
-    let mut level = model.output.offset;
-    for signal in
-        model.inputs.iter().chain([&model.output]).filter(|signal| used.contains(&signal.name.as_str()))
-    {
-        let offset = match detrend {
-            None => signal.offset,
-            Some(_) if segments.is_empty() => Offset::default(),
-            Some(detrend) => Offset::estimate(detrend, log, &signal.name, &segments)?,
-        };
-        log.remove(&signal.name, &offset);
-        if signal.name == *output {
-            level = offset;
+    let signals = || model.inputs().iter().chain(model.outputs());
+    let offsets: Vec<Offset> = match detrend {
+        None => signals().map(|signal| signal.offset).collect(),
+        Some(detrend) => {
+            check_offsets(model)?;
+            let here: Vec<&str> = model.channels().filter(|name| log.has(name)).collect();
+            let segments = log.segments(&here, &rows)?;
+            let offset = |name: &str| match segments.is_empty() || !log.has(name) {
+                true => Ok(Offset::default()),
+                false => Offset::estimate(detrend, log, name, &segments),
+            };
+            signals().map(|signal| offset(&signal.name)).collect::<Result<_, Error>>()?
         }
-    }
-    Ok(Prepared { rows, measured, level })
-}
-
-/// The signals of a model over some rows; `absent` stands for an output that the log does not have.
-pub(super) fn record<'a>(
-    model: &Model,
-    log: &'a Log,
-    rows: &[Rows],
-    absent: Option<&'a [f64]>,
-) -> Result<Record<'a>, Error> {
-    let names: Vec<String> = model.inputs.iter().map(|input| input.name.clone()).collect();
-    let Some(output) = absent else { return log.record(&names, &model.output.name, rows) };
-    let used: Vec<&str> = names.iter().map(String::as_str).collect();
-    let segments = log.segments(&used, rows)?;
-    let inputs = names.iter().map(|name| Ok(log.channel(name)?.values.as_slice()));
-    let past = vec![0; segments.len()];
-    Ok(Record { output, inputs: inputs.collect::<Result<_, Error>>()?, segments, past })
-}
-
-/// The record that a response of a model looks at. It goes on through missing outputs where no past one is needed.
-pub(super) fn record_for<'l>(
-    model: &Model,
-    log: &'l Log,
-    rows: &[Rows],
-    horizon: Horizon,
-    start: Start,
-) -> Result<Record<'l>, Error> {
-    let inputs: Vec<String> = model.inputs.iter().map(|input| input.name.clone()).collect();
-    let needed = match horizon {
-        Horizon::Steps { .. } => model.orders.needs_past_outputs(),
-        Horizon::FreeRun => start == Start::Drop,
     };
-    let output = &model.output.name;
-    if needed { log.record(&inputs, output, rows) } else { log.driven_record(&inputs, output, rows) }
-}
-
-/// The log must have the model's sample time.
-pub(super) fn check_sample_time(model: &Model, log: &Log) -> Result<(), Error> {
-    if (log.sample_time() / model.sample_time - 1.0).abs() > 0.01 {
-        return Err(Error::data(format!(
-            "the log's sample time is {} s, the model's {} s; resample the log, or fit a model to it",
-            log.sample_time(),
-            model.sample_time
-        )));
-    }
-    Ok(())
-}
-
-/// The forecast behind the last usable row, and the row (0-based) that it begins with.
-fn ahead(
-    model: &Model,
-    log: &Log,
-    record: &Record<'_>,
-    rows: &[Rows],
-    steps: usize,
-    initial: Start,
-) -> Result<Option<(usize, Forecast)>, Error> {
-    let Some(first) = record.segments.last().map(|segment| segment.end) else { return Ok(None) };
-    let driving = model.inputs.iter().zip(&model.orders.nb).filter(|(_, nb)| **nb > 0);
-    let driving: Vec<&str> = driving.map(|(input, _)| input.name.as_str()).collect();
-    // As far as the inputs go on without a gap.
-    let stretches = log.segments(&driving, rows)?;
-    let stretch = stretches.into_iter().find(|stretch| stretch.contains(&(first - 1)));
-    let end = stretch.map_or(first, |stretch| stretch.end);
-    let known = if driving.is_empty() && end == log.rows() { steps } else { steps.min(end - first) };
-    if known == 0 {
-        return Ok(None);
-    }
-    check_steps("horizon", known)?;
-    let future: Vec<&[f64]> = record.inputs.iter().map(|u| &u[first..end]).collect();
-    // Values of an input that drives nothing may be missing, and are not needed.
-    let future: Vec<&[f64]> =
-        future.iter().zip(&model.orders.nb).map(|(u, nb)| if *nb > 0 { *u } else { &[] }).collect();
-    let forecast = forecast_if_possible(model, record, &future, known, initial)?;
-    Ok(forecast.map(|forecast| (first, forecast)))
+    let names = model.channels().zip(offsets.iter().copied());
+    Ok(Prepared { log: log.deviations(names)?, rows, levels: offsets[model.inputs().len()..].to_vec() })
 }
 
 #[cfg(test)]
@@ -224,11 +199,11 @@ mod tests {
     use crate::{Channel, Orders, prediction_deviation};
 
     /// A(q) y = B(q) u + e around levels and slopes, with an input if there is a B.
-    fn model(a: f64, b: &[f64]) -> Model {
+    fn model(a: f64, b: &[f64]) -> PolynomialModel {
         let nk = [1];
         let orders = Orders::arx(1, &[b.len()][..b.len().min(1)], &nk[..b.len().min(1)]).unwrap();
         let parameters = [&[a], b].concat();
-        let mut model = Model::from_parameters(&orders, &parameters, None, 0.25, 2.0).unwrap();
+        let mut model = PolynomialModel::from_parameters(&orders, &parameters, None, 0.25, 2.0).unwrap();
         model.output.name = "y".to_owned();
         model.output.offset = Offset { level: 5.0, slope: 0.1 };
         for input in &mut model.inputs {
@@ -247,8 +222,24 @@ mod tests {
         5.0 + 0.1 * 2.0 * row as f64
     }
 
-    fn predicted(model: &Model, log: &Log, rows: &[Rows], steps: usize) -> Applied {
-        apply(model, log.clone(), rows, None, Horizon::Steps { steps }, Start::Drop).unwrap()
+    fn predicted(model: &PolynomialModel, log: &Log, rows: &[Rows], steps: usize) -> One {
+        one(apply(&model.clone().into(), log, rows, None, Horizon::Steps { steps }, Start::Drop).unwrap())
+    }
+
+    /// What is said of the only output.
+    struct One {
+        beyond: usize,
+        measured: Option<Vec<f64>>,
+        predicted: Vec<f64>,
+        standard_deviations: Option<Vec<f64>>,
+        fit: Option<Fit>,
+    }
+
+    fn one(applied: Applied) -> One {
+        let [AppliedOutput { name, measured, predicted, standard_deviations, fit }] =
+            <[AppliedOutput; 1]>::try_from(applied.outputs).unwrap();
+        assert_eq!(name, "y");
+        One { beyond: applied.beyond, measured, predicted, standard_deviations, fit }
     }
 
     fn near(found: f64, expected: f64) -> bool {
@@ -301,7 +292,7 @@ mod tests {
         assert_eq!(predicted(&model, &log, &rows("4..4"), 2).beyond, 2);
         let none = Log::new(vec![channel("y", &[f64::NAN; 4])], 2.0).unwrap();
         assert_eq!(predicted(&model, &none, &[], 2).beyond, 0);
-        let far = apply(&model, log, &[], None, Horizon::Steps { steps: usize::MAX }, Start::Drop);
+        let far = apply(&model.into(), &log, &[], None, Horizon::Steps { steps: usize::MAX }, Start::Drop);
         assert!(matches!(far, Err(Error::Argument { argument, .. }) if argument == "horizon"));
     }
 
@@ -342,16 +333,17 @@ mod tests {
 
     #[test]
     fn free_runs_have_no_deviations_and_from_zero_they_grow() {
-        let model = model(-0.5, &[2.0]);
+        let polynomial = model(-0.5, &[2.0]);
+        let model = polynomial.clone().into();
         let y = [5.0, 6.0, 7.0, 5.0, 4.0];
         let log = Log::new(vec![channel("u", &[1.0; 5]), channel("y", &y)], 2.0).unwrap();
-        let run = apply(&model, log.clone(), &[], None, Horizon::FreeRun, Start::Estimate).unwrap();
+        let run = one(apply(&model, &log, &[], None, Horizon::FreeRun, Start::Estimate).unwrap());
         assert_eq!((run.beyond, run.standard_deviations, run.predicted.len()), (0, None, 5));
         let inputs = Log::new(vec![channel("u", &[1.0; 5])], 2.0).unwrap();
-        let run = apply(&model, inputs, &[], None, Horizon::FreeRun, Start::Zero).unwrap();
+        let run = one(apply(&model, &inputs, &[], None, Horizon::FreeRun, Start::Zero).unwrap());
         assert_eq!((run.measured, run.standard_deviations, run.predicted.len()), (None, None, 5));
-        let zero = apply(&model, log, &[], None, Horizon::Steps { steps: 2 }, Start::Zero).unwrap();
-        let steps = [1, 2, 2, 2, 2].map(|steps| prediction_deviation(&model, steps).unwrap());
+        let zero = one(apply(&model, &log, &[], None, Horizon::Steps { steps: 2 }, Start::Zero).unwrap());
+        let steps = [1, 2, 2, 2, 2].map(|steps| prediction_deviation(&polynomial, steps).unwrap());
         assert_eq!(zero.standard_deviations.unwrap(), steps);
     }
 }

@@ -6,7 +6,7 @@ use super::validation::{Validated, ValidationPlan, validate};
 use crate::Error;
 use crate::data::{Log, Rows, between};
 use crate::estimate::Constant;
-use crate::validate::Horizon;
+use crate::respond::Horizon;
 
 /// Of so many parts of the rows that a choice was made on the last is left out.
 const PARTS: usize = 3;
@@ -31,7 +31,8 @@ pub fn held_out_runs(report: &Report, log: &Log) -> Result<Vec<(String, Validate
     let count: usize = rows.iter().map(Rows::len).sum();
     let last = (PARTS - 1) * count / PARTS;
     let (fitted, left_out) = (between(rows, 0, last), between(rows, last, count));
-    let names: Vec<&str> = report.model.inputs.iter().map(|input| input.name.as_str()).collect();
+    let model = report.model.polynomials("a choice")?;
+    let names: Vec<&str> = model.inputs.iter().map(|input| input.name.as_str()).collect();
     let with_level = report.estimation.level.is_some();
     let mut runs = Vec::new();
     for (purpose, orders) in [("for prediction", prediction), ("for simulation", simulation)] {
@@ -41,7 +42,7 @@ pub fn held_out_runs(report: &Report, log: &Log) -> Result<Vec<(String, Validate
             prefilter: data.prefilter,
             constant: if with_level { Constant::Yes } else { Constant::No },
             trend: report.estimation.slope.is_some(),
-            ..Plan::new(&names, &report.model.output.name, orders.clone())
+            ..Plan::new(&names, &model.output.name, orders.clone())
         };
         let refit = match identify(log.clone(), &[], &plan) {
             Ok(refit) => refit,
@@ -49,7 +50,7 @@ pub fn held_out_runs(report: &Report, log: &Log) -> Result<Vec<(String, Validate
             Err(error) => return Err(error),
         };
         let plan = ValidationPlan { rows: left_out.clone(), ..ValidationPlan::default() };
-        let validated = validate(&refit, None, log.clone(), &[], &plan)?;
+        let validated = validate(&refit, None, log, &[], &plan)?;
         let figure = validated.validation.fit.iter().find(|fit| fit.horizon == Horizon::FreeRun);
         let percent = figure.and_then(|fit| fit.percent);
         let percent =

@@ -19,7 +19,10 @@ use page::{Block, Page, Section};
 
 use super::{Report, Validated, Validation};
 use crate::figures::{self, fixed};
-use crate::{Error, Fit, Inspection, Model, Part, Residuals, Rows, Source};
+use crate::{
+    EquationsModel, Error, Fit, Inspection, Model, OutputSignals, Part, PolynomialModel, Residuals, Rows,
+    Source,
+};
 
 /// The most points of a curve over time.
 const POINTS: usize = 4000;
@@ -46,7 +49,8 @@ pub fn fit_page(
     command: &str,
 ) -> String {
     let model = &report.model;
-    let title = format!("Fit of {}{}", model.output.name, of(&report.data.logs));
+    let names: Vec<&str> = model.outputs().iter().map(|output| output.name.as_str()).collect();
+    let title = format!("Fit of {}{}", names.join(", "), of(&report.data.logs));
     let mut page = Page::new(title, command, &report.generator);
     page.lead = lead(model, &report.fit);
     page.warnings = &report.warnings;
@@ -73,8 +77,9 @@ pub fn fit_page(
         }
         section.table(tables::best(selection));
         if let Some((_, Validated { signals, .. })) = held_out.first() {
-            let runs =
-                held_out.iter().filter_map(|(name, run)| Some((name, run.signals.simulated.as_deref()?)));
+            let runs = held_out
+                .iter()
+                .filter_map(|(name, run)| Some((name, run.signals.outputs.first()?.simulated.as_deref()?)));
             let there = |run: &[f64]| {
                 let first = run.iter().position(|value| value.is_finite())?;
                 Some(first..run.iter().rposition(|value| value.is_finite())? + 1)
@@ -82,16 +87,17 @@ pub fn fit_page(
             let rows = runs.clone().find_map(|(_, run)| there(run)).unwrap_or(0..0);
             let runs: Vec<(String, &[f64])> =
                 runs.map(|(name, run)| (name.clone(), &run[rows.clone()])).collect();
-            let stack = Stack::new(&signals.time[rows.clone()], model.sample_time, points(1 + runs.len()));
-            section.chart(charts::outputs(
+            let stack = Stack::new(&signals.time[rows.clone()], model.sample_time(), points(1 + runs.len()));
+            let measured = signals.outputs.first().map(|output| (&output.name, &output.measured[rows]));
+            section.chart(measured.map_or_else(|| Err(String::new()), |(name, measured)| charts::outputs(
                 "Free runs on rows held out",
                 "Measured output, and what the best model for prediction and the best for simulation make of the inputs alone in \
                  the last third of the rows. Both were fitted to the other two thirds for this picture.",
                 stack,
-                &signals.output,
-                &signals.measured[rows],
+                name,
+                measured,
                 &runs,
-            ));
+            )));
         }
         page.sections.insert(2, section);
     }
@@ -140,9 +146,10 @@ pub fn comparison_page(reports: &[Report], validated: &[Validated], command: &st
     let logs = validated.first().map_or(&[][..], |validated| &validated.validation.logs);
     let mut page = Page::new(format!("Comparison of {} models{}", names.len(), of(logs)), command, generator);
     let named: Vec<(String, &Validated)> = names.iter().cloned().zip(validated).collect();
-    let models: Vec<(String, &Model)> =
-        names.iter().cloned().zip(reports.iter().map(|report| &report.model)).collect();
-    page.lead = models.iter().map(|(name, model)| format!("{name} is {}", headline(model))).collect();
+    let each = || names.iter().zip(reports);
+    page.lead = each().map(|(name, report)| format!("{name} is {}", headline(&report.model))).collect();
+    let models: Vec<(String, &PolynomialModel)> =
+        each().filter_map(|(name, report)| Some((name.clone(), polynomials(&report.model)?))).collect();
     let warnings: Vec<String> = named
         .iter()
         .flat_map(|(name, validated)| {
@@ -152,14 +159,15 @@ pub fn comparison_page(reports: &[Report], validated: &[Validated], command: &st
     page.warnings = &warnings;
 
     let mut section = Section::new("Side by side");
-    section.table(tables::comparison(&named));
+    let criteria = super::compare(validated).ok().and_then(|comparison| comparison.criteria);
+    section.table(tables::comparison(&named, criteria.as_deref()));
     section.text("Too many outside from alpha on: the smallest alpha at which a fraction alpha of the correlations of the residuals, \
                   or more, lies outside the band of that level. The larger, the better; it is no verdict.");
     if validated.iter().any(|validated| !validated.validation.white_expected) {
         section.text(UNASKED);
     }
     page.sections.push(section);
-    page.sections.push(compared_outputs(reports, &named));
+    page.sections.extend(compared_outputs(reports, &named));
 
     let mut section = Section::new("Residuals");
     let all: Vec<(String, &Residuals)> = residuals_of(&named).collect();
@@ -177,7 +185,9 @@ pub fn comparison_page(reports: &[Report], validated: &[Validated], command: &st
             inputs.push(&input.name);
         }
     }
-    page.sections.extend(responses(&models, &inputs));
+    if !models.is_empty() {
+        page.sections.extend(responses(&models, &inputs));
+    }
     let mut section = Section::new("Data");
     section.table(tables::logs(logs));
     page.sections.push(section);
@@ -281,23 +291,32 @@ fn of(logs: &[Source]) -> String {
 }
 
 fn headline(model: &Model) -> String {
-    format!("{}: {}", model.orders, model.orders.equation())
+    match model {
+        Model::Polynomial(model) => format!("{}: {}", model.orders, model.orders.equation()),
+        Model::Equations(_) => model.name(),
+    }
+}
+
+fn polynomials(model: &Model) -> Option<&PolynomialModel> {
+    if let Model::Polynomial(model) = model { Some(model) } else { None }
 }
 
 /// The model in a sentence, and how close it comes.
 fn lead(model: &Model, fits: &[Fit]) -> Vec<String> {
-    let stable = if model.stable { "stable" } else { "unstable" };
+    let stable = polynomials(model).map_or("", |model| if model.stable { ", stable" } else { ", unstable" });
+    let several = model.outputs().len() > 1;
     let mut lead = vec![
         format!("{}.", headline(model)),
         format!(
-            "Sample time {} s, {} parameters, {stable}.",
-            figures::short(model.sample_time),
-            model.parameters.len()
+            "Sample time {} s, {} parameters{stable}.",
+            figures::short(model.sample_time()),
+            model.parameters().len()
         ),
     ];
     let figure = |fit: &Fit| {
         let on = fit.part.map_or_else(String::new, |part| format!(", {} rows", tables::part(part)));
-        Some(format!("{} % ({}{on})", fixed(fit.percent?, 1), fit.horizon))
+        let of = if several { format!("{}, ", fit.output) } else { String::new() };
+        Some(format!("{} % ({of}{}{on})", fixed(fit.percent?, 1), fit.horizon))
     };
     let figures: Vec<String> = fits.iter().filter_map(figure).collect();
     if !figures.is_empty() {
@@ -380,19 +399,22 @@ fn outputs(
         section.table(tables::fits(fits));
         return section;
     };
-    let predicted = merged(parts.iter().map(|(_, validated)| validated.signals.predicted.as_slice()));
-    let simulated = merged(parts.iter().filter_map(|(_, validated)| validated.signals.simulated.as_deref()));
-    let errors: Vec<f64> =
-        signals.measured.iter().zip(&predicted).map(|(y, predicted)| y - predicted).collect();
     let there = |values: &[f64]| values.iter().any(|value| value.is_finite());
     let rows = signals.time.len();
-    let time = timeline(&signals.time, logs, model.sample_time);
+    let time = timeline(&signals.time, logs, model.sample_time());
+    // Steps of a clock without a rhythm are no gaps.
+    let step = if model.takes_any_clock() { f64::INFINITY } else { model.sample_time() };
     let (near, far) = signals.inputs.split_at(signals.inputs.len().min(INPUTS));
-    let stack = |shown: Range<usize>, points: usize| {
+    let stack = |index: usize, output: &OutputSignals, shown: Range<usize>, points: usize| {
+        let own = || parts.iter().filter_map(move |(_, validated)| validated.signals.outputs.get(index));
+        let predicted = merged(own().map(|output| output.predicted.as_slice()));
+        let simulated = merged(own().filter_map(|output| output.simulated.as_deref()));
+        let errors: Vec<f64> =
+            output.measured.iter().zip(&predicted).map(|(y, predicted)| y - predicted).collect();
         let part = |values: &[f64]| values.get(shown.clone()).map(<[f64]>::to_vec).unwrap_or_default();
-        let mut stack = Stack::new(&time[shown.clone()], model.sample_time, points);
-        stack.panel(&signals.output);
-        stack.measured("measured", &part(&signals.measured));
+        let mut stack = Stack::new(&time[shown.clone()], step, points);
+        stack.panel(&output.name);
+        stack.measured("measured", &part(&output.measured));
         if there(&simulated) {
             stack.curve("free run", &part(&simulated));
         }
@@ -416,23 +438,26 @@ fn outputs(
     };
     let several =
         if logs.len() > 1 { " The logs stand one behind the other, whenever they were made." } else { "" };
-    section.chart(stack(0..rows, points).draw(
-        "Output over time",
-        &format!("{words}{anew}{several}{dense}"),
-        shades,
-    ));
-    if rows > points {
-        // Of the rows that the fit knows least.
-        let last = parts
-            .last()
-            .and_then(|(_, validated)| validated.signals.predicted.iter().position(|y| y.is_finite()));
-        let start = last.unwrap_or(0).min(rows);
-        let shown = start..(start + DETAIL).min(rows);
-        let words = format!("The same, with each of the rows {} to {}.", shown.start + 1, shown.end);
-        section.chart(stack(shown, DETAIL).draw("Output in detail", &words, &[]));
+    for (index, output) in signals.outputs.iter().enumerate() {
+        let which = if signals.outputs.len() > 1 { format!(" {}", output.name) } else { String::new() };
+        section.chart(stack(index, output, 0..rows, points).draw(
+            &format!("Output{which} over time"),
+            &format!("{words}{anew}{several}{dense}"),
+            shades,
+        ));
+        if rows > points {
+            // Of the rows that the fit knows least.
+            let last = parts.last().and_then(|(_, validated)| validated.signals.outputs.get(index));
+            let start = last.and_then(|output| output.predicted.iter().position(|y| y.is_finite()));
+            let start = start.unwrap_or(0).min(rows);
+            let shown = start..(start + DETAIL).min(rows);
+            let words = format!("The same, with each of the rows {} to {}.", shown.start + 1, shown.end);
+            let chart = stack(index, output, shown, DETAIL);
+            section.chart(chart.draw(&format!("Output{which} in detail"), &words, &[]));
+        }
     }
     for group in far.chunks(8) {
-        let mut stack = Stack::new(&time, model.sample_time, points);
+        let mut stack = Stack::new(&time, step, points);
         for (position, (name, values)) in group.iter().enumerate() {
             stack.alone(name, values, 2 + position);
         }
@@ -462,22 +487,27 @@ fn merged<'a>(signals: impl Iterator<Item = &'a [f64]>) -> Vec<f64> {
 fn residuals(parts: &[(String, &Validated)]) -> Section {
     let mut section = Section::new("Residuals");
     let several = parts.len() > 1;
-    for (name, validated) in parts {
-        let on = |drawn: figure::Drawn| {
-            drawn.map(|mut chart| {
-                if several {
-                    chart.title.push_str(&format!(", {name} rows"));
-                }
-                chart
-            })
-        };
-        let Some(residuals) = &validated.validation.residuals else {
+    for (name, Validated { validation, .. }) in parts {
+        if validation.residuals.is_empty() {
             section.text(format!("There are no residuals to test ({name}): too few samples count."));
-            continue;
-        };
-        section.chart(on(charts::autocorrelation(residuals, validated.validation.white_expected)));
-        for independence in &residuals.independence {
-            section.chart(on(charts::cross_correlation(independence)));
+        }
+        let outputs = validation.noise.len();
+        for residuals in &validation.residuals {
+            let on = |drawn: figure::Drawn| {
+                drawn.map(|mut chart| {
+                    if outputs > 1 {
+                        chart.title.push_str(&format!(" of {}", residuals.output));
+                    }
+                    if several {
+                        chart.title.push_str(&format!(", {name} rows"));
+                    }
+                    chart
+                })
+            };
+            section.chart(on(charts::autocorrelation(residuals, validation.white_expected)));
+            for independence in &residuals.independence {
+                section.chart(on(charts::cross_correlation(independence)));
+            }
         }
     }
     let all = validations(parts);
@@ -511,9 +541,10 @@ fn residuals(parts: &[(String, &Validated)]) -> Section {
 }
 
 fn residuals_of<'a>(parts: &'a [(String, &'a Validated)]) -> impl Iterator<Item = (String, &'a Residuals)> {
-    parts
-        .iter()
-        .filter_map(|(name, validated)| Some((name.clone(), validated.validation.residuals.as_ref()?)))
+    parts.iter().flat_map(|(name, Validated { validation, .. })| {
+        let of = |residuals: &Residuals| tables::which(name, validation, &residuals.output);
+        validation.residuals.iter().map(move |residuals| (of(residuals), residuals))
+    })
 }
 
 fn validations<'a>(parts: &[(String, &'a Validated)]) -> Vec<(String, &'a Validation)> {
@@ -522,7 +553,10 @@ fn validations<'a>(parts: &[(String, &'a Validated)]) -> Vec<(String, &'a Valida
 
 /// What a model is: responses, roots, parameters.
 fn of_model(report: &Report) -> Vec<Section> {
-    let model = &report.model;
+    let model = match &report.model {
+        Model::Polynomial(model) => model,
+        Model::Equations(model) => return vec![of_equations(report, model)],
+    };
     let inputs: Vec<&str> = model.inputs.iter().map(|input| input.name.as_str()).collect();
     let mut sections = responses(&[("estimate".to_owned(), model)], &inputs);
     let mut section = Section::new("Poles and zeros");
@@ -532,13 +566,23 @@ fn of_model(report: &Report) -> Vec<Section> {
     let mut section = Section::new("Model");
     section.table(tables::parameters(model));
     section.table(tables::signals(model));
-    section.table(tables::estimation(&report.estimation, model));
+    section.table(tables::estimation(&report.estimation, Some(model.noise_variance)));
     sections.push(section);
     sections
 }
 
+fn of_equations(report: &Report, model: &EquationsModel) -> Section {
+    let mut section = Section::new("Model");
+    section.table(tables::unknown_parameters(report, model));
+    section.table(tables::starts(report, model));
+    section.table(tables::estimation(&report.estimation, None));
+    section.text("The model as it was written, before the fit:");
+    section.blocks.push(Block::Command(model.equations.clone()));
+    section
+}
+
 /// Bode plots, step and impulse responses.
-fn responses(models: &[(String, &Model)], inputs: &[&str]) -> Vec<Section> {
+fn responses(models: &[(String, &PolynomialModel)], inputs: &[&str]) -> Vec<Section> {
     let mut frequency = Section::new("Frequency response");
     let mut transient = Section::new("Step and impulse response");
     for input in inputs {
@@ -584,41 +628,43 @@ fn distinct(validated: &[Validated]) -> Vec<String> {
 }
 
 /// The outputs of several models on one log.
-fn compared_outputs(reports: &[Report], models: &[(String, &Validated)]) -> Section {
-    let mut section = Section::new("Measured and modelled");
-    let Some((_, Validated { signals, .. })) = models.first() else { return section };
-    let sample_time = reports.first().map_or(1.0, |report| report.model.sample_time);
+fn compared_outputs(reports: &[Report], models: &[(String, &Validated)]) -> Vec<Section> {
+    let Some((_, Validated { signals, .. })) = models.first() else { return Vec::new() };
+    let any_clock = reports.iter().any(|report| report.model.takes_any_clock());
+    let sample_time = reports.first().map_or(1.0, |report| report.model.sample_time());
+    let step = if any_clock { f64::INFINITY } else { sample_time };
     let points = points(2 * (models.len() + 1));
-    let stack = || Stack::new(&signals.time, sample_time, points);
-    let simulated: Vec<(String, &[f64])> = models
-        .iter()
-        .filter_map(|(name, validated)| Some((name.clone(), validated.signals.simulated.as_deref()?)))
-        .collect();
-    let predicted: Vec<(String, &[f64])> = models
-        .iter()
-        .map(|(name, validated)| (name.clone(), validated.signals.predicted.as_slice()))
-        .collect();
-    if simulated.is_empty() {
-        section.text("No model has inputs: there is no free run.");
-    } else {
-        let words = "Measured output, and what each model makes of the inputs alone.";
-        section.chart(charts::outputs(
-            "Free run",
-            words,
-            stack(),
-            &signals.output,
-            &signals.measured,
-            &simulated,
-        ));
+    let stack = || Stack::new(&signals.time, step, points);
+    let mut outputs: Vec<&OutputSignals> = Vec::new();
+    for output in models.iter().flat_map(|(_, validated)| &validated.signals.outputs) {
+        if !outputs.iter().any(|known| known.name == output.name) {
+            outputs.push(output);
+        }
     }
-    let words = "Measured output, and what each model says of it one sample earlier.";
-    section.chart(charts::outputs(
-        "One step ahead",
-        words,
-        stack(),
-        &signals.output,
-        &signals.measured,
-        &predicted,
-    ));
-    section
+    let of_output = |output: &OutputSignals| {
+        let which = if outputs.len() > 1 { format!(": {}", output.name) } else { String::new() };
+        let mut section = Section::new(format!("Measured and modelled{which}"));
+        let own = || {
+            models.iter().filter_map(|(name, validated)| {
+                let own = validated.signals.outputs.iter().find(|own| own.name == output.name)?;
+                Some((name.clone(), own))
+            })
+        };
+        let simulated: Vec<(String, &[f64])> =
+            own().filter_map(|(name, own)| Some((name, own.simulated.as_deref()?))).collect();
+        let predicted: Vec<(String, &[f64])> =
+            own().map(|(name, own)| (name, own.predicted.as_slice())).collect();
+        if simulated.is_empty() {
+            section.text("No model has inputs: there is no free run.");
+        } else {
+            let words = "Measured output, and what each model makes of the inputs alone.";
+            let (name, measured) = (&output.name, &output.measured);
+            section.chart(charts::outputs("Free run", words, stack(), name, measured, &simulated));
+        }
+        let words = "Measured output, and what each model says of it one sample earlier.";
+        let (name, measured) = (&output.name, &output.measured);
+        section.chart(charts::outputs("One step ahead", words, stack(), name, measured, &predicted));
+        section
+    };
+    outputs.iter().map(|output| of_output(output)).collect()
 }

@@ -1,20 +1,19 @@
 use std::ops::{ControlFlow, Range};
 
-use super::apply::record_for;
-use super::schema::{Data, Estimation, Missing, Parts, Report};
-use super::validation::{estimation_record, estimation_start, goes_through};
+use super::judge::judge;
+use super::schema::{Data, Estimation, Missing, Report};
+use super::seen::{estimation_record, estimation_start, goes_through};
+use super::shares::Shares;
 use super::warnings::{at_the_border, unstable_plant, warnings};
-use crate::data::{
-    Detrend, Log, Offset, Prefilter, Prefiltered, Record, Rows, Source, Split, between, checked,
-};
+use crate::data::{Detrend, Log, Offset, Prefilter, Prefiltered, Record, Rows, Source, Split, digests};
 use crate::estimate::{
     self, Beside, Constant, Deadline, Estimate, Fitted, Method, Monitor, OutputOffset, Search, enough,
 };
 use crate::regression::sum;
-use crate::respond::{Start, innovations};
+use crate::respond::{Horizon, PolynomialOnLog, Start, innovations};
 use crate::select::{self, Automatic, Choice, Focus, Found, Grid, Select, Selection, Task};
-use crate::validate::{Fit, Horizon, Part};
-use crate::{Document, Error, Initial, Orders, Quantity, Signal, Structure};
+use crate::validate::Part;
+use crate::{Document, Error, Initial, Orders, PolynomialModel, Quantity, Signal, Structure};
 
 /// Below this fraction of a channel's size, what detrending leaves is rounding.
 const ROUNDING: f64 = 1e-13;
@@ -187,7 +186,7 @@ impl Plan {
 ///     ..Plan::new(&["u"], "y", Orders::arx(1, &[1], &[1])?)
 /// };
 /// let report = identify(log, &[], &plan)?;
-/// assert!(report.model.stable);
+/// assert!(report.model.polynomials("stability")?.stable);
 /// # Ok::<(), thetahat::Error>(())
 /// ```
 pub fn identify(log: Log, sources: &[Source], plan: &Plan) -> Result<Report, Error> {
@@ -226,6 +225,7 @@ pub fn identify_monitored(
 #[derive(Debug, Clone)]
 pub struct Unjudged {
     report: Report,
+    model: PolynomialModel,
     grid: Option<Grid>,
     focus: Focus,
     /// What was taken from the output before the fit, and after it.
@@ -251,7 +251,7 @@ impl Unjudged {
     /// # Errors
     /// [`Error::Data`] for channels or rows that are not there.
     pub fn judged(self, mut log: Log) -> Result<Report, Error> {
-        let model = &self.report.model;
+        let model = &self.model;
         for signal in &model.inputs {
             log.remove(&signal.name, &signal.offset);
         }
@@ -264,19 +264,19 @@ impl Unjudged {
 
     /// The same on deviations.
     fn judged_on(self, log: &Log) -> Result<Report, Error> {
-        let Self { mut report, grid, focus, .. } = self;
-        let inputs: Vec<String> = report.model.inputs.iter().map(|input| input.name.clone()).collect();
-        let test = report.data.split.as_ref().map_or_else(Vec::new, |parts| parts.test.clone());
-        let parts = [
-            (Part::Estimation, report.data.estimation.clone()),
-            (Part::Validation, report.data.validation.clone()),
-            (Part::Test, test),
-        ];
-        for (part, rows) in parts.into_iter().filter(|(_, rows)| !rows.is_empty()) {
-            judge(&mut report, log, &inputs, &rows, part, focus)?;
+        let Self { mut report, model, grid, focus, .. } = self;
+        let inputs: Vec<String> = model.inputs.iter().map(|input| input.name.clone()).collect();
+        // The rows of the fit as it saw them; other rows begin in the middle of a run.
+        let seen = estimation_record(&report, &model, log, &inputs)?;
+        let start = estimation_start(&report, &model);
+        let own =
+            PolynomialOnLog::new(&model, log, &report.data.estimation, None)?.with_predictions(seen, start);
+        judge(&mut report, &own, Part::Estimation, focus);
+        for (part, rows) in report.data.held_out() {
+            judge(&mut report, &PolynomialOnLog::new(&model, log, &rows, None)?, part, focus);
         }
         if let Some(grid) = grid {
-            report.warnings.extend(at_the_border(&report.model.orders, &grid));
+            report.warnings.extend(at_the_border(&model.orders, &grid));
         }
         report.warnings.extend(unstable_plant(&report));
         Ok(report)
@@ -307,7 +307,9 @@ fn fit(
             format!("'{name}' is neither an input nor the output; name one of: {}", names.join(", ")),
         ));
     }
-    let Shares { estimation, validation, parts } = Shares::of(plan, log.rows())?;
+    let Shares { estimation, validation, parts } =
+        Shares::of(&plan.estimate, &plan.validate, plan.split, log.rows())?;
+    let digests = digests(&log, &names, &estimation)?;
     let segments = log.segments(&names, &estimation)?;
     if segments.is_empty() {
         return Err(Error::data(
@@ -446,6 +448,7 @@ fn fit(
         generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
         data: Data {
             logs: sources.to_vec(),
+            digests,
             rows: log.rows(),
             sample_time: log.sample_time(),
             detrend: plan.detrend.to_string(),
@@ -461,9 +464,9 @@ fn fit(
         estimation: estimation_of(&fitted, output.offset),
         fit: Vec::new(),
         warnings: Vec::new(),
-        model,
+        model: model.clone().into(),
     };
-    report.warnings = warnings(&report);
+    report.warnings = warnings(&report, &model);
     let fitted = |first: usize| estimation.iter().any(|rows| rows.last() >= first);
     report
         .warnings
@@ -472,7 +475,7 @@ fn fit(
         report.warnings.extend(band.warning(&estimation)?);
     }
     let grid = if let Choice::Grid(grid) = &plan.choice { Some(grid.clone()) } else { None };
-    Ok((Unjudged { report, grid, focus: plan.focus, taken }, log))
+    Ok((Unjudged { report, model, grid, focus: plan.focus, taken }, log))
 }
 
 /// The record that models of these orders are fitted to: it goes on through missing outputs where no past one is needed.
@@ -488,36 +491,6 @@ fn estimation_rows<'l>(
         return log.driven_record(&plan.inputs, &plan.output, rows);
     }
     log.record(&plan.inputs, &plan.output, rows)
-}
-
-/// What rows serve for.
-struct Shares {
-    /// For the fit.
-    estimation: Vec<Rows>,
-    /// For figures.
-    validation: Vec<Rows>,
-    parts: Option<Parts>,
-}
-
-impl Shares {
-    fn of(plan: &Plan, rows: usize) -> Result<Self, Error> {
-        let all = vec![Rows::new(1, rows)?];
-        let asked = if plan.estimate.is_empty() { &all } else { &plan.estimate };
-        let estimation = checked("--estimate", asked, rows)?;
-        let validation = checked("--validate", &plan.validate, rows)?;
-        let Some(split) = plan.split else { return Ok(Self { estimation, validation, parts: None }) };
-        if !validation.is_empty() {
-            return Err(Error::argument(
-                "split",
-                "it has a validation part of its own; leave out one of --split and --validate",
-            ));
-        }
-        let [first, second, test] = split.cut(&estimation)?;
-        let count = |part: &[Rows]| part.iter().map(Rows::len).sum::<usize>();
-        let fitted = between(&estimation, 0, count(&first) + count(&second));
-        let parts = Parts { estimation: first, validation: second, test };
-        Ok(Self { estimation: fitted, validation, parts: Some(parts) })
-    }
 }
 
 /// The rows on which models are compared.
@@ -663,66 +636,12 @@ fn estimation_of(fitted: &Fitted, taken: Offset) -> Estimation {
         level: offset.map(|OutputOffset { level, middle, .. }| above(taken.at(middle), level)),
         slope: offset.and_then(|found| Some(above(taken.slope, found.slope?))),
         procedure: estimate.procedure().clone(),
-        initial: estimate.initial(),
+        initial: Some(estimate.initial()),
         samples: estimate.samples(),
         mse: estimate.mse(),
         criteria: *criteria,
         condition: estimate.condition(),
     }
-}
-
-/// Adds the figures of one part of the log: one step ahead, as many as the focus says on rows that the fit did not see, and driven by
-/// the inputs alone where there are any.
-fn judge(
-    report: &mut Report,
-    log: &Log,
-    inputs: &[String],
-    rows: &[Rows],
-    part: Part,
-    focus: Focus,
-) -> Result<(), Error> {
-    // What the estimate started from; other rows begin in the middle of a run.
-    let one = Horizon::Steps { steps: 1 };
-    let (first, record) = if part == Part::Estimation {
-        (estimation_start(report), estimation_record(report, log, inputs)?)
-    } else {
-        let start = Start::natural(&report.model, one);
-        (start, record_for(&report.model, log, rows, one, start)?)
-    };
-    let mut looks = vec![(one, first, record)];
-    if let (Focus::Steps(steps @ 2..), Part::Validation | Part::Test) = (focus, part) {
-        let horizon = Horizon::Steps { steps };
-        let start = Start::natural(&report.model, horizon);
-        looks.push((horizon, start, record_for(&report.model, log, rows, horizon, start)?));
-    }
-    if report.model.orders.nb.iter().any(|&nb| nb > 0) {
-        let record = record_for(&report.model, log, rows, Horizon::FreeRun, Start::Estimate)?;
-        looks.push((Horizon::FreeRun, Start::Estimate, record));
-    }
-    for (horizon, start, record) in looks {
-        let name = match part {
-            Part::Estimation => "estimation",
-            Part::Validation => "validation",
-            Part::Test => "test",
-        };
-        match Fit::of(&report.model, &record, rows, Some(part), horizon, start) {
-            Ok((fit, _)) => {
-                if fit.percent.is_none() {
-                    let why = if fit.samples == 0 {
-                        "its stretches without a gap are too short"
-                    } else {
-                        "the output is constant there, or the response overflows"
-                    };
-                    report.warnings.push(format!("no fit figure on the {name} rows, {horizon}: {why}"));
-                }
-                report.fit.push(fit);
-            }
-            Err(error) => {
-                report.warnings.push(format!("no fit figure on the {name} rows, {horizon}: {error}"))
-            }
-        }
-    }
-    Ok(())
 }
 
 #[cfg(test)]
@@ -785,6 +704,7 @@ mod tests {
             let prefilter = Some("0.01..0.2".parse().unwrap());
             let plan = Plan { prefilter, detrend: Detrend::None, ..Plan::new(&["u"], "y", orders.clone()) };
             let model = identify(log, &[], &plan).unwrap().model;
+            let model = model.polynomials("this test").unwrap();
             for ((square, parameter), truth) in squares.iter_mut().zip(&model.parameters).zip(truth) {
                 *square +=
                     ((parameter.value - truth) / parameter.standard_error.unwrap()).powi(2) / f64::from(runs);

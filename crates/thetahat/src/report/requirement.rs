@@ -1,10 +1,11 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::{Report, Validation};
+use super::{Coverage, Report, Validation};
 use crate::figures::{chance, fixed, number};
-use crate::validate::{Fit, Horizon};
-use crate::{Error, Procedure, Structure};
+use crate::respond::Horizon;
+use crate::validate::{Fit, Residuals};
+use crate::{Error, Model, Procedure, Structure};
 
 /// What there is to ask for.
 const WORDS: &str = "white, independent, stable, fit>=P, fit@K>=P, coverage>=P (P in percent, K steps ahead), mean-error<=E, \
@@ -146,11 +147,12 @@ impl Requirement {
     /// inputs that there are not.
     pub fn check(&self, report: &Report) -> Result<(), Error> {
         let refused = |message: &str| Err(Error::argument("require", message));
+        let oe = matches!(&report.model, Model::Polynomial(model) if model.structure == Structure::Oe);
         let kind = match report.estimation.procedure {
             Procedure::InstrumentalVariables { .. } | Procedure::RefinedInstrumentalVariables { .. } => {
                 Some("fitted by instrumental variables")
             }
-            _ if report.model.structure == Structure::Oe => Some("of output error"),
+            _ if oe => Some("of output error"),
             _ => None,
         };
         match (self, kind) {
@@ -158,9 +160,10 @@ impl Requirement {
                 "white: a model {kind} says nothing of the noise, and its residuals need not be white; ask for \
                  independent"
             )),
-            (Self::Independent, _) if report.model.orders.nb.iter().all(|&nb| nb == 0) => {
+            (Self::Independent, _) if !report.model.is_driven() => {
                 refused("independent: the model has no inputs; ask for white")
             }
+            (Self::Stable, _) => report.model.polynomials("stable: a pole").map(|_| ()),
             _ => Ok(()),
         }
     }
@@ -168,81 +171,124 @@ impl Requirement {
     /// What is missing, in words with the figure; none where it is met. What cannot be told is not met. Tests reject below
     /// `alpha`.
     pub fn unmet(&self, validation: &Validation, alpha: f64) -> Option<String> {
-        let residuals = validation.residuals.as_ref();
-        let untested = || format!("{self}: the residuals could not be tested");
-        match *self {
-            Self::White => match residuals.map(|residuals| residuals.ljung_box.p_value) {
-                Some(Some(p)) if p >= alpha => None,
-                Some(Some(p)) => {
-                    Some(format!("{self}: the p-value of Ljung-Box is {}, below {alpha}", chance(p)))
-                }
-                _ => Some(untested()),
-            },
+        // One word for each output that lacks something.
+        let several = validation.noise.len() > 1;
+        let of = |output: &str| if several { format!("'{output}': ") } else { String::new() };
+        let untested = || Some(format!("{self}: the residuals could not be tested"));
+        let tested_all = validation.residuals.len() >= validation.noise.len().max(1);
+        let failed: Vec<String> = match *self {
+            Self::White | Self::Independent if !tested_all => return untested(),
+            Self::White => validation
+                .residuals
+                .iter()
+                .filter_map(|residuals| match residuals.ljung_box.p_value {
+                    Some(p) if p >= alpha => None,
+                    Some(p) => Some(format!(
+                        "{}the p-value of Ljung-Box is {}, below {alpha}",
+                        of(&residuals.output),
+                        chance(p)
+                    )),
+                    None => Some(format!("{}the residuals could not be tested", of(&residuals.output))),
+                })
+                .collect(),
             Self::Independent => {
-                let Some(residuals) = residuals else { return Some(untested()) };
-                let each = &residuals.independence;
-                let level = alpha / each.len().max(1) as f64;
-                let failed: Vec<String> = each
-                    .iter()
-                    .filter_map(|test| match test.past.p_value {
-                        Some(p) if p >= level => None,
-                        Some(p) => Some(format!("'{}' has p-value {}, below {level}", test.input, chance(p))),
-                        None => Some(format!("'{}' is constant, it could not be tested", test.input)),
+                let each = || {
+                    let of_output = |one: &'_ Residuals| (one.output.clone(), one.independence.clone());
+                    validation.residuals.iter().map(of_output)
+                };
+                if each().any(|(_, tests)| tests.is_empty()) {
+                    return untested();
+                }
+                each()
+                    .flat_map(|(output, tests)| {
+                        let level = alpha / tests.len() as f64;
+                        let of = of(&output);
+                        let failed = tests.into_iter().filter_map(move |test| match test.past.p_value {
+                            Some(p) if p >= level => None,
+                            Some(p) => {
+                                Some(format!("{of}'{}' has p-value {}, below {level}", test.input, chance(p)))
+                            }
+                            None => Some(format!("{of}'{}' is constant, it could not be tested", test.input)),
+                        });
+                        failed.collect::<Vec<_>>()
                     })
-                    .collect();
-                match (each.is_empty(), failed.is_empty()) {
-                    (true, _) => Some(untested()),
-                    (false, true) => None,
-                    (false, false) => Some(format!("{self}: {}", failed.join(", "))),
-                }
+                    .collect()
             }
-            Self::Stable => (!validation.stable).then(|| format!("{self}: the model has a pole outside")),
+            Self::Stable => {
+                let outside = validation.stable != Some(true);
+                outside.then(|| "the model has a pole outside".to_owned()).into_iter().collect()
+            }
             Self::Fit { steps, percent } => {
-                let (fit, horizon) = figures(validation, steps);
-                match fit.and_then(|fit| fit.percent) {
+                let (fits, horizon) = figures(validation, steps);
+                let unmet = |fit: Option<&Fit>| match fit.and_then(|fit| fit.percent) {
                     Some(found) if found >= percent => None,
-                    Some(found) => Some(format!("{self}: the fit is {} % ({horizon})", fixed(found, 3))),
-                    None => Some(format!("{self}: there is no fit figure ({horizon})")),
-                }
+                    Some(found) => Some(format!("the fit is {} % ({horizon})", fixed(found, 3))),
+                    None => Some(format!("there is no fit figure ({horizon})")),
+                };
+                of_fits(&fits, of, unmet)
             }
             Self::MeanError { steps, limit } => {
-                let (fit, horizon) = figures(validation, steps);
-                self.above(limit, "mean |e|", fit.and_then(|fit| fit.mean_absolute_error), horizon)
+                let (fits, horizon) = figures(validation, steps);
+                of_fits(&fits, of, |fit| {
+                    above(limit, "mean |e|", fit.and_then(|fit| fit.mean_absolute_error), horizon)
+                })
             }
             Self::LargestError { steps, limit } => {
-                let (fit, horizon) = figures(validation, steps);
-                self.above(limit, "largest |e|", fit.and_then(|fit| fit.largest_error), horizon)
+                let (fits, horizon) = figures(validation, steps);
+                of_fits(&fits, of, |fit| {
+                    above(limit, "largest |e|", fit.and_then(|fit| fit.largest_error), horizon)
+                })
             }
             Self::Coverage { percent } => {
-                let one = validation.coverage.iter().find(|one| one.steps == 1 && one.level == LEVEL);
-                match one.and_then(|one| one.actual).map(|actual| 100.0 * actual) {
-                    Some(actual) if actual >= percent => None,
-                    Some(actual) => Some(format!(
-                        "{self}: the 95 % intervals one step ahead hold {} % of the outputs",
-                        fixed(actual, 2)
-                    )),
-                    None => Some(format!("{self}: no interval could be told")),
+                let asked = |one: &&Coverage| one.steps == 1 && one.level == LEVEL;
+                let each: Vec<&Coverage> = validation.coverage.iter().filter(asked).collect();
+                if each.is_empty() {
+                    return Some(format!("{self}: no interval could be told"));
                 }
+                each.iter()
+                    .filter_map(|one| match one.actual.map(|actual| 100.0 * actual) {
+                        Some(actual) if actual >= percent => None,
+                        Some(actual) => Some(format!(
+                            "{}the 95 % intervals one step ahead hold {} % of the outputs",
+                            of(&one.output),
+                            fixed(actual, 2)
+                        )),
+                        None => Some(format!("{}no interval could be told", of(&one.output))),
+                    })
+                    .collect()
             }
-        }
-    }
-
-    /// The same for an error that has a limit.
-    fn above(&self, limit: f64, what: &str, found: Option<f64>, horizon: Horizon) -> Option<String> {
-        match found {
-            Some(found) if found <= limit => None,
-            Some(found) => Some(format!("{self}: the {what} is {} ({horizon})", number(found))),
-            None => Some(format!("{self}: there is no {what} ({horizon})")),
-        }
+        };
+        (!failed.is_empty()).then(|| format!("{self}: {}", failed.join(", ")))
     }
 }
 
-/// The figures so many steps ahead; without a number of the free run, or one step ahead of a model without inputs.
-fn figures(validation: &Validation, steps: Option<usize>) -> (Option<&Fit>, Horizon) {
-    let driven = validation.orders.nb.iter().any(|&nb| nb > 0);
+/// What is missing of an error that has a limit.
+fn above(limit: f64, what: &str, found: Option<f64>, horizon: Horizon) -> Option<String> {
+    match found {
+        Some(found) if found <= limit => None,
+        Some(found) => Some(format!("the {what} is {} ({horizon})", number(found))),
+        None => Some(format!("there is no {what} ({horizon})")),
+    }
+}
+
+/// What is missing of each figure; where there is none, that.
+fn of_fits(
+    fits: &[&Fit],
+    of: impl Fn(&str) -> String,
+    unmet: impl Fn(Option<&Fit>) -> Option<String>,
+) -> Vec<String> {
+    if fits.is_empty() {
+        return unmet(None).into_iter().collect();
+    }
+    let each = fits.iter().filter_map(|fit| Some(format!("{}{}", of(&fit.output), unmet(Some(fit))?)));
+    each.collect()
+}
+
+/// The figures so many steps ahead, of each output; without a number of the free run, or one step ahead of a model without inputs.
+fn figures(validation: &Validation, steps: Option<usize>) -> (Vec<&Fit>, Horizon) {
     let horizon = match steps {
-        None if driven => Horizon::FreeRun,
+        None if validation.driven => Horizon::FreeRun,
         steps => Horizon::Steps { steps: steps.unwrap_or(1) },
     };
-    (validation.fit.iter().find(|fit| fit.horizon == horizon), horizon)
+    (validation.fit.iter().filter(|fit| fit.horizon == horizon).collect(), horizon)
 }

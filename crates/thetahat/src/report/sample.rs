@@ -1,7 +1,6 @@
-use super::apply::{Prepared, of_offsets, prepared, record, record_for};
+use super::apply::{Prepared, of_offsets, prepared};
 use crate::data::{Detrend, Log, Rows};
-use crate::respond::{Drawn, Draws, Start, draw};
-use crate::validate::Horizon;
+use crate::respond::{Drawn, Draws, Horizon, Start, draw, record_for};
 use crate::{Error, Model};
 
 /// Free runs of a model on a log, drawn from what the estimate leaves open.
@@ -24,32 +23,29 @@ use crate::{Error, Model};
 /// let channel = |name: &str, values| Channel { name: name.into(), values };
 /// let log = Log::new(vec![channel("u", u), channel("y", y)], 0.1)?;
 /// let model = identify(log.clone(), &[], &Plan::new(&["u"], "y", Orders::arx(1, &[1], &[1])?))?.model;
-/// let runs = sample(&model, log, &[], None, Start::Estimate, &Draws { count: 200, seed: 0 })?;
+/// let runs = sample(&model, &log, &[], None, Start::Estimate, &Draws { count: 200, seed: 0 })?;
 /// let (mean, bands) = runs.bands(&[0.025, 0.975]);
 /// assert!(bands[0][150] < mean[150] && mean[150] < bands[1][150]);
 /// # Ok::<(), thetahat::Error>(())
 /// ```
 pub fn sample(
     model: &Model,
-    mut log: Log,
+    log: &Log,
     rows: &[Rows],
     detrend: Option<Detrend>,
     initial: Start,
     draws: &Draws,
 ) -> Result<Drawn, Error> {
-    let Prepared { rows, measured, level } =
-        prepared(model, &mut log, rows, detrend, (Horizon::FreeRun, initial))?;
-    let model = &of_offsets(model, detrend);
-    let absent = vec![0.0; if measured.is_some() { 0 } else { log.rows() }];
-    let record = if measured.is_some() {
-        record_for(model, &log, &rows, Horizon::FreeRun, initial)?
-    } else {
-        record(model, &log, &rows, Some(&absent))?
-    };
+    model.polynomials("what is drawn from a fit's uncertainty")?;
+    let Prepared { rows, log: deviations, levels } =
+        prepared(model, log, rows, detrend, (Horizon::FreeRun, initial))?;
+    let model = of_offsets(model, detrend);
+    let model = model.polynomials("what is drawn from a fit's uncertainty")?;
+    let record = record_for(model, &deviations, &rows, Horizon::FreeRun, initial)?;
     let mut drawn = draw(model, &record, initial, draws)?;
     for run in &mut drawn.values {
         for (row, value) in run.iter_mut().enumerate() {
-            *value += level.at(log.elapsed(row));
+            *value += levels[0].at(log.elapsed(row));
         }
     }
     Ok(drawn)

@@ -1,9 +1,12 @@
+use std::collections::BTreeMap;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::data::Rows;
 use crate::{
-    Criteria, Document, Error, Fit, Initial, Model, Prefilter, Procedure, Quantity, Selection, Source, text,
+    Criteria, Document, Error, Fit, Initial, Model, Part, Prefilter, Procedure, Quantity, Selection, Source,
+    text,
 };
 
 /// What a fit found: data provenance, the model, its figures. The JSON document `thetahat.report/1`.
@@ -35,6 +38,9 @@ pub struct Report {
 pub struct Data {
     /// The logs in their order, with the rows that each has among all of them. A log is a segment of its own at least.
     pub logs: Vec<Source>,
+    /// Of each log, a digest of the values of each of the model's channels in the rows asked for to estimate on, and of where they stand
+    /// in it: 32 hexadecimal digits of XXH3. Empty for a log that has none of these rows. By them the rows of a fit are recognised.
+    pub digests: Vec<BTreeMap<String, String>>,
     /// The number of rows of all logs, after resampling.
     pub rows: usize,
     /// Seconds from one row to the next.
@@ -86,8 +92,10 @@ pub struct Estimation {
     /// How the estimate was found.
     #[serde(flatten)]
     pub procedure: Procedure,
-    /// What stood for the samples before the first of a segment.
-    pub initial: Initial,
+    /// What stood for the samples before the first of a segment; none for models in equations, which say themselves what is known of
+    /// their states there.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub initial: Option<Initial>,
     /// The output's level in its own units where the inputs are at their offsets, if it was estimated with the parameters; with
     /// a trend that in the middle of the estimation rows. It is part of the model's offset of the output, and one of the
     /// parameters that the criteria count.
@@ -98,13 +106,38 @@ pub struct Estimation {
     pub slope: Option<Quantity>,
     /// N, the samples that count.
     pub samples: usize,
-    /// The mean of e^2 over these samples; for exact likelihood that of v^2/f, with f the variances of innovations over var e.
+    /// The mean of e^2 over these samples; for exact likelihood that of v^2/f, with f the variances of innovations over var e; for
+    /// models in equations that over all values of all outputs.
     pub mse: f64,
-    /// Information criteria, those that are logarithms for each sample; for exact likelihood of that.
+    /// Information criteria, those that are logarithms for each sample; for a largest likelihood of that.
     #[serde(flatten)]
     pub criteria: Criteria,
     /// The condition number of the regressors, scaled to unit norm; for a search that of psi. None where they are dependent.
     pub condition: Option<f64>,
+}
+
+impl Data {
+    /// The rows that were held out of the fit, and what they served for.
+    pub(crate) fn held_out(&self) -> Vec<(Part, Vec<Rows>)> {
+        let test = self.split.as_ref().map_or_else(Vec::new, |parts| parts.test.clone());
+        [(Part::Validation, self.validation.clone()), (Part::Test, test)]
+            .into_iter()
+            .filter(|(_, rows)| !rows.is_empty())
+            .collect()
+    }
+}
+
+#[cfg(test)]
+impl Report {
+    /// The polynomials of a report that has them.
+    pub(crate) fn polynomials(&self) -> &crate::PolynomialModel {
+        self.model.polynomials("this test").unwrap()
+    }
+
+    pub(crate) fn polynomials_mut(&mut self) -> &mut crate::PolynomialModel {
+        let Model::Polynomial(model) = &mut self.model else { panic!("other kind") };
+        model
+    }
 }
 
 impl Document for Report {
@@ -117,9 +150,6 @@ impl Document for Report {
     }
 
     fn refusal(schema: &str) -> String {
-        if schema.starts_with("thetahat.greybox/") {
-            return "this is the fit of a model in equations, which only `thetahat filter` reads; give a report of polynomials".to_owned();
-        }
         let own = Self::SCHEMA;
         format!("its schema is '{}', this version reads '{own}'; fit the log again", text::brief(schema, 40))
     }

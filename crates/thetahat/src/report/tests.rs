@@ -2,7 +2,8 @@
 
 use super::*;
 use crate::regression::noise::Noise;
-use crate::validate::{Horizon, Part};
+use crate::respond::Horizon;
+use crate::validate::Part;
 use crate::{Channel, Initial, Log, Orders, Procedure, Rows, Start};
 
 fn log(u: &[f64], y: &[f64]) -> Log {
@@ -29,14 +30,14 @@ fn conditions(report: &Report) -> usize {
 
 /// The mean square of the errors one step ahead on the rows of the fit is that of the estimate, and its log is known again.
 fn is_consistent(report: &Report, log: &Log) {
-    let orders = &report.model.orders;
+    let orders = &report.polynomials().orders;
     let one = &report.fit[0];
     assert_eq!((one.part, one.horizon), (Some(Part::Estimation), Horizon::Steps { steps: 1 }));
     assert_eq!(one.samples, report.estimation.samples, "{orders}");
     let ratio = one.rmse.unwrap().powi(2) / report.estimation.mse;
     assert!((ratio - 1.0).abs() < 1e-6, "{orders} {ratio}");
     let plan = ValidationPlan { rows: report.data.estimation.clone(), ..ValidationPlan::default() };
-    let found = validate(report, None, log.clone(), &[], &plan).unwrap().validation;
+    let found = validate(report, None, log, &[], &plan).unwrap().validation;
     assert_eq!(found.seen, Seen::Yes, "{orders}");
 }
 
@@ -74,7 +75,7 @@ fn rows_before_the_estimation_rows_are_its_past() {
                 [("201..450", 200), ("1..250", 0), ("2..251", 1), ("101..250,301..400", 100)]
             {
                 let report = fitted(&log, &orders, estimate, initial);
-                let from_zero = report.estimation.initial == Initial::Zero;
+                let from_zero = report.estimation.initial == Some(Initial::Zero);
                 let left_out = if from_zero { 0 } else { usize::saturating_sub(lost, past) };
                 assert_eq!(report.estimation.samples, 250 - left_out, "{orders} {estimate} {initial:?}");
                 is_consistent(&report, &log);
@@ -83,7 +84,10 @@ fn rows_before_the_estimation_rows_are_its_past() {
                 // With a past there is nothing to choose.
                 if initial == Initial::Auto && past > 1 && orders.has_f() {
                     let count = orders.nf.iter().sum::<usize>() * report.data.estimation.len();
-                    assert_eq!((report.estimation.initial, conditions(&report)), (Initial::Estimate, count));
+                    assert_eq!(
+                        (report.estimation.initial, conditions(&report)),
+                        (Some(Initial::Estimate), count)
+                    );
                 }
             }
         }
@@ -108,7 +112,7 @@ fn least_squares_with_a_past_are_those_of_the_rows_behind_it() {
         (known.estimation.samples, alone.estimation.samples, without.estimation.samples),
         (96, 100, 96)
     );
-    for (known, without) in known.model.parameters.iter().zip(&without.model.parameters) {
+    for (known, without) in known.polynomials().parameters.iter().zip(&without.polynomials().parameters) {
         assert!(
             (known.value - without.value).abs() < 1e-10 && known.standard_error == without.standard_error
         );
@@ -136,7 +140,7 @@ fn a_leading_indicator_needs_no_shifting_by_hand() {
         let report = fitted(&cut, &orders(3), "", Initial::Auto);
         let shifted = log(&u[before - 13..u.len() - 3], &y[before - 10..]);
         let by_hand = fitted(&shifted, &orders(0), "11..160", Initial::Auto);
-        let ratio = report.model.noise_variance / by_hand.model.noise_variance;
+        let ratio = report.polynomials().noise_variance / by_hand.polynomials().noise_variance;
         assert!((0.9..1.1).contains(&ratio), "{seed} {ratio}");
         estimated += usize::from(conditions(&report) == 3);
         assert_eq!(conditions(&by_hand), 1);
@@ -145,7 +149,9 @@ fn a_leading_indicator_needs_no_shifting_by_hand() {
         // And nothing is estimated where the past is known.
         let known = fitted(&log(&u, &y), &orders(3), "61..210", Initial::Auto);
         assert_eq!((known.estimation.samples, conditions(&known)), (150, 1));
-        assert!((known.model.noise_variance / by_hand.model.noise_variance - 1.0).abs() < 0.1);
+        assert!(
+            (known.polynomials().noise_variance / by_hand.polynomials().noise_variance - 1.0).abs() < 0.1
+        );
     }
     // Not where the walk happens to be near its mean.
     assert!(estimated >= 4);
@@ -162,7 +168,7 @@ fn unknown_inputs_that_do_not_matter_are_not_estimated() {
         let orders = Orders::oe(&[1], &[1], &[6]).unwrap();
         let plan = Plan { detrend: crate::Detrend::None, ..Plan::new(&["u"], "y", orders) };
         let report = identify(log(&u, &y), &[], &plan).unwrap();
-        assert_eq!((report.estimation.initial, conditions(&report)), (Initial::Zero, 0));
+        assert_eq!((report.estimation.initial, conditions(&report)), (Some(Initial::Zero), 0));
     }
 }
 
@@ -187,11 +193,11 @@ fn missing_outputs_do_not_cut_an_output_error_model() {
     let statistics = |reports: &[Report]| {
         let of =
             |value: &dyn Fn(&Report) -> f64| reports.iter().map(value).sum::<f64>() / reports.len() as f64;
-        let b = |report: &Report| report.model.parameters[0].value;
+        let b = |report: &Report| report.polynomials().parameters[0].value;
         let mean = of(&b);
         let deviation = of(&|report| (b(report) - mean).powi(2)).sqrt();
-        let error = of(&|report| report.model.parameters[0].standard_error.unwrap());
-        (mean, deviation, error, of(&|report| report.model.noise_variance))
+        let error = of(&|report| report.polynomials().parameters[0].standard_error.unwrap());
+        (mean, deviation, error, of(&|report| report.polynomials().noise_variance))
     };
     let ((_, best, ..), (mean, deviation, error, variance)) = (statistics(&whole), statistics(&cut));
     // 30 % fewer samples: 20 % wider, and the standard errors say so.
@@ -211,17 +217,17 @@ fn responses_go_on_through_missing_outputs() {
     }
     let log = log(&u, &y);
     let apply = |report: &Report, log: &Log, horizon, start| {
-        apply(&report.model, log.clone(), &[], None, horizon, start).unwrap()
+        apply(&report.model, log, &[], None, horizon, start).unwrap().outputs.remove(0)
     };
     let one = Horizon::Steps { steps: 1 };
     for orders in [Orders::oe(&[1], &[1], &[1]).unwrap(), Orders::arx(0, &[20], &[1]).unwrap()] {
         let report = fitted(&log, &orders, "", Initial::Auto);
         is_consistent(&report, &log);
-        let start = Start::natural(&report.model, one);
+        let start = Start::natural(report.polynomials(), one);
         let predicted = apply(&report, &log, one, start);
         let first = if orders.has_f() { 0 } else { 20 };
         assert!(predicted.predicted[first..].iter().all(|value| value.is_finite()));
-        let deviation = report.model.noise_variance.sqrt();
+        let deviation = report.polynomials().noise_variance.sqrt();
         assert!(predicted.standard_deviations.unwrap()[first..].iter().all(|own| *own >= deviation));
         assert_eq!(predicted.fit.unwrap().samples, y[first..].iter().filter(|y| !y.is_nan()).count());
         // What is said of the holes is close to what was there.
@@ -233,6 +239,6 @@ fn responses_go_on_through_missing_outputs() {
     let run = apply(&report, &log, Horizon::FreeRun, Start::Estimate);
     assert!(run.predicted.iter().all(|value| value.is_finite()));
     assert_eq!(run.fit.unwrap().samples, 276);
-    let validation = validate(&report, None, log, &[], &ValidationPlan::default()).unwrap();
-    assert!(validation.signals.simulated.unwrap().iter().all(|value| value.is_finite()));
+    let validation = validate(&report, None, &log, &[], &ValidationPlan::default()).unwrap();
+    assert!(validation.signals.outputs[0].simulated.as_ref().unwrap().iter().all(|value| value.is_finite()));
 }

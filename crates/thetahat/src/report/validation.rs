@@ -1,25 +1,25 @@
+use std::collections::BTreeMap;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Report;
-use super::apply::{check_sample_time, record_for};
-use crate::data::{Detrend, Log, Offset, Prefiltered, Record, Rows, Source, checked};
-use crate::estimate::exact_mean;
+use super::judge::of_output;
+use super::seen::rows_of_fit;
+use super::suited::{check_offsets, check_sample_time};
+use crate::data::{Detrend, Log, Offset, Rows, Source, checked};
+use crate::estimate::Criteria;
 use crate::figures::{chance, fixed, number};
 use crate::regression::sum;
-use crate::respond::{Innovations, Response, check_steps, innovations, prediction_deviations};
-use crate::validate::{Fit, Horizon, Relation, Residuals};
-use crate::{Document, Error, Initial, Model, Orders, Procedure, Start, Structure};
+use crate::respond::{Horizon, Innovations, OnLog, Response, Tested, check_steps};
+use crate::validate::{Fit, Relation, Residuals};
+use crate::{Document, Error, Model, Orders, Procedure, Structure};
 
 const GENERATOR: &str = concat!("thetahat ", env!("CARGO_PKG_VERSION"));
 /// The levels of the prediction intervals of which the coverage is counted.
 const LEVELS: [f64; 4] = [0.5, 0.8, 0.95, 0.99];
-/// A log of the fit gives its mean of e^2 again to this fraction; where initial conditions were estimated with the
-/// parameters, they are as exact as the search was.
-const SAME: f64 = 1e-9;
-const NEARLY_SAME: f64 = 1e-6;
-/// A mean of e^2 below this fraction of that of the output is rounding.
-const ROUNDING: f64 = 1e-24;
+/// Fits whose samples differ by more than this fraction have no comparable criteria.
+const AS_MANY: f64 = 0.05;
 /// A mean of the errors above this fraction of their standard deviation is worth a word, if it is as many standard errors
 /// from zero as the second number says.
 const OFF_CENTER: f64 = 0.3;
@@ -44,23 +44,33 @@ pub struct Validation {
     pub rows: Vec<Rows>,
     /// Whether the model was fitted to them.
     pub seen: Seen,
-    /// Which polynomials the model has.
-    pub structure: Structure,
-    /// How long they are.
-    pub orders: Orders,
-    /// Whether all poles lie inside the unit circle.
-    pub stable: bool,
+    /// What the model is called, such as ARX(2, 2, 1).
+    pub model: String,
+    /// How many parameters it has.
+    pub parameters: usize,
+    /// Which polynomials it has; none for a model of another kind.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub structure: Option<Structure>,
+    /// How long they are; none likewise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub orders: Option<Orders>,
+    /// Whether all poles lie inside the unit circle; none for a model without poles.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stable: Option<bool>,
+    /// Whether inputs act on the outputs, so that there is a free run.
+    pub driven: bool,
     /// Whether the model says that its residuals are white: those of output error and by instrumental variables say
     /// nothing of the noise.
     pub white_expected: bool,
-    /// 1 step ahead, some steps ahead, and the free run, each with its start.
+    /// 1 step ahead, some steps ahead, and the free run, each with its start; of each output.
     pub fit: Vec<Fit>,
-    /// The errors one step ahead beside those that the model expects.
-    pub noise: NoiseLevel,
-    /// How often the measured output lies in the prediction intervals.
+    /// The errors of each output one step ahead beside those that the model expects.
+    pub noise: Vec<NoiseLevel>,
+    /// How often the measured outputs lie in the prediction intervals.
     pub coverage: Vec<Coverage>,
-    /// What is left of the log; none where too few samples count.
-    pub residuals: Option<Residuals>,
+    /// What is left of each output; not of one of which too few samples count. Models in equations expect errors of another size in each
+    /// row: of theirs each is divided by its standard deviation.
+    pub residuals: Vec<Residuals>,
     /// What a careful reader should know, in plain words.
     pub warnings: Vec<String>,
 }
@@ -78,19 +88,23 @@ pub enum Seen {
 }
 
 /// The errors one step ahead beside those that the model expects.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct NoiseLevel {
+    /// The output.
+    pub output: String,
     /// The mean of e^2 on the log; none where no sample counts.
     pub mse: Option<f64>,
-    /// The variance of e in the model.
+    /// The variance of e in the model; the mean of them where it expects another in each row.
     pub model: f64,
-    /// The first over the second: 1 where the log is like the one of the fit.
+    /// The first over the second, or the mean of e^2 over the variance of the row: 1 where the log is like the one of the fit.
     pub ratio: Option<f64>,
 }
 
 /// How often the measured output lies in the prediction intervals.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Coverage {
+    /// The output.
+    pub output: String,
     /// How many steps ahead.
     pub steps: usize,
     /// The fraction that should lie inside, such as 0.95.
@@ -108,6 +122,17 @@ pub struct Validated {
     pub validation: Validation,
     /// The signals.
     pub signals: Signals,
+    /// What the model was fitted to, and how well.
+    fitted: FittedTo,
+}
+
+/// What makes fits comparable: the values of the outputs that they were made to, and how many counted.
+#[derive(Debug, Clone, PartialEq)]
+struct FittedTo {
+    /// For each log and each output.
+    outputs: Vec<Vec<String>>,
+    samples: usize,
+    criteria: Criteria,
 }
 
 /// Measured and predicted signals, one value for each row of the log, in the log's own units; NaN where there is none.
@@ -117,9 +142,16 @@ pub struct Signals {
     pub time: Vec<f64>,
     /// The inputs, with their names.
     pub inputs: Vec<(String, Vec<f64>)>,
-    /// The name of the output.
-    pub output: String,
-    /// The measured output.
+    /// The outputs.
+    pub outputs: Vec<OutputSignals>,
+}
+
+/// An output as it was measured and as a model has it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OutputSignals {
+    /// Its name.
+    pub name: String,
+    /// As it was measured.
     pub measured: Vec<f64>,
     /// One step ahead.
     pub predicted: Vec<f64>,
@@ -136,6 +168,10 @@ pub struct Comparison {
     pub generator: String,
     /// The models in the order they were given.
     pub models: Vec<Validation>,
+    /// The information criteria of their fits, in the same order; none where they were not fitted to the same values of the same
+    /// outputs, or the samples that count differ by more than one in twenty.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub criteria: Option<Vec<Criteria>>,
 }
 
 /// How to validate.
@@ -196,15 +232,13 @@ impl ValidationPlan {
 
 /// Says how a stored model does on a log: fits, what is left, and whether intervals hold.
 ///
-/// Every response starts as [`Start::natural`] has it. The model was fitted to rows of this log if the errors one step ahead
-/// on the rows of the fit, with its offsets and its start, give `estimation.mse` again: to 1e-9 of it, or to 1e-6 where initial
-/// conditions were estimated with the parameters. No other log does that. A model of several logs is recognised on all of
-/// them, joined as they were, and not on one of them: its parameters then count as known from elsewhere, which makes the tests
-/// a little milder. The log is used up. Cost: O(N (L + p)).
+/// Every response starts as [`Model::natural_start`] has it. The model was fitted to rows of this log if these have the values that
+/// `data.digests` of the report says, bit for bit. Of a model of several logs each is recognised by itself. Cost: O(N (L + p)) for a
+/// polynomial model, O(N k p (n^3 + m n^2)) for one in equations that looks k steps ahead.
 ///
 /// # Errors
-/// [`Error::Data`] for channels or rows that are not there, no row with a value in every channel, or a sample time that
-/// differs from the model's by more than 1 %; [`Error::Argument`] as for [`ValidationPlan::check`]. What cannot be
+/// [`Error::Data`] for channels or rows that are not there, no row with a value in every channel, a sample time that differs from the
+/// model's by more than 1 %, or a clock that it cannot follow; [`Error::Argument`] as for [`ValidationPlan::check`]. What cannot be
 /// computed of a model on a log, such as the figures of too few samples, is none in the document, with a word why.
 ///
 /// ```
@@ -221,60 +255,45 @@ impl ValidationPlan {
 /// let plan = Plan { estimate: vec!["1..150".parse()?], ..Plan::new(&["u"], "y", Orders::arx(1, &[1], &[1])?) };
 /// let report = identify(log.clone(), &[], &plan)?;
 /// let fresh = ValidationPlan { rows: vec!["151..300".parse()?], ..ValidationPlan::default() };
-/// let found = validate(&report, None, log, &[], &fresh)?.validation;
+/// let found = validate(&report, None, &log, &[], &fresh)?.validation;
 /// assert!(found.fit.iter().all(|fit| fit.percent.is_some_and(|percent| percent > 75.0)));
-/// assert!(found.residuals.is_some_and(|residuals| residuals.samples == 150));
+/// assert_eq!(found.residuals[0].samples, 150);
 /// # Ok::<(), thetahat::Error>(())
 /// ```
 pub fn validate(
     report: &Report,
     name: Option<&str>,
-    mut log: Log,
+    log: &Log,
     sources: &[Source],
     plan: &ValidationPlan,
 ) -> Result<Validated, Error> {
     plan.check()?;
     let model = &report.model;
-    check_sample_time(model, &log)?;
+    check_sample_time(model, log)?;
     let all = vec![Rows::new(1, log.rows())?];
     let rows = checked("--rows", if plan.rows.is_empty() { &all } else { &plan.rows }, log.rows())?;
-    let inputs: Vec<String> = model.inputs.iter().map(|input| input.name.clone()).collect();
-    let output = &model.output.name;
-    let used: Vec<&str> = inputs.iter().chain([output]).map(String::as_str).collect();
-    let segments = log.segments(&used, &rows)?;
-    if segments.is_empty() {
+    let names: Vec<&str> = model.channels().collect();
+    let fitted = rows_of_fit(report, log)?;
+    let seen = overlap(&rows, &fitted);
+    let whole = model.inputs().iter().chain(model.outputs());
+    let mut deviations = log.deviations(whole.map(|signal| (signal.name.as_str(), signal.offset)))?;
+    if !model.takes_any_clock() && log.segments(&names, &rows)?.is_empty() {
         return Err(Error::data("no row has a value in every channel; name other rows"));
     }
-    let copies = inputs.iter().map(|name| Ok((name.clone(), log.channel(name)?.values.clone())));
-    let mut signals = Signals {
-        time: (0..log.rows()).map(|row| log.elapsed(row)).collect(),
-        inputs: copies.collect::<Result<_, Error>>()?,
-        output: output.clone(),
-        measured: log.channel(output)?.values.clone(),
-        predicted: Vec::new(),
-        simulated: None,
-    };
-    for signal in model.inputs.iter().chain([&model.output]) {
-        log.remove(&signal.name, &signal.offset);
-    }
-    let seen =
-        if is_of_fit(report, &log, &inputs) { overlap(&rows, &report.data.estimation) } else { Seen::No };
     // What the offsets of these rows differ from the model's.
-    let mut level = Offset::default();
+    let mut levels = vec![Offset::default(); names.len()];
     if let Some(detrend) = plan.detrend {
-        for name in &used {
-            let own = Offset::estimate(detrend, &log, name, &segments)?;
-            log.remove(name, &own);
-            if name == output {
-                level = own;
-            }
+        check_offsets(model)?;
+        let segments = log.segments(&names, &rows)?;
+        for (name, level) in names.iter().zip(&mut levels) {
+            *level = Offset::estimate(detrend, &deviations, name, &segments)?;
+            deviations.remove(name, level);
         }
     }
-    let record = |horizon| record_for(model, &log, &rows, horizon, Start::natural(model, horizon));
-    let records =
-        Records { ahead: record(Horizon::Steps { steps: 1 })?, free_run: record(Horizon::FreeRun)? };
+    let on_log = model.on_log(&deviations, &rows, None, &fitted)?;
 
-    let white_expected = model.structure != Structure::Oe
+    let polynomial = if let Model::Polynomial(model) = model { Some(model) } else { None };
+    let white_expected = polynomial.is_none_or(|model| model.structure != Structure::Oe)
         && !matches!(
             report.estimation.procedure,
             Procedure::InstrumentalVariables { .. } | Procedure::RefinedInstrumentalVariables { .. }
@@ -285,133 +304,61 @@ pub fn validate(
         report: name.map(str::to_owned),
         logs: sources.to_vec(),
         seen,
-        structure: model.structure,
-        orders: model.orders.clone(),
-        stable: model.stable,
+        model: model.name(),
+        parameters: model.parameters().len(),
+        structure: polynomial.map(|model| model.structure),
+        orders: polynomial.map(|model| model.orders.clone()),
+        stable: polynomial.map(|model| model.stable),
+        driven: on_log.is_driven(),
         white_expected,
         fit: Vec::new(),
-        noise: NoiseLevel { mse: None, model: model.noise_variance, ratio: None },
+        noise: Vec::new(),
         coverage: Vec::new(),
-        residuals: None,
+        residuals: Vec::new(),
         warnings: Vec::new(),
         rows,
     };
-    let (one_step, free_run) = looks(model, &records, plan, &mut validation);
-    // Back in the log's own units.
-    let whole = |response: &Response| -> Vec<f64> {
-        let offset = |row: usize| {
-            let elapsed = log.elapsed(row);
-            level.at(elapsed) + model.output.offset.at(elapsed)
-        };
-        response.values.iter().enumerate().map(|(row, value)| value + offset(row)).collect()
-    };
-    let driven = model.orders.nb.iter().any(|&nb| nb > 0);
-    let nothing = || vec![f64::NAN; log.rows()];
-    signals.predicted = one_step.as_ref().map_or_else(nothing, whole);
-    signals.simulated = driven.then(|| free_run.as_ref().map_or_else(nothing, whole));
-    test_residuals(report, &records.ahead, plan, &mut validation);
+    let Looks { one_step, free_run } = looks(&*on_log, plan, &mut validation);
+    test_residuals(report, &*on_log, plan, &mut validation);
     warn(plan, &mut validation);
-    Ok(Validated { validation, signals })
-}
 
-/// Whether the log, as deviations from the model's offsets, is the one that the model was fitted to.
-fn is_of_fit(report: &Report, log: &Log, inputs: &[String]) -> bool {
-    if report.data.estimation.is_empty() || report.data.estimation.iter().any(|rows| rows.last() > log.rows())
-    {
-        return false;
-    }
-    let start = estimation_start(report);
-    let (output, rows) = (&report.model.output.name, &report.data.estimation);
-    if is_exact(report) {
-        let record = log.driven_record(inputs, output, rows);
-        return record.is_ok_and(|record| gives_likelihood(report, &record));
-    }
-    if let Some(band) = report.data.prefilter {
-        let band = Prefiltered::new(&band, log, inputs, output);
-        return band
-            .is_ok_and(|band| band.record_alone(rows).is_ok_and(|record| gives(report, &record, start)));
-    }
-    let Ok(record) = estimation_record(report, log, inputs) else { return false };
-    if gives(report, &record, start) {
-        return true;
-    }
-    // Estimates by older versions begin with their segments, and end where an output is missing.
-    let Ok(mut record) = log.record(inputs, output, rows) else { return false };
-    record.past.fill(0);
-    gives(report, &record, start)
-}
-
-/// What the responses on the rows of the fit start from, as the estimate did.
-pub(super) fn estimation_start(report: &Report) -> Start {
-    match report.estimation.initial {
-        // Its filter begins with a covariance: predictions have none.
-        _ if is_exact(report) => Start::natural(&report.model, Horizon::Steps { steps: 1 }),
-        Initial::Zero => Start::Zero,
-        // Without F there is nothing to estimate, and C begins from e = 0 where it does in the fit.
-        _ if !report.model.orders.is_linear() => Start::Estimate,
-        _ => Start::Drop,
-    }
-}
-
-/// The rows of the fit as the estimate saw them.
-pub(super) fn estimation_record<'l>(
-    report: &Report,
-    log: &'l Log,
-    inputs: &[String],
-) -> Result<Record<'l>, Error> {
-    let (output, rows) = (&report.model.output.name, &report.data.estimation);
-    let by_instruments = matches!(
-        report.estimation.procedure,
-        Procedure::InstrumentalVariables { .. } | Procedure::RefinedInstrumentalVariables { .. }
-    );
-    if by_instruments {
-        // They begin with their segments.
-        let record = log.record(inputs, output, rows)?;
-        return Ok(Record { past: vec![0; record.segments.len()], ..record });
-    }
-    if !is_exact(report) && goes_through(&report.model.orders, report.estimation.initial) {
-        return log.driven_record(inputs, output, rows);
-    }
-    log.record(inputs, output, rows)
-}
-
-/// Whether an estimate of least squared errors goes on through missing outputs. From zeros, rows of least squares begin anew.
-pub(super) fn goes_through(orders: &Orders, initial: Initial) -> bool {
-    !orders.needs_past_outputs() && (orders.has_f() || initial != Initial::Zero)
-}
-
-/// Whether the estimate is that of largest exact likelihood.
-pub(super) fn is_exact(report: &Report) -> bool {
-    matches!(report.estimation.procedure, Procedure::ExactLikelihood(_))
-}
-
-/// Whether the Kalman filter on a record gives the variance of such an estimate again.
-fn gives_likelihood(report: &Report, record: &Record<'_>) -> bool {
-    let (model, estimation) = (&report.model, &report.estimation);
-    let parameters: Vec<f64> = model.parameters.iter().map(|parameter| parameter.value).collect();
-    let found = exact_mean(record, &model.orders, &parameters, estimation.initial);
-    found.is_some_and(|(samples, mse)| {
-        samples == estimation.samples && (mse - estimation.mse).abs() <= NEARLY_SAME * estimation.mse
-    })
-}
-
-/// Whether the errors one step ahead on a record give the mean square of the estimate again.
-fn gives(report: &Report, record: &Record<'_>, start: Start) -> bool {
-    let (model, estimation) = (&report.model, &report.estimation);
-    let tolerance = if start == Start::Estimate { NEARLY_SAME } else { SAME };
-    let Ok(found) = innovations(model, record, 1, start) else { return false };
-    let (mut samples, mut square, mut size) = (0, 0.0, 0.0);
-    for found in &found {
-        samples += found.counted_errors().count();
-        square += found.counted_errors().map(|e| e * e).sum::<f64>();
-        let outputs = found.counted.iter().cloned().flatten().map(|t| record.output[t]);
-        size += outputs.map(|y| y * y).sum::<f64>();
-    }
-    let (mse, size) = (square / samples as f64, size / samples as f64);
-    samples == estimation.samples
-        && mse.is_finite()
-        && size.is_finite()
-        && (mse - estimation.mse).abs() <= tolerance * estimation.mse + ROUNDING * size
+    let inputs = model.inputs().iter().map(|input| {
+        let name = &input.name;
+        Ok((name.clone(), log.channel(name)?.values.clone()))
+    });
+    let inputs = inputs.collect::<Result<Vec<_>, Error>>()?;
+    let outputs =
+        model.outputs().iter().zip(&levels[inputs.len()..]).enumerate().map(|(index, (signal, level))| {
+            // Back in the log's own units.
+            let whole = |responses: &Option<Vec<Response>>| -> Vec<f64> {
+                let Some(responses) = responses else { return vec![f64::NAN; log.rows()] };
+                let offset = |row: usize| {
+                    let elapsed = log.elapsed(row);
+                    level.at(elapsed) + signal.offset.at(elapsed)
+                };
+                responses[index].values.iter().enumerate().map(|(row, value)| value + offset(row)).collect()
+            };
+            Ok(OutputSignals {
+                name: signal.name.clone(),
+                measured: log.channel(&signal.name)?.values.clone(),
+                predicted: whole(&one_step),
+                simulated: validation.driven.then(|| whole(&free_run)),
+            })
+        });
+    let signals = Signals {
+        time: (0..log.rows()).map(|row| log.elapsed(row)).collect(),
+        inputs,
+        outputs: outputs.collect::<Result<_, Error>>()?,
+    };
+    let digest = |digests: &BTreeMap<String, String>| -> Vec<String> {
+        model.outputs().iter().filter_map(|output| digests.get(&output.name).cloned()).collect()
+    };
+    let fitted = FittedTo {
+        outputs: report.data.digests.iter().map(digest).collect(),
+        samples: report.estimation.samples,
+        criteria: report.estimation.criteria,
+    };
+    Ok(Validated { validation, signals, fitted })
 }
 
 /// Whether rows are among others.
@@ -431,110 +378,121 @@ fn overlap(rows: &[Rows], fitted: &[Rows]) -> Seen {
     }
 }
 
-/// What predictions and free runs look at.
-struct Records<'l> {
-    ahead: Record<'l>,
-    free_run: Record<'l>,
+/// The prediction one step ahead and the free run, where they could be computed.
+struct Looks {
+    one_step: Option<Vec<Response>>,
+    free_run: Option<Vec<Response>>,
 }
 
-/// Fits, noise level and coverage; gives the prediction one step ahead and the free run.
-fn looks(
-    model: &Model,
-    records: &Records<'_>,
-    plan: &ValidationPlan,
-    validation: &mut Validation,
-) -> (Option<Response>, Option<Response>) {
+/// Fits, noise level and coverage.
+fn looks(on_log: &dyn OnLog, plan: &ValidationPlan, validation: &mut Validation) -> Looks {
     let mut steps: Vec<usize> = [&[1], &plan.horizons[..]].concat();
     steps.sort_unstable();
     steps.dedup();
-    let mut one_step = None;
+    let mut looks = Looks { one_step: None, free_run: None };
     let ahead = steps.into_iter().map(|steps| Horizon::Steps { steps });
-    let driven = model.orders.nb.iter().any(|&nb| nb > 0);
-    let mut free_run = None;
-    for horizon in ahead.chain(driven.then_some(Horizon::FreeRun)) {
-        let start = Start::natural(model, horizon);
-        let record = if horizon == Horizon::FreeRun { &records.free_run } else { &records.ahead };
-        let (fit, response) = match Fit::of(model, record, &validation.rows, None, horizon, start) {
-            Ok(found) => found,
+    for horizon in ahead.chain(on_log.is_driven().then_some(Horizon::FreeRun)) {
+        let start = on_log.natural_start(horizon);
+        let responses = match on_log.respond(horizon, start) {
+            Ok(responses) => responses,
             Err(error) => {
                 validation.warnings.push(format!("no fit figure, {horizon}: {error}"));
                 continue;
             }
         };
-        if fit.percent.is_none() {
-            let why = if fit.samples == 0 {
-                "the stretches without a gap are too short"
-            } else {
-                "the output is constant, or the response overflows"
-            };
-            validation.warnings.push(format!("no fit figure, {horizon}: {why}"));
+        for (index, (response, output)) in responses.iter().zip(on_log.outputs()).enumerate() {
+            let (name, measured) = (&output.name, on_log.measured(index));
+            let fit = Fit::new(name, measured, response, &validation.rows, None, (horizon, start));
+            if fit.percent.is_none() {
+                let why = if fit.samples == 0 {
+                    "the stretches without a gap are too short"
+                } else {
+                    "the output is constant, or the response overflows"
+                };
+                let which = of_output(on_log, name);
+                validation.warnings.push(format!("no fit figure{which}, {horizon}: {why}"));
+            }
+            if horizon == (Horizon::Steps { steps: 1 }) {
+                let mse = fit.rmse.map(|rmse| rmse * rmse).filter(|mse| mse.is_finite());
+                let (variance, ratio) = on_log.noise(index, mse);
+                let ratio = ratio.filter(|ratio| ratio.is_finite());
+                validation.noise.push(NoiseLevel { output: name.clone(), mse, model: variance, ratio });
+            }
+            validation.fit.push(fit);
         }
-        if horizon == (Horizon::Steps { steps: 1 }) {
-            let mse = fit.rmse.map(|rmse| rmse * rmse).filter(|mse| mse.is_finite());
-            let ratio = mse.map(|mse| mse / model.noise_variance).filter(|ratio| ratio.is_finite());
-            validation.noise = NoiseLevel { mse, ratio, ..validation.noise };
-        }
-        if let Horizon::Steps { steps } = horizon {
-            validation.coverage.extend(coverage(model, record, &response, steps, start));
-        }
-        validation.fit.push(fit);
         match horizon {
-            Horizon::Steps { steps: 1 } => one_step = Some(response),
-            Horizon::Steps { .. } => {}
-            Horizon::FreeRun => free_run = Some(response),
+            Horizon::Steps { steps } => {
+                // Where that fails, the prediction has failed too.
+                let deviations = on_log.deviations(steps, start).unwrap_or_default();
+                for (index, response) in responses.iter().enumerate() {
+                    let deviations = deviations.get(index).map_or(&[][..], Vec::as_slice);
+                    validation.coverage.extend(coverage(on_log, index, response, deviations, steps));
+                }
+                if steps == 1 {
+                    looks.one_step = Some(responses);
+                }
+            }
+            Horizon::FreeRun => looks.free_run = Some(responses),
         }
     }
-    (one_step, free_run)
+    looks
 }
 
-/// How often the output lies in the intervals around predictions so many steps ahead, as wide as their deviations say.
-fn coverage(
-    model: &Model,
-    record: &Record<'_>,
+/// How often an output lies in the intervals around predictions so many steps ahead, as wide as their deviations say.
+fn coverage<'a>(
+    on_log: &'a dyn OnLog,
+    output: usize,
     response: &Response,
+    deviations: &[f64],
     steps: usize,
-    start: Start,
-) -> Vec<Coverage> {
-    // Where that fails, the prediction has failed too.
-    let deviations = prediction_deviations(model, record, steps, start).unwrap_or_default();
+) -> impl Iterator<Item = Coverage> + use<'a> {
+    let measured = on_log.measured(output);
     let errors: Vec<(f64, f64)> = response
         .counted
         .iter()
         .cloned()
         .flatten()
-        .filter_map(|t| Some(((record.output[t] - response.values[t]).abs(), *deviations.get(t)?)))
+        .filter_map(|t| Some(((measured[t] - response.values[t]).abs(), *deviations.get(t)?)))
         .collect();
     let samples = errors.len();
     let known = samples > 0 && errors.iter().all(|(_, deviation)| deviation.is_finite() && *deviation > 0.0);
-    let each = LEVELS.into_iter().map(|level| {
-        // The deviations are those of Student's distribution, the quantiles are in units of its scale.
-        let width = model.quantile(level) / model.student_factor();
+    LEVELS.into_iter().map(move |level| {
+        let width = on_log.quantile(level);
         let inside = errors.iter().filter(|(error, deviation)| *error <= width * deviation).count();
-        Coverage { steps, level, actual: known.then(|| inside as f64 / samples as f64), samples }
-    });
-    each.collect()
+        Coverage {
+            output: on_log.outputs()[output].name.clone(),
+            steps,
+            level,
+            actual: known.then(|| inside as f64 / samples as f64),
+            samples,
+        }
+    })
 }
 
 /// The tests of what is left one step ahead.
-fn test_residuals(report: &Report, record: &Record<'_>, plan: &ValidationPlan, validation: &mut Validation) {
-    let model = &report.model;
-    let start = Start::natural(model, Horizon::Steps { steps: 1 });
+fn test_residuals(report: &Report, on_log: &dyn OnLog, plan: &ValidationPlan, validation: &mut Validation) {
     // Where that fails, the fit figure has said why.
-    let Ok(found) = innovations(model, record, 1, start) else { return };
+    let Ok(each) = on_log.tested() else { return };
     let relation = match (validation.seen, &report.estimation.procedure) {
-        (Seen::No, _) => Relation::Fresh,
+        // The parameters of equations are none of the noise.
+        (Seen::No, _) | (_, Procedure::InnovationsLikelihood(_)) => Relation::Fresh,
         (_, Procedure::InstrumentalVariables { .. }) => Relation::Instrumental,
         _ => Relation::Fitted,
     };
     let mut alphas = plan.alphas.clone();
     alphas.sort_unstable_by(f64::total_cmp);
     alphas.dedup();
-    match Residuals::of(model, record, &found, relation, plan.lags, &alphas, plan.alpha) {
-        Ok(residuals) => {
-            validation.residuals = Some(residuals);
-            validation.warnings.extend(off_center(&found));
+    for Tested { model, record, innovations } in &each {
+        match Residuals::of(model, record, innovations, relation, plan.lags, &alphas, plan.alpha) {
+            Ok(residuals) => {
+                validation.residuals.push(residuals);
+                validation.warnings.extend(off_center(innovations));
+            }
+            Err(why) => validation.warnings.push(format!(
+                "the residuals{} are not tested: {why}",
+                of_output(on_log, &model.output.name)
+            )),
         }
-        Err(why) => validation.warnings.push(format!("the residuals are not tested: {why}")),
     }
 }
 
@@ -558,32 +516,38 @@ fn off_center(found: &[Innovations]) -> Option<String> {
 /// What is worth a word.
 fn warn(plan: &ValidationPlan, validation: &mut Validation) {
     let mut words = Vec::new();
-    if !validation.stable && validation.fit.iter().any(|fit| fit.horizon == Horizon::FreeRun) {
+    if validation.stable == Some(false) && validation.fit.iter().any(|fit| fit.horizon == Horizon::FreeRun) {
         words.push("the model is unstable: its free run grows without bound".to_owned());
     }
-    if let NoiseLevel { mse: Some(mse), model, ratio: Some(ratio) } = validation.noise
-        && !LIKELY.contains(&ratio)
-    {
-        let what = if ratio > 1.0 {
+    let several = validation.noise.len() > 1;
+    let of = |output: &str| if several { format!(" of '{output}'") } else { String::new() };
+    for noise in &validation.noise {
+        let NoiseLevel { mse: Some(mse), model, ratio: Some(ratio), output } = noise else { continue };
+        if LIKELY.contains(ratio) {
+            continue;
+        }
+        let what = if *ratio > 1.0 {
             "the log is noisier than that of the fit, or the model is not that of this plant"
         } else {
             "the log is quieter than that of the fit: the model's intervals are too wide for it"
         };
         words.push(format!(
-            "the mean square of the errors one step ahead, {}, is {} times the model's noise variance, \
+            "the mean square of the errors{} one step ahead, {}, is {} times the model's noise variance, \
              {}: {what}",
-            number(mse),
-            fixed(ratio, 2),
-            number(model)
+            of(output),
+            number(*mse),
+            fixed(*ratio, 2),
+            number(*model)
         ));
     }
-    if let Some(residuals) = &validation.residuals {
+    for residuals in &validation.residuals {
+        let of = of(&residuals.output);
         let rejected = |p: Option<f64>| p.filter(|p| *p < plan.alpha);
         if validation.white_expected
             && let Some(p) = rejected(residuals.ljung_box.p_value)
         {
             words.push(format!(
-                "the residuals are not white (Ljung-Box, {} lags, p-value {}): the model lacks dynamics of the plant or of \
+                "the residuals{of} are not white (Ljung-Box, {} lags, p-value {}): the model lacks dynamics of the plant or of \
                  the noise",
                 residuals.ljung_box.lags,
                 chance(p)
@@ -596,14 +560,14 @@ fn warn(plan: &ValidationPlan, validation: &mut Validation) {
                 let lags = largest(independence);
                 let lags = if lags.is_empty() { String::new() } else { format!(": see lags {lags}") };
                 words.push(format!(
-                    "the residuals depend on past values of input '{input}' (p-value {}): the model lacks dynamics or has \
+                    "the residuals{of} depend on past values of input '{input}' (p-value {}): the model lacks dynamics or has \
                      the wrong delay{lags}",
                     chance(p)
                 ));
             }
             if independence.suspected {
                 words.push(format!(
-                    "input '{input}' follows past residuals: feedback from the output to the input is suspected"
+                    "input '{input}' follows past residuals{of}: feedback from the output to the input is suspected"
                 ));
             }
         }
@@ -644,7 +608,22 @@ pub fn compare(validated: &[Validated]) -> Result<Comparison, Error> {
         schema: Comparison::SCHEMA.to_owned(),
         generator: GENERATOR.to_owned(),
         models: validated.iter().map(|validated| validated.validation.clone()).collect(),
+        criteria: comparable(validated)
+            .then(|| validated.iter().map(|validated| validated.fitted.criteria).collect()),
     })
+}
+
+/// Whether all models were fitted to the same values of the same outputs, and about as many of them count.
+fn comparable(validated: &[Validated]) -> bool {
+    let outputs = |one: &Validated| -> Vec<String> {
+        one.signals.outputs.iter().map(|output| output.name.clone()).collect()
+    };
+    let samples = || validated.iter().map(|one| one.fitted.samples as f64);
+    let (least, most) = (samples().fold(f64::INFINITY, f64::min), samples().fold(0.0, f64::max));
+    let same = validated.windows(2).all(|pair| {
+        pair[0].fitted.outputs == pair[1].fitted.outputs && outputs(&pair[0]) == outputs(&pair[1])
+    });
+    validated.len() > 1 && same && most - least <= AS_MANY * most
 }
 
 impl Document for Validation {

@@ -1,12 +1,12 @@
 //! What a careful reader of a report should know, in plain words.
 
 use super::schema::Report;
-use super::validation::is_exact;
+use super::seen::is_exact;
 use crate::estimate::{Procedure, SearchOutcome, Stopped};
 use crate::figures::{fixed, number, scientific};
 use crate::model::{cancel, near_cancellation};
 use crate::select::{Grid, OrderRange};
-use crate::{Orders, Structure};
+use crate::{Orders, PolynomialModel, Structure};
 
 /// Condition numbers above this one are worth a word.
 const ILL_CONDITIONED: f64 = 1e6;
@@ -14,8 +14,8 @@ const ILL_CONDITIONED: f64 = 1e6;
 const POOR: f64 = 50.0;
 
 /// What data, model and search call for.
-pub(super) fn warnings(report: &Report) -> Vec<String> {
-    let (data, model) = (&report.data, &report.model);
+pub(super) fn warnings(report: &Report, model: &PolynomialModel) -> Vec<String> {
+    let data = &report.data;
     let mut warnings = Vec::new();
     for missing in data.missing.iter().filter(|missing| missing.rows > 0) {
         let output = missing.channel == model.output.name;

@@ -9,7 +9,7 @@ use thetahat_core::nalgebra::{DMatrix, DVector, SymmetricEigen};
 use super::{Response, Start, check_inputs, simulate};
 use crate::data::Record;
 use crate::regression::{add_filtered, divide};
-use crate::{Error, Model};
+use crate::{Error, PolynomialModel};
 
 /// The most draws.
 const MOST: usize = 100_000;
@@ -65,7 +65,7 @@ pub struct Drawn {
 /// estimate is so uncertain that hardly any drawn parameters are those of a stable model.
 ///
 /// ```
-/// use thetahat::{Draws, Initial, Model, Orders, Record, Signal, Start, arx, draw};
+/// use thetahat::{Draws, Initial, PolynomialModel, Orders, Record, Signal, Start, arx, draw};
 ///
 /// let u: Vec<f64> = (0..200).map(|t| f64::from(t * t % 7)).collect();
 /// let mut y = vec![1.0];
@@ -81,7 +81,12 @@ pub struct Drawn {
 /// assert_eq!(runs, draw(&model, &record, Start::Zero, &Draws { count: 50, seed: 1 })?);
 /// # Ok::<(), thetahat::Error>(())
 /// ```
-pub fn draw(model: &Model, record: &Record<'_>, start: Start, draws: &Draws) -> Result<Drawn, Error> {
+pub fn draw(
+    model: &PolynomialModel,
+    record: &Record<'_>,
+    start: Start,
+    draws: &Draws,
+) -> Result<Drawn, Error> {
     check_inputs(model, record)?;
     let Draws { count, seed } = *draws;
     if !(1..=MOST).contains(&count) {
@@ -182,7 +187,7 @@ struct Spread {
 }
 
 impl Spread {
-    fn of(model: &Model) -> Self {
+    fn of(model: &PolynomialModel) -> Self {
         let root = model.covariance.as_ref().map(|rows| {
             let size = rows.len();
             let scales = DVector::from_fn(size, |k, _| rows[k][k].sqrt());
@@ -200,7 +205,11 @@ impl Spread {
     }
 
     /// A model of drawn parameters, and how many before it were unstable; none where parameters do not vary.
-    fn draw(&self, model: &Model, random: &mut Random) -> Result<(Option<Model>, usize), Error> {
+    fn draw(
+        &self,
+        model: &PolynomialModel,
+        random: &mut Random,
+    ) -> Result<(Option<PolynomialModel>, usize), Error> {
         let Some(root) = &self.root else { return Ok((None, 0)) };
         for unstable in 0..PATIENCE {
             let normal = DVector::from_fn(root.ncols(), |_, _| random.next());
@@ -211,7 +220,7 @@ impl Spread {
                 .zip(&moved)
                 .map(|(parameter, moved)| parameter.value + moved)
                 .collect();
-            let drawn = Model::from_parameters(
+            let drawn = PolynomialModel::from_parameters(
                 &model.orders,
                 &values,
                 None,
@@ -230,12 +239,12 @@ impl Spread {
 }
 
 /// Whether free runs and noise are bounded.
-fn is_stable(model: &Model) -> bool {
+fn is_stable(model: &PolynomialModel) -> bool {
     model.stable && model.noise_poles.iter().all(|pole| pole.re.hypot(pole.im) < 1.0)
 }
 
 /// C/(A D) e over so many samples.
-fn noise(model: &Model, samples: usize, start: Start, random: &mut Random) -> Vec<f64> {
+fn noise(model: &PolynomialModel, samples: usize, start: Start, random: &mut Random) -> Vec<f64> {
     let own = (model.orders.na > 0).then_some(&model.poles);
     let all = own.into_iter().flatten().filter(|pole| pole.polynomial == "a").chain(&model.noise_poles);
     let slowest = all.map(|pole| pole.re.hypot(pole.im)).fold(0.0, f64::max);

@@ -4,7 +4,7 @@ use super::sensitivities::{Paths, student};
 use super::{Start, check_inputs};
 use crate::data::Record;
 use crate::regression::divide_from;
-use crate::{Error, Model};
+use crate::{Error, PolynomialModel};
 
 /// What a model expects after the last sample of a record.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,7 +37,7 @@ pub struct Forecast {
 /// the last segment is too short to start from; [`Error::Undetermined`] as for a prediction.
 ///
 /// ```
-/// use thetahat::{Initial, Model, Orders, Record, Signal, Start, arx, forecast};
+/// use thetahat::{Initial, PolynomialModel, Orders, Record, Signal, Start, arx, forecast};
 ///
 /// let u: Vec<f64> = (0..100).map(|t| f64::from(t * t % 7)).collect();
 /// let mut y = vec![1.0];
@@ -56,7 +56,7 @@ pub struct Forecast {
 /// # Ok::<(), thetahat::Error>(())
 /// ```
 pub fn forecast(
-    model: &Model,
+    model: &PolynomialModel,
     record: &Record<'_>,
     inputs: &[&[f64]],
     steps: usize,
@@ -69,7 +69,7 @@ pub fn forecast(
 
 /// The same; none if the last segment is too short.
 pub(crate) fn forecast_if_possible(
-    model: &Model,
+    model: &PolynomialModel,
     record: &Record<'_>,
     inputs: &[&[f64]],
     steps: usize,
@@ -128,7 +128,7 @@ pub(super) struct Known<'a> {
 }
 
 /// Goes on from what is known with e = 0: `values` holds x and becomes y. Gives w.
-pub(super) fn continuation(model: &Model, known: &Known<'_>, values: &mut [f64]) -> Vec<f64> {
+pub(super) fn continuation(model: &PolynomialModel, known: &Known<'_>, values: &mut [f64]) -> Vec<f64> {
     // Of D w = C e only what e was before is left.
     let mut disturbance = vec![0.0; values.len()];
     for (t, value) in disturbance.iter_mut().take(model.orders.nc).enumerate() {
@@ -142,7 +142,7 @@ pub(super) fn continuation(model: &Model, known: &Known<'_>, values: &mut [f64])
 }
 
 /// Future inputs must be there as far as they have an effect.
-fn check_future(model: &Model, inputs: &[&[f64]], steps: usize) -> Result<(), Error> {
+fn check_future(model: &PolynomialModel, inputs: &[&[f64]], steps: usize) -> Result<(), Error> {
     let (expected, found) = (model.b.len(), inputs.len());
     if found != expected {
         return Err(Error::argument(

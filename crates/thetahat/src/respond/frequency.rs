@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::{Complex, ComplexField};
 
 use crate::model::{Block, Blocks, Gradient, covariance};
-use crate::{Error, Model, Quantity};
+use crate::{Error, PolynomialModel, Quantity};
 
 /// The response of a model from one source to its output, at several frequencies.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -58,7 +58,7 @@ pub struct FrequencyPoint {
 /// [`Error::Argument`] for a frequency that is not a number, negative, above pi/T, or one of a pole on the unit circle.
 ///
 /// ```
-/// use thetahat::{Initial, Model, Orders, Record, Signal, arx, frequency_response, logarithmic_frequencies};
+/// use thetahat::{Initial, PolynomialModel, Orders, Record, Signal, arx, frequency_response, logarithmic_frequencies};
 ///
 /// let u: Vec<f64> = (0..100).map(|t| f64::from(t * t % 7)).collect();
 /// let mut y = vec![1.0];
@@ -78,7 +78,10 @@ pub struct FrequencyPoint {
 /// assert_eq!((bode.len(), bode[0].points.len()), (2, 100));
 /// # Ok::<(), thetahat::Error>(())
 /// ```
-pub fn frequency_response(model: &Model, frequencies: &[f64]) -> Result<Vec<FrequencyResponse>, Error> {
+pub fn frequency_response(
+    model: &PolynomialModel,
+    frequencies: &[f64],
+) -> Result<Vec<FrequencyResponse>, Error> {
     // pi/T itself may be computed in several ways.
     let highest = PI / model.sample_time;
     let inside = |frequency: f64| frequency >= 0.0 && frequency <= highest * (1.0 + 4.0 * f64::EPSILON);

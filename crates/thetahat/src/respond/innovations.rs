@@ -18,7 +18,7 @@ use super::free_response::{Column, UNSEEN, closest_of, impulse_response, until_n
 use super::{NOTHING_LEFT, Start, are_worth, check_inputs, history};
 use crate::data::{Record, measured};
 use crate::regression::{add_filtered, divide, sum_of_squares};
-use crate::{Error, Model};
+use crate::{Error, PolynomialModel};
 
 /// The innovations of one segment.
 #[derive(Debug)]
@@ -44,6 +44,22 @@ pub(crate) struct Innovations {
 }
 
 impl Innovations {
+    /// Errors that were found another way, one for each of `rows`.
+    pub(super) fn alone(rows: Range<usize>, counted: Vec<Range<usize>>, errors: Vec<f64>) -> Self {
+        Self {
+            silent: 0,
+            span: rows.clone(),
+            rows,
+            square: sum_of_squares(&errors),
+            known: counted.iter().map(Range::len).sum(),
+            counted,
+            impulses: Impulses { first: 0, weights: Vec::new() },
+            basis: Basis::default(),
+            disturbance: Vec::new(),
+            errors,
+        }
+    }
+
     /// The errors that count.
     pub(crate) fn counted_errors(&self) -> impl Iterator<Item = &f64> + Clone {
         let first = self.rows.start;
@@ -59,7 +75,7 @@ pub(super) struct Impulses {
 }
 
 impl Impulses {
-    pub(super) fn none(model: &Model) -> Self {
+    pub(super) fn none(model: &PolynomialModel) -> Self {
         Self { first: 0, weights: vec![Vec::new(); model.f.len()] }
     }
 
@@ -93,7 +109,7 @@ pub(super) struct Basis {
 /// [`Error::Argument`] if the record does not have the model's inputs; [`Error::Undetermined`] if an initial condition
 /// cannot be told from the data.
 pub(crate) fn innovations(
-    model: &Model,
+    model: &PolynomialModel,
     record: &Record<'_>,
     horizon: usize,
     start: Start,
@@ -106,7 +122,7 @@ pub(crate) fn innovations(
 
 /// The same of some segments, each with the number of measured samples before it.
 pub(super) fn of_segments(
-    model: &Model,
+    model: &PolynomialModel,
     record: &Record<'_>,
     segments: &[(Range<usize>, usize)],
     horizon: usize,
@@ -141,14 +157,14 @@ pub(super) fn of_segments(
 
 /// For a start from estimated initial conditions: how many samples of a stretch have no e, and where impulses begin. The stretch
 /// begins with the past that the errors of its segment reach back to.
-fn estimated(model: &Model, past: usize, with_inputs: bool) -> (usize, usize) {
+fn estimated(model: &PolynomialModel, past: usize, with_inputs: bool) -> (usize, usize) {
     let silent = past.min(model.orders.history()).max(model.orders.conditioned());
     (silent, if past > 0 || with_inputs { silent - model.orders.nd } else { 0 })
 }
 
 /// The innovations of one segment, if it has enough samples.
 fn of_segment(
-    model: &Model,
+    model: &PolynomialModel,
     record: &Record<'_>,
     segment: &Range<usize>,
     past: usize,
@@ -203,7 +219,7 @@ fn of_segment(
 }
 
 /// The runs of samples that have a measured output: one for models that need past outputs, as their segments miss none.
-fn measured_runs(model: &Model, record: &Record<'_>, rows: &Range<usize>) -> Vec<Range<usize>> {
+fn measured_runs(model: &PolynomialModel, record: &Record<'_>, rows: &Range<usize>) -> Vec<Range<usize>> {
     if model.orders.needs_past_outputs() && !rows.is_empty() {
         return vec![rows.clone()];
     }
@@ -211,7 +227,12 @@ fn measured_runs(model: &Model, record: &Record<'_>, rows: &Range<usize>) -> Vec
 }
 
 /// x over stretches of the inputs, zeros before them, all as long as one another.
-pub(super) fn driven(model: &Model, inputs: &[&[f64]], length: usize, impulses: &Impulses) -> Vec<f64> {
+pub(super) fn driven(
+    model: &PolynomialModel,
+    inputs: &[&[f64]],
+    length: usize,
+    impulses: &Impulses,
+) -> Vec<f64> {
     let mut sum = vec![0.0; length];
     for ((b, u), (f, weights)) in model.b.iter().zip(inputs).zip(model.f.iter().zip(&impulses.weights)) {
         if f.len() == 1 {
@@ -233,7 +254,7 @@ fn add(sum: &mut [f64], values: &[f64]) {
 
 /// w and e over some rows, zeros before them. Where the output is missing, w = -x and e = 0.
 pub(super) fn residuals(
-    model: &Model,
+    model: &PolynomialModel,
     record: &Record<'_>,
     rows: &Range<usize>,
     silent: usize,
@@ -258,7 +279,7 @@ pub(super) fn residuals(
 }
 
 /// (1/C) of D w, of which the first samples are set to zero.
-fn whitened(model: &Model, disturbance: &[f64], silent: usize) -> Vec<f64> {
+fn whitened(model: &PolynomialModel, disturbance: &[f64], silent: usize) -> Vec<f64> {
     let mut errors = if model.d.len() == 1 {
         disturbance.to_vec()
     } else {
@@ -273,18 +294,18 @@ fn whitened(model: &Model, disturbance: &[f64], silent: usize) -> Vec<f64> {
 }
 
 /// How many impulses an input has: nf, or as many more as there are unknown inputs that x depends on from sample `first` on.
-fn count(model: &Model, input: usize, first: usize, with_inputs: bool) -> usize {
+fn count(model: &PolynomialModel, input: usize, first: usize, with_inputs: bool) -> usize {
     let orders = &model.orders;
     if with_inputs { orders.free_responses_and_inputs(input, first) } else { orders.free_responses(input) }
 }
 
 /// How many all inputs have.
-fn unknowns(model: &Model, first: usize, with_inputs: bool) -> usize {
+fn unknowns(model: &PolynomialModel, first: usize, with_inputs: bool) -> usize {
     (0..model.orders.inputs()).map(|input| count(model, input, first, with_inputs)).sum()
 }
 
 /// The impulses that make the errors smallest, given those without impulses.
-pub(super) fn best(model: &Model, errors: &[f64], basis: &Basis) -> Result<Impulses, Error> {
+pub(super) fn best(model: &PolynomialModel, errors: &[f64], basis: &Basis) -> Result<Impulses, Error> {
     let (length, columns) = free_columns(model, errors.len(), basis);
     let mut weights = closest_of(&errors[..length], &columns)?.into_iter();
     let each = basis.counts.iter().map(|count| weights.by_ref().take(*count).collect());
@@ -292,7 +313,7 @@ pub(super) fn best(model: &Model, errors: &[f64], basis: &Basis) -> Result<Impul
 }
 
 /// What unit impulses do to the errors of a stretch, and how many samples of it say something of them.
-pub(super) fn free_columns(model: &Model, samples: usize, basis: &Basis) -> (usize, Vec<Column>) {
+pub(super) fn free_columns(model: &PolynomialModel, samples: usize, basis: &Basis) -> (usize, Vec<Column>) {
     let Basis { silent, first, counts, gaps } = basis;
     let (silent, first) = (*silent, *first);
     let orders = &model.orders;

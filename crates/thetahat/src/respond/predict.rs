@@ -5,7 +5,7 @@ use super::innovations::innovations;
 use super::{Response, Start, check_inputs};
 use crate::data::Record;
 use crate::regression::{add_filtered, divide};
-use crate::{Error, Model};
+use crate::{Error, PolynomialModel};
 
 /// Steps that a prediction or a forecast may look ahead: beyond them a number was mistyped.
 pub(super) const MOST_STEPS: usize = 1_000_000;
@@ -40,7 +40,7 @@ pub(super) const MOST_STEPS: usize = 1_000_000;
 /// condition cannot be told from the data, as for a model so unstable that its responses overflow.
 ///
 /// ```
-/// use thetahat::{Initial, Model, Orders, Record, Signal, Start, arx, predict};
+/// use thetahat::{Initial, PolynomialModel, Orders, Record, Signal, Start, arx, predict};
 ///
 /// let u: Vec<f64> = (0..100_u32).map(|t| f64::from(t * t % 7)).collect();
 /// let mut y = vec![1.0];
@@ -59,7 +59,12 @@ pub(super) const MOST_STEPS: usize = 1_000_000;
 /// assert_eq!(response.counted, [2..100]);
 /// # Ok::<(), thetahat::Error>(())
 /// ```
-pub fn predict(model: &Model, record: &Record<'_>, horizon: usize, start: Start) -> Result<Response, Error> {
+pub fn predict(
+    model: &PolynomialModel,
+    record: &Record<'_>,
+    horizon: usize,
+    start: Start,
+) -> Result<Response, Error> {
     if horizon == 0 {
         return Err(no_step());
     }
@@ -97,7 +102,7 @@ pub fn predict(model: &Model, record: &Record<'_>, horizon: usize, start: Start)
 /// [`Error::Argument`] if `horizon` is 0 or above 10^6.
 ///
 /// ```
-/// use thetahat::{Initial, Model, Orders, Record, Signal, arx, prediction_deviation};
+/// use thetahat::{Initial, PolynomialModel, Orders, Record, Signal, arx, prediction_deviation};
 ///
 /// let mut y: Vec<f64> = vec![0.0, 1.0];
 /// for t in 2..100 {
@@ -112,7 +117,7 @@ pub fn predict(model: &Model, record: &Record<'_>, horizon: usize, start: Start)
 /// assert!((prediction_deviation(&model, 2)? - sigma * (1.0 + a * a).sqrt()).abs() < 1e-14);
 /// # Ok::<(), thetahat::Error>(())
 /// ```
-pub fn prediction_deviation(model: &Model, horizon: usize) -> Result<f64, Error> {
+pub fn prediction_deviation(model: &PolynomialModel, horizon: usize) -> Result<f64, Error> {
     if horizon == 0 {
         return Err(no_step());
     }
@@ -122,7 +127,7 @@ pub fn prediction_deviation(model: &Model, horizon: usize) -> Result<f64, Error>
 }
 
 /// The standard deviations of predictions 1 … `steps` steps ahead.
-pub(crate) fn deviations(model: &Model, steps: usize) -> Vec<f64> {
+pub(crate) fn deviations(model: &PolynomialModel, steps: usize) -> Vec<f64> {
     let sigma = model.noise_variance.sqrt();
     let mut deviations = accumulated(&disturbance_response(model, steps), steps);
     deviations.iter_mut().for_each(|deviation| *deviation *= sigma);
@@ -143,7 +148,7 @@ pub(super) fn accumulated(response: &[f64], length: usize) -> Vec<f64> {
 }
 
 /// The impulse response h of C/(A D), `length` samples at most: what e does to y.
-pub(super) fn disturbance_response(model: &Model, length: usize) -> Vec<f64> {
+pub(super) fn disturbance_response(model: &PolynomialModel, length: usize) -> Vec<f64> {
     let order = model.orders.na + model.orders.nc + model.orders.nd;
     until_negligible(length, order, |length| {
         let mut response = vec![0.0; length];
@@ -161,7 +166,7 @@ pub(crate) fn longest(record: &Record<'_>) -> usize {
     lengths.max().unwrap_or(0)
 }
 
-pub(super) fn check_start(model: &Model, start: Start) -> Result<(), Error> {
+pub(super) fn check_start(model: &PolynomialModel, start: Start) -> Result<(), Error> {
     if start == Start::Estimate && model.orders.is_linear() {
         return Err(Error::argument(
             "initial",

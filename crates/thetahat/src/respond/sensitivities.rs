@@ -39,7 +39,7 @@ use super::predict::{accumulated, disturbance_response, longest};
 use super::{Start, check_inputs};
 use crate::data::Record;
 use crate::regression::{add_filtered, divide, divide_from, product};
-use crate::{Error, Model};
+use crate::{Error, PolynomialModel};
 
 /// A combination of initial conditions whose part of the Gram matrix is below this fraction of the largest cannot be told.
 const UNSEEN: f64 = 1e-20;
@@ -56,7 +56,7 @@ struct Change {
 }
 
 impl Change {
-    fn none(model: &Model) -> Self {
+    fn none(model: &PolynomialModel) -> Self {
         let zeros = |p: &Vec<f64>| vec![0.0; p.len()];
         Self {
             a: zeros(&model.a),
@@ -68,7 +68,7 @@ impl Change {
     }
 
     /// Of the parameters, in their order.
-    fn of(model: &Model, mut parameters: impl Iterator<Item = f64>) -> Self {
+    fn of(model: &PolynomialModel, mut parameters: impl Iterator<Item = f64>) -> Self {
         let mut change = Self::none(model);
         let mut fill = |values: &mut [f64]| values.iter_mut().zip(&mut parameters).for_each(|(v, p)| *v = p);
         fill(&mut change.a[1..]);
@@ -86,7 +86,7 @@ impl Change {
 }
 
 /// l_1, l_2, … of the parameters; none where their covariance is not known.
-fn changes(model: &Model) -> Vec<Change> {
+fn changes(model: &PolynomialModel) -> Vec<Change> {
     let Some(rows) = &model.covariance else { return Vec::new() };
     let scales: Vec<f64> = (0..rows.len()).map(|i| rows[i][i].sqrt()).collect();
     let entry = |i: usize, j: usize| {
@@ -139,7 +139,7 @@ struct Moved {
 impl Paths {
     /// `inputs`, `output`, `disturbance` and `errors` go as far as they are to be looked at.
     pub(super) fn new(
-        model: &Model,
+        model: &PolynomialModel,
         found: &Innovations,
         inputs: Vec<Vec<f64>>,
         output: Vec<f64>,
@@ -166,7 +166,7 @@ impl Paths {
 
     /// The derivative along a change, of impulses into 1/F, and of the errors before the first that is known: of the one
     /// `earlier` samples before it.
-    fn moved(&self, model: &Model, change: &Change, impulses: &Impulses, earlier: usize) -> Moved {
+    fn moved(&self, model: &PolynomialModel, change: &Change, impulses: &Impulses, earlier: usize) -> Moved {
         let mut x = vec![0.0; self.output.len()];
         let all = 0..x.len();
         for (j, (u, own)) in self.inputs.iter().zip(&self.responses).enumerate() {
@@ -202,7 +202,12 @@ impl Paths {
     }
 
     /// The same along a change of the parameters, initial conditions moving with them where they are estimated.
-    fn moved_by_parameters(&self, model: &Model, change: &Change, estimated: bool) -> Result<Moved, Error> {
+    fn moved_by_parameters(
+        &self,
+        model: &PolynomialModel,
+        change: &Change,
+        estimated: bool,
+    ) -> Result<Moved, Error> {
         let none = Impulses::none(model);
         let moved = self.moved(model, change, &none, 0);
         if !estimated {
@@ -213,7 +218,7 @@ impl Paths {
     }
 
     /// What a change does to the samples after the known ones.
-    fn continued(&self, model: &Model, change: &Change, moved: &Moved) -> Vec<f64> {
+    fn continued(&self, model: &PolynomialModel, change: &Change, moved: &Moved) -> Vec<f64> {
         let future = self.known..self.output.len();
         let mut disturbance = vec![0.0; future.len()];
         let mut errors = moved.errors.clone();
@@ -231,7 +236,7 @@ impl Paths {
 
     /// The variances of a forecast's values that come from parameters and initial states; none where the start has no
     /// estimated ones.
-    pub(super) fn of_forecast(&self, model: &Model, start: Start) -> Result<Vec<f64>, Error> {
+    pub(super) fn of_forecast(&self, model: &PolynomialModel, start: Start) -> Result<Vec<f64>, Error> {
         let estimated = start == Start::Estimate;
         let mut variances = vec![0.0; self.output.len() - self.known];
         let mut add = |change: &Change, moved: &Moved, scale: f64| {
@@ -254,12 +259,12 @@ impl Paths {
     }
 
     /// How many samples before the first known error there are others that C looks back to.
-    fn earlier_errors(&self, model: &Model, start: Start) -> std::ops::RangeInclusive<usize> {
+    fn earlier_errors(&self, model: &PolynomialModel, start: Start) -> std::ops::RangeInclusive<usize> {
         1..=if start == Start::Zero { 0 } else { model.orders.nc }
     }
 
     /// Impulses whose outer products sum to (Phi'Phi)^-1.
-    fn uncertain_impulses(&self, model: &Model) -> Vec<Impulses> {
+    fn uncertain_impulses(&self, model: &PolynomialModel) -> Vec<Impulses> {
         let (_, columns) = free_columns(model, self.known, &self.basis);
         let scales: Vec<f64> =
             columns.iter().map(|column| product(&column.values, &column.values).sqrt()).collect();
@@ -287,7 +292,7 @@ impl Paths {
 
 /// The standard deviation of an error whose variance is a sum of squares, as many degrees of freedom being behind the noise
 /// variance.
-pub(super) fn student(model: &Model, noise: f64, other: f64) -> f64 {
+pub(super) fn student(model: &PolynomialModel, noise: f64, other: f64) -> f64 {
     let deviation = noise.hypot(other.sqrt()) * model.student_factor();
     if deviation.is_nan() { f64::INFINITY } else { deviation }
 }
@@ -310,7 +315,7 @@ pub(super) fn student(model: &Model, noise: f64, other: f64) -> f64 {
 /// As for [`predict`](crate::predict).
 ///
 /// ```
-/// use thetahat::{Initial, Model, Orders, Record, Signal, Start, arx, prediction_deviation, prediction_deviations};
+/// use thetahat::{Initial, PolynomialModel, Orders, Record, Signal, Start, arx, prediction_deviation, prediction_deviations};
 ///
 /// let mut y: Vec<f64> = vec![0.0, 1.0];
 /// for t in 2..100 {
@@ -329,7 +334,7 @@ pub(super) fn student(model: &Model, noise: f64, other: f64) -> f64 {
 /// # Ok::<(), thetahat::Error>(())
 /// ```
 pub fn prediction_deviations(
-    model: &Model,
+    model: &PolynomialModel,
     record: &Record<'_>,
     horizon: usize,
     start: Start,
@@ -379,7 +384,7 @@ pub fn prediction_deviations(
 }
 
 /// dh, as long as h.
-fn moved_response(model: &Model, change: &Change, response: &[f64]) -> Vec<f64> {
+fn moved_response(model: &PolynomialModel, change: &Change, response: &[f64]) -> Vec<f64> {
     let rows = 0..response.len();
     let mut moved = vec![0.0; response.len()];
     moved.iter_mut().zip(&change.c).for_each(|(sum, c)| *sum += c);

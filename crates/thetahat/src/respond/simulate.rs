@@ -6,7 +6,7 @@ use super::innovations::{Impulses, driven, residuals};
 use super::{NOTHING_LEFT, Response, Start, are_worth, check_inputs, history};
 use crate::data::{Record, measured};
 use crate::regression::{add_filtered, divide, sum};
-use crate::{Error, Model};
+use crate::{Error, PolynomialModel};
 
 /// The free run of a model: A(q) y^(t) = sum_j (B_j(q)/F_j(q)) u_j(t), driven by the inputs alone.
 ///
@@ -36,7 +36,7 @@ use crate::{Error, Model};
 /// cannot be told from the data, as for a model so unstable that its free responses overflow.
 ///
 /// ```
-/// use thetahat::{Initial, Model, Orders, Record, Signal, Start, arx, simulate};
+/// use thetahat::{Initial, PolynomialModel, Orders, Record, Signal, Start, arx, simulate};
 ///
 /// let u: Vec<f64> = (0..100_u32).map(|t| f64::from(t * t % 7)).collect();
 /// let mut y = vec![1.0];
@@ -55,7 +55,7 @@ use crate::{Error, Model};
 /// assert!((y[10] - run.values[10] - 0.8_f64.powi(10)).abs() < 1e-9);
 /// # Ok::<(), thetahat::Error>(())
 /// ```
-pub fn simulate(model: &Model, record: &Record<'_>, start: Start) -> Result<Response, Error> {
+pub fn simulate(model: &PolynomialModel, record: &Record<'_>, start: Start) -> Result<Response, Error> {
     check_inputs(model, record)?;
     let conditioned = model.orders.conditioned();
     let mut response = Response::empty(record.output.len());
@@ -111,7 +111,7 @@ struct Run {
 
 /// What unknown samples before segments can do to free runs.
 struct Free<'a> {
-    model: &'a Model,
+    model: &'a PolynomialModel,
     output: &'a [f64],
     /// Free runs from zero but for known inputs.
     runs: Vec<Run>,
@@ -120,7 +120,7 @@ struct Free<'a> {
 }
 
 impl<'a> Free<'a> {
-    fn new(model: &'a Model, record: &Record<'a>) -> Self {
+    fn new(model: &'a PolynomialModel, record: &Record<'a>) -> Self {
         Self { model, output: record.output, runs: Vec::new(), responses: Vec::new() }
     }
 

@@ -13,15 +13,15 @@ use super::{Response, Start, predict, simulate};
 use crate::data::Record;
 use crate::model::polynomial::{inverse_series, product};
 use crate::regression::noise::Noise;
-use crate::{Model, Orders};
+use crate::{Orders, PolynomialModel};
 
 /// A(q) y(t) = sum_j B_j(q) u_j(t); `b` holds nk and the coefficients of each input.
-fn model(a: &[f64], b: &[(usize, &[f64])]) -> Model {
+fn model(a: &[f64], b: &[(usize, &[f64])]) -> PolynomialModel {
     let nb: Vec<usize> = b.iter().map(|(_, b)| b.len()).collect();
     let nk: Vec<usize> = b.iter().map(|(nk, _)| *nk).collect();
     let orders = Orders::arx(a.len() - 1, &nb, &nk).unwrap();
     let parameters: Vec<f64> = a[1..].iter().chain(b.iter().flat_map(|(_, b)| b.iter())).copied().collect();
-    Model::from_parameters(&orders, &parameters, None, 0.0, 1.0).unwrap()
+    PolynomialModel::from_parameters(&orders, &parameters, None, 0.0, 1.0).unwrap()
 }
 
 /// A with these real roots.
@@ -30,7 +30,7 @@ fn with_poles(poles: &[f64]) -> Vec<f64> {
 }
 
 /// Runs the difference equation over `rows`, its definition; before `start` all signals are zero.
-fn run(model: &Model, start: usize, rows: Range<usize>, inputs: &[&[f64]], y: &mut [f64]) {
+fn run(model: &PolynomialModel, start: usize, rows: Range<usize>, inputs: &[&[f64]], y: &mut [f64]) {
     for t in rows {
         let driven: f64 = model
             .b
@@ -44,7 +44,7 @@ fn run(model: &Model, start: usize, rows: Range<usize>, inputs: &[&[f64]], y: &m
 }
 
 /// The output of the model to `inputs` from rest.
-fn output(model: &Model, inputs: &[&[f64]]) -> Vec<f64> {
+fn output(model: &PolynomialModel, inputs: &[&[f64]]) -> Vec<f64> {
     let mut y = vec![0.0; inputs[0].len()];
     run(model, 0, 0..y.len(), inputs, &mut y);
     y
@@ -59,7 +59,7 @@ fn difference(response: &Response, expected: &[f64]) -> f64 {
     worst.fold(0.0_f64, |worst, now| if now <= worst { worst } else { now }) / largest
 }
 
-fn models() -> Vec<Model> {
+fn models() -> Vec<PolynomialModel> {
     vec![
         model(&with_poles(&[0.9, -0.5]), &[(1, &[1.0, 0.3])]),
         model(&with_poles(&[0.7]), &[(3, &[0.5, -0.2, 0.1, 0.7]), (0, &[1.0])]),

@@ -4,7 +4,7 @@ use thetahat_core::nalgebra::{Complex, ComplexField};
 
 use crate::model::{Block, Blocks, Gradient, covariance};
 use crate::regression::{add_filtered, divide};
-use crate::{Error, Model, Quantity};
+use crate::{Error, PolynomialModel, Quantity};
 
 /// What is left of the slowest mode at the end of a response.
 const LEFT: f64 = 0.005;
@@ -48,7 +48,7 @@ pub struct TransientResponse {
 /// not converge.
 ///
 /// ```
-/// use thetahat::{Initial, Model, Orders, Record, Signal, arx, step_response};
+/// use thetahat::{Initial, PolynomialModel, Orders, Record, Signal, arx, step_response};
 ///
 /// let u: Vec<f64> = (0..100).map(|t| f64::from(t * t % 7)).collect();
 /// let mut y = vec![1.0];
@@ -65,7 +65,7 @@ pub struct TransientResponse {
 /// # Ok::<(), thetahat::Error>(())
 /// ```
 pub fn step_response(
-    model: &Model,
+    model: &PolynomialModel,
     input: usize,
     samples: Option<usize>,
 ) -> Result<TransientResponse, Error> {
@@ -84,7 +84,7 @@ pub fn step_response(
 /// As for [`step_response`].
 ///
 /// ```
-/// use thetahat::{Initial, Model, Orders, Record, Signal, arx, impulse_response};
+/// use thetahat::{Initial, PolynomialModel, Orders, Record, Signal, arx, impulse_response};
 ///
 /// let u: Vec<f64> = (0..100).map(|t| f64::from(t * t % 7)).collect();
 /// let mut y = vec![1.0];
@@ -101,7 +101,7 @@ pub fn step_response(
 /// # Ok::<(), thetahat::Error>(())
 /// ```
 pub fn impulse_response(
-    model: &Model,
+    model: &PolynomialModel,
     input: usize,
     samples: Option<usize>,
 ) -> Result<TransientResponse, Error> {
@@ -110,7 +110,7 @@ pub fn impulse_response(
 
 /// The response to what `happens` at an input that is zero otherwise.
 fn response(
-    model: &Model,
+    model: &PolynomialModel,
     input: usize,
     samples: Option<usize>,
     happens: impl FnOnce(&mut [f64]),

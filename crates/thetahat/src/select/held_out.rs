@@ -13,7 +13,7 @@ use crate::data::Record;
 use crate::model::polynomial::{is_stable, roots};
 use crate::regression::sum;
 use crate::respond::{Response, Start, predict, simulate};
-use crate::{Error, Horizon, Model, Orders, Structure};
+use crate::{Error, Horizon, Orders, PolynomialModel, Structure};
 
 /// A record is cut into so many blocks.
 const BLOCKS: usize = 3;
@@ -70,7 +70,7 @@ pub(super) fn figures(
         let mut parts = vec![0.0; BLOCKS * PARTS];
         for ((refits, test), parts) in refits.iter().zip(&tests).zip(parts.chunks_mut(PARTS)) {
             let parameters = refits[k].as_ref()?;
-            let model = Model::from_parameters(orders, parameters, None, 1.0, 1.0).ok()?;
+            let model = PolynomialModel::from_parameters(orders, parameters, None, 1.0, 1.0).ok()?;
             let stable = is_all_stable(&model);
             let count = total(test);
             let root = match response(&model, test, horizon) {
@@ -133,13 +133,13 @@ pub(super) fn mean_square(
     record: &Record<'_>,
     horizon: Horizon,
 ) -> Option<f64> {
-    let model = Model::from_parameters(orders, parameters, None, 1.0, 1.0).ok()?;
+    let model = PolynomialModel::from_parameters(orders, parameters, None, 1.0, 1.0).ok()?;
     let response = response(&model, record, horizon).ok()?;
     let errors = || counted(record, &response).map(|(measured, said)| measured - said);
     Some(sum(errors().map(|e| e * e)) / errors().count() as f64).filter(|mean| mean.is_finite())
 }
 
-fn response(model: &Model, record: &Record<'_>, horizon: Horizon) -> Result<Response, Error> {
+fn response(model: &PolynomialModel, record: &Record<'_>, horizon: Horizon) -> Result<Response, Error> {
     match horizon {
         Horizon::FreeRun => simulate(model, record, Start::Estimate),
         Horizon::Steps { steps } => predict(model, record, steps, Start::natural(model, horizon)),
@@ -168,14 +168,16 @@ fn punished(root: f64) -> f64 {
     UNSTABLE * root.max(UNSTABLE)
 }
 
-fn is_all_stable(model: &Model) -> bool {
+fn is_all_stable(model: &PolynomialModel) -> bool {
     let mut scratch = Vec::new();
     std::iter::once(&model.a).chain(&model.f).all(|polynomial| is_stable(polynomial, &mut scratch))
 }
 
 /// The largest modulus of a root of A or an F; infinite where it is not known.
 pub(super) fn radius(orders: &Orders, parameters: &[f64]) -> f64 {
-    let Ok(model) = Model::from_parameters(orders, parameters, None, 1.0, 1.0) else { return f64::INFINITY };
+    let Ok(model) = PolynomialModel::from_parameters(orders, parameters, None, 1.0, 1.0) else {
+        return f64::INFINITY;
+    };
     let largest = |polynomial: &Vec<f64>| {
         let roots = roots(polynomial)?;
         Some(roots.iter().map(|root| root.re.hypot(root.im)).fold(0.0, f64::max))
@@ -211,7 +213,7 @@ impl<'r> Onward<'r> {
     }
 
     /// A segment of which nothing is known before begins with the state that fits it.
-    fn root_mean_square(&self, model: &Model, deviation: f64) -> Option<f64> {
+    fn root_mean_square(&self, model: &PolynomialModel, deviation: f64) -> Option<f64> {
         let begins = |segment: &std::ops::Range<usize>| self.known[segment.start].is_nan();
         let (mut before, mut alone) = (self.record.clone(), self.last.clone());
         let select = |record: &mut Record<'_>, keep: &dyn Fn(&std::ops::Range<usize>) -> bool| {

@@ -6,7 +6,7 @@ use thetahat_core::nalgebra::{DMatrix, DVector};
 use super::estimator::Estimator;
 use super::plan::{PerChannel, TrackPlan};
 use super::tracker::{Stage, Tracker, check};
-use crate::{Error, Model, Orders, Report};
+use crate::{Error, Orders, PolynomialModel, Report};
 
 /// What P_jj of a parameter that nothing is known of is times the square of its scale, as
 /// [`RecursiveLeastSquares`](thetahat_core::RecursiveLeastSquares) has it. The scale of the constant is 1.
@@ -25,7 +25,7 @@ impl Tracker {
     /// As [`Tracker::new`]; [`Error::Report`] if the report is of another structure; if it has no covariance or a noise variance of 0, or an offset that is a line in time; [`Error::Argument`] if the
     /// plan asks for another start than `standard`.
     pub fn from_report(report: &Report, plan: &TrackPlan) -> Result<Self, Error> {
-        let model = &report.model;
+        let model = report.model.polynomials("a tracker")?;
         if model.orders.nd > 0 || model.orders.nf.iter().any(|&nf| nf > 0) {
             return Err(Error::report(format!(
                 "the report has {}: only AR, ARX, ARMA and ARMAX can be tracked",
@@ -57,7 +57,7 @@ impl Tracker {
     /// The same with what a fit knows.
     fn with_knowledge(
         mut self,
-        model: &Model,
+        model: &PolynomialModel,
         relative: &DMatrix<f64>,
         samples: usize,
     ) -> Result<Self, Error> {
@@ -98,7 +98,7 @@ impl Tracker {
 }
 
 /// P: the covariance over the noise variance, symmetric to the bit.
-fn relative_covariance(model: &Model) -> Result<DMatrix<f64>, Error> {
+fn relative_covariance(model: &PolynomialModel) -> Result<DMatrix<f64>, Error> {
     let Some(rows) = &model.covariance else {
         return Err(Error::report(
             "the report has no covariance, so that it does not say how sure its model is",
@@ -122,7 +122,7 @@ fn relative_covariance(model: &Model) -> Result<DMatrix<f64>, Error> {
 }
 
 /// The offsets of a report, which are levels.
-fn offsets(model: &Model) -> Result<PerChannel, Error> {
+fn offsets(model: &PolynomialModel) -> Result<PerChannel, Error> {
     if let Some(signal) = model.inputs.iter().chain([&model.output]).find(|signal| signal.offset.slope != 0.0)
     {
         return Err(Error::report(format!(

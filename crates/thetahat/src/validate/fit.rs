@@ -1,35 +1,9 @@
-use std::fmt;
-
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::data::{Record, Rows};
+use crate::data::Rows;
 use crate::regression::sum;
-use crate::respond::{Response, Start, predict, simulate};
-use crate::{Error, Model};
-
-/// How far ahead a response looks.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(tag = "kind", rename_all = "kebab-case")]
-pub enum Horizon {
-    /// So many steps ahead of the last measured output.
-    Steps {
-        /// At least 1.
-        steps: usize,
-    },
-    /// Driven by the inputs alone.
-    FreeRun,
-}
-
-impl fmt::Display for Horizon {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Steps { steps: 1 } => f.write_str("1 step ahead"),
-            Self::Steps { steps } => write!(f, "{steps} steps ahead"),
-            Self::FreeRun => f.write_str("free run"),
-        }
-    }
-}
+use crate::respond::{Horizon, Response, Start};
 
 /// What rows serve for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -49,6 +23,8 @@ pub enum Part {
 /// and the mean and the largest of the absolute errors |e(t)|, all over the N samples that the response covers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Fit {
+    /// The output.
+    pub output: String,
     /// The rows looked at, 1-based and inclusive.
     pub rows: Vec<Rows>,
     /// What these rows served for; none for a log that the fit did not know.
@@ -73,44 +49,24 @@ pub struct Fit {
     pub largest_error: Option<f64>,
 }
 
-impl Start {
-    /// What a response to measured data had better start from. Free runs, and predictions with C, D or F, of which
-    /// the filters have a memory: [`Start::Estimate`]. Other predictions, which need no more than a few measured
-    /// samples: [`Start::Drop`].
-    ///
-    /// A log without the output leaves only [`Start::Zero`].
-    pub fn natural(model: &Model, horizon: Horizon) -> Self {
-        match horizon {
-            Horizon::Steps { .. } if model.orders.is_linear() => Self::Drop,
-            Horizon::Steps { .. } | Horizon::FreeRun => Self::Estimate,
-        }
-    }
-}
-
 impl Fit {
-    /// The response of a model to a record, and its fit.
-    ///
-    /// # Errors
-    /// As for [`predict`] and [`simulate`].
-    pub fn of(
-        model: &Model,
-        record: &Record<'_>,
+    /// That of a response to some rows, beside what was measured of an output, one value for each row of the log.
+    pub(crate) fn new(
+        output: &str,
+        measured: &[f64],
+        response: &Response,
         rows: &[Rows],
         part: Option<Part>,
-        horizon: Horizon,
-        initial: Start,
-    ) -> Result<(Self, Response), Error> {
-        let response = match horizon {
-            Horizon::Steps { steps } => predict(model, record, steps, initial)?,
-            Horizon::FreeRun => simulate(model, record, initial)?,
-        };
+        (horizon, initial): (Horizon, Start),
+    ) -> Self {
         let counted = || response.counted.iter().cloned().flatten();
         let samples = response.counted.iter().map(|rows| rows.len()).sum::<usize>();
-        let pairs = || counted().map(|t| (record.output[t], response.values[t]));
+        let pairs = || counted().map(|t| (measured[t], response.values[t]));
         let (percent, rmse) = closeness(pairs());
         let errors = || pairs().map(|(measured, said)| (measured - said).abs());
         let known = |figure: f64| Some(figure).filter(|figure| samples > 0 && figure.is_finite());
-        let fit = Self {
+        Self {
+            output: output.to_owned(),
             rows: rows.to_vec(),
             part,
             horizon,
@@ -121,13 +77,12 @@ impl Fit {
             mean_absolute_error: known(sum(errors()) / samples as f64),
             // One that is not a number stays one.
             largest_error: known(errors().fold(0.0, |largest, e| if e <= largest { largest } else { e })),
-        };
-        Ok((fit, response))
+        }
     }
 }
 
 /// percent and rmse, as [`Fit`] defines them, of pairs of a measured value and what a model says.
-pub(crate) fn closeness(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> (Option<f64>, Option<f64>) {
+fn closeness(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> (Option<f64>, Option<f64>) {
     let n = pairs.clone().count() as f64;
     let mean = sum(pairs.clone().map(|(measured, _)| measured)) / n;
     let error = sum(pairs.clone().map(|(measured, said)| (measured - said).powi(2))).sqrt();
@@ -139,10 +94,11 @@ pub(crate) fn closeness(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> (Opt
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::data::Offset;
+    use crate::data::{Offset, Record};
     use crate::estimate::arx;
     use crate::regression::noise::Noise;
-    use crate::{Initial, Orders, Signal};
+    use crate::respond::{predict, simulate};
+    use crate::{Initial, Orders, PolynomialModel, Signal};
 
     #[test]
     fn figures_are_what_they_say() {
@@ -155,9 +111,14 @@ mod tests {
         let estimate = arx(&record, &orders, Initial::Drop).unwrap();
         let signal = || Signal { name: String::new(), offset: Offset::default() };
         let model = estimate.to_model(&orders, 1.0, vec![signal()], signal()).unwrap();
-        let fit = |record: &Record<'_>, horizon, initial| {
-            Fit::of(&model, record, &[], None, horizon, initial).unwrap()
+        let of = |model: &PolynomialModel, record: &Record<'_>, horizon, initial| {
+            let response = match horizon {
+                Horizon::Steps { steps } => predict(model, record, steps, initial).unwrap(),
+                Horizon::FreeRun => simulate(model, record, initial).unwrap(),
+            };
+            (Fit::new("y", record.output, &response, &[], None, (horizon, initial)), response)
         };
+        let fit = |record: &Record<'_>, horizon, initial| of(&model, record, horizon, initial);
 
         // One step ahead on the rows of the fit: its own residuals.
         let (figures, _) = fit(&record, Horizon::Steps { steps: 1 }, Start::Drop);
@@ -183,13 +144,10 @@ mod tests {
         assert_eq!(Start::natural(&model, Horizon::Steps { steps: 3 }), Start::Drop);
         assert_eq!(Start::natural(&model, Horizon::FreeRun), Start::Estimate);
         let orders = Orders::armax(1, &[1], 1, &[1]).unwrap();
-        let armax = Model::from_parameters(&orders, &[-0.5, 1.0, 0.5], None, 1.0, 1.0).unwrap();
+        let armax = PolynomialModel::from_parameters(&orders, &[-0.5, 1.0, 0.5], None, 1.0, 1.0).unwrap();
         let start = Start::natural(&armax, Horizon::Steps { steps: 1 });
         assert_eq!(start, Start::Estimate);
-        assert_eq!(
-            Fit::of(&armax, &record, &[], None, Horizon::Steps { steps: 1 }, start).unwrap().0.samples,
-            100
-        );
+        assert_eq!(of(&armax, &record, Horizon::Steps { steps: 1 }, start).0.samples, 100);
 
         // No sample is far enough from a start; nothing to explain.
         let (figures, _) = fit(&record, Horizon::Steps { steps: 300 }, Start::Drop);

@@ -15,7 +15,7 @@ use std::ops::Range;
 
 use thetahat_core::nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-use crate::Model;
+use crate::PolynomialModel;
 use crate::data::Record;
 use crate::regression::{Products, Taps, add_filtered, divide, sum};
 use crate::respond::Innovations;
@@ -56,7 +56,7 @@ impl<'a> Traces<'a> {
 
     /// `noise_free`: with (B/A) u in the place of y, as instruments have it; for models without C, D and F.
     pub(super) fn new(
-        model: &Model,
+        model: &PolynomialModel,
         record: &Record<'a>,
         innovations: &[Innovations],
         noise_free: bool,

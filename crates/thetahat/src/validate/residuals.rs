@@ -9,7 +9,7 @@ use super::independence::{Parameters, Setting, independence};
 use super::moments::{Moments, Traces, columns, pseudo_inverse};
 use super::verdict::{Anderson, Independence, Test};
 use super::whiteness::{Autocorrelation, anderson, anderson_lags, ljung_box, pairs, past_errors};
-use crate::Model;
+use crate::PolynomialModel;
 use crate::data::Record;
 use crate::distribution::two_sided;
 use crate::estimate::autoregression;
@@ -32,6 +32,8 @@ const NOTHING_LEFT: f64 = 1e-24;
 /// What is left of a log when a model has predicted it one step ahead: whether there is more to be had from it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Residuals {
+    /// The output.
+    pub output: String,
     /// N, the residuals that count.
     pub samples: usize,
     /// How many parameters the tests take as fitted to these samples: 0 on fresh data.
@@ -110,7 +112,7 @@ impl Residuals {
     /// There are lags up to a tenth of the samples, of inputs to a fifth, and as far as a quarter of the samples have
     /// a partner. O(N (L + p)), and O(N (L + p)^2) where the residuals are coloured.
     pub(crate) fn of(
-        model: &Model,
+        model: &PolynomialModel,
         record: &Record<'_>,
         innovations: &[Innovations],
         relation: Relation,
@@ -201,6 +203,7 @@ impl Residuals {
             inputs.iter().map(|&(input, name, lags)| independence(&setting, name, input, lags));
         let independence = independence.collect::<Option<Vec<_>>>().ok_or(Untestable::Range)?;
         Ok(Self {
+            output: model.output.name.clone(),
             samples,
             fitted,
             autocorrelation: std::iter::once(1.0).chain(correlation.values.iter().copied()).collect(),
@@ -214,7 +217,7 @@ impl Residuals {
 
 /// How many past lags of an input are looked at: as many as of the autocorrelation, and more than the plant has
 /// parameters behind its delay.
-fn past_lags(model: &Model, input: usize, lags: usize) -> usize {
+fn past_lags(model: &PolynomialModel, input: usize, lags: usize) -> usize {
     let orders = &model.orders;
     let plant = orders.na + orders.nb[input] + orders.nf[input];
     lags.max(orders.nk[input] + plant + MORE_LAGS)

@@ -13,7 +13,7 @@ use crate::distribution::{outside as events, two_sided};
 use crate::estimate::autoregression;
 use crate::regression::noise::Noise;
 use crate::respond::{Start, innovations};
-use crate::{Error, Initial, Model, Orders, Signal, arx};
+use crate::{Error, Initial, Orders, PolynomialModel, Signal, arx};
 
 /// y(t) = 1.2 y(t-1) - 0.5 y(t-2) + u(t-1) + 0.4 u(t-2) + e(t).
 const A: [f64; 2] = [-1.2, 0.5];
@@ -29,10 +29,10 @@ fn experiment(samples: usize, size: f64) -> (Vec<f64>, Vec<f64>) {
     (u, y)
 }
 
-fn named(model: Model) -> Model {
+fn named(model: PolynomialModel) -> PolynomialModel {
     let signal = |name: &str| Signal { name: name.to_owned(), ..Signal::default() };
     let inputs = (0..model.inputs.len()).map(|input| signal(["u", "v"][input])).collect();
-    Model { inputs, output: signal("y"), ..model }
+    PolynomialModel { inputs, output: signal("y"), ..model }
 }
 
 fn orders() -> Orders {
@@ -40,12 +40,12 @@ fn orders() -> Orders {
 }
 
 /// The true model without uncertainty.
-fn truth() -> Model {
+fn truth() -> PolynomialModel {
     let parameters = [A, B].concat();
-    named(Model::from_parameters(&orders(), &parameters, None, 0.01, 1.0).unwrap())
+    named(PolynomialModel::from_parameters(&orders(), &parameters, None, 0.01, 1.0).unwrap())
 }
 
-fn tested(model: &Model, record: &Record<'_>, relation: Relation) -> Result<Residuals, Untestable> {
+fn tested(model: &PolynomialModel, record: &Record<'_>, relation: Relation) -> Result<Residuals, Untestable> {
     let found = innovations(model, record, 1, Start::Drop).unwrap();
     Residuals::of(model, record, &found, relation, 25, &[0.05, 0.2], 0.05)
 }
@@ -142,9 +142,9 @@ fn anderson_counts_lags_outside_their_bands() {
 }
 
 /// Orders of every kind, with stable parameters.
-fn models() -> Vec<Model> {
+fn models() -> Vec<PolynomialModel> {
     let model = |orders: Result<Orders, Error>, parameters: &[f64]| {
-        named(Model::from_parameters(&orders.unwrap(), parameters, None, 1.0, 1.0).unwrap())
+        named(PolynomialModel::from_parameters(&orders.unwrap(), parameters, None, 1.0, 1.0).unwrap())
     };
     vec![
         model(Orders::arx(2, &[2], &[1]), &[-1.2, 0.5, 1.0, 0.4]),
@@ -165,7 +165,7 @@ fn psi_is_the_derivative_of_the_errors() {
     for model in models() {
         let inputs = [&u[..], &v[..]][..model.inputs.len()].to_vec();
         let record = Record { output: &y, inputs, segments: vec![0..35, 40..80], past: vec![0, 0] };
-        let errors = |model: &Model| {
+        let errors = |model: &PolynomialModel| {
             let mut errors = vec![0.0; 80];
             for found in innovations(model, &record, 1, Start::Zero).unwrap() {
                 errors[found.rows].copy_from_slice(&found.errors);
@@ -183,7 +183,7 @@ fn psi_is_the_derivative_of_the_errors() {
             let moved = |by: f64| {
                 let mut values = values.clone();
                 values[index] += by;
-                errors(&Model::from_parameters(&model.orders, &values, None, 1.0, 1.0).unwrap())
+                errors(&PolynomialModel::from_parameters(&model.orders, &values, None, 1.0, 1.0).unwrap())
             };
             let (low, high) = (moved(-step), moved(step));
             low.iter().zip(high).map(|(low, high)| (low - high) / (2.0 * step)).collect::<Vec<f64>>()
@@ -235,7 +235,7 @@ fn past_errors_are_in_psi_as_the_model_has_it() {
     let samples = 100_000;
     let orders = Orders::new(2, &[1], 1, 1, &[0], &[1]).unwrap();
     let parameters = [-1.2, 0.5, 1.0, 0.4, -0.6];
-    let model = named(Model::from_parameters(&orders, &parameters, None, 1.0, 1.0).unwrap());
+    let model = named(PolynomialModel::from_parameters(&orders, &parameters, None, 1.0, 1.0).unwrap());
     let mut noise = Noise(9);
     let (u, e) = (noise.take(samples), noise.take(samples));
     let (mut v, mut y) = (vec![0.0; 2], vec![0.0; 2]);
@@ -325,7 +325,7 @@ fn coloured_residuals_have_the_variance_of_their_colour() {
         e.push(0.8 * e[t - 1] + noise.next());
     }
     let orders = Orders::oe(&[1], &[1], &[1]).unwrap();
-    let model = named(Model::from_parameters(&orders, &[1.0, -0.5], None, 1.0, 1.0).unwrap());
+    let model = named(PolynomialModel::from_parameters(&orders, &[1.0, -0.5], None, 1.0, 1.0).unwrap());
     let mut x = vec![0.0];
     (1..samples).for_each(|t| x.push(0.5 * x[t - 1] + u[t - 1]));
     let y: Vec<f64> = x.iter().zip(&e).map(|(x, e)| x + e).collect();
@@ -369,7 +369,7 @@ fn what_the_fit_took_has_no_degrees_of_freedom() {
     // The parameters are taken as the truth, uncertain by their covariance, on other samples.
     let fresh = tested(&model, &record, Relation::Fresh).unwrap();
     assert_eq!((fresh.fitted, fresh.independence[0].past.degrees, fresh.ljung_box.degrees), (0, 25.0, 25.0));
-    let certain = Model { covariance: None, ..model.clone() };
+    let certain = PolynomialModel { covariance: None, ..model.clone() };
     let certain = tested(&certain, &record, Relation::Fresh).unwrap();
     assert!(fresh.independence[0].past.statistic < certain.independence[0].past.statistic);
     assert!(fresh.ljung_box.statistic < certain.ljung_box.statistic);
@@ -387,7 +387,8 @@ fn what_the_fit_took_has_no_degrees_of_freedom() {
         model.parameters[0].value + 2.0 * model.parameters[0].standard_error.unwrap(),
         model.parameters[1].value,
     ];
-    let moved = Model::from_parameters(&orders, &parameters, None, model.noise_variance, 1.0).unwrap();
+    let moved =
+        PolynomialModel::from_parameters(&orders, &parameters, None, model.noise_variance, 1.0).unwrap();
     let beside = tested(&moved, &noise, Relation::Fitted).unwrap().ljung_box.statistic;
     assert!((beside - found.ljung_box.statistic).abs() < 1.0, "{beside}");
 }
@@ -398,7 +399,7 @@ fn on_other_samples_the_errors_of_the_parameters_come_on_top() {
     let (u, y) = experiment(samples, 0.3);
     let spread = DMatrix::from_fn(4, 4, |i, j| if i == j { 0.004 * (i + 1) as f64 } else { 0.001 });
     let rows = spread.row_iter().map(|row| row.iter().copied().collect()).collect();
-    let model = Model { covariance: Some(rows), ..truth() };
+    let model = PolynomialModel { covariance: Some(rows), ..truth() };
     let record = Record { past: vec![2], ..Record::new(&y, vec![&u]).unwrap() };
     let record = Record { segments: std::iter::once(2..samples).collect(), ..record };
     let found = tested(&model, &record, Relation::Fresh).unwrap();
@@ -458,7 +459,7 @@ fn an_input_that_is_not_rich_has_few_directions() {
     let u: Vec<f64> = (0..500).map(|t| (0.3 * f64::from(t)).sin()).collect();
     let y = noise.take(500);
     let orders = Orders::arx(0, &[1], &[1]).unwrap();
-    let model = named(Model::from_parameters(&orders, &[0.0], None, 1.0, 1.0).unwrap());
+    let model = named(PolynomialModel::from_parameters(&orders, &[0.0], None, 1.0, 1.0).unwrap());
     let test =
         |u: &[f64]| tested(&model, &Record::new(&y, vec![u]).unwrap(), Relation::Fresh).unwrap().independence;
     // A sinusoid has two, and a few at the ends.
@@ -494,7 +495,7 @@ fn residuals_that_cannot_be_tested_say_why() {
     assert!(with(&huge).unwrap_err().contains("range of numbers"));
     assert!(with(&[0.0; 200]).is_ok());
     let alone = Orders::arx(1, &[], &[]).unwrap();
-    let model = Model::from_parameters(&alone, &[-0.5], None, 1.0, 1.0).unwrap();
+    let model = PolynomialModel::from_parameters(&alone, &[-0.5], None, 1.0, 1.0).unwrap();
     let silent = [0.0; 50];
     let found = tested(&model, &Record::new(&silent, vec![]).unwrap(), Relation::Fresh);
     assert_eq!(found.map(|_| ()), Err(Untestable::Nothing));

@@ -29,7 +29,7 @@ use thetahat_core::nalgebra::{DMatrix, DVector};
 
 use super::moments::eigen;
 use super::verdict::{Anderson, AndersonLevel, Test};
-use crate::Model;
+use crate::PolynomialModel;
 use crate::distribution::{binomial_mid_p, chi_square_tail, outside, two_sided};
 use crate::model::polynomial::is_stable;
 use crate::regression::{Lagged, Presample, Taps, divide};
@@ -92,7 +92,7 @@ pub(super) fn pairs(stretches: &[&[Range<usize>]], lag: usize) -> usize {
 }
 
 /// X, a row for each lag 1 … L and a column for each parameter. Zero for an unstable A or D, which has no such response.
-pub(super) fn past_errors(model: &Model, lags: usize) -> DMatrix<f64> {
+pub(super) fn past_errors(model: &PolynomialModel, lags: usize) -> DMatrix<f64> {
     let orders = &model.orders;
     let response = |monic: &[f64]| {
         let mut response = vec![0.0; lags];

@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use thetahat::{Channel, GreyBox, Recording, Stopped, Times, fit_grey};
+use thetahat::{Channel, EquationsPlan, GreyBox, Log, Procedure, Stopped, fit_equations};
 
 use crate::runs;
 use crate::simulated::Random;
@@ -41,7 +41,7 @@ measurement = { y1 = 0.02, y2 = 0.03 }
 ";
 
 /// A log of it, with the noises that it tells of times `noise`.
-fn log(seed: u64, noise: f64) -> Recording {
+fn log(seed: u64, noise: f64) -> Log {
     let [damping, stiffness, gain, square, drive] = TRUTH;
     let mut random = Random(seed);
     let mut normal = |deviation: f64| deviation * noise * random.normal();
@@ -54,7 +54,7 @@ fn log(seed: u64, noise: f64) -> Recording {
         let turning = gain * torque + drive - damping.exp() * rate - stiffness * angle.sin();
         (angle, rate) = (angle + 0.05 * rate, rate + 0.05 * turning + normal(0.002));
     }
-    Recording { channels: channels.into(), times: Times::Uniform(0.05) }
+    Log::new(channels.into(), 0.05).expect("the case is sound")
 }
 
 #[test]
@@ -65,12 +65,17 @@ fn intervals_of_models_in_equations_cover_the_truth() {
     for noise in [1.0, 1.7] {
         let (mut squares, mut covered) = (0.0, 0_usize);
         for seed in 0..runs as u64 {
-            let found = fit_grey(&model, &[log(100 + seed, noise)], &[], &|_| ControlFlow::Continue(()))
+            let (log, plan) = (log(100 + seed, noise), EquationsPlan::default());
+            let found = fit_equations(&model, &log, &[], &plan, &|_| ControlFlow::Continue(()))
                 .expect("the case is sound");
-            assert_eq!(found.search.stopped, Stopped::Converged, "seed {seed}");
-            assert!(found.search.iterations < 20, "seed {seed}");
-            for (parameter, truth) in found.parameters.iter().zip(TRUTH) {
-                let away = (parameter.value - truth) / parameter.standard_error;
+            let Procedure::InnovationsLikelihood(outcome) = &found.estimation.procedure else {
+                panic!("another procedure")
+            };
+            assert_eq!(outcome.search.stopped, Stopped::Converged, "seed {seed}");
+            assert!(outcome.search.iterations < 20, "seed {seed}");
+            for (parameter, truth) in found.model.parameters().iter().zip(TRUTH) {
+                let error = parameter.standard_error.expect("it has one");
+                let away = (parameter.value - truth) / error;
                 assert!(away.abs() < 5.0, "seed {seed}, {}: {away}", parameter.name);
                 squares += away * away;
                 covered += usize::from(away.abs() < 1.959964);

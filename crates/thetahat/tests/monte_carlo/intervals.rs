@@ -4,8 +4,8 @@
 use std::ops::RangeInclusive;
 
 use thetahat::{
-    Channel, Constant, Horizon, Initial, Interval, Log, Method, Model, Orders, Plan, Quantity, Record, Rows,
-    Signal, Start, apply, estimate, forecast, identify, predict, prediction_deviations,
+    Channel, Constant, Horizon, Initial, Interval, Log, Method, Orders, Plan, PolynomialModel, Quantity,
+    Record, Rows, Signal, Start, apply, estimate, forecast, identify, predict, prediction_deviations,
 };
 
 use super::{filtered, runs};
@@ -59,7 +59,7 @@ fn log(u: &[f64], y: &[f64]) -> Log {
 }
 
 /// What an identified model says, without a covariance of its offsets.
-fn fitted(record: &Record<'_>, orders: &Orders) -> Model {
+fn fitted(record: &Record<'_>, orders: &Orders) -> PolynomialModel {
     let found = estimate(record, orders, &Method::default(), Initial::Auto).expect("the case is sound");
     let inputs = vec![Signal::default(); orders.inputs()];
     found.to_model(orders, 1.0, inputs, Signal::default()).expect("the case is sound")
@@ -139,21 +139,21 @@ fn held_around_a_level(case: &Case, samples: usize, runs: usize) -> [[f64; 3]; 2
         let u = &u[before..];
         let plan = Plan::new(&["u"], "y", case.orders.clone());
         let model = identify(log(&u[..samples], &y[..samples]), &[], &plan).expect("the case is sound").model;
-        let start = Start::natural(&model, Horizon::Steps { steps: 1 });
+        let start = model.natural_start(Horizon::Steps { steps: 1 });
         let mut known = y[..samples + 20].to_vec();
         known[samples..].fill(f64::NAN);
         let all = [Rows::new(1, samples + 20).expect("the case is sound")];
         let ahead =
-            apply(&model, log(&u[..samples + 20], &known), &all, None, Horizon::Steps { steps: 20 }, start);
-        let ahead = ahead.expect("the case is sound");
+            apply(&model, &log(&u[..samples + 20], &known), &all, None, Horizon::Steps { steps: 20 }, start);
+        let ahead = ahead.expect("the case is sound").outputs.remove(0);
         let deviations = ahead.standard_deviations.expect("the case is sound");
         let fresh = log(&u[samples..], &y[samples..]);
         for (at, &steps) in STEPS.iter().enumerate() {
             let row = samples + steps - 1;
             held[0][at] += usize::from((ahead.predicted[row] - y[row]).abs() <= QUANTILE * deviations[row]);
             counts[0][at] += 1;
-            let found = apply(&model, fresh.clone(), &[], None, Horizon::Steps { steps }, start);
-            let found = found.expect("the case is sound");
+            let found = apply(&model, &fresh, &[], None, Horizon::Steps { steps }, start);
+            let found = found.expect("the case is sound").outputs.remove(0);
             let deviations = found.standard_deviations.expect("the case is sound");
             let each = found.predicted.iter().zip(&y[samples..]).zip(&deviations);
             for ((predicted, y), deviation) in each.filter(|((predicted, _), _)| predicted.is_finite()) {
@@ -217,6 +217,7 @@ fn intervals_of_gains_hold_near_an_integrator() {
             let y: Vec<f64> = x.iter().zip(&v).map(|(x, v)| 3.0 + x + v).skip(before).collect();
             let plan = Plan { constant: Constant::Yes, ..Plan::new(&["u"], "y", orders.clone()) };
             let model = identify(log(&u[before..], &y), &[], &plan).expect("the case is sound").model;
+            let model = model.polynomials("a gain").expect("the case is sound");
             gains += usize::from(holds(model.dc_gain[0], 500.0));
             times += usize::from(holds(model.time_constants[0], -1.0 / 0.999_f64.ln()));
         }
@@ -284,7 +285,7 @@ fn standard_errors_are_right_with_missing_outputs() {
             let y: Vec<f64> = y.map(|y| if random.uniform() < 0.3 { f64::NAN } else { y }).collect();
             let plan = Plan::new(&["u"], "y", orders.clone());
             let model = identify(log(&u, &y), &[], &plan).expect("the case is sound").model;
-            for ((values, sum), parameter) in values.iter_mut().zip(&mut errors).zip(&model.parameters) {
+            for ((values, sum), parameter) in values.iter_mut().zip(&mut errors).zip(model.parameters()) {
                 values.push(parameter.value);
                 *sum += parameter.standard_error.expect("the case is sound");
             }

@@ -1,5 +1,5 @@
 use super::*;
-use crate::Model;
+use crate::PolynomialModel;
 use crate::estimate::{Method, estimate, estimate_of_channels};
 use crate::regression::noise::Noise;
 use crate::respond::{Start, simulate};
@@ -175,7 +175,7 @@ fn several_inputs_share_the_denominator_that_simulates() {
     }
     // A stationary point of the free run's errors: a change of any parameter raises them.
     let cost = |parameters: &[f64]| {
-        let model = Model::from_parameters(&orders, parameters, None, 1.0, 1.0).unwrap();
+        let model = PolynomialModel::from_parameters(&orders, parameters, None, 1.0, 1.0).unwrap();
         let run = simulate(&model, &record, Start::Estimate).unwrap();
         (0..y.len()).map(|t| (y[t] - run.values[t]).powi(2)).sum::<f64>()
     };

@@ -5,7 +5,7 @@ use thetahat_core::{
 };
 
 use super::filter;
-use crate::greybox::tests::{CART, PENDULUM};
+use crate::model::equations::tests::{CART, PENDULUM};
 use crate::regression::noise::Noise;
 use crate::{Estimator, GreyBox, StateEstimate, StateFilter, StateModel};
 

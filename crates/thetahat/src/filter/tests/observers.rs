@@ -117,7 +117,7 @@ fn what_does_not_fit_an_observer_is_refused() {
     assert!(refused(CART, matrix(vec![vec![1.0], vec![f64::NAN]])).starts_with("gain: "));
     let blind = CART.replace("H = [[1, 0]]", "H = [[0, 1]]");
     assert!(refused(&blind, poles(&[(0.5, 0.0), (0.2, 0.0)])).contains("only 1 of the 2 states"));
-    let unknown = crate::greybox::tests::CART;
+    let unknown = crate::model::equations::tests::CART;
     assert!(
         refused(unknown, poles(&[(0.5, 0.0), (0.2, 0.0)]))
             .contains("an observer estimates no parameters (mass)")

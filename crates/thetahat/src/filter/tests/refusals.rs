@@ -1,5 +1,5 @@
 use super::NILE;
-use crate::greybox::tests::CART;
+use crate::model::equations::tests::CART;
 use crate::{Error, Estimator, StateFilter, StateModel};
 
 const TWO: &str = "\

@@ -2,16 +2,16 @@ use crate::filter::kind::Kind;
 use crate::filter::linear::Linear;
 use crate::regression::noise::Noise;
 use crate::{
-    Channel, Estimator, InitialState, Log, Model, Offset, Orders, Plan, Record, Start, StateFilter,
+    Channel, Estimator, InitialState, Log, Offset, Orders, Plan, PolynomialModel, Record, Start, StateFilter,
     StateModel, identify, predict,
 };
 
 /// Models of all structures: na, nb, nc, nd, nf, nk and their parameters a, b, c, d, f.
-fn models() -> Vec<Model> {
+fn models() -> Vec<PolynomialModel> {
     let model = |(na, nb, nc, nd, nf, nk): (usize, &[usize], usize, usize, &[usize], &[usize]),
                  parameters: &[f64]| {
         let orders = Orders::new(na, nb, nc, nd, nf, nk).unwrap();
-        Model::from_parameters(&orders, parameters, None, 0.25, 0.5).unwrap()
+        PolynomialModel::from_parameters(&orders, parameters, None, 0.25, 0.5).unwrap()
     };
     vec![
         model((2, &[], 0, 0, &[], &[]), &[-1.5, 0.7]),
@@ -26,7 +26,7 @@ fn models() -> Vec<Model> {
     ]
 }
 
-fn filter(model: &Model) -> StateFilter {
+fn filter(model: &PolynomialModel) -> StateFilter {
     let linear = Linear::of_model(model, InitialState::Zero).unwrap();
     StateFilter::new(StateModel { kind: Kind::Linear(Box::new(linear)) }, Estimator::Kalman).unwrap()
 }
@@ -92,7 +92,7 @@ fn a_report_of_a_fit_is_a_model() {
     let log = Log::new(vec![channel("u", &u), channel("y", &y)], 0.1).unwrap();
     let plan = Plan::new(&["u"], "y", Orders::arx(1, &[1], &[1]).unwrap());
     let identified = identify(log, &[], &plan).unwrap();
-    let model = StateModel::from_report(&identified, InitialState::Zero).unwrap();
+    let model = StateModel::from_report(&identified, Some(InitialState::Zero)).unwrap();
     assert_eq!(
         (model.inputs(), model.outputs(), model.sample_time()),
         (["u".to_owned()].as_slice(), ["y".to_owned()].as_slice(), 0.1)
@@ -111,11 +111,11 @@ fn a_report_of_a_fit_is_a_model() {
         let rows = u.iter().zip(&y).map(|(u, y)| filter.step(None, &[*u], &[*y + 5.0]).unwrap().nis.unwrap());
         rows.take(10).collect::<Vec<f64>>()
     };
-    let (rest, unknown) = (late(InitialState::Zero), late(InitialState::Unknown));
+    let (rest, unknown) = (late(Some(InitialState::Zero)), late(Some(InitialState::Unknown)));
     assert!(rest[0] > 100.0 && unknown[0] < 1.0, "{} {}", rest[0], unknown[0]);
 
     let mut silent = identified.clone();
-    silent.model.noise_variance = 0.0;
-    let error = StateModel::from_report(&silent, InitialState::Unknown).unwrap_err().to_string();
+    silent.polynomials_mut().noise_variance = 0.0;
+    let error = StateModel::from_report(&silent, Some(InitialState::Unknown)).unwrap_err().to_string();
     assert!(error.starts_with("its noise variance is 0"), "{error}");
 }

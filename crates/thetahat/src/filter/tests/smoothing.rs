@@ -2,7 +2,7 @@ use thetahat_core::nalgebra::{DMatrix, DVector};
 
 use super::{FLOW, NILE, filter};
 use crate::Estimator;
-use crate::greybox::tests::CART;
+use crate::model::equations::tests::CART;
 
 #[test]
 fn the_last_state_is_the_filtered_one() {

@@ -47,12 +47,12 @@ fn parameters() -> Vec<f64> {
     [&a[1..], &first, &[2.0, 1.0], &[0.3], &d[1..], &[-1.4, 0.8]].concat()
 }
 
-fn model(parameters: &[f64], covariance: Option<&[Vec<f64>]>) -> Model {
-    Model::from_parameters(&orders(), parameters, covariance, 1.0, 0.5).unwrap()
+fn model(parameters: &[f64], covariance: Option<&[Vec<f64>]>) -> PolynomialModel {
+    PolynomialModel::from_parameters(&orders(), parameters, covariance, 1.0, 0.5).unwrap()
 }
 
 /// All figures of a model in one list: the parts of each root, time constants, gains.
-fn figures(model: &Model) -> Vec<f64> {
+fn figures(model: &PolynomialModel) -> Vec<f64> {
     let roots = model.poles.iter().chain(model.zeros.iter().flatten());
     let roots = roots.chain(&model.noise_poles).chain(&model.noise_zeros);
     let mut figures: Vec<f64> = roots.flat_map(|root| [root.re, root.im]).collect();
@@ -61,7 +61,7 @@ fn figures(model: &Model) -> Vec<f64> {
 }
 
 /// Their standard errors in the same order.
-fn errors(model: &Model) -> Vec<f64> {
+fn errors(model: &PolynomialModel) -> Vec<f64> {
     let roots = model.poles.iter().chain(model.zeros.iter().flatten());
     let roots = roots.chain(&model.noise_poles).chain(&model.noise_zeros);
     let mut errors: Vec<f64> = roots
@@ -101,7 +101,7 @@ fn roots_are_named_and_in_their_places() {
     assert!(quantities.flatten().all(|quantity| quantity.standard_error.is_none()));
     // With one input the letters stand alone.
     let oe = Orders::oe(&[2], &[1], &[1]).unwrap();
-    let oe = Model::from_parameters(&oe, &[1.0, 0.5, -0.9], None, 1.0, 1.0).unwrap();
+    let oe = PolynomialModel::from_parameters(&oe, &[1.0, 0.5, -0.9], None, 1.0, 1.0).unwrap();
     assert_eq!((names(&oe.poles), names(&oe.zeros[0])), (vec!["f".into()], vec!["b".into()]));
 }
 
@@ -161,13 +161,13 @@ fn standard_errors_are_the_spread_of_sampled_models() {
 }
 
 /// An AR model of some poles, and the same standard error for each coefficient.
-fn autoregression(poles: &[f64], error: f64) -> Model {
+fn autoregression(poles: &[f64], error: f64) -> PolynomialModel {
     let a = poles.iter().fold(vec![1.0], |a, pole| product(&a, &[1.0, -pole]));
     let orders = Orders::arx(poles.len(), &[], &[]).unwrap();
     let factor =
         (0..poles.len()).map(|i| (0..poles.len()).map(|j| if i == j { error } else { 0.0 }).collect());
     let spread = Spread::of(factor.collect());
-    Model::from_parameters(&orders, &a[1..], Some(&spread.covariance), 1.0, 1.0).unwrap()
+    PolynomialModel::from_parameters(&orders, &a[1..], Some(&spread.covariance), 1.0, 1.0).unwrap()
 }
 
 #[test]
@@ -193,7 +193,8 @@ fn large_roots_do_not_overflow() {
     for (b, size) in [(vec![1e-3, 1.0], 1e3), (vec![1e-100, 1.0, 0.5, 0.1], 1e100)] {
         let orders = Orders::arx(0, &[b.len()], &[2]).unwrap();
         let spread = Spread::of((0..b.len()).map(|i| vec![if i == 0 { 1e-6 * b[0] } else { 0.0 }]).collect());
-        let model = Model::from_parameters(&orders, &b, Some(&spread.covariance), 1.0, 1.0).unwrap();
+        let model =
+            PolynomialModel::from_parameters(&orders, &b, Some(&spread.covariance), 1.0, 1.0).unwrap();
         let zero = &model.zeros[0][0];
         // z = -b1/b0 there: its relative error is that of b0.
         assert!((zero.re / size + 1.0).abs() < 1e-12, "{zero:?}");
@@ -203,7 +204,8 @@ fn large_roots_do_not_overflow() {
     // A variance beyond the range of numbers is none.
     let orders = Orders::arx(0, &[2], &[0]).unwrap();
     let covariance = vec![vec![1.0, 0.0], vec![0.0, 1.0]];
-    let model = Model::from_parameters(&orders, &[1e-200, 1.0], Some(&covariance), 1.0, 1.0).unwrap();
+    let model =
+        PolynomialModel::from_parameters(&orders, &[1e-200, 1.0], Some(&covariance), 1.0, 1.0).unwrap();
     assert_eq!(model.zeros[0][0].covariance, None);
 }
 
@@ -228,12 +230,12 @@ fn integrators_in_a_and_in_f_have_no_gain() {
     for (na, nf, pole) in [(1, 0, -1.0), (0, 1, -1.0), (1, 0, -1.0 + 1e-16), (0, 1, -1.0 + 1e-16)] {
         let orders = Orders::new(na, &[1], 0, 0, &[nf], &[1]).unwrap();
         let parameters = if na == 1 { [pole, 1.0] } else { [1.0, pole] };
-        let model = Model::from_parameters(&orders, &parameters, None, 1.0, 1.0).unwrap();
+        let model = PolynomialModel::from_parameters(&orders, &parameters, None, 1.0, 1.0).unwrap();
         assert_eq!(model.dc_gain, [None]);
     }
     // An input without B has the gain 0.
     let orders = Orders::new(1, &[0], 0, 0, &[0], &[1]).unwrap();
-    let model = Model::from_parameters(&orders, &[-0.5], Some(&[vec![1.0]]), 1.0, 1.0).unwrap();
+    let model = PolynomialModel::from_parameters(&orders, &[-0.5], Some(&[vec![1.0]]), 1.0, 1.0).unwrap();
     assert_eq!(model.dc_gain, [Some(Quantity::new(0.0, Some(0.0)))]);
     assert!(model.zeros == [vec![]]);
 }
@@ -242,7 +244,7 @@ fn integrators_in_a_and_in_f_have_no_gain() {
 fn stability_is_that_of_a_and_f() {
     let stable = |na, nd, nf, parameters: &[f64]| {
         let orders = Orders::new(na, &[1], 0, nd, &[nf], &[1]).unwrap();
-        Model::from_parameters(&orders, parameters, None, 1.0, 1.0).unwrap().stable
+        PolynomialModel::from_parameters(&orders, parameters, None, 1.0, 1.0).unwrap().stable
     };
     assert!(stable(0, 0, 1, &[1.0, -0.9]) && !stable(0, 0, 1, &[1.0, -1.1]));
     assert!(!stable(1, 0, 0, &[1.1, 1.0]));
@@ -251,9 +253,9 @@ fn stability_is_that_of_a_and_f() {
 }
 
 /// An output-error model with this F and B from nk = 1 on.
-fn output_error(b: &[f64], f: &[f64], covariance: Option<&[Vec<f64>]>) -> Model {
+fn output_error(b: &[f64], f: &[f64], covariance: Option<&[Vec<f64>]>) -> PolynomialModel {
     let orders = Orders::oe(&[b.len()], &[f.len() - 1], &[1]).unwrap();
-    Model::from_parameters(&orders, &[b, &f[1..]].concat(), covariance, 1.0, 1.0).unwrap()
+    PolynomialModel::from_parameters(&orders, &[b, &f[1..]].concat(), covariance, 1.0, 1.0).unwrap()
 }
 
 #[test]
@@ -306,13 +308,13 @@ fn noise_zeros_are_compared_with_noise_poles_and_pairs_with_pairs() {
     let arma = Orders::armax(2, &[], 1, &[]).unwrap();
     let a = product(&[1.0, -0.9], &[1.0, -0.4]);
     let cut: Vec<Vec<f64>> = small.iter().take(3).map(|row| row[..3].to_vec()).collect();
-    let model = Model::from_parameters(&arma, &[a[1], a[2], -0.41], Some(&cut), 1.0, 1.0).unwrap();
+    let model = PolynomialModel::from_parameters(&arma, &[a[1], a[2], -0.41], Some(&cut), 1.0, 1.0).unwrap();
     let (pole, zero) = near_cancellation(&model).unwrap();
     assert_eq!((pole.polynomial.as_str(), zero.polynomial.as_str()), ("a", "c"));
     assert!((pole.re - 0.4).abs() < 1e-12);
     let bj = Orders::bj(&[1], 2, 2, &[0], &[1]).unwrap();
     let with = |c: [f64; 2], d: [f64; 2]| {
-        Model::from_parameters(&bj, &[1.0, c[0], c[1], d[0], d[1]], Some(&small), 1.0, 1.0).unwrap()
+        PolynomialModel::from_parameters(&bj, &[1.0, c[0], c[1], d[0], d[1]], Some(&small), 1.0, 1.0).unwrap()
     };
     let (pole, zero) = near_cancellation(&with([-1.2, 0.72], [-1.21, 0.725])).unwrap();
     assert_eq!((pole.polynomial.as_str(), zero.polynomial.as_str()), ("d", "c"));
@@ -322,10 +324,10 @@ fn noise_zeros_are_compared_with_noise_poles_and_pairs_with_pairs() {
 }
 
 /// A model of first order, y = b/(1 + a q^-1) u(t - 1), and the covariance of (a, b).
-fn first_order(pole: f64, b: f64, covariance: [[f64; 2]; 2]) -> Model {
+fn first_order(pole: f64, b: f64, covariance: [[f64; 2]; 2]) -> PolynomialModel {
     let rows: Vec<Vec<f64>> = covariance.iter().map(|row| row.to_vec()).collect();
     let orders = Orders::arx(1, &[1], &[1]).unwrap();
-    Model::from_parameters(&orders, &[-pole, b], Some(&rows), 1.0, 2.0).unwrap()
+    PolynomialModel::from_parameters(&orders, &[-pole, b], Some(&rows), 1.0, 2.0).unwrap()
 }
 
 #[test]

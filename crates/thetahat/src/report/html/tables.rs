@@ -4,8 +4,9 @@ use super::page::Table;
 use super::text::{complex, or_dash, percent, quantity, rows};
 use crate::figures::{chance, fixed, number, scientific, short, three};
 use crate::{
-    Estimation, Fit, InformationCriterion, Inspection, Model, Orders, Part, Procedure, Report, Root, Rows,
-    Scored, Seen, Selection, Source, Start, Stopped, Validated, Validation,
+    Criteria, EquationsModel, Estimation, Fit, InformationCriterion, Inspection, Orders, Part,
+    PolynomialModel, Procedure, Report, Root, Rows, Scored, Seen, Selection, Source, Start, Stopped,
+    Validated, Validation,
 };
 
 /// The models of a search that are listed.
@@ -13,7 +14,7 @@ const BEST: usize = 20;
 /// Fewer channels than this stand beside each other, more below each other.
 const BESIDE: usize = 5;
 
-pub(super) fn parameters(model: &Model) -> Table {
+pub(super) fn parameters(model: &PolynomialModel) -> Table {
     let mut table = Table::new("Parameters", &["parameter", "value", "standard error"]);
     for parameter in &model.parameters {
         table.row([
@@ -27,10 +28,15 @@ pub(super) fn parameters(model: &Model) -> Table {
 
 pub(super) fn fits(fits: &[Fit]) -> Table {
     let parts = fits.iter().any(|fit| fit.part.is_some());
-    let head = ["part", "horizon", "start", "fit [%]", "RMSE", "mean |e|", "largest |e|", "samples", "rows"];
-    let mut table = Table::new("Fit", if parts { &head } else { &head[1..] });
+    let outputs = fits.iter().any(|fit| fit.output != fits[0].output);
+    let first = outputs.then_some("output").into_iter().chain(parts.then_some("part"));
+    let figures = ["horizon", "start", "fit [%]", "RMSE", "mean |e|", "largest |e|", "samples", "rows"];
+    let head: Vec<&str> = first.chain(figures).collect();
+    let mut table = Table::new("Fit", &head);
     for fit in fits {
-        let mut cells = if parts { vec![or_dash(fit.part, |own| part(own).to_owned())] } else { vec![] };
+        let mut cells = Vec::new();
+        cells.extend(outputs.then(|| fit.output.clone()));
+        cells.extend(parts.then(|| or_dash(fit.part, |own| part(own).to_owned())));
         cells.extend([
             fit.horizon.to_string(),
             start(fit.initial).to_owned(),
@@ -47,7 +53,7 @@ pub(super) fn fits(fits: &[Fit]) -> Table {
 }
 
 /// Poles and zeros with their uncertainty.
-pub(super) fn roots(model: &Model) -> Table {
+pub(super) fn roots(model: &PolynomialModel) -> Table {
     let mut table = Table::new("Roots", &["root", "value", "standard error", "modulus", "time constant [s]"]);
     let mut add = |role: &str, root: &Root, time: Option<String>| {
         let spread = root.covariance.map(|[[re, _], [_, im]]| {
@@ -73,7 +79,7 @@ pub(super) fn roots(model: &Model) -> Table {
 }
 
 /// The channels with their offsets and static gains.
-pub(super) fn signals(model: &Model) -> Table {
+pub(super) fn signals(model: &PolynomialModel) -> Table {
     let mut table =
         Table::new("Signals", &["channel", "role", "offset", "trend [1/s]", "static gain to the output"]);
     let gains =
@@ -88,13 +94,60 @@ pub(super) fn signals(model: &Model) -> Table {
     table
 }
 
-pub(super) fn estimation(estimation: &Estimation, model: &Model) -> Table {
+/// The parameters of a model in equations, and what was known of them before.
+pub(super) fn unknown_parameters(report: &Report, model: &EquationsModel) -> Table {
+    let head = ["parameter", "value", "standard error", "start", "min", "max", "change of variable"];
+    let mut table = Table::new("Parameters", &head);
+    let unknown = match &report.estimation.procedure {
+        Procedure::InnovationsLikelihood(outcome) => outcome.unknown.as_slice(),
+        _ => &[],
+    };
+    for (parameter, known) in model.parameters.iter().zip(unknown) {
+        table.row([
+            parameter.name.clone(),
+            number(parameter.value),
+            or_dash(parameter.standard_error, three),
+            short(known.start),
+            or_dash(known.min, short),
+            or_dash(known.max, short),
+            or_dash(known.change_of_variable.clone(), |words| words),
+        ]);
+    }
+    table
+}
+
+/// Where the states of a model in equations start in its free runs on the estimation rows.
+pub(super) fn starts(report: &Report, model: &EquationsModel) -> Table {
+    let mut table = Table::new("States", &["state", "start of each free run on the estimation rows"]);
+    let starts = match &report.estimation.procedure {
+        Procedure::InnovationsLikelihood(outcome) => outcome.starts.as_slice(),
+        _ => &[],
+    };
+    for (state, starts) in model.states.iter().zip(starts) {
+        let starts: Vec<String> = starts.iter().map(|start| or_dash(*start, number)).collect();
+        table.row([state.clone(), starts.join(", ")]);
+    }
+    table
+}
+
+pub(super) fn estimation(estimation: &Estimation, noise_variance: Option<f64>) -> Table {
     let mut table = Table::new("Estimation", &["figure", "value"]);
     let mut add = |name: &str, value: String| table.row([name.to_owned(), value]);
     add("procedure", procedure(&estimation.procedure));
     add("samples", estimation.samples.to_string());
     add("mean of e²", number(estimation.mse));
-    add("noise variance", number(model.noise_variance));
+    if let Some(variance) = noise_variance {
+        add("noise variance", number(variance));
+    }
+    if let Procedure::InnovationsLikelihood(outcome) = &estimation.procedure {
+        let nis = outcome.nis.as_ref();
+        add("ln L", number(outcome.log_likelihood));
+        add(
+            "mean nis",
+            or_dash(nis, |nis| format!("{} (expected {})", three(nis.mean), three(nis.expected))),
+        );
+        add("covariance multiplied by", three(outcome.covariance_factor));
+    }
     add("condition number", or_dash(estimation.condition, |condition| scientific(condition, 3)));
     let four = |value: f64| fixed(value, 4);
     let criteria = &estimation.criteria;
@@ -139,7 +192,17 @@ fn procedure(procedure: &Procedure) -> String {
             )
         }
         Procedure::Constrained(outcome) => format!("convex optimization, norm {}", outcome.norm),
+        Procedure::InnovationsLikelihood(outcome) => format!(
+            "largest likelihood of the innovations, iterations: {}, {}",
+            outcome.search.iterations,
+            stopped(&outcome.search.stopped)
+        ),
     }
+}
+
+/// Who, and of which output where there are several.
+pub(super) fn which(who: &str, validation: &Validation, output: &str) -> String {
+    if validation.noise.len() > 1 { format!("{who}, {output}") } else { who.to_owned() }
 }
 
 /// The tests of what is left of several parts, or by several models: `who` says which.
@@ -148,8 +211,11 @@ pub(super) fn tests(who: &str, parts: &[(String, &Validation)]) -> Table {
         "Tests of the residuals",
         &["test", who, "lags", "statistic", "degrees of freedom", "p-value"],
     );
-    for (name, validation) in parts {
-        let Some(residuals) = &validation.residuals else { continue };
+    let each = parts.iter().flat_map(|(name, validation)| {
+        validation.residuals.iter().map(move |residuals| (name, validation, residuals))
+    });
+    for (name, validation, residuals) in each {
+        let name = which(name, validation, &residuals.output);
         let mut add = |label: String, test: &crate::Test| {
             table.row([
                 label,
@@ -180,12 +246,14 @@ pub(super) fn anderson(who: &str, parts: &[(String, &Validation)]) -> Table {
         "Correlations outside of their band (Anderson)",
         &["alpha", who, "band", "lags", "outside", "fraction", "p-value", "white"],
     );
-    for (name, validation) in parts {
-        let Some(residuals) = &validation.residuals else { continue };
+    let each = parts.iter().flat_map(|(name, validation)| {
+        validation.residuals.iter().map(move |residuals| (name, validation, residuals))
+    });
+    for (name, validation, residuals) in each {
         for level in &residuals.anderson.levels {
             table.row([
                 short(level.alpha),
-                name.clone(),
+                which(name, validation, &residuals.output),
                 format!("± {}", three(level.band)),
                 residuals.anderson.lags.to_string(),
                 level.outside.to_string(),
@@ -210,14 +278,15 @@ pub(super) fn coverage(who: &str, parts: &[(String, &Validation)]) -> Table {
     let head: Vec<&str> = head.iter().map(String::as_str).collect();
     let mut table = Table::new("How often the output lies in its prediction intervals", &head);
     for (name, validation) in parts {
-        let mut steps: Vec<usize> = validation.coverage.iter().map(|one| one.steps).collect();
-        steps.dedup();
-        for steps in steps {
-            let found: Vec<_> = validation.coverage.iter().filter(|one| one.steps == steps).collect();
+        let same = |one: &crate::Coverage, other: &crate::Coverage| {
+            (one.steps, &one.output) == (other.steps, &other.output)
+        };
+        for found in validation.coverage.chunk_by(same) {
             let at = |level: &f64| found.iter().find(|one| one.level == *level).and_then(|one| one.actual);
-            let mut cells = vec![name.clone(), steps.to_string()];
+            let name = which(name, validation, &found[0].output);
+            let mut cells = vec![name, found[0].steps.to_string()];
             cells.extend(levels.iter().map(|level| or_dash(at(level), percent)));
-            cells.push(or_dash(found.first(), |one| one.samples.to_string()));
+            cells.push(found[0].samples.to_string());
             table.row(cells);
         }
     }
@@ -229,14 +298,15 @@ pub(super) fn noise(who: &str, parts: &[(String, &Validation)]) -> Table {
     let head = [who, "mean of e²", "noise variance of the model", "ratio", "seen by the fit"];
     let mut table = Table::new("Errors one step ahead", &head);
     for (name, validation) in parts {
-        let noise = validation.noise;
-        table.row([
-            name.clone(),
-            or_dash(noise.mse, number),
-            number(noise.model),
-            or_dash(noise.ratio, three),
-            seen(validation.seen).to_owned(),
-        ]);
+        for noise in &validation.noise {
+            table.row([
+                which(name, validation, &noise.output),
+                or_dash(noise.mse, number),
+                number(noise.model),
+                or_dash(noise.ratio, three),
+                seen(validation.seen).to_owned(),
+            ]);
+        }
     }
     table
 }
@@ -333,11 +403,15 @@ fn legend<'a>(models: impl Iterator<Item = &'a Orders>) -> String {
 }
 
 /// Several models side by side.
-pub(super) fn comparison(models: &[(String, &Validated)]) -> Table {
+pub(super) fn comparison(models: &[(String, &Validated)], criteria: Option<&[Criteria]>) -> Table {
     let mut head: Vec<String> =
         ["file", "model", "parameters", "stable", "seen by the fit"].map(str::to_owned).to_vec();
     let mut horizons: Vec<String> = Vec::new();
-    let said = |fit: &Fit| format!("fit {} [%]", fit.horizon);
+    let several = models.iter().any(|(_, validated)| validated.validation.noise.len() > 1);
+    let said = |fit: &Fit| {
+        let of = if several { format!("of {}, ", fit.output) } else { String::new() };
+        format!("fit {of}{} [%]", fit.horizon)
+    };
     for fit in models.iter().flat_map(|(_, validated)| &validated.validation.fit) {
         if !horizons.contains(&said(fit)) {
             horizons.push(said(fit));
@@ -352,40 +426,51 @@ pub(super) fn comparison(models: &[(String, &Validated)]) -> Table {
         "too many outside from alpha on",
     ];
     head.extend(tests.map(str::to_owned));
+    if criteria.is_some() {
+        head.extend(InformationCriterion::all().map(|criterion| format!("{} of the fit", criterion.name())));
+    }
     let head: Vec<&str> = head.iter().map(String::as_str).collect();
-    let orders = models.iter().map(|(_, validated)| &validated.validation.orders);
-    let mut table = Table::new(format!("Figures ({})", legend(orders)), &head);
-    for (name, Validated { validation, .. }) in models {
+    let orders = models.iter().filter_map(|(_, validated)| validated.validation.orders.as_ref());
+    let legend = legend(orders);
+    let legend = if legend.is_empty() { legend } else { format!(" ({legend})") };
+    let mut table = Table::new(format!("Figures{legend}"), &head);
+    for (index, (name, Validated { validation, .. })) in models.iter().enumerate() {
         let mut cells = vec![
             name.clone(),
-            validation.orders.to_string(),
-            validation.orders.parameters().to_string(),
-            yes(validation.stable),
+            validation.model.clone(),
+            validation.parameters.to_string(),
+            or_dash(validation.stable, yes),
             seen(validation.seen).to_owned(),
         ];
         cells.extend(horizons.iter().map(|horizon| {
             let fit = validation.fit.iter().find(|fit| said(fit) == *horizon);
             or_dash(fit.and_then(|fit| fit.percent), |percent| fixed(percent, 3))
         }));
-        cells.push(or_dash(validation.noise.ratio, three));
-        let residuals = validation.residuals.as_ref();
+        // Of several outputs the one that is farthest from what is asked.
+        let farthest = |ratio: &f64| ratio.ln().abs();
+        let ratios = validation.noise.iter().filter_map(|noise| noise.ratio);
+        let ratio = ratios.max_by(|one, other| farthest(one).total_cmp(&farthest(other)));
+        cells.push(or_dash(ratio, three));
+        let each = || validation.residuals.iter();
         let least = |of: fn(&crate::Independence) -> Option<f64>| {
-            let values = residuals?.independence.iter().filter_map(of);
-            values.reduce(f64::min)
+            each().flat_map(|residuals| &residuals.independence).filter_map(of).reduce(f64::min)
         };
         let asked = asked(validation);
-        cells.push(or_dash(residuals.and_then(|residuals| residuals.ljung_box.p_value), |p| {
-            format!("{}{asked}", chance(p))
-        }));
+        let white = each().filter_map(|residuals| residuals.ljung_box.p_value).reduce(f64::min);
+        cells.push(or_dash(white, |p| format!("{}{asked}", chance(p))));
         cells.push(or_dash(least(|independence| independence.past.p_value), chance));
         cells.push(or_dash(least(|independence| independence.feedback.p_value), chance));
-        cells.push(match residuals {
-            Some(residuals) => {
-                let stops = residuals.anderson.stops_at.map_or_else(|| "none up to 0.5".to_owned(), short);
-                format!("{stops}{asked}")
-            }
-            None => "–".to_owned(),
-        });
+        let stops = each().map(|residuals| residuals.anderson.stops_at.unwrap_or(f64::INFINITY));
+        cells.push(or_dash(stops.reduce(f64::min), |stops| {
+            let stops = if stops.is_finite() { short(stops) } else { "none up to 0.5".to_owned() };
+            format!("{stops}{asked}")
+        }));
+        if let Some(own) = criteria.and_then(|criteria| criteria.get(index)) {
+            cells.extend(InformationCriterion::all().map(|criterion| {
+                let value = if criterion.is_logarithmic() { |value| fixed(value, 4) } else { number };
+                or_dash(own.of(criterion), value)
+            }));
+        }
         table.row(cells);
     }
     table.turned()

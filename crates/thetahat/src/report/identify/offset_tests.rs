@@ -3,7 +3,7 @@
 use super::*;
 use crate::estimate::estimate;
 use crate::regression::noise::Noise;
-use crate::{Automatic, Channel, Criterion, Model, OrderRange, Path, Record, Report, Search};
+use crate::{Automatic, Channel, Criterion, OrderRange, Path, PolynomialModel, Record, Report, Search};
 
 fn channel(name: &str, values: &[f64]) -> Channel {
     Channel { name: name.into(), values: values.to_vec() }
@@ -79,7 +79,7 @@ fn what_is_added_to_the_output_changes_its_level_alone() {
     for orders in structures() {
         let plan = Plan { detrend: Detrend::None, method: method.clone(), ..plan(&orders) };
         let (low, high) = (fitted(&u, &y, &plan), fitted(&u, &raised, &plan));
-        for (low, high) in low.model.parameters.iter().zip(&high.model.parameters) {
+        for (low, high) in low.polynomials().parameters.iter().zip(&high.polynomials().parameters) {
             assert!(
                 (low.value - high.value).abs() < 2e-4 * low.standard_error.unwrap(),
                 "{orders} {low:?} {high:?}"
@@ -89,9 +89,12 @@ fn what_is_added_to_the_output_changes_its_level_alone() {
         let error = below.standard_error.unwrap();
         assert!((above.value - below.value - 20.0).abs() < 2e-4 * error, "{orders}");
         assert!((above.standard_error.unwrap() / error - 1.0).abs() < 1e-3, "{orders}");
-        assert_eq!(high.model.output.offset.level, above.value);
-        assert_eq!(low.model.parameters.len(), orders.parameters());
-        assert_eq!((low.model.inputs.len(), low.model.orders), (orders.inputs(), orders));
+        assert_eq!(high.polynomials().output.offset.level, above.value);
+        assert_eq!(low.polynomials().parameters.len(), orders.parameters());
+        assert_eq!(
+            (low.polynomials().inputs.len(), low.polynomials().orders.clone()),
+            (orders.inputs(), orders)
+        );
     }
 }
 
@@ -114,12 +117,12 @@ fn a_constant_is_an_input_of_ones() {
         let place = orders.na + orders.nb.iter().sum::<usize>();
         let mut expected = explicit.parameters().to_vec();
         let constant = expected.remove(place);
-        for (found, expected) in report.model.parameters.iter().zip(&expected) {
+        for (found, expected) in report.polynomials().parameters.iter().zip(&expected) {
             assert!((found.value - expected).abs() < 1e-9, "{orders} {}", found.name);
         }
-        let gain: f64 = report.model.a.iter().sum();
+        let gain: f64 = report.polynomials().a.iter().sum();
         assert!((level(&report).value * gain - constant).abs() < 1e-9, "{orders}");
-        assert!((report.model.noise_variance - explicit.noise_variance()).abs() < 1e-9);
+        assert!((report.polynomials().noise_variance - explicit.noise_variance()).abs() < 1e-9);
         assert_eq!(report.estimation.criteria, explicit.criteria());
     }
 }
@@ -163,14 +166,17 @@ fn a_step_test_from_rest_comes_out_right() {
             let near = |found: Quantity, truth: f64| {
                 (found.value - truth).abs() < 4.0 * found.standard_error.unwrap()
             };
-            assert!(near(report.model.dc_gain[0].unwrap(), 0.5), "{orders} {seed}");
-            assert!(near(report.model.time_constants[0].unwrap(), -2.0 / 0.9_f64.ln()), "{orders} {seed}");
+            assert!(near(report.polynomials().dc_gain[0].unwrap(), 0.5), "{orders} {seed}");
+            assert!(
+                near(report.polynomials().time_constants[0].unwrap(), -2.0 / 0.9_f64.ln()),
+                "{orders} {seed}"
+            );
             // The inputs' offset is their mean.
             assert!(near(level(&report), 300.0 + 0.5 * 27.5), "{orders} {seed}: {:?}", level(&report));
             // From rest all is known without a constant.
             let plan = Plan { detrend: Detrend::Start(40), ..Plan::new(&["u"], "y", orders.clone()) };
             let from_rest = fitted(&u, &y, &plan);
-            assert!(near(from_rest.model.dc_gain[0].unwrap(), 0.5), "{orders} {seed}");
+            assert!(near(from_rest.polynomials().dc_gain[0].unwrap(), 0.5), "{orders} {seed}");
         }
     }
 }
@@ -192,13 +198,13 @@ fn choices_find_the_model_of_a_step_test() {
     for choice in [Choice::Grid(grid), Choice::Automatic(automatic), Choice::Automatic(Automatic::default())]
     {
         let report = fitted(&u, &y, &Plan::new(&["u"], "y", choice));
-        let gain = report.model.dc_gain[0].unwrap();
+        let gain = report.polynomials().dc_gain[0].unwrap();
         assert!((gain.value - 0.5).abs() < 4.0 * gain.standard_error.unwrap(), "{gain:?}");
-        assert_eq!(report.model.inputs.len(), 1);
-        let selection = report.selection.unwrap();
+        assert_eq!(report.polynomials().inputs.len(), 1);
+        let selection = report.selection.as_ref().unwrap();
         assert!(selection.steps.iter().any(|step| step.contains("a constant")), "{:?}", selection.steps);
         assert!(selection.best.iter().all(|model| model.orders.inputs() == 1));
-        assert_eq!(selection.chosen.orders, report.model.orders);
+        assert_eq!(selection.chosen.orders, report.polynomials().orders);
     }
 }
 
@@ -212,9 +218,9 @@ fn a_trend_is_found() {
         let slope = report.estimation.slope.unwrap();
         // Rows are 2 s apart.
         assert!((slope.value - 0.015).abs() < 4.0 * slope.standard_error.unwrap(), "{orders} {slope:?}");
-        assert_eq!(report.model.output.offset.slope, slope.value);
+        assert_eq!(report.polynomials().output.offset.slope, slope.value);
         let middle = level(&report);
-        let line = report.model.output.offset.at(499.0);
+        let line = report.polynomials().output.offset.at(499.0);
         assert!((middle.value - line).abs() < 1e-9, "{orders}: {middle:?} {line}");
     }
 }
@@ -248,16 +254,16 @@ fn other_ways_to_estimate_have_a_constant_too() {
     for (orders, method, close) in ways {
         for constant in [Constant::Yes, Constant::Auto] {
             let report = fitted(&u, &y, &Plan { method: method.clone(), constant, ..plan(&orders) });
-            let gain = report.model.dc_gain[0].unwrap().value;
+            let gain = report.polynomials().dc_gain[0].unwrap().value;
             assert!((gain - 0.5).abs() < close, "{method:?} {constant:?}: {gain}");
             assert!((level(&report).value - 313.75).abs() < 2.0, "{method:?} {:?}", level(&report));
-            assert_eq!(report.model.parameters.len(), 2);
+            assert_eq!(report.polynomials().parameters.len(), 2);
         }
     }
     // A bound on the gain names the input as it did.
     let gain = Criterion { dc_gain: vec!["u=0.4..0.45".parse().unwrap()], ..Criterion::default() };
     let report = fitted(&u, &y, &Plan { method: Method::Constrained(gain), ..plan(&arx) });
-    assert!((report.model.dc_gain[0].unwrap().value - 0.45).abs() < 1e-6);
+    assert!((report.polynomials().dc_gain[0].unwrap().value - 0.45).abs() < 1e-6);
 }
 
 #[test]
@@ -307,13 +313,14 @@ fn what_is_open_of_the_offset_goes_with_the_model() {
     let raised: Vec<f64> = y.iter().map(|y| y + 20.0).collect();
     let method = Method::PredictionError(Search { tolerance: 1e-12, ..Search::default() });
     for orders in structures() {
-        let open =
-            |y: &[f64], plan: &Plan| fitted(&u, y, plan).model.offset_covariance.map(|open| open.covariance);
+        let open = |y: &[f64], plan: &Plan| {
+            fitted(&u, y, plan).polynomials().offset_covariance.clone().map(|open| open.covariance)
+        };
         // Estimated, around zero and around another level: the matrix is the same, and that of the parameters is a part of it.
         let yes = Plan { detrend: Detrend::None, method: method.clone(), ..plan(&orders) };
         let (low, high) = (open(&y, &yes).unwrap(), open(&raised, &yes).unwrap());
         let count = orders.parameters();
-        let own = fitted(&u, &y, &yes).model.covariance.unwrap();
+        let own = fitted(&u, &y, &yes).polynomials().covariance.clone().unwrap();
         assert_eq!(low.len(), count + 1);
         for (i, j) in (0..=count).flat_map(|i| (0..=count).map(move |j| (i, j))) {
             let size = (low[i][i] * low[j][j]).sqrt();
@@ -324,8 +331,8 @@ fn what_is_open_of_the_offset_goes_with_the_model() {
         let found = fitted(&u, &raised, &plan(&orders));
         let mean = Plan { constant: Constant::No, method: method.clone(), ..plan(&orders) };
         let report = fitted(&u, &raised, &mean);
-        let gain: f64 = report.model.a.iter().sum();
-        let off = gain * (level(&found).value - report.model.output.offset.level);
+        let gain: f64 = report.polynomials().a.iter().sum();
+        let off = gain * (level(&found).value - report.polynomials().output.offset.level);
         let taken = open(&raised, &mean).unwrap();
         let expected = low[count][count] + off * off;
         assert!(
@@ -342,17 +349,17 @@ fn what_is_open_of_the_offset_goes_with_the_model() {
         let mut document: serde_json::Value = serde_json::from_str(&report.to_json().unwrap()).unwrap();
         assert_eq!(Report::from_json(&document.to_string()).unwrap(), report);
         document["model"].as_object_mut().unwrap().remove("offset_covariance");
-        assert_eq!(Report::from_json(&document.to_string()).unwrap().model.offset_covariance, None);
+        assert_eq!(Report::from_json(&document.to_string()).unwrap().polynomials().offset_covariance, None);
     }
     let instruments =
         Plan { method: Method::InstrumentalVariables, constant: Constant::No, ..plan(&structures()[0]) };
-    assert!(fitted(&u, &raised, &instruments).model.offset_covariance.is_some());
+    assert!(fitted(&u, &raised, &instruments).polynomials().offset_covariance.is_some());
     let refined = Plan {
         method: Method::RefinedInstrumentalVariables,
         constant: Constant::No,
         ..plan(&structures()[2])
     };
-    assert!(fitted(&u, &raised, &refined).model.offset_covariance.is_some());
+    assert!(fitted(&u, &raised, &refined).polynomials().offset_covariance.is_some());
 }
 
 #[test]
@@ -363,12 +370,13 @@ fn forecasts_count_the_level() {
     let mut y = vec![0.0];
     (1..60).for_each(|t| y.push(0.97 * y[t - 1] + 0.5 * u[t - 1] + noise.normal()));
     let orders = Orders::arx(1, &[1], &[1]).unwrap();
-    let model = fitted(&u, &y, &Plan { constant: Constant::No, ..plan(&orders) }).model;
-    let given = Model { offset_covariance: None, ..model.clone() };
-    let last = |model: &Model, detrend: Option<Detrend>| {
+    let model = fitted(&u, &y, &Plan { constant: Constant::No, ..plan(&orders) }).polynomials().clone();
+    let given = PolynomialModel { offset_covariance: None, ..model.clone() };
+    let last = |model: &PolynomialModel, detrend: Option<Detrend>| {
         let start = crate::Start::Drop;
-        let applied = crate::apply(model, log(&u, &y), &[], detrend, Horizon::Steps { steps: 20 }, start);
-        applied.unwrap().standard_deviations.unwrap()[59]
+        let (model, horizon) = (model.clone().into(), Horizon::Steps { steps: 20 });
+        let applied = crate::apply(&model, &log(&u, &y), &[], detrend, horizon, start);
+        applied.unwrap().outputs[0].standard_deviations.as_ref().unwrap()[59]
     };
     assert!(last(&model, None) > 1.05 * last(&given, None), "{} {}", last(&model, None), last(&given, None));
     // An offset of other rows is not that of the model.

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::regression::noise::Noise;
-use crate::{Channel, Method, Orders, Plan, Requirement, Search, identify};
+use crate::{Channel, Initial, Method, Orders, Plan, Requirement, Search, Start, identify};
 
 /// Rows of u and y around 5 and 20: y(t) = 1.2 y(t-1) - 0.5 y(t-2) + u(t-1) + 0.4 u(t-2) + 0.2 e(t).
 fn signals(rows: usize) -> (Vec<f64>, Vec<f64>) {
@@ -39,7 +39,7 @@ fn plan(text: &str) -> ValidationPlan {
 }
 
 fn found(report: &Report, log: &Log, plan: &ValidationPlan) -> Validation {
-    validate(report, None, log.clone(), &[], plan).unwrap().validation
+    validate(report, None, log, &[], plan).unwrap().validation
 }
 
 #[test]
@@ -64,7 +64,7 @@ fn the_log_of_the_fit_is_known_by_its_errors() {
         (&whole, "51..300", Orders::arx(2, &[], &[]).unwrap(), Initial::Auto),
     ] {
         let report = fitted(log, estimate, orders, initial);
-        let what = format!("{:?} {estimate} {initial:?}", report.model.structure);
+        let what = format!("{:?} {estimate} {initial:?}", report.polynomials().structure);
         let seen = |text: &str| found(&report, log, &plan(text)).seen;
         assert_eq!(seen(estimate), Seen::Yes, "{what}");
         assert_eq!(
@@ -79,7 +79,7 @@ fn the_log_of_the_fit_is_known_by_its_errors() {
         changed[150] += 1e-3;
         let found = found(&report, &super::tests::log(&u, &changed), &plan(estimate));
         assert_eq!(found.seen, Seen::No, "{what}");
-        assert_eq!(found.residuals.unwrap().fitted, 0);
+        assert_eq!(found.residuals[0].fitted, 0);
     }
     // A log that goes on behind the rows of the fit; one that ends before.
     let report = fitted(&log(&u[..300], &y[..300]), "1..300", arx(), Initial::Auto);
@@ -93,7 +93,9 @@ fn figures_are_those_of_their_definitions() {
     let log = log(&u, &y);
     let report = fitted(&log, "1..300", arx(), Initial::Auto);
     let plan = ValidationPlan { horizons: vec![3, 1, 3, 7], ..plan("301..600") };
-    let Validated { validation: found, signals } = validate(&report, Some("m"), log, &[], &plan).unwrap();
+    let Validated { validation: found, signals, .. } =
+        validate(&report, Some("m"), &log, &[], &plan).unwrap();
+    let output = &signals.outputs[0];
     assert_eq!((found.schema.as_str(), found.report.as_deref()), (Validation::SCHEMA, Some("m")));
     let horizons: Vec<String> = found.fit.iter().map(|fit| fit.horizon.to_string()).collect();
     assert_eq!(horizons, ["1 step ahead", "3 steps ahead", "7 steps ahead", "free run"]);
@@ -102,22 +104,26 @@ fn figures_are_those_of_their_definitions() {
         [1, 1, 1, 1, 3, 3, 3, 3, 7, 7, 7, 7]
     );
     // In the log's own units, over the rows that were asked for.
-    assert_eq!((&signals.measured, &signals.inputs[0].1, &signals.time[2]), (&y, &u, &1.0));
-    let errors: Vec<f64> = (300..600).map(|t| y[t] - signals.predicted[t]).collect();
+    assert_eq!((&output.measured, &signals.inputs[0].1, &signals.time[2]), (&y, &u, &1.0));
+    let errors: Vec<f64> = (300..600).map(|t| y[t] - output.predicted[t]).collect();
     let mse = errors.iter().map(|e| e * e).sum::<f64>() / 300.0;
-    assert!((found.noise.mse.unwrap() / mse - 1.0).abs() < 1e-9);
-    assert!((found.noise.ratio.unwrap() - mse / report.model.noise_variance).abs() < 1e-9);
+    assert!((found.noise[0].mse.unwrap() / mse - 1.0).abs() < 1e-9);
+    assert!((found.noise[0].ratio.unwrap() - mse / report.polynomials().noise_variance).abs() < 1e-9);
     assert!((found.fit[0].rmse.unwrap() - mse.sqrt()).abs() < 1e-12);
-    let half = 1.959964 * report.model.noise_variance.sqrt();
+    let half = 1.959964 * report.polynomials().noise_variance.sqrt();
     let inside = errors.iter().filter(|e| e.abs() <= half).count() as f64 / 300.0;
     assert_eq!((found.coverage[2].level, found.coverage[2].actual), (0.95, Some(inside)));
-    let run = signals.simulated.unwrap();
-    assert!(signals.predicted[299].is_nan() && run[299].is_nan() && run[300].is_finite());
+    let run = output.simulated.as_ref().unwrap();
+    assert!(output.predicted[299].is_nan() && run[299].is_nan() && run[300].is_finite());
     let square = (300..600).map(|t| (y[t] - run[t]).powi(2)).sum::<f64>();
     assert!((found.fit[3].rmse.unwrap() - (square / 300.0).sqrt()).abs() < 1e-12);
     assert_eq!(found.fit[3].initial, Start::Estimate);
 
-    assert!(found.white_expected && found.stable && found.warnings.is_empty(), "{:?}", found.warnings);
+    assert!(
+        found.white_expected && found.stable == Some(true) && found.warnings.is_empty(),
+        "{:?}",
+        found.warnings
+    );
     let text = found.to_json().unwrap();
     assert_eq!(Validation::from_json(&text).unwrap(), found);
     assert!(text.ends_with("}\n"));
@@ -130,17 +136,18 @@ fn offsets_of_the_rows_are_taken_where_asked_for() {
     let report = fitted(&whole, "1..300", arx(), Initial::Auto);
     let high: Vec<f64> = y.iter().map(|y| y + 3.0).collect();
     let high = log(&u, &high);
-    let plain = validate(&report, None, high.clone(), &[], &plan("301..600")).unwrap();
+    let plain = validate(&report, None, &high, &[], &plan("301..600")).unwrap();
     let text = plain.validation.warnings.join("\n");
     assert!(text.contains("have a mean of 0.90") && text.contains("--detrend mean"), "{text}");
     assert!(text.contains("times the model's noise variance"), "{text}");
     // An offset is no matter of dynamics.
     assert!(!text.contains("white") && !text.contains("past values"), "{text}");
     let own = ValidationPlan { detrend: Some(Detrend::Mean), ..plan("301..600") };
-    let own = validate(&report, None, high, &[], &own).unwrap();
+    let own = validate(&report, None, &high, &[], &own).unwrap();
     assert!(own.validation.warnings.is_empty(), "{:?}", own.validation.warnings);
     assert!(own.validation.fit.iter().all(|fit| fit.percent.unwrap() > 80.0));
-    let near = |t: usize| (own.signals.predicted[t] - own.signals.measured[t]).abs() < 1.0;
+    let near =
+        |t: usize| (own.signals.outputs[0].predicted[t] - own.signals.outputs[0].measured[t]).abs() < 1.0;
     assert!((301..600).all(near));
 }
 
@@ -175,7 +182,7 @@ fn what_is_wrong_is_said() {
     // Two inputs share the level.
     let of = |p: f64| {
         let mut two = found.clone();
-        let independence = &mut two.residuals.as_mut().unwrap().independence;
+        let independence = &mut two.residuals[0].independence;
         independence.push(independence[0].clone());
         independence[1].past.p_value = Some(p);
         Requirement::Independent.unmet(&two, 0.05)
@@ -183,7 +190,8 @@ fn what_is_wrong_is_said() {
     assert_eq!(of(0.03), None);
     assert!(of(0.02).unwrap().contains("p-value 0.0200, below 0.025"));
     // Without a test there is nothing that could be met.
-    let untested = Validation { residuals: None, fit: vec![], coverage: vec![], stable: false, ..found };
+    let untested =
+        Validation { residuals: vec![], fit: vec![], coverage: vec![], stable: Some(false), ..found };
     for text in ["white", "independent", "fit>=0", "coverage>=0", "stable"] {
         let requirement: Requirement = text.parse().unwrap();
         assert!(requirement.unmet(&untested, 0.05).unwrap().starts_with(text));
@@ -258,13 +266,13 @@ fn logs_that_say_little_leave_nulls() {
         let found = found(&report, &log(&u, &y), &plan(""));
         let text = found.to_json().unwrap();
         assert_eq!(Validation::from_json(&text).unwrap(), found);
-        assert!(found.residuals.is_some() || !found.warnings.is_empty());
+        assert!(!found.residuals.is_empty() || !found.warnings.is_empty());
     }
     let nothing = log(&[f64::NAN; 5], &[1.0; 5]);
-    let error = validate(&report, None, nothing, &[], &plan("")).unwrap_err();
+    let error = validate(&report, None, &nothing, &[], &plan("")).unwrap_err();
     assert!(error.to_string().contains("no row has a value in every channel"), "{error}");
     let slow = Log::new(whole.channels().to_vec(), 0.6).unwrap();
-    assert!(validate(&report, None, slow, &[], &plan("")).unwrap_err().to_string().contains("sample time"));
+    assert!(validate(&report, None, &slow, &[], &plan("")).unwrap_err().to_string().contains("sample time"));
     let wrong = |plan: ValidationPlan| match plan.check() {
         Err(Error::Argument { argument, .. }) => argument,
         other => format!("{other:?}"),
@@ -283,7 +291,7 @@ fn models_are_compared_on_the_same_rows() {
     let (u, y) = signals(300);
     let log = log(&u, &y);
     let report = fitted(&log, "1..300", arx(), Initial::Auto);
-    let on = |text: &str| validate(&report, Some("a"), log.clone(), &[], &plan(text)).unwrap();
+    let on = |text: &str| validate(&report, Some("a"), &log, &[], &plan(text)).unwrap();
     let comparison = compare(&[on("1..200"), on("1..200")]).unwrap();
     assert_eq!(comparison.models.len(), 2);
     let text = comparison.to_json().unwrap();

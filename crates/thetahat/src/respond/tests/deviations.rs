@@ -5,7 +5,7 @@ use super::{signals, views, with_poles};
 use crate::data::Record;
 use crate::regression::noise::Noise;
 use crate::{
-    Draws, Model, OffsetCovariance, Orders, Start, draw, forecast, predict, prediction_deviation,
+    Draws, OffsetCovariance, Orders, PolynomialModel, Start, draw, forecast, predict, prediction_deviation,
     prediction_deviations,
 };
 
@@ -17,12 +17,19 @@ fn covariance(count: usize, noise: &mut Noise) -> Vec<Vec<f64>> {
 }
 
 /// g' P g at each place of what `values` gives for parameters, by central differences.
-fn spread(model: &Model, covariance: &[Vec<f64>], values: impl Fn(&Model) -> Vec<f64>) -> Vec<f64> {
+fn spread(
+    model: &PolynomialModel,
+    covariance: &[Vec<f64>],
+    values: impl Fn(&PolynomialModel) -> Vec<f64>,
+) -> Vec<f64> {
     let center: Vec<f64> = model.parameters.iter().map(|parameter| parameter.value).collect();
     let moved = |k: usize, by: f64| {
         let mut moved = center.clone();
         moved[k] += by;
-        values(&Model::from_parameters(&model.orders, &moved, None, model.noise_variance, 1.0).unwrap())
+        values(
+            &PolynomialModel::from_parameters(&model.orders, &moved, None, model.noise_variance, 1.0)
+                .unwrap(),
+        )
     };
     let step = 1e-7;
     let slopes: Vec<Vec<f64>> = (0..center.len())
@@ -39,7 +46,7 @@ fn spread(model: &Model, covariance: &[Vec<f64>], values: impl Fn(&Model) -> Vec
     (0..slopes.first().map_or(0, Vec::len)).map(at).collect()
 }
 
-fn starts(model: &Model) -> &'static [Start] {
+fn starts(model: &PolynomialModel) -> &'static [Start] {
     if model.orders.is_linear() {
         &[Start::Zero, Start::Drop]
     } else {
@@ -57,8 +64,10 @@ fn parameters_add_the_square_of_what_they_do() {
         let (u, e) = (signals(model.b.len(), 140, &mut noise), noise.take(140));
         let (noisy, exact) = (output(&model, &u, &e), output(&model, &u, &[0.0; 140]));
         let future: Vec<&[f64]> = u.iter().map(|u| &u[120..]).collect();
-        let uncertain =
-            Model { covariance: Some(covariance(model.parameters.len(), &mut noise)), ..model.clone() };
+        let uncertain = PolynomialModel {
+            covariance: Some(covariance(model.parameters.len(), &mut noise)),
+            ..model.clone()
+        };
         let matrix = uncertain.covariance.as_ref().unwrap();
         let assert_added = |what: &str, with: &[f64], without: &[f64], expected: &[f64]| {
             assert_eq!(with.len(), expected.len());
@@ -94,14 +103,17 @@ fn parameters_add_the_square_of_what_they_do() {
             for horizon in [1, 4] {
                 let counted =
                     |values: Vec<f64>| values.into_iter().filter(|v| !v.is_nan()).collect::<Vec<_>>();
-                let of = |model: &Model| counted(predict(model, &record, horizon, start).unwrap().values);
-                let deviations =
-                    |model: &Model| counted(prediction_deviations(model, &record, horizon, start).unwrap());
+                let of = |model: &PolynomialModel| {
+                    counted(predict(model, &record, horizon, start).unwrap().values)
+                };
+                let deviations = |model: &PolynomialModel| {
+                    counted(prediction_deviations(model, &record, horizon, start).unwrap())
+                };
                 let expected = spread(&model, matrix, of);
                 let what = format!("{start:?} {horizon}");
                 assert_added(&what, &deviations(&uncertain), &deviations(&model), &expected);
             }
-            let ahead = |model: &Model| forecast(model, &record, &future, 20, start).unwrap();
+            let ahead = |model: &PolynomialModel| forecast(model, &record, &future, 20, start).unwrap();
             let expected = spread(&model, matrix, |model| ahead(model).values);
             let (with, without) = (ahead(&uncertain).standard_deviations, ahead(&model).standard_deviations);
             assert_added(&format!("{start:?} forecast"), &with, &without, &expected);
@@ -152,7 +164,7 @@ fn degrees_of_freedom_make_intervals_wider() {
     let y = Noise(24).take(30);
     let record = Record::new(&y, vec![]).unwrap();
     let of = |degrees: Option<usize>| {
-        let model = Model { degrees_of_freedom: degrees, ..model.clone() };
+        let model = PolynomialModel { degrees_of_freedom: degrees, ..model.clone() };
         prediction_deviations(&model, &record, 3, Start::Drop).unwrap()[10]
     };
     assert_eq!(of(None), prediction_deviation(&model, 3).unwrap());
@@ -162,7 +174,7 @@ fn degrees_of_freedom_make_intervals_wider() {
 }
 
 /// A matrix of zeros but for the variances of what is open of the offset.
-fn open(model: &mut Model, variances: &[f64], middle: Option<f64>) {
+fn open(model: &mut PolynomialModel, variances: &[f64], middle: Option<f64>) {
     let own = model.parameters.len();
     let size = own + variances.len();
     let entry = |i: usize, j: usize| if i == j && i >= own { variances[i - own] } else { 0.0 };
@@ -177,7 +189,7 @@ fn an_open_offset_adds_what_a_constant_and_a_trend_do() {
     let record = Record::new(&y, vec![&u]).unwrap();
     let near = |found: f64, variance: f64| (found / variance.sqrt() - 1.0).abs() < 1e-12;
     let of = |orders: Orders, parameters: &[f64]| {
-        Model::from_parameters(&orders, parameters, None, 0.25, 0.5).unwrap()
+        PolynomialModel::from_parameters(&orders, parameters, None, 0.25, 0.5).unwrap()
     };
     // Without A the constant is the level.
     let mut oe = of(Orders::oe(&[1], &[1], &[1]).unwrap(), &[1.0, -0.5]);

@@ -3,7 +3,7 @@
 use crate::data::Record;
 use crate::regression::noise::Noise;
 use crate::respond::{Draws, Start, draw, simulate};
-use crate::{Channel, Error, Log, Model, Orders, Rows};
+use crate::{Channel, Error, Log, Orders, PolynomialModel, Rows};
 
 fn diagonal(variances: &[f64]) -> Vec<Vec<f64>> {
     let row = |i: usize| (0..variances.len()).map(|j| if i == j { variances[i] } else { 0.0 }).collect();
@@ -20,7 +20,7 @@ fn moments(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
 fn noise_goes_through_its_model_and_is_stationary_unless_it_starts_at_rest() {
     // y = 2 u(t - 1) + e/(1 - 0.8 q^-1), e of variance 0.36: v has the variance 1 and r(1) = 0.8.
     let orders = Orders::bj(&[1], 0, 1, &[0], &[1]).unwrap();
-    let model = Model::from_parameters(&orders, &[2.0, -0.8], None, 0.36, 1.0).unwrap();
+    let model = PolynomialModel::from_parameters(&orders, &[2.0, -0.8], None, 0.36, 1.0).unwrap();
     let u = Noise(1).take(40);
     let y = vec![0.0; 40];
     let record = Record::new(&y, vec![&u]).unwrap();
@@ -48,7 +48,7 @@ fn parameters_vary_as_their_covariance_says() {
     // A gain alone: y = b u, without noise.
     let orders = Orders::arx(0, &[2], &[0]).unwrap();
     let covariance = vec![vec![0.04, 0.018], vec![0.018, 0.09]];
-    let model = Model::from_parameters(&orders, &[1.0, -2.0], Some(&covariance), 0.0, 1.0).unwrap();
+    let model = PolynomialModel::from_parameters(&orders, &[1.0, -2.0], Some(&covariance), 0.0, 1.0).unwrap();
     // u = 1, 0, 0 gives b0, then b1.
     let u = [1.0, 0.0, 0.0];
     let record = Record::new(&[0.0; 3], vec![&u]).unwrap();
@@ -71,9 +71,14 @@ fn parameters_vary_as_their_covariance_says() {
 #[test]
 fn the_same_seed_gives_the_same_bits_on_any_number_of_threads() {
     let orders = Orders::armax(1, &[1], 1, &[1]).unwrap();
-    let model =
-        Model::from_parameters(&orders, &[-0.7, 1.0, 0.3], Some(&diagonal(&[1e-3, 1e-3, 1e-2])), 0.1, 1.0)
-            .unwrap();
+    let model = PolynomialModel::from_parameters(
+        &orders,
+        &[-0.7, 1.0, 0.3],
+        Some(&diagonal(&[1e-3, 1e-3, 1e-2])),
+        0.1,
+        1.0,
+    )
+    .unwrap();
     let u = Noise(1).take(300);
     let y = Noise(2).take(300);
     let mut record = Record::new(&y, vec![&u]).unwrap();
@@ -101,9 +106,14 @@ fn the_same_seed_gives_the_same_bits_on_any_number_of_threads() {
 fn unstable_parameters_are_drawn_again_and_counted() {
     let orders = Orders::arx(1, &[1], &[1]).unwrap();
     let drawn = |pole: f64, variance: f64| {
-        let model =
-            Model::from_parameters(&orders, &[-pole, 1.0], Some(&diagonal(&[variance, 0.0])), 1.0, 1.0)
-                .unwrap();
+        let model = PolynomialModel::from_parameters(
+            &orders,
+            &[-pole, 1.0],
+            Some(&diagonal(&[variance, 0.0])),
+            1.0,
+            1.0,
+        )
+        .unwrap();
         let u = [1.0; 200];
         draw(&model, &Record::new(&u, vec![&u]).unwrap(), Start::Zero, &Draws { count: 500, seed: 1 })
     };
@@ -121,7 +131,7 @@ fn unstable_parameters_are_drawn_again_and_counted() {
 #[test]
 fn what_cannot_be_drawn_is_refused() {
     let orders = Orders::arx(1, &[1], &[1]).unwrap();
-    let model = Model::from_parameters(&orders, &[-0.5, 1.0], None, 1.0, 1.0).unwrap();
+    let model = PolynomialModel::from_parameters(&orders, &[-0.5, 1.0], None, 1.0, 1.0).unwrap();
     let u = vec![0.0; 2000];
     let record = Record::new(&u, vec![&u]).unwrap();
     for count in [0, 100_001, 100_000] {
@@ -137,7 +147,7 @@ fn runs_go_on_where_an_output_is_missing() {
         (Orders::oe(&[1], &[1], &[1]).unwrap(), &[1.0, -0.5][..]),
         (Orders::bj(&[1], 0, 1, &[1], &[1]).unwrap(), &[1.0, -0.8, -0.5]),
     ] {
-        let model = Model::from_parameters(&orders, parameters, None, 1.0, 1.0).unwrap();
+        let model = PolynomialModel::from_parameters(&orders, parameters, None, 1.0, 1.0).unwrap();
         let channel = |name: &str, values: Vec<f64>| Channel { name: name.to_owned(), values };
         let mut y = Noise(5).take(30);
         y[10..14].fill(f64::NAN);

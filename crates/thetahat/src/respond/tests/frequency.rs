@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use super::general::models;
 use crate::regression::noise::Noise;
-use crate::{Error, FrequencyPoint, Model, frequency_response, logarithmic_frequencies};
+use crate::{Error, FrequencyPoint, PolynomialModel, frequency_response, logarithmic_frequencies};
 
 /// A covariance matrix of some parameters, well conditioned and not diagonal.
 fn spread(count: usize, size: f64, noise: &mut Noise) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
@@ -15,11 +15,15 @@ fn spread(count: usize, size: f64, noise: &mut Noise) -> (Vec<Vec<f64>>, Vec<Vec
     (factor, covariance)
 }
 
-fn with_parameters(model: &Model, parameters: &[f64], covariance: Option<&[Vec<f64>]>) -> Model {
-    Model::from_parameters(&model.orders, parameters, covariance, 0.25, 0.1).unwrap()
+fn with_parameters(
+    model: &PolynomialModel,
+    parameters: &[f64],
+    covariance: Option<&[Vec<f64>]>,
+) -> PolynomialModel {
+    PolynomialModel::from_parameters(&model.orders, parameters, covariance, 0.25, 0.1).unwrap()
 }
 
-fn parameters(model: &Model) -> Vec<f64> {
+fn parameters(model: &PolynomialModel) -> Vec<f64> {
     model.parameters.iter().map(|parameter| parameter.value).collect()
 }
 
@@ -208,7 +212,7 @@ fn frequencies_that_are_none_are_refused() {
     assert_eq!(frequency_response(&model, &[]).unwrap()[0].points, []);
     // A zero on the unit circle has no phase to be uncertain of.
     let notch = super::model(&[1.0], &[(0, &[1.0, 0.0, 1.0])]);
-    let notch = Model { covariance: Some(vec![vec![0.0; 3]; 3]), ..notch };
+    let notch = PolynomialModel { covariance: Some(vec![vec![0.0; 3]; 3]), ..notch };
     let point = frequency_response(&notch, &[PI / 2.0]).unwrap()[0].points[0];
     assert_eq!((point.magnitude.value, point.phase.standard_error), (0.0, None));
     for (first, last, count) in [

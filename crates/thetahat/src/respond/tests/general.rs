@@ -9,14 +9,15 @@ use crate::regression::noise::Noise;
 use crate::respond::innovations::innovations;
 use crate::respond::predict::deviations;
 use crate::{
-    Error, Initial, Method, Model, Orders, Signal, Start, estimate, predict, prediction_deviation, simulate,
+    Error, Initial, Method, Orders, PolynomialModel, Signal, Start, estimate, predict, prediction_deviation,
+    simulate,
 };
 
 /// One input: nk, B behind it, and F.
 pub(super) type Input<'a> = (usize, &'a [f64], &'a [f64]);
 
 /// A y = sum_j B_j/F_j u_j + C/D e.
-pub(super) fn model(a: &[f64], inputs: &[Input<'_>], c: &[f64], d: &[f64]) -> Model {
+pub(super) fn model(a: &[f64], inputs: &[Input<'_>], c: &[f64], d: &[f64]) -> PolynomialModel {
     let lengths = |of: fn(&Input<'_>) -> usize| inputs.iter().map(of).collect::<Vec<usize>>();
     let orders = Orders::new(
         a.len() - 1,
@@ -30,10 +31,10 @@ pub(super) fn model(a: &[f64], inputs: &[Input<'_>], c: &[f64], d: &[f64]) -> Mo
     inputs.iter().for_each(|(_, b, _)| parameters.extend_from_slice(b));
     parameters.extend(c[1..].iter().chain(&d[1..]));
     inputs.iter().for_each(|(_, _, f)| parameters.extend_from_slice(&f[1..]));
-    Model::from_parameters(&orders.unwrap(), &parameters, None, 0.25, 1.0).unwrap()
+    PolynomialModel::from_parameters(&orders.unwrap(), &parameters, None, 0.25, 1.0).unwrap()
 }
 
-pub(super) fn models() -> Vec<Model> {
+pub(super) fn models() -> Vec<PolynomialModel> {
     let one: &[f64] = &[1.0];
     let (fast, slow) = (with_poles(&[0.5, -0.3]), with_poles(&[0.99, 0.8]));
     let wave = [1.0, -1.6, 0.95];
@@ -67,7 +68,7 @@ pub(super) fn models() -> Vec<Model> {
 
 /// The recursions that define a model, from zeros before `begin`, written down sample by sample.
 pub(super) struct Recursion<'a> {
-    pub(super) model: &'a Model,
+    pub(super) model: &'a PolynomialModel,
     pub(super) inputs: &'a [&'a [f64]],
     pub(super) begin: usize,
     /// The first samples without e.
@@ -82,7 +83,12 @@ fn earlier(polynomial: &[f64], signal: &[f64], t: usize) -> f64 {
 }
 
 impl<'a> Recursion<'a> {
-    pub(super) fn new(model: &'a Model, inputs: &'a [&'a [f64]], begin: usize, silent: usize) -> Self {
+    pub(super) fn new(
+        model: &'a PolynomialModel,
+        inputs: &'a [&'a [f64]],
+        begin: usize,
+        silent: usize,
+    ) -> Self {
         Self { model, inputs, begin, silent, x: vec![Vec::new(); model.f.len()] }
     }
 
@@ -195,7 +201,7 @@ fn a_free_run_goes_on_from_what_is_known() {
 }
 
 /// The output to inputs and innovations, from zeros.
-pub(super) fn output(model: &Model, inputs: &[Vec<f64>], e: &[f64]) -> Vec<f64> {
+pub(super) fn output(model: &PolynomialModel, inputs: &[Vec<f64>], e: &[f64]) -> Vec<f64> {
     let length = e.len();
     // x = (B/F) u and (C/D) e as series.
     let filtered = |numerator: &[f64], denominator: &[f64], u: &[f64]| {
@@ -269,7 +275,7 @@ fn innovations_are_the_residuals_of_the_estimate() {
 }
 
 /// (1/C) of -D x, of which the first samples are zero: what a change of x does to e.
-fn effect(model: &Model, x: &[f64], silent: usize) -> Vec<f64> {
+fn effect(model: &PolynomialModel, x: &[f64], silent: usize) -> Vec<f64> {
     let mut e = vec![0.0; x.len()];
     for t in silent..x.len() {
         e[t] = -x[t] - earlier(&model.d, x, t) - earlier(&model.c, &e, t);
@@ -278,7 +284,7 @@ fn effect(model: &Model, x: &[f64], silent: usize) -> Vec<f64> {
 }
 
 /// What each single value of x_j before a segment does to x.
-fn effects_of_the_past(model: &Model, length: usize) -> Vec<Vec<f64>> {
+fn effects_of_the_past(model: &PolynomialModel, length: usize) -> Vec<Vec<f64>> {
     let mut effects = Vec::new();
     for f in model.f.iter().filter(|f| f.len() > 1) {
         let respond = |pulse: &dyn Fn(usize) -> f64| {
@@ -296,7 +302,7 @@ fn effects_of_the_past(model: &Model, length: usize) -> Vec<Vec<f64>> {
 
 /// What each single value of an input with F before a segment does to x, and how many more initial conditions it takes to make
 /// up for all of them where x counts from sample `first` on.
-fn effects_of_inputs(model: &Model, length: usize, first: usize) -> (Vec<Vec<f64>>, usize) {
+fn effects_of_inputs(model: &PolynomialModel, length: usize, first: usize) -> (Vec<Vec<f64>>, usize) {
     let (mut effects, mut more) = (Vec::new(), 0);
     for (b, f) in model.b.iter().zip(&model.f).filter(|(_, f)| f.len() > 1) {
         let respond = |lag: usize| {

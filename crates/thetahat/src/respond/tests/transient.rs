@@ -3,16 +3,16 @@
 use thetahat_core::nalgebra::Complex;
 
 use crate::respond::{frequency_response, impulse_response, step_response};
-use crate::{Model, Orders};
+use crate::{Orders, PolynomialModel};
 
 /// A model whose parameters have the identity as covariance matrix, or that of one parameter alone.
-fn model(orders: &Orders, parameters: &[f64], alone: Option<usize>) -> Model {
+fn model(orders: &Orders, parameters: &[f64], alone: Option<usize>) -> PolynomialModel {
     let count = parameters.len();
     let entry = |row: usize, column: usize| {
         f64::from(row == column && alone.is_none_or(|parameter| parameter == row))
     };
     let rows: Vec<Vec<f64>> = (0..count).map(|row| (0..count).map(|c| entry(row, c)).collect()).collect();
-    Model::from_parameters(orders, parameters, Some(&rows), 1.0, 0.5).unwrap()
+    PolynomialModel::from_parameters(orders, parameters, Some(&rows), 1.0, 0.5).unwrap()
 }
 
 #[test]
@@ -119,7 +119,7 @@ fn derivatives_are_those_of_finite_differences() {
 fn it_ends_where_there_is_no_more_to_see() {
     let samples = |a: &[f64]| {
         let orders = Orders::arx(a.len(), &[1], &[1]).unwrap();
-        let model = Model::from_parameters(&orders, &[a, &[1.0]].concat(), None, 1.0, 1.0).unwrap();
+        let model = PolynomialModel::from_parameters(&orders, &[a, &[1.0]].concat(), None, 1.0, 1.0).unwrap();
         let step = step_response(&model, 0, None).unwrap();
         assert!(step.values.iter().all(|value| value.value.is_finite() && value.standard_error.is_none()));
         step.values.len()
@@ -133,7 +133,7 @@ fn it_ends_where_there_is_no_more_to_see() {
     assert_eq!(samples(&[-0.999_999_9]), 20_000);
     // Unstable beyond what numbers can hold.
     let orders = Orders::arx(1, &[1], &[1]).unwrap();
-    let model = Model::from_parameters(&orders, &[-1e30, 1.0], None, 1.0, 1.0).unwrap();
+    let model = PolynomialModel::from_parameters(&orders, &[-1e30, 1.0], None, 1.0, 1.0).unwrap();
     let step = step_response(&model, 0, Some(100)).unwrap();
     assert!(
         (10..=12).contains(&step.values.len()) && step.values.iter().all(|value| value.value.is_finite())
@@ -143,7 +143,7 @@ fn it_ends_where_there_is_no_more_to_see() {
 #[test]
 fn what_is_not_there_is_refused() {
     let orders = Orders::arx(1, &[1], &[1]).unwrap();
-    let model = Model::from_parameters(&orders, &[-0.5, 1.0], None, 1.0, 1.0).unwrap();
+    let model = PolynomialModel::from_parameters(&orders, &[-0.5, 1.0], None, 1.0, 1.0).unwrap();
     for respond in [step_response, impulse_response] {
         assert!(respond(&model, 1, None).is_err());
         assert!(respond(&model, 0, Some(0)).is_err());

@@ -3,7 +3,7 @@ use super::super::winners::winners;
 use super::*;
 use crate::estimate::{Method, estimate};
 use crate::respond::simulate;
-use crate::{Horizon, Model, Start};
+use crate::{Horizon, PolynomialModel, Start};
 
 const F: [f64; 3] = [1.0, -1.5, 0.7];
 
@@ -92,9 +92,9 @@ fn figures_of_blocks_are_those_of_single_fits() {
     let model = |segments: &[Range<usize>]| {
         let estimate =
             estimate(&record(&y, &[&u], segments), &orders, &Method::default(), Initial::Drop).unwrap();
-        Model::from_parameters(&orders, estimate.parameters(), None, 1.0, 1.0).unwrap()
+        PolynomialModel::from_parameters(&orders, estimate.parameters(), None, 1.0, 1.0).unwrap()
     };
-    let error = |model: &Model, record: &Record<'_>, rows: Range<usize>| {
+    let error = |model: &PolynomialModel, record: &Record<'_>, rows: Range<usize>| {
         let run = simulate(model, record, Start::Estimate).unwrap();
         rows.map(|t| (y[t] - run.values[t]).powi(2)).sum::<f64>()
     };
@@ -196,7 +196,8 @@ fn selection_on_unseen_rows_looks_at_the_horizon() {
         // The noise that no model simulates: uniform within a half.
         assert!((0.06..0.11).contains(&unseen), "{select:?} {unseen}");
         if select == Select::Validation {
-            let model = Model::from_parameters(&orders, &found.guess.unwrap(), None, 1.0, 1.0).unwrap();
+            let model =
+                PolynomialModel::from_parameters(&orders, &found.guess.unwrap(), None, 1.0, 1.0).unwrap();
             let run = simulate(&model, &second, Start::Estimate).unwrap();
             let own = (350..500).map(|t| (y[t] - run.values[t]).powi(2)).sum::<f64>() / 150.0;
             assert!(close(unseen, own, 1e-9), "{unseen} {own}");

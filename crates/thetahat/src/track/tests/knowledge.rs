@@ -27,16 +27,19 @@ fn it_goes_on_where_the_fit_ended() {
     let report = fit(&inputs, &y, "1..400", orders(), Detrend::None);
     let mut tracker = Tracker::from_report(&report, &unforgetting()).unwrap();
     // At first it is the report.
-    assert_eq!(tracker.names(), report.model.parameters.iter().map(|p| p.name.clone()).collect::<Vec<_>>());
+    assert_eq!(
+        tracker.names(),
+        report.polynomials().parameters.iter().map(|p| p.name.clone()).collect::<Vec<_>>()
+    );
     let mut errors = [0.0; 5];
     tracker.write_standard_errors(&mut errors).unwrap();
     for ((parameter, value), error) in
-        report.model.parameters.iter().zip(tracker.parameters().unwrap()).zip(errors)
+        report.polynomials().parameters.iter().zip(tracker.parameters().unwrap()).zip(errors)
     {
         assert_eq!(parameter.value, *value);
         assert!((error / parameter.standard_error.unwrap() - 1.0).abs() < 1e-12);
     }
-    assert!((tracker.noise_variance().unwrap() / report.model.noise_variance - 1.0).abs() < 1e-14);
+    assert!((tracker.noise_variance().unwrap() / report.polynomials().noise_variance - 1.0).abs() < 1e-14);
     let scales = tracker.scales().unwrap();
     assert!(
         scales
@@ -70,7 +73,7 @@ fn offsets_come_along_and_a_constant_stands_beside() {
     for constant in [false, true] {
         let plan = TrackPlan { constant, ..unforgetting() };
         let mut tracker = Tracker::from_report(&report, &plan).unwrap();
-        assert_eq!(tracker.offsets().output, report.model.output.offset.level);
+        assert_eq!(tracker.offsets().output, report.polynomials().output.offset.level);
         let tracked = run(&mut tracker, &inputs[400..], &raised[400..]);
         assert!(tracked[2..].iter().all(|tracked| tracked.error.abs() < 0.5), "{constant}");
     }
@@ -93,7 +96,7 @@ fn a_noise_model_comes_along() {
     let mut tracker = Tracker::from_report(&report, &plan).unwrap();
     assert_eq!(tracker.names()[5..], ["constant", "c1"]);
     let parameters = tracker.parameters().unwrap();
-    assert_eq!([parameters[5], parameters[6]], [0.0, report.model.c[1]]);
+    assert_eq!([parameters[5], parameters[6]], [0.0, report.polynomials().c[1]]);
     let tracked = run(&mut tracker, &inputs[500..], &y[500..]);
     // With C the errors are e, uniform in -0.3 … 0.3; without it their variance would be 1.36 times as large.
     let mse = tracker.score().mean_squared_error().unwrap();
@@ -116,13 +119,16 @@ fn reports_that_cannot_be_tracked_are_refused() {
 
     type Damage = fn(&mut Report);
     let damages: [(Damage, &str); 6] = [
-        (|report| report.model.covariance = None, "no covariance"),
-        (|report| report.model.noise_variance = 0.0, "noise variance of 0"),
-        (|report| report.model.parameters.truncate(2), "damaged"),
-        (|report| report.model.covariance.iter_mut().for_each(|rows| rows[1][1] = -1.0), "positive"),
+        (|report| report.polynomials_mut().covariance = None, "no covariance"),
+        (|report| report.polynomials_mut().noise_variance = 0.0, "noise variance of 0"),
+        (|report| report.polynomials_mut().parameters.truncate(2), "damaged"),
+        (
+            |report| report.polynomials_mut().covariance.iter_mut().for_each(|rows| rows[1][1] = -1.0),
+            "positive",
+        ),
         (|report| report.estimation.samples = 5, "5 rows"),
         (
-            |report| report.model.covariance.iter_mut().for_each(|rows| rows[4][4] = 1e-220),
+            |report| report.polynomials_mut().covariance.iter_mut().for_each(|rows| rows[4][4] = 1e-220),
             "scale: that of input 2, ",
         ),
     ];

@@ -12,8 +12,8 @@ use super::super::figure::{
 use super::super::object::{Object, marker, scatter, stroke};
 use super::super::text;
 use crate::{
-    Error, FrequencyResponse, Model, Quantity, Root, TransientResponse, figures, frequency_response,
-    impulse_response, logarithmic_frequencies, step_response,
+    Error, FrequencyResponse, PolynomialModel, Quantity, Root, TransientResponse, figures,
+    frequency_response, impulse_response, logarithmic_frequencies, step_response,
 };
 
 /// Frequencies of a Bode plot.
@@ -28,7 +28,7 @@ const FARTHEST: f64 = 3.0;
 const ROUND: usize = 60;
 
 /// Magnitude and phase of several models from one input, or from the noise where that is none.
-pub(crate) fn bode(models: &[(String, &Model)], input: Option<&str>) -> Drawn {
+pub(crate) fn bode(models: &[(String, &PolynomialModel)], input: Option<&str>) -> Drawn {
     let mut found: Vec<(usize, &String, FrequencyResponse)> = Vec::new();
     let mut refused = Vec::new();
     for (position, (name, model)) in models.iter().enumerate() {
@@ -98,12 +98,12 @@ pub(crate) fn bode(models: &[(String, &Model)], input: Option<&str>) -> Drawn {
 }
 
 /// Whether the model adds e to the output as it is.
-fn is_white(model: &Model) -> bool {
+fn is_white(model: &PolynomialModel) -> bool {
     (model.orders.na, model.orders.nc, model.orders.nd) == (0, 0, 0)
 }
 
 /// The response from one source; none if the model does not have it.
-fn response(model: &Model, input: Option<&str>) -> Result<Option<FrequencyResponse>, String> {
+fn response(model: &PolynomialModel, input: Option<&str>) -> Result<Option<FrequencyResponse>, String> {
     let highest = PI / model.sample_time;
     let roots = model.poles.iter().chain(&model.noise_poles).map(|root| 1.0 - root.re.hypot(root.im));
     let slowest = roots.map(f64::abs).filter(|distance| *distance > 0.0).fold(1.0, f64::min);
@@ -140,7 +140,7 @@ fn interval(values: &[Quantity], lowest: f64) -> Option<(Vec<f64>, Vec<f64>)> {
 }
 
 /// What a unit step of an input does in several models, and what an impulse that lasts one sample does.
-pub(crate) fn transients(models: &[(String, &Model)], input: &str) -> [Drawn; 2] {
+pub(crate) fn transients(models: &[(String, &PolynomialModel)], input: &str) -> [Drawn; 2] {
     let step = "The output after a step of the input by one unit at time 0, from rest.";
     let impulse = "The output after an input of one unit in the sample at time 0 alone, from rest.";
     [
@@ -150,10 +150,10 @@ pub(crate) fn transients(models: &[(String, &Model)], input: &str) -> [Drawn; 2]
 }
 
 fn transient(
-    models: &[(String, &Model)],
+    models: &[(String, &PolynomialModel)],
     input: &str,
     (what, happens): (&str, &str),
-    respond: impl Fn(&Model, usize, Option<usize>) -> Result<TransientResponse, Error>,
+    respond: impl Fn(&PolynomialModel, usize, Option<usize>) -> Result<TransientResponse, Error>,
 ) -> Drawn {
     let single = models.len() == 1;
     let mut traces: Vec<Object> = Vec::new();
@@ -193,7 +193,7 @@ fn transient(
 }
 
 /// Poles and zeros in the z plane.
-pub(crate) fn roots(model: &Model) -> Drawn {
+pub(crate) fn roots(model: &PolynomialModel) -> Drawn {
     let groups: [(&str, Vec<&Root>, &str, usize); 4] = [
         ("poles", model.poles.iter().collect(), "x-thin", 0),
         ("zeros", model.zeros.iter().flatten().collect(), "circle-open", 1),

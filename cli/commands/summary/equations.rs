@@ -1,0 +1,64 @@
+//! What a fit of a model in equations found, as a table for people.
+
+use thetahat::figures::{error, number, scientific, short};
+use thetahat::text::harmless;
+use thetahat::{EquationsModel, Procedure, Report};
+
+use super::filtered::surprise;
+use super::text::{Text, columns, or_dash};
+use super::{counted, criteria, fits, stopped};
+
+/// The main figures of a fit of a model in equations.
+pub(super) fn table(report: &Report, model: &EquationsModel, width: usize) -> String {
+    let mut text = Text::new(width);
+    let listed = |names: Vec<String>| if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+    let names =
+        |signals: &[thetahat::Signal]| listed(signals.iter().map(|signal| harmless(&signal.name)).collect());
+    text.line(&format!("{}, sample time {} s", report.model.name(), short(model.sample_time)));
+    text.line(&format!(
+        "inputs {}, outputs {}, states {}",
+        names(&model.inputs),
+        names(&model.outputs),
+        listed(model.states.clone())
+    ));
+    text.line("");
+    let Procedure::InnovationsLikelihood(outcome) = &report.estimation.procedure else {
+        return text.finish();
+    };
+    let head = ["parameter", "value", "standard error", "start", "estimated as"];
+    let mut parameters = columns(&head).words(&[4]);
+    for (parameter, known) in model.parameters.iter().zip(&outcome.unknown) {
+        parameters.row([
+            parameter.name.clone(),
+            number(parameter.value),
+            or_dash(parameter.standard_error, error),
+            short(known.start),
+            known.change_of_variable.clone().unwrap_or_default(),
+        ]);
+    }
+    text.table(parameters);
+    let (estimation, search) = (&report.estimation, &outcome.search);
+    text.line(&format!(
+        "{} rows, {} measured values, log-likelihood {}, condition number {}",
+        report.data.rows,
+        estimation.samples,
+        number(outcome.log_likelihood),
+        or_dash(estimation.condition, |condition| scientific(condition, 3))
+    ));
+    text.line(&criteria(&estimation.criteria));
+    let starts = match search.reached.len() {
+        0 => String::new(),
+        count => format!(" from the best of {count} starts"),
+    };
+    text.line(&format!(
+        "largest likelihood, {}{starts}, {}",
+        counted(search.iterations),
+        stopped(search.stopped)
+    ));
+    if let Some(nis) = &outcome.nis {
+        text.line(&surprise(nis));
+    }
+    text.line("");
+    fits(&mut text, &report.fit);
+    text.finish()
+}

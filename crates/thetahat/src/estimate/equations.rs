@@ -1,0 +1,226 @@
+//! Models in equations: the parameters of the largest likelihood.
+
+mod likelihood;
+mod search;
+mod uncertainty;
+
+use oorandom::Rand64;
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use thetahat_core::nalgebra::DMatrix;
+
+use super::optimize::{Deadline, Monitor, Search, Stopped};
+use crate::model::equations::{Scale, Unknown};
+use crate::respond::NisSummary;
+use crate::respond::equations::{Experiment, Failure};
+use crate::{Error, GreyBox};
+pub(crate) use likelihood::Criterion;
+use search::Found;
+pub(crate) use uncertainty::listed;
+
+/// How the parameters of a model in equations were found: those of the largest likelihood of its innovations.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct EquationsOutcome {
+    /// The sum over all measured values of -1/2 (ln 2 pi S + e^2/S).
+    pub log_likelihood: f64,
+    /// How surprising the rows were, counted by row: the mean is above what is expected if the noises of the log are larger
+    /// than those of the model. None where nothing was measured.
+    pub nis: Option<NisSummary>,
+    /// What the covariance of the parameters was multiplied by: max(1, nis.mean/nis.expected).
+    pub covariance_factor: f64,
+    /// What was known of the parameters before the fit, in their order.
+    pub unknown: Vec<UnknownParameter>,
+    /// Where the states start in the free runs on the estimation rows: a list for each state, with an entry for each run; none where
+    /// it grows out of range.
+    pub starts: Vec<Vec<Option<f64>>>,
+    /// How the search went.
+    pub search: LikelihoodSearch,
+}
+
+/// What was known of a parameter before a fit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct UnknownParameter {
+    /// Its name.
+    pub name: String,
+    /// Where the search started.
+    pub start: f64,
+    /// The lower bound, if there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub min: Option<f64>,
+    /// The upper bound, if there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max: Option<f64>,
+    /// How it is kept within its bounds, such as `mass = 0.1 + exp(z)`, z being the variable that the search moved; none for
+    /// one without.
+    pub change_of_variable: Option<String>,
+    /// The standard error of the estimate if the noises of the model are those of the log: not multiplied by the covariance factor.
+    pub nominal_standard_error: f64,
+}
+
+/// How the search for the largest likelihood went.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct LikelihoodSearch {
+    /// Iterations allowed, for each start.
+    pub max_iterations: usize,
+    /// Iterations done, from the start that won.
+    pub iterations: usize,
+    /// It stops when a step would raise the log-likelihood by no more than this fraction of half the measured values, or of half the
+    /// sum of e^2/S where that is larger.
+    pub tolerance: f64,
+    /// Why it stopped.
+    pub stopped: Stopped,
+    /// The log-likelihood at the start that won and after each iteration from there.
+    pub log_likelihoods: Vec<f64>,
+    /// The seed of random starts, if there were any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seed: Option<u64>,
+    /// The log-likelihood that each start led to, that of the model first; none where the filter does not work at the start. Empty if
+    /// there was but one.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub reached: Vec<Option<f64>>,
+}
+
+/// What was found.
+#[derive(Debug, Clone)]
+pub(crate) struct EquationsEstimate {
+    /// The parameters after the change of variable, and in their own units.
+    pub(crate) z: Vec<f64>,
+    pub(crate) values: Vec<f64>,
+    /// Their covariance in their own units, as if the noises of the model were those of the log.
+    pub(crate) covariance: DMatrix<f64>,
+    /// The ratio of the longest to the shortest direction of psi, its columns scaled to unit norm.
+    pub(crate) condition: f64,
+    /// V, the negative logarithm of the likelihood.
+    pub(crate) value: f64,
+    /// How many values were measured.
+    pub(crate) samples: usize,
+    pub(crate) search: LikelihoodSearch,
+}
+
+/// The unknown parameters of the largest likelihood on some experiments.
+///
+/// The search starts where the model says, and from `starts` further points: there the variables are drawn from what the model knows of
+/// them, N(z, sd). What reaches the largest likelihood wins, the first of them where several do. All of them are searched side by side;
+/// the result does not depend on how many threads there are.
+///
+/// # Errors
+/// As for [`fit_equations`](crate::fit_equations).
+pub(crate) fn largest_likelihood(
+    model: &GreyBox,
+    experiments: &[Experiment],
+    options: &Search,
+    monitor: Monitor<'_>,
+) -> Result<EquationsEstimate, Error> {
+    options.check_numbers()?;
+    let unknown = model.parameters();
+    let names: Vec<String> = unknown.iter().map(|unknown| unknown.name.clone()).collect();
+    let samples = Criterion::new(model, experiments).measurements;
+    if samples <= names.len() {
+        let message = format!(
+            "{} unknown parameters need more than {samples} measured values; give a longer log",
+            names.len()
+        );
+        return Err(Error::undetermined(names, message));
+    }
+    let deadline = Deadline::after(options.time_limit);
+    let bounded: Vec<bool> = unknown.iter().map(|unknown| unknown.scale != Scale::Free).collect();
+    let searched: Vec<Result<Result<Found, Failure>, Error>> = starts(unknown, options)
+        .into_par_iter()
+        .map(|start| {
+            let mut criterion = Criterion::new(model, experiments);
+            let (most, tolerance) = (options.max_iterations, options.tolerance);
+            search::search(&mut criterion, &start, &bounded, most, tolerance, deadline, monitor)
+        })
+        .collect();
+    let searched: Vec<Result<Found, Failure>> = searched.into_iter().collect::<Result<_, Error>>()?;
+    let reached: Vec<Option<f64>> =
+        searched.iter().map(|found| found.as_ref().ok().map(|found| -found.value())).collect();
+    // The failure of the model's own start is what there is to say if no start works.
+    let mut best: Option<Result<Found, Failure>> = None;
+    for found in searched {
+        let better = match (&best, &found) {
+            (None, _) => true,
+            (Some(Err(_)), Ok(_)) => true,
+            (Some(Ok(best)), Ok(found)) => found.value() < best.value(),
+            (Some(_), Err(_)) => false,
+        };
+        if better {
+            best = Some(found);
+        }
+    }
+    let best = best.ok_or_else(|| Error::data("there is no start to search from"))?;
+    let found = best.map_err(|failure| failure.error(experiments))?;
+
+    let mut criterion = Criterion::new(model, experiments);
+    criterion.linearize(&found.z).map_err(|failure| failure.error(experiments))?;
+    let slopes: Vec<f64> = unknown.iter().zip(&found.z).map(|(unknown, z)| unknown.scale.slope(*z)).collect();
+    let (covariance, condition) = uncertainty::covariance(&criterion.information, &slopes, &names)?;
+    uncertainty::check(unknown, &found.z, &covariance)?;
+    Ok(EquationsEstimate {
+        values: unknown.iter().zip(&found.z).map(|(unknown, &z)| unknown.inside(z)).collect(),
+        covariance,
+        condition,
+        value: found.value(),
+        samples,
+        search: LikelihoodSearch {
+            max_iterations: options.max_iterations,
+            iterations: found.values.len() - 1,
+            tolerance: options.tolerance,
+            stopped: found.stopped,
+            log_likelihoods: found.values.iter().map(|value| -value).collect(),
+            seed: (options.starts > 0).then_some(options.seed),
+            reached: if options.starts > 0 { reached } else { Vec::new() },
+        },
+        z: found.z,
+    })
+}
+
+/// The start that the model says, and random ones.
+fn starts(unknown: &[Unknown], options: &Search) -> Vec<Vec<f64>> {
+    let mut random = Rand64::new(u128::from(options.seed));
+    // The sum of twelve uniform numbers is close enough to a normal one.
+    let mut normal = || (0..12).map(|_| random.rand_float()).sum::<f64>() - 6.0;
+    let own = unknown.iter().map(|unknown| unknown.start_variable().0).collect();
+    let mut drawn = || {
+        let near = |unknown: &Unknown| {
+            let (z, deviation) = unknown.start_variable();
+            z + deviation * normal()
+        };
+        unknown.iter().map(near).collect()
+    };
+    let more: Vec<Vec<f64>> = (0..options.starts).map(|_| drawn()).collect();
+    std::iter::once(own).chain(more).collect()
+}
+
+impl Unknown {
+    /// The value of a variable. What rounds to a bound is the number next to it: bounds are not reached.
+    fn inside(&self, z: f64) -> f64 {
+        let (min, max) = self.bounds();
+        let mut value = self.scale.value(z);
+        value = min.map_or(value, |min| value.max(min.next_up()));
+        max.map_or(value, |max| value.min(max.next_down()))
+    }
+
+    fn bounds(&self) -> (Option<f64>, Option<f64>) {
+        match self.scale {
+            Scale::Free => (None, None),
+            Scale::Above(min) => (Some(min), None),
+            Scale::Below(max) => (None, Some(max)),
+            Scale::Between(min, max) => (Some(min), Some(max)),
+        }
+    }
+
+    /// What was known of it, beside a standard error.
+    pub(crate) fn reported(&self, nominal_standard_error: f64) -> UnknownParameter {
+        let (min, max) = self.bounds();
+        UnknownParameter {
+            name: self.name.clone(),
+            start: self.start,
+            min,
+            max,
+            change_of_variable: self.change_of_variable(),
+            nominal_standard_error,
+        }
+    }
+}

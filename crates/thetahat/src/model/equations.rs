@@ -1,0 +1,279 @@
+//! Models of a plant in equations, written by hand in a TOML file, with exact derivatives.
+
+mod document;
+mod dynamics;
+mod expression;
+mod fitted;
+mod graph;
+mod program;
+mod read;
+mod scale;
+#[cfg(test)]
+pub(crate) mod tests;
+
+pub(crate) use document::{Document, Entry, Section, suggestion};
+use dynamics::{Functions, Step};
+pub use fitted::EquationsModel;
+pub(crate) use scale::Scale;
+
+use crate::Error;
+
+/// A model in equations, of which some parameters may be unknown.
+///
+/// ```text
+/// x(k+1) = f(x(k), p, u(k), t, dt) + w(k)      or      dx/dt = f(x, p, u, t)
+/// y(k)   = h(x(k), p, u(k), t) + v(k)
+/// ```
+///
+/// It is written as TOML:
+///
+/// ```text
+/// sample_time = 0.1                  # seconds
+///
+/// [states]                           # what is known of each at the first row; sd = 0: exactly that
+/// position = { start = 0, sd = 1 }
+/// velocity = { start = 0, sd = 1 }
+///
+/// [inputs]                           # name in the equations = channel of the log
+/// force = "u"
+///
+/// [parameters]                       # a number, or what is known of an unknown one
+/// mass = { start = 2, sd = 1, unknown = true, min = 0.1 }
+/// damping = 0.4
+///
+/// [next]                             # or [derivative]
+/// position = "position + dt * velocity"
+/// velocity = "velocity + dt * (force - damping * velocity) / mass"
+///
+/// [outputs]                          # channel of the log = expression
+/// y = "position"
+///
+/// [noise]                            # standard deviations: of a sample, of a reading
+/// process = { velocity = 0.01 }
+/// measurement = { y = 0.05 }
+/// ```
+///
+/// **Expressions** have numbers, the names of states, inputs and parameters, `+ - * / ^` and parentheses, `sin cos tan asin
+/// acos atan sinh cosh tanh exp ln log10 sqrt abs sign` of one argument and `atan2 min max` of two, `pi`, and `t`, the
+/// seconds since the first row. Angles are in rad. `-x^2` is `-(x^2)`, `x^y^z` is `x^(y^z)`. A power whose exponent is no
+/// constant is `exp(y ln x)`, so x must be positive. Where `min`, `max`, `abs` or `sign` has no derivative, it is that of
+/// one side.
+///
+/// **Time.** `[next]` gives the next state. With `dt`, the seconds of a step, in its equations the steps may vary, else each
+/// is one `sample_time`. `[derivative]` gives dx/dt; it is integrated by the classical Runge-Kutta method of order four in
+/// one step from row to row, or in `substeps` of them, with the input held. A step of several sample times is taken as that
+/// many equal steps, so that a missing row does no harm.
+///
+/// **Noise.** `process` is what a sample of length `sample_time` adds to the state: its variance grows with the length of the
+/// step, sd² dt/sample_time. A state that is not named has none. `measurement` is the standard deviation of each output.
+///
+/// **Unknown parameters** have a `start`, the standard deviation `sd` of what is known of it, and perhaps bounds `min`
+/// and `max`, between which a change of variable keeps them: p = min + exp(z), p = max - exp(z), or
+/// p = min + (max - min)/(1 + exp(-z)), with z free. `walk` is the standard deviation by which such a parameter drifts each
+/// `sample_time`.
+///
+/// All equations are compiled once into one list of operations in which nothing is computed twice, together with all partial
+/// derivatives, found by the rules of calculus. Nothing is approximated by differences.
+///
+/// ```
+/// use thetahat::GreyBox;
+///
+/// let model = GreyBox::from_toml(
+///     "sample_time = 60
+///      [states]
+///      temperature = { start = 20, sd = 5 }
+///      [inputs]
+///      power = \"heater\"
+///      [parameters]
+///      resistance = { start = 0.01, sd = 0.005, unknown = true, min = 0 }
+///      capacity = 4e5
+///      [derivative]
+///      temperature = \"(power - (temperature - 20) / resistance) / capacity\"
+///      [outputs]
+///      thermometer = \"temperature\"
+///      [noise]
+///      measurement = { thermometer = 0.1 }",
+/// )?;
+/// assert_eq!(model.states(), ["temperature"]);
+/// assert_eq!(model.inputs(), ["heater"]);
+/// assert_eq!(model.unknown().collect::<Vec<_>>(), ["resistance"]);
+///
+/// let error = GreyBox::from_toml("sample_time = 1\n[states]\nx = { start = 0 }").unwrap_err();
+/// assert!(error.to_string().starts_with("line 3, column 1: 'states.x.sd' is missing"));
+/// # Ok::<(), thetahat::Error>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct GreyBox {
+    text: String,
+    sample_time: f64,
+    states: Vec<String>,
+    start: Vec<f64>,
+    start_deviations: Vec<f64>,
+    inputs: Vec<String>,
+    outputs: Vec<String>,
+    unknown: Vec<Unknown>,
+    /// Unknown ones that are known by now.
+    known: Vec<(String, f64)>,
+    step: Step,
+    /// Whether the equations know the length of a step.
+    any_step: bool,
+    linear: bool,
+    transition: Functions,
+    observation: Functions,
+    process_variances: Vec<f64>,
+    measurement_variances: Vec<f64>,
+}
+
+/// A parameter that is to be found.
+#[derive(Debug, Clone)]
+pub(crate) struct Unknown {
+    pub(crate) name: String,
+    pub(crate) scale: Scale,
+    /// In the parameter's own unit.
+    pub(crate) start: f64,
+    pub(crate) deviation: f64,
+    pub(crate) walk: f64,
+}
+
+/// The most equal steps that one step is divided into.
+pub(crate) const MOST_STEPS: f64 = 1e6;
+
+impl GreyBox {
+    /// Reads a model.
+    ///
+    /// # Errors
+    /// [`Error::Model`] with line and column, and with what is wrong there: of the TOML, of a key, or of an expression.
+    pub fn from_toml(text: &str) -> Result<Self, Error> {
+        read::model(text, &[])
+    }
+
+    /// The same with some unknown parameters known: for what a fit has found.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] if the model has no unknown parameter of a name, a value is outside its bounds or not finite.
+    pub fn with_parameters(&self, values: &[(&str, f64)]) -> Result<Self, Error> {
+        for (name, value) in values {
+            let Some(unknown) = self.unknown.iter().find(|unknown| unknown.name == *name) else {
+                let near = suggestion(name, self.unknown());
+                return Err(Error::argument(name, format!("the model has no such unknown parameter{near}")));
+            };
+            if !unknown.scale.contains(*value) {
+                return Err(Error::argument(name, format!("{value} is outside of the parameter's bounds")));
+            }
+        }
+        let mut known = self.known.clone();
+        known.extend(values.iter().map(|(name, value)| ((*name).to_owned(), *value)));
+        read::model(&self.text, &known)
+    }
+
+    /// Those of the unknown parameters that were given values.
+    pub fn known(&self) -> &[(String, f64)] {
+        &self.known
+    }
+
+    /// The text that it was read from.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// The length of a sample, in seconds.
+    pub fn sample_time(&self) -> f64 {
+        self.sample_time
+    }
+
+    /// The names of the states, in the order of the text.
+    pub fn states(&self) -> &[String] {
+        &self.states
+    }
+
+    /// The channels of the inputs, in the order of the text.
+    pub fn inputs(&self) -> &[String] {
+        &self.inputs
+    }
+
+    /// The channels of the outputs, in the order of the text.
+    pub fn outputs(&self) -> &[String] {
+        &self.outputs
+    }
+
+    /// The names of the unknown parameters, in the order of the text.
+    pub fn unknown(&self) -> impl ExactSizeIterator<Item = &str> {
+        self.unknown.iter().map(|unknown| unknown.name.as_str())
+    }
+
+    /// Whether the derivatives by the states depend on neither states nor unknown parameters.
+    pub fn is_linear(&self) -> bool {
+        self.linear
+    }
+
+    /// What is known of the unknown parameters, and their changes of variable.
+    pub(crate) fn parameters(&self) -> &[Unknown] {
+        &self.unknown
+    }
+
+    /// How a step of `dt` seconds is taken: as so many equal ones, and the length of each.
+    ///
+    /// # Errors
+    /// [`Error::Data`] if it is not above 0 or too long; if the equations do not know its length, and it is no whole
+    /// multiple of the sample time within 1 %.
+    pub(crate) fn division(&self, dt: f64) -> Result<(usize, f64), Error> {
+        if self.any_step {
+            let count = (check_step(dt)? / self.sample_time).round().max(1.0);
+            Ok((check_count(count, dt, self.sample_time)?, dt / count))
+        } else {
+            Ok((whole_steps(dt, self.sample_time)?, self.sample_time))
+        }
+    }
+}
+
+impl Unknown {
+    /// What the parameter starts from after the change of variable: z, and its standard deviation.
+    pub(crate) fn start_variable(&self) -> (f64, f64) {
+        let z = self.scale.variable(self.start);
+        (z, self.deviation / self.scale.slope(z).abs())
+    }
+
+    /// The standard deviation by which z drifts each sample: as p does where it starts.
+    pub(crate) fn walk_variable(&self) -> f64 {
+        self.walk / self.scale.slope(self.scale.variable(self.start)).abs()
+    }
+
+    /// The change of variable in words; none without bounds.
+    pub(crate) fn change_of_variable(&self) -> Option<String> {
+        self.scale.words(&self.name)
+    }
+}
+
+fn check_step(dt: f64) -> Result<f64, Error> {
+    if dt > 0.0 && dt.is_finite() {
+        Ok(dt)
+    } else {
+        Err(Error::data(format!("a step of {dt} s: time must rise from row to row")))
+    }
+}
+
+fn check_count(count: f64, dt: f64, sample_time: f64) -> Result<usize, Error> {
+    if count <= MOST_STEPS {
+        Ok(count as usize)
+    } else {
+        Err(Error::data(format!(
+            "a step of {dt} s is more than {MOST_STEPS} times the model's sample time of {sample_time} s; begin again behind \
+             such a gap"
+        )))
+    }
+}
+
+/// A step as a whole number of sample times, which it must be within 1 %.
+///
+/// # Errors
+/// [`Error::Data`] if it is not, or there are more than a million.
+pub(crate) fn whole_steps(dt: f64, sample_time: f64) -> Result<usize, Error> {
+    let count = (check_step(dt)? / sample_time).round();
+    if count < 1.0 || (dt / (count * sample_time) - 1.0).abs() > 0.01 {
+        return Err(Error::data(format!(
+            "a step of {dt} s is no whole multiple of the model's sample time of {sample_time} s; resample the log, or write \
+             the model in equations with dt or [derivative]"
+        )));
+    }
+    check_count(count, dt, sample_time)
+}

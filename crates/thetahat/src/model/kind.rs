@@ -1,0 +1,129 @@
+//! The kinds of models.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::equations::EquationsModel;
+use super::fitted::{Parameter, PolynomialModel, Signal};
+use crate::Error;
+
+/// An estimated model of any kind.
+///
+/// All kinds have a head: inputs, outputs, sample time, parameters and their covariance. What only some have, such as
+/// polynomials, their own type says.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum Model {
+    /// A(q) y = B(q)/F(q) u + C(q)/D(q) e.
+    Polynomial(Box<PolynomialModel>),
+    /// Equations of the states and the outputs, written by hand.
+    Equations(EquationsModel),
+}
+
+impl From<PolynomialModel> for Model {
+    fn from(model: PolynomialModel) -> Self {
+        Self::Polynomial(Box::new(model))
+    }
+}
+
+impl From<EquationsModel> for Model {
+    fn from(model: EquationsModel) -> Self {
+        Self::Equations(model)
+    }
+}
+
+impl Model {
+    /// The inputs, in their order.
+    pub fn inputs(&self) -> &[Signal] {
+        match self {
+            Self::Polynomial(model) => &model.inputs,
+            Self::Equations(model) => &model.inputs,
+        }
+    }
+
+    /// The outputs, in their order.
+    pub fn outputs(&self) -> &[Signal] {
+        match self {
+            Self::Polynomial(model) => std::slice::from_ref(&model.output),
+            Self::Equations(model) => &model.outputs,
+        }
+    }
+
+    /// The names of the channels: inputs, then outputs.
+    pub fn channels(&self) -> impl Iterator<Item = &str> {
+        self.inputs().iter().chain(self.outputs()).map(|signal| signal.name.as_str())
+    }
+
+    /// Seconds from one sample to the next.
+    pub fn sample_time(&self) -> f64 {
+        match self {
+            Self::Polynomial(model) => model.sample_time,
+            Self::Equations(model) => model.sample_time,
+        }
+    }
+
+    /// The parameters, in the order of the covariance.
+    pub fn parameters(&self) -> &[Parameter] {
+        match self {
+            Self::Polynomial(model) => &model.parameters,
+            Self::Equations(model) => &model.parameters,
+        }
+    }
+
+    /// The covariance matrix of the parameters, row by row; none where it is not known.
+    pub fn covariance(&self) -> Option<&[Vec<f64>]> {
+        match self {
+            Self::Polynomial(model) => model.covariance.as_deref(),
+            Self::Equations(model) => model.covariance.as_deref(),
+        }
+    }
+
+    /// Whether inputs act on the outputs.
+    pub fn is_driven(&self) -> bool {
+        match self {
+            Self::Polynomial(model) => model.orders.nb.iter().any(|&nb| nb > 0),
+            Self::Equations(model) => !model.inputs.is_empty(),
+        }
+    }
+
+    /// Whether it takes logs whose clock is irregular.
+    pub fn takes_any_clock(&self) -> bool {
+        matches!(self, Self::Equations(_))
+    }
+
+    /// What it is called: structure and orders, such as ARX(2, 2, 1), or how many states the equations have.
+    pub fn name(&self) -> String {
+        match self {
+            Self::Polynomial(model) => model.orders.to_string(),
+            Self::Equations(model) => {
+                let count = model.states.len();
+                format!("equations, {count} state{}", if count == 1 { "" } else { "s" })
+            }
+        }
+    }
+
+    /// The polynomials.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] if the model has none, with what it can do instead; `what` needs them.
+    pub fn polynomials(&self, what: &str) -> Result<&PolynomialModel, Error> {
+        match self {
+            Self::Polynomial(model) => Ok(model),
+            Self::Equations(_) => Err(Error::argument(
+                "model",
+                format!(
+                    "{what} is of polynomial models, and this one is in equations: it predicts, simulates, validates, compares and \
+                     filters"
+                ),
+            )),
+        }
+    }
+
+    /// Checks a model that was read: that its parts fit together, so that it can be computed with.
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        match self {
+            Self::Polynomial(model) => model.check(),
+            Self::Equations(model) => model.check(),
+        }
+    }
+}

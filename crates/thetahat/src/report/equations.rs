@@ -1,0 +1,258 @@
+//! Fits of models in equations.
+
+#[cfg(test)]
+mod tests;
+mod warnings;
+
+use super::judge::judge;
+use super::schema::{Data, Estimation, Missing, Report};
+use super::shares::Shares;
+use crate::data::{Rows, Split, digests};
+use crate::distribution::chi_square_interval;
+use crate::estimate::equations::{EquationsEstimate, largest_likelihood};
+use crate::estimate::{Criteria, EquationsOutcome, Monitor, Procedure, Search};
+use crate::model::EquationsModel;
+use crate::respond::equations::{EquationsOnLog, Experiment, Predictor, experiments, walk};
+use crate::respond::{NisCount, NisSummary};
+use crate::select::Focus;
+use crate::validate::{Part, Relation, Residuals};
+use crate::{Document, Error, GreyBox, Log, Model, Source};
+
+/// Lags of the test of whiteness that a fit warns by, and its levels.
+const LAGS: usize = 20;
+const LEVEL: f64 = 0.05;
+
+/// What to fit a model in equations to, and how.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct EquationsPlan {
+    /// Rows to estimate on; none: all.
+    pub estimate: Vec<Rows>,
+    /// Rows to validate on.
+    pub validate: Vec<Rows>,
+    /// Cuts the rows to estimate on into parts: the fit is to the first two, and judged on the third.
+    pub split: Option<Split>,
+    /// Iterations, tolerance, starts, seed and time limit of the search; the rest does not apply.
+    pub search: Search,
+}
+
+/// Finds the unknown parameters of a model in equations in a log, or in several that are joined, and reports on it.
+///
+/// The predictor is the extended Kalman filter with the noises of the model. With its innovations e and their variances S
+/// over all values of outputs that were measured, the estimate is
+///
+/// ```text
+/// p^ = argmin V(p),   V = 1/2 sum (e^2/S + ln 2 pi S)
+/// ```
+///
+/// the maximum-likelihood estimate where innovations are Gaussian. Without process noise that is output error with an
+/// estimated initial state, of which the model knows `start` and `sd`. Each log starts from there anew. Of an unknown
+/// parameter the fit uses `start`, where the search begins, and its bounds; `walk` is for a filter that estimates it with the state.
+/// A search finds the minimum that its start leads to. Further starts, so many as `search.starts` says, are drawn from what the model
+/// knows of the parameters, start and `sd` after the change of variable; the largest likelihood that is reached wins.
+///
+/// **Rows.** The state of the first row that is estimated on is the model's start, in each log. Rows of it that are not asked for but
+/// stand behind go through the filter and do not count; so is the model looked at on other rows of these logs. Each further row is predicted over the time from the row before,
+/// with that row's inputs, and then corrected by its own outputs. The clock may be irregular
+/// ([`Log::recorded`](crate::Log::recorded)). A missing output (NaN) is left out alone; a missing input holds the value before it, zero before the first.
+///
+/// **Search.** Fisher scoring with the damping of Levenberg and Marquardt. Derivatives of e and S are exact: the filter is
+/// computed in dual numbers. `monitor` is told of V divided by the number of measured values before each iteration, on the thread that searches.
+///
+/// **Standard errors** come from the inverse of the information, with e_i and S_i the derivatives by parameter i,
+///
+/// ```text
+/// I_ij = sum (e_i e_j/S + S_i S_j/(2 S^2))
+/// ```
+///
+/// which holds if the noises of the model are those of the log. Then the mean of e^2/S is 1. Where it is above 1, the covariance is multiplied by it: that is
+/// right if all noises are too small by one factor, and a good guess else. Where it is below 1 the covariance stays, as too
+/// large a noise must not make an estimate look certain. The report has the plain ones too.
+///
+/// For n states, m outputs, p parameters and N rows an iteration costs O(N (n^3 + m n^2) p).
+///
+/// Source: Ljung, System Identification, 2nd ed. 1999, sections 7.2 to 7.4; Gupta and Mehra 1974; Segal and Weinstein 1989.
+///
+/// # Errors
+/// [`Error::Argument`] if nothing in the model is unknown, or for rows that are not there; [`Error::Data`] if a channel is not there, the clock
+/// does not run forward, a step is not one that the model can take, or the filter leaves the range of numbers where the search
+/// starts; [`Error::Undetermined`] with the parameters that the logs leave open, or that ran away to where they have no effect; [`Error::Interrupted`] if the monitor says so.
+///
+/// ```
+/// use std::ops::ControlFlow;
+/// use thetahat::{Channel, EquationsPlan, GreyBox, Log, fit_equations};
+///
+/// let model = GreyBox::from_toml(
+///     "sample_time = 1
+///      [states]
+///      level = { start = 0, sd = 0.1 }
+///      [inputs]
+///      flow = \"u\"
+///      [parameters]
+///      area = { start = 1, sd = 1, unknown = true, min = 0 }
+///      [next]
+///      level = \"level + dt * (flow - 0.1 * level) / area\"
+///      [outputs]
+///      y = \"level\"
+///      [noise]
+///      measurement = { y = 0.01 }",
+/// )?;
+/// // A tank of 2 m^2.
+/// let u: Vec<f64> = (0..100).map(|t| f64::from(t / 10 % 3)).collect();
+/// let mut y = vec![0.0];
+/// for t in 1..u.len() {
+///     y.push(y[t - 1] + (u[t - 1] - 0.1 * y[t - 1]) / 2.0);
+/// }
+/// let channel = |name: &str, values| Channel { name: name.into(), values };
+/// let log = Log::new(vec![channel("u", u), channel("y", y)], 1.0)?;
+/// let report = fit_equations(&model, &log, &[], &EquationsPlan::default(), &|_| ControlFlow::Continue(()))?;
+/// assert!((report.model.parameters()[0].value - 2.0).abs() < 1e-3);
+/// # Ok::<(), thetahat::Error>(())
+/// ```
+pub fn fit_equations(
+    model: &GreyBox,
+    log: &Log,
+    sources: &[Source],
+    plan: &EquationsPlan,
+    monitor: Monitor<'_>,
+) -> Result<Report, Error> {
+    if model.parameters().is_empty() {
+        return Err(Error::argument(
+            "model",
+            "none of its parameters is unknown; give one as { start = …, sd = …, unknown = true }",
+        ));
+    }
+    let names: Vec<&str> = model.inputs().iter().chain(model.outputs()).map(String::as_str).collect();
+    let absent: Vec<&str> = names.iter().filter(|name| !log.has(name)).copied().collect();
+    if let Some(name) = absent.first() {
+        let found: Vec<&str> = log.channels().iter().map(|channel| channel.name.as_str()).collect();
+        let message = format!(
+            "the model needs channel '{name}', the log has: {}; rename one of them",
+            found.join(", ")
+        );
+        return Err(Error::in_channel(name, None, message));
+    }
+    let Shares { estimation, validation, parts } =
+        Shares::of(&plan.estimate, &plan.validate, plan.split, log.rows())?;
+    let fitted_to = experiments(model, log, &estimation, &estimation)?;
+    let found = largest_likelihood(model, &fitted_to, &plan.search, monitor)?;
+    let Errors { nis, mse } = errors(model, &fitted_to, &found)?;
+    let factor = nis.map_or(1.0, |nis| nis.relative().max(1.0));
+    let covariance = found.covariance.row_iter().map(|row| row.iter().map(|value| value * factor).collect());
+    let fitted = EquationsModel::new(model, &found.values, covariance.collect());
+
+    let missing = names.iter().map(|name| {
+        let values = &log.channel(name)?.values;
+        let rows = values.iter().filter(|value| value.is_nan()).count();
+        Ok(Missing { channel: (*name).to_owned(), rows })
+    });
+    let stretches = fitted_to.iter().flat_map(|experiment| {
+        let rows = experiment.counted().iter();
+        rows.map(|rows| Rows::from_positions(&(rows.start + experiment.first..rows.end + experiment.first)))
+    });
+    let data = Data {
+        logs: sources.to_vec(),
+        digests: digests(log, &names, &estimation)?,
+        rows: log.rows(),
+        sample_time: log.sample_time(),
+        detrend: "none".to_owned(),
+        prefilter: None,
+        validation,
+        split: parts,
+        segments: stretches.collect(),
+        missing: missing.collect::<Result<_, Error>>()?,
+        time_gaps: log.jumps(),
+        estimation,
+    };
+    let own = EquationsOnLog::new(&fitted, log, &data.estimation, &data.estimation)?;
+    let unknown = model.parameters().iter().enumerate();
+    let unknown = unknown.map(|(index, unknown)| unknown.reported(found.covariance[(index, index)].sqrt()));
+    let samples = found.samples as f64;
+    // The mean square of errors of which the Gaussian likelihood is this one.
+    let cost = (2.0 * found.value / samples - 1.0 - std::f64::consts::TAU.ln()).exp();
+    let estimation = Estimation {
+        procedure: Procedure::InnovationsLikelihood(EquationsOutcome {
+            log_likelihood: -found.value,
+            nis,
+            covariance_factor: factor,
+            unknown: unknown.collect(),
+            starts: own.starts(),
+            search: found.search,
+        }),
+        initial: None,
+        level: None,
+        slope: None,
+        samples: found.samples,
+        mse,
+        criteria: Criteria::new(cost, found.values.len(), found.samples),
+        condition: Some(found.condition),
+    };
+    let walking: Vec<String> = model
+        .parameters()
+        .iter()
+        .filter(|unknown| unknown.walk > 0.0)
+        .map(|unknown| unknown.name.clone())
+        .collect();
+    let mut words = warnings::of_inputs(model, &fitted_to, log.rows());
+    words.extend(warnings::of_fit(&fitted, &estimation, &walking));
+    words.extend(warnings::of_colour(&own, |tested| {
+        let residuals = Residuals::of(
+            &tested.model,
+            &tested.record,
+            &tested.innovations,
+            Relation::Fresh,
+            LAGS,
+            &[LEVEL],
+            LEVEL,
+        );
+        residuals.ok().map(|residuals| residuals.ljung_box)
+    }));
+    let mut report = Report {
+        schema: Report::SCHEMA.to_owned(),
+        generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
+        data,
+        selection: None,
+        model: Model::Equations(fitted.clone()),
+        estimation,
+        fit: Vec::new(),
+        warnings: words,
+    };
+    judge(&mut report, &own, Part::Estimation, Focus::Auto);
+    for (part, rows) in report.data.held_out() {
+        let on_log = EquationsOnLog::new(&fitted, log, &rows, &report.data.estimation)?;
+        judge(&mut report, &on_log, part, Focus::Auto);
+    }
+    Ok(report)
+}
+
+/// How large the innovations of a fit are.
+struct Errors {
+    /// Of each row with something measured, the sum of e^2/S: as the filter's elements come one after the other, each with the
+    /// variance that is left by those before, this is the normalised innovation squared of the row.
+    nis: Option<NisSummary>,
+    /// The mean of (y - h(x^))^2.
+    mse: f64,
+}
+
+fn errors(model: &GreyBox, experiments: &[Experiment], found: &EquationsEstimate) -> Result<Errors, Error> {
+    let mut count = NisCount::default();
+    let mut row = None;
+    let (mut nis, mut measured) = (0.0, 0);
+    let mut squares = 0.0;
+    let mut add = |nis: f64, measured: usize| {
+        if let Some(bounds) = chi_square_interval(measured) {
+            count.add(nis, measured, bounds);
+        }
+    };
+    walk(model, experiments, &mut Predictor::new(model), &found.z, |at, prediction, innovation| {
+        if row.replace((at.log, at.row)).is_some_and(|row| row != (at.log, at.row)) {
+            add(nis, measured);
+            (nis, measured) = (0.0, 0);
+        }
+        nis += innovation.error * innovation.error / innovation.variance;
+        measured += 1;
+        squares += (experiments[at.log].output(at.row)[at.output] - prediction).powi(2);
+    })
+    .map_err(|failure| failure.error(experiments))?;
+    add(nis, measured);
+    Ok(Errors { nis: count.summary(), mse: squares / found.samples as f64 })
+}

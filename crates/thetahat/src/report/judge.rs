@@ -1,0 +1,54 @@
+//! The figures of a fit.
+
+use super::schema::Report;
+use crate::respond::{Horizon, OnLog};
+use crate::select::Focus;
+use crate::validate::{Fit, Part};
+
+/// Adds the figures of one part of the log: one step ahead, as many as the focus says on rows that the fit did not see, and driven by
+/// the inputs alone where there are any.
+pub(super) fn judge(report: &mut Report, on_log: &dyn OnLog, part: Part, focus: Focus) {
+    let mut horizons = vec![Horizon::Steps { steps: 1 }];
+    if let (Focus::Steps(steps @ 2..), Part::Validation | Part::Test) = (focus, part) {
+        horizons.push(Horizon::Steps { steps });
+    }
+    if on_log.is_driven() {
+        horizons.push(Horizon::FreeRun);
+    }
+    let (rows, name) = match part {
+        Part::Estimation => (report.data.estimation.clone(), "estimation"),
+        Part::Validation => (report.data.validation.clone(), "validation"),
+        Part::Test => (report.data.split.as_ref().map_or_else(Vec::new, |parts| parts.test.clone()), "test"),
+    };
+    for horizon in horizons {
+        let start = on_log.natural_start(horizon);
+        let responses = match on_log.respond(horizon, start) {
+            Ok(responses) => responses,
+            Err(error) => {
+                report.warnings.push(format!("no fit figure on the {name} rows, {horizon}: {error}"));
+                continue;
+            }
+        };
+        for (index, (response, output)) in responses.iter().zip(on_log.outputs()).enumerate() {
+            let measured = on_log.measured(index);
+            let fit = Fit::new(&output.name, measured, response, &rows, Some(part), (horizon, start));
+            if fit.percent.is_none() {
+                let why = if fit.samples == 0 {
+                    "its stretches without a gap are too short"
+                } else {
+                    "the output is constant there, or the response overflows"
+                };
+                report.warnings.push(format!(
+                    "no fit figure on the {name} rows{}, {horizon}: {why}",
+                    of_output(on_log, &output.name)
+                ));
+            }
+            report.fit.push(fit);
+        }
+    }
+}
+
+/// Of which output, where there are several.
+pub(super) fn of_output(on_log: &dyn OnLog, name: &str) -> String {
+    if on_log.outputs().len() > 1 { format!(" of '{name}'") } else { String::new() }
+}

@@ -1,0 +1,12 @@
+//! What models in equations say of a log: the extended Kalman filter along it, predictions from its estimates, and free runs.
+
+mod experiment;
+mod free_run;
+mod on_log;
+mod predictor;
+mod walk;
+
+pub(crate) use experiment::{Experiment, experiments};
+pub(crate) use on_log::EquationsOnLog;
+pub(crate) use predictor::Predictor;
+pub(crate) use walk::{Failure, reach, step, walk};

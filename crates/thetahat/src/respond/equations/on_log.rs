@@ -1,0 +1,363 @@
+//! A model in equations beside a log.
+
+use std::borrow::Cow;
+use std::cell::OnceCell;
+use std::ops::Range;
+
+use thetahat_core::Dual;
+
+use super::experiment::{Experiment, experiments};
+use super::free_run::{Begin, FreeRun, free_run};
+use super::predictor::Predictor;
+use super::walk::{Failure, Predicted, ahead, beyond, walk};
+use crate::data::{Record, Rows, measured};
+use crate::distribution::two_sided;
+use crate::model::{EquationsModel, PolynomialModel, Signal};
+use crate::respond::on_log::{OnLog, Tested};
+use crate::respond::{Forecast, Horizon, Innovations, Response, Start, check_steps};
+use crate::{Error, GreyBox, Log, Orders};
+
+/// Derivatives that are computed together.
+const LANE: usize = 4;
+
+/// A model in equations beside a log. Its offsets are zero, so deviations are the signals themselves.
+#[derive(Debug)]
+pub(crate) struct EquationsOnLog<'l> {
+    stored: &'l EquationsModel,
+    model: GreyBox,
+    /// The values of its unknown parameters after the change of variable, and their covariance, row by row.
+    z: Vec<f64>,
+    spread: Option<Vec<Vec<f64>>>,
+    experiments: Vec<Experiment>,
+    /// For each output, as long as the log: what counts, what was measured.
+    counted: Vec<Vec<Range<usize>>>,
+    measured: Vec<Vec<f64>>,
+    /// The inputs, a missing value held.
+    inputs: Vec<Vec<f64>>,
+    rows: usize,
+    sample_time: f64,
+    /// What the filter says of each output.
+    filtered: OnceCell<Vec<Filtered>>,
+}
+
+/// The innovations of an output, as long as the log; NaN where nothing was measured.
+#[derive(Debug, Clone)]
+struct Filtered {
+    /// e, S, and e/sqrt(S).
+    errors: Vec<f64>,
+    variances: Vec<f64>,
+    standardised: Vec<f64>,
+}
+
+impl<'l> EquationsOnLog<'l> {
+    /// A model beside some rows of a log, of which it was fitted to some.
+    pub(crate) fn new(
+        stored: &'l EquationsModel,
+        log: &'l Log,
+        rows: &[Rows],
+        fitted: &[Rows],
+    ) -> Result<Self, Error> {
+        let (model, z) = stored.with_variables()?;
+        let experiments = experiments(&model, log, rows, fitted)?;
+        let length = log.rows();
+        let (height, width) = (stored.outputs.len(), stored.inputs.len());
+        let mut outputs = vec![vec![f64::NAN; length]; height];
+        let mut inputs = vec![vec![0.0; length]; width];
+        for experiment in &experiments {
+            for row in 0..experiment.rows() {
+                let into = |signals: &mut [Vec<f64>], values: &[f64]| {
+                    for (signal, value) in signals.iter_mut().zip(values) {
+                        signal[experiment.first + row] = *value;
+                    }
+                };
+                into(&mut outputs, experiment.output(row));
+                into(&mut inputs, experiment.input(row));
+            }
+        }
+        let stretches: Vec<Range<usize>> = experiments.iter().flat_map(stretches).collect();
+        let counted =
+            outputs.iter().map(|output| stretches.iter().flat_map(|rows| measured(output, rows)).collect());
+        let spread = stored.covariance.as_ref().map(|rows| {
+            let slopes: Vec<f64> =
+                model.parameters().iter().zip(&z).map(|(unknown, z)| unknown.scale.slope(*z)).collect();
+            let entry = |i: usize, j: usize| rows[i][j] / (slopes[i] * slopes[j]);
+            (0..z.len()).map(|i| (0..z.len()).map(|j| entry(i, j)).collect()).collect()
+        });
+        Ok(Self {
+            counted: counted.collect(),
+            measured: outputs,
+            inputs,
+            rows: length,
+            sample_time: log.sample_time(),
+            stored,
+            model,
+            z,
+            spread,
+            experiments,
+            filtered: OnceCell::new(),
+        })
+    }
+
+    /// The filter along all experiments, once.
+    fn filtered(&self) -> Result<&[Filtered], Error> {
+        if let Some(found) = self.filtered.get() {
+            return Ok(found);
+        }
+        let nothing = || vec![f64::NAN; self.rows];
+        let mut found: Vec<Filtered> = (0..self.stored.outputs.len())
+            .map(|_| Filtered { errors: nothing(), variances: nothing(), standardised: nothing() })
+            .collect();
+        let mut predictor = Predictor::new(&self.model);
+        walk(&self.model, &self.experiments, &mut predictor, &self.z, |at, _, innovation| {
+            let row = self.experiments[at.log].first + at.row;
+            found[at.output].errors[row] = innovation.error;
+            found[at.output].variances[row] = innovation.variance;
+            found[at.output].standardised[row] = innovation.error / innovation.variance.sqrt();
+        })
+        .map_err(|failure| failure.error(&self.experiments))?;
+        Ok(self.filtered.get_or_init(|| found))
+    }
+
+    /// Signals of the whole log from what is said of each experiment's rows that count.
+    fn spread_out<T>(&self, said: &[Vec<T>], of: impl Fn(&T) -> f64) -> Vec<Vec<f64>> {
+        let height = self.stored.outputs.len();
+        let mut signals = vec![vec![f64::NAN; self.rows]; height];
+        for (experiment, said) in self.experiments.iter().zip(said) {
+            for row in experiment.counted().iter().cloned().flatten() {
+                for (output, signal) in signals.iter_mut().enumerate() {
+                    signal[experiment.first + row] = of(&said[row * height + output]);
+                }
+            }
+        }
+        signals
+    }
+
+    fn responses(&self, signals: Vec<Vec<f64>>) -> Vec<Response> {
+        let each = signals.into_iter().zip(&self.counted);
+        each.map(|(values, counted)| Response { values, counted: counted.clone() }).collect()
+    }
+
+    /// What each experiment is said to be so many steps ahead.
+    fn ahead(&self, steps: usize) -> Result<Vec<Vec<Predicted<f64>>>, Error> {
+        let each = self.experiments.iter().enumerate().map(|(log, experiment)| {
+            ahead(&self.model, experiment, &self.z, steps)
+                .map_err(|row| Failure { log, row }.error(&self.experiments))
+        });
+        each.collect()
+    }
+
+    /// Where each state starts in the free runs, with an entry for each run; none where it grows out of range.
+    pub(crate) fn starts(&self) -> Vec<Vec<Option<f64>>> {
+        let runs: Vec<Option<Vec<f64>>> = self
+            .experiments
+            .iter()
+            .flat_map(|experiment| match free_run(&self.model, experiment, &self.z, Begin::Best) {
+                Some(runs) => runs.into_iter().map(|run| Some(run.start)).collect(),
+                None => vec![None; experiment.counted().len()],
+            })
+            .collect();
+        let of_state =
+            |state: usize| runs.iter().map(|start| start.as_ref().map(|start| start[state])).collect();
+        (0..self.stored.states.len()).map(of_state).collect()
+    }
+
+    /// The free runs of all experiments.
+    fn free_runs(&self, begin: Begin) -> Result<Vec<Vec<FreeRun>>, Error> {
+        let each = self.experiments.iter().map(|experiment| {
+            free_run(&self.model, experiment, &self.z, begin)
+                .ok_or_else(|| Error::data("the free run grows out of the range of numbers"))
+        });
+        each.collect()
+    }
+
+    /// What `predict` says of an experiment with these parameters, and in the variances what is open of them: g' P g, with the slopes g
+    /// of the predictions by the parameters.
+    fn with_open_parameters<P, D>(&self, log: usize, plain: P, dual: D) -> Result<Vec<Predicted<f64>>, Error>
+    where
+        P: Fn(&[f64]) -> Result<Vec<Predicted<f64>>, usize>,
+        D: Fn(&[Dual<f64, LANE>]) -> Result<Vec<Predicted<Dual<f64, LANE>>>, usize>,
+    {
+        let failed = |row| Failure { log, row }.error(&self.experiments);
+        let Some(spread) = &self.spread else { return plain(&self.z).map_err(failed) };
+        let size = self.z.len();
+        let mut said: Vec<Predicted<f64>> = Vec::new();
+        let mut slopes: Vec<f64> = Vec::new();
+        for lane in 0..size.div_ceil(LANE) {
+            let mut variables: Vec<Dual<f64, LANE>> = self.z.iter().map(|z| Dual::from(*z)).collect();
+            let own = lane * LANE..size.min((lane + 1) * LANE);
+            for (place, index) in own.clone().enumerate() {
+                variables[index].derivatives[place] = 1.0;
+            }
+            let found = dual(&variables).map_err(failed)?;
+            if lane == 0 {
+                slopes = vec![0.0; found.len() * size];
+                let values = found.iter();
+                said = values
+                    .map(|one| Predicted { value: one.value.value, variance: one.variance.value })
+                    .collect();
+            }
+            for (one, slopes) in found.iter().zip(slopes.chunks_exact_mut(size)) {
+                slopes[own.clone()].copy_from_slice(&one.value.derivatives[..own.len()]);
+            }
+        }
+        for (one, slopes) in said.iter_mut().zip(slopes.chunks_exact(size)) {
+            let mut sum = 0.0;
+            for (row, slope) in spread.iter().zip(slopes) {
+                sum += slope * row.iter().zip(slopes).map(|(entry, slope)| entry * slope).sum::<f64>();
+            }
+            one.variance += sum.max(0.0);
+        }
+        Ok(said)
+    }
+}
+
+/// The rows of a log that count in an experiment.
+fn stretches(experiment: &Experiment) -> impl Iterator<Item = Range<usize>> {
+    let first = experiment.first;
+    experiment.counted().iter().map(move |rows| first + rows.start..first + rows.end)
+}
+
+impl OnLog for EquationsOnLog<'_> {
+    fn outputs(&self) -> &[Signal] {
+        &self.stored.outputs
+    }
+
+    fn is_driven(&self) -> bool {
+        !self.stored.inputs.is_empty()
+    }
+
+    fn natural_start(&self, _: Horizon) -> Start {
+        Start::Estimate
+    }
+
+    fn measured(&self, output: usize) -> &[f64] {
+        &self.measured[output]
+    }
+
+    fn respond(&self, horizon: Horizon, start: Start) -> Result<Vec<Response>, Error> {
+        if start == Start::Drop {
+            return Err(Error::argument(
+                "initial",
+                "models in equations start from what they know of their states, and leave out no rows; take zero, which is what the \
+                 model says, or estimate",
+            ));
+        }
+        match horizon {
+            Horizon::Steps { steps } => {
+                let said = self.ahead(steps)?;
+                Ok(self.responses(self.spread_out(&said, |one| one.value)))
+            }
+            Horizon::FreeRun => {
+                let begin = if start == Start::Zero { Begin::Model } else { Begin::Best };
+                let height = self.stored.outputs.len();
+                let mut signals = vec![vec![f64::NAN; self.rows]; height];
+                for (experiment, runs) in self.experiments.iter().zip(self.free_runs(begin)?) {
+                    for run in runs {
+                        for (row, values) in run.rows.zip(run.outputs.chunks_exact(height)) {
+                            for (signal, value) in signals.iter_mut().zip(values) {
+                                signal[experiment.first + row] = *value;
+                            }
+                        }
+                    }
+                }
+                Ok(self.responses(signals))
+            }
+        }
+    }
+
+    fn deviations(&self, steps: usize, _: Start) -> Result<Vec<Vec<f64>>, Error> {
+        let each = self.experiments.iter().enumerate().map(|(log, experiment)| {
+            self.with_open_parameters(
+                log,
+                |z| ahead(&self.model, experiment, z, steps),
+                |z| ahead(&self.model, experiment, z, steps),
+            )
+        });
+        let said = each.collect::<Result<Vec<_>, Error>>()?;
+        Ok(self.spread_out(&said, |one| one.variance.sqrt()))
+    }
+
+    fn quantile(&self, level: f64) -> f64 {
+        two_sided(1.0 - level)
+    }
+
+    fn noise(&self, output: usize, _: Option<f64>) -> (f64, Option<f64>) {
+        let own = self.stored.noise_covariance[output][output];
+        let Ok(filtered) = self.filtered() else { return (own, None) };
+        let Filtered { errors, variances, .. } = &filtered[output];
+        let (mut count, mut variance, mut ratio) = (0.0, 0.0, 0.0);
+        for (e, s) in errors.iter().zip(variances).filter(|(_, s)| !s.is_nan()) {
+            count += 1.0;
+            variance += s;
+            ratio += e * e / s;
+        }
+        if count == 0.0 { (own, None) } else { (variance / count, Some(ratio / count)) }
+    }
+
+    fn forecast(
+        &self,
+        log: &Log,
+        _: &[Rows],
+        steps: usize,
+        _: Start,
+    ) -> Result<Option<(usize, Vec<Forecast>)>, Error> {
+        let Some(last) = self.experiments.len().checked_sub(1) else { return Ok(None) };
+        let experiment = &self.experiments[last];
+        let is_measured = |row: &usize| experiment.output(*row).iter().any(|value| !value.is_nan());
+        let Some(base) = (0..experiment.rows()).rev().find(is_measured) else { return Ok(None) };
+        let inside = experiment.rows() - 1 - base;
+        let goes_on = self.inputs.is_empty() && experiment.first + experiment.rows() == log.rows();
+        let steps = if goes_on { steps } else { steps.min(inside) };
+        if steps == 0 {
+            return Ok(None);
+        }
+        check_steps("horizon", steps)?;
+        let said = self.with_open_parameters(
+            last,
+            |z| beyond(&self.model, experiment, z, base, steps),
+            |z| beyond(&self.model, experiment, z, base, steps),
+        )?;
+        let height = self.stored.outputs.len();
+        let of_output = |output: usize| {
+            let own = || said.iter().skip(output).step_by(height);
+            Forecast {
+                values: own().map(|one| one.value).collect(),
+                standard_deviations: own().map(|one| one.variance.sqrt()).collect(),
+            }
+        };
+        Ok(Some((experiment.first + base + 1, (0..height).map(of_output).collect())))
+    }
+
+    /// The innovations, each divided by its standard deviation. They are what a model without parameters that sees the same inputs leaves
+    /// of itself.
+    fn tested(&self) -> Result<Vec<Tested<'_>>, Error> {
+        let inputs = self.stored.inputs.len();
+        let orders = Orders::arx(0, &vec![1; inputs], &vec![0; inputs])?;
+        let filtered = self.filtered()?;
+        let each = filtered.iter().zip(&self.counted).zip(&self.stored.outputs);
+        let each = each.map(|((filtered, counted), output)| {
+            let standardised = &filtered.standardised;
+            let mut model =
+                PolynomialModel::from_parameters(&orders, &vec![0.0; inputs], None, 1.0, self.sample_time)?;
+            model.inputs.clone_from(&self.stored.inputs);
+            model.output = output.clone();
+            let innovations = self.experiments.iter().flat_map(stretches).map(|rows| {
+                let own: Vec<f64> =
+                    standardised[rows.clone()].iter().map(|e| if e.is_nan() { 0.0 } else { *e }).collect();
+                let inside = |one: &&Range<usize>| rows.start <= one.start && one.end <= rows.end;
+                let counted = counted.iter().filter(inside).cloned().collect();
+                Innovations::alone(rows, counted, own)
+            });
+            let innovations = innovations.collect();
+            let segments: Vec<Range<usize>> = self.experiments.iter().flat_map(stretches).collect();
+            let record = Record {
+                output: standardised,
+                inputs: self.inputs.iter().map(Vec::as_slice).collect(),
+                past: vec![0; segments.len()],
+                segments,
+            };
+            Ok(Tested { model: Cow::Owned(model), record, innovations })
+        });
+        each.collect()
+    }
+}

@@ -1,0 +1,224 @@
+//! The extended Kalman filter as a predictor, in any kind of number.
+//!
+//! With P = U D U' (U unit upper triangular, D diagonal), a step and a scalar element y = h(x) + v of a measurement:
+//!
+//! ```text
+//! x <- f(x),   P <- F P F' + Q                              F = df/dx at the filtered state
+//! e = y - h(x),   S = H P H' + r,   x <- x + P H' e/S,   P <- P - P H' H P/S     H = dh/dx at the predicted state
+//! ```
+//!
+//! Elements of one measurement are used one after the other, all linearised about the predicted state, so that those behind
+//! the first are corrected for what it moved: e_j = y_j - h_j(x^) - H_j (x - x^). In dual numbers the same operations give
+//! de/dz and dS/dz, exact but for rounding.
+//!
+//! Time update: Thornton's modified weighted Gram-Schmidt on [F U | I] with the weights (D, Q). Measurement update:
+//! Bierman's. thetahat-core has both too, in its kernels on slices. They stand here again as those take `Real` numbers, f32 and f64,
+//! and a dual number is none: it carries derivatives along, and is no real field. The test `value_is_the_likelihood_of_the_filter`
+//! holds both to the same likelihood. Both updates keep D from going negative (Bierman, Factorization Methods for Discrete Sequential Estimation, 1977,
+//! chapters V and VI). The quicker refactoring of F P F' + Q is not worth a second path here: derivatives take most of
+//! the time.
+
+use thetahat_core::Number;
+
+use crate::GreyBox;
+
+/// The estimate of the state and its covariance, and room for a step. Matrices are column after column.
+#[derive(Debug, Clone)]
+pub(crate) struct Predictor<S> {
+    /// x^.
+    pub(crate) state: Vec<S>,
+    /// D on the diagonal, U above it; zero below.
+    factor: Vec<S>,
+    /// x^ where the measurement was linearised.
+    origin: Vec<S>,
+    /// h(x^).
+    pub(crate) output: Vec<S>,
+    /// H, m x n.
+    output_matrix: Vec<S>,
+    next: Vec<S>,
+    /// F, n x n.
+    state_matrix: Vec<S>,
+    /// The rows of [F U | I], one after the other, and the weights of their columns.
+    rows: Vec<S>,
+    weights: Vec<S>,
+    /// U'h and D U'h.
+    projected: Vec<S>,
+    gain: Vec<S>,
+    work: Vec<S>,
+}
+
+/// e and S of one element.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Innovation<S> {
+    pub(crate) error: S,
+    pub(crate) variance: S,
+}
+
+impl<S: Number<f64>> Predictor<S> {
+    pub(crate) fn new(model: &GreyBox) -> Self {
+        let (n, m) = (model.states().len(), model.outputs().len());
+        let zeros = |count: usize| vec![S::from(0.0); count];
+        Self {
+            state: zeros(n),
+            factor: zeros(n * n),
+            origin: zeros(n),
+            output: zeros(m),
+            output_matrix: zeros(m * n),
+            next: zeros(n),
+            state_matrix: zeros(n * n),
+            rows: zeros(2 * n * n),
+            weights: zeros(2 * n),
+            projected: zeros(n),
+            gain: zeros(n),
+            work: Vec::new(),
+        }
+    }
+
+    /// Goes to the start of a log: x0, and P diagonal.
+    pub(crate) fn restart(&mut self, model: &GreyBox) {
+        let (start, deviations) = model.start();
+        let n = start.len();
+        self.factor.fill(S::from(0.0));
+        for (index, (&start, &deviation)) in start.iter().zip(deviations).enumerate() {
+            self.state[index] = S::from(start);
+            self.factor[index * n + index] = S::from(deviation * deviation);
+        }
+    }
+
+    /// Takes over the estimate of another.
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        self.state.copy_from_slice(&other.state);
+        self.factor.copy_from_slice(&other.factor);
+    }
+
+    /// H P H' + r of one output about the predicted state: the variance of what is measured of it. n^2 multiply-adds.
+    pub(crate) fn variance(&self, output: usize, noise: f64) -> S {
+        let (n, m) = (self.state.len(), self.output.len());
+        let mut variance = S::from(noise);
+        for column in 0..n {
+            let known = (0..column)
+                .map(|k| self.factor[column * n + k] * self.output_matrix[k * m + output])
+                .fold(self.output_matrix[column * m + output], |sum, product| sum + product);
+            variance += known * self.factor[column * n + column] * known;
+        }
+        variance
+    }
+
+    /// Over a step of `dt` seconds from the time `t`, with the input held. About 4 n^3 multiply-adds beside the model.
+    pub(crate) fn predict(&mut self, model: &GreyBox, z: &[S], u: &[f64], t: f64, dt: f64) {
+        let n = self.state.len();
+        model.advance(&self.state, z, u, t, dt, &mut self.next, &mut self.state_matrix, &mut self.work);
+        let zero = S::from(0.0);
+        let width = 2 * n;
+        for row in 0..n {
+            for column in 0..n {
+                let known = (0..column)
+                    .map(|k| self.state_matrix[k * n + row] * self.factor[column * n + k])
+                    .fold(self.state_matrix[column * n + row], |sum, product| sum + product);
+                self.rows[row * width + column] = known;
+            }
+            self.rows[row * width + n..(row + 1) * width].fill(zero);
+            self.weights[row] = self.factor[row * n + row];
+        }
+        // One column for each state that noise enters.
+        let mut columns = n;
+        for (row, variance) in model.process_variances(dt).enumerate().take(n) {
+            if variance > 0.0 {
+                self.rows[row * width + columns] = S::from(1.0);
+                self.weights[columns] = S::from(variance);
+                columns += 1;
+            }
+        }
+        for index in (0..n).rev() {
+            let (before, own) = self.rows.split_at_mut(index * width);
+            let own = &own[..columns];
+            let weighted = |other: &[S], weights: &[S]| {
+                let products = other.iter().zip(own).zip(weights);
+                products.fold(zero, |sum, ((&other, &own), &weight)| sum + other * own * weight)
+            };
+            let pivot = weighted(own, &self.weights);
+            self.factor[index * n + index] = pivot;
+            for row in 0..index {
+                let other = &mut before[row * width..][..columns];
+                // Where nothing is uncertain, the column does not matter.
+                let entry = if pivot.value() > 0.0 { weighted(other, &self.weights) / pivot } else { zero };
+                self.factor[index * n + row] = entry;
+                other.iter_mut().zip(own).for_each(|(other, &own)| *other -= entry * own);
+            }
+        }
+        std::mem::swap(&mut self.state, &mut self.next);
+    }
+
+    /// Linearises the measurement about the predicted state.
+    pub(crate) fn observe(&mut self, model: &GreyBox, z: &[S], u: &[f64], t: f64) {
+        model.observe(&self.state, z, u, t, &mut self.output, &mut self.output_matrix, &mut self.work);
+        self.origin.copy_from_slice(&self.state);
+    }
+
+    /// Takes element `index` of the measurement, of variance `noise`. Gives its innovation; none where S is not positive
+    /// or a number not finite: then the filter is of no more use. 2 n^2 multiply-adds.
+    pub(crate) fn absorb(&mut self, index: usize, measured: f64, noise: f64) -> Option<Innovation<S>> {
+        let (n, m) = (self.state.len(), self.output.len());
+        let zero = S::from(0.0);
+        let mut error = -(self.output[index] - measured);
+        for column in 0..n {
+            error -= self.output_matrix[column * m + index] * (self.state[column] - self.origin[column]);
+        }
+        let mut variance = S::from(noise);
+        for column in 0..n {
+            let known = (0..column)
+                .map(|k| self.factor[column * n + k] * self.output_matrix[k * m + index])
+                .fold(self.output_matrix[column * m + index], |sum, product| sum + product);
+            self.projected[column] = known;
+            self.gain[column] = self.factor[column * n + column] * known;
+            variance += known * self.gain[column];
+        }
+        let (e, s) = (error.value(), variance.value());
+        // Not for NaN either.
+        if !(s > 0.0 && s.is_finite() && (e * e / s).is_finite()) {
+            return None;
+        }
+        let mut before = S::from(noise);
+        for column in 0..n {
+            let (f, v) = (self.projected[column], self.gain[column]);
+            let after = before + f * v;
+            // Where a_(j-1) is 0, nothing is known to be uncertain yet: all b are 0.
+            let (kept, p) = if before.value() > 0.0 { (before / after, -f / before) } else { (zero, zero) };
+            if after.value() > 0.0 {
+                self.factor[column * n + column] *= kept;
+            }
+            for row in 0..column {
+                let given = self.factor[column * n + row];
+                self.factor[column * n + row] = given + self.gain[row] * p;
+                self.gain[row] += given * v;
+            }
+            before = after;
+        }
+        let scale = error / variance;
+        for (state, &gain) in self.state.iter_mut().zip(&self.gain) {
+            *state += gain * scale;
+        }
+        Some(Innovation { error, variance })
+    }
+
+    /// Whether the state is made of numbers.
+    pub(crate) fn is_finite(&self) -> bool {
+        self.state.iter().all(|state| state.value().is_finite())
+    }
+}
+
+impl Predictor<f64> {
+    /// L = U D^(1/2) with P = L L', column after column.
+    pub(crate) fn root(&self) -> Vec<f64> {
+        let n = self.state.len();
+        let mut root = self.factor.clone();
+        for column in 0..n {
+            let deviation = self.factor[column * n + column].max(0.0).sqrt();
+            for row in 0..column {
+                root[column * n + row] *= deviation;
+            }
+            root[column * n + column] = deviation;
+        }
+        root
+    }
+}

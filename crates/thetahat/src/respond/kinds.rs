@@ -1,0 +1,36 @@
+//! Models of any kind beside a log.
+
+use super::equations::EquationsOnLog;
+use super::on_log::{OnLog, PolynomialOnLog};
+use super::{Horizon, Start};
+use crate::data::{Log, Rows};
+use crate::{Error, Model};
+
+impl Model {
+    /// The model beside some rows of a log of which its offsets were taken; responses start naturally unless it is said otherwise.
+    /// `fitted` are the rows of this log that it was fitted to.
+    ///
+    /// # Errors
+    /// [`Error::Data`] for channels or rows that are not there, and a clock or numbers that the model cannot follow.
+    pub(crate) fn on_log<'l>(
+        &'l self,
+        log: &'l Log,
+        rows: &[Rows],
+        asked: Option<Start>,
+        fitted: &[Rows],
+    ) -> Result<Box<dyn OnLog + 'l>, Error> {
+        Ok(match self {
+            Self::Polynomial(model) => Box::new(PolynomialOnLog::new(model, log, rows, asked)?),
+            Self::Equations(model) => Box::new(EquationsOnLog::new(model, log, rows, fitted)?),
+        })
+    }
+
+    /// What a response to measured data had better start from: see [`Start::natural`]. Models in equations know what their text says of
+    /// their states in the first row of a log; free runs start from the state that explains the outputs best.
+    pub fn natural_start(&self, horizon: Horizon) -> Start {
+        match self {
+            Self::Polynomial(model) => Start::natural(model, horizon),
+            Self::Equations(_) => Start::Estimate,
+        }
+    }
+}

@@ -1,0 +1,199 @@
+//! What a model says of the rows of a log, whatever its kind: all that its figures, tests and pages rest on.
+
+use std::borrow::Cow;
+
+use super::forecast::forecast_if_possible;
+use super::innovations::{Innovations, innovations};
+use super::predict::check_steps;
+use super::sensitivities::prediction_deviations;
+use super::{Forecast, Horizon, Response, Start, predict, simulate};
+use crate::Error;
+use crate::data::{Log, Record, Rows};
+use crate::model::{PolynomialModel, Signal};
+
+/// A model beside a log of which its offsets were taken.
+///
+/// Lists have an entry for each output, signals a value for each row of the log.
+pub(crate) trait OnLog {
+    /// The outputs.
+    fn outputs(&self) -> &[Signal];
+
+    /// Whether inputs act on them.
+    fn is_driven(&self) -> bool;
+
+    /// What a response had better start from.
+    fn natural_start(&self, horizon: Horizon) -> Start;
+
+    /// What was measured of an output, as a deviation from its offset.
+    fn measured(&self, output: usize) -> &[f64];
+
+    /// The responses, as such deviations.
+    fn respond(&self, horizon: Horizon, start: Start) -> Result<Vec<Response>, Error>;
+
+    /// The standard deviations of the errors of predictions, what is open of the parameters in them; NaN where there is none.
+    fn deviations(&self, steps: usize, start: Start) -> Result<Vec<Vec<f64>>, Error>;
+
+    /// How many of these deviations from a prediction the end of an interval lies that holds the output with probability `level`.
+    fn quantile(&self, level: f64) -> f64;
+
+    /// The variance that the model expects of an error one step ahead, in the mean, and how many times larger the squared errors are of
+    /// which `mse` is the mean.
+    fn noise(&self, output: usize, mse: Option<f64>) -> (f64, Option<f64>);
+
+    /// What is left of each output one step ahead.
+    fn tested(&self) -> Result<Vec<Tested<'_>>, Error>;
+
+    /// What is expected behind the last usable row of `rows`, so many steps ahead at most, and the row (0-based) that it begins with;
+    /// none where there is nothing to start from, or predictions reach there by themselves.
+    fn forecast(
+        &self,
+        log: &Log,
+        rows: &[Rows],
+        steps: usize,
+        start: Start,
+    ) -> Result<Option<(usize, Vec<Forecast>)>, Error>;
+}
+
+/// What is left of an output, and the model that says which of its past values it may depend on.
+#[derive(Debug)]
+pub(crate) struct Tested<'a> {
+    pub(crate) model: Cow<'a, PolynomialModel>,
+    pub(crate) record: Record<'a>,
+    pub(crate) innovations: Vec<Innovations>,
+}
+
+/// A model of polynomials beside a log.
+#[derive(Debug)]
+pub(crate) struct PolynomialOnLog<'l> {
+    model: &'l PolynomialModel,
+    /// What predictions look at, and what they start from.
+    ahead: Record<'l>,
+    start: Start,
+    /// What free runs look at.
+    free_run: Record<'l>,
+}
+
+impl<'l> PolynomialOnLog<'l> {
+    /// A model beside some rows of a log; responses start naturally unless it is said otherwise.
+    ///
+    /// # Errors
+    /// [`Error::Data`] for channels or rows that are not there.
+    pub(crate) fn new(
+        model: &'l PolynomialModel,
+        log: &'l Log,
+        rows: &[Rows],
+        asked: Option<Start>,
+    ) -> Result<Self, Error> {
+        let start = |horizon| asked.unwrap_or_else(|| Start::natural(model, horizon));
+        let one = Horizon::Steps { steps: 1 };
+        let record = |horizon| record_for(model, log, rows, horizon, start(horizon));
+        Ok(Self { model, ahead: record(one)?, start: start(one), free_run: record(Horizon::FreeRun)? })
+    }
+
+    /// Predictions that look at another record, and start from something else.
+    pub(crate) fn with_predictions(self, ahead: Record<'l>, start: Start) -> Self {
+        Self { ahead, start, ..self }
+    }
+
+    fn record(&self, horizon: Horizon) -> &Record<'l> {
+        match horizon {
+            Horizon::Steps { .. } => &self.ahead,
+            Horizon::FreeRun => &self.free_run,
+        }
+    }
+}
+
+impl OnLog for PolynomialOnLog<'_> {
+    fn outputs(&self) -> &[Signal] {
+        std::slice::from_ref(&self.model.output)
+    }
+
+    fn is_driven(&self) -> bool {
+        self.model.orders.nb.iter().any(|&nb| nb > 0)
+    }
+
+    fn natural_start(&self, horizon: Horizon) -> Start {
+        match horizon {
+            Horizon::Steps { .. } => self.start,
+            Horizon::FreeRun => Start::natural(self.model, horizon),
+        }
+    }
+
+    fn measured(&self, _: usize) -> &[f64] {
+        self.ahead.output
+    }
+
+    fn respond(&self, horizon: Horizon, start: Start) -> Result<Vec<Response>, Error> {
+        let record = self.record(horizon);
+        let response = match horizon {
+            Horizon::Steps { steps } => predict(self.model, record, steps, start)?,
+            Horizon::FreeRun => simulate(self.model, record, start)?,
+        };
+        Ok(vec![response])
+    }
+
+    fn deviations(&self, steps: usize, start: Start) -> Result<Vec<Vec<f64>>, Error> {
+        Ok(vec![prediction_deviations(self.model, &self.ahead, steps, start)?])
+    }
+
+    fn quantile(&self, level: f64) -> f64 {
+        // The deviations are those of Student's distribution, the quantiles are in units of its scale.
+        self.model.quantile(level) / self.model.student_factor()
+    }
+
+    fn noise(&self, _: usize, mse: Option<f64>) -> (f64, Option<f64>) {
+        let variance = self.model.noise_variance;
+        (variance, mse.map(|mse| mse / variance))
+    }
+
+    fn tested(&self) -> Result<Vec<Tested<'_>>, Error> {
+        let found = innovations(self.model, &self.ahead, 1, self.start)?;
+        let record = self.ahead.clone();
+        Ok(vec![Tested { model: Cow::Borrowed(self.model), record, innovations: found }])
+    }
+
+    fn forecast(
+        &self,
+        log: &Log,
+        rows: &[Rows],
+        steps: usize,
+        start: Start,
+    ) -> Result<Option<(usize, Vec<Forecast>)>, Error> {
+        let (model, record) = (self.model, &self.ahead);
+        let Some(first) = record.segments.last().map(|segment| segment.end) else { return Ok(None) };
+        let driving = model.inputs.iter().zip(&model.orders.nb).filter(|(_, nb)| **nb > 0);
+        let driving: Vec<&str> = driving.map(|(input, _)| input.name.as_str()).collect();
+        // As far as the inputs go on without a gap.
+        let stretches = log.segments(&driving, rows)?;
+        let stretch = stretches.into_iter().find(|stretch| stretch.contains(&(first - 1)));
+        let end = stretch.map_or(first, |stretch| stretch.end);
+        let known = if driving.is_empty() && end == log.rows() { steps } else { steps.min(end - first) };
+        if known == 0 {
+            return Ok(None);
+        }
+        check_steps("horizon", known)?;
+        let future: Vec<&[f64]> = record.inputs.iter().map(|u| &u[first..end]).collect();
+        // Values of an input that drives nothing may be missing, and are not needed.
+        let future: Vec<&[f64]> =
+            future.iter().zip(&model.orders.nb).map(|(u, nb)| if *nb > 0 { *u } else { &[] }).collect();
+        let forecast = forecast_if_possible(model, record, &future, known, start)?;
+        Ok(forecast.map(|forecast| (first, vec![forecast])))
+    }
+}
+
+/// The record that a response of a model looks at. It goes on through missing outputs where no past one is needed.
+pub(crate) fn record_for<'l>(
+    model: &PolynomialModel,
+    log: &'l Log,
+    rows: &[Rows],
+    horizon: Horizon,
+    start: Start,
+) -> Result<Record<'l>, Error> {
+    let inputs: Vec<String> = model.inputs.iter().map(|input| input.name.clone()).collect();
+    let needed = match horizon {
+        Horizon::Steps { .. } => model.orders.needs_past_outputs(),
+        Horizon::FreeRun => start == Start::Drop,
+    };
+    let output = &model.output.name;
+    if needed { log.record(&inputs, output, rows) } else { log.driven_record(&inputs, output, rows) }
+}

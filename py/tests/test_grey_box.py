@@ -1,0 +1,233 @@
+"""Models in equations: texts, dicts and functions of Python, their fits, and what every method makes of them."""
+
+from __future__ import annotations
+
+import copy
+import json
+import pickle
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import thetahat as th
+from thetahat import plot
+
+DATA = Path(__file__).parents[2] / "tests" / "data"
+TANK: dict[str, Any] = {
+    "sample_time": 1.0,
+    "states": {"level": {"start": 0.0, "sd": 0.1}},
+    "inputs": {"flow": "u"},
+    "parameters": {"area": {"start": 1, "sd": 1, "unknown": True, "min": 0}, "loss": 0.1},
+    "next": {"level": "level + dt * (flow - loss * level) / area"},
+    "outputs": {"y": "level"},
+    "noise": {"process": {"level": 0.01}, "measurement": {"y": 0.05}},
+}
+
+
+def tank_log(rows: int = 400, seed: int = 0) -> th.Log:
+    """A tank of 2 m^2."""
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.uniform(-1, 1, rows // 10), 10)
+    level = np.zeros(rows)
+    for t in range(1, rows):
+        level[t] = level[t - 1] + (u[t - 1] - 0.1 * level[t - 1]) / 2 + 0.01 * rng.standard_normal()
+    return th.Log(level + 0.05 * rng.standard_normal(rows), u, sample_time=1)
+
+
+def test_texts_files_and_dicts_are_one_model(tmp_path: Path) -> None:
+    of_dict = th.GreyBox(TANK)
+    (tmp_path / "tank.toml").write_text(of_dict.to_toml())
+    assert th.GreyBox(of_dict.to_toml()) == of_dict == th.GreyBox(tmp_path / "tank.toml")
+    assert of_dict.to_dict() == TANK
+    assert (of_dict.states, of_dict.inputs, of_dict.outputs, of_dict.unknown) == (["level"], ["u"], ["y"], ["area"])
+    known = of_dict.with_parameters(area=2.0)
+    assert known.unknown == [] and known != of_dict
+    for model in (of_dict, known):
+        assert pickle.loads(pickle.dumps(model)) == model == copy.deepcopy(model)
+
+
+def test_functions_of_python_are_the_same_equations() -> None:
+    box = th.GreyBox.from_functions(
+        sample_time=1.0,
+        states={"level": (0.0, 0.1)},
+        inputs={"flow": "u"},
+        parameters=TANK["parameters"],
+        next=lambda x, u, p, dt: {"level": x.level + dt * (u.flow - p.loss * x.level) / p.area},
+        outputs=lambda x, u, p: {"y": x.level},
+        process={"level": 0.01},
+        measurement={"y": 0.05},
+    )
+    log = tank_log()
+    assert np.array_equal(th.grey(log, box).parameters, th.grey(log, TANK).parameters)
+
+
+def test_functions_of_numpy_become_those_of_the_equations() -> None:
+    def derivative(x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {
+            "a": np.sin(x.a) + np.exp(-x.b) * np.sqrt(np.abs(x.b)) - x.a**2 + np.square(x.b),
+            "b": np.minimum(x.a, 1.0) / 2 - np.arctan2(x.b, -3) + 0.5 * np.tanh(p.c) + +u.u,
+        }
+
+    box = th.GreyBox.from_functions(
+        sample_time=0.1,
+        states={"a": {"start": 0, "sd": 1}, "b": (1, 0)},
+        inputs=["u"],
+        parameters={"c": 2.0},
+        derivative=derivative,
+        outputs=lambda x, u, p: {"y": x.a, "z": 0 * x.b + 1},
+        measurement={"y": 1.0, "z": 1.0},
+        substeps=3,
+    )
+    found = box.to_dict()
+    assert found["derivative"]["a"] == "(((sin(a) + (exp((-b)) * sqrt(abs(b)))) - (a ^ 2.0)) + (b * b))"
+    assert found["derivative"]["b"] == "((((min(a, 1.0) / 2.0) - atan2(b, (-3.0))) + (0.5 * tanh(c))) + u)"
+    assert found["substeps"] == 3
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"states": {}}, "states"),
+        ({"next": {"level": "level + volume"}}, "volume"),
+        ({"sample_time": float("nan")}, "sample_time"),
+        ({"outputs": {"y": "level +"}}, "line"),
+        ({"sample_time": None}, "sample_time: expected a number"),
+    ],
+)
+def test_a_model_that_is_none_is_refused_with_its_place(change: dict[str, Any], words: str) -> None:
+    with pytest.raises((ValueError, TypeError), match=words):
+        th.GreyBox({**TANK, **change})
+
+
+def test_functions_that_cannot_be_equations_are_refused() -> None:
+    def made(next: Any) -> th.GreyBox:
+        outputs = lambda x, u, p: {"y": x.x}  # noqa: E731
+        return th.GreyBox.from_functions(
+            sample_time=1, states={"x": (0, 1)}, next=next, outputs=outputs, measurement={"y": 1.0}
+        )
+
+    import math
+
+    for function, words in [
+        (lambda x, u, p, dt: {"x": math.sin(x.x)}, "use NumPy's functions"),
+        (lambda x, u, p, dt: {"x": 1.0 if x.x > 0 else 0.0}, "no value to branch on|greater"),
+        (lambda x, u, p, dt: x.x, "return a dict"),
+        (lambda x, u, p, dt: {"x": np.floor(x.x)}, "floor: equations have"),
+        (lambda x, u, p, dt: {"x": "x"}, "expression"),
+    ]:
+        with pytest.raises(TypeError, match=words):
+            made(function)
+    with pytest.raises(AttributeError):
+        made(lambda x, u, p, dt: {"x": x.y})
+    with pytest.raises(ValueError, match="one of derivative and next"):
+        made(None)
+
+
+def test_a_fit_is_a_model_with_every_method(tmp_path: Path) -> None:
+    log = tank_log()
+    model = th.grey(log, TANK, estimate=slice(0, 300))
+    assert (model.kind, model.name, model.outputs, model.inputs) == ("equations", "equations, 1 state", ["y"], ["u"])
+    assert model.parameter_names == ["area"] and abs(model.parameters[0] - 2) < 4 * model.standard_errors[0]
+    assert model.predict(log, 3).shape == (400,) and model.simulate(log).shape == (400,)
+    low, high = model.predict_interval(log, 5)
+    inside = np.mean((low < log.y) & (log.y < high))
+    assert 0.9 < inside < 0.99
+    assert model.simulate([1.0] * 5).shape == (5,)
+    ahead = model.forecast(log, 4, u=[0.0] * 4)
+    assert np.all(np.isfinite(ahead.values)) and np.all(np.diff(ahead.standard_deviations) > 0)
+    validation = model.validate(log, rows=slice(300, 400), require="white,fit>=70,coverage>=85")
+    assert validation.unmet == [] and validation.document["seen"] == "no"
+    assert model.validate(log, rows="1..300").document["seen"] == "yes"
+    assert model.validate(log[:300]).document["seen"] == "yes"
+    model.write_html(tmp_path / "page.html", log)
+    assert "change of variable" in (tmp_path / "page.html").read_text()
+    assert th.compare({"tank": model, "arx": th.arx(log, na=1, nb=1, estimate="1..300")}, log).document["criteria"] is not None
+    again = th.Model.from_json(model.to_json())
+    assert again.to_json() == model.to_json() == pickle.loads(pickle.dumps(model)).to_json()
+    assert np.array_equal(again.predict(log, 3), model.predict(log, 3))
+    plot.fit(model, log)
+    plot.residuals(validation)
+
+
+@pytest.mark.parametrize(
+    "what", ["a", "orders", "stable", "poles", "frequency_response", "step_response", "to_state_space", "sample", "to_control"]
+)
+def test_what_equations_do_not_have_is_said_in_a_sentence(what: str) -> None:
+    log = tank_log()
+    model = th.grey(log, TANK)
+    with pytest.raises((AttributeError, ValueError), match="is of polynomial models"):
+        found = getattr(model, what)
+        found(log) if what == "sample" else found()
+
+
+def test_wrong_arguments_change_nothing() -> None:
+    log = tank_log()
+    wrong: list[tuple[dict[str, Any], type[Exception], str]] = [
+        ({"estimate": "1..900"}, ValueError, "the log has 400 rows"),
+        ({"starts": -1}, ValueError, "starts"),
+        ({"tolerance": 0.0}, ValueError, "tolerance"),
+        ({"model": th.GreyBox(TANK).with_parameters(area=2.0)}, ValueError, "none of its parameters is unknown"),
+        ({"model": {**TANK, "inputs": {"flow": "v"}}}, ValueError, "needs channel 'v'"),
+        ({"log": log.y}, TypeError, "expected a Log"),
+    ]
+    for arguments, error, words in wrong:
+        with pytest.raises(error, match=words):
+            th.grey(**{"log": log, "model": TANK, **arguments})
+    still = th.Log(np.zeros(50), np.zeros(50), sample_time=1)
+    with pytest.raises(th.EstimationError) as open_:
+        th.grey(still, {**TANK, "parameters": {**TANK["parameters"], "loss": 0.0}})
+    assert open_.value.parameters == ["area"]
+
+
+def test_further_starts_find_the_lower_optimum() -> None:
+    # A pendulum: from 6 the search ends where its frequency is another one.
+    rng = np.random.default_rng(3)
+    angle, rate, y = 1.0, 0.0, []
+    for _ in range(300):
+        y.append(angle + 0.02 * rng.standard_normal())
+        # The midpoint rule, ten times as fine as the model's.
+        for _ in range(50):
+            middle = rate - 0.0005 * (9.8 * np.sin(angle) + 0.05 * rate)
+            force = 9.8 * np.sin(angle + 0.0005 * rate) + 0.05 * middle
+            angle, rate = angle + 0.001 * middle, rate - 0.001 * force
+    log = th.Log(y, sample_time=0.05)
+    box = th.GreyBox.from_functions(
+        sample_time=0.05,
+        states={"angle": (1.0, 0.0), "rate": (0.0, 0.0)},
+        parameters={"stiffness": {"start": 3, "sd": 6, "unknown": True, "min": 0}, "damping": 0.05},
+        derivative=lambda x, u, p: {"angle": x.rate, "rate": -p.stiffness * np.sin(x.angle) - p.damping * x.rate},
+        outputs=lambda x, u, p: {"y": x.angle},
+        measurement={"y": 0.02},
+        substeps=5,
+    )
+    with pytest.warns(th.EstimationWarning):
+        alone = th.grey(log, box)
+    best = th.grey(log, box, starts=20, seed=1)
+    assert abs(best.parameters[0] - 9.8) < 0.1 < abs(alone.parameters[0] - 9.8)
+    assert best.log_likelihood > alone.log_likelihood
+    assert best.to_json() == th.grey(log, box, starts=20, seed=1).to_json()
+
+
+def test_the_documents_are_those_of_the_command_line(tmp_path: Path) -> None:
+    for name in ("mass_spring_damper", "dc_motor"):
+        path, box = DATA / f"{name}.csv", th.GreyBox(DATA / f"{name}.toml")
+        log = th.read_csv(path, inputs=box.inputs, output=box.outputs, time="t", uniform=False)
+        model = th.grey(log, box, estimate="1..500", validate="501..700")
+        report = tmp_path / "report.json"
+        words = ["fit", "--grey", str(DATA / f"{name}.toml"), str(path), "--time", "t", "--estimate", "1..500"]
+        words += ["--validate", "501..700", "--report", str(report)]
+        subprocess.run([str(Path(sys.executable).with_name("thetahat")), *words], check=True, capture_output=True)
+        assert model.to_json() == report.read_text()
+        whole = model.predict(log, 2)
+        assert whole.shape == ((len(log),) if len(box.outputs) == 1 else (len(log), len(box.outputs)))
+        validation = model.validate(log)
+        assert [noise["output"] for noise in validation.document["noise"]] == box.outputs
+        if len(box.outputs) > 1:
+            with pytest.raises(ValueError, match="output: there are several"):
+                validation.fit()
+        assert validation.fit(output=box.outputs[0]) > 50
+        assert json.loads(model.to_json())["model"]["kind"] == "equations"

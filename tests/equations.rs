@@ -99,8 +99,6 @@ fn every_verb_takes_the_report() {
     assert!(run.stdout.lines().nth(1).is_some_and(|line| line.starts_with("0.0,,")), "{}", run.stdout);
     assert!(folder.refused("predict report.json inputs.csv --time t", 3).contains("no output 'i'"));
     let refusals = [
-        ("bode report.json", 3, "a frequency response is of polynomial models"),
-        ("step report.json", 3, "a step response is of polynomial models"),
         ("simulate report.json log.csv --time t --draws 5", 3, "is of polynomial models"),
         ("track log.csv --time t --warm report.json", 3, "a tracker is of polynomial models"),
         ("predict report.json log.csv --time t --detrend mean", 2, "takes nothing from them"),
@@ -112,6 +110,37 @@ fn every_verb_takes_the_report() {
         let message = folder.refused(line, code);
         assert!(message.contains(words), "{line}: {message}");
     }
+}
+
+#[test]
+fn linear_equations_have_responses() {
+    let (folder, report) = fitted("dc_motor", "1..1000", "");
+    let constant = number(&report, "/model/parameters/0/value");
+    let friction = number(&report, "/model/parameters/1/value");
+    // 2 s are fifty times as long as the slowest mode lasts.
+    let run = folder.done("step report.json --samples 201");
+    let last = |output: &str| -> Vec<f64> {
+        let own =
+            run.stdout.lines().rfind(|line| line.starts_with(&format!("{output},u,"))).expect("it is there");
+        own.split(',').skip(2).map(|field| field.parse().expect("a number")).collect()
+    };
+    assert!(run.stdout.starts_with("output,input,time,value,standard_error\n"), "{}", run.stdout);
+    let gain = constant / (1.5 * friction + constant * constant);
+    assert!((last("speed")[1] / gain - 1.0).abs() < 1e-3, "{:?} {gain}", last("speed"));
+    assert!((last("i")[1] / (gain * friction / constant) - 1.0).abs() < 1e-3, "{:?}", last("i"));
+    assert!(last("speed")[2] > 0.0);
+    let run = folder.done("bode report.json --frequencies 0.01..1 --points 2");
+    let magnitude = run.stdout.lines().find(|line| line.starts_with("speed,u,0.01,")).expect("it is there");
+    let magnitude: f64 = magnitude.split(',').nth(3).and_then(|field| field.parse().ok()).expect("a number");
+    assert!((magnitude / gain - 1.0).abs() < 1e-3 && !run.stdout.contains("noise"), "{}", run.stdout);
+    folder.done("fit --grey model.toml log.csv --time t --html page.html");
+    assert!(folder.read("page.html").contains("Frequency response"));
+
+    let (folder, _) = fitted("battery", "1..600", "--html page.html");
+    for verb in ["bode", "step", "impulse"] {
+        assert!(folder.refused(&format!("{verb} report.json"), 3).contains("are not linear"));
+    }
+    assert!(!folder.read("page.html").contains("Frequency response"));
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use thetahat::{Quantity, frequency_response, logarithmic_frequencies};
+use thetahat::{Model, Quantity, frequency_response, logarithmic_frequencies};
 
 use super::stored;
 use crate::args::BodeArguments;
@@ -12,24 +12,31 @@ use crate::output;
 pub(crate) fn bode(arguments: &BodeArguments) -> Result<(), Failure> {
     let asked = arguments.frequencies.as_deref().map(range).transpose()?;
     let model = stored::model(&arguments.report)?;
-    let model = stored::polynomials(&arguments.report, &model, "a frequency response")?;
-    let nyquist = PI / model.sample_time;
+    let models = stored::linear(&arguments.report, &model, "a frequency response")?;
+    let nyquist = PI / model.sample_time();
     let (low, high) = asked.unwrap_or((nyquist / 1000.0, nyquist));
     // The ends first: an error then says them as they were given.
-    let responses = frequency_response(model, &[low, high])
-        .and_then(|_| logarithmic_frequencies(low, high, arguments.points as usize))
-        .and_then(|frequencies| frequency_response(model, &frequencies))
-        .map_err(|error| Failure::option(&error))?;
+    let responses = models.iter().map(|model| {
+        let found = frequency_response(model, &[low, high])
+            .and_then(|_| logarithmic_frequencies(low, high, arguments.points as usize))
+            .and_then(|frequencies| frequency_response(model, &frequencies));
+        Ok((&model.output.name, found.map_err(|error| Failure::option(&error))?))
+    });
+    let responses = responses.collect::<Result<Vec<_>, Failure>>()?;
+    let (several, has_noise) = (models.len() > 1, matches!(model, Model::Polynomial(_)));
     output::write_csv(&arguments.out, |csv| {
-        csv.write_record([
+        let output = several.then_some("output").into_iter();
+        csv.write_record(output.chain([
             "input",
             "frequency",
             "magnitude",
             "magnitude_standard_error",
             "phase",
             "phase_standard_error",
-        ])?;
-        for response in &responses {
+        ]))?;
+        let all = responses.iter().flat_map(|(output, each)| each.iter().map(move |one| (output, one)));
+        for (output, response) in all.filter(|(_, response)| has_noise || response.input.is_some()) {
+            let output = several.then(|| output::cell(output));
             let name = output::cell(response.input.as_deref().unwrap_or("noise"));
             for point in &response.points {
                 // What is not a number is left empty.
@@ -39,7 +46,12 @@ pub(crate) fn bode(arguments: &BodeArguments) -> Result<(), Failure> {
                 let (magnitude, spread) = (known(magnitude), standard_error.and_then(known));
                 let (phase, turn) =
                     (degrees(point.phase.value), point.phase.standard_error.and_then(degrees));
-                csv.serialize((&name, point.frequency, magnitude, spread, phase, turn))?;
+                match &output {
+                    Some(output) => {
+                        csv.serialize((output, &name, point.frequency, magnitude, spread, phase, turn))?
+                    }
+                    None => csv.serialize((&name, point.frequency, magnitude, spread, phase, turn))?,
+                }
             }
         }
         Ok(())

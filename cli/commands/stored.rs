@@ -1,5 +1,6 @@
 //! What `fit` wrote, read back.
 
+use std::borrow::Cow;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
@@ -23,6 +24,15 @@ pub(super) fn polynomials<'m>(
     what: &str,
 ) -> Result<&'m PolynomialModel, Failure> {
     model.polynomials(what).map_err(|error| Failure::data(format!("{}: {error}", path.display())))
+}
+
+/// What a stored model is from its inputs to each output, if it is linear: `what` needs it to be.
+pub(super) fn linear<'m>(
+    path: &Path,
+    model: &'m Model,
+    what: &str,
+) -> Result<Vec<Cow<'m, PolynomialModel>>, Failure> {
+    model.linear(what).map_err(|error| Failure::data(format!("{}: {error}", path.display())))
 }
 
 /// A stored report.

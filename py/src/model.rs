@@ -278,17 +278,23 @@ impl Model {
         points: usize,
     ) -> PyResult<Vec<(Option<String>, [Column<'py>; 7])>> {
         let model = Arc::clone(&self.model);
-        let polynomials = self.polynomials(py, "a frequency response")?;
+        self.linear(py, "a frequency response")?;
         let frequencies = match frequencies {
             Some(frequencies) => vector("w", frequencies, None)?.as_slice()?.to_vec(),
             None => {
-                let nyquist = std::f64::consts::PI / polynomials.sample_time;
+                let nyquist = std::f64::consts::PI / model.sample_time();
                 logarithmic_frequencies(nyquist / 1000.0, nyquist, points)
                     .map_err(|error| error::batch(py, error))?
             }
         };
         let responses = interruptible(py, move |_| {
-            frequency_response(model.polynomials("a frequency response")?, &frequencies)
+            let models = model.linear("a frequency response")?;
+            let mut found = frequency_response(&models[0], &frequencies)?;
+            // Of equations the noise is not told.
+            found.retain(|response| {
+                response.input.is_some() || matches!(*model, thetahat::Model::Polynomial(_))
+            });
+            Ok(found)
         })?;
         let columns = responses.into_iter().map(|response| {
             let column = |of: &dyn Fn(&thetahat::FrequencyPoint) -> f64| {
@@ -350,6 +356,21 @@ impl Model {
         self.model.polynomials(what).map_err(|error| error::batch(py, error))
     }
 
+    /// Refuses a model that is not linear, or has several outputs.
+    fn linear(&self, py: Python<'_>, what: &str) -> PyResult<()> {
+        let models = self.model.linear(what).map_err(|error| error::batch(py, error))?;
+        match &models[..] {
+            [only] if only.inputs.is_empty() && matches!(*self.model, thetahat::Model::Equations(_)) => {
+                Err(PyValueError::new_err(format!("{what} needs inputs, and the model has none")))
+            }
+            [_] => Ok(()),
+            all => Err(PyValueError::new_err(format!(
+                "{what} is of models with one output, and this one has {}; the command line gives those of all",
+                all.len()
+            ))),
+        }
+    }
+
     /// The times, the values and their standard errors of a response to an input.
     fn transient<'py>(
         &self,
@@ -357,7 +378,12 @@ impl Model {
         respond: impl FnOnce(&PolynomialModel) -> Result<TransientResponse, thetahat::Error> + Send + 'static,
     ) -> PyResult<[Column<'py>; 3]> {
         let model = Arc::clone(&self.model);
-        let response = interruptible(py, move |_| respond(model.polynomials("a step or impulse response")?))?;
+        let what = "a step or impulse response";
+        self.linear(py, what)?;
+        let response = interruptible(py, move |_| {
+            let models = model.linear(what)?;
+            respond(&models[0])
+        })?;
         let values = response.values.iter().map(|quantity| quantity.value).collect();
         let errors = response.values.iter().map(or_nan).collect();
         Ok([response.time, values, errors].map(|column| PyArray1::from_vec(py, column)))

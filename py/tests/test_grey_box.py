@@ -154,7 +154,7 @@ def test_a_fit_is_a_model_with_every_method(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "what", ["a", "orders", "stable", "poles", "frequency_response", "step_response", "to_state_space", "sample", "to_control"]
+    "what", ["a", "orders", "stable", "poles", "to_state_space", "sample", "to_control"]
 )
 def test_what_equations_do_not_have_is_said_in_a_sentence(what: str) -> None:
     log = tank_log()
@@ -162,6 +162,22 @@ def test_what_equations_do_not_have_is_said_in_a_sentence(what: str) -> None:
     with pytest.raises((AttributeError, ValueError), match="is of polynomial models"):
         found = getattr(model, what)
         found(log) if what == "sample" else found()
+
+
+def test_linear_equations_have_responses_and_others_not() -> None:
+    model = th.grey(tank_log(), TANK)
+    step = model.step_response(samples=60)
+    assert step.values[0] == 0 and abs(step.values[-1] - 10) < 1 and step.standard_errors[5] > 0
+    response = model.frequency_response(np.array([0.001, 0.1]))
+    area = model.parameters[0]
+    exact = 1 / (area * (np.exp(0.1j) - 1) + 0.1)
+    assert response.sources == ["u"] and abs(response.values[0, 1] - exact) < 1e-9
+    plot.bode(model)
+    bent = th.grey(tank_log(), {**TANK, "next": {"level": "level + dt * (flow - loss * level - 0.01 * level^3) / area"}})
+    with pytest.raises(ValueError, match="these equations are not linear"):
+        bent.step_response()
+    with pytest.raises(ValueError, match="there is no input 3"):
+        model.step_response(3)
 
 
 def test_wrong_arguments_change_nothing() -> None:

@@ -90,7 +90,7 @@ fn residuals(report: &Report, log: &Log, rows: [usize; 2], seen: Seen) -> Residu
     let plan = ValidationPlan { rows, ..ValidationPlan::default() };
     let found = validate(report, None, log, &[], &plan).expect("the case is sound").validation;
     assert_eq!(found.seen, seen);
-    found.residuals.expect("the case is sound")
+    found.residuals.into_iter().next().expect("the case is sound")
 }
 
 /// What is rejected on the rows of the fit, and on fresh ones.

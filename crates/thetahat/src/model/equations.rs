@@ -5,6 +5,7 @@ mod dynamics;
 mod expression;
 mod fitted;
 mod graph;
+mod linear;
 mod program;
 mod read;
 mod scale;
@@ -118,6 +119,7 @@ pub struct GreyBox {
     /// Whether the equations know the length of a step.
     any_step: bool,
     linear: bool,
+    superposes: bool,
     transition: Functions,
     observation: Functions,
     process_variances: Vec<f64>,
@@ -204,6 +206,12 @@ impl GreyBox {
     /// Whether the derivatives by the states depend on neither states nor unknown parameters.
     pub fn is_linear(&self) -> bool {
         self.linear
+    }
+
+    /// Whether what several inputs do adds up, at any time: the equations are linear in states and inputs together, and do not know
+    /// the time. Unknown parameters may stand anywhere in them.
+    pub fn superposes(&self) -> bool {
+        self.superposes
     }
 
     /// What is known of the unknown parameters, and their changes of variable.

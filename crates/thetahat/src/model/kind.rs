@@ -1,5 +1,7 @@
 //! The kinds of models.
 
+use std::borrow::Cow;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -116,6 +118,18 @@ impl Model {
                      filters"
                 ),
             )),
+        }
+    }
+
+    /// What the model is from its inputs to each of its outputs, as polynomials: those of its own, or the transfer functions of linear
+    /// equations, of which the noise is not told.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] if it is not linear, with what it can do instead; `what` needs it to be.
+    pub fn linear(&self, what: &str) -> Result<Vec<Cow<'_, PolynomialModel>>, Error> {
+        match self {
+            Self::Polynomial(model) => Ok(vec![Cow::Borrowed(&**model)]),
+            Self::Equations(model) => Ok(model.linear(what)?.into_iter().map(Cow::Owned).collect()),
         }
     }
 

@@ -186,7 +186,7 @@ pub fn comparison_page(reports: &[Report], validated: &[Validated], command: &st
         }
     }
     if !models.is_empty() {
-        page.sections.extend(responses(&models, &inputs));
+        page.sections.extend(responses(&models, &inputs, true));
     }
     let mut section = Section::new("Data");
     section.table(tables::logs(logs));
@@ -555,10 +555,10 @@ fn validations<'a>(parts: &[(String, &'a Validated)]) -> Vec<(String, &'a Valida
 fn of_model(report: &Report) -> Vec<Section> {
     let model = match &report.model {
         Model::Polynomial(model) => model,
-        Model::Equations(model) => return vec![of_equations(report, model)],
+        Model::Equations(model) => return of_equations(report, model),
     };
     let inputs: Vec<&str> = model.inputs.iter().map(|input| input.name.as_str()).collect();
-    let mut sections = responses(&[("estimate".to_owned(), model)], &inputs);
+    let mut sections = responses(&[("estimate".to_owned(), model)], &inputs, true);
     let mut section = Section::new("Poles and zeros");
     section.chart(charts::roots(model));
     section.table(tables::roots(model));
@@ -571,25 +571,37 @@ fn of_model(report: &Report) -> Vec<Section> {
     sections
 }
 
-fn of_equations(report: &Report, model: &EquationsModel) -> Section {
+fn of_equations(report: &Report, model: &EquationsModel) -> Vec<Section> {
     let mut section = Section::new("Model");
     section.table(tables::unknown_parameters(report, model));
     section.table(tables::starts(report, model));
     section.table(tables::estimation(&report.estimation, None));
     section.text("The model as it was written, before the fit:");
     section.blocks.push(Block::Command(model.equations.clone()));
-    section
+    // Equations that are not linear have no responses of this kind.
+    let linear = report.model.linear("a response").unwrap_or_default();
+    let named: Vec<(String, &PolynomialModel)> =
+        linear.iter().map(|model| (format!("to {}", model.output.name), &**model)).collect();
+    let inputs: Vec<&str> = model.inputs.iter().map(|input| input.name.as_str()).collect();
+    let mut sections = match named.is_empty() || inputs.is_empty() {
+        true => Vec::new(),
+        false => responses(&named, &inputs, false),
+    };
+    sections.push(section);
+    sections
 }
 
 /// Bode plots, step and impulse responses.
-fn responses(models: &[(String, &PolynomialModel)], inputs: &[&str]) -> Vec<Section> {
+fn responses(models: &[(String, &PolynomialModel)], inputs: &[&str], has_noise: bool) -> Vec<Section> {
     let mut frequency = Section::new("Frequency response");
     let mut transient = Section::new("Step and impulse response");
     for input in inputs {
         frequency.chart(charts::bode(models, Some(input)));
         charts::transients(models, input).into_iter().for_each(|drawn| transient.chart(drawn));
     }
-    frequency.chart(charts::bode(models, None));
+    if has_noise {
+        frequency.chart(charts::bode(models, None));
+    }
     if inputs.is_empty() {
         transient.text("Without inputs there is no step response.");
     }

@@ -96,8 +96,15 @@ pub(super) fn model(text: &str, known: &[(String, f64)]) -> Result<GreyBox, Erro
 
     let (transition, first) = functions(&mut graph, &rates, states.len(), unknown.len());
     let (observation, second) = functions(&mut graph, &seen, states.len(), unknown.len());
-    let slopes: Vec<Node> = first.into_iter().chain(second).collect();
+    let mut slopes: Vec<Node> = first.into_iter().chain(second).collect();
     let bends = |operation| matches!(operation, Operation::State(_) | Operation::Parameter(_));
+    let linear = unknown.is_empty() && !graph.depends(&slopes, bends);
+    let moves = |operation| matches!(operation, Operation::State(_) | Operation::Input(_) | Operation::Time);
+    let all: Vec<Node> = rates.iter().chain(&seen).copied().collect();
+    for input in 0..inputs.len() {
+        slopes.extend(graph.derivatives(&all, Operation::Input(input)));
+    }
+    let superposes = !graph.depends(&slopes, moves);
     let any_step = step != Step::Next || graph.depends(&rates, |operation| operation == Operation::Step);
     Ok(GreyBox {
         text: text.to_owned(),
@@ -107,7 +114,8 @@ pub(super) fn model(text: &str, known: &[(String, f64)]) -> Result<GreyBox, Erro
         states: states.iter().map(|state| state.key.to_owned()).collect(),
         inputs: inputs.into_iter().map(|(_, channel)| channel).collect(),
         outputs: outputs.iter().map(|entry| entry.key.to_owned()).collect(),
-        linear: unknown.is_empty() && !graph.depends(&slopes, bends),
+        linear,
+        superposes,
         unknown,
         known: known.to_vec(),
         step,

@@ -6,51 +6,8 @@ use std::path::Path;
 
 use thetahat::text;
 
+use crate::options::{option_of, with_options};
 use crate::table;
-
-/// The option that an argument of the library is here, if it is one.
-fn option_of(argument: &str) -> Option<&str> {
-    const SAME: [&str; 33] = [
-        "alarm",
-        "alpha",
-        "alphas",
-        "constant",
-        "dc-gain",
-        "dead-zone",
-        "detrend",
-        "draws",
-        "estimator",
-        "forgetting",
-        "frequencies",
-        "gain",
-        "horizon",
-        "initial",
-        "lags",
-        "method",
-        "nf",
-        "noise-bound",
-        "norm",
-        "offset",
-        "poles",
-        "prefilter",
-        "require",
-        "resample",
-        "ridge",
-        "rows",
-        "scale",
-        "select",
-        "split",
-        "start",
-        "step",
-        "tolerance",
-        "trend",
-    ];
-    match argument {
-        // One at a time.
-        "bounds" => Some("bound"),
-        same => SAME.contains(&same).then_some(same),
-    }
-}
 
 /// One line for a person, and an exit code for a script.
 #[derive(Debug)]
@@ -94,7 +51,7 @@ impl Failure {
 
     /// The message may repeat names and parts of files: it is shown as [`text::message`] does.
     fn new(kind: Kind, message: impl AsRef<str>) -> Self {
-        Self { kind, message: text::message(message.as_ref()) }
+        Self { kind, message: text::message(&with_options(message.as_ref())) }
     }
 
     /// The command line does not make sense.

@@ -26,6 +26,7 @@ mod live;
 mod log;
 mod memory;
 mod messages;
+mod options;
 mod output;
 mod progress;
 mod replace;
@@ -43,6 +44,7 @@ pub use binding::{Opened, equations_plan, inspect, plan, read, validation_plan, 
 pub use commands::demo::LOG as DEMO_LOG;
 pub use commands::summary::{comparison, inspection, table, validation};
 pub use failure::{Failure, Kind};
+pub use options::with_options;
 pub use wrap::WIDTH;
 
 /// Runs the program on its arguments, the program's name first, and gives its exit code: 0 done, 2 usage, 3 bad data,

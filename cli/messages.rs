@@ -4,11 +4,12 @@ use std::io::Write;
 
 use thetahat::text::message;
 
+use crate::options::with_options;
 use crate::wrap;
 
 /// Says something that the reader should know.
 pub(crate) fn warn(warning: &str) {
-    tell(&format!("\x1b[1;33mwarning:\x1b[0m {}", message(warning)));
+    tell(&format!("\x1b[1;33mwarning:\x1b[0m {}", message(&with_options(warning))));
 }
 
 /// Says something that may be long: on a terminal it is broken between words.

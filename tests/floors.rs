@@ -53,7 +53,7 @@ const LIBRARY: House = House {
 const COMMAND_LINE: House = House {
     source: "cli",
     floors: &[
-        &["main", "memory", "shell", "wrap"],
+        &["main", "memory", "options", "shell", "wrap"],
         &["messages", "table"],
         &["failure"],
         &["interrupt"],
@@ -82,6 +82,8 @@ struct Named {
     paths: Vec<Vec<String>>,
     /// Names that others may take from it, and where they come from.
     given: BTreeMap<String, Vec<String>>,
+    /// Texts that it holds, those inside of macros with what stands around them.
+    texts: Vec<String>,
 }
 
 impl Named {
@@ -145,6 +147,19 @@ impl<'ast> Visit<'ast> for Named {
 
     fn visit_item_use(&mut self, item: &'ast ItemUse) {
         self.take(&item.tree, Vec::new(), !matches!(item.vis, Visibility::Inherited));
+    }
+
+    fn visit_attribute(&mut self, _: &'ast Attribute) {
+        // Documentation may say how the program is called.
+    }
+
+    fn visit_lit_str(&mut self, text: &'ast syn::LitStr) {
+        self.texts.push(text.value());
+    }
+
+    fn visit_macro(&mut self, called: &'ast syn::Macro) {
+        self.texts.push(called.tokens.to_string());
+        visit::visit_macro(self, called);
     }
 
     fn visit_path(&mut self, path: &'ast syn::Path) {
@@ -296,4 +311,30 @@ fn what_is_turned_round_is_seen() {
     assert_eq!(of("use crate::Model;", "", ""), ["data must not know model: data names crate::Model"]);
     assert_eq!(of("fn f(m: &crate::model::Model) {}", "", "").len(), 1);
     assert_eq!(of("", "use super::Model;", "use super::Root;").len(), 2);
+}
+
+/// Options of the command line that a text names.
+fn options(text: &str) -> impl Iterator<Item = &str> {
+    let each = text.split("--").skip(1).zip(text.split("--"));
+    each.filter_map(|(option, before)| {
+        let begins = before.is_empty() || before.ends_with([' ', '(', '"', '\n']);
+        let letters = option.bytes().take_while(|byte| byte.is_ascii_lowercase() || *byte == b'-').count();
+        (begins && letters > 0).then_some(&option[..letters])
+    })
+}
+
+#[test]
+fn libraries_name_no_options() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    for library in ["crates/thetahat-core/src", "crates/thetahat/src"] {
+        for (module, named) in modules(&root.join(library)) {
+            // What inspect suggests is a command line of the program, and so is what a page says of how it was made.
+            let found: Vec<&str> = named.texts.iter().flat_map(|text| options(text)).collect();
+            assert!(found.is_empty(), "{library}, {}: {found:?}", module.join("::"));
+        }
+    }
+    assert_eq!(
+        options("leave out --split (--validate), a--b, -- and 1 --2").collect::<Vec<_>>(),
+        ["split", "validate"]
+    );
 }

@@ -73,7 +73,7 @@ fn undetermined(py: Python<'_>, message: String, parameters: Vec<String>) -> PyE
 ///
 /// It may repeat names and parts of files, and goes to a terminal: it is bounded, and what is not seen is an escape.
 pub(crate) fn in_python(message: &str) -> String {
-    let message = thetahat::text::message(message);
+    let message = thetahat::text::message(&thetahat_cli::with_options(message));
     let mut text = String::with_capacity(message.len());
     let mut rest = message.as_str();
     while let Some(start) = rest.find("--") {

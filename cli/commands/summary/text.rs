@@ -8,6 +8,7 @@ use thetahat::Root;
 use thetahat::figures::{error, number};
 use thetahat::text::harmless;
 
+use crate::options::with_options;
 use crate::wrap::wrapped;
 
 /// What stands where there is no figure.
@@ -30,7 +31,7 @@ impl Text {
 
     /// Appends sentences.
     pub(super) fn line(&mut self, content: &str) {
-        self.verbatim(&wrapped(content, self.width));
+        self.verbatim(&wrapped(&with_options(content), self.width));
     }
 
     /// Appends a line as it is, such as one to be typed.

@@ -157,7 +157,7 @@ pub(crate) fn choose(task: &Task<'_>, choice: &Choice) -> Result<Found, Error> {
     if task.select == Select::Validation && task.validation.is_none() {
         return Err(Error::argument(
             "select",
-            "validation needs rows that the models are not fitted to; name them (--validate), or select by cv",
+            "validation needs rows that the models are not fitted to; name them (`validate`), or select by cv",
         ));
     }
     let inputs = task.inputs.len();

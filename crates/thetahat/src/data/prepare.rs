@@ -99,7 +99,7 @@ fn leading(segments: &[Range<usize>], count: usize) -> Result<Vec<Range<usize>>,
     let available: usize = segments.iter().map(Range::len).sum();
     if count == 0 || count > available {
         return Err(Error::data(format!(
-            "--detrend start:{count} needs {count} rows, at least 1; there are {available} without missing values"
+            "`detrend` start:{count} needs {count} rows, at least 1; there are {available} without missing values"
         )));
     }
     let mut left = count;

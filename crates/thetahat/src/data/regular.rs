@@ -39,7 +39,7 @@ impl fmt::Display for Regular {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { step, rows, recorded } = self;
         if self.is_worth() {
-            return write!(f, "resample it every {step} s (--resample {step}:linear)");
+            return write!(f, "resample it every {step} s (`resample` {step}:linear)");
         }
         write!(
             f,
@@ -68,7 +68,7 @@ mod tests {
         let time: Vec<f64> = (0..100).map(|k| f64::from(k) + if k < 50 { 0.0 } else { 800.0 }).collect();
         let regular = Regular::of(&time, 1.003);
         assert!(regular.is_worth() && regular.step == 1.0);
-        assert_eq!(regular.to_string(), "resample it every 1 s (--resample 1:linear)");
+        assert_eq!(regular.to_string(), "resample it every 1 s (`resample` 1:linear)");
     }
 
     #[test]
@@ -80,6 +80,6 @@ mod tests {
         assert!(!regular.is_worth());
         let words = regular.to_string();
         assert!(words.contains("66000 rows, of which 2280 were recorded; cut it at its pauses"), "{words}");
-        assert!(!words.contains("--resample 1"), "{words}");
+        assert!(!words.contains("`resample` 1"), "{words}");
     }
 }

@@ -64,7 +64,7 @@ impl Ticks {
         let Some(median) = median(&mut forward) else {
             return Err(at(
                 2,
-                "the time never advances; name another column (--time), or give --sample-time",
+                "the time never advances; name another column (`time`), or give `sample-time`",
             ));
         };
         let median = shortest(median, 2.0 * f64::EPSILON * latest);

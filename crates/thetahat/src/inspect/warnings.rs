@@ -202,7 +202,7 @@ pub(super) fn of_the_dynamics(inspection: &Inspection, plan: &InspectionPlan) ->
     for delay in inspection.delays.iter().filter(|delay| delay.nk.is_some()) {
         if let Some(confidence) = delay.confidence.filter(|confidence| *confidence < UNSURE) {
             words.push(format!(
-                "the delay of input '{}' is uncertain: {} has {} %; try others (--nk), or excite it faster",
+                "the delay of input '{}' is uncertain: {} has {} %; try others (`nk`), or excite it faster",
                 delay.input,
                 delay.nk.unwrap_or(0),
                 fixed((100.0 * confidence).floor(), 0)
@@ -213,10 +213,10 @@ pub(super) fn of_the_dynamics(inspection: &Inspection, plan: &InspectionPlan) ->
         |input: &str| inspection.feedback.iter().any(|feedback| feedback.found && feedback.input == input);
     for delay in inspection.delays.iter().filter(|delay| delay.nk == Some(0)) {
         words.push(format!(
-            "the output follows input '{}' within the same row: it acts at once (a fit takes --nk 0), its rows are shifted, or it \
+            "the output follows input '{}' within the same row: it acts at once (a fit takes `nk` 0), its rows are shifted, or it \
              is computed from the output{}",
             delay.input,
-            if suspected(&delay.input) { "; as feedback is suspected, --nk 1 keeps that out" } else { "" }
+            if suspected(&delay.input) { "; as feedback is suspected, `nk` 1 keeps that out" } else { "" }
         ));
     }
     words

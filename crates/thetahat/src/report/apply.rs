@@ -164,7 +164,7 @@ pub(super) fn prepared(
 ) -> Result<Prepared, Error> {
     check_sample_time(model, log)?;
     let all = vec![Rows::new(1, log.rows())?];
-    let rows = checked("--rows", if rows.is_empty() { &all } else { rows }, log.rows())?;
+    let rows = checked("rows", if rows.is_empty() { &all } else { rows }, log.rows())?;
     for input in model.inputs() {
         log.channel(&input.name)?;
     }

@@ -21,13 +21,13 @@ impl Shares {
         rows: usize,
     ) -> Result<Self, Error> {
         let all = [Rows::new(1, rows)?];
-        let estimation = checked("--estimate", if estimate.is_empty() { &all } else { estimate }, rows)?;
-        let validation = checked("--validate", validate, rows)?;
+        let estimation = checked("estimation rows", if estimate.is_empty() { &all } else { estimate }, rows)?;
+        let validation = checked("validation rows", validate, rows)?;
         let Some(split) = split else { return Ok(Self { estimation, validation, parts: None }) };
         if !validation.is_empty() {
             return Err(Error::argument(
                 "split",
-                "it has a validation part of its own; leave out one of --split and --validate",
+                "it has a validation part of its own; leave out one of `split` and `validate`",
             ));
         }
         let [first, second, test] = split.cut(&estimation)?;

@@ -271,7 +271,7 @@ pub fn validate(
     let model = &report.model;
     check_sample_time(model, log)?;
     let all = vec![Rows::new(1, log.rows())?];
-    let rows = checked("--rows", if plan.rows.is_empty() { &all } else { &plan.rows }, log.rows())?;
+    let rows = checked("rows", if plan.rows.is_empty() { &all } else { &plan.rows }, log.rows())?;
     let names: Vec<&str> = model.channels().collect();
     let fitted = rows_of_fit(report, log)?;
     let seen = overlap(&rows, &fitted);
@@ -506,7 +506,7 @@ fn off_center(found: &[Innovations]) -> Option<String> {
     (share > OFF_CENTER && share * samples.sqrt() > CERTAIN).then(|| {
         format!(
             "the errors one step ahead have a mean of {}, {} times their standard deviation: the offsets of this \
-             log are not those of the model; --detrend mean takes its own",
+             log are not those of the model; `detrend` mean takes its own",
             number(mean),
             fixed(share, 2)
         )

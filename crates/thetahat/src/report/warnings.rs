@@ -94,10 +94,10 @@ fn search_warnings(search: &SearchOutcome) -> Vec<String> {
         Stopped::Converged => {}
         Stopped::MaxIterations => warnings.push(format!(
             "no convergence in {iterations} iterations: the parameters are not those of least cost; allow more \
-             (--max-iterations), or lower the orders"
+             (`max-iterations`), or lower the orders"
         )),
         Stopped::TimeLimit => warnings.push(format!(
-            "no convergence: the time was used up after {iterations} iterations; allow more (--time-limit)"
+            "no convergence: the time was used up after {iterations} iterations; allow more (`time-limit`)"
         )),
         Stopped::NoDescent if !search.stability_bound => warnings.push(format!(
             "the search stopped after {iterations} iterations where no step lowers the cost (gradient {}): the cost is \

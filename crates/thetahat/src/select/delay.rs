@@ -230,7 +230,7 @@ pub(super) fn found(task: &Task<'_>, steps: &mut Vec<String>) -> Result<(Vec<Del
             steps.push(if feedback.is_some_and(|feedback| feedback.is_suspected()) {
                 format!(
                     "{name} and the output go together at once, and past errors of the output foretell {name}: that may be \
-                     feedback; --nk 1 keeps it out."
+                     feedback; `nk` 1 keeps it out."
                 )
             } else {
                 format!("{name} and the output go together at once: it acts within the same sample.")

@@ -128,10 +128,10 @@ fn both(winners: &Winners, order: &[&Scored], task: &Task<'_>) -> Vec<String> {
         }
         Focus::Auto if chosen != prediction => "Taken: the second, as the difference is clear.".to_owned(),
         Focus::Auto if simulation != prediction && order[prediction].held_out.is_none() => {
-            "Taken: the first, as the two cannot be compared; --focus simulation takes the second.".to_owned()
+            "Taken: the first, as the two cannot be compared; `focus` simulation takes the second.".to_owned()
         }
         Focus::Auto if simulation != prediction => {
-            "Taken: the first, as the difference is not clear; --focus simulation takes the second."
+            "Taken: the first, as the difference is not clear; `focus` simulation takes the second."
                 .to_owned()
         }
         _ => return words,

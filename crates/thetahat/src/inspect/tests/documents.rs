@@ -66,7 +66,7 @@ fn an_irregular_clock_is_resampled() {
         .collect();
     let record = || recording(&[("u", &u), ("y", &y)], Times::Measured(time.clone()));
     let found = inspected(record(), &plan(&["u"], Some("y")));
-    assert!(found.clock.irregular && says(&found, "irregular") && says(&found, "--resample 0.5:linear"));
+    assert!(found.clock.irregular && says(&found, "irregular") && says(&found, "`resample` 0.5:linear"));
     let resampled = found.log.resampled.clone().unwrap();
     assert_eq!((resampled.step, resampled.interpolation, resampled.rows), (0.5, Interpolation::Linear, 600));
     assert_eq!((found.rows, found.channels[0].repeated), (600, quality(u.clone()).repeated));

@@ -138,7 +138,7 @@ fn offsets_of_the_rows_are_taken_where_asked_for() {
     let high = log(&u, &high);
     let plain = validate(&report, None, &high, &[], &plan("301..600")).unwrap();
     let text = plain.validation.warnings.join("\n");
-    assert!(text.contains("have a mean of 0.90") && text.contains("--detrend mean"), "{text}");
+    assert!(text.contains("have a mean of 0.90") && text.contains("`detrend` mean"), "{text}");
     assert!(text.contains("times the model's noise variance"), "{text}");
     // An offset is no matter of dynamics.
     assert!(!text.contains("white") && !text.contains("past values"), "{text}");

@@ -120,7 +120,7 @@ fn an_effect_at_once_that_may_be_feedback_is_said_to_be_one() {
         let selection = automatic(&Record::new(&y, vec![&u]).unwrap(), Some(Structure::Arx), None).unwrap();
         assert_eq!(selection.chosen.orders.nk, [0], "{gain} {held} {:?}", selection.steps);
         assert!(
-            selection.steps.iter().any(|step| step.contains("may be feedback; --nk 1 keeps it out")),
+            selection.steps.iter().any(|step| step.contains("may be feedback; `nk` 1 keeps it out")),
             "{gain} {held} {:?}",
             selection.steps
         );

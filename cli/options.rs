@@ -1,0 +1,101 @@
+//! What the library's arguments are called here.
+//!
+//! The library names them between backticks, as `detrend`, wherever one is advised; here they are options.
+
+/// The arguments of the library that are options, by the name that both have.
+pub(crate) const OPTIONS: [&str; 40] = [
+    "alarm",
+    "alpha",
+    "alphas",
+    "constant",
+    "dc-gain",
+    "dead-zone",
+    "detrend",
+    "draws",
+    "estimator",
+    "focus",
+    "forgetting",
+    "frequencies",
+    "gain",
+    "horizon",
+    "initial",
+    "lags",
+    "max-iterations",
+    "method",
+    "nf",
+    "nk",
+    "noise-bound",
+    "norm",
+    "offset",
+    "poles",
+    "prefilter",
+    "require",
+    "resample",
+    "ridge",
+    "rows",
+    "sample-time",
+    "scale",
+    "select",
+    "split",
+    "start",
+    "step",
+    "time",
+    "time-limit",
+    "tolerance",
+    "trend",
+    "validate",
+];
+
+/// The option that an argument is, if it is one.
+pub(crate) fn option_of(argument: &str) -> Option<&'static str> {
+    // One at a time.
+    let name = if argument == "bounds" { return Some("bound") } else { argument };
+    OPTIONS.into_iter().find(|option| *option == name)
+}
+
+/// A message of the library with its arguments as options: `detrend` mean is --detrend mean.
+pub fn with_options(message: &str) -> String {
+    let mut parts = message.split('`');
+    let mut text = parts.next().unwrap_or_default().to_owned();
+    // Whether the next part stands behind a backtick that has not been closed.
+    let mut open = true;
+    for part in parts {
+        match option_of(part).filter(|_| open) {
+            Some(option) => {
+                text.push_str("--");
+                text.push_str(option);
+                // The backtick behind it is gone too.
+                open = false;
+            }
+            None => {
+                if open {
+                    text.push('`');
+                }
+                text.push_str(part);
+                open = true;
+            }
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn arguments_become_options_and_nothing_else_does() {
+        for (from, to) in [
+            ("`detrend` mean takes its own", "--detrend mean takes its own"),
+            ("leave out one of `split` and `validate`", "leave out one of --split and --validate"),
+            ("(`max-iterations`), or", "(--max-iterations), or"),
+            ("`nk`", "--nk"),
+            ("a `channel` and `nk` 1", "a `channel` and --nk 1"),
+            ("none", "none"),
+            ("a ` alone, `nk` 0", "a ` alone, --nk 0"),
+            ("", ""),
+        ] {
+            assert_eq!(with_options(from), to);
+        }
+    }
+}

@@ -64,8 +64,8 @@ pub use estimate::{
     estimate, estimate_monitored,
 };
 pub use filter::{
-    EstimatedNumber, Estimator, FilterSummary, InitialState, ObserverGain, SmoothedStates, StateEstimate,
-    StateFilter, StateModel, StateValues,
+    EstimatedNumber, Estimator, FilterSnapshot, FilterSummary, InitialState, ObserverGain, SmoothedStates,
+    StateEstimate, StateFilter, StateModel, StateValues,
 };
 pub use greybox::{GreyBox, GreyFit, GreyOutput, GreyParameter, GreyReport, GreySearch, GreyState, fit_grey};
 pub use inspect::{

@@ -1,6 +1,6 @@
 //! The lines of `track`.
 
-use thetahat::thetahat_core::{Alarm, Chart};
+use thetahat::thetahat_core::Alarm;
 use thetahat::{Tracked, Tracker};
 
 use crate::failure::Failure;
@@ -98,15 +98,10 @@ impl Columns {
         index: usize,
         alarm: &Alarm<f64>,
     ) -> Result<(), Failure> {
-        let chart = match alarm.chart {
-            Chart::MeanUp => "mean_up",
-            Chart::MeanDown => "mean_down",
-            Chart::Variance => "variance",
-        };
         lines.add(|cells| {
             self.head(cells, "alarm", row, time, Some(index));
             cells.skip(FIGURES.len() + usize::from(self.horizon.is_some()) + 2 * self.parameters);
-            cells.word(chart);
+            cells.word(alarm.chart.word());
             cells.number(alarm.statistic);
             cells.count(alarm.samples.into());
         })

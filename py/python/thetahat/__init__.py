@@ -8,7 +8,7 @@ Whatever takes numbers takes arrays of NumPy, lists and tuples, and the series a
 channel also a column. What is None, NaN, NA, null or masked is missing.
 
 Estimators that run with the process take a sample at a time, or a whole array: `RecursiveLeastSquares`, `RecursiveArx`,
-`RecursiveArmax`, `KalmanFilter`, `ExtendedKalmanFilter`, `LuenbergerObserver`.
+`RecursiveArmax`, `KalmanFilter`, `ExtendedKalmanFilter`, `LuenbergerObserver`. A `ChangeDetector` watches their innovations.
 
 >>> import thetahat as th
 >>> log = th.dc_motor()
@@ -24,6 +24,9 @@ from thetahat._model import Model
 from thetahat._options import FitOptions, ReadOptions, ValidationOptions
 from thetahat._responses import Forecast, FrequencyResponse, StateSpace, TransientResponse
 from thetahat._thetahat import (
+    Alarm,
+    ChangeDetector,
+    ChangeTrajectory,
     EstimationError,
     ExtendedKalmanFilter,
     FilterTrajectory,
@@ -46,6 +49,9 @@ from thetahat._thetahat import (
 )
 
 __all__ = [
+    "Alarm",
+    "ChangeDetector",
+    "ChangeTrajectory",
     "Comparison",
     "EstimationError",
     "EstimationWarning",

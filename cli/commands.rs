@@ -15,6 +15,7 @@ mod track;
 mod transient;
 mod validate;
 
+pub use filter::consistency;
 pub(crate) use fit::{Channels, Experiments, experiments};
 pub(crate) use inspect::inspected;
 

@@ -34,8 +34,9 @@ use messages::{say, tell};
 use thetahat::text;
 
 pub use binding::{Opened, inspect, plan, read, validation_plan, write};
+pub use commands::consistency;
 pub use commands::demo::LOG as DEMO_LOG;
-pub use commands::summary::{comparison, inspection, table, validation};
+pub use commands::summary::{comparison, filtered, inspection, table, tracking, validation};
 pub use failure::{Failure, Kind};
 pub use wrap::WIDTH;
 

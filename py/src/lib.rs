@@ -1,10 +1,11 @@
 //! The compiled module `thetahat._thetahat`: the engine behind the Python package `thetahat`.
 //!
-//! `log`, `model` and `judgement` are the batch half, `online` the steppers. `array` reads and makes NumPy arrays, `error` is
+//! `log`, `model` and `judgement` are the batch half, `online` the steppers, `filter` and `track` the steppers behind logs. `array` reads and makes NumPy arrays, `error` is
 //! the one map of errors, `work` runs what takes long.
 
 mod array;
 mod error;
+mod filter;
 mod judgement;
 mod log;
 mod model;
@@ -28,6 +29,8 @@ fn _thetahat(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<log::Log>()?;
     module.add_class::<model::Model>()?;
     module.add_class::<judgement::Validation>()?;
+    module.add_class::<filter::StateModel>()?;
+    module.add_class::<filter::StateFilter>()?;
     module.add_function(wrap_pyfunction!(model::fit, module)?)?;
     module.add_function(wrap_pyfunction!(judgement::validate, module)?)?;
     module.add_function(wrap_pyfunction!(judgement::compare, module)?)?;

@@ -3,21 +3,21 @@
 //! A class holds a stepper of `thetahat_core` and does what that does, to the bit. `run` works on a copy of it, which
 //! takes its place when all rows went well.
 
-mod argument;
+pub(crate) mod argument;
 mod armax;
 mod arx;
 mod callable;
 pub(crate) mod detector;
 mod extended;
 mod forgetting;
-mod innovation;
+pub(crate) mod innovation;
 mod kalman;
 mod least_squares;
 mod limits;
 mod luenberger;
 mod model;
 mod recursive;
-mod results;
+pub(crate) mod results;
 mod trajectory;
 mod used;
 

@@ -8,7 +8,8 @@ Whatever takes numbers takes arrays of NumPy, lists and tuples, and the series a
 channel also a column. What is None, NaN, NA, null or masked is missing.
 
 Estimators that run with the process take a sample at a time, or a whole array: `RecursiveLeastSquares`, `RecursiveArx`,
-`RecursiveArmax`, `KalmanFilter`, `ExtendedKalmanFilter`, `LuenbergerObserver`. A `ChangeDetector` watches their innovations.
+`RecursiveArmax`, `KalmanFilter`, `ExtendedKalmanFilter`, `LuenbergerObserver`. A `ChangeDetector` watches their innovations. A `StateFilter` is a filter of a
+fitted or written model, with its channels and offsets.
 
 >>> import thetahat as th
 >>> log = th.dc_motor()
@@ -17,6 +18,7 @@ Estimators that run with the process take a sample at a time, or a whole array: 
 Model(ARMAX(2, 2, 1, 1), 1-step fit 98.37 % on rows 1..700)
 """
 
+from thetahat._filter import StateEstimate, StateFilter, StateModel, StateTrajectory
 from thetahat._fit import EstimationWarning, ar, arma, armax, arx, bj, general, iv, oe, search, sriv
 from thetahat._judgement import Comparison, Inspection, Validation, compare, inspect
 from thetahat._log import Log, dc_motor, read_csv
@@ -78,7 +80,11 @@ __all__ = [
     "RecursiveLeastSquares",
     "RecursiveTrajectory",
     "SmoothedTrajectory",
+    "StateEstimate",
+    "StateFilter",
+    "StateModel",
     "StateSpace",
+    "StateTrajectory",
     "SteadyState",
     "TransientResponse",
     "Validation",

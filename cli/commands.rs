@@ -18,6 +18,7 @@ mod validate;
 pub use filter::consistency;
 pub(crate) use fit::{Channels, Experiments, experiments};
 pub(crate) use inspect::inspected;
+pub use track::{TrackedRow, Tracking};
 
 use crate::args::{Arguments, Command};
 use crate::failure::Failure;

@@ -75,7 +75,7 @@ const PYTHON: House = House {
         &["array"],
         &["log", "online"],
         &["model"],
-        &["filter", "judgement"],
+        &["filter", "judgement", "track"],
     ],
 };
 

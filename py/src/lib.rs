@@ -10,6 +10,7 @@ mod judgement;
 mod log;
 mod model;
 mod online;
+mod track;
 mod work;
 
 use std::ffi::OsString;
@@ -31,6 +32,8 @@ fn _thetahat(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<judgement::Validation>()?;
     module.add_class::<filter::StateModel>()?;
     module.add_class::<filter::StateFilter>()?;
+    module.add_class::<track::Tracker>()?;
+    module.add_function(wrap_pyfunction!(track::policy, module)?)?;
     module.add_function(wrap_pyfunction!(model::fit, module)?)?;
     module.add_function(wrap_pyfunction!(judgement::validate, module)?)?;
     module.add_function(wrap_pyfunction!(judgement::compare, module)?)?;

@@ -9,7 +9,7 @@ mod arx;
 mod callable;
 pub(crate) mod detector;
 mod extended;
-mod forgetting;
+pub(crate) mod forgetting;
 pub(crate) mod innovation;
 mod kalman;
 mod least_squares;

@@ -9,7 +9,7 @@ channel also a column. What is None, NaN, NA, null or masked is missing.
 
 Estimators that run with the process take a sample at a time, or a whole array: `RecursiveLeastSquares`, `RecursiveArx`,
 `RecursiveArmax`, `KalmanFilter`, `ExtendedKalmanFilter`, `LuenbergerObserver`. A `ChangeDetector` watches their innovations. A `StateFilter` is a filter of a
-fitted or written model, with its channels and offsets.
+fitted or written model and a `Tracker` a recursive model with the channels and offsets of a log, its gaps and its documents.
 
 >>> import thetahat as th
 >>> log = th.dc_motor()
@@ -49,6 +49,7 @@ from thetahat._thetahat import (
     SteadyState,
     __version__,
 )
+from thetahat._track import Tracked, Tracker, TrackTrajectory
 
 __all__ = [
     "Alarm",
@@ -86,6 +87,9 @@ __all__ = [
     "StateSpace",
     "StateTrajectory",
     "SteadyState",
+    "TrackTrajectory",
+    "Tracked",
+    "Tracker",
     "TransientResponse",
     "Validation",
     "ValidationOptions",

@@ -32,24 +32,34 @@ const MOST_OUTPUTS: usize = 1000;
 ///     the change was. Only samples with an innovation of known variance are counted.
 /// row : int or None
 ///     The row of a run that gave it, counted from 0; None of a single sample.
+/// forgetting : str or None
+///     The way to forget of the tracker that gave it, where a `Tracker` has several.
 #[pyclass(module = "thetahat", frozen, eq)]
 #[derive(Clone, PartialEq)]
 pub(crate) struct Alarm {
     given: Given<f64>,
     #[pyo3(get)]
     row: Option<usize>,
+    #[pyo3(get)]
+    forgetting: Option<String>,
 }
 
 impl Alarm {
-    pub(crate) fn new(given: Given<f64>, row: Option<usize>) -> Self {
-        Alarm { given, row }
+    fn new(given: Given<f64>, row: Option<usize>) -> Self {
+        Alarm { given, row, forgetting: None }
+    }
+
+    /// That of one of several trackers, or of the only one.
+    pub(crate) fn of(given: Given<f64>, row: usize, forgetting: Option<String>) -> Self {
+        Alarm { given, row: Some(row), forgetting }
     }
 
     pub(crate) fn restore(kept: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let (word, statistic, samples, row): (String, f64, u32, Option<usize>) = kept.extract()?;
+        let (word, statistic, samples, row, forgetting): (String, f64, u32, Option<usize>, Option<String>) =
+            kept.extract()?;
         let chart = Chart::ALL.into_iter().find(|chart| chart.word() == word);
         let chart = chart.ok_or_else(|| PyValueError::new_err(format!("chart: there is no chart {word}")))?;
-        Ok(Alarm { given: Given { chart, statistic, samples }, row })
+        Ok(Alarm { given: Given { chart, statistic, samples }, row, forgetting })
     }
 }
 
@@ -73,12 +83,15 @@ impl Alarm {
     fn __repr__(&self) -> String {
         let Given { chart, statistic, samples } = self.given;
         let row = self.row.map_or_else(String::new, |row| format!(", row={row}"));
-        format!("Alarm(chart='{}', statistic={}, samples={samples}{row})", chart.word(), text(statistic))
+        let forgetting =
+            self.forgetting.as_ref().map_or_else(String::new, |policy| format!(", forgetting='{policy}'"));
+        let (chart, statistic) = (chart.word(), text(statistic));
+        format!("Alarm(chart='{chart}', statistic={statistic}, samples={samples}{row}{forgetting})")
     }
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py>> {
         let Given { chart, statistic, samples } = self.given;
-        attributes("Alarm", (chart.word(), statistic, samples, self.row).into_pyobject(py)?)
+        attributes("Alarm", (chart.word(), statistic, samples, self.row, &self.forgetting).into_pyobject(py)?)
     }
 }
 

@@ -5,10 +5,10 @@ use std::ffi::OsString;
 use std::path::Path;
 
 use clap::Args;
-use thetahat::{EquationsPlan, Inspection, Log, Plan, Requirement, Source, ValidationPlan};
+use thetahat::{EquationsPlan, Inspection, Log, Plan, Report, Requirement, Source, ValidationPlan};
 
 use crate::args::{InspectArguments, ValidateArguments};
-use crate::commands::{Experiments, experiments, inspected};
+use crate::commands::{Experiments, Tracking, experiments, inspected};
 use crate::failure::Failure;
 use crate::job::{FitJob, GreyJob, InspectJob, LookJob};
 use crate::replace::replace;
@@ -87,6 +87,23 @@ pub fn inspect(options: &[OsString]) -> Result<Inspection, Failure> {
     let mut job = InspectJob::resolve(&arguments)?;
     job.log.quiet = true;
     Ok(inspected(&job, &arguments)?.0)
+}
+
+/// What `thetahat track` does with these options, in memory, for a log with these channels. `report` is where it starts from.
+///
+/// # Errors
+/// A [`Failure`] as the program would report it.
+pub fn track(
+    options: &[OsString],
+    inputs: Vec<String>,
+    output: String,
+    report: Option<&Report>,
+) -> Result<Tracking, Failure> {
+    // The name stands for the report in messages.
+    let warm = report.map(|_| "--warm=warm");
+    let words: Vec<OsString> =
+        options.iter().cloned().chain(warm.into_iter().chain(["log"]).map(OsString::from)).collect();
+    Tracking::new(&arguments("track", &words)?, inputs, output, report)
 }
 
 /// Writes a file as the program does: whole, or not at all.

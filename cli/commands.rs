@@ -16,8 +16,10 @@ mod track;
 mod transient;
 mod validate;
 
+pub use filter::consistency;
 pub(crate) use fit::{Channels, Experiments, experiments};
 pub(crate) use inspect::inspected;
+pub use track::{TrackedRow, Tracking};
 
 use crate::args::{Arguments, Command};
 use crate::failure::Failure;

@@ -58,6 +58,8 @@ impl Written {
 enum Sink {
     Stdout(Stdout),
     File(File),
+    /// Lines are counted alone.
+    None,
 }
 
 struct Column {
@@ -84,17 +86,38 @@ impl LineWriter {
             Sink::File(file)
         };
         let mut lines = Self::begin(path, sink, format, names, Written::default());
-        if format == Format::Csv {
-            for (index, column) in lines.columns.iter().enumerate() {
-                if index > 0 {
-                    lines.buffer.push(b',');
-                }
-                lines.buffer.extend_from_slice(&column.title);
-            }
-            lines.buffer.push(b'\n');
-            lines.written = Written { lines: 1, bytes: lines.buffer.len() as u64, ..Written::default() };
-        }
+        lines.head();
         Ok(lines)
+    }
+
+    /// Counts the lines that would be written: from the first one on, or beyond those that an earlier run has counted.
+    pub(crate) fn counting(format: Format, names: &[String], written: Option<Written>) -> Self {
+        let anew = written.is_none();
+        let mut lines = Self::begin(Path::new(""), Sink::None, format, names, written.unwrap_or_default());
+        if anew {
+            lines.head();
+        }
+        lines
+    }
+
+    /// What a line is.
+    pub(crate) fn format(&self) -> Format {
+        self.format
+    }
+
+    /// The header of a CSV.
+    fn head(&mut self) {
+        if self.format != Format::Csv {
+            return;
+        }
+        for (index, column) in self.columns.iter().enumerate() {
+            if index > 0 {
+                self.buffer.push(b',');
+            }
+            self.buffer.extend_from_slice(&column.title);
+        }
+        self.buffer.push(b'\n');
+        self.written = Written { lines: 1, bytes: self.buffer.len() as u64, ..Written::default() };
     }
 
     /// Goes on where an earlier run saved that it was: what a file has beyond that is taken off when the next line comes.
@@ -176,8 +199,11 @@ impl LineWriter {
         if self.buffer.is_empty() {
             return Ok(());
         }
-        interrupt::writing();
+        if !matches!(self.sink, Sink::None) {
+            interrupt::writing();
+        }
         let written = match &mut self.sink {
+            Sink::None => Ok(()),
             Sink::Stdout(stdout) => {
                 let mut stdout = stdout.lock();
                 stdout.write_all(&self.buffer).and_then(|()| stdout.flush())

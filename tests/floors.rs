@@ -69,7 +69,14 @@ const COMMAND_LINE: House = House {
 
 const PYTHON: House = House {
     source: "py/src",
-    floors: &[&["error"], &["work"], &["array"], &["grey_box", "log", "online"], &["model"], &["judgement"]],
+    floors: &[
+        &["error"],
+        &["work"],
+        &["array"],
+        &["grey_box", "log", "online"],
+        &["model"],
+        &["filter", "judgement", "track"],
+    ],
 };
 
 /// A module by its path from the root of its crate, which is the empty one.

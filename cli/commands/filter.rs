@@ -36,7 +36,7 @@ pub(crate) fn filter(arguments: &FilterArguments) -> Result<(), Failure> {
         let json = run.filter.summary().to_json().map_err(|error| Failure::data(error.to_string()))?;
         output::write(path, |file| file.write_all(json.as_bytes()))?;
     }
-    if let Some(word) = surprise(&run.filter.summary()) {
+    if let Some(word) = consistency(&run.filter.summary()) {
         warn(&format!("{}: {word}", run.name));
     }
     if !job.lines.quiet {
@@ -47,7 +47,7 @@ pub(crate) fn filter(arguments: &FilterArguments) -> Result<(), Failure> {
 }
 
 /// What to think of normalised innovations that are far from what the model says.
-fn surprise(summary: &FilterSummary) -> Option<String> {
+pub fn consistency(summary: &FilterSummary) -> Option<String> {
     let nis = summary.nis.as_ref()?;
     let ratio = nis.mean / nis.expected;
     let advice = match ratio {

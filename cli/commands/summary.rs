@@ -16,10 +16,10 @@ use thetahat::{
     SearchOutcome, Signal, Solver, Start, Stopped, Structure,
 };
 
-pub(crate) use filtered::filtered;
+pub use filtered::filtered;
 pub use inspection::inspection;
 use text::{Text, columns, or_dash, some};
-pub(crate) use tracking::tracking;
+pub use tracking::tracking;
 pub use validation::{comparison, validation};
 
 /// So many of a list are written.

@@ -3,17 +3,19 @@
 mod channels;
 mod columns;
 mod pace;
+mod session;
 mod state;
+mod tracking;
 
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use thetahat::{Document, Report, TrackSummary, Tracker};
+use thetahat::{Document, Report};
 
 use super::{stored, summary};
 use crate::args::TrackArguments;
 use crate::failure::Failure;
-use crate::job::TrackJob;
+use crate::job::{Clock, TrackJob};
 use crate::line_writer::LineWriter;
 use crate::live::{Live, Next};
 use crate::log;
@@ -21,9 +23,11 @@ use crate::messages::{say, warn};
 use crate::output;
 use crate::replace::Held;
 use crate::wrap::{WIDTH, stderr_width};
-use columns::{Columns, Sample};
-use pace::Step;
+use columns::Columns;
+use session::{Row, Session};
 use state::{Place, RowPlace, State};
+
+pub use tracking::{TrackedRow, Tracking};
 
 pub(crate) fn track(arguments: &TrackArguments) -> Result<(), Failure> {
     let job = TrackJob::resolve(arguments)?;
@@ -104,7 +108,8 @@ impl<'a> Run<'a> {
         })?;
         let channels = chosen.unwrap_or_default();
         let trackers = job.trackers(&channels.inputs, &channels.output, report)?;
-        let columns = Columns::new(job, &trackers);
+        let has_clock = matches!(job.log.clock, Clock::Column { .. });
+        let columns = Columns::new(has_clock, job.horizon, &trackers);
         let setting = state::setting(job, &channels, &trackers);
         let resumed = stored.is_some();
         let state = match stored {
@@ -189,56 +194,22 @@ impl<'a> Run<'a> {
     /// Takes in the row at hand; says whether there was an alarm.
     fn row(&mut self, after_gap: bool) -> Result<bool, Failure> {
         let Self { job, name, live, lines, columns, state, unsaved, deviations, .. } = self;
-        let (values, time, malformed) = (live.values(), live.time(), live.is_malformed());
-        state.rows = state.rows.saturating_add(1);
         *unsaved = true;
-        let row = state.rows;
-        let step = time.map_or(Step::Regular, |time| state.pace.step(time));
-        if after_gap || step != Step::Regular {
-            state.trackers.iter_mut().for_each(Tracker::gap);
-            state.gaps = state.gaps.saturating_add(1);
-            columns.gap(lines, row, time)?;
-        }
-        state.remember(values, time);
-        // With a clock the next time tells what is missing.
-        if malformed && live.has_clock() {
-            return Ok(false);
-        }
-        let Some((&output, inputs)) = values.split_last() else { return Ok(false) };
-        let mut any = false;
-        for (index, (tracker, alarms)) in state.trackers.iter_mut().zip(&mut state.alarms).enumerate() {
-            let tracked = tracker
-                .log_row(output, inputs)
-                .map_err(|error| Failure::data(format!("{name}:{}: {error}", live.line())))?;
-            if row.is_multiple_of(job.lines.every) {
-                let done = match (malformed, tracked.too_large) {
-                    (true, _) => "malformed",
-                    (_, true) => "too large",
-                    _ => tracked.action.word(),
-                };
-                let sample = Sample { row, time, index, action: done, output, tracked };
-                columns.sample(lines, &sample, tracker, deviations)?;
-            }
-            if let Some(alarm) = tracked.alarm {
-                any = true;
-                *alarms = alarms.saturating_add(1);
-                columns.alarm(lines, row, time, index, &alarm)?;
-            }
-        }
-        Ok(any)
+        let row = Row {
+            values: live.values(),
+            time: live.time(),
+            malformed: live.is_malformed(),
+            has_clock: live.has_clock(),
+            after_gap,
+        };
+        let mut session = Session { every: job.lines.every, columns, state, lines, deviations };
+        session.row(&row, || format!("{name}:{}", live.line()), |_| ())
     }
 
     fn save(&mut self) -> Result<(), Failure> {
         (self.saved, self.unsaved) = (Instant::now(), false);
         self.state.written = self.lines.written();
         self.state_file.as_mut().map_or(Ok(()), |file| self.state.write(file))
-    }
-
-    /// What the trackers have come to.
-    fn summary(&self) -> TrackSummary {
-        let State { rows, gaps, trackers, alarms, .. } = &self.state;
-        let trackers = trackers.iter().zip(alarms).map(|(tracker, &alarms)| tracker.summary(alarms));
-        TrackSummary::new(*rows, *gaps, trackers.collect())
     }
 
     /// Says it.
@@ -249,7 +220,7 @@ impl<'a> Run<'a> {
                 self.name
             ));
         }
-        let summary = self.summary();
+        let summary = self.state.summary();
         if summary.gaps > summary.rows / 2 {
             let expected = self.state.pace.sample_time().unwrap_or(f64::NAN);
             warn(&format!(

@@ -141,6 +141,7 @@ fn empty(argument: &str) -> PyErr {
     PyValueError::new_err(format!("{argument}: expected at least one entry, found none"))
 }
 
-fn plural(count: usize) -> &'static str {
+/// The word after a number of entries.
+pub(crate) fn plural(count: usize) -> &'static str {
     if count == 1 { "entry" } else { "entries" }
 }

@@ -1,15 +1,18 @@
 //! The compiled module `thetahat._thetahat`: the engine behind the Python package `thetahat`.
 //!
-//! `log`, `grey_box`, `model` and `judgement` are the batch half, `online` the steppers. `array` reads and makes NumPy arrays, `error` is
+//! `log`, `grey_box`, `model` and `judgement` are the batch half, `online` the steppers, `filter` and `track` the steppers behind
+//! logs. `array` reads and makes NumPy arrays, `error` is
 //! the one map of errors, `work` runs what takes long.
 
 mod array;
 mod error;
+mod filter;
 mod grey_box;
 mod judgement;
 mod log;
 mod model;
 mod online;
+mod track;
 mod work;
 
 use std::ffi::OsString;
@@ -30,6 +33,10 @@ fn _thetahat(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<grey_box::GreyBox>()?;
     module.add_class::<model::Model>()?;
     module.add_class::<judgement::Validation>()?;
+    module.add_class::<filter::StateModel>()?;
+    module.add_class::<filter::StateFilter>()?;
+    module.add_class::<track::Tracker>()?;
+    module.add_function(wrap_pyfunction!(track::policy, module)?)?;
     module.add_function(wrap_pyfunction!(model::fit, module)?)?;
     module.add_function(wrap_pyfunction!(model::fit_equations, module)?)?;
     module.add_function(wrap_pyfunction!(judgement::validate, module)?)?;

@@ -160,6 +160,18 @@ impl Log {
         self.log.time().map(|time| PyArray1::from_slice(py, time))
     }
 
+    /// Seconds from the first row of the log that this one was cut from.
+    #[getter]
+    fn before(&self) -> f64 {
+        self.log.before()
+    }
+
+    /// What the times are called, and the first one as it was written, where they are dates.
+    #[getter]
+    fn clock(&self) -> (Option<String>, Option<String>) {
+        self.sources.first().map_or((None, None), |source| (source.time.clone(), source.start.clone()))
+    }
+
     /// The rows (from 0) before which no segment reaches back.
     #[getter]
     fn breaks(&self) -> Vec<usize> {

@@ -3,20 +3,21 @@
 //! A class holds a stepper of `thetahat_core` and does what that does, to the bit. `run` works on a copy of it, which
 //! takes its place when all rows went well.
 
-mod argument;
+pub(crate) mod argument;
 mod armax;
 mod arx;
 mod callable;
+pub(crate) mod detector;
 mod extended;
-mod forgetting;
-mod innovation;
+pub(crate) mod forgetting;
+pub(crate) mod innovation;
 mod kalman;
 mod least_squares;
 mod limits;
 mod luenberger;
 mod model;
 mod recursive;
-mod results;
+pub(crate) mod results;
 mod trajectory;
 mod used;
 
@@ -42,6 +43,9 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<kalman::KalmanFilter>()?;
     module.add_class::<extended::ExtendedKalmanFilter>()?;
     module.add_class::<luenberger::LuenbergerObserver>()?;
+    module.add_class::<detector::ChangeDetector>()?;
+    module.add_class::<detector::ChangeTrajectory>()?;
+    module.add_class::<detector::Alarm>()?;
     module.add_class::<trajectory::FilterTrajectory>()?;
     module.add_class::<trajectory::ObserverTrajectory>()?;
     module.add_class::<trajectory::SmoothedTrajectory>()?;
@@ -72,6 +76,9 @@ fn _restore<'py>(py: Python<'py>, class_name: &str, kept: &Bound<'py, PyAny>) ->
         "LuenbergerObserver" => {
             any(Bound::new(py, luenberger::LuenbergerObserver { observer: read(kept)? })?.into_any())
         }
+        "Alarm" => any(Bound::new(py, detector::Alarm::restore(kept)?)?.into_any()),
+        "ChangeDetector" => any(Bound::new(py, detector::ChangeDetector::restore(read(kept)?)?)?.into_any()),
+        "ChangeTrajectory" => any(Bound::new(py, detector::ChangeTrajectory::restore(kept)?)?.into_any()),
         "RecursiveTrajectory" => {
             any(Bound::new(py, recursive::RecursiveTrajectory::restore(kept)?)?.into_any())
         }

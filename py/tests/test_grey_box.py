@@ -164,6 +164,21 @@ def test_what_equations_do_not_have_is_said_in_a_sentence(what: str) -> None:
         found(log) if what == "sample" else found()
 
 
+def test_a_filter_takes_equations_and_their_fits() -> None:
+    log = tank_log()
+    box, model = th.GreyBox(TANK), th.grey(tank_log(), TANK)
+    learning, fitted = th.StateFilter(box), th.StateFilter(model)
+    assert (learning.unknown, fitted.unknown) == (["area"], [])
+    trajectory = fitted.run(log)
+    known = th.StateFilter(box.with_parameters(area=float(model.parameters[0])), "ekf").run(log)
+    assert np.allclose(trajectory.filtered, known.filtered)
+    assert np.array_equal(pickle.loads(pickle.dumps(th.StateFilter(box))).run(log).filtered, learning.run(log).filtered)
+    with pytest.raises(ValueError, match="says itself where"):
+        th.StateFilter(model, initial="zero")
+    with pytest.raises(ValueError, match="a tracker is of polynomial models"):
+        th.Tracker(warm=model)
+
+
 def test_linear_equations_have_responses_and_others_not() -> None:
     model = th.grey(tank_log(), TANK)
     step = model.step_response(samples=60)

@@ -575,6 +575,76 @@ def test_without_matplotlib_the_import_says_what_to_install() -> None:
     subprocess.run([sys.executable, "-c", program], check=True)
 
 
+def walk() -> th.StateModel:
+    return th.StateModel([[1.0]], [[1.0]], [[1.0]], [[4.0]], [[100.0]], sample_time=1, states=["level"])
+
+
+def test_states_of_a_filter_with_their_bands() -> None:
+    y = np.random.default_rng(2).standard_normal(50).cumsum()
+    y[20:24] = np.nan
+    trajectory = th.StateFilter(walk()).run(y)
+    above, below = plot.states(trajectory)
+    line = above.lines[0]
+    np.testing.assert_array_equal(line.get_ydata(), trajectory.filtered[:, 0])
+    (band,) = [one for one in above.collections if isinstance(one, PolyCollection)]
+    high = np.asarray(band.get_paths()[0].vertices)[:, 1].max()
+    assert high == pytest.approx((trajectory.filtered + HALF * trajectory.filtered_deviations).max())
+    assert [text.get_text() for text in above.get_legend().get_texts()] == ["given the rows so far", "95 % band"]
+    np.testing.assert_array_equal(below.lines[0].get_ydata(), trajectory.nis)
+    assert (above.get_ylabel(), below.get_ylabel(), below.get_xlabel()) == ("level", "NIS", "time [s]")
+    smoothed = th.StateFilter(walk()).run(y, smooth=True)
+    ax = plot.states(smoothed, level=0.5)[0]
+    assert smoothed.smoothed is not None
+    np.testing.assert_array_equal(ax.lines[0].get_ydata(), smoothed.smoothed[:, 0])
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["given all rows", "50 % band"]
+
+
+def test_states_of_an_observer_have_no_bands_and_lines_break_at_gaps() -> None:
+    observer = th.StateFilter(walk(), "luenberger", poles=[0.5])
+    trajectory = observer.run([1.0, 2.0, 3.0, 4.0], time=[0.0, 1.0, 5.0, 6.0])
+    (ax,) = plot.states(trajectory)
+    assert not ax.collections and np.isnan(ax.lines[0].get_xdata()).tolist() == [False, False, True, False, False]
+    one = th.StateFilter(walk()).run([1.0])
+    assert len(plot.states(one)) == 2
+    with pytest.raises(TypeError, match="trajectory: expected a StateTrajectory, found list"):
+        plot.states([1.0])  # type: ignore[arg-type]
+
+
+def test_parameters_of_trackers_with_their_alarms(log: th.Log) -> None:
+    tracker = th.Tracker(2, 2, forgetting=[0.98, None], alarm=50)
+    trajectory = tracker.run(log)
+    axes = plot.parameters(trajectory)
+    assert [ax.get_ylabel() for ax in axes] == ["a1", "a2", "b1", "b2"] and axes[-1].get_xlabel() == "time [s]"
+    for column, ax in enumerate(axes):
+        for place in range(2):
+            np.testing.assert_array_equal(ax.lines[place].get_ydata(), trajectory.parameters[:, column, place])
+        rows = {alarm.row for alarm in trajectory.alarms}
+        assert rows and len(ax.lines) == 2 + len(rows)
+    assert "alarm" in [text.get_text() for text in axes[0].get_legend().get_texts()]
+    alone = th.Tracker(2, 2).run(log[:5])
+    # Nothing is known yet.
+    assert all(np.isnan(ax.lines[0].get_ydata()).all() for ax in plot.parameters(alone))
+    with pytest.raises(TypeError, match="trajectory: expected a TrackTrajectory, found StateTrajectory"):
+        plot.parameters(th.StateFilter(walk()).run([1.0]))  # type: ignore[arg-type]
+
+
+def test_changes_with_their_thresholds() -> None:
+    errors = np.random.default_rng(2).standard_normal(200)
+    errors[100:] += 2.0
+    trajectory = th.ChangeDetector.with_thresholds(5.0, np.inf).run(errors, np.ones(200))
+    axes = plot.changes(trajectory)
+    assert [ax.get_ylabel() for ax in axes] == ["mean up", "mean down"] and axes[-1].get_xlabel() == "row"
+    for place, ax in enumerate(axes):
+        np.testing.assert_array_equal(ax.lines[0].get_ydata(), trajectory.statistics[:, place])
+        assert ax.lines[1].get_ydata()[0] == 5.0
+    assert axes[0].lines[2].get_xdata().tolist() == [alarm.row for alarm in trajectory.alarms]
+    off = th.ChangeDetector.with_thresholds(np.inf, np.inf).run(errors, np.ones(200))
+    with pytest.raises(ValueError, match="trajectory: all charts are turned off"):
+        plot.changes(off)
+    with pytest.raises(TypeError, match="trajectory: expected a ChangeTrajectory"):
+        plot.changes(3)  # type: ignore[arg-type]
+
+
 def test_given_axes_make_no_figure(log: th.Log, model: th.Model) -> None:
     _, axes = plt.subplots(3, 2)
     before = plt.get_fignums()

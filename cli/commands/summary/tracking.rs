@@ -7,7 +7,7 @@ use super::text::{Text, columns, or_dash, some};
 use super::{MOST, NO_ERROR, formula};
 
 /// How the ways to forget did, and where each has come to.
-pub(crate) fn tracking(summary: &TrackSummary, faults: &str, watched: bool, width: usize) -> String {
+pub fn tracking(summary: &TrackSummary, faults: &str, watched: bool, width: usize) -> String {
     let mut text = Text::new(width);
     let gaps = match summary.gaps {
         0 => String::new(),

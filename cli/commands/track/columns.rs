@@ -1,10 +1,9 @@
 //! The lines of `track`.
 
-use thetahat::thetahat_core::{Alarm, Chart};
+use thetahat::thetahat_core::Alarm;
 use thetahat::{Tracked, Tracker};
 
 use crate::failure::Failure;
-use crate::job::{Clock, TrackJob};
 use crate::line_writer::{Cells, LineWriter};
 
 /// What stands in front of the parameters of each sample.
@@ -35,38 +34,38 @@ pub(super) struct Sample {
 }
 
 impl Columns {
-    pub(super) fn new(job: &TrackJob, trackers: &[Tracker]) -> Self {
+    /// Those of a log that may have a clock, with a forecast so many rows ahead if one was asked for.
+    pub(super) fn new(has_time: bool, horizon: Option<usize>, trackers: &[Tracker]) -> Self {
         let parameters = trackers.first().map_or(&[][..], Tracker::names);
         let policies: Vec<String> = match trackers {
             [_] => Vec::new(),
             several => several.iter().map(|tracker| tracker.plan().forgetting.to_string()).collect(),
         };
-        let has_time = matches!(job.log.clock, Clock::Column { .. });
         let mut names: Vec<String> = vec!["event".to_owned(), "row".to_owned()];
         names.extend(has_time.then(|| "time".to_owned()));
         names.extend((!policies.is_empty()).then(|| "forgetting".to_owned()));
         names.extend(FIGURES.map(str::to_owned));
-        names.extend(job.horizon.map(|_| "forecast".to_owned()));
+        names.extend(horizon.map(|_| "forecast".to_owned()));
         names.extend(parameters.iter().cloned());
         names.extend(parameters.iter().map(|name| format!("{name}_se")));
         if trackers.first().is_some_and(|tracker| tracker.detector().is_some()) {
             names.extend(ALARM.map(str::to_owned));
         }
-        Self { names, has_time, policies, horizon: job.horizon, parameters: parameters.len() }
+        Self { names, has_time, policies, horizon, parameters: parameters.len() }
     }
 
     pub(super) fn names(&self) -> &[String] {
         &self.names
     }
 
-    /// A line about a sample.
+    /// A line about a sample, with the standard errors of the parameters; gives the forecast, if there is one.
     pub(super) fn sample(
         &self,
         lines: &mut LineWriter,
         sample: &Sample,
         tracker: &mut Tracker,
         deviations: &mut [f64],
-    ) -> Result<(), Failure> {
+    ) -> Result<Option<f64>, Failure> {
         let Sample { row, time, index, action, output, tracked } = sample;
         tracker.write_standard_errors(deviations).map_err(|error| Failure::data(error.to_string()))?;
         let forecast = self.horizon.map(|rows| tracker.forecast(rows)).transpose();
@@ -86,7 +85,8 @@ impl Columns {
                 None => (0..self.parameters).for_each(|_| cells.number(f64::NAN)),
             }
             deviations.iter().for_each(|&value| cells.number(value));
-        })
+        })?;
+        Ok(forecast)
     }
 
     /// A line about an alarm.
@@ -98,15 +98,10 @@ impl Columns {
         index: usize,
         alarm: &Alarm<f64>,
     ) -> Result<(), Failure> {
-        let chart = match alarm.chart {
-            Chart::MeanUp => "mean_up",
-            Chart::MeanDown => "mean_down",
-            Chart::Variance => "variance",
-        };
         lines.add(|cells| {
             self.head(cells, "alarm", row, time, Some(index));
             cells.skip(FIGURES.len() + usize::from(self.horizon.is_some()) + 2 * self.parameters);
-            cells.word(chart);
+            cells.word(alarm.chart.word());
             cells.number(alarm.statistic);
             cells.count(alarm.samples.into());
         })

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
-use thetahat::{PerChannel, Tracker, text};
+use thetahat::{PerChannel, TrackSummary, Tracker, text};
 
 use super::pace::Pace;
 use crate::args::ResumeArgument;
@@ -18,7 +18,7 @@ use crate::replace::Held;
 const SCHEMA: &str = "thetahat.track-state/1";
 
 /// All that a run must know to go on as if it had never ended.
-#[derive(Serialize, Deserialize)]
+#[derive(Clone, Serialize, Deserialize)]
 pub(super) struct State {
     schema: String,
     generator: String,
@@ -65,30 +65,36 @@ impl State {
 
     /// Reads a state; none if there is no file yet.
     pub(super) fn read(file: &mut Held, path: &Path) -> Result<Option<Self>, Failure> {
+        let Some(bytes) = file.read()? else { return Ok(None) };
+        Self::parse(&bytes)
+            .map(Some)
+            .map_err(|message| Failure::data(format!("{}: {message}", path.display())))
+    }
+
+    /// Reads a state; an error is a message.
+    pub(super) fn parse(bytes: &[u8]) -> Result<Self, String> {
         #[derive(Deserialize)]
         struct Head {
             schema: String,
         }
-        let bad = |message: String| Failure::data(format!("{}: {message}", path.display()));
-        let Some(bytes) = file.read()? else { return Ok(None) };
         let malformed = |error: serde_json::Error| {
-            bad(format!(
+            format!(
                 "this is no state of thetahat track: {error}; name another file, or remove it to start anew"
-            ))
+            )
         };
-        let head: Head = serde_json::from_slice(&bytes).map_err(malformed)?;
+        let head: Head = serde_json::from_slice(bytes).map_err(malformed)?;
         if head.schema != SCHEMA {
-            return Err(bad(format!(
+            return Err(format!(
                 "this state is of version '{}', this program reads '{SCHEMA}'; remove it to start anew, or use the \
                  program that wrote it",
                 text::brief(&head.schema, 40)
-            )));
+            ));
         }
-        let state: Self = serde_json::from_slice(&bytes).map_err(malformed)?;
+        let state: Self = serde_json::from_slice(bytes).map_err(malformed)?;
         if !state.is_sound() {
-            return Err(bad("its parts do not fit together; remove it to start anew".to_owned()));
+            return Err("its parts do not fit together; remove it to start anew".to_owned());
         }
-        Ok(Some(state))
+        Ok(state)
     }
 
     /// Whether its own parts fit together, as they do if nobody has edited it. The trackers are looked at beside new ones.
@@ -113,8 +119,7 @@ impl State {
     ) -> Result<Self, Failure> {
         let path = job.state.as_ref().map_or_else(String::new, |state| state.path.display().to_string());
         for (option, now) in setting {
-            let before =
-                self.setting.iter().find(|(other, _)| other == option).map(|(_, value)| value.as_str());
+            let before = self.set(option);
             if before != Some(now.as_str()) {
                 return Err(Failure::data(format!(
                     "{path}: this state is of another model or run: {option} was '{}' and is '{now}' now; give what it was, or \
@@ -140,9 +145,33 @@ impl State {
 
     /// Writes it: the file holds the old state or this one, whatever happens.
     pub(super) fn write(&self, file: &mut Held) -> Result<(), Failure> {
-        let mut json = serde_json::to_vec(self).map_err(|error| Failure::data(error.to_string()))?;
-        json.push(b'\n');
-        file.write(&json)
+        file.write(self.to_json()?.as_bytes())
+    }
+
+    /// The document.
+    pub(super) fn to_json(&self) -> Result<String, Failure> {
+        let json = serde_json::to_string(self).map_err(|error| Failure::data(error.to_string()))?;
+        Ok(json + "\n")
+    }
+
+    /// What the setting says of an option.
+    pub(super) fn set(&self, option: &str) -> Option<&str> {
+        self.setting.iter().find(|(other, _)| other == option).map(|(_, value)| value.as_str())
+    }
+
+    /// Names the clock, before the first row: the column of times, and the first one as it is written if times are dates.
+    pub(super) fn name_clock(&mut self, name: &str, start: Option<String>) {
+        if let Some((_, value)) = self.setting.iter_mut().find(|(option, _)| option == "--time") {
+            name.clone_into(value);
+        }
+        self.start = start;
+    }
+
+    /// What the trackers have come to.
+    pub(super) fn summary(&self) -> TrackSummary {
+        let trackers =
+            self.trackers.iter().zip(&self.alarms).map(|(tracker, &alarms)| tracker.summary(alarms));
+        TrackSummary::new(self.rows, self.gaps, trackers.collect())
     }
 
     /// Keeps what the row that was just absorbed is known by.

@@ -16,6 +16,20 @@ pub enum Chart {
     Variance,
 }
 
+impl Chart {
+    /// All of them.
+    pub const ALL: [Chart; 3] = [Chart::MeanUp, Chart::MeanDown, Chart::Variance];
+
+    /// `mean_up`, `mean_down` or `variance`.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Chart::MeanUp => "mean_up",
+            Chart::MeanDown => "mean_down",
+            Chart::Variance => "variance",
+        }
+    }
+}
+
 /// What a chart says once it has passed its threshold.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

@@ -9,6 +9,7 @@ mod matrices;
 mod model;
 mod row;
 mod smooth;
+mod snapshot;
 mod step;
 mod summary;
 #[cfg(test)]
@@ -20,5 +21,6 @@ pub use estimator::{Estimator, ObserverGain};
 pub use linear::InitialState;
 pub use model::StateModel;
 pub use smooth::SmoothedStates;
+pub use snapshot::FilterSnapshot;
 pub use step::StateFilter;
 pub use summary::{EstimatedNumber, FilterSummary};

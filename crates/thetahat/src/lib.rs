@@ -63,8 +63,8 @@ pub use estimate::{
     UnknownParameter, arx, arx_factor, estimate, estimate_monitored,
 };
 pub use filter::{
-    EstimatedNumber, Estimator, FilterSummary, InitialState, ObserverGain, SmoothedStates, StateEstimate,
-    StateFilter, StateModel, StateValues,
+    EstimatedNumber, Estimator, FilterSnapshot, FilterSummary, InitialState, ObserverGain, SmoothedStates,
+    StateEstimate, StateFilter, StateModel, StateValues,
 };
 pub use inspect::{
     ChannelQuality, Clock, DelayEstimate, Excitation, Feedback, Inspection, InspectionPlan, Saturation,

@@ -8,7 +8,8 @@ Whatever takes numbers takes arrays of NumPy, lists and tuples, and the series a
 channel also a column. What is None, NaN, NA, null or masked is missing.
 
 Estimators that run with the process take a sample at a time, or a whole array: `RecursiveLeastSquares`, `RecursiveArx`,
-`RecursiveArmax`, `KalmanFilter`, `ExtendedKalmanFilter`, `LuenbergerObserver`.
+`RecursiveArmax`, `KalmanFilter`, `ExtendedKalmanFilter`, `LuenbergerObserver`. A `ChangeDetector` watches their innovations. A `StateFilter` is a filter of a
+fitted or written model and a `Tracker` a recursive model with the channels and offsets of a log, its gaps and its documents.
 
 >>> import thetahat as th
 >>> log = th.dc_motor()
@@ -17,6 +18,7 @@ Estimators that run with the process take a sample at a time, or a whole array: 
 Model(ARMAX(2, 2, 1, 1), 1-step fit 98.37 % on rows 1..700)
 """
 
+from thetahat._filter import StateEstimate, StateFilter, StateModel, StateTrajectory
 from thetahat._fit import EstimationWarning, ar, arma, armax, arx, bj, general, iv, oe, search, sriv
 from thetahat._grey_box import GreyBox, grey
 from thetahat._judgement import Comparison, Inspection, Validation, compare, inspect
@@ -25,6 +27,9 @@ from thetahat._model import Model
 from thetahat._options import EquationsOptions, FitOptions, ReadOptions, ValidationOptions
 from thetahat._responses import Forecast, FrequencyResponse, StateSpace, TransientResponse
 from thetahat._thetahat import (
+    Alarm,
+    ChangeDetector,
+    ChangeTrajectory,
     EstimationError,
     ExtendedKalmanFilter,
     FilterTrajectory,
@@ -45,8 +50,12 @@ from thetahat._thetahat import (
     SteadyState,
     __version__,
 )
+from thetahat._track import Tracked, Tracker, TrackTrajectory
 
 __all__ = [
+    "Alarm",
+    "ChangeDetector",
+    "ChangeTrajectory",
     "Comparison",
     "EquationsOptions",
     "EstimationError",
@@ -75,8 +84,15 @@ __all__ = [
     "RecursiveLeastSquares",
     "RecursiveTrajectory",
     "SmoothedTrajectory",
+    "StateEstimate",
+    "StateFilter",
+    "StateModel",
     "StateSpace",
+    "StateTrajectory",
     "SteadyState",
+    "TrackTrajectory",
+    "Tracked",
+    "Tracker",
     "TransientResponse",
     "Validation",
     "ValidationOptions",

@@ -134,6 +134,14 @@ def broken(log: Log, values: Array) -> tuple[Array, Array]:
     return np.insert(time, breaks, np.nan), np.insert(values, breaks, np.nan)
 
 
+def gapped(time: Array, *values: Array) -> list[Array]:
+    """Time and values, with a break of the line where rows are missing, or where another experiment begins."""
+    steps = np.diff(time)
+    usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
+    breaks = np.flatnonzero((steps > 1.5 * usual) | (steps <= 0)) + 1
+    return [np.insert(one, breaks, np.nan) for one in (time, *values)]
+
+
 def borders(ax: Axes, log: Log) -> None:
     """A line between each experiment and the one before it."""
     time = _time(log)

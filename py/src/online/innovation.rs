@@ -60,6 +60,19 @@ impl Innovation {
         Kept { error, variance, nis: innovation.nis, action: innovation.action }.into()
     }
 
+    /// One element for each output.
+    pub(crate) fn elements(&self) -> Kept<f64, DVector<f64>> {
+        match &self.value {
+            Value::Number(Kept { error, variance, nis, action }) => Kept {
+                error: DVector::from_element(1, *error),
+                variance: DVector::from_element(1, *variance),
+                nis: *nis,
+                action: *action,
+            },
+            Value::Vector(innovation) => innovation.clone(),
+        }
+    }
+
     pub(crate) fn restore(kept: &Bound<'_, PyAny>) -> PyResult<Self> {
         let (error, variance, nis, name): (Bound<'_, PyAny>, Bound<'_, PyAny>, f64, String) =
             kept.extract()?;

@@ -1,5 +1,6 @@
 //! What is shown of a row.
 
+use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::{DMatrix, DVector};
 use thetahat_core::{Action, Error, Innovation};
 
@@ -9,27 +10,37 @@ use super::model::StateModel;
 use crate::distribution::chi_square_interval;
 
 /// The numbers of one row.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Row {
     states: usize,
     /// Of the states, and behind them of the parameters after the change of variable.
+    #[serde(with = "super::snapshot::numbers")]
     pub(super) predicted: Vec<f64>,
+    #[serde(with = "super::snapshot::numbers")]
     predicted_deviations: Vec<f64>,
+    #[serde(with = "super::snapshot::numbers")]
     filtered: Vec<f64>,
+    #[serde(with = "super::snapshot::numbers")]
     filtered_deviations: Vec<f64>,
+    #[serde(with = "super::snapshot::numbers")]
     parameters: Vec<f64>,
+    #[serde(with = "super::snapshot::numbers")]
     parameter_deviations: Vec<f64>,
+    #[serde(with = "super::snapshot::numbers")]
     outputs: Vec<f64>,
+    #[serde(with = "super::snapshot::numbers")]
     output_deviations: Vec<f64>,
+    #[serde(with = "super::snapshot::numbers")]
     innovations: Vec<f64>,
     held: Vec<bool>,
+    #[serde(with = "super::snapshot::numbers")]
     covariance: Vec<f64>,
     /// The 95 % bounds of the normalised innovation squared of 1, 2 … elements.
     bounds: Vec<Option<(f64, f64)>>,
 }
 
 /// What a measurement told.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub(super) struct Told {
     nis: Option<f64>,
     log_likelihood: Option<f64>,
@@ -71,6 +82,29 @@ impl Row {
             covariance: zeros(size * size),
             bounds: (1..=outputs).map(chi_square_interval).collect(),
         }
+    }
+
+    /// Whether it has the sizes and bounds of this one.
+    pub(super) fn is_like(&self, other: &Self) -> bool {
+        let sizes = |row: &Self| {
+            let numbers = [
+                &row.predicted,
+                &row.predicted_deviations,
+                &row.filtered,
+                &row.filtered_deviations,
+                &row.parameters,
+                &row.parameter_deviations,
+                &row.outputs,
+                &row.output_deviations,
+                &row.innovations,
+                &row.covariance,
+            ];
+            numbers.map(Vec::len)
+        };
+        sizes(self) == sizes(other)
+            && self.states == other.states
+            && self.held.len() == other.held.len()
+            && self.bounds == other.bounds
     }
 
     pub(super) fn predicted(&mut self, filter: &Filter) -> Result<(), Error> {

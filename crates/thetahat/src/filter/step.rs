@@ -57,22 +57,22 @@ use crate::data::Offset;
 /// ```
 #[derive(Debug, Clone)]
 pub struct StateFilter {
-    model: StateModel,
+    pub(super) model: StateModel,
     /// The word for the estimator that was asked for.
-    estimator: &'static str,
-    engine: Engine,
+    pub(super) estimator: &'static str,
+    pub(super) engine: Engine,
     /// The time of the first row.
-    origin: f64,
+    pub(super) origin: f64,
     /// The row before, from which the next prediction starts.
-    previous: Option<Moment>,
-    totals: Totals,
-    row: Row,
+    pub(super) previous: Option<Moment>,
+    pub(super) totals: Totals,
+    pub(super) row: Row,
     /// Where the next row is worked out: a step that fails leaves the last one as it is.
-    next: Row,
-    told: Option<Told>,
+    pub(super) next: Row,
+    pub(super) told: Option<Told>,
     work: Work,
     /// All rows with the step before each, for a smoother.
-    history: Option<Vec<(Option<Division>, Moment)>>,
+    pub(super) history: Option<Vec<(Option<Division>, Moment)>>,
 }
 
 impl StateFilter {

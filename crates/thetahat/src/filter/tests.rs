@@ -4,6 +4,7 @@ mod reference;
 mod refusals;
 mod reports;
 mod smoothing;
+mod snapshots;
 
 use crate::{Estimator, StateFilter, StateModel};
 

@@ -1,10 +1,12 @@
 //! What a filter has seen so far.
 
+use serde::{Deserialize, Serialize};
+
 use super::estimate::StateEstimate;
 use crate::respond::NisCount;
 
 /// What a filter has seen so far.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Totals {
     pub(super) rows: usize,
     /// The elements of measurements that were there.

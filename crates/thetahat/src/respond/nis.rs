@@ -28,7 +28,7 @@ impl NisSummary {
 }
 
 /// The same while rows come in.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct NisCount {
     rows: usize,
     measured: usize,

@@ -384,9 +384,8 @@ impl Tracker {
         };
         let given =
             |asked: &Option<PerChannel>, have: &PerChannel| asked.as_ref().is_none_or(|asked| asked == have);
-        let charts = [Chart::MeanUp, Chart::MeanDown, Chart::Variance];
         let thresholds = |tracker: &Self| {
-            tracker.detector.as_ref().map(|detector| charts.map(|chart| detector.threshold(chart)))
+            tracker.detector.as_ref().map(|detector| Chart::ALL.map(|chart| detector.threshold(chart)))
         };
         stage
             && fresh.names == self.names

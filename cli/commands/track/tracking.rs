@@ -1,0 +1,279 @@
+//! Tracking in memory: rows come from a caller, and nothing is read or written.
+
+use thetahat::{Report, TrackSummary, Tracked, Tracker};
+
+use super::columns::Columns;
+use super::session::{Row, Session};
+use super::state::{self, State};
+use crate::args::TrackArguments;
+use crate::commands::Channels;
+use crate::failure::Failure;
+use crate::job::{Clock, TrackJob};
+use crate::line_writer::{Format, LineWriter, Written};
+
+/// What `thetahat track` does with the rows of a log, fed row by row, with its state and its documents.
+///
+/// The state counts the lines that the program writes of these rows: so it is the state of the program, which goes on from it as
+/// from its own.
+pub struct Tracking {
+    inputs: Vec<String>,
+    output: String,
+    every: u64,
+    horizon: Option<usize>,
+    columns: Columns,
+    state: State,
+    lines: LineWriter,
+    deviations: Vec<f64>,
+}
+
+/// What one of the trackers made of a row.
+#[derive(Debug)]
+#[non_exhaustive]
+pub struct TrackedRow<'a> {
+    /// Which tracker, in the order of the ways to forget.
+    pub index: usize,
+    /// The tracker after the row.
+    pub tracker: &'a Tracker,
+    /// What it made of it.
+    pub tracked: Tracked,
+    /// What was done, in a word.
+    pub action: &'static str,
+    /// The standard errors of its parameters.
+    pub standard_errors: &'a [f64],
+    /// The output as many rows later as was asked for.
+    pub forecast: Option<f64>,
+}
+
+impl Tracking {
+    /// That of a log with these channels, with the options of `thetahat track`; with a report, `--warm` must be among them.
+    pub(crate) fn new(
+        arguments: &TrackArguments,
+        inputs: Vec<String>,
+        output: String,
+        report: Option<&Report>,
+    ) -> Result<Self, Failure> {
+        let job = TrackJob::resolve(arguments)?;
+        let trackers = job.trackers(&inputs, &output, report)?;
+        let has_clock = matches!(job.log.clock, Clock::Column { .. });
+        let columns = Columns::new(has_clock, job.horizon, &trackers);
+        let channels = Channels { inputs, output };
+        let setting = state::setting(&job, &channels, &trackers);
+        let sample_time = job.sample_time.or(report.map(|report| report.model.sample_time()));
+        let lines = LineWriter::counting(job.lines.format, columns.names(), None);
+        let Channels { inputs, output } = channels;
+        let state = State::new(setting, trackers, None, sample_time);
+        Ok(Self::of(inputs, output, job.lines.every, job.horizon, columns, state, lines))
+    }
+
+    fn of(
+        inputs: Vec<String>,
+        output: String,
+        every: u64,
+        horizon: Option<usize>,
+        columns: Columns,
+        state: State,
+        lines: LineWriter,
+    ) -> Self {
+        let parameters = state.trackers.first().map_or(0, |tracker| tracker.names().len());
+        Self { inputs, output, every, horizon, columns, state, lines, deviations: vec![f64::NAN; parameters] }
+    }
+
+    /// Goes on from the state that `thetahat track --state` has written, or [`Tracking::state`].
+    ///
+    /// # Errors
+    /// A [`Failure`] if the text is no such state, or was edited; if the names of inputs hold commas, which do not tell where one
+    /// ends, and `inputs` does not say them.
+    pub fn from_state(text: &str, inputs: Option<Vec<String>>) -> Result<Self, Failure> {
+        let state = State::parse(text.as_bytes()).map_err(Failure::data)?;
+        let damaged = || Failure::data("its parts do not fit together; give a state that was not edited");
+        let set = |option: &str| state.set(option).ok_or_else(damaged);
+        let Some(first) = state.trackers.first() else { return Err(damaged()) };
+        let count = first.orders().inputs();
+        let joined = set("--input")?;
+        let written: Vec<String> = match count {
+            0 => Vec::new(),
+            1 => vec![joined.to_owned()],
+            _ => joined.split(',').map(str::to_owned).collect(),
+        };
+        let inputs = match inputs {
+            Some(inputs) if inputs.join(",") == joined => inputs,
+            Some(_) => return Err(Failure::data(format!("the inputs of this state are {joined}"))),
+            None => written,
+        };
+        if inputs.len() != count {
+            return Err(Failure::data(format!(
+                "the names of its inputs hold commas: {joined}; say which they are"
+            )));
+        }
+        let alike = |tracker: &Tracker| {
+            tracker.orders() == first.orders()
+                && tracker.names() == first.names()
+                && tracker.score().samples() <= state.rows
+        };
+        let every = set("--every")?.parse().ok().filter(|&every: &u64| every > 0).ok_or_else(damaged)?;
+        let horizon = match set("--horizon")? {
+            "" => None,
+            rows => Some(rows.parse().ok().filter(|rows| (1..=10_000).contains(rows)).ok_or_else(damaged)?),
+        };
+        let format = match set("--format")? {
+            "jsonl" => Format::JsonLines,
+            "csv" => Format::Csv,
+            _ => return Err(damaged()),
+        };
+        if !state.trackers.iter().all(alike) {
+            return Err(damaged());
+        }
+        let columns = Columns::new(!set("--time")?.is_empty(), horizon, &state.trackers);
+        let output = set("--output")?.to_owned();
+        let lines = LineWriter::counting(format, columns.names(), Some(state.written.clone()));
+        Ok(Self::of(inputs, output, every, horizon, columns, state, lines))
+    }
+
+    /// Takes rows as long as there are some: `next` gives their values, the inputs and then the output, their time, and
+    /// whether an unknown number of rows is missing before them; `seen` is told what each tracker made of each row. After a
+    /// failure nothing has changed.
+    ///
+    /// `clock` is what the first rows of all say of theirs: the column of times, which is empty without one, and the first time as
+    /// it is written if times are dates.
+    ///
+    /// # Errors
+    /// What `next` says; a [`Failure`] if a value is infinite.
+    pub fn rows<'a, E: From<Failure>>(
+        &mut self,
+        clock: Option<(&str, Option<String>)>,
+        mut next: impl FnMut() -> Result<Option<(&'a [f64], Option<f64>, bool)>, E>,
+        mut seen: impl FnMut(&TrackedRow<'_>),
+        stop_on_alarm: bool,
+    ) -> Result<(), E> {
+        self.lines.flush()?;
+        let kept = (self.state.clone(), self.lines.written());
+        if let Some((name, start)) = clock.filter(|_| self.state.rows == 0) {
+            self.state.name_clock(name, start);
+            self.set_columns(None);
+        }
+        let done = self.take(&mut next, &mut seen, stop_on_alarm);
+        if done.is_err() {
+            self.state = kept.0;
+            self.set_columns(Some(kept.1));
+        }
+        done
+    }
+
+    /// The columns of the lines, which depend on whether there is a clock, behind what was written.
+    fn set_columns(&mut self, written: Option<Written>) {
+        self.columns = Columns::new(self.clock().is_some(), self.horizon, &self.state.trackers);
+        self.lines = LineWriter::counting(self.lines.format(), self.columns.names(), written);
+    }
+
+    fn take<'a, E: From<Failure>>(
+        &mut self,
+        next: &mut impl FnMut() -> Result<Option<(&'a [f64], Option<f64>, bool)>, E>,
+        seen: &mut impl FnMut(&TrackedRow<'_>),
+        stop_on_alarm: bool,
+    ) -> Result<(), E> {
+        let Self { every, columns, state, lines, deviations, horizon, .. } = self;
+        let mut count = 0_usize;
+        let (horizon, mut unwritten) = (*horizon, vec![f64::NAN; deviations.len()]);
+        while let Some((values, time, after_gap)) = next()? {
+            let row = Row { values, time, malformed: false, has_clock: time.is_some(), after_gap };
+            let mut session = Session { every: *every, columns, state: &mut *state, lines, deviations };
+            let alarm = session.row(
+                &row,
+                || format!("row {count}"),
+                |one| {
+                    // A row without a line has them too.
+                    let (standard_errors, forecast) = one.line.unwrap_or_else(|| {
+                        // There is one place for each.
+                        let _ = one.tracker.write_standard_errors(&mut unwritten);
+                        let forecast =
+                            horizon.map(|rows| one.tracker.clone().forecast(rows).unwrap_or(f64::NAN));
+                        (&unwritten, forecast)
+                    });
+                    seen(&TrackedRow {
+                        index: one.index,
+                        tracker: one.tracker,
+                        tracked: one.tracked,
+                        action: one.action,
+                        standard_errors,
+                        forecast,
+                    });
+                },
+            )?;
+            count += 1;
+            if alarm && stop_on_alarm {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Tells that an unknown number of rows is missing here, of a log without a clock.
+    ///
+    /// # Errors
+    /// A [`Failure`] if the line about it cannot be counted.
+    pub fn gap(&mut self) -> Result<(), Failure> {
+        let Self { columns, state, lines, .. } = self;
+        state.trackers.iter_mut().for_each(Tracker::gap);
+        state.gaps = state.gaps.saturating_add(1);
+        columns.gap(lines, state.rows.saturating_add(1), None)
+    }
+
+    /// The state, as `thetahat track --state` writes it.
+    ///
+    /// # Errors
+    /// A [`Failure`] if it cannot be written as JSON.
+    pub fn state(&mut self) -> Result<String, Failure> {
+        self.lines.flush()?;
+        self.state.written = self.lines.written();
+        self.state.to_json()
+    }
+
+    /// The document that `thetahat track --summary` writes.
+    pub fn summary(&self) -> TrackSummary {
+        self.state.summary()
+    }
+
+    /// The trackers, one for each way to forget.
+    pub fn trackers(&self) -> &[Tracker] {
+        &self.state.trackers
+    }
+
+    /// The prediction so many steps ahead of each, see [`Tracker::forecast`].
+    ///
+    /// # Errors
+    /// A [`Failure`] if the steps are out of their range.
+    pub fn forecast(&mut self, steps: usize) -> Result<Vec<f64>, Failure> {
+        let each = self.state.trackers.iter_mut().map(|tracker| tracker.forecast(steps));
+        each.collect::<Result<_, _>>().map_err(|error| Failure::option(&error))
+    }
+
+    /// The input channels.
+    pub fn inputs(&self) -> &[String] {
+        &self.inputs
+    }
+
+    /// The output channel.
+    pub fn output(&self) -> &str {
+        &self.output
+    }
+
+    /// The column of times; none if rows have none, or there was none yet that says.
+    pub fn clock(&self) -> Option<&str> {
+        self.state.set("--time").filter(|name| !name.is_empty())
+    }
+
+    /// The first time as it is written, if times are dates.
+    pub fn start(&self) -> Option<&str> {
+        self.state.start.as_deref()
+    }
+
+    /// The latest time.
+    pub fn last_time(&self) -> Option<f64> {
+        self.state.pace.last()
+    }
+
+    /// How many rows ahead a forecast is, if one was asked for.
+    pub fn horizon(&self) -> Option<usize> {
+        self.horizon
+    }
+}

@@ -1,0 +1,655 @@
+"""Models that are estimated along a log: what `thetahat track` does, over whole logs and row by row."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from html import escape
+from typing import TYPE_CHECKING, Any, NamedTuple, Union
+
+import numpy as np
+import numpy.typing as npt
+
+from thetahat import _clock, _files, _numbers, _options, _picture, _rows, _thetahat
+from thetahat._options import Duration
+from thetahat._thetahat import Alarm, Forgetting
+
+if TYPE_CHECKING:
+    import os
+
+    from thetahat._model import Model
+
+Array = npt.NDArray[np.float64]
+
+Policy = Union[float, str, Forgetting, None]
+"""A way to forget: a factor, a text such as "selective:0.99", a `Forgetting`, or None."""
+
+
+class Tracked(NamedTuple):
+    """What a tracker made of a row.
+
+    With several ways to forget, numbers are arrays with one for each.
+    """
+
+    predicted: float | Array
+    """The one-step prediction, from all rows before and the inputs of this one; NaN if there is none."""
+    error: float | Array
+    """The innovation: the output less its prediction; NaN if one of the two is missing."""
+    variance: float | Array
+    """The variance of the innovation; NaN until the noise variance is known."""
+    nis: float | Array
+    """The normalised innovation squared: 1 on average. NaN where the variance is not known."""
+    action: str | npt.NDArray[np.str_]
+    """What was done with the row, see `Innovation`; "too large" of a value that was taken for missing."""
+    excitation: float | Array
+    """How much is known of the parameter that least is known of, 0 to 1. Below 0.5 or so, do not rely on the parameters."""
+    forecast: float | Array
+    """The output ``horizon`` rows later; NaN if there is none, or none was asked for."""
+    alarms: list[Alarm]
+    """The changes that were noticed."""
+
+
+class TrackTrajectory:
+    """What a `Tracker` made of many rows.
+
+    With several ways to forget, all but `time` and `measured` have a last axis with one place for each.
+
+    Attributes
+    ----------
+    time : ndarray, shape (N,)
+        Seconds.
+    measured : ndarray, shape (N,)
+        The outputs of the log.
+    predicted : ndarray, shape (N,)
+        The one-step predictions, in the units of the log; NaN where there is none.
+    errors, variances : ndarray, shape (N,)
+        The innovations and their variances; NaN where there is none.
+    nis : ndarray, shape (N,)
+        The normalised innovations squared; NaN where the variance is not known.
+    excitation : ndarray, shape (N,)
+        How much is known of the parameter that least is known of, 0 to 1.
+    forecasts : ndarray, shape (N,)
+        The outputs ``horizon`` rows later; NaN if that was not asked for.
+    parameters, standard_errors : ndarray, shape (N, n)
+        The parameters after each row, and their standard errors; NaN where they are not known.
+    actions : ndarray of str, shape (N,)
+        What was done with each row, see `Innovation`; "too large" of a value that was taken for missing.
+    alarms : list of Alarm
+        The changes that were noticed, row by row.
+    parameter_names : list of str
+        Such as ``a1``, ``b1``, ``constant``.
+    forgetting : list of str
+        The ways to forget.
+    """
+
+    predicted: Array
+    errors: Array
+    variances: Array
+    nis: Array
+    excitation: Array
+    forecasts: Array
+    parameters: Array
+    standard_errors: Array
+    actions: npt.NDArray[np.str_]
+    alarms: list[Alarm]
+
+    def __init__(self, tracker: Tracker, rows: _rows.Rows, found: dict[str, Any]) -> None:
+        taken, count = found.pop("taken"), len(tracker.forgetting)
+        self.alarms = found.pop("alarms")
+        too_large = found.pop("too_large").reshape(taken, count)
+        found["actions"] = np.where(too_large, "too large", found["actions"].reshape(taken, count))
+        for name, values in found.items():
+            values = values[:taken]
+            setattr(self, name, values[:, 0] if count == 1 else np.moveaxis(values, 1, -1))
+        step = tracker.sample_time
+        self.time = rows.time(1.0 if step is None else step)[:taken]
+        self.measured = rows.outputs[:taken, 0]
+        self.parameter_names = tracker.parameter_names
+        self.output = tracker.output
+        self.forgetting = tracker.forgetting
+        self._clock = rows.clock.part(0, taken)
+        self._horizon = tracker.horizon
+        self._watched = tracker._tracker.watched
+
+    def to_pandas(self, tracker: int = 0) -> Any:
+        """A data frame of pandas with the index that the log came with; its columns are those of ``thetahat track``.
+
+        Parameters
+        ----------
+        tracker : int, default 0
+            Which of several ways to forget, counted from 0.
+
+        Examples
+        --------
+        >>> import thetahat as th
+        >>> frame = th.Tracker(na=2, nb=2).run(th.dc_motor()).to_pandas()
+        >>> frame.columns.tolist()[:6]
+        ['action', 'measured', 'predicted', 'innovation', 'innovation_sd', 'nis']
+        >>> frame[["a1", "a2", "b1", "b2"]].tail(1).to_numpy().round(2)
+        array([[-1.56,  0.6 ,  0.38,  0.27]])
+        """
+        return _clock.to_pandas(self._clock, self.time, self._columns(tracker))
+
+    def to_polars(self, tracker: int = 0) -> Any:
+        """As `to_pandas`, for Polars: the times are the first column."""
+        return _clock.to_polars(self._clock, self.time, self._columns(tracker))
+
+    def _of(self, values: npt.NDArray[Any], tracker: int) -> npt.NDArray[Any]:
+        """The part of one way to forget."""
+        return values if len(self.forgetting) == 1 else values[..., tracker]
+
+    def _place(self, tracker: int) -> int:
+        place = _options.integer("tracker", tracker)
+        if not 0 <= place < len(self.forgetting):
+            raise ValueError(f"tracker: there is no tracker {place}; there are {len(self.forgetting)}, counted from 0")
+        return place
+
+    def _alarms(self, tracker: int) -> list[Alarm]:
+        several = len(self.forgetting) > 1
+        return [alarm for alarm in self.alarms if not several or alarm.forgetting == self.forgetting[tracker]]
+
+    def _columns(self, tracker: int) -> dict[str, Any]:
+        place = self._place(tracker)
+        columns: dict[str, Any] = {
+            "action": self._of(self.actions, place),
+            "measured": self.measured,
+            "predicted": self._of(self.predicted, place),
+            "innovation": self._of(self.errors, place),
+            "innovation_sd": np.sqrt(self._of(self.variances, place)),
+            "nis": self._of(self.nis, place),
+            "excitation": self._of(self.excitation, place),
+        }
+        if self._horizon is not None:
+            columns["forecast"] = self._of(self.forecasts, place)
+        for suffix, values in (("", self.parameters), ("_se", self.standard_errors)):
+            found = self._of(values, place)
+            columns |= {f"{name}{suffix}": found[:, column] for column, name in enumerate(self.parameter_names)}
+        if self._watched:
+            charts, statistics = np.full(len(self), "", dtype="U9"), np.full(len(self), np.nan)
+            samples = np.full(len(self), np.nan)
+            for alarm in self._alarms(place):
+                charts[alarm.row], statistics[alarm.row], samples[alarm.row] = alarm.chart, alarm.statistic, alarm.samples
+            columns |= {"chart": charts, "statistic": statistics, "samples": samples}
+        return columns
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def __repr__(self) -> str:
+        several = "" if len(self.forgetting) == 1 else f", {len(self.forgetting)} ways to forget"
+        alarms = f", {len(self.alarms)} alarm{'' if len(self.alarms) == 1 else 's'}" if self._watched else ""
+        return f"TrackTrajectory({len(self)} rows, parameters {', '.join(self.parameter_names)}{several}{alarms})"
+
+    def _repr_html_(self) -> str:
+        values = self._of(self.parameters, 0)
+        return _picture.rows(repr(self), [(name, [values[:, place]]) for place, name in enumerate(self.parameter_names)])
+
+
+class Tracker:
+    """An ARX or ARMAX model that is estimated while the plant runs: what ``thetahat track`` does.
+
+    ::
+
+        A(q) y(k) = sum_j B_j(q) u_j(k) + constant + C(q) e(k)
+
+    It is a `RecursiveArx` or a `RecursiveArmax` with what a log needs: channels with names and offsets, scales that are found in
+    the first rows, gaps of the clock, predictions and forecasts, figures, detection of changes, a start from a fitted model, and a
+    state that is kept in a file.
+
+    Parameters
+    ----------
+    na : int, optional
+        Coefficients of A: past outputs.
+    nb : int or sequence of int, optional
+        Coefficients of B: one value for each input or one for all, 0 for a model without inputs.
+    nc : int, optional
+        Coefficients of C: past disturbances.
+    nk : int or sequence of int, default 1
+        Samples from input to first effect, one value for each input or one for all.
+    warm : Model, optional
+        Start from a fit instead: its orders, parameters, covariance, noise and offsets.
+    inputs : sequence of str, or str, optional
+        The channels of the inputs: those of ``warm``; without it u, or u1, u2, … as many as nb has.
+    output : str, optional
+        The channel of the output: that of ``warm``, or y.
+    offset : dict of str to float, optional
+        What is subtracted from a channel: 0, or the offsets of ``warm``.
+    scale : dict of str to float, optional
+        The typical magnitude of each channel; a factor of 3 does not matter. Without them the largest of the first rows, from
+        which then nothing is predicted.
+    constant : bool, default False
+        Whether a constant is estimated too, for channels of which the offsets are not known; without ``offset`` the first value of each
+        is taken off.
+    method : {"rls", "els", "rpem"}, optional
+        Recursive least squares; with C extended least squares, or the recursive prediction error method, which is the default.
+    forgetting : float, str, Forgetting or None, or a sequence of them, default 0.99
+        What is forgotten; several run side by side. A float is exponential forgetting with that factor, None forgets nothing. A text is
+        "none", "exponential:LAMBDA", "selective:LAMBDA", "random-walk:VARIANCE" or "variable:LAMBDA:MINIMUM:NOISE".
+    start : str, optional
+        "standard" (from a wide prior), "exact" (without prior, once the rows determine the parameters), "mixed" or
+        "mixed:SAMPLES" (standard, then blended into exact).
+    dead_zone : float, optional
+        An innovation of at most this size corrects nothing, in units of the output.
+    horizon : int, optional
+        Forecast the output so many rows later in each row, inputs held at their last value.
+    alarm : float, optional
+        Watch the innovations for changes of their mean and variance (CUSUM), with so many samples between two false alarms on
+        average, 10 to 1e9. See `ChangeDetector`.
+    sample_time : float or timedelta, optional
+        Time from one row to the next, where rows have times: that of ``warm``, or the first step. A step of less than half or more than
+        one and a half of it is a gap.
+
+    Raises
+    ------
+    ValueError
+        If orders are missing or do not go with the method, a name is no channel, or a number is out of its range.
+
+    Notes
+    -----
+    An object is for one thread at a time. It pickles and copies, wherever it stands.
+
+    References
+    ----------
+    Ljung, System Identification, 2nd ed., 1999, chapter 11.
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> log = th.dc_motor()
+    >>> tracker = th.Tracker(na=2, nb=2, forgetting=[0.99, None])
+    >>> trajectory = tracker.run(log[:900])
+    >>> trajectory.parameters.shape
+    (900, 4, 2)
+    >>> tracker.parameters[:, 1].round(2)
+    array([-1.54,  0.58,  0.36,  0.32])
+    >>> tracked = tracker.log_row(log.y[900], log.u[900], time=log.time[900])
+    >>> tracked.action.tolist()
+    ['updated', 'updated']
+    """
+
+    __slots__ = ("_sample_time", "_tracker")
+    _tracker: _thetahat.Tracker
+    _sample_time: float | None
+
+    def __init__(
+        self,
+        na: int | None = None,
+        nb: int | Sequence[int] | None = None,
+        nc: int | None = None,
+        nk: int | Sequence[int] | None = None,
+        *,
+        warm: Model | None = None,
+        inputs: Sequence[str] | str | None = None,
+        output: str | None = None,
+        offset: Mapping[str, float] | None = None,
+        scale: Mapping[str, float] | None = None,
+        constant: bool = False,
+        method: str | None = None,
+        forgetting: Policy | Sequence[Policy] = 0.99,
+        start: str | None = None,
+        dead_zone: float | None = None,
+        horizon: int | None = None,
+        alarm: float | None = None,
+        sample_time: Duration | None = None,
+    ) -> None:
+        from thetahat._model import Model
+
+        orders = {"na": na, "nb": nb, "nc": nc, "nk": nk}
+        named = None if inputs is None else [inputs] if isinstance(inputs, str) else list(inputs)
+        if warm is not None:
+            if not isinstance(warm, Model):
+                raise TypeError(f"warm: expected a Model, found {type(warm).__name__}")
+            for name, order in orders.items():
+                if order is not None:
+                    raise ValueError(f"{name}: the orders are those of warm; leave it out")
+            named = warm.inputs if named is None else named
+            if len(named) != len(warm.inputs):
+                raise ValueError(f"inputs: expected {len(warm.inputs)} names as warm has inputs, found {len(named)}")
+        elif named is None:
+            named = _inputs(nb)
+        words = _options.order_words(**orders)
+        if not isinstance(constant, bool):
+            raise TypeError(f"constant: expected True or False, found {constant!r}")
+        words += ["--constant"] if constant else []
+        words += [f"--{name}={_options.text(name, value)}" for name, value in (("method", method), ("start", start)) if value is not None]
+        words.append(f"--forgetting={','.join(_policies(forgetting))}")
+        for name, values in (("offset", offset), ("scale", scale)):
+            if values is not None and not isinstance(values, Mapping):
+                raise TypeError(f"{name}: expected a dict, found {values!r}")
+            words += [f"--{name}={_options.text(name, key)}={_options.number(name, value)}" for key, value in (values or {}).items()]
+        if dead_zone is not None:
+            words.append(f"--dead-zone={_options.number('dead_zone', dead_zone)}")
+        if horizon is not None:
+            words.append(f"--horizon={_options.count('horizon', horizon, 10_000)}")
+        if alarm is not None:
+            words.append(f"--alarm={_options.number('alarm', alarm)}")
+        self._sample_time = None if sample_time is None else _options.seconds("sample_time", sample_time)
+        if self._sample_time is not None:
+            words.append(f"--sample-time={self._sample_time!r}")
+        elif warm is not None:
+            self._sample_time = warm.sample_time
+        named = [_options.text("inputs", name) for name in named]
+        measured = (warm.output if warm is not None else "y") if output is None else _options.text("output", output)
+        if len({*named, measured}) <= len(named):
+            raise ValueError(f"inputs: {_numbers.twice([*named, measured])!r} is named twice; each channel has one role")
+        self._tracker = _thetahat.Tracker(words, named, measured, None if warm is None else warm._model)
+
+    @classmethod
+    def from_state(cls, text: str) -> Tracker:
+        """Go on from the state that `state` gave or ``thetahat track --state`` wrote.
+
+        Parameters
+        ----------
+        text : str
+            The state.
+
+        Raises
+        ------
+        ValueError
+            If the text is no such state, or was edited.
+
+        Examples
+        --------
+        >>> import thetahat as th
+        >>> log = th.dc_motor()
+        >>> tracker = th.Tracker(na=2, nb=2)
+        >>> _ = tracker.run(log[:500])
+        >>> again = th.Tracker.from_state(tracker.state())
+        >>> bool((again.run(log[500:]).parameters == tracker.run(log[500:]).parameters).all())
+        True
+        """
+        return cls._restored(_options.text("text", text), None, None)
+
+    @classmethod
+    def read_state(cls, path: str | os.PathLike[str]) -> Tracker:
+        """Go on from the state in a file, see `from_state`."""
+        with open(_files.name(path), encoding="utf-8") as file:
+            return cls.from_state(file.read())
+
+    @classmethod
+    def _restored(cls, text: str, inputs: Sequence[str] | None, sample_time: float | None) -> Tracker:
+        """Makes a tracker again of what `__reduce__` gave."""
+        made = object.__new__(cls)
+        made._tracker = _thetahat.Tracker.from_state(text, inputs)
+        made._sample_time = json.loads(text)["pace"]["sample_time"] if sample_time is None else sample_time
+        return made
+
+    def state(self) -> str:
+        """All that there is to know to go on, to the bit: the state that ``thetahat track --state`` writes.
+
+        Of the same rows it is the same to the byte. It counts the lines that the program would have written about them, so that the
+        program goes on from it with its output after these.
+        """
+        return self._tracker.state()
+
+    def write_state(self, path: str | os.PathLike[str]) -> None:
+        """Write the state to a file, whole or not at all."""
+        _thetahat.write(_files.name(path), self.state())
+
+    def log_row(self, y: float, u: npt.ArrayLike | None = None, *, time: float | None = None) -> Tracked:
+        """Take one row of a log: y(k) and u(k), recorded at the same instant.
+
+        Parameters
+        ----------
+        y : float
+            The output, in its own unit. NaN is a missing sample.
+        u : float, or array_like of shape (inputs,); None without inputs
+            The inputs. NaN is a missing sample.
+        time : float, optional
+            Seconds; where rows have times, each has one.
+
+        Returns
+        -------
+        Tracked
+
+        Raises
+        ------
+        ValueError
+            If a shape is wrong, a value infinite, or the time not after that of the row before. Nothing has changed then.
+        """
+        measured = _numbers.array("y", y)
+        if measured.size != 1:
+            raise ValueError(f"y: expected a number, found shape {measured.shape}")
+        driving = np.empty((1, 0)) if u is None else _numbers.array("u", u).reshape(1, -1)
+        if driving.shape[1] != len(self.inputs):
+            raise ValueError(f"u: expected {len(self.inputs)} numbers, found {driving.shape[1]}")
+        seconds = None if time is None else np.array([float(_options.number("time", time))])
+        rows = _rows.Rows(driving, measured.reshape(1, 1), seconds, None, _clock.Clock(), name=None if time is None else "time")
+        found = self._run(rows, stop_on_alarm=False)
+        one = TrackTrajectory(self, rows, found)
+
+        def last(values: npt.NDArray[Any]) -> Any:
+            return values[0] if values.ndim > 1 else values[0].item()
+
+        return Tracked(
+            predicted=last(one.predicted),
+            error=last(one.errors),
+            variance=last(one.variances),
+            nis=last(one.nis),
+            action=last(one.actions),
+            excitation=last(one.excitation),
+            forecast=last(one.forecasts),
+            alarms=one.alarms,
+        )
+
+    def run(
+        self,
+        data: _rows.Data,
+        *,
+        u: _numbers.Columns | None = None,
+        time: _rows.Times | None = None,
+        stop_on_alarm: bool = False,
+    ) -> TrackTrajectory:
+        """Take many rows: the same as `log_row` in a loop, to the bit.
+
+        The interpreter lock is released meanwhile. Rows go on from those before them: of two parts of a log the second follows the
+        first.
+
+        Parameters
+        ----------
+        data : Log, data frame, dict of str to array_like, or array_like of shape (N,)
+            The output and inputs. Those of a log, a frame or a dict are found by name; an array holds the output. Between the
+            experiments of a log are gaps.
+        u : array_like of shape (N,) or (N, inputs), or data frame or dict of str to array_like, optional
+            The inputs, where they are not in ``data``.
+        time : str or array_like of shape (N,), optional
+            The times, or the column that holds them: instants, durations or seconds. Without it an index of pandas is the clock if it
+            holds times. A log has its own clock.
+        stop_on_alarm : bool, default False
+            Whether to end after the row of the first alarm.
+
+        Returns
+        -------
+        TrackTrajectory
+
+        Raises
+        ------
+        TypeError
+            If something does not hold numbers.
+        ValueError
+            If a channel is not there, a shape is wrong, a value infinite, or the first time is not after that of the row before.
+            Nothing has changed then.
+        """
+        rows = _rows.of(data, u, time, None, self.inputs, [self.output])
+        if not isinstance(stop_on_alarm, bool):
+            raise TypeError(f"stop_on_alarm: expected True or False, found {stop_on_alarm!r}")
+        return TrackTrajectory(self, rows, self._run(rows, stop_on_alarm))
+
+    def _run(self, rows: _rows.Rows, stop_on_alarm: bool) -> dict[str, Any]:
+        name, start, last = self._tracker.clock
+        seconds = rows.seconds
+        if self.rows > 0 and (name is None) != (seconds is None):
+            before, now = ("had times", "have none") if seconds is None else ("had no times", "have some")
+            raise ValueError(f"time: the rows before {before}, and these {now}; give all of them times, or none")
+        if seconds is not None and self.rows > 0:
+            if start is not None and rows.start is not None and start != rows.start:
+                seconds = seconds + _apart(start, rows.start)
+            if last is not None and not seconds[0] > last:
+                raise ValueError(f"time: the first row is {last - seconds[0]:g} s before the latest one that was taken; give later rows")
+        clock = ("" if seconds is None else rows.name or "time", rows.start)
+        return self._tracker.run(rows.inputs, rows.outputs, seconds, clock, list(rows.borders), stop_on_alarm)
+
+    def gap(self) -> None:
+        """Tell that an unknown number of rows is missing here. Where rows have times, these tell it.
+
+        Raises
+        ------
+        ValueError
+            If rows have times.
+        """
+        if self._tracker.clock[0] is not None:
+            raise ValueError("gap: rows have times, which tell it")
+        self._tracker.gap()
+
+    def forecast(self, steps: int) -> Any:
+        """The output so many steps ahead of the latest row, inputs held at their latest values.
+
+        Parameters
+        ----------
+        steps : int
+            How many, 1 to 10000.
+
+        Returns
+        -------
+        float, or ndarray with one for each way to forget
+            In the units of the log. NaN before there is an estimate, and where it depends on a missing sample.
+
+        Examples
+        --------
+        >>> import thetahat as th
+        >>> log = th.dc_motor()
+        >>> tracker = th.Tracker(na=2, nb=2)
+        >>> _ = tracker.run(log[:900])
+        >>> bool(abs(tracker.forecast(1) - log.y[900]) < 5)
+        True
+        """
+        return self._one(self._tracker.forecast(_options.count("steps", steps, 10_000)))
+
+    def _one(self, values: npt.NDArray[Any]) -> Any:
+        """The value of the only way to forget; else all of them."""
+        return values[0].item() if len(values) == 1 else values
+
+    def _last_axis(self, values: Array) -> Array:
+        return values[0] if len(values) == 1 else values.T
+
+    @property
+    def parameters(self) -> Array:
+        """The parameters in the order of `parameter_names`, shape (n,), or (n, ways to forget); NaN before there is an estimate."""
+        return self._last_axis(self._tracker.parameters())
+
+    @property
+    def standard_errors(self) -> Array:
+        """Their standard errors, of the shape of `parameters`; NaN until the noise variance is known."""
+        return self._last_axis(self._tracker.standard_errors())
+
+    @property
+    def noise_variance(self) -> Any:
+        """The variance of e, a float, or an array with one for each way to forget; NaN until enough rows are in."""
+        return self._one(self._tracker.noise_variances())
+
+    @property
+    def parameter_names(self) -> list[str]:
+        """Such as ``a1``, ``b1``, ``constant``."""
+        return self._tracker.names
+
+    @property
+    def forgetting(self) -> list[str]:
+        """The ways to forget, as texts."""
+        return self._tracker.policies
+
+    @property
+    def inputs(self) -> list[str]:
+        """The channels of the inputs."""
+        return self._tracker.inputs
+
+    @property
+    def output(self) -> str:
+        """The channel of the output."""
+        return self._tracker.output
+
+    @property
+    def offsets(self) -> dict[str, float]:
+        """What is taken from each channel."""
+        return dict(zip([*self.inputs, self.output], self._tracker.offsets))
+
+    @property
+    def scales(self) -> dict[str, float] | None:
+        """The typical magnitude of each channel less its offset; None while they are not known."""
+        scales = self._tracker.scales
+        return None if scales is None else dict(zip([*self.inputs, self.output], scales))
+
+    @property
+    def horizon(self) -> int | None:
+        """How many rows ahead a forecast is, if one was asked for."""
+        return self._tracker.horizon
+
+    @property
+    def sample_time(self) -> float | None:
+        """Seconds from one row to the next, where that was said."""
+        return self._sample_time
+
+    @property
+    def rows(self) -> int:
+        """How many rows it has taken."""
+        return self._tracker.rows
+
+    def to_json(self) -> str:
+        """The document of ``thetahat track --summary``: of the same rows the same bytes."""
+        return self._tracker.to_json()
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """The document as a dict: all that there is to know at the latest row."""
+        document: dict[str, Any] = json.loads(self.to_json())
+        return document
+
+    def summary(self) -> str:
+        """The table that ``thetahat track`` prints.
+
+        Examples
+        --------
+        >>> import thetahat as th
+        >>> tracker = th.Tracker(na=2, nb=2)
+        >>> _ = tracker.run(th.dc_motor())
+        >>> print(tracker.summary().splitlines()[1])
+        1000 rows
+        """
+        return self._tracker.table()
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Write the document to a file, whole or not at all."""
+        _thetahat.write(_files.name(path), self.to_json())
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return (Tracker._restored, (self.state(), self.inputs, self._sample_time))
+
+    def __repr__(self) -> str:
+        return f"Tracker({self._tracker.orders}, forgetting {', '.join(self.forgetting)}, {self.rows} rows)"
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(self.summary())}</pre>"
+
+
+def _inputs(nb: int | Sequence[int] | None) -> list[str]:
+    """The usual names of so many inputs."""
+    if isinstance(nb, (list, tuple, np.ndarray)):
+        return ["u"] if len(nb) == 1 else [f"u{place}" for place in range(1, len(nb) + 1)]
+    return [] if nb is None or nb == 0 else ["u"]
+
+
+def _policies(forgetting: Any) -> list[str]:
+    every = list(forgetting) if isinstance(forgetting, (list, tuple, np.ndarray)) else [forgetting]
+    if not every:
+        raise ValueError("forgetting: there is none; give at least one")
+    return [one if isinstance(one, str) else _thetahat.policy(one) for one in every]
+
+
+def _apart(first: str, second: str) -> float:
+    """Seconds from one time to another, as they are written."""
+    try:
+        one, other = _clock.read("time", [first, second]).values
+    except (TypeError, ValueError):
+        raise ValueError(
+            f"time: the times of these rows count from {second}, and those before from {first}; give times in ISO 8601"
+        ) from None
+    return float((other - one) / _clock.SECOND)

@@ -1,0 +1,312 @@
+//! Models that are estimated along a log: the state and the document of `thetahat track`.
+
+use std::ffi::OsString;
+
+use numpy::{PyArray1, PyArray2, PyUntypedArrayMethods};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+use thetahat::{Document, PerChannel};
+use thetahat_cli::{Failure, TrackedRow, Tracking};
+
+use crate::array::{matrix, vector};
+use crate::error;
+use crate::model::Model;
+use crate::online::argument::{room, row};
+use crate::online::detector::Alarm;
+use crate::online::forgetting::Memory;
+use crate::online::innovation::{code, names};
+use crate::online::results::Results;
+use crate::work::Pulse;
+
+/// A way to forget as the command line writes it.
+#[pyfunction]
+pub(crate) fn policy(forgetting: Memory) -> String {
+    thetahat::Policy(forgetting.0).to_string()
+}
+
+/// ARX or ARMAX models of one log, one for each way to forget.
+#[pyclass(module = "thetahat._thetahat")]
+pub(crate) struct Tracker {
+    tracking: Tracking,
+}
+
+/// Arrays of a run: (rows, trackers), those of parameters with one more axis.
+const COLUMNS: [&str; 8] =
+    ["predicted", "errors", "variances", "nis", "excitation", "forecasts", "parameters", "standard_errors"];
+
+#[pymethods]
+impl Tracker {
+    /// A tracker with the options of `thetahat track` for these channels, from nothing or from a fitted model.
+    #[new]
+    #[pyo3(signature = (options, inputs, output, report))]
+    fn new(
+        py: Python<'_>,
+        options: Vec<OsString>,
+        inputs: Vec<String>,
+        output: String,
+        report: Option<&Bound<'_, Model>>,
+    ) -> PyResult<Self> {
+        let report = report.map(|model| model.get().report(py)).transpose()?;
+        let tracking = py
+            .detach(|| thetahat_cli::track(&options, inputs, output, report.as_deref()))
+            .map_err(|failure| error::program(py, &failure))?;
+        Ok(Self { tracking })
+    }
+
+    /// Goes on from a state.
+    #[staticmethod]
+    fn from_state(py: Python<'_>, text: &str, inputs: Option<Vec<String>>) -> PyResult<Self> {
+        let tracking = Tracking::from_state(text, inputs).map_err(|failure| error::program(py, &failure))?;
+        Ok(Self { tracking })
+    }
+
+    /// The state.
+    fn state(&mut self, py: Python<'_>) -> PyResult<String> {
+        self.tracking.state().map_err(|failure| error::program(py, &failure))
+    }
+
+    /// Takes rows: inputs, outputs, their times if they have some, what these are called and the first one as it is written, and
+    /// the rows before which an unknown number is missing.
+    #[pyo3(signature = (inputs, outputs, seconds, clock, gaps, stop_on_alarm))]
+    fn run<'py>(
+        &mut self,
+        py: Python<'py>,
+        inputs: &Bound<'py, PyAny>,
+        outputs: &Bound<'py, PyAny>,
+        seconds: Option<&Bound<'py, PyAny>>,
+        clock: (String, Option<String>),
+        gaps: Vec<usize>,
+        stop_on_alarm: bool,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let k = self.tracking.inputs().len();
+        let outputs = matrix("y", outputs, [None, Some(1)])?;
+        let rows = outputs.shape()[0];
+        let outputs = outputs.as_slice()?;
+        let inputs = if k == 0 { None } else { Some(matrix("u", inputs, [Some(rows), Some(k)])?) };
+        let inputs = inputs.as_ref().map_or(Ok(&[][..]), |inputs| inputs.as_slice())?;
+        let seconds = seconds.map(|seconds| vector("time", seconds, Some(rows))).transpose()?;
+        let seconds = seconds.as_ref().map(|seconds| seconds.as_slice()).transpose()?;
+        let mut values = room(&[rows, k + 1])?;
+        for (at, &output) in outputs.iter().enumerate() {
+            let inputs = row(inputs, at, k);
+            for (value, name) in inputs
+                .iter()
+                .zip(self.tracking.inputs())
+                .chain([(&output, &self.tracking.output().to_owned())])
+            {
+                if value.is_infinite() {
+                    let message = format!("row {at}: '{name}' is infinite; NaN is a missing sample");
+                    return Err(PyValueError::new_err(message));
+                }
+            }
+            values.extend_from_slice(inputs);
+            values.push(output);
+        }
+
+        let policies: Vec<Option<String>> = match self.tracking.trackers() {
+            [_] => vec![None],
+            several => several.iter().map(|tracker| Some(tracker.plan().forgetting.to_string())).collect(),
+        };
+        let (count, n) = (policies.len(), self.names().len());
+        let (flat, deep) = (vec![rows, count], vec![rows, count, n]);
+        let mut shapes = [const { Vec::new() }; 8];
+        shapes[..6].fill(flat);
+        shapes[6..].fill(deep);
+        let results = Results::new(py, shapes)?;
+        let mut alarms = Vec::new();
+        let (mut codes, mut too_large) = (room(&[rows, count])?, room(&[rows, count])?);
+        let unknown = vec![f64::NAN; n];
+        let taken = results.write(|mut columns| {
+            py.detach(|| {
+                let mut pulse = Pulse::new(count * 4 * n * n + 100);
+                let mut at = 0;
+                let next = || -> Result<_, Stop> {
+                    if at == rows {
+                        return Ok(None);
+                    }
+                    pulse.check()?;
+                    let time = seconds.and_then(|seconds| seconds.get(at)).copied();
+                    let found = (row(&values, at, k + 1), time, gaps.contains(&at));
+                    at += 1;
+                    Ok(Some(found))
+                };
+                let mut seen = |row: &TrackedRow<'_>| {
+                    let tracked = &row.tracked;
+                    let known = tracked.variance.is_finite();
+                    let numbers = [
+                        tracked.predicted,
+                        tracked.error,
+                        tracked.variance,
+                        if known { tracked.nis } else { f64::NAN },
+                        tracked.excitation,
+                        row.forecast.unwrap_or(f64::NAN),
+                    ];
+                    for (column, number) in columns.iter_mut().zip(numbers) {
+                        column.push(&[number]);
+                    }
+                    columns[6].push(row.tracker.parameters().unwrap_or(&unknown));
+                    columns[7].push(row.standard_errors);
+                    let index = codes.len() / count;
+                    codes.push(code(tracked.action));
+                    too_large.push(tracked.too_large);
+                    if let Some(given) = tracked.alarm {
+                        alarms.push(Alarm::of(given, index, policies.get(row.index).cloned().flatten()));
+                    }
+                };
+                let clock = (clock.0.as_str(), clock.1);
+                self.tracking.rows(Some(clock), next, &mut seen, stop_on_alarm)
+            })
+        })?;
+        taken.map_err(|stop: Stop| match stop {
+            Stop::Refused(failure) => error::program(py, &failure),
+            Stop::Interrupted(raised) => raised,
+        })?;
+        let found = PyDict::new(py);
+        found.set_item("taken", codes.len() / count)?;
+        for (name, array) in COLUMNS.into_iter().zip(results.arrays()?) {
+            found.set_item(name, array)?;
+        }
+        found.set_item("actions", names(py, &PyArray1::from_vec(py, codes))?)?;
+        found.set_item("too_large", PyArray1::from_vec(py, too_large))?;
+        found.set_item("alarms", PyList::new(py, alarms)?)?;
+        Ok(found)
+    }
+
+    /// Tells that an unknown number of rows is missing here.
+    fn gap(&mut self, py: Python<'_>) -> PyResult<()> {
+        self.tracking.gap().map_err(|failure| error::program(py, &failure))
+    }
+
+    /// The prediction so many steps ahead of each tracker.
+    fn forecast<'py>(&mut self, py: Python<'py>, steps: usize) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let found = self.tracking.forecast(steps).map_err(|failure| error::program(py, &failure))?;
+        Ok(PyArray1::from_vec(py, found))
+    }
+
+    /// The document.
+    fn to_json(&self, py: Python<'_>) -> PyResult<String> {
+        self.tracking.summary().to_json().map_err(|error| error::batch(py, error))
+    }
+
+    /// The table that `thetahat track` prints.
+    fn table(&self) -> String {
+        let watched = self.tracking.trackers().iter().any(|tracker| tracker.detector().is_some());
+        thetahat_cli::tracking(&self.tracking.summary(), "", watched, thetahat_cli::WIDTH)
+    }
+
+    /// The parameters of each tracker; NaN before there is an estimate.
+    fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let each = self.tracking.trackers().iter().map(|tracker| {
+            tracker.parameters().map_or_else(|| vec![f64::NAN; tracker.names().len()], <[f64]>::to_vec)
+        });
+        two_dimensions(py, each.collect())
+    }
+
+    /// Their standard errors; NaN where they are not known.
+    fn standard_errors<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let each = self.tracking.trackers().iter().map(|tracker| {
+            let mut errors = vec![f64::NAN; tracker.names().len()];
+            tracker.write_standard_errors(&mut errors).map(|()| errors)
+        });
+        two_dimensions(py, each.collect::<Result<_, _>>().map_err(|error| error::batch(py, error))?)
+    }
+
+    /// The variance of e of each tracker; NaN where it is not known.
+    fn noise_variances<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let each = self.tracking.trackers().iter();
+        PyArray1::from_iter(py, each.map(|tracker| tracker.noise_variance().unwrap_or(f64::NAN)))
+    }
+
+    /// The names of the parameters.
+    #[getter]
+    fn names(&self) -> Vec<String> {
+        self.tracking.trackers().first().map_or_else(Vec::new, |tracker| tracker.names().to_vec())
+    }
+
+    /// The ways to forget.
+    #[getter]
+    fn policies(&self) -> Vec<String> {
+        self.tracking.trackers().iter().map(|tracker| tracker.plan().forgetting.to_string()).collect()
+    }
+
+    /// Structure and orders, such as ARX(2, 2, 1).
+    #[getter]
+    fn orders(&self) -> String {
+        self.tracking.trackers().first().map_or_else(String::new, |tracker| tracker.orders().to_string())
+    }
+
+    /// What is taken from each channel, the output last.
+    #[getter]
+    fn offsets(&self) -> Vec<f64> {
+        self.tracking.trackers().first().map_or_else(Vec::new, |tracker| all(tracker.offsets()))
+    }
+
+    /// The typical magnitudes of the channels, the output last; none while they are not known.
+    #[getter]
+    fn scales(&self) -> Option<Vec<f64>> {
+        self.tracking.trackers().first().and_then(|tracker| tracker.scales().map(all))
+    }
+
+    #[getter]
+    fn inputs(&self) -> Vec<String> {
+        self.tracking.inputs().to_vec()
+    }
+
+    #[getter]
+    fn output(&self) -> String {
+        self.tracking.output().to_owned()
+    }
+
+    #[getter]
+    fn horizon(&self) -> Option<usize> {
+        self.tracking.horizon()
+    }
+
+    /// Whether changes are watched for.
+    #[getter]
+    fn watched(&self) -> bool {
+        self.tracking.trackers().iter().any(|tracker| tracker.detector().is_some())
+    }
+
+    #[getter]
+    fn rows(&self) -> u64 {
+        self.tracking.summary().rows
+    }
+
+    /// What the times are called, the first one as it was written, and the latest one.
+    #[getter]
+    fn clock(&self) -> (Option<String>, Option<String>, Option<f64>) {
+        let owned = |text: Option<&str>| text.map(str::to_owned);
+        (owned(self.tracking.clock()), owned(self.tracking.start()), self.tracking.last_time())
+    }
+}
+
+fn two_dimensions(py: Python<'_>, rows: Vec<Vec<f64>>) -> PyResult<Bound<'_, PyArray2<f64>>> {
+    PyArray2::from_vec2(py, &rows).map_err(|error| PyValueError::new_err(error.to_string()))
+}
+
+/// One number for each channel, the output last.
+fn all(channels: &PerChannel) -> Vec<f64> {
+    channels.inputs.iter().copied().chain([channels.output]).collect()
+}
+
+/// Why a run ended before its last row.
+enum Stop {
+    /// The program refused a row.
+    Refused(Failure),
+    /// A handler of a signal raised this.
+    Interrupted(PyErr),
+}
+
+impl From<Failure> for Stop {
+    fn from(failure: Failure) -> Self {
+        Stop::Refused(failure)
+    }
+}
+
+impl From<PyErr> for Stop {
+    fn from(raised: PyErr) -> Self {
+        Stop::Interrupted(raised)
+    }
+}

@@ -31,6 +31,9 @@ pub(crate) struct Tracker {
     tracking: Tracking,
 }
 
+/// Times, what they are called, and the first one as it was written where they are dates.
+type Clock<'py> = (Bound<'py, PyAny>, String, Option<String>);
+
 /// Arrays of a run: (rows, trackers), those of parameters with one more axis.
 const COLUMNS: [&str; 8] =
     ["predicted", "errors", "variances", "nis", "excitation", "forecasts", "parameters", "standard_errors"];
@@ -66,16 +69,14 @@ impl Tracker {
         self.tracking.state().map_err(|failure| error::program(py, &failure))
     }
 
-    /// Takes rows: inputs, outputs, their times if they have some, what these are called and the first one as it is written, and
-    /// the rows before which an unknown number is missing.
-    #[pyo3(signature = (inputs, outputs, seconds, clock, gaps, stop_on_alarm))]
+    /// Takes rows: inputs, outputs, their clock if they have one, and the rows before which an unknown number is missing.
+    #[pyo3(signature = (inputs, outputs, clock, gaps, stop_on_alarm))]
     fn run<'py>(
         &mut self,
         py: Python<'py>,
         inputs: &Bound<'py, PyAny>,
         outputs: &Bound<'py, PyAny>,
-        seconds: Option<&Bound<'py, PyAny>>,
-        clock: (String, Option<String>),
+        clock: Option<Clock<'py>>,
         gaps: Vec<usize>,
         stop_on_alarm: bool,
     ) -> PyResult<Bound<'py, PyDict>> {
@@ -85,7 +86,10 @@ impl Tracker {
         let outputs = outputs.as_slice()?;
         let inputs = if k == 0 { None } else { Some(matrix("u", inputs, [Some(rows), Some(k)])?) };
         let inputs = inputs.as_ref().map_or(Ok(&[][..]), |inputs| inputs.as_slice())?;
-        let seconds = seconds.map(|seconds| vector("time", seconds, Some(rows))).transpose()?;
+        let (seconds, name, start) = match clock {
+            Some((seconds, name, start)) => (Some(vector("time", &seconds, Some(rows))?), name, start),
+            None => (None, String::new(), None),
+        };
         let seconds = seconds.as_ref().map(|seconds| seconds.as_slice()).transpose()?;
         let mut values = room(&[rows, k + 1])?;
         for (at, &output) in outputs.iter().enumerate() {
@@ -154,8 +158,7 @@ impl Tracker {
                         alarms.push(Alarm::of(given, index, policies.get(row.index).cloned().flatten()));
                     }
                 };
-                let clock = (clock.0.as_str(), clock.1);
-                self.tracking.rows(Some(clock), next, &mut seen, stop_on_alarm)
+                self.tracking.rows(Some((&name, start)), next, &mut seen, stop_on_alarm)
             })
         })?;
         taken.map_err(|stop: Stop| match stop {

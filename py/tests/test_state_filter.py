@@ -167,6 +167,20 @@ def test_observers(folder: Path, words: list[str], options: dict[str, Any]) -> N
         th.StateFilter(th.StateModel.from_toml(TWO), "luenberger", **options).run(frame, smooth=True)
 
 
+def test_a_model_in_equations_with_unknown_parameters(folder: Path) -> None:
+    data = Path(__file__).parents[2] / "tests" / "data"
+    if not data.exists():
+        pytest.skip("the models of the repository are not here")
+    model, log = data / "mass_spring_damper.toml", data / "mass_spring_damper.csv"
+    expected, document = lines(folder, str(model), str(log), "--rows=1..300")
+    filter = th.StateFilter(th.StateModel.read(model))
+    trajectory = filter.run(pd.read_csv(log)[:300])
+    same(trajectory.to_pandas(), expected)
+    assert filter.to_json() == document and filter.estimator == "ekf" and trajectory.parameters.shape[1] == len(filter.unknown) > 0
+    again = pickle.loads(pickle.dumps(filter))
+    assert again.to_json() == document
+
+
 def test_matrices_are_the_model_that_the_text_is(folder: Path) -> None:
     frame = two_channels()
     model = th.StateModel(

@@ -199,8 +199,7 @@ class Tracker:
         self,
         inputs: ArrayLike,
         outputs: ArrayLike,
-        seconds: ArrayLike | None,
-        clock: tuple[str, str | None],
+        clock: tuple[ArrayLike, str, str | None] | None,
         gaps: Sequence[int],
         stop_on_alarm: bool,
     ) -> dict[str, Any]: ...

@@ -486,8 +486,8 @@ class Tracker:
                 seconds = seconds + _apart(start, rows.start)
             if last is not None and not seconds[0] > last:
                 raise ValueError(f"time: the first row is {last - seconds[0]:g} s before the latest one that was taken; give later rows")
-        clock = ("" if seconds is None else rows.name or "time", rows.start)
-        return self._tracker.run(rows.inputs, rows.outputs, seconds, clock, list(rows.borders), stop_on_alarm)
+        clock = None if seconds is None else (seconds, rows.name or "time", rows.start)
+        return self._tracker.run(rows.inputs, rows.outputs, clock, list(rows.borders), stop_on_alarm)
 
     def gap(self) -> None:
         """Tell that an unknown number of rows is missing here. Where rows have times, these tell it.

@@ -233,6 +233,11 @@ impl Tracking {
         self.state.summary()
     }
 
+    /// How many rows were taken.
+    pub fn count(&self) -> u64 {
+        self.state.rows
+    }
+
     /// The trackers, one for each way to forget.
     pub fn trackers(&self) -> &[Tracker] {
         &self.state.trackers

@@ -1,6 +1,6 @@
 //! The compiled module `thetahat._thetahat`: the engine behind the Python package `thetahat`.
 //!
-//! `log`, `model` and `judgement` are the batch half, `online` the steppers, `filter` and `track` the steppers behind logs. `array` reads and makes NumPy arrays, `error` is
+//! `log`, `model` and `judgement` are the batch half, `online` the steppers, `filter` and `track` the steppers that follow logs. `array` reads and makes NumPy arrays, `error` is
 //! the one map of errors, `work` runs what takes long.
 
 mod array;

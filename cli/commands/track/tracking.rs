@@ -159,7 +159,7 @@ impl Tracking {
         done
     }
 
-    /// The columns of the lines, which depend on whether there is a clock, behind what was written.
+    /// The columns of the lines, which depend on whether there is a clock; they go on after what was written.
     fn set_columns(&mut self, written: Option<Written>) {
         self.columns = Columns::new(self.clock().is_some(), self.horizon, &self.state.trackers);
         self.lines = LineWriter::counting(self.lines.format(), self.columns.names(), written);

@@ -92,14 +92,14 @@ pub(crate) struct StateFilter {
     filter: thetahat::StateFilter,
 }
 
-/// The numbers of a row, behind those of the rows before it.
+/// The numbers of the rows so far.
 struct Record<'a> {
     columns: [Column<'a>; 12],
     codes: Vec<u8>,
     held: Vec<bool>,
 }
 
-/// Arrays of a run with a row for each row: what [`Record`] writes.
+/// Arrays of a run with one row for each row of the log: what [`Record`] writes.
 const COLUMNS: [&str; 12] = [
     "predicted",
     "predicted_deviations",

@@ -274,7 +274,7 @@ impl Tracker {
 
     #[getter]
     fn rows(&self) -> u64 {
-        self.tracking.summary().rows
+        self.tracking.count()
     }
 
     /// What the times are called, the first one as it was written, and the latest one.

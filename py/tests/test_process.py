@@ -127,8 +127,28 @@ LINEAR = (
             "th._thetahat.inspect",
             "log._log,",
         ),
+        (
+            "tracker = th.Tracker(100, 0, forgetting=None)",
+            "tracker.run",
+            "np.random.default_rng(1).standard_normal(200_000),",
+        ),
+        (
+            "one = np.eye(60); filter = th.StateFilter(th.StateModel(one, one[:1], one, [[1.0]], one, sample_time=1))",
+            "filter.run",
+            "np.ones(100_000),",
+        ),
     ],
-    ids=["RecursiveLeastSquares", "KalmanFilter", "observer", "smooth", "steady_state", "step_response", "inspect"],
+    ids=[
+        "RecursiveLeastSquares",
+        "KalmanFilter",
+        "observer",
+        "smooth",
+        "steady_state",
+        "step_response",
+        "inspect",
+        "Tracker",
+        "StateFilter",
+    ],
 )
 def test_ctrl_c_ends_what_takes_long(before: str, function: str, arguments: str) -> None:
     done = python(INTERRUPTED.format(before=before, function=function, arguments=arguments))

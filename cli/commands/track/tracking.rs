@@ -159,7 +159,7 @@ impl Tracking {
         done
     }
 
-    /// The columns of the lines, which depend on whether there is a clock, behind what was written.
+    /// The columns of the lines, which depend on whether there is a clock; they go on after what was written.
     fn set_columns(&mut self, written: Option<Written>) {
         self.columns = Columns::new(self.clock().is_some(), self.horizon, &self.state.trackers);
         self.lines = LineWriter::counting(self.lines.format(), self.columns.names(), written);
@@ -231,6 +231,11 @@ impl Tracking {
     /// The document that `thetahat track --summary` writes.
     pub fn summary(&self) -> TrackSummary {
         self.state.summary()
+    }
+
+    /// How many rows were taken.
+    pub fn count(&self) -> u64 {
+        self.state.rows
     }
 
     /// The trackers, one for each way to forget.

@@ -46,7 +46,7 @@ class Tracked(NamedTuple):
     forecast: float | Array
     """The output ``horizon`` rows later; NaN if there is none, or none was asked for."""
     alarms: list[Alarm]
-    """The changes that were noticed."""
+    """The changes that were noticed; this row is their row 0."""
 
 
 class TrackTrajectory:
@@ -416,20 +416,16 @@ class Tracker:
         seconds = None if time is None else np.array([float(_options.number("time", time))])
         rows = _rows.Rows(driving, measured.reshape(1, 1), seconds, None, _clock.Clock(), name=None if time is None else "time")
         found = self._run(rows, stop_on_alarm=False)
-        one = TrackTrajectory(self, rows, found)
-
-        def last(values: npt.NDArray[Any]) -> Any:
-            return values[0] if values.ndim > 1 else values[0].item()
-
+        actions = np.where(found["too_large"], "too large", found["actions"])
         return Tracked(
-            predicted=last(one.predicted),
-            error=last(one.errors),
-            variance=last(one.variances),
-            nis=last(one.nis),
-            action=last(one.actions),
-            excitation=last(one.excitation),
-            forecast=last(one.forecasts),
-            alarms=one.alarms,
+            predicted=self._one(found["predicted"][0]),
+            error=self._one(found["errors"][0]),
+            variance=self._one(found["variances"][0]),
+            nis=self._one(found["nis"][0]),
+            action=self._one(actions),
+            excitation=self._one(found["excitation"][0]),
+            forecast=self._one(found["forecasts"][0]),
+            alarms=found["alarms"],
         )
 
     def run(

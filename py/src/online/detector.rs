@@ -31,7 +31,7 @@ const MOST_OUTPUTS: usize = 1000;
 ///     Since how many samples it had been above 0, this one included: the maximum likelihood estimate of how long ago
 ///     the change was. Only samples with an innovation of known variance are counted.
 /// row : int or None
-///     The row of a run that gave it, counted from 0; None of a single sample.
+///     The row of a run that gave it, counted from 0; None of `ChangeDetector.update`.
 /// forgetting : str or None
 ///     The way to forget of the tracker that gave it, where a `Tracker` has several.
 #[pyclass(module = "thetahat", frozen, eq)]

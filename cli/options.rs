@@ -3,7 +3,7 @@
 //! The library names them between backticks, as `detrend`, wherever one is advised; here they are options.
 
 /// The arguments of the library that are options, by the name that both have.
-pub(crate) const OPTIONS: [&str; 40] = [
+pub(crate) const OPTIONS: [&str; 41] = [
     "alarm",
     "alpha",
     "alphas",
@@ -12,6 +12,7 @@ pub(crate) const OPTIONS: [&str; 40] = [
     "dead-zone",
     "detrend",
     "draws",
+    "estimate",
     "estimator",
     "focus",
     "forgetting",

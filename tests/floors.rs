@@ -335,7 +335,6 @@ fn libraries_name_no_options() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     for library in ["crates/thetahat-core/src", "crates/thetahat/src"] {
         for (module, named) in modules(&root.join(library)) {
-            // What inspect suggests is a command line of the program, and so is what a page says of how it was made.
             let found: Vec<&str> = named.texts.iter().flat_map(|text| options(text)).collect();
             assert!(found.is_empty(), "{library}, {}: {found:?}", module.join("::"));
         }

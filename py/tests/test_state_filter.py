@@ -363,7 +363,7 @@ def test_bad_logs() -> None:
 def test_bad_filters() -> None:
     nile, model = th.StateModel.from_toml(NILE), th.arx(th.dc_motor(), 2, 2)
     cases: list[tuple[Any, dict[str, Any], type[Exception], str]] = [
-        ("model.toml", {}, TypeError, "model: expected a Model or a StateModel, found str"),
+        ("model.toml", {}, TypeError, "model: expected a Model, a StateModel or a GreyBox, found str"),
         (nile, {"initial": "zero"}, ValueError, "initial: a StateModel says itself"),
         (model, {"initial": "drop"}, ValueError, "initial: 'drop' is neither 'zero' nor 'unknown'"),
         (nile, {"estimator": "wiener"}, ValueError, "estimator: 'wiener' is none of"),

@@ -132,7 +132,7 @@ impl fmt::Display for Padding {
         write!(
             f,
             "from row {first} to the end ({} rows) no channel changes, as in a log that was padded: leave these rows out \
-             (--estimate 1..{}) unless the plant rested",
+             (`estimate` 1..{}) unless the plant rested",
             self.rows.len(),
             first - 1
         )

@@ -44,7 +44,7 @@ impl fmt::Display for Regular {
         write!(
             f,
             "resampled every {step} s it would have {} rows, of which {recorded} were recorded; cut it at its pauses into several \
-             logs, or resample it more slowly (--resample)",
+             logs, or resample it more slowly (`resample`)",
             if *rows < 1e9 { format!("{rows}") } else { short(*rows) }
         )
     }

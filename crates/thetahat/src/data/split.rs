@@ -176,7 +176,7 @@ pub(crate) fn checked(argument: &str, ranges: &[Rows], rows: usize) -> Result<Ve
     for range in &sorted {
         if range.last > rows {
             return Err(Error::data(format!(
-                "{argument} {range}: the log has {rows} rows; name rows up to that"
+                "`{argument}` {range}: the log has {rows} rows; name rows up to that"
             )));
         }
     }

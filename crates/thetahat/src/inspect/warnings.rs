@@ -94,7 +94,7 @@ fn of_channel(channel: &ChannelQuality, rows: usize) -> Vec<String> {
         };
         say(format!(
             "has values far from their neighbours at row{} {}{more}: where they are wrong, empty their fields, or fit with \
-             --norm 1",
+             `norm` 1",
             plural(channel.outlier_count),
             listed.join(", ")
         ));
@@ -164,7 +164,7 @@ pub(super) fn of_the_dynamics(inspection: &Inspection, plan: &InspectionPlan) ->
         if share >= TREND && inspection.rest.is_none() {
             words.push(format!(
                 "channel '{}' has a trend that explains {} % of it: if that is drift and no answer to an input, fit with \
-                 --detrend linear",
+                 `detrend` linear",
                 channel.name,
                 fixed(100.0 * share, 0)
             ));
@@ -173,7 +173,7 @@ pub(super) fn of_the_dynamics(inspection: &Inspection, plan: &InspectionPlan) ->
     if let Some(rest) = inspection.rest {
         words.push(format!(
             "the log is a step test that begins at rest for {rest} rows: its means are no level of the plant; take the offsets \
-             from there (--detrend start:{rest}), and estimate the output's slope with the parameters if it drifts (--trend)"
+             from there (`detrend` start:{rest}), and estimate the output's slope with the parameters if it drifts (`trend`)"
         ));
     }
     if plan.output.is_none() && !plan.inputs.is_empty() {
@@ -195,7 +195,7 @@ pub(super) fn of_the_dynamics(inspection: &Inspection, plan: &InspectionPlan) ->
     for feedback in inspection.feedback.iter().filter(|feedback| feedback.found) {
         words.push(format!(
             "input '{}' follows past errors of the output: feedback is suspected; fit a model with noise (arx, armax, bj), \
-             as oe and --method iv or sriv are biased in a closed loop",
+             as oe and `method` iv or sriv are biased in a closed loop",
             feedback.input
         ));
     }

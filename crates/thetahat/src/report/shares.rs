@@ -21,8 +21,8 @@ impl Shares {
         rows: usize,
     ) -> Result<Self, Error> {
         let all = [Rows::new(1, rows)?];
-        let estimation = checked("estimation rows", if estimate.is_empty() { &all } else { estimate }, rows)?;
-        let validation = checked("validation rows", validate, rows)?;
+        let estimation = checked("estimate", if estimate.is_empty() { &all } else { estimate }, rows)?;
+        let validation = checked("validate", validate, rows)?;
         let Some(split) = split else { return Ok(Self { estimation, validation, parts: None }) };
         if !validation.is_empty() {
             return Err(Error::argument(

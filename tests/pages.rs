@@ -266,7 +266,14 @@ fn every_snippet_is_tested() {
 #[test]
 fn links_lead_to_files_and_headings() {
     let mut count = 0;
-    for page in pages().into_iter().chain([page("CONTRIBUTING.md")]) {
+    let others = [
+        "CONTRIBUTING.md",
+        "CHANGELOG.md",
+        "py/README.md",
+        "benches/peers/README.md",
+        "tests/data/public/README.md",
+    ];
+    for page in pages().into_iter().chain(others.map(page)) {
         for link in page.links() {
             let (file, heading) =
                 link.split_once('#').map_or((&link[..], None), |(file, at)| (file, Some(at)));
@@ -295,8 +302,10 @@ fn what_is_wrong_with_a_link_is_seen() {
 #[test]
 fn options_that_pages_name_exist() {
     let folder = Folder::new();
-    let verbs =
-        ["fit", "inspect", "predict", "simulate", "validate", "compare", "track", "filter", "bode", "step"];
+    let verbs = [
+        "fit", "inspect", "predict", "simulate", "validate", "compare", "track", "filter", "bode", "step",
+        "impulse",
+    ];
     let help: String = verbs.iter().map(|verb| folder.done(&format!("{verb} --help")).stdout).collect();
     let known: Vec<&str> = help.split(|c: char| !c.is_ascii_lowercase() && c != '-').collect();
     for page in pages() {

@@ -34,7 +34,7 @@ impl Recording {
     /// let log = Recording { channels: vec![y], times: Times::Measured(vec![0.0, 0.5, 2.0]) };
     /// let part = log.part("2..3".parse()?)?;
     /// assert_eq!((&part.channels[0].values[..], part.times), (&[2.0, 3.0][..], Times::Measured(vec![0.5, 2.0])));
-    /// assert_eq!(log.part("2..4".parse()?).unwrap_err().to_string(), "rows 2..4: the log has 3 rows; name rows up to that");
+    /// assert_eq!(log.part("2..4".parse()?).unwrap_err().to_string(), "`rows` 2..4: the log has 3 rows; name rows up to that");
     /// # Ok::<(), thetahat::Error>(())
     /// ```
     pub fn part(&self, rows: Rows) -> Result<Self, Error> {

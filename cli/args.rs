@@ -16,8 +16,9 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 pub(crate) use filter::{EstimatorArgument, FilterArguments, FilterStartArgument};
 pub(crate) use fit::{
-    ConstantArgument, CriterionArguments, FitArguments, InitialArgument, LikelihoodArgument, MethodArgument,
-    ModelArgument, ModelArguments, PathArgument, SearchArgument, SearchArguments,
+    ConstantArgument, CriterionArguments, FitArguments, InitialArgument, LikelihoodArgument, MapArgument,
+    MethodArgument, ModelArgument, ModelArguments, NarxArguments, PathArgument, SearchArgument,
+    SearchArguments,
 };
 pub(crate) use inspect::InspectArguments;
 pub(crate) use lines::{LineArguments, LineFormatArgument};

@@ -8,6 +8,7 @@ mod fit;
 mod grey;
 mod help;
 mod inspect;
+mod narx;
 mod respond;
 mod search;
 mod stored;

@@ -5,6 +5,7 @@ mod fit;
 mod grey;
 mod inspect;
 mod method;
+mod narx;
 mod orders;
 mod search;
 mod track;
@@ -27,6 +28,7 @@ pub(crate) use filter::FilterJob;
 pub(crate) use fit::FitJob;
 pub(crate) use grey::GreyJob;
 pub(crate) use inspect::InspectJob;
+pub(crate) use narx::NarxJob;
 pub(crate) use track::TrackJob;
 pub(crate) use validate::LookJob;
 

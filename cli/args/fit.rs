@@ -46,12 +46,14 @@ pub(crate) struct FitArguments {
         help_heading = "Model",
         conflicts_with_all = [
             "ModelArguments", "path", "select", "search", "step", "CriterionArguments", "input", "output", "detrend", "offset",
-            "prefilter",
+            "prefilter", "NarxArguments",
         ]
     )]
     pub(crate) grey: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) model: ModelArguments,
+    #[command(flatten)]
+    pub(crate) narx: NarxArguments,
     #[command(flatten)]
     pub(crate) choice: ChoiceArguments,
     #[command(flatten)]
@@ -123,6 +125,60 @@ pub(crate) struct ModelArguments {
     pub(crate) trend: bool,
 }
 
+/// A nonlinear ARX model.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Nonlinear ARX")]
+pub(crate) struct NarxArguments {
+    /// Fit y(k) = g(past outputs and inputs) + e(k), with a g that is linear in its parameters; its functions are chosen one by one,
+    /// that which explains most of what is left comes next
+    #[arg(
+        long,
+        value_enum,
+        value_name = "MAP",
+        conflicts_with_all = [
+            "model", "na", "nb", "nc", "nd", "nf", "method", "likelihood", "initial", "focus", "constant", "trend", "path", "search",
+            "max_iterations", "tolerance", "step", "starts", "norm", "bound", "dc_gain", "noise_bound", "prefilter", "time_limit",
+        ]
+    )]
+    pub(crate) narx: Option<MapArgument>,
+    /// Past outputs that g reads: y(k-1), …, y(k-N) [default: 2]
+    #[arg(long, value_name = "N", requires = "narx")]
+    pub(crate) ny: Option<usize>,
+    /// Values of each input that g reads, from --nk on: u(k-nk), …; one number for each input or one for all [default: 2]
+    #[arg(long, value_name = "N[,…]", value_delimiter = ',', requires = "narx")]
+    pub(crate) nu: Vec<usize>,
+    /// Factors of a product at most (poly) [default: 2]
+    #[arg(long, value_name = "D", requires = "narx")]
+    pub(crate) degree: Option<usize>,
+    /// How many functions to take [default: --select says it, by the free run on validation rows, or on blocks of the estimation rows]
+    #[arg(long, value_name = "N", requires = "narx", conflicts_with = "select")]
+    pub(crate) terms: Option<usize>,
+    /// How many functions to look at [default: 40]
+    #[arg(long, value_name = "N", requires = "narx", conflicts_with = "terms")]
+    pub(crate) most_terms: Option<usize>,
+    /// Where radial basis functions stand (rbf): chosen among the samples, at the means of N clusters, at a grid of N in each direction,
+    /// or at N pseudo-random points [default: chosen]
+    #[arg(long, value_name = "chosen|kmeans:N|grid:N|random:N", requires = "narx", group = "random")]
+    pub(crate) centres: Option<String>,
+    /// sigma of radial basis functions exp(-|z - centre|^2/sigma^2), z in standard deviations [default: so that neighbours overlap]
+    #[arg(long, value_name = "SIGMA", requires = "narx", allow_hyphen_values = true)]
+    pub(crate) width: Option<f64>,
+    /// Leave out the constant and the regressors themselves beside radial basis functions
+    #[arg(long, requires = "narx")]
+    pub(crate) no_linear: bool,
+    /// Leave signals in their own units: else each is divided by its standard deviation
+    #[arg(long, requires = "narx")]
+    pub(crate) raw_terms: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum MapArgument {
+    /// Products of regressors up to a degree
+    Poly,
+    /// Radial basis functions
+    Rbf,
+}
+
 /// How to choose, where orders are ranges or are not given.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Choice (orders that are ranges, or not given)")]
@@ -156,10 +212,10 @@ pub(crate) struct SearchArguments {
     #[arg(long, value_name = "C1[,C2]", allow_hyphen_values = true)]
     pub(crate) step: Option<String>,
     /// Search from so many further starts [default: 0]
-    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(..=10_000))]
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(..=10_000), group = "random")]
     pub(crate) starts: Option<u32>,
-    /// Which random starts [default: 0]
-    #[arg(long, value_name = "S", requires = "starts")]
+    /// Which random starts, or which random centres [default: 0]
+    #[arg(long, value_name = "S", requires = "random")]
     pub(crate) seed: Option<u64>,
     /// After so long begin no iteration, and look for no further start
     #[arg(long, value_name = "SECONDS", allow_hyphen_values = true)]

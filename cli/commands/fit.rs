@@ -1,6 +1,6 @@
 //! `thetahat fit`: from logs to a model and its report.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use thetahat::{
     Document, Log, Report, Rows, Source, Validated, ValidationPlan, fit_page, held_out_runs,
@@ -8,10 +8,10 @@ use thetahat::{
 };
 
 use super::search::{Found, watched};
-use super::{grey, summary};
+use super::{grey, narx, summary};
 use crate::args::{FitArguments, FormatArgument};
 use crate::failure::Failure;
-use crate::job::{FitJob, GreyJob};
+use crate::job::{FitJob, GreyJob, LogJob, NarxJob};
 use crate::log::{self, Clocks, Joined};
 use crate::messages::warn;
 use crate::output;
@@ -21,7 +21,10 @@ pub(crate) fn fit(arguments: &FitArguments, line: &str) -> Result<(), Failure> {
     let outputs = [&arguments.report, &arguments.html];
     let Found { report, log, sources } = match &arguments.grey {
         Some(model) => grey::found(&GreyJob::resolve(arguments, model)?)?,
-        None => found(&FitJob::resolve(arguments)?, arguments.html.is_some())?,
+        None => match arguments.narx.narx {
+            Some(map) => narx::found(&NarxJob::resolve(arguments, map)?)?,
+            None => found(&FitJob::resolve(arguments)?, arguments.html.is_some())?,
+        },
     };
     let json = report.to_json().map_err(|error| Failure::data(error.to_string()))?;
     let page =
@@ -88,13 +91,43 @@ pub(crate) struct Channels {
     pub(crate) output: String,
 }
 
-/// Reads all logs, one behind the other, with any clock or with an even one.
+/// Which columns are wanted.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Wanted<'a> {
+    /// Named inputs; none: those called u, u1, u2, …
+    pub(crate) inputs: Option<&'a [String]>,
+    /// The named output; none: y.
+    pub(crate) output: Option<&'a str>,
+    /// Whether the model has inputs.
+    pub(crate) driven: bool,
+    /// What asks for a model without inputs.
+    pub(crate) none: &'a str,
+}
+
+/// Reads all logs, one after the other, with any clock or with an even one.
 pub(crate) fn experiments(job: &FitJob, any_clock: bool) -> Result<Experiments, Failure> {
+    let wanted = Wanted {
+        inputs: job.inputs.as_deref(),
+        output: job.output.as_deref(),
+        driven: job.orders.has_inputs(),
+        none: "--nb 0",
+    };
+    read(&job.paths, &job.log, &wanted, any_clock, |inputs| job.orders.of(inputs).map(|_| ()))
+}
+
+/// The same; `check` says whether so many inputs go with the rest.
+pub(super) fn read(
+    paths: &[PathBuf],
+    log: &LogJob,
+    wanted: &Wanted<'_>,
+    any_clock: bool,
+    check: impl Fn(usize) -> Result<(), Failure>,
+) -> Result<Experiments, Failure> {
     let mut channels: Option<Channels> = None;
     let Joined { log, sources, words } =
-        log::joined(&job.paths, &job.log, Clocks { any: any_clock, sample_time: None }, |path, header| {
+        log::joined(paths, log, Clocks { any: any_clock, sample_time: None }, |path, header| {
             let bad = |message: String| Failure::data(format!("{}: {message}", path.display()));
-            let own = Channels::choose(job, header).map_err(bad)?;
+            let own = Channels::choose(wanted, header).map_err(bad)?;
             let first = channels.get_or_insert_with(|| own.clone());
             if own != *first {
                 return Err(bad(format!(
@@ -103,7 +136,7 @@ pub(crate) fn experiments(job: &FitJob, any_clock: bool) -> Result<Experiments, 
                     log::listed(&first.inputs)
                 )));
             }
-            job.orders.of(own.inputs.len())?;
+            check(own.inputs.len())?;
             Ok(own.inputs.into_iter().chain([own.output]).collect())
         })?;
     Ok(Experiments { log, sources, channels: channels.unwrap_or_default(), words })
@@ -111,25 +144,26 @@ pub(crate) fn experiments(job: &FitJob, any_clock: bool) -> Result<Experiments, 
 
 impl Channels {
     /// The named ones, or those called u, u1, u2, … and y.
-    fn choose(job: &FitJob, header: &[String]) -> Result<Self, String> {
+    fn choose(wanted: &Wanted<'_>, header: &[String]) -> Result<Self, String> {
         let there_are = || format!("there are: {}", log::listed(header));
-        let output = match &job.output {
-            Some(name) => name.clone(),
+        let output = match wanted.output {
+            Some(name) => name.to_owned(),
             None if header.iter().any(|name| name == "y") => "y".to_owned(),
             None => {
                 return Err(format!("no column is called y; name the output with --output; {}", there_are()));
             }
         };
-        if !job.orders.has_inputs() {
+        if !wanted.driven {
             return Ok(Self { inputs: Vec::new(), output });
         }
-        if let Some(inputs) = &job.inputs {
-            return Ok(Self { inputs: inputs.clone(), output });
+        if let Some(inputs) = wanted.inputs {
+            return Ok(Self { inputs: inputs.to_vec(), output });
         }
         let inputs = usual_inputs(header);
         if inputs.is_empty() {
             return Err(format!(
-                "no column is called u, u1, u2, …; name the inputs with --input, or give --nb 0 for a model without; {}",
+                "no column is called u, u1, u2, …; name the inputs with --input, or give {} for a model without; {}",
+                wanted.none,
                 there_are()
             ));
         }

@@ -3,6 +3,7 @@
 mod equations;
 mod filtered;
 mod inspection;
+mod nonlinear_arx;
 mod selection;
 mod text;
 mod tracking;
@@ -37,6 +38,7 @@ pub fn table(report: &Report, width: usize) -> String {
     let model = match &report.model {
         Model::Polynomial(model) => model,
         Model::Equations(model) => return equations::table(report, model, width),
+        Model::NonlinearArx(model) => return nonlinear_arx::table(report, model, width),
     };
     let mut text = Text::new(width);
     selection::selection(&mut text, report);
@@ -139,7 +141,7 @@ fn estimation(text: &mut Text, estimation: &Estimation, model: &PolynomialModel)
             ));
         }
         Procedure::Constrained(outcome) => criterion(text, outcome, model, start),
-        Procedure::InnovationsLikelihood(_) => {}
+        Procedure::InnovationsLikelihood(_) | Procedure::ForwardRegression(_) => {}
         Procedure::PredictionError(search) => {
             text.line(&format!(
                 "prediction error, {}, {}",

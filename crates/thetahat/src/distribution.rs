@@ -28,6 +28,15 @@ pub(crate) fn student_two_sided(alpha: f64, degrees: Option<usize>) -> f64 {
         .map_or_else(|| two_sided(alpha), |student| student.inverse_cdf(1.0 - (alpha / 2.0).clamp(0.0, 0.5)))
 }
 
+/// sqrt(nu/(nu - 2)), the standard deviation of Student's distribution with so many degrees of freedom; 1 where they are not
+/// known. With fewer than three it has none, and that of three serves.
+pub(crate) fn student_factor(degrees: Option<usize>) -> f64 {
+    degrees.map_or(1.0, |degrees| {
+        let degrees = degrees.max(3) as f64;
+        (degrees / (degrees - 2.0)).sqrt()
+    })
+}
+
 /// How often a standard normal number lies farther from zero than `distance`, and the first two even Hermite coefficients of
 /// that event, E (x^2 - 1) and E (x^4 - 6 x^2 + 3) over it.
 pub(crate) fn outside(distance: f64) -> (f64, [f64; 2]) {

@@ -8,6 +8,7 @@ mod criterion;
 pub(crate) mod equations;
 mod exact;
 mod instrumental;
+pub(crate) mod nonlinear_arx;
 mod normal;
 mod objective;
 mod offset;
@@ -39,6 +40,7 @@ pub use criteria::{Criteria, InformationCriterion};
 pub use criterion::{Bound, Criterion, CriterionOutcome, GainBound, Norm};
 pub use equations::{EquationsOutcome, LikelihoodSearch, UnknownParameter};
 pub use exact::LikelihoodOutcome;
+pub use nonlinear_arx::{RunFigures, TermStep, TermsOutcome};
 pub use offset::Constant;
 pub(crate) use offset::{Beside, Fitted, OutputOffset, Task, pays};
 pub(crate) use optimize::Deadline;
@@ -119,6 +121,8 @@ pub enum Procedure {
     ExactLikelihood(LikelihoodOutcome),
     /// The largest likelihood of the innovations of a model in equations.
     InnovationsLikelihood(EquationsOutcome),
+    /// In one step for functions of the regressors, which were chosen one after the other.
+    ForwardRegression(TermsOutcome),
 }
 
 /// How to estimate.
@@ -375,7 +379,8 @@ impl Estimate {
             Procedure::Constrained(_)
             | Procedure::Robust(_)
             | Procedure::ExactLikelihood(_)
-            | Procedure::InnovationsLikelihood(_) => None,
+            | Procedure::InnovationsLikelihood(_)
+            | Procedure::ForwardRegression(_) => None,
             Procedure::InstrumentalVariables { .. } | Procedure::RefinedInstrumentalVariables { .. } => {
                 self.covariance
             }

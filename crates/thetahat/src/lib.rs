@@ -59,8 +59,8 @@ pub use error::Error;
 pub use estimate::{
     Algorithm, Bound, Constant, Criteria, Criterion, CriterionOutcome, EquationsOutcome, Estimate, GainBound,
     InformationCriterion, Initial, LikelihoodOutcome, LikelihoodSearch, Loss, Method, Monitor, Norm,
-    Procedure, Progress, Robust, RobustOutcome, Search, SearchOutcome, Solver, StartOutcome, Step, Stopped,
-    UnknownParameter, arx, arx_factor, estimate, estimate_monitored,
+    Procedure, Progress, Robust, RobustOutcome, RunFigures, Search, SearchOutcome, Solver, StartOutcome,
+    Step, Stopped, TermStep, TermsOutcome, UnknownParameter, arx, arx_factor, estimate, estimate_monitored,
 };
 pub use filter::{
     EstimatedNumber, Estimator, FilterSnapshot, FilterSummary, InitialState, ObserverGain, SmoothedStates,
@@ -71,14 +71,14 @@ pub use inspect::{
     SpectrumPoint, inspect, inspect_log,
 };
 pub use model::{
-    EquationsModel, GreyBox, Interval, Model, OffsetCovariance, Orders, Parameter, PolynomialModel, Quantity,
-    Root, Signal, StateSpace, Structure,
+    EquationsModel, GreyBox, Interval, Map, Model, NonlinearArxModel, OffsetCovariance, Orders, Parameter,
+    PolynomialModel, Quantity, Regressor, Root, Signal, StateSpace, Structure,
 };
 pub use report::{
-    Applied, AppliedOutput, Comparison, Coverage, Data, EquationsPlan, Estimation, Missing, NoiseLevel,
-    OutputSignals, Parts, Plan, Report, Requirement, Seen, Signals, Unjudged, Validated, Validation,
-    ValidationPlan, apply, compare, fit_equations, held_out_runs, identify, identify_monitored, sample,
-    validate,
+    Applied, AppliedOutput, Centres, Comparison, Coverage, Data, EquationsPlan, Estimation, InputLags,
+    MapPlan, Missing, NoiseLevel, NonlinearArxPlan, OutputSignals, Parts, Plan, Report, Requirement, Seen,
+    Signals, Unjudged, Validated, Validation, ValidationPlan, apply, compare, fit_equations,
+    fit_nonlinear_arx, held_out_runs, identify, identify_monitored, sample, validate,
 };
 #[cfg(feature = "html")]
 pub use report::{comparison_page, fit_page, inspection_page, validation_page};

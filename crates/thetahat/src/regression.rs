@@ -4,9 +4,11 @@
 mod blocks;
 pub(crate) mod convex;
 mod filter;
+mod forward;
 mod gram;
 mod kernel;
 mod lagged;
+mod monomials;
 mod qr;
 mod solve;
 
@@ -16,9 +18,11 @@ pub(crate) mod noise;
 mod tests;
 
 pub(crate) use filter::{add_filtered, divide, divide_from, divide_together};
+pub(crate) use forward::{Path, forward};
 pub(crate) use gram::{Interior, Products};
 pub(crate) use kernel::{product, sum, sum_of_squares};
 pub(crate) use lagged::{Lagged, Presample, Taps};
+pub(crate) use monomials::{Moments, Monomials};
 pub(crate) use qr::factor_rows;
 pub use solve::Solver;
 pub(crate) use solve::{Regression, SAFE_NORMS, Unsolved, condition};

@@ -7,6 +7,7 @@ mod held_out_runs;
 mod html;
 mod identify;
 mod judge;
+mod nonlinear_arx;
 mod requirement;
 mod sample;
 mod schema;
@@ -24,6 +25,7 @@ pub use held_out_runs::held_out_runs;
 #[cfg(feature = "html")]
 pub use html::{comparison_page, fit_page, inspection_page, validation_page};
 pub use identify::{Plan, Unjudged, identify, identify_monitored};
+pub use nonlinear_arx::{Centres, InputLags, MapPlan, NonlinearArxPlan, fit_nonlinear_arx};
 pub use requirement::Requirement;
 pub use sample::sample;
 pub use schema::{Data, Estimation, Missing, Parts, Report};

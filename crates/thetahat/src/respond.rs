@@ -9,6 +9,7 @@ mod horizon;
 mod innovations;
 mod kinds;
 mod nis;
+pub(crate) mod nonlinear_arx;
 mod on_log;
 mod predict;
 mod sensitivities;

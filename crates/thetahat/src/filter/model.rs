@@ -78,6 +78,10 @@ impl StateModel {
                 "a model in equations says itself where its states start; leave it out, or change its text",
             )),
             Model::Equations(model) => Ok(model.with_values()?.into()),
+            Model::NonlinearArx(_) => Err(Error::argument(
+                "model",
+                "a nonlinear ARX model has no state to filter: it predicts, simulates, validates and compares",
+            )),
         }
     }
 

@@ -4,7 +4,7 @@ use thetahat_core::nalgebra::DMatrix;
 
 use super::quantity::{Quantity, Root};
 use crate::data::Offset;
-use crate::distribution::student_two_sided;
+use crate::distribution::{student_factor, student_two_sided};
 use crate::{Error, Orders, Structure};
 
 /// A channel as a model sees it: its name, and what its values are measured from.
@@ -114,14 +114,17 @@ pub struct PolynomialModel {
 }
 
 /// One thing as a list of one.
-mod only {
+pub(super) mod only {
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-    pub(super) fn serialize<T: Serialize, S: Serializer>(only: &T, serializer: S) -> Result<S::Ok, S::Error> {
+    pub(in crate::model) fn serialize<T: Serialize, S: Serializer>(
+        only: &T,
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
         [only].serialize(serializer)
     }
 
-    pub(super) fn deserialize<'de, T: Deserialize<'de>, D: Deserializer<'de>>(
+    pub(in crate::model) fn deserialize<'de, T: Deserialize<'de>, D: Deserializer<'de>>(
         deserializer: D,
     ) -> Result<T, D::Error> {
         let [only] = <[T; 1]>::deserialize(deserializer)?;
@@ -130,14 +133,17 @@ mod only {
 }
 
 /// A variance as a matrix of one row.
-mod only_variance {
+pub(super) mod only_variance {
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-    pub(super) fn serialize<S: Serializer>(variance: &f64, serializer: S) -> Result<S::Ok, S::Error> {
+    pub(in crate::model) fn serialize<S: Serializer>(
+        variance: &f64,
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
         [[variance]].serialize(serializer)
     }
 
-    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    pub(in crate::model) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
         let [[variance]] = <[[f64; 1]; 1]>::deserialize(deserializer)?;
         Ok(variance)
     }
@@ -168,13 +174,9 @@ impl PolynomialModel {
         Some((model, signals))
     }
 
-    /// sqrt(nu/(nu - 2)), the standard deviation of Student's distribution with the degrees of freedom of the noise variance;
-    /// 1 where they are not known. With fewer than three it has none, and that of three serves.
+    /// The standard deviation of Student's distribution with the degrees of freedom of the noise variance.
     pub(crate) fn student_factor(&self) -> f64 {
-        self.degrees_of_freedom.map_or(1.0, |degrees| {
-            let degrees = degrees.max(3) as f64;
-            (degrees / (degrees - 2.0)).sqrt()
-        })
+        student_factor(self.degrees_of_freedom)
     }
 
     /// How many standard errors from an estimate the end of an interval lies that holds its truth with probability `level`.

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::equations::EquationsModel;
 use super::fitted::{Parameter, PolynomialModel, Signal};
+use super::nonlinear_arx::NonlinearArxModel;
 use crate::Error;
 
 /// An estimated model of any kind.
@@ -20,6 +21,14 @@ pub enum Model {
     Polynomial(Box<PolynomialModel>),
     /// Equations of the states and the outputs, written by hand.
     Equations(EquationsModel),
+    /// y = g(past outputs and inputs) + e.
+    NonlinearArx(Box<NonlinearArxModel>),
+}
+
+impl From<NonlinearArxModel> for Model {
+    fn from(model: NonlinearArxModel) -> Self {
+        Self::NonlinearArx(Box::new(model))
+    }
 }
 
 impl From<PolynomialModel> for Model {
@@ -40,6 +49,7 @@ impl Model {
         match self {
             Self::Polynomial(model) => &model.inputs,
             Self::Equations(model) => &model.inputs,
+            Self::NonlinearArx(model) => &model.inputs,
         }
     }
 
@@ -48,6 +58,7 @@ impl Model {
         match self {
             Self::Polynomial(model) => std::slice::from_ref(&model.output),
             Self::Equations(model) => &model.outputs,
+            Self::NonlinearArx(model) => std::slice::from_ref(&model.output),
         }
     }
 
@@ -61,6 +72,7 @@ impl Model {
         match self {
             Self::Polynomial(model) => model.sample_time,
             Self::Equations(model) => model.sample_time,
+            Self::NonlinearArx(model) => model.sample_time,
         }
     }
 
@@ -69,6 +81,7 @@ impl Model {
         match self {
             Self::Polynomial(model) => &model.parameters,
             Self::Equations(model) => &model.parameters,
+            Self::NonlinearArx(model) => &model.parameters,
         }
     }
 
@@ -77,6 +90,7 @@ impl Model {
         match self {
             Self::Polynomial(model) => model.covariance.as_deref(),
             Self::Equations(model) => model.covariance.as_deref(),
+            Self::NonlinearArx(model) => model.covariance.as_deref(),
         }
     }
 
@@ -85,6 +99,7 @@ impl Model {
         match self {
             Self::Polynomial(model) => model.orders.nb.iter().any(|&nb| nb > 0),
             Self::Equations(model) => !model.inputs.is_empty(),
+            Self::NonlinearArx(model) => model.sources().iter().any(|source| *source > 0),
         }
     }
 
@@ -101,6 +116,7 @@ impl Model {
                 let count = model.states.len();
                 format!("equations, {count} state{}", if count == 1 { "" } else { "s" })
             }
+            Self::NonlinearArx(model) => model.name(),
         }
     }
 
@@ -118,6 +134,7 @@ impl Model {
                      filters"
                 ),
             )),
+            Self::NonlinearArx(model) => Err(model.is_not_linear(what)),
         }
     }
 
@@ -130,6 +147,7 @@ impl Model {
         match self {
             Self::Polynomial(model) => Ok(vec![Cow::Borrowed(&**model)]),
             Self::Equations(model) => Ok(model.linear(what)?.into_iter().map(Cow::Owned).collect()),
+            Self::NonlinearArx(model) => Err(model.is_not_linear(what)),
         }
     }
 
@@ -138,6 +156,7 @@ impl Model {
         match self {
             Self::Polynomial(model) => model.check(),
             Self::Equations(model) => model.check(),
+            Self::NonlinearArx(model) => model.check(),
         }
     }
 }

@@ -20,8 +20,8 @@ use page::{Block, Page, Section};
 use super::{Report, Validated, Validation};
 use crate::figures::{self, fixed};
 use crate::{
-    EquationsModel, Error, Fit, Inspection, Model, OutputSignals, Part, PolynomialModel, Residuals, Rows,
-    Source,
+    EquationsModel, Error, Fit, Inspection, Model, NonlinearArxModel, OutputSignals, Part, PolynomialModel,
+    Procedure, Residuals, Rows, Source,
 };
 
 /// The most points of a curve over time.
@@ -293,7 +293,7 @@ fn of(logs: &[Source]) -> String {
 fn headline(model: &Model) -> String {
     match model {
         Model::Polynomial(model) => format!("{}: {}", model.orders, model.orders.equation()),
-        Model::Equations(_) => model.name(),
+        Model::Equations(_) | Model::NonlinearArx(_) => model.name(),
     }
 }
 
@@ -556,6 +556,7 @@ fn of_model(report: &Report) -> Vec<Section> {
     let model = match &report.model {
         Model::Polynomial(model) => model,
         Model::Equations(model) => return of_equations(report, model),
+        Model::NonlinearArx(model) => return of_nonlinear_arx(report, model),
     };
     let inputs: Vec<&str> = model.inputs.iter().map(|input| input.name.as_str()).collect();
     let mut sections = responses(&[("estimate".to_owned(), model)], &inputs, true);
@@ -569,6 +570,20 @@ fn of_model(report: &Report) -> Vec<Section> {
     section.table(tables::estimation(&report.estimation, Some(model.noise_variance)));
     sections.push(section);
     sections
+}
+
+fn of_nonlinear_arx(report: &Report, model: &NonlinearArxModel) -> Vec<Section> {
+    let mut choice = Section::new("Choice of functions");
+    if let Procedure::ForwardRegression(outcome) = &report.estimation.procedure {
+        choice.chart(charts::complexity(outcome));
+        choice.table(tables::path(outcome, model.parameters.len()));
+    }
+    let mut section = Section::new("Model");
+    section.chart(charts::slices(model));
+    section.table(tables::functions(model));
+    section.table(tables::regressors(model));
+    section.table(tables::estimation(&report.estimation, Some(model.noise_variance)));
+    vec![choice, section]
 }
 
 fn of_equations(report: &Report, model: &EquationsModel) -> Vec<Section> {

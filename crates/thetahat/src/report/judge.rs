@@ -31,7 +31,8 @@ pub(super) fn judge(report: &mut Report, on_log: &dyn OnLog, part: Part, focus: 
         };
         for (index, (response, output)) in responses.iter().zip(on_log.outputs()).enumerate() {
             let measured = on_log.measured(index);
-            let fit = Fit::new(&output.name, measured, response, &rows, Some(part), (horizon, start));
+            let mut fit = Fit::new(&output.name, measured, response, &rows, Some(part), (horizon, start));
+            fit.outside = on_log.outside(index, response, horizon);
             if fit.percent.is_none() {
                 let why = if fit.samples == 0 {
                     "its stretches without a gap are too short"

@@ -402,7 +402,8 @@ fn looks(on_log: &dyn OnLog, plan: &ValidationPlan, validation: &mut Validation)
         };
         for (index, (response, output)) in responses.iter().zip(on_log.outputs()).enumerate() {
             let (name, measured) = (&output.name, on_log.measured(index));
-            let fit = Fit::new(name, measured, response, &validation.rows, None, (horizon, start));
+            let mut fit = Fit::new(name, measured, response, &validation.rows, None, (horizon, start));
+            fit.outside = on_log.outside(index, response, horizon);
             if fit.percent.is_none() {
                 let why = if fit.samples == 0 {
                     "the stretches without a gap are too short"
@@ -474,8 +475,10 @@ fn test_residuals(report: &Report, on_log: &dyn OnLog, plan: &ValidationPlan, va
     // Where that fails, the fit figure has said why.
     let Ok(each) = on_log.tested() else { return };
     let relation = match (validation.seen, &report.estimation.procedure) {
-        // The parameters of equations are none of the noise.
-        (Seen::No, _) | (_, Procedure::InnovationsLikelihood(_)) => Relation::Fresh,
+        // The parameters of equations are none of the noise; those of functions are not of the model that the tests know.
+        (Seen::No, _) | (_, Procedure::InnovationsLikelihood(_) | Procedure::ForwardRegression(_)) => {
+            Relation::Fresh
+        }
         (_, Procedure::InstrumentalVariables { .. }) => Relation::Instrumental,
         _ => Relation::Fitted,
     };

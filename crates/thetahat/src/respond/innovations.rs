@@ -21,7 +21,7 @@ use crate::regression::{add_filtered, divide, sum_of_squares};
 use crate::{Error, PolynomialModel};
 
 /// The innovations of one segment.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Innovations {
     /// The samples looked at: the segment, and before it those that it starts from.
     pub(crate) rows: Range<usize>,
@@ -68,7 +68,7 @@ impl Innovations {
 }
 
 /// Impulses into 1/F from a sample of a stretch on, for each input.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Impulses {
     pub(super) first: usize,
     pub(super) weights: Vec<Vec<f64>>,

@@ -1,6 +1,7 @@
 //! Models of any kind beside a log.
 
 use super::equations::EquationsOnLog;
+use super::nonlinear_arx::NonlinearArxOnLog;
 use super::on_log::{OnLog, PolynomialOnLog};
 use super::{Horizon, Start};
 use crate::data::{Log, Rows};
@@ -22,15 +23,18 @@ impl Model {
         Ok(match self {
             Self::Polynomial(model) => Box::new(PolynomialOnLog::new(model, log, rows, asked)?),
             Self::Equations(model) => Box::new(EquationsOnLog::new(model, log, rows, fitted)?),
+            Self::NonlinearArx(model) => Box::new(NonlinearArxOnLog::new(model, log, rows)?),
         })
     }
 
     /// What a response to measured data had better start from: see [`Start::natural`]. Models in equations know what their text says of
-    /// their states in the first row of a log; free runs start from the state that explains the outputs best.
+    /// their states in the first row of a log; free runs start from the state that explains the outputs best. Nonlinear ARX models start
+    /// from measured samples.
     pub fn natural_start(&self, horizon: Horizon) -> Start {
         match self {
             Self::Polynomial(model) => Start::natural(model, horizon),
             Self::Equations(_) => Start::Estimate,
+            Self::NonlinearArx(_) => Start::Drop,
         }
     }
 }

@@ -1,11 +1,12 @@
 //! What a model says of the rows of a log, whatever its kind: all that its figures, tests and pages rest on.
 
 use std::borrow::Cow;
+use std::cell::OnceCell;
 
 use super::forecast::forecast_if_possible;
 use super::innovations::{Innovations, innovations};
-use super::predict::check_steps;
-use super::sensitivities::prediction_deviations;
+use super::predict::{check_start, check_steps, predicted};
+use super::sensitivities::{deviations_of, prediction_deviations};
 use super::{Forecast, Horizon, Response, Start, predict, simulate};
 use crate::Error;
 use crate::data::{Log, Record, Rows};
@@ -52,6 +53,12 @@ pub(crate) trait OnLog {
         steps: usize,
         start: Start,
     ) -> Result<Option<(usize, Vec<Forecast>)>, Error>;
+
+    /// The share of the samples of a response for which the model read what lies outside of what it was fitted to; none where that does
+    /// not matter.
+    fn outside(&self, _output: usize, _response: &Response, _horizon: Horizon) -> Option<f64> {
+        None
+    }
 }
 
 /// What is left of an output, and the model that says which of its past values it may depend on.
@@ -59,7 +66,7 @@ pub(crate) trait OnLog {
 pub(crate) struct Tested<'a> {
     pub(crate) model: Cow<'a, PolynomialModel>,
     pub(crate) record: Record<'a>,
-    pub(crate) innovations: Vec<Innovations>,
+    pub(crate) innovations: Cow<'a, [Innovations]>,
 }
 
 /// A model of polynomials beside a log.
@@ -69,6 +76,8 @@ pub(crate) struct PolynomialOnLog<'l> {
     /// What predictions look at, and what they start from.
     ahead: Record<'l>,
     start: Start,
+    /// What is left one step ahead, once somebody asked.
+    innovations: OnceCell<Vec<Innovations>>,
     /// What free runs look at.
     free_run: Record<'l>,
 }
@@ -87,12 +96,27 @@ impl<'l> PolynomialOnLog<'l> {
         let start = |horizon| asked.unwrap_or_else(|| Start::natural(model, horizon));
         let one = Horizon::Steps { steps: 1 };
         let record = |horizon| record_for(model, log, rows, horizon, start(horizon));
-        Ok(Self { model, ahead: record(one)?, start: start(one), free_run: record(Horizon::FreeRun)? })
+        Ok(Self {
+            model,
+            ahead: record(one)?,
+            start: start(one),
+            innovations: OnceCell::new(),
+            free_run: record(Horizon::FreeRun)?,
+        })
     }
 
     /// Predictions that look at another record, and start from something else.
     pub(crate) fn with_predictions(self, ahead: Record<'l>, start: Start) -> Self {
-        Self { ahead, start, ..self }
+        Self { ahead, start, innovations: OnceCell::new(), ..self }
+    }
+
+    /// What is left one step ahead: predictions, their deviations and the tests rest on it, and it is computed once.
+    fn innovations(&self) -> Result<&[Innovations], Error> {
+        if let Some(found) = self.innovations.get() {
+            return Ok(found);
+        }
+        let found = innovations(self.model, &self.ahead, 1, self.start)?;
+        Ok(self.innovations.get_or_init(|| found))
     }
 
     fn record(&self, horizon: Horizon) -> &Record<'l> {
@@ -126,6 +150,10 @@ impl OnLog for PolynomialOnLog<'_> {
     fn respond(&self, horizon: Horizon, start: Start) -> Result<Vec<Response>, Error> {
         let record = self.record(horizon);
         let response = match horizon {
+            Horizon::Steps { steps: 1 } if start == self.start => {
+                check_start(self.model, start)?;
+                predicted(self.model, record, 1, self.innovations()?)
+            }
             Horizon::Steps { steps } => predict(self.model, record, steps, start)?,
             Horizon::FreeRun => simulate(self.model, record, start)?,
         };
@@ -133,7 +161,12 @@ impl OnLog for PolynomialOnLog<'_> {
     }
 
     fn deviations(&self, steps: usize, start: Start) -> Result<Vec<Vec<f64>>, Error> {
-        Ok(vec![prediction_deviations(self.model, &self.ahead, steps, start)?])
+        let (model, record) = (self.model, &self.ahead);
+        // An open offset makes another model, whose innovations have more inputs.
+        if (steps, start) == (1, self.start) && model.offset_covariance.is_none() {
+            return Ok(vec![deviations_of(model, record, 1, start, self.innovations()?)?]);
+        }
+        Ok(vec![prediction_deviations(model, record, steps, start)?])
     }
 
     fn quantile(&self, level: f64) -> f64 {
@@ -147,9 +180,8 @@ impl OnLog for PolynomialOnLog<'_> {
     }
 
     fn tested(&self) -> Result<Vec<Tested<'_>>, Error> {
-        let found = innovations(self.model, &self.ahead, 1, self.start)?;
-        let record = self.ahead.clone();
-        Ok(vec![Tested { model: Cow::Borrowed(self.model), record, innovations: found }])
+        let (model, record) = (Cow::Borrowed(self.model), self.ahead.clone());
+        Ok(vec![Tested { model, record, innovations: Cow::Borrowed(self.innovations()?) }])
     }
 
     fn forecast(
@@ -163,22 +195,33 @@ impl OnLog for PolynomialOnLog<'_> {
         let Some(first) = record.segments.last().map(|segment| segment.end) else { return Ok(None) };
         let driving = model.inputs.iter().zip(&model.orders.nb).filter(|(_, nb)| **nb > 0);
         let driving: Vec<&str> = driving.map(|(input, _)| input.name.as_str()).collect();
-        // As far as the inputs go on without a gap.
-        let stretches = log.segments(&driving, rows)?;
-        let stretch = stretches.into_iter().find(|stretch| stretch.contains(&(first - 1)));
-        let end = stretch.map_or(first, |stretch| stretch.end);
-        let known = if driving.is_empty() && end == log.rows() { steps } else { steps.min(end - first) };
+        let known = known_ahead(log, rows, &driving, first, steps)?;
         if known == 0 {
             return Ok(None);
         }
         check_steps("horizon", known)?;
-        let future: Vec<&[f64]> = record.inputs.iter().map(|u| &u[first..end]).collect();
+        let future: Vec<&[f64]> =
+            record.inputs.iter().map(|u| &u[first..(first + known).min(u.len())]).collect();
         // Values of an input that drives nothing may be missing, and are not needed.
         let future: Vec<&[f64]> =
             future.iter().zip(&model.orders.nb).map(|(u, nb)| if *nb > 0 { *u } else { &[] }).collect();
         let forecast = forecast_if_possible(model, record, &future, known, start)?;
         Ok(forecast.map(|forecast| (first, vec![forecast])))
     }
+}
+
+/// How many of so many steps from row `first` on have known inputs, which go on without a gap.
+pub(super) fn known_ahead(
+    log: &Log,
+    rows: &[Rows],
+    driving: &[&str],
+    first: usize,
+    steps: usize,
+) -> Result<usize, Error> {
+    let segments = log.segments(driving, rows)?;
+    let segment = segments.into_iter().find(|segment| segment.contains(&(first - 1)));
+    let end = segment.map_or(first, |segment| segment.end);
+    Ok(if driving.is_empty() && end == log.rows() { steps } else { steps.min(end - first) })
 }
 
 /// The record that a response of a model looks at. It goes on through missing outputs where no past one is needed.

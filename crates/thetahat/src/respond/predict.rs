@@ -1,7 +1,7 @@
 use std::ops::Range;
 
 use super::free_response::until_negligible;
-use super::innovations::innovations;
+use super::innovations::{Innovations, innovations};
 use super::{Response, Start, check_inputs};
 use crate::data::Record;
 use crate::regression::{add_filtered, divide};
@@ -72,10 +72,20 @@ pub fn predict(
     check_start(model, start)?;
     // Farther than from before the first sample to the last there is nothing to look from.
     let horizon = horizon.min(longest(record) + 1);
+    Ok(predicted(model, record, horizon, &innovations(model, record, horizon, start)?))
+}
+
+/// The prediction that follows from the innovations of those samples that have one so many steps ahead.
+pub(super) fn predicted(
+    model: &PolynomialModel,
+    record: &Record<'_>,
+    horizon: usize,
+    innovations: &[Innovations],
+) -> Response {
     let response = disturbance_response(model, horizon);
     let weights: Vec<f64> = response.iter().map(|h| -h).collect();
     let mut predicted = Response::empty(record.output.len());
-    for found in innovations(model, record, horizon, start)? {
+    for found in innovations {
         for counted in &found.counted {
             let values = &mut predicted.values[counted.clone()];
             values.copy_from_slice(&record.output[counted.clone()]);
@@ -87,9 +97,9 @@ pub fn predict(
                 predicted.values[row] = -found.disturbance[row - found.rows.start];
             }
         }
-        predicted.counted.extend(found.counted);
+        predicted.counted.extend(found.counted.iter().cloned());
     }
-    Ok(predicted)
+    predicted
 }
 
 /// The standard deviation of the error of a k-step prediction, in units of y: sigma sqrt(sum_{i<k} h_i^2), with h the

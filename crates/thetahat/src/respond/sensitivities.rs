@@ -344,6 +344,17 @@ pub fn prediction_deviations(
         return prediction_deviations(&model, &record.with_inputs(&signals), horizon, start);
     }
     let horizon = horizon.min(longest(record) + 1);
+    deviations_of(model, record, horizon, start, &innovations(model, record, horizon, start)?)
+}
+
+/// The same from the innovations of the samples that have a prediction.
+pub(super) fn deviations_of(
+    model: &PolynomialModel,
+    record: &Record<'_>,
+    horizon: usize,
+    start: Start,
+    innovations: &[Innovations],
+) -> Result<Vec<f64>, Error> {
     let response = disturbance_response(model, horizon);
     let sigma = model.noise_variance.sqrt();
     let sizes = accumulated(&response, horizon);
@@ -351,12 +362,12 @@ pub fn prediction_deviations(
     let moved_responses: Vec<Vec<f64>> =
         changes.iter().map(|change| moved_response(model, change, &response)).collect();
     let mut deviations = vec![f64::NAN; record.output.len()];
-    for found in innovations(model, record, horizon, start)? {
+    for found in innovations {
         let rows = found.rows.clone();
         let inputs = record.inputs.iter().map(|u| u[rows.clone()].to_vec()).collect();
         let output = record.output[rows.clone()].to_vec();
         let (disturbance, errors) = (found.disturbance.clone(), found.errors.clone());
-        let paths = Paths::new(model, &found, inputs, output, disturbance, errors);
+        let paths = Paths::new(model, found, inputs, output, disturbance, errors);
         // Where the output is missing there is a prediction too, if no past one is needed.
         let counted = found.span.start - rows.start..found.span.end - rows.start;
         let mut variances = vec![0.0; counted.len()];

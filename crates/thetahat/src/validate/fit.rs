@@ -47,6 +47,9 @@ pub struct Fit {
     /// The largest |e(t)| in units of y; none likewise.
     #[serde(default)]
     pub largest_error: Option<f64>,
+    /// Of a nonlinear model the share of these samples for which it read values outside of those that it was fitted to, 0 … 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub outside: Option<f64>,
 }
 
 impl Fit {
@@ -77,6 +80,7 @@ impl Fit {
             mean_absolute_error: known(sum(errors()) / samples as f64),
             // One that is not a number stays one.
             largest_error: known(errors().fold(0.0, |largest, e| if e <= largest { largest } else { e })),
+            outside: None,
         }
     }
 }

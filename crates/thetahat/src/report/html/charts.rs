@@ -5,9 +5,11 @@ mod dynamics;
 mod search;
 mod signals;
 mod spectrum;
+mod terms;
 
 pub(super) use correlation::{autocorrelation, compared_autocorrelations, cross_correlation, prewhitened};
 pub(super) use dynamics::{bode, roots, transients};
 pub(super) use search::{delays, score, search};
 pub(super) use signals::{Marked, Shade, Stack, outputs};
 pub(super) use spectrum::spectrum;
+pub(super) use terms::{complexity, slices};

@@ -4,9 +4,9 @@ use super::page::Table;
 use super::text::{complex, or_dash, percent, quantity, rows};
 use crate::figures::{chance, fixed, number, scientific, short, three};
 use crate::{
-    Criteria, EquationsModel, Estimation, Fit, InformationCriterion, Inspection, Orders, Part,
-    PolynomialModel, Procedure, Report, Root, Rows, Scored, Seen, Selection, Source, Start, Stopped,
-    Validated, Validation,
+    Criteria, EquationsModel, Estimation, Fit, InformationCriterion, Inspection, NonlinearArxModel, Orders,
+    Part, PolynomialModel, Procedure, Report, Root, Rows, Scored, Seen, Selection, Source, Start, Stopped,
+    TermsOutcome, Validated, Validation,
 };
 
 /// The models of a search that are listed.
@@ -21,6 +21,52 @@ pub(super) fn parameters(model: &PolynomialModel) -> Table {
             parameter.name.clone(),
             number(parameter.value),
             or_dash(parameter.standard_error, three),
+        ]);
+    }
+    table
+}
+
+/// The same of a nonlinear ARX model.
+pub(super) fn functions(model: &NonlinearArxModel) -> Table {
+    let mut table = Table::new("Parameters", &["function", "parameter", "standard error"]);
+    for parameter in &model.parameters {
+        let error = or_dash(parameter.standard_error, three);
+        table.row([parameter.name.clone(), number(parameter.value), error]);
+    }
+    table
+}
+
+/// What a nonlinear ARX model reads.
+pub(super) fn regressors(model: &NonlinearArxModel) -> Table {
+    let mut table = Table::new("Regressors", &["regressor", "divided by", "least", "largest"]);
+    for regressor in &model.regressors {
+        let [low, high] = regressor.range;
+        table.row([regressor.name(), number(regressor.scale), number(low), number(high)]);
+    }
+    table
+}
+
+/// The path of a choice of functions.
+pub(super) fn path(outcome: &TermsOutcome, taken: usize) -> Table {
+    let head = [
+        "",
+        "function",
+        "error reduction ratio",
+        "RMSE, 1 step ahead",
+        "free run",
+        "free run, held out",
+        "cannot be told from it",
+    ];
+    let mut table = Table::new("Path of the choice", &head);
+    for (at, step) in outcome.path.iter().enumerate() {
+        table.row([
+            format!("{}{}", at + 1, if at + 1 == taken { " taken" } else { "" }),
+            step.term.clone(),
+            scientific(step.error_reduction, 3),
+            number(step.rmse),
+            or_dash(step.free_run.rmse, number),
+            or_dash(step.held_out.and_then(|run| run.rmse), number),
+            step.aliases.join(", "),
         ]);
     }
     table
@@ -197,6 +243,12 @@ fn procedure(procedure: &Procedure) -> String {
             outcome.search.iterations,
             stopped(&outcome.search.stopped)
         ),
+        Procedure::ForwardRegression(outcome) => {
+            format!(
+                "forward regression among {} functions, their number by {}",
+                outcome.candidates, outcome.selected_by
+            )
+        }
     }
 }
 

@@ -348,7 +348,7 @@ impl OnLog for EquationsOnLog<'_> {
                 let counted = counted.iter().filter(inside).cloned().collect();
                 Innovations::alone(rows, counted, own)
             });
-            let innovations = innovations.collect();
+            let innovations: Vec<Innovations> = innovations.collect();
             let segments: Vec<Range<usize>> = self.experiments.iter().flat_map(stretches).collect();
             let record = Record {
                 output: standardised,
@@ -356,7 +356,7 @@ impl OnLog for EquationsOnLog<'_> {
                 past: vec![0; segments.len()],
                 segments,
             };
-            Ok(Tested { model: Cow::Owned(model), record, innovations })
+            Ok(Tested { model: Cow::Owned(model), record, innovations: Cow::Owned(innovations) })
         });
         each.collect()
     }

@@ -1,0 +1,26 @@
+//! `thetahat fit --narx`: a nonlinear ARX model.
+
+use thetahat::fit_nonlinear_arx;
+
+use super::fit::{Wanted, read};
+use super::search::Found;
+use crate::failure::Failure;
+use crate::job::NarxJob;
+use crate::log;
+use crate::messages::warn;
+
+/// Reads the logs and fits the model.
+pub(super) fn found(job: &NarxJob) -> Result<Found, Failure> {
+    let wanted = Wanted {
+        inputs: job.inputs.as_deref(),
+        output: job.output.as_deref(),
+        driven: job.driven,
+        none: "--nu 0",
+    };
+    let found = read(&job.paths, &job.log, &wanted, false, |_| Ok(()))?;
+    found.words.iter().for_each(|word| warn(word));
+    let plan = job.plan(found.channels.inputs, found.channels.output)?;
+    let report =
+        fit_nonlinear_arx(&found.log, &found.sources, &plan).map_err(log::failure(&found.sources))?;
+    Ok(Found { report, log: Some(found.log), sources: found.sources })
+}

@@ -1,0 +1,133 @@
+use std::path::{Path, PathBuf};
+
+use thetahat::{Centres, InputLags, MapPlan, NonlinearArxPlan};
+
+use super::fit::named_values;
+use super::{LogJob, parsed, rows};
+use crate::args::{FitArguments, MapArgument, Names, NarxArguments};
+use crate::failure::Failure;
+use crate::memory::PerValue;
+
+/// A nonlinear ARX model to fit.
+#[derive(Debug)]
+pub(crate) struct NarxJob {
+    /// The logs, at least one.
+    pub(crate) paths: Vec<PathBuf>,
+    /// How all of them are read.
+    pub(crate) log: LogJob,
+    /// Named inputs; none: those called u, u1, u2, …
+    pub(crate) inputs: Option<Vec<String>>,
+    /// The named output; none: y.
+    pub(crate) output: Option<String>,
+    /// Whether there are inputs at all.
+    pub(crate) driven: bool,
+    nu: Vec<usize>,
+    nk: Vec<usize>,
+    /// The rest of the plan: channels and the lags of inputs are open.
+    plan: NonlinearArxPlan,
+}
+
+impl NarxJob {
+    pub(crate) fn resolve(arguments: &FitArguments, map: MapArgument) -> Result<Self, Failure> {
+        let own = &arguments.narx;
+        let default = NonlinearArxPlan::new(&[], "");
+        let plan = NonlinearArxPlan {
+            estimate: rows("--estimate", &arguments.estimate)?,
+            validate: rows("--validate", &arguments.validate)?,
+            split: arguments.choice.split.as_deref().map(|text| parsed("--split", text)).transpose()?,
+            detrend: parsed("--detrend", &arguments.detrend)?,
+            offsets: named_values("--offset", &arguments.offset)?,
+            output_lags: own.ny.unwrap_or(default.output_lags),
+            map: map_plan(own, map, arguments.search.seed)?,
+            terms: own.terms,
+            most: own.most_terms.unwrap_or(default.most),
+            select: arguments.choice.select,
+            ridge: arguments.criterion.ridge.unwrap_or(0.0),
+            raw_terms: own.raw_terms,
+            ..default
+        };
+        let nk = arguments.model.nk.iter().map(|text| {
+            text.trim().parse().map_err(|_| {
+                Failure::usage(format!(
+                    "--nk {text}: a nonlinear ARX model takes one delay for each input, such as --nk 1"
+                ))
+            })
+        });
+        let job = Self {
+            paths: arguments.logs.clone(),
+            log: LogJob { per_value: PerValue::Search, ..LogJob::resolve(&arguments.log, &arguments.clock)? },
+            inputs: Names::all(&arguments.input),
+            output: arguments.output.clone(),
+            driven: own.nu.is_empty() || own.nu.iter().any(|lags| *lags > 0),
+            nu: own.nu.clone(),
+            nk: nk.collect::<Result<_, Failure>>()?,
+            plan,
+        };
+        if job.paths.iter().filter(|path| *path == Path::new("-")).count() > 1 {
+            return Err(Failure::usage("only one of the logs can come from standard input (-)"));
+        }
+        if !job.driven && job.inputs.is_some() {
+            return Err(Failure::usage(
+                "--nu 0 makes a model without inputs; leave out --input, or give another --nu",
+            ));
+        }
+        Ok(job)
+    }
+
+    /// The plan for the channels of a log.
+    pub(crate) fn plan(&self, inputs: Vec<String>, output: String) -> Result<NonlinearArxPlan, Failure> {
+        let each = |option: &str, values: &[usize], default: usize| -> Result<Vec<usize>, Failure> {
+            match values {
+                [] => Ok(vec![default; inputs.len()]),
+                [one] => Ok(vec![*one; inputs.len()]),
+                several if several.len() == inputs.len() => Ok(several.to_vec()),
+                several => Err(Failure::usage(format!(
+                    "{option} has {} numbers for {} inputs; give one for all or one for each",
+                    several.len(),
+                    inputs.len()
+                ))),
+            }
+        };
+        let (nu, nk) = (each("--nu", &self.nu, 2)?, each("--nk", &self.nk, 1)?);
+        let input_lags = nu.into_iter().zip(nk).map(|(lags, delay)| InputLags { lags, delay }).collect();
+        let plan = NonlinearArxPlan { inputs, output, input_lags, ..self.plan.clone() };
+        plan.check().map_err(|error| Failure::usage(crate::options::with_options(&error.to_string())))?;
+        Ok(plan)
+    }
+}
+
+fn map_plan(arguments: &NarxArguments, map: MapArgument, seed: Option<u64>) -> Result<MapPlan, Failure> {
+    let not_for = |option: &str, other: &str| Err(Failure::usage(format!("{option} is for --narx {other}")));
+    match map {
+        MapArgument::Poly => {
+            if arguments.centres.is_some() || arguments.width.is_some() || arguments.no_linear {
+                return not_for("--centres, --width and --no-linear", "rbf");
+            }
+            Ok(MapPlan::Polynomial { degree: arguments.degree.unwrap_or(2) })
+        }
+        MapArgument::Rbf => {
+            if arguments.degree.is_some() {
+                return not_for("--degree", "poly");
+            }
+            let text = arguments.centres.as_deref().unwrap_or("chosen");
+            Ok(MapPlan::Radial {
+                centres: centres(text, seed.unwrap_or(0))?,
+                width: arguments.width,
+                linear: !arguments.no_linear,
+            })
+        }
+    }
+}
+
+fn centres(text: &str, seed: u64) -> Result<Centres, Failure> {
+    let (word, count) = text.split_once(':').unwrap_or((text, ""));
+    match (word, count.parse()) {
+        ("chosen", _) if count.is_empty() => Ok(Centres::Chosen),
+        ("kmeans", Ok(count)) => Ok(Centres::Clusters { count, seed }),
+        ("grid", Ok(each)) => Ok(Centres::Grid { each }),
+        ("random", Ok(count)) => Ok(Centres::Random { count, seed }),
+        _ => Err(Failure::usage(format!(
+            "--centres {text}: write it as chosen, kmeans:N, grid:N or random:N, such as kmeans:20"
+        ))),
+    }
+}

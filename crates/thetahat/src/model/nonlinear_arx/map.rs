@@ -1,0 +1,281 @@
+//! The functions of which a nonlinear ARX model is a weighted sum.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// The functions f_j of a nonlinear ARX model, of n regressors z.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "type", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Map {
+    /// f_j = the product of some regressors; the constant 1 is the product of none (Leontaritis and Billings 1985).
+    Polynomial {
+        /// For each function the regressors that are multiplied, from 0 on, in rising order.
+        terms: Vec<Vec<usize>>,
+    },
+    /// f_j = exp(-|z - alpha_j|^2/sigma_j^2), and with `linear` 1 and each regressor before them (Chen, Cowan and Grant 1991, with
+    /// sigma^2 for their 2 sigma^2).
+    Radial {
+        /// alpha, a point for each function.
+        centres: Vec<Vec<f64>>,
+        /// sigma, one for each function.
+        widths: Vec<f64>,
+        /// Whether 1 and the regressors come first.
+        linear: bool,
+    },
+}
+
+impl Map {
+    /// How many functions there are of so many regressors.
+    pub fn parameters(&self, regressors: usize) -> usize {
+        match self {
+            Self::Polynomial { terms } => terms.len(),
+            Self::Radial { centres, linear, .. } => centres.len() + if *linear { regressors + 1 } else { 0 },
+        }
+    }
+
+    /// Some of its functions beside those of the linear path, by their places among all.
+    pub(crate) fn some<'a>(&self, places: impl Iterator<Item = &'a usize>) -> Self {
+        match self {
+            Self::Polynomial { terms } => {
+                Self::Polynomial { terms: places.filter_map(|place| terms.get(*place).cloned()).collect() }
+            }
+            Self::Radial { centres, widths, linear } => {
+                let before = self.parameters(centres.first().map_or(0, Vec::len)) - centres.len();
+                let own: Vec<usize> = places.map(|place| place - before).collect();
+                Self::Radial {
+                    centres: own.iter().map(|place| centres[*place].clone()).collect(),
+                    widths: own.iter().map(|place| widths[*place]).collect(),
+                    linear: *linear,
+                }
+            }
+        }
+    }
+
+    /// What it is, of so many parameters.
+    pub(super) fn describe(&self, parameters: usize) -> String {
+        let plural = |count: usize| if count == 1 { "" } else { "s" };
+        match self {
+            Self::Polynomial { .. } => format!("polynomial, {parameters} term{}", plural(parameters)),
+            Self::Radial { centres, .. } => {
+                format!("radial basis functions, {} centre{}", centres.len(), plural(centres.len()))
+            }
+        }
+    }
+
+    /// The functions by name, those of the regressors being given: y(k-1)^2*u(k), or rbf1.
+    pub(crate) fn names(&self, regressors: &[String]) -> Vec<String> {
+        match self {
+            Self::Polynomial { terms } => terms.iter().map(|term| product(term, regressors)).collect(),
+            Self::Radial { centres, linear, .. } => {
+                let path = std::iter::once("1".to_owned()).chain(regressors.iter().cloned());
+                let path = path.take(if *linear { regressors.len() + 1 } else { 0 });
+                path.chain((1..=centres.len()).map(|place| format!("rbf{place}"))).collect()
+            }
+        }
+    }
+
+    /// Whether its parts go with so many regressors; else which does not.
+    pub(super) fn check(&self, regressors: usize) -> Result<(), String> {
+        match self {
+            Self::Polynomial { terms } => {
+                match terms.iter().position(|term| term.iter().any(|factor| *factor >= regressors)) {
+                    Some(place) => Err(format!("terms[{place}] names a regressor that is not there")),
+                    None => Ok(()),
+                }
+            }
+            Self::Radial { centres, widths, .. } => {
+                let point =
+                    |point: &Vec<f64>| point.len() == regressors && point.iter().all(|z| z.is_finite());
+                if let Some(place) = centres.iter().position(|centre| !point(centre)) {
+                    return Err(format!("centres[{place}] is no point of {regressors} regressors"));
+                }
+                let positive = |width: &f64| width.is_finite() && *width > 0.0;
+                if widths.len() != centres.len() || !widths.iter().all(positive) {
+                    return Err("widths is not a positive number for each centre".to_owned());
+                }
+                Ok(())
+            }
+        }
+    }
+}
+
+/// A product by its factors: y(k-1)^2*u(k).
+fn product(term: &[usize], regressors: &[String]) -> String {
+    let mut parts: Vec<String> = Vec::new();
+    let mut rest = term;
+    while let Some(factor) = rest.first() {
+        let power = rest.iter().take_while(|other| *other == factor).count();
+        let name = regressors.get(*factor).map_or("?", String::as_str);
+        parts.push(if power == 1 { name.to_owned() } else { format!("{name}^{power}") });
+        rest = &rest[power..];
+    }
+    if parts.is_empty() { "1".to_owned() } else { parts.join("*") }
+}
+
+/// A map laid out to be evaluated along a log, with its parameters. Nothing of it allocates.
+#[derive(Debug, Clone)]
+pub(crate) struct Evaluator {
+    theta: Vec<f64>,
+    kind: Kind,
+}
+
+#[derive(Debug, Clone)]
+enum Kind {
+    /// The factors of all terms one after the other, and where each term ends.
+    Polynomial { factors: Vec<usize>, ends: Vec<usize> },
+    /// The centres one after the other, and 1/sigma^2.
+    Radial { centres: Vec<f64>, inverse_squares: Vec<f64>, linear: bool },
+}
+
+impl Evaluator {
+    /// # Panics
+    /// Never for a map that was checked.
+    pub(crate) fn new(map: &Map, theta: Vec<f64>) -> Self {
+        let kind = match map {
+            Map::Polynomial { terms } => {
+                let ends = terms.iter().scan(0, |end, term| {
+                    *end += term.len();
+                    Some(*end)
+                });
+                Kind::Polynomial { factors: terms.concat(), ends: ends.collect() }
+            }
+            Map::Radial { centres, widths, linear } => Kind::Radial {
+                centres: centres.concat(),
+                inverse_squares: widths.iter().map(|width| 1.0 / (width * width)).collect(),
+                linear: *linear,
+            },
+        };
+        Self { theta, kind }
+    }
+
+    /// How many functions there are.
+    pub(crate) fn parameters(&self) -> usize {
+        self.theta.len()
+    }
+
+    /// g(z) = sum_j theta_j f_j(z).
+    pub(crate) fn value(&self, z: &[f64]) -> f64 {
+        let mut sum = 0.0;
+        self.each(z, |j, f| sum += self.theta[j] * f);
+        sum
+    }
+
+    /// f_j(z) for each j.
+    pub(crate) fn functions(&self, z: &[f64], into: &mut [f64]) {
+        self.each(z, |j, f| into[j] = f);
+    }
+
+    fn each(&self, z: &[f64], mut take: impl FnMut(usize, f64)) {
+        match &self.kind {
+            Kind::Polynomial { factors, ends } => {
+                let mut start = 0;
+                for (j, end) in ends.iter().enumerate() {
+                    take(j, factors[start..*end].iter().fold(1.0, |product, factor| product * z[*factor]));
+                    start = *end;
+                }
+            }
+            Kind::Radial { centres, inverse_squares, linear } => {
+                let mut first = 0;
+                if *linear {
+                    take(0, 1.0);
+                    z.iter().enumerate().for_each(|(i, z)| take(i + 1, *z));
+                    first = z.len() + 1;
+                }
+                for (j, (centre, inverse)) in centres.chunks_exact(z.len()).zip(inverse_squares).enumerate() {
+                    take(first + j, (-distance(z, centre) * inverse).exp());
+                }
+            }
+        }
+    }
+
+    /// dg/dz_i for each i.
+    pub(crate) fn slopes(&self, z: &[f64], into: &mut [f64]) {
+        into.fill(0.0);
+        match &self.kind {
+            Kind::Polynomial { factors, ends } => {
+                let mut start = 0;
+                for (theta, end) in self.theta.iter().zip(ends) {
+                    let own = &factors[start..*end];
+                    for (at, factor) in own.iter().enumerate() {
+                        let others = own.iter().enumerate().filter(|(other, _)| *other != at);
+                        into[*factor] += others.fold(*theta, |product, (_, other)| product * z[*other]);
+                    }
+                    start = *end;
+                }
+            }
+            Kind::Radial { centres, inverse_squares, linear } => {
+                let mut weights = self.theta.iter();
+                if *linear {
+                    weights.next();
+                    into.iter_mut().zip(weights.by_ref()).for_each(|(slope, theta)| *slope = *theta);
+                }
+                let each = centres.chunks_exact(z.len()).zip(inverse_squares);
+                for ((centre, inverse), theta) in each.zip(weights) {
+                    let value = theta * (-distance(z, centre) * inverse).exp();
+                    for ((slope, z), centre) in into.iter_mut().zip(z).zip(centre) {
+                        *slope -= 2.0 * inverse * (z - centre) * value;
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// |z - alpha|^2.
+fn distance(z: &[f64], centre: &[f64]) -> f64 {
+    z.iter().zip(centre).map(|(z, centre)| (z - centre) * (z - centre)).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn maps() -> [Map; 3] {
+        let centres = vec![vec![0.2, -0.4], vec![1.0, 0.3], vec![-0.7, 0.9]];
+        [
+            Map::Polynomial { terms: vec![vec![], vec![0], vec![0, 0, 1], vec![1, 1]] },
+            Map::Radial { centres: centres.clone(), widths: vec![0.8, 1.0, 2.0], linear: false },
+            Map::Radial { centres, widths: vec![0.8, 1.0, 2.0], linear: true },
+        ]
+    }
+
+    #[test]
+    fn slopes_are_differences_of_values() {
+        for map in maps() {
+            assert_eq!(map.check(2), Ok(()));
+            let count = map.parameters(2);
+            let theta: Vec<f64> = (0..count).map(|j| 0.3 + j as f64 * 0.4).collect();
+            let evaluator = Evaluator::new(&map, theta.clone());
+            let z = [0.37, -0.81];
+            let mut functions = vec![0.0; count];
+            evaluator.functions(&z, &mut functions);
+            let sum: f64 = functions.iter().zip(&theta).map(|(f, theta)| f * theta).sum();
+            assert!((sum - evaluator.value(&z)).abs() < 1e-14);
+            let mut slopes = [0.0; 2];
+            evaluator.slopes(&z, &mut slopes);
+            for i in 0..2 {
+                let moved = |step: f64| {
+                    let mut z = z;
+                    z[i] += step;
+                    evaluator.value(&z)
+                };
+                let difference = (moved(1e-5) - moved(-1e-5)) / 2e-5;
+                assert!((difference - slopes[i]).abs() < 1e-8, "{map:?} {i}: {difference} {slopes:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn functions_have_names() {
+        let regressors = ["y(k-1)".to_owned(), "u(k)".to_owned()];
+        assert_eq!(maps()[0].names(&regressors), ["1", "y(k-1)", "y(k-1)^2*u(k)", "u(k)^2"]);
+        assert_eq!(maps()[2].names(&regressors), ["1", "y(k-1)", "u(k)", "rbf1", "rbf2", "rbf3"]);
+    }
+
+    #[test]
+    fn parts_that_do_not_fit_are_told() {
+        assert!(Map::Polynomial { terms: vec![vec![2]] }.check(2).is_err());
+        assert!(Map::Radial { centres: vec![vec![1.0]], widths: vec![1.0], linear: true }.check(2).is_err());
+        assert!(Map::Radial { centres: vec![vec![1.0]], widths: vec![], linear: true }.check(1).is_err());
+    }
+}

@@ -1,0 +1,245 @@
+//! Monomials of variables, and their Gram matrix from moments.
+//!
+//! The product of two monomials of degree d at most is one of degree 2 d at most, so that the Gram matrix of M monomials of n
+//! variables holds C(n + 2 d, 2 d) different numbers, and no matrix of regressors is needed. With x_0 = 1 a monomial is a tuple
+//! i_1 <= … <= i_d of indices, 0 where there is no further factor. A moment is a tuple of 2 d such indices; it is the product of its
+//! first half, whose last index is c, and of its second half, whose first index is not below c:
+//!
+//! ```text
+//! moments with i_d = c:   sum_t A_c(t) B_c(t)',   A_c the monomials that end with c, B_c those that begin with c or later
+//! ```
+//!
+//! These are products of dense matrices, a tile for each c. Cost for N rows: 2 N C(n + 2 d, 2 d) flops.
+
+use std::collections::HashMap;
+
+use faer::linalg::matmul::matmul;
+use faer::{Accum, Mat, Par};
+use rayon::prelude::*;
+
+use crate::Error;
+
+/// Rows of which the monomials are in memory at once.
+const ROWS: usize = 512;
+/// Moments at most: 512 MB.
+const MOST_MOMENTS: usize = 64_000_000;
+
+/// All monomials of some variables up to a degree, the constant first.
+#[derive(Debug, Clone)]
+pub(crate) struct Monomials {
+    variables: usize,
+    degree: usize,
+    /// Indices as above, in lexicographic order.
+    tuples: Vec<Vec<u16>>,
+    /// The place of each tuple.
+    places: HashMap<Vec<u16>, usize>,
+    /// For each tuple the tile that it is in as a first half, and its row there.
+    rows: Vec<(usize, usize)>,
+    /// For each tile the monomials of its rows, and the first monomial of its columns, which end with the last monomial.
+    tiles: Vec<(Vec<usize>, usize)>,
+}
+
+impl Monomials {
+    /// # Errors
+    /// [`Error::Argument`] if there is nothing to multiply, or there are too many products.
+    pub(crate) fn new(variables: usize, degree: usize) -> Result<Self, Error> {
+        if degree == 0 {
+            return Err(Error::argument("degree", "a polynomial of degree 0 is a constant; give 1 or more"));
+        }
+        let moments = combinations(variables + 2 * degree, 2 * degree);
+        if moments.is_none_or(|moments| moments > MOST_MOMENTS) || variables >= usize::from(u16::MAX) {
+            return Err(Error::argument(
+                "degree",
+                format!(
+                    "polynomials of degree {degree} of {variables} regressors have too many terms to choose from; give a lower \
+                     degree or fewer lags"
+                ),
+            ));
+        }
+        let mut tuples = vec![Vec::new()];
+        for _ in 0..degree {
+            tuples = tuples
+                .into_iter()
+                .flat_map(|tuple: Vec<u16>| {
+                    let first = tuple.last().copied().unwrap_or(0);
+                    (first..=variables as u16).map(move |next| [&tuple[..], &[next]].concat())
+                })
+                .collect();
+        }
+        let mut tiles: Vec<(Vec<usize>, usize)> = (0..=variables)
+            .map(|c| (Vec::new(), tuples.partition_point(|tuple| usize::from(tuple[0]) < c)))
+            .collect();
+        let mut rows = Vec::with_capacity(tuples.len());
+        for (place, tuple) in tuples.iter().enumerate() {
+            let tile = usize::from(tuple[degree - 1]);
+            rows.push((tile, tiles[tile].0.len()));
+            tiles[tile].0.push(place);
+        }
+        let places = tuples.iter().cloned().enumerate().map(|(place, tuple)| (tuple, place)).collect();
+        Ok(Self { variables, degree, tuples, places, rows, tiles })
+    }
+
+    pub(crate) fn count(&self) -> usize {
+        self.tuples.len()
+    }
+
+    /// The variables that are multiplied, from 0 on; none for the constant.
+    pub(crate) fn factors(&self, place: usize) -> Vec<usize> {
+        self.tuples[place].iter().filter(|index| **index > 0).map(|index| usize::from(*index) - 1).collect()
+    }
+
+    /// The values of all monomials in some rows, a column for each; `variable` fills those of a variable.
+    fn values(&self, rows: usize, variable: impl Fn(usize, &mut [f64])) -> Mat<f64> {
+        let mut variables = vec![1.0; (self.variables + 1) * rows];
+        for (index, values) in variables.chunks_exact_mut(rows.max(1)).enumerate().skip(1) {
+            variable(index - 1, values);
+        }
+        let mut values = Mat::zeros(rows, self.count());
+        // The product of all but the last factor stands in the stack, for each length.
+        let mut stack = vec![1.0; self.degree * rows];
+        let mut before: &[u16] = &[];
+        for (place, tuple) in self.tuples.iter().enumerate() {
+            let common = tuple.iter().zip(before).take_while(|(one, other)| one == other).count();
+            for depth in common..self.degree {
+                let factor = &variables[usize::from(tuple[depth]) * rows..][..rows];
+                let (below, own) = stack.split_at_mut(depth * rows);
+                for (t, product) in own[..rows].iter_mut().enumerate() {
+                    let prefix = if depth == 0 { 1.0 } else { below[(depth - 1) * rows + t] };
+                    *product = prefix * factor[t];
+                }
+            }
+            let product = &stack[(self.degree - 1) * rows..];
+            values.col_as_slice_mut(place).copy_from_slice(&product[..rows]);
+            before = tuple;
+        }
+        values
+    }
+}
+
+/// n over k, unless it overflows.
+fn combinations(n: usize, k: usize) -> Option<usize> {
+    (1..=k).try_fold(1_usize, |product, i| Some(product.checked_mul(n - k + i)? / i))
+}
+
+/// Sums over rows of products of monomials, and of monomials and a target.
+#[derive(Debug, Clone)]
+pub(crate) struct Moments {
+    tiles: Vec<Mat<f64>>,
+    /// For each monomial the sum of its products with the target.
+    pub(crate) cross: Vec<f64>,
+    /// The sum of the target's squares.
+    pub(crate) energy: f64,
+    pub(crate) rows: usize,
+}
+
+impl Moments {
+    pub(crate) fn zero(monomials: &Monomials) -> Self {
+        let count = monomials.count();
+        let tile = |(rows, first): &(Vec<usize>, usize)| Mat::zeros(rows.len(), count - first);
+        Self {
+            tiles: monomials.tiles.iter().map(tile).collect(),
+            cross: vec![0.0; count],
+            energy: 0.0,
+            rows: 0,
+        }
+    }
+
+    /// Adds so many rows; `variable` fills the values of a variable from a row on, `target` those of the target.
+    pub(crate) fn add(
+        &mut self,
+        monomials: &Monomials,
+        rows: usize,
+        variable: impl Fn(usize, usize, &mut [f64]),
+        target: impl Fn(usize, &mut [f64]),
+    ) {
+        for first in (0..rows).step_by(ROWS) {
+            let some = ROWS.min(rows - first);
+            let values = monomials.values(some, |index, into| variable(index, first, into));
+            let mut y = vec![0.0; some];
+            target(first, &mut y);
+            self.tiles.par_iter_mut().zip(&monomials.tiles).for_each(|(sum, (rows, column))| {
+                let left = Mat::from_fn(some, rows.len(), |t, row| values[(t, rows[row])]);
+                let right = values.as_ref().subcols(*column, values.ncols() - column);
+                matmul(sum.as_mut(), Accum::Add, left.transpose(), right, 1.0, Par::Seq);
+            });
+            for (sum, place) in self.cross.iter_mut().zip(0..) {
+                *sum += super::product(values.col_as_slice(place), &y);
+            }
+            self.energy += super::sum_of_squares(&y);
+        }
+        self.rows += rows;
+    }
+
+    /// Adds the sums of other rows.
+    pub(crate) fn merge(&mut self, other: &Self) {
+        for (sum, tile) in self.tiles.iter_mut().zip(&other.tiles) {
+            *sum += tile;
+        }
+        self.cross.iter_mut().zip(&other.cross).for_each(|(sum, value)| *sum += value);
+        self.energy += other.energy;
+        self.rows += other.rows;
+    }
+
+    /// An entry of the Gram matrix of the monomials.
+    pub(crate) fn gram(&self, monomials: &Monomials, one: usize, other: usize) -> f64 {
+        let degree = monomials.degree;
+        let mut both = [&monomials.tuples[one][..], &monomials.tuples[other]].concat();
+        both.sort_unstable();
+        let (first, second) = both.split_at(degree);
+        let place = |half: &[u16]| monomials.places.get(half).copied();
+        let (Some(first), Some(second)) = (place(first), place(second)) else { return f64::NAN };
+        let (tile, row) = monomials.rows[first];
+        self.tiles[tile][(row, second - monomials.tiles[tile].1)]
+    }
+
+    /// Whether all sums are numbers.
+    pub(crate) fn is_finite(&self) -> bool {
+        let finite =
+            |tile: &Mat<f64>| tile.col_iter().all(|column| column.iter().all(|value| value.is_finite()));
+        self.energy.is_finite()
+            && self.cross.iter().all(|value| value.is_finite())
+            && self.tiles.iter().all(finite)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn moments_are_the_gram_matrix_of_the_monomials() {
+        for (variables, degree) in [(1, 1), (3, 1), (1, 4), (3, 2), (2, 3)] {
+            let monomials = Monomials::new(variables, degree).unwrap();
+            assert_eq!(Some(monomials.count()), combinations(variables + degree, degree));
+            let value = |index: usize, t: usize| ((t * (index + 3) + index) % 17) as f64 / 8.0 - 1.0;
+            let rows = 1300;
+            let variable = |index: usize, first: usize, into: &mut [f64]| {
+                into.iter_mut().zip(first..).for_each(|(into, t)| *into = value(index, t));
+            };
+            let target = |first: usize, into: &mut [f64]| {
+                into.iter_mut().zip(first..).for_each(|(into, t)| *into = (t % 5) as f64);
+            };
+            let mut moments = Moments::zero(&monomials);
+            moments.add(&monomials, rows, variable, target);
+            let monomial = |place: usize, t: usize| -> f64 {
+                monomials.factors(place).iter().map(|factor| value(*factor, t)).product()
+            };
+            for one in 0..monomials.count() {
+                let direct: f64 = (0..rows).map(|t| monomial(one, t) * (t % 5) as f64).sum();
+                assert!((moments.cross[one] - direct).abs() < 1e-9 * rows as f64);
+                for other in 0..monomials.count() {
+                    let direct: f64 = (0..rows).map(|t| monomial(one, t) * monomial(other, t)).sum();
+                    let found = moments.gram(&monomials, one, other);
+                    assert!((found - direct).abs() < 1e-9 * rows as f64, "{one} {other}: {found} {direct}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn too_many_products_are_refused() {
+        assert!(Monomials::new(3, 0).is_err());
+        let error = Monomials::new(60, 5).unwrap_err().to_string();
+        assert!(error.contains("too many terms"), "{error}");
+    }
+}

@@ -1,0 +1,486 @@
+//! Fits of nonlinear ARX models.
+
+use std::collections::BTreeMap;
+
+use super::judge::judge;
+use super::schema::{Data, Estimation, Missing, Report};
+use super::shares::Shares;
+use crate::data::{Detrend, Log, Offset, Rows, Source, Split, digests};
+use crate::estimate::nonlinear_arx::{Candidates, Chosen, Count, Samples, Solved, centres};
+use crate::estimate::{Criteria, Procedure, TermsOutcome};
+use crate::model::{Map, NonlinearArxModel, Regressor, Signal};
+use crate::regression::Monomials;
+use crate::respond::Horizon;
+use crate::respond::nonlinear_arx::NonlinearArxOnLog;
+use crate::select::{Focus, Select};
+use crate::validate::Part;
+use crate::{Document, Error, Model};
+
+/// Below this fraction of a channel's size, what an offset leaves is rounding.
+const ROUNDING: f64 = 1e-13;
+/// Functions that a choice takes at most, unless it is said otherwise.
+const MOST: usize = 40;
+/// Samples that radial basis functions may stand at.
+const CANDIDATES: usize = 1000;
+/// Radial basis functions at most.
+const MOST_CENTRES: usize = 2000;
+
+/// Which lags of an input a nonlinear ARX model reads: `lags` of them from `delay` on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct InputLags {
+    /// How many.
+    pub lags: usize,
+    /// The shortest one; 0 where the input acts at once.
+    pub delay: usize,
+}
+
+/// The functions that a nonlinear ARX model is made of.
+#[derive(Debug, Clone, PartialEq)]
+pub enum MapPlan {
+    /// Products of regressors up to a degree, of which forward regression chooses.
+    Polynomial {
+        /// The largest number of factors.
+        degree: usize,
+    },
+    /// Radial basis functions.
+    Radial {
+        /// Where they stand.
+        centres: Centres,
+        /// sigma of all of them, in units of the scaled regressors; none: so wide that neighbours overlap.
+        width: Option<f64>,
+        /// Whether a constant and the regressors themselves are functions too.
+        linear: bool,
+    },
+}
+
+/// Where radial basis functions stand.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Centres {
+    /// At samples of the estimation rows, of which forward regression chooses.
+    Chosen,
+    /// At the means of so many clusters of the estimation rows.
+    Clusters {
+        /// How many.
+        count: usize,
+        /// Which random start.
+        seed: u64,
+    },
+    /// At a grid over the range of the estimation rows, so many in each direction.
+    Grid {
+        /// How many in each direction.
+        each: usize,
+    },
+    /// At so many pseudo-random points in that range.
+    Random {
+        /// How many.
+        count: usize,
+        /// Which points.
+        seed: u64,
+    },
+}
+
+/// What nonlinear ARX model to fit, and how.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NonlinearArxPlan {
+    /// The input channels.
+    pub inputs: Vec<String>,
+    /// The output channel.
+    pub output: String,
+    /// Rows to estimate on; none: all.
+    pub estimate: Vec<Rows>,
+    /// Rows to validate on.
+    pub validate: Vec<Rows>,
+    /// Cuts the rows to estimate on into parts: models are fitted to the first one and compared, the chosen one is fitted again to the
+    /// first two, and judged on the third.
+    pub split: Option<Split>,
+    /// What is taken from each channel.
+    pub detrend: Detrend,
+    /// Channels whose offset is set by hand.
+    pub offsets: Vec<(String, f64)>,
+    /// Past outputs that are read: y(k-1), …, y(k-n).
+    pub output_lags: usize,
+    /// What is read of each input.
+    pub input_lags: Vec<InputLags>,
+    /// The functions.
+    pub map: MapPlan,
+    /// How many functions are taken; none: `select` says it.
+    pub terms: Option<usize>,
+    /// How many functions a choice looks at.
+    pub most: usize,
+    /// What makes one number of functions better than another; none: the free run on the validation rows where there are some, else that
+    /// on five blocks of the estimation rows.
+    pub select: Option<Select>,
+    /// Keeps parameters small: weighs like so many more samples in which the output is 0.
+    pub ridge: f64,
+    /// Whether signals keep their own units: else each is divided by its standard deviation over the estimation rows.
+    pub raw_terms: bool,
+}
+
+impl NonlinearArxPlan {
+    /// All rows, means removed, products of at most two of two past outputs and two past values of each input; further settings as fields.
+    pub fn new(inputs: &[&str], output: &str) -> Self {
+        Self {
+            inputs: inputs.iter().map(|input| (*input).to_owned()).collect(),
+            output: output.to_owned(),
+            estimate: Vec::new(),
+            validate: Vec::new(),
+            split: None,
+            detrend: Detrend::Mean,
+            offsets: Vec::new(),
+            output_lags: 2,
+            input_lags: vec![InputLags { lags: 2, delay: 1 }; inputs.len()],
+            map: MapPlan::Polynomial { degree: 2 },
+            terms: None,
+            most: MOST,
+            select: None,
+            ridge: 0.0,
+            raw_terms: false,
+        }
+    }
+
+    /// Whether the plan makes sense, whatever the log.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] with the argument that does not.
+    pub fn check(&self) -> Result<(), Error> {
+        let names: Vec<&String> = self.inputs.iter().chain([&self.output]).collect();
+        for (position, name) in names.iter().enumerate() {
+            if names[..position].contains(name) {
+                return Err(Error::argument(
+                    "channels",
+                    format!("'{name}' is named twice; a channel has one role"),
+                ));
+            }
+        }
+        if let Some((name, _)) = self.offsets.iter().find(|(name, _)| !names.contains(&name)) {
+            return Err(Error::argument("offset", format!("'{name}' is neither an input nor the output")));
+        }
+        if self.input_lags.len() != self.inputs.len() {
+            return Err(Error::argument(
+                "nu",
+                format!(
+                    "there are lags of {} inputs, and {} inputs",
+                    self.input_lags.len(),
+                    self.inputs.len()
+                ),
+            ));
+        }
+        let longest = self.input_lags.iter().map(|input| input.lags.saturating_add(input.delay));
+        if longest.chain([self.output_lags]).any(|lag| lag > crate::model::LARGEST) {
+            return Err(Error::argument("ny", format!("lags above {} are not read", crate::model::LARGEST)));
+        }
+        if self.output_lags == 0 && self.input_lags.iter().all(|input| input.lags == 0) {
+            return Err(Error::argument(
+                "ny",
+                "the model reads nothing; give lags of the output or of an input",
+            ));
+        }
+        if self.terms == Some(0) || self.most == 0 {
+            return Err(Error::argument("terms", "a model has one function at least"));
+        }
+        if !(self.ridge.is_finite() && self.ridge >= 0.0) {
+            return Err(Error::argument("ridge", format!("{} is not a number from 0 on", self.ridge)));
+        }
+        if self.terms.is_some() && self.select.is_some() {
+            return Err(Error::argument("select", "the number of terms is given; leave out one of the two"));
+        }
+        Ok(())
+    }
+}
+
+/// Fits a nonlinear ARX model that is linear in its parameters,
+///
+/// ```text
+/// y(t) = sum_j theta_j f_j(z(t)) + e(t)
+/// ```
+///
+/// where z are lags of the output and of the inputs, each less its offset and divided by its scale, and f_j are functions of the plan's map
+/// that forward regression chooses: the one that explains most of what is left comes next (Chen, Billings and Luo, Int. J. Control 50,
+/// 1989). Products are chosen from moments, without a matrix of all of them, and the parameters come from a QR of the chosen ones; their
+/// covariance is that of a linear regression with white noise. How many are taken is what the free run says of rows that they were not
+/// fitted to, an information criterion, or given.
+///
+/// Cost: O(N C(n + 2 d, 2 d)) for products of degree d of n regressors, and O(M K^2) for K of M functions.
+///
+/// # Errors
+/// [`Error::Argument`] for a plan that makes no sense or rows that are not there; [`Error::Data`] for channels that are not there, an
+/// irregular clock, or sums that leave the range of numbers; [`Error::Undetermined`] if rows are too few, a channel is constant, or
+/// functions depend on one another.
+///
+/// ```
+/// use thetahat::{Channel, Log, NonlinearArxPlan, fit_nonlinear_arx};
+///
+/// // y(t) = 0.5 y(t-1) + u(t-1)^2, without noise.
+/// let u: Vec<f64> = (0..200).map(|t| f64::from(t * t % 13) / 6.0 - 1.0).collect();
+/// let mut y = vec![0.0];
+/// for t in 1..u.len() {
+///     y.push(0.5 * y[t - 1] + u[t - 1] * u[t - 1]);
+/// }
+/// let channel = |name: &str, values| Channel { name: name.into(), values };
+/// let log = Log::new(vec![channel("u", u), channel("y", y)], 1.0)?;
+/// let plan = NonlinearArxPlan { terms: Some(3), ..NonlinearArxPlan::new(&["u"], "y") };
+/// let report = fit_nonlinear_arx(&log, &[], &plan)?;
+/// assert!(report.fit.iter().all(|fit| fit.percent.is_some_and(|percent| percent > 99.99)));
+/// # Ok::<(), thetahat::Error>(())
+/// ```
+pub fn fit_nonlinear_arx(log: &Log, sources: &[Source], plan: &NonlinearArxPlan) -> Result<Report, Error> {
+    plan.check()?;
+    let names: Vec<&str> = plan.inputs.iter().chain([&plan.output]).map(String::as_str).collect();
+    names.iter().try_for_each(|name| log.channel(name).map(|_| ()))?;
+    let Shares { estimation, validation, parts } =
+        Shares::of(&plan.estimate, &plan.validate, plan.split, log.rows())?;
+    let compared_on = parts.as_ref().map_or_else(|| validation.clone(), |parts| parts.validation.clone());
+    if plan.select == Some(Select::Validation) && compared_on.is_empty() {
+        return Err(Error::argument("select", "validation needs rows for it; give `validate` or `split`"));
+    }
+    let (signals, deviations) = deviations(log, plan, &names, &estimation)?;
+    let head = head(log, plan, &signals, &deviations, &estimation)?;
+    let samples = |rows: &[Rows]| -> Result<Samples<'_>, Error> {
+        let record = deviations.record(&plan.inputs, &plan.output, rows)?;
+        let segments: Vec<_> = record.segments.into_iter().zip(record.past).collect();
+        Samples::new(&deviations, head.clone(), &segments, plan.ridge)
+    };
+    let all = samples(&estimation)?;
+    let candidates = candidates(&plan.map, &all)?;
+    let select = plan.select.unwrap_or(if compared_on.is_empty() { Select::Cv } else { Select::Validation });
+    let (count, selected_by) = match (plan.terms, select) {
+        (Some(count), _) => (Count::Given(count), "given".to_owned()),
+        (None, Select::Criterion(criterion)) => (Count::Least(criterion), criterion.word().to_owned()),
+        (None, Select::Validation) => (Count::HeldOut(compared_on), "validation".to_owned()),
+        (None, Select::Cv) => (Count::Blocks, "cv".to_owned()),
+    };
+    // With a split the choice looks at models of the first part, and the chosen one is fitted to both.
+    let first_part = match (&parts, &count) {
+        (Some(parts), Count::HeldOut(_)) => Some(samples(&parts.estimation)?),
+        _ => None,
+    };
+    let most = plan.terms.unwrap_or(plan.most);
+    let Chosen { map, steps } = all.choose(&candidates, &[], most, &count, first_part.as_ref())?;
+    let Solved { model, mse, condition } = all.solve(map)?;
+
+    let missing = names.iter().map(|name| {
+        let values = &log.channel(name)?.values;
+        Ok(Missing {
+            channel: (*name).to_owned(),
+            rows: values.iter().filter(|value| value.is_nan()).count(),
+        })
+    });
+    let segments = deviations.segments(&names, &estimation)?;
+    let data = Data {
+        logs: sources.to_vec(),
+        digests: digests(log, &names, &estimation)?,
+        rows: log.rows(),
+        sample_time: log.sample_time(),
+        detrend: plan.detrend.to_string(),
+        prefilter: None,
+        validation,
+        split: parts,
+        segments: segments.iter().map(Rows::from_positions).collect(),
+        missing: missing.collect::<Result<_, Error>>()?,
+        time_gaps: log.jumps(),
+        estimation,
+    };
+    let estimation = Estimation {
+        procedure: Procedure::ForwardRegression(TermsOutcome {
+            candidates: candidates.count(all.regressors()),
+            selected_by,
+            ridge: Some(plan.ridge).filter(|ridge| *ridge > 0.0),
+            path: steps,
+        }),
+        initial: None,
+        level: None,
+        slope: None,
+        samples: all.count(),
+        mse,
+        criteria: Criteria::new(mse, model.parameters.len(), all.count()),
+        condition,
+    };
+    let mut report = Report {
+        schema: Report::SCHEMA.to_owned(),
+        generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
+        data,
+        selection: None,
+        model: Model::from(model.clone()),
+        estimation,
+        fit: Vec::new(),
+        warnings: Vec::new(),
+    };
+    let on_log = |rows: &[Rows]| NonlinearArxOnLog::new(&model, &deviations, rows);
+    let own = on_log(&report.data.estimation)?;
+    judge(&mut report, &own, Part::Estimation, Focus::Auto);
+    for (part, rows) in report.data.held_out() {
+        judge(&mut report, &on_log(&rows)?, part, Focus::Auto);
+    }
+    report.warnings.extend(warnings(&report, &model));
+    Ok(report)
+}
+
+/// The functions to choose from.
+fn candidates(map: &MapPlan, samples: &Samples<'_>) -> Result<Candidates, Error> {
+    let (centres, width, linear) = match map {
+        MapPlan::Polynomial { degree } => {
+            return Ok(Candidates::Products(Monomials::new(samples.regressors(), *degree)?));
+        }
+        MapPlan::Radial { centres, width, linear } => (*centres, *width, *linear),
+    };
+    if let Some(width) = width.filter(|width| !(width.is_finite() && *width > 0.0)) {
+        return Err(Error::argument("width", format!("{width} is not a positive number")));
+    }
+    let points = samples.points();
+    let (many, wanted) = match centres {
+        Centres::Chosen => (CANDIDATES, CANDIDATES),
+        Centres::Clusters { count, .. } | Centres::Random { count, .. } => {
+            (points.len().min(MOST_CENTRES), count)
+        }
+        Centres::Grid { each } => {
+            let wanted = (0..samples.regressors()).try_fold(1_usize, |count, _| count.checked_mul(each));
+            (MOST_CENTRES, wanted.unwrap_or(usize::MAX))
+        }
+    };
+    if wanted == 0 || wanted > many {
+        return Err(Error::argument(
+            "centres",
+            format!("there would be {wanted} centres, for {} samples; give from 1 to {many}", points.len()),
+        ));
+    }
+    if points.is_empty() {
+        return Err(Error::undetermined(
+            Vec::new(),
+            "no estimation row has all regressors; name more rows, or fewer lags",
+        ));
+    }
+    let at = match centres {
+        Centres::Chosen => centres::spread(&points, CANDIDATES),
+        Centres::Clusters { count, seed } => centres::clusters(&points, count, seed),
+        Centres::Grid { each } => centres::grid(&points, each),
+        Centres::Random { count, seed } => centres::random(&points, count, seed),
+    };
+    let chosen = centres == Centres::Chosen;
+    let map = centres::map(at, width, &points, chosen, linear);
+    let path = if linear { samples.regressors() + 1 } else { 0 };
+    let always = if chosen { path } else { map.parameters(samples.regressors()) };
+    Ok(Candidates::Functions { map, always })
+}
+
+/// The offsets of the channels, and the log without them.
+fn deviations(
+    log: &Log,
+    plan: &NonlinearArxPlan,
+    names: &[&str],
+    estimation: &[Rows],
+) -> Result<(BTreeMap<String, Signal>, Log), Error> {
+    let segments = log.segments(names, estimation)?;
+    if segments.is_empty() {
+        return Err(Error::data(
+            "no estimation row has a value in every channel; name other rows or channels",
+        ));
+    }
+    let mut signals = BTreeMap::new();
+    for name in names {
+        let by_hand = plan.offsets.iter().find(|(channel, _)| channel == name);
+        let offset = match by_hand {
+            Some(&(_, level)) => Offset { level, slope: 0.0 },
+            None => Offset::estimate(plan.detrend, log, name, &segments)?,
+        };
+        signals.insert((*name).to_owned(), Signal { name: (*name).to_owned(), offset });
+    }
+    let deviations = log.deviations(names.iter().map(|name| (*name, signals[*name].offset)))?;
+    Ok((signals, deviations))
+}
+
+/// The model but its functions: signals, regressors and scales.
+fn head(
+    log: &Log,
+    plan: &NonlinearArxPlan,
+    signals: &BTreeMap<String, Signal>,
+    deviations: &Log,
+    estimation: &[Rows],
+) -> Result<NonlinearArxModel, Error> {
+    let names: Vec<&str> = signals.keys().map(String::as_str).collect();
+    let segments = deviations.segments(&names, estimation)?;
+    // The standard deviation over the estimation rows; 1 in the signals' own units.
+    let scale = |name: &str| -> Result<f64, Error> {
+        let (own, raw) = (&deviations.channel(name)?.values, &log.channel(name)?.values);
+        let values =
+            |of: &'_ [f64]| segments.iter().flat_map(|rows| of[rows.clone()].to_vec()).collect::<Vec<f64>>();
+        let (values, size) =
+            (values(own), values(raw).iter().fold(0.0_f64, |size, value| size.max(value.abs())));
+        let mean = crate::regression::sum(values.iter().copied()) / values.len() as f64;
+        let variance =
+            crate::regression::sum(values.iter().map(|value| (value - mean).powi(2))) / values.len() as f64;
+        let spread = variance.sqrt();
+        if !(spread > ROUNDING * size) {
+            let role = if name == plan.output { "output" } else { "input" };
+            return Err(Error::undetermined(
+                Vec::new(),
+                format!(
+                    "{role} '{name}' is constant over the estimation rows: it can determine nothing; name rows in which it changes{}",
+                    if role == "input" { ", or leave it out" } else { "" }
+                ),
+            ));
+        }
+        Ok(if plan.raw_terms { 1.0 } else { spread })
+    };
+    let output_scale = scale(&plan.output)?;
+    let regressor = |channel: &str, lag: usize, scale: f64| Regressor {
+        channel: channel.to_owned(),
+        lag,
+        scale,
+        range: [0.0; 2],
+    };
+    let mut regressors: Vec<Regressor> =
+        (1..=plan.output_lags).map(|lag| regressor(&plan.output, lag, output_scale)).collect();
+    for (input, lags) in plan.inputs.iter().zip(&plan.input_lags) {
+        let scale = scale(input)?;
+        regressors.extend((lags.delay..lags.delay + lags.lags).map(|lag| regressor(input, lag, scale)));
+    }
+    Ok(NonlinearArxModel {
+        sample_time: log.sample_time(),
+        inputs: plan.inputs.iter().map(|input| signals[input].clone()).collect(),
+        output: signals[&plan.output].clone(),
+        regressors,
+        output_scale,
+        output_range: [0.0; 2],
+        map: Map::Polynomial { terms: Vec::new() },
+        noise_variance: 0.0,
+        degrees_of_freedom: None,
+        parameters: Vec::new(),
+        covariance: None,
+    })
+}
+
+/// What a careful reader should know.
+fn warnings(report: &Report, model: &NonlinearArxModel) -> Vec<String> {
+    let mut warnings = Vec::new();
+    let Procedure::ForwardRegression(outcome) = &report.estimation.procedure else { return warnings };
+    let taken = &outcome.path[..model.parameters.len().min(outcome.path.len())];
+    if let Some(step) = taken.last().filter(|step| !step.free_run.in_range) {
+        let what = if step.free_run.rmse.is_some() {
+            "leaves 1.1 times the range of the output"
+        } else {
+            "grows without bound"
+        };
+        warnings.push(format!("the free run on the estimation rows {what}: do not simulate with this model before you have looked at it"));
+    }
+    let aliases: Vec<&str> = taken.iter().flat_map(|step| &step.aliases).map(String::as_str).collect();
+    if let Some(first) = aliases.first() {
+        let others =
+            if aliases.len() > 1 { format!(" and {} more", aliases.len() - 1) } else { String::new() };
+        warnings.push(format!(
+            "{first}{others} cannot be told from sums of the chosen terms on the estimation rows, as where an input has few levels"
+        ));
+    }
+    for fit in &report.fit {
+        if let (Some(outside), Some(part), Horizon::FreeRun) = (fit.outside, fit.part, fit.horizon)
+            && outside > 0.1
+            && part != Part::Estimation
+        {
+            let name = if part == Part::Test { "test" } else { "validation" };
+            warnings.push(format!(
+                "in {:.0} % of the {name} rows the free run reads values outside of those of the estimation rows: the model extrapolates",
+                100.0 * outside
+            ));
+        }
+    }
+    warnings
+}

@@ -5,12 +5,14 @@ use std::ffi::OsString;
 use std::path::Path;
 
 use clap::Args;
-use thetahat::{EquationsPlan, Inspection, Log, Plan, Report, Requirement, Source, ValidationPlan};
+use thetahat::{
+    EquationsPlan, Inspection, Log, NonlinearArxPlan, Plan, Report, Requirement, Source, ValidationPlan,
+};
 
-use crate::args::{InspectArguments, ValidateArguments};
+use crate::args::{FitArguments, InspectArguments, ValidateArguments};
 use crate::commands::{Experiments, Tracking, experiments, inspected};
 use crate::failure::Failure;
-use crate::job::{FitJob, GreyJob, InspectJob, LookJob};
+use crate::job::{FitJob, GreyJob, InspectJob, LookJob, NarxJob};
 use crate::replace::replace;
 
 /// Logs that were read as one.
@@ -63,6 +65,23 @@ pub fn equations_plan(options: &[OsString]) -> Result<EquationsPlan, Failure> {
     let log = OsString::from("log");
     let words: Vec<OsString> = options.iter().cloned().chain([log]).collect();
     Ok(GreyJob::resolve(&arguments("fit", &words)?, Path::new("model"))?.plan)
+}
+
+/// The plan that `thetahat fit --narx` makes of these options for a log with these channels.
+///
+/// # Errors
+/// A [`Failure`] as the program would report it.
+pub fn narx_plan(
+    options: &[OsString],
+    inputs: Vec<String>,
+    output: String,
+) -> Result<NonlinearArxPlan, Failure> {
+    let log = OsString::from("log");
+    let words: Vec<OsString> = options.iter().cloned().chain([log]).collect();
+    let arguments: FitArguments = arguments("fit", &words)?;
+    let map = arguments.narx.narx.ok_or_else(|| Failure::usage("--narx: name the functions, poly or rbf"))?;
+    let job = NarxJob::resolve(&arguments, map)?;
+    job.plan(if job.driven { inputs } else { Vec::new() }, output)
 }
 
 /// How `thetahat validate` looks at a log with these options, and what it requires.

@@ -26,6 +26,7 @@ mod inspect;
 mod interrupt;
 mod likelihood;
 mod names;
+mod nonlinear_arx;
 mod output_files;
 mod pages;
 mod predict_simulate;

@@ -39,6 +39,7 @@ fn _thetahat(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(track::policy, module)?)?;
     module.add_function(wrap_pyfunction!(model::fit, module)?)?;
     module.add_function(wrap_pyfunction!(model::fit_equations, module)?)?;
+    module.add_function(wrap_pyfunction!(model::fit_narx, module)?)?;
     module.add_function(wrap_pyfunction!(judgement::validate, module)?)?;
     module.add_function(wrap_pyfunction!(judgement::compare, module)?)?;
     module.add_function(wrap_pyfunction!(judgement::inspect, module)?)?;

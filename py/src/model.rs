@@ -70,6 +70,17 @@ pub(crate) fn fit_equations(
     Ok(Model::of(report))
 }
 
+/// Fits a nonlinear ARX model to a log with the options of `thetahat fit --narx`.
+#[pyfunction]
+pub(crate) fn fit_narx(py: Python<'_>, log: &Bound<'_, Log>, options: Vec<OsString>) -> PyResult<Model> {
+    let log = log.get();
+    let plan = thetahat_cli::narx_plan(&options, log.inputs.clone(), log.output()?.clone())
+        .map_err(|failure| error::program(py, &failure))?;
+    let (channels, sources) = (Arc::clone(&log.log), log.sources.clone());
+    let report = interruptible(py, move |_| thetahat::fit_nonlinear_arx(&channels, &sources, &plan))?;
+    Ok(Model::of(report))
+}
+
 #[pymethods]
 impl Model {
     /// Reads the document back.

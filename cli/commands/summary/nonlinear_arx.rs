@@ -30,7 +30,7 @@ pub(super) fn table(report: &Report, model: &NonlinearArxModel, width: usize) ->
             number(parameter.value),
             or_dash(parameter.standard_error, error),
             or_dash(step, |step| scientific(step.error_reduction, 3)),
-            run(|step| step.free_run.rmse),
+            run(|step| step.free_run.and_then(|run| run.rmse)),
         ];
         cells.extend(held_out.then(|| run(|step| step.held_out.and_then(|run| run.rmse))));
         parameters.row(cells);

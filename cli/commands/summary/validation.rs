@@ -296,6 +296,17 @@ fn residuals_of(text: &mut Text, found: &Validation, residuals: &Residuals, alph
         );
         add(format!("no feedback to {input}"), feedback, ["none seen", "suspected"][usize::from(*suspected)]);
     }
+    // Of a linear model only where there is something to see.
+    let says = |test: &Test| found.structure.is_none() || rejected(test);
+    for one in found.nonlinear.iter().filter(|one| one.output == residuals.output) {
+        let input = harmless(&one.input);
+        for (what, test) in [("errors", &one.errors), ("squared errors", &one.squares)] {
+            if says(test) {
+                let verdict = ["none seen", "nonlinear"][usize::from(rejected(test))];
+                add(format!("no {input}^2 in {what}"), test, verdict);
+            }
+        }
+    }
     text.table(table);
     let anderson = &residuals.anderson;
     let head = ["Anderson: alpha", "outside", "of", "fraction", "p-value (mid)", &level];

@@ -96,4 +96,4 @@ pub use track::{
     Beginning, PerChannel, Policy, TrackMethod, TrackPlan, TrackScore, TrackSummary, Tracked, Tracker,
     TrackerSummary, change_detector,
 };
-pub use validate::{Anderson, AndersonLevel, Fit, Independence, Part, Residuals, Test};
+pub use validate::{Anderson, AndersonLevel, Fit, Independence, Nonlinearity, Part, Residuals, Test};

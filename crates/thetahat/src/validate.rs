@@ -4,6 +4,7 @@ pub(crate) mod feedback;
 mod fit;
 mod independence;
 mod moments;
+mod nonlinear;
 mod residuals;
 #[cfg(test)]
 mod tests;
@@ -11,6 +12,8 @@ mod verdict;
 mod whiteness;
 
 pub use fit::{Fit, Part};
+pub use nonlinear::Nonlinearity;
+pub(crate) use nonlinear::nonlinearities;
 pub(crate) use residuals::Relation;
 pub use residuals::Residuals;
 pub use verdict::{Anderson, AndersonLevel, Independence, Test};

@@ -1,7 +1,7 @@
 """System identification: models of dynamic systems from logged data.
 
 A log holds measured signals (`Log`, `read_csv`). A fit makes a model of it (`arx`, `armax`, `oe`, `bj`, `ar`, `arma`, `general`,
-`iv`, `sriv`), `search` chooses one, `grey` finds the parameters of a model in equations (`GreyBox`), `inspect` looks at a log before. A `Model` predicts, simulates, forecasts and is validated.
+`iv`, `sriv`), `search` chooses one, `grey` finds the parameters of a model in equations (`GreyBox`), `narx` fits nonlinear ARX models, `inspect` looks at a log before. A `Model` predicts, simulates, forecasts and is validated.
 `thetahat.plot` draws, and `thetahat.sklearn` fits into scikit-learn.
 
 Whatever takes numbers takes arrays of NumPy, lists and tuples, and the series and frames of pandas, Polars and PyArrow; of one
@@ -24,7 +24,8 @@ from thetahat._grey_box import GreyBox, grey
 from thetahat._judgement import Comparison, Inspection, Validation, compare, inspect
 from thetahat._log import Log, dc_motor, read_csv
 from thetahat._model import Model
-from thetahat._options import EquationsOptions, FitOptions, ReadOptions, ValidationOptions
+from thetahat._narx import narx
+from thetahat._options import EquationsOptions, FitOptions, NarxOptions, ReadOptions, ValidationOptions
 from thetahat._responses import Forecast, FrequencyResponse, StateSpace, TransientResponse
 from thetahat._thetahat import (
     Alarm,
@@ -75,6 +76,7 @@ __all__ = [
     "Log",
     "LuenbergerObserver",
     "Model",
+    "NarxOptions",
     "NonlinearObservation",
     "NonlinearTransition",
     "ObserverTrajectory",
@@ -108,6 +110,7 @@ __all__ = [
     "grey",
     "inspect",
     "iv",
+    "narx",
     "oe",
     "read_csv",
     "search",

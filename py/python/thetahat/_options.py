@@ -158,6 +158,51 @@ class EquationsOptions(TypedDict, total=False):
     time_limit: float
 
 
+class NarxOptions(TypedDict, total=False):
+    """What a fit of a nonlinear ARX model can be told.
+
+    Attributes
+    ----------
+    estimate, validate, split, detrend, offset, ridge
+        What to fit to, what to judge on and what is taken from the channels, see `FitOptions`.
+    degree : int
+        Factors of a product at most, for ``"poly"``: 2.
+    terms : int
+        How many functions to take; chosen unless it is said.
+    most_terms : int
+        How many functions a choice looks at: 40.
+    select : str
+        What makes one number of functions better than another: ``"validation"``, the free run on the validation rows, where there are
+        some, else ``"cv"``, that on five blocks of the estimation rows; or an information criterion, such as ``"mdl"``.
+    centres : str
+        Where radial basis functions stand: ``"chosen"`` among the samples, ``"kmeans:N"``, ``"grid:N"`` or ``"random:N"``.
+    width : float
+        sigma of exp(-|z - centre|^2/sigma^2), z in standard deviations; so that neighbours overlap, unless it is said.
+    linear : bool
+        Whether a constant and the regressors themselves stand beside radial basis functions: True.
+    raw_terms : bool
+        Leave signals in their own units: else each is divided by its standard deviation.
+    seed : int
+        Which random centres.
+    """
+
+    estimate: Rows
+    validate: Rows
+    split: tuple[float, float, float]
+    detrend: str
+    offset: Mapping[str, float]
+    ridge: float
+    degree: int
+    terms: int
+    most_terms: int
+    select: str
+    centres: str
+    width: float
+    linear: bool
+    raw_terms: bool
+    seed: int
+
+
 class ValidationOptions(TypedDict, total=False):
     """How to validate a model on a log.
 
@@ -243,7 +288,9 @@ def words(allowed: type, arguments: Mapping[str, Any], rows: int | None = None) 
         if name == "header":
             # The command line says it the other way round.
             found += [] if _flag(name, value) else ["--no-header"]
-        elif name in ("decimal_comma", "trend"):
+        elif name == "linear":
+            found += [] if _flag(name, value) else ["--no-linear"]
+        elif name in ("decimal_comma", "trend", "raw_terms"):
             found += [f"--{name.replace('_', '-')}"] if _flag(name, value) else []
         else:
             found += [f"--{name.replace('_', '-')}={text}" for text in _texts(name, value, rows)]

@@ -51,8 +51,9 @@ pub struct TermStep {
     pub aliases: Vec<String>,
     /// The root mean square of the errors one step ahead on the estimation rows, in units of the output.
     pub rmse: f64,
-    /// The free run on the estimation rows.
-    pub free_run: RunFigures,
+    /// The free run on the estimation rows; none of a step after which functions that are always there are still to come.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub free_run: Option<RunFigures>,
     /// The free run on the rows that the choice looked at, where there are some; one step ahead where there are no inputs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub held_out: Option<RunFigures>,
@@ -93,7 +94,8 @@ fn run(model: &NonlinearArxModel, log: &Log, rows: &[Rows]) -> Result<Sums, Erro
             let (said, error) = (response.values[t], (measured[t] - response.values[t]).abs());
             sums.count += 1;
             sums.squares += error * error;
-            sums.largest = if error <= sums.largest { sums.largest } else { error };
+            // One that is not a number stays one.
+            sums.largest = if error > sums.largest || error.is_nan() { error } else { sums.largest };
             sums.strays |= !((said - middle).abs() <= half);
         }
     }
@@ -113,7 +115,8 @@ impl Sums {
     fn add(&mut self, other: Self) {
         self.count += other.count;
         self.squares += other.squares;
-        self.largest = if other.largest <= self.largest { self.largest } else { other.largest };
+        let largest = other.largest;
+        self.largest = if largest > self.largest || largest.is_nan() { largest } else { self.largest };
         self.strays |= other.strays;
     }
 
@@ -414,9 +417,12 @@ impl<'l> Samples<'l> {
     ) -> Result<Chosen, Error> {
         let always = if let Candidates::Functions { always, .. } = candidates { *always } else { 0 };
         let most = most.max(always).min(self.rows.len().saturating_sub(1));
-        let names = |places: &[usize]| {
-            let regressors: Vec<String> = self.head.regressors.iter().map(|one| one.name()).collect();
-            candidates.map(places).names(&regressors)
+        let regressors: Vec<String> = self.head.regressors.iter().map(|one| one.name()).collect();
+        let name = |place: usize| match candidates {
+            Candidates::Products(_) => candidates.map(&[place]).names(&regressors).pop().unwrap_or_default(),
+            Candidates::Functions { map, .. } => {
+                map.names(&regressors).get(place).cloned().unwrap_or_default()
+            }
         };
         let first: Vec<usize> = if always > 0 { (0..always).collect() } else { first.to_vec() };
         let mut blocks = Vec::new();
@@ -444,6 +450,16 @@ impl<'l> Samples<'l> {
             return Err(Error::undetermined(
                 Vec::new(),
                 "no function explains anything of the output on the estimation rows; name rows in which it changes, or other lags",
+            ));
+        }
+        if path.places(always) != first[..always.min(first.len())] {
+            let missing = first.iter().take(always).find(|place| !path.places(always).contains(place));
+            let name = missing.map_or_else(String::new, |place| name(*place));
+            return Err(Error::undetermined(
+                vec![name.clone()],
+                format!(
+                    "{name} is a sum of the other functions on the estimation rows; take other lags, other centres or other rows"
+                ),
             ));
         }
         // What held-out rows say of each length of the path.
@@ -475,19 +491,14 @@ impl<'l> Samples<'l> {
         let rows = as_rows(&self.rows);
         let mut steps = Vec::new();
         for (at, chosen) in path.chosen.iter().enumerate() {
-            let name = |place: usize| match candidates {
-                Candidates::Products(_) => names(&[place]).pop().unwrap_or_default(),
-                Candidates::Functions { map, .. } => {
-                    let regressors: Vec<String> = self.head.regressors.iter().map(|one| one.name()).collect();
-                    map.names(&regressors).get(place).cloned().unwrap_or_default()
-                }
-            };
             steps.push(TermStep {
                 term: name(chosen.place),
                 error_reduction: chosen.reduction,
                 aliases: chosen.aliases.iter().map(|place| name(*place)).collect(),
                 rmse: (path.left(at + 1).max(0.0) * variance).sqrt(),
-                free_run: RunFigures::of(&self.on_path(candidates, &path, at + 1), self.log, &rows)?,
+                free_run: (at + 1 >= always)
+                    .then(|| RunFigures::of(&self.on_path(candidates, &path, at + 1), self.log, &rows))
+                    .transpose()?,
                 held_out: held_out[at],
             });
         }
@@ -535,7 +546,8 @@ impl<'l> Samples<'l> {
             let path = self.path(candidates, &products, first, lengths);
             let rows = as_rows(rows);
             for (at, sum) in sums.iter_mut().enumerate() {
-                let own = (at < path.chosen.len()).then(|| self.on_path(candidates, &path, at + 1));
+                let own = (at < path.chosen.len() && at + 1 >= first.len().min(lengths))
+                    .then(|| self.on_path(candidates, &path, at + 1));
                 *sum = match (sum.take(), own) {
                     (Some(mut sum), Some(model)) => {
                         sum.add(run(&model, self.log, &rows)?);

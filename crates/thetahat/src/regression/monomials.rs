@@ -21,6 +21,8 @@ use crate::Error;
 
 /// Rows of which the monomials are in memory at once.
 const ROWS: usize = 512;
+/// A higher degree was mistyped.
+const MOST_FACTORS: usize = 12;
 /// Moments at most: 512 MB.
 const MOST_MOMENTS: usize = 64_000_000;
 
@@ -45,6 +47,12 @@ impl Monomials {
     pub(crate) fn new(variables: usize, degree: usize) -> Result<Self, Error> {
         if degree == 0 {
             return Err(Error::argument("degree", "a polynomial of degree 0 is a constant; give 1 or more"));
+        }
+        if degree > MOST_FACTORS {
+            return Err(Error::argument(
+                "degree",
+                format!("{degree} is above {MOST_FACTORS}, the highest degree"),
+            ));
         }
         let moments = combinations(variables + 2 * degree, 2 * degree);
         if moments.is_none_or(|moments| moments > MOST_MOMENTS) || variables >= usize::from(u16::MAX) {

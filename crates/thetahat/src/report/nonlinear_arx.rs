@@ -454,8 +454,8 @@ fn warnings(report: &Report, model: &NonlinearArxModel) -> Vec<String> {
     let mut warnings = Vec::new();
     let Procedure::ForwardRegression(outcome) = &report.estimation.procedure else { return warnings };
     let taken = &outcome.path[..model.parameters.len().min(outcome.path.len())];
-    if let Some(step) = taken.last().filter(|step| !step.free_run.in_range) {
-        let what = if step.free_run.rmse.is_some() {
+    if let Some(run) = taken.last().and_then(|step| step.free_run).filter(|run| !run.in_range) {
+        let what = if run.rmse.is_some() {
             "leaves 1.1 times the range of the output"
         } else {
             "grows without bound"
@@ -484,3 +484,6 @@ fn warnings(report: &Report, model: &NonlinearArxModel) -> Vec<String> {
     }
     warnings
 }
+
+#[cfg(test)]
+mod tests;

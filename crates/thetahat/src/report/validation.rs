@@ -12,7 +12,7 @@ use crate::estimate::Criteria;
 use crate::figures::{chance, fixed, number};
 use crate::regression::sum;
 use crate::respond::{Horizon, Innovations, OnLog, Response, Tested, check_steps};
-use crate::validate::{Fit, Relation, Residuals};
+use crate::validate::{Fit, Nonlinearity, Relation, Residuals, nonlinearities};
 use crate::{Document, Error, Model, Orders, Procedure, Structure};
 
 const GENERATOR: &str = concat!("thetahat ", env!("CARGO_PKG_VERSION"));
@@ -71,6 +71,9 @@ pub struct Validation {
     /// What is left of each output; not of one of which too few samples count. Models in equations expect errors of another size in each
     /// row: of theirs each is divided by its standard deviation.
     pub residuals: Vec<Residuals>,
+    /// Whether the errors one step ahead hold squares of an input, for each output and each input whose square is not constant.
+    #[serde(default)]
+    pub nonlinear: Vec<Nonlinearity>,
     /// What a careful reader should know, in plain words.
     pub warnings: Vec<String>,
 }
@@ -315,6 +318,7 @@ pub fn validate(
         noise: Vec::new(),
         coverage: Vec::new(),
         residuals: Vec::new(),
+        nonlinear: Vec::new(),
         warnings: Vec::new(),
         rows,
     };
@@ -489,6 +493,8 @@ fn test_residuals(report: &Report, on_log: &dyn OnLog, plan: &ValidationPlan, va
         match Residuals::of(model, record, innovations, relation, plan.lags, &alphas, plan.alpha) {
             Ok(residuals) => {
                 validation.residuals.push(residuals);
+                let inputs: Vec<&str> = model.inputs.iter().map(|input| input.name.as_str()).collect();
+                validation.nonlinear.extend(nonlinearities(&model.output.name, &inputs, record, innovations));
                 validation.warnings.extend(off_center(innovations));
             }
             Err(why) => validation.warnings.push(format!(
@@ -573,6 +579,18 @@ fn warn(plan: &ValidationPlan, validation: &mut Validation) {
                     "input '{input}' follows past residuals{of}: feedback from the output to the input is suspected"
                 ));
             }
+        }
+    }
+    // Of a linear model it is no fault, and the table says it.
+    let is_nonlinear = validation.structure.is_none();
+    for found in validation.nonlinear.iter().filter(|_| is_nonlinear) {
+        let of = of(&found.output);
+        if let Some(p) = found.errors.p_value.filter(|p| *p < plan.alpha) {
+            words.push(format!(
+                "the residuals{of} hold squares of input '{}' (p-value {}): the model lacks nonlinear terms",
+                found.input,
+                chance(p)
+            ));
         }
     }
     validation.warnings.extend(words);

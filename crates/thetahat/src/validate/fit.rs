@@ -79,7 +79,9 @@ impl Fit {
             rmse,
             mean_absolute_error: known(sum(errors()) / samples as f64),
             // One that is not a number stays one.
-            largest_error: known(errors().fold(0.0, |largest, e| if e <= largest { largest } else { e })),
+            largest_error: known(
+                errors().fold(0.0_f64, |largest, e| if e > largest || e.is_nan() { e } else { largest }),
+            ),
             outside: None,
         }
     }

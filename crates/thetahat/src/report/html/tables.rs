@@ -64,7 +64,7 @@ pub(super) fn path(outcome: &TermsOutcome, taken: usize) -> Table {
             step.term.clone(),
             scientific(step.error_reduction, 3),
             number(step.rmse),
-            or_dash(step.free_run.rmse, number),
+            or_dash(step.free_run.and_then(|run| run.rmse), number),
             or_dash(step.held_out.and_then(|run| run.rmse), number),
             step.aliases.join(", "),
         ]);
@@ -282,6 +282,10 @@ pub(super) fn tests(who: &str, parts: &[(String, &Validation)]) -> Table {
         for independence in &residuals.independence {
             add(format!("independent of past {}", independence.input), &independence.past);
             add(format!("no feedback to {}", independence.input), &independence.feedback);
+        }
+        for one in validation.nonlinear.iter().filter(|one| one.output == residuals.output) {
+            add(format!("no {}² in errors", one.input), &one.errors);
+            add(format!("no {}² in squared errors", one.input), &one.squares);
         }
     }
     table

@@ -20,7 +20,7 @@ pub(crate) fn complexity(outcome: &TermsOutcome) -> Drawn {
             .then(|| line(name, Curve { x, y: rounded(&y) }, position).with("mode", "lines+markers"))
     };
     let of = |figure: fn(&RunFigures) -> Option<f64>| -> Vec<Option<f64>> {
-        outcome.path.iter().map(|step| figure(&step.free_run)).collect()
+        outcome.path.iter().map(|step| step.free_run.as_ref().and_then(figure)).collect()
     };
     let held_out = |figure: fn(&RunFigures) -> Option<f64>| -> Vec<Option<f64>> {
         outcome.path.iter().map(|step| step.held_out.as_ref().and_then(figure)).collect()

@@ -1,0 +1,99 @@
+"""Nonlinear ARX models."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from typing import Union
+
+from thetahat import _options, _thetahat
+from thetahat._fit import EstimationWarning
+from thetahat._log import Log, handle
+from thetahat._model import Model
+from thetahat._options import NarxOptions, Rows
+
+Lags = Union[int, Sequence[int]]
+"""A number for all inputs, or one for each."""
+
+
+def narx(
+    log: Log,
+    map: str = "poly",
+    *,
+    ny: int = 2,
+    nu: Lags = 2,
+    nk: Lags = 1,
+    degree: int | None = None,
+    terms: int | None = None,
+    most_terms: int | None = None,
+    centres: str | None = None,
+    width: float | None = None,
+    linear: bool | None = None,
+    select: str | None = None,
+    ridge: float | None = None,
+    raw_terms: bool | None = None,
+    seed: int | None = None,
+    estimate: Rows | None = None,
+    validate: Rows | None = None,
+    split: tuple[float, float, float] | None = None,
+    detrend: str | None = None,
+    offset: Mapping[str, float] | None = None,
+) -> Model:
+    """Fit a nonlinear ARX model, y(k) = g(past outputs and inputs) + e(k), with a g that is linear in its parameters.
+
+    Its functions are chosen one by one: that which explains most of what is left comes next.
+
+    Parameters
+    ----------
+    log : Log
+        The data.
+    map : {"poly", "rbf"}
+        Products of the regressors, or radial basis functions.
+    ny : int
+        Past outputs that g reads: y(k-1), ..., y(k-ny).
+    nu : int, or one for each input
+        Values of the input that g reads, from ``nk`` on; 0 for a time series.
+    nk : int, or one for each input
+        Samples from input to first effect; 0 where it acts at once.
+    degree, terms, most_terms, centres, width, linear, select, ridge, raw_terms, seed, estimate, validate, split, detrend, offset
+        Which functions, what to fit to and how, see `thetahat.NarxOptions`.
+
+    Returns
+    -------
+    Model
+        Its `Model.kind` is ``"nonlinear-arx"``.
+
+    Raises
+    ------
+    EstimationError
+        If the data cannot determine the parameters, which are named.
+    ValueError
+        If an argument does not make sense, or no row to fit to has a value in every channel.
+
+    Warns
+    -----
+    EstimationWarning
+        For what a careful reader of the model should know.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import thetahat as th
+    >>> u = np.random.default_rng(0).uniform(-1, 1, 400)
+    >>> y = np.zeros(400)
+    >>> for k in range(1, 400):
+    ...     y[k] = 0.5 * y[k - 1] + u[k - 1] + 0.4 * u[k - 1] ** 2
+    >>> log = th.Log(y, u, sample_time=1)
+    >>> model = th.narx(log, terms=3, detrend="none", raw_terms=True)
+    >>> sorted(model.parameter_names)
+    ['u(k-1)', 'u(k-1)^2', 'y(k-1)']
+    """
+    words = [f"--narx={_options.text('map', map)}", f"--ny={_options.integer('ny', ny)}"]
+    words += _options.order_words(nk=nk)
+    each = [nu] if isinstance(nu, int) else list(nu)
+    words.append(f"--nu={','.join(str(_options.integer('nu', one)) for one in each)}")
+    words += _options.words(NarxOptions, locals(), len(log) if isinstance(log, Log) else None)
+    found = Model._of(_thetahat.fit_narx(handle("log", log), words))
+    for warning in found.warnings:
+        warnings.warn(warning, EstimationWarning, stacklevel=2)
+    return found

@@ -8,10 +8,8 @@ mod criterion;
 pub(crate) mod equations;
 mod exact;
 mod instrumental;
-mod normal;
-mod objective;
 mod offset;
-mod optimize;
+mod outcome;
 mod plant_first;
 mod polynomials;
 mod prediction_error;
@@ -19,6 +17,7 @@ mod predictor;
 mod restart;
 mod robust;
 mod start;
+mod stretches;
 #[cfg(test)]
 mod tests;
 mod uncertainty;
@@ -30,6 +29,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::data::Record;
 use crate::model::{PolynomialModel, Signal};
+use crate::optimize::{Monitor, Search, Stopped};
 pub use crate::regression::Solver;
 use crate::{Error, Orders, Structure};
 pub use arx::{arx, arx_factor};
@@ -41,12 +41,12 @@ pub use equations::{EquationsOutcome, LikelihoodSearch, UnknownParameter};
 pub use exact::LikelihoodOutcome;
 pub use offset::Constant;
 pub(crate) use offset::{Beside, Fitted, OutputOffset, Task, pays};
-pub(crate) use optimize::Deadline;
-pub use optimize::{Algorithm, Monitor, Progress, Search, SearchOutcome, StartOutcome, Step, Stopped};
+pub use outcome::{SearchOutcome, StartOutcome};
 pub(crate) use plant_first::noise_order;
 pub(crate) use polynomials::extended;
-pub(crate) use prediction_error::{drop_is_not_for_f, stretches};
+pub(crate) use prediction_error::drop_is_not_for_f;
 pub use robust::{Loss, Robust, RobustOutcome};
+pub(crate) use stretches::stretches;
 pub(crate) use uncertainty::{Autoregression, autoregression, backward_filtered_products};
 
 /// What stands for the samples before the first of a segment.

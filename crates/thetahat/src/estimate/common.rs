@@ -2,11 +2,12 @@
 
 use std::ops::Range;
 
-use super::optimize::{Deadline, Monitor, Search, best_free, search};
-use super::prediction_error::{energy, is_determined};
+use super::prediction_error::is_determined;
 use super::predictor::{Begin, Predictor};
 use super::start::candidates;
+use super::stretches::energy;
 use crate::data::Record;
+use crate::optimize::{Deadline, Monitor, Search, best_free, search};
 use crate::respond::NOTHING_LEFT;
 use crate::{Error, Orders};
 

@@ -20,7 +20,7 @@
 //!
 //! Whether a constant is worth its parameter is decided by MDL (Rissanen, Automatica 14, 1978): N ln(V_0/V_1) > ln N. For
 //! models that are linear in their parameters V_1 follows from V_0, the residuals' sum and the normal equations; for others
-//! the decrease that one Gauss-Newton step foretells (Rao's score test, Proc. Cambridge Philosophical Society 44, 1948) says
+//! the decrease that one Gauss-Newton step predicts (Rao's score test, Proc. Cambridge Philosophical Society 44, 1948) says
 //! whether a second search can change the answer. The errors of an output-error model may have any colour, and slow ones look
 //! like an offset: there k^2/var k > ln N is asked for too, with the variance that knows of the colour (Wald's test, which is
 //! the same as the first one where errors are white). Near an integrator a level may be anything beside an initial condition
@@ -32,7 +32,6 @@ use std::ops::Range;
 use std::time::Instant;
 
 use super::arx::with_past;
-use super::optimize::best_free;
 use super::prediction_error::predictor_of;
 use super::predictor::{Begin, Predictor};
 use super::uncertainty::autoregression;
@@ -42,10 +41,11 @@ use super::{
 };
 use crate::data::{Log, Offset, Record};
 use crate::model::{OffsetCovariance, Quantity, is_covariance};
+use crate::optimize::best_free;
 use crate::regression::{Presample, sum};
 use crate::{Criteria, Error, Orders, Structure};
 
-/// A search for a constant begins where a step foretells this fraction of what it must be worth.
+/// A search for a constant begins where a step predicts this fraction of what it must be worth.
 const PROMISING: f64 = 0.5;
 /// A constant that is worth this many times its price needs no comparison with a model without it.
 const CERTAIN: f64 = 2.0;
@@ -428,7 +428,7 @@ impl Task<'_> {
             let price = (1.0 + predictor.initial_conditions() as f64 - known) * samples.ln();
             let count = predictor.samples() as f64;
             let Ok(cost) = best_free(&mut predictor, &parameters) else { return false };
-            let left = (cost - predictor.foretold()).max(0.0);
+            let left = (cost - predictor.predicted_decrease()).max(0.0);
             samples * (without.mse() * count / left).ln() > PROMISING * price
         };
         let rests = without.initial() == Initial::Zero;

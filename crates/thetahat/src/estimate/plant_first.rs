@@ -21,11 +21,11 @@ use std::ops::Range;
 use thetahat_core::nalgebra::DMatrix;
 
 use super::arx::rows;
-use super::optimize::{Monitor, Search, best_free};
 use super::polynomials::Polynomials;
 use super::prediction_error::{prediction_error, predictor_of};
 use super::{Estimate, Initial, Procedure};
 use crate::data::Record;
+use crate::optimize::{Monitor, Search, best_free};
 use crate::regression::{sum, sum_of_squares};
 use crate::{Error, InformationCriterion, Orders};
 

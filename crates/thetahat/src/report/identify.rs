@@ -6,9 +6,8 @@ use super::seen::{estimation_record, estimation_start, goes_through};
 use super::shares::Shares;
 use super::warnings::{at_the_border, unstable_plant, warnings};
 use crate::data::{Detrend, Log, Offset, Prefilter, Prefiltered, Record, Rows, Source, Split, digests};
-use crate::estimate::{
-    self, Beside, Constant, Deadline, Estimate, Fitted, Method, Monitor, OutputOffset, Search, enough,
-};
+use crate::estimate::{self, Beside, Constant, Estimate, Fitted, Method, OutputOffset, enough};
+use crate::optimize::{Deadline, Monitor, Search};
 use crate::regression::sum;
 use crate::respond::{Horizon, PolynomialOnLog, Start, innovations};
 use crate::select::{self, Automatic, Choice, Focus, Found, Grid, Select, Selection, Task};

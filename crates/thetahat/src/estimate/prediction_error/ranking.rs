@@ -8,12 +8,14 @@
 use rayon::prelude::*;
 
 use super::nested::thinned;
-use super::{Beginning, Job, Problem, filled, hopeless};
+use super::{Beginning, Job, Problem, hopeless};
 use crate::Error;
-use crate::estimate::optimize::{Algorithm, Found, Search, StartOutcome, best_free, best_linear};
+use crate::estimate::outcome::StartOutcome;
 use crate::estimate::predictor::{Begin, Predictor};
 use crate::estimate::restart::restarts;
 use crate::estimate::start::candidates;
+use crate::estimate::stretches::filled;
+use crate::optimize::{Algorithm, Found, Search, best_free, best_linear};
 
 /// Starts of which the costs differ by more than this fraction of the lowest may lead to different minima.
 const DISAGREEMENT: f64 = 1e-3;
@@ -231,7 +233,7 @@ fn lead_apart(recipes: &[&Start], predictor: &mut Predictor<'_>) -> bool {
     // The cost at a start, and where it leads.
     let mut followed = |start: &Start| {
         let cost = best_free(predictor, &start.parameters).ok()?;
-        Some((cost, cost - predictor.foretold()))
+        Some((cost, cost - predictor.predicted_decrease()))
     };
     let Some((cost, lowest)) = followed(recipes[0]) else { return true };
     lowest < (1.0 - FAR) * cost

@@ -1,7 +1,8 @@
 //! Searches against one another, and what they say when something is wrong.
 
 use super::*;
-use crate::estimate::{Procedure, Step};
+use crate::estimate::Procedure;
+use crate::optimize::{Algorithm, Step};
 use crate::regression::noise::Noise;
 
 /// The response of numerator/denominator from rest.

@@ -11,7 +11,9 @@ use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::DMatrix;
 
 use crate::model::equations::{Scale, Unknown};
-use crate::optimize::{Deadline, Found, Monitor, Search, Stopped, lowest, normal_number, search};
+use crate::optimize::{
+    Algorithm, Deadline, Found, Monitor, Search, Step, Stopped, lowest, normal_number, search,
+};
 use crate::respond::NisSummary;
 use crate::respond::equations::{Experiment, Failure};
 use crate::{Error, GreyBox};
@@ -61,6 +63,12 @@ pub struct UnknownParameter {
 /// How the search for the largest likelihood went.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LikelihoodSearch {
+    /// How steps were chosen.
+    #[serde(default)]
+    pub algorithm: Algorithm,
+    /// The step length of steepest descent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub step: Option<Step>,
     /// Iterations allowed, for each start.
     pub max_iterations: usize,
     /// Iterations done, from the start that won.
@@ -155,6 +163,8 @@ pub(crate) fn largest_likelihood(
         value: found.cost() / 2.0,
         samples,
         search: LikelihoodSearch {
+            algorithm: options.algorithm,
+            step: (options.algorithm == Algorithm::Gradient).then_some(options.step),
             max_iterations: options.max_iterations,
             iterations: found.costs.len() - 1,
             tolerance: options.tolerance,

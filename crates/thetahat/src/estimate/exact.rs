@@ -227,8 +227,8 @@ impl<'r> Job<'_, 'r> {
         if holes {
             filled(record, |record| add("conditional-filled", record))?;
         }
-        if let Some(guess) = &self.options.guess {
-            starts.push(("guess", guess.clone()));
+        if let Some(initial) = &self.options.initial_parameters {
+            starts.push(("guess", initial.clone()));
         }
         match refused {
             Some(error) if starts.is_empty() => Err(error),

@@ -56,7 +56,7 @@ pub struct Search {
     /// After so long no iteration begins, no start is searched from, and none is looked for but the first.
     pub time_limit: Option<Duration>,
     /// One more start: parameters in their order, such as those of a model that is known to be close.
-    pub guess: Option<Vec<f64>>,
+    pub initial_parameters: Option<Vec<f64>>,
     /// Whether the plant is found first, with the least errors of its free run, and the noise behind it: for models that
     /// simulate. Else all parameters together have the least errors one step ahead.
     pub plant_first: bool,
@@ -66,16 +66,16 @@ impl Search {
     /// Checks the numbers, and that a start that is given has a value for each of the parameters, of these names.
     ///
     /// # Errors
-    /// [`Error::Argument`] for a tolerance or step constant that is not positive, or a guess of another length.
+    /// [`Error::Argument`] for a tolerance or step constant that is not positive, or initial parameters of another length.
     pub(crate) fn check(&self, names: &[String]) -> Result<(), Error> {
-        if let Some(guess) = &self.guess
-            && (guess.len() != names.len() || !guess.iter().all(|value| value.is_finite()))
+        if let Some(initial) = &self.initial_parameters
+            && (initial.len() != names.len() || !initial.iter().all(|value| value.is_finite()))
         {
             return Err(Error::argument(
-                "guess",
+                "initial_parameters",
                 format!(
                     "it has {} values; give {} finite ones: {}",
-                    guess.len(),
+                    initial.len(),
                     names.len(),
                     names.join(", ")
                 ),
@@ -108,7 +108,7 @@ impl Default for Search {
             starts: 0,
             seed: 0,
             time_limit: None,
-            guess: None,
+            initial_parameters: None,
             plant_first: false,
         }
     }

@@ -32,7 +32,7 @@ pub struct EquationsPlan {
     pub validate: Vec<Rows>,
     /// Cuts the rows to estimate on into parts: the fit is to the first two, and judged on the third.
     pub split: Option<Split>,
-    /// How to search; a guess and `plant_first` do not apply.
+    /// How to search; `initial_parameters` and `plant_first` do not apply.
     pub search: Search,
 }
 

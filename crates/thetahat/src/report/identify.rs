@@ -363,7 +363,7 @@ fn fit(
             let Chosen { found: Found { selection, mut guess }, with_constant } =
                 selected(&record, plan, &compared, &beside, monitor)?;
             if let (Method::PredictionError(search), false) = (&mut method, with_constant) {
-                search.guess = guess.take();
+                search.initial_parameters = guess.take();
             }
             let orders = selection.chosen.orders.clone();
             (Some(selection), orders, guess)
@@ -396,7 +396,7 @@ fn fit(
             let method = match &method {
                 Method::PredictionError(search) => Method::PredictionError(Search {
                     plant_first: true,
-                    guess: Some(plant.to_vec()),
+                    initial_parameters: Some(plant.to_vec()),
                     ..search.clone()
                 }),
                 other => other.clone(),

@@ -221,7 +221,7 @@ struct Reached<'r> {
     begin: Begin,
 }
 
-/// A and B by name: a guess, and those of least squares, of instrumental variables and of noise with a numerator.
+/// A and B by name: initial parameters that were given, and those of least squares, of instrumental variables and of noise with a numerator.
 fn starts(
     record: &Record<'_>,
     orders: &Orders,
@@ -232,11 +232,11 @@ fn starts(
     let noisy = Orders { nc: orders.na, ..orders.clone() };
     let count = linear.parameters();
     let mut starts = Vec::new();
-    if let Some(guess) = options.guess.as_ref().filter(|guess| guess.len() >= count) {
-        starts.push(("guess", guess.clone()));
+    if let Some(initial) = options.initial_parameters.as_ref().filter(|initial| initial.len() >= count) {
+        starts.push(("guess", initial.clone()));
     }
     let found = filled(record, |record| -> Result<_, Error> {
-        let search = Search { plant_first: false, guess: None, ..options.clone() };
+        let search = Search { plant_first: false, initial_parameters: None, ..options.clone() };
         let armax = match prediction_error(record, &noisy, Initial::Auto, &search, monitor) {
             Err(Error::Interrupted) => return Err(Error::Interrupted),
             other => other,

@@ -100,7 +100,8 @@ impl Modes<'_> {
             let Sample { u, y, b, f } = self.sample(seed);
             let record = Record::new(&y, vec![&u]).unwrap();
             let truth = [&b[1..], &f[1..]].concat();
-            let least = reached(&record, &orders, Search { guess: Some(truth), ..Search::default() });
+            let least =
+                reached(&record, &orders, Search { initial_parameters: Some(truth), ..Search::default() });
             reached(&record, &orders, Search { max_iterations: 20, ..Search::default() })
                 <= least * (1.0 + 1e-5)
         });

@@ -117,6 +117,57 @@ fn what_is_outside_is_refused_and_told() {
     assert_eq!(refused.unwrap_err(), Beyond);
 }
 
+/// x^2 with a matrix that is a hundred times too large, so that steps are a hundredth of the way.
+struct Cautious<const LENGTHENS: bool> {
+    at: f64,
+    matrix: [f64; 1],
+    right: [f64; 1],
+}
+
+impl<const LENGTHENS: bool> Objective for Cautious<LENGTHENS> {
+    type Refusal = Beyond;
+
+    const STEP_RULES: StepRules = StepRules { shortenings: 0, lengthens: LENGTHENS };
+
+    fn samples(&self) -> usize {
+        1
+    }
+
+    fn evaluate(&mut self, parameters: &[f64]) -> Result<f64, Beyond> {
+        self.at = parameters[0];
+        Ok(self.at * self.at)
+    }
+
+    fn linearize(&mut self) -> Result<f64, Beyond> {
+        (self.matrix, self.right) = ([100.0], [-self.at]);
+        Ok(0.0)
+    }
+
+    fn matrix(&self) -> &[f64] {
+        &self.matrix
+    }
+
+    fn right(&self) -> &[f64] {
+        &self.right
+    }
+}
+
+#[test]
+fn steps_that_gain_more_than_predicted_are_doubled_where_that_is_asked_for() {
+    fn iterations<const LENGTHENS: bool>() -> usize {
+        let mut objective = Cautious::<LENGTHENS> { at: 0.0, matrix: [0.0], right: [0.0] };
+        let options = Search { max_iterations: 1000, ..Search::default() };
+        let go_on = |_: Progress| ControlFlow::Continue(());
+        let found =
+            search(&mut objective, &[1.0], &options, 1e-8, Deadline::default(), &go_on).unwrap().unwrap();
+        assert_eq!(found.parameters, [objective.at]);
+        assert!(found.cost() <= 1e-8 && found.costs.windows(2).all(|pair| pair[1] < pair[0]), "{found:?}");
+        found.costs.len() - 1
+    }
+    assert!(iterations::<true>() < 12);
+    assert!(iterations::<false>() > 500);
+}
+
 #[test]
 fn iterations_and_time_have_limits_and_a_monitor_ends_a_search() {
     let options = Search { max_iterations: 3, ..Search::default() };

@@ -57,7 +57,7 @@ pub struct SearchOutcome {
     /// The largest modulus of a pole that a start had outside the unit circle, before it was reflected into it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unstable_pole: Option<f64>,
-    /// Whether this search was for the least errors of a free run, and the noise was found behind it.
+    /// Whether this search was for the least errors of a free run, and the noise was found after it.
     #[serde(default)]
     pub plant_first: bool,
 }

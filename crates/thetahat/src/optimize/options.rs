@@ -57,7 +57,7 @@ pub struct Search {
     pub time_limit: Option<Duration>,
     /// One more start: parameters in their order, such as those of a model that is known to be close.
     pub initial_parameters: Option<Vec<f64>>,
-    /// Whether the plant is found first, with the least errors of its free run, and the noise behind it: for models that
+    /// Whether the plant is found first, with the least errors of its free run, and the noise after it: for models that
     /// simulate. Else all parameters together have the least errors one step ahead.
     pub plant_first: bool,
 }

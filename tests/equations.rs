@@ -184,6 +184,26 @@ fn several_logs_begin_anew_and_clocks_may_be_irregular() {
 }
 
 #[test]
+fn all_searches_find_the_largest_likelihood() {
+    for name in ["dc_motor", "mass_spring_damper", "battery"] {
+        let (_, usual) = fitted(name, "1..600", "");
+        let search = &usual["estimation"]["search"];
+        assert_eq!(search["algorithm"], "lm");
+        for (algorithm, more) in
+            [("gauss-newton", ""), ("newton", ""), ("gradient", " --step 1 --max-iterations 1000")]
+        {
+            let (_, found) = fitted(name, "1..600", &format!("--search {algorithm}{more}"));
+            let own = &found["estimation"]["search"];
+            assert_eq!(own["algorithm"], algorithm);
+            assert_eq!(own["step"].is_object(), algorithm == "gradient");
+            let reached = |report: &Value| number(report, "/estimation/log_likelihood");
+            let difference = (reached(&found) - reached(&usual)).abs();
+            assert!(difference < 1e-4, "{name} {algorithm}: {difference}");
+        }
+    }
+}
+
+#[test]
 fn further_starts_find_a_lower_optimum() {
     let (folder, _) = fitted("mass_spring_damper", "1..400", "--starts 3 --seed 2");
     let one: Value = serde_json::from_str(&folder.read("report.json")).expect("it is JSON");
@@ -194,9 +214,12 @@ fn further_starts_find_a_lower_optimum() {
         "fit --grey model.toml log.csv --time t --estimate 1..400 --starts 3 --seed 2 --report report.json",
     );
     assert_eq!(folder.read("report.json"), text);
-    for (option, words) in
-        [("--starts 20000", "starts"), ("--tolerance 0", "tolerance"), ("--select mdl", "cannot be used")]
-    {
+    for (option, words) in [
+        ("--step 1", "--search gradient"),
+        ("--starts 20000", "starts"),
+        ("--tolerance 0", "tolerance"),
+        ("--select mdl", "cannot be used"),
+    ] {
         let run = folder.run(&format!("fit --grey model.toml log.csv --time t {option}"));
         assert!(run.code == 2 && run.stderr.contains(words), "{}", run.stderr);
     }

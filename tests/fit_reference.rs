@@ -140,7 +140,8 @@ fn assert_minimum(case: &Value, log: &str, theta: &[f64], mse: f64) {
     let order = |position: usize| vec![numbers(&case["orders"])[position] as usize; inputs.len()];
     let orders = Orders::oe(&order(1), &order(4), &order(5)).expect("these are orders");
     // From all starts, to see what comes of this one.
-    let search = Search { guess: Some(theta.to_vec()), starts: 6, tolerance: 1e-14, ..Search::default() };
+    let search =
+        Search { initial_parameters: Some(theta.to_vec()), starts: 6, tolerance: 1e-14, ..Search::default() };
     let record = Record::new(&y, inputs.iter().map(Vec::as_slice).collect()).expect("nothing is missing");
     let method = Method::PredictionError(search);
     let found = estimate(&record, &orders, &method, Initial::Zero).expect("there is a fit");

@@ -37,7 +37,7 @@ const LIBRARY: House = House {
     floors: &[
         &["distribution", "figures", "text"],
         &["error"],
-        &["document", "regression"],
+        &["document", "optimize", "regression"],
         &["data"],
         &["model"],
         &["respond"],

@@ -45,7 +45,7 @@ pub(crate) struct FitArguments {
         value_name = "MODEL",
         help_heading = "Model",
         conflicts_with_all = [
-            "ModelArguments", "path", "select", "search", "step", "CriterionArguments", "input", "output", "detrend", "offset",
+            "ModelArguments", "path", "select", "CriterionArguments", "input", "output", "detrend", "offset",
             "prefilter", "NarxArguments",
         ]
     )]

@@ -178,14 +178,19 @@ fn initial(initial: Initial, conditions: usize) -> String {
     }
 }
 
-/// How a search went, in a few words.
-fn outcome(search: &SearchOutcome) -> String {
-    let algorithm = match search.algorithm {
+/// The word of an algorithm in the options.
+fn word(algorithm: Algorithm) -> &'static str {
+    match algorithm {
         Algorithm::LevenbergMarquardt => "lm",
         Algorithm::GaussNewton => "gauss-newton",
         Algorithm::Newton => "newton",
         Algorithm::Gradient => "gradient",
-    };
+    }
+}
+
+/// How a search went, in a few words.
+fn outcome(search: &SearchOutcome) -> String {
+    let algorithm = word(search.algorithm);
     let border = if search.stability_bound { " at the border of stability" } else { "" };
     let (iterations, stopped) = (counted(search.iterations), stopped(search.stopped));
     // A comparison follows several starts; costs on fewer samples are others.

@@ -243,6 +243,17 @@ def test_further_starts_find_the_lower_optimum() -> None:
     assert best.to_json() == th.grey(log, box, starts=20, seed=1).to_json()
 
 
+def test_all_searches_find_the_same_optimum() -> None:
+    log = tank_log()
+    usual = th.grey(log, TANK)
+    for search in ("gauss-newton", "newton", "gradient"):
+        found = th.grey(log, TANK, search=search, max_iterations=1000)
+        assert json.loads(found.to_json())["estimation"]["search"]["algorithm"] == search
+        assert abs(found.log_likelihood - usual.log_likelihood) < 1e-3
+    with pytest.raises(ValueError, match="step"):
+        th.grey(log, TANK, step=0.5)
+
+
 def test_the_documents_are_those_of_the_command_line(tmp_path: Path) -> None:
     for name in ("mass_spring_damper", "dc_motor"):
         path, box = DATA / f"{name}.csv", th.GreyBox(DATA / f"{name}.toml")

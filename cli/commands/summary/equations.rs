@@ -6,7 +6,7 @@ use thetahat::{EquationsModel, Procedure, Report};
 
 use super::filtered::surprise;
 use super::text::{Text, columns, or_dash};
-use super::{counted, criteria, fits, stopped};
+use super::{counted, criteria, fits, stopped, word};
 
 /// The main figures of a fit of a model in equations.
 pub(super) fn table(report: &Report, model: &EquationsModel, width: usize) -> String {
@@ -51,8 +51,9 @@ pub(super) fn table(report: &Report, model: &EquationsModel, width: usize) -> St
         count => format!(" from the best of {count} starts"),
     };
     text.line(&format!(
-        "largest likelihood, {}{starts}, {}",
+        "largest likelihood, {} ({}){starts}, {}",
         counted(search.iterations),
+        word(search.algorithm),
         stopped(search.stopped)
     ));
     if let Some(nis) = &outcome.nis {

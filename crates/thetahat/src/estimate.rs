@@ -9,10 +9,8 @@ pub(crate) mod equations;
 mod exact;
 mod instrumental;
 pub(crate) mod nonlinear_arx;
-mod normal;
-mod objective;
 mod offset;
-mod optimize;
+mod outcome;
 mod plant_first;
 mod polynomials;
 mod prediction_error;
@@ -20,6 +18,7 @@ mod predictor;
 mod restart;
 mod robust;
 mod start;
+mod stretches;
 #[cfg(test)]
 mod tests;
 mod uncertainty;
@@ -31,6 +30,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::data::Record;
 use crate::model::{PolynomialModel, Signal};
+use crate::optimize::{Monitor, Search, Stopped};
 pub use crate::regression::Solver;
 use crate::{Error, Orders, Structure};
 pub use arx::{arx, arx_factor};
@@ -43,12 +43,12 @@ pub use exact::LikelihoodOutcome;
 pub use nonlinear_arx::{RunFigures, TermStep, TermsOutcome};
 pub use offset::Constant;
 pub(crate) use offset::{Beside, Fitted, OutputOffset, Task, pays};
-pub(crate) use optimize::Deadline;
-pub use optimize::{Algorithm, Monitor, Progress, Search, SearchOutcome, StartOutcome, Step, Stopped};
+pub use outcome::{SearchOutcome, StartOutcome};
 pub(crate) use plant_first::noise_order;
 pub(crate) use polynomials::extended;
-pub(crate) use prediction_error::{drop_is_not_for_f, stretches};
+pub(crate) use prediction_error::drop_is_not_for_f;
 pub use robust::{Loss, Robust, RobustOutcome};
+pub(crate) use stretches::stretches;
 pub(crate) use uncertainty::{Autoregression, autoregression, backward_filtered_products};
 
 /// What stands for the samples before the first of a segment.

@@ -42,6 +42,7 @@ pub mod figures;
 mod filter;
 mod inspect;
 mod model;
+mod optimize;
 mod regression;
 mod report;
 mod respond;
@@ -57,10 +58,10 @@ pub use data::{
 pub use document::{Document, is_document};
 pub use error::Error;
 pub use estimate::{
-    Algorithm, Bound, Constant, Criteria, Criterion, CriterionOutcome, EquationsOutcome, Estimate, GainBound,
-    InformationCriterion, Initial, LikelihoodOutcome, LikelihoodSearch, Loss, Method, Monitor, Norm,
-    Procedure, Progress, Robust, RobustOutcome, RunFigures, Search, SearchOutcome, Solver, StartOutcome,
-    Step, Stopped, TermStep, TermsOutcome, UnknownParameter, arx, arx_factor, estimate, estimate_monitored,
+    Bound, Constant, Criteria, Criterion, CriterionOutcome, EquationsOutcome, Estimate, GainBound,
+    InformationCriterion, Initial, LikelihoodOutcome, LikelihoodSearch, Loss, Method, Norm, Procedure,
+    Robust, RobustOutcome, RunFigures, SearchOutcome, Solver, StartOutcome, TermStep, TermsOutcome,
+    UnknownParameter, arx, arx_factor, estimate, estimate_monitored,
 };
 pub use filter::{
     EstimatedNumber, Estimator, FilterSnapshot, FilterSummary, InitialState, ObserverGain, SmoothedStates,
@@ -74,6 +75,7 @@ pub use model::{
     EquationsModel, GreyBox, Interval, Map, Model, NonlinearArxModel, OffsetCovariance, Orders, Parameter,
     PolynomialModel, Quantity, Regressor, Root, Signal, StateSpace, Structure,
 };
+pub use optimize::{Algorithm, Monitor, Progress, Search, Step, Stopped};
 pub use report::{
     Applied, AppliedOutput, Centres, Comparison, Coverage, Data, EquationsPlan, Estimation, InputLags,
     MapPlan, Missing, NoiseLevel, NonlinearArxPlan, OutputSignals, Parts, Plan, Report, Requirement, Seen,

@@ -26,7 +26,8 @@ mod winners;
 use std::ops::ControlFlow;
 
 use crate::data::Record;
-use crate::estimate::{Deadline, Initial, Monitor, Search};
+use crate::estimate::Initial;
+use crate::optimize::{Deadline, Monitor, Search};
 use crate::{Error, Orders};
 pub(crate) use automatic::constant_pays;
 pub use choice::{Automatic, Choice, Grid, OrderRange, Path, Select};

@@ -32,14 +32,14 @@ fn iterations_take_no_memory() {
         for algorithm in
             [Algorithm::LevenbergMarquardt, Algorithm::GaussNewton, Algorithm::Newton, Algorithm::Gradient]
         {
-            // A guess far from the minimum, and a tolerance that is never met.
+            // Far from the minimum, and a tolerance that is never met.
             let fit = |max_iterations| {
-                let guess = vec![0.1; orders.parameters()];
+                let initial = vec![0.1; orders.parameters()];
                 let search = Search {
                     algorithm,
                     max_iterations,
                     tolerance: 1e-300,
-                    guess: Some(guess),
+                    initial_parameters: Some(initial),
                     ..Search::default()
                 };
                 let mut iterations = 0;

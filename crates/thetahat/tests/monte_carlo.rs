@@ -126,7 +126,7 @@ fn assert_found(angles: &[f64]) {
         };
         let default = fit(Search::default());
         // Every start there is, the truth among them.
-        let best = fit(Search { guess: Some(truth.clone()), starts: 5, ..Search::default() });
+        let best = fit(Search { initial_parameters: Some(truth.clone()), starts: 5, ..Search::default() });
         let Procedure::PredictionError(search) = default.procedure() else {
             unreachable!("the default method searches")
         };

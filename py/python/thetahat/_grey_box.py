@@ -321,8 +321,10 @@ def grey(
     estimate: Rows | None = None,
     validate: Rows | None = None,
     split: tuple[float, float, float] | None = None,
+    search: str | None = None,
     max_iterations: int | None = None,
     tolerance: float | None = None,
+    step: float | tuple[float, float] | None = None,
     starts: int | None = None,
     seed: int | None = None,
     time_limit: float | None = None,
@@ -336,7 +338,7 @@ def grey(
         each begin as the model says.
     model : GreyBox, str, path or dict
         The equations.
-    estimate, validate, split, max_iterations, tolerance, starts, seed, time_limit
+    estimate, validate, split, search, max_iterations, tolerance, step, starts, seed, time_limit
         What to fit to and how, see `thetahat.EquationsOptions`.
 
     Returns

@@ -136,10 +136,14 @@ class EquationsOptions(TypedDict, total=False):
     ----------
     estimate, validate, split
         Rows to fit to and to judge on, see `FitOptions`. In each log the model begins, as it says, with the first row to fit to.
+    search : {"lm", "gauss-newton", "newton", "gradient"}
+        How steps are chosen: Levenberg and Marquardt's way, unless said otherwise.
     max_iterations : int
         Iterations at most, from each start: 100.
     tolerance : float
         Stop where the next step would raise the log-likelihood by no more than this fraction of half the measured values: 1e-8.
+    step : float or (float, float)
+        Step length of the gradient search: c1, or c1/(c2 + l) in iteration l.
     starts : int
         Search from so many further starts, drawn from what the model knows of its parameters.
     seed : int
@@ -151,8 +155,10 @@ class EquationsOptions(TypedDict, total=False):
     estimate: Rows
     validate: Rows
     split: tuple[float, float, float]
+    search: str
     max_iterations: int
     tolerance: float
+    step: Union[float, tuple[float, float]]
     starts: int
     seed: int
     time_limit: float

@@ -2,11 +2,12 @@
 
 use std::ops::Range;
 
-use super::optimize::{Deadline, Monitor, Search, best_free, search};
-use super::prediction_error::{energy, is_determined};
+use super::prediction_error::is_determined;
 use super::predictor::{Begin, Predictor};
 use super::start::candidates;
+use super::stretches::energy;
 use crate::data::Record;
+use crate::optimize::{Deadline, Monitor, Search, best_free, search};
 use crate::respond::NOTHING_LEFT;
 use crate::{Error, Orders};
 
@@ -67,7 +68,7 @@ impl<'a> Common<'a> {
         options.check_numbers()?;
         let samples: usize = record.segments.iter().map(Range::len).sum();
         let tolerance = options.tolerance.max(SETTLED / samples.max(1) as f64);
-        let options = Search { guess: None, starts: 0, tolerance, ..options.clone() };
+        let options = Search { initial_parameters: None, starts: 0, tolerance, ..options.clone() };
         let smallest = NOTHING_LEFT * energy(record);
         let begin = if free { Begin::Unknown } else { Begin::Zero };
         Ok(Self { record, begin, window, options, smallest, deadline, monitor })

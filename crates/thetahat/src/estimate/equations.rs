@@ -1,7 +1,7 @@
 //! Models in equations: the parameters of the largest likelihood.
 
 mod likelihood;
-mod search;
+mod objective;
 mod uncertainty;
 
 use oorandom::Rand64;
@@ -10,13 +10,15 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::DMatrix;
 
-use super::optimize::{Deadline, Monitor, Search, Stopped};
 use crate::model::equations::{Scale, Unknown};
+use crate::optimize::{
+    Algorithm, Deadline, Found, Monitor, Search, Step, Stopped, lowest, normal_number, search,
+};
 use crate::respond::NisSummary;
 use crate::respond::equations::{Experiment, Failure};
 use crate::{Error, GreyBox};
 pub(crate) use likelihood::Criterion;
-use search::Found;
+use objective::Deviance;
 pub(crate) use uncertainty::listed;
 
 /// How the parameters of a model in equations were found: those of the largest likelihood of its innovations.
@@ -61,6 +63,12 @@ pub struct UnknownParameter {
 /// How the search for the largest likelihood went.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LikelihoodSearch {
+    /// How steps were chosen.
+    #[serde(default)]
+    pub algorithm: Algorithm,
+    /// The step length of steepest descent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub step: Option<Step>,
     /// Iterations allowed, for each start.
     pub max_iterations: usize,
     /// Iterations done, from the start that won.
@@ -124,68 +132,59 @@ pub(crate) fn largest_likelihood(
         return Err(Error::undetermined(names, message));
     }
     let deadline = Deadline::after(options.time_limit);
-    let bounded: Vec<bool> = unknown.iter().map(|unknown| unknown.scale != Scale::Free).collect();
     let searched: Vec<Result<Result<Found, Failure>, Error>> = starts(unknown, options)
         .into_par_iter()
         .map(|start| {
-            let mut criterion = Criterion::new(model, experiments);
-            let (most, tolerance) = (options.max_iterations, options.tolerance);
-            search::search(&mut criterion, &start, &bounded, most, tolerance, deadline, monitor)
+            let mut deviance = Deviance::new(model, experiments);
+            // No likelihood is so large that it cannot be larger.
+            search(&mut deviance, &start, options, f64::NEG_INFINITY, deadline, monitor)
         })
         .collect();
     let searched: Vec<Result<Found, Failure>> = searched.into_iter().collect::<Result<_, Error>>()?;
+    let log_likelihood = |cost: f64| -cost / 2.0;
     let reached: Vec<Option<f64>> =
-        searched.iter().map(|found| found.as_ref().ok().map(|found| -found.value())).collect();
+        searched.iter().map(|found| found.as_ref().ok().map(|found| log_likelihood(found.cost()))).collect();
     // The failure of the model's own start is what there is to say if no start works.
-    let mut best: Option<Result<Found, Failure>> = None;
-    for found in searched {
-        let better = match (&best, &found) {
-            (None, _) => true,
-            (Some(Err(_)), Ok(_)) => true,
-            (Some(Ok(best)), Ok(found)) => found.value() < best.value(),
-            (Some(_), Err(_)) => false,
-        };
-        if better {
-            best = Some(found);
-        }
-    }
-    let best = best.ok_or_else(|| Error::data("there is no start to search from"))?;
+    let best = lowest(searched.iter().map(|found| found.as_ref().ok())).unwrap_or(0);
+    let best =
+        searched.into_iter().nth(best).ok_or_else(|| Error::data("there is no start to search from"))?;
     let found = best.map_err(|failure| failure.error(experiments))?;
 
     let mut criterion = Criterion::new(model, experiments);
-    criterion.linearize(&found.z).map_err(|failure| failure.error(experiments))?;
-    let slopes: Vec<f64> = unknown.iter().zip(&found.z).map(|(unknown, z)| unknown.scale.slope(*z)).collect();
+    criterion.linearize(&found.parameters).map_err(|failure| failure.error(experiments))?;
+    let slopes: Vec<f64> =
+        unknown.iter().zip(&found.parameters).map(|(unknown, z)| unknown.scale.slope(*z)).collect();
     let (covariance, condition) = uncertainty::covariance(&criterion.information, &slopes, &names)?;
-    uncertainty::check(unknown, &found.z, &covariance)?;
+    uncertainty::check(unknown, &found.parameters, &covariance)?;
     Ok(EquationsEstimate {
-        values: unknown.iter().zip(&found.z).map(|(unknown, &z)| unknown.inside(z)).collect(),
+        values: unknown.iter().zip(&found.parameters).map(|(unknown, &z)| unknown.inside(z)).collect(),
         covariance,
         condition,
-        value: found.value(),
+        value: found.cost() / 2.0,
         samples,
         search: LikelihoodSearch {
+            algorithm: options.algorithm,
+            step: (options.algorithm == Algorithm::Gradient).then_some(options.step),
             max_iterations: options.max_iterations,
-            iterations: found.values.len() - 1,
+            iterations: found.costs.len() - 1,
             tolerance: options.tolerance,
             stopped: found.stopped,
-            log_likelihoods: found.values.iter().map(|value| -value).collect(),
+            log_likelihoods: found.costs.iter().map(|cost| log_likelihood(*cost)).collect(),
             seed: (options.starts > 0).then_some(options.seed),
             reached: if options.starts > 0 { reached } else { Vec::new() },
         },
-        z: found.z,
+        z: found.parameters,
     })
 }
 
 /// The start that the model says, and random ones.
 fn starts(unknown: &[Unknown], options: &Search) -> Vec<Vec<f64>> {
     let mut random = Rand64::new(u128::from(options.seed));
-    // The sum of twelve uniform numbers is close enough to a normal one.
-    let mut normal = || (0..12).map(|_| random.rand_float()).sum::<f64>() - 6.0;
     let own = unknown.iter().map(|unknown| unknown.start_variable().0).collect();
     let mut drawn = || {
         let near = |unknown: &Unknown| {
             let (z, deviation) = unknown.start_variable();
-            z + deviation * normal()
+            z + deviation * normal_number(&mut random)
         };
         unknown.iter().map(near).collect()
     };

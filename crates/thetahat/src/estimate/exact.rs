@@ -39,15 +39,15 @@ use thetahat_core::nalgebra::{ComplexField, DVector};
 
 use super::arx::{out_of_range, rows, signals};
 use super::border::multiply_out;
-use super::objective::Objective;
-use super::optimize::{
-    Deadline, Found, Monitor, Search, SearchOutcome, StartOutcome, Stopped, best_free, search,
-};
+use super::outcome::{SearchOutcome, StartOutcome, search_outcome};
 use super::polynomials::Polynomials;
-use super::prediction_error::{energy, filled, flat, prediction_error, search_outcome};
+use super::prediction_error::{flat, prediction_error};
+use super::stretches::{energy, filled};
 use super::{Estimate, Initial, Procedure};
 use crate::data::{Record, measured};
 use crate::model::polynomial::{is_stable, roots};
+use crate::optimize::Objective;
+use crate::optimize::{Deadline, Found, Monitor, Search, Stopped, best_free, search};
 use crate::respond::{NOTHING_LEFT, are_worth};
 use crate::{Error, Orders, Structure};
 use likelihood::{Begin, Likelihood};
@@ -83,7 +83,7 @@ pub(super) fn exact(
 ) -> Result<Estimate, Error> {
     let driven = orders.nb.iter().take(orders.inputs() - lines).any(|&nb| nb > 0);
     check(orders, driven, initial)?;
-    options.check(orders)?;
+    options.check(&orders.names())?;
     signals(record, orders)?;
     let energy = energy(record);
     if !energy.is_normal() && energy != 0.0 {
@@ -129,7 +129,7 @@ pub(super) fn beside(
     let begin = if estimate.initial() == Initial::Zero { Begin::Rest } else { Begin::Free };
     let mut likelihood = Likelihood::new(record, orders, lines, begin);
     let cost = best_free(&mut likelihood, parameters).ok()?;
-    likelihood.linearize();
+    likelihood.linearize().ok()?;
     let (inverse, _) = likelihood.inverse()?;
     let step = &inverse * DVector::from_column_slice(likelihood.right());
     let covariance = inverse * (estimate.noise_variance() * cost / likelihood.squares());
@@ -227,8 +227,8 @@ impl<'r> Job<'_, 'r> {
         if holes {
             filled(record, |record| add("conditional-filled", record))?;
         }
-        if let Some(guess) = &self.options.guess {
-            starts.push(("guess", guess.clone()));
+        if let Some(initial) = &self.options.initial_parameters {
+            starts.push(("guess", initial.clone()));
         }
         match refused {
             Some(error) if starts.is_empty() => Err(error),
@@ -299,8 +299,8 @@ impl<'r> Job<'_, 'r> {
     /// The estimate of a search.
     fn finish(&self, reached: Reached<'_>) -> Result<Estimate, Error> {
         let Reached { mut likelihood, found, begin, starts } = reached;
-        // Steps that were tried last may have left it elsewhere.
-        likelihood.linearize();
+        // Steps that were tried last may have left it elsewhere. It has normal equations.
+        let _ = likelihood.linearize();
         let (size, samples) = (found.parameters.len(), likelihood.samples());
         let left = (samples - size - likelihood.initial_conditions()) as f64;
         let cost = found.cost();

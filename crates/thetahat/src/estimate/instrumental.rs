@@ -7,7 +7,6 @@ use thetahat_core::LeastSquares;
 use thetahat_core::nalgebra::{DMatrix, DVector, Dyn};
 
 use super::arx::{arx, resolved, rows, signals};
-use super::optimize::{Deadline, Stopped};
 use super::start::noise::{Equation, Mixed, behind};
 use super::start::plant::{
     Equations, Group, Input, Plant, Point, add_delayed, divided, energy, inverse, multiplied,
@@ -17,6 +16,7 @@ use super::start::{candidates, stable};
 use super::uncertainty::{autoregression, backward_filtered_products, coloured, columns, restricted};
 use super::{Estimate, Initial, Procedure};
 use crate::data::Record;
+use crate::optimize::{Deadline, Stopped};
 use crate::regression::{Lagged, Presample, Taps};
 use crate::{Error, Orders};
 

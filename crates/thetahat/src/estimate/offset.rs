@@ -20,7 +20,7 @@
 //!
 //! Whether a constant is worth its parameter is decided by MDL (Rissanen, Automatica 14, 1978): N ln(V_0/V_1) > ln N. For
 //! models that are linear in their parameters V_1 follows from V_0, the residuals' sum and the normal equations; for others
-//! the decrease that one Gauss-Newton step foretells (Rao's score test, Proc. Cambridge Philosophical Society 44, 1948) says
+//! the decrease that one Gauss-Newton step predicts (Rao's score test, Proc. Cambridge Philosophical Society 44, 1948) says
 //! whether a second search can change the answer. The errors of an output-error model may have any colour, and slow ones look
 //! like an offset: there k^2/var k > ln N is asked for too, with the variance that knows of the colour (Wald's test, which is
 //! the same as the first one where errors are white). Near an integrator a level may be anything beside an initial condition
@@ -32,7 +32,6 @@ use std::ops::Range;
 use std::time::Instant;
 
 use super::arx::with_past;
-use super::optimize::best_free;
 use super::prediction_error::predictor_of;
 use super::predictor::{Begin, Predictor};
 use super::uncertainty::autoregression;
@@ -42,10 +41,11 @@ use super::{
 };
 use crate::data::{Log, Offset, Record};
 use crate::model::{OffsetCovariance, Quantity, is_covariance};
+use crate::optimize::best_free;
 use crate::regression::{Presample, sum};
 use crate::{Criteria, Error, Orders, Structure};
 
-/// A search for a constant begins where a step foretells this fraction of what it must be worth.
+/// A search for a constant begins where a step predicts this fraction of what it must be worth.
 const PROMISING: f64 = 0.5;
 /// A constant that is worth this many times its price needs no comparison with a model without it.
 const CERTAIN: f64 = 2.0;
@@ -174,7 +174,7 @@ pub(crate) struct OutputOffset {
 }
 
 impl Task<'_> {
-    /// The estimate with a constant, if that is asked for or worth it, and with a trend, if `beside` has one. `guess` has the
+    /// The estimate with a constant, if that is asked for or worth it, and with a trend, if `beside` has one. `start` has the
     /// parameters of a model with both, where a choice among models has found some.
     ///
     /// # Errors
@@ -184,17 +184,17 @@ impl Task<'_> {
         &self,
         constant: Constant,
         beside: &Beside,
-        guess: Option<Vec<f64>>,
+        start: Option<Vec<f64>>,
     ) -> Result<Fitted, Error> {
         let wanted = constant == Constant::Yes || beside.ramp.is_some();
         match self.refusal() {
             Some(why) if wanted => return Err(Error::argument("constant", why)),
-            Some(_) => return self.plain(guess.map(|guess| beside.without(self.orders, &guess))),
-            None if constant == Constant::No && !wanted => return self.plain(guess),
+            Some(_) => return self.plain(start.map(|start| beside.without(self.orders, &start))),
+            None if constant == Constant::No && !wanted => return self.plain(start),
             None => {}
         }
         if wanted {
-            return self.wanted(beside, guess);
+            return self.wanted(beside, start);
         }
         match self.method {
             // These have no sum of squares that is least: the constant's own error says what it is worth.
@@ -211,14 +211,14 @@ impl Task<'_> {
         }
         let started = Instant::now();
         // What a choice found with a constant comes close to the end.
-        let with = guess.as_ref().map(|guess| self.beside(beside, Some(guess.clone())));
+        let with = start.as_ref().map(|start| self.beside(beside, Some(start.clone())));
         let with = match with {
             Some(Err(Error::Interrupted)) => return Err(Error::Interrupted),
             Some(Ok(Some(Found { fitted, worth: Some(worth), .. }))) if worth > CERTAIN => return Ok(fitted),
             Some(Ok(found)) => found,
             _ => None,
         };
-        let without = self.plain(guess.map(|guess| beside.without(self.orders, &guess)))?;
+        let without = self.plain(start.map(|start| beside.without(self.orders, &start)))?;
         let Found { fitted: with, worth, white_samples } = match with {
             Some(found) => found,
             None if self.promises(beside, &without.estimate) => {
@@ -283,17 +283,17 @@ impl Task<'_> {
     }
 
     /// Without a constant.
-    fn plain(&self, guess: Option<Vec<f64>>) -> Result<Fitted, Error> {
-        let method = with_guess(self.method, guess);
+    fn plain(&self, start: Option<Vec<f64>>) -> Result<Fitted, Error> {
+        let method = starting_from(self.method, start);
         let Self { record, inputs, orders, initial, monitor, .. } = *self;
         let estimate = estimate_of_channels(record, inputs, orders, &method, initial, monitor)?;
         Ok(Fitted { criteria: estimate.criteria(), estimate, offset: None, open: None })
     }
 
     /// With a constant, whatever it is worth.
-    fn wanted(&self, beside: &Beside, guess: Option<Vec<f64>>) -> Result<Fitted, Error> {
+    fn wanted(&self, beside: &Beside, start: Option<Vec<f64>>) -> Result<Fitted, Error> {
         let missing = |message: &str| Error::undetermined(vec!["constant".to_owned()], message);
-        match self.beside(beside, guess) {
+        match self.beside(beside, start) {
             Ok(Some(found)) => Ok(found.fitted),
             Ok(None) => Err(missing(
                 "the model has an integrator, A(1) = 0: its output has no level to be estimated; leave the constant out, or \
@@ -311,8 +311,8 @@ impl Task<'_> {
     }
 
     /// With a constant, and what it is worth. None where there is no level.
-    fn beside(&self, beside: &Beside, guess: Option<Vec<f64>>) -> Result<Option<Found>, Error> {
-        let all = self.all(beside, guess)?;
+    fn beside(&self, beside: &Beside, start: Option<Vec<f64>>) -> Result<Option<Found>, Error> {
+        let all = self.all(beside, start)?;
         let place = beside.places(self.orders).start;
         let variance = all.covariance().map(|covariance| covariance[place][place]);
         let worth =
@@ -327,21 +327,21 @@ impl Task<'_> {
     }
 
     /// The estimate of all parameters, the constant and the trend among them.
-    fn all(&self, beside: &Beside, guess: Option<Vec<f64>>) -> Result<Estimate, Error> {
+    fn all(&self, beside: &Beside, start: Option<Vec<f64>>) -> Result<Estimate, Error> {
         let signals = beside.signals();
         let record = self.record.with_inputs(&signals);
         let orders = self.orders.with_constants(beside.count());
-        // A guess of the model alone is one of it with zeros.
+        // Initial parameters of the model alone are some of it with zeros.
         let own = match self.method {
-            Method::PredictionError(Search { guess: Some(own), .. })
-            | Method::ExactLikelihood(Search { guess: Some(own), .. })
+            Method::PredictionError(Search { initial_parameters: Some(own), .. })
+            | Method::ExactLikelihood(Search { initial_parameters: Some(own), .. })
                 if own.len() == self.orders.parameters() =>
             {
                 Some(beside.with_zeros(self.orders, own))
             }
             _ => None,
         };
-        let method = with_guess(self.method, guess.or(own));
+        let method = starting_from(self.method, start.or(own));
         // Zeros before the first sample, to which A reaches back, are not at the level.
         let initial = match self.initial {
             Initial::Auto if self.orders.na > 0 && orders.nf.iter().any(|&nf| nf > 0) => Initial::Estimate,
@@ -428,7 +428,7 @@ impl Task<'_> {
             let price = (1.0 + predictor.initial_conditions() as f64 - known) * samples.ln();
             let count = predictor.samples() as f64;
             let Ok(cost) = best_free(&mut predictor, &parameters) else { return false };
-            let left = (cost - predictor.foretold()).max(0.0);
+            let left = (cost - predictor.predicted_decrease()).max(0.0);
             samples * (without.mse() * count / left).ln() > PROMISING * price
         };
         let rests = without.initial() == Initial::Zero;
@@ -438,14 +438,14 @@ impl Task<'_> {
     }
 }
 
-/// A search begins from a guess too.
-fn with_guess(method: &Method, guess: Option<Vec<f64>>) -> Method {
-    match (method, guess) {
-        (Method::PredictionError(search), Some(guess)) => {
-            Method::PredictionError(Search { guess: Some(guess), ..search.clone() })
+/// A search begins from these parameters too.
+fn starting_from(method: &Method, start: Option<Vec<f64>>) -> Method {
+    match (method, start) {
+        (Method::PredictionError(search), Some(start)) => {
+            Method::PredictionError(Search { initial_parameters: Some(start), ..search.clone() })
         }
-        (Method::ExactLikelihood(search), Some(guess)) => {
-            Method::ExactLikelihood(Search { guess: Some(guess), ..search.clone() })
+        (Method::ExactLikelihood(search), Some(start)) => {
+            Method::ExactLikelihood(Search { initial_parameters: Some(start), ..search.clone() })
         }
         _ => method.clone(),
     }

@@ -21,11 +21,11 @@ use std::ops::Range;
 use thetahat_core::nalgebra::DMatrix;
 
 use super::arx::rows;
-use super::optimize::{Monitor, Search, best_free};
 use super::polynomials::Polynomials;
 use super::prediction_error::{prediction_error, predictor_of};
 use super::{Estimate, Initial, Procedure};
 use crate::data::Record;
+use crate::optimize::{Monitor, Search, best_free};
 use crate::regression::{sum, sum_of_squares};
 use crate::{Error, InformationCriterion, Orders};
 
@@ -51,8 +51,9 @@ pub(super) fn plant_first(
         let (first, errors) = shared::plant(record, orders, &plant, initial, options, monitor)?;
         (first, errors, (0..b.end).collect())
     } else {
-        let guess = options.guess.as_ref().and_then(|guess| own_guess(guess, orders, &plant));
-        let search = Search { plant_first: false, guess, ..options.clone() };
+        let initial_parameters =
+            options.initial_parameters.as_ref().and_then(|initial| of_plant(initial, orders, &plant));
+        let search = Search { plant_first: false, initial_parameters, ..options.clone() };
         let first = prediction_error(record, &plant, initial, &search, monitor)?;
         let errors = free_run_errors(record, &plant, &first)?;
         // F, which is A where that is the denominator.
@@ -71,7 +72,7 @@ pub(super) fn plant_first(
         Ok(noise) => {
             let past = vec![0; segments.len()];
             let record = Record { output: &errors, inputs: Vec::new(), segments, past };
-            let search = Search { plant_first: false, guess: None, ..options.clone() };
+            let search = Search { plant_first: false, initial_parameters: None, ..options.clone() };
             let found = prediction_error(&record, &noise, Initial::Auto, &search, monitor)?;
             (found.samples(), found.mse() * found.samples() as f64, Some(found))
         }
@@ -178,13 +179,13 @@ fn plant(orders: &Orders, named: usize) -> Result<Orders, Error> {
     Ok(Orders { na: 0, nc: 0, nd: 0, nf: nf.collect(), ..orders.clone() })
 }
 
-/// A guess of the plant alone, or its part of one of all parameters.
-fn own_guess(guess: &[f64], orders: &Orders, plant: &Orders) -> Option<Vec<f64>> {
-    if guess.len() == plant.parameters() {
-        return Some(guess.to_vec());
+/// Initial parameters of the plant alone, or its part of those of all parameters.
+fn of_plant(initial: &[f64], orders: &Orders, plant: &Orders) -> Option<Vec<f64>> {
+    if initial.len() == plant.parameters() {
+        return Some(initial.to_vec());
     }
-    (guess.len() == orders.parameters() && orders.na == 0).then(|| {
-        let Polynomials { b, f, .. } = Polynomials::new(orders, guess);
+    (initial.len() == orders.parameters() && orders.na == 0).then(|| {
+        let Polynomials { b, f, .. } = Polynomials::new(orders, initial);
         let f = f.iter().flat_map(|f| f[1..].iter().copied());
         b.iter().flatten().copied().chain(f).collect()
     })

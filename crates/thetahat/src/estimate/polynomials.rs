@@ -3,6 +3,15 @@
 use crate::Orders;
 use crate::model::polynomial::is_stable;
 
+/// Why parameters have no cost.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Unusable {
+    /// C or F has a root outside the unit circle.
+    Unstable,
+    /// The errors overflow.
+    Overflow,
+}
+
 /// The polynomials of a parameter vector.
 #[derive(Debug)]
 pub(super) struct Polynomials {

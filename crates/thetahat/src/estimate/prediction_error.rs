@@ -4,30 +4,23 @@
 mod nested;
 mod ranking;
 
-use std::ops::Range;
-
 use thetahat_core::LeastSquares;
 use thetahat_core::nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::arx::{arx, estimate_is_for_f, out_of_range, rows, signals};
-use super::objective::Objective;
-use super::objective::Unusable;
-use super::optimize::{
-    Algorithm, Deadline, Found, Monitor, Search, SearchOutcome, StartOutcome, Stopped, best_free, search,
-};
+use super::outcome::{SearchOutcome, StartOutcome, search_outcome};
+use super::polynomials::Unusable;
 use super::predictor::{Begin, Predictor};
+use super::stretches::{energy, thinned};
 use super::uncertainty::{autoregression, backward_filtered_products, coloured, restricted};
 use super::{Estimate, Initial, Procedure};
-use crate::data::{Record, measured};
+use crate::data::Record;
 use crate::model::{cancel, near_cancellation};
-use crate::regression::{Taps, condition, sum_of_squares};
+use crate::optimize::{Deadline, Found, Monitor, Search, Stopped, best_free, search};
+use crate::regression::{Taps, condition};
 use crate::respond::{NOTHING_LEFT, are_worth};
 use crate::{Error, Orders, PolynomialModel, Structure};
 
-/// From so many samples on, starts see stretches of the record only.
-const LONG: usize = 1 << 18;
-const STRETCHES: usize = 8;
-const STRETCH: usize = 1 << 12;
 /// A search from the best start has ended after so many iterations, where there is nothing to be found elsewhere.
 const EASY_ITERATIONS: usize = 5;
 /// Above this condition number the Gram matrix does not give the covariance to a thousandth.
@@ -66,7 +59,7 @@ pub(super) fn prediction_error(
     if orders.is_linear() {
         return arx(record, orders, initial);
     }
-    options.check(orders)?;
+    options.check(&orders.names())?;
     signals(record, orders)?;
     let (begin, choose) = begins(record, orders, initial)?;
     let mut predictor = Predictor::new(record, orders, begin);
@@ -201,7 +194,7 @@ impl Job<'_> {
 
     /// Estimates the initial conditions where that is worth its parameters: N ln(V_zero/V_estimate) > n ln N.
     ///
-    /// One of the two searches is done, where a step of the other foretells that it cannot change the answer.
+    /// One of the two searches is done, where a step of the other predicts that it cannot change the answer.
     fn choose<'r>(
         &self,
         record: &Record<'r>,
@@ -226,9 +219,9 @@ impl Job<'_> {
         if at_rest_first
             && let Some(found) = self.search_from(problem(Begin::Zero), &mut resting, beginning)?
         {
-            let foretold = best_free(&mut estimated, &found.parameters)
-                .map_or(f64::INFINITY, |cost| cost - estimated.foretold());
-            if !worth(found.cost(), foretold) {
+            let predicted = best_free(&mut estimated, &found.parameters)
+                .map_or(f64::INFINITY, |cost| cost - estimated.predicted_decrease());
+            if !worth(found.cost(), predicted) {
                 return Ok(Reached { predictor: resting, found, initial: Initial::Zero });
             }
             at_rest = Some(found);
@@ -239,9 +232,9 @@ impl Job<'_> {
             return Ok(Reached { predictor: resting, found, initial: Initial::Zero });
         };
         if at_rest.is_none() {
-            let foretold = best_free(&mut resting, &free.parameters)
-                .map_or(f64::INFINITY, |cost| cost - resting.foretold());
-            if !worth(foretold, free.cost()) {
+            let predicted = best_free(&mut resting, &free.parameters)
+                .map_or(f64::INFINITY, |cost| cost - resting.predicted_decrease());
+            if !worth(predicted, free.cost()) {
                 at_rest = self.search(&mut resting, &free.parameters)?.ok();
             }
         }
@@ -253,7 +246,7 @@ impl Job<'_> {
 
     /// Estimates what inputs before the record have done where that is worth its parameters, beside the other initial conditions.
     ///
-    /// No search is done where a step foretells that it cannot change the answer.
+    /// No search is done where a step predicts that it cannot change the answer.
     fn with_inputs<'r>(
         &self,
         record: &Record<'r>,
@@ -274,14 +267,15 @@ impl Job<'_> {
         };
         let mut best: Option<(f64, &[f64])> = None;
         for parameters in [&reached.found.parameters, start] {
-            let foretold = best_free(&mut wide, parameters).map(|cost| cost - wide.foretold());
-            if let Ok(foretold) = foretold
-                && best.is_none_or(|(least, _)| foretold < least)
+            let predicted = best_free(&mut wide, parameters).map(|cost| cost - wide.predicted_decrease());
+            if let Ok(predicted) = predicted
+                && best.is_none_or(|(least, _)| predicted < least)
             {
-                best = Some((foretold, parameters));
+                best = Some((predicted, parameters));
             }
         }
-        let Some((_, start)) = best.filter(|(foretold, _)| worth(given, mean(*foretold, &wide), few)) else {
+        let Some((_, start)) = best.filter(|(predicted, _)| worth(given, mean(*predicted, &wide), few))
+        else {
             return Ok(reached);
         };
         let Ok(found) = self.search(&mut wide, start)? else { return Ok(reached) };
@@ -354,34 +348,6 @@ impl Job<'_> {
             initial,
             procedure: Procedure::PredictionError(outcome),
         })
-    }
-}
-
-/// How a search on the whole record went.
-pub(super) fn search_outcome(
-    options: &Search,
-    found: &Found,
-    predictor: &impl Objective,
-    starts: Vec<StartOutcome>,
-) -> SearchOutcome {
-    SearchOutcome {
-        algorithm: options.algorithm,
-        tolerance: options.tolerance,
-        max_iterations: options.max_iterations,
-        step: (options.algorithm == Algorithm::Gradient).then_some(options.step),
-        seed: (options.starts > 0).then_some(options.seed),
-        iterations: found.costs.len() - 1,
-        costs: found.costs.iter().map(|cost| cost / predictor.samples() as f64).collect(),
-        gradient_norm: found.gradient_norm,
-        stopped: found.stopped,
-        stability_bound: found.stability_bound,
-        unstable_steps: found.unstable_steps,
-        initial_conditions: predictor.initial_conditions(),
-        start_samples: None,
-        start: starts.first().map(|start| start.name.clone()).unwrap_or_default(),
-        starts,
-        unstable_pole: None,
-        plant_first: false,
     }
 }
 
@@ -549,75 +515,6 @@ fn inverted(triangle: &DMatrix<f64>, scales: &DVector<f64>) -> Option<DMatrix<f6
     let mut inverse = triangle.solve_upper_triangular(&DMatrix::identity(size, size))?;
     inverse.column_iter_mut().for_each(|mut column| column.component_div_assign(scales));
     Some(inverse)
-}
-
-/// Stretches of a long record, spread evenly over its samples; none for a record that is not long.
-fn thinned<'a>(record: &Record<'a>) -> Option<Record<'a>> {
-    let total: usize = record.segments.iter().map(Range::len).sum();
-    if total < LONG { None } else { stretches(record, STRETCHES, STRETCH) }
-}
-
-/// So many stretches of at most so many samples, spread evenly over a record; none if of short segments less than half
-/// of that would be left.
-pub(crate) fn stretches<'a>(record: &Record<'a>, count: usize, length: usize) -> Option<Record<'a>> {
-    let total: usize = record.segments.iter().map(Range::len).sum();
-    let mut segments = Vec::with_capacity(count);
-    let (mut before, mut rest) = (0, record.segments.iter().peekable());
-    for position in (0..count).map(|k| k * (total / count)) {
-        while let Some(segment) = rest.next_if(|segment| before + segment.len() <= position) {
-            before += segment.len();
-        }
-        if let Some(segment) = rest.peek() {
-            let start = segment.start + position - before;
-            segments.push(start..segment.end.min(start + length));
-        }
-    }
-    let kept: usize = segments.iter().map(Range::len).sum();
-    let (output, inputs) = (record.output, record.inputs.clone());
-    let past = vec![0; segments.len()];
-    (2 * kept > count * length).then_some(Record { output, inputs, segments, past })
-}
-
-/// The sum of squares of the output over all segments.
-pub(super) fn energy(record: &Record<'_>) -> f64 {
-    let square = |rows: &Range<usize>| sum_of_squares(&record.output[rows.clone()]);
-    let whole: f64 = record.segments.iter().map(square).sum();
-    if !whole.is_nan() {
-        return whole;
-    }
-    record
-        .segments
-        .iter()
-        .flat_map(|segment| measured(record.output, segment))
-        .map(|rows| square(&rows))
-        .sum()
-}
-
-/// Gives `starts` a record without missing outputs: these are put on lines from one measured output to the next. Starts need to
-/// lead near the minimum, no more.
-pub(super) fn filled<T>(record: &Record<'_>, starts: impl FnOnce(&Record<'_>) -> T) -> T {
-    let runs = |segment: &Range<usize>| measured(record.output, segment);
-    let whole = |segment: &Range<usize>| runs(segment).first() == Some(segment);
-    if record.segments.iter().all(whole) {
-        return starts(record);
-    }
-    let mut output = record.output.to_vec();
-    let mut segments = Vec::new();
-    for segment in &record.segments {
-        let runs = runs(segment);
-        for pair in runs.windows(2) {
-            let (left, right) = (pair[0].end - 1, pair[1].start);
-            let slope = (output[right] - output[left]) / (right - left) as f64;
-            for row in left + 1..right {
-                output[row] = output[left] + slope * (row - left) as f64;
-            }
-        }
-        if let (Some(first), Some(last)) = (runs.first(), runs.last()) {
-            segments.push(first.start..last.end);
-        }
-    }
-    let past = vec![0; segments.len()];
-    starts(&Record { output: &output, inputs: record.inputs.clone(), segments, past })
 }
 
 /// There must be more samples that count than parameters and initial conditions.

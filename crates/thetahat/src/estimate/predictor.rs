@@ -47,8 +47,8 @@ use rayon::prelude::*;
 use thetahat_core::LeastSquares;
 use thetahat_core::nalgebra::{Cholesky, DMatrix, Dyn};
 
-use super::objective::Unusable;
-use super::polynomials::Polynomials;
+use super::border::Border;
+use super::polynomials::{Polynomials, Unusable};
 use super::uncertainty::backward_filtered_products;
 use crate::Orders;
 use crate::data::{Record, measured};
@@ -222,6 +222,7 @@ pub(super) struct Predictor<'a> {
     /// The normal equations of the parameters, the free responses taken out.
     pub(super) matrix: Vec<f64>,
     pub(super) right: Vec<f64>,
+    border: Border,
 }
 
 impl<'a> Predictor<'a> {
@@ -300,6 +301,7 @@ impl<'a> Predictor<'a> {
             stability: Vec::with_capacity(orders.nf.iter().copied().fold(orders.nc, usize::max)),
             matrix: vec![0.0; parameters * parameters],
             right: vec![0.0; parameters],
+            border: Border::new(orders, false),
             layouts,
             sections,
         }

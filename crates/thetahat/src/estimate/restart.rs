@@ -8,6 +8,7 @@ use thetahat_core::nalgebra::{Complex, ComplexField};
 use super::polynomials::Polynomials;
 use crate::Orders;
 use crate::model::polynomial::{product, roots};
+use crate::optimize::normal_number;
 
 /// The standard deviation of a change of a root: of the logarithms of its distance from the unit circle and of its angle.
 const SPREAD: f64 = 0.7;
@@ -21,7 +22,7 @@ const SMALLEST_ANGLE: f64 = 1e-3 * PI;
 /// C, D and F are drawn by their roots: every second vector has all of them moved from where they are in `best`, by factors
 /// on the distance 1 - |z| from the unit circle and on the angle; the others have new ones, these two numbers being
 /// uniform on a logarithmic scale, as the time constants and frequencies of plants are. A and B, which are linear
-/// once C, D and F are given, are left to [`best_linear`](super::optimize::best_linear).
+/// once C, D and F are given, are left to [`best_linear`](crate::optimize::best_linear).
 pub(super) fn restarts(
     orders: &Orders,
     best: &[f64],
@@ -45,11 +46,11 @@ pub(super) fn restarts(
 
 /// A monic polynomial with roots near some others. Of a conjugate pair the one in the upper half plane is given.
 fn near(roots: &[Complex<f64>], length: usize, random: &mut Rand64) -> Vec<f64> {
-    let mut normal = || (0..12).map(|_| random.rand_float()).sum::<f64>() - 6.0;
     let upper = roots.iter().filter(|root| root.im >= 0.0);
     let mut monic = upper.fold(vec![1.0], |monic, root| {
-        let distance = ((1.0 - root.modulus()).max(NEAREST) * (SPREAD * normal()).exp()).min(1.0);
-        let factor = (SPREAD * normal()).exp();
+        let distance =
+            ((1.0 - root.modulus()).max(NEAREST) * (SPREAD * normal_number(random)).exp()).min(1.0);
+        let factor = (SPREAD * normal_number(random)).exp();
         let from_one = root.im == 0.0 && root.re < 0.0;
         match root.im {
             0.0 if from_one => product(&monic, &[1.0, 1.0 - distance]),

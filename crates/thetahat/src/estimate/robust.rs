@@ -44,14 +44,14 @@ use thetahat_core::nalgebra::DMatrix;
 
 use super::arx::rows;
 use super::criterion::sparsity;
-use super::optimize::{Deadline, Found, Monitor, Search, SearchOutcome, StartOutcome, best_free, search};
-use super::prediction_error::{
-    backward_products, energy, inverse_root, prediction_error, predictor_of, search_outcome,
-};
+use super::outcome::{SearchOutcome, StartOutcome, search_outcome};
+use super::prediction_error::{backward_products, inverse_root, prediction_error, predictor_of};
 use super::predictor::Predictor;
+use super::stretches::energy;
 use super::uncertainty::{autoregression, coloured};
 use super::{Estimate, Initial, Procedure};
 use crate::data::Record;
+use crate::optimize::{Deadline, Found, Monitor, Search, best_free, search};
 use crate::respond::NOTHING_LEFT;
 use crate::{Error, Orders, Structure};
 

@@ -25,9 +25,9 @@ use thetahat_core::nalgebra::{Complex, ComplexField};
 
 use super::arx::{enough, out_of_range, signals};
 use super::border::multiply_out;
-use super::optimize::Deadline;
 use crate::data::Record;
 use crate::model::polynomial::{is_stable, roots};
+use crate::optimize::Deadline;
 use crate::regression::{Lagged, Presample, Taps, Unsolved};
 use crate::{Error, Orders};
 

@@ -10,8 +10,9 @@ use super::shares::Shares;
 use crate::data::{Rows, Split, digests};
 use crate::distribution::chi_square_interval;
 use crate::estimate::equations::{EquationsEstimate, largest_likelihood};
-use crate::estimate::{Criteria, EquationsOutcome, Monitor, Procedure, Search};
+use crate::estimate::{Criteria, EquationsOutcome, Procedure};
 use crate::model::EquationsModel;
+use crate::optimize::{Monitor, Search};
 use crate::respond::equations::{EquationsOnLog, Experiment, Predictor, experiments, walk};
 use crate::respond::{NisCount, NisSummary};
 use crate::select::Focus;
@@ -31,7 +32,7 @@ pub struct EquationsPlan {
     pub validate: Vec<Rows>,
     /// Cuts the rows to estimate on into parts: the fit is to the first two, and judged on the third.
     pub split: Option<Split>,
-    /// Iterations, tolerance, starts, seed and time limit of the search; the rest does not apply.
+    /// How to search; `initial_parameters` and `plant_first` do not apply.
     pub search: Search,
 }
 
@@ -55,8 +56,9 @@ pub struct EquationsPlan {
 /// with that row's inputs, and then corrected by its own outputs. The clock may be irregular
 /// ([`Log::recorded`](crate::Log::recorded)). A missing output (NaN) is left out alone; a missing input holds the value before it, zero before the first.
 ///
-/// **Search.** Fisher scoring with the damping of Levenberg and Marquardt. Derivatives of e and S are exact: the filter is
-/// computed in dual numbers. `monitor` is told of V divided by the number of measured values before each iteration, on the thread that searches.
+/// **Search.** Fisher scoring with the damping of Levenberg and Marquardt, unless `search.algorithm` says otherwise: the information
+/// stands for the Gauss-Newton matrix; Newton and Raphson's Hessian comes from differences of the gradient. Derivatives of e and S are
+/// exact: the filter is computed in dual numbers. `monitor` is told of V divided by the number of measured values before each iteration, on the thread that searches.
 ///
 /// **Standard errors** come from the inverse of the information, with e_i and S_i the derivatives by parameter i,
 ///

@@ -6,9 +6,8 @@ use super::seen::{estimation_record, estimation_start, goes_through};
 use super::shares::Shares;
 use super::warnings::{at_the_border, unstable_plant, warnings};
 use crate::data::{Detrend, Log, Offset, Prefilter, Prefiltered, Record, Rows, Source, Split, digests};
-use crate::estimate::{
-    self, Beside, Constant, Deadline, Estimate, Fitted, Method, Monitor, OutputOffset, Search, enough,
-};
+use crate::estimate::{self, Beside, Constant, Estimate, Fitted, Method, OutputOffset, enough};
+use crate::optimize::{Deadline, Monitor, Search};
 use crate::regression::sum;
 use crate::respond::{Horizon, PolynomialOnLog, Start, innovations};
 use crate::select::{self, Automatic, Choice, Focus, Found, Grid, Select, Selection, Task};
@@ -364,7 +363,7 @@ fn fit(
             let Chosen { found: Found { selection, mut guess }, with_constant } =
                 selected(&record, plan, &compared, &beside, monitor)?;
             if let (Method::PredictionError(search), false) = (&mut method, with_constant) {
-                search.guess = guess.take();
+                search.initial_parameters = guess.take();
             }
             let orders = selection.chosen.orders.clone();
             (Some(selection), orders, guess)
@@ -397,7 +396,7 @@ fn fit(
             let method = match &method {
                 Method::PredictionError(search) => Method::PredictionError(Search {
                     plant_first: true,
-                    guess: Some(plant.to_vec()),
+                    initial_parameters: Some(plant.to_vec()),
                     ..search.clone()
                 }),
                 other => other.clone(),

@@ -2,9 +2,10 @@
 
 use super::schema::Report;
 use super::seen::is_exact;
-use crate::estimate::{Procedure, SearchOutcome, Stopped};
+use crate::estimate::{Procedure, SearchOutcome};
 use crate::figures::{fixed, number, scientific};
 use crate::model::{cancel, near_cancellation};
+use crate::optimize::Stopped;
 use crate::select::{Grid, OrderRange};
 use crate::{Orders, PolynomialModel, Structure};
 

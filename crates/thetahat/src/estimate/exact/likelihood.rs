@@ -7,11 +7,11 @@ use thetahat_core::nalgebra::{Cholesky, DMatrix};
 use super::kalman::{Filter, Process};
 use crate::Orders;
 use crate::data::Record;
-use crate::estimate::normal;
-use crate::estimate::objective::Objective;
-use crate::estimate::objective::Unusable;
-use crate::estimate::polynomials::Polynomials;
+use crate::estimate::border::Border;
+use crate::estimate::polynomials::{Polynomials, Unusable};
 use crate::model::polynomial::is_stable;
+use crate::optimize::Objective;
+use crate::optimize::normal;
 use crate::regression::{condition, divide, divide_from};
 
 /// What the response to the inputs starts from.
@@ -90,6 +90,7 @@ pub(super) struct Likelihood<'a> {
     matrix: Vec<f64>,
     right: Vec<f64>,
     scratch: Vec<f64>,
+    border: Border,
 }
 
 impl<'a> Likelihood<'a> {
@@ -131,6 +132,7 @@ impl<'a> Likelihood<'a> {
             matrix: vec![0.0; parameters * parameters],
             right: vec![0.0; parameters],
             scratch: Vec::new(),
+            border: Border::new(orders, true),
         }
     }
 
@@ -261,9 +263,7 @@ impl Signals {
 }
 
 impl Objective for Likelihood<'_> {
-    fn orders(&self) -> &Orders {
-        &self.orders
-    }
+    type Refusal = Unusable;
 
     fn samples(&self) -> usize {
         self.samples
@@ -271,10 +271,6 @@ impl Objective for Likelihood<'_> {
 
     fn initial_conditions(&self) -> usize {
         self.sections.iter().map(|section| section.free.len()).sum()
-    }
-
-    fn needs_stable_a(&self) -> bool {
-        true
     }
 
     fn linear(&self) -> Range<usize> {
@@ -323,7 +319,7 @@ impl Objective for Likelihood<'_> {
     ///
     /// (Harvey 1989, section 3.4.5, and the part of var e taken out), and -grad ln L = N/2 grad ln cost. So the normal equations of a
     /// Gauss-Newton step of the cost are those of Fisher scoring times cost/N.
-    fn linearize(&mut self) -> f64 {
+    fn linearize(&mut self) -> Result<f64, Unusable> {
         let (size, places) = (self.right.len(), self.places());
         let (samples, Sums { squares, logarithms }) = (self.samples as f64, &self.sums);
         let scale = (logarithms / samples).exp();
@@ -332,7 +328,7 @@ impl Objective for Likelihood<'_> {
         self.right.fill(0.0);
         let Polynomials { a, c, .. } = &self.polynomials;
         // Where it was evaluated, it has a covariance.
-        let Some(process) = Process::new(a, c, true) else { return 0.0 };
+        let Some(process) = Process::new(a, c, true) else { return Ok(0.0) };
         let known = places.len();
         let mut variances = vec![0.0; known * known];
         let mut logarithm_slopes = vec![0.0; known];
@@ -397,7 +393,7 @@ impl Objective for Likelihood<'_> {
                 self.matrix[place * size + other] += 0.5 * cost / samples * both;
             }
         }
-        gain
+        Ok(gain)
     }
 
     fn try_free(&mut self, step: &[f64]) {
@@ -424,5 +420,13 @@ impl Objective for Likelihood<'_> {
 
     fn right(&self) -> &[f64] {
         &self.right
+    }
+
+    fn is_outside(refusal: &Unusable) -> bool {
+        *refusal == Unusable::Unstable
+    }
+
+    fn draw_in(&mut self, from: &[f64], trial: &mut [f64]) -> bool {
+        self.border.draw_in(from, trial)
     }
 }

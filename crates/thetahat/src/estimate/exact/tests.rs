@@ -320,7 +320,7 @@ fn the_gradient_is_that_of_differences() {
     for begin in [Begin::Rest, Begin::Free] {
         let mut likelihood = Likelihood::new(&record, &orders, 2, begin);
         let cost = best_free(&mut likelihood, &theta).unwrap();
-        likelihood.linearize();
+        likelihood.linearize().unwrap();
         let right = likelihood.right().to_vec();
         for (place, own) in right.iter().enumerate() {
             let at = |step: f64| {

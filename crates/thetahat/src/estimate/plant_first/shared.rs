@@ -9,19 +9,19 @@ use thetahat_core::LeastSquares;
 use thetahat_core::nalgebra::{Complex, ComplexField, DMatrix, DVector};
 
 use super::super::arx::{arx, rows};
-use super::super::border::multiply_out;
+use super::super::border::{Border, multiply_out};
 use super::super::instrumental::instrumental_variables;
-use super::super::objective::Objective;
-use super::super::objective::Unusable;
-use super::super::optimize::{
-    Deadline, Found, Monitor, Search, StartOutcome, best_free, best_linear, search,
-};
-use super::super::prediction_error::{energy, filled, flat, prediction_error, root_of, search_outcome};
+use super::super::outcome::{StartOutcome, search_outcome};
+use super::super::polynomials::Unusable;
+use super::super::prediction_error::{flat, prediction_error, root_of};
 use super::super::predictor::{Begin, Predictor};
+use super::super::stretches::{energy, filled};
 use super::super::uncertainty::{coloured, restricted};
 use super::super::{Estimate, Initial, Procedure, drop_is_not_for_f};
 use crate::data::Record;
 use crate::model::polynomial::roots;
+use crate::optimize::Objective;
+use crate::optimize::{Deadline, Found, Monitor, Search, best_free, best_linear, search};
 use crate::respond::{NOTHING_LEFT, are_worth};
 use crate::{Error, Orders};
 
@@ -39,6 +39,7 @@ struct Shared<'r> {
     moved: Vec<f64>,
     matrix: Vec<f64>,
     right: Vec<f64>,
+    border: Border,
 }
 
 impl<'r> Shared<'r> {
@@ -51,6 +52,7 @@ impl<'r> Shared<'r> {
         let (count, size) = (na + b, own.len());
         Self {
             predictor: Predictor::with_one_denominator(record, plant, begin),
+            border: Border::new(&orders, true),
             orders,
             theta: vec![0.0; size],
             moved: vec![0.0; size],
@@ -67,9 +69,7 @@ impl<'r> Shared<'r> {
 }
 
 impl Objective for Shared<'_> {
-    fn orders(&self) -> &Orders {
-        &self.orders
-    }
+    type Refusal = Unusable;
 
     fn samples(&self) -> usize {
         self.predictor.samples()
@@ -77,10 +77,6 @@ impl Objective for Shared<'_> {
 
     fn initial_conditions(&self) -> usize {
         self.predictor.initial_conditions()
-    }
-
-    fn needs_stable_a(&self) -> bool {
-        true
     }
 
     fn linear(&self) -> Range<usize> {
@@ -96,7 +92,7 @@ impl Objective for Shared<'_> {
         self.predictor.evaluate(&self.theta)
     }
 
-    fn linearize(&mut self) -> f64 {
+    fn linearize(&mut self) -> Result<f64, Unusable> {
         let gain = self.predictor.linearize();
         let (count, size) = (self.right.len(), self.own.len());
         self.matrix.fill(0.0);
@@ -109,7 +105,7 @@ impl Objective for Shared<'_> {
         for (entry, &own) in self.predictor.right.iter().zip(&self.own) {
             self.right[own] += entry;
         }
-        gain
+        Ok(gain)
     }
 
     fn try_free(&mut self, step: &[f64]) {
@@ -130,6 +126,14 @@ impl Objective for Shared<'_> {
 
     fn right(&self) -> &[f64] {
         &self.right
+    }
+
+    fn is_outside(refusal: &Unusable) -> bool {
+        *refusal == Unusable::Unstable
+    }
+
+    fn draw_in(&mut self, from: &[f64], trial: &mut [f64]) -> bool {
+        self.border.draw_in(from, trial)
     }
 }
 
@@ -217,7 +221,7 @@ struct Reached<'r> {
     begin: Begin,
 }
 
-/// A and B by name: a guess, and those of least squares, of instrumental variables and of noise with a numerator.
+/// A and B by name: initial parameters that were given, and those of least squares, of instrumental variables and of noise with a numerator.
 fn starts(
     record: &Record<'_>,
     orders: &Orders,
@@ -228,11 +232,11 @@ fn starts(
     let noisy = Orders { nc: orders.na, ..orders.clone() };
     let count = linear.parameters();
     let mut starts = Vec::new();
-    if let Some(guess) = options.guess.as_ref().filter(|guess| guess.len() >= count) {
-        starts.push(("guess", guess.clone()));
+    if let Some(initial) = options.initial_parameters.as_ref().filter(|initial| initial.len() >= count) {
+        starts.push(("guess", initial.clone()));
     }
     let found = filled(record, |record| -> Result<_, Error> {
-        let search = Search { plant_first: false, guess: None, ..options.clone() };
+        let search = Search { plant_first: false, initial_parameters: None, ..options.clone() };
         let armax = match prediction_error(record, &noisy, Initial::Auto, &search, monitor) {
             Err(Error::Interrupted) => return Err(Error::Interrupted),
             other => other,
@@ -276,7 +280,8 @@ fn finish(
 ) -> Result<(Estimate, super::Errors), Error> {
     let Reached { mut shared, found, starts, begin } = reached;
     let _ = best_free(&mut shared, &found.parameters);
-    shared.linearize();
+    // It has normal equations.
+    let _ = shared.linearize();
     let samples = shared.samples();
     let taken = found.parameters.len() + shared.initial_conditions();
     let selection = shared.selection();

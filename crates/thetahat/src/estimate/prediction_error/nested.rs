@@ -7,12 +7,13 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use super::{Job, Problem, filled, stretches};
+use super::{Job, Problem};
 use crate::data::Record;
-use crate::estimate::optimize::{Search, best_free};
 use crate::estimate::polynomials::extended;
 use crate::estimate::predictor::{Begin, Predictor};
 use crate::estimate::start::Plants;
+use crate::estimate::stretches::{filled, stretches};
+use crate::optimize::{Search, best_free};
 use crate::{Error, Orders};
 
 /// How many starts of a smaller model are followed for how many iterations: near enough to its optimum.

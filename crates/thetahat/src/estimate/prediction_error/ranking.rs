@@ -8,12 +8,14 @@
 use rayon::prelude::*;
 
 use super::nested::thinned;
-use super::{Beginning, Job, Problem, filled, hopeless};
+use super::{Beginning, Job, Problem, hopeless};
 use crate::Error;
-use crate::estimate::optimize::{Algorithm, Found, Search, StartOutcome, best_free, best_linear};
+use crate::estimate::outcome::StartOutcome;
 use crate::estimate::predictor::{Begin, Predictor};
 use crate::estimate::restart::restarts;
 use crate::estimate::start::candidates;
+use crate::estimate::stretches::filled;
+use crate::optimize::{Algorithm, Found, Search, best_free, best_linear};
 
 /// Starts of which the costs differ by more than this fraction of the lowest may lead to different minima.
 const DISAGREEMENT: f64 = 1e-3;
@@ -26,7 +28,7 @@ const SAME_COST: f64 = 1e-6;
 const ROUNDS: [(usize, f64); 2] = [(4, 1.2), (10, 1.05)];
 
 /// The name of the start that was given.
-const GUESS: &str = "initial-parameters";
+const GIVEN: &str = "initial-parameters";
 /// The name of those from smaller models.
 const NESTED: &str = "nested";
 
@@ -47,16 +49,16 @@ impl Job<'_> {
         predictor: &mut Predictor<'_>,
     ) -> Result<Beginning, Error> {
         let Problem { record, orders, .. } = problem;
-        let guess = self.options.guess.iter().map(|guess| (GUESS, guess.clone()));
+        let given = self.options.initial_parameters.iter().map(|given| (GIVEN, given.clone()));
         let recipes = filled(record, |record| candidates(record, orders, self.deadline));
         let found = match recipes {
-            Err(error) if self.options.guess.is_none() => return Err(error),
+            Err(error) if self.options.initial_parameters.is_none() => return Err(error),
             found => found.unwrap_or_default(),
         };
         let unstable_pole = found.iter().filter_map(|candidate| candidate.unstable_pole).reduce(f64::max);
         let recipes = found.into_iter().map(|candidate| (candidate.name, candidate.parameters));
         let mut starts: Vec<Start> = Vec::new();
-        for (name, parameters) in guess.chain(recipes) {
+        for (name, parameters) in given.chain(recipes) {
             if self.deadline.is_over() && starts.iter().any(|start| start.cost.is_finite()) {
                 break;
             }
@@ -70,7 +72,7 @@ impl Job<'_> {
             && self.options.max_iterations > comparison;
         // What was given and costs least comes from a search.
         let several = self.options.starts > 0;
-        let known = !several && starts.first().is_some_and(|start| start.outcome.name == GUESS);
+        let known = !several && starts.first().is_some_and(|start| start.outcome.name == GIVEN);
         let mut compared = !has_f || !default || known || several;
         let may_compare = has_f && default && !known && !self.deadline.is_over();
         let doubtful = may_compare && is_doubtful(problem, &starts, predictor);
@@ -166,7 +168,7 @@ impl Job<'_> {
         let results = starts.par_iter().enumerate().map(|(number, start)| {
             // Those that were given or come from smaller models are not left out for others that cost less.
             let chosen =
-                number <= self.options.starts || [GUESS, NESTED].contains(&start.outcome.name.as_str());
+                number <= self.options.starts || [GIVEN, NESTED].contains(&start.outcome.name.as_str());
             if !chosen || number > 0 && self.deadline.is_over() {
                 return Ok(None);
             }
@@ -231,7 +233,7 @@ fn lead_apart(recipes: &[&Start], predictor: &mut Predictor<'_>) -> bool {
     // The cost at a start, and where it leads.
     let mut followed = |start: &Start| {
         let cost = best_free(predictor, &start.parameters).ok()?;
-        Some((cost, cost - predictor.foretold()))
+        Some((cost, cost - predictor.predicted_decrease()))
     };
     let Some((cost, lowest)) = followed(recipes[0]) else { return true };
     lowest < (1.0 - FAR) * cost

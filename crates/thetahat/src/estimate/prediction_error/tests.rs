@@ -1,7 +1,8 @@
 //! Searches against one another, and what they say when something is wrong.
 
 use super::*;
-use crate::estimate::{Procedure, Step};
+use crate::estimate::Procedure;
+use crate::optimize::{Algorithm, Step};
 use crate::regression::noise::Noise;
 
 /// The response of numerator/denominator from rest.
@@ -237,7 +238,7 @@ fn what_cannot_be_estimated_is_refused_in_words() {
         Search { tolerance: 0.0, ..Search::default() },
         Search { tolerance: f64::NAN, ..Search::default() },
         Search { step: Step { c1: -1.0, c2: None }, ..Search::default() },
-        Search { guess: Some(vec![1.0]), ..Search::default() },
+        Search { initial_parameters: Some(vec![1.0]), ..Search::default() },
     ] {
         let refused = found(&record, &orders[0], Initial::Auto, &search).unwrap_err();
         assert!(matches!(refused, Error::Argument { .. }), "{refused}");
@@ -292,7 +293,7 @@ fn a_search_goes_on_along_the_border_of_stability() {
     let record = Record::new(&y, vec![&u]).unwrap();
     let orders = Orders::oe(&[2], &[2], &[1]).unwrap();
     // Far from the plant in all parameters, with a pole from which the steps lead out of the circle.
-    let search = Search { guess: Some(vec![0.5, 0.0, -1.2, 0.25]), ..Search::default() };
+    let search = Search { initial_parameters: Some(vec![0.5, 0.0, -1.2, 0.25]), ..Search::default() };
     let estimate = found(&record, &orders, Initial::Zero, &search).unwrap();
     let [b1, b2, f1, f2] = estimate.parameters() else { panic!("four parameters") };
     assert!((b1 - 1.0).abs() < 0.1 && (b2 - 0.5).abs() < 0.2, "{b1} {b2}");

@@ -3,14 +3,12 @@
 use std::ops::Range;
 
 use super::Predictor;
-use crate::Orders;
-use crate::estimate::normal;
-use crate::estimate::objective::{Objective, Unusable};
+use crate::estimate::polynomials::Unusable;
+use crate::optimize::Objective;
+use crate::optimize::normal;
 
 impl Objective for Predictor<'_> {
-    fn orders(&self) -> &Orders {
-        self.orders()
-    }
+    type Refusal = Unusable;
 
     fn samples(&self) -> usize {
         self.samples()
@@ -18,10 +16,6 @@ impl Objective for Predictor<'_> {
 
     fn initial_conditions(&self) -> usize {
         self.initial_conditions()
-    }
-
-    fn needs_stable_a(&self) -> bool {
-        false
     }
 
     fn linear(&self) -> Range<usize> {
@@ -37,8 +31,8 @@ impl Objective for Predictor<'_> {
         self.evaluate(parameters)
     }
 
-    fn linearize(&mut self) -> f64 {
-        self.linearize()
+    fn linearize(&mut self) -> Result<f64, Unusable> {
+        Ok(self.linearize())
     }
 
     fn try_free(&mut self, step: &[f64]) {
@@ -56,11 +50,19 @@ impl Objective for Predictor<'_> {
     fn right(&self) -> &[f64] {
         &self.right
     }
+
+    fn is_outside(refusal: &Unusable) -> bool {
+        *refusal == Unusable::Unstable
+    }
+
+    fn draw_in(&mut self, from: &[f64], trial: &mut [f64]) -> bool {
+        self.border.draw_in(from, trial)
+    }
 }
 
 impl Predictor<'_> {
     /// By how much a full Gauss-Newton step from what was evaluated last would lower the cost, to first order.
-    pub(in crate::estimate) fn foretold(&mut self) -> f64 {
+    pub(in crate::estimate) fn predicted_decrease(&mut self) -> f64 {
         let size = self.right.len();
         let free_gain = self.linearize();
         let mut factor = self.matrix.clone();

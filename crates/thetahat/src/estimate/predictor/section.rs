@@ -6,8 +6,8 @@ use thetahat_core::nalgebra::DMatrix;
 
 use super::{Column, Layout, loss};
 use crate::data::Record;
-use crate::estimate::normal;
 use crate::estimate::polynomials::Polynomials;
+use crate::optimize::normal;
 use crate::regression::{Interior, add_filtered, divide, divide_together, product, sum_of_squares};
 
 /// The fraction of a free response, squared, below which what is left of it is rounding.

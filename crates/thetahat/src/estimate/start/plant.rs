@@ -25,7 +25,7 @@ use thetahat_core::nalgebra::{DMatrix, DVector};
 
 use super::reduced::{Factor, Free, Reduced};
 use super::stable;
-use crate::estimate::optimize::Deadline;
+use crate::optimize::Deadline;
 use crate::regression::{Lagged, Presample, Taps, add_filtered, divide, divide_together, sum_of_squares};
 
 /// Below this fraction of sum y^2, sum e^2 is rounding.

@@ -6,9 +6,9 @@ use super::plant::{Group, Input, Plant, Point, divided};
 use super::reduced::{Free, Reduced};
 use super::{Candidate, candidates, stable};
 use crate::data::Record;
-use crate::estimate::optimize::Deadline;
 use crate::estimate::{Method, Search, estimate};
 use crate::model::polynomial::{is_stable, product};
+use crate::optimize::Deadline;
 use crate::regression::noise::Noise;
 use crate::regression::{Taps, add_filtered, sum_of_squares};
 use crate::{Error, Initial, Orders};
@@ -100,7 +100,8 @@ impl Modes<'_> {
             let Sample { u, y, b, f } = self.sample(seed);
             let record = Record::new(&y, vec![&u]).unwrap();
             let truth = [&b[1..], &f[1..]].concat();
-            let least = reached(&record, &orders, Search { guess: Some(truth), ..Search::default() });
+            let least =
+                reached(&record, &orders, Search { initial_parameters: Some(truth), ..Search::default() });
             reached(&record, &orders, Search { max_iterations: 20, ..Search::default() })
                 <= least * (1.0 + 1e-5)
         });

@@ -12,11 +12,13 @@
 //! de/dz and dS/dz, exact but for rounding.
 //!
 //! Time update: Thornton's modified weighted Gram-Schmidt on [F U | I] with the weights (D, Q). Measurement update:
-//! Bierman's. thetahat-core has both too, in its kernels on slices. They stand here again as those take `Real` numbers, f32 and f64,
-//! and a dual number is none: it carries derivatives along, and is no real field. The test `value_is_the_likelihood_of_the_filter`
-//! holds both to the same likelihood. Both updates keep D from going negative (Bierman, Factorization Methods for Discrete Sequential Estimation, 1977,
-//! chapters V and VI). The quicker refactoring of F P F' + Q is not worth a second path here: derivatives take most of
-//! the time.
+//! Bierman's. Both keep D from going negative (Bierman, Factorization Methods for Discrete Sequential Estimation, 1977, chapters V
+//! and VI).
+//!
+//! thetahat-core updates the same factors by other arithmetic, made for plain numbers on small processors: reciprocals for divisions,
+//! four rows of U at a time, a threshold below which variances count as zero, and F P F' + Q factored anew where nothing cancels. Here
+//! derivatives take most of the time, and a branch on a threshold would be one more place where V is not smooth. The test
+//! `value_is_the_likelihood_of_the_filter` holds both to the same likelihood.
 
 use thetahat_core::Number;
 

@@ -5,7 +5,7 @@ const DEPENDENT: f64 = 1e-13;
 
 /// `G = L L'` in place for a symmetric matrix of `size` rows, of which the lower triangle is read and replaced by L. Gives
 /// the number of columns that depend on those before them: they are left out, and solutions are zero there. n^3/6 multiply-adds.
-pub(super) fn factor(matrix: &mut [f64], size: usize) -> usize {
+pub(crate) fn factor(matrix: &mut [f64], size: usize) -> usize {
     let mut dependent = 0;
     for column in 0..size {
         let (above, below) = matrix.split_at_mut((column + 1) * size);
@@ -26,7 +26,7 @@ pub(super) fn factor(matrix: &mut [f64], size: usize) -> usize {
 }
 
 /// Solves `L L' x = right` in place. n^2 multiply-adds.
-pub(super) fn solve(factor: &[f64], size: usize, right: &mut [f64]) {
+pub(crate) fn solve(factor: &[f64], size: usize, right: &mut [f64]) {
     for row in 0..size {
         let known: f64 = factor[row * size..][..row].iter().zip(&*right).map(|(a, x)| a * x).sum();
         right[row] = (right[row] - known) / factor[row * size + row];

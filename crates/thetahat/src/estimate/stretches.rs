@@ -1,0 +1,80 @@
+//! The parts of a record that starts see, and how large its output is.
+
+use std::ops::Range;
+
+use crate::data::{Record, measured};
+use crate::regression::sum_of_squares;
+
+/// From so many samples on, starts see stretches of the record only.
+const LONG: usize = 1 << 18;
+const STRETCHES: usize = 8;
+const STRETCH: usize = 1 << 12;
+
+/// Stretches of a long record, spread evenly over its samples; none for a record that is not long.
+pub(super) fn thinned<'a>(record: &Record<'a>) -> Option<Record<'a>> {
+    let total: usize = record.segments.iter().map(Range::len).sum();
+    if total < LONG { None } else { stretches(record, STRETCHES, STRETCH) }
+}
+
+/// So many stretches of at most so many samples, spread evenly over a record; none if of short segments less than half
+/// of that would be left.
+pub(crate) fn stretches<'a>(record: &Record<'a>, count: usize, length: usize) -> Option<Record<'a>> {
+    let total: usize = record.segments.iter().map(Range::len).sum();
+    let mut segments = Vec::with_capacity(count);
+    let (mut before, mut rest) = (0, record.segments.iter().peekable());
+    for position in (0..count).map(|k| k * (total / count)) {
+        while let Some(segment) = rest.next_if(|segment| before + segment.len() <= position) {
+            before += segment.len();
+        }
+        if let Some(segment) = rest.peek() {
+            let start = segment.start + position - before;
+            segments.push(start..segment.end.min(start + length));
+        }
+    }
+    let kept: usize = segments.iter().map(Range::len).sum();
+    let (output, inputs) = (record.output, record.inputs.clone());
+    let past = vec![0; segments.len()];
+    (2 * kept > count * length).then_some(Record { output, inputs, segments, past })
+}
+
+/// The sum of squares of the output over all segments.
+pub(super) fn energy(record: &Record<'_>) -> f64 {
+    let square = |rows: &Range<usize>| sum_of_squares(&record.output[rows.clone()]);
+    let whole: f64 = record.segments.iter().map(square).sum();
+    if !whole.is_nan() {
+        return whole;
+    }
+    record
+        .segments
+        .iter()
+        .flat_map(|segment| measured(record.output, segment))
+        .map(|rows| square(&rows))
+        .sum()
+}
+
+/// Gives `starts` a record without missing outputs: these are put on lines from one measured output to the next. Starts need to
+/// lead near the minimum, no more.
+pub(super) fn filled<T>(record: &Record<'_>, starts: impl FnOnce(&Record<'_>) -> T) -> T {
+    let runs = |segment: &Range<usize>| measured(record.output, segment);
+    let whole = |segment: &Range<usize>| runs(segment).first() == Some(segment);
+    if record.segments.iter().all(whole) {
+        return starts(record);
+    }
+    let mut output = record.output.to_vec();
+    let mut segments = Vec::new();
+    for segment in &record.segments {
+        let runs = runs(segment);
+        for pair in runs.windows(2) {
+            let (left, right) = (pair[0].end - 1, pair[1].start);
+            let slope = (output[right] - output[left]) / (right - left) as f64;
+            for row in left + 1..right {
+                output[row] = output[left] + slope * (row - left) as f64;
+            }
+        }
+        if let (Some(first), Some(last)) = (runs.first(), runs.last()) {
+            segments.push(first.start..last.end);
+        }
+    }
+    let past = vec![0; segments.len()];
+    starts(&Record { output: &output, inputs: record.inputs.clone(), segments, past })
+}

@@ -5,7 +5,9 @@ use std::ffi::OsString;
 use std::path::Path;
 
 use clap::Args;
-use thetahat::{EquationsPlan, Inspection, Log, Plan, Report, Requirement, Source, ValidationPlan};
+use thetahat::data::{Log, Source};
+use thetahat::inspect::Inspection;
+use thetahat::report::{EquationsPlan, Plan, Report, Requirement, ValidationPlan};
 
 use crate::args::{InspectArguments, ValidateArguments};
 use crate::commands::{Experiments, Tracking, experiments, inspected};

@@ -32,7 +32,7 @@ pub struct Channel {
 /// across such a border. A missing output alone is no border to models that do not need past outputs.
 ///
 /// ```
-/// use thetahat::{Channel, Log};
+/// use thetahat::data::{Channel, Log};
 ///
 /// let u = Channel { name: "u".into(), values: vec![0.0, 1.0, 1.0] };
 /// let y = Channel { name: "y".into(), values: vec![0.0, 0.0, 0.5] };
@@ -184,7 +184,7 @@ impl Log {
     /// [`Error::Data`] as for [`Log::new`], and if time is not finite, repeats or goes back.
     ///
     /// ```
-    /// use thetahat::{Channel, Log};
+    /// use thetahat::data::{Channel, Log};
     ///
     /// let y = Channel { name: "y".into(), values: vec![0.0, 1.0, 0.5] };
     /// let log = Log::recorded(vec![y], vec![0.0, 1.0, 1.8])?;
@@ -508,7 +508,7 @@ impl Log {
     /// As for [`record`](Self::record).
     ///
     /// ```
-    /// use thetahat::{Channel, Log};
+    /// use thetahat::data::{Channel, Log};
     ///
     /// let u = Channel { name: "u".into(), values: vec![0.0, 1.0, 1.0, 2.0] };
     /// let y = Channel { name: "y".into(), values: vec![0.0, f64::NAN, 0.5, 0.5] };

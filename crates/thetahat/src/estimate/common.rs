@@ -6,9 +6,10 @@ use super::optimize::{Deadline, Monitor, Search, best_free, search};
 use super::prediction_error::{energy, is_determined};
 use super::predictor::{Begin, Predictor};
 use super::start::candidates;
+use crate::Error;
 use crate::data::Record;
+use crate::model::Orders;
 use crate::respond::NOTHING_LEFT;
-use crate::{Error, Orders};
 
 /// A step that raises the log-likelihood by less than this fraction of one is not done.
 const SETTLED: f64 = 0.02;

@@ -11,10 +11,15 @@ use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::DMatrix;
 
 use super::optimize::{Deadline, Monitor, Search, Stopped};
-use crate::model::equations::{Scale, Unknown};
-use crate::respond::NisSummary;
-use crate::respond::equations::{Experiment, Failure};
-use crate::{Error, GreyBox};
+use crate::Error;
+use crate::model::{
+    GreyBox,
+    equations::{Scale, Unknown},
+};
+use crate::respond::{
+    NisSummary,
+    equations::{Experiment, Failure},
+};
 pub(crate) use likelihood::Criterion;
 use search::Found;
 pub(crate) use uncertainty::listed;
@@ -105,7 +110,7 @@ pub(crate) struct EquationsEstimate {
 /// the result does not depend on how many threads there are.
 ///
 /// # Errors
-/// As for [`fit_equations`](crate::fit_equations).
+/// As for [`fit_equations`](crate::report::fit_equations).
 pub(crate) fn largest_likelihood(
     model: &GreyBox,
     experiments: &[Experiment],

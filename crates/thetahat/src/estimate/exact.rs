@@ -46,10 +46,13 @@ use super::optimize::{
 use super::polynomials::Polynomials;
 use super::prediction_error::{energy, filled, flat, prediction_error, search_outcome};
 use super::{Estimate, Initial, Procedure};
+use crate::Error;
 use crate::data::{Record, measured};
-use crate::model::polynomial::{is_stable, roots};
+use crate::model::{
+    Orders, Structure,
+    polynomial::{is_stable, roots},
+};
 use crate::respond::{NOTHING_LEFT, are_worth};
-use crate::{Error, Orders, Structure};
 use likelihood::{Begin, Likelihood};
 
 /// Starts have roots of A and C inside this circle.

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::Orders;
+use crate::model::Orders;
 
 /// A cost of the parameters, and of the weights of free responses, which it keeps itself: [`evaluate`](Self::evaluate) takes
 /// trial weights, [`linearize`](Self::linearize) makes these, and the parameters evaluated last, the current point.

@@ -40,10 +40,11 @@ use super::{
     Criterion, Estimate, Initial, Method, Monitor, Norm, Procedure, Search, arx, estimate_of_channels, exact,
     prediction_error,
 };
+use crate::Error;
 use crate::data::{Log, Offset, Record};
-use crate::model::{OffsetCovariance, Quantity, is_covariance};
+use crate::estimate::Criteria;
+use crate::model::{OffsetCovariance, Orders, Quantity, Structure, is_covariance};
 use crate::regression::{Presample, sum};
-use crate::{Criteria, Error, Orders, Structure};
 
 /// A search for a constant begins where a step foretells this fraction of what it must be worth.
 const PROMISING: f64 = 0.5;

@@ -25,7 +25,8 @@ use serde::{Deserialize, Serialize};
 use super::border::Border;
 use super::normal;
 use super::objective::{Objective, Unusable};
-use crate::{Error, Orders};
+use crate::Error;
+use crate::model::Orders;
 
 /// The first damping of Levenberg and Marquardt. A larger one wastes iterations on fast-sampled plants.
 pub(crate) const FIRST_DAMPING: f64 = 1e-8;

@@ -18,11 +18,11 @@ use super::optimize::{
 use super::predictor::{Begin, Predictor};
 use super::uncertainty::{autoregression, backward_filtered_products, coloured, restricted};
 use super::{Estimate, Initial, Procedure};
+use crate::Error;
 use crate::data::{Record, measured};
-use crate::model::{cancel, near_cancellation};
+use crate::model::{Orders, PolynomialModel, Structure, cancel, near_cancellation};
 use crate::regression::{Taps, condition, sum_of_squares};
 use crate::respond::{NOTHING_LEFT, are_worth};
-use crate::{Error, Orders, PolynomialModel, Structure};
 
 /// From so many samples on, starts see stretches of the record only.
 const LONG: usize = 1 << 18;

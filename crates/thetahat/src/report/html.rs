@@ -18,11 +18,13 @@ use charts::{Marked, Shade, Stack};
 use page::{Block, Page, Section};
 
 use super::{Report, Validated, Validation};
+use crate::Error;
+use crate::data::{Rows, Source};
 use crate::figures::{self, fixed};
-use crate::{
-    EquationsModel, Error, Fit, Inspection, Model, OutputSignals, Part, PolynomialModel, Residuals, Rows,
-    Source,
-};
+use crate::inspect::Inspection;
+use crate::model::{EquationsModel, Model, PolynomialModel};
+use crate::report::OutputSignals;
+use crate::validate::{Fit, Part, Residuals};
 
 /// The most points of a curve over time.
 const POINTS: usize = 4000;
@@ -41,7 +43,7 @@ const INPUTS: usize = 5;
 /// The page of a fit: what the model is, how it was found, and how it does on each part of the log.
 ///
 /// `validated` has one entry for each part: estimation, validation, test, as far as there are any, all on the whole log.
-/// `held_out` is what [`held_out_runs`](crate::held_out_runs) gives, or nothing. `command` is shown as what made the page.
+/// `held_out` is what [`held_out_runs`](crate::report::held_out_runs) gives, or nothing. `command` is shown as what made the page.
 pub fn fit_page(
     report: &Report,
     validated: &[Validated],

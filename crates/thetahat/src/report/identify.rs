@@ -7,13 +7,15 @@ use super::shares::Shares;
 use super::warnings::{at_the_border, unstable_plant, warnings};
 use crate::data::{Detrend, Log, Offset, Prefilter, Prefiltered, Record, Rows, Source, Split, digests};
 use crate::estimate::{
-    self, Beside, Constant, Deadline, Estimate, Fitted, Method, Monitor, OutputOffset, Search, enough,
+    self, Beside, Constant, Deadline, Estimate, Fitted, Initial, Method, Monitor, OutputOffset, Search,
+    enough,
 };
+use crate::model::{Orders, PolynomialModel, Quantity, Signal, Structure};
 use crate::regression::sum;
 use crate::respond::{Horizon, PolynomialOnLog, Start, innovations};
 use crate::select::{self, Automatic, Choice, Focus, Found, Grid, Select, Selection, Task};
 use crate::validate::Part;
-use crate::{Document, Error, Initial, Orders, PolynomialModel, Quantity, Signal, Structure};
+use crate::{Document, Error};
 
 /// Below this fraction of a channel's size, what detrending leaves is rounding.
 const ROUNDING: f64 = 1e-13;
@@ -171,7 +173,9 @@ impl Plan {
 /// cannot determine the parameters, which are named.
 ///
 /// ```
-/// use thetahat::{Channel, Log, Orders, Plan, identify};
+/// use thetahat::data::{Channel, Log};
+/// use thetahat::model::Orders;
+/// use thetahat::report::{Plan, identify};
 ///
 /// let u: Vec<f64> = (0..200).map(|t| f64::from(t * t % 7)).collect();
 /// let mut y = vec![20.0];
@@ -211,7 +215,9 @@ pub fn identify_monitored(
 ///
 /// ```
 /// use std::ops::ControlFlow;
-/// use thetahat::{Channel, Log, Orders, Plan, Unjudged, identify};
+/// use thetahat::data::{Channel, Log};
+/// use thetahat::model::Orders;
+/// use thetahat::report::{Plan, Unjudged, identify};
 ///
 /// let u: Vec<f64> = (0..200).map(|t| f64::from(t * t % 7)).collect();
 /// let y = [vec![0.0], u[..199].to_vec()].concat();
@@ -650,8 +656,9 @@ mod offset_tests;
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::data::Channel;
     use crate::regression::noise::Noise;
-    use crate::{Channel, OrderRange, Path};
+    use crate::select::{OrderRange, Path};
 
     #[test]
     fn figures_that_wait_are_the_same() {

@@ -8,12 +8,13 @@ use super::judge::of_output;
 use super::seen::rows_of_fit;
 use super::suited::{check_offsets, check_sample_time};
 use crate::data::{Detrend, Log, Offset, Rows, Source, checked};
-use crate::estimate::Criteria;
+use crate::estimate::{Criteria, Procedure};
 use crate::figures::{chance, fixed, number};
+use crate::model::{Model, Orders, Structure};
 use crate::regression::sum;
 use crate::respond::{Horizon, Innovations, OnLog, Response, Tested, check_steps};
 use crate::validate::{Fit, Relation, Residuals};
-use crate::{Document, Error, Model, Orders, Procedure, Structure};
+use crate::{Document, Error};
 
 const GENERATOR: &str = concat!("thetahat ", env!("CARGO_PKG_VERSION"));
 /// The levels of the prediction intervals of which the coverage is counted.
@@ -242,7 +243,9 @@ impl ValidationPlan {
 /// computed of a model on a log, such as the figures of too few samples, is none in the document, with a word why.
 ///
 /// ```
-/// use thetahat::{Channel, Log, Plan, Orders, ValidationPlan, identify, validate};
+/// use thetahat::data::{Channel, Log};
+/// use thetahat::model::Orders;
+/// use thetahat::report::{Plan, ValidationPlan, identify, validate};
 ///
 /// let u: Vec<f64> = (0..300).map(|t| f64::from(t * t % 11)).collect();
 /// let mut y = vec![20.0];
@@ -576,7 +579,7 @@ fn warn(plan: &ValidationPlan, validation: &mut Validation) {
 }
 
 /// The past lags farthest outside their band, three at most, in rising order.
-fn largest(independence: &crate::Independence) -> String {
+fn largest(independence: &crate::validate::Independence) -> String {
     let behind = independence.past.lags + 1;
     let each = independence.correlation.iter().zip(&independence.band).skip(behind).zip(1_usize..);
     let mut outside: Vec<(f64, usize)> = each

@@ -5,13 +5,13 @@ use std::ops::Range;
 use thetahat_core::nalgebra::{Cholesky, DMatrix};
 
 use super::kalman::{Filter, Process};
-use crate::Orders;
 use crate::data::Record;
-use crate::estimate::normal;
-use crate::estimate::objective::Objective;
-use crate::estimate::objective::Unusable;
-use crate::estimate::polynomials::Polynomials;
-use crate::model::polynomial::is_stable;
+use crate::estimate::{
+    normal,
+    objective::{Objective, Unusable},
+    polynomials::Polynomials,
+};
+use crate::model::{Orders, polynomial::is_stable};
 use crate::regression::{condition, divide, divide_from};
 
 /// What the response to the inputs starts from.

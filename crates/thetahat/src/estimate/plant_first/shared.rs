@@ -20,10 +20,10 @@ use super::super::prediction_error::{energy, filled, flat, prediction_error, roo
 use super::super::predictor::{Begin, Predictor};
 use super::super::uncertainty::{coloured, restricted};
 use super::super::{Estimate, Initial, Procedure, drop_is_not_for_f};
+use crate::Error;
 use crate::data::Record;
-use crate::model::polynomial::roots;
+use crate::model::{Orders, polynomial::roots};
 use crate::respond::{NOTHING_LEFT, are_worth};
-use crate::{Error, Orders};
 
 /// Starts have poles inside this circle.
 const INSIDE: f64 = 0.99;

@@ -8,12 +8,15 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use super::{Job, Problem, filled, stretches};
+use crate::Error;
 use crate::data::Record;
-use crate::estimate::optimize::{Search, best_free};
-use crate::estimate::polynomials::extended;
-use crate::estimate::predictor::{Begin, Predictor};
-use crate::estimate::start::Plants;
-use crate::{Error, Orders};
+use crate::estimate::{
+    optimize::{Search, best_free},
+    polynomials::extended,
+    predictor::{Begin, Predictor},
+    start::Plants,
+};
+use crate::model::Orders;
 
 /// How many starts of a smaller model are followed for how many iterations: near enough to its optimum.
 const ROUNDS: [(usize, usize); 2] = [(3, 3), (1, 8)];

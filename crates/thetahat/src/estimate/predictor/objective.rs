@@ -3,9 +3,11 @@
 use std::ops::Range;
 
 use super::Predictor;
-use crate::Orders;
-use crate::estimate::normal;
-use crate::estimate::objective::{Objective, Unusable};
+use crate::estimate::{
+    normal,
+    objective::{Objective, Unusable},
+};
+use crate::model::Orders;
 
 impl Objective for Predictor<'_> {
     fn orders(&self) -> &Orders {

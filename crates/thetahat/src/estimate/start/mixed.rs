@@ -6,8 +6,8 @@ use super::Candidate;
 use super::noise::{Equation, Mixed, behind};
 use super::output_error::{OutputError, Start};
 use super::plant::{Equations, Group, Input, Limits, Plant, Point, divided, energy, multiplied};
-use crate::Orders;
 use crate::estimate::optimize::Deadline;
+use crate::model::Orders;
 
 /// Rounds of least squares with filtered signals.
 pub(super) const ROUNDS: usize = 3;

@@ -12,9 +12,8 @@ use std::ops::Range;
 use super::noise::{Equation, Mixed};
 use super::plant::{Best, Equations, Group, Input, Limits, Plant, Point, add_delayed, divided};
 use super::stable;
-use crate::Orders;
 use crate::estimate::optimize::Deadline;
-use crate::model::polynomial::product;
+use crate::model::{Orders, polynomial::product};
 
 const STEIGLITZ_MCBRIDE: Limits = Limits { iterations: 20, tolerance: 1e-3 };
 const REFINED: Limits = Limits { iterations: 15, tolerance: 1e-3 };

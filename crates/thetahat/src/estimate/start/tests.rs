@@ -5,13 +5,14 @@ use std::ops::Range;
 use super::plant::{Group, Input, Plant, Point, divided};
 use super::reduced::{Free, Reduced};
 use super::{Candidate, candidates, stable};
+use crate::Error;
 use crate::data::Record;
-use crate::estimate::optimize::Deadline;
-use crate::estimate::{Method, Search, estimate};
-use crate::model::polynomial::{is_stable, product};
-use crate::regression::noise::Noise;
-use crate::regression::{Taps, add_filtered, sum_of_squares};
-use crate::{Error, Initial, Orders};
+use crate::estimate::{Initial, Method, Search, estimate, optimize::Deadline};
+use crate::model::{
+    Orders,
+    polynomial::{is_stable, product},
+};
+use crate::regression::{Taps, add_filtered, noise::Noise, sum_of_squares};
 
 /// Nearly normal, of unit variance.
 fn normal(noise: &mut Noise, count: usize) -> Vec<f64> {

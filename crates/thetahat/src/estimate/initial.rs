@@ -17,8 +17,7 @@ use serde::{Deserialize, Serialize};
 /// n more initial conditions are worth it if N ln(V_without/V_with) > n ln N. C begins with e = 0.
 ///
 /// [`Method::ExactLikelihood`](crate::estimate::Method::ExactLikelihood) takes no past output and leaves no sample out: drop is
-/// refused, and the response to the inputs is
-/// treated as with F, A standing for F.
+/// refused, and the response to the inputs is treated as with F, A standing for F.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Initial {

@@ -35,6 +35,7 @@ mod held_out_runs;
 mod html;
 mod identify;
 mod judge;
+mod plan;
 mod requirement;
 mod sample;
 mod schema;
@@ -51,7 +52,8 @@ pub use equations::{EquationsPlan, fit_equations};
 pub use held_out_runs::held_out_runs;
 #[cfg(feature = "html")]
 pub use html::{comparison_page, fit_page, inspection_page, validation_page};
-pub use identify::{Plan, Unjudged, identify, identify_monitored};
+pub use identify::{Unjudged, identify, identify_monitored};
+pub use plan::Plan;
 pub use requirement::Requirement;
 pub use sample::sample;
 pub use schema::{Data, Estimation, Missing, Parts, Report};

@@ -7,9 +7,10 @@ use std::hint::black_box;
 use std::time::Duration;
 
 use criterion::{BenchmarkId, Criterion, Throughput};
-use thetahat::{
-    Estimate, Initial, Offset, Orders, Record, Signal, Start, arx, arx_factor, predict, simulate,
-};
+use thetahat::data::{Offset, Record};
+use thetahat::estimate::{Estimate, Initial, arx, arx_factor};
+use thetahat::model::{Orders, Signal};
+use thetahat::respond::{Start, predict, simulate};
 
 /// Samples of the longest signals.
 const SAMPLES: usize = 1_000_000;

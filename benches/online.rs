@@ -7,7 +7,8 @@ use std::time::Duration;
 use criterion::BenchmarkGroup;
 use criterion::Criterion;
 use criterion::measurement::WallTime;
-use thetahat::{Orders, PerChannel, TrackPlan, Tracker};
+use thetahat::model::Orders;
+use thetahat::track::{PerChannel, TrackPlan, Tracker};
 use thetahat_core::nalgebra::{self, Const, SMatrix, SVector};
 use thetahat_core::{
     ArxOrders, Covariance, Forgetting, InputOrders, KalmanFilter, LinearObservation, LinearTransition, Real,

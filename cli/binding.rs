@@ -5,9 +5,9 @@ use std::ffi::OsString;
 use std::path::Path;
 
 use clap::Args;
-use thetahat::{
-    EquationsPlan, Inspection, Log, NonlinearArxPlan, Plan, Report, Requirement, Source, ValidationPlan,
-};
+use thetahat::data::{Log, Source};
+use thetahat::inspect::Inspection;
+use thetahat::report::{EquationsPlan, NonlinearArxPlan, Plan, Report, Requirement, ValidationPlan};
 
 use crate::args::{FitArguments, InspectArguments, ValidateArguments};
 use crate::commands::{Experiments, Tracking, experiments, inspected};

@@ -14,7 +14,8 @@ mod validate;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use thetahat::{Interpolation, Resample, Rows, Start};
+use thetahat::data::{Interpolation, Resample, Rows};
+use thetahat::respond::Start;
 
 use crate::args::{
     ClockArguments, LineArguments, LineFormatArgument, LiveClockArguments, LogArguments, StartArgument,

@@ -3,7 +3,9 @@
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
-use thetahat::{Channel, Error, GreyBox, Log, Model, Recording, Resampling, Rows, Source, Times, text};
+use thetahat::data::{Channel, Log, Recording, Resampling, Rows, Source, Times};
+use thetahat::model::{GreyBox, Model};
+use thetahat::{Error, text};
 
 use crate::failure::Failure;
 use crate::interrupt;

@@ -83,7 +83,7 @@ impl Searching {
         Self(Bar::new())
     }
 
-    pub(crate) fn update(&self, progress: thetahat::Progress) {
+    pub(crate) fn update(&self, progress: thetahat::optimize::Progress) {
         let make = || {
             let bar = ProgressBar::new_spinner();
             bar.enable_steady_tick(TURN);

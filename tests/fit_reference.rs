@@ -6,7 +6,10 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
-use thetahat::{Initial, Method, Orders, Procedure, Record, Search, estimate};
+use thetahat::data::Record;
+use thetahat::estimate::{Initial, Method, Procedure, estimate};
+use thetahat::model::Orders;
+use thetahat::optimize::Search;
 
 use crate::harness::{Answer, Folder, number, numbers, parameters};
 use crate::signals::csv;

@@ -5,10 +5,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
-use thetahat::{
-    Channel, Detrend, Inspection, InspectionPlan, Log, Model, Orders, Plan, PolynomialModel, Recording,
-    Report, Source, Times, Validated, ValidationPlan, comparison_page, fit_page, identify, inspect,
-    inspection_page, validate, validation_page,
+use thetahat::data::{Channel, Detrend, Log, Recording, Source, Times};
+use thetahat::inspect::{Inspection, InspectionPlan, inspect};
+use thetahat::model::{Model, Orders, PolynomialModel};
+use thetahat::report::{
+    Plan, Report, Validated, ValidationPlan, comparison_page, fit_page, identify, inspection_page, validate,
+    validation_page,
 };
 
 use crate::browser::Browser;

@@ -1,7 +1,8 @@
 //! The JSON document and the table.
 
 use serde_json::{Value, json};
-use thetahat::{Document, Report};
+use thetahat::Document;
+use thetahat::report::Report;
 
 use crate::harness::{Folder, number, numbers};
 use crate::signals::{Experiment, Random, csv, plain_log, response};

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
-use thetahat::Select;
+use thetahat::select::Select;
 
 use super::{ClockArguments, FormatArgument, LogArguments, Names};
 

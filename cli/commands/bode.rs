@@ -2,7 +2,8 @@
 
 use std::f64::consts::PI;
 
-use thetahat::{Model, Quantity, frequency_response, logarithmic_frequencies};
+use thetahat::model::{Model, Quantity};
+use thetahat::respond::{frequency_response, logarithmic_frequencies};
 
 use super::stored;
 use crate::args::BodeArguments;

@@ -1,6 +1,7 @@
 //! `thetahat compare`: several stored models side by side on a log.
 
-use thetahat::{Document, Report, Validated, compare as compared, comparison_page};
+use thetahat::Document;
+use thetahat::report::{Report, Validated, compare as compared, comparison_page};
 
 use super::validate::{loaded, one, print};
 use super::{stored, summary};

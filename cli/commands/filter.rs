@@ -2,8 +2,10 @@
 
 mod columns;
 
+use thetahat::Document;
 use thetahat::figures::fixed;
-use thetahat::{Document, FilterSummary, Report, StateFilter, StateModel};
+use thetahat::filter::{FilterSummary, StateFilter, StateModel};
+use thetahat::report::Report;
 
 use super::{stored, summary};
 use crate::args::FilterArguments;

@@ -2,9 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use thetahat::{
-    Document, Log, Report, Rows, Source, Validated, ValidationPlan, fit_page, held_out_runs,
-    identify_monitored, validate,
+use thetahat::Document;
+use thetahat::data::{Log, Rows, Source};
+use thetahat::report::{
+    Report, Validated, ValidationPlan, fit_page, held_out_runs, identify_monitored, validate,
 };
 
 use super::search::{Found, watched};

@@ -1,6 +1,7 @@
 //! `thetahat fit --grey`: the unknown parameters of a model in equations.
 
-use thetahat::{GreyBox, fit_equations};
+use thetahat::model::GreyBox;
+use thetahat::report::fit_equations;
 
 use super::search::{Found, watched};
 use super::stored;

@@ -1,7 +1,11 @@
 //! What the program says of itself: the report's schema, shell completions, manual pages.
 
 use clap::CommandFactory;
-use thetahat::{Comparison, Document, FilterSummary, Inspection, Report, TrackSummary, Validation};
+use thetahat::Document;
+use thetahat::filter::FilterSummary;
+use thetahat::inspect::Inspection;
+use thetahat::report::{Comparison, Report, Validation};
+use thetahat::track::TrackSummary;
 
 use crate::args::{Arguments, DocumentArgument};
 use crate::failure::Failure;

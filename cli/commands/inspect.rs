@@ -3,7 +3,10 @@
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
-use thetahat::{Document, Inspection, InspectionPlan, Recording, Times, inspection_page, text};
+use thetahat::data::{Recording, Times};
+use thetahat::inspect::{Inspection, InspectionPlan};
+use thetahat::report::inspection_page;
+use thetahat::{Document, text};
 
 use super::fit::usual_inputs;
 use super::summary;
@@ -54,7 +57,7 @@ pub(crate) fn inspected(
     let plan = InspectionPlan { inputs: chosen.inputs, output: chosen.output, resample };
     let kept = arguments.html.is_some().then(|| recording.clone());
     let mut inspection =
-        thetahat::inspect(recording, &source, &plan).map_err(log::at_line(&source.file, &lines))?;
+        thetahat::inspect::inspect(recording, &source, &plan).map_err(log::at_line(&source.file, &lines))?;
     inspection.warnings.splice(0..0, words.into_iter().chain(chosen.words));
     inspection.command = job.command(arguments, &inspection);
     Ok((inspection, kept))

@@ -1,6 +1,6 @@
 //! `thetahat fit --narx`: a nonlinear ARX model.
 
-use thetahat::fit_nonlinear_arx;
+use thetahat::report::fit_nonlinear_arx;
 
 use super::fit::{Wanted, read};
 use super::search::Found;

@@ -3,7 +3,9 @@
 use std::io::Write;
 use std::path::Path;
 
-use thetahat::{Applied, Detrend, Drawn, Draws, Horizon, Log, Start, sample};
+use thetahat::data::{Detrend, Log};
+use thetahat::report::{Applied, sample};
+use thetahat::respond::{Drawn, Draws, Horizon, Start};
 
 use super::{stored, summary};
 use crate::args::{PredictArguments, RespondArguments, SimulateArguments};

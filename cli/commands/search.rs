@@ -2,7 +2,10 @@
 
 use std::ops::ControlFlow;
 
-use thetahat::{Error, Log, Monitor, Report, Source};
+use thetahat::Error;
+use thetahat::data::{Log, Source};
+use thetahat::optimize::Monitor;
+use thetahat::report::Report;
 
 use crate::failure::Failure;
 use crate::interrupt;

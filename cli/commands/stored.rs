@@ -5,7 +5,9 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
-use thetahat::{Document, Model, PolynomialModel, Report};
+use thetahat::Document;
+use thetahat::model::{Model, PolynomialModel};
+use thetahat::report::Report;
 
 use crate::failure::{Failure, Kind};
 

@@ -9,13 +9,18 @@ mod text;
 mod tracking;
 mod validation;
 
-use thetahat::figures::{error, fixed, number, scientific, short};
-use thetahat::text::harmless;
-use thetahat::{
-    Algorithm, Criteria, CriterionOutcome, Estimation, Fit, InformationCriterion, Initial, Interval, Model,
-    Norm, Orders, Part, PolynomialModel, Procedure, Quantity, Report, RobustOutcome, Root, Rows,
-    SearchOutcome, Signal, Solver, Start, Stopped, Structure,
+use thetahat::data::Rows;
+use thetahat::estimate::{
+    Criteria, CriterionOutcome, InformationCriterion, Initial, Norm, Procedure, RobustOutcome, SearchOutcome,
+    Solver,
 };
+use thetahat::figures::{error, fixed, number, scientific, short};
+use thetahat::model::{Interval, Model, Orders, PolynomialModel, Quantity, Root, Signal, Structure};
+use thetahat::optimize::{Algorithm, Stopped};
+use thetahat::report::{Estimation, Report};
+use thetahat::respond::Start;
+use thetahat::text::harmless;
+use thetahat::validate::{Fit, Part};
 
 pub use filtered::filtered;
 pub use inspection::inspection;

@@ -10,7 +10,8 @@ mod tracking;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use thetahat::{Document, Report};
+use thetahat::Document;
+use thetahat::report::Report;
 
 use super::{stored, summary};
 use crate::args::TrackArguments;

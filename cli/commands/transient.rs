@@ -1,6 +1,8 @@
 //! `thetahat step` and `thetahat impulse`: what a stored model's output does after a step or an impulse of its inputs.
 
-use thetahat::{Error, PolynomialModel, Quantity, TransientResponse, impulse_response, step_response};
+use thetahat::Error;
+use thetahat::model::{PolynomialModel, Quantity};
+use thetahat::respond::{TransientResponse, impulse_response, step_response};
 
 use super::stored;
 use crate::args::TransientArguments;

@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use thetahat::{Document, Report, Validated, ValidationPlan, validate as validated, validation_page};
+use thetahat::Document;
+use thetahat::report::{Report, Validated, ValidationPlan, validate as validated, validation_page};
 
 use super::{stored, summary};
 use crate::args::{FormatArgument, LookArguments, ValidateArguments};

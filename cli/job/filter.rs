@@ -1,7 +1,8 @@
 use std::path::{Path, PathBuf};
 
+use thetahat::data::Rows;
+use thetahat::filter::{Estimator, InitialState, ObserverGain, StateModel};
 use thetahat::thetahat_core::nalgebra::Complex;
-use thetahat::{Estimator, InitialState, ObserverGain, Rows, StateModel};
 
 use super::{LineJob, LogJob, parsed};
 use crate::args::{EstimatorArgument, FilterArguments, FilterStartArgument};

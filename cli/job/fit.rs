@@ -1,6 +1,9 @@
 use std::path::{Path, PathBuf};
 
-use thetahat::{Constant, Detrend, Focus, Initial, Method, Plan, Prefilter, Rows, Select, Split};
+use thetahat::data::{Detrend, Prefilter, Rows, Split};
+use thetahat::estimate::{Constant, Initial, Method};
+use thetahat::report::Plan;
+use thetahat::select::{Focus, Select};
 
 use super::orders::OrderJob;
 use super::{LogJob, method, parsed, rows};

@@ -1,6 +1,6 @@
 use std::path::{Path, PathBuf};
 
-use thetahat::EquationsPlan;
+use thetahat::report::EquationsPlan;
 
 use super::{LogJob, parsed, rows, search};
 use crate::args::FitArguments;

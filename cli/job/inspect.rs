@@ -1,6 +1,6 @@
 use std::path::PathBuf;
 
-use thetahat::Inspection;
+use thetahat::inspect::Inspection;
 
 use super::{Clock, LogJob};
 use crate::args::{InspectArguments, Names};

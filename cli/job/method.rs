@@ -1,4 +1,4 @@
-use thetahat::{Criterion, Loss, Method, Norm, Robust};
+use thetahat::estimate::{Criterion, Loss, Method, Norm, Robust};
 
 use super::orders::OrderJob;
 use super::{parsed, positive, search};

@@ -1,6 +1,6 @@
 use std::path::{Path, PathBuf};
 
-use thetahat::{Centres, InputLags, MapPlan, NonlinearArxPlan};
+use thetahat::report::{Centres, InputLags, MapPlan, NonlinearArxPlan};
 
 use super::fit::named_values;
 use super::{LogJob, parsed, rows};

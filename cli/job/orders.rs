@@ -1,4 +1,5 @@
-use thetahat::{Automatic, Choice, Grid, OrderRange, Orders, Path, Structure};
+use thetahat::model::{Orders, Structure};
+use thetahat::select::{Automatic, Choice, Grid, OrderRange, Path};
 
 use super::parsed;
 use crate::args::{ModelArgument, ModelArguments, PathArgument};

@@ -1,6 +1,6 @@
 use std::time::Duration;
 
-use thetahat::{Algorithm, Search, Step};
+use thetahat::optimize::{Algorithm, Search, Step};
 
 use super::positive;
 use crate::args::{SearchArgument, SearchArguments};

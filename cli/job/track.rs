@@ -1,6 +1,8 @@
 use std::path::{Path, PathBuf};
 
-use thetahat::{Orders, PerChannel, Policy, Report, TrackMethod, TrackPlan, Tracker};
+use thetahat::model::Orders;
+use thetahat::report::Report;
+use thetahat::track::{PerChannel, Policy, TrackMethod, TrackPlan, Tracker};
 
 use super::fit::named_values;
 use super::{LineJob, LogJob, parsed};

@@ -1,6 +1,7 @@
 use std::path::{Path, PathBuf};
 
-use thetahat::{Detrend, Requirement, ValidationPlan};
+use thetahat::data::Detrend;
+use thetahat::report::{Requirement, ValidationPlan};
 
 use super::{LogJob, parsed, rows};
 use crate::args::LookArguments;

@@ -4,8 +4,9 @@ use numpy::{PyArray1, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use thetahat::Document;
+use thetahat::filter::{Estimator, InitialState, ObserverGain, StateEstimate, StateValues};
 use thetahat::thetahat_core::nalgebra::Complex;
-use thetahat::{Document, Estimator, InitialState, ObserverGain, StateEstimate, StateValues};
 
 use crate::array::{finite_matrix, matrix, vector};
 use crate::error;
@@ -19,7 +20,7 @@ use crate::work::Pulse;
 /// A model with a state: the text of one with matrices or equations, or that of a report.
 #[pyclass(frozen, module = "thetahat._thetahat")]
 pub(crate) struct StateModel {
-    model: thetahat::StateModel,
+    model: thetahat::filter::StateModel,
 }
 
 #[pymethods]
@@ -27,7 +28,7 @@ impl StateModel {
     /// Reads a text.
     #[staticmethod]
     fn from_toml(py: Python<'_>, text: &str) -> PyResult<Self> {
-        let model = thetahat::StateModel::from_toml(text).map_err(|error| error::batch(py, error))?;
+        let model = thetahat::filter::StateModel::from_toml(text).map_err(|error| error::batch(py, error))?;
         Ok(Self { model })
     }
 
@@ -44,7 +45,7 @@ impl StateModel {
             }
         };
         let report = model.get().report(py)?;
-        let model = thetahat::StateModel::from_report(&report, start);
+        let model = thetahat::filter::StateModel::from_report(&report, start);
         Ok(Self { model: model.map_err(|error| PyValueError::new_err(format!("model: {error}")))? })
     }
 
@@ -89,7 +90,7 @@ impl StateModel {
 /// An estimator of the state of a model, fed row by row.
 #[pyclass(module = "thetahat._thetahat")]
 pub(crate) struct StateFilter {
-    filter: thetahat::StateFilter,
+    filter: thetahat::filter::StateFilter,
 }
 
 /// The numbers of the rows so far.
@@ -198,12 +199,13 @@ impl StateFilter {
                 )));
             }
         };
-        let filter = thetahat::StateFilter::new(model, estimator).map_err(|failure| match failure {
-            thetahat::Error::Argument { argument, message } if argument == "start" => {
-                PyValueError::new_err(format!("model: it cannot start: {message}"))
-            }
-            other => error::batch(py, other),
-        })?;
+        let filter =
+            thetahat::filter::StateFilter::new(model, estimator).map_err(|failure| match failure {
+                thetahat::Error::Argument { argument, message } if argument == "start" => {
+                    PyValueError::new_err(format!("model: it cannot start: {message}"))
+                }
+                other => error::batch(py, other),
+            })?;
         Ok(Self { filter })
     }
 

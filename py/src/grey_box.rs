@@ -7,14 +7,14 @@ use crate::error;
 
 /// A model in equations, of which some parameters may be unknown.
 #[pyclass(frozen, module = "thetahat._thetahat")]
-pub(crate) struct GreyBox(pub(crate) thetahat::GreyBox);
+pub(crate) struct GreyBox(pub(crate) thetahat::model::GreyBox);
 
 #[pymethods]
 impl GreyBox {
     /// Reads a text in TOML.
     #[new]
     fn new(py: Python<'_>, text: &str) -> PyResult<Self> {
-        Ok(Self(thetahat::GreyBox::from_toml(text).map_err(|error| error::batch(py, error))?))
+        Ok(Self(thetahat::model::GreyBox::from_toml(text).map_err(|error| error::batch(py, error))?))
     }
 
     /// The text in TOML of a document in JSON.

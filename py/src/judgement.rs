@@ -5,7 +5,9 @@ use std::sync::Arc;
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use thetahat::{Document, Inspection, InspectionPlan, Report, Requirement, Validated};
+use thetahat::Document;
+use thetahat::inspect::{Inspection, InspectionPlan};
+use thetahat::report::{Report, Requirement, Validated};
 
 use crate::error;
 use crate::log::Log;
@@ -37,7 +39,7 @@ pub(crate) fn validate(
         requirement.check(&report).map_err(|error| error::batch(py, error))?;
     }
     let (log, sources, alpha) = (Arc::clone(&log.log), log.sources.clone(), plan.alpha);
-    let found = interruptible(py, move |_| thetahat::validate(&report, None, &log, &sources, &plan))?;
+    let found = interruptible(py, move |_| thetahat::report::validate(&report, None, &log, &sources, &plan))?;
     Ok(Validation { found, requirements, alpha })
 }
 
@@ -75,10 +77,11 @@ pub(crate) fn compare(
     let models = models.collect::<PyResult<Vec<(String, Arc<Report>)>>>()?;
     let (log, sources) = (Arc::clone(&log.log), log.sources.clone());
     let comparison = interruptible(py, move |_| {
-        let each =
-            models.iter().map(|(name, report)| thetahat::validate(report, Some(name), &log, &sources, &plan));
+        let each = models
+            .iter()
+            .map(|(name, report)| thetahat::report::validate(report, Some(name), &log, &sources, &plan));
         let found: Vec<Validated> = each.collect::<Result<_, _>>()?;
-        thetahat::compare(&found)
+        thetahat::report::compare(&found)
     })?;
     let json = comparison.to_json().map_err(|error| error::batch(py, error))?;
     Ok((json, thetahat_cli::comparison(&comparison, thetahat_cli::WIDTH)))
@@ -94,7 +97,7 @@ pub(crate) fn inspect(py: Python<'_>, log: &Bound<'_, Log>) -> PyResult<(String,
     let plan =
         InspectionPlan { inputs: log.inputs.clone(), output: log.outputs.first().cloned(), resample: None };
     let log = Arc::clone(&log.log);
-    let found = interruptible(py, move |_| thetahat::inspect_log(&log, &source, &plan))?;
+    let found = interruptible(py, move |_| thetahat::inspect::inspect_log(&log, &source, &plan))?;
     written(py, &found)
 }
 

@@ -25,7 +25,7 @@ fn _thetahat(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add("DEMO_LOG", thetahat_cli::DEMO_LOG)?;
     // The word, the name, and whether it is a logarithm of the cost and a penalty.
-    let criteria = thetahat::InformationCriterion::all()
+    let criteria = thetahat::estimate::InformationCriterion::all()
         .map(|criterion| (criterion.word(), criterion.name(), criterion.is_logarithmic()));
     module.add("CRITERIA", criteria.collect::<Vec<_>>())?;
     module.add("EstimationError", module.py().get_type::<error::EstimationError>())?;

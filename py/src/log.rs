@@ -7,7 +7,7 @@ use numpy::PyArray1;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
-use thetahat::{Channel, Interpolation, Resample, Resampling, Rows, Source};
+use thetahat::data::{Channel, Interpolation, Resample, Resampling, Rows, Source};
 
 use crate::array::vector;
 use crate::error;
@@ -16,7 +16,7 @@ use crate::work::{awaited, interruptible};
 /// Channels on a common clock, where they came from, and which of them are inputs and outputs.
 #[pyclass(frozen, module = "thetahat._thetahat")]
 pub(crate) struct Log {
-    pub(crate) log: Arc<thetahat::Log>,
+    pub(crate) log: Arc<thetahat::data::Log>,
     pub(crate) sources: Vec<Source>,
     #[pyo3(get)]
     pub(crate) inputs: Vec<String>,
@@ -54,10 +54,10 @@ impl Log {
         };
         let mut resampled = None;
         let log = match (time, resample) {
-            (None, _) => thetahat::Log::new(channels, sample_time),
+            (None, _) => thetahat::data::Log::new(channels, sample_time),
             (Some(time), None) => {
                 let time = vector("time", &time, None)?.as_slice()?.to_vec();
-                let of = if uniform { thetahat::Log::with_time } else { thetahat::Log::recorded };
+                let of = if uniform { thetahat::data::Log::with_time } else { thetahat::data::Log::recorded };
                 of(channels, time)
             }
             (Some(time), Some((step, how, anti_alias))) => {
@@ -73,7 +73,7 @@ impl Log {
                 };
                 let (how, time) = (Resample { step, interpolation, anti_alias }, time.as_slice()?);
                 resampled = Some(Resampling::new(&how, time).map_err(|error| error::batch(py, error))?);
-                thetahat::Log::resampled(channels, time, &how)
+                thetahat::data::Log::resampled(channels, time, &how)
             }
         };
         let log = log.map_err(|error| error::batch(py, error))?;
@@ -108,7 +108,7 @@ impl Log {
             before += log.log.rows();
         }
         let copies = logs.iter().map(|log| (*log.log).clone()).collect();
-        let log = thetahat::Log::join(copies).map_err(|error| error::batch(py, error))?;
+        let log = thetahat::data::Log::join(copies).map_err(|error| error::batch(py, error))?;
         Ok(Self { log: Arc::new(log), sources, inputs: first.inputs.clone(), outputs: first.outputs.clone() })
     }
 
@@ -219,7 +219,7 @@ impl Log {
         let (time, breaks, borders, before, sources) = clock;
         let time =
             time.map(|time| PyResult::Ok(vector("time", &time, None)?.as_slice()?.to_vec())).transpose()?;
-        let log = thetahat::Log::restored(read(channels)?, sample_time, time, breaks, borders, before);
+        let log = thetahat::data::Log::restored(read(channels)?, sample_time, time, breaks, borders, before);
         let log = log.map_err(|error| error::batch(py, error))?;
         let sources =
             serde_json::from_str(&sources).map_err(|error| PyValueError::new_err(error.to_string()))?;
@@ -242,7 +242,10 @@ impl Log {
 }
 
 /// A copy of some channels, for what uses them up.
-pub(crate) fn copy(log: &thetahat::Log, names: &[&str]) -> Result<thetahat::Log, thetahat::Error> {
+pub(crate) fn copy(
+    log: &thetahat::data::Log,
+    names: &[&str],
+) -> Result<thetahat::data::Log, thetahat::Error> {
     log.part(names, Rows::new(1, log.rows())?)
 }
 

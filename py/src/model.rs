@@ -6,10 +6,14 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use numpy::{PyArray1, PyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
-use thetahat::{
-    Channel, Document, Draws, Horizon, PolynomialModel, Procedure, Quantity, Report, Start, StateSpace,
-    TransientResponse, Unjudged, apply, frequency_response, impulse_response, logarithmic_frequencies,
-    sample, step_response,
+use thetahat::Document;
+use thetahat::data::Channel;
+use thetahat::estimate::Procedure;
+use thetahat::model::{PolynomialModel, Quantity, StateSpace};
+use thetahat::report::{Report, Unjudged, apply, sample};
+use thetahat::respond::{
+    Draws, Horizon, Start, TransientResponse, frequency_response, impulse_response, logarithmic_frequencies,
+    step_response,
 };
 
 use crate::array::{from_matrix, matrix, vector};
@@ -23,12 +27,12 @@ use crate::work::interruptible;
 /// Its figures are computed when somebody asks for the document: they take several times as long as least squares.
 #[pyclass(frozen, module = "thetahat._thetahat")]
 pub(crate) struct Model {
-    model: Arc<thetahat::Model>,
+    model: Arc<thetahat::model::Model>,
     /// The report as far as it was known at once.
     known: Arc<Report>,
     report: OnceLock<Arc<Report>>,
     /// What the figures are computed of, as long as they are not.
-    unjudged: Mutex<Option<(Unjudged, Arc<thetahat::Log>)>>,
+    unjudged: Mutex<Option<(Unjudged, Arc<thetahat::data::Log>)>>,
 }
 
 /// An array with one value for each row.
@@ -65,7 +69,7 @@ pub(crate) fn fit_equations(
     let log = log.get();
     let (channels, sources, model) = (Arc::clone(&log.log), log.sources.clone(), model.get().0.clone());
     let report = interruptible(py, move |monitor| {
-        thetahat::fit_equations(&model, &channels, &sources, &plan, monitor)
+        thetahat::report::fit_equations(&model, &channels, &sources, &plan, monitor)
     })?;
     Ok(Model::of(report))
 }
@@ -77,7 +81,7 @@ pub(crate) fn fit_narx(py: Python<'_>, log: &Bound<'_, Log>, options: Vec<OsStri
     let plan = thetahat_cli::narx_plan(&options, log.inputs.clone(), log.output()?.clone())
         .map_err(|failure| error::program(py, &failure))?;
     let (channels, sources) = (Arc::clone(&log.log), log.sources.clone());
-    let report = interruptible(py, move |_| thetahat::fit_nonlinear_arx(&channels, &sources, &plan))?;
+    let report = interruptible(py, move |_| thetahat::report::fit_nonlinear_arx(&channels, &sources, &plan))?;
     Ok(Model::of(report))
 }
 
@@ -147,17 +151,17 @@ impl Model {
         let log = log.map(Bound::get).map(|log| (Arc::clone(&log.log), log.sources.clone()));
         let (report, command) = (self.report(py)?, command.to_owned());
         interruptible(py, move |_| {
-            let plan = thetahat::ValidationPlan::default();
+            let plan = thetahat::report::ValidationPlan::default();
             let (mut looks, mut held_out) = (Vec::new(), Vec::new());
             if let Some((log, sources)) = log {
-                let look = thetahat::validate(&report, None, &log, &sources, &plan)?;
+                let look = thetahat::report::validate(&report, None, &log, &sources, &plan)?;
                 // Another log has not the rows of the choice.
-                if look.validation.seen != thetahat::Seen::No {
-                    held_out = thetahat::held_out_runs(&report, &log)?;
+                if look.validation.seen != thetahat::report::Seen::No {
+                    held_out = thetahat::report::held_out_runs(&report, &log)?;
                 }
                 looks.push(look);
             }
-            Ok(thetahat::fit_page(&report, &looks, &held_out, &command))
+            Ok(thetahat::report::fit_page(&report, &looks, &held_out, &command))
         })
     }
 
@@ -186,7 +190,7 @@ impl Model {
         let channels = self.driving(inputs)?;
         let model = Arc::clone(&self.model);
         let applied = interruptible(py, move |_| {
-            let log = thetahat::Log::new(channels, model.sample_time())?;
+            let log = thetahat::data::Log::new(channels, model.sample_time())?;
             apply(&model, &log, &[], None, Horizon::FreeRun, Start::Zero)
         })?;
         Ok(applied.outputs.into_iter().map(|one| PyArray1::from_vec(py, one.predicted)).collect())
@@ -212,7 +216,7 @@ impl Model {
             }
             (None, Some(inputs)) => {
                 let channels = self.driving(inputs)?;
-                let log = thetahat::Log::new(channels, model.sample_time());
+                let log = thetahat::data::Log::new(channels, model.sample_time());
                 (Arc::new(log.map_err(|error| error::batch(py, error))?), Start::Zero)
             }
             (None, None) => return Err(PyValueError::new_err("u: give inputs, or a log")),
@@ -303,12 +307,12 @@ impl Model {
             let mut found = frequency_response(&models[0], &frequencies)?;
             // Of equations the noise is not told.
             found.retain(|response| {
-                response.input.is_some() || matches!(*model, thetahat::Model::Polynomial(_))
+                response.input.is_some() || matches!(*model, thetahat::model::Model::Polynomial(_))
             });
             Ok(found)
         })?;
         let columns = responses.into_iter().map(|response| {
-            let column = |of: &dyn Fn(&thetahat::FrequencyPoint) -> f64| {
+            let column = |of: &dyn Fn(&thetahat::respond::FrequencyPoint) -> f64| {
                 PyArray1::from_vec(py, response.points.iter().map(of).collect())
             };
             let columns = [
@@ -371,7 +375,9 @@ impl Model {
     fn linear(&self, py: Python<'_>, what: &str) -> PyResult<()> {
         let models = self.model.linear(what).map_err(|error| error::batch(py, error))?;
         match &models[..] {
-            [only] if only.inputs.is_empty() && matches!(*self.model, thetahat::Model::Equations(_)) => {
+            [only]
+                if only.inputs.is_empty() && matches!(*self.model, thetahat::model::Model::Equations(_)) =>
+            {
                 Err(PyValueError::new_err(format!("{what} needs inputs, and the model has none")))
             }
             [_] => Ok(()),
@@ -464,14 +470,14 @@ impl Model {
 }
 
 /// The channels of a log that a model is about; it may lack outputs.
-fn channels<'a>(model: &'a thetahat::Model, log: &thetahat::Log) -> Vec<&'a str> {
+fn channels<'a>(model: &'a thetahat::model::Model, log: &thetahat::data::Log) -> Vec<&'a str> {
     let inputs = model.inputs().iter().map(|input| input.name.as_str());
     let outputs = model.outputs().iter().map(|output| output.name.as_str());
     inputs.chain(outputs.filter(|output| log.has(output))).collect()
 }
 
 /// How many rows at the end of a log miss a channel of the model.
-fn missing_at_the_end(model: &thetahat::Model, log: &thetahat::Log) -> usize {
+fn missing_at_the_end(model: &thetahat::model::Model, log: &thetahat::data::Log) -> usize {
     let names = channels(model, log);
     let used: Vec<&[f64]> =
         names.iter().filter_map(|name| Some(&log.channel(name).ok()?.values[..])).collect();
@@ -479,7 +485,11 @@ fn missing_at_the_end(model: &thetahat::Model, log: &thetahat::Log) -> usize {
 }
 
 /// A log that goes on with known inputs and no output.
-fn extended(log: &thetahat::Log, future: &[Channel], steps: usize) -> Result<thetahat::Log, thetahat::Error> {
+fn extended(
+    log: &thetahat::data::Log,
+    future: &[Channel],
+    steps: usize,
+) -> Result<thetahat::data::Log, thetahat::Error> {
     let channels = log.channels().iter().map(|channel| {
         let mut values = channel.values.clone();
         match future.iter().find(|input| input.name == channel.name) {
@@ -493,7 +503,7 @@ fn extended(log: &thetahat::Log, future: &[Channel], steps: usize) -> Result<the
         let ahead = (1..=steps).map(|step| last + step as f64 * log.sample_time());
         time.iter().copied().chain(ahead).collect()
     });
-    thetahat::Log::restored(
+    thetahat::data::Log::restored(
         channels.collect(),
         log.sample_time(),
         time,

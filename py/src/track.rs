@@ -6,7 +6,8 @@ use numpy::{PyArray1, PyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
-use thetahat::{Document, PerChannel};
+use thetahat::Document;
+use thetahat::track::PerChannel;
 use thetahat_cli::{Failure, TrackedRow, Tracking};
 
 use crate::array::{matrix, vector};
@@ -22,7 +23,7 @@ use crate::work::Pulse;
 /// A way to forget as the command line writes it.
 #[pyfunction]
 pub(crate) fn policy(forgetting: Memory) -> String {
-    thetahat::Policy(forgetting.0).to_string()
+    thetahat::track::Policy(forgetting.0).to_string()
 }
 
 /// ARX or ARMAX models of one log, one for each way to forget.

@@ -16,7 +16,8 @@ use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::{ThreadPool, ThreadPoolBuilder};
-use thetahat::{Error, Monitor};
+use thetahat::Error;
+use thetahat::optimize::Monitor;
 
 use crate::error;
 

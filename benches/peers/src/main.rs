@@ -17,10 +17,10 @@ use std::time::Instant;
 
 use faer::Mat;
 use faer::prelude::SolveLstsq;
-use thetahat::{
-    Choice, Estimate, Grid, Initial, OrderRange, Orders, Path as Walk, Record, Select, arx, arx_factor,
-    choose_orders,
-};
+use thetahat::data::Record;
+use thetahat::estimate::{Estimate, Initial, arx, arx_factor};
+use thetahat::model::Orders;
+use thetahat::select::{Choice, Grid, OrderRange, Path as Walk, Select, choose_orders};
 
 /// Rows of the log.
 const SAMPLES: usize = 1_000_000;

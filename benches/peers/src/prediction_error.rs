@@ -12,7 +12,10 @@ use std::io;
 use std::path::Path;
 use std::time::Instant;
 
-use thetahat::{Initial, Method, Orders, Record, Search, estimate};
+use thetahat::data::Record;
+use thetahat::estimate::{Initial, Method, estimate};
+use thetahat::optimize::Search;
+use thetahat::model::Orders;
 
 /// Length of the signals.
 const SAMPLES: usize = 1_000_000;

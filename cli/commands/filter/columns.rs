@@ -1,6 +1,6 @@
 //! The lines of `filter`.
 
-use thetahat::{Estimator, StateEstimate, StateModel, StateValues};
+use thetahat::filter::{Estimator, StateEstimate, StateModel, StateValues};
 
 use crate::failure::Failure;
 use crate::job::{Clock, FilterJob};

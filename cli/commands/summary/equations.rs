@@ -1,8 +1,10 @@
 //! What a fit of a model in equations found, as a table for people.
 
+use thetahat::estimate::Procedure;
 use thetahat::figures::{error, number, scientific, short};
+use thetahat::model::EquationsModel;
+use thetahat::report::Report;
 use thetahat::text::harmless;
-use thetahat::{EquationsModel, Procedure, Report};
 
 use super::filtered::surprise;
 use super::text::{Text, columns, or_dash};
@@ -12,8 +14,9 @@ use super::{counted, criteria, fits, stopped, word};
 pub(super) fn table(report: &Report, model: &EquationsModel, width: usize) -> String {
     let mut text = Text::new(width);
     let listed = |names: Vec<String>| if names.is_empty() { "none".to_owned() } else { names.join(", ") };
-    let names =
-        |signals: &[thetahat::Signal]| listed(signals.iter().map(|signal| harmless(&signal.name)).collect());
+    let names = |signals: &[thetahat::model::Signal]| {
+        listed(signals.iter().map(|signal| harmless(&signal.name)).collect())
+    };
     text.line(&format!("{}, sample time {} s", report.model.name(), short(model.sample_time)));
     text.line(&format!(
         "inputs {}, outputs {}, states {}",

@@ -1,6 +1,7 @@
 //! What `filter` says at its end.
 
-use thetahat::{EstimatedNumber, FilterSummary, NisSummary};
+use thetahat::filter::{EstimatedNumber, FilterSummary};
+use thetahat::respond::NisSummary;
 
 use thetahat::figures::{error, fixed, number};
 

@@ -1,8 +1,8 @@
 //! An inspection as a table for people.
 
 use thetahat::figures::{chance, fixed, number, short};
+use thetahat::inspect::{ChannelQuality, Excitation, Inspection, SpectrumPoint};
 use thetahat::text::{brief, harmless};
-use thetahat::{ChannelQuality, Excitation, Inspection, SpectrumPoint};
 
 use super::text::{Text, columns, or_dash};
 

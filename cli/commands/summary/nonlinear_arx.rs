@@ -1,8 +1,10 @@
 //! What a fit of a nonlinear ARX model found, as a table for people.
 
+use thetahat::estimate::{Procedure, TermStep, TermsOutcome};
 use thetahat::figures::{error, number, scientific, short};
+use thetahat::model::NonlinearArxModel;
+use thetahat::report::Report;
 use thetahat::text::harmless;
-use thetahat::{NonlinearArxModel, Procedure, Report, TermStep, TermsOutcome};
 
 use super::text::{Text, columns, or_dash};
 use super::{NO_ERROR, criteria, fits, signal};

@@ -1,7 +1,8 @@
 //! How a model was chosen, for people.
 
 use thetahat::figures::{fixed, number};
-use thetahat::{Report, Scored, Select, Selection};
+use thetahat::report::Report;
+use thetahat::select::{Scored, Select, Selection};
 
 use super::orders_legend;
 use super::text::{Text, columns, or_dash};

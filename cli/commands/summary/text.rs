@@ -4,8 +4,8 @@ use std::fmt::Write;
 
 use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, Width, presets};
 use textwrap::core::display_width;
-use thetahat::Root;
 use thetahat::figures::{error, number};
+use thetahat::model::Root;
 use thetahat::text::harmless;
 
 use crate::options::with_options;

@@ -1,7 +1,7 @@
 //! What `track` says at its end.
 
-use thetahat::TrackSummary;
 use thetahat::figures::{error, fixed, number, short};
+use thetahat::track::TrackSummary;
 
 use super::text::{Text, columns, or_dash, some};
 use super::{MOST, NO_ERROR, formula};

@@ -1,11 +1,12 @@
 //! Validations and comparisons as tables for people.
 
+use thetahat::estimate::InformationCriterion;
 use thetahat::figures::{chance, fixed, number, short, three};
+use thetahat::model::Orders;
+use thetahat::report::{Comparison, Coverage, Requirement, Seen, Validation};
+use thetahat::respond::Horizon;
 use thetahat::text::harmless;
-use thetahat::{
-    Comparison, Coverage, Fit, Horizon, Independence, InformationCriterion, Orders, Requirement, Residuals,
-    Seen, Test, Validation,
-};
+use thetahat::validate::{Fit, Independence, Residuals, Test};
 
 use super::text::{Text, columns, or_dash, some};
 use super::{MOST, NO_FIT, fits, orders_legend, rows};

@@ -1,6 +1,6 @@
 //! Which columns are tracked.
 
-use thetahat::Report;
+use thetahat::report::Report;
 
 use crate::commands::Channels;
 use crate::commands::fit::usual_inputs;

@@ -1,7 +1,7 @@
 //! The lines of `track`.
 
 use thetahat::thetahat_core::Alarm;
-use thetahat::{Tracked, Tracker};
+use thetahat::track::{Tracked, Tracker};
 
 use crate::failure::Failure;
 use crate::line_writer::{Cells, LineWriter};

@@ -1,6 +1,6 @@
 //! A row after another through the trackers, wherever they come from.
 
-use thetahat::{Tracked, Tracker};
+use thetahat::track::{Tracked, Tracker};
 
 use super::columns::{Columns, Sample};
 use super::pace::Step;

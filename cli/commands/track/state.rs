@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
-use thetahat::{PerChannel, TrackSummary, Tracker, text};
+use thetahat::text;
+use thetahat::track::{PerChannel, TrackSummary, Tracker};
 
 use super::pace::Pace;
 use crate::args::ResumeArgument;

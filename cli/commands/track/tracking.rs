@@ -1,6 +1,7 @@
 //! Tracking in memory: rows come from a caller, and nothing is read or written.
 
-use thetahat::{Report, TrackSummary, Tracked, Tracker};
+use thetahat::report::Report;
+use thetahat::track::{TrackSummary, Tracked, Tracker};
 
 use super::columns::Columns;
 use super::session::{Row, Session};

@@ -1,10 +1,31 @@
 //! Logs: channels on a common clock, cut into segments; and what is done to them before a fit.
+//!
+//! - [`Log`] holds [`Channel`]s with one value for each row. It is built from values in memory, with a sample time or with a time for
+//!   each row. A missing value is NaN. [`Log::join`] puts several experiments one after the other.
+//! - [`Record`] borrows the signals of a log that an estimate sees: an output, the inputs, and the segments without a gap.
+//! - [`Rows`] and [`Split`] say which rows serve for what. Rows are counted from 1, and a range includes both ends.
+//! - [`Detrend`] finds the [`Offset`] of each channel, [`Prefilter`] is a band of frequencies.
+//! - [`Recording`] and its [`Times`] are a log with any clock. [`Resample`] puts it on a uniform one by [`Interpolation`], after a
+//!   filter ([`AntiAlias`]); a document has a note of it ([`Resampling`]) in its [`Source`].
+//!
+//! ```
+//! use thetahat::data::{Channel, Log};
+//!
+//! let channel = |name: &str, values| Channel { name: name.into(), values };
+//! let u = channel("u", vec![1.0, 0.0, 1.0, 1.0, 0.0]);
+//! let y = channel("y", vec![0.0, 0.5, f64::NAN, 0.5, 0.75]);
+//! let log = Log::new(vec![u, y], 0.1)?;
+//! let record = log.record(&["u".into()], "y", &["1..5".parse()?])?;
+//! assert_eq!(record.segments, [0..2, 3..5]); // the missing value is a gap
+//! # Ok::<(), thetahat::Error>(())
+//! ```
 
 mod digest;
 mod log;
 mod offset;
 mod prefilter;
 mod prepare;
+mod record;
 mod recording;
 mod regular;
 mod resample;
@@ -14,12 +35,13 @@ mod split;
 mod tests;
 
 pub(crate) use digest::{digest, digests, inside};
-pub use log::{Channel, Interpolation, Log, Record};
+pub use log::{Channel, Interpolation, Log};
 pub(crate) use log::{GAP, JITTER, check, measured};
 pub use offset::Offset;
 pub use prefilter::Prefilter;
 pub(crate) use prefilter::Prefiltered;
 pub use prepare::Detrend;
+pub use record::Record;
 pub use recording::{Recording, Times};
 pub(crate) use regular::{Regular, shortest};
 pub use resample::{AntiAlias, Resample};

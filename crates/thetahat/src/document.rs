@@ -9,7 +9,8 @@ use crate::{Error, text};
 /// A JSON document of this program: a schema with a major version, in its field `schema`, and its fields.
 ///
 /// ```
-/// use thetahat::{Document, Validation};
+/// use thetahat::report::Validation;
+/// use thetahat::Document;
 ///
 /// assert_eq!(Validation::SCHEMA, "thetahat.validation/1");
 /// assert!(Validation::json_schema()["properties"]["fit"].is_object());

@@ -1,4 +1,32 @@
 //! From a record and orders to parameters.
+//!
+//! - [`estimate()`] fits the model that [`Orders`] say to a [`Record`] by a [`Method`] and gives an [`Estimate`];
+//!   [`estimate_monitored`] tells a [`Monitor`](crate::optimize::Monitor) of its progress. [`Initial`] says what stands for the samples before the first.
+//! - [`arx`] is its short form for models that are linear in their parameters. [`arx_factor`] gives a triangular factor that merges
+//!   with those of other records.
+//! - Methods have settings: a [`Search`](crate::optimize::Search), [`Robust`] (a [`Loss`]), [`Criterion`] (a
+//!   [`Norm`], [`Bound`]s and [`GainBound`]s), [`LikelihoodSearch`] for models in equations ([`UnknownParameter`]).
+//!   [`Constant`] says whether the level of the output is estimated too.
+//! - [`Procedure`] says how an estimate was found: by a [`Solver`], or with a [`SearchOutcome`] ([`StartOutcome`]),
+//!   [`CriterionOutcome`], [`RobustOutcome`], [`LikelihoodOutcome`],
+//!   [`EquationsOutcome`] or [`TermsOutcome`] (a path of [`TermStep`]s with their [`RunFigures`]).
+//! - [`Criteria`] are the values of each [`InformationCriterion`].
+//!
+//! The methods and their sources are at [`Method`]; the theory is that of Ljung, System Identification, 2nd ed. 1999, chapters 7
+//! and 10.
+//!
+//! ```
+//! use thetahat::data::Record;
+//! use thetahat::estimate::{Initial, arx};
+//! use thetahat::model::Orders;
+//!
+//! let u = [1.0, -1.0, 2.0, 0.0, 1.0];
+//! let y = [0.0, 2.0, -1.0, 3.5, 1.75]; // y(t) = 0.5 y(t-1) + 2 u(t-1)
+//! let estimate = arx(&Record::new(&y, vec![&u])?, &Orders::arx(1, &[1], &[1])?, Initial::Drop)?;
+//! assert!((estimate.parameters()[0] + 0.5).abs() < 1e-12); // a1
+//! assert!((estimate.parameters()[1] - 2.0).abs() < 1e-12); // b1
+//! # Ok::<(), thetahat::Error>(())
+//! ```
 
 mod arx;
 mod border;
@@ -7,6 +35,7 @@ mod criteria;
 mod criterion;
 pub(crate) mod equations;
 mod exact;
+mod initial;
 mod instrumental;
 pub(crate) mod nonlinear_arx;
 mod offset;
@@ -28,11 +57,12 @@ use std::ops::ControlFlow;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::Error;
 use crate::data::Record;
+use crate::model::{Orders, Structure};
 use crate::model::{PolynomialModel, Signal};
 use crate::optimize::{Monitor, Search, Stopped};
 pub use crate::regression::Solver;
-use crate::{Error, Orders, Structure};
 pub use arx::{arx, arx_factor};
 pub(crate) use arx::{enough, estimate_is_for_f};
 pub(crate) use common::{Common, Point, Window};
@@ -40,6 +70,7 @@ pub use criteria::{Criteria, InformationCriterion};
 pub use criterion::{Bound, Criterion, CriterionOutcome, GainBound, Norm};
 pub use equations::{EquationsOutcome, LikelihoodSearch, UnknownParameter};
 pub use exact::LikelihoodOutcome;
+pub use initial::Initial;
 pub use nonlinear_arx::{RunFigures, TermStep, TermsOutcome};
 pub use offset::Constant;
 pub(crate) use offset::{Beside, Fitted, OutputOffset, Task, pays};
@@ -50,39 +81,6 @@ pub(crate) use prediction_error::drop_is_not_for_f;
 pub use robust::{Loss, Robust, RobustOutcome};
 pub(crate) use stretches::stretches;
 pub(crate) use uncertainty::{Autoregression, autoregression, backward_filtered_products};
-
-/// What stands for the samples before the first of a segment.
-///
-/// Samples that were measured directly before it ([`Record::past`](crate::Record::past)) are past inputs and outputs, r = max(na,
-/// nb + nk - 1) + nd of them at most; only zeros do without. With r of them every sample of the segment counts. Where there are
-/// fewer, the errors begin where A, D, and B of inputs without F reach back to measured samples only:
-///
-/// | | without F | with F |
-/// |---|---|---|
-/// | drop | past samples, or the first r do not count | refused |
-/// | estimate | refused | past samples; nf free responses of each 1/F, and max(nf, nb + nk - 1) without a past where that is worth it |
-/// | zero | zeros | zeros |
-/// | auto | drop | estimate with a past, or where it is worth it; else zero |
-///
-/// n more initial conditions are worth it if N ln(V_without/V_with) > n ln N. C begins with e = 0.
-///
-/// [`Method::ExactLikelihood`] takes no past output, and leaves no sample out: drop is refused, and the response to the inputs is
-/// treated as with F, A standing for F.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum Initial {
-    /// [`Initial::Drop`] where no F is estimated; else [`Initial::Estimate`] if a segment has a past or that is worth its
-    /// parameters, and [`Initial::Zero`] if not.
-    #[default]
-    Auto,
-    /// Nothing: samples without a full regressor are left out, and e = 0 there. For models without F.
-    Drop,
-    /// Zeros: all samples count.
-    Zero,
-    /// Free responses of 1/F, found with the parameters; the other polynomials begin as for [`Initial::Drop`]. For models
-    /// with F: what unknown samples do to the errors of others ends after r samples.
-    Estimate,
-}
 
 /// How an estimate was found.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -147,7 +145,10 @@ pub enum Method {
     /// the first term is soon over.
     ///
     /// ```
-    /// use thetahat::{Channel, Initial, Log, Method, Orders, Procedure, Search, estimate};
+    /// use thetahat::data::{Channel, Log};
+    /// use thetahat::estimate::{Initial, Method, Procedure, estimate};
+    /// use thetahat::optimize::Search;
+    /// use thetahat::model::Orders;
     ///
     /// let (mut y, mut noise) = (vec![0.0], 1_u32);
     /// for t in 1..200 {
@@ -183,7 +184,9 @@ impl Default for Method {
 /// [`Error::Data`] if squares of the signals leave the range of `f64`.
 ///
 /// ```
-/// use thetahat::{Initial, Method, Orders, Record, estimate};
+/// use thetahat::data::Record;
+/// use thetahat::estimate::{Initial, Method, estimate};
+/// use thetahat::model::Orders;
 ///
 /// // x(t) = 0.8 x(t-1) + u(t-1) from rest, seen with a small disturbance.
 /// let u: Vec<f64> = (0..200_u32).map(|t| f64::from(t * t % 11) - 5.0).collect();
@@ -311,7 +314,7 @@ impl Estimate {
         Ok(PolynomialModel { inputs, output, ..model })
     }
 
-    /// theta-hat, in the order of [`Orders::names`](crate::Orders::names).
+    /// theta-hat, in the order of [`Orders::names`](crate::model::Orders::names).
     pub fn parameters(&self) -> &[f64] {
         &self.parameters
     }

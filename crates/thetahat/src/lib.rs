@@ -6,96 +6,98 @@
 //! A(q) y(t) = sum_j B_j(q)/F_j(q) u_j(t - nk_j) + C(q)/D(q) e(t)
 //! ```
 //!
-//! with A, C, D, F monic in q^-1 and e white (Ljung, System Identification: Theory for the User, 2nd ed. 1999).
-//! [`Orders`] say how many coefficients each has, and with that the [`Structure`]: ARX, ARMAX, output error, Box-Jenkins, AR,
-//! ARMA or any other.
+//! with A, C, D, F monic in q^-1 and e white (Ljung, System Identification: Theory for the User, 2nd ed. 1999), is written as
+//! equations of its states, or is a nonlinear map of past outputs and inputs.
 //!
-//! - [`Log`] holds channels on a common clock, [`Record`] the signals that an estimate sees.
-//! - [`estimate`] gives an [`Estimate`] from a [`Record`], [`Orders`] and a [`Method`]. [`arx`] is its short form for models
-//!   that are linear in their parameters; [`arx_factor`] gives a triangular factor that merges with others.
-//! - [`predict`], [`simulate`] and [`forecast`] say what a [`PolynomialModel`] says, [`draw`] what it leaves open;
-//!   [`frequency_response`], [`step_response`] and [`impulse_response`] what it is to sines, steps and impulses; [`Fit`] says
-//!   how close that is.
-//! - [`PolynomialModel::state_space`] writes a model as a recursion of first order, for filters and controllers.
-//! - [`StateFilter`] estimates the state of a [`StateModel`] row by row: of a report, of matrices, or of a model in equations,
-//!   a [`GreyBox`], of which parameters may be unknown.
-//! - [`inspect`] says what a log is worth before any fit.
-//! - [`identify`] goes the whole way from a [`Log`] to a [`Report`], the JSON document; [`apply`] takes a stored model to a log.
-//! - [`validate()`] says how a stored model does on a log and what is left of it, [`compare`] puts several side by side, a
-//!   [`Requirement`] makes a gate of it.
-//! - A [`Tracker`] estimates ARX and ARMAX models while the plant runs, sample by sample, with predictions and with alarms
-//!   where the plant changes.
-//! - With the feature `html`, `fit_page` and its like make pages with charts of them.
+//! # From a log to a model
 //!
-//! Rows of a log are counted from 1 and ranges include both ends; sample positions inside a [`Record`] are counted from 0.
+//! ```
+//! use thetahat::Document;
+//! use thetahat::data::{Channel, Log};
+//! use thetahat::model::Orders;
+//! use thetahat::report::{Plan, ValidationPlan, identify, validate};
+//! use thetahat::respond::{Horizon, Start, step_response};
+//!
+//! // A room of 20 degrees with a heater that is switched on and off, one row every minute.
+//! let (mut heater, mut temperature, mut random) = (vec![0.0], vec![20.0], 1_u32);
+//! for t in 1..400 {
+//!     random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+//!     let noise = f64::from(random >> 16) / 32_768.0 - 1.0;
+//!     temperature.push(20.0 + 0.9 * (temperature[t - 1] - 20.0) + 0.5 * heater[t - 1] + 0.1 * noise);
+//!     heater.push(f64::from(random >> 28 & 1));
+//! }
+//! let channel = |name: &str, values| Channel { name: name.into(), values };
+//! let log = Log::new(vec![channel("heater", heater), channel("temperature", temperature)], 60.0)?;
+//!
+//! // y(t) + a1 y(t-1) = b1 u(t-1) + e(t), fitted to the first 300 rows.
+//! let orders = Orders::arx(1, &[1], &[1])?;
+//! let plan = Plan { estimate: vec!["1..300".parse()?], ..Plan::new(&["heater"], "temperature", orders) };
+//! let report = identify(log.clone(), &[], &plan)?;
+//! let a1 = &report.model.parameters()[0];
+//! assert!((a1.value + 0.9).abs() < 3.0 * a1.standard_error.unwrap());
+//! assert!(report.to_json()?.contains("thetahat.report/1")); // the document to store
+//!
+//! // On rows that the fit did not use: the model fits, and nothing is left in its residuals.
+//! let held_out = ValidationPlan { rows: vec!["301..400".parse()?], ..ValidationPlan::default() };
+//! let validation = validate(&report, None, &log, &[], &held_out)?.validation;
+//! assert!(validation.fit[0].percent.unwrap() > 85.0);
+//! assert!(validation.residuals[0].ljung_box.p_value.unwrap() > 0.05);
+//!
+//! // The temperature that the model expects from the heater alone, row by row.
+//! let free_run = report.apply(&log, &[], None, Horizon::FreeRun, Start::Estimate)?;
+//! assert_eq!(free_run.outputs[0].predicted.len(), 400);
+//!
+//! // What the heater does when it is switched on: half a degree in the first minute, five in the end.
+//! let step = step_response(report.model.polynomials("a step response")?, 0, None)?;
+//! assert!((step.values[1].value - 0.5).abs() < 0.1);
+//! assert!((step.values.last().unwrap().value - 5.0).abs() < 0.5);
+//! # Ok::<(), thetahat::Error>(())
+//! ```
+//!
+//! # Modules
+//!
+//! | module | what it is for |
+//! |---|---|
+//! | [`data`] | logs, rows, records, and what is done to them before a fit |
+//! | [`inspect`] | what a log is worth before any fit |
+//! | [`model`] | orders, models with polynomials, models in equations, nonlinear ARX models |
+//! | [`estimate`] | from a record and orders to parameters |
+//! | [`optimize`] | the search that estimates share |
+//! | [`select`] | which of several models to believe |
+//! | [`respond`] | predictions, free runs, forecasts, step and frequency responses |
+//! | [`validate`] | figures of fit and tests of residuals |
+//! | [`report`] | the whole way from a log to a document and its page |
+//! | [`track`] | models that are estimated while the plant runs |
+//! | [`filter`] | states that are estimated while the plant runs |
+//! | [`figures`], [`text`] | how numbers and names are written for people |
+//!
+//! Every [`Document`] is written as JSON and read back. Every function that can fail gives an [`Error`] that says what is wrong, where,
+//! and what to do.
+//!
+//! Rows of a log are counted from 1 and ranges include both ends; sample positions inside a [`data::Record`] are counted from 0.
 //! The same input gives the same bits, whatever the number of threads.
 //!
-//! What it does not do: open files, print, or run without a heap. For the last see `thetahat-core`, whose estimators a
-//! [`Tracker`] and a [`StateFilter`] are made of.
+//! The crate does not open files, print, or run without a heap. For the last see [`thetahat_core`], whose estimators a
+//! [`track::Tracker`] and a [`filter::StateFilter`] are made of.
 
-mod data;
+pub mod data;
 mod distribution;
 mod document;
 mod error;
-mod estimate;
+pub mod estimate;
 pub mod figures;
-mod filter;
-mod inspect;
-mod model;
-mod optimize;
+pub mod filter;
+pub mod inspect;
+pub mod model;
+pub mod optimize;
 mod regression;
-mod report;
-mod respond;
-mod select;
+pub mod report;
+pub mod respond;
+pub mod select;
 pub mod text;
-mod track;
-mod validate;
+pub mod track;
+pub mod validate;
 
-pub use data::{
-    AntiAlias, Channel, Detrend, Interpolation, Log, Offset, Prefilter, Record, Recording, Resample,
-    Resampling, Rows, Source, Split, Times,
-};
 pub use document::{Document, is_document};
 pub use error::Error;
-pub use estimate::{
-    Bound, Constant, Criteria, Criterion, CriterionOutcome, EquationsOutcome, Estimate, GainBound,
-    InformationCriterion, Initial, LikelihoodOutcome, LikelihoodSearch, Loss, Method, Norm, Procedure,
-    Robust, RobustOutcome, RunFigures, SearchOutcome, Solver, StartOutcome, TermStep, TermsOutcome,
-    UnknownParameter, arx, arx_factor, estimate, estimate_monitored,
-};
-pub use filter::{
-    EstimatedNumber, Estimator, FilterSnapshot, FilterSummary, InitialState, ObserverGain, SmoothedStates,
-    StateEstimate, StateFilter, StateModel, StateValues,
-};
-pub use inspect::{
-    ChannelQuality, Clock, DelayEstimate, Excitation, Feedback, Inspection, InspectionPlan, Saturation,
-    SpectrumPoint, inspect, inspect_log,
-};
-pub use model::{
-    EquationsModel, GreyBox, Interval, Map, Model, NonlinearArxModel, OffsetCovariance, Orders, Parameter,
-    PolynomialModel, Quantity, Regressor, Root, Signal, StateSpace, Structure,
-};
-pub use optimize::{Algorithm, Monitor, Progress, Search, Step, Stopped};
-pub use report::{
-    Applied, AppliedOutput, Centres, Comparison, Coverage, Data, EquationsPlan, Estimation, InputLags,
-    MapPlan, Missing, NoiseLevel, NonlinearArxPlan, OutputSignals, Parts, Plan, Report, Requirement, Seen,
-    Signals, Unjudged, Validated, Validation, ValidationPlan, apply, compare, fit_equations,
-    fit_nonlinear_arx, held_out_runs, identify, identify_monitored, sample, validate,
-};
-#[cfg(feature = "html")]
-pub use report::{comparison_page, fit_page, inspection_page, validation_page};
-pub use respond::{
-    Drawn, Draws, Forecast, FrequencyPoint, FrequencyResponse, Horizon, NisSummary, Response, Start,
-    TransientResponse, draw, forecast, frequency_response, impulse_response, logarithmic_frequencies,
-    predict, prediction_deviation, prediction_deviations, simulate, step_response,
-};
-pub use select::{
-    Automatic, Best, Choice, Delay, Focus, Grid, HeldOut, OrderRange, Path, Scan, Scored, Select, Selection,
-    choose_orders,
-};
 pub use thetahat_core;
-pub use track::{
-    Beginning, PerChannel, Policy, TrackMethod, TrackPlan, TrackScore, TrackSummary, Tracked, Tracker,
-    TrackerSummary, change_detector,
-};
-pub use validate::{Anderson, AndersonLevel, Fit, Independence, Nonlinearity, Part, Residuals, Test};

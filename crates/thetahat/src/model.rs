@@ -1,4 +1,22 @@
-//! What a model is: its orders, its polynomials, and the document that a fit stores.
+//! What a model is: its orders, its polynomials, its equations, and the form that a document stores.
+//!
+//! - [`Orders`] say how many coefficients each polynomial of A(q) y(t) = B(q)/F(q) u(t - nk) + C(q)/D(q) e(t) has, and with that the
+//!   [`Structure`] (Ljung, System Identification: Theory for the User, 2nd ed. 1999, section 4.2).
+//! - [`PolynomialModel`] has the polynomials, each [`Parameter`] with its standard error, every [`Root`] and [`Quantity`] that follows
+//!   from them with an [`Interval`], and the [`Signal`]s it was fitted to. [`OffsetCovariance`] is what is open of their offsets.
+//! - [`StateSpace`] is the same model as a recursion of first order, for filters and controllers.
+//! - [`GreyBox`] is a model in equations as a person writes it, [`EquationsModel`] one whose parameters were estimated.
+//! - [`NonlinearArxModel`] is a nonlinear map of past outputs and inputs: a [`Map`] of [`Regressor`]s.
+//! - [`Model`] is a model of any kind: what reports hold.
+//!
+//! ```
+//! use thetahat::model::{Orders, Structure};
+//!
+//! let orders = Orders::bj(&[2], 1, 1, &[2], &[3])?;
+//! assert_eq!(orders.structure(), Structure::Bj);
+//! assert_eq!(orders.names(), ["b3", "b4", "c1", "d1", "f1", "f2"]);
+//! # Ok::<(), thetahat::Error>(())
+//! ```
 
 mod assembly;
 mod dynamics;

@@ -1,5 +1,7 @@
 //! The search for the parameters of the least cost, whatever the cost is.
 //!
+//! [`Search`] says how: an [`Algorithm`], a [`Step`], limits. It tells a [`Monitor`] of its [`Progress`], and why it [`Stopped`].
+//!
 //! With the normal equations G step = g of an iteration (see [`Objective`]), scaled so that G has a unit diagonal:
 //!
 //! ```text
@@ -32,7 +34,7 @@
 //! - the change of theta: with s = G^-1 g the decrease is s'G s, which is J/N times the squared length of s in standard errors. With a
 //!   tolerance of 1e-8 and 1000 samples no combination of parameters is further than 0.003 standard errors from the minimum;
 //! - the gradient: the decrease is the square of its norm in the metric G^-1, whatever the units of the parameters. How large it
-//!   is at the end, a report says ([`SearchOutcome::gradient_norm`](crate::SearchOutcome::gradient_norm)).
+//!   is at the end, a report says ([`SearchOutcome::gradient_norm`](crate::estimate::SearchOutcome::gradient_norm)).
 //!
 //! A cost that no step lowers further ends a search too: at what rounding allows it has converged, else there is
 //! [`NoDescent`](Stopped::NoDescent). Iterations and time have limits.

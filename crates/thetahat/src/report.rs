@@ -1,4 +1,33 @@
-//! The document that a fit leaves behind, and the way there.
+//! From a log to a document: fits, validations and comparisons of whole logs, and their pages.
+//!
+//! - [`identify`] fits what a [`Plan`] says and gives a [`Report`]; [`identify_monitored`] can be watched and ended, [`Unjudged`] is a
+//!   fit before its figures. [`fit_equations`] does the same for a model in equations with an [`EquationsPlan`],
+//!   [`fit_nonlinear_arx`] for a nonlinear ARX model with a [`NonlinearArxPlan`] ([`InputLags`], [`MapPlan`], [`Centres`]).
+//! - [`Report`] is the JSON document of a fit: its [`Data`] ([`Parts`], [`Missing`]), the model, its [`Estimation`] and its figures.
+//! - [`validate`] tests a report on a log as a [`ValidationPlan`] says. It gives a [`Validated`]: the document, a [`Validation`] with
+//!   [`NoiseLevel`], [`Coverage`] and whether the fit has [`Seen`] the rows, and the [`Signals`] for charts ([`OutputSignals`]).
+//! - [`compare`] puts several validations side by side in a [`Comparison`]. A [`Requirement`] makes a gate of a validation.
+//! - [`apply`] predicts or simulates a log with a stored model ([`Applied`], [`AppliedOutput`]), [`sample`] draws from it.
+//!   [`held_out_runs`] are the free runs of the models between which a choice was made.
+//! - With the feature `html`, `fit_page`, `validation_page`, `comparison_page` and `inspection_page` make pages with charts.
+//!
+//! ```
+//! use thetahat::Document;
+//! use thetahat::data::{Channel, Log};
+//! use thetahat::model::Orders;
+//! use thetahat::report::{Plan, Report, Requirement, ValidationPlan, identify, validate};
+//!
+//! let u: Vec<f64> = (0..200).map(|t| f64::from(t * t % 7)).collect();
+//! let y = [vec![0.0], u[..199].to_vec()].concat();
+//! let channel = |name: &str, values| Channel { name: name.into(), values };
+//! let log = Log::new(vec![channel("u", u), channel("y", y)], 0.1)?;
+//! let report = identify(log.clone(), &[], &Plan::new(&["u"], "y", Orders::arx(0, &[1], &[1])?))?;
+//! let stored = Report::from_json(&report.to_json()?)?;
+//! let validation = validate(&stored, None, &log, &[], &ValidationPlan::default())?.validation;
+//! let requirement: Requirement = "fit>=90".parse()?;
+//! assert_eq!(requirement.unmet(&validation, 0.05), None);
+//! # Ok::<(), thetahat::Error>(())
+//! ```
 
 mod apply;
 mod equations;
@@ -8,6 +37,7 @@ mod html;
 mod identify;
 mod judge;
 mod nonlinear_arx;
+mod plan;
 mod requirement;
 mod sample;
 mod schema;
@@ -24,8 +54,9 @@ pub use equations::{EquationsPlan, fit_equations};
 pub use held_out_runs::held_out_runs;
 #[cfg(feature = "html")]
 pub use html::{comparison_page, fit_page, inspection_page, validation_page};
-pub use identify::{Plan, Unjudged, identify, identify_monitored};
+pub use identify::{Unjudged, identify, identify_monitored};
 pub use nonlinear_arx::{Centres, InputLags, MapPlan, NonlinearArxPlan, fit_nonlinear_arx};
+pub use plan::Plan;
 pub use requirement::Requirement;
 pub use sample::sample;
 pub use schema::{Data, Estimation, Missing, Parts, Report};

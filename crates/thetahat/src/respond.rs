@@ -1,4 +1,34 @@
-//! What a model says: driven by its inputs alone, or by what was measured, and what it is to each frequency.
+//! How a model responds: to a record of inputs and outputs, to steps, to impulses and to each frequency.
+//!
+//! - [`predict`] gives the k-step prediction, [`simulate`] the free run, which sees the inputs alone; [`Start`] says what they start
+//!   from. [`forecast`] goes on after the last sample of a record.
+//! - [`prediction_deviation`] is how far predictions are off because of the noise, [`prediction_deviations`] what uncertain parameters
+//!   add to that. [`draw`] gives random free runs and forecasts of models that the data do not tell apart.
+//! - [`step_response`] and [`impulse_response`] are those in time, [`frequency_response`] that to sines, with standard errors.
+//! - [`Horizon`] says how far ahead a figure looks, [`NisSummary`] whether the errors of a filter are as large as it expects.
+//!
+//! All of these take and give deviations from the model's offsets. [`report::apply`](crate::report::apply) takes a whole log, with
+//! its offsets. The sources are named at each function; most are Ljung, System Identification, 2nd ed. 1999, chapters 2 and 3.
+//!
+//! ```
+//! use thetahat::data::Record;
+//! use thetahat::estimate::{Initial, arx};
+//! use thetahat::model::{Orders, Signal};
+//! use thetahat::respond::{Start, predict, simulate};
+//!
+//! let u: Vec<f64> = (0..50_u32).map(|t| f64::from(t * t % 7)).collect();
+//! let mut y = vec![0.0];
+//! for t in 1..u.len() {
+//!     y.push(0.8 * y[t - 1] + 0.5 * u[t - 1]);
+//! }
+//! let (record, orders) = (Record::new(&y, vec![&u])?, Orders::arx(1, &[1], &[1])?);
+//! let estimate = arx(&record, &orders, Initial::Drop)?;
+//! let model = estimate.to_model(&orders, 1.0, vec![Signal::default()], Signal::default())?;
+//! let next = predict(&model, &record, 1, Start::Drop)?;
+//! let run = simulate(&model, &record, Start::Zero)?;
+//! assert!((next.values[40] - y[40]).abs() < 1e-9 && (run.values[40] - y[40]).abs() < 1e-9);
+//! # Ok::<(), thetahat::Error>(())
+//! ```
 
 mod draws;
 pub(crate) mod equations;
@@ -12,19 +42,13 @@ mod nis;
 pub(crate) mod nonlinear_arx;
 mod on_log;
 mod predict;
+mod response;
 mod sensitivities;
 mod simulate;
+mod start;
 #[cfg(test)]
 mod tests;
 mod transient;
-
-use std::ops::Range;
-
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-
-use crate::data::Record;
-use crate::{Error, PolynomialModel};
 
 pub use draws::{Drawn, Draws, draw};
 pub use forecast::{Forecast, forecast};
@@ -36,69 +60,10 @@ pub use nis::NisSummary;
 pub(crate) use on_log::{OnLog, PolynomialOnLog, Tested, record_for};
 pub(crate) use predict::check_steps;
 pub use predict::{predict, prediction_deviation};
+pub use response::Response;
 pub use sensitivities::prediction_deviations;
 pub use simulate::simulate;
+pub use start::Start;
+pub(crate) use start::{NOTHING_LEFT, are_worth};
+use start::{check_inputs, history};
 pub use transient::{TransientResponse, impulse_response, step_response};
-
-/// What a response starts from, in the words of [`Initial`](crate::Initial) for fits.
-///
-/// In the first r = max(na, nb + nk - 1 of the inputs without F) + nd samples of a stretch, A, B and D reach back to
-/// samples that are not there. Unless these are taken as zero, e is, and the r samples do not count. What [`Initial`](crate::Initial)
-/// says of them holds here too.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum Start {
-    /// Rest: all samples before the first of a segment are zero, and all of the segment count.
-    Zero,
-    /// Nothing but measured samples: those directly before the segment where the log has them, else the segment's first
-    /// ones. The first r of all these do not count. They are all that ARX models need. C and F begin there from rest: samples
-    /// before the segment warm them up, and without such samples their first outputs are wrong where they were not at
-    /// rest.
-    Drop,
-    /// The initial condition that fits best in the least-squares sense: to the segment's output in a free run, of which all
-    /// samples count; to the one-step errors otherwise. The inputs that were measured directly before the segment are used, and for
-    /// predictions the outputs, as far as errors reach back to them: max(na, nb + nk - 1) + nd samples. Where there are
-    /// fewer, the first r of all these do not count in predictions.
-    Estimate,
-}
-
-/// A record must have as many inputs as the model.
-fn check_inputs(model: &PolynomialModel, record: &Record<'_>) -> Result<(), Error> {
-    let (expected, found) = (model.b.len(), record.inputs.len());
-    if found == expected {
-        return Ok(());
-    }
-    Err(Error::argument("inputs", format!("the model has {expected} inputs, the record {found}")))
-}
-
-/// Where to look from for a start from measured samples, so that a response `ahead` steps ahead begins with the segment.
-fn history(model: &PolynomialModel, segment: &Range<usize>, past: usize, ahead: usize) -> usize {
-    let forgets = model.c.len() == 1 && model.f.iter().all(|f| f.len() == 1);
-    let wanted = if forgets { model.orders.conditioned() + ahead } else { usize::MAX };
-    segment.start - past.min(wanted)
-}
-
-/// A sum of squared errors below this fraction of the output's is rounding.
-pub(crate) const NOTHING_LEFT: f64 = 1e-28;
-
-/// Whether `more` initial conditions are worth it that lower the sum of squared errors over so many samples:
-/// N ln(V_without/V_with) > n ln N. The same rule for estimates and for what is made of them. `nothing` is a sum that is rounding.
-pub(crate) fn are_worth(samples: usize, without: f64, with: f64, more: usize, nothing: f64) -> bool {
-    let samples = samples as f64;
-    without > nothing && samples * (without / with).ln() > more as f64 * samples.ln()
-}
-
-/// A response to a record.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Response {
-    /// One value for each sample, in deviations like the record; NaN where there is none.
-    pub values: Vec<f64>,
-    /// The samples that the response covers and that have a measured output, as 0-based ranges.
-    pub counted: Vec<Range<usize>>,
-}
-
-impl Response {
-    fn empty(samples: usize) -> Self {
-        Self { values: vec![f64::NAN; samples], counted: Vec::new() }
-    }
-}

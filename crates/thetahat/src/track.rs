@@ -1,4 +1,28 @@
-//! Models that are estimated while the plant runs.
+//! Models that are estimated while the plant runs, row by row.
+//!
+//! - [`Tracker`] estimates an ARX or ARMAX model, predicts, and raises alarms where the plant changes. Each row gives a [`Tracked`].
+//! - [`TrackPlan`] says how: the [`TrackMethod`], a [`Policy`] of forgetting, a [`Beginning`], and numbers for each channel
+//!   ([`PerChannel`]).
+//! - [`TrackScore`] says how well it predicted so far, [`TrackerSummary`] what it knows, [`TrackSummary`] is the document of a run.
+//! - [`change_detector`] makes a detector with a mean number of samples between false alarms.
+//!
+//! The estimators, with equations and sources, are in [`thetahat_core`].
+//!
+//! ```
+//! use thetahat::model::Orders;
+//! use thetahat::track::{TrackPlan, Tracker};
+//!
+//! let mut tracker = Tracker::new(&Orders::arx(1, &[1], &[1])?, &TrackPlan::default())?;
+//! let mut y = 0.0;
+//! for k in 0..200 {
+//!     let u = if k % 7 < 3 { 1.0 } else { -1.0 };
+//!     tracker.log_row(y, &[u])?;
+//!     y = 0.8 * y + 0.5 * u;
+//! }
+//! let parameters = tracker.parameters().expect("an estimate");
+//! assert!((parameters[0] + 0.8).abs() < 1e-3 && (parameters[1] - 0.5).abs() < 1e-3);
+//! # Ok::<(), thetahat::Error>(())
+//! ```
 
 mod collecting;
 mod estimator;
@@ -7,12 +31,11 @@ mod plan;
 mod run_length;
 mod score;
 mod summary;
+#[cfg(test)]
+mod tests;
 mod tracker;
 mod warm;
 mod words;
-
-#[cfg(test)]
-mod tests;
 
 pub use plan::{Beginning, PerChannel, Policy, TrackMethod, TrackPlan};
 pub use run_length::change_detector;

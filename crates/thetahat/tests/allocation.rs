@@ -1,10 +1,12 @@
 //! Iterations of a search take no memory: more of them allocate no more. Samples of a tracker take none at all.
 
 use allocation_counter::measure;
-use thetahat::{
-    Algorithm, Channel, Initial, InspectionPlan, Method, Orders, Procedure, Record, Recording, Rows, Search,
-    Source, Times, TrackMethod, TrackPlan, Tracker, estimate, inspect,
-};
+use thetahat::data::{Channel, Record, Recording, Rows, Source, Times};
+use thetahat::estimate::{Initial, Method, Procedure, estimate};
+use thetahat::inspect::{InspectionPlan, inspect};
+use thetahat::model::Orders;
+use thetahat::optimize::{Algorithm, Search};
+use thetahat::track::{TrackMethod, TrackPlan, Tracker};
 
 /// A signal that looks random, and is the same everywhere.
 fn signal(length: usize, mut state: u32) -> Vec<f64> {

@@ -10,9 +10,11 @@ mod intervals;
 #[path = "monte_carlo/simulated.rs"]
 mod simulated;
 
-use thetahat::{
-    Automatic, Choice, Initial, Method, Orders, Procedure, Record, Search, Select, choose_orders, estimate,
-};
+use thetahat::data::Record;
+use thetahat::estimate::{Initial, Method, Procedure, estimate};
+use thetahat::model::Orders;
+use thetahat::optimize::Search;
+use thetahat::select::{Automatic, Choice, Select, choose_orders};
 
 use simulated::{BEFORE, Random, filtered};
 

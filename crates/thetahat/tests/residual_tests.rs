@@ -5,9 +5,11 @@
 #[path = "monte_carlo/simulated.rs"]
 mod simulated;
 
-use thetahat::{
-    Channel, Log, Method, Orders, Plan, Report, Residuals, Rows, Seen, ValidationPlan, identify, validate,
-};
+use thetahat::data::{Channel, Log, Rows};
+use thetahat::estimate::Method;
+use thetahat::model::Orders;
+use thetahat::report::{Plan, Report, Seen, ValidationPlan, identify, validate};
+use thetahat::validate::Residuals;
 
 use simulated::{BEFORE, Random, filtered};
 

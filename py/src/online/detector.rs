@@ -5,7 +5,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyList;
 use serde::{Deserialize, Serialize};
-use thetahat::change_detector;
+use thetahat::track::change_detector;
 use thetahat_core::nalgebra::DVector;
 use thetahat_core::{Action, Alarm as Given, ChangeDetector as Charts, Chart, Innovation as Kept};
 

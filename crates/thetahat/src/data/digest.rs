@@ -65,7 +65,7 @@ fn write(hasher: &mut XxHash3_128, values: &[f64]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Channel;
+    use crate::data::Channel;
 
     #[test]
     fn a_digest_is_that_of_the_rows_whatever_stands_around_them() {

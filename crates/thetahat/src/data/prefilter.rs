@@ -38,7 +38,7 @@ const LARGEST_PART: f64 = 0.25;
 /// The band of frequencies in Hz that a fit looks at; either end may be open.
 ///
 /// ```
-/// use thetahat::Prefilter;
+/// use thetahat::data::Prefilter;
 ///
 /// let band: Prefilter = "0.1..5".parse()?;
 /// assert_eq!((band.low, band.high), (Some(0.1), Some(5.0)));

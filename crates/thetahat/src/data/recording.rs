@@ -3,7 +3,7 @@
 use super::{Channel, Rows, check, checked};
 use crate::Error;
 
-/// A log as it was recorded: unlike a [`Log`](crate::Log) it may have an irregular clock. NaN means that the sample is missing.
+/// A log as it was recorded: unlike a [`Log`](crate::data::Log) it may have an irregular clock. NaN means that the sample is missing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recording {
     /// The channels, all as long.
@@ -28,7 +28,7 @@ impl Recording {
     /// [`Error::Data`] for rows that are not there, channels that differ in length, and another number of times.
     ///
     /// ```
-    /// use thetahat::{Channel, Recording, Times};
+    /// use thetahat::data::{Channel, Recording, Times};
     ///
     /// let y = Channel { name: "y".into(), values: vec![1.0, 2.0, 3.0] };
     /// let log = Recording { channels: vec![y], times: Times::Measured(vec![0.0, 0.5, 2.0]) };

@@ -183,7 +183,7 @@ impl Log {
     /// gives more than 10^8 rows.
     ///
     /// ```
-    /// use thetahat::{Channel, Interpolation, Log, Resample};
+    /// use thetahat::data::{Channel, Interpolation, Log, Resample};
     ///
     /// // A slow sine, and a fast one that looks slow every 10 ms: 99 Hz would become 1 Hz.
     /// let time: Vec<f64> = (0..2000).map(|k| f64::from(k) * 1e-3).collect();

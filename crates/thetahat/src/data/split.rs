@@ -10,7 +10,7 @@ use crate::Error;
 /// Rows of a log, 1-based, both ends included: what a person writes as `1..300`.
 ///
 /// ```
-/// use thetahat::Rows;
+/// use thetahat::data::Rows;
 ///
 /// let rows: Rows = "1..300".parse()?;
 /// assert_eq!(rows.len(), 300);
@@ -73,7 +73,7 @@ impl Rows {
 /// A share of 0 leaves a part out: `80/0/20` where no validation is needed, `75/25/0` where no test is wanted.
 ///
 /// ```
-/// use thetahat::Split;
+/// use thetahat::data::Split;
 ///
 /// assert!("60/20/20".parse::<Split>().is_ok());
 /// assert!("60/20".parse::<Split>().is_err());

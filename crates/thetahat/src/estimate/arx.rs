@@ -4,10 +4,11 @@ use std::ops::Range;
 use thetahat_core::LeastSquares;
 use thetahat_core::nalgebra::{DMatrix, Dyn};
 
+use crate::Error;
 use crate::data::{Record, measured};
 use crate::estimate::{Estimate, Initial, Procedure};
+use crate::model::Orders;
 use crate::regression::{Lagged, Presample, Regression, Taps, Unsolved};
-use crate::{Error, Orders};
 
 impl Estimate {
     /// The estimate that a triangular factor holds, such as [`arx_factor`] gives or several of them merged.
@@ -63,7 +64,9 @@ impl Estimate {
 /// squares of the signals leave the range of `f64` (beyond about 1e150, or below 1e-150).
 ///
 /// ```
-/// use thetahat::{Initial, Orders, Record, arx};
+/// use thetahat::data::Record;
+/// use thetahat::estimate::{Initial, arx};
+/// use thetahat::model::Orders;
 ///
 /// // y(t) = 0.5 y(t-1) + 2 u(t-1), without noise.
 /// let u = [1.0, -1.0, 2.0, 0.0, 1.0, 3.0, -2.0, 1.0];
@@ -95,7 +98,9 @@ pub fn arx(record: &Record<'_>, orders: &Orders, initial: Initial) -> Result<Est
 /// [`Error::Argument`] if the record does not have the orders' inputs; [`Error::Data`] if a sample is not finite.
 ///
 /// ```
-/// use thetahat::{Estimate, Initial, Orders, Record, arx_factor};
+/// use thetahat::data::Record;
+/// use thetahat::estimate::{Estimate, Initial, arx_factor};
+/// use thetahat::model::Orders;
 ///
 /// let (u, y) = ([1.0, -1.0, 2.0, 0.0, 1.0, 3.0], [0.0, 2.0, -1.0, 3.5, 1.75, 2.9]);
 /// let orders = Orders::arx(1, &[1], &[1])?;

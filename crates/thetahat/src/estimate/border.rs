@@ -8,8 +8,10 @@
 use thetahat_core::nalgebra::{Complex, ComplexField};
 
 use super::polynomials::Polynomials;
-use crate::Orders;
-use crate::model::polynomial::{Roots, is_stable};
+use crate::model::{
+    Orders,
+    polynomial::{Roots, is_stable},
+};
 
 /// The fraction of the distance from the circle.
 const NEARER: f64 = 0.2;

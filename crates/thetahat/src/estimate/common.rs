@@ -6,10 +6,11 @@ use super::prediction_error::is_determined;
 use super::predictor::{Begin, Predictor};
 use super::start::candidates;
 use super::stretches::energy;
+use crate::Error;
 use crate::data::Record;
+use crate::model::Orders;
 use crate::optimize::{Deadline, Monitor, Search, best_free, search};
 use crate::respond::NOTHING_LEFT;
-use crate::{Error, Orders};
 
 /// A step that raises the log-likelihood by less than this fraction of one is not done.
 const SETTLED: f64 = 0.02;

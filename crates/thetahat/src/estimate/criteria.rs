@@ -81,7 +81,7 @@ fn logarithm(cost: f64) -> Option<f64> {
 /// FPE has the units of y squared. A value is none where it is not defined: the logarithms at J = 0, AICc at N <= p + 1.
 ///
 /// ```
-/// use thetahat::InformationCriterion;
+/// use thetahat::estimate::InformationCriterion;
 ///
 /// let criterion: InformationCriterion = "hqc".parse()?;
 /// assert_eq!((criterion.word(), criterion.name()), ("hqc", "HQC"));
@@ -155,7 +155,7 @@ impl FromStr for InformationCriterion {
 /// All information criteria of a model. A document has them by their words, with null where one is not defined.
 ///
 /// ```
-/// use thetahat::{Criteria, InformationCriterion};
+/// use thetahat::estimate::{Criteria, InformationCriterion};
 ///
 /// let criteria = Criteria::new(1.6575, 6, 300);
 /// assert!((criteria.of(InformationCriterion::FPE).unwrap() - 1.7252).abs() < 5e-5);

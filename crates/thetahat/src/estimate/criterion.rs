@@ -11,11 +11,15 @@ use thetahat_core::nalgebra::DVector;
 
 use super::arx::{linear, out_of_range, rows, signals, taps, unsolved, with_past};
 use super::enough;
+use crate::Error;
 use crate::data::Record;
+use crate::model::Orders;
 pub use crate::regression::convex::Norm;
-use crate::regression::convex::{Failure, Fitting, Solved, peak};
-use crate::regression::{Lagged, Presample, Unsolved, sum};
-use crate::{Error, Orders};
+use crate::regression::{
+    Lagged, Presample, Unsolved,
+    convex::{Failure, Fitting, Solved, peak},
+    sum,
+};
 use demands::Demands;
 
 /// A noise bound that the data meet to this is met.
@@ -26,7 +30,7 @@ const NORMAL_QUANTILE: f64 = 1.959_963_984_540_054;
 /// A range that a parameter has to stay in, in its own units. Equal ends set its value, infinite ones are open.
 ///
 /// ```
-/// use thetahat::Bound;
+/// use thetahat::estimate::Bound;
 ///
 /// let bound: Bound = "a1=-1.9..0".parse()?;
 /// assert_eq!((bound.parameter.as_str(), bound.low, bound.high), ("a1", -1.9, 0.0));
@@ -47,7 +51,7 @@ pub struct Bound {
 /// A range for the static gain B_j(1)/A(1) from an input to the output, in units of y over units of u. Equal ends set it.
 ///
 /// ```
-/// use thetahat::GainBound;
+/// use thetahat::estimate::GainBound;
 ///
 /// let gain: GainBound = "u1=1..3".parse()?;
 /// assert_eq!((gain.input.as_deref(), gain.low, gain.high), (Some("u1"), 1.0, 3.0));
@@ -89,7 +93,7 @@ pub struct GainBound {
 /// Control 27 (1982), who also bound the set by a box).
 ///
 /// ```
-/// use thetahat::{Criterion, Norm};
+/// use thetahat::estimate::{Criterion, Norm};
 ///
 /// assert!(Criterion::default().is_plain());
 /// let criterion = Criterion { norm: Norm::One, bounds: vec!["a1=-1..0".parse()?], ..Criterion::default() };
@@ -275,7 +279,7 @@ fn check_range(argument: &str, words: &str, low: f64, high: f64) -> Result<(), E
 /// 2 p programs.
 ///
 /// # Errors
-/// As for [`arx`](crate::arx); [`Error::Argument`] if an option makes no sense, or names what is not there;
+/// As for [`arx`](crate::estimate::arx); [`Error::Argument`] if an option makes no sense, or names what is not there;
 /// [`Error::Data`] if the demands cannot hold together: it names as few of them as clash, and for a noise bound the
 /// smallest that is possible.
 pub(crate) fn constrained(

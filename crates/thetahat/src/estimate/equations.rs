@@ -10,13 +10,18 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::DMatrix;
 
-use crate::model::equations::{Scale, Unknown};
+use crate::Error;
+use crate::model::{
+    GreyBox,
+    equations::{Scale, Unknown},
+};
 use crate::optimize::{
     Algorithm, Deadline, Found, Monitor, Search, Step, Stopped, lowest, normal_number, search,
 };
-use crate::respond::NisSummary;
-use crate::respond::equations::{Experiment, Failure};
-use crate::{Error, GreyBox};
+use crate::respond::{
+    NisSummary,
+    equations::{Experiment, Failure},
+};
 pub(crate) use likelihood::Criterion;
 use objective::Deviance;
 pub(crate) use uncertainty::listed;
@@ -113,7 +118,7 @@ pub(crate) struct EquationsEstimate {
 /// the result does not depend on how many threads there are.
 ///
 /// # Errors
-/// As for [`fit_equations`](crate::fit_equations).
+/// As for [`fit_equations`](crate::report::fit_equations).
 pub(crate) fn largest_likelihood(
     model: &GreyBox,
     experiments: &[Experiment],

@@ -44,12 +44,14 @@ use super::polynomials::Polynomials;
 use super::prediction_error::{flat, prediction_error};
 use super::stretches::{energy, filled};
 use super::{Estimate, Initial, Procedure};
+use crate::Error;
 use crate::data::{Record, measured};
-use crate::model::polynomial::{is_stable, roots};
-use crate::optimize::Objective;
-use crate::optimize::{Deadline, Found, Monitor, Search, Stopped, best_free, search};
+use crate::model::{
+    Orders, Structure,
+    polynomial::{is_stable, roots},
+};
+use crate::optimize::{Deadline, Found, Monitor, Objective, Search, Stopped, best_free, search};
 use crate::respond::{NOTHING_LEFT, are_worth};
-use crate::{Error, Orders, Structure};
 use likelihood::{Begin, Likelihood};
 
 /// Starts have roots of A and C inside this circle.

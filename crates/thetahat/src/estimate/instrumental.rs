@@ -15,10 +15,11 @@ use super::start::reduced::Reduced;
 use super::start::{candidates, stable};
 use super::uncertainty::{autoregression, backward_filtered_products, coloured, columns, restricted};
 use super::{Estimate, Initial, Procedure};
+use crate::Error;
 use crate::data::Record;
+use crate::model::Orders;
 use crate::optimize::{Deadline, Stopped};
 use crate::regression::{Lagged, Presample, Taps};
-use crate::{Error, Orders};
 
 /// Corrections of a solution by its residuals.
 const CORRECTIONS: usize = 2;

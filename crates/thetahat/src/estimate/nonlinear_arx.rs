@@ -96,7 +96,7 @@ fn run(model: &NonlinearArxModel, log: &Log, rows: &[Rows]) -> Result<Sums, Erro
             sums.squares += error * error;
             // One that is not a number stays one.
             sums.largest = if error > sums.largest || error.is_nan() { error } else { sums.largest };
-            sums.strays |= !((said - middle).abs() <= half);
+            sums.strays |= said.is_nan() || (said - middle).abs() > half;
         }
     }
     Ok(sums)

@@ -28,22 +28,26 @@
 //! tell a mean as well as N errors e of spectral density S do (Kent, Biometrika 69, 1982, on likelihood ratios of models that
 //! do not hold).
 
-use std::ops::Range;
+mod beside;
+#[cfg(test)]
+mod tests;
+mod worth;
+
 use std::time::Instant;
 
-use super::arx::with_past;
-use super::prediction_error::predictor_of;
 use super::predictor::{Begin, Predictor};
-use super::uncertainty::autoregression;
 use super::{
-    Criterion, Estimate, Initial, Method, Monitor, Norm, Procedure, Search, arx, estimate_of_channels, exact,
+    Criterion, Estimate, Initial, Method, Monitor, Procedure, Search, arx, estimate_of_channels, exact,
     prediction_error,
 };
-use crate::data::{Log, Offset, Record};
-use crate::model::{OffsetCovariance, Quantity, is_covariance};
+use crate::Error;
+use crate::data::{Offset, Record};
+use crate::estimate::Criteria;
+use crate::model::{OffsetCovariance, Orders, Quantity, Structure};
 use crate::optimize::best_free;
-use crate::regression::{Presample, sum};
-use crate::{Criteria, Error, Orders, Structure};
+pub(crate) use beside::Beside;
+pub(crate) use worth::pays;
+use worth::{OfConstant, conditions, is_worth, lowers_mdl, white_samples};
 
 /// A search for a constant begins where a step predicts this fraction of what it must be worth.
 const PROMISING: f64 = 0.5;
@@ -51,10 +55,6 @@ const PROMISING: f64 = 0.5;
 const CERTAIN: f64 = 2.0;
 /// The same of a constant that is not sure by its own error: the colour of slow errors is seen poorly in short logs.
 const CLEAR: f64 = 8.0;
-/// Of A(1) nothing but rounding is left below this fraction of the sum of |a_i|: there is no level.
-const INTEGRATOR: f64 = 1e-9;
-/// Of a column of ones less than this fraction of its square is left beside the regressors: they hold a constant already.
-const DEPENDENT: f64 = 1e-9;
 
 /// Whether a constant is estimated with the parameters: the level of the output where the inputs are at their offsets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -66,66 +66,6 @@ pub enum Constant {
     Yes,
     /// Never.
     No,
-}
-
-/// The constant and the trend that may be estimated beside the parameters of some rows.
-#[derive(Debug, Clone)]
-pub(crate) struct Beside {
-    rows: usize,
-    /// r, one value for each row, where there is a trend.
-    ramp: Option<Vec<f64>>,
-    /// t_m and h, in seconds.
-    middle: f64,
-    half: f64,
-    sample_time: f64,
-}
-
-impl Beside {
-    /// # Errors
-    /// [`Error::Argument`] for a trend through several logs.
-    pub(crate) fn new(log: &Log, segments: &[Range<usize>], trend: bool) -> Result<Self, Error> {
-        if trend && log.is_joined() {
-            return Err(Error::argument(
-                "trend",
-                "several logs have no common clock for a line; leave it out, or fit one log",
-            ));
-        }
-        let first = segments.first().map_or(0.0, |segment| log.elapsed(segment.start));
-        let last = segments.last().map_or(0.0, |segment| log.elapsed(segment.end - 1));
-        let (middle, half) = (f64::midpoint(first, last), 0.5 * (last - first));
-        let half = if half > 0.0 { half } else { 1.0 };
-        let at = |row: usize| (log.elapsed(row) - middle) / half;
-        let ramp = trend.then(|| (0..log.rows()).map(at).collect());
-        Ok(Self { rows: log.rows(), ramp, middle, half, sample_time: log.sample_time() })
-    }
-
-    /// How many inputs these are.
-    pub(crate) fn count(&self) -> usize {
-        1 + usize::from(self.ramp.is_some())
-    }
-
-    /// 1 and r.
-    pub(crate) fn signals(&self) -> Vec<Vec<f64>> {
-        std::iter::once(vec![1.0; self.rows]).chain(self.ramp.clone()).collect()
-    }
-
-    /// Where their coefficients stand among the parameters of a model of these orders with them.
-    fn places(&self, orders: &Orders) -> Range<usize> {
-        let first = orders.na + orders.nb.iter().sum::<usize>();
-        first..first + self.count()
-    }
-
-    /// The parameters of a model with them, of one without: both are zero.
-    fn with_zeros(&self, orders: &Orders, parameters: &[f64]) -> Vec<f64> {
-        let (before, after) = parameters.split_at(self.places(orders).start);
-        [before, &vec![0.0; self.count()], after].concat()
-    }
-
-    /// The parameters of a model without them, of one with them.
-    fn without(&self, orders: &Orders, parameters: &[f64]) -> Vec<f64> {
-        let places = self.places(orders);
-        [&parameters[..places.start], &parameters[places.end..]].concat()
-    }
 }
 
 /// What to estimate, beside the constant.
@@ -186,7 +126,7 @@ impl Task<'_> {
         beside: &Beside,
         start: Option<Vec<f64>>,
     ) -> Result<Fitted, Error> {
-        let wanted = constant == Constant::Yes || beside.ramp.is_some();
+        let wanted = constant == Constant::Yes || beside.has_trend();
         match self.refusal() {
             Some(why) if wanted => return Err(Error::argument("constant", why)),
             Some(_) => return self.plain(start.map(|start| beside.without(self.orders, &start))),
@@ -371,7 +311,7 @@ impl Task<'_> {
             return Ok(None);
         }
         let found = match without.procedure() {
-            Procedure::LeastSquares { .. } | Procedure::Constrained(_) if beside.ramp.is_none() => {
+            Procedure::LeastSquares { .. } | Procedure::Constrained(_) if !beside.has_trend() => {
                 OfConstant::new(self.record, self.orders, without).map(|of| of.joint(without))
             }
             Procedure::InstrumentalVariables { .. } | Procedure::Robust(_) => match self.all(beside, None) {
@@ -450,229 +390,3 @@ fn starting_from(method: &Method, start: Option<Vec<f64>>) -> Method {
         _ => method.clone(),
     }
 }
-
-/// var e/S(0), at most 1: the variance of the errors over their spectral density at frequency zero, by their autoregression.
-/// None where they cannot be computed.
-fn white_samples(record: &Record<'_>, orders: &Orders, estimate: &Estimate) -> Option<f64> {
-    let mut predictor = predictor_of(record, orders, estimate);
-    best_free(&mut predictor, estimate.parameters()).ok()?;
-    let (residuals, segments) = predictor.residuals();
-    let taken = orders.parameters() + predictor.initial_conditions();
-    Some(1.0 / autoregression(&residuals, &segments, taken).at_zero().max(1.0))
-}
-
-/// Whether the errors become smaller by what one parameter and further initial conditions cost: MDL, with the likelihood of
-/// Gaussian errors; where other norms were made small, of errors with Laplace's distribution or a uniform one. `share` of the
-/// samples counts.
-fn is_worth(without: &Estimate, with: &Estimate, share: f64) -> bool {
-    let samples = with.samples() as f64;
-    let price = 1.0 + conditions(with) as f64 - conditions(without) as f64;
-    let size = |estimate: &Estimate| match estimate.procedure() {
-        Procedure::Constrained(outcome) if outcome.norm != Norm::Two => outcome.objective.powi(2),
-        _ => estimate.cost(),
-    };
-    without.mse() > 0.0 && share * samples * (size(without) / size(with)).ln() > price * samples.ln()
-}
-
-/// The initial conditions that were estimated.
-fn conditions(estimate: &Estimate) -> usize {
-    match estimate.procedure() {
-        Procedure::PredictionError(outcome) => outcome.initial_conditions,
-        Procedure::RefinedInstrumentalVariables { initial_conditions, .. } => *initial_conditions,
-        Procedure::ExactLikelihood(outcome) => outcome.search.initial_conditions,
-        _ => 0,
-    }
-}
-
-/// Whether a constant lowers the MDL of a linear model of a record.
-pub(crate) fn pays(record: &Record<'_>, orders: &Orders) -> bool {
-    arx(record, orders, Initial::Drop).is_ok_and(|without| lowers_mdl(record, orders, &without))
-}
-
-/// Whether a constant lowers the MDL of a linear model, given its least squares.
-fn lowers_mdl(record: &Record<'_>, orders: &Orders, without: &Estimate) -> bool {
-    let samples = without.samples() as f64;
-    let cost = without.mse() * samples;
-    let decrease = OfConstant::new(record, orders, without).map_or(0.0, |of| of.errors * of.errors / of.left);
-    let left = (cost - decrease).max(0.0);
-    cost > 0.0 && samples * (cost / left).ln() > samples.ln()
-}
-
-/// What a constant beside the parameters of a linear model does, exactly: with z = 1 it lowers the sum of squared errors by
-///
-/// ```text
-/// (z'e)^2 / (z'z - z'Phi (Phi'Phi)^-1 Phi'z),
-/// ```
-///
-/// the sums z'Phi being those of the signals, moved by one sample from lag to lag: O(N + p).
-struct OfConstant {
-    /// z'e, the denominator, and (Phi'Phi)^-1 Phi'z.
-    errors: f64,
-    left: f64,
-    taken: Vec<f64>,
-}
-
-impl OfConstant {
-    /// None where z depends on Phi, or where there is no noise.
-    fn new(record: &Record<'_>, orders: &Orders, estimate: &Estimate) -> Option<Self> {
-        let (columns, errors) = sums(record, orders, estimate);
-        let covariance = estimate.covariance().filter(|_| estimate.noise_variance() > 0.0)?;
-        let product = |row: &Vec<f64>| {
-            row.iter().zip(&columns).map(|(entry, sum)| entry * sum).sum::<f64>() / estimate.noise_variance()
-        };
-        let taken: Vec<f64> = covariance.iter().map(product).collect();
-        let samples = estimate.samples() as f64;
-        let left = samples - columns.iter().zip(&taken).map(|(sum, taken)| sum * taken).sum::<f64>();
-        (left > DEPENDENT * samples).then_some(Self { errors, left, taken })
-    }
-
-    /// The covariance of the parameters and of the constant after them, both being estimated, and the step that leads there.
-    fn joint(&self, estimate: &Estimate) -> (Vec<Vec<f64>>, Vec<f64>) {
-        // By the constant, 1.
-        let along: Vec<f64> = self.taken.iter().map(|taken| -taken).chain([1.0]).collect();
-        let own = estimate.covariance().unwrap_or(&[]);
-        let variance = estimate.noise_variance() / self.left;
-        let entry = |i: usize, j: usize| {
-            own.get(i).and_then(|row| row.get(j)).copied().unwrap_or(0.0) + variance * along[i] * along[j]
-        };
-        let rows = (0..along.len()).map(|i| (0..along.len()).map(|j| entry(i, j)).collect());
-        (rows.collect(), along.iter().map(|value| value * self.errors / self.left).collect())
-    }
-}
-
-/// z'Phi and z'e.
-fn sums(record: &Record<'_>, orders: &Orders, estimate: &Estimate) -> (Vec<f64>, f64) {
-    let (skipped, presample) = match estimate.initial() {
-        Initial::Zero => (0, Presample::Zero),
-        _ => (orders.reach(), Presample::Drop),
-    };
-    let segments = with_past(record, orders, presample);
-    let sums = |signal: &[f64], first: usize, count: usize| {
-        let mut sums = vec![0.0; count];
-        for segment in segments.iter().filter(|segment| segment.len() > skipped) {
-            // Samples before a segment are zero, or none is looked at.
-            let rows = |lag: usize| {
-                let begin = (segment.start + skipped).saturating_sub(lag).max(segment.start);
-                begin..segment.end.saturating_sub(lag).max(begin)
-            };
-            let mut known = rows(first);
-            let mut total = sum(signal[known.clone()].iter().copied());
-            for (lag, all) in (first..).zip(&mut sums) {
-                let next = rows(lag);
-                total += sum(signal[next.start..known.start].iter().copied());
-                total -= sum(signal[next.end..known.end].iter().copied());
-                known = next;
-                *all += total;
-            }
-        }
-        sums
-    };
-    let mut columns: Vec<f64> = sums(record.output, 1, orders.na).iter().map(|sum| -sum).collect();
-    for (input, (&nb, &nk)) in record.inputs.iter().zip(orders.nb.iter().zip(&orders.nk)) {
-        columns.extend(sums(input, nk, nb));
-    }
-    let output: f64 = sums(record.output, 0, 1).iter().sum();
-    let errors = output - sum(columns.iter().zip(estimate.parameters()).map(|(sum, value)| sum * value));
-    (columns, errors)
-}
-
-impl Beside {
-    /// The covariance of all parameters, and what they would change, as those of a line l(t) = level + slope (t - t_m) beside which
-    /// nothing is left:
-    ///
-    /// ```text
-    /// d kappa = dk - sum_i da_i (level - slope i T),   d mu = dm/h - slope sum_i da_i
-    /// ```
-    ///
-    /// as A(q) (y - l) changes by them.
-    fn open(
-        &self,
-        orders: &Orders,
-        rows: &[Vec<f64>],
-        step: &[f64],
-        [level, slope]: [f64; 2],
-    ) -> Option<OffsetCovariance> {
-        let places = self.places(orders);
-        let own = (0..rows.len()).filter(|k| !places.contains(k)).map(|k| vec![(k, 1.0)]);
-        let lags = || (0..orders.na).zip(1_u32..);
-        let constant = lags().map(|(k, lag)| (k, f64::from(lag) * self.sample_time * slope - level));
-        let constant: Vec<(usize, f64)> = constant.chain([(places.start, 1.0)]).collect();
-        let trend =
-            || lags().map(|(k, _)| (k, -slope)).chain([(places.start + 1, 1.0 / self.half)]).collect();
-        let more = std::iter::once(constant).chain(self.ramp.is_some().then(trend));
-        let gradients: Vec<Vec<(usize, f64)>> = own.chain(more).collect();
-        let along = |gradient: &[(usize, f64)]| gradient.iter().map(|(k, g)| g * step[*k]).sum::<f64>();
-        let entry = |left: &[(usize, f64)], right: &[(usize, f64)]| {
-            let row = |row: &[f64]| right.iter().map(|(k, g)| g * row[*k]).sum::<f64>();
-            left.iter().map(|(k, g)| g * row(&rows[*k])).sum::<f64>() + along(left) * along(right)
-        };
-        let line = |left: &Vec<(usize, f64)>| gradients.iter().map(|right| entry(left, right)).collect();
-        let covariance: Vec<Vec<f64>> = gradients.iter().map(line).collect();
-        let middle = self.ramp.is_some().then_some(self.middle);
-        is_covariance(&covariance).then_some(OffsetCovariance { covariance, middle })
-    }
-
-    /// The model's own estimate of one with a constant, and the offset. None where there is no level.
-    fn apart(&self, orders: &Orders, all: Estimate) -> Option<Fitted> {
-        let places = self.places(orders);
-        let a = &all.parameters[..orders.na];
-        let gain = 1.0 + a.iter().sum::<f64>();
-        if gain.abs() <= INTEGRATOR * (1.0 + a.iter().map(|a| a.abs()).sum::<f64>()) {
-            return None;
-        }
-        let delay: f64 = a.iter().zip(1_u32..).map(|(a, lag)| f64::from(lag) * a).sum();
-        let (constant, ramp) = (all.parameters[places.start], self.ramp.is_some());
-        // In units of the output over one sample.
-        let trend = if ramp { all.parameters[places.start + 1] / self.half } else { 0.0 };
-        let drift = self.sample_time * trend;
-        let slope = trend / gain;
-        let level = (constant + drift * delay / gain) / gain;
-        let mut of_level = vec![0.0; all.parameters.len()];
-        let mut of_slope = of_level.clone();
-        for (lag, (level, slope)) in (1_u32..).zip(of_level.iter_mut().zip(&mut of_slope)).take(orders.na) {
-            *level = (-constant + drift * (f64::from(lag) - 2.0 * delay / gain)) / (gain * gain);
-            *slope = -trend / (gain * gain);
-        }
-        of_level[places.start] = 1.0 / gain;
-        if ramp {
-            of_level[places.start + 1] = self.sample_time * delay / (self.half * gain * gain);
-            of_slope[places.start + 1] = 1.0 / (self.half * gain);
-        }
-        let error = |gradient: &[f64]| {
-            let row = |row: &Vec<f64>| row.iter().zip(gradient).map(|(entry, g)| entry * g).sum::<f64>();
-            let variance = |covariance: &[Vec<f64>]| {
-                covariance.iter().zip(gradient).map(|(entries, g)| g * row(entries)).sum::<f64>()
-            };
-            all.covariance().map(variance).filter(|variance| *variance >= 0.0).map(f64::sqrt)
-        };
-        let level = Quantity::new(level, error(&of_level));
-        let slope = ramp.then(|| Quantity::new(slope, error(&of_slope)));
-        let rise = slope.map_or(0.0, |slope| slope.value);
-        let offset = OutputOffset {
-            offset: Offset { level: level.value - rise * self.middle, slope: rise },
-            level,
-            slope,
-            middle: self.middle,
-        };
-        let finite = [offset.offset.level, offset.offset.slope].into_iter().all(f64::is_finite);
-        let still = vec![0.0; all.parameters.len()];
-        let open = all.covariance().and_then(|rows| self.open(orders, rows, &still, [level.value, rise]));
-        let criteria = all.criteria();
-        let own = |values: &Vec<f64>| self.without(orders, values);
-        let covariance = all.covariance.as_ref().map(|rows| {
-            let rows = rows.iter().enumerate().filter(|(row, _)| !places.contains(row));
-            rows.map(|(_, row)| own(row)).collect()
-        });
-        let mut procedure = all.procedure.clone();
-        if let Procedure::Constrained(outcome) = &mut procedure
-            && let Some(extents) = &mut outcome.box_
-        {
-            extents.truncate(places.start);
-        }
-        let estimate = Estimate { parameters: own(&all.parameters), covariance, procedure, ..all };
-        finite.then_some(Fitted { estimate, criteria, offset: Some(offset), open })
-    }
-}
-
-#[cfg(test)]
-mod tests;

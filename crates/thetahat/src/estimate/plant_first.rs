@@ -24,10 +24,12 @@ use super::arx::rows;
 use super::polynomials::Polynomials;
 use super::prediction_error::{prediction_error, predictor_of};
 use super::{Estimate, Initial, Procedure};
+use crate::Error;
 use crate::data::Record;
+use crate::estimate::InformationCriterion;
+use crate::model::Orders;
 use crate::optimize::{Monitor, Search, best_free};
 use crate::regression::{sum, sum_of_squares};
-use crate::{Error, InformationCriterion, Orders};
 
 /// Autoregressions behind a plant have so many coefficients at most.
 const LONGEST: usize = 10;

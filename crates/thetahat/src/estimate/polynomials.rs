@@ -1,7 +1,6 @@
 //! The polynomials of a parameter vector.
 
-use crate::Orders;
-use crate::model::polynomial::is_stable;
+use crate::model::{Orders, polynomial::is_stable};
 
 /// Why parameters have no cost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

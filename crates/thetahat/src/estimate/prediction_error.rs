@@ -14,12 +14,12 @@ use super::predictor::{Begin, Predictor};
 use super::stretches::{energy, thinned};
 use super::uncertainty::{autoregression, backward_filtered_products, coloured, restricted};
 use super::{Estimate, Initial, Procedure};
+use crate::Error;
 use crate::data::Record;
-use crate::model::{cancel, near_cancellation};
+use crate::model::{Orders, PolynomialModel, Structure, cancel, near_cancellation};
 use crate::optimize::{Deadline, Found, Monitor, Search, Stopped, best_free, search};
 use crate::regression::{Taps, condition};
 use crate::respond::{NOTHING_LEFT, are_worth};
-use crate::{Error, Orders, PolynomialModel, Structure};
 
 /// A search from the best start has ended after so many iterations, where there is nothing to be found elsewhere.
 const EASY_ITERATIONS: usize = 5;

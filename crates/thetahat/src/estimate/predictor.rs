@@ -50,8 +50,8 @@ use thetahat_core::nalgebra::{Cholesky, DMatrix, Dyn};
 use super::border::Border;
 use super::polynomials::{Polynomials, Unusable};
 use super::uncertainty::backward_filtered_products;
-use crate::Orders;
 use crate::data::{Record, measured};
+use crate::model::Orders;
 use crate::regression::{Products, Taps, factor_rows};
 use section::Section;
 

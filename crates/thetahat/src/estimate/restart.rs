@@ -6,8 +6,10 @@ use oorandom::Rand64;
 use thetahat_core::nalgebra::{Complex, ComplexField};
 
 use super::polynomials::Polynomials;
-use crate::Orders;
-use crate::model::polynomial::{product, roots};
+use crate::model::{
+    Orders,
+    polynomial::{product, roots},
+};
 use crate::optimize::normal_number;
 
 /// The standard deviation of a change of a root: of the logarithms of its distance from the unit circle and of its angle.

@@ -50,10 +50,11 @@ use super::predictor::Predictor;
 use super::stretches::energy;
 use super::uncertainty::{autoregression, coloured};
 use super::{Estimate, Initial, Procedure};
+use crate::Error;
 use crate::data::Record;
+use crate::model::{Orders, Structure};
 use crate::optimize::{Deadline, Found, Monitor, Search, best_free, search};
 use crate::respond::NOTHING_LEFT;
-use crate::{Error, Orders, Structure};
 
 /// The median of |e| of normal errors, in standard deviations.
 const MEDIAN: f64 = 0.674_489_750_196_081_7;

@@ -25,11 +25,14 @@ use thetahat_core::nalgebra::{Complex, ComplexField};
 
 use super::arx::{enough, out_of_range, signals};
 use super::border::multiply_out;
+use crate::Error;
 use crate::data::Record;
-use crate::model::polynomial::{is_stable, roots};
+use crate::model::{
+    Orders,
+    polynomial::{is_stable, roots},
+};
 use crate::optimize::Deadline;
 use crate::regression::{Lagged, Presample, Taps, Unsolved};
-use crate::{Error, Orders};
 
 /// Roots closer to the unit circle are moved away from it by this factor.
 const SHRINK: f64 = 0.999;

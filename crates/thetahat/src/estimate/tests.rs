@@ -3,10 +3,11 @@
 use std::ops::Range;
 
 use super::{Estimate, arx, arx_factor};
+use crate::Error;
 use crate::data::Record;
-use crate::model::polynomial::product;
+use crate::estimate::Initial;
+use crate::model::{Orders, polynomial::product};
 use crate::regression::noise::Noise;
-use crate::{Error, Initial, Orders};
 
 /// What made the data.
 struct Plant {

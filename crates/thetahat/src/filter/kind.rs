@@ -8,9 +8,8 @@ use thetahat_core::{
 
 use super::linear::Linear;
 use super::linearization::{Linearization, Work};
-use crate::GreyBox;
 use crate::data::Offset;
-use crate::model::equations::whole_steps;
+use crate::model::{GreyBox, equations::whole_steps};
 
 pub(super) type Filter = ExtendedKalmanFilter<f64, Dyn>;
 pub(super) type Observer = LuenbergerObserver<f64, Dyn, Dyn>;

@@ -5,8 +5,9 @@ use std::borrow::Cow;
 use thetahat_core::nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use thetahat_core::{Covariance, LinearObservation, LinearTransition};
 
+use crate::Error;
 use crate::data::Offset;
-use crate::{Error, PolynomialModel};
+use crate::model::PolynomialModel;
 
 type Transition = LinearTransition<f64, Dyn, Dyn>;
 

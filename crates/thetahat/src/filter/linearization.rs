@@ -3,7 +3,7 @@
 use thetahat_core::nalgebra::{DMatrix, DVector, Dyn};
 use thetahat_core::{Covariance, Error, Observation, Transition};
 
-use crate::GreyBox;
+use crate::model::GreyBox;
 
 /// A function of states and unknown parameters with its Jacobian and its noise, all at one estimate.
 ///

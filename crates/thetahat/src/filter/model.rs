@@ -1,12 +1,13 @@
 use super::kind::Kind;
 use super::linear::{InitialState, Linear};
 use super::matrices;
-use crate::model::equations::Document;
-use crate::{Error, GreyBox, Model, Report};
+use crate::Error;
+use crate::model::{GreyBox, Model, equations::Document};
+use crate::report::Report;
 
 /// A model with a state, for a [`StateFilter`](super::StateFilter).
 ///
-/// It is a [`Report`] of a fit, in the form of [`PolynomialModel::state_space`](crate::PolynomialModel::state_space); or a TOML file with
+/// It is a [`Report`] of a fit, in the form of [`PolynomialModel::state_space`](crate::model::PolynomialModel::state_space); or a TOML file with
 /// equations (see [`GreyBox`]), or with matrices:
 ///
 /// ```text
@@ -44,7 +45,7 @@ impl StateModel {
     /// [`Error::Model`] with line and column, and with what is wrong there.
     ///
     /// ```
-    /// use thetahat::StateModel;
+    /// use thetahat::filter::StateModel;
     ///
     /// let text = "sample_time = 1\noutputs = ['y']\nF = [[1]]\nH = [[1]]\nQ = [[0.1]]\nR = [[1, 2]]\nP0 = [[1]]";
     /// let error = StateModel::from_toml(text).unwrap_err();

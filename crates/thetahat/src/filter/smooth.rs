@@ -46,7 +46,7 @@ impl StateFilter {
     /// [`Error::Data`] if numbers overflow.
     ///
     /// ```
-    /// use thetahat::{Estimator, StateFilter, StateModel};
+    /// use thetahat::filter::{Estimator, StateFilter, StateModel};
     ///
     /// let text = "sample_time = 1\noutputs = ['y']\nF = [[1]]\nH = [[1]]\nQ = [[1]]\nR = [[1e-9]]\nP0 = [[1]]";
     /// let mut filter = StateFilter::new(StateModel::from_toml(text)?, Estimator::Kalman)?.recording();

@@ -43,7 +43,7 @@ impl StateFilter {
     /// Where it stands.
     ///
     /// ```
-    /// use thetahat::{Estimator, StateFilter, StateModel};
+    /// use thetahat::filter::{Estimator, StateFilter, StateModel};
     ///
     /// let text = "sample_time = 1\noutputs = ['y']\nF = [[1]]\nH = [[1]]\nQ = [[1]]\nR = [[1]]\nP0 = [[1]]";
     /// let fresh = || StateFilter::new(StateModel::from_toml(text)?, Estimator::Kalman);

@@ -33,7 +33,7 @@ use crate::data::Offset;
 /// counts in the first of them.
 ///
 /// ```
-/// use thetahat::{Estimator, StateFilter, StateModel};
+/// use thetahat::filter::{Estimator, StateFilter, StateModel};
 ///
 /// // The yearly flow of the Nile as a level that walks (Durbin and Koopman, 2nd ed. 2012, section 2.2).
 /// let model = StateModel::from_toml(

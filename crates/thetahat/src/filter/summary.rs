@@ -3,7 +3,8 @@ use serde::{Deserialize, Serialize};
 
 use super::StateFilter;
 use super::estimate::StateValues;
-use crate::{Document, NisSummary};
+use crate::Document;
+use crate::respond::NisSummary;
 
 /// What a [`StateFilter`] has come to: the JSON document `thetahat.filter/1`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

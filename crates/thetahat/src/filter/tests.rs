@@ -6,7 +6,7 @@ mod reports;
 mod smoothing;
 mod snapshots;
 
-use crate::{Estimator, StateFilter, StateModel};
+use crate::filter::{Estimator, StateFilter, StateModel};
 
 /// The level of the Nile, a walk that is measured.
 pub(super) const NILE: &str = "\

@@ -1,8 +1,7 @@
 //! The quality of one channel.
 
 use super::{ChannelQuality, moments, outliers, quantization, saturation};
-use crate::Channel;
-use crate::data::Times;
+use crate::data::{Channel, Times};
 
 /// The first rows of outliers that are named.
 const NAMED: usize = 20;

@@ -2,7 +2,8 @@
 
 use std::ops::Range;
 
-use super::{DelayEstimate, samples, whitening};
+use super::moments::samples;
+use super::{DelayEstimate, whitening};
 use crate::Error;
 use crate::data::Record;
 use crate::regression::{Lagged, Presample, Taps, sum_of_squares};

@@ -5,7 +5,8 @@ use std::ops::Range;
 use rayon::prelude::*;
 use thetahat_core::nalgebra::DMatrix;
 
-use super::{Excitation, moments, samples, spectrum};
+use super::moments::{self, samples};
+use super::{Excitation, spectrum};
 use crate::regression::{Lagged, Presample, Taps, sum, sum_of_squares};
 
 /// The highest order looked for.

@@ -3,8 +3,9 @@ use std::collections::HashSet;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::Document;
+use crate::data::Source;
 use crate::validate::feedback;
-use crate::{Document, Source};
 
 /// What a log is worth, before any fit. The JSON document `thetahat.inspection/1`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -17,6 +17,11 @@ pub(super) fn scale(values: impl Iterator<Item = f64>) -> f64 {
     (-largest.log2().round().clamp(-1000.0, 1000.0)).exp2()
 }
 
+/// How many samples some segments have.
+pub(super) fn samples(segments: &[Range<usize>]) -> usize {
+    segments.iter().map(Range::len).sum()
+}
+
 /// The mean of values that are there, in two passes: the second takes the rounding of the first away.
 pub(super) fn mean(values: &[f64]) -> f64 {
     mean_of(|| values.iter().copied())

@@ -3,8 +3,9 @@
 use std::f64::consts::PI;
 use std::ops::Range;
 
+use super::SpectrumPoint;
 use super::fourier::RealTransform;
-use super::{SpectrumPoint, samples};
+use super::moments::samples;
 use crate::regression::sum;
 
 /// The longest window, in samples: it gives 513 frequencies.

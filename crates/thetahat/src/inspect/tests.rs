@@ -1,8 +1,13 @@
 use std::f64::consts::PI;
+use std::ops::Range;
 
+use super::clock::Ticks;
 use super::*;
+use crate::Error;
+use crate::data::{Channel, Interpolation, Log, Recording, Resample, Source, Times};
 use crate::regression::noise::Noise;
 use crate::regression::{Presample, Taps, sum_of_squares};
+use crate::validate::feedback::feedback;
 
 mod channels;
 mod documents;

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::samples;
+use super::moments::samples;
 use crate::regression::{Lagged, Presample, Taps, add_filtered};
 
 /// The highest order of an autoregression.

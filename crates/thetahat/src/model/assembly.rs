@@ -2,7 +2,8 @@
 
 use super::dynamics;
 use super::fitted::{Parameter, PolynomialModel, Signal, is_covariance};
-use crate::{Error, Orders};
+use crate::Error;
+use crate::model::Orders;
 
 impl PolynomialModel {
     /// The model of some parameters, in the order of [`Orders::names`]. Its signals have no names and no offsets. A matrix that

@@ -38,8 +38,9 @@ use thetahat_core::nalgebra::{Complex, ComplexField};
 
 use super::polynomial;
 use super::quantity::{Interval, Quantity, Root};
+use crate::Error;
 use crate::figures::fixed;
-use crate::{Error, PolynomialModel};
+use crate::model::PolynomialModel;
 
 /// A root this close to another one, in its own standard deviations, may not be simple as far as the data can tell.
 /// Of sampled polynomials of degree 2 one in six then has a pair where the others have real roots, or the other way

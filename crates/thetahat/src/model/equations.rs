@@ -77,7 +77,7 @@ use crate::Error;
 /// derivatives, found by the rules of calculus. Nothing is approximated by differences.
 ///
 /// ```
-/// use thetahat::GreyBox;
+/// use thetahat::model::GreyBox;
 ///
 /// let model = GreyBox::from_toml(
 ///     "sample_time = 60

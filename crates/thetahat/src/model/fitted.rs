@@ -3,9 +3,10 @@ use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::DMatrix;
 
 use super::quantity::{Quantity, Root};
+use crate::Error;
 use crate::data::Offset;
 use crate::distribution::{student_factor, student_two_sided};
-use crate::{Error, Orders, Structure};
+use crate::model::{Orders, Structure};
 
 /// A channel as a model sees it: its name, and what its values are measured from.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
@@ -274,10 +275,9 @@ pub(crate) fn is_covariance(rows: &[Vec<f64>]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::data::Record;
-    use crate::estimate::arx;
+    use crate::data::{Offset, Record};
+    use crate::estimate::{Initial, arx};
     use crate::regression::noise::Noise;
-    use crate::{Initial, Offset};
 
     /// The model fitted to data that ARX with these parameters made without noise.
     fn fitted(a: &[f64], b: &[f64]) -> PolynomialModel {

@@ -14,7 +14,7 @@ pub(crate) const LARGEST: usize = 1000;
 /// and nf. B has nb coefficients, the first of which multiplies u(t - nk).
 ///
 /// ```
-/// use thetahat::Orders;
+/// use thetahat::model::Orders;
 ///
 /// let orders = Orders::arx(2, &[2], &[3])?;
 /// assert_eq!(orders.names(), ["a1", "a2", "b3", "b4"]);
@@ -152,7 +152,7 @@ impl Orders {
     /// What the numbers of these orders stand for, as they are written: `ARX(na, nb, nk)`.
     ///
     /// ```
-    /// assert_eq!(thetahat::Orders::oe(&[2], &[1], &[3])?.legend(), "OE(nb, nf, nk)");
+    /// assert_eq!(thetahat::model::Orders::oe(&[2], &[1], &[3])?.legend(), "OE(nb, nf, nk)");
     /// # Ok::<(), thetahat::Error>(())
     /// ```
     pub fn legend(&self) -> &'static str {
@@ -170,7 +170,7 @@ impl Orders {
     /// The equation of these orders, without what they do not have.
     ///
     /// ```
-    /// assert_eq!(thetahat::Orders::arx(2, &[2], &[1])?.equation(), "A(q) y(t) = B(q) u(t) + e(t)");
+    /// assert_eq!(thetahat::model::Orders::arx(2, &[2], &[1])?.equation(), "A(q) y(t) = B(q) u(t) + e(t)");
     /// # Ok::<(), thetahat::Error>(())
     /// ```
     pub fn equation(&self) -> String {
@@ -287,7 +287,7 @@ impl Orders {
 /// brackets where they differ.
 ///
 /// ```
-/// assert_eq!(thetahat::Orders::oe(&[2], &[1], &[3])?.to_string(), "OE(2, 1, 3)");
+/// assert_eq!(thetahat::model::Orders::oe(&[2], &[1], &[3])?.to_string(), "OE(2, 1, 3)");
 /// # Ok::<(), thetahat::Error>(())
 /// ```
 impl fmt::Display for Orders {

@@ -60,7 +60,7 @@ impl Interval {
     /// In words, the ends written by a function: `1.2 to 3.4`, `1.2 and more`, `3.4 and less`, `anything`.
     ///
     /// ```
-    /// use thetahat::Interval;
+    /// use thetahat::model::Interval;
     ///
     /// let shown = |lower, upper| Interval { lower, upper }.shown(|value| value.to_string());
     /// assert_eq!(shown(Some(1.5), Some(2.5)), "1.5 to 2.5");

@@ -1,6 +1,6 @@
 use thetahat_core::nalgebra::DMatrix;
 
-use crate::PolynomialModel;
+use crate::model::PolynomialModel;
 
 /// A model in innovations form, x of n states and u of m inputs:
 ///
@@ -62,7 +62,9 @@ impl PolynomialModel {
     /// Cost: O(n (n + m)) to write the matrices.
     ///
     /// ```
-    /// use thetahat::{Initial, PolynomialModel, Orders, Record, Signal, arx};
+    /// use thetahat::data::Record;
+    /// use thetahat::estimate::{Initial, arx};
+    /// use thetahat::model::{Orders, PolynomialModel, Signal};
     ///
     /// let u: Vec<f64> = (0..100_u32).map(|t| f64::from(t * t % 7)).collect();
     /// let mut y = vec![0.0, 0.0];
@@ -164,8 +166,10 @@ mod tests {
     use thetahat_core::nalgebra::{Complex, ComplexField};
 
     use super::*;
-    use crate::Orders;
-    use crate::model::polynomial::{inverse_series, product};
+    use crate::model::{
+        Orders,
+        polynomial::{inverse_series, product},
+    };
 
     const ONE: &[f64] = &[1.0];
     const FAST: &[f64] = &[1.0, -0.2, -0.15];

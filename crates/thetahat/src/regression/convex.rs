@@ -14,6 +14,7 @@
 //! The solver runs in one thread: the same bits whatever the number of threads.
 
 mod fit;
+mod limit;
 mod samples;
 
 use std::fmt;
@@ -28,7 +29,8 @@ use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::{DMatrix, DVector};
 
 use crate::Error;
-pub(crate) use fit::{Fitting, Limit, Solved, peak};
+pub(crate) use fit::{Fitting, Solved, peak};
+pub(crate) use limit::Limit;
 
 /// Duality gap and residuals that the interior point method is to reach, on rows of unit size.
 const TOLERANCE: f64 = 1e-11;

@@ -3,10 +3,11 @@ use std::borrow::Cow;
 use super::schema::Report;
 use super::seen::rows_of_fit;
 use super::suited::{check_offsets, check_sample_time};
+use crate::Error;
 use crate::data::{Detrend, Log, Offset, Rows, checked};
+use crate::model::{Model, PolynomialModel};
 use crate::respond::{Horizon, Response, Start};
 use crate::validate::Fit;
-use crate::{Error, Model, PolynomialModel};
 
 /// What a model says of a log, in the log's own units.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,7 +32,7 @@ pub struct AppliedOutput {
     /// C and D, and for those in equations.
     pub predicted: Vec<f64>,
     /// The standard deviations of the errors of `predicted`, those of the parameters among them, for the steps that each value
-    /// looks ahead, as [`prediction_deviations`](crate::prediction_deviations) and [`forecast`](crate::forecast) have them;
+    /// looks ahead, as [`prediction_deviations`](crate::respond::prediction_deviations) and [`forecast`](crate::respond::forecast) have them;
     /// NaN where there is none. None for a free run.
     pub standard_deviations: Option<Vec<f64>>,
     /// How close they are. None if the log does not have the output.
@@ -54,8 +55,8 @@ pub struct AppliedOutput {
 ///
 /// # Errors
 /// [`Error::Data`] for channels or rows that are not there, a sample time that differs from the model's by more than
-/// 1 %, or a clock that the model cannot follow; and as for [`predict`](crate::predict), [`simulate`](crate::simulate) and
-/// [`forecast`](crate::forecast).
+/// 1 %, or a clock that the model cannot follow; and as for [`predict`](crate::respond::predict), [`simulate`](crate::respond::simulate) and
+/// [`forecast`](crate::respond::forecast).
 pub fn apply(
     model: &Model,
     log: &Log,
@@ -196,7 +197,9 @@ pub(super) fn prepared(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Channel, Orders, prediction_deviation};
+    use crate::data::Channel;
+    use crate::model::Orders;
+    use crate::respond::prediction_deviation;
 
     /// A(q) y = B(q) u + e around levels and slopes, with an input if there is a B.
     fn model(a: f64, b: &[f64]) -> PolynomialModel {

@@ -7,17 +7,21 @@ mod warnings;
 use super::judge::judge;
 use super::schema::{Data, Estimation, Missing, Report};
 use super::shares::Shares;
-use crate::data::{Rows, Split, digests};
+use crate::data::{Log, Rows, Source, Split, digests};
 use crate::distribution::chi_square_interval;
-use crate::estimate::equations::{EquationsEstimate, largest_likelihood};
-use crate::estimate::{Criteria, EquationsOutcome, Procedure};
-use crate::model::EquationsModel;
+use crate::estimate::{
+    Criteria, EquationsOutcome, Procedure,
+    equations::{EquationsEstimate, largest_likelihood},
+};
+use crate::model::{EquationsModel, GreyBox, Model};
 use crate::optimize::{Monitor, Search};
-use crate::respond::equations::{EquationsOnLog, Experiment, Predictor, experiments, walk};
-use crate::respond::{NisCount, NisSummary};
+use crate::respond::{
+    NisCount, NisSummary,
+    equations::{EquationsOnLog, Experiment, Predictor, experiments, walk},
+};
 use crate::select::Focus;
 use crate::validate::{Part, Relation, Residuals};
-use crate::{Document, Error, GreyBox, Log, Model, Source};
+use crate::{Document, Error};
 
 /// Lags of the test of whiteness that a fit warns by, and its levels.
 const LAGS: usize = 20;
@@ -54,7 +58,7 @@ pub struct EquationsPlan {
 /// **Rows.** The state of the first row that is estimated on is the model's start, in each log. Rows of it that are not asked for but
 /// stand behind go through the filter and do not count; so is the model looked at on other rows of these logs. Each further row is predicted over the time from the row before,
 /// with that row's inputs, and then corrected by its own outputs. The clock may be irregular
-/// ([`Log::recorded`](crate::Log::recorded)). A missing output (NaN) is left out alone; a missing input holds the value before it, zero before the first.
+/// ([`Log::recorded`](crate::data::Log::recorded)). A missing output (NaN) is left out alone; a missing input holds the value before it, zero before the first.
 ///
 /// **Search.** Fisher scoring with the damping of Levenberg and Marquardt, unless `search.algorithm` says otherwise: the information
 /// stands for the Gauss-Newton matrix; Newton and Raphson's Hessian comes from differences of the gradient. Derivatives of e and S are
@@ -81,7 +85,9 @@ pub struct EquationsPlan {
 ///
 /// ```
 /// use std::ops::ControlFlow;
-/// use thetahat::{Channel, EquationsPlan, GreyBox, Log, fit_equations};
+/// use thetahat::data::{Channel, Log};
+/// use thetahat::model::GreyBox;
+/// use thetahat::report::{EquationsPlan, fit_equations};
 ///
 /// let model = GreyBox::from_toml(
 ///     "sample_time = 1

@@ -1,6 +1,7 @@
 //! The free runs of the two winners of a choice on rows that neither was fitted to.
 
-use super::identify::{Plan, identify};
+use super::identify::identify;
+use super::plan::Plan;
 use super::schema::Report;
 use super::validation::{Validated, ValidationPlan, validate};
 use crate::Error;

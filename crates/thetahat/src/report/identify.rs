@@ -1,165 +1,23 @@
 use std::ops::{ControlFlow, Range};
 
 use super::judge::judge;
+use super::plan::Plan;
 use super::schema::{Data, Estimation, Missing, Report};
 use super::seen::{estimation_record, estimation_start, goes_through};
 use super::shares::Shares;
 use super::warnings::{at_the_border, unstable_plant, warnings};
-use crate::data::{Detrend, Log, Offset, Prefilter, Prefiltered, Record, Rows, Source, Split, digests};
-use crate::estimate::{self, Beside, Constant, Estimate, Fitted, Method, OutputOffset, enough};
+use crate::data::{Detrend, Log, Offset, Prefiltered, Record, Rows, Source, digests};
+use crate::estimate::{self, Beside, Constant, Estimate, Fitted, Initial, Method, OutputOffset, enough};
+use crate::model::{Orders, PolynomialModel, Quantity, Signal};
 use crate::optimize::{Deadline, Monitor, Search};
 use crate::regression::sum;
 use crate::respond::{Horizon, PolynomialOnLog, Start, innovations};
-use crate::select::{self, Automatic, Choice, Focus, Found, Grid, Select, Selection, Task};
+use crate::select::{self, Choice, Focus, Found, Grid, Task};
 use crate::validate::Part;
-use crate::{Document, Error, Initial, Orders, PolynomialModel, Quantity, Signal, Structure};
+use crate::{Document, Error};
 
 /// Below this fraction of a channel's size, what detrending leaves is rounding.
 const ROUNDING: f64 = 1e-13;
-
-/// What to fit, and to which part of a log.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Plan {
-    /// The input channels, in the order of the orders.
-    pub inputs: Vec<String>,
-    /// The output channel.
-    pub output: String,
-    /// Rows to estimate on; none: all.
-    pub estimate: Vec<Rows>,
-    /// Rows to validate on.
-    pub validate: Vec<Rows>,
-    /// Cuts the rows to estimate on into parts: models are fitted to the first one and compared, the chosen one is fitted again
-    /// to the first two, and judged on the third. None: all rows to estimate on serve for the fit.
-    pub split: Option<Split>,
-    /// What is taken from each channel.
-    pub detrend: Detrend,
-    /// Channels whose offset is set by hand.
-    pub offsets: Vec<(String, f64)>,
-    /// The band of frequencies whose errors the fit, and a choice, make small. The model describes the signals as they
-    /// are, its figures and its noise variance are those of unfiltered errors. None: all frequencies.
-    pub prefilter: Option<Prefilter>,
-    /// The orders, which say the structure too; or among which to choose.
-    pub choice: Choice,
-    /// What makes one model better than another, where there is a choice.
-    pub select: Select,
-    /// What the model is for: it decides among several, and what a fit makes small.
-    pub focus: Focus,
-    /// How to estimate.
-    pub method: Method,
-    /// What stands for the samples before a segment.
-    pub initial: Initial,
-    /// Whether the level of the output is estimated with the parameters: where the output would stay if the inputs stayed at
-    /// their offsets. A mean is not it where a log begins or ends far from there, as that of a step test. Auto leaves alone what
-    /// was given: nothing is taken with [`Detrend::None`], and what is set by hand stays.
-    pub constant: Constant,
-    /// Whether a slope of the output is estimated with the parameters, and the level with it.
-    pub trend: bool,
-}
-
-impl Plan {
-    /// All rows, means removed, the default method; further settings as fields: `Plan { validate, ..Plan::new(…) }`.
-    pub fn new(inputs: &[&str], output: &str, choice: impl Into<Choice>) -> Self {
-        Self {
-            inputs: inputs.iter().map(|input| (*input).to_owned()).collect(),
-            output: output.to_owned(),
-            estimate: Vec::new(),
-            validate: Vec::new(),
-            split: None,
-            detrend: Detrend::Mean,
-            offsets: Vec::new(),
-            prefilter: None,
-            choice: choice.into(),
-            select: Select::default(),
-            focus: Focus::default(),
-            method: Method::default(),
-            initial: Initial::default(),
-            constant: Constant::default(),
-            trend: false,
-        }
-    }
-
-    /// Whether the output's offset is found in the data before the fit.
-    fn takes_output_offset(&self) -> bool {
-        self.detrend != Detrend::None && !self.offsets.iter().any(|(name, _)| *name == self.output)
-    }
-
-    /// Whether a constant is estimated: auto leaves alone the output of which the offset was given, as nothing or by hand, and one
-    /// of which a band is looked at.
-    fn constant(&self) -> Constant {
-        let given = !self.takes_output_offset() || self.prefilter.is_some();
-        if self.constant == Constant::Auto && given { Constant::No } else { self.constant }
-    }
-
-    /// Whether the noise of a chosen model is found behind it: of one that simulates, without a description of its own.
-    fn puts_noise_behind(&self, selection: &Selection) -> bool {
-        let simulates = selection.winners.as_ref().is_some_and(|best| {
-            selection.chosen.orders == best.simulation.orders
-                && best.simulation.orders != best.prediction.orders
-        });
-        let free_run = matches!(self.focus, Focus::Auto | Focus::Simulation);
-        simulates
-            && free_run
-            && selection.chosen.structure == Structure::Oe
-            && matches!(&self.choice, Choice::Automatic(Automatic { structure: None, .. }))
-    }
-
-    /// Refuses a focus that does not go with orders or method.
-    fn check_focus(&self, orders: &Orders) -> Result<(), Error> {
-        if !matches!(self.focus, Focus::Simulation | Focus::Steps(_)) {
-            return Ok(());
-        }
-        if self.focus == Focus::Simulation && orders.nb.iter().all(|&nb| nb == 0) {
-            return Err(Error::argument(
-                "focus",
-                "simulation needs inputs that drive the model; take prediction",
-            ));
-        }
-        if self.focus == Focus::Simulation && !matches!(self.method, Method::PredictionError(_)) {
-            return Err(Error::argument(
-                "focus",
-                "a fit for simulation minimises the squared errors of the free run; leave out the other method or criterion",
-            ));
-        }
-        Ok(())
-    }
-
-    /// Refuses a constant or a trend that does not go with the rest, whatever the data.
-    fn check(&self) -> Result<(), Error> {
-        if self.trend && self.constant == Constant::No {
-            return Err(Error::argument(
-                "trend",
-                "it is a line with a slope and a level, which is the constant; leave out one of the two",
-            ));
-        }
-        if self.prefilter.is_some() && matches!(self.method, Method::ExactLikelihood(_)) {
-            return Err(Error::argument(
-                "prefilter",
-                "the exact likelihood is that of errors that are white, and those in a band are not; leave one of the two out",
-            ));
-        }
-        if self.prefilter.is_some() && (self.trend || self.constant == Constant::Yes) {
-            return Err(Error::argument(
-                "constant",
-                "a level is not in a band of frequencies: take either the band or the constant",
-            ));
-        }
-        let mixed = match &self.choice {
-            Choice::Known(_) => false,
-            Choice::Grid(grid) => grid.na.last() > 0,
-            Choice::Automatic(automatic) => {
-                !matches!(automatic.structure, Some(Structure::Oe | Structure::Bj))
-            }
-        };
-        if mixed && self.initial == Initial::Zero && (self.trend || self.constant == Constant::Yes) {
-            return Err(Error::argument(
-                "constant",
-                "zeros before the first sample are not at the level that is to be found, and A of some of the models reaches \
-                 back to them; take another initial condition, or leave the constant out",
-            ));
-        }
-        Ok(())
-    }
-}
 
 /// Fits a model to a log and reports on it: the whole way from data to figures.
 ///
@@ -170,7 +28,9 @@ impl Plan {
 /// cannot determine the parameters, which are named.
 ///
 /// ```
-/// use thetahat::{Channel, Log, Orders, Plan, identify};
+/// use thetahat::data::{Channel, Log};
+/// use thetahat::model::Orders;
+/// use thetahat::report::{Plan, identify};
 ///
 /// let u: Vec<f64> = (0..200).map(|t| f64::from(t * t % 7)).collect();
 /// let mut y = vec![20.0];
@@ -210,7 +70,9 @@ pub fn identify_monitored(
 ///
 /// ```
 /// use std::ops::ControlFlow;
-/// use thetahat::{Channel, Log, Orders, Plan, Unjudged, identify};
+/// use thetahat::data::{Channel, Log};
+/// use thetahat::model::Orders;
+/// use thetahat::report::{Plan, Unjudged, identify};
 ///
 /// let u: Vec<f64> = (0..200).map(|t| f64::from(t * t % 7)).collect();
 /// let y = [vec![0.0], u[..199].to_vec()].concat();
@@ -645,83 +507,5 @@ fn estimation_of(fitted: &Fitted, taken: Offset) -> Estimation {
 
 #[cfg(test)]
 mod offset_tests;
-
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::regression::noise::Noise;
-    use crate::{Channel, OrderRange, Path};
-
-    #[test]
-    fn figures_that_wait_are_the_same() {
-        let mut noise = Noise(5);
-        let (u, e) = (noise.take(400), noise.take(400));
-        let mut y = vec![20.0; 400];
-        for t in 1..400 {
-            y[t] = 20.0 + 0.8 * (y[t - 1] - 20.0) + 0.5 * u[t - 1] + 0.1 * e[t];
-        }
-        y[300] = f64::NAN;
-        let channel = |name: &str, values: &[f64]| Channel { name: name.into(), values: values.to_vec() };
-        let log = Log::new(vec![channel("u", &u), channel("y", &y)], 0.1).unwrap();
-        let one = OrderRange::new(1, 1).unwrap();
-        let grid = Grid {
-            na: OrderRange::new(1, 2).unwrap(),
-            nb: vec![one],
-            nc: 0.into(),
-            nd: 0.into(),
-            nf: vec![0.into()],
-            nk: vec![one],
-            path: Path::All,
-        };
-        let known = Plan::new(&["u"], "y", Orders::oe(&[1], &[1], &[1]).unwrap());
-        let plans = [
-            Plan { validate: vec!["301..400".parse().unwrap()], detrend: Detrend::Linear, ..known.clone() },
-            Plan { split: Some("60/20/20".parse().unwrap()), choice: Choice::Grid(grid), ..known },
-        ];
-        for plan in plans {
-            let whole = identify(log.clone(), &[], &plan).unwrap();
-            let unjudged = Unjudged::new(log.clone(), &[], &plan, &|_| ControlFlow::Continue(())).unwrap();
-            assert!(unjudged.report().fit.is_empty() && unjudged.report().model == whole.model);
-            assert_eq!(unjudged.judged(log.clone()).unwrap(), whole);
-        }
-    }
-
-    #[test]
-    fn a_fit_in_a_band_knows_how_sure_it_is_and_what_noise_there_is() {
-        let mut noise = Noise(7);
-        let orders = Orders::oe(&[1], &[1], &[1]).unwrap();
-        let truth = [0.5, -0.8];
-        let channel = |name: &str, values: Vec<f64>| Channel { name: name.into(), values };
-        let (runs, samples) = (100, 500);
-        let (mut squares, mut variance) = ([0.0; 2], 0.0);
-        for _ in 0..runs {
-            let u = noise.take(samples);
-            let mut x = vec![0.0];
-            (1..samples).for_each(|t| x.push(0.8 * x[t - 1] + 0.5 * u[t - 1]));
-            let y = x.iter().map(|x| x + 0.3 * noise.normal()).collect();
-            let log = Log::new(vec![channel("u", u), channel("y", y)], 1.0).unwrap();
-            let prefilter = Some("0.01..0.2".parse().unwrap());
-            let plan = Plan { prefilter, detrend: Detrend::None, ..Plan::new(&["u"], "y", orders.clone()) };
-            let model = identify(log, &[], &plan).unwrap().model;
-            let model = model.polynomials("this test").unwrap();
-            for ((square, parameter), truth) in squares.iter_mut().zip(&model.parameters).zip(truth) {
-                *square +=
-                    ((parameter.value - truth) / parameter.standard_error.unwrap()).powi(2) / f64::from(runs);
-            }
-            variance += model.noise_variance / f64::from(runs);
-        }
-        // chi-square of 100 degrees over 100 has a deviation of 0.14.
-        assert!(squares.iter().all(|square| (0.65..1.45).contains(square)), "{squares:?}");
-        assert!((variance / 0.09 - 1.0).abs() < 0.05, "{variance}");
-    }
-
-    #[test]
-    fn the_largest_is_found_in_any_place() {
-        assert_eq!(largest(&[]), 0.0);
-        for place in 0..19 {
-            let mut values = [0.5; 19];
-            values[place] = -3.0;
-            assert_eq!(largest(&values), 3.0);
-        }
-    }
-}
+mod tests;

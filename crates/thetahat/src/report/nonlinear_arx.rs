@@ -6,15 +6,16 @@ use super::judge::judge;
 use super::schema::{Data, Estimation, Missing, Report};
 use super::shares::Shares;
 use crate::data::{Detrend, Log, Offset, Rows, Source, Split, digests};
-use crate::estimate::nonlinear_arx::{Candidates, Chosen, Count, Samples, Solved, centres};
-use crate::estimate::{Criteria, Procedure, TermsOutcome};
-use crate::model::{Map, NonlinearArxModel, Regressor, Signal};
+use crate::estimate::{
+    Criteria, Procedure, TermsOutcome,
+    nonlinear_arx::{Candidates, Chosen, Count, Samples, Solved, centres},
+};
+use crate::model::{Map, Model, NonlinearArxModel, Regressor, Signal};
 use crate::regression::Monomials;
-use crate::respond::Horizon;
-use crate::respond::nonlinear_arx::NonlinearArxOnLog;
+use crate::respond::{Horizon, nonlinear_arx::NonlinearArxOnLog};
 use crate::select::{Focus, Select};
 use crate::validate::Part;
-use crate::{Document, Error, Model};
+use crate::{Document, Error};
 
 /// Below this fraction of a channel's size, what an offset leaves is rounding.
 const ROUNDING: f64 = 1e-13;
@@ -208,7 +209,8 @@ impl NonlinearArxPlan {
 /// functions depend on one another.
 ///
 /// ```
-/// use thetahat::{Channel, Log, NonlinearArxPlan, fit_nonlinear_arx};
+/// use thetahat::data::{Channel, Log};
+/// use thetahat::report::{NonlinearArxPlan, fit_nonlinear_arx};
 ///
 /// // y(t) = 0.5 y(t-1) + u(t-1)^2, without noise.
 /// let u: Vec<f64> = (0..200).map(|t| f64::from(t * t % 13) / 6.0 - 1.0).collect();
@@ -409,7 +411,7 @@ fn head(
         let variance =
             crate::regression::sum(values.iter().map(|value| (value - mean).powi(2))) / values.len() as f64;
         let spread = variance.sqrt();
-        if !(spread > ROUNDING * size) {
+        if spread.is_nan() || spread <= ROUNDING * size {
             let role = if name == plan.output { "output" } else { "input" };
             return Err(Error::undetermined(
                 Vec::new(),

@@ -2,10 +2,12 @@ use std::fmt;
 use std::str::FromStr;
 
 use super::{Coverage, Report, Validation};
+use crate::Error;
+use crate::estimate::Procedure;
 use crate::figures::{chance, fixed, number};
+use crate::model::{Model, Structure};
 use crate::respond::Horizon;
 use crate::validate::{Fit, Residuals};
-use crate::{Error, Model, Procedure, Structure};
 
 /// What there is to ask for.
 const WORDS: &str = "white, independent, stable, fit>=P, fit@K>=P, coverage>=P (P in percent, K steps ahead), mean-error<=E, \
@@ -16,7 +18,7 @@ const LEVEL: f64 = 0.95;
 /// What a model must do on a log to be taken.
 ///
 /// ```
-/// use thetahat::Requirement;
+/// use thetahat::report::Requirement;
 ///
 /// let requirement: Requirement = "fit@5>=80".parse()?;
 /// assert_eq!(requirement, Requirement::Fit { steps: Some(5), percent: 80.0 });

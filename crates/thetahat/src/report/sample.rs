@@ -1,19 +1,23 @@
 use super::apply::{Prepared, of_offsets, prepared};
+use crate::Error;
 use crate::data::{Detrend, Log, Rows};
+use crate::model::Model;
 use crate::respond::{Drawn, Draws, Horizon, Start, draw, record_for};
-use crate::{Error, Model};
 
 /// Free runs of a model on a log, drawn from what the estimate leaves open.
 ///
 /// They are in the log's own units, with a value for each row of the log; NaN outside the rows asked for, in gaps, and before
-/// a start. But for [`Start::Drop`], which begins anew from measured outputs, they go on where the output alone is missing. `rows` are those to respond to; none: all. Offsets are as for [`apply`](crate::apply), and a log without the output
+/// a start. But for [`Start::Drop`], which begins anew from measured outputs, they go on where the output alone is missing. `rows` are those to respond to; none: all. Offsets are as for [`apply`](crate::report::apply), and a log without the output
 /// does for [`Start::Zero`]. [`Drawn::bands`] gives the mean and quantiles of each row.
 ///
 /// # Errors
-/// As for [`apply`](crate::apply) and [`draw`].
+/// As for [`apply`](crate::report::apply) and [`draw`].
 ///
 /// ```
-/// use thetahat::{Channel, Draws, Log, Orders, Plan, Start, identify, sample};
+/// use thetahat::data::{Channel, Log};
+/// use thetahat::model::Orders;
+/// use thetahat::report::{Plan, identify, sample};
+/// use thetahat::respond::{Draws, Start};
 ///
 /// let u: Vec<f64> = (0..200).map(|t| f64::from(t * t % 7)).collect();
 /// let mut y = vec![20.0];

@@ -3,11 +3,12 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::data::Rows;
-use crate::{
-    Criteria, Document, Error, Fit, Initial, Model, Part, Prefilter, Procedure, Quantity, Selection, Source,
-    text,
-};
+use crate::data::{Prefilter, Rows, Source};
+use crate::estimate::{Criteria, Initial, Procedure};
+use crate::model::{Model, Quantity};
+use crate::select::Selection;
+use crate::validate::{Fit, Part};
+use crate::{Document, Error, text};
 
 /// What a fit found: data provenance, the model, its figures. The JSON document `thetahat.report/1`.
 ///
@@ -130,11 +131,11 @@ impl Data {
 #[cfg(test)]
 impl Report {
     /// The polynomials of a report that has them.
-    pub(crate) fn polynomials(&self) -> &crate::PolynomialModel {
+    pub(crate) fn polynomials(&self) -> &crate::model::PolynomialModel {
         self.model.polynomials("this test").unwrap()
     }
 
-    pub(crate) fn polynomials_mut(&mut self) -> &mut crate::PolynomialModel {
+    pub(crate) fn polynomials_mut(&mut self) -> &mut crate::model::PolynomialModel {
         let Model::Polynomial(model) = &mut self.model else { panic!("other kind") };
         model
     }

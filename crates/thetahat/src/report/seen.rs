@@ -1,9 +1,11 @@
 //! The rows of a fit as the estimate saw them.
 
 use super::schema::Report;
-use crate::data::{Record, Rows, digest, inside};
+use crate::Error;
+use crate::data::{Log, Record, Rows, digest, inside};
+use crate::estimate::{Initial, Procedure};
+use crate::model::{Orders, PolynomialModel};
 use crate::respond::{Horizon, Start};
-use crate::{Error, Initial, Log, Orders, PolynomialModel, Procedure};
 
 /// What the responses on the rows of the fit start from, as the estimate did.
 pub(super) fn estimation_start(report: &Report, model: &PolynomialModel) -> Start {

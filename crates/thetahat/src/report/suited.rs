@@ -1,6 +1,8 @@
 //! Whether a log suits a model.
 
-use crate::{Error, Log, Model};
+use crate::Error;
+use crate::data::Log;
+use crate::model::Model;
 
 /// The log must have the model's sample time, unless the model takes any.
 pub(super) fn check_sample_time(model: &Model, log: &Log) -> Result<(), Error> {

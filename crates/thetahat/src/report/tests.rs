@@ -1,10 +1,12 @@
 //! What a report says where a log has a past, lacks one, or has holes.
 
 use super::*;
+use crate::data::{Channel, Log, Rows};
+use crate::estimate::{Initial, Procedure};
+use crate::model::Orders;
 use crate::regression::noise::Noise;
-use crate::respond::Horizon;
+use crate::respond::{Horizon, Start};
 use crate::validate::Part;
-use crate::{Channel, Initial, Log, Orders, Procedure, Rows, Start};
 
 fn log(u: &[f64], y: &[f64]) -> Log {
     let channel = |name: &str, values: &[f64]| Channel { name: name.into(), values: values.to_vec() };
@@ -101,7 +103,7 @@ fn least_squares_with_a_past_are_those_of_the_rows_behind_it() {
     let orders = Orders::arx(2, &[3], &[2]).unwrap();
     let plan = |estimate: &str| Plan {
         estimate: rows(estimate),
-        detrend: crate::Detrend::None,
+        detrend: crate::data::Detrend::None,
         ..Plan::new(&["u"], "y", orders.clone())
     };
     // The first four of the rows have no full regressor without a past.
@@ -166,7 +168,7 @@ fn unknown_inputs_that_do_not_matter_are_not_estimated() {
         (6..300).for_each(|t| x.push(0.8 * x[t - 1] + u[t - 6]));
         let y: Vec<f64> = x.iter().map(|x| x + 0.1 * noise.normal()).collect();
         let orders = Orders::oe(&[1], &[1], &[6]).unwrap();
-        let plan = Plan { detrend: crate::Detrend::None, ..Plan::new(&["u"], "y", orders) };
+        let plan = Plan { detrend: crate::data::Detrend::None, ..Plan::new(&["u"], "y", orders) };
         let report = identify(log(&u, &y), &[], &plan).unwrap();
         assert_eq!((report.estimation.initial, conditions(&report)), (Some(Initial::Zero), 0));
     }

@@ -4,10 +4,9 @@ use super::schema::Report;
 use super::seen::is_exact;
 use crate::estimate::{Procedure, SearchOutcome};
 use crate::figures::{fixed, number, scientific};
-use crate::model::{cancel, near_cancellation};
+use crate::model::{Orders, PolynomialModel, Structure, cancel, near_cancellation};
 use crate::optimize::Stopped;
 use crate::select::{Grid, OrderRange};
-use crate::{Orders, PolynomialModel, Structure};
 
 /// Condition numbers above this one are worth a word.
 const ILL_CONDITIONED: f64 = 1e6;

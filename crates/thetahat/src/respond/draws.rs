@@ -7,9 +7,10 @@ use rayon::prelude::*;
 use thetahat_core::nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::{Response, Start, check_inputs, simulate};
+use crate::Error;
 use crate::data::Record;
+use crate::model::PolynomialModel;
 use crate::regression::{add_filtered, divide};
-use crate::{Error, PolynomialModel};
 
 /// The most draws.
 const MOST: usize = 100_000;
@@ -65,7 +66,10 @@ pub struct Drawn {
 /// estimate is so uncertain that hardly any drawn parameters are those of a stable model.
 ///
 /// ```
-/// use thetahat::{Draws, Initial, PolynomialModel, Orders, Record, Signal, Start, arx, draw};
+/// use thetahat::data::Record;
+/// use thetahat::estimate::{Initial, arx};
+/// use thetahat::model::{Orders, PolynomialModel, Signal};
+/// use thetahat::respond::{Draws, Start, draw};
 ///
 /// let u: Vec<f64> = (0..200).map(|t| f64::from(t * t % 7)).collect();
 /// let mut y = vec![1.0];

@@ -2,16 +2,17 @@ use super::innovations::{driven, of_segments};
 use super::predict::{check_start, check_steps, deviations};
 use super::sensitivities::{Paths, student};
 use super::{Start, check_inputs};
+use crate::Error;
 use crate::data::Record;
+use crate::model::PolynomialModel;
 use crate::regression::divide_from;
-use crate::{Error, PolynomialModel};
 
 /// What a model expects after the last sample of a record.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Forecast {
     /// y^(N+1 | N), y^(N+2 | N), …, in deviations like the record.
     pub values: Vec<f64>,
-    /// The standard deviations of their errors: what the noise does, as [`prediction_deviation`](crate::prediction_deviation)
+    /// The standard deviations of their errors: what the noise does, as [`prediction_deviation`](crate::respond::prediction_deviation)
     /// has it, and what the uncertainty of the parameters, the output's offset and the initial states adds to first order, with the factor
     /// sqrt(nu/(nu - 2)) of Student's distribution where the noise variance was estimated with nu degrees of freedom.
     pub standard_deviations: Vec<f64>,
@@ -27,7 +28,7 @@ pub struct Forecast {
 ///
 /// It is the mean of y(N+k) given everything up to N and the inputs (Ljung, System Identification, 2nd ed. 1999,
 /// section 3.2). `inputs[j][i]` is u_j(N+1+i). With nk samples of delay the last nk are not needed, and an input
-/// without B needs none; what is there beyond them is not read. The start is as for [`predict`](crate::predict).
+/// without B needs none; what is there beyond them is not read. The start is as for [`predict`](crate::respond::predict).
 ///
 /// Cost: p + 1 times that of a prediction of the last segment, and O(steps p (na + nb + nc + nd + nf)), for p parameters.
 ///
@@ -37,7 +38,10 @@ pub struct Forecast {
 /// the last segment is too short to start from; [`Error::Undetermined`] as for a prediction.
 ///
 /// ```
-/// use thetahat::{Initial, PolynomialModel, Orders, Record, Signal, Start, arx, forecast};
+/// use thetahat::data::Record;
+/// use thetahat::estimate::{Initial, arx};
+/// use thetahat::model::{Orders, PolynomialModel, Signal};
+/// use thetahat::respond::{Start, forecast};
 ///
 /// let u: Vec<f64> = (0..100).map(|t| f64::from(t * t % 7)).collect();
 /// let mut y = vec![1.0];

@@ -4,8 +4,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::{Complex, ComplexField};
 
-use crate::model::{Block, Blocks, Gradient, covariance};
-use crate::{Error, PolynomialModel, Quantity};
+use crate::Error;
+use crate::model::{Block, Blocks, Gradient, PolynomialModel, Quantity, covariance};
 
 /// The response of a model from one source to its output, at several frequencies.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -58,7 +58,10 @@ pub struct FrequencyPoint {
 /// [`Error::Argument`] for a frequency that is not a number, negative, above pi/T, or one of a pole on the unit circle.
 ///
 /// ```
-/// use thetahat::{Initial, PolynomialModel, Orders, Record, Signal, arx, frequency_response, logarithmic_frequencies};
+/// use thetahat::data::Record;
+/// use thetahat::estimate::{Initial, arx};
+/// use thetahat::model::{Orders, PolynomialModel, Signal};
+/// use thetahat::respond::{frequency_response, logarithmic_frequencies};
 ///
 /// let u: Vec<f64> = (0..100).map(|t| f64::from(t * t % 7)).collect();
 /// let mut y = vec![1.0];
@@ -117,7 +120,7 @@ pub fn frequency_response(
 /// [`Error::Argument`] unless 0 < first < last, both finite, and `count` is at least 2.
 ///
 /// ```
-/// let frequencies = thetahat::logarithmic_frequencies(0.1, 10.0, 3)?;
+/// let frequencies = thetahat::respond::logarithmic_frequencies(0.1, 10.0, 3)?;
 /// assert_eq!((frequencies[0], frequencies[2]), (0.1, 10.0));
 /// assert!((frequencies[1] - 1.0).abs() < 1e-15);
 /// # Ok::<(), thetahat::Error>(())

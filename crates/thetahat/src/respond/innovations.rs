@@ -16,9 +16,10 @@ use std::ops::Range;
 
 use super::free_response::{Column, UNSEEN, closest_of, impulse_response, until_negligible};
 use super::{NOTHING_LEFT, Start, are_worth, check_inputs, history};
+use crate::Error;
 use crate::data::{Record, measured};
+use crate::model::PolynomialModel;
 use crate::regression::{add_filtered, divide, sum_of_squares};
-use crate::{Error, PolynomialModel};
 
 /// The innovations of one segment.
 #[derive(Debug, Clone)]
@@ -101,7 +102,7 @@ pub(super) struct Basis {
 /// a measured output to look from, for a start from anything but zero.
 ///
 /// Where the inputs before the record are unknown and matter, their effect is estimated with the initial conditions if that is
-/// worth its parameters, for all segments or none, by the rule of [`Initial::Auto`](crate::Initial::Auto).
+/// worth its parameters, for all segments or none, by the rule of [`Initial::Auto`](crate::estimate::Initial::Auto).
 ///
 /// O(N (na + nb + nc + nd + nf)), and O(N n^2) more for n initial conditions, as far as their responses do not die away.
 ///

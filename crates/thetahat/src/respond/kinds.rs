@@ -4,8 +4,9 @@ use super::equations::EquationsOnLog;
 use super::nonlinear_arx::NonlinearArxOnLog;
 use super::on_log::{OnLog, PolynomialOnLog};
 use super::{Horizon, Start};
+use crate::Error;
 use crate::data::{Log, Rows};
-use crate::{Error, Model};
+use crate::model::Model;
 
 impl Model {
     /// The model beside some rows of a log of which its offsets were taken; responses start naturally unless it is said otherwise.

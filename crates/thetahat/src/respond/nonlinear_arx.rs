@@ -17,10 +17,10 @@ use std::ops::Range;
 use super::on_log::{OnLog, Tested};
 use super::predict::check_steps;
 use super::{Forecast, Horizon, Innovations, Response, Start};
+use crate::Error;
 use crate::data::{Log, Record, Rows, measured};
 use crate::distribution::{student_factor, student_two_sided};
-use crate::model::{Evaluator, NonlinearArxModel, PolynomialModel, Signal};
-use crate::{Error, Orders};
+use crate::model::{Evaluator, NonlinearArxModel, Orders, PolynomialModel, Signal};
 
 /// A free run that is so many times as far from zero as any output of the fit is no number any more.
 const LOST: f64 = 1e6;
@@ -71,7 +71,7 @@ impl<'m> Runner<'m> {
         let mut z = vec![0.0; self.taps.len()];
         for t in rows.clone() {
             let value = self.next(y, inputs, t, &mut z);
-            if !(value.abs() <= lost) {
+            if value.is_nan() || value.abs() > lost {
                 y[t..rows.end].fill(f64::NAN);
                 return false;
             }

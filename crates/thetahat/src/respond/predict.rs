@@ -3,9 +3,10 @@ use std::ops::Range;
 use super::free_response::until_negligible;
 use super::innovations::{Innovations, innovations};
 use super::{Response, Start, check_inputs};
+use crate::Error;
 use crate::data::Record;
+use crate::model::PolynomialModel;
 use crate::regression::{add_filtered, divide};
-use crate::{Error, PolynomialModel};
 
 /// Steps that a prediction or a forecast may look ahead: beyond them a number was mistyped.
 pub(super) const MOST_STEPS: usize = 1_000_000;
@@ -25,14 +26,14 @@ pub(super) const MOST_STEPS: usize = 1_000_000;
 /// [`Start::Estimate`] leave out the samples without an output k steps before them to look from: the first r + k - 1
 /// of those they look at (for r see [`Start`]). What unknown samples have done to B/F u is nothing to the first two; the
 /// last estimates it from the one-step errors, whatever k is, as estimates with
-/// [`Initial::Estimate`](crate::Initial::Estimate) do. It leaves out segments with no more samples than there are numbers
+/// [`Initial::Estimate`](crate::estimate::Initial::Estimate) do. It leaves out segments with no more samples than there are numbers
 /// to estimate.
 ///
 /// Signals are deviations from the model's offsets. Cost: O(N (na + nb + nc + nd + nf + k)), the k up to where h has died
 /// away; for n initial conditions to be estimated O(N n^2) more, up to where their responses have.
 ///
 /// Models without A, C and D have predictions where an output is missing too, as they need no past one (see
-/// [`Log::driven_record`](crate::Log::driven_record)); these samples do not count.
+/// [`Log::driven_record`](crate::data::Log::driven_record)); these samples do not count.
 ///
 /// # Errors
 /// [`Error::Argument`] if `horizon` is 0, the record does not have the model's inputs, or [`Start::Estimate`] is
@@ -40,7 +41,10 @@ pub(super) const MOST_STEPS: usize = 1_000_000;
 /// condition cannot be told from the data, as for a model so unstable that its responses overflow.
 ///
 /// ```
-/// use thetahat::{Initial, PolynomialModel, Orders, Record, Signal, Start, arx, predict};
+/// use thetahat::data::Record;
+/// use thetahat::estimate::{Initial, arx};
+/// use thetahat::model::{Orders, PolynomialModel, Signal};
+/// use thetahat::respond::{Start, predict};
 ///
 /// let u: Vec<f64> = (0..100_u32).map(|t| f64::from(t * t % 7)).collect();
 /// let mut y = vec![1.0];
@@ -106,13 +110,16 @@ pub(super) fn predicted(
 /// impulse response of C/(A D) and sigma^2 the variance of e.
 ///
 /// It is that of a true model that started long ago: the uncertainty of the parameters and of the initial condition comes
-/// on top, as [`prediction_deviations`](crate::prediction_deviations) have it. Infinite where h overflows. Cost: O(k (na + nc + nd)), up to where h has died away.
+/// on top, as [`prediction_deviations`](crate::respond::prediction_deviations) have it. Infinite where h overflows. Cost: O(k (na + nc + nd)), up to where h has died away.
 ///
 /// # Errors
 /// [`Error::Argument`] if `horizon` is 0 or above 10^6.
 ///
 /// ```
-/// use thetahat::{Initial, PolynomialModel, Orders, Record, Signal, arx, prediction_deviation};
+/// use thetahat::data::Record;
+/// use thetahat::estimate::{Initial, arx};
+/// use thetahat::model::{Orders, PolynomialModel, Signal};
+/// use thetahat::respond::prediction_deviation;
 ///
 /// let mut y: Vec<f64> = vec![0.0, 1.0];
 /// for t in 2..100 {

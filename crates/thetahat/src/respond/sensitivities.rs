@@ -27,7 +27,7 @@
 //!
 //! The output's offset is an estimate as well. What is open of it is a constant k and a trend m on the right side of the equation,
 //! two more inputs whose coefficients are zero and uncertain: their directions are among the l_i (see
-//! [`OffsetCovariance`](crate::OffsetCovariance)).
+//! [`OffsetCovariance`](crate::model::OffsetCovariance)).
 //!
 //! With sigma^2 estimated with nu degrees of freedom, the error over its scale is Student's t, whose standard deviation is
 //! sqrt(nu/(nu - 2)) of the scale.
@@ -37,9 +37,10 @@ use thetahat_core::nalgebra::{DMatrix, SymmetricEigen};
 use super::innovations::{Basis, Impulses, Innovations, best, free_columns, innovations};
 use super::predict::{accumulated, disturbance_response, longest};
 use super::{Start, check_inputs};
+use crate::Error;
 use crate::data::Record;
+use crate::model::PolynomialModel;
 use crate::regression::{add_filtered, divide, divide_from, product};
-use crate::{Error, PolynomialModel};
 
 /// A combination of initial conditions whose part of the Gram matrix is below this fraction of the largest cannot be told.
 const UNSEEN: f64 = 1e-20;
@@ -304,18 +305,21 @@ pub(super) fn student(model: &PolynomialModel, noise: f64, other: f64) -> f64 {
 /// sigma^2 sum_{i<k} h_i^2 + g' P g,   g = dy^(t | t-k)/dtheta
 /// ```
 ///
-/// The first part is [`prediction_deviation`](crate::prediction_deviation) squared; the second depends on the signals. Where the
+/// The first part is [`prediction_deviation`](crate::respond::prediction_deviation) squared; the second depends on the signals. Where the
 /// noise variance was estimated with nu degrees of freedom, they are those of Student's distribution, a factor
 /// sqrt(nu/(nu - 2)). They are right for samples that the model was not fitted to; on those of the fit they are a little too
-/// large. NaN where [`predict`](crate::predict) has no prediction. `horizon` and `start` are as there.
+/// large. NaN where [`predict`](crate::respond::predict) has no prediction. `horizon` and `start` are as there.
 ///
 /// Cost: p + 1 times that of the prediction for p parameters.
 ///
 /// # Errors
-/// As for [`predict`](crate::predict).
+/// As for [`predict`](crate::respond::predict).
 ///
 /// ```
-/// use thetahat::{Initial, PolynomialModel, Orders, Record, Signal, Start, arx, prediction_deviation, prediction_deviations};
+/// use thetahat::data::Record;
+/// use thetahat::estimate::{Initial, arx};
+/// use thetahat::model::{Orders, PolynomialModel, Signal};
+/// use thetahat::respond::{Start, prediction_deviation, prediction_deviations};
 ///
 /// let mut y: Vec<f64> = vec![0.0, 1.0];
 /// for t in 2..100 {

@@ -4,9 +4,10 @@ use super::forecast::{Known, continuation};
 use super::free_response::{Column, Delays, UNSEEN, closest, closest_of, impulse_response, until_negligible};
 use super::innovations::{Impulses, driven, residuals};
 use super::{NOTHING_LEFT, Response, Start, are_worth, check_inputs, history};
+use crate::Error;
 use crate::data::{Record, measured};
+use crate::model::PolynomialModel;
 use crate::regression::{add_filtered, divide, sum};
-use crate::{Error, PolynomialModel};
 
 /// The free run of a model: A(q) y^(t) = sum_j (B_j(q)/F_j(q)) u_j(t), driven by the inputs alone.
 ///
@@ -23,10 +24,10 @@ use crate::{Error, PolynomialModel};
 /// that brings y^ closest to the output in the least-squares sense: everything that unknown samples before the segment
 /// can do. n is how many earlier inputs B reaches back to that are not known, nb + nk - 1 at most. They are
 /// taken to be zero, unless estimating them is worth its parameters by the rule of
-/// [`Initial::Auto`](crate::Initial::Auto). Segments too short for a start are left out.
+/// [`Initial::Auto`](crate::estimate::Initial::Auto). Segments too short for a start are left out.
 ///
 /// But for [`Start::Drop`], the run goes on where an output is missing (see
-/// [`Log::driven_record`](crate::Log::driven_record)); these samples do not count.
+/// [`Log::driven_record`](crate::data::Log::driven_record)); these samples do not count.
 ///
 /// Signals are deviations from the model's offsets. The output of the record is not read for [`Start::Zero`].
 /// Cost: O(N (na + nb + nf)), and O(N n) more for n free responses that do not die away, O(N n^2) where outputs are missing.
@@ -36,7 +37,10 @@ use crate::{Error, PolynomialModel};
 /// cannot be told from the data, as for a model so unstable that its free responses overflow.
 ///
 /// ```
-/// use thetahat::{Initial, PolynomialModel, Orders, Record, Signal, Start, arx, simulate};
+/// use thetahat::data::Record;
+/// use thetahat::estimate::{Initial, arx};
+/// use thetahat::model::{Orders, PolynomialModel, Signal};
+/// use thetahat::respond::{Start, simulate};
 ///
 /// let u: Vec<f64> = (0..100_u32).map(|t| f64::from(t * t % 7)).collect();
 /// let mut y = vec![1.0];

@@ -11,9 +11,11 @@ use std::ops::Range;
 
 use super::{Response, Start, predict, simulate};
 use crate::data::Record;
-use crate::model::polynomial::{inverse_series, product};
+use crate::model::{
+    Orders, PolynomialModel,
+    polynomial::{inverse_series, product},
+};
 use crate::regression::noise::Noise;
-use crate::{Orders, PolynomialModel};
 
 /// A(q) y(t) = sum_j B_j(q) u_j(t); `b` holds nk and the coefficients of each input.
 fn model(a: &[f64], b: &[(usize, &[f64])]) -> PolynomialModel {

@@ -2,9 +2,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::{Complex, ComplexField};
 
-use crate::model::{Block, Blocks, Gradient, covariance};
+use crate::Error;
+use crate::model::{Block, Blocks, Gradient, PolynomialModel, Quantity, covariance};
 use crate::regression::{add_filtered, divide};
-use crate::{Error, PolynomialModel, Quantity};
 
 /// What is left of the slowest mode at the end of a response.
 const LEFT: f64 = 0.005;
@@ -48,7 +48,10 @@ pub struct TransientResponse {
 /// not converge.
 ///
 /// ```
-/// use thetahat::{Initial, PolynomialModel, Orders, Record, Signal, arx, step_response};
+/// use thetahat::data::Record;
+/// use thetahat::estimate::{Initial, arx};
+/// use thetahat::model::{Orders, PolynomialModel, Signal};
+/// use thetahat::respond::step_response;
 ///
 /// let u: Vec<f64> = (0..100).map(|t| f64::from(t * t % 7)).collect();
 /// let mut y = vec![1.0];
@@ -84,7 +87,10 @@ pub fn step_response(
 /// As for [`step_response`].
 ///
 /// ```
-/// use thetahat::{Initial, PolynomialModel, Orders, Record, Signal, arx, impulse_response};
+/// use thetahat::data::Record;
+/// use thetahat::estimate::{Initial, arx};
+/// use thetahat::model::{Orders, PolynomialModel, Signal};
+/// use thetahat::respond::impulse_response;
 ///
 /// let u: Vec<f64> = (0..100).map(|t| f64::from(t * t % 7)).collect();
 /// let mut y = vec![1.0];

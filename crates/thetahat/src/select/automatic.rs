@@ -10,9 +10,10 @@ use super::delay;
 use super::grid::key;
 use super::ranking::ranked;
 use super::{Automatic, Found, Selection, Task};
+use crate::Error;
 use crate::data::Record;
 use crate::estimate::{Initial, pays};
-use crate::{Error, Orders, Structure};
+use crate::model::{Orders, Structure};
 
 /// The highest order of ARX and AR models, and of the others.
 const LONGEST: usize = 10;

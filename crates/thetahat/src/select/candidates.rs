@@ -2,10 +2,11 @@
 
 use super::Scored;
 use super::linear::{Columns, Kept, Rows};
+use crate::Error;
 use crate::data::Record;
 use crate::estimate::{Initial, Point, Window, drop_is_not_for_f, estimate_is_for_f};
+use crate::model::Orders;
 use crate::regression::{Presample, sum_of_squares};
-use crate::{Error, Orders};
 
 /// So many inputs at most: a Gram matrix of all their lags has to fit.
 pub(super) const MOST_INPUTS: usize = 100;

@@ -5,8 +5,9 @@ use std::str::FromStr;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use crate::model::LARGEST;
-use crate::{Error, InformationCriterion, Orders, Structure};
+use crate::Error;
+use crate::estimate::InformationCriterion;
+use crate::model::{LARGEST, Orders, Structure};
 
 /// Which orders a model may have.
 #[derive(Debug, Clone, PartialEq)]
@@ -59,7 +60,7 @@ pub struct Automatic {
 /// Orders from a first to a last one, both included: what a person writes as `1..10`, or `2`.
 ///
 /// ```
-/// use thetahat::OrderRange;
+/// use thetahat::select::OrderRange;
 ///
 /// let range: OrderRange = "1..10".parse()?;
 /// assert_eq!((range.first(), range.last()), (1, 10));

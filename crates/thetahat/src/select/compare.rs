@@ -4,9 +4,10 @@ use super::candidates::{Compared, Samples, Tried, energy, rows, total};
 use super::linear::{Columns, Fitted, Scaled};
 use super::search::Family;
 use super::{EXACT, Scored, Select, Task, held_out, unseen};
+use crate::Error;
 use crate::data::Record;
 use crate::estimate::{Common, Initial, Point, stretches};
-use crate::{Error, Orders};
+use crate::model::Orders;
 
 /// Of records with more samples, models of which some need a search see stretches only: so many, each so long.
 const LONG: usize = 1 << 16;

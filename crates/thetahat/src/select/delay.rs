@@ -21,10 +21,12 @@ use super::candidates::{MOST_INPUTS, Samples, are_enough, rows};
 use super::linear::{Columns, Fitted, Rows, Scaled};
 use super::ranking::number;
 use super::{Delay, Scan, Task};
+use crate::Error;
 use crate::data::Record;
+use crate::estimate::InformationCriterion;
 use crate::figures::fixed;
+use crate::model::Orders;
 use crate::validate::feedback;
-use crate::{Error, InformationCriterion, Orders};
 
 /// Orders of the models: na, and input lags.
 const DELAY_ORDER: usize = 10;

@@ -7,10 +7,11 @@ use rayon::prelude::*;
 use super::Task;
 use super::candidates::{Samples, Tried, rows, total};
 use super::linear::{Columns, Kept, Rows, Scaled};
+use crate::Error;
 use crate::data::Record;
 use crate::estimate::{Common, Point};
+use crate::model::Orders;
 use crate::regression::Presample;
-use crate::{Error, Orders};
 
 /// The linear models among those that have parameters, and all others.
 pub(super) fn parted(tried: &[Tried]) -> (Vec<usize>, Vec<usize>) {

@@ -3,7 +3,8 @@
 use std::collections::BTreeSet;
 
 use super::{Grid, OrderRange, Path};
-use crate::{Error, Orders};
+use crate::Error;
+use crate::model::Orders;
 
 /// More models than that were not meant.
 const MOST_MODELS: usize = 100_000;

@@ -9,11 +9,14 @@ use rayon::prelude::*;
 use super::candidates::{Samples, Tried, total};
 use super::folds::Folds;
 use super::{HeldOut, Task};
+use crate::Error;
 use crate::data::Record;
-use crate::model::polynomial::{is_stable, roots};
+use crate::model::{
+    Orders, PolynomialModel, Structure,
+    polynomial::{is_stable, roots},
+};
 use crate::regression::sum;
-use crate::respond::{Response, Start, predict, simulate};
-use crate::{Error, Horizon, Orders, PolynomialModel, Structure};
+use crate::respond::{Horizon, Response, Start, predict, simulate};
 
 /// A record is cut into so many blocks.
 const BLOCKS: usize = 3;

@@ -20,9 +20,10 @@ use thetahat_core::LeastSquares;
 use thetahat_core::nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::EXACT;
+use crate::Error;
 use crate::data::Record;
+use crate::model::Orders;
 use crate::regression::{Lagged, Presample, Taps, condition};
-use crate::{Error, Orders};
 
 /// Above this condition number the Gram matrix is not exact enough.
 const MAXIMUM_CONDITION: f64 = 1e5;

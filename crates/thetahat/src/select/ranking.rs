@@ -6,9 +6,10 @@ use super::candidates::{Compared, total};
 use super::compare::Outcome;
 use super::winners::{Winners, winners};
 use super::{Best, Focus, Found, Path, Scored, Select, Selection, Task};
+use crate::Error;
 use crate::estimate::{Method, estimate_of_channels};
 use crate::figures::{fixed, scientific};
-use crate::{Error, Horizon};
+use crate::respond::Horizon;
 
 /// Models of a table.
 const BEST: usize = 50;

@@ -10,8 +10,9 @@ use rayon::prelude::*;
 
 use super::candidates::Tried;
 use super::grid::key;
+use crate::Error;
 use crate::estimate::{Common, Point, extended};
-use crate::{Error, Orders};
+use crate::model::Orders;
 
 /// So many of the best begin from the data as well.
 const BEST: usize = 5;

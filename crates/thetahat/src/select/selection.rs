@@ -2,7 +2,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{Focus, Path, Select};
-use crate::{Orders, Structure};
+use crate::model::{Orders, Structure};
 
 /// How a model was chosen among others.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -10,8 +10,12 @@ mod unseen;
 use std::ops::{ControlFlow, Range};
 
 use super::*;
+use crate::Error;
+use crate::data::Record;
+use crate::estimate::Initial;
+use crate::model::{Orders, Structure};
+use crate::optimize::{Deadline, Monitor, Search};
 use crate::regression::noise::Noise;
-use crate::{Orders, Structure};
 
 /// numerator/denominator applied to a signal from rest.
 fn filtered(numerator: &[f64], denominator: &[f64], signal: &[f64]) -> Vec<f64> {

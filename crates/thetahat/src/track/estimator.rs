@@ -8,7 +8,7 @@ use thetahat_core::{
 };
 
 use super::plan::{PerChannel, TrackPlan};
-use crate::Orders;
+use crate::model::Orders;
 
 /// Delay lines.
 pub(super) type Lines = Lags<f64, Dyn, Dyn>;

@@ -4,7 +4,7 @@ use thetahat_core::{ArmaxMethod, Forgetting, Start};
 /// How a model is tracked.
 ///
 /// ```
-/// use thetahat::{Beginning, Policy, TrackPlan};
+/// use thetahat::track::{Beginning, Policy, TrackPlan};
 ///
 /// let plan = TrackPlan { forgetting: "0.98".parse()?, start: "exact".parse()?, ..TrackPlan::default() };
 /// assert_eq!(plan.forgetting.to_string(), "exponential:0.98");
@@ -34,7 +34,7 @@ pub struct TrackPlan {
     pub noise_scale: Option<f64>,
     /// Whether to watch for changes, and how many samples shall be between two false alarms on average, 10 to 1e9. With a short
     /// memory they come more seldom: with 4 parameters and a factor of 0.99 about half as often as asked (measured). See
-    /// [`change_detector`](crate::change_detector).
+    /// [`change_detector`](crate::track::change_detector).
     pub alarm_interval: Option<f64>,
 }
 
@@ -101,8 +101,8 @@ impl TrackMethod {
 /// made.
 ///
 /// ```
-/// use thetahat::Policy;
 /// use thetahat::thetahat_core::Forgetting;
+/// use thetahat::track::Policy;
 ///
 /// let policy: Policy = "selective:0.99".parse()?;
 /// assert_eq!(policy.0, Forgetting::Selective { factor: 0.99 });
@@ -117,8 +117,8 @@ pub struct Policy(pub Forgetting<f64>);
 /// taken out. See [`Start`].
 ///
 /// ```
-/// use thetahat::Beginning;
 /// use thetahat::thetahat_core::Start;
+/// use thetahat::track::Beginning;
 ///
 /// assert_eq!("mixed:20".parse::<Beginning>()?.0, Start::Mixed { blend: 20 });
 /// # Ok::<(), thetahat::Error>(())

@@ -64,8 +64,8 @@ const PRECISION: f64 = 1e-6;
 /// [`Error::Argument`] if the interval is not in 10 … 1e9, or there are not 1 to 1000 outputs.
 ///
 /// ```
-/// use thetahat::change_detector;
 /// use thetahat::thetahat_core::Chart;
+/// use thetahat::track::change_detector;
 ///
 /// let detector = change_detector(10_000.0, 1)?;
 /// assert!((detector.threshold(Chart::MeanUp) - 8.75).abs() < 0.01);

@@ -2,7 +2,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Tracker;
-use crate::{Document, Orders, Parameter};
+use crate::Document;
+use crate::model::{Orders, Parameter};
 
 /// What trackers of one log have come to, side by side: the JSON document `thetahat.track/1`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -22,7 +23,7 @@ pub struct TrackSummary {
 /// What a tracker has come to.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct TrackerSummary {
-    /// What it forgets, as [`Policy`](crate::Policy) is written.
+    /// What it forgets, as [`Policy`](crate::track::Policy) is written.
     pub forgetting: String,
     /// The orders of its model, without the constant.
     pub orders: Orders,

@@ -9,8 +9,11 @@ use thetahat_core::{Action, Chart, Forgetting, InputOrders, RecursiveArmax, Recu
 use thetahat_core::{ArmaxMethod, ArmaxOrders, ArxOrders};
 
 use super::*;
+use crate::Error;
+use crate::data::Record;
+use crate::estimate::{Initial, arx};
+use crate::model::Orders;
 use crate::regression::noise::Noise;
-use crate::{Error, Initial, Orders, Record, arx};
 
 /// A log of y(t) = 1.5 y(t-1) - 0.7 y(t-2) + 2 u1(t-1) + 0.5 u1(t-2) - u2(t) + e(t) + c e(t-1), with e uniform in -size … size.
 pub(super) fn log(rows: usize, size: f64, c: f64, seed: u64) -> (Vec<[f64; 2]>, Vec<f64>) {

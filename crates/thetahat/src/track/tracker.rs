@@ -6,7 +6,8 @@ use super::estimator::{Estimator, Lines};
 use super::plan::{PerChannel, TrackPlan};
 use super::run_length::change_detector;
 use super::score::TrackScore;
-use crate::{Error, Orders};
+use crate::Error;
+use crate::model::Orders;
 
 mod snapshot;
 
@@ -68,7 +69,8 @@ pub struct Tracked {
 /// error.
 ///
 /// ```
-/// use thetahat::{Orders, TrackPlan, Tracker};
+/// use thetahat::model::Orders;
+/// use thetahat::track::{TrackPlan, Tracker};
 ///
 /// let mut tracker = Tracker::new(&Orders::arx(1, &[1], &[1])?, &TrackPlan::default())?;
 /// let mut y = 0.0;

@@ -6,7 +6,9 @@ use thetahat_core::nalgebra::{DMatrix, DVector};
 use super::estimator::Estimator;
 use super::plan::{PerChannel, TrackPlan};
 use super::tracker::{Stage, Tracker, check};
-use crate::{Error, Orders, PolynomialModel, Report};
+use crate::Error;
+use crate::model::{Orders, PolynomialModel};
+use crate::report::Report;
 
 /// What P_jj of a parameter that nothing is known of is times the square of its scale, as
 /// [`RecursiveLeastSquares`](thetahat_core::RecursiveLeastSquares) has it. The scale of the constant is 1.

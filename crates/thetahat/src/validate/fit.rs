@@ -101,10 +101,10 @@ fn closeness(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> (Option<f64>, O
 mod tests {
     use super::*;
     use crate::data::{Offset, Record};
-    use crate::estimate::arx;
+    use crate::estimate::{Initial, arx};
+    use crate::model::{Orders, PolynomialModel, Signal};
     use crate::regression::noise::Noise;
     use crate::respond::{predict, simulate};
-    use crate::{Initial, Orders, PolynomialModel, Signal};
 
     #[test]
     fn figures_are_what_they_say() {

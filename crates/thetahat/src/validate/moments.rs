@@ -15,8 +15,8 @@ use std::ops::Range;
 
 use thetahat_core::nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-use crate::PolynomialModel;
 use crate::data::Record;
+use crate::model::PolynomialModel;
 use crate::regression::{Products, Taps, add_filtered, divide, sum};
 use crate::respond::Innovations;
 

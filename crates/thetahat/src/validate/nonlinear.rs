@@ -81,7 +81,8 @@ fn nonlinearity(output: &str, input: &str, u: &[f64], innovations: &[Innovations
         fourth += (e * e - square).powi(2);
     }
     // An input of two levels has no square to speak of.
-    if !(products[(0, 0)] > NOTHING * count * mean * mean) || !(square > 0.0) {
+    let changes = products[(0, 0)] > NOTHING * count * mean * mean;
+    if !changes || square <= 0.0 {
         return None;
     }
     let eigen = SymmetricEigen::new(products.clone());

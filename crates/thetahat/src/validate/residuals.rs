@@ -9,10 +9,10 @@ use super::independence::{Parameters, Setting, independence};
 use super::moments::{Moments, Traces, columns, pseudo_inverse};
 use super::verdict::{Anderson, Independence, Test};
 use super::whiteness::{Autocorrelation, anderson, anderson_lags, ljung_box, pairs, past_errors};
-use crate::PolynomialModel;
 use crate::data::Record;
 use crate::distribution::two_sided;
 use crate::estimate::autoregression;
+use crate::model::PolynomialModel;
 use crate::regression::{Taps, sum_of_squares};
 use crate::respond::Innovations;
 

@@ -8,12 +8,13 @@ use super::moments::{Moments, Traces, columns, pseudo_inverse};
 use super::residuals::Untestable;
 use super::whiteness::{Autocorrelation, anderson, anderson_lags, ljung_box, past_errors};
 use super::*;
+use crate::Error;
 use crate::data::Record;
 use crate::distribution::{outside as events, two_sided};
-use crate::estimate::autoregression;
+use crate::estimate::{Initial, arx, autoregression};
+use crate::model::{Orders, PolynomialModel, Signal};
 use crate::regression::noise::Noise;
 use crate::respond::{Start, innovations};
-use crate::{Error, Initial, Orders, PolynomialModel, Signal, arx};
 
 /// y(t) = 1.2 y(t-1) - 0.5 y(t-2) + u(t-1) + 0.4 u(t-2) + e(t).
 const A: [f64; 2] = [-1.2, 0.5];

@@ -29,9 +29,8 @@ use thetahat_core::nalgebra::{DMatrix, DVector};
 
 use super::moments::eigen;
 use super::verdict::{Anderson, AndersonLevel, Test};
-use crate::PolynomialModel;
 use crate::distribution::{binomial_mid_p, chi_square_tail, outside, two_sided};
-use crate::model::polynomial::is_stable;
+use crate::model::{PolynomialModel, polynomial::is_stable};
 use crate::regression::{Lagged, Presample, Taps, divide};
 
 /// Directions of which the fit has left less than this fraction say nothing.

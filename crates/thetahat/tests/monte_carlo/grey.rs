@@ -2,7 +2,11 @@
 
 use std::ops::ControlFlow;
 
-use thetahat::{Channel, EquationsPlan, GreyBox, Log, Procedure, Stopped, fit_equations};
+use thetahat::data::{Channel, Log};
+use thetahat::estimate::Procedure;
+use thetahat::model::GreyBox;
+use thetahat::optimize::Stopped;
+use thetahat::report::{EquationsPlan, fit_equations};
 
 use crate::runs;
 use crate::simulated::Random;

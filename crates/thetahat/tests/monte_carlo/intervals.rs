@@ -3,10 +3,11 @@
 
 use std::ops::RangeInclusive;
 
-use thetahat::{
-    Channel, Constant, Horizon, Initial, Interval, Log, Method, Orders, Plan, PolynomialModel, Quantity,
-    Record, Rows, Signal, Start, apply, estimate, forecast, identify, predict, prediction_deviations,
-};
+use thetahat::data::{Channel, Log, Record, Rows};
+use thetahat::estimate::{Constant, Initial, Method, estimate};
+use thetahat::model::{Interval, Orders, PolynomialModel, Quantity, Signal};
+use thetahat::report::{Plan, apply, identify};
+use thetahat::respond::{Horizon, Start, forecast, predict, prediction_deviations};
 
 use super::{filtered, runs};
 use crate::simulated::Random;

@@ -1,5 +1,5 @@
 use super::*;
-use crate::Channel;
+use crate::data::Channel;
 use crate::regression::noise::Noise;
 
 const STEP: f64 = 0.01;

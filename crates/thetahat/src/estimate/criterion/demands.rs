@@ -5,8 +5,9 @@ use std::ops::Range;
 use thetahat_core::nalgebra::DVector;
 
 use super::{Criterion, GainBound, check_range};
+use crate::Error;
+use crate::model::Orders;
 use crate::regression::convex::{Fitting, Limit};
-use crate::{Error, Orders};
 
 /// An end of a limit is active if a move of the predictions by this part of the residuals' RMS could reach it.
 const ACTIVE: f64 = 1e-8;

@@ -8,8 +8,7 @@ use std::ops::Range;
 use thetahat_core::nalgebra::{DMatrix, DVector};
 
 use super::*;
-use crate::Initial;
-use crate::estimate::arx::arx;
+use crate::estimate::{Initial, arx::arx};
 use crate::regression::noise::Noise;
 use reference::{Reference, box_of_vertices, errors, norm_of, table};
 

@@ -18,7 +18,7 @@ use std::f64::consts::TAU;
 
 use thetahat_core::Dual;
 
-use crate::GreyBox;
+use crate::model::GreyBox;
 use crate::respond::equations::{Experiment, Failure, Predictor, reach, step, walk};
 
 /// Derivatives that are computed together.

@@ -17,8 +17,7 @@
 //! is 2 V without its logarithms, which may be of either sign.
 
 use super::likelihood::Criterion;
-use crate::GreyBox;
-use crate::model::equations::Scale;
+use crate::model::{GreyBox, equations::Scale};
 use crate::optimize::{Objective, StepRules};
 use crate::respond::equations::{Experiment, Failure};
 

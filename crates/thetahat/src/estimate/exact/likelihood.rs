@@ -5,13 +5,13 @@ use std::ops::Range;
 use thetahat_core::nalgebra::{Cholesky, DMatrix};
 
 use super::kalman::{Filter, Process};
-use crate::Orders;
 use crate::data::Record;
-use crate::estimate::border::Border;
-use crate::estimate::polynomials::{Polynomials, Unusable};
-use crate::model::polynomial::is_stable;
-use crate::optimize::Objective;
-use crate::optimize::normal;
+use crate::estimate::{
+    border::Border,
+    polynomials::{Polynomials, Unusable},
+};
+use crate::model::{Orders, polynomial::is_stable};
+use crate::optimize::{Objective, normal};
 use crate::regression::{condition, divide, divide_from};
 
 /// What the response to the inputs starts from.

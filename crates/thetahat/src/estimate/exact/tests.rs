@@ -5,9 +5,11 @@ use std::ops::ControlFlow;
 use thetahat_core::nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::*;
-use crate::Algorithm;
+use crate::data::{Channel, Detrend, Log};
+use crate::estimate::{Constant, Method};
+use crate::optimize::Algorithm;
 use crate::regression::noise::Noise;
-use crate::{Channel, Constant, Detrend, Log, Method, Plan, identify};
+use crate::report::{Plan, identify};
 
 /// An ARMA model of a log as statsmodels has it.
 struct Case {
@@ -169,7 +171,7 @@ fn the_optimum_is_that_of_statsmodels() {
         // AIC as statsmodels counts it, with the variance as a parameter.
         let (samples, count) = (found.samples as f64, (na + nc) as f64);
         let aic = samples
-            * (found.criteria.of(crate::InformationCriterion::AIC).unwrap()
+            * (found.criteria.of(crate::estimate::InformationCriterion::AIC).unwrap()
                 + std::f64::consts::TAU.ln()
                 + 1.0)
             + 2.0;
@@ -465,8 +467,9 @@ fn the_report_is_that_of_its_log_and_criteria_decide_about_a_level() {
     let report = identify(log.clone(), &[], &plan).unwrap();
     assert_eq!(report.estimation.samples, 400 - 44);
     assert_eq!(report.data.segments.len(), 1);
-    let validation = crate::validate(&report, None, &log, &[], &crate::ValidationPlan::default());
-    assert_eq!(validation.unwrap().validation.seen, crate::Seen::Yes);
+    let validation =
+        crate::report::validate(&report, None, &log, &[], &crate::report::ValidationPlan::default());
+    assert_eq!(validation.unwrap().validation.seen, crate::report::Seen::Yes);
     // What the mean leaves open of the level: as much as the error of a level that is estimated.
     assert!(report.polynomials().offset_covariance.is_some());
     // The mean is the level but for its error.

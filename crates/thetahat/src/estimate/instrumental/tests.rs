@@ -1,8 +1,9 @@
 //! Consistency where least squares is biased, intervals that cover, and identities.
 
 use super::*;
-use crate::estimate::{Method, Search, estimate};
+use crate::estimate::{Method, estimate};
 use crate::model::polynomial::product;
+use crate::optimize::Search;
 use crate::regression::add_filtered;
 use crate::regression::noise::Noise;
 

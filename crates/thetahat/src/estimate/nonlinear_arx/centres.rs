@@ -53,7 +53,7 @@ pub(crate) fn clusters(points: &[Vec<f64>], count: usize, seed: u64) -> Vec<Vec<
         let last = &centres[centres.len() - 1];
         away.iter_mut().zip(points).for_each(|(away, point)| *away = away.min(square(point, last)));
         let total: f64 = away.iter().sum();
-        if !(total > 0.0) {
+        if total <= 0.0 {
             break;
         }
         let mut left = numbers.rand_float() * total;

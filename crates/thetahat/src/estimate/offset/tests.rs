@@ -1,5 +1,6 @@
 use super::*;
-use crate::Channel;
+use crate::data::Channel;
+use crate::data::Log;
 use crate::regression::noise::Noise;
 
 /// y(t) = 1.2 y(t-1) - 0.4 y(t-2) + 0.5 u(t-1) + 0.3 + 0.01 t + 0.1 e(t).
@@ -34,7 +35,8 @@ fn a_linear_model_says_exactly_what_a_constant_is_worth() {
             let found = of.errors * of.errors / of.left;
             // What all parameters would be, and how certain, to the noise variance of either.
             let (rows, step) = of.joint(&without);
-            let beside = Beside { ramp: None, ..beside(200) };
+            let mut beside = beside(200);
+            beside.ramp = None;
             let place = beside.places(&orders).start;
             let ratio = with.noise_variance() / without.noise_variance();
             let last = with.parameters()[place];

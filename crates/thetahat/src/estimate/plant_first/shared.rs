@@ -18,12 +18,11 @@ use super::super::predictor::{Begin, Predictor};
 use super::super::stretches::{energy, filled};
 use super::super::uncertainty::{coloured, restricted};
 use super::super::{Estimate, Initial, Procedure, drop_is_not_for_f};
+use crate::Error;
 use crate::data::Record;
-use crate::model::polynomial::roots;
-use crate::optimize::Objective;
-use crate::optimize::{Deadline, Found, Monitor, Search, best_free, best_linear, search};
+use crate::model::{Orders, polynomial::roots};
+use crate::optimize::{Deadline, Found, Monitor, Objective, Search, best_free, best_linear, search};
 use crate::respond::{NOTHING_LEFT, are_worth};
-use crate::{Error, Orders};
 
 /// Starts have poles inside this circle.
 const INSIDE: f64 = 0.99;

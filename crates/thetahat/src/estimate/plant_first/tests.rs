@@ -1,6 +1,6 @@
 use super::*;
-use crate::PolynomialModel;
 use crate::estimate::{Method, estimate, estimate_of_channels};
+use crate::model::PolynomialModel;
 use crate::regression::noise::Noise;
 use crate::respond::{Start, simulate};
 

@@ -8,13 +8,16 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use super::{Job, Problem};
+use crate::Error;
 use crate::data::Record;
-use crate::estimate::polynomials::extended;
-use crate::estimate::predictor::{Begin, Predictor};
-use crate::estimate::start::Plants;
-use crate::estimate::stretches::{filled, stretches};
+use crate::estimate::{
+    polynomials::extended,
+    predictor::{Begin, Predictor},
+    start::Plants,
+    stretches::{filled, stretches},
+};
+use crate::model::Orders;
 use crate::optimize::{Search, best_free};
-use crate::{Error, Orders};
 
 /// How many starts of a smaller model are followed for how many iterations: near enough to its optimum.
 const ROUNDS: [(usize, usize); 2] = [(3, 3), (1, 8)];

@@ -4,8 +4,7 @@ use std::ops::Range;
 
 use super::Predictor;
 use crate::estimate::polynomials::Unusable;
-use crate::optimize::Objective;
-use crate::optimize::normal;
+use crate::optimize::{Objective, normal};
 
 impl Objective for Predictor<'_> {
     type Refusal = Unusable;

@@ -7,8 +7,10 @@ use super::mixed::{Coefficients, Data, ROUNDS, starts};
 use super::noise::{Equation, Mixed, behind};
 use super::output_error::{OutputError, Start};
 use super::plant::{Input, divided, energy, multiplied};
-use crate::Orders;
-use crate::model::polynomial::{product, roots};
+use crate::model::{
+    Orders,
+    polynomial::{product, roots},
+};
 
 /// Ways to split a denominator that are tried.
 const SPLITS: usize = 12;

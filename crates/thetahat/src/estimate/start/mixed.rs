@@ -6,7 +6,7 @@ use super::Candidate;
 use super::noise::{Equation, Mixed, behind};
 use super::output_error::{OutputError, Start};
 use super::plant::{Equations, Group, Input, Limits, Plant, Point, divided, energy, multiplied};
-use crate::Orders;
+use crate::model::Orders;
 use crate::optimize::Deadline;
 
 /// Rounds of least squares with filtered signals.

@@ -12,8 +12,7 @@ use std::ops::Range;
 use super::noise::{Equation, Mixed};
 use super::plant::{Best, Equations, Group, Input, Limits, Plant, Point, add_delayed, divided};
 use super::stable;
-use crate::Orders;
-use crate::model::polynomial::product;
+use crate::model::{Orders, polynomial::product};
 use crate::optimize::Deadline;
 
 const STEIGLITZ_MCBRIDE: Limits = Limits { iterations: 20, tolerance: 1e-3 };

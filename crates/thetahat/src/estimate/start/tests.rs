@@ -5,13 +5,16 @@ use std::ops::Range;
 use super::plant::{Group, Input, Plant, Point, divided};
 use super::reduced::{Free, Reduced};
 use super::{Candidate, candidates, stable};
+use crate::Error;
 use crate::data::Record;
-use crate::estimate::{Method, Search, estimate};
-use crate::model::polynomial::{is_stable, product};
+use crate::estimate::{Initial, Method, estimate};
+use crate::model::{
+    Orders,
+    polynomial::{is_stable, product},
+};
 use crate::optimize::Deadline;
-use crate::regression::noise::Noise;
-use crate::regression::{Taps, add_filtered, sum_of_squares};
-use crate::{Error, Initial, Orders};
+use crate::optimize::Search;
+use crate::regression::{Taps, add_filtered, noise::Noise, sum_of_squares};
 
 /// Nearly normal, of unit variance.
 fn normal(noise: &mut Noise, count: usize) -> Vec<f64> {

@@ -5,9 +5,12 @@ use thetahat_core::{
 };
 
 use super::filter;
-use crate::model::equations::tests::{CART, PENDULUM};
+use crate::filter::{Estimator, StateEstimate, StateFilter, StateModel};
+use crate::model::{
+    GreyBox,
+    equations::tests::{CART, PENDULUM},
+};
 use crate::regression::noise::Noise;
-use crate::{Estimator, GreyBox, StateEstimate, StateFilter, StateModel};
 
 /// The cart with a known mass of 2, in equations and in matrices.
 fn known_cart() -> (String, String) {

@@ -2,7 +2,8 @@ use thetahat_core::nalgebra::{Complex, DMatrix, DVector, Dyn};
 use thetahat_core::{Action, Covariance, LinearObservation, LinearTransition, LuenbergerObserver};
 
 use super::filter;
-use crate::{Estimator, GreyBox, ObserverGain, StateFilter, StateModel};
+use crate::filter::{Estimator, ObserverGain, StateFilter, StateModel};
+use crate::model::GreyBox;
 
 const CART: &str = "\
 sample_time = 1

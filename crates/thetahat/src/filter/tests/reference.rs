@@ -1,5 +1,5 @@
 use super::{FLOW, NILE, filter};
-use crate::{Estimator, StateFilter};
+use crate::filter::{Estimator, StateFilter};
 
 const TRACK: &str = "\
 sample_time = 1

@@ -1,6 +1,7 @@
 use super::NILE;
+use crate::Error;
+use crate::filter::{Estimator, StateFilter, StateModel};
 use crate::model::equations::tests::CART;
-use crate::{Error, Estimator, StateFilter, StateModel};
 
 const TWO: &str = "\
 sample_time = 0.5

@@ -1,10 +1,9 @@
-use crate::filter::kind::Kind;
-use crate::filter::linear::Linear;
+use crate::data::{Channel, Log, Offset, Record};
+use crate::filter::{Estimator, InitialState, StateFilter, StateModel, kind::Kind, linear::Linear};
+use crate::model::{Orders, PolynomialModel};
 use crate::regression::noise::Noise;
-use crate::{
-    Channel, Estimator, InitialState, Log, Offset, Orders, Plan, PolynomialModel, Record, Start, StateFilter,
-    StateModel, identify, predict,
-};
+use crate::report::{Plan, identify};
+use crate::respond::{Start, predict};
 
 /// Models of all structures: na, nb, nc, nd, nf, nk and their parameters a, b, c, d, f.
 fn models() -> Vec<PolynomialModel> {
@@ -72,7 +71,7 @@ fn a_missing_row_makes_the_next_as_uncertain_as_two_steps_ahead() {
         }
         for steps in 1..4 {
             let estimate = filter.step(None, &inputs, &[f64::NAN]).unwrap();
-            let expected = crate::prediction_deviation(&model, steps).unwrap();
+            let expected = crate::respond::prediction_deviation(&model, steps).unwrap();
             let found = estimate.outputs.standard_deviations.unwrap()[0];
             assert!((found - expected).abs() < 1e-12, "{:?}: {found} {expected}", model.orders);
         }

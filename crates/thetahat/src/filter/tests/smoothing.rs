@@ -1,7 +1,7 @@
 use thetahat_core::nalgebra::{DMatrix, DVector};
 
 use super::{FLOW, NILE, filter};
-use crate::Estimator;
+use crate::filter::Estimator;
 use crate::model::equations::tests::CART;
 
 #[test]

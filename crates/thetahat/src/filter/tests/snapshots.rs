@@ -1,8 +1,8 @@
 use thetahat_core::nalgebra::Complex;
 
 use super::{FLOW, NILE, filter};
+use crate::filter::{Estimator, FilterSnapshot, ObserverGain, StateFilter};
 use crate::model::equations::tests::CART;
-use crate::{Estimator, FilterSnapshot, ObserverGain, StateFilter};
 
 /// The same through JSON.
 fn kept(filter: &StateFilter) -> FilterSnapshot {

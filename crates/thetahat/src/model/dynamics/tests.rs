@@ -1,9 +1,8 @@
 //! What follows from polynomials, against finite differences and against the spread of sampled models.
 
 use super::*;
-use crate::Orders;
 use crate::distribution::two_sided;
-use crate::model::polynomial::product;
+use crate::model::{Orders, polynomial::product};
 use crate::regression::noise::Noise;
 
 /// A square root of a covariance matrix, and the matrix.

@@ -19,7 +19,8 @@
 use thetahat_core::{Dual, Number};
 
 use super::{EquationsModel, GreyBox};
-use crate::{Error, Orders, PolynomialModel};
+use crate::Error;
+use crate::model::{Orders, PolynomialModel};
 
 /// Derivatives that are computed together.
 const LANE: usize = 4;

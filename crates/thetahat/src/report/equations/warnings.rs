@@ -1,13 +1,15 @@
 //! What a careful reader of a fit of a model in equations should know, in plain words.
 
-use crate::estimate::Procedure;
-use crate::estimate::equations::listed;
+use crate::estimate::{Procedure, equations::listed};
 use crate::figures::{chance, fixed};
-use crate::model::EquationsModel;
+use crate::model::{EquationsModel, GreyBox};
+use crate::optimize::Stopped;
 use crate::report::schema::Estimation;
-use crate::respond::equations::{EquationsOnLog, Experiment};
-use crate::respond::{OnLog, Tested};
-use crate::{GreyBox, Stopped, Test};
+use crate::respond::{
+    OnLog, Tested,
+    equations::{EquationsOnLog, Experiment},
+};
+use crate::validate::Test;
 
 /// Mean nis, relative to what is expected, outside of this range: the noises of the model are not those of the log.
 const FITTING: std::ops::RangeInclusive<f64> = 0.8..=1.25;

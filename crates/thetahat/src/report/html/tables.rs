@@ -2,12 +2,16 @@
 
 use super::page::Table;
 use super::text::{complex, or_dash, percent, quantity, rows};
+use crate::data::{Rows, Source};
+use crate::estimate::{Criteria, InformationCriterion, Procedure, TermsOutcome};
 use crate::figures::{chance, fixed, number, scientific, short, three};
-use crate::{
-    Criteria, EquationsModel, Estimation, Fit, InformationCriterion, Inspection, NonlinearArxModel, Orders,
-    Part, PolynomialModel, Procedure, Report, Root, Rows, Scored, Seen, Selection, Source, Start, Stopped,
-    TermsOutcome, Validated, Validation,
-};
+use crate::inspect::Inspection;
+use crate::model::{EquationsModel, NonlinearArxModel, Orders, PolynomialModel, Root};
+use crate::optimize::Stopped;
+use crate::report::{Estimation, Report, Seen, Validated, Validation};
+use crate::respond::Start;
+use crate::select::{Scored, Selection};
+use crate::validate::{Fit, Part};
 
 /// The models of a search that are listed.
 const BEST: usize = 20;
@@ -268,7 +272,7 @@ pub(super) fn tests(who: &str, parts: &[(String, &Validation)]) -> Table {
     });
     for (name, validation, residuals) in each {
         let name = which(name, validation, &residuals.output);
-        let mut add = |label: String, test: &crate::Test| {
+        let mut add = |label: String, test: &crate::validate::Test| {
             table.row([
                 label,
                 name.clone(),
@@ -334,7 +338,7 @@ pub(super) fn coverage(who: &str, parts: &[(String, &Validation)]) -> Table {
     let head: Vec<&str> = head.iter().map(String::as_str).collect();
     let mut table = Table::new("How often the output lies in its prediction intervals", &head);
     for (name, validation) in parts {
-        let same = |one: &crate::Coverage, other: &crate::Coverage| {
+        let same = |one: &crate::report::Coverage, other: &crate::report::Coverage| {
             (one.steps, &one.output) == (other.steps, &other.output)
         };
         for found in validation.coverage.chunk_by(same) {
@@ -508,7 +512,7 @@ pub(super) fn comparison(models: &[(String, &Validated)], criteria: Option<&[Cri
         let ratio = ratios.max_by(|one, other| farthest(one).total_cmp(&farthest(other)));
         cells.push(or_dash(ratio, three));
         let each = || validation.residuals.iter();
-        let least = |of: fn(&crate::Independence) -> Option<f64>| {
+        let least = |of: fn(&crate::validate::Independence) -> Option<f64>| {
             each().flat_map(|residuals| &residuals.independence).filter_map(of).reduce(f64::min)
         };
         let asked = asked(validation);

@@ -1,7 +1,8 @@
 //! How numbers and names are written.
 
+use crate::data::Rows;
 use crate::figures::{number, three};
-use crate::{Quantity, Root, Rows};
+use crate::model::{Quantity, Root};
 
 /// What stands where there is no figure.
 pub(super) const NONE: &str = "–";

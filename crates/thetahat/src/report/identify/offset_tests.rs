@@ -1,9 +1,13 @@
 //! Constants and trends: what they change, and what they leave.
 
 use super::*;
-use crate::estimate::estimate;
+use crate::data::{Channel, Record};
+use crate::estimate::{Criterion, estimate};
+use crate::model::PolynomialModel;
+use crate::optimize::Search;
 use crate::regression::noise::Noise;
-use crate::{Automatic, Channel, Criterion, OrderRange, Path, PolynomialModel, Record, Report, Search};
+use crate::report::Report;
+use crate::select::{Automatic, OrderRange, Path};
 
 fn channel(name: &str, values: &[f64]) -> Channel {
     Channel { name: name.into(), values: values.to_vec() }
@@ -194,7 +198,7 @@ fn choices_find_the_model_of_a_step_test() {
         path: Path::All,
     };
     let (u, y) = step_test(20, 0.3);
-    let automatic = Automatic { structure: Some(crate::Structure::Oe), nk: None };
+    let automatic = Automatic { structure: Some(crate::model::Structure::Oe), nk: None };
     for choice in [Choice::Grid(grid), Choice::Automatic(automatic), Choice::Automatic(Automatic::default())]
     {
         let report = fitted(&u, &y, &Plan::new(&["u"], "y", choice));
@@ -243,7 +247,7 @@ fn no_constant_is_seen_where_there_is_none() {
 fn other_ways_to_estimate_have_a_constant_too() {
     let (u, y) = step_test(30, 0.2);
     let bounded = Criterion { bounds: vec!["a1=-0.95..-0.8".parse().unwrap()], ..Criterion::default() };
-    let one = Criterion { norm: crate::Norm::One, ..Criterion::default() };
+    let one = Criterion { norm: crate::estimate::Norm::One, ..Criterion::default() };
     let (arx, oe) = (Orders::arx(1, &[1], &[1]).unwrap(), Orders::oe(&[1], &[1], &[1]).unwrap());
     let ways = [
         (arx.clone(), Method::InstrumentalVariables, 0.05),
@@ -373,9 +377,9 @@ fn forecasts_count_the_level() {
     let model = fitted(&u, &y, &Plan { constant: Constant::No, ..plan(&orders) }).polynomials().clone();
     let given = PolynomialModel { offset_covariance: None, ..model.clone() };
     let last = |model: &PolynomialModel, detrend: Option<Detrend>| {
-        let start = crate::Start::Drop;
+        let start = crate::respond::Start::Drop;
         let (model, horizon) = (model.clone().into(), Horizon::Steps { steps: 20 });
-        let applied = crate::apply(&model, &log(&u, &y), &[], detrend, horizon, start);
+        let applied = crate::report::apply(&model, &log(&u, &y), &[], detrend, horizon, start);
         applied.unwrap().outputs[0].standard_deviations.as_ref().unwrap()[59]
     };
     assert!(last(&model, None) > 1.05 * last(&given, None), "{} {}", last(&model, None), last(&given, None));

@@ -1,9 +1,10 @@
 use super::*;
-use crate::Channel;
+use crate::data::Channel;
+use crate::estimate::Constant;
+use crate::model::Orders;
 use crate::regression::noise::Noise;
+use crate::report::{Plan, ValidationPlan, identify, validate};
 use crate::respond::Start;
-use crate::{Constant, Orders, Plan};
-use crate::{ValidationPlan, identify, validate};
 
 /// y(t) = 0.5 y(t-1) + u(t-1) + square u(t-1)^2 + cube u(t-1)^3 + e(t), e about normal with a standard deviation of 0.05.
 fn log(rows: usize, seed: u64, square: f64, cube: f64) -> Log {
@@ -124,7 +125,7 @@ fn the_number_of_terms_is_chosen_by_the_free_run() {
         let taken = report.model.parameters().len();
         assert!((3..=15).contains(&taken), "{by}: {taken}");
         if by != "mdl" {
-            let rank = |step: &crate::TermStep| {
+            let rank = |step: &crate::estimate::TermStep| {
                 step.held_out
                     .map_or((true, f64::INFINITY), |run| (!run.in_range, run.rmse.unwrap_or(f64::INFINITY)))
             };
@@ -184,7 +185,7 @@ fn nonlinear_terms_are_seen_in_residuals() {
             };
             let found =
                 validate(&report.unwrap(), None, &log, &[], &ValidationPlan::default()).unwrap().validation;
-            let below = |test: &crate::Test| usize::from(test.p_value.unwrap() < 0.05);
+            let below = |test: &crate::validate::Test| usize::from(test.p_value.unwrap() < 0.05);
             counts[0] += below(&found.nonlinear[0].errors);
             counts[1] += below(&found.nonlinear[0].squares);
         }

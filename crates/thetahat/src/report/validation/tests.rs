@@ -1,8 +1,13 @@
 //! What a validation says of models whose truth is known.
 
 use super::*;
+use crate::data::Channel;
+use crate::estimate::{Initial, Method};
+use crate::model::Orders;
+use crate::optimize::Search;
 use crate::regression::noise::Noise;
-use crate::{Channel, Initial, Method, Orders, Plan, Requirement, Search, Start, identify};
+use crate::report::{Plan, Requirement, identify};
+use crate::respond::Start;
 
 /// Rows of u and y around 5 and 20: y(t) = 1.2 y(t-1) - 0.5 y(t-2) + u(t-1) + 0.4 u(t-2) + 0.2 e(t).
 fn signals(rows: usize) -> (Vec<f64>, Vec<f64>) {

@@ -2,8 +2,9 @@
 
 use std::ops::Range;
 
-use crate::data::{Rows, inside};
-use crate::{Error, GreyBox, Log};
+use crate::Error;
+use crate::data::{Log, Rows, inside};
+use crate::model::GreyBox;
 
 /// Inputs and outputs of a log on its own clock, from its first row to the last one that counts.
 #[derive(Debug, Clone, PartialEq)]

@@ -17,7 +17,7 @@ use thetahat_core::nalgebra::{DMatrix, DVector};
 use super::experiment::Experiment;
 use super::predictor::Predictor;
 use super::walk::{reach, step};
-use crate::GreyBox;
+use crate::model::GreyBox;
 
 const MOST_STEPS: usize = 30;
 /// The start is found when a step would lower the sum by less than this fraction.

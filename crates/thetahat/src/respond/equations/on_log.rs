@@ -10,12 +10,14 @@ use super::experiment::{Experiment, experiments};
 use super::free_run::{Begin, FreeRun, free_run};
 use super::predictor::Predictor;
 use super::walk::{Failure, Predicted, ahead, beyond, walk};
-use crate::data::{Record, Rows, measured};
+use crate::Error;
+use crate::data::{Log, Record, Rows, measured};
 use crate::distribution::two_sided;
-use crate::model::{EquationsModel, PolynomialModel, Signal};
-use crate::respond::on_log::{OnLog, Tested};
-use crate::respond::{Forecast, Horizon, Innovations, Response, Start, check_steps};
-use crate::{Error, GreyBox, Log, Orders};
+use crate::model::{EquationsModel, GreyBox, Orders, PolynomialModel, Signal};
+use crate::respond::{
+    Forecast, Horizon, Innovations, Response, Start, check_steps,
+    on_log::{OnLog, Tested},
+};
 
 /// Derivatives that are computed together.
 const LANE: usize = 4;

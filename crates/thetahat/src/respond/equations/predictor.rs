@@ -22,7 +22,7 @@
 
 use thetahat_core::Number;
 
-use crate::GreyBox;
+use crate::model::GreyBox;
 
 /// The estimate of the state and its covariance, and room for a step. Matrices are column after column.
 #[derive(Debug, Clone)]

@@ -4,7 +4,8 @@ use thetahat_core::Number;
 
 use super::experiment::Experiment;
 use super::predictor::{Innovation, Predictor};
-use crate::{Error, GreyBox};
+use crate::Error;
+use crate::model::GreyBox;
 
 /// Where the filter ceased to work: a number overflowed, or is none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

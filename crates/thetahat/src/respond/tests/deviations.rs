@@ -3,11 +3,9 @@
 use super::general::{model, models, output};
 use super::{signals, views, with_poles};
 use crate::data::Record;
+use crate::model::{OffsetCovariance, Orders, PolynomialModel};
 use crate::regression::noise::Noise;
-use crate::{
-    Draws, OffsetCovariance, Orders, PolynomialModel, Start, draw, forecast, predict, prediction_deviation,
-    prediction_deviations,
-};
+use crate::respond::{Draws, Start, draw, forecast, predict, prediction_deviation, prediction_deviations};
 
 /// A covariance matrix of full rank, small enough that the first order is exact.
 fn covariance(count: usize, noise: &mut Noise) -> Vec<Vec<f64>> {

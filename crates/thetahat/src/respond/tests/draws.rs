@@ -1,9 +1,10 @@
 //! Draws against what they are drawn from.
 
-use crate::data::Record;
+use crate::Error;
+use crate::data::{Channel, Log, Record, Rows};
+use crate::model::{Orders, PolynomialModel};
 use crate::regression::noise::Noise;
 use crate::respond::{Draws, Start, draw, simulate};
-use crate::{Channel, Error, Log, Orders, PolynomialModel, Rows};
 
 fn diagonal(variances: &[f64]) -> Vec<Vec<f64>> {
     let row = |i: usize| (0..variances.len()).map(|j| if i == j { variances[i] } else { 0.0 }).collect();

@@ -2,9 +2,10 @@
 
 use super::general::{Recursion, model, models, output};
 use super::{signals, views, with_poles};
+use crate::Error;
 use crate::data::Record;
 use crate::regression::noise::Noise;
-use crate::{Error, Start, forecast, predict, prediction_deviation};
+use crate::respond::{Start, forecast, predict, prediction_deviation};
 
 #[test]
 fn a_forecast_is_what_the_recursions_give_from_the_end() {

@@ -3,8 +3,10 @@
 use std::f64::consts::PI;
 
 use super::general::models;
+use crate::Error;
+use crate::model::PolynomialModel;
 use crate::regression::noise::Noise;
-use crate::{Error, FrequencyPoint, PolynomialModel, frequency_response, logarithmic_frequencies};
+use crate::respond::{FrequencyPoint, frequency_response, logarithmic_frequencies};
 
 /// A covariance matrix of some parameters, well conditioned and not diagonal.
 fn spread(count: usize, size: f64, noise: &mut Noise) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {

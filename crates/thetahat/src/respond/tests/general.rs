@@ -3,14 +3,16 @@
 use std::ops::Range;
 
 use super::{cut, difference, signals, views, with_poles};
+use crate::Error;
 use crate::data::Record;
-use crate::model::polynomial::{inverse_series, product};
+use crate::estimate::{Initial, Method, estimate};
+use crate::model::{
+    Orders, PolynomialModel, Signal,
+    polynomial::{inverse_series, product},
+};
 use crate::regression::noise::Noise;
-use crate::respond::innovations::innovations;
-use crate::respond::predict::deviations;
-use crate::{
-    Error, Initial, Method, Orders, PolynomialModel, Signal, Start, estimate, predict, prediction_deviation,
-    simulate,
+use crate::respond::{
+    Start, innovations::innovations, predict, predict::deviations, prediction_deviation, simulate,
 };
 
 /// One input: nk, B behind it, and F.

@@ -2,8 +2,8 @@
 
 use thetahat_core::nalgebra::Complex;
 
+use crate::model::{Orders, PolynomialModel};
 use crate::respond::{frequency_response, impulse_response, step_response};
-use crate::{Orders, PolynomialModel};
 
 /// A model whose parameters have the identity as covariance matrix, or that of one parameter alone.
 fn model(orders: &Orders, parameters: &[f64], alone: Option<usize>) -> PolynomialModel {

@@ -2,8 +2,8 @@ use super::super::candidates::Compared;
 use super::super::winners::winners;
 use super::*;
 use crate::estimate::{Method, estimate};
-use crate::respond::simulate;
-use crate::{Horizon, PolynomialModel, Start};
+use crate::model::PolynomialModel;
+use crate::respond::{Horizon, Start, simulate};
 
 const F: [f64; 3] = [1.0, -1.5, 0.7];
 

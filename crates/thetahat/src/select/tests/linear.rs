@@ -1,5 +1,5 @@
 use super::*;
-use crate::{Criteria, InformationCriterion, arx, estimate};
+use crate::estimate::{Criteria, InformationCriterion, arx, estimate};
 
 /// Two inputs, an output that follows them, and three segments, of which one is too short for the larger models.
 fn signals() -> ([Vec<f64>; 3], Vec<Range<usize>>) {
@@ -176,7 +176,7 @@ fn models_with_more_parameters_than_samples_are_left_out() {
     let expected = estimate(
         &super::record(&y, &[], std::slice::from_ref(&(6..12))),
         &Orders::arx(2, &[], &[]).unwrap(),
-        &crate::Method::default(),
+        &crate::estimate::Method::default(),
         Initial::Drop,
     );
     let own = selection.best.iter().find(|model| model.parameters == 2).unwrap();

@@ -1,5 +1,5 @@
 use super::*;
-use crate::arx;
+use crate::estimate::arx;
 
 fn grid() -> Grid {
     Grid {

@@ -1,7 +1,8 @@
 //! Trackers that go on from a report.
 
 use super::*;
-use crate::{Channel, Detrend, Log, Plan, Report, identify};
+use crate::data::{Channel, Detrend, Log};
+use crate::report::{Plan, Report, identify};
 
 /// A fit of rows of the log.
 fn fit(inputs: &[[f64; 2]], y: &[f64], rows: &str, orders: Orders, detrend: Detrend) -> Report {

@@ -4,10 +4,13 @@ use serde::{Deserialize, Serialize};
 use thetahat_core::{ChangeDetector, SnapshotVersion};
 
 use super::{Room, Stage, Tracker};
-use crate::track::missing;
-use crate::track::plan::{PerChannel, TrackPlan};
-use crate::track::score::TrackScore;
-use crate::{Error, Orders};
+use crate::Error;
+use crate::model::Orders;
+use crate::track::{
+    missing,
+    plan::{PerChannel, TrackPlan},
+    score::TrackScore,
+};
 
 #[derive(Serialize, Deserialize)]
 pub(super) struct Snapshot {

@@ -2,10 +2,14 @@ use thetahat_core::{Dual, Number};
 
 use super::expressions::Three;
 use super::{CART, PENDULUM};
-use crate::GreyBox;
-use crate::model::equations::expression::read;
-use crate::model::equations::graph::{Graph, Leaves, Operation};
-use crate::model::equations::program::Program;
+use crate::model::{
+    GreyBox,
+    equations::{
+        expression::read,
+        graph::{Graph, Leaves, Operation},
+        program::Program,
+    },
+};
 
 /// The value of an expression and its derivatives by x, y and a.
 fn evaluated(text: &str, at: [f64; 3]) -> (f64, [f64; 3], [f64; 3]) {

@@ -1,6 +1,6 @@
 //! Transfer functions of linear equations.
 
-use crate::{EquationsModel, GreyBox};
+use crate::model::{EquationsModel, GreyBox};
 
 /// Three states, two inputs of which one acts at once, two outputs, and two unknown parameters of which one has a bound.
 const TEXT: &str = "\

@@ -1,6 +1,5 @@
 use super::{CART, PENDULUM};
-use crate::GreyBox;
-use crate::model::equations::Scale;
+use crate::model::{GreyBox, equations::Scale};
 
 #[test]
 fn a_model_keeps_the_order_of_its_text() {

@@ -1,5 +1,5 @@
 use super::CART;
-use crate::GreyBox;
+use crate::model::GreyBox;
 
 /// The error of the cart with one text in place of another.
 fn refused(from: &str, to: &str) -> String {

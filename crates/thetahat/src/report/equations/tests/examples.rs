@@ -4,11 +4,14 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use super::models::{Found, experiment, joined};
+use crate::data::{Channel, Recording, Source, Times};
 use crate::estimate::equations::Criterion;
-use crate::{
-    Channel, Document, EquationsPlan, Error, Estimator, GreyBox, Horizon, Model, NisSummary, Recording,
-    Report, Source, StateFilter, StateModel, Stopped, Times, ValidationPlan, fit_equations, validate,
-};
+use crate::filter::{Estimator, StateFilter, StateModel};
+use crate::model::{GreyBox, Model};
+use crate::optimize::Stopped;
+use crate::report::{EquationsPlan, Report, ValidationPlan, fit_equations, validate};
+use crate::respond::{Horizon, NisSummary};
+use crate::{Document, Error};
 
 fn data(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data").join(name)
@@ -191,7 +194,9 @@ fn reports_go_there_and_back() {
     assert_eq!(fitted.unknown().count(), 0);
     let value = Criterion::new(&fitted, &[experiment(&fitted, &recording)]).evaluate(&[]).unwrap();
     assert!(text.contains(&format!("\"samples\": {}", report.estimation.samples)));
-    let crate::Procedure::InnovationsLikelihood(outcome) = &report.estimation.procedure else { panic!() };
+    let crate::estimate::Procedure::InnovationsLikelihood(outcome) = &report.estimation.procedure else {
+        panic!()
+    };
     assert!((value + outcome.log_likelihood).abs() < 1e-9 * value.abs());
 
     // What was known before stays known.

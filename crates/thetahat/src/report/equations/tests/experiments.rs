@@ -1,6 +1,8 @@
 use super::models::experiment;
+use crate::Error;
+use crate::data::{Channel, Log, Recording, Times};
+use crate::model::GreyBox;
 use crate::respond::equations::experiments;
-use crate::{Channel, Error, GreyBox, Log, Recording, Times};
 
 fn recording(times: Vec<f64>) -> Recording {
     let channel = |name: &str, values: [f64; 4]| Channel { name: name.into(), values: values.to_vec() };

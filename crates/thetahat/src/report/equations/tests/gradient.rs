@@ -2,7 +2,8 @@ use thetahat_core::nalgebra::DMatrix;
 
 use super::models::{TRUTH, experiment, holed, log, pendulum, pendulum_text};
 use crate::estimate::equations::Criterion;
-use crate::{Estimator, GreyBox, StateFilter, StateModel};
+use crate::filter::{Estimator, StateFilter, StateModel};
+use crate::model::GreyBox;
 
 #[test]
 fn gradient_and_value_agree() {

@@ -2,12 +2,17 @@
 
 use std::ops::ControlFlow;
 
+use crate::Error;
+use crate::data::{Channel, Log, Recording, Rows, Times};
+use crate::estimate::{EquationsOutcome, Procedure};
+use crate::model::{EquationsModel, GreyBox, Model};
 use crate::regression::noise::Noise;
-use crate::respond::equations::{Experiment, experiments};
-use crate::{
-    Channel, EquationsModel, EquationsOutcome, EquationsPlan, Error, Fit, GreyBox, Horizon, Log, Model,
-    Procedure, Recording, Report, Rows, Times, fit_equations,
+use crate::report::{EquationsPlan, Report, fit_equations};
+use crate::respond::{
+    Horizon,
+    equations::{Experiment, experiments},
 };
+use crate::validate::Fit;
 
 /// Of the pendulum's parameters, in their order. None has bounds, so that z is the parameter.
 pub(super) const TRUTH: [f64; 5] = [-0.5, 2.0, 1.5, 0.1, 0.3];

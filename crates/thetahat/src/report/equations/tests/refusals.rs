@@ -4,8 +4,12 @@ use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::models::{Found, joined};
+use crate::Error;
+use crate::data::{Channel, Recording, Times};
+use crate::model::GreyBox;
+use crate::optimize::Stopped;
 use crate::regression::noise::Noise;
-use crate::{Channel, EquationsPlan, Error, GreyBox, Recording, Stopped, Times, fit_equations};
+use crate::report::{EquationsPlan, fit_equations};
 
 /// dx/dt = (gain scale u - loss x + push)/1, y = x, with the lines of some parameters.
 fn tank(parameters: &str) -> GreyBox {

@@ -4,7 +4,9 @@ use super::super::decimate::{Curve, rounded};
 use super::super::figure::{COLOURS, Drawn, NEUTRAL, axis, band, chart, layout, line, significant};
 use super::super::object::{self, Object};
 use super::super::text;
-use crate::{DelayEstimate, Independence, Residuals, figures};
+use crate::figures;
+use crate::inspect::DelayEstimate;
+use crate::validate::{Independence, Residuals};
 
 const HEIGHT: usize = 320;
 const BAND: &str = "95 % band";

@@ -11,10 +11,12 @@ use super::super::figure::{
 };
 use super::super::object::{Object, marker, scatter, stroke};
 use super::super::text;
-use crate::{
-    Error, FrequencyResponse, PolynomialModel, Quantity, Root, TransientResponse, figures,
-    frequency_response, impulse_response, logarithmic_frequencies, step_response,
+use crate::model::{PolynomialModel, Quantity, Root};
+use crate::respond::{
+    FrequencyResponse, TransientResponse, frequency_response, impulse_response, logarithmic_frequencies,
+    step_response,
 };
+use crate::{Error, figures};
 
 /// Frequencies of a Bode plot.
 const FREQUENCIES: usize = 200;
@@ -62,8 +64,9 @@ pub(crate) fn bode(models: &[(String, &PolynomialModel)], input: Option<&str>) -
         let name = if single { "estimate".to_owned() } else { text::plain(name) };
         let x: Vec<f64> = response.points.iter().map(|point| significant(point.frequency)).collect();
         for (axis, turn) in [("y", false), ("y2", true)] {
-            let of =
-                |point: &crate::FrequencyPoint| if turn { degrees(point.phase) } else { point.magnitude };
+            let of = |point: &crate::respond::FrequencyPoint| {
+                if turn { degrees(point.phase) } else { point.magnitude }
+            };
             let values: Vec<Quantity> = response.points.iter().map(of).collect();
             // The logarithm of what is not above zero has no place.
             let lowest = if turn { f64::NEG_INFINITY } else { least / 10.0 };

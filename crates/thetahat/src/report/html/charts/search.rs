@@ -4,7 +4,8 @@ use super::super::decimate::{Curve, rounded};
 use super::super::figure::{COLOURS, Drawn, axis, chart, layout, line, significant};
 use super::super::object::{Object, marker, scatter, stroke};
 use super::super::text;
-use crate::{Scored, Select, Selection, figures};
+use crate::figures;
+use crate::select::{Scored, Select, Selection};
 
 /// What models were chosen by.
 pub(crate) fn score(select: Select) -> &'static str {

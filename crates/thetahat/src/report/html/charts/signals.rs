@@ -8,7 +8,7 @@ use super::super::figure::{
 };
 use super::super::object::{Object, marker, scatter, stroke};
 use super::super::text;
-use crate::Rows;
+use crate::data::Rows;
 
 /// More panels than these go into a further figure.
 const MOST_PANELS: usize = 8;

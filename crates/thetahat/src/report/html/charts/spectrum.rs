@@ -4,7 +4,7 @@ use super::super::decimate::Curve;
 use super::super::figure::{Drawn, chart, layout, line, logarithmic, positive_range, significant};
 use super::super::object::Object;
 use super::super::text;
-use crate::Excitation;
+use crate::inspect::Excitation;
 
 /// The most points of a spectrum, and of all of them: neighbours are averaged.
 const POINTS: [usize; 2] = [2000, 20_000];

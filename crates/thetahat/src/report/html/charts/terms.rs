@@ -4,9 +4,9 @@ use super::super::decimate::{Curve, rounded};
 use super::super::figure::{Drawn, axis, chart, layout, line};
 use super::super::object::Object;
 use super::super::text;
+use crate::estimate::{RunFigures, TermsOutcome};
 use crate::model::NonlinearArxModel;
 use crate::respond::nonlinear_arx::slice;
-use crate::{RunFigures, TermsOutcome};
 
 /// Points of a slice.
 const POINTS: usize = 101;

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use thetahat::track::Policy;
 
 use super::{LineArguments, LiveClockArguments, LogArguments, Names};
 
@@ -49,10 +50,9 @@ pub(crate) struct TrackArguments {
     /// How to estimate [default: rls; with C rpem]
     #[arg(long, value_enum, help_heading = "Adaptation")]
     pub(crate) method: Option<TrackMethodArgument>,
-    /// What is forgotten, several side by side: none, LAMBDA or exponential:LAMBDA, selective:LAMBDA,
-    /// random-walk:VARIANCE, variable:LAMBDA:MINIMUM:NOISE
     #[arg(
         long,
+        help = policies(),
         value_name = "HOW[,HOW…]",
         value_delimiter = ',',
         default_value = "exponential:0.99",
@@ -103,6 +103,15 @@ pub(crate) struct TrackArguments {
     pub(crate) clock: LiveClockArguments,
     #[command(flatten)]
     pub(crate) log: LogArguments,
+}
+
+/// The help of --forgetting.
+fn policies() -> String {
+    let written: Vec<String> = Policy::all_written().collect();
+    format!(
+        "What is forgotten, several side by side: FACTOR for exponential:FACTOR, or {}",
+        written.join(", ")
+    )
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -30,7 +30,7 @@ use thetahat_core::Error;
 
 /// Adds all classes of this part.
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<forgetting::Forgetting>()?;
+    forgetting::register(module)?;
     module.add_class::<innovation::Innovation>()?;
     module.add_class::<least_squares::RecursiveLeastSquares>()?;
     module.add_class::<arx::RecursiveArx>()?;

@@ -1,5 +1,10 @@
 //! How fast a recursive estimator forgets, and how it starts.
+//!
+//! Another policy is a variant of [`Forgetting`], an entry of [`TABLE`], and an arm in each match of this file: what does not
+//! know of it does not compile. The estimators, the command line, documents and Python take all from here.
 
+use crate::error::check_length;
+use crate::triangle::diagonal_mut;
 use crate::{Error, Real};
 
 /// How a recursive estimator forgets old samples.
@@ -170,30 +175,22 @@ impl<T: Real> Forgetting<T> {
         let n = T::from_count(size);
         // A little less than n/(n + 1), so that a factor that was computed as n/(n + 1) passes.
         let least = n / (n + T::one()) - T::from_count(4) * T::EPSILON;
-        let is_factor = |factor: T| factor > least && factor > T::zero() && factor <= T::one();
         match *self {
             Forgetting::None => Ok(()),
             Forgetting::Exponential { factor } | Forgetting::Selective { factor } => {
-                check_factor(is_factor(factor))
+                FACTOR.check(factor, least, T::one())
             }
-            Forgetting::RandomWalk { variance } => {
-                let fits = variance >= T::zero() && variance <= T::from_count(100);
-                fits.then_some(()).ok_or(Error::OutOfRange { argument: "variance", range: "0 to 100" })
-            }
+            Forgetting::RandomWalk { variance } => VARIANCE.check(variance, least, T::one()),
             Forgetting::Variable { factor, minimum, noise_variance } => {
-                check_factor(is_factor(factor))?;
-                if !(is_factor(minimum) && minimum <= factor) {
-                    let range = "n/(n + 1) to the factor, for n parameters";
-                    return Err(Error::OutOfRange { argument: "minimum", range });
-                }
-                let fits = noise_variance >= T::MIN_POSITIVE && noise_variance.is_finite();
-                fits.then_some(())
-                    .ok_or(Error::OutOfRange { argument: "noise_variance", range: "finite and above 0" })
+                FACTOR.check(factor, least, T::one())?;
+                MINIMUM.check(minimum, least, factor)?;
+                NOISE_VARIANCE.check(noise_variance, least, factor)
             }
         }
     }
 
     /// The factor by which the weights of the residuals shrink, if the innovation does not decide.
+    #[inline(always)]
     pub(crate) fn factor(&self) -> T {
         match *self {
             Forgetting::None | Forgetting::RandomWalk { .. } => T::one(),
@@ -202,11 +199,307 @@ impl<T: Real> Forgetting<T> {
             | Forgetting::Variable { factor, .. } => factor,
         }
     }
+
+    /// Whether anything is forgotten, so that a variance can grow.
+    #[inline(always)]
+    pub(crate) fn forgets(&self) -> bool {
+        match self {
+            Forgetting::None => false,
+            Forgetting::Exponential { .. }
+            | Forgetting::Selective { .. }
+            | Forgetting::RandomWalk { .. }
+            | Forgetting::Variable { .. } => true,
+        }
+    }
+
+    /// Whether the innovation decides about the factor.
+    #[inline(always)]
+    pub(crate) fn follows_innovation(&self) -> bool {
+        match self {
+            Forgetting::Variable { .. } => true,
+            Forgetting::None
+            | Forgetting::Exponential { .. }
+            | Forgetting::Selective { .. }
+            | Forgetting::RandomWalk { .. } => false,
+        }
+    }
+
+    /// The variance by which parameters walk, each sample, if they do.
+    #[inline(always)]
+    pub(crate) fn walk(&self) -> Option<T> {
+        match *self {
+            Forgetting::RandomWalk { variance } => Some(variance),
+            Forgetting::None
+            | Forgetting::Exponential { .. }
+            | Forgetting::Selective { .. }
+            | Forgetting::Variable { .. } => None,
+        }
+    }
+
+    /// What is forgotten between the two phases of an update, given f = U'φ and v = D f. Keeps v = D f; returns φ'P φ, which
+    /// was `spread`.
+    #[inline(always)]
+    pub(crate) fn forget_directions(&self, covariance: &mut [T], f: &[T], v: &mut [T], spread: T) -> T {
+        match *self {
+            Forgetting::Selective { factor } => forget_selectively(covariance, f, v, factor),
+            Forgetting::None
+            | Forgetting::Exponential { .. }
+            | Forgetting::RandomWalk { .. }
+            | Forgetting::Variable { .. } => spread,
+        }
+    }
+
+    /// λ(k): by what P is divided in this sample.
+    #[inline(always)]
+    pub(crate) fn factor_at(&self, errors: &[T], spread: T) -> T {
+        match *self {
+            Forgetting::None | Forgetting::RandomWalk { .. } | Forgetting::Selective { .. } => T::one(),
+            Forgetting::Exponential { factor } => factor,
+            Forgetting::Variable { factor, minimum, noise_variance } => {
+                let surprise =
+                    errors.iter().fold(T::zero(), |sum, &error| sum + error / noise_variance * error);
+                let surprise = surprise / T::from_count(errors.len()) / (T::one() + spread);
+                let factor = T::one() - (T::one() - factor) * surprise;
+                if factor > minimum { factor } else { minimum }
+            }
+        }
+    }
 }
 
-fn check_factor(fits: bool) -> Result<(), Error> {
-    let range = "n/(n + 1) to 1, for n parameters: the memory, 1/(1 - factor), must be longer than n samples";
-    fits.then_some(()).ok_or(Error::OutOfRange { argument: "factor", range })
+/// Selective forgetting: D_j <- D_j/λ where f_j² D_j > (1 - λ)/100.
+#[inline(always)]
+fn forget_selectively<T: Real>(covariance: &mut [T], f: &[T], v: &mut [T], lambda: T) -> T {
+    let (growth, least) = (T::one() / lambda, (T::one() - lambda) / T::from_count(100));
+    let (size, mut spread) = (f.len(), T::zero());
+    for (index, (&f, v)) in f.iter().zip(v).enumerate() {
+        if f * *v > least
+            && let Some(variance) = diagonal_mut(covariance, size, index)
+        {
+            *variance *= growth;
+            *v *= growth;
+        }
+        spread += f * *v;
+    }
+    spread
+}
+
+/// The most numbers that a policy has.
+const MOST_NUMBERS: usize = 3;
+
+/// A policy with its word and its numbers, as what reads and prints policies knows it. See [`Forgetting::policies`].
+#[derive(Debug)]
+#[non_exhaustive]
+pub struct ForgettingPolicy {
+    /// The word for it, such as `random-walk`.
+    pub word: &'static str,
+    /// What it does, in a sentence.
+    pub says: &'static str,
+    /// What else is to be known of it; may be empty.
+    pub notes: &'static str,
+    /// Who described it; may be empty.
+    pub source: &'static str,
+    /// Its numbers, in their order.
+    pub numbers: &'static [PolicyNumber],
+    make: fn([f64; MOST_NUMBERS]) -> Forgetting<f64>,
+}
+
+/// A number of a policy.
+#[derive(Debug)]
+#[non_exhaustive]
+pub struct PolicyNumber {
+    /// Its name, such as `noise_variance`.
+    pub name: &'static str,
+    /// What it is.
+    pub says: &'static str,
+    /// Where it lies.
+    pub range: PolicyRange,
+    /// What it usually is, if there is such a number.
+    pub usual: Option<f64>,
+}
+
+/// Where a number of a policy lies, as long as the number of parameters is not known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum PolicyRange {
+    /// Above 0, at most 1; for n parameters n/(n + 1) to 1.
+    Factor,
+    /// As a factor, and at most the first number of the policy, which is one.
+    UpToFactor,
+    /// 0 to 100.
+    Growth,
+    /// Finite and above 0.
+    Positive,
+}
+
+impl PolicyRange {
+    /// The range in words: "a number …".
+    pub fn says(self) -> &'static str {
+        match self {
+            PolicyRange::Factor => "a number above 0 and at most 1",
+            PolicyRange::UpToFactor => "a number above 0 and at most the factor",
+            PolicyRange::Growth => "a number from 0 to 100",
+            PolicyRange::Positive => "a finite number above 0",
+        }
+    }
+}
+
+impl PolicyNumber {
+    /// That a number is in its range, given the least factor and the first number of the policy.
+    #[inline(always)]
+    fn check<T: Real>(&self, value: T, least: T, first: T) -> Result<(), Error> {
+        let is_factor = value > least && value > T::zero() && value <= T::one();
+        let (fits, range) = match self.range {
+            PolicyRange::Factor => {
+                let range = "n/(n + 1) to 1, for n parameters: the memory, 1/(1 - factor), must be longer than n samples";
+                (is_factor, range)
+            }
+            PolicyRange::UpToFactor => {
+                (is_factor && value <= first, "n/(n + 1) to the factor, for n parameters")
+            }
+            PolicyRange::Growth => (value >= T::zero() && value <= T::from_count(100), "0 to 100"),
+            PolicyRange::Positive => (value >= T::MIN_POSITIVE && value.is_finite(), "finite and above 0"),
+        };
+        fits.then_some(()).ok_or(Error::OutOfRange { argument: self.name, range })
+    }
+}
+
+const FACTOR: PolicyNumber = PolicyNumber {
+    name: "factor",
+    says: "Lambda: the memory is 1/(1 - lambda) samples.",
+    range: PolicyRange::Factor,
+    usual: None,
+};
+
+const VARIANCE: PolicyNumber = PolicyNumber {
+    name: "variance",
+    says: "How much the variance of a parameter grows each sample, in 1/scale^2 times the noise variance.",
+    range: PolicyRange::Growth,
+    usual: None,
+};
+
+const MINIMUM: PolicyNumber =
+    PolicyNumber { name: "minimum", says: "The least factor.", range: PolicyRange::UpToFactor, usual: None };
+
+const NOISE_VARIANCE: PolicyNumber = PolicyNumber {
+    name: "noise_variance",
+    says: "The variance of the noise, in the unit of y squared.",
+    range: PolicyRange::Positive,
+    usual: None,
+};
+
+/// All policies, in the order of [`Forgetting`]. Firmware does not refer to it, so that no text is linked.
+static TABLE: [ForgettingPolicy; 5] = [
+    ForgettingPolicy {
+        word: "none",
+        says: "Nothing is forgotten: all samples weigh the same.",
+        notes: "",
+        source: "",
+        numbers: &[],
+        make: |_| Forgetting::None,
+    },
+    ForgettingPolicy {
+        word: "exponential",
+        says: "A sample that is k samples old weighs factor^k.",
+        notes: "In a silence of many times the memory the estimate bursts: noise in the regressors drives it away from what \
+                was known, and the standard errors say so. See `selective`.",
+        source: "Ljung and Söderström, Theory and Practice of Recursive Identification, 1983, section 2.6.",
+        numbers: &[PolicyNumber { usual: Some(0.99), ..FACTOR }],
+        make: |[factor, ..]| Forgetting::Exponential { factor },
+    },
+    ForgettingPolicy {
+        word: "selective",
+        says: "Forgets only what a sample tells of: what is not excited is kept. For plants with long silences.",
+        notes: "An excitation that falls below a tenth of what it was counts as silence.",
+        source: "A relative: Goel, Bruce and Bernstein, Recursive least squares with variable-direction forgetting, 2020.",
+        numbers: &[FACTOR],
+        make: |[factor, ..]| Forgetting::Selective { factor },
+    },
+    ForgettingPolicy {
+        word: "random-walk",
+        says: "The parameters do a random walk.",
+        notes: "",
+        source: "Ljung and Söderström, Theory and Practice of Recursive Identification, 1983, section 2.6.",
+        numbers: &[VARIANCE],
+        make: |[variance, ..]| Forgetting::RandomWalk { variance },
+    },
+    ForgettingPolicy {
+        word: "variable",
+        says: "Forgets where an innovation is larger than the noise makes it.",
+        notes: "",
+        source: "Fortescue, Kershenbaum and Ydstie, Implementation of self-tuning regulators with variable forgetting \
+                 factors, 1981.",
+        numbers: &[
+            PolicyNumber {
+                says: "The factor where the innovation is as large as the noise makes it.",
+                ..FACTOR
+            },
+            MINIMUM,
+            NOISE_VARIANCE,
+        ],
+        make: |[factor, minimum, noise_variance]| Forgetting::Variable { factor, minimum, noise_variance },
+    },
+];
+
+impl Forgetting<f64> {
+    /// All policies with their words, names and ranges: what a program needs that reads or prints them.
+    ///
+    /// ```
+    /// use thetahat_core::{Error, Forgetting};
+    ///
+    /// let mut policies = Forgetting::policies().iter();
+    /// let policy = policies.find(|policy| policy.word == "random-walk").unwrap();
+    /// assert_eq!(policy.numbers[0].name, "variance");
+    /// assert_eq!(policy.with(&[1e-6]), Ok(Forgetting::RandomWalk { variance: 1e-6 }));
+    /// assert!(matches!(policy.with(&[101.0]), Err(Error::OutOfRange { argument: "variance", .. })));
+    /// ```
+    pub fn policies() -> &'static [ForgettingPolicy] {
+        &TABLE
+    }
+
+    /// Which policy it is, and its numbers.
+    ///
+    /// ```
+    /// let (policy, mut numbers) = thetahat_core::Forgetting::default().describe();
+    /// assert_eq!(policy.word, "exponential");
+    /// assert!(numbers.next().is_some_and(|(number, value)| number.name == "factor" && value == 0.99));
+    /// ```
+    pub fn describe(
+        self,
+    ) -> (&'static ForgettingPolicy, impl Iterator<Item = (&'static PolicyNumber, f64)> + Clone) {
+        let (policy, values) = match self {
+            Forgetting::None => (&TABLE[0], [0.0; MOST_NUMBERS]),
+            Forgetting::Exponential { factor } => (&TABLE[1], [factor, 0.0, 0.0]),
+            Forgetting::Selective { factor } => (&TABLE[2], [factor, 0.0, 0.0]),
+            Forgetting::RandomWalk { variance } => (&TABLE[3], [variance, 0.0, 0.0]),
+            Forgetting::Variable { factor, minimum, noise_variance } => {
+                (&TABLE[4], [factor, minimum, noise_variance])
+            }
+        };
+        (policy, policy.numbers.iter().zip(values))
+    }
+}
+
+impl ForgettingPolicy {
+    /// The first of these numbers that is out of its range.
+    pub fn refused(&self, numbers: &[f64]) -> Option<(&'static PolicyNumber, f64)> {
+        let first = numbers.first().copied().unwrap_or(0.0);
+        let mut pairs = self.numbers.iter().zip(numbers.iter().copied());
+        pairs.find(|(number, value)| number.check(*value, 0.0, first).is_err())
+    }
+
+    /// The policy with these numbers, each in its range. That a factor is above n/(n + 1) is checked when an estimator with n
+    /// parameters is made.
+    ///
+    /// Errors: [`Error::Length`] for another number of them, [`Error::OutOfRange`] with the name of one.
+    pub fn with(&self, numbers: &[f64]) -> Result<Forgetting<f64>, Error> {
+        check_length("numbers", self.numbers.len(), numbers.len())?;
+        if let Some((number, value)) = self.refused(numbers) {
+            number.check(value, 0.0, numbers.first().copied().unwrap_or(value))?;
+        }
+        let mut values = [0.0; MOST_NUMBERS];
+        values.iter_mut().zip(numbers).for_each(|(value, &number)| *value = number);
+        Ok((self.make)(values))
+    }
 }
 
 /// How a recursive estimator starts.
@@ -273,5 +566,25 @@ impl Phase {
     #[inline(always)]
     pub(crate) fn is_running(self) -> bool {
         matches!(self, Phase::Running | Phase::Given | Phase::Free)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_policy_is_what_its_entry_makes() {
+        for policy in Forgetting::policies() {
+            let numbers = [0.75, 0.5, 0.25];
+            let made = policy.with(&numbers[..policy.numbers.len()]).unwrap();
+            let (described, values) = made.describe();
+            assert!(core::ptr::eq(policy, described), "{}", policy.word);
+            assert!(values.map(|(_, value)| value).eq(numbers[..policy.numbers.len()].iter().copied()));
+            let named = |word: &str| Forgetting::policies().iter().filter(|other| other.word == word).count();
+            assert_eq!(named(policy.word), 1);
+            let refused = |numbers: &[f64]| matches!(policy.with(numbers), Err(Error::Length { .. }));
+            assert!(refused(&[0.5; 4]) && (policy.numbers.is_empty() || refused(&[])));
+        }
     }
 }

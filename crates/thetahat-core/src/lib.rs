@@ -146,7 +146,7 @@ pub use dim::Dimension;
 pub use dual::{Dual, Number};
 pub use ekf::ExtendedKalmanFilter;
 pub use error::Error;
-pub use forgetting::{Forgetting, Start};
+pub use forgetting::{Forgetting, ForgettingPolicy, PolicyNumber, PolicyRange, Start};
 pub use innovation::{Action, Innovation};
 pub use kalman::KalmanFilter;
 pub use lags::{ArxOrders, InputOrders, Lags};

@@ -478,10 +478,7 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
     /// One sample without a measurement, which is what a NaN is. Only the random walk takes note of it, once the
     /// start is over and while adaptation is on; a variance that comes back to its bound here is not reported.
     pub fn advance(&mut self) {
-        if matches!(self.forgetting, Forgetting::RandomWalk { .. })
-            && self.phase.is_running()
-            && self.adapting
-        {
+        if self.forgetting.walk().is_some() && self.phase.is_running() && self.adapting {
             self.after.call(self);
             self.cap();
         }

@@ -31,6 +31,11 @@ pub(crate) fn column_mut<T>(columns: &mut [T], size: usize, index: usize) -> &mu
     columns.get_mut(index * size..(index + 1) * size).unwrap_or_default()
 }
 
+/// Entry (`index`, `index`) of a square matrix stored column after column.
+pub(crate) fn diagonal_mut<T>(columns: &mut [T], size: usize, index: usize) -> Option<&mut T> {
+    column_mut(columns, size, index).get_mut(index)
+}
+
 /// A sum that also keeps what rounding takes from it (Kahan 1965).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Sum<T> {

@@ -1,9 +1,12 @@
 //! Forgetting policies.
 
+use std::ffi::{CStr, CString};
+
 use pyo3::Borrowed;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use thetahat_core::Forgetting as Policy;
+use pyo3::types::{PyCFunction, PyDict, PyString, PyTuple};
+use thetahat_core::{Forgetting as Policy, ForgettingPolicy};
 
 use super::{Reduced, argument, snapshot};
 
@@ -37,112 +40,18 @@ pub(crate) struct Forgetting {
 impl Forgetting {
     /// A policy that was read back, checked as a new one is.
     pub(crate) fn restore(policy: Policy<f64>) -> PyResult<Self> {
-        match policy {
-            Policy::Exponential { factor } => Self::exponential(factor),
-            Policy::Selective { factor } => Self::selective(factor),
-            Policy::RandomWalk { variance } => Self::random_walk(variance),
-            Policy::Variable { factor, minimum, noise_variance } => {
-                Self::variable(factor, minimum, noise_variance)
-            }
-            _ => Ok(Forgetting { policy }),
-        }
+        let (kind, numbers) = policy.describe();
+        made(kind, &numbers.map(|(_, value)| value).collect::<Vec<_>>())
     }
 }
 
 #[pymethods]
 impl Forgetting {
-    /// Nothing is forgotten: all samples weigh the same.
-    #[staticmethod]
-    fn none() -> Self {
-        Forgetting { policy: Policy::None }
-    }
-
-    /// A sample that is k samples old weighs factor ** k.
-    ///
-    /// In a silence of many times the memory the estimate bursts: noise in the regressors drives it away from what
-    /// was known, and the standard errors say so. See ``selective``.
-    ///
-    /// Parameters
-    /// ----------
-    /// factor : float
-    ///     Above 0, at most 1.
-    #[staticmethod]
-    #[pyo3(signature = (factor = 0.99))]
-    fn exponential(factor: f64) -> PyResult<Self> {
-        check_factor("factor", factor, 1.0)?;
-        Ok(Forgetting { policy: Policy::Exponential { factor } })
-    }
-
-    /// Forgets only what a sample tells of: what is not excited is kept. For plants with long silences.
-    ///
-    /// An excitation that falls below a tenth of what it was counts as silence.
-    ///
-    /// Parameters
-    /// ----------
-    /// factor : float
-    ///     Above 0, at most 1.
-    ///
-    /// References
-    /// ----------
-    /// A relative: Goel, Bruce and Bernstein, Recursive least squares with variable-direction forgetting, 2020.
-    #[staticmethod]
-    fn selective(factor: f64) -> PyResult<Self> {
-        check_factor("factor", factor, 1.0)?;
-        Ok(Forgetting { policy: Policy::Selective { factor } })
-    }
-
-    /// The parameters do a random walk.
-    ///
-    /// Parameters
-    /// ----------
-    /// variance : float
-    ///     How much the variance of a parameter grows each sample, in 1 / scale ** 2 times the noise variance: 0 to
-    ///     100.
-    #[staticmethod]
-    fn random_walk(variance: f64) -> PyResult<Self> {
-        if !(0.0..=100.0).contains(&variance) {
-            return Err(PyValueError::new_err(format!("variance: expected 0 to 100, found {variance}")));
-        }
-        Ok(Forgetting { policy: Policy::RandomWalk { variance } })
-    }
-
-    /// Forgets where an innovation is larger than the noise makes it.
-    ///
-    /// Parameters
-    /// ----------
-    /// factor : float
-    ///     The factor where the innovation is as large as the noise makes it.
-    /// minimum : float
-    ///     The least factor, at most ``factor``.
-    /// noise_variance : float
-    ///     The variance of the noise, in the unit of y squared; above 0.
-    ///
-    /// References
-    /// ----------
-    /// Fortescue, Kershenbaum and Ydstie, Implementation of self-tuning regulators with variable forgetting factors,
-    /// 1981.
-    #[staticmethod]
-    fn variable(factor: f64, minimum: f64, noise_variance: f64) -> PyResult<Self> {
-        check_factor("factor", factor, 1.0)?;
-        check_factor("minimum", minimum, factor)?;
-        if !(noise_variance >= f64::MIN_POSITIVE && noise_variance.is_finite()) {
-            let message = format!("noise_variance: expected a finite number above 0, found {noise_variance}");
-            return Err(PyValueError::new_err(message));
-        }
-        Ok(Forgetting { policy: Policy::Variable { factor, minimum, noise_variance } })
-    }
-
     fn __repr__(&self) -> String {
-        match self.policy {
-            Policy::None => "Forgetting.none()".to_owned(),
-            Policy::Exponential { factor } => format!("Forgetting.exponential(factor={factor:?})"),
-            Policy::Selective { factor } => format!("Forgetting.selective(factor={factor:?})"),
-            Policy::RandomWalk { variance } => format!("Forgetting.random_walk(variance={variance:?})"),
-            Policy::Variable { factor, minimum, noise_variance } => format!(
-                "Forgetting.variable(factor={factor:?}, minimum={minimum:?}, noise_variance={noise_variance:?})"
-            ),
-            _ => "Forgetting".to_owned(),
-        }
+        let (policy, numbers) = self.policy.describe();
+        let numbers: Vec<String> =
+            numbers.map(|(number, value)| format!("{}={value:?}", number.name)).collect();
+        format!("Forgetting.{}({})", name(policy), numbers.join(", "))
     }
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py>> {
@@ -150,13 +59,105 @@ impl Forgetting {
     }
 }
 
-fn check_factor(argument: &str, factor: f64, most: f64) -> PyResult<()> {
-    if factor > 0.0 && factor <= most {
-        return Ok(());
+/// Adds the class, with a static method for each policy.
+pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    let py = module.py();
+    module.add_class::<Forgetting>()?;
+    let class = py.get_type::<Forgetting>();
+    let staticmethod = py.import("builtins")?.getattr("staticmethod")?;
+    for policy in Policy::policies() {
+        // Python keeps pointers to both as long as the module lives, which is as long as the process does.
+        let name: &'static CStr = Box::leak(CString::new(name(policy))?.into_boxed_c_str());
+        let documentation: &'static CStr = Box::leak(CString::new(documentation(policy))?.into_boxed_c_str());
+        let make = |arguments: &Bound<'_, PyTuple>, named: Option<&Bound<'_, PyDict>>| {
+            made(policy, &numbers(policy, arguments, named)?)
+        };
+        let function = PyCFunction::new_closure(py, Some(name), Some(documentation), make)?;
+        class.setattr(function.getattr("__name__")?.cast::<PyString>()?, staticmethod.call1((function,))?)?;
     }
-    Err(PyValueError::new_err(format!(
-        "{argument}: expected a number above 0, at most {most}, found {factor}"
-    )))
+    Ok(())
+}
+
+/// What the static method of a policy is called.
+fn name(policy: &ForgettingPolicy) -> String {
+    policy.word.replace('-', "_")
+}
+
+/// Its signature, where Python looks for it, and its text.
+fn documentation(policy: &ForgettingPolicy) -> String {
+    let arguments = policy.numbers.iter().map(|number| match number.usual {
+        Some(usual) => format!("{}={usual:?}", number.name),
+        None => number.name.to_owned(),
+    });
+    let (signature, plain) = (arguments.collect::<Vec<_>>().join(", "), |text: &str| text.replace('`', "``"));
+    let mut text = format!("{}({signature})\n--\n\n{}\n", name(policy), plain(policy.says));
+    if !policy.notes.is_empty() {
+        text += &format!("\n{}\n", plain(policy.notes));
+    }
+    if !policy.numbers.is_empty() {
+        text += "\nParameters\n----------\n";
+    }
+    for number in policy.numbers {
+        let range = number.range.says();
+        text += &format!(
+            "{} : float\n    {} {}{}.\n",
+            number.name,
+            number.says,
+            range[..1].to_uppercase(),
+            &range[1..]
+        );
+    }
+    if !policy.source.is_empty() {
+        text += &format!("\nReferences\n----------\n{}\n", policy.source);
+    }
+    text
+}
+
+/// The numbers of a policy among the arguments of its static method.
+fn numbers(
+    policy: &ForgettingPolicy,
+    arguments: &Bound<'_, PyTuple>,
+    named: Option<&Bound<'_, PyDict>>,
+) -> PyResult<Vec<f64>> {
+    let wrong = |what: String| PyTypeError::new_err(format!("Forgetting.{}() {what}", name(policy)));
+    if arguments.len() > policy.numbers.len() {
+        let (expected, found) = (policy.numbers.len(), arguments.len());
+        return Err(wrong(format!("takes {expected} positional arguments but {found} were given")));
+    }
+    let mut left = named.map(|named| named.copy()).transpose()?;
+    let mut values = Vec::with_capacity(policy.numbers.len());
+    for (index, number) in policy.numbers.iter().enumerate() {
+        let by_place = arguments.get_item(index).ok();
+        let by_name = match &left {
+            Some(left) => left.get_item(number.name)?,
+            None => None,
+        };
+        if let (Some(left), Some(_)) = (&mut left, &by_name) {
+            left.del_item(number.name)?;
+        }
+        values.push(match (by_place, by_name, number.usual) {
+            (Some(_), Some(_), _) => {
+                return Err(wrong(format!("got multiple values for argument '{}'", number.name)));
+            }
+            (Some(given), None, _) | (None, Some(given), _) => argument::number(number.name, &given)?,
+            (None, None, Some(usual)) => usual,
+            (None, None, None) => return Err(wrong(format!("missing required argument '{}'", number.name))),
+        });
+    }
+    match left.and_then(|left| left.keys().iter().next()) {
+        Some(other) => Err(wrong(format!("got an unexpected keyword argument '{other}'"))),
+        None => Ok(values),
+    }
+}
+
+/// The policy with these numbers, each in its range.
+fn made(policy: &ForgettingPolicy, numbers: &[f64]) -> PyResult<Forgetting> {
+    if let Some((number, value)) = policy.refused(numbers) {
+        let message = format!("{}: expected {}, found {value}", number.name, number.range.says());
+        return Err(PyValueError::new_err(message));
+    }
+    let made = policy.with(numbers).map_err(|error| PyValueError::new_err(error.to_string()))?;
+    Ok(Forgetting { policy: made })
 }
 
 /// The argument `forgetting`: a float, None, or a policy.

@@ -41,10 +41,7 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> After<RecursiveLeastSqu
     /// What a policy needs once the start is over.
     #[inline(always)]
     pub(super) fn of(forgetting: Forgetting<T>) -> Self {
-        After(match forgetting {
-            Forgetting::RandomWalk { .. } => Some(RecursiveLeastSquares::walk),
-            _ => None,
-        })
+        After(if forgetting.walk().is_some() { Some(RecursiveLeastSquares::walk) } else { None })
     }
 
     /// What every policy and every start can do with: it finds out.
@@ -57,7 +54,7 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
     /// P_jj <- P_jj + n `variance` / scale_j², for the parameter whose turn it is, unless it is held.
     #[inline(never)]
     pub(super) fn walk(&mut self) {
-        let Forgetting::RandomWalk { variance } = self.forgetting else { return };
+        let Some(variance) = self.forgetting.walk() else { return };
         let growth = variance * T::from_count(self.bounds.len()) / T::from_count(100);
         let (factor, bounds) = (self.covariance.as_mut_slice(), self.bounds.as_slice());
         let turn = usize::from(self.turn);
@@ -136,10 +133,8 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
     /// By how much the variances of the prior that an exact start takes out are above p_j. With forgetting it cannot
     /// be more than 1: an estimate that is less sure than the cap lets it be would be held where it is.
     pub(super) fn width(&self) -> T {
-        match (self.phase, self.forgetting) {
-            (Phase::Collecting, Forgetting::None) => T::from_count(10_000),
-            _ => T::one(),
-        }
+        let wide = self.phase == Phase::Collecting && !self.forgetting.forgets();
+        if wide { T::from_count(10_000) } else { T::one() }
     }
 }
 

@@ -5,7 +5,6 @@ use nalgebra::{Const, OMatrix, OVector};
 use super::RecursiveLeastSquares;
 use super::sample::scale_variances;
 use crate::error::check_length;
-use crate::forgetting::Forgetting;
 use crate::{Covariance, Dimension, Error, Real, ud};
 
 impl<T: Real, N: Dimension + Dimension<Const<1>>> RecursiveLeastSquares<T, N> {
@@ -113,9 +112,9 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
 
     /// What makes P the covariance of the parameters of one output.
     fn variance_scale(&self, output: usize) -> Option<T> {
-        let share = match self.forgetting {
-            Forgetting::RandomWalk { .. } => T::one(),
-            _ => self.residuals.squared_weights / self.residuals.weights,
+        let share = match self.forgetting.walk() {
+            Some(_) => T::one(),
+            None => self.residuals.squared_weights / self.residuals.weights,
         };
         Some(self.residuals.variance(output, self.bounds.len())? * share)
     }

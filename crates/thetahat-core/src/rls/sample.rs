@@ -3,7 +3,7 @@
 use crate::error::check_length;
 use crate::forgetting::{Forgetting, Phase};
 use crate::lags::is_infinite;
-use crate::triangle::column_mut;
+use crate::triangle::{column_mut, diagonal_mut};
 use crate::ud::{add_multiple, dot};
 use crate::{Action, Dimension, Error, Real, RecursiveLeastSquares, ud};
 
@@ -62,21 +62,8 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
             check_small(gradient, errors, spread)?;
             // Nothing can fail from here on.
             let rule = if resting { Forgetting::None } else { policy };
-            let spread = match rule {
-                Forgetting::Selective { factor: lambda } => forget_selectively(factor, f, v, lambda),
-                _ => spread,
-            };
-            let noise = match rule {
-                Forgetting::None | Forgetting::RandomWalk { .. } | Forgetting::Selective { .. } => T::one(),
-                Forgetting::Exponential { factor } => factor,
-                Forgetting::Variable { factor, minimum, noise_variance } => {
-                    let surprise =
-                        errors.iter().fold(T::zero(), |sum, &error| sum + error / noise_variance * error);
-                    let surprise = surprise / T::from_count(errors.len()) / (T::one() + spread);
-                    let factor = T::one() - (T::one() - factor) * surprise;
-                    if factor > minimum { factor } else { minimum }
-                }
-            };
+            let spread = rule.forget_directions(factor, f, v, spread);
+            let noise = rule.factor_at(errors, spread);
             // The divisions for the innovation come first: they go on beside those of the update.
             let (total, growth) = (noise + spread, T::one() / noise);
             let nis = residuals.normalise(errors, variances, n, total * growth);
@@ -85,7 +72,7 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
             }
             // P does not shrink in a dead zone, but the estimate is better than it says.
             let (mut share, mut action) = (T::one(), Action::Skipped);
-            let weight = if let Forgetting::Variable { .. } = rule { noise } else { weight };
+            let weight = if rule.follows_innovation() { noise } else { weight };
             if !resting {
                 let inverse = ud::update(factor, f, v, noise, growth);
                 // A sample that fixes parameters tells of the prior as well as of the noise. A start that takes the prior
@@ -112,7 +99,7 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
             }
             return Ok((nis, action));
         }
-        if let Forgetting::None = policy {
+        if !policy.forgets() {
             return Ok((nis, action));
         }
         if self.cap() && action == Action::Updated {
@@ -189,28 +176,6 @@ fn check_small<T: Real>(gradient: &[T], errors: &[T], spread: T) -> Result<(), E
         return Err(Error::TooLarge { argument: "output" });
     }
     Ok(())
-}
-
-/// Selective forgetting, between the two phases of an update: D_j <- D_j/λ where f_j² D_j > (1 - λ)/100. Keeps
-/// v = D f; returns φ'P φ.
-#[inline(always)]
-fn forget_selectively<T: Real>(factor: &mut [T], f: &[T], v: &mut [T], lambda: T) -> T {
-    let (growth, least) = (T::one() / lambda, (T::one() - lambda) / T::from_count(100));
-    let (size, mut spread) = (f.len(), T::zero());
-    for (index, (&f, v)) in f.iter().zip(v).enumerate() {
-        if f * *v > least
-            && let Some(variance) = diagonal_mut(factor, size, index)
-        {
-            *variance *= growth;
-            *v *= growth;
-        }
-        spread += f * *v;
-    }
-    spread
-}
-
-fn diagonal_mut<T: Real>(factor: &mut [T], size: usize, index: usize) -> Option<&mut T> {
-    column_mut(factor, size, index).get_mut(index)
 }
 
 /// P <- `scale` P.

@@ -87,15 +87,8 @@ impl TrackMethod {
     }
 }
 
-/// What a tracker forgets, written as a word and its numbers.
-///
-/// | written | [`Forgetting`] |
-/// |---|---|
-/// | `none`, or `1` | nothing |
-/// | `exponential:F`, or only `F` | the factor F = 1 - 1/(memory in samples) |
-/// | `selective:F` | the same factor, only for what a sample tells of |
-/// | `random-walk:V` | the variance of each parameter grows by V noise variances/scale² a sample, 0 to 100 |
-/// | `variable:F:M:N` | the factor F, at least M, where innovations are as large as the noise variance N in units of y² |
+/// What a tracker forgets, written as a word and its numbers, with a colon before each: `none`, `selective:0.99`. The words and
+/// numbers are those of [`Forgetting::policies`]; a factor alone is that of `exponential`, and 1 alone is `none`.
 ///
 /// What is written is read back as the same. That a factor is above n/(n + 1), for n parameters, is checked when a tracker is
 /// made.

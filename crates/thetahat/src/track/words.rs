@@ -1,6 +1,7 @@
 //! Methods, policies and starts as a person writes them.
 
 use std::fmt;
+use std::iter;
 use std::str::FromStr;
 
 use thetahat_core::{Forgetting, Start};
@@ -35,8 +36,20 @@ impl fmt::Display for TrackMethod {
 }
 
 /// The policies, in the words of a message.
-const POLICIES: &str = "write none, a factor such as 0.99, exponential:0.99, selective:0.99, random-walk:1e-6 or \
-                        variable:FACTOR:MINIMUM:NOISE_VARIANCE";
+fn policies() -> String {
+    let written: Vec<String> = Policy::all_written().collect();
+    format!("write {}, or a factor such as 0.99", written.join(", "))
+}
+
+impl Policy {
+    /// How each policy is written, such as `variable:FACTOR:MINIMUM:NOISE_VARIANCE`.
+    pub fn all_written() -> impl Iterator<Item = String> {
+        Forgetting::policies().iter().map(|policy| {
+            let numbers = policy.numbers.iter().map(|number| number.name.to_uppercase());
+            iter::once(policy.word.to_owned()).chain(numbers).collect::<Vec<_>>().join(":")
+        })
+    }
+}
 
 impl FromStr for Policy {
     type Err = Error;
@@ -47,63 +60,43 @@ impl FromStr for Policy {
         let wrong = |why: &str| Error::argument("forgetting", format!("'{text}' {why}"));
         let number = |written: &str| {
             let number = written.parse::<f64>().ok().filter(|number| number.is_finite());
-            number.ok_or_else(|| wrong(&format!("has '{written}' where a number must be; {POLICIES}")))
+            number.ok_or_else(|| wrong(&format!("has '{written}' where a number must be; {}", policies())))
         };
-        let factor = |written: &str| {
-            let factor = number(written)?;
-            let fits = factor > 0.0 && factor <= 1.0;
-            fits.then_some(factor).ok_or_else(|| wrong("has a factor that is not above 0 and at most 1"))
+        let mut parts = text.split(':');
+        let word = parts.next().unwrap_or_default();
+        let given: Vec<&str> = parts.collect();
+        let named = |word: &str| Forgetting::policies().iter().find(|policy| policy.word == word);
+        let (policy, numbers) = match named(word) {
+            Some(policy) if policy.numbers.len() == given.len() => {
+                (policy, given.into_iter().map(number).collect::<Result<Vec<_>, _>>()?)
+            }
+            Some(_) => {
+                return Err(wrong(&format!("does not have the numbers of its word; {}", policies())));
+            }
+            None if given.is_empty() && word.parse::<f64>().is_ok() => {
+                let factor = number(word)?;
+                if factor == 1.0 {
+                    return Ok(Self(Forgetting::None));
+                }
+                (Forgetting::Exponential { factor }.describe().0, vec![factor])
+            }
+            None => return Err(wrong(&format!("is no policy; {}", policies()))),
         };
-        let (word, numbers) =
-            text.split_once(':').map_or((text, None), |(word, numbers)| (word, Some(numbers)));
-        let given = numbers.map_or(Vec::new(), |numbers| numbers.split(':').collect());
-        let forgetting = match (word, given.as_slice()) {
-            ("none", []) => Forgetting::None,
-            ("exponential", [one]) => Forgetting::Exponential { factor: factor(one)? },
-            ("selective", [one]) => Forgetting::Selective { factor: factor(one)? },
-            ("random-walk", [variance]) => {
-                let variance = number(variance)?;
-                if !(0.0..=100.0).contains(&variance) {
-                    return Err(wrong("has a variance that is not in 0 to 100"));
-                }
-                Forgetting::RandomWalk { variance }
-            }
-            ("variable", [most, least, noise]) => {
-                let (most, minimum, noise_variance) = (factor(most)?, factor(least)?, number(noise)?);
-                if minimum > most {
-                    return Err(wrong("has a minimum above its factor"));
-                }
-                if noise_variance < f64::MIN_POSITIVE {
-                    return Err(wrong("has a noise variance that is not above 0"));
-                }
-                Forgetting::Variable { factor: most, minimum, noise_variance }
-            }
-            (_, []) if word.parse::<f64>().is_ok() => match factor(word)? {
-                1.0 => Forgetting::None,
-                factor => Forgetting::Exponential { factor },
-            },
-            ("none" | "exponential" | "selective" | "random-walk" | "variable", _) => {
-                return Err(wrong(&format!("does not have the numbers of its word; {POLICIES}")));
-            }
-            _ => return Err(wrong(&format!("is no policy; {POLICIES}"))),
-        };
-        Ok(Self(forgetting))
+        if let Some((number, _)) = policy.refused(&numbers) {
+            let (name, range) = (number.name.replace('_', " "), number.range.says());
+            return Err(wrong(&format!("has a {name} that is not {range}")));
+        }
+        policy.with(&numbers).map(Self).map_err(|error| wrong(&error.to_string()))
     }
 }
 
 /// As it is read.
 impl fmt::Display for Policy {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (policy, mut numbers) = self.0.describe();
+        f.write_str(policy.word)?;
         // `{:?}` writes small numbers with an exponent, and all so that they are read back to the bit.
-        match self.0 {
-            Forgetting::Exponential { factor } => write!(f, "exponential:{factor:?}"),
-            Forgetting::Selective { factor } => write!(f, "selective:{factor:?}"),
-            Forgetting::RandomWalk { variance } => write!(f, "random-walk:{variance:?}"),
-            Forgetting::Variable { factor, minimum, noise_variance } => {
-                write!(f, "variable:{factor:?}:{minimum:?}:{noise_variance:?}")
-            }
-            _ => f.write_str("none"),
-        }
+        numbers.try_for_each(|(_, value)| write!(f, ":{value:?}"))
     }
 }
 

@@ -26,7 +26,7 @@ pub(crate) use respond::{
     BodeArguments, PredictArguments, RespondArguments, SimulateArguments, StartArgument, TransientArguments,
 };
 pub(crate) use track::{ResumeArgument, TrackArguments, TrackMethodArgument, TrackModelArgument};
-pub(crate) use validate::{CompareArguments, LookArguments, ValidateArguments};
+pub(crate) use validate::{CompareArguments, EvaluationArguments, ValidateArguments};
 
 const EXIT_CODES: &str = "\
 Exit codes:
@@ -70,11 +70,11 @@ Examples:
   thetahat fit log.csv --na 2 --nb 2 --norm 1 --bound a1=-1.9..0 --dc-gain 1..20
   thetahat fit log.csv --model oe --nb 2 --nf 2 --norm huber")]
     Fit(Box<FitArguments>),
-    /// Look at a log before any fit
+    /// Inspect a log before any fit
     ///
     /// Says of each channel its range, mean and trend, missing and repeated values, rounding, saturation and outliers; of the
     /// clock its step and jitter; of each input how much it excites, its delay and whether it follows the output. Ends
-    /// with warnings and the line of thetahat fit that goes with the log. Without -u and -y it looks at all columns of
+    /// with warnings and the line of thetahat fit that goes with the log. Without -u and -y it inspects all columns of
     /// numbers.
     #[command(after_help = "\
 Examples:

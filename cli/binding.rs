@@ -12,7 +12,7 @@ use thetahat::report::{EquationsPlan, Plan, Report, Requirement, ValidationPlan}
 use crate::args::{InspectArguments, ValidateArguments};
 use crate::commands::{Experiments, Tracking, experiments, inspected};
 use crate::failure::Failure;
-use crate::job::{FitJob, GreyJob, InspectJob, LookJob};
+use crate::job::{EvaluationJob, FitJob, GreyJob, InspectJob};
 use crate::replace::replace;
 
 /// Logs that were read as one.
@@ -67,7 +67,7 @@ pub fn equations_plan(options: &[OsString]) -> Result<EquationsPlan, Failure> {
     Ok(GreyJob::resolve(&arguments("fit", &words)?, Path::new("model"))?.plan)
 }
 
-/// How `thetahat validate` looks at a log with these options, and what it requires.
+/// How `thetahat validate` evaluates a model with these options, and what it requires.
 ///
 /// # Errors
 /// A [`Failure`] as the program would report it.
@@ -75,7 +75,7 @@ pub fn validation_plan(options: &[OsString]) -> Result<(ValidationPlan, Vec<Requ
     let files = ["report", "log"].map(OsString::from);
     let words: Vec<OsString> = options.iter().cloned().chain(files).collect();
     let arguments: ValidateArguments = arguments("validate", &words)?;
-    let mut job = LookJob::resolve(&arguments.look, &[])?;
+    let mut job = EvaluationJob::resolve(&arguments.evaluation, &[])?;
     let requirements = job.requirements(&arguments.require)?;
     Ok((job.plan, requirements))
 }

@@ -29,7 +29,7 @@ pub(crate) use fit::FitJob;
 pub(crate) use grey::GreyJob;
 pub(crate) use inspect::InspectJob;
 pub(crate) use track::TrackJob;
-pub(crate) use validate::LookJob;
+pub(crate) use validate::EvaluationJob;
 
 /// How to read a log.
 #[derive(Debug)]

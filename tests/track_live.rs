@@ -428,7 +428,7 @@ fn a_state_whose_numbers_were_edited_is_refused() {
         ("/trackers/0/score/output_variance", (-1.0).into()),
         ("/trackers/0/score/mean_nis", (-1.0).into()),
         ("/trackers/0/score/samples", 101.into()),
-        ("/trackers/0/score/judged", 1000.into()),
+        ("/trackers/0/score/evaluated", 1000.into()),
         ("/trackers/0/scales/output", (-2.0).into()),
         ("/trackers/0/settling", 1000.into()),
         ("/trackers/0/has_estimate", false.into()),

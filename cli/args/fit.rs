@@ -107,7 +107,7 @@ pub(crate) struct ModelArguments {
     /// without D and F)
     #[arg(long, value_enum, default_value = "conditional", help_heading = "Model")]
     pub(crate) likelihood: LikelihoodArgument,
-    /// What stands before the first sample of a stretch
+    /// What stands before the first sample of a segment
     #[arg(long, value_enum, default_value = "auto", help_heading = "Model")]
     pub(crate) initial: InitialArgument,
     /// What the model is for: prediction (errors one step ahead), simulation (free runs, driven by the inputs alone), or a number
@@ -134,7 +134,7 @@ pub(crate) struct ChoiceArguments {
     #[arg(long, value_name = "CRITERION", value_parser = selects())]
     pub(crate) select: Option<Select>,
     /// Cut the rows in time order into parts: models are fitted to the first and compared, the chosen one is fitted again to
-    /// the first two and judged on the third; 0 for a part that is not wanted
+    /// the first two and evaluated on the third; 0 for a part that is not wanted
     #[arg(long, value_name = "E/V/T", conflicts_with = "validate", allow_hyphen_values = true)]
     pub(crate) split: Option<String>,
 }

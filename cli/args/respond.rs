@@ -11,7 +11,7 @@ pub(crate) struct PredictArguments {
     /// Steps ahead; inf for a free run, like simulate
     #[arg(long, value_name = "K", default_value = "1", allow_hyphen_values = true)]
     pub(crate) horizon: String,
-    /// What stands before the first sample of a stretch
+    /// What stands before the first sample of a segment
     #[arg(long, value_enum, default_value = "auto")]
     pub(crate) initial: StartArgument,
     #[command(flatten)]
@@ -29,7 +29,7 @@ pub(crate) struct SimulateArguments {
     /// Write the drawn runs themselves to a file: CSV with a row for each row of the log, and a column for each draw
     #[arg(long, value_name = "FILE", requires = "draws")]
     pub(crate) draws_file: Option<PathBuf>,
-    /// What stands before the first sample of a stretch
+    /// What stands before the first sample of a segment
     #[arg(long, value_enum, default_value = "auto")]
     pub(crate) initial: StartArgument,
     #[command(flatten)]

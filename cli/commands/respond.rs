@@ -105,7 +105,7 @@ fn respond(
         let of = if applied.outputs.len() > 1 { format!("{}: ", output.name) } else { String::new() };
         match &output.fit {
             Some(_) if !output.predicted.iter().any(|value| value.is_finite()) => {
-                warn(&format!("{of}no row could be predicted: the stretches without a gap are too short"))
+                warn(&format!("{of}no row could be predicted: the segments without a gap are too short"))
             }
             Some(fit) => tell(&format!("{of}{}", summary::figure(fit))),
             None => {}

@@ -98,7 +98,7 @@ impl State {
         Ok(state)
     }
 
-    /// Whether its own parts fit together, as they do if nobody has edited it. The trackers are looked at beside new ones.
+    /// Whether its own parts fit together, as they do if nobody has edited it. The trackers are compared with new ones.
     fn is_sound(&self) -> bool {
         let Self { rows, written, first, last, pace, gaps, alarms, trackers, .. } = self;
         !trackers.is_empty()

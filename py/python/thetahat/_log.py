@@ -19,7 +19,7 @@ from thetahat._options import Duration, ReadOptions, Resample
 class Log:
     """Inputs and outputs on a common clock.
 
-    A log owns its data: arrays are copied once, here. NaN is a missing sample; it ends a stretch, and nothing reaches
+    A log owns its data: arrays are copied once, here. NaN is a missing sample; it ends a segment, and nothing reaches
     across. Rows are counted as Python does: ``log[:500]`` is the log of the first 500, and ``log["u"]`` is a channel.
 
     Parameters
@@ -339,7 +339,7 @@ class Log:
 
     @property
     def segments(self) -> list[range]:
-        """The stretches of rows that estimators see: in none a value is missing, the clock jumps, or an experiment ends.
+        """The segments of rows that estimators see: in none a value is missing, the clock jumps, or an experiment ends.
 
         Examples
         --------

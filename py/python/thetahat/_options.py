@@ -45,7 +45,7 @@ class FitOptions(TypedDict, total=False):
     Attributes
     ----------
     estimate, validate : rows
-        The rows to fit to (all, unless said otherwise), and those to judge on: ``slice(0, 500)`` as Python counts, or
+        The rows to fit to (all, unless said otherwise), and those to validate on: ``slice(0, 500)`` as Python counts, or
         ``"1..500"``, which counts from 1 and holds both ends; or a list of these.
     split : (float, float, float)
         Cuts the rows in time order into parts to fit, to choose and to test, such as ``(60, 20, 20)``.
@@ -57,7 +57,7 @@ class FitOptions(TypedDict, total=False):
         The band of frequencies in Hz whose errors the fit makes small, such as ``(0.1, 5)``: inputs and output go through one
         Butterworth filter. The model and its figures are of the signals as they are.
     initial : {"auto", "drop", "zero", "estimate"}
-        What stands for the samples before the first of a stretch. Rows that the log has before those to fit to are used as
+        What stands for the samples before the first of a segment. Rows that the log has before those to fit to are used as
         past inputs and outputs in all cases but "zero". Without them, "drop" leaves out the first rows, for models without F;
         "estimate" finds what they did to B/F u with the parameters, for models with F. "auto" is "drop" without F; with F it
         is "estimate" where there is a past or where that is worth its parameters, else "zero".
@@ -135,7 +135,7 @@ class EquationsOptions(TypedDict, total=False):
     Attributes
     ----------
     estimate, validate, split
-        Rows to fit to and to judge on, see `FitOptions`. In each log the model begins, as it says, with the first row to fit to.
+        Rows to fit to and to validate on, see `FitOptions`. In each log the model begins, as it says, with the first row to fit to.
     max_iterations : int
         Iterations at most, from each start: 100.
     tolerance : float
@@ -164,11 +164,11 @@ class ValidationOptions(TypedDict, total=False):
     Attributes
     ----------
     rows : rows
-        The rows to look at; all, unless said otherwise.
+        The rows to validate on; all, unless said otherwise.
     detrend : {"model", "none", "mean", "linear", "start:K"}
-        The offsets: the model's own, or those of the rows looked at.
+        The offsets: the model's own, or those of the rows evaluated.
     horizon : int or list of int
-        How many steps ahead to look besides 1.
+        Prediction horizons besides 1, in steps.
     lags : int
         Lags of the tests of residuals.
     alpha : float

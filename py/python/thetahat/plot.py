@@ -31,7 +31,7 @@ from matplotlib.ticker import MaxNLocator
 
 from thetahat import _drawing, _numbers, _options, _thetahat
 from thetahat._filter import StateTrajectory
-from thetahat._judgement import Inspection, Validation
+from thetahat._evaluation import Inspection, Validation
 from thetahat._log import Log
 from thetahat._model import Model
 from thetahat._responses import FrequencyResponse, TransientResponse
@@ -222,7 +222,7 @@ def residuals(of: Validation | Model, log: Log | None = None, axes: Any = None) 
             raise TypeError("log: a model is validated on data; give a Log too")
         of = of.validate(log)
     elif log is not None:
-        raise TypeError("log: the validation has looked at its own; leave it out")
+        raise TypeError("log: the validation has a log of its own; leave it out")
     _drawing.expect("of", of, Validation)
     if len(of.document["noise"]) > 1:
         raise ValueError("of: there are several outputs; the page of the validation shows them all")

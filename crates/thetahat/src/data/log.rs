@@ -394,7 +394,7 @@ impl Log {
         self.jumps.len() - self.borders.len()
     }
 
-    /// The stretches of consecutive rows inside `parts` in which none of the named channels misses a value
+    /// The segments of consecutive rows inside `parts` in which none of the named channels misses a value
     /// and the clock does not jump, as 0-based ranges.
     ///
     /// # Errors
@@ -410,7 +410,7 @@ impl Log {
 
     /// The same for the values of some of its channels.
     pub(crate) fn segments_of(&self, channels: &[&[f64]], parts: &[Rows]) -> Vec<Range<usize>> {
-        // Those that miss nothing need not be looked through row by row.
+        // Those that miss nothing need not be searched row by row.
         let channels: Vec<&[f64]> = channels.iter().copied().filter(|values| misses(values)).collect();
         let mut segments = Vec::new();
         for part in parts {

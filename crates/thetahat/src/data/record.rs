@@ -13,7 +13,7 @@ pub struct Record<'a> {
     pub output: &'a [f64],
     /// u_j(t), N values each.
     pub inputs: Vec<&'a [f64]>,
-    /// Stretches of consecutive samples, in rising order, apart from each other.
+    /// Segments of consecutive samples, in rising order, apart from each other.
     pub segments: Vec<Range<usize>>,
     /// How many usable samples stand directly before each segment: the measured past that a response may start from.
     pub past: Vec<usize>,

@@ -125,7 +125,7 @@ struct Filtered<'a> {
     usable: Vec<bool>,
     missing: Vec<usize>,
     /// Rows without a gap of the clock between them.
-    stretches: Vec<Range<usize>>,
+    segments: Vec<Range<usize>>,
 }
 
 impl<'a> Filtered<'a> {
@@ -142,22 +142,22 @@ impl<'a> Filtered<'a> {
         Self {
             weights,
             missing: missing.collect(),
-            stretches: starts.iter().zip(ends).map(|(start, end)| *start..end).collect(),
+            segments: starts.iter().zip(ends).map(|(start, end)| *start..end).collect(),
             usable,
         }
     }
 
-    /// The stretch of a row.
-    fn stretch(&self, row: usize) -> Range<usize> {
-        let behind = self.stretches.partition_point(|stretch| stretch.start <= row);
-        self.stretches[behind - 1].clone()
+    /// The segment of a row.
+    fn segment(&self, row: usize) -> Range<usize> {
+        let behind = self.segments.partition_point(|segment| segment.start <= row);
+        self.segments[behind - 1].clone()
     }
 
     /// The filtered value of a row.
     fn at(&self, values: &[f64], row: usize) -> f64 {
         let half = self.weights.len() / 2;
-        let stretch = self.stretch(row);
-        let rows = row.saturating_sub(half).max(stretch.start)..(row + half + 1).min(stretch.end);
+        let segment = self.segment(row);
+        let rows = row.saturating_sub(half).max(segment.start)..(row + half + 1).min(segment.end);
         let weights = &self.weights[rows.start + half - row..rows.end + half - row];
         let (sum, weight) = if self.missing[rows.end] == self.missing[rows.start] {
             (product(weights, &values[rows.clone()]), weights.iter().sum())
@@ -242,7 +242,7 @@ impl Log {
                     return f64::NAN;
                 }
                 let value = filtered.at(own, left);
-                if interpolation == Interpolation::Hold || !late || left + 1 >= filtered.stretch(left).end {
+                if interpolation == Interpolation::Hold || !late || left + 1 >= filtered.segment(left).end {
                     return value;
                 }
                 let fraction = (instant - time[left]) / (time[left + 1] - time[left]);

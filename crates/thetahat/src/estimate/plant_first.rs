@@ -128,7 +128,7 @@ pub(crate) fn noise_order(record: &Record<'_>, orders: &Orders, estimate: &Estim
     let longest = LONGEST.min(v.len() / SAMPLES);
     let mut best = (f64::INFINITY, 0);
     for order in 0..=longest {
-        // All of them look at the same errors.
+        // All of them see the same errors.
         let segments: Vec<Range<usize>> = all
             .segments
             .iter()
@@ -192,10 +192,10 @@ fn own_guess(guess: &[f64], orders: &Orders, plant: &Orders) -> Option<Vec<f64>>
     })
 }
 
-/// Errors, and the stretches of them that follow one another.
+/// Errors, and the segments of them that follow one another.
 type Errors = (Vec<f64>, Vec<Range<usize>>);
 
-/// v of an estimated plant, and the stretches of it that follow one another.
+/// v of an estimated plant, and the segments of it that follow one another.
 fn free_run_errors(record: &Record<'_>, plant: &Orders, estimate: &Estimate) -> Result<Errors, Error> {
     let mut predictor = predictor_of(record, plant, estimate);
     if best_free(&mut predictor, estimate.parameters()).is_err() {

@@ -410,7 +410,7 @@ impl<'a> Predictor<'a> {
         self.sections.iter().map(|section| section.free_gain).sum()
     }
 
-    /// The errors that count, and the stretches of them that follow one another.
+    /// The errors that count, and the segments of them that follow one another.
     pub(super) fn residuals(&self) -> (Vec<f64>, Vec<Range<usize>>) {
         let mut residuals = Vec::with_capacity(self.samples);
         let runs =

@@ -16,7 +16,7 @@ pub(super) type Observer = LuenbergerObserver<f64, Dyn, Dyn>;
 
 /// A row as a model sees it: deviations from the channels' offsets.
 #[derive(Debug, Clone)]
-pub(super) struct Moment {
+pub(super) struct Sample {
     /// Seconds since the first row.
     pub(super) time: f64,
     pub(super) inputs: DVector<f64>,
@@ -132,7 +132,7 @@ impl Kind {
     pub(super) fn predict(
         &self,
         filter: &mut impl Recursion,
-        from: &Moment,
+        from: &Sample,
         (count, dt): Division,
         work: &mut Work,
     ) -> Result<(), Error> {
@@ -169,7 +169,7 @@ impl Kind {
     pub(super) fn correct(
         &self,
         filter: &mut impl Recursion,
-        at: &Moment,
+        at: &Sample,
         work: &mut Work,
         show: impl FnOnce(&DVector<f64>, &DMatrix<f64>),
     ) -> Result<Innovation<f64, DVector<f64>>, Error> {
@@ -193,7 +193,7 @@ impl Kind {
         &self,
         observer: &mut Observer,
         poles: Option<&DVector<Complex<f64>>>,
-        from: &Moment,
+        from: &Sample,
         (count, dt): Division,
         work: &mut Work,
     ) -> Result<(), Error> {
@@ -223,7 +223,7 @@ impl Kind {
     pub(super) fn outputs(
         &self,
         estimate: &DVector<f64>,
-        at: &Moment,
+        at: &Sample,
         work: &mut Work,
     ) -> Result<DVector<f64>, Error> {
         Ok(match self {

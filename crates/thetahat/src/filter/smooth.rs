@@ -76,22 +76,22 @@ impl StateFilter {
         let mut smoother = Smoother::new(kind.started().map_err(overflow)?);
         let mut work = Work::default();
         // Which of the smoother's samples a row is.
-        let (mut sample, mut samples) = (0, Vec::with_capacity(history.len()));
+        let (mut place, mut places) = (0, Vec::with_capacity(history.len()));
         let mut previous = None;
-        for (division, moment) in history {
+        for (division, sample) in history {
             if let Some((previous, division)) = previous.zip(*division) {
                 kind.predict(&mut smoother, previous, division, &mut work).map_err(overflow)?;
-                sample += division.0;
+                place += division.0;
             }
-            kind.correct(&mut smoother, moment, &mut work, |_, _| ()).map_err(overflow)?;
-            samples.push(sample);
-            previous = Some(moment);
+            kind.correct(&mut smoother, sample, &mut work, |_, _| ()).map_err(overflow)?;
+            places.push(place);
+            previous = Some(sample);
         }
         let smoothed = smoother.smooth().map_err(overflow)?;
 
         let (states, parameters) = (self.model().states().len(), self.model().unknown().len());
         let (mut values, mut deviations) = (Vec::new(), Vec::new());
-        for sample in samples.into_iter().map(|sample| &smoothed[sample]) {
+        for sample in places.into_iter().map(|place| &smoothed[place]) {
             values.extend_from_slice(sample.state.as_slice());
             deviations.extend(sample.covariance.diagonal().iter().map(|variance| variance.sqrt()));
         }

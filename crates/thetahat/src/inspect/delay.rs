@@ -9,9 +9,9 @@ use crate::data::Record;
 use crate::regression::{Lagged, Presample, Taps, sum_of_squares};
 use crate::select::{constant_pays, delays};
 
-/// The highest lag looked at.
+/// The highest lag tried.
 const HIGHEST: usize = 50;
-/// Samples for each lag looked at.
+/// Samples for each lag tried.
 const SAMPLES: usize = 10;
 /// Below this fraction of the square of a signal, what is left of it by its past is rounding.
 const ROUNDING: f64 = 1e-8;

@@ -9,9 +9,9 @@ use super::moments::{self, samples};
 use super::{Excitation, spectrum};
 use crate::regression::{Lagged, Presample, Taps, sum, sum_of_squares};
 
-/// The highest order looked for.
+/// The highest order tried.
 const HIGHEST: usize = 50;
-/// Samples for each order looked for.
+/// Samples for each order tried.
 const SAMPLES: usize = 4;
 /// An eigenvalue below this fraction of the largest counts as zero.
 const TOLERANCE: f64 = 1e-6;

@@ -1,4 +1,4 @@
-//! Filters in q^-1 over stretches of a signal: products with a polynomial, and divisions by a monic one.
+//! Filters in q^-1 over segments of a signal: products with a polynomial, and divisions by a monic one.
 
 use std::ops::Range;
 

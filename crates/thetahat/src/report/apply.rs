@@ -1,7 +1,7 @@
 use std::borrow::Cow;
 
+use super::fitted_rows::rows_of_fit;
 use super::schema::Report;
-use super::seen::rows_of_fit;
 use super::suited::{check_offsets, check_sample_time};
 use crate::Error;
 use crate::data::{Detrend, Log, Offset, Rows, checked};
@@ -47,7 +47,7 @@ pub struct AppliedOutput {
 /// A prediction k steps ahead is also a forecast of the k samples behind the last usable row, each as many steps
 /// ahead as it lies behind that row: of rows asked for that have the inputs but not the output, and, for a model that
 /// no input drives and if the log's last row was asked for, of rows behind the log's end, in its own time step. There
-/// is no forecast where the last stretch without a gap is too short to start from. A model without A, C and D needs no past
+/// is no forecast where the last segment without a gap is too short to start from. A model without A, C and D needs no past
 /// output: it has a value in every row that its inputs reach. So has one in equations, of which every prediction starts from what its
 /// filter knows k rows before.
 ///

@@ -13,7 +13,7 @@ use crate::respond::Horizon;
 const PARTS: usize = 3;
 
 /// Where a choice found one model for prediction and another for simulation: both, by name, fitted to the first two thirds of the
-/// rows that it was made on, and looked at on the last third of `log`. None where there was no such choice, and none of a model that
+/// rows that it was made on, and evaluated on the last third of `log`. None where there was no such choice, and none of a model that
 /// these rows do not determine.
 ///
 /// Cost: two fits.

@@ -1,7 +1,7 @@
 //! What a careful reader of a report should know, in plain words.
 
+use super::fitted_rows::is_exact;
 use super::schema::Report;
-use super::seen::is_exact;
 use crate::estimate::{Procedure, SearchOutcome, Stopped};
 use crate::figures::{fixed, number, scientific};
 use crate::model::{Orders, PolynomialModel, Structure, cancel, near_cancellation};

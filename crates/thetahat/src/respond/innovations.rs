@@ -6,7 +6,7 @@
 //! e(t) = (D(q)/C(q)) w(t)
 //! ```
 //!
-//! (Ljung, System Identification, 2nd ed. 1999, sections 3.2 and 4.2). In the first r samples of a stretch of which
+//! (Ljung, System Identification, 2nd ed. 1999, sections 3.2 and 4.2). In the first r samples of a segment of which
 //! the past is unknown, v = D w is set to zero, and with it e = v/C; r = max(na, nb + nk - 1) + nd, over the inputs
 //! without F. F begins from rest, or with impulses: nf free responses of 1/F, the combination of which makes up for any x
 //! before, inputs before being zero; or max(nf, nb + nk - 1) of them, which makes up for any such inputs too. This is what estimates
@@ -24,7 +24,7 @@ use crate::regression::{add_filtered, divide, sum_of_squares};
 /// The innovations of one segment.
 #[derive(Debug)]
 pub(crate) struct Innovations {
-    /// The samples looked at: the segment, and before it those that it starts from.
+    /// The samples used: the segment, and before it those that it starts from.
     pub(crate) rows: Range<usize>,
     /// How many of the first of the rows have e = 0 for want of what was before.
     pub(super) silent: usize,
@@ -68,7 +68,7 @@ impl Innovations {
     }
 }
 
-/// Impulses into 1/F from a sample of a stretch on, for each input.
+/// Impulses into 1/F from a sample of a segment on, for each input.
 #[derive(Debug)]
 pub(super) struct Impulses {
     pub(super) first: usize,
@@ -86,10 +86,10 @@ impl Impulses {
     }
 }
 
-/// Which impulses are estimated for a stretch.
+/// Which impulses are estimated for a segment.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Basis {
-    /// The first samples of the stretch have no e.
+    /// The first samples of the segment have no e.
     silent: usize,
     /// The sample that the first impulse is at, and how many there are for each input.
     pub(super) first: usize,
@@ -156,7 +156,7 @@ pub(super) fn of_segments(
     Ok(if worth { more } else { found })
 }
 
-/// For a start from estimated initial conditions: how many samples of a stretch have no e, and where impulses begin. The stretch
+/// For a start from estimated initial conditions: how many samples of a segment have no e, and where impulses begin. The segment
 /// begins with the past that the errors of its segment reach back to.
 fn estimated(model: &PolynomialModel, past: usize, with_inputs: bool) -> (usize, usize) {
     let silent = past.min(model.orders.history()).max(model.orders.conditioned());
@@ -227,7 +227,7 @@ fn measured_runs(model: &PolynomialModel, record: &Record<'_>, rows: &Range<usiz
     measured(record.output, rows)
 }
 
-/// x over stretches of the inputs, zeros before them, all as long as one another.
+/// x over segments of the inputs, zeros before them, all as long as one another.
 pub(super) fn driven(
     model: &PolynomialModel,
     inputs: &[&[f64]],
@@ -313,7 +313,7 @@ pub(super) fn best(model: &PolynomialModel, errors: &[f64], basis: &Basis) -> Re
     Ok(Impulses { first: basis.first, weights: each.collect() })
 }
 
-/// What unit impulses do to the errors of a stretch, and how many samples of it say something of them.
+/// What unit impulses do to the errors of a segment, and how many samples of it say something of them.
 pub(super) fn free_columns(model: &PolynomialModel, samples: usize, basis: &Basis) -> (usize, Vec<Column>) {
     let Basis { silent, first, counts, gaps } = basis;
     let (silent, first) = (*silent, *first);

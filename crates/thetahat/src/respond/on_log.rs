@@ -66,10 +66,10 @@ pub(crate) struct Tested<'a> {
 #[derive(Debug)]
 pub(crate) struct PolynomialOnLog<'l> {
     model: &'l PolynomialModel,
-    /// What predictions look at, and what they start from.
+    /// What predictions are made from, and what they start from.
     ahead: Record<'l>,
     start: Start,
-    /// What free runs look at.
+    /// What free runs are made from.
     free_run: Record<'l>,
 }
 
@@ -90,7 +90,7 @@ impl<'l> PolynomialOnLog<'l> {
         Ok(Self { model, ahead: record(one)?, start: start(one), free_run: record(Horizon::FreeRun)? })
     }
 
-    /// Predictions that look at another record, and start from something else.
+    /// Predictions from another record, and start from something else.
     pub(crate) fn with_predictions(self, ahead: Record<'l>, start: Start) -> Self {
         Self { ahead, start, ..self }
     }
@@ -164,9 +164,9 @@ impl OnLog for PolynomialOnLog<'_> {
         let driving = model.inputs.iter().zip(&model.orders.nb).filter(|(_, nb)| **nb > 0);
         let driving: Vec<&str> = driving.map(|(input, _)| input.name.as_str()).collect();
         // As far as the inputs go on without a gap.
-        let stretches = log.segments(&driving, rows)?;
-        let stretch = stretches.into_iter().find(|stretch| stretch.contains(&(first - 1)));
-        let end = stretch.map_or(first, |stretch| stretch.end);
+        let segments = log.segments(&driving, rows)?;
+        let segment = segments.into_iter().find(|segment| segment.contains(&(first - 1)));
+        let end = segment.map_or(first, |segment| segment.end);
         let known = if driving.is_empty() && end == log.rows() { steps } else { steps.min(end - first) };
         if known == 0 {
             return Ok(None);
@@ -181,7 +181,7 @@ impl OnLog for PolynomialOnLog<'_> {
     }
 }
 
-/// The record that a response of a model looks at. It goes on through missing outputs where no past one is needed.
+/// The record that a response of a model is made from. It goes on through missing outputs where no past one is needed.
 pub(crate) fn record_for<'l>(
     model: &PolynomialModel,
     log: &'l Log,

@@ -113,7 +113,7 @@ fn roots(matrix: DMatrix<f64>) -> Vec<(f64, Vec<f64>)> {
         .collect()
 }
 
-/// The signals of a stretch, of which the first `known` samples are measured and others may follow.
+/// The signals of a segment, of which the first `known` samples are measured and others may follow.
 #[derive(Debug)]
 pub(super) struct Paths {
     pub(super) known: usize,
@@ -138,7 +138,7 @@ struct Moved {
 }
 
 impl Paths {
-    /// `inputs`, `output`, `disturbance` and `errors` go as far as they are to be looked at.
+    /// `inputs`, `output`, `disturbance` and `errors` go as far as they are used.
     pub(super) fn new(
         model: &PolynomialModel,
         found: &Innovations,

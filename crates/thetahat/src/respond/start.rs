@@ -9,7 +9,7 @@ use crate::model::PolynomialModel;
 
 /// What a response starts from, in the words of [`Initial`](crate::estimate::Initial) for fits.
 ///
-/// In the first r = max(na, nb + nk - 1 of the inputs without F) + nd samples of a stretch, A, B and D reach back to
+/// In the first r = max(na, nb + nk - 1 of the inputs without F) + nd samples of a segment, A, B and D reach back to
 /// samples that are not there. Unless these are taken as zero, e is, and the r samples do not count. What [`Initial`](crate::estimate::Initial)
 /// says of them holds here too.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]

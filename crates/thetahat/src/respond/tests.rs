@@ -84,7 +84,7 @@ fn views(signals: &[Vec<f64>]) -> Vec<&[f64]> {
     signals.iter().map(Vec::as_slice).collect()
 }
 
-/// Segments of all lengths, and how many samples before each may be looked at.
+/// Segments of all lengths, and how many samples before each may be used.
 fn cut<'a>(output: &'a [f64], inputs: &'a [Vec<f64>]) -> Record<'a> {
     let segments = vec![0..1, 3..60, 61..69, 70..140];
     Record { output, inputs: views(inputs), segments, past: vec![0, 2, 0, 7] }

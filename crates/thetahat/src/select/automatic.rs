@@ -9,7 +9,7 @@ use super::compare::compare;
 use super::delay;
 use super::grid::key;
 use super::ranking::ranked;
-use super::{Automatic, Found, Selection, Task};
+use super::{Automatic, SelectedModel, Selection, Task};
 use crate::Error;
 use crate::data::Record;
 use crate::estimate::{Initial, pays};
@@ -18,7 +18,7 @@ use crate::model::{Orders, Structure};
 /// The highest order of ARX and AR models, and of the others.
 const LONGEST: usize = 10;
 const HIGHEST: usize = 3;
-/// Orders of A or F, of B, of C and of D in models that are looked at for their free runs.
+/// Orders of A or F, of B, of C and of D in models that are compared by their free runs.
 const DIAGONAL_ARX: [[usize; 4]; 8] = [
     [1, 1, 0, 0],
     [2, 2, 0, 0],
@@ -46,7 +46,7 @@ const CONSTANT_ORDERS: [usize; 2] = [2, LONGEST];
 
 /// # Errors
 /// As for [`choose`](super::choose).
-pub(super) fn choose(task: &Task<'_>, automatic: &Automatic) -> Result<Found, Error> {
+pub(super) fn choose(task: &Task<'_>, automatic: &Automatic) -> Result<SelectedModel, Error> {
     let inputs = task.inputs.len();
     if inputs > MOST_INPUTS {
         return Err(Error::argument(
@@ -90,10 +90,10 @@ pub(super) fn choose(task: &Task<'_>, automatic: &Automatic) -> Result<Found, Er
     models.sort_by_key(Orders::parameters);
     let tried = models.clone();
     let outcome = compare(task, models)?;
-    let Found { mut selection, guess } = ranked(task, outcome, None)?;
+    let SelectedModel { mut selection, guess } = ranked(task, outcome, None)?;
     selection.steps.extend(at_the_edge(&selection.chosen.orders, &tried));
     steps.append(&mut selection.steps);
-    Ok(Found { selection: Selection { steps, delays, ..selection }, guess })
+    Ok(SelectedModel { selection: Selection { steps, delays, ..selection }, guess })
 }
 
 /// Orders without some inputs.

@@ -1,6 +1,6 @@
 //! The models of a choice, and the samples that all of them are compared on.
 
-use super::Scored;
+use super::Candidate;
 use super::linear::{Columns, Kept, Rows};
 use crate::Error;
 use crate::data::Record;
@@ -20,7 +20,7 @@ const LEAST_OF_PIECE: usize = 20;
 
 /// A model on the common samples.
 #[derive(Debug, Clone)]
-pub(super) struct Tried {
+pub(super) struct Trial {
     pub(super) orders: Orders,
     pub(super) point: Option<Point>,
 }
@@ -28,7 +28,7 @@ pub(super) struct Tried {
 /// A model that was compared.
 #[derive(Debug, Clone)]
 pub(super) struct Compared {
-    pub(super) scored: Scored,
+    pub(super) scored: Candidate,
     /// The parameters, if they were searched for.
     pub(super) guess: Option<Vec<f64>>,
     /// The largest modulus of a pole of the plant; infinite where that is not known.

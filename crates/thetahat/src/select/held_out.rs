@@ -1,12 +1,12 @@
 //! How well models simulate samples that they were not fitted to, or predict them several steps ahead.
 //!
-//! The record is cut into thirds. Each model is fitted again to two of them and looked at on the third, with the initial state
+//! The record is cut into thirds. Each model is fitted again to two of them and evaluated on the third, with the initial state
 //! that fits best there. Errors are in standard deviations of the output and count up to five of them, so that a run that leaves the
 //! range of the data does not outweigh all others; a model that is unstable without a third counts as if it had left it.
 
 use rayon::prelude::*;
 
-use super::candidates::{Samples, Tried, total};
+use super::candidates::{Samples, Trial, total};
 use super::folds::Folds;
 use super::{HeldOut, Task};
 use crate::Error;
@@ -52,13 +52,13 @@ pub(super) fn figures(
     task: &Task<'_>,
     record: &Record<'_>,
     samples: &Samples,
-    tried: &[Tried],
+    tried: &[Trial],
     which: &[usize],
 ) -> Result<Vec<Option<Seen>>, Error> {
     let mut figures = vec![None; tried.len()];
     let deviation = deviation(record);
     let folds = Folds::new(record, BLOCKS);
-    let some: Vec<Tried> = which.iter().map(|&k| tried[k].clone()).collect();
+    let some: Vec<Trial> = which.iter().map(|&k| tried[k].clone()).collect();
     if some.is_empty() || deviation == 0.0 || (0..BLOCKS).any(|fold| total(&folds.test(fold)) == 0) {
         return Ok(figures);
     }
@@ -113,9 +113,9 @@ pub(super) fn figures(
     Ok(figures)
 }
 
-/// The models that are looked at: of each structure, delay and number of parameters the one with the least criterion, in the order
+/// The models that are evaluated: of each structure, delay and number of parameters the one with the least criterion, in the order
 /// of their criterion.
-pub(super) fn promising(order: &[usize], tried: &[Tried]) -> Vec<usize> {
+pub(super) fn promising(order: &[usize], tried: &[Trial]) -> Vec<usize> {
     let mut seen: Vec<(Structure, usize, &[usize])> = Vec::new();
     let mut promising = Vec::new();
     for &k in order {

@@ -27,7 +27,7 @@ impl<'a> Task<'a> {
         orders.with_constants(self.estimation.inputs.len() - self.inputs.len())
     }
 
-    /// Whether models are judged by more than errors one step ahead.
+    /// Whether models are evaluated by more than errors one step ahead.
     pub(super) fn looks_further(&self) -> bool {
         !self.inputs.is_empty() && self.focus.looks_further()
     }
@@ -50,7 +50,7 @@ impl<'a> Task<'a> {
 
 /// What was chosen.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Found {
+pub(crate) struct SelectedModel {
     pub(crate) selection: Selection,
     /// The parameters of the chosen model, with a constant and a trend where the records have them, if a search found them: a
     /// start for the search on all samples.

@@ -36,7 +36,7 @@ pub(super) struct Winners {
     pub(super) chosen: usize,
 }
 
-/// The winners among models in the order of their criterion; none where no model is stable, or none was looked at.
+/// The winners among models in the order of their criterion; none where no model is stable, or none was evaluated.
 ///
 /// What has no figures on blocks, as the data without one do not determine it, may predict; it is not compared.
 pub(super) fn winners(focus: Focus, models: &[&Compared], samples: usize) -> Option<Winners> {

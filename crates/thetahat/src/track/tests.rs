@@ -313,7 +313,7 @@ fn the_score_is_its_definition() {
     let near = |found: Option<f64>, expected: f64| {
         assert!((found.unwrap() / expected - 1.0).abs() < 1e-12, "{found:?} {expected}");
     };
-    assert_eq!((score.samples(), score.judged()), (958, 958));
+    assert_eq!((score.samples(), score.evaluated()), (958, 958));
     near(score.mean_squared_error(), mse);
     near(score.fit(), 100.0 * (1.0 - (mse / variance).sqrt()));
     near(score.mean_nis(), mean(&mut counted.iter().map(|t| t.nis)));

@@ -133,7 +133,7 @@ impl Objective for Shared<'_> {
     }
 }
 
-/// The plant, its parameters in the order of A and B, with its free-run errors and their stretches.
+/// The plant, its parameters in the order of A and B, with its free-run errors and their segments.
 pub(super) fn plant(
     record: &Record<'_>,
     orders: &Orders,

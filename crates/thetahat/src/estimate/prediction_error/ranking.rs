@@ -87,7 +87,7 @@ impl Job<'_> {
             let missing = (self.options.starts + 1).saturating_sub(starts.len());
             let more: Vec<_> = restarts(orders, &best.parameters, self.options.seed, missing).collect();
             let more = more.into_iter().enumerate().map(|(number, mut parameters)| {
-                // A start that has no cost is judged by that.
+                // A start without a cost is ranked by that.
                 let _ = best_linear(predictor, &mut parameters);
                 Start::new(&format!("random-{}", number + 1), parameters, predictor)
             });
@@ -205,7 +205,7 @@ fn sort(starts: &mut [Start]) {
 }
 
 /// Whether searches from these sorted starts may end in different places, or far from where they begin: where they lead is
-/// predicted by a step of Gauss and Newton, for a long record on stretches of it.
+/// predicted by a step of Gauss and Newton, for a long record on segments of it.
 fn is_doubtful(problem: Problem<'_, '_>, starts: &[Start], predictor: &mut Predictor<'_>) -> bool {
     let mut recipes: Vec<(&str, &Start)> = Vec::new();
     for start in starts.iter().filter(|start| start.cost.is_finite()) {

@@ -135,7 +135,7 @@ fn clipped_values_are_saturated() {
     for decimals in [2, 15] {
         let values = limited(-0.7, 0.9, decimals);
         let count = |limit: f64| {
-            // Not the stretches with which the log begins or ends.
+            // Not the segments with which the log begins or ends.
             assert!(values[0] != limit && values[999] != limit);
             values.iter().filter(|value| **value == limit).count()
         };

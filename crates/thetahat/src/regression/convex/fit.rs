@@ -296,7 +296,7 @@ impl<'a> Fitting<'a> {
             let (high, second) = self.farthest(&frame, parameter, &-direction, bound, radius)?;
             Ok(([low, high], first + second))
         });
-        // Collected before a failure is looked at, so that it is the first one whatever the threads.
+        // Collected before a failure is reported, so that it is the first one whatever the threads.
         let extents: Vec<Result<_, Failure>> = extents.collect();
         let extents: Vec<([f64; 2], u32)> = extents.into_iter().collect::<Result<_, _>>()?;
         Ok((extents.iter().map(|(ends, _)| *ends).collect(), extents.iter().map(|(_, steps)| steps).sum()))

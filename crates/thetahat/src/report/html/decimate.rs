@@ -1,6 +1,6 @@
 //! Fewer points for the same picture.
 //!
-//! The rows are cut into as many equal stretches as the picture can show. Of each only the smallest and the largest value
+//! The rows are cut into as many equal segments as the picture can show. Of each only the smallest and the largest value
 //! stay, in their order: no peak is lost, as it would be by leaving out samples, or made smaller, as by averaging (Steinarsson
 //! 2013, Downsampling Time Series for Visual Representation, section 2).
 

@@ -151,9 +151,9 @@ fn the_errors_of_the_fit_are_those_of_the_model() {
                     (evaluated / report.estimation.mse - 1.0).abs() < 1e-9,
                     "{orders} {initial:?} {trend}"
                 );
-                let unjudged =
-                    Unjudged::new(log(&u, &y), &[], &plan, &|_| ControlFlow::Continue(())).unwrap();
-                assert_eq!(unjudged.judged(log(&u, &y)).unwrap(), report, "{orders}");
+                let pending =
+                    PendingEvaluation::new(log(&u, &y), &[], &plan, &|_| ControlFlow::Continue(())).unwrap();
+                assert_eq!(pending.evaluate(log(&u, &y)).unwrap(), report, "{orders}");
             }
         }
     }

@@ -85,7 +85,7 @@ class Validation(_Document):
         Raises
         ------
         ValueError
-            If the validation did not look so far ahead, or there are several outputs and none is named.
+            If the validation did not evaluate that horizon, or there are several outputs and none is named.
         """
         return self._figure("percent", horizon, output)
 
@@ -122,7 +122,7 @@ class Validation(_Document):
                 return float("nan" if fit[name] is None else fit[name])
         if horizon is None:
             raise ValueError("horizon: a model without inputs has no free run; give a number of steps")
-        raise ValueError(f"horizon: {horizon} was not looked at; validate with horizon={horizon}")
+        raise ValueError(f"horizon: {horizon} was not evaluated; validate with horizon={horizon}")
 
     @property
     def whiteness(self) -> float:
@@ -287,14 +287,14 @@ def inspect(
     skip_rows: int | None = None,
     missing: str | Sequence[str] | None = None,
 ) -> Inspection:
-    """Look at a log before any fit: its clock, the quality of its channels, excitation, delays and feedback.
+    """Inspect a log before any fit: its clock, the quality of its channels, excitation, delays and feedback.
 
     Parameters
     ----------
     log : Log, or path
         The data, or a CSV file, whose clock may be irregular.
     inputs, output
-        The columns of a file that are inputs and output; without names all columns of numbers are looked at.
+        The columns of a file that are inputs and output; without names all columns of numbers are inspected.
     time, sample_time, resample, time_format, delimiter, comment, encoding, decimal_comma, header, skip_rows, missing
         How a file is read, see `thetahat.ReadOptions`.
 

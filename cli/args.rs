@@ -85,7 +85,7 @@ Examples:
     ///
     /// Writes CSV: time or row, measured, predicted and the standard deviation of its error, that of the parameters included, in the
     /// log's own units. The fit figures go to standard error. Rows at the end that have inputs but no output are forecast, each as many steps ahead as
-    /// it lies behind the last measured one; a series without inputs is forecast beyond the end of the log.
+    /// it lies after the last measured one; a series without inputs is forecast beyond the end of the log.
     #[command(after_help = "\
 Examples:
   thetahat predict model.json log.csv --horizon 5 > predicted.csv

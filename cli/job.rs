@@ -175,11 +175,11 @@ pub(crate) fn parsed<T: FromStr<Err = thetahat::Error>>(argument: &str, text: &s
     })
 }
 
-/// STEP:hold or STEP:linear, and :unfiltered behind it.
+/// STEP:hold or STEP:linear, and :unfiltered after it.
 fn resampling(text: &str) -> Result<Resample, Failure> {
     let wrong = || {
         Failure::usage(format!(
-            "--resample {text}: write it as STEP:hold or STEP:linear, such as 0.5:linear; with :unfiltered behind it without \
+            "--resample {text}: write it as STEP:hold or STEP:linear, such as 0.5:linear; with :unfiltered after it without \
              a filter"
         ))
     };

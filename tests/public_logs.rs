@@ -6,7 +6,7 @@ use serde_json::Value;
 use crate::fit_reference::{figures, folder_with_any};
 use crate::harness::{Folder, number};
 
-/// A log, the options that it needs, its rows behind these, and its number of inputs.
+/// A log, the options that it needs, its rows after these, and its number of inputs.
 struct Public {
     file: &'static str,
     options: &'static str,

@@ -155,7 +155,7 @@ pub(crate) struct SearchArguments {
     /// Step length of the gradient search: C1, or C1/(C2 + l) in iteration l [default: 1]
     #[arg(long, value_name = "C1[,C2]", allow_hyphen_values = true)]
     pub(crate) step: Option<String>,
-    /// Search from so many further starts [default: 0]
+    /// Search from this many further starts [default: 0]
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(..=10_000))]
     pub(crate) starts: Option<u32>,
     /// Which random starts [default: 0]
@@ -181,7 +181,7 @@ pub(crate) struct CriterionArguments {
     /// Keep the static gain from an input in a range, or at a value
     #[arg(long, value_name = "[INPUT=]G|LOW..HIGH", allow_hyphen_values = true)]
     pub(crate) dc_gain: Vec<String>,
-    /// Keep parameters small: weighs like so many more samples in which the output is 0 [default: 0]
+    /// Keep parameters small: weighs like this many more samples in which the output is 0 [default: 0]
     #[arg(long, value_name = "SAMPLES", allow_hyphen_values = true)]
     pub(crate) ridge: Option<f64>,
     /// Let no error exceed this, in units of the output, and find the box of all parameters that keep to it

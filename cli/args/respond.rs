@@ -20,7 +20,7 @@ pub(crate) struct PredictArguments {
 
 #[derive(Debug, Args)]
 pub(crate) struct SimulateArguments {
-    /// Draw so many runs of what the model leaves open: its noise, and its parameters within their covariance
+    /// Draw this many runs of what the model leaves open: its noise, and its parameters within their covariance
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub(crate) draws: Option<u32>,
     /// Which draws [default: 0]

@@ -89,7 +89,7 @@ pub(crate) struct Channels {
     pub(crate) output: String,
 }
 
-/// Reads all logs, one behind the other, with any clock or with an even one.
+/// Reads all logs, one after the other, with any clock or with an even one.
 pub(crate) fn experiments(job: &FitJob, any_clock: bool) -> Result<Experiments, Failure> {
     let mut channels: Option<Channels> = None;
     let Joined { log, sources, words } =

@@ -63,7 +63,7 @@ pub(crate) fn inspected(
     Ok((inspection, kept))
 }
 
-/// So many columns that are left out for one reason are named.
+/// This many columns that are left out for one reason are named.
 const MOST_TOLD: usize = 3;
 
 /// Which columns are inspected, and what they are.

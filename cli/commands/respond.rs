@@ -120,7 +120,7 @@ struct RowClock<'l> {
 }
 
 impl RowClock<'_> {
-    /// The time of a row (0-based), where there are times; those behind the end of the log go on in its own step.
+    /// The time of a row (0-based), where there are times; those after the end of the log go on in its own step.
     fn at(&self, position: usize) -> Option<f64> {
         let rows = self.log.rows();
         let beyond = (position + 1).saturating_sub(rows) as f64 * self.log.sample_time();

@@ -26,7 +26,7 @@ use text::{Text, columns, or_dash, some};
 pub use tracking::tracking;
 pub use validation::{comparison, validation};
 
-/// So many of a list are written.
+/// This many of a list are written.
 const MOST: usize = 8;
 /// Costs that differ by less than this fraction are one.
 const ROUNDING: f64 = 1e-9;
@@ -36,7 +36,7 @@ const NO_ROOT_ERROR: &str =
     "no standard error is known, or no time constant goes with a pole on or outside of the unit circle";
 const NO_FIT: &str = "the output is constant, no sample counts, or the response overflows";
 
-/// The report's main figures, so many columns wide.
+/// The report's main figures, this many columns wide.
 pub fn table(report: &Report, width: usize) -> String {
     let model = match &report.model {
         Model::Polynomial(model) => model,

@@ -123,7 +123,7 @@ pub(crate) struct Pulse {
 }
 
 impl Pulse {
-    /// For a loop of which a round takes about so many multiplications.
+    /// For a loop of which a round takes about this many multiplications.
     pub(crate) fn new(multiplications: usize) -> Self {
         let stride = WORK / multiplications.clamp(1, WORK);
         Self { stride, left: stride, asked: Instant::now() }

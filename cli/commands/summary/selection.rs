@@ -7,7 +7,7 @@ use thetahat::select::{Candidate, Select, Selection};
 use super::orders_legend;
 use super::text::{Text, columns, or_dash};
 
-/// So many of the best are shown; the report has more.
+/// This many of the best are shown; the report has more.
 const SHOWN: usize = 8;
 
 /// The parts that the rows were cut into, what was done, and the best models.

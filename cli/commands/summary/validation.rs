@@ -19,7 +19,7 @@ type ErrorFigure = (&'static str, fn(&Fit) -> Option<f64>);
 const ERRORS: [ErrorFigure; 2] =
     [("mean |e|", |fit| fit.mean_absolute_error), ("largest |e|", |fit| fit.largest_error)];
 
-/// How a model does on a log, and what was required of it, so many columns wide.
+/// How a model does on a log, and what was required of it, this many columns wide.
 pub fn validation(found: &Validation, requirements: &[Requirement], alpha: f64, width: usize) -> String {
     let mut text = Text::new(width);
     let files: Vec<String> = found.logs.iter().map(|log| harmless(&log.file)).collect();
@@ -63,7 +63,7 @@ pub fn validation(found: &Validation, requirements: &[Requirement], alpha: f64, 
     text.finish()
 }
 
-/// Several models, a column for each, so many columns of text wide.
+/// Several models, a column for each, this many columns of text wide.
 pub fn comparison(comparison: &Comparison, width: usize) -> String {
     let models = &comparison.models;
     let mut text = Text::new(width);

@@ -44,7 +44,7 @@ impl Line {
         })
     }
 
-    /// What goes into it, of a model with so many inputs.
+    /// What goes into it, of a model with this many inputs.
     fn source(&self, inputs: usize) -> Source {
         let index = usize::from(self.index);
         match index.checked_sub(inputs) {
@@ -164,7 +164,7 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
         Self::fits_with(orders, 0)
     }
 
-    /// The same with so many past residuals.
+    /// The same with this many past residuals.
     pub(crate) const fn fits_with(orders: &ArxOrders<'_>, residuals: usize) -> bool {
         let parameters = orders.parameters().saturating_add(residuals);
         let exact = match N::SIZE {

@@ -47,7 +47,7 @@ pub fn harmless(text: &str) -> String {
     harmless
 }
 
-/// A name as a message repeats it: [`harmless`], and cut off after so many characters.
+/// A name as a message repeats it: [`harmless`], and cut off after this many characters.
 ///
 /// ```
 /// assert_eq!(thetahat::text::brief("heater", 40), "heater");

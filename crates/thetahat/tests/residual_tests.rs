@@ -13,7 +13,7 @@ use thetahat::validate::Residuals;
 
 use simulated::{BEFORE, Random, filtered};
 
-/// Rows of the fit, and as many fresh ones behind them: Anderson's test counts 20 lags of so many.
+/// Rows of the fit, and as many fresh ones after them: Anderson's test counts 20 lags of them.
 const ROWS: usize = 400;
 const LEVEL: f64 = 0.05;
 

@@ -169,7 +169,7 @@ def scale_to(ax: Axes, measured: Sequence[Array], modelled: Sequence[Array]) -> 
 
 
 def fixed(value: float, decimals: int) -> str:
-    """So many decimals, or powers of ten where that is wider than twelve characters."""
+    """This many decimals, or powers of ten where that is wider than twelve characters."""
     text = f"{value:.{decimals}f}"
     return text if len(text) <= 12 else f"{value:.4e}"
 

@@ -80,7 +80,7 @@ class Validation(_Document):
     alpha: float
 
     def fit(self, horizon: int | None = 1, *, output: str | None = None) -> float:
-        """The fit in percent so many steps ahead, or in a free run (None); NaN where there is none.
+        """The fit in percent ``horizon`` steps ahead, or in a free run (None); NaN where there is none.
 
         Raises
         ------
@@ -90,7 +90,7 @@ class Validation(_Document):
         return self._figure("percent", horizon, output)
 
     def mean_absolute_error(self, horizon: int | None = 1, *, output: str | None = None) -> float:
-        """The mean of ``|e|`` so many steps ahead, or in a free run (None), in units of the output; NaN where there is none.
+        """The mean of ``|e|`` ``horizon`` steps ahead, or in a free run (None), in units of the output; NaN where there is none.
 
         It raises as `fit` does.
 
@@ -105,7 +105,7 @@ class Validation(_Document):
         return self._figure("mean_absolute_error", horizon, output)
 
     def largest_error(self, horizon: int | None = 1, *, output: str | None = None) -> float:
-        """The largest ``|e|`` so many steps ahead, or in a free run (None), in units of the output; NaN where there is none.
+        """The largest ``|e|`` ``horizon`` steps ahead, or in a free run (None), in units of the output; NaN where there is none.
 
         It raises as `fit` does.
         """
@@ -133,7 +133,7 @@ class Validation(_Document):
 
     @property
     def anderson(self) -> dict[float, float]:
-        """How likely so many autocorrelations of white residuals lie outside their band, by the level of the band.
+        """How likely as many autocorrelations of white residuals lie outside their band, by the level of the band.
 
         The mid-p-value of the count, which is about binomial (Anderson's test); below `alpha` the residuals are not white.
         Empty where they could not be tested. Of several outputs the least.

@@ -368,7 +368,7 @@ class Model(ReportedModel):
         Parameters
         ----------
         w : array_like, optional
-            Frequencies in radians per second. Without them, so many points evenly on a logarithmic scale up to pi over the
+            Frequencies in radians per second. Without them, this many points evenly on a logarithmic scale up to pi over the
             sample time.
         points : int, default 100
             How many.

@@ -72,7 +72,7 @@ class FitOptions(TypedDict, total=False):
     trend : bool
         Whether a slope of the output is estimated with the parameters too, and its level with it.
     focus : {"auto", "prediction", "simulation"} or int
-        What the model is for: errors one step ahead, free runs that the inputs alone drive, or so many steps ahead. With
+        What the model is for: errors one step ahead, free runs that the inputs alone drive, or a number of steps ahead. With
         orders, "simulation" finds the plant with the least errors of its free run and the noise behind it, and a number
         is the horizon of the figure on held-out rows. In a choice it says what models are compared by on rows that were held
         out from them; "auto" is "prediction", unless without orders another model simulates these clearly better.
@@ -84,7 +84,7 @@ class FitOptions(TypedDict, total=False):
     dc_gain : float, (float, float) or dict
         A range or value of the static gain; of each input by its name.
     ridge : float
-        Keeps parameters small: weighs like so many more samples in which the output is 0.
+        Keeps parameters small: weighs like this many more samples in which the output is 0.
     noise_bound : float
         Let no error exceed this, in units of the output.
     search : {"lm", "gauss-newton", "newton", "gradient"}
@@ -97,11 +97,11 @@ class FitOptions(TypedDict, total=False):
     step : float or (float, float)
         Step length of the gradient search: c1, or c1/(c2 + l) in iteration l.
     starts : int
-        Search from so many further starts.
+        Search from this many further starts.
     seed : int
         Which random starts.
     time_limit : float
-        After so many seconds begin no iteration, and look for no further start.
+        After this many seconds begin no iteration, and look for no further start.
     """
 
     estimate: Rows
@@ -141,11 +141,11 @@ class EquationsOptions(TypedDict, total=False):
     tolerance : float
         Stop where the next step would raise the log-likelihood by no more than this fraction of half the measured values: 1e-8.
     starts : int
-        Search from so many further starts, drawn from what the model knows of its parameters.
+        Search from this many further starts, drawn from what the model knows of its parameters.
     seed : int
         Which random starts.
     time_limit : float
-        After so many seconds begin no iteration.
+        After this many seconds begin no iteration.
     """
 
     estimate: Rows

@@ -10,9 +10,9 @@ use crate::Error;
 use crate::data::{Offset, Regular, Rows, checked, shortest};
 use crate::figures::short;
 
-/// So many rows at the end that repeat one value in all channels are told.
+/// This many rows at the end that repeat one value in all channels are told.
 const PADDING: usize = 20;
-/// A step longer than so many medians starts a new segment.
+/// A step longer than this many medians starts a new segment.
 pub(crate) const GAP: f64 = 1.5;
 /// Steps may differ from their median by this fraction.
 pub(crate) const JITTER: f64 = 0.1;

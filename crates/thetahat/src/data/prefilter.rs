@@ -256,7 +256,7 @@ impl Prefiltered {
     }
 }
 
-/// So many samples at most of a segment are left out.
+/// At most this many samples of a segment are left out.
 fn longest(first: usize, end: usize) -> usize {
     (LARGEST_PART * (end - first) as f64) as usize
 }

@@ -102,14 +102,14 @@ impl Log {
         let needed: Vec<&[f64]> = inputs.iter().copied().chain(measured.then_some(output)).collect();
         let segments = self.segments_of(&needed, &checked("rows", rows, self.rows())?);
         let usable = |row: usize| needed.iter().all(|values| !values[row].is_nan());
-        // In one pass: the row behind the last missing sample before each segment.
+        // In one pass: the row after the last missing sample before each segment.
         let (mut first, mut seen) = (0, 0);
         let past = segments.iter().map(|segment| {
             if let Some(missing) = (seen..segment.start).rev().find(|row| !usable(*row)) {
                 first = missing + 1;
             }
             seen = segment.start;
-            // Or that behind the last jump of the clock.
+            // Or that after the last jump of the clock.
             let jumps = self.breaks().partition_point(|&jump| jump <= segment.start);
             let jump = if jumps == 0 { 0 } else { self.breaks()[jumps - 1] };
             segment.start - first.max(jump)

@@ -14,7 +14,7 @@
 //! no phase. All channels are filtered alike, so that y = G u stays true of what is left: a linear filter commutes with G.
 //!
 //! Both sums go over the rows that are there: in which all channels have a value (Knutsson and Westin, Normalized and
-//! differential convolution, 1993), and none of them behind a gap of the clock. At the end of a log they have about half of
+//! differential convolution, 1993), and none of them after a gap of the clock. At the end of a log they have about half of
 //! the weight; a row for which they have less than two fifths is missing.
 
 use std::f64::consts::PI;
@@ -32,7 +32,7 @@ use crate::regression::product;
 
 /// Rows that resampling may give: beyond them a step was mistyped.
 const MOST_ROWS: f64 = 1e8;
-/// A step from so many recorded ones on is filtered for.
+/// A step from this many recorded ones on is filtered for.
 const DECIMATES: f64 = 2.0;
 /// Where the pass band ends and the stop band begins, in units of half the new sampling frequency.
 const PASS: f64 = 0.8;
@@ -89,7 +89,7 @@ impl Resample {
 }
 
 impl AntiAlias {
-    /// h(-M) … h(M) for a recorded step of so many seconds, of sum 1.
+    /// h(-M) … h(M) for a recorded step of this many seconds, of sum 1.
     fn weights(&self, recorded: f64) -> Vec<f64> {
         let half = (self.taps / 2) as f64;
         let beta = 0.1102 * (ATTENUATION - 8.7);
@@ -149,8 +149,8 @@ impl<'a> Filtered<'a> {
 
     /// The segment of a row.
     fn segment(&self, row: usize) -> Range<usize> {
-        let behind = self.segments.partition_point(|segment| segment.start <= row);
-        self.segments[behind - 1].clone()
+        let after = self.segments.partition_point(|segment| segment.start <= row);
+        self.segments[after - 1].clone()
     }
 
     /// The filtered value of a row.

@@ -154,7 +154,7 @@ pub(crate) fn estimate_is_for_f() -> Error {
 /// The segments with as many of the measured samples before them as a regressor reaches back to: their first row with a full
 /// regressor is then the segment's own first, if so many are there.
 ///
-/// Without A a row needs no past output, and a segment ends where an output is missing only to go on behind it.
+/// Without A a row needs no past output, and a segment ends where an output is missing only to go on after it.
 pub(super) fn with_past<'r>(
     record: &'r Record<'_>,
     orders: &Orders,

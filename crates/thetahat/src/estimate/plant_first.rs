@@ -31,12 +31,12 @@ use crate::estimate::InformationCriterion;
 use crate::model::Orders;
 use crate::regression::{sum, sum_of_squares};
 
-/// Autoregressions behind a plant have so many coefficients at most.
+/// Autoregressions behind a plant have this many coefficients at most.
 const LONGEST: usize = 10;
-/// So many errors for each of them.
+/// This many errors for each of them.
 const SAMPLES: usize = 10;
 
-/// The estimate of a plant first; `named` inputs have names, those behind them are a constant and a trend.
+/// The estimate of a plant first; `named` inputs have names, those after them are a constant and a trend.
 pub(super) fn plant_first(
     record: &Record<'_>,
     named: usize,
@@ -118,7 +118,7 @@ pub(super) fn plant_first(
     })
 }
 
-/// How many coefficients of an autoregression behind an output-error model lower MDL.
+/// How many coefficients of an autoregression of the errors of an output-error model lower MDL.
 pub(crate) fn noise_order(record: &Record<'_>, orders: &Orders, estimate: &Estimate) -> Result<usize, Error> {
     let (mut v, segments) = free_run_errors(record, orders, estimate)?;
     let level = sum(v.iter().copied()) / v.len().max(1) as f64;
@@ -240,7 +240,7 @@ fn covariance(
     for (column, &row) in places.iter().enumerate() {
         jacobian[(row, column)] = 1.0;
     }
-    // Behind A and B.
+    // After A and B.
     let c = orders.na + orders.nb.iter().sum::<usize>();
     if orders.na > 0 && orders.inputs() > named {
         // k = A(1) l.

@@ -269,8 +269,8 @@ impl<'a> Predictor<'a> {
             && pasts.iter().any(|past| free(Begin::UnknownInputs, *past) > free(Begin::Unknown, *past))
     }
 
-    /// The samples that are the same for all models: in so many first samples of each segment, or more, e = 0, and so many of them,
-    /// or more, do not count. Segments without a sample that counts, or with no more than the free responses need, are left out.
+    /// The samples that are the same for all models: at least the first `silent` samples of each segment have e = 0, and at least
+    /// the first `counted` do not count. Segments without a sample that counts, or with no more than the free responses need, are left out.
     /// What was measured before a segment is not used.
     pub(super) fn counting(
         record: &Record<'a>,

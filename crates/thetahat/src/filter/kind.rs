@@ -24,7 +24,7 @@ pub(super) struct Sample {
     pub(super) outputs: DVector<f64>,
 }
 
-/// How the time from one row to the next is taken: so many steps, of so many seconds.
+/// How the time from one row to the next is taken: how many steps, and the seconds of each.
 pub(super) type Division = (usize, f64);
 
 /// A filter, or a smoother around one.
@@ -140,7 +140,7 @@ impl Kind {
             Kind::Linear(linear) => {
                 let there: Vec<bool> = from.outputs.iter().map(|output| !output.is_nan()).collect();
                 let mut left = count;
-                if let Some(transition) = linear.behind(&there)? {
+                if let Some(transition) = linear.after(&there)? {
                     let outputs =
                         from.outputs.iter().map(|output| if output.is_nan() { 0.0 } else { *output });
                     let drives: Vec<f64> = from.inputs.iter().copied().chain(outputs).collect();

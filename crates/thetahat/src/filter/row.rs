@@ -13,7 +13,7 @@ use crate::distribution::chi_square_interval;
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Row {
     states: usize,
-    /// Of the states, and behind them of the parameters after the change of variable.
+    /// Of the states, and after them of the parameters after the change of variable.
     #[serde(with = "super::snapshot::numbers")]
     pub(super) predicted: Vec<f64>,
     #[serde(with = "super::snapshot::numbers")]

@@ -23,7 +23,7 @@ impl SmoothedStates {
     }
 
     /// The state in a row, counted from 1, and the unknown parameters as they were there, in their own units; none for
-    /// row 0 and behind the last one. Parameters that do not walk are the same in all rows.
+    /// row 0 and after the last one. Parameters that do not walk are the same in all rows.
     pub fn row(&self, row: usize) -> Option<(StateValues<'_>, StateValues<'_>)> {
         let size = self.states + self.parameters;
         let start = row.checked_sub(1)?.checked_mul(size)?;

@@ -25,7 +25,7 @@ use crate::data::Offset;
 /// its sample time, within 1 %: it predicts as many times.
 ///
 /// **Filters.** Where the noises are correlated, as in a report's innovations form, what a measurement tells of the process
-/// noise is used in the prediction behind it. The covariance is kept factored: see
+/// noise is used in the prediction after it. The covariance is kept factored: see
 /// [`ExtendedKalmanFilter`](thetahat_core::ExtendedKalmanFilter).
 ///
 /// **Observer.** In predictor form a row's measurement corrects the state of the next row: there is no filtered state, and

@@ -106,7 +106,7 @@ pub(super) fn correlation(
     found
 }
 
-/// The segments with so many samples more at their beginnings.
+/// The segments with this many samples more at their beginnings.
 fn kept_with_past(kept: &[Range<usize>], past: usize) -> Vec<Range<usize>> {
     kept.iter().map(|segment| segment.start - past..segment.end).collect()
 }

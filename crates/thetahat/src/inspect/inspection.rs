@@ -116,7 +116,7 @@ pub struct Saturation {
 pub struct Excitation {
     /// The input channel.
     pub input: String,
-    /// The order of persistence of excitation: so many parameters it can tell apart. No more than `highest`.
+    /// The order of persistence of excitation: this many parameters it can tell apart. No more than `highest`.
     pub order: usize,
     /// The highest order tried.
     pub highest: usize,

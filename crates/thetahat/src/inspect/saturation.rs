@@ -2,7 +2,7 @@
 
 use super::Saturation;
 
-/// A limit must have so many rows in runs, for each row of the most frequent value near it.
+/// A limit must have this many rows in runs, for each row of the most frequent value near it.
 const CROWDED: usize = 5;
 /// The values near a limit that it is compared with.
 const NEAR: usize = 8;
@@ -33,7 +33,7 @@ pub(super) fn runs(values: &[f64]) -> impl Iterator<Item = Run> {
 /// `sorted` are the values that are there, in rising order.
 pub(super) fn saturation(values: &[f64], sorted: &[f64]) -> Option<Saturation> {
     let levels = || sorted.chunk_by(|left, right| left == right);
-    // Two limits, and so many levels between them.
+    // Two limits, and this many levels between them.
     levels().nth(NEAR + 1)?;
     let count = runs(values).count();
     let most = |near: &mut dyn Iterator<Item = &[f64]>| near.map(<[f64]>::len).max().unwrap_or(0);

@@ -146,7 +146,7 @@ mod only_variance {
 
 impl PolynomialModel {
     /// The model with what is open of its output's offset as further inputs, of which the coefficients are zero and uncertain;
-    /// and those inputs over so many rows. None where nothing is said of it.
+    /// and those inputs over this many rows. None where nothing is said of it.
     pub(crate) fn with_open_offset(&self, rows: usize) -> Option<(Self, Vec<Vec<f64>>)> {
         let open = self.offset_covariance.as_ref()?;
         let (count, place) = (open.count(), self.orders.na + self.orders.nb.iter().sum::<usize>());

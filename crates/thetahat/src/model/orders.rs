@@ -10,7 +10,7 @@ pub(crate) const LARGEST: usize = 1000;
 
 /// The orders of A(q) y(t) = sum_j B_j(q)/F_j(q) u_j(t - nk_j) + C(q)/D(q) e(t).
 ///
-/// A, C, D and F are monic: na is the number of coefficients a1 … a_na behind the leading 1, and likewise nc, nd
+/// A, C, D and F are monic: na is the number of coefficients a1 … a_na after the leading 1, and likewise nc, nd
 /// and nf. B has nb coefficients, the first of which multiplies u(t - nk).
 ///
 /// ```
@@ -215,7 +215,7 @@ impl Orders {
         (0..self.inputs()).map(|input| self.input_reach(input)).fold(self.na, usize::max)
     }
 
-    /// With so many further inputs after their own, of one coefficient each that acts at once: those of a constant and a trend.
+    /// With this many further inputs after their own, of one coefficient each that acts at once: those of a constant and a trend.
     pub(crate) fn with_constants(&self, count: usize) -> Self {
         let more = |values: &[usize], value| [values, &vec![value; count]].concat();
         Self { nb: more(&self.nb, 1), nf: more(&self.nf, 0), nk: more(&self.nk, 0), ..self.clone() }
@@ -233,7 +233,7 @@ impl Orders {
         direct.map(|input| self.input_reach(input)).fold(self.na, usize::max) + self.nd
     }
 
-    /// How many samples before a segment its errors reach back to: max(na, nb + nk - 1 of all inputs) + nd. With so many known,
+    /// How many samples before a segment its errors reach back to: max(na, nb + nk - 1 of all inputs) + nd. With this many known,
     /// all samples of the segment have an error.
     pub(crate) fn history(&self) -> usize {
         self.reach() + self.nd

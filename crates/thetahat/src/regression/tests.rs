@@ -38,7 +38,7 @@ impl Case {
         Lagged::new(&signals, self.taps.clone(), &self.segments, self.initial)
     }
 
-    /// Each row of the regressor matrix, and behind it the target.
+    /// Each row of the regressor matrix, and after it the target.
     fn rows(&self) -> Vec<Vec<f64>> {
         let used = || self.taps.iter().filter(|taps| taps.count > 0);
         let reach = used().map(|taps| taps.first + taps.count - 1).max().unwrap_or(0);

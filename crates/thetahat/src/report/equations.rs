@@ -51,11 +51,11 @@ pub struct EquationsPlan {
 /// the maximum-likelihood estimate where innovations are Gaussian. Without process noise that is output error with an
 /// estimated initial state, of which the model knows `start` and `sd`. Each log starts from there anew. Of an unknown
 /// parameter the fit uses `start`, where the search begins, and its bounds; `walk` is for a filter that estimates it with the state.
-/// A search finds the minimum that its start leads to. Further starts, so many as `search.starts` says, are drawn from what the model
+/// A search finds the minimum that its start leads to. Further starts, as many as `search.starts` says, are drawn from what the model
 /// knows of the parameters, start and `sd` after the change of variable; the largest likelihood that is reached wins.
 ///
 /// **Rows.** The state of the first row that is estimated on is the model's start, in each log. Rows of it that are not asked for but
-/// stand behind go through the filter and do not count; so is the model evaluated on other rows of these logs. Each further row is predicted over the time from the row before,
+/// stand after go through the filter and do not count; so is the model evaluated on other rows of these logs. Each further row is predicted over the time from the row before,
 /// with that row's inputs, and then corrected by its own outputs. The clock may be irregular
 /// ([`Log::recorded`](crate::data::Log::recorded)). A missing output (NaN) is left out alone; a missing input holds the value before it, zero before the first.
 ///

@@ -270,7 +270,7 @@ fn fit(
             let task = estimate::Task { record: &record, orders: &with_noise, method: &method, ..task };
             fitted = task.fit(constant, &beside, None)?;
             selection.steps.push(format!(
-                "Behind it an autoregression of order {order} describes what its free run leaves, for predictions: {with_noise}."
+                "After it an autoregression of order {order} describes what its free run leaves, for predictions: {with_noise}."
             ));
             (seen, orders) = (record, with_noise);
         }

@@ -343,7 +343,7 @@ fn evaluate(on_log: &dyn OnLog, plan: &ValidationPlan, validation: &mut Validati
     evaluated
 }
 
-/// How often an output lies in the intervals around predictions so many steps ahead, as wide as their deviations say.
+/// How often an output lies in the intervals around predictions this many steps ahead, as wide as their deviations say.
 fn coverage<'a>(
     on_log: &'a dyn OnLog,
     output: usize,
@@ -482,8 +482,8 @@ fn warn(plan: &ValidationPlan, validation: &mut Validation) {
 
 /// The past lags farthest outside their band, three at most, in rising order.
 fn largest(independence: &crate::validate::Independence) -> String {
-    let behind = independence.past.lags + 1;
-    let each = independence.correlation.iter().zip(&independence.band).skip(behind).zip(1_usize..);
+    let after = independence.past.lags + 1;
+    let each = independence.correlation.iter().zip(&independence.band).skip(after).zip(1_usize..);
     let mut outside: Vec<(f64, usize)> = each
         .map(|((value, band), lag)| (value.abs() / band, lag))
         .filter(|(ratio, _)| *ratio > 1.0)

@@ -43,7 +43,7 @@ pub(crate) trait OnLog {
     /// What is left of each output one step ahead.
     fn tested(&self) -> Result<Vec<Tested<'_>>, Error>;
 
-    /// What is expected behind the last usable row of `rows`, so many steps ahead at most, and the row (0-based) that it begins with;
+    /// What is expected after the last usable row of `rows`, at most this many steps ahead, and the row (0-based) that it begins with;
     /// none where there is nothing to start from, or predictions reach there by themselves.
     fn forecast(
         &self,

@@ -199,7 +199,7 @@ impl<'a> Free<'a> {
         gaps: bool,
         values: &mut [f64],
     ) -> Result<(), Error> {
-        // Behind the last free response there is nothing to fit.
+        // After the last free response there is nothing to fit.
         let used = || self.responses.iter().zip(counts).filter(|(_, count)| **count > 0);
         let ends = used().map(|(response, count)| response.len() + count);
         let length = ends.max().unwrap_or(0).max(counts.iter().sum::<usize>() + 1).min(output.len());

@@ -48,7 +48,7 @@ pub(super) fn history(model: &PolynomialModel, segment: &Range<usize>, past: usi
 /// A sum of squared errors below this fraction of the output's is rounding.
 pub(crate) const NOTHING_LEFT: f64 = 1e-28;
 
-/// Whether `more` initial conditions are worth it that lower the sum of squared errors over so many samples:
+/// Whether `more` initial conditions are worth it that lower the sum of squared errors over this many samples:
 /// N ln(V_without/V_with) > n ln N. The same rule for estimates and for what is made of them. `nothing` is a sum that is rounding.
 pub(crate) fn are_worth(samples: usize, without: f64, with: f64, more: usize, nothing: f64) -> bool {
     let samples = samples as f64;

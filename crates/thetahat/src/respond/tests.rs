@@ -75,7 +75,7 @@ fn models() -> Vec<PolynomialModel> {
     ]
 }
 
-/// So many signals of `length` samples.
+/// This many signals of `length` samples.
 fn signals(count: usize, length: usize, noise: &mut Noise) -> Vec<Vec<f64>> {
     (0..count).map(|_| noise.take(length)).collect()
 }

@@ -8,12 +8,12 @@ use crate::estimate::{Initial, Point, Window, drop_is_not_for_f, estimate_is_for
 use crate::model::Orders;
 use crate::regression::{Presample, sum_of_squares};
 
-/// So many inputs at most: a Gram matrix of all their lags has to fit.
+/// At most this many inputs: a Gram matrix of all their lags has to fit.
 pub(super) const MOST_INPUTS: usize = 100;
-/// So many samples for each parameter at least.
+/// At least this many samples for each parameter.
 const SAMPLES: usize = 4;
-/// So many samples behind those that models reach back to do not count where there is C: what 1/C makes of e = 0 before
-/// them fades there. It would be tens of times the price of a parameter.
+/// Samples skipped after the maximum lag, so that transients of 1/C die away: they would be tens of times the price of a
+/// parameter.
 const FADING: usize = 50;
 /// Of a segment of mean length not more than this part is given to that.
 const LEAST_OF_PIECE: usize = 20;
@@ -59,7 +59,7 @@ impl Samples {
         Ok(Self::unknown(record, models.iter()))
     }
 
-    /// The samples behind those that some model reaches back to.
+    /// The samples after the maximum lag of all models.
     pub(super) fn unknown<'m>(record: &Record<'_>, models: impl Iterator<Item = &'m Orders> + Clone) -> Self {
         // Segments that are too short for the free responses of one model are so for all.
         let reach = |orders: &Orders| orders.conditioned().max(orders.nf.iter().sum());
@@ -95,7 +95,7 @@ pub(super) fn energy(record: &Record<'_>) -> f64 {
     record.segments.iter().map(|segment| sum_of_squares(&record.output[segment.clone()])).sum()
 }
 
-/// Whether a record has enough samples for so many parameters, and does not lose more than half of them to the start of its
+/// Whether a record has enough samples for this many parameters, and does not lose more than half of them to the start of its
 /// segments.
 pub(super) fn are_enough(record: &Record<'_>, parameters: usize, masked: usize) -> bool {
     let left = |segment: &std::ops::Range<usize>| segment.len().saturating_sub(masked);

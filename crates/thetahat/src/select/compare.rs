@@ -9,7 +9,7 @@ use crate::data::Record;
 use crate::estimate::{Common, Initial, Point, stretches};
 use crate::model::Orders;
 
-/// Of records with more samples, models of which some need a search see segments only: so many, each so long.
+/// Of records with more samples, models of which some need a search see segments only: this many, each so long.
 const LONG: usize = 1 << 16;
 const SEGMENTS: usize = 16;
 const SEGMENT: usize = 1 << 11;

@@ -44,7 +44,7 @@ struct Long {
     na: usize,
     /// Lags of a B at most.
     lags: usize,
-    /// The first lag behind all windows.
+    /// The first lag after all windows.
     end: usize,
     columns: Columns,
     rows: Rows,

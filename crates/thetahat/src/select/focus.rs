@@ -20,7 +20,7 @@ pub enum Focus {
     Prediction,
     /// Free runs, driven by the inputs alone.
     Simulation,
-    /// Predictions so many steps ahead.
+    /// Predictions this many steps ahead.
     Steps(usize),
 }
 

@@ -18,13 +18,13 @@ use crate::model::{
 use crate::regression::sum;
 use crate::respond::{Horizon, Response, Start, predict, simulate};
 
-/// A record is cut into so many blocks.
+/// A record is cut into this many blocks.
 const BLOCKS: usize = 3;
-/// A block is cut into so many parts: 10 to 30 in all are enough (Schmeiser 1982).
+/// A block is cut into this many parts: 10 to 30 in all are enough (Schmeiser 1982).
 const PARTS: usize = 10;
-/// Errors count up to so many standard deviations of the output.
+/// Errors count up to this many standard deviations of the output.
 const LARGEST: f64 = 5.0;
-/// The error of an unstable refit counts so many times, and is this at least.
+/// The error of an unstable refit counts this many times, and is this at least.
 const UNSTABLE: f64 = 1.5;
 
 /// By how many of its standard errors the mean square of one model exceeds that of another on the same samples.
@@ -197,7 +197,7 @@ fn deviation(record: &Record<'_>) -> f64 {
     (sum(values().map(|y| (y - mean).powi(2))) / count).sqrt()
 }
 
-/// The last block behind what comes before it in its segments.
+/// The last block after what comes before it in its segments.
 struct Onward<'r> {
     record: Record<'r>,
     /// The output without the last block.

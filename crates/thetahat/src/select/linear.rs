@@ -29,7 +29,7 @@ use crate::regression::{Lagged, Presample, Taps, condition};
 const MAXIMUM_CONDITION: f64 = 1e5;
 /// Costs keep at least seven digits.
 const DIGITS: f64 = 1e7;
-/// A column of which less than this is left behind those before it depends on them.
+/// A column is dependent if less than this fraction of its norm is orthogonal to the columns before it.
 const DEPENDENT: f64 = 1e-13;
 /// The same for the norm, where columns are made orthogonal.
 const PARALLEL: f64 = 1e-13;
@@ -114,7 +114,7 @@ impl Rows {
     ) -> Result<Self, Error> {
         let signals: Vec<&[f64]> =
             std::iter::once(record.output).chain(record.inputs.iter().copied()).collect();
-        let lagged = Lagged::new(&signals, columns.taps(), &record.segments, presample).behind(masked);
+        let lagged = Lagged::new(&signals, columns.taps(), &record.segments, presample).after(masked);
         match kept {
             Kept::Products => {
                 let (matrix, right, square) = lagged.normal_equations();

@@ -14,7 +14,7 @@ use crate::Error;
 use crate::estimate::{Common, Point, extended};
 use crate::model::Orders;
 
-/// So many of the best begin from the data as well.
+/// This many of the best begin from the data as well.
 const BEST: usize = 5;
 /// How often the best are searched for.
 const ROUNDS: usize = 3;

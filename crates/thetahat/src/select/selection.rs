@@ -67,7 +67,7 @@ pub struct Candidate {
 pub struct Best {
     /// The stable model with the least criterion.
     pub prediction: Candidate,
-    /// The stable model with the least error on held-out blocks, in free runs or so many steps ahead as the focus says.
+    /// The stable model with the least error on held-out blocks, in free runs or as many steps ahead as the focus says.
     pub simulation: Candidate,
 }
 
@@ -112,7 +112,7 @@ pub struct HeldOut {
     pub unpunished: f64,
     /// How many models without a block are unstable.
     pub unstable: usize,
-    /// Of so many.
+    /// The models fitted, each without a block.
     pub refits: usize,
 }
 

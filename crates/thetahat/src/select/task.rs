@@ -10,7 +10,7 @@ use crate::model::Orders;
 pub(crate) struct Task<'a> {
     pub(crate) estimation: &'a Record<'a>,
     pub(crate) validation: Option<&'a Record<'a>>,
-    /// The inputs' names. Both records have further inputs behind these where a constant or a trend is part of every model.
+    /// The inputs' names. Both records have further inputs after these where a constant or a trend is part of every model.
     pub(crate) inputs: &'a [String],
     pub(crate) select: Select,
     pub(crate) focus: Focus,

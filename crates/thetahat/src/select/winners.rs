@@ -21,7 +21,7 @@ const FAR: f64 = 0.3;
 const GATE: f64 = 0.1;
 const STANDARD_ERRORS: f64 = 2.0;
 const CLEARLY: f64 = 0.1;
-/// A model that simulates has no time constant of more than so many times the samples.
+/// A model that simulates has no time constant of more than this many times the samples.
 const SLOWEST: f64 = 2.0;
 /// Mean squares below this are rounding.
 const NOTHING: f64 = 1e-12;

@@ -55,7 +55,7 @@ pub struct Tracked {
 ///
 /// The estimator needs the typical magnitude of each channel, for its prior and its bounds. If the plan does not have
 /// them, the tracker keeps the latest L rows, L being the reach of the orders plus two rows for each parameter and
-/// at least 10, until so many have been seen and every channel has shown a value other than 0 (below 1e-98 counts as 0). So
+/// at least 10, until there are L and every channel has shown a value other than 0 (below 1e-98 counts as 0). So
 /// long the action is [`Action::Collecting`]. Then the scales are the largest magnitudes that were seen, the rows that were kept
 /// go into the estimator, and from the next row on all is, to the bit, as if the scales had been given and it had started
 /// with the first of these rows.
@@ -282,11 +282,11 @@ impl Tracker {
         self.inputs.fill(f64::NAN);
     }
 
-    /// The prediction so many steps ahead: y(k + steps) from the samples up to k, in the output's units. Inputs to come are
+    /// The prediction this many steps ahead: y(k + steps) from the samples up to k, in the output's units. Inputs to come are
     /// held at their latest values.
     ///
     /// NaN if there is none: before there is an estimate, where it depends on a missing sample, or where an unstable
-    /// model overflows. 2 n multiply-adds and moves a step. (The memory for it is taken at the first call with so many steps.)
+    /// model overflows. 2 n multiply-adds and moves a step. (The memory for it is taken at the first call with this many steps.)
     ///
     /// # Errors
     /// [`Error::Argument`] if the steps are not in 1 … 10,000.

@@ -38,7 +38,7 @@ const ORDERS: [usize; 4] = [10, 5, 2, 1];
 const SAMPLES: usize = 5;
 /// How many past innovations the input may follow.
 const PAST: usize = 5;
-/// The input's own past values: one for so many samples, no fewer and no more than these.
+/// The input's own past values: one for this many samples, no fewer and no more than these.
 const SAMPLES_OF_OWN_PAST: usize = 20;
 const OWN_PAST: [usize; 2] = [10, 40];
 /// Where that many depend on one another, as those of a few sinusoids do.
@@ -55,7 +55,7 @@ const PARTS: usize = 5;
 /// Below this p-value there may be feedback, if as much is explained.
 const LEVEL: f64 = 0.01;
 const EXPLAINED: f64 = 0.005;
-/// An input repeats itself if it does so to this fraction of its largest value; so many comparisons are made for each sample.
+/// An input repeats itself if it does so to this fraction of its largest value; this many comparisons are made for each sample.
 const REPEATED: f64 = 1e-6;
 const COMPARISONS: usize = 20;
 /// Residuals below this fraction of the output, or of the input, are rounding.
@@ -161,7 +161,7 @@ fn repeats(input: &[f64], segments: &[Range<usize>]) -> bool {
     false
 }
 
-/// The same beyond so many past values of the input: none if they depend on one another, or are too many, and nothing if they
+/// The same beyond this many past values of the input: none if they depend on one another, or are too many, and nothing if they
 /// determine it.
 fn beyond(
     own: usize,
@@ -263,7 +263,7 @@ fn evaluated<R: Iterator<Item = usize>>(
 /// The regression of `signals[0]` without the first samples of each segment, if there are samples enough for it.
 fn solved(signals: &[&[f64]], segments: &[Range<usize>], taps: &[Taps], masked: usize) -> Option<Regression> {
     let parameters: usize = taps.iter().map(|taps| taps.count).sum();
-    let lagged = Lagged::new(signals, taps.to_vec(), segments, Presample::Drop).behind(masked);
+    let lagged = Lagged::new(signals, taps.to_vec(), segments, Presample::Drop).after(masked);
     if lagged.rows() < SAMPLES * parameters {
         return None;
     }

@@ -35,7 +35,7 @@ use crate::distribution::{chi_square_tail, two_sided};
 use crate::estimate::{Autoregression, backward_filtered_products};
 use crate::regression::{Lagged, Presample, Taps, sum_of_squares};
 
-/// Directions in which an input has less than the energy of so many of its samples are left out: a sum of few errors is not
+/// Directions in which an input has less than the energy of this many of its samples are left out: a sum of few errors is not
 /// normal, and where an input is not rich they are no more than its ends.
 const RICH: f64 = 10.0;
 

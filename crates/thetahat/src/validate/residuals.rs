@@ -18,9 +18,9 @@ use crate::respond::Innovations;
 
 /// Fewer samples than this, and one for each parameter that was fitted to them, say nothing.
 const FEWEST: usize = 10;
-/// A lag has pairs for at least one in so many samples.
+/// A lag has pairs for at least one in this many samples.
 const PAIRS: usize = 4;
-/// At least so many samples stand for each lag of the autocorrelation, and of an input: with fewer, Ljung and Box's test
+/// At least this many samples stand for each lag of the autocorrelation, and of an input: with fewer, Ljung and Box's test
 /// rejects too often.
 const SAMPLES_PER_LAG: usize = 10;
 const SAMPLES_PER_INPUT_LAG: usize = 5;
@@ -92,7 +92,7 @@ impl fmt::Display for Untestable {
             }
             Self::Apart { samples, pairs } => write!(
                 f,
-                "gaps leave {pairs} of {samples} samples directly behind another one, and tests need a fourth of them; name rows \
+                "gaps leave {pairs} of {samples} samples directly after another one, and tests need a fourth of them; name rows \
                  without gaps"
             ),
             Self::Nothing => {
@@ -216,7 +216,7 @@ impl Residuals {
 }
 
 /// How many past lags of an input are tested: as many as of the autocorrelation, and more than the plant has
-/// parameters behind its delay.
+/// parameters after its delay.
 fn past_lags(model: &PolynomialModel, input: usize, lags: usize) -> usize {
     let orders = &model.orders;
     let plant = orders.na + orders.nb[input] + orders.nf[input];

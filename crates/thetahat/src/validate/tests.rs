@@ -512,7 +512,7 @@ fn short_logs_have_fewer_lags() {
         (found.ljung_box.lags, found.anderson.lags, found.independence[0].past.lags)
     };
     assert_eq!(of(std::iter::once(0..400).collect()), (25, 19, 25));
-    // Of an input ten more than the plant has parameters, behind its delay.
+    // Of an input ten more than the plant has parameters, after its delay.
     assert_eq!(of(std::iter::once(0..82).collect()), (8, 4, 15));
     // Of segments of eight samples that count, three quarters have a partner six steps before: no more lags.
     assert_eq!(of((0..40).map(|k| 10 * k..10 * k + 10).collect()), (6, 6, 6));

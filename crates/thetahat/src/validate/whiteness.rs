@@ -70,10 +70,10 @@ impl Autocorrelation {
     }
 }
 
-/// How many pairs of samples of one segment are so many steps apart. A segment is a list of runs of samples.
+/// How many pairs of samples of one segment are this many steps apart. A segment is a list of runs of samples.
 pub(super) fn pairs(segments: &[&[Range<usize>]], lag: usize) -> usize {
     let of = |runs: &[Range<usize>]| {
-        // Each run against itself and those from which it is so many steps away: both lists rise.
+        // Each run against itself and those from which it is this many steps away: both lists rise.
         let (mut count, mut first) = (0, 0);
         for run in runs {
             while runs[first].end + lag <= run.start {

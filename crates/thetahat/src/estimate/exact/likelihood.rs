@@ -158,8 +158,8 @@ impl<'a> Likelihood<'a> {
 
     /// Where the coefficients of A and C stand among the parameters.
     fn places(&self) -> Vec<usize> {
-        let behind = self.orders.na + self.orders.nb.iter().sum::<usize>();
-        (0..self.orders.na).chain(behind..behind + self.orders.nc).collect()
+        let after = self.orders.na + self.orders.nb.iter().sum::<usize>();
+        (0..self.orders.na).chain(after..after + self.orders.nc).collect()
     }
 }
 

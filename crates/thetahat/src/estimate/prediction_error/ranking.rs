@@ -40,7 +40,7 @@ struct Start {
 }
 
 impl Job<'_> {
-    /// The starts, the best first. If more than one is asked for, searches from so many and takes what the best search found.
+    /// The starts, the best first. If more than one is asked for, searches from this many and takes what the best search found.
     pub(super) fn ranked(
         &self,
         problem: Problem<'_, '_>,

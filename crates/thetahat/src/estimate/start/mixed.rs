@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::Candidate;
-use super::noise::{Equation, Mixed, behind};
+use super::noise::{Equation, Mixed, after};
 use super::output_error::{OutputError, Start};
 use super::plant::{Equations, Group, Input, Limits, Plant, Point, divided, energy, multiplied};
 use crate::estimate::optimize::Deadline;
@@ -164,7 +164,7 @@ impl<'a> Data<'a> {
     /// Rounds of generalised least squares; the plant and the noise with the lowest sum of squared errors.
     pub(super) fn generalised(&self, equation: &Equation<'_>, start: Mixed) -> Option<(f64, Mixed, Mixed)> {
         let reach = self.orders.reach();
-        let later = behind(self.segments, reach);
+        let later = after(self.segments, reach);
         let mut plant = start;
         let mut best: Option<(f64, Mixed, Mixed)> = None;
         for _ in 0..ROUNDS {
@@ -254,7 +254,7 @@ impl<'a> Data<'a> {
             return None;
         }
         // Inputs without F have no free response to make up for unknown samples before a segment.
-        let segments = behind(self.segments, self.orders.conditioned() - self.orders.nd);
+        let segments = after(self.segments, self.orders.conditioned() - self.orders.nd);
         let left = energy(&start.errors, &segments);
         let exact = left <= EXACT * energy(self.output, self.segments);
         if exact { None } else { self.noise_of(&start.errors, &segments) }

@@ -48,7 +48,7 @@ impl Equation<'_> {
             .fold(self.order, usize::max)
     }
 
-    /// The same for a model of so many coefficients of A and each B.
+    /// The same for a model of this many coefficients of A and each B.
     fn reach_of(&self, order: usize) -> usize {
         self.inputs
             .iter()
@@ -57,7 +57,7 @@ impl Equation<'_> {
             .fold(order, usize::max)
     }
 
-    /// How many samples have so many before them in their segment.
+    /// How many samples have `past` others before them in their segment.
     fn left(&self, past: usize) -> usize {
         self.segments.iter().map(|segment| segment.len().saturating_sub(past)).sum()
     }
@@ -183,12 +183,12 @@ impl Equation<'_> {
             // Nothing to see of C.
             return plain();
         }
-        let behind = behind(self.segments, reach);
+        let after = after(self.segments, reach);
         let mut signals = self.signals();
         let mut taps = self.taps();
         taps.push(Taps { signal: signals.len(), first: 1, count: nc, sign: 1.0 });
         signals.push(&residuals);
-        let second = Lagged::new(&signals, taps, &behind, Presample::Drop);
+        let second = Lagged::new(&signals, taps, &after, Presample::Drop);
         if second.rows() <= self.parameters() + nc {
             return plain();
         }
@@ -221,8 +221,8 @@ impl Equation<'_> {
         let mut taps = self.taps();
         taps.iter_mut().for_each(|taps| taps.signal += 1);
         taps.push(Taps { signal: filtered.len(), first: 1, count: nc, sign: 1.0 });
-        let behind = behind(self.segments, self.reach());
-        let step = Lagged::new(&signals, taps, &behind, Presample::Drop);
+        let after = after(self.segments, self.reach());
+        let step = Lagged::new(&signals, taps, &after, Presample::Drop);
         if step.rows() <= self.parameters() + nc {
             return None;
         }
@@ -238,6 +238,6 @@ impl Equation<'_> {
 }
 
 /// Segments without their first samples.
-pub(in crate::estimate) fn behind(segments: &[Range<usize>], samples: usize) -> Vec<Range<usize>> {
+pub(in crate::estimate) fn after(segments: &[Range<usize>], samples: usize) -> Vec<Range<usize>> {
     segments.iter().map(|segment| (segment.start + samples).min(segment.end)..segment.end).collect()
 }

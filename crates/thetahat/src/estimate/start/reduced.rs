@@ -190,7 +190,7 @@ impl Reduced {
             let taps = [taps, &free.taps(signals.len())].concat();
             let length = free.responses.first().map_or(0, Vec::len);
             for segment in segments {
-                // Behind the free responses there is nothing to take out.
+                // After the free responses there is nothing to take out.
                 let head = 0..segment.len().min(length);
                 let of_segment = signals.iter().map(|signal| &signal[segment.start..][..head.end]);
                 let both: Vec<&[f64]> =

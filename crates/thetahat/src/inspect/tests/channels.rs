@@ -69,7 +69,7 @@ fn what_is_not_there_is_none() {
     assert_eq!((single.mean, single.trend, single.longest_hold, single.repeated), (Some(5.0), None, 1, 0));
 }
 
-/// The values rounded to so many decimals.
+/// The values rounded to this many decimals.
 fn printed(values: &[f64], decimals: usize) -> Vec<f64> {
     values.iter().map(|value| format!("{value:.decimals$}").parse().unwrap()).collect()
 }
@@ -122,7 +122,7 @@ fn continuous_and_stepped_values_are_not_rounded() {
     }
 }
 
-/// A slow sine between two limits, seen with so many decimals.
+/// A slow sine between two limits, seen with this many decimals.
 fn limited(low: f64, high: f64, decimals: usize) -> Vec<f64> {
     printed(
         &(0..1000).map(|row| (f64::from(row) / 40.0).sin().clamp(low, high)).collect::<Vec<_>>(),

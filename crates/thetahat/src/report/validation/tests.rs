@@ -85,7 +85,7 @@ fn the_log_of_the_fit_is_known_by_its_errors() {
         assert_eq!(found.in_sample, InSample::No, "{what}");
         assert_eq!(found.residuals[0].fitted, 0);
     }
-    // A log that goes on behind the rows of the fit; one that ends before.
+    // A log that goes on after the rows of the fit; one that ends before.
     let report = fitted(&log(&u[..300], &y[..300]), "1..300", arx(), Initial::Auto);
     assert_eq!(found(&report, &whole, &plan("1..300")).in_sample, InSample::Yes);
     assert_eq!(found(&report, &log(&u[..200], &y[..200]), &plan("")).in_sample, InSample::No);

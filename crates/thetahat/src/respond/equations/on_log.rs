@@ -139,7 +139,7 @@ impl<'l> EquationsOnLog<'l> {
         each.map(|(values, counted)| Response { values, counted: counted.clone() }).collect()
     }
 
-    /// What each experiment is said to be so many steps ahead.
+    /// The predictions of each experiment, `steps` ahead.
     fn ahead(&self, steps: usize) -> Result<Vec<Vec<Predicted<f64>>>, Error> {
         let each = self.experiments.iter().enumerate().map(|(log, experiment)| {
             ahead(&self.model, experiment, &self.z, steps)

@@ -15,7 +15,7 @@ use crate::respond::{
     Start, innovations::innovations, predict, predict::deviations, prediction_deviation, simulate,
 };
 
-/// One input: nk, B behind it, and F.
+/// One input: nk, B after it, and F.
 pub(super) type Input<'a> = (usize, &'a [f64], &'a [f64]);
 
 /// A y = sum_j B_j/F_j u_j + C/D e.
@@ -296,8 +296,8 @@ fn effects_of_the_past(model: &PolynomialModel, length: usize) -> Vec<Vec<f64>> 
             }
             x
         };
-        let behind = |polynomial: &[f64], at: usize| polynomial.get(at).copied().unwrap_or(0.0);
-        effects.extend((1..f.len()).map(|lag| respond(&|t| -behind(f, t + lag))));
+        let after = |polynomial: &[f64], at: usize| polynomial.get(at).copied().unwrap_or(0.0);
+        effects.extend((1..f.len()).map(|lag| respond(&|t| -after(f, t + lag))));
     }
     effects
 }

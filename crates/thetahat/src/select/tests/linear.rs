@@ -22,7 +22,7 @@ fn grid_of_two() -> Grid {
     }
 }
 
-/// The mean of e^2 of one model on the samples behind `first` of each segment.
+/// The mean of e^2 of one model on the samples after `first` of each segment.
 fn mse(record: &Record<'_>, orders: &Orders, first: usize, initial: Initial) -> Option<f64> {
     let cut = if initial == Initial::Zero { 0 } else { first - orders.reach() };
     let long = record.segments.iter().filter(|segment| segment.len() > cut);

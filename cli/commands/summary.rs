@@ -188,7 +188,7 @@ fn outcome(search: &SearchOutcome) -> String {
         Algorithm::Newton => "newton",
         Algorithm::Gradient => "gradient",
     };
-    let border = if search.stability_bound { " at the border of stability" } else { "" };
+    let boundary = if search.stability_bound { " at the stability boundary" } else { "" };
     let (iterations, stopped) = (counted(search.iterations), stopped(search.stopped));
     // A comparison follows several starts; costs on fewer samples are others.
     let costs = search.starts.first().and_then(|start| start.cost).zip(search.costs.first());
@@ -196,7 +196,7 @@ fn outcome(search: &SearchOutcome) -> String {
         && search.starts.iter().skip(1).any(|start| start.reached.is_some())
         && costs.is_some_and(|(start, first)| *first < (1.0 - ROUNDING) * start);
     let compared = if followed { " after a comparison of starts" } else { "" };
-    format!("{iterations} ({algorithm}) from {}{compared}, {stopped}{border}", search.start)
+    format!("{iterations} ({algorithm}) from {}{compared}, {stopped}{boundary}", search.start)
 }
 
 fn counted(iterations: usize) -> String {

@@ -496,8 +496,8 @@ fn extended(
         channels.collect(),
         log.sample_time(),
         time,
-        log.breaks().to_vec(),
-        log.borders().to_vec(),
+        log.segment_starts().to_vec(),
+        log.boundaries().to_vec(),
         log.before(),
     )
 }

@@ -483,7 +483,7 @@ class Tracker:
             if last is not None and not seconds[0] > last:
                 raise ValueError(f"time: the first row is {last - seconds[0]:g} s before the latest one that was taken; give later rows")
         clock = None if seconds is None else (seconds, rows.name or "time", rows.start)
-        return self._tracker.run(rows.inputs, rows.outputs, clock, list(rows.borders), stop_on_alarm)
+        return self._tracker.run(rows.inputs, rows.outputs, clock, list(rows.boundaries), stop_on_alarm)
 
     def gap(self) -> None:
         """Tell that an unknown number of rows is missing here. Where rows have times, these tell it.

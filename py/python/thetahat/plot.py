@@ -108,7 +108,7 @@ def log(log: Log, axes: Any = None) -> Grid:
         time, values = _drawing.broken(log, values)
         ax.plot(time, values, drawstyle=style, **_drawing.lone(values))
         ax.set_ylabel(_drawing.shown(name))
-        _drawing.borders(ax, log)
+        _drawing.boundaries(ax, log)
     grid[-1].set_xlabel("time [s]")
     return grid
 
@@ -174,7 +174,7 @@ def fit(
             low, high = (_drawing.broken(log, end)[1] for end in model.predict_interval(log, horizon, level=level))
             bands.append(_drawing.band(ax, time, low, high, line.get_color()))
     _drawing.label_one(bands, level)
-    _drawing.borders(ax, log)
+    _drawing.boundaries(ax, log)
     _drawing.scale_to(ax, list(measured.values()), drawn_all)
     ax.set_xlabel("time [s]")
     ax.set_ylabel(_drawing.shown(", ".join(measured)))

@@ -188,7 +188,7 @@ pub(crate) struct Prefiltered {
 
 impl Prefiltered {
     /// Filters the inputs and the output of a log alike, from the first row on of each segment in which all of them have a
-    /// value and the clock does not jump, as if its values had been there forever before.
+    /// value and the clock has no gap, as if its values had been there forever before.
     ///
     /// # Errors
     /// [`Error::Argument`] for an end of the band that is not below half the sampling frequency; [`Error::Data`] for a

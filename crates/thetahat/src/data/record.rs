@@ -109,10 +109,10 @@ impl Log {
                 first = missing + 1;
             }
             seen = segment.start;
-            // Or that after the last jump of the clock.
-            let jumps = self.breaks().partition_point(|&jump| jump <= segment.start);
-            let jump = if jumps == 0 { 0 } else { self.breaks()[jumps - 1] };
-            segment.start - first.max(jump)
+            // Or that after the last gap of the clock.
+            let starts = self.segment_starts().partition_point(|&start| start <= segment.start);
+            let start = if starts == 0 { 0 } else { self.segment_starts()[starts - 1] };
+            segment.start - first.max(start)
         });
         let past = past.collect();
         Ok(Record { output, inputs, segments, past })

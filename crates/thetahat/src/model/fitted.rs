@@ -92,7 +92,7 @@ pub struct PolynomialModel {
     /// The coefficients with their standard errors, in the order of `covariance`.
     pub parameters: Vec<Parameter>,
     /// The covariance matrix of the parameters, row by row; none where no theory gives one, and where it cannot be computed, as
-    /// at the border of stability.
+    /// at the stability boundary.
     pub covariance: Option<Vec<Vec<f64>>>,
     /// What is open of the output's offset together with the parameters; none where it was given, where it is not known, and in
     /// reports that do not say. Predictions, forecasts and drawn runs count it.

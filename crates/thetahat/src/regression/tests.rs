@@ -196,7 +196,7 @@ fn the_gram_matrix_of_any_segments_is_that_of_the_rows() {
 #[test]
 fn the_gram_matrix_of_long_signals_is_that_of_the_rows() {
     let mut noise = Noise(2);
-    // Around the borders of blocks of 8192 samples.
+    // Around the boundaries of blocks of 8192 samples.
     for (length, cut) in [(8190, 0), (8192 + 9, 5), (20_000, 8192), (20_000, 19_990)] {
         let case = Case {
             signals: vec![noise.take(length), noise.take(length)],

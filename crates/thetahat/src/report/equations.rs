@@ -166,7 +166,7 @@ pub fn fit_equations(
         split: parts,
         segments: segments.collect(),
         missing: missing.collect::<Result<_, Error>>()?,
-        time_gaps: log.jumps(),
+        time_gaps: log.gaps(),
         estimation,
     };
     let own = EquationsOnLog::new(&fitted, log, &data.estimation, &data.estimation)?;

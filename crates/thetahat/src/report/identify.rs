@@ -5,7 +5,7 @@ use super::fitted_rows::{estimation_record, estimation_start, goes_through};
 use super::plan::Plan;
 use super::schema::{Data, Estimation, Missing, Report};
 use super::shares::Shares;
-use super::warnings::{at_the_border, unstable_plant, warnings};
+use super::warnings::{at_the_stability_boundary, unstable_plant, warnings};
 use crate::data::{Detrend, Log, Offset, Prefiltered, Record, Rows, Source, digests};
 use crate::estimate::{
     self, Beside, Constant, Deadline, Estimate, Fitted, Initial, Method, Monitor, OutputOffset, Search,
@@ -139,7 +139,7 @@ impl PendingEvaluation {
             evaluate(&mut report, &PolynomialOnLog::new(&model, log, &rows, None)?, part, focus);
         }
         if let Some(grid) = grid {
-            report.warnings.extend(at_the_border(&model.orders, &grid));
+            report.warnings.extend(at_the_stability_boundary(&model.orders, &grid));
         }
         report.warnings.extend(unstable_plant(&report));
         Ok(report)
@@ -321,7 +321,7 @@ fn fit(
             split: parts,
             segments: segments.iter().map(Rows::from_positions).collect(),
             missing,
-            time_gaps: log.jumps(),
+            time_gaps: log.gaps(),
         },
         selection,
         estimation: estimation_of(&fitted, output.offset),

@@ -63,7 +63,7 @@ pub struct Data {
     pub segments: Vec<Rows>,
     /// How many values each channel misses.
     pub missing: Vec<Missing>,
-    /// How often the clock jumps.
+    /// How many gaps the clock has.
     pub time_gaps: usize,
 }
 

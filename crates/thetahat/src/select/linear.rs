@@ -348,13 +348,13 @@ impl<'s> Ladder<'s> {
             self.targets.truncate((common + 1) * self.scaled.size);
         }
         columns[common..].iter().all(|&column| match self.scaled.kept {
-            Kept::Products => self.border(column),
+            Kept::Products => self.extend(column),
             Kept::Factor => self.orthogonalize(column),
         })
     }
 
     /// One more column of a Gram matrix.
-    fn border(&mut self, column: usize) -> bool {
+    fn extend(&mut self, column: usize) -> bool {
         let products = self.scaled.column(column);
         let start = self.factor.len();
         let mut from = 0;

@@ -359,7 +359,7 @@ pub(super) fn data(report: &Report) -> Table {
         add("split: test", parts(&split.test));
     }
     add("segments without a gap", rows(&data.segments));
-    add("jumps of the clock", data.time_gaps.to_string());
+    add("gaps in the clock", data.time_gaps.to_string());
     for missing in &data.missing {
         add(&format!("missing in {}", missing.channel), missing.rows.to_string());
     }

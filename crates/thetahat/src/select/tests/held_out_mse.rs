@@ -71,7 +71,7 @@ fn cross_validation_is_a_loop_over_blocks_in_time() {
     let (y, u) = signals();
     let all = record(&y, &[&u], &[0..150, 150..250, 260..400]);
     let selection = chosen(&all, None, &Choice::Grid(grid()), Select::Cv, Initial::Auto).unwrap().selection;
-    // 390 samples in fifths of 78; the clock jumps at 150.
+    // 390 samples in fifths of 78; the clock has a gap at 150.
     let one = std::slice::from_ref::<Range<usize>>;
     let blocks =
         [one(&(0..78)), &[78..150, 150..156], one(&(156..234)), &[234..250, 260..322], one(&(322..400))];

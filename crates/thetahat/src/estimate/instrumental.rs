@@ -155,7 +155,7 @@ impl Stage<'_> {
     /// The samples that count.
     fn counted(&self) -> Vec<Range<usize>> {
         match self.presample {
-            Presample::Drop => after(self.segments, self.skipped + self.orders.reach()),
+            Presample::Drop => after(self.segments, self.skipped + self.orders.maximum_lag()),
             Presample::Zero => self.segments.to_vec(),
         }
     }
@@ -163,7 +163,8 @@ impl Stage<'_> {
     /// A y - sum_j B_j u_j for the samples that count, zero elsewhere.
     fn residuals(&self, theta: &DVector<f64>) -> Vec<f64> {
         let (equation, model) = equation(&self.signals, self.segments, self.orders, theta.as_slice());
-        let from = if self.presample == Presample::Drop { self.skipped + self.orders.reach() } else { 0 };
+        let from =
+            if self.presample == Presample::Drop { self.skipped + self.orders.maximum_lag() } else { 0 };
         equation.errors(&model, from)
     }
 
@@ -366,7 +367,7 @@ fn refined_from(
     let unit = DMatrix::identity(parameters, parameters);
     let root = factor.factor().solve_upper_triangular(&unit).ok_or_else(undetermined)?;
     let left = &root * root.transpose();
-    // Signals of a segment alone, so that those of the free responses stand beside them.
+    // Signals of a segment alone, so that those of the initial-condition responses stand beside them.
     let all_taps = [&taps[..], &point.free.taps(signals.len())].concat();
     let alone = |segment: &Range<usize>| -> Vec<Vec<f64>> {
         let own = signals.iter().map(|signal| signal[segment.clone()].to_vec());

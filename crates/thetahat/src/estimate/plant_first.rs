@@ -207,11 +207,11 @@ fn free_run_errors(record: &Record<'_>, plant: &Orders, estimate: &Estimate) -> 
 /// A v, where all of v is there.
 fn filtered(v: &[f64], segments: &[Range<usize>], a: &[f64]) -> (Vec<f64>, Vec<Range<usize>>) {
     let mut errors = Vec::with_capacity(v.len());
-    let reach = a.len() - 1;
-    let segments = segments.iter().filter(|segment| segment.len() > reach).map(|segment| {
+    let lag = a.len() - 1;
+    let segments = segments.iter().filter(|segment| segment.len() > lag).map(|segment| {
         let first = errors.len();
         errors.extend(
-            (segment.start + reach..segment.end)
+            (segment.start + lag..segment.end)
                 .map(|t| sum(a.iter().zip((0..=t).rev()).map(|(a, t)| a * v[t]))),
         );
         first..errors.len()

@@ -53,7 +53,7 @@ impl StateFilter {
     /// for y in [2.0, f64::NAN, f64::NAN, f64::NAN, 6.0] {
     ///     filter.step(None, &[], &[y])?;
     /// }
-    /// // Between two readings a walk is a line, and least known in the middle.
+    /// // Between two measurements a walk is a line, and least known in the middle.
     /// let smoothed = filter.smooth()?;
     /// let (state, _) = smoothed.row(3).unwrap();
     /// assert!((state.values[0] - 4.0).abs() < 1e-6);

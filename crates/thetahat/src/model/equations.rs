@@ -49,7 +49,7 @@ use crate::Error;
 /// [outputs]                          # channel of the log = expression
 /// y = "position"
 ///
-/// [noise]                            # standard deviations: of a sample, of a reading
+/// [noise]                            # standard deviations: of a sample, of a measurement
 /// process = { velocity = 0.01 }
 /// measurement = { y = 0.05 }
 /// ```

@@ -21,17 +21,17 @@ pub(super) struct Segment {
 pub(super) fn blocks(segments: impl Iterator<Item = Segment>) -> Vec<Vec<Segment>> {
     let mut blocks = Vec::new();
     let mut block = Vec::new();
-    let mut room = BLOCK;
+    let mut left = BLOCK;
     for Segment { start, rows } in segments {
         let mut first = rows.start;
         while first < rows.end {
-            let end = rows.end.min(first + room);
+            let end = rows.end.min(first + left);
             block.push(Segment { start, rows: first..end });
-            room -= end - first;
+            left -= end - first;
             first = end;
-            if room == 0 {
+            if left == 0 {
                 blocks.push(std::mem::take(&mut block));
-                room = BLOCK;
+                left = BLOCK;
             }
         }
     }

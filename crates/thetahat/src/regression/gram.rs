@@ -69,7 +69,7 @@ pub(crate) struct Products {
     longest: usize,
 }
 
-/// The interior of some segments, and room for the sums over it.
+/// The interior of some segments, and the buffer of the sums over it.
 #[derive(Debug)]
 pub(crate) struct Interior {
     blocks: Vec<Vec<Segment>>,

@@ -1,6 +1,6 @@
 use std::ops::Range;
 
-use super::free_response::until_negligible;
+use super::initial_condition::until_negligible;
 use super::innovations::innovations;
 use super::{Response, Start, check_inputs};
 use crate::Error;

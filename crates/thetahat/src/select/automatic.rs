@@ -182,8 +182,9 @@ fn diagonal(record: &Record<'_>, structures: &[Structure], nk: &[usize]) -> Resu
         };
         for orders in all {
             let orders = of_structure(*structure, *orders, nk)?;
-            let masked = (0..nk.len()).map(|input| orders.input_reach(input)).fold(orders.na, usize::max);
-            if are_enough(record, orders.parameters(), masked) {
+            let left_out =
+                (0..nk.len()).map(|input| orders.maximum_input_lag(input)).fold(orders.na, usize::max);
+            if are_enough(record, orders.parameters(), left_out) {
                 models.push(orders);
             }
         }
@@ -201,8 +202,9 @@ fn candidates(record: &Record<'_>, structures: &[Structure], nk: &[usize]) -> Re
         let of = |order: usize| of_structure(*structure, [order; 4], nk);
         let fits = |order: &usize| {
             of(*order).is_ok_and(|orders| {
-                let masked = (0..inputs).map(|input| orders.input_reach(input)).fold(*order, usize::max);
-                are_enough(record, orders.parameters(), masked)
+                let left_out =
+                    (0..inputs).map(|input| orders.maximum_input_lag(input)).fold(*order, usize::max);
+                are_enough(record, orders.parameters(), left_out)
             })
         };
         let highest = (2..=most).rev().find(fits).unwrap_or(1);

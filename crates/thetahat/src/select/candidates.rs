@@ -61,9 +61,9 @@ impl Samples {
 
     /// The samples after the maximum lag of all models.
     pub(super) fn unknown<'m>(record: &Record<'_>, models: impl Iterator<Item = &'m Orders> + Clone) -> Self {
-        // Segments that are too short for the free responses of one model are so for all.
-        let reach = |orders: &Orders| orders.conditioned().max(orders.nf.iter().sum());
-        let silent = models.clone().map(reach).max().unwrap_or(0);
+        // Segments that are too short for the initial-condition responses of one model are so for all.
+        let lag = |orders: &Orders| orders.conditioned().max(orders.nf.iter().sum());
+        let silent = models.clone().map(lag).max().unwrap_or(0);
         let coloured = models.filter(|orders| orders.nc > 0).count() > 0;
         let most = total(record) / record.segments.len().max(1) / LEAST_OF_PIECE;
         let counted = silent + if coloured { FADING.min(most) } else { 0 };
@@ -97,8 +97,8 @@ pub(super) fn energy(record: &Record<'_>) -> f64 {
 
 /// Whether a record has enough samples for this many parameters, and does not lose more than half of them to the start of its
 /// segments.
-pub(super) fn are_enough(record: &Record<'_>, parameters: usize, masked: usize) -> bool {
-    let left = |segment: &std::ops::Range<usize>| segment.len().saturating_sub(masked);
+pub(super) fn are_enough(record: &Record<'_>, parameters: usize, left_out: usize) -> bool {
+    let left = |segment: &std::ops::Range<usize>| segment.len().saturating_sub(left_out);
     let count: usize = record.segments.iter().map(left).sum();
     count >= SAMPLES * parameters && 2 * count >= total(record)
 }

@@ -101,7 +101,7 @@ pub(super) enum Kept {
 }
 
 impl Rows {
-    /// The rows of a record, of which the first `masked` of each segment do not count.
+    /// The rows of a record, of which the first `left_out` of each segment do not count.
     ///
     /// # Errors
     /// [`Error::Data`] if squares leave the range of numbers.
@@ -109,12 +109,12 @@ impl Rows {
         record: &Record<'_>,
         columns: &Columns,
         presample: Presample,
-        masked: usize,
+        left_out: usize,
         kept: Kept,
     ) -> Result<Self, Error> {
         let signals: Vec<&[f64]> =
             std::iter::once(record.output).chain(record.inputs.iter().copied()).collect();
-        let lagged = Lagged::new(&signals, columns.taps(), &record.segments, presample).after(masked);
+        let lagged = Lagged::new(&signals, columns.taps(), &record.segments, presample).after(left_out);
         match kept {
             Kept::Products => {
                 let (matrix, right, square) = lagged.normal_equations();

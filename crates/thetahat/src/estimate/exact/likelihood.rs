@@ -93,15 +93,15 @@ pub(super) struct Likelihood<'a> {
 }
 
 impl<'a> Likelihood<'a> {
-    /// Segments without more measured outputs than they have free responses are left out.
+    /// Segments without more measured outputs than they have initial-condition responses are left out.
     pub(super) fn new(record: &Record<'a>, orders: &Orders, lines: usize, begin: Begin) -> Self {
         let driving = 0..orders.inputs() - lines;
-        let reach = driving.map(|input| orders.input_reach(input)).max();
+        let lag = driving.map(|input| orders.maximum_input_lag(input)).max();
         let mut sections = Vec::new();
         for (segment, past) in record.segments.iter().zip(&record.past) {
-            let known = if begin == Begin::Rest { 0 } else { reach.unwrap_or(0).min(*past) };
-            let free = match (begin, reach) {
-                (Begin::Free, Some(reach)) if reach > 0 => orders.na.max(reach - known),
+            let known = if begin == Begin::Rest { 0 } else { lag.unwrap_or(0).min(*past) };
+            let free = match (begin, lag) {
+                (Begin::Free, Some(lag)) if lag > 0 => orders.na.max(lag - known),
                 _ => 0,
             };
             let rows = segment.start - known..segment.end;
@@ -187,7 +187,7 @@ impl Signals {
     ) -> Self {
         let Polynomials { a, b, .. } = polynomials;
         let rows = section.output.len();
-        let lead = orders.reach().max(1);
+        let lead = orders.maximum_lag().max(1);
         let driving = orders.inputs() - lines;
         let mut beyond = Line::default();
         let mut response = vec![0.0; lead + rows];

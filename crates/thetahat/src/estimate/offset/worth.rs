@@ -105,7 +105,7 @@ impl OfConstant {
 fn sums(record: &Record<'_>, orders: &Orders, estimate: &Estimate) -> (Vec<f64>, f64) {
     let (skipped, presample) = match estimate.initial() {
         Initial::Zero => (0, Presample::Zero),
-        _ => (orders.reach(), Presample::Drop),
+        _ => (orders.maximum_lag(), Presample::Drop),
     };
     let segments = with_past(record, orders, presample);
     let sums = |signal: &[f64], first: usize, count: usize| {

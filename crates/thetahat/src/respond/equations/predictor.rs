@@ -22,7 +22,7 @@ use thetahat_core::Number;
 
 use crate::model::GreyBox;
 
-/// The estimate of the state and its covariance, and room for a step. Matrices are column after column.
+/// The estimate of the state and its covariance, and the workspace of a step. Matrices are column after column.
 #[derive(Debug, Clone)]
 pub(crate) struct Predictor<S> {
     /// x^.

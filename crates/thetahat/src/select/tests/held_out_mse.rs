@@ -31,7 +31,7 @@ fn cost(y: &[f64], u: &[f64], orders: &Orders, theta: &[f64], rows: impl Iterato
 
 /// The pieces without the samples that a model of this grid does not need.
 fn cut(pieces: &[Range<usize>], orders: &Orders) -> Vec<Range<usize>> {
-    pieces.iter().map(|piece| piece.start + 4 - orders.reach()..piece.end).collect()
+    pieces.iter().map(|piece| piece.start + 4 - orders.maximum_lag()..piece.end).collect()
 }
 
 #[test]

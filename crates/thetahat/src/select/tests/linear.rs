@@ -24,7 +24,7 @@ fn grid_of_two() -> Grid {
 
 /// The mean of e^2 of one model on the samples after `first` of each segment.
 fn mse(record: &Record<'_>, orders: &Orders, first: usize, initial: Initial) -> Option<f64> {
-    let cut = if initial == Initial::Zero { 0 } else { first - orders.reach() };
+    let cut = if initial == Initial::Zero { 0 } else { first - orders.maximum_lag() };
     let long = record.segments.iter().filter(|segment| segment.len() > cut);
     let segments: Vec<_> = long.map(|segment| segment.start + cut..segment.end).collect();
     Some(arx(&super::record(record.output, &record.inputs, &segments), orders, initial).ok()?.mse())

@@ -27,7 +27,7 @@ pub(crate) use respond::{
     BodeArguments, PredictArguments, RespondArguments, SimulateArguments, StartArgument, TransientArguments,
 };
 pub(crate) use track::{ResumeArgument, TrackArguments, TrackMethodArgument, TrackModelArgument};
-pub(crate) use validate::{CompareArguments, LookArguments, ValidateArguments};
+pub(crate) use validate::{CompareArguments, EvaluationArguments, ValidateArguments};
 
 const EXIT_CODES: &str = "\
 Exit codes:
@@ -71,11 +71,11 @@ Examples:
   thetahat fit log.csv --na 2 --nb 2 --norm 1 --bound a1=-1.9..0 --dc-gain 1..20
   thetahat fit log.csv --model oe --nb 2 --nf 2 --norm huber")]
     Fit(Box<FitArguments>),
-    /// Look at a log before any fit
+    /// Inspect a log before any fit
     ///
     /// Says of each channel its range, mean and trend, missing and repeated values, rounding, saturation and outliers; of the
     /// clock its step and jitter; of each input how much it excites, its delay and whether it follows the output. Ends
-    /// with warnings and the line of thetahat fit that goes with the log. Without -u and -y it looks at all columns of
+    /// with warnings and the line of thetahat fit that goes with the log. Without -u and -y it inspects all columns of
     /// numbers.
     #[command(after_help = "\
 Examples:
@@ -86,7 +86,7 @@ Examples:
     ///
     /// Writes CSV: time or row, measured, predicted and the standard deviation of its error, that of the parameters included, in the
     /// log's own units. The fit figures go to standard error. Rows at the end that have inputs but no output are forecast, each as many steps ahead as
-    /// it lies behind the last measured one; a series without inputs is forecast beyond the end of the log.
+    /// it lies after the last measured one; a series without inputs is forecast beyond the end of the log.
     #[command(after_help = "\
 Examples:
   thetahat predict model.json log.csv --horizon 5 > predicted.csv

@@ -12,7 +12,7 @@ use thetahat::report::{EquationsPlan, NonlinearArxPlan, Plan, Report, Requiremen
 use crate::args::{FitArguments, InspectArguments, ValidateArguments};
 use crate::commands::{Experiments, Tracking, experiments, inspected};
 use crate::failure::Failure;
-use crate::job::{FitJob, GreyJob, InspectJob, LookJob, NarxJob};
+use crate::job::{EvaluationJob, FitJob, GreyJob, InspectJob, NarxJob};
 use crate::replace::replace;
 
 /// Logs that were read as one.
@@ -84,7 +84,7 @@ pub fn narx_plan(
     job.plan(if job.driven { inputs } else { Vec::new() }, output)
 }
 
-/// How `thetahat validate` looks at a log with these options, and what it requires.
+/// How `thetahat validate` evaluates a model with these options, and what it requires.
 ///
 /// # Errors
 /// A [`Failure`] as the program would report it.
@@ -92,7 +92,7 @@ pub fn validation_plan(options: &[OsString]) -> Result<(ValidationPlan, Vec<Requ
     let files = ["report", "log"].map(OsString::from);
     let words: Vec<OsString> = options.iter().cloned().chain(files).collect();
     let arguments: ValidateArguments = arguments("validate", &words)?;
-    let mut job = LookJob::resolve(&arguments.look, &[])?;
+    let mut job = EvaluationJob::resolve(&arguments.evaluation, &[])?;
     let requirements = job.requirements(&arguments.require)?;
     Ok((job.plan, requirements))
 }

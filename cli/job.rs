@@ -31,7 +31,7 @@ pub(crate) use grey::GreyJob;
 pub(crate) use inspect::InspectJob;
 pub(crate) use narx::NarxJob;
 pub(crate) use track::TrackJob;
-pub(crate) use validate::LookJob;
+pub(crate) use validate::EvaluationJob;
 
 /// How to read a log.
 #[derive(Debug)]
@@ -177,11 +177,11 @@ pub(crate) fn parsed<T: FromStr<Err = thetahat::Error>>(argument: &str, text: &s
     })
 }
 
-/// STEP:hold or STEP:linear, and :unfiltered behind it.
+/// STEP:hold or STEP:linear, and :unfiltered after it.
 fn resampling(text: &str) -> Result<Resample, Failure> {
     let wrong = || {
         Failure::usage(format!(
-            "--resample {text}: write it as STEP:hold or STEP:linear, such as 0.5:linear; with :unfiltered behind it without \
+            "--resample {text}: write it as STEP:hold or STEP:linear, such as 0.5:linear; with :unfiltered after it without \
              a filter"
         ))
     };

@@ -93,7 +93,7 @@ fn end(failure: &Failure) -> u8 {
 /// Prints what the syntax of a command line says. Nobody is left to tell if that fails.
 fn print(error: &clap::Error) {
     let plain = error.render().to_string();
-    if plain.lines().any(|line| line.contains(text::is_unseen)) {
+    if plain.lines().any(|line| line.contains(text::is_invisible)) {
         // A file's name, which may hold anything, stood for a pattern of the shell.
         plain.lines().for_each(|line| say(&text::harmless(line)));
     } else {

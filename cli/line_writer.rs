@@ -18,10 +18,10 @@ pub(crate) enum Format {
     Csv,
 }
 
-/// By so many of its last bytes a file is known.
+/// A file is recognised by this many of its last bytes.
 const KNOWN_BY: usize = 48;
 
-/// So many bytes are written at once, where nobody waits for them.
+/// This many bytes are written at once, where nobody waits for them.
 const FULL: usize = 1 << 16;
 
 /// A file or standard output, and the lines on their way to it. Only whole lines are ever written.
@@ -274,7 +274,7 @@ impl Cells<'_> {
         });
     }
 
-    /// Nothing in so many columns.
+    /// Nothing in this many columns.
     pub(crate) fn skip(&mut self, columns: usize) {
         for _ in 0..columns {
             if self.lines.format == Format::Csv {

@@ -5,7 +5,7 @@ use crate::interrupt;
 use crate::messages::warn;
 use crate::table::{Event, Stream};
 
-/// So many faults of a kind are told one by one.
+/// This many faults of a kind are told one by one.
 const TOLD: u64 = 5;
 
 /// The rows of a log that is followed, malformed lines, odd clocks and requests to end dealt with.
@@ -140,7 +140,7 @@ impl Live {
         self.is_blank
     }
 
-    /// What was in the log besides good rows, as it goes behind the number of rows: nothing, or such as ", 2 malformed".
+    /// What was in the log besides good rows, as it goes after the number of rows: nothing, or such as ", 2 malformed".
     pub(crate) fn faults(&self) -> String {
         let malformed = match self.malformed {
             0 => String::new(),

@@ -53,7 +53,7 @@ pub(crate) struct Joined {
     pub(crate) words: Vec<String>,
 }
 
-/// Reads the columns of some logs that `choose` names of each, seeing those there are, one log behind the other.
+/// Reads the columns of some logs that `choose` names of each, seeing those there are, one log after the other.
 pub(crate) fn joined(
     paths: &[PathBuf],
     job: &LogJob,

@@ -26,7 +26,7 @@ impl Bound {
         Self { per_value, free: free() }
     }
 
-    /// What so many values take, in words, if it is more than there is.
+    /// What this many values take, in words, if it is more than there is.
     pub(crate) fn passed_by(&self, values: usize) -> Option<String> {
         let taken = values as u64 * self.per_value as u64;
         let free = self.free.filter(|free| taken > *free)?;
@@ -74,7 +74,7 @@ fn own() -> Option<u64> {
     Some(most.saturating_sub(used))
 }
 
-/// The number behind a word at the beginning of a line; none if there is another word.
+/// The number after a word at the beginning of a line; none if there is another word.
 fn number_after(text: &str, word: &str) -> Option<u64> {
     let rest = text.lines().find_map(|line| line.strip_prefix(word))?;
     rest.split_whitespace().next()?.parse().ok()

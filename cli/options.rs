@@ -58,14 +58,14 @@ pub(crate) fn option_of(argument: &str) -> Option<&'static str> {
 pub fn with_options(message: &str) -> String {
     let mut parts = message.split('`');
     let mut text = parts.next().unwrap_or_default().to_owned();
-    // Whether the next part stands behind a backtick that has not been closed.
+    // Whether the next part stands after a backtick that has not been closed.
     let mut open = true;
     for part in parts {
         match option_of(part).filter(|_| open) {
             Some(option) => {
                 text.push_str("--");
                 text.push_str(option);
-                // The backtick behind it is gone too.
+                // The backtick after it is gone too.
                 open = false;
             }
             None => {

@@ -62,7 +62,7 @@ impl Reading {
         Self(Bar::new())
     }
 
-    /// So many bytes, of how many if that is known.
+    /// This many bytes, of how many if that is known.
     pub(crate) fn update(&self, read: u64, total: Option<u64>) {
         let make = || match total {
             Some(total) => (ProgressBar::new(total), "reading {wide_bar} {bytes}/{total_bytes} {eta}"),

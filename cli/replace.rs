@@ -16,7 +16,7 @@ use crate::failure::Failure;
 use crate::interrupt;
 use crate::messages::warn;
 
-/// What a passing name begins and ends with; between the two are so many letters and digits.
+/// What a passing name begins and ends with; between the two are this many letters and digits.
 const BEFORE: &str = ".thetahat-";
 const AFTER: &str = ".tmp";
 const LETTERS: usize = 12;

@@ -156,15 +156,15 @@ fn validation_takes_the_smallest_model_within_a_percent_of_the_least() {
     let folder = Folder::with_log(Experiment::new(1000).csv());
     for (select, options) in [("validation", "--split 60/20/20"), ("cv", "")] {
         let report = folder.fit(&format!("log.csv --na 1..5 --nb 1..5 --nk 1 {options} --select {select}"));
-        let least = number(&report, "/selection/least/unseen");
+        let least = number(&report, "/selection/least/held_out_mse");
         let best = report["selection"]["best"].as_array().unwrap();
-        let all = best.iter().map(|entry| (number(entry, "/unseen"), number(entry, "/parameters")));
-        let smallest = all.clone().fold(f64::INFINITY, |least, (unseen, _)| least.min(unseen));
+        let all = best.iter().map(|entry| (number(entry, "/held_out_mse"), number(entry, "/parameters")));
+        let smallest = all.clone().fold(f64::INFINITY, |least, (mse, _)| least.min(mse));
         assert_eq!(least, smallest, "{select}");
-        let close = all.filter(|(unseen, _)| *unseen <= 1.01 * least);
+        let close = all.filter(|(mse, _)| *mse <= 1.01 * least);
         let fewest = close.fold(f64::INFINITY, |fewest, (_, parameters)| fewest.min(parameters));
         assert_eq!(number(&report, "/selection/chosen/parameters"), fewest, "{select}");
-        assert!(number(&report, "/selection/chosen/unseen") <= 1.01 * least, "{select}");
+        assert!(number(&report, "/selection/chosen/held_out_mse") <= 1.01 * least, "{select}");
         assert_eq!(orders(&report), [2, 2, 0, 0, 0, 1], "{select}");
     }
 }

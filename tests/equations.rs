@@ -37,7 +37,7 @@ fn figures_of_a_fit_are_those_of_a_validation() {
     for (rows, part, seen) in [("1..600", "estimation", "yes"), ("701..900", "validation", "no")] {
         let run = folder.done(&format!("validate report.json log.csv --time t --rows {rows} --format json"));
         let validation: Value = serde_json::from_str(&run.stdout).expect("it is JSON");
-        assert_eq!(validation["seen"], seen);
+        assert_eq!(validation["in_sample"], seen);
         for output in ["i", "speed"] {
             for kind in ["steps", "free-run"] {
                 let (one, other) = (
@@ -63,7 +63,7 @@ fn figures_of_a_fit_are_those_of_a_validation() {
     folder.write("other.csv", folder.read("log.csv").replacen("0.01,", "0.0100001,", 1));
     let run = folder.done("validate report.json other.csv --time t --rows 1..600 --format json");
     let validation: Value = serde_json::from_str(&run.stdout).expect("it is JSON");
-    assert_eq!(validation["seen"], "yes", "the clock is no channel");
+    assert_eq!(validation["in_sample"], "yes", "the clock is no channel");
 }
 
 #[test]
@@ -169,7 +169,7 @@ fn several_logs_begin_anew_and_clocks_may_be_irregular() {
     // Either of them is known.
     let run = folder.done("validate two.json short.csv --time t --format json");
     let validation: Value = serde_json::from_str(&run.stdout).expect("it is JSON");
-    assert_eq!(validation["seen"], "yes");
+    assert_eq!(validation["in_sample"], "yes");
     folder.done("fit --grey model.toml thin.csv --time t --report thin.json");
     folder.done("validate thin.json thin.csv --time t --require 'white,fit@1>=95'");
     folder.done(

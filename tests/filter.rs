@@ -251,7 +251,7 @@ fn the_series_resistance_of_a_cell_from_its_first_pulse() {
     let folder = folder_with("leaf_cell_hppc_25c.csv");
     let log = folder.read("log.csv");
     let model = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/leaf_cell.toml");
-    // The rows around the first discharge: from a minute of rest to half a minute behind the pulse.
+    // The rows around the first discharge: from a minute of rest to half a minute after the pulse.
     let rows: Vec<(f64, f64)> = log
         .lines()
         .skip(1)

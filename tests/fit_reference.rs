@@ -41,7 +41,7 @@ pub(crate) fn folder_with(log: &str) -> Folder {
     folder_with_any(log).expect("the log comes with the tests")
 }
 
-/// The last digit of a number written with so many significant digits.
+/// The last digit of a number written with this many significant digits.
 fn last_digit(value: f64, digits: i32) -> f64 {
     10_f64.powi(value.abs().log10().floor() as i32 + 1 - digits)
 }

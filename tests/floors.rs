@@ -75,7 +75,7 @@ const PYTHON: House = House {
         &["array"],
         &["grey_box", "log", "online"],
         &["model"],
-        &["filter", "judgement", "track"],
+        &["evaluation", "filter", "track"],
     ],
 };
 

@@ -102,7 +102,7 @@ fn the_noise_of_a_plant_that_simulates_is_described_behind_it() {
     let report = folder.fit(&format!("{rows} --focus simulation"));
     assert_eq!(report["selection"]["chosen"]["structure"], "oe", "{}", words(&report));
     assert_eq!(report["model"]["structure"], "bj");
-    assert!(words(&report).contains("Behind it an autoregression of order"), "{}", words(&report));
+    assert!(words(&report).contains("After it an autoregression of order"), "{}", words(&report));
     assert!(figures(&report, "steps")[0] > figures(&report, "free-run")[0]);
     let own = folder.fit(&format!("{rows} --focus simulation --model oe"));
     assert_eq!(own["model"]["structure"], "oe");

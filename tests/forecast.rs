@@ -1,4 +1,4 @@
-//! How sure a prediction is, and what comes behind the last measured row.
+//! How sure a prediction is, and what comes after the last measured row.
 
 use serde_json::Value;
 
@@ -152,7 +152,7 @@ fn rows_with_inputs_and_no_output_are_forecast() {
     folder.write("future.csv", experiment.csv());
     let answer = answer(&folder, "predict model.json future.csv --horizon 8");
     assert_eq!(answer.time.len(), 200);
-    // Each as many steps ahead as it lies behind the last measured row.
+    // Each as many steps ahead as it lies after the last measured row.
     for (step, row) in (1..=8).zip(190..) {
         let ahead = self::answer(&folder, &format!("predict model.json log.csv --horizon {step}"));
         let (found, expected) = (answer.predicted[row].unwrap(), ahead.predicted[row].unwrap());

@@ -84,7 +84,7 @@ fn fit_page_of(folder: &Folder, line: &str) -> PathBuf {
 /// The parts of the log that a model is fitted to, and validated on.
 const PARTS: &str = "--estimate 1..600 --validate 601..900";
 
-/// Opens a page and checks what all pages promise: so many charts with curves in them, a silent console, no request.
+/// Opens a page and checks what all pages promise: this many charts with curves in them, a silent console, no request.
 fn opened(browser: &mut Browser, path: &Path, charts: usize) {
     browser.open(path, 1200);
     let drawn = browser.value(

@@ -32,7 +32,7 @@ fn a_series_with_holes_is_fitted_as_by_statsmodels() {
     assert!(table.contains("stationary from the first sample on"), "{table}");
     // The report is one for the other verbs.
     let validation = folder.done("validate model.json log.csv --format json").stdout;
-    assert!(validation.contains("\"seen\": \"yes\""), "{validation}");
+    assert!(validation.contains("\"in_sample\": \"yes\""), "{validation}");
     let ahead = folder.done("predict model.json log.csv --horizon 3").stdout;
     assert!(ahead.lines().count() > 309, "{ahead}");
     // What it starts from is the conditional estimate of a log that is cut at each hole, which is not as near.

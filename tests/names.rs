@@ -2,7 +2,7 @@
 //! spreadsheet takes for a formula, nor a line without end.
 
 use serde_json::{Value, json};
-use thetahat::text::is_unseen;
+use thetahat::text::is_invisible;
 
 use crate::harness::{Folder, Run};
 use crate::signals::{Experiment, csv, plain_log};
@@ -20,7 +20,7 @@ fn folder() -> Folder {
 }
 
 fn is_harmless(run: &Run) -> bool {
-    [&run.stdout, &run.stderr].iter().all(|text| text.lines().all(|line| !line.contains(is_unseen)))
+    [&run.stdout, &run.stderr].iter().all(|text| text.lines().all(|line| !line.contains(is_invisible)))
 }
 
 #[test]

@@ -266,7 +266,7 @@ fn the_report_says_how_the_search_went() {
     assert_eq!(search["stability_bound"], false);
     let starts = search["starts"].as_array().unwrap();
     assert_eq!(starts[0]["name"], search["start"]);
-    // Those of smaller models are searched from beside so many others.
+    // Those of smaller models are searched from beside that many others.
     let nested = starts.iter().filter(|start| start["name"] == "nested").count();
     let reached = starts.iter().filter(|start| start["reached"].is_number()).count();
     assert!(starts.len() >= 5 && (5..=5 + nested).contains(&reached), "{starts:?}");

@@ -63,7 +63,7 @@ fn drift_does_no_harm_to_a_fit_above_its_frequencies() {
     // The log of the fit is known again.
     let validation = folder.done("validate model.json log.csv --rows 1..3000 --format json").stdout;
     let validation: Value = serde_json::from_str(&validation).unwrap();
-    assert_eq!(validation["seen"], "yes");
+    assert_eq!(validation["in_sample"], "yes");
     assert!((number(&validation, "/noise/0/ratio") - 1.0).abs() < 0.01);
 }
 

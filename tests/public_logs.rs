@@ -6,7 +6,7 @@ use serde_json::Value;
 use crate::fit_reference::{figures, folder_with_any};
 use crate::harness::{Folder, number};
 
-/// A log, the options that it needs, its rows behind these, and its number of inputs.
+/// A log, the options that it needs, its rows after these, and its number of inputs.
 struct Public {
     file: &'static str,
     options: &'static str,
@@ -40,7 +40,7 @@ const LOGS: [Public; 18] = [
 ];
 
 /// The mean square of one-step errors on the last rows of a fit to the first ones.
-fn unseen(report: &Value) -> f64 {
+fn held_out_mse(report: &Value) -> f64 {
     number(figures(report, "validation", "steps"), "/rmse").powi(2)
 }
 
@@ -55,7 +55,7 @@ fn reference(folder: &Folder, line: &str, inputs: bool) -> f64 {
         });
     let fits = orders.map(|orders| folder.fit(&format!("{line} {orders}")));
     let best = fits.min_by(|a, b| number(a, "/estimation/mdl").total_cmp(&number(b, "/estimation/mdl")));
-    best.map_or(f64::NAN, |best| unseen(&best))
+    best.map_or(f64::NAN, |best| held_out_mse(&best))
 }
 
 #[test]
@@ -72,14 +72,14 @@ fn every_public_log_is_inspected_and_fitted() {
         let last = rows * 7 / 10;
         let line = format!("log.csv {options} --estimate 1..{last} --validate {}..{rows}", last + 1);
         let chosen = folder.fit(&line);
-        let (ours, theirs) = (unseen(&chosen), reference(&folder, &line.replace("--nb 0", ""), inputs));
+        let (ours, theirs) = (held_out_mse(&chosen), reference(&folder, &line.replace("--nb 0", ""), inputs));
         let name = format!(
             "{file} {options}: {} ratio {:.3}",
             chosen["selection"]["chosen"]["orders"],
             ours / theirs
         );
         told += &format!("{name}\n");
-        // The gas furnace behaves otherwise in its last rows: reported, not judged.
+        // The gas furnace behaves otherwise in its last rows: reported, not asserted.
         if (ours.is_nan() || ours > 1.2 * theirs) && file != "gas_furnace.csv" {
             worse.push(name);
         }

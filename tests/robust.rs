@@ -40,7 +40,7 @@ fn every_structure_has_its_robust_fit() {
     assert!(table.contains("robust prediction error, "), "{table}");
     // The report is one for the other verbs.
     let validation = folder.done("validate model.json log.csv --format json").stdout;
-    assert!(validation.contains("\"seen\": \"yes\""), "{validation}");
+    assert!(validation.contains("\"in_sample\": \"yes\""), "{validation}");
     for options in [
         "--na 2 --nb 2 --norm huber",
         "--na 2 --nb 2 --norm huber --search gauss-newton --tolerance 1e-10",

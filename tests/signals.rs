@@ -63,7 +63,7 @@ pub(crate) struct Polynomials {
 impl Polynomials {
     /// With one input. What is empty is 1.
     pub(crate) fn new(a: &[f64], b: &[f64], c: &[f64], d: &[f64], f: &[f64]) -> Self {
-        let monic = |behind: &[f64]| [&[1.0], behind].concat();
+        let monic = |after: &[f64]| [&[1.0], after].concat();
         Self { a: monic(a), b: vec![b.to_vec()], c: monic(c), d: monic(d), f: vec![monic(f)] }
     }
 

@@ -253,7 +253,7 @@ fn a_log_that_has_grown_goes_on_behind_its_last_whole_line() {
     let folder = Folder::with_log(&log);
     let whole = folder.done(&format!("track log.csv {MODEL}")).stdout;
     let mut joined = String::new();
-    // Cut in the middle of a line, behind a line break, and at the end.
+    // Cut in the middle of a line, after a line break, and at the end.
     for cut in [log.len() / 3, log.len() / 2, log[..log.len() / 2 + 40].rfind('\n').unwrap() + 1, log.len()] {
         folder.write("log.csv", &log[..cut]);
         let run = folder.done(&format!("track log.csv {MODEL} --state state.json"));
@@ -428,7 +428,7 @@ fn a_state_whose_numbers_were_edited_is_refused() {
         ("/trackers/0/score/output_variance", (-1.0).into()),
         ("/trackers/0/score/mean_nis", (-1.0).into()),
         ("/trackers/0/score/samples", 101.into()),
-        ("/trackers/0/score/judged", 1000.into()),
+        ("/trackers/0/score/evaluated", 1000.into()),
         ("/trackers/0/scales/output", (-2.0).into()),
         ("/trackers/0/settling", 1000.into()),
         ("/trackers/0/has_estimate", false.into()),

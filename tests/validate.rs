@@ -38,7 +38,7 @@ fn the_figures_are_those_that_predict_and_simulate_give() {
     for model in ["arx", "oe", "armax", "bj", "ar", "iv", "sriv"] {
         let found = validation(&folder, &format!("{model}.json log.csv --rows 301..600 --horizon 4"));
         assert_eq!(found["schema"], "thetahat.validation/1");
-        assert_eq!((&found["report"], &found["seen"]), (&format!("{model}.json").into(), &"no".into()));
+        assert_eq!((&found["report"], &found["in_sample"]), (&format!("{model}.json").into(), &"no".into()));
         assert_eq!(found["rows"], serde_json::json!([[301, 600]]));
         let fits = found["fit"].as_array().unwrap();
         assert_eq!(fits.len(), if model == "ar" { 2 } else { 3 });
@@ -68,13 +68,13 @@ fn rows_of_the_fit_are_known() {
     for (rows, seen) in [("1..300", "yes"), ("50..200", "yes"), ("201..400", "partly"), ("301..600", "no")] {
         for model in ["arx", "oe", "armax", "bj", "ar", "iv", "sriv"] {
             let found = validation(&folder, &format!("{model}.json log.csv --rows {rows}"));
-            assert_eq!(found["seen"], seen, "{model} {rows}");
+            assert_eq!(found["in_sample"], seen, "{model} {rows}");
             assert_eq!(found["residuals"][0]["fitted"] == 0, seen == "no");
         }
     }
     let other = csv(&[("u", &Experiment::new(600).u), ("y", &Random::new(3).signal(600))]);
     folder.write("other.csv", other);
-    assert_eq!(validation(&folder, "arx.json other.csv --rows 1..300")["seen"], "no");
+    assert_eq!(validation(&folder, "arx.json other.csv --rows 1..300")["in_sample"], "no");
 }
 
 #[test]
@@ -302,7 +302,10 @@ fn gaps_cut_the_log() {
     folder.write("gaps.csv", csv(&[("u", &u), ("y", &y)]));
     folder.done("fit gaps.csv --na 2 --nb 2 --report gaps.json");
     let found = validation(&folder, "gaps.json gaps.csv");
-    assert_eq!((&found["seen"], &found["residuals"][0]["samples"]), (&"yes".into(), &(600 - 11 - 24).into()));
+    assert_eq!(
+        (&found["in_sample"], &found["residuals"][0]["samples"]),
+        (&"yes".into(), &(600 - 11 - 24).into())
+    );
     assert!(number(&found, "/residuals/0/ljung_box/p_value") > 0.01);
     let run = folder.run("validate gaps.json gaps.csv --require white,independent");
     assert_eq!(run.code, 0, "{}", run.stderr);

@@ -23,7 +23,7 @@ import padasip
 import pykalman
 from filterpy.kalman import KalmanFilter
 
-# At most so many times the step of the peer.
+# At most this many times the step of the peer.
 REQUIRED = {
     ("4x2", "adskalman, Joseph"): 1.05,
     ("6x3", "adskalman, Joseph"): 0.8,
@@ -36,7 +36,7 @@ PACKAGES = ["NumPy", "filterpy", "pykalman", "padasip"]
 
 ROUNDS = 150
 
-# Python, which is slower by far, takes part in every so many.
+# Python, which is slower by far, takes part in one round of this many.
 SELDOM = 15
 
 

@@ -27,7 +27,7 @@ from sippy_unipi import armaxMIMO, io_optMIMO, system_identification  # noqa: F4
 SAMPLES = 10_000
 MANY = 1_000_000
 
-# A fit to MANY samples takes at most so many times as long as one to SAMPLES.
+# A fit to MANY samples takes at most this many times as long as one to SAMPLES.
 GROWTH = 120
 
 ROUNDS = 20

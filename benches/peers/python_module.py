@@ -44,7 +44,7 @@ def least(work, rounds):
 
 
 def by_turns(ours, theirs, rounds, seldom=1):
-    """The least times of both, theirs in every so many rounds, and the results."""
+    """The least times of both, theirs in every few rounds, and the results."""
     mine, yours = [], []
     for turn in range(rounds):
         mine.append(least(ours, 1))

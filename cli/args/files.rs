@@ -29,11 +29,11 @@ impl Command {
             }
             Self::Validate(validate) => {
                 read.extend([validate.report.clone(), validate.path.clone()]);
-                written.extend(validate.look.out.iter().chain(&validate.look.html).cloned());
+                written.extend(validate.evaluation.out.iter().chain(&validate.evaluation.html).cloned());
             }
             Self::Compare(compare) => {
                 read.extend(compare.reports.iter().chain([&compare.path]).cloned());
-                written.extend(compare.look.out.iter().chain(&compare.look.html).cloned());
+                written.extend(compare.evaluation.out.iter().chain(&compare.evaluation.html).cloned());
             }
             Self::Track(track) => {
                 read.extend([&track.path].into_iter().chain(&track.warm).cloned());

@@ -109,7 +109,7 @@ pub(crate) struct ModelArguments {
     /// without D and F)
     #[arg(long, value_enum, default_value = "conditional", help_heading = "Model")]
     pub(crate) likelihood: LikelihoodArgument,
-    /// What stands before the first sample of a stretch
+    /// What stands before the first sample of a segment
     #[arg(long, value_enum, default_value = "auto", help_heading = "Model")]
     pub(crate) initial: InitialArgument,
     /// What the model is for: prediction (errors one step ahead), simulation (free runs, driven by the inputs alone), or a number
@@ -190,7 +190,7 @@ pub(crate) struct ChoiceArguments {
     #[arg(long, value_name = "CRITERION", value_parser = selects())]
     pub(crate) select: Option<Select>,
     /// Cut the rows in time order into parts: models are fitted to the first and compared, the chosen one is fitted again to
-    /// the first two and judged on the third; 0 for a part that is not wanted
+    /// the first two and evaluated on the third; 0 for a part that is not wanted
     #[arg(long, value_name = "E/V/T", conflicts_with = "validate", allow_hyphen_values = true)]
     pub(crate) split: Option<String>,
 }
@@ -211,7 +211,7 @@ pub(crate) struct SearchArguments {
     /// Step length of the gradient search: C1, or C1/(C2 + l) in iteration l [default: 1]
     #[arg(long, value_name = "C1[,C2]", allow_hyphen_values = true)]
     pub(crate) step: Option<String>,
-    /// Search from so many further starts [default: 0]
+    /// Search from this many further starts [default: 0]
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(..=10_000), group = "random")]
     pub(crate) starts: Option<u32>,
     /// Which random starts, or which random centres [default: 0]
@@ -237,7 +237,7 @@ pub(crate) struct CriterionArguments {
     /// Keep the static gain from an input in a range, or at a value
     #[arg(long, value_name = "[INPUT=]G|LOW..HIGH", allow_hyphen_values = true)]
     pub(crate) dc_gain: Vec<String>,
-    /// Keep parameters small: weighs like so many more samples in which the output is 0 [default: 0]
+    /// Keep parameters small: weighs like this many more samples in which the output is 0 [default: 0]
     #[arg(long, value_name = "SAMPLES", allow_hyphen_values = true)]
     pub(crate) ridge: Option<f64>,
     /// Let no error exceed this, in units of the output, and find the box of all parameters that keep to it

@@ -52,7 +52,7 @@ pub(crate) struct LogArguments {
     /// The first row is data; columns are called 1, 2, …
     #[arg(long, help_heading = "Log format")]
     pub(crate) no_header: bool,
-    /// Leave out so many rows below the header, such as a row of units
+    /// Leave out this many rows below the header, such as a row of units
     #[arg(
         long,
         value_name = "N",

@@ -11,7 +11,7 @@ pub(crate) struct PredictArguments {
     /// Steps ahead; inf for a free run, like simulate
     #[arg(long, value_name = "K", default_value = "1", allow_hyphen_values = true)]
     pub(crate) horizon: String,
-    /// What stands before the first sample of a stretch
+    /// What stands before the first sample of a segment
     #[arg(long, value_enum, default_value = "auto")]
     pub(crate) initial: StartArgument,
     #[command(flatten)]
@@ -20,7 +20,7 @@ pub(crate) struct PredictArguments {
 
 #[derive(Debug, Args)]
 pub(crate) struct SimulateArguments {
-    /// Draw so many runs of what the model leaves open: its noise, and its parameters within their covariance
+    /// Draw this many runs of what the model leaves open: its noise, and its parameters within their covariance
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub(crate) draws: Option<u32>,
     /// Which draws [default: 0]
@@ -29,7 +29,7 @@ pub(crate) struct SimulateArguments {
     /// Write the drawn runs themselves to a file: CSV with a row for each row of the log, and a column for each draw
     #[arg(long, value_name = "FILE", requires = "draws")]
     pub(crate) draws_file: Option<PathBuf>,
-    /// What stands before the first sample of a stretch
+    /// What stands before the first sample of a segment
     #[arg(long, value_enum, default_value = "auto")]
     pub(crate) initial: StartArgument,
     #[command(flatten)]

@@ -75,10 +75,10 @@ pub(crate) struct TrackArguments {
     #[arg(long, value_name = "WIDTH", allow_hyphen_values = true, help_heading = "Adaptation")]
     pub(crate) dead_zone: Option<f64>,
 
-    /// Add to each row a forecast of the output so many rows later, inputs held at their last value
+    /// Add to each row a forecast of the output this many rows later, inputs held at their last value
     #[arg(long, value_name = "T", value_parser = clap::value_parser!(u32).range(1..=10_000), help_heading = "Watch")]
     pub(crate) horizon: Option<u32>,
-    /// Watch the innovations for changes of their mean and variance (CUSUM), with so many samples between two false alarms on
+    /// Watch the innovations for changes of their mean and variance (CUSUM), with this many samples between two false alarms on
     /// average
     #[arg(long, value_name = "SAMPLES", allow_hyphen_values = true, help_heading = "Watch")]
     pub(crate) alarm: Option<f64>,
@@ -91,7 +91,7 @@ pub(crate) struct TrackArguments {
     /// Keep the estimator's whole state in a file, and go on from it if it is there
     #[arg(long, value_name = "FILE", help_heading = "State")]
     pub(crate) state: Option<PathBuf>,
-    /// Write the state every so many rows, besides at the end, and within 10 s where rows are slow to come
+    /// Write the state every N rows, besides at the end, and within 10 s where rows are slow to come
     #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u64).range(1..),
         requires = "state", help_heading = "State")]
     pub(crate) save_every: u64,

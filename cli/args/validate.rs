@@ -20,7 +20,7 @@ pub(crate) struct ValidateArguments {
     #[arg(long, value_name = "WHAT[,WHAT…]", value_delimiter = ',', help_heading = "Tests")]
     pub(crate) require: Vec<String>,
     #[command(flatten)]
-    pub(crate) look: LookArguments,
+    pub(crate) evaluation: EvaluationArguments,
 }
 
 #[derive(Debug, Args)]
@@ -32,19 +32,19 @@ pub(crate) struct CompareArguments {
     #[arg(value_name = "LOG", required = true)]
     pub(crate) path: PathBuf,
     #[command(flatten)]
-    pub(crate) look: LookArguments,
+    pub(crate) evaluation: EvaluationArguments,
 }
 
 /// What validate and compare share.
 #[derive(Debug, Args)]
-pub(crate) struct LookArguments {
-    /// Rows to look at, 1-based and inclusive [default: all]
+pub(crate) struct EvaluationArguments {
+    /// Rows to validate on, 1-based and inclusive [default: all]
     #[arg(long, value_name = "A..B[,C..D]", value_delimiter = ',')]
     pub(crate) rows: Vec<String>,
-    /// Offsets: the model's own, or none, mean, linear, start:K of the rows looked at
+    /// Offsets: the model's own, or none, mean, linear, start:K of the rows evaluated
     #[arg(long, default_value = "model", value_name = "WHAT")]
     pub(crate) detrend: String,
-    /// How many steps ahead to look besides 1
+    /// Prediction horizons besides 1, in steps
     #[arg(
         long,
         value_name = "K[,K…]",

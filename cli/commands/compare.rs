@@ -7,15 +7,15 @@ use super::validate::{loaded, one, print};
 use super::{stored, summary};
 use crate::args::CompareArguments;
 use crate::failure::Failure;
-use crate::job::LookJob;
+use crate::job::EvaluationJob;
 use crate::messages::warn;
 use crate::output;
 use crate::wrap::stdout_width;
 
 pub(crate) fn compare(arguments: &CompareArguments, line: &str) -> Result<(), Failure> {
-    let look = &arguments.look;
+    let evaluation = &arguments.evaluation;
     let read: Vec<_> = arguments.reports.iter().chain([&arguments.path]).collect();
-    let job = LookJob::resolve(look, &read)?;
+    let job = EvaluationJob::resolve(evaluation, &read)?;
     let reports: Vec<Report> =
         arguments.reports.iter().map(|path| stored::report(path)).collect::<Result<_, _>>()?;
     let loaded = loaded(&arguments.path, &job, &reports.iter().collect::<Vec<_>>())?;
@@ -25,12 +25,12 @@ pub(crate) fn compare(arguments: &CompareArguments, line: &str) -> Result<(), Fa
     let found: Vec<Validated> = each.collect::<Result<_, _>>()?;
     let comparison = compared(&found).map_err(|error| Failure::option(&error))?;
     let json = comparison.to_json().map_err(|error| Failure::data(error.to_string()))?;
-    if let Some(path) = &look.html {
+    if let Some(path) = &evaluation.html {
         let page = comparison_page(&reports, &found, line);
         output::page(path, &page.map_err(|error| Failure::data(error.to_string()))?)?;
     }
     for (path, model) in arguments.reports.iter().zip(&comparison.models) {
         model.warnings.iter().for_each(|warning| warn(&format!("{}: {warning}", path.display())));
     }
-    print(look, &json, || summary::comparison(&comparison, stdout_width()))
+    print(evaluation, &json, || summary::comparison(&comparison, stdout_width()))
 }

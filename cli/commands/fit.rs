@@ -8,7 +8,7 @@ use thetahat::report::{
     Report, Validated, ValidationPlan, fit_page, held_out_runs, identify_monitored, validate,
 };
 
-use super::search::{Found, watched};
+use super::search::{Identified, watched};
 use super::{grey, narx, summary};
 use crate::args::{FitArguments, FormatArgument};
 use crate::failure::Failure;
@@ -20,7 +20,7 @@ use crate::wrap::stdout_width;
 
 pub(crate) fn fit(arguments: &FitArguments, line: &str) -> Result<(), Failure> {
     let outputs = [&arguments.report, &arguments.html];
-    let Found { report, log, sources } = match &arguments.grey {
+    let Identified { report, log, sources } = match &arguments.grey {
         Some(model) => grey::found(&GreyJob::resolve(arguments, model)?)?,
         None => match arguments.narx.narx {
             Some(map) => narx::found(&NarxJob::resolve(arguments, map)?)?,
@@ -48,27 +48,27 @@ pub(crate) fn fit(arguments: &FitArguments, line: &str) -> Result<(), Failure> {
 }
 
 /// Reads the logs and fits the model.
-fn found(job: &FitJob, keeps_log: bool) -> Result<Found, Failure> {
+fn found(job: &FitJob, keeps_log: bool) -> Result<Identified, Failure> {
     let Experiments { log, sources, channels, words } = experiments(job, false)?;
     words.iter().for_each(|word| warn(word));
     let kept = keeps_log.then(|| log.clone());
     let plan = job.plan(channels.inputs, channels.output)?;
     let report = watched(|monitor| identify_monitored(log, &sources, &plan, monitor))?;
-    Ok(Found { report: report.map_err(log::failure(&sources))?, log: kept, sources })
+    Ok(Identified { report: report.map_err(log::failure(&sources))?, log: kept, sources })
 }
 
-/// The page of a fit, with a look at each part of the log.
+/// The page of a fit, with a validation of each part of the log.
 fn page(report: &Report, log: &Log, sources: &[Source], line: &str) -> Result<String, Failure> {
     let data = &report.data;
     let test = data.split.as_ref().map_or(&[][..], |parts| &parts.test);
     let parts = [&data.estimation[..], &data.validation, test].into_iter().filter(|rows| !rows.is_empty());
-    let look = |rows: &[Rows]| {
+    let validated = |rows: &[Rows]| {
         let plan = ValidationPlan { rows: rows.to_vec(), ..ValidationPlan::default() };
         validate(report, None, log, sources, &plan).map_err(log::failure(sources))
     };
-    let looks: Vec<Validated> = parts.map(look).collect::<Result<_, _>>()?;
+    let validated: Vec<Validated> = parts.map(validated).collect::<Result<_, _>>()?;
     let held_out = held_out_runs(report, log).map_err(log::failure(sources))?;
-    Ok(fit_page(report, &looks, &held_out, line))
+    Ok(fit_page(report, &validated, &held_out, line))
 }
 
 /// Reads the logs and fits the model.

@@ -3,7 +3,7 @@
 use thetahat::model::GreyBox;
 use thetahat::report::fit_equations;
 
-use super::search::{Found, watched};
+use super::search::{Identified, watched};
 use super::stored;
 use crate::failure::Failure;
 use crate::job::GreyJob;
@@ -11,7 +11,7 @@ use crate::log::{self, Clocks, Joined};
 use crate::messages::warn;
 
 /// Reads the logs and fits the model.
-pub(super) fn found(job: &GreyJob) -> Result<Found, Failure> {
+pub(super) fn found(job: &GreyJob) -> Result<Identified, Failure> {
     let text = stored::text(&job.model)?;
     let model = GreyBox::from_toml(&text)
         .map_err(|error| Failure::data(format!("{}: {error}", job.model.display())))?;
@@ -21,5 +21,5 @@ pub(super) fn found(job: &GreyJob) -> Result<Found, Failure> {
     words.iter().for_each(|word| warn(word));
     let report = watched(|monitor| fit_equations(&model, &log, &sources, &job.plan, monitor))?;
     let report = report.map_err(log::failure(&sources))?;
-    Ok(Found { report, log: Some(log), sources })
+    Ok(Identified { report, log: Some(log), sources })
 }

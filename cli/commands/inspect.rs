@@ -39,7 +39,7 @@ pub(crate) fn inspect(arguments: &InspectArguments, line: &str) -> Result<(), Fa
     output::write(&arguments.out, |file| file.write_all(text.as_bytes()))
 }
 
-/// Reads the log and looks at it. What was read is there for a page, if one was asked for.
+/// Reads the log and inspects it. What was read is there for a page, if one was asked for.
 pub(crate) fn inspected(
     job: &InspectJob,
     arguments: &InspectArguments,
@@ -63,10 +63,10 @@ pub(crate) fn inspected(
     Ok((inspection, kept))
 }
 
-/// So many columns that are left out for one reason are named.
+/// This many columns that are left out for one reason are named.
 const MOST_TOLD: usize = 3;
 
-/// Which columns are looked at, and what they are.
+/// Which columns are inspected, and what they are.
 #[derive(Debug, Default)]
 struct Chosen {
     columns: Vec<String>,

@@ -3,14 +3,14 @@
 use thetahat::report::fit_nonlinear_arx;
 
 use super::fit::{Wanted, read};
-use super::search::Found;
+use super::search::Identified;
 use crate::failure::Failure;
 use crate::job::NarxJob;
 use crate::log;
 use crate::messages::warn;
 
 /// Reads the logs and fits the model.
-pub(super) fn found(job: &NarxJob) -> Result<Found, Failure> {
+pub(super) fn found(job: &NarxJob) -> Result<Identified, Failure> {
     let wanted = Wanted {
         inputs: job.inputs.as_deref(),
         output: job.output.as_deref(),
@@ -22,5 +22,5 @@ pub(super) fn found(job: &NarxJob) -> Result<Found, Failure> {
     let plan = job.plan(found.channels.inputs, found.channels.output)?;
     let report =
         fit_nonlinear_arx(&found.log, &found.sources, &plan).map_err(log::failure(&found.sources))?;
-    Ok(Found { report, log: Some(found.log), sources: found.sources })
+    Ok(Identified { report, log: Some(found.log), sources: found.sources })
 }

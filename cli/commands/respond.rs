@@ -105,7 +105,7 @@ fn respond(
         let of = if applied.outputs.len() > 1 { format!("{}: ", output.name) } else { String::new() };
         match &output.fit {
             Some(_) if !output.predicted.iter().any(|value| value.is_finite()) => {
-                warn(&format!("{of}no row could be predicted: the stretches without a gap are too short"))
+                warn(&format!("{of}no row could be predicted: the segments without a gap are too short"))
             }
             Some(fit) => tell(&format!("{of}{}", summary::figure(fit))),
             None => {}
@@ -120,7 +120,7 @@ struct RowClock<'l> {
 }
 
 impl RowClock<'_> {
-    /// The time of a row (0-based), where there are times; those behind the end of the log go on in its own step.
+    /// The time of a row (0-based), where there are times; those after the end of the log go on in its own step.
     fn at(&self, position: usize) -> Option<f64> {
         let rows = self.log.rows();
         let beyond = (position + 1).saturating_sub(rows) as f64 * self.log.sample_time();

@@ -12,7 +12,7 @@ use crate::interrupt;
 use crate::progress::Searching;
 
 /// What a fit found, and the log that it was made to, if it was kept.
-pub(super) struct Found {
+pub(super) struct Identified {
     pub(super) report: Report,
     pub(super) log: Option<Log>,
     pub(super) sources: Vec<Source>,

@@ -28,7 +28,7 @@ use text::{Text, columns, or_dash, some};
 pub use tracking::tracking;
 pub use validation::{comparison, validation};
 
-/// So many of a list are written.
+/// This many of a list are written.
 const MOST: usize = 8;
 /// Costs that differ by less than this fraction are one.
 const ROUNDING: f64 = 1e-9;
@@ -38,7 +38,7 @@ const NO_ROOT_ERROR: &str =
     "no standard error is known, or no time constant goes with a pole on or outside of the unit circle";
 const NO_FIT: &str = "the output is constant, no sample counts, or the response overflows";
 
-/// The report's main figures, so many columns wide.
+/// The report's main figures, this many columns wide.
 pub fn table(report: &Report, width: usize) -> String {
     let model = match &report.model {
         Model::Polynomial(model) => model,
@@ -196,7 +196,7 @@ fn word(algorithm: Algorithm) -> &'static str {
 /// How a search went, in a few words.
 fn outcome(search: &SearchOutcome) -> String {
     let algorithm = word(search.algorithm);
-    let border = if search.stability_bound { " at the border of stability" } else { "" };
+    let boundary = if search.stability_bound { " at the stability boundary" } else { "" };
     let (iterations, stopped) = (counted(search.iterations), stopped(search.stopped));
     // A comparison follows several starts; costs on fewer samples are others.
     let costs = search.starts.first().and_then(|start| start.cost).zip(search.costs.first());
@@ -204,7 +204,7 @@ fn outcome(search: &SearchOutcome) -> String {
         && search.starts.iter().skip(1).any(|start| start.reached.is_some())
         && costs.is_some_and(|(start, first)| *first < (1.0 - ROUNDING) * start);
     let compared = if followed { " after a comparison of starts" } else { "" };
-    format!("{iterations} ({algorithm}) from {}{compared}, {stopped}{border}", search.start)
+    format!("{iterations} ({algorithm}) from {}{compared}, {stopped}{boundary}", search.start)
 }
 
 fn counted(iterations: usize) -> String {

@@ -47,7 +47,7 @@ pub(crate) fn track(arguments: &TrackArguments) -> Result<(), Failure> {
     if ended.as_ref().is_err_and(Failure::is_closed) {
         return ended.map(drop);
     }
-    // In the middle of a row the state is neither that before it nor that behind it.
+    // In the middle of a row the state is neither that before it nor that after it.
     let saved = if run.midway { Ok(()) } else { run.lines.sync().and_then(|()| run.save()) };
     let ended = ended?;
     saved?;
@@ -213,7 +213,7 @@ impl<'a> Run<'a> {
         self.state_file.as_mut().map_or(Ok(()), |file| self.state.write(file))
     }
 
-    /// Says it.
+    /// Warns of an unfinished line and of an unexpected clock, writes the summary, and prints it.
     fn report(&self) -> Result<(), Failure> {
         if self.live.is_unfinished() {
             warn(&format!(

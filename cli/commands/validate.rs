@@ -6,17 +6,17 @@ use thetahat::Document;
 use thetahat::report::{Report, Validated, ValidationPlan, validate as validated, validation_page};
 
 use super::{stored, summary};
-use crate::args::{FormatArgument, LookArguments, ValidateArguments};
+use crate::args::{EvaluationArguments, FormatArgument, ValidateArguments};
 use crate::failure::Failure;
-use crate::job::LookJob;
+use crate::job::EvaluationJob;
 use crate::log::{self, Clocks, Loaded};
 use crate::messages::warn;
 use crate::output;
 use crate::wrap::stdout_width;
 
 pub(crate) fn validate(arguments: &ValidateArguments, line: &str) -> Result<(), Failure> {
-    let look = &arguments.look;
-    let mut job = LookJob::resolve(look, &[&arguments.report, &arguments.path])?;
+    let evaluation = &arguments.evaluation;
+    let mut job = EvaluationJob::resolve(evaluation, &[&arguments.report, &arguments.path])?;
     let requirements = job.requirements(&arguments.require)?;
     let report = stored::report(&arguments.report)?;
     let refused = |error| Failure::option(&error);
@@ -26,13 +26,15 @@ pub(crate) fn validate(arguments: &ValidateArguments, line: &str) -> Result<(), 
     let found = one(&arguments.report, &report, &loaded, &job.plan)?;
     let validation = &found.validation;
     let json = validation.to_json().map_err(|error| Failure::data(error.to_string()))?;
-    if let Some(path) = &look.html {
+    if let Some(path) = &evaluation.html {
         output::page(path, &validation_page(&report, &found, line))?;
     }
     for warning in &validation.warnings {
         warn(warning);
     }
-    print(look, &json, || summary::validation(validation, &requirements, job.plan.alpha, stdout_width()))?;
+    print(evaluation, &json, || {
+        summary::validation(validation, &requirements, job.plan.alpha, stdout_width())
+    })?;
 
     let unmet = requirements.iter().filter_map(|requirement| requirement.unmet(validation, job.plan.alpha));
     let unmet: Vec<String> = unmet.collect();
@@ -43,7 +45,7 @@ pub(crate) fn validate(arguments: &ValidateArguments, line: &str) -> Result<(), 
 }
 
 /// Reads the channels of some models from a log.
-pub(super) fn loaded(path: &Path, job: &LookJob, reports: &[&Report]) -> Result<Loaded, Failure> {
+pub(super) fn loaded(path: &Path, job: &EvaluationJob, reports: &[&Report]) -> Result<Loaded, Failure> {
     let mut names: Vec<String> = Vec::new();
     for name in reports.iter().flat_map(|report| report.model.channels()) {
         if !names.iter().any(|known| known == name) {
@@ -74,13 +76,19 @@ pub(super) fn one(
 }
 
 /// Writes the document, and prints it or the table.
-pub(super) fn print(look: &LookArguments, json: &str, table: impl FnOnce() -> String) -> Result<(), Failure> {
-    if let Some(path) = &look.out {
+pub(super) fn print(
+    evaluation: &EvaluationArguments,
+    json: &str,
+    table: impl FnOnce() -> String,
+) -> Result<(), Failure> {
+    if let Some(path) = &evaluation.out {
         output::write(path, |file| file.write_all(json.as_bytes()))?;
     }
-    match look.format {
+    match evaluation.format {
         // Standard output holds one document.
-        _ if [&look.out, &look.html].into_iter().flatten().any(|path| path == Path::new("-")) => Ok(()),
+        _ if [&evaluation.out, &evaluation.html].into_iter().flatten().any(|path| path == Path::new("-")) => {
+            Ok(())
+        }
         FormatArgument::Json => output::print(json),
         FormatArgument::Table => output::print(&table()),
     }

@@ -12,7 +12,7 @@ use crate::table;
 const LONGEST: usize = 20;
 const FEWEST: usize = 10;
 
-/// A log to look at.
+/// A log to inspect.
 #[derive(Debug)]
 pub(crate) struct InspectJob {
     pub(crate) path: PathBuf,
@@ -33,7 +33,7 @@ impl InspectJob {
         })
     }
 
-    /// Whether columns were named: others are then not looked at.
+    /// Whether columns were named: others are then not inspected.
     pub(crate) fn is_named(&self) -> bool {
         self.inputs.is_some() || self.output.is_some()
     }

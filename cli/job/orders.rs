@@ -190,7 +190,7 @@ impl OrderJob {
         }
     }
 
-    /// The choice for so many inputs: one value stands for all of them.
+    /// The choice for this many inputs: one value stands for all of them.
     pub(crate) fn of(&self, inputs: usize) -> Result<Choice, Failure> {
         let lengths = |argument: &str, count: usize| {
             if count <= 1 || count == inputs || inputs == 0 {

@@ -229,7 +229,7 @@ impl Given {
         }
     }
 
-    /// The orders for so many inputs.
+    /// The orders for this many inputs.
     fn of(&self, inputs: usize) -> Result<Orders, Failure> {
         let each = |option: &str, given: &[usize], usual: usize| match given {
             [] => Ok(vec![usual; inputs]),

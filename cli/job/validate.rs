@@ -4,19 +4,19 @@ use thetahat::data::Detrend;
 use thetahat::report::{Requirement, ValidationPlan};
 
 use super::{LogJob, parsed, rows};
-use crate::args::LookArguments;
+use crate::args::EvaluationArguments;
 use crate::failure::Failure;
 
-/// How to look at a log with one model or several.
+/// How to evaluate one model or several on a log.
 #[derive(Debug)]
-pub(crate) struct LookJob {
+pub(crate) struct EvaluationJob {
     pub(crate) log: LogJob,
     pub(crate) plan: ValidationPlan,
 }
 
-impl LookJob {
+impl EvaluationJob {
     /// `read` are the reports and the log.
-    pub(crate) fn resolve(arguments: &LookArguments, read: &[&PathBuf]) -> Result<Self, Failure> {
+    pub(crate) fn resolve(arguments: &EvaluationArguments, read: &[&PathBuf]) -> Result<Self, Failure> {
         if read.iter().filter(|path| path.as_path() == Path::new("-")).count() > 1 {
             return Err(Failure::usage(
                 "only one of the reports and the log can come from standard input (-)",
@@ -38,7 +38,7 @@ impl LookJob {
         Ok(Self { log: LogJob::resolve(&arguments.log, &arguments.clock)?, plan })
     }
 
-    /// What is required, and looked at for it.
+    /// What is required, and evaluated for it.
     pub(crate) fn requirements(&mut self, texts: &[String]) -> Result<Vec<Requirement>, Failure> {
         let requirements: Vec<Requirement> =
             texts.iter().map(|text| parsed("--require", text)).collect::<Result<_, _>>()?;

@@ -8,7 +8,7 @@ use super::record::Record;
 /// may be a decimal comma or part of a text, a tab hardly ever is.
 const DELIMITERS: [u8; 3] = [b'\t', b';', b','];
 
-/// How many rows are looked at to recognise the delimiter.
+/// How many rows are read to recognise the delimiter.
 const SAMPLE: usize = 64;
 
 /// What separates fields and what is no row at all.

@@ -22,7 +22,7 @@ impl Lines {
     /// Notes the line of the next row. Rows come in order, and each row is on a later line than the one
     /// before.
     pub(super) fn push(&mut self, row: usize, line: u64) {
-        // A piece of a file counts its lines from zero too: they are never behind the rows.
+        // A piece of a file counts its lines from zero too: they are never after the rows.
         let ahead = line - row as u64;
         if self.runs.last().is_none_or(|&(_, last)| last != ahead) {
             self.runs.push((row, ahead));

@@ -27,7 +27,7 @@ pub(super) struct Sizes {
     pub(super) row: usize,
 }
 
-/// So many rows say whether a column holds numbers.
+/// This many rows say whether a column holds numbers.
 const LOOKED_AT: usize = 1000;
 
 /// The sizes for real files.

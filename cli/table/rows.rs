@@ -53,7 +53,7 @@ impl Rows {
         Self { columns: vec![Vec::new(); columns], line, ..Self::default() }
     }
 
-    /// Adds a row that takes so many lines.
+    /// Adds a row that takes this many lines.
     fn push(&mut self, values: &[f64], lines: u64) {
         for (column, &value) in self.columns.iter_mut().zip(values) {
             column.push(value);
@@ -126,7 +126,7 @@ impl Plan {
     /// Reads the rows of a text that starts with a row and ends with a newline, in pieces of about
     /// `piece_size` bytes.
     ///
-    /// Returns how much of the text was read: all of it, unless a quoted field goes on behind it.
+    /// Returns how much of the text was read: all of it, unless a quoted field goes on after it.
     pub(super) fn read(
         &self,
         text: &[u8],
@@ -274,7 +274,7 @@ impl Plan {
     }
 }
 
-/// Cuts a text behind newlines into pieces of `size` bytes or a little more.
+/// Cuts a text after newlines into pieces of `size` bytes or a little more.
 fn pieces(mut text: &[u8], size: usize) -> Vec<&[u8]> {
     let mut pieces = Vec::with_capacity(text.len() / size + 1);
     while !text.is_empty() {

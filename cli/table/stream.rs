@@ -260,7 +260,7 @@ fn read(mut source: Source, pieces: &SyncSender<Message>, empty: &Receiver<Vec<u
     }
 }
 
-/// Whether a text holds so many whole lines that are neither blank nor comments.
+/// Whether a text holds this many whole lines that are neither blank nor comments.
 pub(super) fn has_lines(mut text: &[u8], wanted: usize, comment: Option<u8>) -> bool {
     // What separates fields does not matter for that.
     let dialect = super::dialect::Dialect { delimiter: b',', comment };

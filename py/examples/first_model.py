@@ -4,7 +4,7 @@
 # A DC motor was logged for ten seconds: the voltage on it and the speed of its shaft, a hundred times a second. We want a
 # model that predicts the speed from the voltage, and we want to know how far to trust it.
 #
-# The steps are the ones of every identification: look at the data, fit, judge on data that the fit has not seen, use.
+# The steps are the ones of every identification: inspect the data, fit, validate on held-out data, use.
 
 # %%
 import tempfile
@@ -34,7 +34,7 @@ for row, (time, voltage, speed) in enumerate(zip(clean.time, clean.u[:, 0], clea
 path.write_text("\n".join(rows) + "\n")
 
 # %% [markdown]
-# ## Look before you fit
+# ## Inspect before you fit
 #
 # `inspect` reads the file and says what it found. It sees the hole in the clock and the missing fields. It also finds the
 # delay from the correlation of input and output: one sample, as for anything that is sampled and held.
@@ -62,7 +62,7 @@ arx = th.arx(training, na=2, nb=2)
 print(arx.summary())
 
 # %% [markdown]
-# ## Judge
+# ## Validate
 #
 # The fit one step ahead is high, but that says little: the last speed alone is a good guess of the next. Two things say
 # more. The free run sees the voltage alone. And what is left, the residuals, should be white: if the errors can be

@@ -2,8 +2,8 @@
 # # How many parameters?
 #
 # More parameters always fit the data of the fit better. At some point they fit the noise. This study uses a simulated
-# plant, so that we know the answer, and asks each of the usual methods for it: MDL, an unseen part of the data,
-# cross-validation, and the tests of the residuals. In the end, and only then, it looks at a part of the data that nobody
+# plant, so that we know the answer, and asks each of the usual methods for it: MDL, a held-out part of the data,
+# cross-validation, and the tests of the residuals. In the end, and only then, it uses a part of the data that nobody
 # has touched.
 
 # %%
@@ -35,7 +35,7 @@ log = th.Log(y, u, sample_time=0.1)
 # ## Three parts
 #
 # 60 % of the rows are to fit to, 20 % to choose by, 20 % to report on. The parts are blocks in time. Rows drawn at random
-# would put the neighbours of every row that is judged into the fit.
+# would put the neighbours of every row that is evaluated into the fit.
 
 # %%
 estimation, validation, test = log[:900], log[900:1200], log[1200:]
@@ -53,7 +53,7 @@ print(by_mdl)
 plot.selection(by_mdl)
 
 # %% [markdown]
-# ## The least error on unseen rows
+# ## The least error on held-out rows
 #
 # The other way is to take the model with the least error on the second part. But that part is a sample too. Among many
 # models of nearly the same quality, the least is the one that had luck, and it tends to be too large. So `search` goes on
@@ -75,7 +75,7 @@ plot.selection(by_rows)
 #
 # ## Cross-validation
 #
-# Cross-validation lets each block of the first two parts be the unseen one in turn. It uses the data better and costs
+# Cross-validation lets each block of the first two parts be the held-out one in turn. It uses the data better and costs
 # more fits.
 
 # %%
@@ -95,11 +95,11 @@ passes: dict[int, bool] = {}
 for scored in found["of_size"][:8]:
     orders = scored["orders"]
     candidate = th.arx(estimation, orders["na"], orders["nb"], orders["nk"])
-    judged = candidate.validate(validation)
-    passes[scored["parameters"]] = judged.whiteness > 0.01 and judged.independence["u"] > 0.01
+    evaluated = candidate.validate(validation)
+    passes[scored["parameters"]] = evaluated.whiteness > 0.01 and evaluated.independence["u"] > 0.01
     print(
-        f"{scored['parameters']} parameters: white p = {judged.whiteness:.1e}, "
-        f"independent p = {judged.independence['u']:.1e}, {'passes' if passes[scored['parameters']] else 'fails'}"
+        f"{scored['parameters']} parameters: white p = {evaluated.whiteness:.1e}, "
+        f"independent p = {evaluated.independence['u']:.1e}, {'passes' if passes[scored['parameters']] else 'fails'}"
     )
 
 # %% [markdown]

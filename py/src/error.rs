@@ -71,7 +71,7 @@ fn undetermined(py: Python<'_>, message: String, parameters: Vec<String>) -> PyE
 /// A message that names options of the command line, with the keyword arguments that they are here: `--sample-time 0` is
 /// `sample_time 0`.
 ///
-/// It may repeat names and parts of files, and goes to a terminal: it is bounded, and what is not seen is an escape.
+/// It may repeat names and parts of files, and goes to a terminal: it is bounded, and what is invisible is an escape.
 pub(crate) fn in_python(message: &str) -> String {
     let message = thetahat::text::message(&thetahat_cli::with_options(message));
     let mut text = String::with_capacity(message.len());

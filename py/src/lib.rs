@@ -1,14 +1,14 @@
 //! The compiled module `thetahat._thetahat`: the engine behind the Python package `thetahat`.
 //!
-//! `log`, `grey_box`, `model` and `judgement` are the batch half, `online` the steppers, `filter` and `track` the steppers behind
+//! `log`, `grey_box`, `model` and `evaluation` are the batch half, `online` the steppers, `filter` and `track` the steppers behind
 //! logs. `array` reads and makes NumPy arrays, `error` is
 //! the one map of errors, `work` runs what takes long.
 
 mod array;
 mod error;
+mod evaluation;
 mod filter;
 mod grey_box;
-mod judgement;
 mod log;
 mod model;
 mod online;
@@ -32,7 +32,7 @@ fn _thetahat(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<log::Log>()?;
     module.add_class::<grey_box::GreyBox>()?;
     module.add_class::<model::Model>()?;
-    module.add_class::<judgement::Validation>()?;
+    module.add_class::<evaluation::Validation>()?;
     module.add_class::<filter::StateModel>()?;
     module.add_class::<filter::StateFilter>()?;
     module.add_class::<track::Tracker>()?;
@@ -40,10 +40,10 @@ fn _thetahat(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(model::fit, module)?)?;
     module.add_function(wrap_pyfunction!(model::fit_equations, module)?)?;
     module.add_function(wrap_pyfunction!(model::fit_narx, module)?)?;
-    module.add_function(wrap_pyfunction!(judgement::validate, module)?)?;
-    module.add_function(wrap_pyfunction!(judgement::compare, module)?)?;
-    module.add_function(wrap_pyfunction!(judgement::inspect, module)?)?;
-    module.add_function(wrap_pyfunction!(judgement::inspect_file, module)?)?;
+    module.add_function(wrap_pyfunction!(evaluation::validate, module)?)?;
+    module.add_function(wrap_pyfunction!(evaluation::compare, module)?)?;
+    module.add_function(wrap_pyfunction!(evaluation::inspect, module)?)?;
+    module.add_function(wrap_pyfunction!(evaluation::inspect_file, module)?)?;
     online::register(module)?;
     work::register(module)?;
     module.add_function(wrap_pyfunction!(in_python, module)?)?;

@@ -174,14 +174,14 @@ impl Log {
 
     /// The rows (from 0) before which no segment reaches back.
     #[getter]
-    fn breaks(&self) -> Vec<usize> {
-        self.log.breaks().to_vec()
+    fn segment_starts(&self) -> Vec<usize> {
+        self.log.segment_starts().to_vec()
     }
 
     /// Those of them (from 0) at which another experiment begins.
     #[getter]
-    fn borders(&self) -> Vec<usize> {
-        self.log.borders().to_vec()
+    fn boundaries(&self) -> Vec<usize> {
+        self.log.boundaries().to_vec()
     }
 
     /// A channel.
@@ -202,7 +202,7 @@ impl Log {
             serde_json::to_string(&this.sources).map_err(|error| PyValueError::new_err(error.to_string()))?;
         let parts = (
             (channels, &this.inputs, &this.outputs, this.log.sample_time()),
-            (this.time(py), this.log.breaks(), this.log.borders(), this.log.before(), sources),
+            (this.time(py), this.log.segment_starts(), this.log.boundaries(), this.log.before(), sources),
         );
         let restore = slf.get_type().getattr("_restore")?;
         Ok((restore, parts.into_pyobject(py)?))
@@ -216,10 +216,11 @@ impl Log {
         clock: (Option<Bound<'_, PyAny>>, Vec<usize>, Vec<usize>, f64, String),
     ) -> PyResult<Self> {
         let (channels, inputs, outputs, sample_time) = data;
-        let (time, breaks, borders, before, sources) = clock;
+        let (time, starts, boundaries, before, sources) = clock;
         let time =
             time.map(|time| PyResult::Ok(vector("time", &time, None)?.as_slice()?.to_vec())).transpose()?;
-        let log = thetahat::data::Log::restored(read(channels)?, sample_time, time, breaks, borders, before);
+        let log =
+            thetahat::data::Log::restored(read(channels)?, sample_time, time, starts, boundaries, before);
         let log = log.map_err(|error| error::batch(py, error))?;
         let sources =
             serde_json::from_str(&sources).map_err(|error| PyValueError::new_err(error.to_string()))?;

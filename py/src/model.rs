@@ -10,7 +10,7 @@ use thetahat::Document;
 use thetahat::data::Channel;
 use thetahat::estimate::Procedure;
 use thetahat::model::{PolynomialModel, Quantity, StateSpace};
-use thetahat::report::{Report, Unjudged, apply, sample};
+use thetahat::report::{PendingEvaluation, Report, apply, sample};
 use thetahat::respond::{
     Draws, Horizon, Start, TransientResponse, frequency_response, impulse_response, logarithmic_frequencies,
     step_response,
@@ -32,7 +32,7 @@ pub(crate) struct Model {
     known: Arc<Report>,
     report: OnceLock<Arc<Report>>,
     /// What the figures are computed of, as long as they are not.
-    unjudged: Mutex<Option<(Unjudged, Arc<thetahat::data::Log>)>>,
+    pending: Mutex<Option<(PendingEvaluation, Arc<thetahat::data::Log>)>>,
 }
 
 /// An array with one value for each row.
@@ -45,15 +45,15 @@ pub(crate) fn fit(py: Python<'_>, log: &Bound<'_, Log>, options: Vec<OsString>) 
     let plan = thetahat_cli::plan(&options, log.inputs.clone(), log.output()?.clone())
         .map_err(|failure| error::program(py, &failure))?;
     let (channels, sources) = (Arc::clone(&log.log), log.sources.clone());
-    let unjudged = interruptible(py, move |monitor| {
+    let pending = interruptible(py, move |monitor| {
         let names: Vec<&str> = plan.inputs.iter().chain([&plan.output]).map(String::as_str).collect();
-        Unjudged::new(copy(&channels, &names)?, &sources, &plan, monitor)
+        PendingEvaluation::new(copy(&channels, &names)?, &sources, &plan, monitor)
     })?;
     Ok(Model {
-        model: unjudged.report().model.clone().into(),
-        known: unjudged.report().clone().into(),
+        model: pending.report().model.clone().into(),
+        known: pending.report().clone().into(),
         report: OnceLock::new(),
-        unjudged: Mutex::new(Some((unjudged, Arc::clone(&log.log)))),
+        pending: Mutex::new(Some((pending, Arc::clone(&log.log)))),
     })
 }
 
@@ -101,10 +101,10 @@ impl Model {
 
     /// What is known without the figures: the parts `model` and `estimation` of the document.
     fn parts(&self, py: Python<'_>) -> PyResult<(String, String)> {
-        let known = self.unjudged.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let known = self.pending.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let stored;
         let report = match &known {
-            Some((unjudged, _)) => unjudged.report(),
+            Some((pending, _)) => pending.report(),
             None => {
                 stored = self.report(py)?;
                 &*stored
@@ -127,7 +127,7 @@ impl Model {
 
     /// What to warn of after a fit. Of least squares alone the figures wait: nothing to warn of hangs on them but how close it is.
     fn warnings(&self, py: Python<'_>) -> PyResult<Vec<String>> {
-        let known = self.unjudged.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let known = self.pending.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let waits = |report: &Report| {
             report.selection.is_none()
                 && !matches!(
@@ -137,7 +137,7 @@ impl Model {
         };
         let stored;
         let report = match &known {
-            Some((unjudged, _)) if waits(unjudged.report()) => unjudged.report(),
+            Some((pending, _)) if waits(pending.report()) => pending.report(),
             _ => {
                 stored = self.report(py)?;
                 &*stored
@@ -146,22 +146,22 @@ impl Model {
         Ok(report.warnings.iter().map(|warning| error::in_python(warning)).collect())
     }
 
-    /// The page that `thetahat fit --html` writes, with a look at a log if there is one.
+    /// The page that `thetahat fit --html` writes, with a validation of a log if there is one.
     fn page(&self, py: Python<'_>, log: Option<&Bound<'_, Log>>, command: &str) -> PyResult<String> {
         let log = log.map(Bound::get).map(|log| (Arc::clone(&log.log), log.sources.clone()));
         let (report, command) = (self.report(py)?, command.to_owned());
         interruptible(py, move |_| {
             let plan = thetahat::report::ValidationPlan::default();
-            let (mut looks, mut held_out) = (Vec::new(), Vec::new());
+            let (mut validated, mut held_out) = (Vec::new(), Vec::new());
             if let Some((log, sources)) = log {
-                let look = thetahat::report::validate(&report, None, &log, &sources, &plan)?;
+                let found = thetahat::report::validate(&report, None, &log, &sources, &plan)?;
                 // Another log has not the rows of the choice.
-                if look.validation.seen != thetahat::report::Seen::No {
+                if found.validation.in_sample != thetahat::report::InSample::No {
                     held_out = thetahat::report::held_out_runs(&report, &log)?;
                 }
-                looks.push(look);
+                validated.push(found);
             }
-            Ok(thetahat::report::fit_page(&report, &looks, &held_out, &command))
+            Ok(thetahat::report::fit_page(&report, &validated, &held_out, &command))
         })
     }
 
@@ -275,7 +275,7 @@ impl Model {
                     Ok((PyArray1::from_slice(py, ahead), PyArray1::from_slice(py, deviations)))
                 }
                 _ => Err(PyValueError::new_err(
-                    "log: it ends in missing samples, or in a stretch too short to start from; give one that ends in more \
+                    "log: it ends in missing samples, or in a segment too short to start from; give one that ends in more \
                      samples",
                 )),
             }
@@ -363,7 +363,7 @@ impl Model {
     fn of(report: Report) -> Self {
         let known = Arc::new(report);
         let model = known.model.clone().into();
-        Self { model, report: Arc::clone(&known).into(), known, unjudged: Mutex::new(None) }
+        Self { model, report: Arc::clone(&known).into(), known, pending: Mutex::new(None) }
     }
 
     /// The polynomials, of which alone `what` is known.
@@ -409,16 +409,16 @@ impl Model {
     /// The whole report.
     pub(crate) fn report(&self, py: Python<'_>) -> PyResult<Arc<Report>> {
         // The lock is not held while others compute: they may wait for the interpreter, and its owner for the lock.
-        let unjudged = self.unjudged.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        if let Some((unjudged, log)) = unjudged {
+        let pending = self.pending.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        if let Some((pending, log)) = pending {
             let model = Arc::clone(&self.model);
             let report = interruptible(py, move |_| {
                 let copied = copy(&log, &channels(&model, &log))?;
-                unjudged.judged(copied)
+                pending.evaluate(copied)
             })?;
             // Whoever was faster found the same.
             let _ = self.report.set(Arc::new(report));
-            *self.unjudged.lock().unwrap_or_else(PoisonError::into_inner) = None;
+            *self.pending.lock().unwrap_or_else(PoisonError::into_inner) = None;
         }
         self.report.get().cloned().ok_or_else(|| PyRuntimeError::new_err("the model has no report"))
     }
@@ -507,8 +507,8 @@ fn extended(
         channels.collect(),
         log.sample_time(),
         time,
-        log.breaks().to_vec(),
-        log.borders().to_vec(),
+        log.segment_starts().to_vec(),
+        log.boundaries().to_vec(),
         log.before(),
     )
 }

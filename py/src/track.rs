@@ -182,7 +182,7 @@ impl Tracker {
         self.tracking.gap().map_err(|failure| error::program(py, &failure))
     }
 
-    /// The prediction so many steps ahead of each tracker.
+    /// The prediction this many steps ahead of each tracker.
     fn forecast<'py>(&mut self, py: Python<'py>, steps: usize) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let found = self.tracking.forecast(steps).map_err(|failure| error::program(py, &failure))?;
         Ok(PyArray1::from_vec(py, found))

@@ -23,7 +23,7 @@ use crate::error;
 
 /// How often Python is asked whether somebody pressed Ctrl-C.
 const PATIENCE: Duration = Duration::from_millis(50);
-/// A loop looks at the time after about so many multiplications, some tens of microseconds.
+/// A loop checks the time after about this many multiplications, some tens of microseconds.
 const WORK: usize = 1 << 17;
 
 /// How long the interpreter waits at its end for calls of functions to return.
@@ -116,14 +116,14 @@ fn signals() -> PyResult<()> {
 
 /// Ends a loop without the interpreter lock at Ctrl-C.
 pub(crate) struct Pulse {
-    /// Rounds of the loop between two looks at the time.
+    /// Rounds of the loop between two checks of the time.
     stride: usize,
     left: usize,
     asked: Instant,
 }
 
 impl Pulse {
-    /// For a loop of which a round takes about so many multiplications.
+    /// For a loop of which a round takes about this many multiplications.
     pub(crate) fn new(multiplications: usize) -> Self {
         let stride = WORK / multiplications.clamp(1, WORK);
         Self { stride, left: stride, asked: Instant::now() }
@@ -133,11 +133,11 @@ impl Pulse {
     #[inline(always)]
     pub(crate) fn check(&mut self) -> PyResult<()> {
         self.left -= 1;
-        if self.left == 0 { self.look() } else { Ok(()) }
+        if self.left == 0 { self.check_time() } else { Ok(()) }
     }
 
     #[cold]
-    fn look(&mut self) -> PyResult<()> {
+    fn check_time(&mut self) -> PyResult<()> {
         self.left = self.stride;
         if self.asked.elapsed() < PATIENCE {
             return Ok(());

@@ -325,7 +325,7 @@ def test_a_file_as_pandas_reads_it(tmp_path: Any) -> None:
     for read, options in ways:
         log = log_of(read, **options)
         assert log.sample_time == 600.0 and len(log) == ROWS - 3 and np.isnan(log.y[11])
-        with pytest.warns(th.EstimationWarning, match="jumps of the clock: 1"):
+        with pytest.warns(th.EstimationWarning, match="gaps in the clock: 1"):
             model = th.arx(log, 1, 1)
         forecast = model.forecast(log, 2, U[:2]).to_polars()
         assert list(pd.to_datetime(forecast["when"].to_list(), utc=True)) == list(AUTUMN[-1] + pd.to_timedelta([10, 20], "min"))

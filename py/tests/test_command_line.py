@@ -74,7 +74,7 @@ def test_several_logs_and_resampling(folder: Path) -> None:
     Path("a.csv").write_text("\n".join(rows[:400] + rows[401:500]) + "\n")
     Path("b.csv").write_text("\n".join([rows[0], *rows[600:]]) + "\n")
     words = ["fit", "a.csv", "b.csv", "--time=t", "--na=2", "--nb=2", "--format=json"]
-    with pytest.warns(th.EstimationWarning, match="jumps of the clock"):
+    with pytest.warns(th.EstimationWarning, match="gaps in the clock"):
         model = th.arx(th.read_csv(["a.csv", "b.csv"], time="t"), 2, 2)
     assert model.to_json() == program(folder, *words)
     words = ["fit", "a.csv", "--time=t", "--resample=0.01:linear", "--na=2", "--nb=2", "--format=json"]

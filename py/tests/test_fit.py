@@ -57,8 +57,8 @@ def test_a_model_is_for_what_focus_says() -> None:
     assert th.bj(motor, nb=2, nc=0, nd=1, nf=2, estimate="1..700", constant="no", focus="prediction") == th.bj(
         motor, nb=2, nc=0, nd=1, nf=2, estimate="1..700", constant="no"
     )
-    judged = th.arx(motor, 2, 2, estimate="1..700", validate="701..1000", focus=5)
-    horizons = [fit["horizon"].get("steps") for fit in judged.document["fit"] if fit["part"] == "validation"]
+    evaluated = th.arx(motor, 2, 2, estimate="1..700", validate="701..1000", focus=5)
+    horizons = [fit["horizon"].get("steps") for fit in evaluated.document["fit"] if fit["part"] == "validation"]
     assert horizons == [1, 5, None]
     chosen = th.search(motor, model="oe", focus="simulation").selection
     assert chosen is not None and chosen["focus"] == "simulation"

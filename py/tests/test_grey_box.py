@@ -140,9 +140,9 @@ def test_a_fit_is_a_model_with_every_method(tmp_path: Path) -> None:
     ahead = model.forecast(log, 4, u=[0.0] * 4)
     assert np.all(np.isfinite(ahead.values)) and np.all(np.diff(ahead.standard_deviations) > 0)
     validation = model.validate(log, rows=slice(300, 400), require="white,fit>=70,coverage>=85")
-    assert validation.unmet == [] and validation.document["seen"] == "no"
-    assert model.validate(log, rows="1..300").document["seen"] == "yes"
-    assert model.validate(log[:300]).document["seen"] == "yes"
+    assert validation.unmet == [] and validation.document["in_sample"] == "no"
+    assert model.validate(log, rows="1..300").document["in_sample"] == "yes"
+    assert model.validate(log[:300]).document["in_sample"] == "yes"
     model.write_html(tmp_path / "page.html", log)
     assert "change of variable" in (tmp_path / "page.html").read_text()
     assert th.compare({"tank": model, "arx": th.arx(log, na=1, nb=1, estimate="1..300")}, log).document["criteria"] is not None

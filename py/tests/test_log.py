@@ -171,7 +171,7 @@ def test_a_log_says_what_there_is() -> None:
     )
     assert [len(joined[rows]) for rows in joined.experiments] == [5, 3, 1]
     assert joined[joined.experiments[1]] == th.Log([1.0, np.nan, 3.0])
-    # A part keeps the borders inside of it, and those are no gaps of one experiment.
+    # A part keeps the boundaries inside of it, and those are no gaps of one experiment.
     assert joined[4:6].experiments == [range(1), range(1, 2)]
     assert th.Log.join([th.Log(Y), th.Log(Y)]) != th.Log(np.tile(Y, 2), time=[*range(5), *range(9, 14)])
     assert th.Log([np.nan, np.nan]).segments == []
@@ -193,7 +193,7 @@ def test_an_inspection_keeps_experiments_apart() -> None:
     assert (document["experiments"], document["clock"]["gaps"]) == (3, 3)
     assert "experiments" not in th.inspect(one).document
     assert "901 rows in 3 experiments" in th.inspect(joined).summary()
-    # Across a border u and y have nothing to do with one another.
+    # Across a boundary u and y have nothing to do with one another.
     short = th.Log.join([th.Log(y[k : k + 4], u[k : k + 4]) for k in range(0, 600, 4)])
     assert th.inspect(one).delays == {"u": 2} and th.inspect(short).excitation["u"] < th.inspect(one).excitation["u"]
 

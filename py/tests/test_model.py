@@ -225,12 +225,12 @@ def test_validations_say_what_was_required(motor: th.Log) -> None:
     assert validation.fit(7) < validation.fit(1) and validation.independence["u"] > 0.05
     assert list(validation.anderson) == [0.01, 0.02, 0.05, 0.1, 0.2]
     assert all(0 < p < 1 for p in validation.anderson.values())
-    with pytest.raises(ValueError, match="horizon: 4 was not looked at"):
+    with pytest.raises(ValueError, match="horizon: 4 was not evaluated"):
         validation.fit(4)
     errors = np.abs(motor.y[700:] - model.predict(motor[700:], None, initial="estimate"))
     assert np.isclose(validation.mean_absolute_error(None), errors.mean())
     assert np.isclose(validation.largest_error(None), errors.max())
-    with pytest.raises(ValueError, match="horizon: 4 was not looked at"):
+    with pytest.raises(ValueError, match="horizon: 4 was not evaluated"):
         validation.largest_error(4)
     assert model.validate(motor, rows=slice(700, 1000)).document["rows"] == [[701, 1000]]
     for wrong in ({"require": "fast"}, {"lags": 0}, {"alpha": 2.0}, {"horizon": 0}, {"rows": "0..5"}):

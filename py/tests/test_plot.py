@@ -235,12 +235,12 @@ def test_instrumental_variables_have_their_bands(log: th.Log) -> None:
 def test_experiments_that_were_joined_are_not_connected(log: th.Log) -> None:
     joined = th.Log.join([log[500:503], log[:3]])
     assert joined.time[3] < joined.time[2]
-    line, border = plot.log(joined)[0].get_lines()
+    line, boundary = plot.log(joined)[0].get_lines()
     np.testing.assert_array_equal(np.isnan(np.asarray(line.get_ydata(), dtype=float)), [0, 0, 0, 1, 0, 0, 0])
     # One after the other, whatever their clocks say.
     time = np.asarray(line.get_xdata(), dtype=float)
     assert np.all(np.diff(time[np.isfinite(time)]) > 0)
-    assert time[2] < np.ravel(border.get_xdata())[0] < time[4]
+    assert time[2] < np.ravel(boundary.get_xdata())[0] < time[4]
 
 
 def test_experiments_with_clocks_that_go_on_are_not_connected_either() -> None:
@@ -422,11 +422,11 @@ def test_poles_and_zeros_with_their_regions(uncertain: th.Model) -> None:
     chi_square = 5.991464547107979
     for root, ellipse in zip(complex_roots, ellipses):
         assert ellipse.center == (root["re"], root["im"])
-        # Every point of the border is as far out as the quantile: d' S^-1 d = chi-square of two degrees, 95 %.
-        border = ellipse.get_patch_transform().transform(ellipse.get_path().vertices)
-        away = border - np.array(ellipse.center)
+        # Every point of the boundary is as far out as the quantile: d' S^-1 d = chi-square of two degrees, 95 %.
+        boundary = ellipse.get_patch_transform().transform(ellipse.get_path().vertices)
+        away = boundary - np.array(ellipse.center)
         distance = np.einsum("ki,ij,kj->k", away, np.linalg.inv(root["covariance"]), away)
-        # The border is made of curves whose control points, every third aside, lie outside.
+        # The boundary is made of curves whose control points, every third aside, lie outside.
         np.testing.assert_allclose(distance[::3][:8], chi_square, rtol=0.15)
         np.testing.assert_allclose(distance.min(), chi_square, rtol=1e-3)
         area = np.pi * ellipse.width * ellipse.height / 4

@@ -7,7 +7,7 @@ use thetahat::figures::{error, fixed, number};
 
 use super::text::{Text, columns, or_dash};
 
-/// How surprising the log was, and where the state has come to.
+/// How consistent the innovations were (NIS), and where the state has come to.
 pub fn filtered(summary: &FilterSummary, faults: &str, width: usize) -> String {
     let mut text = Text::new(width);
     let estimator = match summary.estimator.as_str() {

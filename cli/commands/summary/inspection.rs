@@ -6,10 +6,10 @@ use thetahat::text::{brief, harmless};
 
 use super::text::{Text, columns, or_dash};
 
-/// So many channels, and warnings, are shown of very many.
+/// This many channels, and warnings, are shown of very many.
 const MOST: usize = 10;
 
-/// What was found, the warnings, and the line that would fit a model, so many columns wide.
+/// What was found, the warnings, and the line that would fit a model, this many columns wide.
 pub fn inspection(inspection: &Inspection, width: usize) -> String {
     let mut text = Text::new(width);
     text.line(&clock(inspection));

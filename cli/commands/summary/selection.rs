@@ -2,12 +2,12 @@
 
 use thetahat::figures::{fixed, number};
 use thetahat::report::Report;
-use thetahat::select::{Scored, Select, Selection};
+use thetahat::select::{Candidate, Select, Selection};
 
 use super::orders_legend;
 use super::text::{Text, columns, or_dash};
 
-/// So many of the best are shown; the report has more.
+/// This many of the best are shown; the report has more.
 const SHOWN: usize = 8;
 
 /// The parts that the rows were cut into, what was done, and the best models.
@@ -23,16 +23,16 @@ pub(super) fn selection(text: &mut Text, report: &Report) {
     let Some(selection) = &report.selection else { return };
     selection.steps.iter().for_each(|step| text.line(step));
     text.line("");
-    let unseen = selection.best.iter().any(|scored| scored.unseen.is_some());
+    let held_out = selection.best.iter().any(|scored| scored.held_out_mse.is_some());
     let score = score(selection);
     let mut names = vec!["", "model", "parameters", "MSE"];
-    names.extend(unseen.then_some("MSE on unseen").into_iter().chain(score));
+    names.extend(held_out.then_some("MSE held out").into_iter().chain(score));
     let mut table =
         columns(&names).words(&[1]).none("not defined: the model is exact, or has too many parameters");
     // The smallest model within a percent of the least may stand far behind it.
     let chosen = std::iter::once(&selection.chosen);
     let others = selection.best.iter().filter(|scored| scored.orders != selection.chosen.orders);
-    let shown: Vec<&Scored> = chosen.chain(others).take(SHOWN).collect();
+    let shown: Vec<&Candidate> = chosen.chain(others).take(SHOWN).collect();
     for (position, scored) in shown.iter().enumerate() {
         let role = match &selection.least {
             _ if position == 0 => "chosen",
@@ -46,7 +46,7 @@ pub(super) fn selection(text: &mut Text, report: &Report) {
             scored.parameters.to_string(),
             number(scored.mse),
         ];
-        row.extend(unseen.then(|| or_dash(scored.unseen, number)));
+        row.extend(held_out.then(|| or_dash(scored.held_out_mse, number)));
         row.extend(score.map(|_| criterion(selection.select, scored)));
         table.row(row);
     }
@@ -69,7 +69,7 @@ fn score(selection: &Selection) -> Option<&'static str> {
     }
 }
 
-fn criterion(select: Select, scored: &Scored) -> String {
+fn criterion(select: Select, scored: &Candidate) -> String {
     let logarithmic = matches!(select, Select::Criterion(criterion) if criterion.is_logarithmic());
     or_dash(scored.score, |score| if logarithmic { fixed(score, 4) } else { number(score) })
 }

@@ -144,7 +144,7 @@ impl Table {
         let mut table = comfy_table::Table::new();
         table.load_style(presets::NOTHING).set_header(of(&self.head));
         table.set_content_arrangement(ContentArrangement::Dynamic);
-        // The blanks behind the last column do not show.
+        // The blanks after the last column do not show.
         table.set_width(u16::try_from(width + BETWEEN).unwrap_or(u16::MAX));
         for row in &self.rows {
             table.add_row(of(row));

@@ -3,7 +3,7 @@
 use thetahat::estimate::InformationCriterion;
 use thetahat::figures::{chance, fixed, number, short, three};
 use thetahat::model::Orders;
-use thetahat::report::{Comparison, Coverage, Requirement, Seen, Validation};
+use thetahat::report::{Comparison, Coverage, InSample, Requirement, Validation};
 use thetahat::respond::Horizon;
 use thetahat::text::harmless;
 use thetahat::validate::{Fit, Independence, Residuals, Test};
@@ -19,7 +19,7 @@ type ErrorFigure = (&'static str, fn(&Fit) -> Option<f64>);
 const ERRORS: [ErrorFigure; 2] =
     [("mean |e|", |fit| fit.mean_absolute_error), ("largest |e|", |fit| fit.largest_error)];
 
-/// How a model does on a log, and what was required of it, so many columns wide.
+/// How a model does on a log, and what was required of it, this many columns wide.
 pub fn validation(found: &Validation, requirements: &[Requirement], alpha: f64, width: usize) -> String {
     let mut text = Text::new(width);
     let files: Vec<String> = found.logs.iter().map(|log| harmless(&log.file)).collect();
@@ -29,7 +29,7 @@ pub fn validation(found: &Validation, requirements: &[Requirement], alpha: f64, 
         found.model,
         some(&files, MOST, ", "),
         rows(&found.rows),
-        seen(found.seen)
+        in_sample(found.in_sample)
     ));
     if let Some(orders) = &found.orders {
         text.line(&orders_legend([orders]));
@@ -63,7 +63,7 @@ pub fn validation(found: &Validation, requirements: &[Requirement], alpha: f64, 
     text.finish()
 }
 
-/// Several models, a column for each, so many columns of text wide.
+/// Several models, a column for each, this many columns of text wide.
 pub fn comparison(comparison: &Comparison, width: usize) -> String {
     let models = &comparison.models;
     let mut text = Text::new(width);
@@ -83,10 +83,10 @@ pub fn comparison(comparison: &Comparison, width: usize) -> String {
     row("parameters", &|model| model.parameters.to_string());
     row("stable", &|model| or_dash(model.stable, yes));
     row("fitted to these rows", &|model| {
-        match model.seen {
-            Seen::No => "no",
-            Seen::Partly => "partly",
-            Seen::Yes => "yes",
+        match model.in_sample {
+            InSample::No => "no",
+            InSample::Partly => "partly",
+            InSample::Yes => "yes",
         }
         .to_owned()
     });
@@ -203,11 +203,11 @@ fn errors(text: &mut Text, fits: &[Fit]) {
     text.table(table);
 }
 
-fn seen(seen: Seen) -> &'static str {
-    match seen {
-        Seen::No => "fresh, the fit did not see them",
-        Seen::Partly => "the model was fitted to some of them",
-        Seen::Yes => "the model was fitted to them",
+fn in_sample(in_sample: InSample) -> &'static str {
+    match in_sample {
+        InSample::No => "held out, the fit did not use them",
+        InSample::Partly => "the model was fitted to some of them",
+        InSample::Yes => "the model was fitted to them",
     }
 }
 

@@ -34,7 +34,7 @@ pub(super) struct Sample {
 }
 
 impl Columns {
-    /// Those of a log that may have a clock, with a forecast so many rows ahead if one was asked for.
+    /// Those of a log that may have a clock, with a forecast this many rows ahead if one was asked for.
     pub(super) fn new(has_time: bool, horizon: Option<usize>, trackers: &[Tracker]) -> Self {
         let parameters = trackers.first().map_or(&[][..], Tracker::names);
         let policies: Vec<String> = match trackers {

@@ -98,7 +98,7 @@ impl State {
         Ok(state)
     }
 
-    /// Whether its own parts fit together, as they do if nobody has edited it. The trackers are looked at beside new ones.
+    /// Whether its own parts fit together, as they do if nobody has edited it. The trackers are compared with new ones.
     fn is_sound(&self) -> bool {
         let Self { rows, written, first, last, pace, gaps, alarms, trackers, .. } = self;
         !trackers.is_empty()
@@ -237,7 +237,7 @@ pub(super) enum Place {
     /// The first row tells whether the log starts over.
     Unknown,
     /// At its start: the rows that were absorbed are skipped.
-    Behind,
+    After,
     /// Beyond a hole.
     Beyond,
 }
@@ -245,10 +245,10 @@ pub(super) enum Place {
 impl Place {
     pub(super) fn resumed(resume: ResumeArgument, path: &Path) -> Self {
         match resume {
-            ResumeArgument::Start => Self::Behind,
+            ResumeArgument::Start => Self::After,
             ResumeArgument::Now => Self::Beyond,
             ResumeArgument::Auto if path == Path::new("-") => Self::Unknown,
-            ResumeArgument::Auto => Self::Behind,
+            ResumeArgument::Auto => Self::After,
         }
     }
 
@@ -256,10 +256,10 @@ impl Place {
     pub(super) fn of_row(&mut self, state: &State, live: &Live, file: &str) -> Result<RowPlace, Failure> {
         let is = |known: &[Option<f64>]| print(live.values(), live.time()).eq(known.iter().copied());
         if *self == Self::Unknown {
-            *self = if is(&state.first) { Self::Behind } else { Self::Beyond };
+            *self = if is(&state.first) { Self::After } else { Self::Beyond };
         }
         match self {
-            Self::Behind if state.rows > 0 => {
+            Self::After if state.rows > 0 => {
                 let row = live.row();
                 if row == 1 && !is(&state.first) || row == state.rows && !is(&state.last) {
                     return Err(Failure::data(format!(
@@ -298,7 +298,7 @@ impl Place {
                  start anew"
             )));
         }
-        if self == Self::Behind && state.rows > 0 {
+        if self == Self::After && state.rows > 0 {
             return Err(Failure::data(format!(
                 "{file}: it ends before row {}, the last one that the state has absorbed; give the log that the state is of",
                 state.rows

@@ -244,7 +244,7 @@ impl Tracking {
         &self.state.trackers
     }
 
-    /// The prediction so many steps ahead of each, see [`Tracker::forecast`].
+    /// The prediction this many steps ahead of each, see [`Tracker::forecast`].
     ///
     /// # Errors
     /// A [`Failure`] if the steps are out of their range.

@@ -100,7 +100,7 @@ pub enum ArmaxMethod {
 ///
 /// # Sizes
 ///
-/// `N` is the number of parameters, [`ArmaxOrders::parameters`], and `D` the room for inputs on their way, at least
+/// `N` is the number of parameters, [`ArmaxOrders::parameters`], and `D` the buffer for inputs on their way, at least
 /// [`ArmaxOrders::delays`]. Memory: that of `RecursiveArx`, and n² + 1 numbers for past gradients.
 ///
 /// Source: Ljung and Söderström, Theory and Practice of Recursive Identification, 1983, sections 3.7.2 (gradients),
@@ -339,13 +339,13 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
     /// [`RecursiveArx::predict_in`](crate::RecursiveArx::predict_in), whose errors it has.
     pub fn predict_in(
         &self,
-        room: &mut Lags<T, N, D>,
+        workspace: &mut Lags<T, N, D>,
         future_inputs: &[T],
         outputs: &mut [T],
     ) -> Result<(), Error> {
-        room.copy_from(&self.lags)?;
+        workspace.copy_from(&self.lags)?;
         let parameters = self.estimator.parameters().as_slice();
-        predict_ahead(room, parameters, self.residual, future_inputs, outputs)
+        predict_ahead(workspace, parameters, self.residual, future_inputs, outputs)
     }
 
     /// Takes the parameters of A, B and the constant back to their limits, one range for each, and returns whether one was

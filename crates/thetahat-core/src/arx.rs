@@ -52,7 +52,7 @@ use crate::{
 ///
 /// # Sizes
 ///
-/// `N` is the number of parameters, [`ArxOrders::parameters`], and `D` the room for inputs on their way, at least
+/// `N` is the number of parameters, [`ArxOrders::parameters`], and `D` the buffer for inputs on their way, at least
 /// [`ArxOrders::delays`], as for [`Lags`]. Memory: that of both; for 4 parameters in `f32` on a 32-bit machine 196
 /// bytes.
 ///
@@ -258,13 +258,13 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
     /// Errors: those of `predict`; [`Error::Length`] (only with `Dyn`) if the lines have another size.
     pub fn predict_in(
         &self,
-        room: &mut Lags<T, N, D>,
+        workspace: &mut Lags<T, N, D>,
         future_inputs: &[T],
         outputs: &mut [T],
     ) -> Result<(), Error> {
-        room.copy_from(&self.lags)?;
+        workspace.copy_from(&self.lags)?;
         let parameters = self.estimator.parameters().as_slice();
-        predict_ahead(room, parameters, T::zero(), future_inputs, outputs)
+        predict_ahead(workspace, parameters, T::zero(), future_inputs, outputs)
     }
 
     /// Takes the parameters back to their limits, one range for each, and returns whether one was out. See
@@ -318,7 +318,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
     /// # use thetahat_core::nalgebra::Const;
     /// # use thetahat_core::{ArxOrders, InputOrders, RecursiveArx};
     /// # const ORDERS: ArxOrders = ArxOrders { na: 2, inputs: &[InputOrders { nb: 2, nk: 3 }], constant: false };
-    /// type Plant = RecursiveArx<f32, Const<4>>; // room for one input on its way, of three
+    /// type Plant = RecursiveArx<f32, Const<4>>; // a buffer for one input on its way, of three
     /// const _: () = assert!(Plant::fits(&ORDERS));
     /// ```
     pub const fn fits(orders: &ArxOrders<'_>) -> bool {

@@ -255,7 +255,7 @@ impl<T: Real, N: Dimension> ExtendedKalmanFilter<T, N> {
             self.linear = corrected;
             return Ok(innovation);
         }
-        let (ungated, judged) = (self.linear.clone().with_gate(T::INFINITY)?, corrected.clone());
+        let (ungated, checked) = (self.linear.clone().with_gate(T::INFINITY)?, corrected.clone());
         for iteration in 1..self.iterations {
             let Linearised { rows, error, noise } =
                 Linearised::at(corrected.state(), observation, input, measurement)?
@@ -263,7 +263,7 @@ impl<T: Real, N: Dimension> ExtendedKalmanFilter<T, N> {
             corrected.clone_from(&ungated);
             corrected.absorb(rows, error, &noise, |h, v, s, e| record(iteration, h, v, s, e))?;
         }
-        self.linear = corrected.with_gate_of(&judged);
+        self.linear = corrected.with_gate_of(&checked);
         Ok(innovation)
     }
 }

@@ -44,7 +44,7 @@ impl Line {
         })
     }
 
-    /// What goes into it, of a model with so many inputs.
+    /// What goes into it, of a model with this many inputs.
     fn source(&self, inputs: usize) -> Source {
         let index = usize::from(self.index);
         match index.checked_sub(inputs) {
@@ -76,7 +76,7 @@ impl Line {
 ///
 /// # Sizes
 ///
-/// `N` is the number of parameters, [`ArxOrders::parameters`]. `D` is the room for inputs on their way to the
+/// `N` is the number of parameters, [`ArxOrders::parameters`]. `D` is the buffer for inputs on their way to the
 /// regressor, at least [`ArxOrders::delays`]. It is 1 unless you say otherwise, which is right for one input
 /// with nk = 1, and enough for nk = 0 or without input. Both are checked in [`new`](Lags::new). With the
 /// feature `alloc` both may be `Dyn`: then they follow from the orders, and `new` allocates, and fails as a
@@ -164,7 +164,7 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
         Self::fits_with(orders, 0)
     }
 
-    /// The same with so many past residuals.
+    /// The same with this many past residuals.
     pub(crate) const fn fits_with(orders: &ArxOrders<'_>, residuals: usize) -> bool {
         let parameters = orders.parameters().saturating_add(residuals);
         let exact = match N::SIZE {
@@ -302,8 +302,8 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
     ///
     /// Errors, after which nothing has changed: [`Error::Length`] (only with `Dyn`).
     pub(crate) fn copy_from(&mut self, other: &Self) -> Result<(), Error> {
-        check_length("room", other.regressor.len(), self.regressor.len())?;
-        check_length("room", other.delayed.len(), self.delayed.len())?;
+        check_length("workspace", other.regressor.len(), self.regressor.len())?;
+        check_length("workspace", other.delayed.len(), self.delayed.len())?;
         ud::copy(other.regressor.as_slice(), self.regressor.as_mut_slice());
         ud::copy(other.delayed.as_slice(), self.delayed.as_mut_slice());
         self.lines

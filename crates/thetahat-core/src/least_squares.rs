@@ -261,7 +261,7 @@ impl<T: Real, N: Dimension> LeastSquares<T, N> {
         self.rows
     }
 
-    /// Which columns are linearly independent, judged on columns of unit norm, so that units do not matter.
+    /// Which columns are linearly independent, decided on columns of unit norm, so that units do not matter.
     ///
     /// R is triangularised with column pivoting. A column is dependent if what remains of it, once the
     /// columns chosen before it are projected out, is at most

@@ -20,7 +20,7 @@
 //!
 //! | what a sample tells | |
 //! |---|---|
-//! | [`Innovation`] | what was not predicted, how surprising it is, and the [`Action`] that was taken |
+//! | [`Innovation`] | what was not predicted, how likely it was (NIS), and the [`Action`] that was taken |
 //! | [`ChangeDetector`] | charts that watch innovations, of estimators and filters; an [`Alarm`] says what changed, and since when |
 //!
 //! A [`Covariance`] is kept factored, so that it never becomes indefinite.

@@ -226,7 +226,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>> RecursiveLeastSquares<T, N> {
         Ok(Innovation { error, variance, nis, action })
     }
 
-    /// The same with a noise variance that is known from so many earlier samples, as from a batch fit: σ̂² is
+    /// The same with a noise variance that is known from this many earlier samples, as from a batch fit: σ̂² is
     /// `variance` until the next sample, and the earlier samples weigh as they would have if they had come in here,
     /// all alike. For [`with_parameters`](RecursiveLeastSquares::with_parameters) and
     /// [`with_covariance`](RecursiveLeastSquares::with_covariance), which say nothing of the noise.

@@ -3,13 +3,13 @@
 use statrs::distribution::{ChiSquared, Continuous, ContinuousCDF, Normal, StudentsT};
 use statrs::function::beta::checked_beta_reg;
 
-/// How often a chi-square number of so many degrees of freedom is as large; none for no degrees of freedom.
+/// How often a chi-square number of this many degrees of freedom is as large; none for no degrees of freedom.
 pub(crate) fn chi_square_tail(statistic: f64, degrees: f64) -> Option<f64> {
     let distribution = ChiSquared::new(degrees).ok()?;
     Some(distribution.sf(statistic.max(0.0))).filter(|p| p.is_finite())
 }
 
-/// Between which a chi-square number of so many degrees of freedom lies in 95 % of all cases: its quantiles 0.025 and 0.975;
+/// Between which a chi-square number of this many degrees of freedom lies in 95 % of all cases: its quantiles 0.025 and 0.975;
 /// none for no degrees of freedom.
 pub(crate) fn chi_square_interval(degrees: usize) -> Option<(f64, f64)> {
     let distribution = ChiSquared::new(degrees as f64).ok()?;

@@ -20,7 +20,7 @@ use crate::{Error, text};
 pub trait Document: Serialize + DeserializeOwned + JsonSchema {
     /// What messages call it.
     const NAME: &'static str;
-    /// The schema that this version writes, and reads with any minor version behind it.
+    /// The schema that this version writes, and reads with any minor version after it.
     const SCHEMA: &'static str;
     /// What to do where a text is none.
     const REMEDY: &'static str;

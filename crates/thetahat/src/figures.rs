@@ -44,7 +44,7 @@ pub fn short(value: f64) -> String {
     text
 }
 
-/// A number with so many decimals; as [`number`] where that is too wide.
+/// A number with this many decimals; as [`number`] where that is too wide.
 ///
 /// ```
 /// use thetahat::figures::fixed;
@@ -56,7 +56,7 @@ pub fn fixed(value: f64, decimals: usize) -> String {
     if value.is_finite() && text.len() <= WIDEST { text } else { number(value) }
 }
 
-/// A number in powers of ten with so many decimals, or as many of them as there is room for.
+/// A number in powers of ten with this many decimals, or as many of them as there is room for.
 ///
 /// ```
 /// use thetahat::figures::scientific;

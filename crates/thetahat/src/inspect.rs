@@ -1,6 +1,6 @@
 //! What a log is worth, before any fit.
 //!
-//! - [`inspect()`] looks at a [`Recording`](crate::data::Recording), [`inspect_log`] at a [`Log`](crate::data::Log); an
+//! - [`inspect()`] inspects a [`Recording`](crate::data::Recording), [`inspect_log`] at a [`Log`](crate::data::Log); an
 //!   [`InspectionPlan`] names the channels.
 //! - [`Inspection`] is the document: the [`Clock`], the quality of each channel ([`ChannelQuality`], [`Saturation`]), how rich the
 //!   inputs are ([`Excitation`], [`SpectrumPoint`]), their delays ([`DelayEstimate`]), and whether they follow the output

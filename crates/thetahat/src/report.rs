@@ -1,11 +1,11 @@
 //! From a log to a document: fits, validations and comparisons of whole logs, and their pages.
 //!
-//! - [`identify`] fits what a [`Plan`] says and gives a [`Report`]; [`identify_monitored`] can be watched and ended, [`Unjudged`] is a
+//! - [`identify`] fits what a [`Plan`] says and gives a [`Report`]; [`identify_monitored`] can be watched and ended, [`PendingEvaluation`] is a
 //!   fit before its figures. [`fit_equations`] does the same for a model in equations with an [`EquationsPlan`],
 //!   [`fit_nonlinear_arx`] for a nonlinear ARX model with a [`NonlinearArxPlan`] ([`InputLags`], [`MapPlan`], [`Centres`]).
 //! - [`Report`] is the JSON document of a fit: its [`Data`] ([`Parts`], [`Missing`]), the model, its [`Estimation`] and its figures.
 //! - [`validate`] tests a report on a log as a [`ValidationPlan`] says. It gives a [`Validated`]: the document, a [`Validation`] with
-//!   [`NoiseLevel`], [`Coverage`] and whether the fit has [`Seen`] the rows, and the [`Signals`] for charts ([`OutputSignals`]).
+//!   [`NoiseLevel`], [`Coverage`] and whether the fit has [`InSample`] the rows, and the [`Signals`] for charts ([`OutputSignals`]).
 //! - [`compare`] puts several validations side by side in a [`Comparison`]. A [`Requirement`] makes a gate of a validation.
 //! - [`apply`] predicts or simulates a log with a stored model ([`Applied`], [`AppliedOutput`]), [`sample`] draws from it.
 //!   [`held_out_runs`] are the free runs of the models between which a choice was made.
@@ -31,17 +31,17 @@
 
 mod apply;
 mod equations;
+mod evaluate;
+mod fitted_rows;
 mod held_out_runs;
 #[cfg(feature = "html")]
 mod html;
 mod identify;
-mod judge;
 mod nonlinear_arx;
 mod plan;
 mod requirement;
 mod sample;
 mod schema;
-mod seen;
 mod shares;
 mod suited;
 #[cfg(test)]
@@ -54,13 +54,13 @@ pub use equations::{EquationsPlan, fit_equations};
 pub use held_out_runs::held_out_runs;
 #[cfg(feature = "html")]
 pub use html::{comparison_page, fit_page, inspection_page, validation_page};
-pub use identify::{Unjudged, identify, identify_monitored};
+pub use identify::{PendingEvaluation, identify, identify_monitored};
 pub use nonlinear_arx::{Centres, InputLags, MapPlan, NonlinearArxPlan, fit_nonlinear_arx};
 pub use plan::Plan;
 pub use requirement::Requirement;
 pub use sample::sample;
 pub use schema::{Data, Estimation, Missing, Parts, Report};
 pub use validation::{
-    Comparison, Coverage, NoiseLevel, OutputSignals, Seen, Signals, Validated, Validation, ValidationPlan,
-    compare, validate,
+    Comparison, Coverage, InSample, NoiseLevel, OutputSignals, Signals, Validated, Validation,
+    ValidationPlan, compare, validate,
 };

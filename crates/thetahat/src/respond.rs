@@ -33,9 +33,9 @@
 mod draws;
 pub(crate) mod equations;
 mod forecast;
-mod free_response;
 mod frequency;
 mod horizon;
+mod initial_condition;
 mod innovations;
 mod kinds;
 mod nis;

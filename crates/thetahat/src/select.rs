@@ -5,7 +5,7 @@
 //!   orders that the data suggest.
 //! - [`Select`] is what makes one model better: an information criterion, or errors on samples that it was not fitted to
 //!   ([`HeldOut`]). [`Focus`] is what the model is for.
-//! - [`Selection`] has every model that was compared ([`Scored`]), the winners ([`Best`]) and the delays ([`Delay`], [`Scan`]).
+//! - [`Selection`] has every model that was compared ([`Candidate`]), the winners ([`Best`]) and the delays ([`Delay`], [`DelayScore`]).
 //!
 //! ```
 //! use thetahat::data::Record;
@@ -34,6 +34,7 @@ mod focus;
 mod folds;
 mod grid;
 mod held_out;
+mod held_out_mse;
 mod linear;
 mod ranking;
 mod search;
@@ -41,7 +42,6 @@ mod selection;
 mod task;
 #[cfg(test)]
 mod tests;
-mod unseen;
 mod winners;
 
 pub(crate) use automatic::constant_pays;
@@ -50,6 +50,6 @@ pub(crate) use choose::choose;
 pub use choose::choose_orders;
 pub(crate) use delay::delays;
 pub use focus::Focus;
-pub use selection::{Best, Delay, HeldOut, Scan, Scored, Selection};
+pub use selection::{Best, Candidate, Delay, DelayScore, HeldOut, Selection};
 use task::EXACT;
-pub(crate) use task::{Found, Task};
+pub(crate) use task::{SelectedModel, Task};

@@ -10,17 +10,17 @@ const LONGEST: usize = 1000;
 const START: usize = 600;
 const END: usize = 300;
 
-/// Whether a character is not seen but does something, or nothing at all: the control characters, those that break lines,
+/// Whether a character is invisible: the control characters, those that break lines,
 /// set the direction of writing or have no width (Unicode 16, category Cc, `Default_Ignorable_Code_Point`, U+2028, U+2029 and
 /// U+FFF9 to U+FFFB).
 ///
 /// ```
-/// use thetahat::text::is_unseen;
+/// use thetahat::text::is_invisible;
 ///
-/// assert!(['\x1b', '\u{9b}', '\n', '\u{200b}', '\u{202e}', '\u{2066}', '\u{feff}'].into_iter().all(is_unseen));
-/// assert!(!"Temp [°C] é µ 温度 ع 🌡".contains(is_unseen));
+/// assert!(['\x1b', '\u{9b}', '\n', '\u{200b}', '\u{202e}', '\u{2066}', '\u{feff}'].into_iter().all(is_invisible));
+/// assert!(!"Temp [°C] é µ 温度 ع 🌡".contains(is_invisible));
 /// ```
-pub fn is_unseen(character: char) -> bool {
+pub fn is_invisible(character: char) -> bool {
     character.is_control()
         || matches!(character,
             '\u{ad}' | '\u{34f}' | '\u{61c}' | '\u{115f}'..='\u{1160}' | '\u{17b4}'..='\u{17b5}'
@@ -30,7 +30,7 @@ pub fn is_unseen(character: char) -> bool {
             | '\u{e0000}'..='\u{e0fff}')
 }
 
-/// A text with what is not seen ([`is_unseen`]) as an escape: harmless to a terminal, and on one line.
+/// A text with what is invisible ([`is_invisible`]) as an escape: harmless to a terminal, and on one line.
 ///
 /// ```
 /// assert_eq!(thetahat::text::harmless("u\x1b[2J\u{202e}x"), "u\\u{1b}[2J\\u{202e}x");
@@ -38,7 +38,7 @@ pub fn is_unseen(character: char) -> bool {
 pub fn harmless(text: &str) -> String {
     let mut harmless = String::with_capacity(text.len());
     for character in text.chars() {
-        if is_unseen(character) {
+        if is_invisible(character) {
             harmless.extend(character.escape_default());
         } else {
             harmless.push(character);
@@ -47,7 +47,7 @@ pub fn harmless(text: &str) -> String {
     harmless
 }
 
-/// A name as a message repeats it: [`harmless`], and cut off after so many characters.
+/// A name as a message repeats it: [`harmless`], and cut off after this many characters.
 ///
 /// ```
 /// assert_eq!(thetahat::text::brief("heater", 40), "heater");
@@ -94,7 +94,7 @@ pub fn message(text: &str) -> String {
     }
 }
 
-/// A text as a string of JSON, between quotes, with what is not seen as an escape.
+/// A text as a string of JSON, between quotes, with what is invisible as an escape.
 ///
 /// ```
 /// assert_eq!(thetahat::text::json("a\"\u{202e}\n"), r#""a\"\u202e\n""#);
@@ -103,9 +103,9 @@ pub fn json(text: &str) -> String {
     escaped_json(serde_json::Value::from(text).to_string())
 }
 
-/// A JSON text with what is not seen as escapes, except line breaks, which stand between its tokens only. It says the same.
+/// A JSON text with what is invisible as escapes, except line breaks, which stand between its tokens only. It says the same.
 pub(crate) fn escaped_json(json: String) -> String {
-    let is_shown = |character: char| character == '\n' || !is_unseen(character);
+    let is_shown = |character: char| character == '\n' || !is_invisible(character);
     if json.chars().all(is_shown) {
         return json;
     }
@@ -128,17 +128,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn json_says_the_same_without_what_is_not_seen() {
+    fn json_says_the_same_without_what_is_invisible() {
         let name = "a\u{7f}\u{9b}\u{e0041}\u{202e}\r\t温度🌡";
         let written = json(name);
-        assert!(!written.contains(is_unseen), "{written:?}");
+        assert!(!written.contains(is_invisible), "{written:?}");
         assert_eq!(serde_json::from_str::<String>(&written).unwrap(), name);
     }
 
     #[test]
     fn a_message_about_a_message_is_the_same() {
         let long = message(&"\x1b\u{202e}é".repeat(100_000));
-        assert!(long.chars().count() == START + END + 1 && !long.contains(is_unseen));
+        assert!(long.chars().count() == START + END + 1 && !long.contains(is_invisible));
         assert_eq!(message(&long), long);
         assert_eq!(message("short: 'µ'"), "short: 'µ'");
         // Neither too short nor too long at the seam.

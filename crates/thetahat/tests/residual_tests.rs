@@ -8,12 +8,12 @@ mod simulated;
 use thetahat::data::{Channel, Log, Rows};
 use thetahat::estimate::Method;
 use thetahat::model::Orders;
-use thetahat::report::{Plan, Report, Seen, ValidationPlan, identify, validate};
+use thetahat::report::{InSample, Plan, Report, ValidationPlan, identify, validate};
 use thetahat::validate::Residuals;
 
 use simulated::{BEFORE, Random, filtered};
 
-/// Rows of the fit, and as many fresh ones behind them: Anderson's test counts 20 lags of so many.
+/// Rows of the fit, and as many fresh ones after them: Anderson's test counts 20 lags of them.
 const ROWS: usize = 400;
 const LEVEL: f64 = 0.05;
 
@@ -87,11 +87,11 @@ fn fitted(log: &Log, orders: &Orders, method: &Method) -> Report {
     identify(log.clone(), &[], &plan).expect("the case is sound")
 }
 
-fn residuals(report: &Report, log: &Log, rows: [usize; 2], seen: Seen) -> Residuals {
+fn residuals(report: &Report, log: &Log, rows: [usize; 2], seen: InSample) -> Residuals {
     let rows = vec![Rows::new(rows[0], rows[1]).expect("the case is sound")];
     let plan = ValidationPlan { rows, ..ValidationPlan::default() };
     let found = validate(report, None, log, &[], &plan).expect("the case is sound").validation;
-    assert_eq!(found.seen, seen);
+    assert_eq!(found.in_sample, seen);
     found.residuals.into_iter().next().expect("the case is sound")
 }
 
@@ -106,8 +106,8 @@ fn rates(kind: &Kind<'_>) -> [Rates; 2] {
         let y: Vec<f64> = x.iter().zip(&v).map(|(x, v)| x + v).skip(BEFORE).collect();
         let log = log((kind.orders.inputs() > 0).then_some(&u[BEFORE..]), &y);
         let report = fitted(&log, &kind.orders, &kind.method);
-        rates[0].count(&residuals(&report, &log, [1, ROWS], Seen::Yes));
-        rates[1].count(&residuals(&report, &log, [ROWS + 1, 2 * ROWS], Seen::No));
+        rates[0].count(&residuals(&report, &log, [1, ROWS], InSample::Yes));
+        rates[1].count(&residuals(&report, &log, [ROWS + 1, 2 * ROWS], InSample::No));
     }
     for (rates, part) in rates.iter().zip(["seen", "fresh"]) {
         rates.print(&format!("{}, {part}", kind.name));
@@ -239,7 +239,7 @@ fn feedback_is_seen_and_does_no_harm() {
         }
         let log = log(Some(&u[BEFORE..]), &y[BEFORE..]);
         let report = fitted(&log, &orders, &Method::default());
-        rates.count(&residuals(&report, &log, [1, ROWS], Seen::Yes));
+        rates.count(&residuals(&report, &log, [1, ROWS], InSample::Yes));
     }
     rates.print("ARX in a loop");
     assert!(rates.feedback > 95.0, "{rates:?}");

@@ -209,7 +209,7 @@ class Clock(NamedTuple):
         return Clock(said, self.times._replace(values=plain if (plain == exact).all() else exact, rule=None))
 
     def text(self) -> str:
-        """What the repr of a log says behind the sample time."""
+        """What the repr of a log says after the sample time."""
         start = "" if self.times is None or not self.times.are_times else f" from {self.times.text()}"
         return (f" {self.said}" if self.said else "") + start
 
@@ -245,7 +245,7 @@ def to_pandas(clock: Clock, seconds: _numbers.Array, columns: dict[str, Any]) ->
 
 
 def to_polars(clock: Clock, seconds: _numbers.Array, columns: dict[str, Any]) -> Any:
-    """A data frame of columns behind one of times, or of the numbers that the rows have."""
+    """A data frame of columns after one of times, or of the numbers that the rows have."""
     polars = _imported("polars")
     labels = Labels(seconds, "time")
     if clock.times is not None:

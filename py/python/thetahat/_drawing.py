@@ -127,22 +127,22 @@ def _time(log: Log) -> Array:
 
 
 def broken(log: Log, values: Array) -> tuple[Array, Array]:
-    """Time and values, with a break of the line where the clock jumps, and where an experiment begins."""
+    """Time and values, with a break of the line where the clock has a gap, and where an experiment begins."""
     time = _time(log)
-    jumps = np.flatnonzero(np.diff(time) > 1.5 * log.sample_time) + 1
-    breaks = np.union1d(jumps, [rows.start for rows in log.experiments[1:]]).astype(np.intp)
-    return np.insert(time, breaks, np.nan), np.insert(values, breaks, np.nan)
+    gaps = np.flatnonzero(np.diff(time) > 1.5 * log.sample_time) + 1
+    starts = np.union1d(gaps, [rows.start for rows in log.experiments[1:]]).astype(np.intp)
+    return np.insert(time, starts, np.nan), np.insert(values, starts, np.nan)
 
 
 def gapped(time: Array, *values: Array) -> list[Array]:
     """Time and values, with a break of the line where rows are missing, or where another experiment begins."""
     steps = np.diff(time)
     usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
-    breaks = np.flatnonzero((steps > 1.5 * usual) | (steps <= 0)) + 1
-    return [np.insert(one, breaks, np.nan) for one in (time, *values)]
+    starts = np.flatnonzero((steps > 1.5 * usual) | (steps <= 0)) + 1
+    return [np.insert(one, starts, np.nan) for one in (time, *values)]
 
 
-def borders(ax: Axes, log: Log) -> None:
+def boundaries(ax: Axes, log: Log) -> None:
     """A line between each experiment and the one before it."""
     time = _time(log)
     for rows in log.experiments[1:]:
@@ -169,7 +169,7 @@ def scale_to(ax: Axes, measured: Sequence[Array], modelled: Sequence[Array]) -> 
 
 
 def fixed(value: float, decimals: int) -> str:
-    """So many decimals, or powers of ten where that is wider than twelve characters."""
+    """This many decimals, or powers of ten where that is wider than twelve characters."""
     text = f"{value:.{decimals}f}"
     return text if len(text) <= 12 else f"{value:.4e}"
 

@@ -556,7 +556,7 @@ class StateFilter:
         rows = _rows.of(data, u, time, sample_time, self.inputs, self.outputs)
         if not isinstance(smooth, bool):
             raise TypeError(f"smooth: expected True or False, found {smooth!r}")
-        if rows.borders:
+        if rows.boundaries:
             raise ValueError("data: it holds several experiments, which have states of their own; take log[log.experiments[0]], …")
         steps = None
         if rows.seconds is not None:

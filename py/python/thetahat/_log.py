@@ -19,7 +19,7 @@ from thetahat._options import Duration, ReadOptions, Resample
 class Log:
     """Inputs and outputs on a common clock.
 
-    A log owns its data: arrays are copied once, here. NaN is a missing sample; it ends a stretch, and nothing reaches
+    A log owns its data: arrays are copied once, here. NaN is a missing sample; it ends a segment, and nothing reaches
     across. Rows are counted as Python does: ``log[:500]`` is the log of the first 500, and ``log["u"]`` is a channel.
 
     Parameters
@@ -334,12 +334,12 @@ class Log:
         >>> log.experiments
         [range(0, 2), range(2, 5)]
         """
-        edges = [0, *self._log.borders, len(self)]
+        edges = [0, *self._log.boundaries, len(self)]
         return [range(*ends) for ends in zip(edges, edges[1:])]
 
     @property
     def segments(self) -> list[range]:
-        """The stretches of rows that estimators see: in none a value is missing, the clock jumps, or an experiment ends.
+        """The segments of rows that estimators see: in none a value is missing, the clock has a gap, or an experiment ends.
 
         Examples
         --------
@@ -350,11 +350,11 @@ class Log:
         present = np.ones(len(self), dtype=bool)
         for name in [*self.inputs, *self.outputs]:
             present &= ~np.isnan(self._log.values(name))
-        breaks = np.array(self._log.breaks, dtype=np.intp)
+        starts = np.array(self._log.segment_starts, dtype=np.intp)
         first, last = present.copy(), present.copy()
         first[1:] &= ~present[:-1]
         last[:-1] &= ~present[1:]
-        first[breaks], last[breaks - 1] = present[breaks], present[breaks - 1]
+        first[starts], last[starts - 1] = present[starts], present[starts - 1]
         return [range(*ends) for ends in zip(np.flatnonzero(first).tolist(), (np.flatnonzero(last) + 1).tolist())]
 
     @property
@@ -406,12 +406,12 @@ class Log:
         if not isinstance(other, Log):
             return NotImplemented
         mine, yours = self._log, other._log
-        same = (mine.inputs, mine.outputs, mine.sample_time, mine.breaks, mine.borders) == (
+        same = (mine.inputs, mine.outputs, mine.sample_time, mine.segment_starts, mine.boundaries) == (
             yours.inputs,
             yours.outputs,
             yours.sample_time,
-            yours.breaks,
-            yours.borders,
+            yours.segment_starts,
+            yours.boundaries,
         )
         arrays = ((self.y, other.y), (self.u, other.u), (self.time, other.time))
         return same and all(np.array_equal(one, another, equal_nan=True) for one, another in arrays)

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from thetahat import _files, _numbers, _options, _picture, _thetahat
-from thetahat._judgement import Validation
+from thetahat._evaluation import Validation
 from thetahat._log import Log, handle
 from thetahat._options import Rows, ValidationOptions
 from thetahat._report import ReportedModel
@@ -86,7 +86,7 @@ class Model(ReportedModel):
         path : str or path
             The file to write; it is written whole or not at all.
         log : Log, optional
-            Data to look at, such as those of the fit.
+            Data to evaluate on, such as those of the fit.
         """
         _thetahat.write(_files.name(path), self._model.page(None if log is None else handle("log", log), "thetahat.Model.write_html"))
 
@@ -100,7 +100,7 @@ class Model(ReportedModel):
         horizon : int or None, default 1
             Steps ahead. None is a free run: the inputs alone drive the model.
         initial : {"auto", "drop", "zero", "estimate"}, default "auto"
-            What stands before the first sample of a stretch, in the words of the fits: nothing ("drop": measured samples
+            What stands before the first sample of a segment, in the words of the fits: nothing ("drop": measured samples
             start the prediction, and the first ones have none), zeros, or what fits best. "auto" is "drop" where the
             model needs no more, else "estimate"; "zero" where the log has no output.
 
@@ -262,7 +262,7 @@ class Model(ReportedModel):
         log : Log
             What is known.
         steps : int
-            How far to look.
+            The horizon.
         u : array_like, shape (steps,) or (steps, inputs), or data frame or dict of str to array_like
             The inputs in these steps, of a model that has some. Those of a frame or dict are found by name.
         initial : {"auto", "drop", "zero", "estimate"}, default "auto"
@@ -368,7 +368,7 @@ class Model(ReportedModel):
         Parameters
         ----------
         w : array_like, optional
-            Frequencies in radians per second. Without them, so many points evenly on a logarithmic scale up to pi over the
+            Frequencies in radians per second. Without them, this many points evenly on a logarithmic scale up to pi over the
             sample time.
         points : int, default 100
             How many.

@@ -45,7 +45,7 @@ class FitOptions(TypedDict, total=False):
     Attributes
     ----------
     estimate, validate : rows
-        The rows to fit to (all, unless said otherwise), and those to judge on: ``slice(0, 500)`` as Python counts, or
+        The rows to fit to (all, unless said otherwise), and those to validate on: ``slice(0, 500)`` as Python counts, or
         ``"1..500"``, which counts from 1 and holds both ends; or a list of these.
     split : (float, float, float)
         Cuts the rows in time order into parts to fit, to choose and to test, such as ``(60, 20, 20)``.
@@ -57,7 +57,7 @@ class FitOptions(TypedDict, total=False):
         The band of frequencies in Hz whose errors the fit makes small, such as ``(0.1, 5)``: inputs and output go through one
         Butterworth filter. The model and its figures are of the signals as they are.
     initial : {"auto", "drop", "zero", "estimate"}
-        What stands for the samples before the first of a stretch. Rows that the log has before those to fit to are used as
+        What stands for the samples before the first of a segment. Rows that the log has before those to fit to are used as
         past inputs and outputs in all cases but "zero". Without them, "drop" leaves out the first rows, for models without F;
         "estimate" finds what they did to B/F u with the parameters, for models with F. "auto" is "drop" without F; with F it
         is "estimate" where there is a past or where that is worth its parameters, else "zero".
@@ -72,7 +72,7 @@ class FitOptions(TypedDict, total=False):
     trend : bool
         Whether a slope of the output is estimated with the parameters too, and its level with it.
     focus : {"auto", "prediction", "simulation"} or int
-        What the model is for: errors one step ahead, free runs that the inputs alone drive, or so many steps ahead. With
+        What the model is for: errors one step ahead, free runs that the inputs alone drive, or a number of steps ahead. With
         orders, "simulation" finds the plant with the least errors of its free run and the noise behind it, and a number
         is the horizon of the figure on held-out rows. In a choice it says what models are compared by on rows that were held
         out from them; "auto" is "prediction", unless without orders another model simulates these clearly better.
@@ -84,7 +84,7 @@ class FitOptions(TypedDict, total=False):
     dc_gain : float, (float, float) or dict
         A range or value of the static gain; of each input by its name.
     ridge : float
-        Keeps parameters small: weighs like so many more samples in which the output is 0.
+        Keeps parameters small: weighs like this many more samples in which the output is 0.
     noise_bound : float
         Let no error exceed this, in units of the output.
     search : {"lm", "gauss-newton", "newton", "gradient"}
@@ -97,11 +97,11 @@ class FitOptions(TypedDict, total=False):
     step : float or (float, float)
         Step length of the gradient search: c1, or c1/(c2 + l) in iteration l.
     starts : int
-        Search from so many further starts.
+        Search from this many further starts.
     seed : int
         Which random starts.
     time_limit : float
-        After so many seconds begin no iteration, and look for no further start.
+        After this many seconds begin no iteration, and look for no further start.
     """
 
     estimate: Rows
@@ -135,7 +135,7 @@ class EquationsOptions(TypedDict, total=False):
     Attributes
     ----------
     estimate, validate, split
-        Rows to fit to and to judge on, see `FitOptions`. In each log the model begins, as it says, with the first row to fit to.
+        Rows to fit to and to validate on, see `FitOptions`. In each log the model begins, as it says, with the first row to fit to.
     search : {"lm", "gauss-newton", "newton", "gradient"}
         How steps are chosen: Levenberg and Marquardt's way, unless said otherwise.
     max_iterations : int
@@ -145,11 +145,11 @@ class EquationsOptions(TypedDict, total=False):
     step : float or (float, float)
         Step length of the gradient search: c1, or c1/(c2 + l) in iteration l.
     starts : int
-        Search from so many further starts, drawn from what the model knows of its parameters.
+        Search from this many further starts, drawn from what the model knows of its parameters.
     seed : int
         Which random starts.
     time_limit : float
-        After so many seconds begin no iteration.
+        After this many seconds begin no iteration.
     """
 
     estimate: Rows
@@ -215,11 +215,11 @@ class ValidationOptions(TypedDict, total=False):
     Attributes
     ----------
     rows : rows
-        The rows to look at; all, unless said otherwise.
+        The rows to validate on; all, unless said otherwise.
     detrend : {"model", "none", "mean", "linear", "start:K"}
-        The offsets: the model's own, or those of the rows looked at.
+        The offsets: the model's own, or those of the rows evaluated.
     horizon : int or list of int
-        How many steps ahead to look besides 1.
+        Prediction horizons besides 1, in steps.
     lags : int
         Lags of the tests of residuals.
     alpha : float

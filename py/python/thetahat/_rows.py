@@ -38,7 +38,7 @@ class Rows(NamedTuple):
     """The way back to data frames."""
     before: float = 0.0
     """Seconds from the first row of the log that these were cut from."""
-    borders: Sequence[int] = ()
+    boundaries: Sequence[int] = ()
     """The rows at which another experiment begins."""
     name: str | None = None
     """What the times are called."""
@@ -160,7 +160,7 @@ def _of_log(log: Log, inputs: Sequence[str], outputs: Sequence[str]) -> Rows:
         None if seconds is not None or assumed else log.sample_time,
         log._clock,
         log._log.before,
-        log._log.borders,
+        log._log.boundaries,
         None if seconds is None else called or "time",
         start,
     )

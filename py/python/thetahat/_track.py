@@ -231,9 +231,9 @@ class Tracker:
     dead_zone : float, optional
         An innovation of at most this size corrects nothing, in units of the output.
     horizon : int, optional
-        Forecast the output so many rows later in each row, inputs held at their last value.
+        Forecast the output this many rows later in each row, inputs held at their last value.
     alarm : float, optional
-        Watch the innovations for changes of their mean and variance (CUSUM), with so many samples between two false alarms on
+        Watch the innovations for changes of their mean and variance (CUSUM), with this many samples between two false alarms on
         average, 10 to 1e9. See `ChangeDetector`.
     sample_time : float or timedelta, optional
         Time from one row to the next, where rows have times: that of ``warm``, or the first step. A step of less than half or more than
@@ -483,7 +483,7 @@ class Tracker:
             if last is not None and not seconds[0] > last:
                 raise ValueError(f"time: the first row is {last - seconds[0]:g} s before the latest one that was taken; give later rows")
         clock = None if seconds is None else (seconds, rows.name or "time", rows.start)
-        return self._tracker.run(rows.inputs, rows.outputs, clock, list(rows.borders), stop_on_alarm)
+        return self._tracker.run(rows.inputs, rows.outputs, clock, list(rows.boundaries), stop_on_alarm)
 
     def gap(self) -> None:
         """Tell that an unknown number of rows is missing here. Where rows have times, these tell it.
@@ -498,7 +498,7 @@ class Tracker:
         self._tracker.gap()
 
     def forecast(self, steps: int) -> Any:
-        """The output so many steps ahead of the latest row, inputs held at their latest values.
+        """The output this many steps ahead of the latest row, inputs held at their latest values.
 
         Parameters
         ----------
@@ -627,7 +627,7 @@ class Tracker:
 
 
 def _inputs(nb: int | Sequence[int] | None) -> list[str]:
-    """The usual names of so many inputs."""
+    """The usual names of this many inputs."""
     if isinstance(nb, (list, tuple, np.ndarray)):
         return ["u"] if len(nb) == 1 else [f"u{place}" for place in range(1, len(nb) + 1)]
     return [] if nb is None or nb == 0 else ["u"]

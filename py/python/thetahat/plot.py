@@ -31,7 +31,7 @@ from matplotlib.ticker import MaxNLocator
 
 from thetahat import _drawing, _numbers, _options, _thetahat
 from thetahat._filter import StateTrajectory
-from thetahat._judgement import Inspection, Validation
+from thetahat._evaluation import Inspection, Validation
 from thetahat._log import Log
 from thetahat._model import Model
 from thetahat._responses import FrequencyResponse, TransientResponse
@@ -108,7 +108,7 @@ def log(log: Log, axes: Any = None) -> Grid:
         time, values = _drawing.broken(log, values)
         ax.plot(time, values, drawstyle=style, **_drawing.lone(values))
         ax.set_ylabel(_drawing.shown(name))
-        _drawing.borders(ax, log)
+        _drawing.boundaries(ax, log)
     grid[-1].set_xlabel("time [s]")
     return grid
 
@@ -174,7 +174,7 @@ def fit(
             low, high = (_drawing.broken(log, end)[1] for end in model.predict_interval(log, horizon, level=level))
             bands.append(_drawing.band(ax, time, low, high, line.get_color()))
     _drawing.label_one(bands, level)
-    _drawing.borders(ax, log)
+    _drawing.boundaries(ax, log)
     _drawing.scale_to(ax, list(measured.values()), drawn_all)
     ax.set_xlabel("time [s]")
     ax.set_ylabel(_drawing.shown(", ".join(measured)))
@@ -222,7 +222,7 @@ def residuals(of: Validation | Model, log: Log | None = None, axes: Any = None) 
             raise TypeError("log: a model is validated on data; give a Log too")
         of = of.validate(log)
     elif log is not None:
-        raise TypeError("log: the validation has looked at its own; leave it out")
+        raise TypeError("log: the validation has a log of its own; leave it out")
     _drawing.expect("of", of, Validation)
     if len(of.document["noise"]) > 1:
         raise ValueError("of: there are several outputs; the page of the validation shows them all")

@@ -23,7 +23,7 @@ pub(crate) struct Cost {
 }
 
 pub(crate) struct Meter {
-    /// The ticks between two readings with nothing in between.
+    /// The ticks between two measurements with nothing in between.
     nothing: u32,
 }
 

@@ -1,4 +1,4 @@
-//! Judges the firmware: the bits it printed, what the bare image holds, what each step cost, how large images are.
+//! Checks the firmware: the bits it printed, what the bare image holds, what each step cost, how large images are.
 //!
 //! `check FOLDER` reads, in Cargo's target folder, the images for each processor and level of optimisation and the output
 //! of the reporting one. It prints the tables of costs and sizes, and compares them with `budgets.md` and with
@@ -92,8 +92,8 @@ fn costs(folder: &Path, write: bool) -> Result<Vec<String>, Box<dyn Error>> {
             measured.add_costs(&step.name, step.ram, Costs { code, stack: step.stack, typical, worst });
         }
     }
-    let mut faults = judge(&STEPS, &measured, write)?;
-    faults.extend(judge(&IMAGES, &images(folder)?, write)?);
+    let mut faults = check(&STEPS, &measured, write)?;
+    faults.extend(check(&IMAGES, &images(folder)?, write)?);
     Ok(faults)
 }
 
@@ -115,7 +115,7 @@ fn images(folder: &Path) -> Result<Table, Box<dyn Error>> {
 }
 
 /// Prints what was measured. Returns what is above its budget, or not as the page says; or renews the page.
-fn judge(kind: &'static Kind, measured: &Table, write: bool) -> Result<Vec<String>, Box<dyn Error>> {
+fn check(kind: &'static Kind, measured: &Table, write: bool) -> Result<Vec<String>, Box<dyn Error>> {
     println!("{measured}");
     let mut faults = measured.above(&Table::read(kind, &fs::read_to_string(BUDGETS)?)?);
     let page = fs::read_to_string(PAGE)?;

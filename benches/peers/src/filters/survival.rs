@@ -60,7 +60,7 @@ fn potter_exact(eps: f64) -> [f64; 4] {
     [d, -b, -b, a].map(|element| element / (a * d - b * b))
 }
 
-/// An ordinary filter for so many steps.
+/// An ordinary filter for this many steps.
 struct Endurance(usize);
 
 impl Visit<f32, 3, 1> for Endurance {

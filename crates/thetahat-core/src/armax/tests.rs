@@ -440,7 +440,7 @@ fn options_are_checked_and_reach_the_estimator() {
 
 #[test]
 fn limits_leave_c_stable() {
-    // C near the border of stability, and limits that pull at what correlates with it.
+    // C near the stability boundary, and limits that pull at what correlates with it.
     let orders = ArmaxOrders { na: 1, inputs: &[one(1, 1)], nc: 2, constant: false };
     let limits = [-0.5..=0.0, 1.2..=f64::INFINITY];
     for method in METHODS {

@@ -346,7 +346,7 @@ fn predictions_in_used_lines_are_the_same() {
     let method = ArmaxMethod::PredictionError;
     let mut armax: RecursiveArmax<f64, Dyn, Dyn> =
         RecursiveArmax::new(&orders, method, 1.0, &[1.0, 1.0], 1.0, FORGETTING).unwrap();
-    let (mut room, mut other) = (arx.lags().clone(), armax.lags().clone());
+    let (mut workspace, mut other) = (arx.lags().clone(), armax.lags().clone());
     let mut noise = Noise(9);
     for k in 0..60 {
         let u = [noise.next(), noise.next()];
@@ -356,14 +356,14 @@ fn predictions_in_used_lines_are_the_same() {
         let future: Vec<f64> = (0..8).map(|_| noise.next()).collect();
         let (mut expected, mut found) = ([0.0; 4], [0.0; 4]);
         arx.predict(&future, &mut expected).unwrap();
-        arx.predict_in(&mut room, &future, &mut found).unwrap();
+        arx.predict_in(&mut workspace, &future, &mut found).unwrap();
         assert_eq!(debug(&found), debug(&expected));
         armax.predict(&future, &mut expected).unwrap();
         armax.predict_in(&mut other, &future, &mut found).unwrap();
         assert_eq!(debug(&found), debug(&expected));
     }
     let error = arx.predict_in(&mut other, &[], &mut []).unwrap_err();
-    assert_eq!(error, Error::Length { argument: "room", expected: 5, found: 7 });
+    assert_eq!(error, Error::Length { argument: "workspace", expected: 5, found: 7 });
 }
 
 #[test]

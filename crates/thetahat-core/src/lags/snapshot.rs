@@ -44,7 +44,7 @@ impl<T: Real, N: Dimension, D: Dimension> From<Lags<T, N, D>> for Snapshot<T, N,
 }
 
 impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
-    /// That they make so many parameters, of which the last `residuals` are those of past residuals.
+    /// That they make this many parameters, of which the last `residuals` are those of past residuals.
     pub(crate) fn check_residuals(&self, parameters: usize, residuals: usize) -> Result<(), Error> {
         check_length("lags", parameters, self.regressor.len())?;
         let of_residuals = |line: &&Line| line.nb > 0 && line.source(self.inputs) == Source::Residual;

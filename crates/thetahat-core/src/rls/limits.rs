@@ -182,7 +182,7 @@ fn cut_off<T: Real>(parameters: &mut [T], limits: &[RangeInclusive<T>]) {
     }
 }
 
-/// That there is a range for each of so many parameters, and that none is empty.
+/// That there is a range for each of this many parameters, and that none is empty.
 pub(crate) fn check_limits<T: Real>(limits: &[RangeInclusive<T>], parameters: usize) -> Result<(), Error> {
     check_length("limits", parameters, limits.len())?;
     let possible = |limit: &RangeInclusive<T>| *limit.start() < T::INFINITY && *limit.end() > -T::INFINITY;

@@ -10,9 +10,9 @@ use crate::Error;
 use crate::data::{Offset, Regular, Rows, checked, shortest};
 use crate::figures::short;
 
-/// So many rows at the end that repeat one value in all channels are told.
+/// This many rows at the end that repeat one value in all channels are told.
 const PADDING: usize = 20;
-/// A step longer than so many medians starts a new segment.
+/// A step longer than this many medians starts a new segment.
 pub(crate) const GAP: f64 = 1.5;
 /// Steps may differ from their median by this fraction.
 pub(crate) const JITTER: f64 = 0.1;
@@ -28,8 +28,8 @@ pub struct Channel {
 
 /// Channels on a common, uniform clock.
 ///
-/// Time is in seconds. Where the clock jumps, or a sample is missing, a new segment starts; no method of this crate reaches
-/// across such a border. A missing output alone is no border to models that do not need past outputs.
+/// Time is in seconds. Where the clock has a gap, or a sample is missing, a new segment starts; no method of this crate reaches
+/// across such a boundary. A missing output alone is no boundary to models that do not need past outputs.
 ///
 /// ```
 /// use thetahat::data::{Channel, Log};
@@ -47,10 +47,10 @@ pub struct Log {
     sample_time: f64,
     /// Seconds, one for each row, where the log came with a clock.
     time: Option<Vec<f64>>,
-    /// 0-based rows before which the clock jumps.
-    jumps: Vec<usize>,
+    /// 0-based rows before which the clock has a gap, or another log begins.
+    starts: Vec<usize>,
     /// Those of them at which another log begins.
-    borders: Vec<usize>,
+    boundaries: Vec<usize>,
     /// Seconds from the first row of the log that this one was cut from, from where slopes are counted.
     before: f64,
     /// Why the clock is not uniform, if it is not.
@@ -105,8 +105,8 @@ impl Log {
             rows,
             sample_time,
             time: None,
-            jumps: Vec::new(),
-            borders: Vec::new(),
+            starts: Vec::new(),
+            boundaries: Vec::new(),
             before: 0.0,
             irregular: None,
         })
@@ -142,15 +142,15 @@ impl Log {
         let rows = check(&channels)?;
         let median = median_step(&time, rows)?;
         let long = steps(&time).enumerate().filter(|(_, step)| *step > GAP * median);
-        let jumps: Vec<usize> = long.map(|(position, _)| position + 1).collect();
-        let irregular = irregularity(&time, median, &jumps);
+        let starts: Vec<usize> = long.map(|(position, _)| position + 1).collect();
+        let irregular = irregularity(&time, median, &starts);
         Ok(Self {
             channels,
             rows,
             sample_time: median,
             time: Some(time),
-            jumps,
-            borders: Vec::new(),
+            starts,
+            boundaries: Vec::new(),
             before: 0.0,
             irregular,
         })
@@ -171,8 +171,8 @@ impl Log {
             rows: time.len(),
             sample_time,
             time: Some(time),
-            jumps: Vec::new(),
-            borders: Vec::new(),
+            starts: Vec::new(),
+            boundaries: Vec::new(),
             before: 0.0,
             irregular: None,
         }
@@ -204,9 +204,9 @@ impl Log {
                 })?;
                 channel.values.append(&mut own.values);
             }
-            joined.jumps.push(joined.rows);
-            joined.jumps.extend(log.jumps.iter().map(|jump| jump + joined.rows));
-            joined.borders.push(joined.rows);
+            joined.starts.push(joined.rows);
+            joined.starts.extend(log.starts.iter().map(|start| start + joined.rows));
+            joined.boundaries.push(joined.rows);
             joined.time = match (joined.time, log.time) {
                 (Some(mut time), Some(mut more)) => {
                     time.append(&mut more);
@@ -244,15 +244,15 @@ impl Log {
             channels,
             sample_time: self.sample_time,
             time: self.time.as_ref().map(|time| time[range.clone()].to_vec()),
-            jumps: inside(&self.jumps),
-            borders: inside(&self.borders),
+            starts: inside(&self.starts),
+            boundaries: inside(&self.boundaries),
             before: self.elapsed(range.start),
             irregular: self.irregular.clone(),
         })
     }
 
     /// A log that was taken apart to store it: by its channels, [sample time](Self::sample_time), [clock](Self::time),
-    /// [breaks](Self::breaks), [borders](Self::borders) and what came [before](Self::before).
+    /// [segment starts](Self::segment_starts), [boundaries](Self::boundaries) and what came [before](Self::before).
     ///
     /// # Errors
     /// As for [`Log::new`]; [`Error::Data`] if the clock does not go with the rows, or a break is no row of the log.
@@ -260,8 +260,8 @@ impl Log {
         channels: Vec<Channel>,
         sample_time: f64,
         time: Option<Vec<f64>>,
-        breaks: Vec<usize>,
-        borders: Vec<usize>,
+        starts: Vec<usize>,
+        boundaries: Vec<usize>,
         before: f64,
     ) -> Result<Self, Error> {
         let log = Self::new(channels, sample_time)?;
@@ -270,28 +270,29 @@ impl Log {
             let inside = positions.iter().all(|position| (1..log.rows).contains(position));
             inside && positions.is_sorted_by(|a, b| a < b)
         };
-        let known = borders.iter().all(|border| breaks.binary_search(border).is_ok());
-        if !(time.iter().all(finite) && rising(&breaks) && rising(&borders) && known && before.is_finite()) {
+        let known = boundaries.iter().all(|boundary| starts.binary_search(boundary).is_ok());
+        if !(time.iter().all(finite) && rising(&starts) && rising(&boundaries) && known && before.is_finite())
+        {
             return Err(Error::data("the parts of a stored log do not fit together; store it again"));
         }
-        let irregular = time.as_ref().and_then(|time| irregularity(time, sample_time, &breaks));
-        Ok(Self { time, jumps: breaks, borders, before, irregular, ..log })
+        let irregular = time.as_ref().and_then(|time| irregularity(time, sample_time, &starts));
+        Ok(Self { time, starts, boundaries, before, irregular, ..log })
     }
 
-    /// The rows (0-based) before which no segment reaches back: where the clock jumps, or another log begins.
-    pub fn breaks(&self) -> &[usize] {
-        &self.jumps
+    /// The rows (0-based) before which no segment reaches back: where the clock has a gap, or another log begins.
+    pub fn segment_starts(&self) -> &[usize] {
+        &self.starts
     }
 
-    /// Those of the breaks at which another log begins.
-    pub fn borders(&self) -> &[usize] {
-        &self.borders
+    /// Those of the segment starts at which another log begins.
+    pub fn boundaries(&self) -> &[usize] {
+        &self.boundaries
     }
 
     /// The rows (0-based) of each log of which this one is made.
     pub(crate) fn logs(&self) -> impl Iterator<Item = Range<usize>> {
-        let starts = std::iter::once(0).chain(self.borders.iter().copied());
-        starts.zip(self.borders.iter().copied().chain([self.rows])).map(|(first, end)| first..end)
+        let starts = std::iter::once(0).chain(self.boundaries.iter().copied());
+        starts.zip(self.boundaries.iter().copied().chain([self.rows])).map(|(first, end)| first..end)
     }
 
     /// The log with offsets taken from some channels, and without the others. A channel that is not there is missing in every row.
@@ -310,7 +311,7 @@ impl Log {
 
     /// Whether it is several logs as one, which have no common clock.
     pub(crate) fn is_joined(&self) -> bool {
-        !self.borders.is_empty()
+        !self.boundaries.is_empty()
     }
 
     /// The number of rows, at least 1.
@@ -389,13 +390,13 @@ impl Log {
         Ok(Some(Padding { rows: Rows::new(self.rows - last + 1, self.rows)? }))
     }
 
-    /// How often the clock jumps, not counting where another log begins.
-    pub fn jumps(&self) -> usize {
-        self.jumps.len() - self.borders.len()
+    /// How many gaps the clock has, not counting where another log begins.
+    pub fn gaps(&self) -> usize {
+        self.starts.len() - self.boundaries.len()
     }
 
-    /// The stretches of consecutive rows inside `parts` in which none of the named channels misses a value
-    /// and the clock does not jump, as 0-based ranges.
+    /// The segments of consecutive rows inside `parts` in which none of the named channels misses a value
+    /// and the clock has no gap, as 0-based ranges.
     ///
     /// # Errors
     /// [`Error::Data`] for a name that is not there.
@@ -410,16 +411,17 @@ impl Log {
 
     /// The same for the values of some of its channels.
     pub(crate) fn segments_of(&self, channels: &[&[f64]], parts: &[Rows]) -> Vec<Range<usize>> {
-        // Those that miss nothing need not be looked through row by row.
+        // Those that miss nothing need not be searched row by row.
         let channels: Vec<&[f64]> = channels.iter().copied().filter(|values| misses(values)).collect();
         let mut segments = Vec::new();
         for part in parts {
             let part = part.positions();
-            let mut borders = vec![part.start];
-            borders
-                .extend(self.jumps.iter().copied().filter(|jump| part.contains(jump) && *jump > part.start));
-            borders.push(part.end);
-            for pair in borders.windows(2) {
+            let mut edges = vec![part.start];
+            edges.extend(
+                self.starts.iter().copied().filter(|start| part.contains(start) && *start > part.start),
+            );
+            edges.push(part.end);
+            for pair in edges.windows(2) {
                 let mut first = pair[0];
                 let rows = if channels.is_empty() { pair[1]..pair[1] } else { pair[0]..pair[1] };
                 for row in rows {
@@ -514,10 +516,10 @@ fn misses(values: &[f64]) -> bool {
     values.chunks(1024).any(|block| block.iter().fold(false, |missing, value| missing | value.is_nan()))
 }
 
-/// The first step that is neither the median nor one to a row before which the clock jumps.
-fn irregularity(time: &[f64], median: f64, jumps: &[usize]) -> Option<Error> {
+/// The first step that is neither the median nor one to a row before which the clock has a gap, or another log begins.
+fn irregularity(time: &[f64], median: f64, starts: &[usize]) -> Option<Error> {
     let off = |(position, step): &(usize, f64)| {
-        (step - median).abs() > JITTER * median && jumps.binary_search(&(position + 1)).is_err()
+        (step - median).abs() > JITTER * median && starts.binary_search(&(position + 1)).is_err()
     };
     let (position, step) = steps(time).enumerate().find(off)?;
     Some(Error::Data {

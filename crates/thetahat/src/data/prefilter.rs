@@ -1,4 +1,4 @@
-//! A band of frequencies that a fit looks at.
+//! A band of frequencies in which errors count.
 //!
 //! Inputs and output go through the same causal filter L(q) before the fit, so that y = G u + v becomes L y = G (L u) + L v:
 //! the model still describes the signals as they are, and the fit makes the sum of the squares of L e small (Ljung, System
@@ -32,10 +32,10 @@ use crate::Error;
 const ORDER: usize = 4;
 /// What is left of the slowest mode of L where its transient counts as over.
 const LEFT: f64 = 0.01;
-/// Of a stretch no larger part than this is left out for it.
+/// Of a segment no larger part than this is left out for it.
 const LARGEST_PART: f64 = 0.25;
 
-/// The band of frequencies in Hz that a fit looks at; either end may be open.
+/// The band of frequencies in Hz in which errors count; either end may be open.
 ///
 /// ```
 /// use thetahat::data::Prefilter;
@@ -187,8 +187,8 @@ pub(crate) struct Prefiltered {
 }
 
 impl Prefiltered {
-    /// Filters the inputs and the output of a log alike, from the first row on of each stretch in which all of them have a
-    /// value and the clock does not jump, as if its values had been there forever before.
+    /// Filters the inputs and the output of a log alike, from the first row on of each segment in which all of them have a
+    /// value and the clock has no gap, as if its values had been there forever before.
     ///
     /// # Errors
     /// [`Error::Argument`] for an end of the band that is not below half the sampling frequency; [`Error::Data`] for a
@@ -197,19 +197,19 @@ impl Prefiltered {
         let Filter { sections, settling } = band.filter(log.sample_time())?;
         let names: Vec<&str> = inputs.iter().map(String::as_str).chain([output]).collect();
         let all = Rows::new(1, log.rows())?;
-        let stretches = log.segments(&names, &[all])?;
+        let segments = log.segments(&names, &[all])?;
         let mut filtered = log.part(&names, all)?;
         filtered.channels_mut().par_iter_mut().for_each(|channel| {
-            for stretch in &stretches {
-                let own = &mut channel.values[stretch.clone()];
+            for segment in &segments {
+                let own = &mut channel.values[segment.clone()];
                 sections.iter().for_each(|section| section.apply(own));
             }
         });
         Ok(Self { log: filtered, inputs: inputs.to_vec(), output: output.to_owned(), settling })
     }
 
-    /// The signals over some rows, without the beginning of each stretch: the rows in which more than 1 % of the slowest mode
-    /// of the filter is there, but not more than a quarter of the stretch.
+    /// The signals over some rows, without the beginning of each segment: the rows in which more than 1 % of the slowest mode
+    /// of the filter is there, but not more than a quarter of the segment.
     ///
     /// # Errors
     /// As for [`Log::record`].
@@ -243,12 +243,12 @@ impl Prefiltered {
     /// As for [`Log::record`].
     pub(crate) fn warning(&self, rows: &[Rows]) -> Result<Option<String>, Error> {
         let record = self.log.record(&self.inputs, &self.output, rows)?;
-        let mut stretches = record.segments.iter().zip(&record.past);
+        let mut segments = record.segments.iter().zip(&record.past);
         let short =
-            stretches.any(|(segment, before)| self.settling > longest(segment.start - before, segment.end));
+            segments.any(|(segment, before)| self.settling > longest(segment.start - before, segment.end));
         Ok(short.then(|| {
             format!(
-                "the prefilter settles in {} rows, and not more than a quarter of a stretch is left out for that: it is \
+                "the prefilter settles in {} rows, and not more than a quarter of a segment is left out for that: it is \
                  still settling in some of the rows; raise the lower end of the band, or leave it open",
                 self.settling
             )
@@ -256,7 +256,7 @@ impl Prefiltered {
     }
 }
 
-/// So many samples at most of a stretch are left out.
+/// At most this many samples of a segment are left out.
 fn longest(first: usize, end: usize) -> usize {
     (LARGEST_PART * (end - first) as f64) as usize
 }

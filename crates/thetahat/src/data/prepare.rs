@@ -16,7 +16,7 @@ pub enum Detrend {
     Mean,
     /// The least-squares line through the estimation rows.
     Linear,
-    /// The mean of the first so many estimation rows: for a step test that begins at rest.
+    /// The mean of the first estimation rows, this many of them: for a step test that begins at rest.
     Start(usize),
 }
 

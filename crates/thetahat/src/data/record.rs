@@ -13,7 +13,7 @@ pub struct Record<'a> {
     pub output: &'a [f64],
     /// u_j(t), N values each.
     pub inputs: Vec<&'a [f64]>,
-    /// Stretches of consecutive samples, in rising order, apart from each other.
+    /// Segments of consecutive samples, in rising order, apart from each other.
     pub segments: Vec<Range<usize>>,
     /// How many usable samples stand directly before each segment: the measured past that a response may start from.
     pub past: Vec<usize>,
@@ -102,17 +102,17 @@ impl Log {
         let needed: Vec<&[f64]> = inputs.iter().copied().chain(measured.then_some(output)).collect();
         let segments = self.segments_of(&needed, &checked("rows", rows, self.rows())?);
         let usable = |row: usize| needed.iter().all(|values| !values[row].is_nan());
-        // In one pass: the row behind the last missing sample before each segment.
+        // In one pass: the row after the last missing sample before each segment.
         let (mut first, mut seen) = (0, 0);
         let past = segments.iter().map(|segment| {
             if let Some(missing) = (seen..segment.start).rev().find(|row| !usable(*row)) {
                 first = missing + 1;
             }
             seen = segment.start;
-            // Or that behind the last jump of the clock.
-            let jumps = self.breaks().partition_point(|&jump| jump <= segment.start);
-            let jump = if jumps == 0 { 0 } else { self.breaks()[jumps - 1] };
-            segment.start - first.max(jump)
+            // Or that after the last gap of the clock.
+            let starts = self.segment_starts().partition_point(|&start| start <= segment.start);
+            let start = if starts == 0 { 0 } else { self.segment_starts()[starts - 1] };
+            segment.start - first.max(start)
         });
         let past = past.collect();
         Ok(Record { output, inputs, segments, past })

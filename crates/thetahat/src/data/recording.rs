@@ -17,7 +17,7 @@ pub struct Recording {
 pub enum Times {
     /// Seconds, one value for each row.
     Measured(Vec<f64>),
-    /// One row every so many seconds.
+    /// One row every given number of seconds.
     Uniform(f64),
 }
 

@@ -4,7 +4,7 @@ use std::fmt;
 
 use crate::figures::short;
 
-/// So many rows of a resampled log stand for each recorded one at most: with more, hardly anything in it was measured.
+/// At most this many rows of a resampled log stand for each recorded one: with more, hardly anything in it was measured.
 const MOST_GROWTH: f64 = 10.0;
 /// The step has the fewest digits within this fraction of the median.
 const ROUND_STEP: f64 = 0.02;

@@ -14,7 +14,7 @@
 //! no phase. All channels are filtered alike, so that y = G u stays true of what is left: a linear filter commutes with G.
 //!
 //! Both sums go over the rows that are there: in which all channels have a value (Knutsson and Westin, Normalized and
-//! differential convolution, 1993), and none of them behind a gap of the clock. At the end of a log they have about half of
+//! differential convolution, 1993), and none of them after a gap of the clock. At the end of a log they have about half of
 //! the weight; a row for which they have less than two fifths is missing.
 
 use std::f64::consts::PI;
@@ -32,7 +32,7 @@ use crate::regression::product;
 
 /// Rows that resampling may give: beyond them a step was mistyped.
 const MOST_ROWS: f64 = 1e8;
-/// A step from so many recorded ones on is filtered for.
+/// A step from this many recorded ones on is filtered for.
 const DECIMATES: f64 = 2.0;
 /// Where the pass band ends and the stop band begins, in units of half the new sampling frequency.
 const PASS: f64 = 0.8;
@@ -89,7 +89,7 @@ impl Resample {
 }
 
 impl AntiAlias {
-    /// h(-M) … h(M) for a recorded step of so many seconds, of sum 1.
+    /// h(-M) … h(M) for a recorded step of this many seconds, of sum 1.
     fn weights(&self, recorded: f64) -> Vec<f64> {
         let half = (self.taps / 2) as f64;
         let beta = 0.1102 * (ATTENUATION - 8.7);
@@ -125,7 +125,7 @@ struct Filtered<'a> {
     usable: Vec<bool>,
     missing: Vec<usize>,
     /// Rows without a gap of the clock between them.
-    stretches: Vec<Range<usize>>,
+    segments: Vec<Range<usize>>,
 }
 
 impl<'a> Filtered<'a> {
@@ -142,22 +142,22 @@ impl<'a> Filtered<'a> {
         Self {
             weights,
             missing: missing.collect(),
-            stretches: starts.iter().zip(ends).map(|(start, end)| *start..end).collect(),
+            segments: starts.iter().zip(ends).map(|(start, end)| *start..end).collect(),
             usable,
         }
     }
 
-    /// The stretch of a row.
-    fn stretch(&self, row: usize) -> Range<usize> {
-        let behind = self.stretches.partition_point(|stretch| stretch.start <= row);
-        self.stretches[behind - 1].clone()
+    /// The segment of a row.
+    fn segment(&self, row: usize) -> Range<usize> {
+        let after = self.segments.partition_point(|segment| segment.start <= row);
+        self.segments[after - 1].clone()
     }
 
     /// The filtered value of a row.
     fn at(&self, values: &[f64], row: usize) -> f64 {
         let half = self.weights.len() / 2;
-        let stretch = self.stretch(row);
-        let rows = row.saturating_sub(half).max(stretch.start)..(row + half + 1).min(stretch.end);
+        let segment = self.segment(row);
+        let rows = row.saturating_sub(half).max(segment.start)..(row + half + 1).min(segment.end);
         let weights = &self.weights[rows.start + half - row..rows.end + half - row];
         let (sum, weight) = if self.missing[rows.end] == self.missing[rows.start] {
             (product(weights, &values[rows.clone()]), weights.iter().sum())
@@ -242,7 +242,7 @@ impl Log {
                     return f64::NAN;
                 }
                 let value = filtered.at(own, left);
-                if interpolation == Interpolation::Hold || !late || left + 1 >= filtered.stretch(left).end {
+                if interpolation == Interpolation::Hold || !late || left + 1 >= filtered.segment(left).end {
                     return value;
                 }
                 let fraction = (instant - time[left]) / (time[left + 1] - time[left]);

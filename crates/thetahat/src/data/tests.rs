@@ -26,7 +26,7 @@ fn row_of(result: Result<Log, Error>) -> Option<usize> {
 fn missing_samples_and_jumps_cut_a_log() {
     let u = channel("u", &[NAN, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, NAN, 1.0, 1.0]);
     let y = channel("y", &[1.0, 1.0, 1.0, NAN, 1.0, 1.0, 1.0, NAN, 1.0, NAN]);
-    // The clock jumps before the sixth row.
+    // The clock has a gap before the sixth row.
     let time = vec![0.0, 1.0, 2.0, 3.0, 4.0, 7.0, 8.0, 9.0, 10.0, 11.0];
     let log = Log::with_time(vec![u, y], time).unwrap();
     let record = |parts: &[Rows]| log.record(&["u".to_owned()], "y", parts).unwrap();
@@ -38,7 +38,7 @@ fn missing_samples_and_jumps_cut_a_log() {
     // Only the channels in use count.
     assert_eq!(log.segments(&["y"], &[rows("1..3")]).unwrap(), std::iter::once(0..3).collect::<Vec<_>>());
     assert_eq!(log.segments(&["u"], &[rows("1..1"), rows("8..8")]).unwrap(), []);
-    assert_eq!((log.jumps(), log.sample_time()), (1, 1.0));
+    assert_eq!((log.gaps(), log.sample_time()), (1, 1.0));
 }
 
 #[test]
@@ -57,7 +57,7 @@ fn clocks_are_uniform_up_to_gaps() {
     // The median of an even number of steps is the mean of the middle two.
     assert_eq!(with(&[0.0, 1.0, 2.08]).unwrap().sample_time(), 1.04);
     assert_eq!(with(&[0.0, 1.0, 2.0, 3.09]).unwrap().sample_time(), 1.0);
-    assert_eq!(with(&[0.0, 1.0, 2.0, 3.0, 4.0, 5.501]).unwrap().jumps(), 1);
+    assert_eq!(with(&[0.0, 1.0, 2.0, 3.0, 4.0, 5.501]).unwrap().gaps(), 1);
     assert_eq!(row_of(with(&[0.0, 1.0, 2.0, 3.0, 4.0, 5.499])), Some(6));
     assert_eq!(row_of(with(&[0.0, 1.0, 2.0, 2.89, 4.0])), Some(4));
     assert_eq!(row_of(with(&[0.0, 1.0, 1.0, 2.0])), Some(3));
@@ -85,7 +85,7 @@ fn a_resampled_log_reads_between_samples() {
     let read = |values: [f64; 4], interpolation| {
         let log =
             Log::resampled(vec![channel("y", &values)], &time, &Resample::new(0.5, interpolation)).unwrap();
-        assert_eq!((log.rows(), log.sample_time(), log.jumps()), (9, 0.5, 0));
+        assert_eq!((log.rows(), log.sample_time(), log.gaps()), (9, 0.5, 0));
         log.channels()[0].values.clone()
     };
     let hold = read([1.0, 3.0, 5.0, 0.0], Interpolation::Hold);
@@ -184,22 +184,25 @@ fn small_signals_on_large_offsets_keep_their_digits() {
 fn a_part_is_cut_where_the_log_is() {
     let u = channel("u", &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
     let y = channel("y", &[0.5, 1.5, NAN, 3.5, 4.5, 5.5]);
-    // The clock jumps before the fourth row.
+    // The clock has a gap before the fourth row.
     let time = vec![0.0, 0.1, 0.2, 0.9, 1.0, 1.1];
     let log = Log::with_time(vec![u.clone(), y.clone()], time).unwrap();
     let joined = Log::join(vec![log.clone(), log.clone()]).unwrap();
-    assert_eq!((joined.breaks(), joined.borders()), (&[3, 6, 9][..], &[6][..]));
+    assert_eq!((joined.segment_starts(), joined.boundaries()), (&[3, 6, 9][..], &[6][..]));
 
     let all = log.part(&["u", "y"], rows("1..6")).unwrap();
-    assert_eq!((all.sample_time(), all.time(), all.breaks()), (log.sample_time(), log.time(), log.breaks()));
+    assert_eq!(
+        (all.sample_time(), all.time(), all.segment_starts()),
+        (log.sample_time(), log.time(), log.segment_starts())
+    );
     let part = joined.part(&["y"], rows("5..11")).unwrap();
     let values = &part.channels()[0].values;
     assert!(values[4].is_nan() && [&values[..4], &values[5..]].concat() == [4.5, 5.5, 0.5, 1.5, 3.5, 4.5]);
-    assert_eq!((part.rows(), part.breaks(), part.borders()), (7, &[2, 5][..], &[2][..]));
+    assert_eq!((part.rows(), part.segment_starts(), part.boundaries()), (7, &[2, 5][..], &[2][..]));
     assert_eq!((part.sample_time(), part.before()), (log.sample_time(), 1.0));
     assert_eq!(part.part(&["y"], rows("2..3")).unwrap().before(), 1.1);
-    // A jump that the part begins with is none.
-    assert!(log.part(&["u"], rows("4..6")).unwrap().breaks().is_empty());
+    // A gap that the part begins with is none.
+    assert!(log.part(&["u"], rows("4..6")).unwrap().segment_starts().is_empty());
     assert!(log.part(&["w"], rows("1..2")).is_err() && log.part(&["u"], rows("1..7")).is_err());
 }
 
@@ -207,22 +210,22 @@ fn a_part_is_cut_where_the_log_is() {
 fn a_stored_log_comes_back() {
     let log = Log::with_time(vec![channel("y", &[1.0, 2.0, 3.0, 4.0])], vec![0.0, 0.1, 0.5, 0.6]).unwrap();
     let joined = Log::join(vec![log.clone(), log]).unwrap();
-    let again = |breaks: &[usize], borders: &[usize], time: Option<Vec<f64>>| {
+    let again = |starts: &[usize], boundaries: &[usize], time: Option<Vec<f64>>| {
         Log::restored(
             joined.channels().to_vec(),
             joined.sample_time(),
             time,
-            breaks.to_vec(),
-            borders.to_vec(),
+            starts.to_vec(),
+            boundaries.to_vec(),
             joined.before(),
         )
     };
     let time = joined.time().map(<[f64]>::to_vec);
-    assert_eq!(again(joined.breaks(), joined.borders(), time.clone()).unwrap(), joined);
-    for (breaks, borders) in
+    assert_eq!(again(joined.segment_starts(), joined.boundaries(), time.clone()).unwrap(), joined);
+    for (starts, boundaries) in
         [(&[2, 8][..], &[][..]), (&[0], &[]), (&[4, 2], &[]), (&[2, 4], &[5]), (&[4, 4], &[4])]
     {
-        assert!(again(breaks, borders, time.clone()).is_err(), "{breaks:?} {borders:?}");
+        assert!(again(starts, boundaries, time.clone()).is_err(), "{starts:?} {boundaries:?}");
     }
     assert!(again(&[], &[], Some(vec![0.0; 7])).is_err() && again(&[], &[], Some(vec![NAN; 8])).is_err());
 }

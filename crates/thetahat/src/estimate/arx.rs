@@ -154,7 +154,7 @@ pub(crate) fn estimate_is_for_f() -> Error {
 /// The segments with as many of the measured samples before them as a regressor reaches back to: their first row with a full
 /// regressor is then the segment's own first, if so many are there.
 ///
-/// Without A a row needs no past output, and a segment ends where an output is missing only to go on behind it.
+/// Without A a row needs no past output, and a segment ends where an output is missing only to go on after it.
 pub(super) fn with_past<'r>(
     record: &'r Record<'_>,
     orders: &Orders,
@@ -167,10 +167,10 @@ pub(super) fn with_past<'r>(
     if orders.na > 0 && !known {
         return Cow::Borrowed(&record.segments);
     }
-    let reach = if presample == Presample::Drop { orders.reach() } else { 0 };
+    let lag = if presample == Presample::Drop { orders.maximum_lag() } else { 0 };
     let each = record.segments.iter().zip(&record.past).flat_map(|(segment, past)| {
         let first = segment.start - past;
-        pieces(segment).into_iter().map(move |piece| piece.start - reach.min(piece.start - first)..piece.end)
+        pieces(segment).into_iter().map(move |piece| piece.start - lag.min(piece.start - first)..piece.end)
     });
     Cow::Owned(each.collect())
 }
@@ -211,7 +211,7 @@ pub(crate) fn enough(samples: usize, orders: &Orders) -> Result<(), Error> {
         format!(
             "too few rows for the orders: {parameters} parameters need more samples than that, and {samples} have a full \
              regressor (reaching back {}); give more rows or lower the orders",
-            orders.reach()
+            orders.maximum_lag()
         ),
     ))
 }

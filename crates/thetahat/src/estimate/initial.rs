@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 /// | | without F | with F |
 /// |---|---|---|
 /// | drop | past samples, or the first r do not count | refused |
-/// | estimate | refused | past samples; nf free responses of each 1/F, and max(nf, nb + nk - 1) without a past where that is worth it |
+/// | estimate | refused | past samples; nf initial-condition responses of each 1/F, and max(nf, nb + nk - 1) without a past where that is worth it |
 /// | zero | zeros | zeros |
 /// | auto | drop | estimate with a past, or where it is worth it; else zero |
 ///
@@ -29,7 +29,7 @@ pub enum Initial {
     Drop,
     /// Zeros: all samples count.
     Zero,
-    /// Free responses of 1/F, found with the parameters; the other polynomials begin as for [`Initial::Drop`]. For models
+    /// Initial-condition responses of 1/F, found with the parameters; the other polynomials begin as for [`Initial::Drop`]. For models
     /// with F: what unknown samples do to the errors of others ends after r samples.
     Estimate,
 }

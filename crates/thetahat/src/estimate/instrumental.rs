@@ -7,7 +7,7 @@ use thetahat_core::LeastSquares;
 use thetahat_core::nalgebra::{DMatrix, DVector, Dyn};
 
 use super::arx::{arx, resolved, rows, signals};
-use super::start::noise::{Equation, Mixed, behind};
+use super::start::noise::{Equation, Mixed, after};
 use super::start::plant::{
     Equations, Group, Input, Plant, Point, add_delayed, divided, energy, inverse, multiplied,
 };
@@ -155,7 +155,7 @@ impl Stage<'_> {
     /// The samples that count.
     fn counted(&self) -> Vec<Range<usize>> {
         match self.presample {
-            Presample::Drop => behind(self.segments, self.skipped + self.orders.reach()),
+            Presample::Drop => after(self.segments, self.skipped + self.orders.maximum_lag()),
             Presample::Zero => self.segments.to_vec(),
         }
     }
@@ -163,13 +163,14 @@ impl Stage<'_> {
     /// A y - sum_j B_j u_j for the samples that count, zero elsewhere.
     fn residuals(&self, theta: &DVector<f64>) -> Vec<f64> {
         let (equation, model) = equation(&self.signals, self.segments, self.orders, theta.as_slice());
-        let from = if self.presample == Presample::Drop { self.skipped + self.orders.reach() } else { 0 };
+        let from =
+            if self.presample == Presample::Drop { self.skipped + self.orders.maximum_lag() } else { 0 };
         equation.errors(&model, from)
     }
 
     fn solve(&self) -> Option<Solution> {
         let na = self.orders.na;
-        let later = behind(self.segments, self.skipped);
+        let later = after(self.segments, self.skipped);
         let segments = if self.presample == Presample::Drop { &later } else { self.segments };
         // [x | u | y]: the first two are z, the last two phi but for their order.
         let mut taps = self.instrument_taps(0);
@@ -195,7 +196,7 @@ impl Stage<'_> {
 
     /// The condition number of the instruments; none if some depend on others.
     fn condition(&self) -> Option<f64> {
-        let later = behind(self.segments, self.skipped);
+        let later = after(self.segments, self.skipped);
         let segments = if self.presample == Presample::Drop { &later } else { self.segments };
         condition_of(
             &Lagged::new(&self.signals, self.instrument_taps(0), segments, self.presample).factor().ok()?,
@@ -208,7 +209,7 @@ impl Stage<'_> {
         let counted = self.counted();
         let samples: usize = counted.iter().map(Range::len).sum();
         let most = theta.len();
-        let left = |order: usize| behind(&counted, order).iter().map(Range::len).sum::<usize>();
+        let left = |order: usize| after(&counted, order).iter().map(Range::len).sum::<usize>();
         let order = (1..=most).rev().find(|&order| 2 * left(order) >= samples && left(order) > 2 * most);
         let equation = |order| {
             Equation { output: &residuals, order, inputs: Vec::new(), segments: &counted }.least_squares()
@@ -366,7 +367,7 @@ fn refined_from(
     let unit = DMatrix::identity(parameters, parameters);
     let root = factor.factor().solve_upper_triangular(&unit).ok_or_else(undetermined)?;
     let left = &root * root.transpose();
-    // Signals of a segment alone, so that those of the free responses stand beside them.
+    // Signals of a segment alone, so that those of the initial-condition responses stand beside them.
     let all_taps = [&taps[..], &point.free.taps(signals.len())].concat();
     let alone = |segment: &Range<usize>| -> Vec<Vec<f64>> {
         let own = signals.iter().map(|signal| signal[segment.clone()].to_vec());
@@ -446,7 +447,7 @@ fn iterate(point: &mut Point<'_, '_>, samples: usize) -> (usize, Stopped) {
     (ITERATIONS, Stopped::MaxIterations)
 }
 
-/// The condition number of the columns behind a factor, scaled to unit norm; none if some depend on others.
+/// The condition number of the columns after a factor, scaled to unit norm; none if some depend on others.
 fn condition_of(factor: &LeastSquares<f64, Dyn>) -> Option<f64> {
     let independent = factor.rank().dependent().next().is_none();
     independent.then(|| factor.condition())

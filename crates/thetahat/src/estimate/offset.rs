@@ -93,7 +93,7 @@ pub(crate) struct Fitted {
 }
 
 /// An estimate with a constant, and what that is worth.
-struct Found {
+struct WithConstant {
     fitted: Fitted,
     /// In units of its price: (k/its standard error)^2 over ln N, where that is known.
     worth: Option<f64>,
@@ -140,7 +140,7 @@ impl Task<'_> {
             // These have no sum of squares that is least: the constant's own error says what it is worth.
             Method::InstrumentalVariables | Method::RefinedInstrumentalVariables | Method::Robust(_) => {
                 return match self.beside(beside, None) {
-                    Ok(Some(Found { fitted, worth: Some(worth), .. })) if worth > 1.0 => Ok(fitted),
+                    Ok(Some(WithConstant { fitted, worth: Some(worth), .. })) if worth > 1.0 => Ok(fitted),
                     _ => self.plain(None),
                 };
             }
@@ -154,12 +154,14 @@ impl Task<'_> {
         let with = start.as_ref().map(|start| self.beside(beside, Some(start.clone())));
         let with = match with {
             Some(Err(Error::Interrupted)) => return Err(Error::Interrupted),
-            Some(Ok(Some(Found { fitted, worth: Some(worth), .. }))) if worth > CERTAIN => return Ok(fitted),
+            Some(Ok(Some(WithConstant { fitted, worth: Some(worth), .. }))) if worth > CERTAIN => {
+                return Ok(fitted);
+            }
             Some(Ok(found)) => found,
             _ => None,
         };
         let without = self.plain(start.map(|start| beside.without(self.orders, &start)))?;
-        let Found { fitted: with, worth, white_samples } = match with {
+        let WithConstant { fitted: with, worth, white_samples } = match with {
             Some(found) => found,
             None if self.promises(beside, &without.estimate) => {
                 let from = beside.with_zeros(self.orders, without.estimate.parameters());
@@ -187,7 +189,9 @@ impl Task<'_> {
         let method = self.method_within(started);
         match (Task { method: &method, ..*self }).beside(beside, Some(from)) {
             Err(Error::Interrupted) => Err(Error::Interrupted),
-            Ok(Some(Found { fitted: with, .. })) if is_worth(&without.estimate, &with.estimate, 1.0) => {
+            Ok(Some(WithConstant { fitted: with, .. }))
+                if is_worth(&without.estimate, &with.estimate, 1.0) =>
+            {
                 Ok(with)
             }
             _ => Ok(without),
@@ -251,7 +255,7 @@ impl Task<'_> {
     }
 
     /// With a constant, and what it is worth. None where there is no level.
-    fn beside(&self, beside: &Beside, start: Option<Vec<f64>>) -> Result<Option<Found>, Error> {
+    fn beside(&self, beside: &Beside, start: Option<Vec<f64>>) -> Result<Option<WithConstant>, Error> {
         let all = self.all(beside, start)?;
         let place = beside.places(self.orders).start;
         let variance = all.covariance().map(|covariance| covariance[place][place]);
@@ -263,7 +267,7 @@ impl Task<'_> {
                 (self.record.with_inputs(&signals), self.orders.with_constants(beside.count()));
             white_samples(&record, &orders, &all).unwrap_or(0.0)
         });
-        Ok(beside.apart(self.orders, all).map(|fitted| Found { fitted, worth, white_samples }))
+        Ok(beside.apart(self.orders, all).map(|fitted| WithConstant { fitted, worth, white_samples }))
     }
 
     /// The estimate of all parameters, the constant and the trend among them.

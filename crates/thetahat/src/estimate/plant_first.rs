@@ -31,12 +31,12 @@ use crate::model::Orders;
 use crate::optimize::{Monitor, Search, best_free};
 use crate::regression::{sum, sum_of_squares};
 
-/// Autoregressions behind a plant have so many coefficients at most.
+/// Autoregressions behind a plant have this many coefficients at most.
 const LONGEST: usize = 10;
-/// So many errors for each of them.
+/// This many errors for each of them.
 const SAMPLES: usize = 10;
 
-/// The estimate of a plant first; `named` inputs have names, those behind them are a constant and a trend.
+/// The estimate of a plant first; `named` inputs have names, those after them are a constant and a trend.
 pub(super) fn plant_first(
     record: &Record<'_>,
     named: usize,
@@ -119,7 +119,7 @@ pub(super) fn plant_first(
     })
 }
 
-/// How many coefficients of an autoregression behind an output-error model lower MDL.
+/// How many coefficients of an autoregression of the errors of an output-error model lower MDL.
 pub(crate) fn noise_order(record: &Record<'_>, orders: &Orders, estimate: &Estimate) -> Result<usize, Error> {
     let (mut v, segments) = free_run_errors(record, orders, estimate)?;
     let level = sum(v.iter().copied()) / v.len().max(1) as f64;
@@ -129,7 +129,7 @@ pub(crate) fn noise_order(record: &Record<'_>, orders: &Orders, estimate: &Estim
     let longest = LONGEST.min(v.len() / SAMPLES);
     let mut best = (f64::INFINITY, 0);
     for order in 0..=longest {
-        // All of them look at the same errors.
+        // All of them see the same errors.
         let segments: Vec<Range<usize>> = all
             .segments
             .iter()
@@ -193,10 +193,10 @@ fn of_plant(initial: &[f64], orders: &Orders, plant: &Orders) -> Option<Vec<f64>
     })
 }
 
-/// Errors, and the stretches of them that follow one another.
+/// Errors, and the segments of them that follow one another.
 type Errors = (Vec<f64>, Vec<Range<usize>>);
 
-/// v of an estimated plant, and the stretches of it that follow one another.
+/// v of an estimated plant, and the segments of it that follow one another.
 fn free_run_errors(record: &Record<'_>, plant: &Orders, estimate: &Estimate) -> Result<Errors, Error> {
     let mut predictor = predictor_of(record, plant, estimate);
     if best_free(&mut predictor, estimate.parameters()).is_err() {
@@ -208,11 +208,11 @@ fn free_run_errors(record: &Record<'_>, plant: &Orders, estimate: &Estimate) -> 
 /// A v, where all of v is there.
 fn filtered(v: &[f64], segments: &[Range<usize>], a: &[f64]) -> (Vec<f64>, Vec<Range<usize>>) {
     let mut errors = Vec::with_capacity(v.len());
-    let reach = a.len() - 1;
-    let segments = segments.iter().filter(|segment| segment.len() > reach).map(|segment| {
+    let lag = a.len() - 1;
+    let segments = segments.iter().filter(|segment| segment.len() > lag).map(|segment| {
         let first = errors.len();
         errors.extend(
-            (segment.start + reach..segment.end)
+            (segment.start + lag..segment.end)
                 .map(|t| sum(a.iter().zip((0..=t).rev()).map(|(a, t)| a * v[t]))),
         );
         first..errors.len()
@@ -241,7 +241,7 @@ fn covariance(
     for (column, &row) in places.iter().enumerate() {
         jacobian[(row, column)] = 1.0;
     }
-    // Behind A and B.
+    // After A and B.
     let c = orders.na + orders.nb.iter().sum::<usize>();
     if orders.na > 0 && orders.inputs() > named {
         // k = A(1) l.

@@ -62,14 +62,14 @@ const PARALLEL_FROM: usize = 1 << 15;
 #[derive(Debug)]
 struct Layout {
     orders: Orders,
-    /// Those of the parameters in their order, then of the free responses, then of g. Signal 0 is e.
+    /// Those of the parameters in their order, then of the initial-condition responses, then of g. Signal 0 is e.
     taps: Vec<Taps>,
     /// Signal, position among the products, lag and sign, one for each column.
     columns: Vec<Column>,
     products: Products,
     parameters: usize,
     free: usize,
-    /// How many of the free responses each input has, and the sample of the section that the first begins at.
+    /// How many of the initial-condition responses each input has, and the sample of the section that the first begins at.
     own_free: Vec<usize>,
     origin: usize,
     /// r, the first samples of the section in which v = 0; none without C.
@@ -78,7 +78,7 @@ struct Layout {
     counted: usize,
     /// From where on errors count linearly; none: they count by their squares.
     bound: Option<f64>,
-    /// Whether there are free responses that begin long before it.
+    /// Whether there are initial-condition responses that begin long before it.
     faded: bool,
     output: usize,
     inputs: Vec<usize>,
@@ -121,7 +121,7 @@ struct Common {
 }
 
 impl Layout {
-    /// That of sections that begin `past` samples before their segment. Where all F are one, their free responses are those of an
+    /// That of sections that begin `past` samples before their segment. Where all F are one, their initial-condition responses are those of an
     /// input.
     fn new(orders: &Orders, begin: Begin, past: usize, common: Option<Common>, one: bool) -> Self {
         let inputs = orders.inputs();
@@ -219,14 +219,14 @@ pub(super) struct Predictor<'a> {
     sections: Vec<Section<'a>>,
     samples: usize,
     stability: Vec<f64>,
-    /// The normal equations of the parameters, the free responses taken out.
+    /// The normal equations of the parameters, the initial-condition responses taken out.
     pub(super) matrix: Vec<f64>,
     pub(super) right: Vec<f64>,
     border: Border,
 }
 
 impl<'a> Predictor<'a> {
-    /// Segments without more samples that count than they have free responses are left out.
+    /// Segments without more samples that count than they have initial-condition responses are left out.
     pub(super) fn new(record: &Record<'a>, orders: &Orders, begin: Begin) -> Self {
         Self::with(record, orders, begin, false)
     }
@@ -270,8 +270,8 @@ impl<'a> Predictor<'a> {
             && pasts.iter().any(|past| free(Begin::UnknownInputs, *past) > free(Begin::Unknown, *past))
     }
 
-    /// The samples that are the same for all models: in so many first samples of each segment, or more, e = 0, and so many of them,
-    /// or more, do not count. Segments without a sample that counts, or with no more than the free responses need, are left out.
+    /// The samples that are the same for all models: at least the first `silent` samples of each segment have e = 0, and at least
+    /// the first `counted` do not count. Segments without a sample that counts, or with no more than the initial-condition responses need, are left out.
     /// What was measured before a segment is not used.
     pub(super) fn counting(
         record: &Record<'a>,
@@ -321,7 +321,7 @@ impl<'a> Predictor<'a> {
         self.sections.iter().map(|section| section.free.len()).sum()
     }
 
-    /// ln det(I + `ratio` G) of the free responses' part G of the Gram matrix, at the current point, over all segments.
+    /// ln det(I + `ratio` G) of the initial-condition responses' part G of the Gram matrix, at the current point, over all segments.
     pub(super) fn free_information(&self, ratio: f64) -> f64 {
         let parameters = self.right.len();
         let of = |section: &Section<'_>| {
@@ -336,7 +336,7 @@ impl<'a> Predictor<'a> {
         self.sections.iter().map(of).sum()
     }
 
-    /// By how much a column of psi is at most larger than what the free responses leave of it, at the current point.
+    /// By how much a column of psi is at most larger than what the initial-condition responses leave of it, at the current point.
     pub(super) fn cancellation(&self) -> f64 {
         let parameters = self.right.len();
         let whole = |k: usize| {
@@ -348,7 +348,7 @@ impl<'a> Predictor<'a> {
         (0..parameters).map(ratio).fold(1.0, f64::max).sqrt()
     }
 
-    /// Forgets the weights of the free responses.
+    /// Forgets the weights of the initial-condition responses.
     pub(super) fn restart(&mut self) {
         for section in &mut self.sections {
             section.free.fill(0.0);
@@ -391,7 +391,7 @@ impl<'a> Predictor<'a> {
     }
 
     /// Takes what was evaluated last as the current point, and forms the normal equations there. Gives by how much the
-    /// free responses alone can lower the cost.
+    /// initial-condition responses alone can lower the cost.
     pub(super) fn linearize(&mut self) -> f64 {
         let (layouts, polynomials) = (&self.layouts, &self.polynomials);
         let each = |section: &mut Section<'_>| {
@@ -412,7 +412,7 @@ impl<'a> Predictor<'a> {
         self.sections.iter().map(|section| section.free_gain).sum()
     }
 
-    /// The errors that count, and the stretches of them that follow one another.
+    /// The errors that count, and the segments of them that follow one another.
     pub(super) fn residuals(&self) -> (Vec<f64>, Vec<Range<usize>>) {
         let mut residuals = Vec::with_capacity(self.samples);
         let runs =
@@ -442,7 +442,7 @@ impl<'a> Predictor<'a> {
         (errors, segments)
     }
 
-    /// psi without the free responses for the same samples, a list for each parameter, zero where an output is missing. For models
+    /// psi without the initial-condition responses for the same samples, a list for each parameter, zero where an output is missing. For models
     /// of output error, at the current point.
     pub(super) fn sensitivities(&self) -> Vec<Vec<f64>> {
         let mut all = vec![Vec::with_capacity(self.samples); self.right.len()];
@@ -455,7 +455,7 @@ impl<'a> Predictor<'a> {
         all
     }
 
-    /// sum zeta zeta' over all samples, zeta being `weights` psi without the free responses, zero where samples do not count,
+    /// sum zeta zeta' over all samples, zeta being `weights` psi without the initial-condition responses, zero where samples do not count,
     /// filtered backwards in time by 1/A(q^+1), A = `monic`. For models of output error, at the current point.
     pub(super) fn backward_filtered_products(&self, weights: &DMatrix<f64>, monic: &[f64]) -> DMatrix<f64> {
         let parameters = self.right.len();
@@ -470,8 +470,8 @@ impl<'a> Predictor<'a> {
         sum
     }
 
-    /// The triangular factor of psi without the free responses, at the current point, as exact as Householder QR.
-    /// 2 N (p + n)^2 flops for n free responses in a segment.
+    /// The triangular factor of psi without the initial-condition responses, at the current point, as exact as Householder QR.
+    /// 2 N (p + n)^2 flops for n initial-condition responses in a segment.
     ///
     /// # Errors
     /// If an entry is not finite, or too large for squares to be summed without overflow.
@@ -484,7 +484,7 @@ impl<'a> Predictor<'a> {
             let count = parameters + free;
             let (columns, shifts) = layout.columns.split_at(count);
             let entry = |row: usize, column: usize| {
-                // The free responses come first: what is left of the parameters stands below them in the factor.
+                // The initial-condition responses come first: what is left of the parameters stands below them in the factor.
                 let index = if column < free { parameters + column } else { column - free };
                 let Some(Column { signal, lag, sign, .. }) = columns.get(index) else {
                     return section.signals[0][row];
@@ -511,7 +511,7 @@ impl<'a> Predictor<'a> {
         Ok(whole)
     }
 
-    /// Sets the weights of the free responses to those that are best for a step of the parameters, to first order.
+    /// Sets the weights of the initial-condition responses to those that are best for a step of the parameters, to first order.
     pub(super) fn try_free(&mut self, step: &[f64]) {
         self.sections.iter_mut().for_each(|section| section.try_free(step));
     }

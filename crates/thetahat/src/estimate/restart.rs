@@ -18,7 +18,7 @@ const SPREAD: f64 = 0.7;
 const NEAREST: f64 = 1e-3;
 const SMALLEST_ANGLE: f64 = 1e-3 * PI;
 
-/// So many parameter vectors, with C, D and every F drawn at random, A and B as they are in `best`. The same seed gives the
+/// This many parameter vectors, with C, D and every F drawn at random, A and B as they are in `best`. The same seed gives the
 /// same ones.
 ///
 /// C, D and F are drawn by their roots: every second vector has all of them moved from where they are in `best`, by factors

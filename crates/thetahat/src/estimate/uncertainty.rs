@@ -45,7 +45,7 @@ use crate::regression::{Lagged, Presample, Taps, divide_from, sum, sum_of_square
 const HIGHEST: usize = 10;
 /// Rows in memory at once.
 const ROWS: usize = 1024;
-/// From so many samples on, what the fit takes of v is nothing beside what is left.
+/// From this many samples on, what the fit takes of v is nothing beside what is left.
 const MANY: usize = 20_000;
 /// How often expected products are formed; four digits of A stand after as many, or after twice as many where outputs are missing.
 const ROUNDS: usize = 6;
@@ -90,7 +90,7 @@ impl Autoregression {
     }
 }
 
-/// The power of white noise of variance 1 behind 1/A, by the reflection coefficients of A; infinite for an unstable one.
+/// The power of white noise of variance 1 after 1/A, by the reflection coefficients of A; infinite for an unstable one.
 fn power(monic: &[f64]) -> f64 {
     let mut rest = monic.get(1..).unwrap_or(&[]).to_vec();
     let mut power = 1.0;
@@ -121,7 +121,7 @@ fn lagged<'a>(residuals: &'a [f64], segments: &'a [Range<usize>], count: usize) 
     Lagged::new(&[residuals], taps, segments, Presample::Drop)
 }
 
-/// The highest order for so many samples: of short segments not too much is left out.
+/// The highest order for this many samples: of short segments not too much is left out.
 fn highest(residuals: &[f64], segments: &[Range<usize>], taken: usize) -> usize {
     let samples: usize = segments.iter().map(Range::len).sum();
     let known = residuals.iter().filter(|error| !error.is_nan()).count();
@@ -269,7 +269,7 @@ pub(super) fn columns(
 /// filtered backwards in time by 1/A(q^+1):
 ///
 /// ```text
-/// zeta(t) = M psi(t) - a1 zeta(t + 1) - … - an zeta(t + n),   zeta = 0 behind the last sample
+/// zeta(t) = M psi(t) - a1 zeta(t + 1) - … - an zeta(t + n),   zeta = 0 after the last sample
 /// ```
 ///
 /// The columns of psi are `sign * s(t - lag)`, zero before the first sample of the segment. Blocks of rows from the
@@ -293,8 +293,8 @@ pub(crate) fn backward_filtered_products(
     let (start, mut end) = (start.start, last.end);
     let mut raw = vec![Vec::with_capacity(ROWS); columns.len()];
     let mut combined = vec![Vec::with_capacity(ROWS); size];
-    // The zeta behind each block, the earliest last.
-    let mut behind: Vec<Vec<f64>> = vec![Vec::new(); size];
+    // The zeta after each block, the earliest last.
+    let mut after: Vec<Vec<f64>> = vec![Vec::new(); size];
     while end > start {
         let first = end.saturating_sub(ROWS).max(start);
         for (values, &(signal, lag, sign)) in raw.iter_mut().zip(&columns) {
@@ -322,10 +322,10 @@ pub(crate) fn backward_filtered_products(
                 &mut combined
             }
         };
-        for (values, behind) in filtered.iter_mut().zip(&mut behind) {
-            divide_from(weights, behind, values);
-            behind.extend_from_slice(&values[values.len().saturating_sub(weights.len())..]);
-            behind.drain(..behind.len().saturating_sub(weights.len()));
+        for (values, after) in filtered.iter_mut().zip(&mut after) {
+            divide_from(weights, after, values);
+            after.extend_from_slice(&values[values.len().saturating_sub(weights.len())..]);
+            after.drain(..after.len().saturating_sub(weights.len()));
         }
         for (i, left) in filtered.iter().enumerate() {
             for (j, right) in filtered.iter().enumerate().take(i + 1) {

@@ -16,7 +16,7 @@ pub(super) type Observer = LuenbergerObserver<f64, Dyn, Dyn>;
 
 /// A row as a model sees it: deviations from the channels' offsets.
 #[derive(Debug, Clone)]
-pub(super) struct Moment {
+pub(super) struct Sample {
     /// Seconds since the first row.
     pub(super) time: f64,
     pub(super) inputs: DVector<f64>,
@@ -24,7 +24,7 @@ pub(super) struct Moment {
     pub(super) outputs: DVector<f64>,
 }
 
-/// How the time from one row to the next is taken: so many steps, of so many seconds.
+/// How the time from one row to the next is taken: how many steps, and the seconds of each.
 pub(super) type Division = (usize, f64);
 
 /// A filter, or a smoother around one.
@@ -132,7 +132,7 @@ impl Kind {
     pub(super) fn predict(
         &self,
         filter: &mut impl Recursion,
-        from: &Moment,
+        from: &Sample,
         (count, dt): Division,
         work: &mut Work,
     ) -> Result<(), Error> {
@@ -140,7 +140,7 @@ impl Kind {
             Kind::Linear(linear) => {
                 let there: Vec<bool> = from.outputs.iter().map(|output| !output.is_nan()).collect();
                 let mut left = count;
-                if let Some(transition) = linear.behind(&there)? {
+                if let Some(transition) = linear.after(&there)? {
                     let outputs =
                         from.outputs.iter().map(|output| if output.is_nan() { 0.0 } else { *output });
                     let drives: Vec<f64> = from.inputs.iter().copied().chain(outputs).collect();
@@ -169,7 +169,7 @@ impl Kind {
     pub(super) fn correct(
         &self,
         filter: &mut impl Recursion,
-        at: &Moment,
+        at: &Sample,
         work: &mut Work,
         show: impl FnOnce(&DVector<f64>, &DMatrix<f64>),
     ) -> Result<Innovation<f64, DVector<f64>>, Error> {
@@ -193,7 +193,7 @@ impl Kind {
         &self,
         observer: &mut Observer,
         poles: Option<&DVector<Complex<f64>>>,
-        from: &Moment,
+        from: &Sample,
         (count, dt): Division,
         work: &mut Work,
     ) -> Result<(), Error> {
@@ -223,7 +223,7 @@ impl Kind {
     pub(super) fn outputs(
         &self,
         estimate: &DVector<f64>,
-        at: &Moment,
+        at: &Sample,
         work: &mut Work,
     ) -> Result<DVector<f64>, Error> {
         Ok(match self {

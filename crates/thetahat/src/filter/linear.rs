@@ -11,8 +11,8 @@ use crate::model::PolynomialModel;
 
 type Transition = LinearTransition<f64, Dyn, Dyn>;
 
-/// The variance of a state of which nothing is known, in those of e. A millionth of it is what one row leaves: six digits are
-/// lost in a smoother, and none in a filter.
+/// Prior variance of an unknown state, in units of the variance of e. One row leaves a millionth of it: a smoother loses six
+/// digits, a filter none.
 const UNKNOWN: f64 = 1e6;
 
 /// What is known of the state in which the model of a report starts.
@@ -158,7 +158,7 @@ impl Linear {
         Ok(Self { input_offsets, output_offsets: vec![model.output.offset], ..linear })
     }
 
-    /// The transition behind a row with these outputs there, and what drives it.
+    /// The transition after a row with these outputs there, and what drives it.
     ///
     /// Where the noises are correlated, what is measured of v tells of w too. With S_M, R_M and H_M of the outputs that are
     /// there and W = S_M R_M⁻¹,
@@ -168,9 +168,9 @@ impl Linear {
     /// ```
     ///
     /// in which w̄ and v_M are not correlated (Anderson and Moore, Optimal Filtering, 1979, section 5.5): so the time update
-    /// and the smoother are those of uncorrelated noises. The inputs of this transition are u and y behind one another. None
+    /// and the smoother are those of uncorrelated noises. The inputs of this transition are u and y one after the other. None
     /// if the noises are not correlated, or nothing is there.
-    pub(super) fn behind(&self, there: &[bool]) -> Result<Option<Cow<'_, Transition>>, thetahat_core::Error> {
+    pub(super) fn after(&self, there: &[bool]) -> Result<Option<Cow<'_, Transition>>, thetahat_core::Error> {
         match &self.correlation {
             Some(correlation) if there.iter().all(|there| *there) => {
                 Ok(Some(Cow::Borrowed(&correlation.full)))

@@ -5,7 +5,7 @@ use thetahat_core::nalgebra::{DMatrix, DVector};
 use thetahat_core::{Action, Error, Innovation};
 
 use super::estimate::{StateEstimate, StateValues};
-use super::kind::{Filter, Kind, Moment};
+use super::kind::{Filter, Kind, Sample};
 use super::model::StateModel;
 use crate::distribution::chi_square_interval;
 
@@ -13,7 +13,7 @@ use crate::distribution::chi_square_interval;
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Row {
     states: usize,
-    /// Of the states, and behind them of the parameters after the change of variable.
+    /// Of the states, and after them of the parameters after the change of variable.
     #[serde(with = "super::snapshot::numbers")]
     pub(super) predicted: Vec<f64>,
     #[serde(with = "super::snapshot::numbers")]
@@ -55,8 +55,8 @@ impl Told {
     }
 
     /// By an observer, which knows no noise.
-    pub(super) fn nothing(moment: &Moment) -> Self {
-        let missing = moment.outputs.iter().all(|output| output.is_nan());
+    pub(super) fn nothing(sample: &Sample) -> Self {
+        let missing = sample.outputs.iter().all(|output| output.is_nan());
         let action = if missing { Action::Missing } else { Action::Updated };
         Self { nis: None, log_likelihood: None, action }
     }
@@ -137,9 +137,9 @@ impl Row {
     }
 
     /// The outputs as predicted, and what they are off.
-    pub(super) fn seen(&mut self, outputs: &DVector<f64>, moment: &Moment) {
+    pub(super) fn seen(&mut self, outputs: &DVector<f64>, sample: &Sample) {
         self.outputs.copy_from_slice(outputs.as_slice());
-        for ((innovation, measured), output) in self.innovations.iter_mut().zip(&moment.outputs).zip(outputs)
+        for ((innovation, measured), output) in self.innovations.iter_mut().zip(&sample.outputs).zip(outputs)
         {
             *innovation = measured - output;
         }

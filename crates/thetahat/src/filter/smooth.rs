@@ -23,7 +23,7 @@ impl SmoothedStates {
     }
 
     /// The state in a row, counted from 1, and the unknown parameters as they were there, in their own units; none for
-    /// row 0 and behind the last one. Parameters that do not walk are the same in all rows.
+    /// row 0 and after the last one. Parameters that do not walk are the same in all rows.
     pub fn row(&self, row: usize) -> Option<(StateValues<'_>, StateValues<'_>)> {
         let size = self.states + self.parameters;
         let start = row.checked_sub(1)?.checked_mul(size)?;
@@ -53,7 +53,7 @@ impl StateFilter {
     /// for y in [2.0, f64::NAN, f64::NAN, f64::NAN, 6.0] {
     ///     filter.step(None, &[], &[y])?;
     /// }
-    /// // Between two readings a walk is a line, and least known in the middle.
+    /// // Between two measurements a walk is a line, and least known in the middle.
     /// let smoothed = filter.smooth()?;
     /// let (state, _) = smoothed.row(3).unwrap();
     /// assert!((state.values[0] - 4.0).abs() < 1e-6);
@@ -76,22 +76,22 @@ impl StateFilter {
         let mut smoother = Smoother::new(kind.started().map_err(overflow)?);
         let mut work = Work::default();
         // Which of the smoother's samples a row is.
-        let (mut sample, mut samples) = (0, Vec::with_capacity(history.len()));
+        let (mut place, mut places) = (0, Vec::with_capacity(history.len()));
         let mut previous = None;
-        for (division, moment) in history {
+        for (division, sample) in history {
             if let Some((previous, division)) = previous.zip(*division) {
                 kind.predict(&mut smoother, previous, division, &mut work).map_err(overflow)?;
-                sample += division.0;
+                place += division.0;
             }
-            kind.correct(&mut smoother, moment, &mut work, |_, _| ()).map_err(overflow)?;
-            samples.push(sample);
-            previous = Some(moment);
+            kind.correct(&mut smoother, sample, &mut work, |_, _| ()).map_err(overflow)?;
+            places.push(place);
+            previous = Some(sample);
         }
         let smoothed = smoother.smooth().map_err(overflow)?;
 
         let (states, parameters) = (self.model().states().len(), self.model().unknown().len());
         let (mut values, mut deviations) = (Vec::new(), Vec::new());
-        for sample in samples.into_iter().map(|sample| &smoothed[sample]) {
+        for sample in places.into_iter().map(|place| &smoothed[place]) {
             values.extend_from_slice(sample.state.as_slice());
             deviations.extend(sample.covariance.diagonal().iter().map(|variance| variance.sqrt()));
         }

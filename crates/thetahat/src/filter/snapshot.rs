@@ -5,7 +5,7 @@ use thetahat_core::nalgebra::DVector;
 
 use super::StateFilter;
 use super::estimator::Engine;
-use super::kind::{Filter, Moment, Observer};
+use super::kind::{Filter, Observer, Sample};
 use super::row::{Row, Told};
 use super::totals::Totals;
 use crate::Error;
@@ -19,7 +19,7 @@ pub struct FilterSnapshot {
     estimator: String,
     origin: f64,
     engine: EngineSnapshot,
-    previous: Option<MomentSnapshot>,
+    previous: Option<SampleSnapshot>,
     totals: Totals,
     row: Row,
     told: Option<Told>,
@@ -32,7 +32,7 @@ enum EngineSnapshot {
 }
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
-struct MomentSnapshot {
+struct SampleSnapshot {
     time: f64,
     inputs: Vec<f64>,
     #[serde(with = "numbers")]
@@ -61,7 +61,7 @@ impl StateFilter {
                 Engine::Filter(filter) => EngineSnapshot::Filter(filter.clone()),
                 Engine::Observer { observer, .. } => EngineSnapshot::Observer(observer.clone()),
             },
-            previous: self.previous.as_ref().map(|Moment { time, inputs, outputs }| MomentSnapshot {
+            previous: self.previous.as_ref().map(|Sample { time, inputs, outputs }| SampleSnapshot {
                 time: *time,
                 inputs: inputs.as_slice().to_vec(),
                 outputs: outputs.as_slice().to_vec(),
@@ -80,12 +80,12 @@ impl StateFilter {
         let FilterSnapshot { estimator, origin, engine, previous, totals, row, told } = snapshot;
         let (states, inputs, outputs) =
             (self.row.predicted.len(), self.model.inputs().len(), self.model.outputs().len());
-        let previous = previous.map(|MomentSnapshot { time, inputs, outputs }| Moment {
+        let previous = previous.map(|SampleSnapshot { time, inputs, outputs }| Sample {
             time,
             inputs: DVector::from_vec(inputs),
             outputs: DVector::from_vec(outputs),
         });
-        let has_size = |moment: &Moment| (moment.inputs.len(), moment.outputs.len()) == (inputs, outputs);
+        let has_size = |sample: &Sample| (sample.inputs.len(), sample.outputs.len()) == (inputs, outputs);
         let fits = match (&engine, &self.engine) {
             (EngineSnapshot::Filter(filter), Engine::Filter(_)) => filter.state().len() == states,
             (EngineSnapshot::Observer(observer), Engine::Observer { .. }) => {

@@ -2,7 +2,7 @@ use thetahat_core::nalgebra::{DMatrix, DVector};
 
 use super::estimate::StateEstimate;
 use super::estimator::{Engine, Estimator};
-use super::kind::{Division, Moment};
+use super::kind::{Division, Sample};
 use super::linearization::Work;
 use super::model::StateModel;
 use super::row::{Row, Told};
@@ -25,7 +25,7 @@ use crate::data::Offset;
 /// its sample time, within 1 %: it predicts as many times.
 ///
 /// **Filters.** Where the noises are correlated, as in a report's innovations form, what a measurement tells of the process
-/// noise is used in the prediction behind it. The covariance is kept factored: see
+/// noise is used in the prediction after it. The covariance is kept factored: see
 /// [`ExtendedKalmanFilter`](thetahat_core::ExtendedKalmanFilter).
 ///
 /// **Observer.** In predictor form a row's measurement corrects the state of the next row: there is no filtered state, and
@@ -64,7 +64,7 @@ pub struct StateFilter {
     /// The time of the first row.
     pub(super) origin: f64,
     /// The row before, from which the next prediction starts.
-    pub(super) previous: Option<Moment>,
+    pub(super) previous: Option<Sample>,
     pub(super) totals: Totals,
     pub(super) row: Row,
     /// Where the next row is worked out: a step that fails leaves the last one as it is.
@@ -72,7 +72,7 @@ pub struct StateFilter {
     pub(super) told: Option<Told>,
     work: Work,
     /// All rows with the step before each, for a smoother.
-    pub(super) history: Option<Vec<(Option<Division>, Moment)>>,
+    pub(super) history: Option<Vec<(Option<Division>, Sample)>>,
 }
 
 impl StateFilter {
@@ -136,7 +136,7 @@ impl StateFilter {
     }
 
     /// The rows that it remembers, with the step before each.
-    pub(super) fn history(&self) -> Option<&[(Option<Division>, Moment)]> {
+    pub(super) fn history(&self) -> Option<&[(Option<Division>, Sample)]> {
         self.history.as_deref()
     }
 
@@ -185,7 +185,7 @@ impl StateFilter {
             None => None,
         };
         let time = self.previous.as_ref().map_or(self.origin, |previous| previous.time + seconds);
-        let moment = self.moment(time, inputs, outputs);
+        let sample = self.sample(time, inputs, outputs);
         let Self { model: StateModel { kind }, engine, previous, next, work, .. } = self;
         let from = previous.as_ref().zip(division);
 
@@ -198,10 +198,10 @@ impl StateFilter {
                 }
                 next.predicted(filter).map_err(refused)?;
                 let show = |outputs: &DVector<f64>, h: &DMatrix<f64>| {
-                    next.seen(outputs, &moment);
+                    next.seen(outputs, &sample);
                     next.output_deviations(kind, h);
                 };
-                let innovation = kind.correct(filter, &moment, work, show).map_err(refused)?;
+                let innovation = kind.correct(filter, &sample, work, show).map_err(refused)?;
                 next.filtered(filter);
                 next.parameters(kind);
                 Told::of(&innovation)
@@ -211,21 +211,21 @@ impl StateFilter {
                     kind.observe(observer, poles.as_ref(), previous, division, work).map_err(refused)?;
                 }
                 next.predicted.copy_from_slice(observer.state().as_slice());
-                let outputs = kind.outputs(observer.state(), &moment, work).map_err(refused)?;
+                let outputs = kind.outputs(observer.state(), &sample, work).map_err(refused)?;
                 if !outputs.iter().all(|output| output.is_finite()) {
                     return Err(refused(thetahat_core::Error::Overflow));
                 }
-                next.seen(&outputs, &moment);
-                Told::nothing(&moment)
+                next.seen(&outputs, &sample);
+                Told::nothing(&sample)
             }
         };
         next.finish(kind, time, inputs);
         self.engine = engine;
         std::mem::swap(&mut self.row, &mut self.next);
         if let Some(history) = &mut self.history {
-            history.push((division, moment.clone()));
+            history.push((division, sample.clone()));
         }
-        self.previous = Some(moment);
+        self.previous = Some(sample);
         let told = self.told.insert(told);
         let certain = matches!(self.engine, Engine::Filter(_));
         let estimate = self.row.estimate(row, time, certain, told);
@@ -234,7 +234,7 @@ impl StateFilter {
     }
 
     /// A row as the model sees it.
-    fn moment(&self, time: f64, inputs: &[f64], outputs: &[f64]) -> Moment {
+    fn sample(&self, time: f64, inputs: &[f64], outputs: &[f64]) -> Sample {
         let (input_offsets, output_offsets) = self.model.kind.offsets();
         let offset =
             |offsets: &[Offset], index: usize| offsets.get(index).map_or(0.0, |offset| offset.at(time));
@@ -245,7 +245,7 @@ impl StateFilter {
         });
         let outputs =
             DVector::from_fn(outputs.len(), |index, _| outputs[index] - offset(output_offsets, index));
-        Moment { time, inputs, outputs }
+        Sample { time, inputs, outputs }
     }
 }
 

@@ -21,7 +21,7 @@ pub struct FilterSummary {
     pub measured: usize,
     /// The log-likelihood of all of them; none from an observer.
     pub log_likelihood: Option<f64>,
-    /// How surprising the rows were, counted by row; none where nothing was measured, and from an observer.
+    /// The normalised innovation squared, counted by row; none where nothing was measured, and from an observer.
     pub nis: Option<NisSummary>,
     /// The states given all rows; from an observer as predicted for the last row.
     pub states: Vec<EstimatedNumber>,

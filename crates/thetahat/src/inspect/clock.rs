@@ -16,7 +16,7 @@ pub(super) struct Ticks {
 }
 
 impl Ticks {
-    /// The steps as [`Log::with_time`](crate::data::Log::with_time) judges them: over 1.5 medians there is a gap; another step
+    /// The steps as [`Log::with_time`](crate::data::Log::with_time) takes them: over 1.5 medians there is a gap; another step
     /// more than 10 % off the median makes the clock irregular. The median is that of the steps that go forward. O(N).
     ///
     /// # Errors

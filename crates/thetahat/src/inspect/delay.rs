@@ -9,9 +9,9 @@ use crate::data::Record;
 use crate::regression::{Lagged, Presample, Taps, sum_of_squares};
 use crate::select::{constant_pays, delays};
 
-/// The highest lag looked at.
+/// The highest lag tried.
 const HIGHEST: usize = 50;
-/// Samples for each lag looked at.
+/// Samples for each lag tried.
 const SAMPLES: usize = 10;
 /// Below this fraction of the square of a signal, what is left of it by its past is rounding.
 const ROUNDING: f64 = 1e-8;
@@ -106,7 +106,7 @@ pub(super) fn correlation(
     found
 }
 
-/// The segments with so many samples more at their beginnings.
+/// The segments with this many samples more at their beginnings.
 fn kept_with_past(kept: &[Range<usize>], past: usize) -> Vec<Range<usize>> {
     kept.iter().map(|segment| segment.start - past..segment.end).collect()
 }

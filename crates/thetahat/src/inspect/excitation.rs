@@ -9,9 +9,9 @@ use super::moments::{self, samples};
 use super::{Excitation, spectrum};
 use crate::regression::{Lagged, Presample, Taps, sum, sum_of_squares};
 
-/// The highest order looked for.
+/// The highest order tried.
 const HIGHEST: usize = 50;
-/// Samples for each order looked for.
+/// Samples for each order tried.
 const SAMPLES: usize = 4;
 /// An eigenvalue below this fraction of the largest counts as zero.
 const TOLERANCE: f64 = 1e-6;
@@ -110,7 +110,7 @@ pub(super) fn are_the_same(left: &[f64], right: &[f64], segments: &[Range<usize>
     square > 0.0 && whole > 0.0 && rest <= SAME * whole
 }
 
-/// The highest order that so many samples tell of: of short segments not too much may be left out.
+/// The highest order that this many samples tell of: of short segments not too much may be left out.
 fn highest(segments: &[Range<usize>]) -> usize {
     let total = samples(segments);
     let full = |order: usize| -> usize {
@@ -125,7 +125,7 @@ fn unit<I: Iterator<Item = f64>>(values: impl Fn() -> I) -> f64 {
     values().fold(0.0, |largest: f64, value| largest.max((value - mean).abs()))
 }
 
-/// The rank of the covariance of so many lags.
+/// The rank of the covariance of this many lags.
 fn rank(deviations: &[f64], segments: &[Range<usize>], lags: usize) -> usize {
     let ones = vec![1.0; deviations.len()];
     let taps = vec![

@@ -90,11 +90,11 @@ pub struct ChannelQuality {
     pub trend_share: Option<f64>,
     /// Rows that repeat the value before them.
     pub repeated: usize,
-    /// The longest stretch of equal values, in rows.
+    /// The longest run of equal values, in rows.
     pub longest_hold: usize,
     /// The step of which all values are multiples, away from an offset, to rounding; none if there is none.
     pub quantization: Option<f64>,
-    /// Stretches at the largest or the smallest value.
+    /// Segments at the largest or the smallest value.
     pub saturation: Option<Saturation>,
     /// The first rows (1-based, 20 at most) of values far from their neighbours.
     pub outliers: Vec<usize>,
@@ -105,9 +105,9 @@ pub struct ChannelQuality {
 /// How often a channel rests at its limits.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Saturation {
-    /// Rows at the smallest value, in stretches of several.
+    /// Rows at the smallest value, in runs of several.
     pub low: usize,
-    /// Rows at the largest value, in stretches of several.
+    /// Rows at the largest value, in runs of several.
     pub high: usize,
 }
 
@@ -116,9 +116,9 @@ pub struct Saturation {
 pub struct Excitation {
     /// The input channel.
     pub input: String,
-    /// The order of persistence of excitation: so many parameters it can tell apart. No more than `highest`.
+    /// The order of persistence of excitation: this many parameters it can tell apart. No more than `highest`.
     pub order: usize,
-    /// The highest order looked for.
+    /// The highest order tried.
     pub highest: usize,
     /// The fraction of samples at which it changes.
     pub changes: f64,

@@ -1,15 +1,15 @@
 //! Values far from their neighbours.
 
-/// Values before and behind that a value is compared with.
+/// Values before and after that a value is compared with.
 const HALF: usize = 3;
 const WINDOW: usize = 2 * HALF + 1;
-/// So many scales away a value is an outlier.
+/// This many scales away a value is an outlier.
 const THRESHOLD: f64 = 8.0;
 /// With fewer values there are no neighbours to speak of.
 const FEWEST: usize = 2 * WINDOW;
 /// The fraction of values that are no outliers for sure.
 const ORDINARY: f64 = 0.98;
-/// The size that so many standard normal variables stay below.
+/// The size that this many standard normal variables stay below.
 const NORMAL_SIZE: f64 = 2.326_347_874_040_841;
 
 /// The positions of values that lie more than 8 scales off the median of the seven values around them.

@@ -1,6 +1,6 @@
 use crate::data::Resample;
 
-/// What to look at.
+/// What to inspect.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct InspectionPlan {
     /// The input channels.

@@ -8,12 +8,12 @@ const ROUNDING: f64 = 1e-13;
 const FEWEST: usize = 8;
 /// A step is that of a converter of 24 bits at most; finer ones are how the numbers are printed.
 const MOST_STEPS: f64 = 16_777_216.0;
-/// A step is told from the rounding of decimal printing from so many units of the last printed place on.
+/// A step is told from the rounding of decimal printing from this many units of the last printed place on.
 const CLEAR: f64 = 10.0;
 
 /// The step of which the differences of all values are multiples; `distinct` in rising order.
 ///
-/// First a step coarser than the printed decimals is looked for, such as 10/4095 printed with seven: an approximate
+/// First a step coarser than the printed decimals is searched for, such as 10/4095 printed with seven: an approximate
 /// greatest common divisor of the differences between neighbours (Euclid's algorithm with the tolerance of printing), which is
 /// then improved over the whole range and verified on every value. Failing that, it is the greatest common divisor of the
 /// values in units of their last printed place. None where there are fewer than eight different values, or the step is
@@ -74,7 +74,7 @@ fn common_step(distinct: &[f64], tolerance: f64) -> Option<f64> {
         let difference = differences[position];
         let multiple = (difference / step).round();
         let remainder = (difference - multiple * step).abs();
-        // The step is the mean of so many differences, each with an error of one tolerance at most.
+        // The step is the mean of this many differences, each with an error of one tolerance at most.
         let uncertainty = if multiples > 0.0 { position as f64 / multiples } else { 1.0 };
         if remainder > tolerance * (1.0 + multiple * uncertainty) {
             // At most half of it: this ends soon.

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-/// An input that changes so many times at most is one of a step test.
+/// An input that changes at most this many times is one of a step test.
 const FEW_CHANGES: usize = 5;
 /// At rest the standard deviation of an output is no more than this part of its range, and neither is what it moves by: the
 /// difference between the means of the first and the second half.

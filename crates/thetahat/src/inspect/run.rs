@@ -90,7 +90,7 @@ pub fn inspect_log(log: &Log, source: &Source, plan: &InspectionPlan) -> Result<
     };
     let ticks = match log.time() {
         Some(time) if log.is_joined() => {
-            let ends = log.borders().iter().copied().chain([log.rows()]);
+            let ends = log.boundaries().iter().copied().chain([log.rows()]);
             let mut begin = 0;
             Ticks::joined(ends.map(|end| &time[std::mem::replace(&mut begin, end)..end]), log.sample_time())?
         }
@@ -98,7 +98,7 @@ pub fn inspect_log(log: &Log, source: &Source, plan: &InspectionPlan) -> Result<
     };
     let roles = roles(log.channels(), plan)?;
     let mut inspection = of_the_rows(log.channels(), &times, &ticks, &roles, source, plan)?;
-    inspection.experiments = log.borders().len() + 1;
+    inspection.experiments = log.boundaries().len() + 1;
     dynamics(&mut inspection, log, plan)?;
     let words = warnings::of_the_dynamics(&inspection, plan);
     inspection.warnings.extend(words);

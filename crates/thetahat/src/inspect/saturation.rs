@@ -1,12 +1,12 @@
-//! Stretches at the largest or the smallest value.
+//! Runs at the largest or the smallest value.
 
 use super::Saturation;
 
-/// A limit must have so many rows in stretches, for each row of the most frequent value near it.
+/// A limit must have this many rows in runs, for each row of the most frequent value near it.
 const CROWDED: usize = 5;
 /// The values near a limit that it is compared with.
 const NEAR: usize = 8;
-/// Fewer rows in stretches are chance.
+/// Fewer rows in runs are chance.
 const FEWEST: usize = 5;
 
 /// Consecutive rows of one value.
@@ -16,30 +16,30 @@ pub(super) struct Run {
     pub(super) rows: usize,
 }
 
-/// The stretches of equal values, those of missing ones left out. A missing value ends a stretch.
+/// The runs of equal values, those of missing ones left out. A missing value ends a run.
 pub(super) fn runs(values: &[f64]) -> impl Iterator<Item = Run> {
-    let stretches = values.chunk_by(|left, right| left == right).filter(|run| !run[0].is_nan());
-    stretches.map(|run| Run { value: run[0], rows: run.len() })
+    let runs = values.chunk_by(|left, right| left == right).filter(|run| !run[0].is_nan());
+    runs.map(|run| Run { value: run[0], rows: run.len() })
 }
 
-/// Rows in stretches of two and more at the limits, where a limit is crowded.
+/// Rows in runs of two and more at the limits, where a limit is crowded.
 ///
 /// A clipped signal piles up at its limit: far more rows stand there than at any of the values next to it. A binary or
 /// stepped signal has no such values; a smooth signal that was rounded has at most 2.4 times as many rows at its peak as at the
 /// level below, whatever its curvature (a parabola spends sqrt(q) within one rounding step q
-/// of its top and sqrt(2q) - sqrt(q) within the next: 1/(sqrt 2 - 1)), hence the factor of 5. A stretch with which the log begins or ends does not count:
+/// of its top and sqrt(2q) - sqrt(q) within the next: 1/(sqrt 2 - 1)), hence the factor of 5. A run with which the log begins or ends does not count:
 /// experiments begin and end at rest.
 ///
 /// `sorted` are the values that are there, in rising order.
 pub(super) fn saturation(values: &[f64], sorted: &[f64]) -> Option<Saturation> {
     let levels = || sorted.chunk_by(|left, right| left == right);
-    // Two limits, and so many levels between them.
+    // Two limits, and this many levels between them.
     levels().nth(NEAR + 1)?;
-    let stretches = runs(values).count();
+    let count = runs(values).count();
     let most = |near: &mut dyn Iterator<Item = &[f64]>| near.map(<[f64]>::len).max().unwrap_or(0);
     let rows = |limit: f64, most: usize| {
         // Without the first and the last.
-        let inner = runs(values).take(stretches.saturating_sub(1)).skip(1);
+        let inner = runs(values).take(count.saturating_sub(1)).skip(1);
         let rows: usize = inner.filter(|run| run.value == limit && run.rows > 1).map(|run| run.rows).sum();
         if rows >= FEWEST && rows > CROWDED * most { rows } else { 0 }
     };

@@ -21,7 +21,7 @@ const SHORTEST: usize = 8;
 ///
 /// with Hann's window h. It is one-sided: by the trapezoidal rule, its integral from 0 to pi/T is the variance (that of the windowed
 /// samples, exactly). L is the largest power of two up to 1024 and a fourth of the samples that fits into a segment. No window
-/// reaches across the border of two segments. Empty if there are fewer than eight samples to a window, or a density leaves
+/// reaches across the boundary of two segments. Empty if there are fewer than eight samples to a window, or a density leaves
 /// the range of numbers. O(N log L).
 ///
 /// `deviations` are of mean zero and have sizes up to 1, in units of `unit`.

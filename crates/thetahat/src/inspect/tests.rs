@@ -13,7 +13,7 @@ mod channels;
 mod documents;
 mod dynamics;
 
-/// So many normal numbers, to the eye: sums of twelve uniform ones.
+/// This many normal numbers, to the eye: sums of twelve uniform ones.
 fn normal(seed: u64, count: usize) -> Vec<f64> {
     let mut noise = Noise(seed);
     (0..count).map(|_| (0..12).map(|_| noise.next()).sum::<f64>() / 2.0).collect()
@@ -29,7 +29,7 @@ fn divided(a: &[f64], x: &[f64]) -> Vec<f64> {
     y
 }
 
-/// x, so many samples late.
+/// x, this many samples late.
 fn late(x: &[f64], by: usize) -> Vec<f64> {
     [vec![0.0; by], x[..x.len() - by].to_vec()].concat()
 }

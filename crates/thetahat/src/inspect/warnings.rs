@@ -133,7 +133,7 @@ pub(super) fn of_the_dynamics(inspection: &Inspection, plan: &InspectionPlan) ->
         let pairs = inspection.log.rows.len().saturating_sub(1) as f64;
         let changes = excitation.changes * pairs;
         if excitation.highest == 0 {
-            words.push(format!("input '{name}' has too few rows in a stretch to tell what it excites"));
+            words.push(format!("input '{name}' has too few rows in a segment to tell what it excites"));
         } else if excitation.order == 0 {
             words.push(format!(
                 "input '{name}' excites nothing: leave it out, or record a log in which it changes"

@@ -7,7 +7,7 @@ use crate::regression::{Lagged, Presample, Taps, add_filtered};
 
 /// The highest order of an autoregression.
 const HIGHEST: usize = 30;
-/// Samples for each order looked at.
+/// Samples for each order tried.
 const SAMPLES: usize = 10;
 /// Of the square of a signal, what an autoregression leaves is rounding below this fraction.
 const ROUNDING: f64 = 1e-10;
@@ -16,7 +16,7 @@ const ROUNDING: f64 = 1e-10;
 /// samples: A, monic. It is a filter without feedback, so A need not be stable.
 ///
 /// The factor of the normal equations of a lower order is a part of that of the highest. Where a lag depends on those before it
-/// (a sum of sinusoids), or nothing but rounding is left, no higher order is looked at. O(N).
+/// (a sum of sinusoids), or nothing but rounding is left, no higher order is tried. O(N).
 pub(super) fn autoregression(signal: &[f64], segments: &[Range<usize>]) -> Vec<f64> {
     let total = samples(segments);
     let lagged = |count| {

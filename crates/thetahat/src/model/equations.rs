@@ -49,7 +49,7 @@ use crate::Error;
 /// [outputs]                          # channel of the log = expression
 /// y = "position"
 ///
-/// [noise]                            # standard deviations: of a sample, of a reading
+/// [noise]                            # standard deviations: of a sample, of a measurement
 /// process = { velocity = 0.01 }
 /// measurement = { y = 0.05 }
 /// ```
@@ -219,7 +219,7 @@ impl GreyBox {
         &self.unknown
     }
 
-    /// How a step of `dt` seconds is taken: as so many equal ones, and the length of each.
+    /// How a step of `dt` seconds is taken: as this many equal ones, and the length of each.
     ///
     /// # Errors
     /// [`Error::Data`] if it is not above 0 or too long; if the equations do not know its length, and it is no whole
@@ -265,7 +265,7 @@ fn check_count(count: f64, dt: f64, sample_time: f64) -> Result<usize, Error> {
         Ok(count as usize)
     } else {
         Err(Error::data(format!(
-            "a step of {dt} s is more than {MOST_STEPS} times the model's sample time of {sample_time} s; begin again behind \
+            "a step of {dt} s is more than {MOST_STEPS} times the model's sample time of {sample_time} s; begin again after \
              such a gap"
         )))
     }

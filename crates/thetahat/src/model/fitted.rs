@@ -92,7 +92,7 @@ pub struct PolynomialModel {
     /// The coefficients with their standard errors, in the order of `covariance`.
     pub parameters: Vec<Parameter>,
     /// The covariance matrix of the parameters, row by row; none where no theory gives one, and where it cannot be computed, as
-    /// at the border of stability.
+    /// at the stability boundary.
     pub covariance: Option<Vec<Vec<f64>>>,
     /// What is open of the output's offset together with the parameters; none where it was given, where it is not known, and in
     /// reports that do not say. Predictions, forecasts and drawn runs count it.
@@ -152,7 +152,7 @@ pub(super) mod only_variance {
 
 impl PolynomialModel {
     /// The model with what is open of its output's offset as further inputs, of which the coefficients are zero and uncertain;
-    /// and those inputs over so many rows. None where nothing is said of it.
+    /// and those inputs over this many rows. None where nothing is said of it.
     pub(crate) fn with_open_offset(&self, rows: usize) -> Option<(Self, Vec<Vec<f64>>)> {
         let open = self.offset_covariance.as_ref()?;
         let (count, place) = (open.count(), self.orders.na + self.orders.nb.iter().sum::<usize>());

@@ -10,7 +10,7 @@ pub(crate) const LARGEST: usize = 1000;
 
 /// The orders of A(q) y(t) = sum_j B_j(q)/F_j(q) u_j(t - nk_j) + C(q)/D(q) e(t).
 ///
-/// A, C, D and F are monic: na is the number of coefficients a1 … a_na behind the leading 1, and likewise nc, nd
+/// A, C, D and F are monic: na is the number of coefficients a1 … a_na after the leading 1, and likewise nc, nd
 /// and nf. B has nb coefficients, the first of which multiplies u(t - nk).
 ///
 /// ```
@@ -210,33 +210,33 @@ impl Orders {
         self.na + self.nc + self.nd + self.nb.iter().sum::<usize>() + self.nf.iter().sum::<usize>()
     }
 
-    /// How many past samples a full ARX regressor reaches back: max(na, nb + nk - 1).
-    pub fn reach(&self) -> usize {
-        (0..self.inputs()).map(|input| self.input_reach(input)).fold(self.na, usize::max)
+    /// The maximum lag of a full ARX regressor: max(na, nb + nk - 1).
+    pub fn maximum_lag(&self) -> usize {
+        (0..self.inputs()).map(|input| self.maximum_input_lag(input)).fold(self.na, usize::max)
     }
 
-    /// With so many further inputs after their own, of one coefficient each that acts at once: those of a constant and a trend.
+    /// With this many further inputs after their own, of one coefficient each that acts at once: those of a constant and a trend.
     pub(crate) fn with_constants(&self, count: usize) -> Self {
         let more = |values: &[usize], value| [values, &vec![value; count]].concat();
         Self { nb: more(&self.nb, 1), nf: more(&self.nf, 0), nk: more(&self.nk, 0), ..self.clone() }
     }
 
-    /// How many past samples of an input B reaches back: nb + nk - 1, or 0 without B.
-    pub(crate) fn input_reach(&self, input: usize) -> usize {
+    /// The maximum lag of B for an input: nb + nk - 1, or 0 without B.
+    pub(crate) fn maximum_input_lag(&self, input: usize) -> usize {
         if self.nb[input] == 0 { 0 } else { self.nb[input] + self.nk[input] - 1 }
     }
 
-    /// How many first samples of a segment have no e where nothing before it is known and no free response of 1/F makes
-    /// up for it: max(na, nb + nk - 1 of the inputs without F), and nd more. For ARX this is the reach.
+    /// How many first samples of a segment have no e where nothing before it is known and no initial-condition response of 1/F makes
+    /// up for it: max(na, nb + nk - 1 of the inputs without F), and nd more. For ARX this is the maximum lag.
     pub(crate) fn conditioned(&self) -> usize {
         let direct = (0..self.inputs()).filter(|&input| self.nf[input] == 0);
-        direct.map(|input| self.input_reach(input)).fold(self.na, usize::max) + self.nd
+        direct.map(|input| self.maximum_input_lag(input)).fold(self.na, usize::max) + self.nd
     }
 
-    /// How many samples before a segment its errors reach back to: max(na, nb + nk - 1 of all inputs) + nd. With so many known,
+    /// How many samples before a segment its errors reach back to: max(na, nb + nk - 1 of all inputs) + nd. With this many known,
     /// all samples of the segment have an error.
     pub(crate) fn history(&self) -> usize {
-        self.reach() + self.nd
+        self.maximum_lag() + self.nd
     }
 
     /// Whether errors depend on past outputs. If not, A = C = D = 1, a missing output is a missing error and nothing more.
@@ -249,7 +249,7 @@ impl Orders {
         self.nf.iter().any(|&nf| nf > 0)
     }
 
-    /// The number of free responses of 1/F for an input: what unknown samples before a segment do to B/F u is, from sample
+    /// The number of initial-condition responses of 1/F for an input: what unknown samples before a segment do to B/F u is, from sample
     /// nb + nk - 1 on, a combination of nf of them. Before that earlier inputs are taken to be zero, the mean.
     pub(crate) fn free_responses(&self, input: usize) -> usize {
         self.nf[input]
@@ -258,7 +258,7 @@ impl Orders {
     /// The same where earlier inputs are not taken to be zero: max(nf, nb + nk - 1), the first `known` inputs being known.
     pub(crate) fn free_responses_and_inputs(&self, input: usize, known: usize) -> usize {
         let nf = self.nf[input];
-        if nf == 0 { 0 } else { nf.max(self.input_reach(input).saturating_sub(known)) }
+        if nf == 0 { 0 } else { nf.max(self.maximum_input_lag(input).saturating_sub(known)) }
     }
 
     /// The parameters' names in their order: a, b of each input, c, d, f of each input.
@@ -318,7 +318,7 @@ mod tests {
         let general = Orders::new(1, &[1], 2, 1, &[2], &[3]).unwrap();
         assert_eq!(general.names(), ["a1", "b3", "c1", "c2", "d1", "f1", "f2"]);
         assert_eq!(orders.parameters(), 4);
-        assert_eq!(orders.reach(), 4);
+        assert_eq!(orders.maximum_lag(), 4);
     }
 
     #[test]

@@ -41,7 +41,7 @@ pub(crate) struct Roots {
 }
 
 impl Roots {
-    /// With memory for polynomials of so many coefficients.
+    /// With memory for polynomials of this many coefficients.
     pub(crate) fn with_capacity(coefficients: usize) -> Self {
         Self {
             rising: Vec::with_capacity(coefficients),

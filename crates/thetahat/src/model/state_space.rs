@@ -156,7 +156,7 @@ fn order(polynomial: &[f64]) -> usize {
     polynomial.len().saturating_sub(1)
 }
 
-/// Zero behind the last.
+/// Zero after the last.
 fn coefficient(polynomial: &[f64], power: usize) -> f64 {
     polynomial.get(power).copied().unwrap_or(0.0)
 }
@@ -175,7 +175,7 @@ mod tests {
     const FAST: &[f64] = &[1.0, -0.2, -0.15];
     const WAVE: &[f64] = &[1.0, -1.6, 0.95];
 
-    /// A y = sum_j B_j/F_j u_j + C/D e with var e = 0.25; an input is nk, the coefficients of B behind it, and F.
+    /// A y = sum_j B_j/F_j u_j + C/D e with var e = 0.25; an input is nk, the coefficients of B after it, and F.
     fn model(a: &[f64], inputs: &[(usize, &[f64], &[f64])], c: &[f64], d: &[f64]) -> PolynomialModel {
         let nb: Vec<usize> = inputs.iter().map(|(_, b, _)| b.len()).collect();
         let nf: Vec<usize> = inputs.iter().map(|(_, _, f)| f.len() - 1).collect();

@@ -11,27 +11,27 @@ const PARALLEL_FROM: usize = 8;
 
 /// Consecutive samples of one segment, which begins at sample `start`.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Stretch {
+pub(super) struct Segment {
     pub(super) start: usize,
     pub(super) rows: Range<usize>,
 }
 
-/// Cuts stretches into blocks: a long one gives many blocks, many short ones share one, so that neither
+/// Cuts segments into blocks: a long one gives many blocks, many short ones share one, so that neither
 /// 10^6 samples nor 10^5 segments cost more than their samples do.
-pub(super) fn blocks(stretches: impl Iterator<Item = Stretch>) -> Vec<Vec<Stretch>> {
+pub(super) fn blocks(segments: impl Iterator<Item = Segment>) -> Vec<Vec<Segment>> {
     let mut blocks = Vec::new();
     let mut block = Vec::new();
-    let mut room = BLOCK;
-    for Stretch { start, rows } in stretches {
+    let mut left = BLOCK;
+    for Segment { start, rows } in segments {
         let mut first = rows.start;
         while first < rows.end {
-            let end = rows.end.min(first + room);
-            block.push(Stretch { start, rows: first..end });
-            room -= end - first;
+            let end = rows.end.min(first + left);
+            block.push(Segment { start, rows: first..end });
+            left -= end - first;
             first = end;
-            if room == 0 {
+            if left == 0 {
                 blocks.push(std::mem::take(&mut block));
-                room = BLOCK;
+                left = BLOCK;
             }
         }
     }
@@ -42,7 +42,7 @@ pub(super) fn blocks(stretches: impl Iterator<Item = Stretch>) -> Vec<Vec<Stretc
 }
 
 /// What `of` makes of each block, in their order.
-pub(super) fn map_blocks<T: Send>(blocks: &[Vec<Stretch>], of: impl Fn(&[Stretch]) -> T + Sync) -> Vec<T> {
+pub(super) fn map_blocks<T: Send>(blocks: &[Vec<Segment>], of: impl Fn(&[Segment]) -> T + Sync) -> Vec<T> {
     if blocks.len() < PARALLEL_FROM {
         blocks.iter().map(|block| of(block)).collect()
     } else {
@@ -50,19 +50,19 @@ pub(super) fn map_blocks<T: Send>(blocks: &[Vec<Stretch>], of: impl Fn(&[Stretch
     }
 }
 
-/// The sum over all stretches of the `size` values that `add` adds for each of them: the first of `sums`, which has room
+/// The sum over all segments of the `size` values that `add` adds for each of them: the first of `sums`, which has room
 /// for as many for each block, at least one.
 pub(super) fn sum_blocks(
-    blocks: &[Vec<Stretch>],
+    blocks: &[Vec<Segment>],
     size: usize,
     sums: &mut [f64],
-    add: impl Fn(&Stretch, &mut [f64]) + Sync,
+    add: impl Fn(&Segment, &mut [f64]) + Sync,
 ) {
     sums.fill(0.0);
     if size == 0 {
         return;
     }
-    let of = |(block, sums): (&Vec<Stretch>, &mut [f64])| block.iter().for_each(|stretch| add(stretch, sums));
+    let of = |(block, sums): (&Vec<Segment>, &mut [f64])| block.iter().for_each(|segment| add(segment, sums));
     if blocks.len() < PARALLEL_FROM {
         blocks.iter().zip(sums.chunks_mut(size)).for_each(of);
     } else {

@@ -1,4 +1,4 @@
-//! Filters in q^-1 over stretches of a signal: products with a polynomial, and divisions by a monic one.
+//! Filters in q^-1 over segments of a signal: products with a polynomial, and divisions by a monic one.
 
 use std::ops::Range;
 
@@ -12,8 +12,8 @@ pub(crate) fn add_filtered(
     x: &[f64],
     start: usize,
 ) {
-    let reach = weights.len().saturating_sub(1);
-    let full = (start + reach).clamp(rows.start, rows.end);
+    let lag = weights.len().saturating_sub(1);
+    let full = (start + lag).clamp(rows.start, rows.end);
     let (head, tail) = target.split_at_mut(full - rows.start);
     for (row, value) in (rows.start..full).zip(head) {
         let known = (row + 1).saturating_sub(start).min(weights.len());
@@ -21,7 +21,7 @@ pub(crate) fn add_filtered(
         *value += weights.iter().zip(past).map(|(weight, x)| weight * x).sum::<f64>();
     }
     if full < rows.end && !weights.is_empty() {
-        kernel::add_filtered(tail, weights, &x[full - reach..rows.end]);
+        kernel::add_filtered(tail, weights, &x[full - lag..rows.end]);
     }
 }
 

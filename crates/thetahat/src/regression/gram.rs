@@ -16,7 +16,7 @@ use std::ops::Range;
 
 use thetahat_core::nalgebra::{DMatrix, DVector};
 
-use super::blocks::{Stretch, blocks, sum_blocks};
+use super::blocks::{Segment, blocks, sum_blocks};
 use super::kernel::correlations;
 use super::lagged::{Lagged, Taps, sample};
 
@@ -69,10 +69,10 @@ pub(crate) struct Products {
     longest: usize,
 }
 
-/// The interior of some segments, and room for the sums over it.
+/// The interior of some segments, and the buffer of the sums over it.
 #[derive(Debug)]
 pub(crate) struct Interior {
-    blocks: Vec<Vec<Stretch>>,
+    blocks: Vec<Vec<Segment>>,
     sums: Vec<f64>,
 }
 
@@ -102,8 +102,8 @@ impl Products {
 
     /// The interior of segments, each given by its first sample and the samples that count.
     pub(crate) fn interior(&self, segments: impl Iterator<Item = (usize, Range<usize>)>) -> Interior {
-        let stretches = segments.map(|(start, rows)| Stretch { start, rows: self.inside(start, &rows) });
-        let blocks = blocks(stretches);
+        let segments = segments.map(|(start, rows)| Segment { start, rows: self.inside(start, &rows) });
+        let blocks = blocks(segments);
         Interior { sums: vec![0.0; blocks.len().max(1) * self.diagonals.len()], blocks }
     }
 
@@ -116,8 +116,8 @@ impl Products {
         entries: &mut [f64],
     ) {
         let count = self.diagonals.len();
-        sum_blocks(&interior.blocks, count, &mut interior.sums, |stretch, sums| {
-            add_stretch(signals, supports, &self.diagonals, &stretch.rows, sums);
+        sum_blocks(&interior.blocks, count, &mut interior.sums, |segment, sums| {
+            add_segment(signals, supports, &self.diagonals, &segment.rows, sums);
         });
         for (diagonal, shared) in self.diagonals.iter().zip(&interior.sums) {
             for lag in diagonal.lags() {
@@ -208,7 +208,7 @@ fn diagonals(spans: &[Span]) -> Vec<Diagonal> {
 }
 
 /// Adds the products of the interior samples `taus`, diagonal by diagonal.
-fn add_stretch<S: AsRef<[f64]>>(
+fn add_segment<S: AsRef<[f64]>>(
     signals: &[S],
     supports: &[usize],
     diagonals: &[Diagonal],
@@ -223,7 +223,7 @@ fn add_stretch<S: AsRef<[f64]>>(
         sums = rest;
         let (Some(first), Some(last)) = (pair.first(), pair.last()) else { continue };
         let x = &signals[first.left.signal].as_ref()[taus.clone()];
-        // z(tau - d) with d falling: the same stretch of the partner, one sample later each.
+        // z(tau - d) with d falling: the same segment of the partner, one sample later each.
         let from = taus.start.saturating_add_signed(-first.difference);
         let to = taus.end.saturating_add_signed(-last.difference);
         if taus.start >= supports[first.left.signal] || from >= supports[first.right.signal] {

@@ -53,9 +53,9 @@ impl<'a> Lagged<'a> {
         Self { signals: signals.to_vec(), taps, segments, initial, longest }
     }
 
-    /// Leaves out so many first samples of each segment, those with a full regressor too; all samples count still where
+    /// Leaves out the first `first` samples of each segment, those with a full regressor too; all samples count still where
     /// zeros stand before a segment.
-    pub(crate) fn behind(self, first: usize) -> Self {
+    pub(crate) fn after(self, first: usize) -> Self {
         Self { longest: self.longest.max(first), ..self }
     }
 

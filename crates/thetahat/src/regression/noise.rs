@@ -21,7 +21,7 @@ impl Noise {
         (-2.0 * (1.0 - uniform()).ln()).sqrt() * (std::f64::consts::TAU * uniform()).cos()
     }
 
-    /// So many uniform ones.
+    /// This many uniform ones.
     pub(crate) fn take(&mut self, count: usize) -> Vec<f64> {
         (0..count).map(|_| self.next()).collect()
     }

@@ -22,7 +22,7 @@ use std::ops::Range;
 use thetahat_core::nalgebra::{DMatrix, DVector, Dyn};
 use thetahat_core::{Error, LeastSquares};
 
-use super::blocks::{Stretch, blocks, map_blocks};
+use super::blocks::{Segment, blocks, map_blocks};
 use super::kernel::{add_scaled, product};
 
 /// Rows folded at once: with some ten columns they stay in the first-level cache.
@@ -33,8 +33,8 @@ const BATCH: usize = 16;
 /// The triangular factor of the rows of `blocks`. `entry` gives the value of a row in a column, the target last;
 /// column c comes multiplied by `scales[c]`, which the factor does not have.
 pub(super) fn factor(
-    blocks: &[Vec<Stretch>],
-    entry: impl Fn(&Stretch, usize, usize) -> f64 + Sync,
+    blocks: &[Vec<Segment>],
+    entry: impl Fn(&Segment, usize, usize) -> f64 + Sync,
     scales: &[f64],
 ) -> Result<LeastSquares<f64, Dyn>, Error> {
     let mut whole = LeastSquares::with_size(Dyn(scales.len() - 1));
@@ -52,24 +52,24 @@ pub(crate) fn factor_rows(
     entry: impl Fn(usize, usize) -> f64 + Sync,
     columns: usize,
 ) -> Result<LeastSquares<f64, Dyn>, Error> {
-    let stretch = Stretch { start: rows.start, rows };
-    factor(&blocks(std::iter::once(stretch)), |_, row, column| entry(row, column), &vec![1.0; columns])
+    let segment = Segment { start: rows.start, rows };
+    factor(&blocks(std::iter::once(segment)), |_, row, column| entry(row, column), &vec![1.0; columns])
 }
 
 /// The factor of one block.
 fn block_factor(
-    block: &[Stretch],
-    entry: &impl Fn(&Stretch, usize, usize) -> f64,
+    block: &[Segment],
+    entry: &impl Fn(&Segment, usize, usize) -> f64,
     scales: &[f64],
 ) -> Result<LeastSquares<f64, Dyn>, Error> {
-    let rows: Vec<(&Stretch, usize)> =
-        block.iter().flat_map(|stretch| stretch.rows.clone().map(move |row| (stretch, row))).collect();
+    let rows: Vec<(&Segment, usize)> =
+        block.iter().flat_map(|segment| segment.rows.clone().map(move |row| (segment, row))).collect();
     let size = scales.len();
     if rows.len() < size {
         // Reflections would leave rounding in the rows of R that must be zero.
         let mut factor = LeastSquares::with_size(Dyn(size - 1));
-        for &(stretch, row) in &rows {
-            let value = |column: usize| entry(stretch, row, column) / scales[column];
+        for &(segment, row) in &rows {
+            let value = |column: usize| entry(segment, row, column) / scales[column];
             factor.add(&DVector::from_fn(size - 1, |column, _| value(column)), value(size - 1))?;
         }
         return Ok(factor);
@@ -77,8 +77,8 @@ fn block_factor(
     let mut folding = Folding::new(size);
     for some in rows.chunks(ROWS) {
         folding.fold(some.len(), |column, values| {
-            for (value, &(stretch, row)) in values.iter_mut().zip(some) {
-                *value = entry(stretch, row, column);
+            for (value, &(segment, row)) in values.iter_mut().zip(some) {
+                *value = entry(segment, row, column);
             }
         });
     }

@@ -22,7 +22,7 @@ use serde::{Deserialize, Serialize};
 use thetahat_core::LeastSquares;
 use thetahat_core::nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use super::blocks::{Stretch, blocks, sum_blocks};
+use super::blocks::{Segment, blocks, sum_blocks};
 use super::gram::gram;
 use super::kernel::{add_filtered, correlations, product};
 use super::lagged::Lagged;
@@ -168,11 +168,11 @@ impl Lagged<'_> {
                     *sum += phi * residual;
                 }
             }
-            inner.push(Stretch { start: segment.start, rows: full..rows.end });
+            inner.push(Segment { start: segment.start, rows: full..rows.end });
         }
         let blocks = blocks(inner.into_iter());
         let mut sums = vec![0.0; blocks.len().max(1) * (size + 1)];
-        sum_blocks(&blocks, size + 1, &mut sums, |Stretch { rows, .. }, sums| {
+        sum_blocks(&blocks, size + 1, &mut sums, |Segment { rows, .. }, sums| {
             let residuals = self.full_residuals(rows, parameters);
             sums[0] += product(&residuals, &residuals);
             let mut next = 1;
@@ -217,13 +217,13 @@ impl Lagged<'_> {
     pub(crate) fn factor(&self) -> Result<LeastSquares<f64, Dyn>, thetahat_core::Error> {
         let scales: Vec<f64> = self.signals.iter().map(|signal| scale(signal, self.segments)).collect();
         let columns: Vec<(usize, usize, f64)> = self.columns().chain([(0, 0, 1.0)]).collect();
-        let stretches =
-            self.segments.iter().map(|segment| Stretch { start: segment.start, rows: self.counted(segment) });
+        let segments =
+            self.segments.iter().map(|segment| Segment { start: segment.start, rows: self.counted(segment) });
         qr::factor(
-            &blocks(stretches),
-            |stretch, row, column| {
+            &blocks(segments),
+            |segment, row, column| {
                 let (signal, lag, sign) = columns[column];
-                sign * scales[signal] * self.sample(signal, stretch.start, row, lag)
+                sign * scales[signal] * self.sample(signal, segment.start, row, lag)
             },
             &columns.iter().map(|&(signal, _, _)| scales[signal]).collect::<Vec<_>>(),
         )

@@ -38,10 +38,10 @@ impl Case {
         Lagged::new(&signals, self.taps.clone(), &self.segments, self.initial)
     }
 
-    /// Each row of the regressor matrix, and behind it the target.
+    /// Each row of the regressor matrix, and after it the target.
     fn rows(&self) -> Vec<Vec<f64>> {
         let used = || self.taps.iter().filter(|taps| taps.count > 0);
-        let reach = used().map(|taps| taps.first + taps.count - 1).max().unwrap_or(0);
+        let lag = used().map(|taps| taps.first + taps.count - 1).max().unwrap_or(0);
         let mut rows = Vec::new();
         for segment in &self.segments {
             let sample = |signal: usize, row: usize, lag: usize| match row.checked_sub(lag) {
@@ -49,7 +49,7 @@ impl Case {
                 _ => 0.0,
             };
             for row in segment.clone() {
-                if self.initial == Presample::Drop && row < segment.start + reach {
+                if self.initial == Presample::Drop && row < segment.start + lag {
                     continue;
                 }
                 let mut values: Vec<f64> = used()
@@ -164,7 +164,7 @@ fn gram_error(case: &Case) -> f64 {
 #[test]
 fn the_gram_matrix_of_any_segments_is_that_of_the_rows() {
     let mut noise = Noise(1);
-    // Lengths of segments with a sample between them; the reach of the orders below is 0 to 12.
+    // Lengths of segments with a sample between them; the maximum lag of the orders below is 0 to 12.
     let cuts: [&[usize]; 5] = [&[1], &[40], &[1, 2, 30, 3, 7, 8, 9, 25], &[12, 13, 14, 24, 25, 26], &[5; 12]];
     for lengths in cuts {
         let mut end = 0;
@@ -196,7 +196,7 @@ fn the_gram_matrix_of_any_segments_is_that_of_the_rows() {
 #[test]
 fn the_gram_matrix_of_long_signals_is_that_of_the_rows() {
     let mut noise = Noise(2);
-    // Around the borders of blocks of 8192 samples.
+    // Around the boundaries of blocks of 8192 samples.
     for (length, cut) in [(8190, 0), (8192 + 9, 5), (20_000, 8192), (20_000, 19_990)] {
         let case = Case {
             signals: vec![noise.take(length), noise.take(length)],

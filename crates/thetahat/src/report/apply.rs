@@ -1,7 +1,7 @@
 use std::borrow::Cow;
 
+use super::fitted_rows::rows_of_fit;
 use super::schema::Report;
-use super::seen::rows_of_fit;
 use super::suited::{check_offsets, check_sample_time};
 use crate::Error;
 use crate::data::{Detrend, Log, Offset, Rows, checked};
@@ -14,7 +14,7 @@ use crate::validate::Fit;
 pub struct Applied {
     /// What it says of each output.
     pub outputs: Vec<AppliedOutput>,
-    /// How many rows behind the end of the log are forecast.
+    /// How many rows after the end of the log are forecast.
     pub beyond: usize,
     /// The rows asked for, in rising order.
     pub rows: Vec<Rows>,
@@ -27,7 +27,7 @@ pub struct AppliedOutput {
     pub name: String,
     /// The measured output, one value for each row of the log; NaN where it is missing. None if the log does not have it.
     pub measured: Option<Vec<f64>>,
-    /// The response, one value for each row of the log and then for each of the `beyond` rows behind it; NaN outside the
+    /// The response, one value for each row of the log and then for each of the `beyond` rows after it; NaN outside the
     /// rows asked for, in gaps, and before a start. Gaps of the output alone are none for free runs, for models without A,
     /// C and D, and for those in equations.
     pub predicted: Vec<f64>,
@@ -44,10 +44,10 @@ pub struct AppliedOutput {
 /// `rows` are those to respond to; none: all. The model's own offsets are used unless `detrend` says how to find
 /// others on these rows. A free run also works on a log without the model's outputs, from [`Start::Zero`].
 ///
-/// A prediction k steps ahead is also a forecast of the k samples behind the last usable row, each as many steps
-/// ahead as it lies behind that row: of rows asked for that have the inputs but not the output, and, for a model that
-/// no input drives and if the log's last row was asked for, of rows behind the log's end, in its own time step. There
-/// is no forecast where the last stretch without a gap is too short to start from. A model without A, C and D needs no past
+/// A prediction k steps ahead is also a forecast of the k samples after the last usable row, each as many steps
+/// ahead as it lies after that row: of rows asked for that have the inputs but not the output, and, for a model that
+/// no input drives and if the log's last row was asked for, of rows after the log's end, in its own time step. There
+/// is no forecast where the last segment without a gap is too short to start from. A model without A, C and D needs no past
 /// output: it has a value in every row that its inputs reach. So has one in equations, of which every prediction starts from what its
 /// filter knows k rows before.
 ///
@@ -315,7 +315,7 @@ mod tests {
             let deviation = applied.standard_deviations.as_ref().unwrap()[row];
             assert_eq!(deviation, prediction_deviation(&model, row - 2).unwrap());
         }
-        // Farther than the horizon there is nothing, nor behind a gap in the input.
+        // Farther than the horizon there is nothing, nor after a gap in the input.
         assert!(applied.predicted[6].is_nan());
         let gap = predicted(&model, &log(&[u[0], u[1], u[2], u[3], nan, u[5], u[6]]), &[], 3);
         assert!(gap.predicted[3].is_finite() && gap.predicted[4..].iter().all(|value| value.is_nan()));

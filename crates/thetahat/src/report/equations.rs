@@ -4,7 +4,7 @@
 mod tests;
 mod warnings;
 
-use super::judge::judge;
+use super::evaluate::evaluate;
 use super::schema::{Data, Estimation, Missing, Report};
 use super::shares::Shares;
 use crate::data::{Log, Rows, Source, Split, digests};
@@ -34,7 +34,7 @@ pub struct EquationsPlan {
     pub estimate: Vec<Rows>,
     /// Rows to validate on.
     pub validate: Vec<Rows>,
-    /// Cuts the rows to estimate on into parts: the fit is to the first two, and judged on the third.
+    /// Cuts the rows to estimate on into parts: the fit is to the first two, and evaluated on the third.
     pub split: Option<Split>,
     /// How to search; `initial_parameters` and `plant_first` do not apply.
     pub search: Search,
@@ -52,11 +52,11 @@ pub struct EquationsPlan {
 /// the maximum-likelihood estimate where innovations are Gaussian. Without process noise that is output error with an
 /// estimated initial state, of which the model knows `start` and `sd`. Each log starts from there anew. Of an unknown
 /// parameter the fit uses `start`, where the search begins, and its bounds; `walk` is for a filter that estimates it with the state.
-/// A search finds the minimum that its start leads to. Further starts, so many as `search.starts` says, are drawn from what the model
+/// A search finds the minimum that its start leads to. Further starts, as many as `search.starts` says, are drawn from what the model
 /// knows of the parameters, start and `sd` after the change of variable; the largest likelihood that is reached wins.
 ///
 /// **Rows.** The state of the first row that is estimated on is the model's start, in each log. Rows of it that are not asked for but
-/// stand behind go through the filter and do not count; so is the model looked at on other rows of these logs. Each further row is predicted over the time from the row before,
+/// stand after go through the filter and do not count; so is the model evaluated on other rows of these logs. Each further row is predicted over the time from the row before,
 /// with that row's inputs, and then corrected by its own outputs. The clock may be irregular
 /// ([`Log::recorded`](crate::data::Log::recorded)). A missing output (NaN) is left out alone; a missing input holds the value before it, zero before the first.
 ///
@@ -153,7 +153,7 @@ pub fn fit_equations(
         let rows = values.iter().filter(|value| value.is_nan()).count();
         Ok(Missing { channel: (*name).to_owned(), rows })
     });
-    let stretches = fitted_to.iter().flat_map(|experiment| {
+    let segments = fitted_to.iter().flat_map(|experiment| {
         let rows = experiment.counted().iter();
         rows.map(|rows| Rows::from_positions(&(rows.start + experiment.first..rows.end + experiment.first)))
     });
@@ -166,9 +166,9 @@ pub fn fit_equations(
         prefilter: None,
         validation,
         split: parts,
-        segments: stretches.collect(),
+        segments: segments.collect(),
         missing: missing.collect::<Result<_, Error>>()?,
-        time_gaps: log.jumps(),
+        time_gaps: log.gaps(),
         estimation,
     };
     let own = EquationsOnLog::new(&fitted, log, &data.estimation, &data.estimation)?;
@@ -224,10 +224,10 @@ pub fn fit_equations(
         fit: Vec::new(),
         warnings: words,
     };
-    judge(&mut report, &own, Part::Estimation, Focus::Auto);
+    evaluate(&mut report, &own, Part::Estimation, Focus::Auto);
     for (part, rows) in report.data.held_out() {
         let on_log = EquationsOnLog::new(&fitted, log, &rows, &report.data.estimation)?;
-        judge(&mut report, &on_log, part, Focus::Auto);
+        evaluate(&mut report, &on_log, part, Focus::Auto);
     }
     Ok(report)
 }

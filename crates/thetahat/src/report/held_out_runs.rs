@@ -9,11 +9,11 @@ use crate::data::{Log, Rows, between};
 use crate::estimate::Constant;
 use crate::respond::Horizon;
 
-/// Of so many parts of the rows that a choice was made on the last is left out.
+/// The rows that a choice was made on are cut into this many parts, of which the last is held out.
 const PARTS: usize = 3;
 
 /// Where a choice found one model for prediction and another for simulation: both, by name, fitted to the first two thirds of the
-/// rows that it was made on, and looked at on the last third of `log`. None where there was no such choice, and none of a model that
+/// rows that it was made on, and evaluated on the last third of `log`. None where there was no such choice, and none of a model that
 /// these rows do not determine.
 ///
 /// Cost: two fits.

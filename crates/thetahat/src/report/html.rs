@@ -105,15 +105,15 @@ pub fn validation_page(report: &Report, validated: &Validated, command: &str) ->
     let title = format!("Validation of {}{}", model_name(validation, 0), of(&validation.logs));
     let mut page = Page::new(title, command, &validation.generator);
     page.lead = lead(model, &validation.fit);
-    page.lead.push(match validation.seen {
-        super::Seen::No => "The model was not fitted to these rows.".to_owned(),
-        super::Seen::Partly => "The model was fitted to some of these rows.".to_owned(),
-        super::Seen::Yes => "The model was fitted to these rows: the figures flatter it.".to_owned(),
+    page.lead.push(match validation.in_sample {
+        super::InSample::No => "The model was not fitted to these rows.".to_owned(),
+        super::InSample::Partly => "The model was fitted to some of these rows.".to_owned(),
+        super::InSample::Yes => "The model was fitted to these rows: the figures flatter it.".to_owned(),
     });
     page.warnings = &validation.warnings;
     let rows = match validation.rows.as_slice() {
         [rows] => format!("rows {rows}"),
-        _ => "all rows looked at".to_owned(),
+        _ => "all rows evaluated".to_owned(),
     };
     let parts = [(rows, validated)];
     page.sections = vec![outputs(model, &parts, &[], &validation.fit, &validation.logs), residuals(&parts)];

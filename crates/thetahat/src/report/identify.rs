@@ -1,18 +1,18 @@
 use std::ops::{ControlFlow, Range};
 
-use super::judge::judge;
+use super::evaluate::evaluate;
+use super::fitted_rows::{estimation_record, estimation_start, goes_through};
 use super::plan::Plan;
 use super::schema::{Data, Estimation, Missing, Report};
-use super::seen::{estimation_record, estimation_start, goes_through};
 use super::shares::Shares;
-use super::warnings::{at_the_border, unstable_plant, warnings};
+use super::warnings::{at_the_stability_boundary, unstable_plant, warnings};
 use crate::data::{Detrend, Log, Offset, Prefiltered, Record, Rows, Source, digests};
 use crate::estimate::{self, Beside, Constant, Estimate, Fitted, Initial, Method, OutputOffset, enough};
 use crate::model::{Orders, PolynomialModel, Quantity, Signal};
 use crate::optimize::{Deadline, Monitor, Search};
 use crate::regression::sum;
 use crate::respond::{Horizon, PolynomialOnLog, Start, innovations};
-use crate::select::{self, Choice, Focus, Found, Grid, Task};
+use crate::select::{self, Choice, Focus, Grid, SelectedModel, Task};
 use crate::validate::Part;
 use crate::{Document, Error};
 
@@ -62,29 +62,29 @@ pub fn identify_monitored(
     plan: &Plan,
     monitor: Monitor<'_>,
 ) -> Result<Report, Error> {
-    let (unjudged, log) = fit(log, sources, plan, monitor)?;
-    unjudged.judged_on(&log)
+    let (pending, log) = fit(log, sources, plan, monitor)?;
+    pending.evaluate_on(&log)
 }
 
-/// A fit before its figures: they take several times as long as least squares, and not everybody looks at them.
+/// A fit before its figures: they take several times as long as least squares, and not every caller needs them.
 ///
 /// ```
 /// use std::ops::ControlFlow;
 /// use thetahat::data::{Channel, Log};
 /// use thetahat::model::Orders;
-/// use thetahat::report::{Plan, Unjudged, identify};
+/// use thetahat::report::{Plan, PendingEvaluation, identify};
 ///
 /// let u: Vec<f64> = (0..200).map(|t| f64::from(t * t % 7)).collect();
 /// let y = [vec![0.0], u[..199].to_vec()].concat();
 /// let channel = |name: &str, values| Channel { name: name.into(), values };
 /// let log = Log::new(vec![channel("u", u), channel("y", y)], 0.1)?;
 /// let plan = Plan::new(&["u"], "y", Orders::arx(0, &[1], &[1])?);
-/// let unjudged = Unjudged::new(log.clone(), &[], &plan, &|_| ControlFlow::Continue(()))?;
-/// assert_eq!(unjudged.judged(log.clone())?, identify(log, &[], &plan)?);
+/// let pending = PendingEvaluation::new(log.clone(), &[], &plan, &|_| ControlFlow::Continue(()))?;
+/// assert_eq!(pending.evaluate(log.clone())?, identify(log, &[], &plan)?);
 /// # Ok::<(), thetahat::Error>(())
 /// ```
 #[derive(Debug, Clone)]
-pub struct Unjudged {
+pub struct PendingEvaluation {
     report: Report,
     model: PolynomialModel,
     grid: Option<Grid>,
@@ -93,7 +93,7 @@ pub struct Unjudged {
     taken: [Offset; 2],
 }
 
-impl Unjudged {
+impl PendingEvaluation {
     /// [`identify_monitored`] up to the figures.
     ///
     /// # Errors
@@ -111,7 +111,7 @@ impl Unjudged {
     ///
     /// # Errors
     /// [`Error::Data`] for channels or rows that are not there.
-    pub fn judged(self, mut log: Log) -> Result<Report, Error> {
+    pub fn evaluate(self, mut log: Log) -> Result<Report, Error> {
         let model = &self.model;
         for signal in &model.inputs {
             log.remove(&signal.name, &signal.offset);
@@ -120,11 +120,11 @@ impl Unjudged {
         for offset in self.taken.iter().filter(|offset| **offset != Offset::default()) {
             log.remove(&model.output.name, offset);
         }
-        self.judged_on(&log)
+        self.evaluate_on(&log)
     }
 
     /// The same on deviations.
-    fn judged_on(self, log: &Log) -> Result<Report, Error> {
+    fn evaluate_on(self, log: &Log) -> Result<Report, Error> {
         let Self { mut report, model, grid, focus, .. } = self;
         let inputs: Vec<String> = model.inputs.iter().map(|input| input.name.clone()).collect();
         // The rows of the fit as it saw them; other rows begin in the middle of a run.
@@ -132,12 +132,12 @@ impl Unjudged {
         let start = estimation_start(&report, &model);
         let own =
             PolynomialOnLog::new(&model, log, &report.data.estimation, None)?.with_predictions(seen, start);
-        judge(&mut report, &own, Part::Estimation, focus);
+        evaluate(&mut report, &own, Part::Estimation, focus);
         for (part, rows) in report.data.held_out() {
-            judge(&mut report, &PolynomialOnLog::new(&model, log, &rows, None)?, part, focus);
+            evaluate(&mut report, &PolynomialOnLog::new(&model, log, &rows, None)?, part, focus);
         }
         if let Some(grid) = grid {
-            report.warnings.extend(at_the_border(&model.orders, &grid));
+            report.warnings.extend(at_the_stability_boundary(&model.orders, &grid));
         }
         report.warnings.extend(unstable_plant(&report));
         Ok(report)
@@ -150,7 +150,7 @@ fn fit(
     sources: &[Source],
     plan: &Plan,
     monitor: Monitor<'_>,
-) -> Result<(Unjudged, Log), Error> {
+) -> Result<(PendingEvaluation, Log), Error> {
     plan.check()?;
     let names: Vec<&str> = plan.inputs.iter().chain([&plan.output]).map(String::as_str).collect();
     for (position, name) in names.iter().enumerate() {
@@ -222,7 +222,7 @@ fn fit(
                 estimation: parts.as_ref().map_or(&estimation, |parts| &parts.estimation),
                 validation: parts.as_ref().map_or(&validation, |parts| &parts.validation),
             };
-            let Chosen { found: Found { selection, mut guess }, with_constant } =
+            let Chosen { found: SelectedModel { selection, mut guess }, with_constant } =
                 selected(&record, plan, &compared, &beside, monitor)?;
             if let (Method::PredictionError(search), false) = (&mut method, with_constant) {
                 search.initial_parameters = guess.take();
@@ -268,7 +268,7 @@ fn fit(
             let task = estimate::Task { record: &record, orders: &with_noise, method: &method, ..task };
             fitted = task.fit(constant, &beside, None)?;
             selection.steps.push(format!(
-                "Behind it an autoregression of order {order} describes what its free run leaves, for predictions: {with_noise}."
+                "After it an autoregression of order {order} describes what its free run leaves, for predictions: {with_noise}."
             ));
             (seen, orders) = (record, with_noise);
         }
@@ -291,7 +291,7 @@ fn fit(
         fitted.criteria = fitted.estimate.criteria();
     }
     // A prefilter leaves rows out, but cuts nothing.
-    let stretches = if band.is_some() { segments } else { seen.segments };
+    let segments = if band.is_some() { segments } else { seen.segments };
     let Fitted { estimate, offset, open, .. } = &fitted;
     let mut model = estimate.to_model(&orders, log.sample_time(), inputs.to_vec(), output.clone())?;
     model.offset_covariance.clone_from(open);
@@ -317,9 +317,9 @@ fn fit(
             estimation: estimation.clone(),
             validation: validation.clone(),
             split: parts,
-            segments: stretches.iter().map(Rows::from_positions).collect(),
+            segments: segments.iter().map(Rows::from_positions).collect(),
             missing,
-            time_gaps: log.jumps(),
+            time_gaps: log.gaps(),
         },
         selection,
         estimation: estimation_of(&fitted, output.offset),
@@ -336,7 +336,7 @@ fn fit(
         report.warnings.extend(band.warning(&estimation)?);
     }
     let grid = if let Choice::Grid(grid) = &plan.choice { Some(grid.clone()) } else { None };
-    Ok((Unjudged { report, model, grid, focus: plan.focus, taken }, log))
+    Ok((PendingEvaluation { report, model, grid, focus: plan.focus, taken }, log))
 }
 
 /// The record that models of these orders are fitted to: it goes on through missing outputs where no past one is needed.
@@ -362,7 +362,7 @@ struct Compared<'a> {
 
 /// A choice, and whether all models had a constant.
 struct Chosen {
-    found: Found,
+    found: SelectedModel,
     with_constant: bool,
 }
 
@@ -380,8 +380,8 @@ fn selected<'a>(
             "a choice among models compares prediction errors; give the orders for another method or criterion",
         ));
     };
-    let unseen = compared.validation;
-    let unseen = if unseen.is_empty() { None } else { Some(record(unseen)?) };
+    let held_out = compared.validation;
+    let held_out = if held_out.is_empty() { None } else { Some(record(held_out)?) };
     let estimation = record(compared.estimation)?;
     let with_constant = match plan.constant() {
         _ if plan.trend => true,
@@ -392,10 +392,10 @@ fn selected<'a>(
         Constant::Auto => plan.initial != Initial::Zero && select::constant_pays(&estimation),
     };
     let signals = if with_constant { beside.signals() } else { Vec::new() };
-    let unseen = unseen.map(|unseen| unseen.with_inputs(&signals));
+    let held_out = held_out.map(|held_out| held_out.with_inputs(&signals));
     let task = Task {
         estimation: &estimation.with_inputs(&signals),
-        validation: unseen.as_ref(),
+        validation: held_out.as_ref(),
         inputs: &plan.inputs,
         select: plan.select,
         focus: plan.focus,

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::judge::judge;
+use super::evaluate::evaluate;
 use super::schema::{Data, Estimation, Missing, Report};
 use super::shares::Shares;
 use crate::data::{Detrend, Log, Offset, Rows, Source, Split, digests};
@@ -279,7 +279,7 @@ pub fn fit_nonlinear_arx(log: &Log, sources: &[Source], plan: &NonlinearArxPlan)
         split: parts,
         segments: segments.iter().map(Rows::from_positions).collect(),
         missing: missing.collect::<Result<_, Error>>()?,
-        time_gaps: log.jumps(),
+        time_gaps: log.gaps(),
         estimation,
     };
     let estimation = Estimation {
@@ -309,9 +309,9 @@ pub fn fit_nonlinear_arx(log: &Log, sources: &[Source], plan: &NonlinearArxPlan)
     };
     let on_log = |rows: &[Rows]| NonlinearArxOnLog::new(&model, &deviations, rows);
     let own = on_log(&report.data.estimation)?;
-    judge(&mut report, &own, Part::Estimation, Focus::Auto);
+    evaluate(&mut report, &own, Part::Estimation, Focus::Auto);
     for (part, rows) in report.data.held_out() {
-        judge(&mut report, &on_log(&rows)?, part, Focus::Auto);
+        evaluate(&mut report, &on_log(&rows)?, part, Focus::Auto);
     }
     report.warnings.extend(warnings(&report, &model));
     Ok(report)

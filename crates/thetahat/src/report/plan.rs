@@ -16,7 +16,7 @@ pub struct Plan {
     /// Rows to validate on.
     pub validate: Vec<Rows>,
     /// Cuts the rows to estimate on into parts: models are fitted to the first one and compared, the chosen one is fitted again
-    /// to the first two, and judged on the third. None: all rows to estimate on serve for the fit.
+    /// to the first two, and evaluated on the third. None: all rows to estimate on serve for the fit.
     pub split: Option<Split>,
     /// What is taken from each channel.
     pub detrend: Detrend,
@@ -71,7 +71,7 @@ impl Plan {
     }
 
     /// Whether a constant is estimated: auto leaves alone the output of which the offset was given, as nothing or by hand, and one
-    /// of which a band is looked at.
+    /// of which a band counts.
     pub(super) fn constant(&self) -> Constant {
         let given = !self.takes_output_offset() || self.prefilter.is_some();
         if self.constant == Constant::Auto && given { Constant::No } else { self.constant }

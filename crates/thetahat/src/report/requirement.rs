@@ -54,7 +54,7 @@ pub enum Requirement {
         /// In units of the output.
         limit: f64,
     },
-    /// `coverage>=P`: the 95 % intervals one step ahead hold at least so many of the measured outputs.
+    /// `coverage>=P`: the 95 % intervals one step ahead hold at least P % of the measured outputs.
     Coverage {
         /// Of all samples.
         percent: f64,
@@ -286,7 +286,7 @@ fn of_fits(
     each.collect()
 }
 
-/// The figures so many steps ahead, of each output; without a number of the free run, or one step ahead of a model without inputs.
+/// The figures this many steps ahead, of each output; without a number of the free run, or one step ahead of a model without inputs.
 fn figures(validation: &Validation, steps: Option<usize>) -> (Vec<&Fit>, Horizon) {
     let horizon = match steps {
         None if validation.driven => Horizon::FreeRun,

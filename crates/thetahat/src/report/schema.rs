@@ -59,11 +59,11 @@ pub struct Data {
     /// How the rows were cut in time order, if they were.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub split: Option<Parts>,
-    /// The stretches of estimation rows without a gap; a missing output is none to models that go on through it.
+    /// The segments of estimation rows without a gap; a missing output is none to models that go on through it.
     pub segments: Vec<Rows>,
     /// How many values each channel misses.
     pub missing: Vec<Missing>,
-    /// How often the clock jumps.
+    /// How many gaps the clock has.
     pub time_gaps: usize,
 }
 

@@ -1,4 +1,4 @@
-//! Which rows a fit is made to, and which judge it.
+//! Which rows a fit is made to, and which it is evaluated on.
 
 use super::schema::Parts;
 use crate::Error;

@@ -40,7 +40,7 @@ fn is_consistent(report: &Report, log: &Log) {
     assert!((ratio - 1.0).abs() < 1e-6, "{orders} {ratio}");
     let plan = ValidationPlan { rows: report.data.estimation.clone(), ..ValidationPlan::default() };
     let found = validate(report, None, log, &[], &plan).unwrap().validation;
-    assert_eq!(found.seen, Seen::Yes, "{orders}");
+    assert_eq!(found.in_sample, InSample::Yes, "{orders}");
 }
 
 /// y(t) = 0.9 y(t-1) + u(t-1) with white noise around it, u held for some samples.

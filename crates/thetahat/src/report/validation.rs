@@ -4,11 +4,11 @@ mod tests;
 
 use std::collections::BTreeMap;
 
-pub use document::{Comparison, Coverage, NoiseLevel, Seen, Validation};
+pub use document::{Comparison, Coverage, InSample, NoiseLevel, Validation};
 
 use super::Report;
-use super::judge::of_output;
-use super::seen::rows_of_fit;
+use super::evaluate::of_output;
+use super::fitted_rows::rows_of_fit;
 use super::suited::{check_offsets, check_sample_time};
 use crate::data::{Detrend, Log, Offset, Rows, Source, checked};
 use crate::estimate::{Criteria, Procedure};
@@ -80,11 +80,11 @@ pub struct OutputSignals {
 /// How to validate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ValidationPlan {
-    /// Rows to look at; none: all.
+    /// Rows to validate on; none: all.
     pub rows: Vec<Rows>,
     /// How to find the offsets on these rows; none: the model's own.
     pub detrend: Option<Detrend>,
-    /// How many steps ahead to look besides 1.
+    /// Prediction horizons besides 1, in steps.
     pub horizons: Vec<usize>,
     /// L, the lags of the tests of residuals: 1 … 1000. Short logs have fewer.
     pub lags: usize,
@@ -208,7 +208,7 @@ pub fn validate(
         generator: GENERATOR.to_owned(),
         report: name.map(str::to_owned),
         logs: sources.to_vec(),
-        seen,
+        in_sample: seen,
         model: model.name(),
         parameters: model.parameters().len(),
         structure: polynomial.map(|model| model.structure),
@@ -224,7 +224,7 @@ pub fn validate(
         warnings: Vec::new(),
         rows,
     };
-    let Looks { one_step, free_run } = looks(&*on_log, plan, &mut validation);
+    let Evaluated { one_step, free_run } = evaluate(&*on_log, plan, &mut validation);
     test_residuals(report, &*on_log, plan, &mut validation);
     warn(plan, &mut validation);
 
@@ -268,7 +268,7 @@ pub fn validate(
 }
 
 /// Whether rows are among others.
-fn overlap(rows: &[Rows], fitted: &[Rows]) -> Seen {
+fn overlap(rows: &[Rows], fitted: &[Rows]) -> InSample {
     let shared = |rows: &Rows| -> usize {
         let each = fitted.iter().map(|fitted| {
             let (first, last) = (rows.first().max(fitted.first()), rows.last().min(fitted.last()));
@@ -278,24 +278,24 @@ fn overlap(rows: &[Rows], fitted: &[Rows]) -> Seen {
     };
     let (all, shared): (usize, usize) = (rows.iter().map(Rows::len).sum(), rows.iter().map(shared).sum());
     match shared {
-        0 => Seen::No,
-        _ if shared == all => Seen::Yes,
-        _ => Seen::Partly,
+        0 => InSample::No,
+        _ if shared == all => InSample::Yes,
+        _ => InSample::Partly,
     }
 }
 
 /// The prediction one step ahead and the free run, where they could be computed.
-struct Looks {
+struct Evaluated {
     one_step: Option<Vec<Response>>,
     free_run: Option<Vec<Response>>,
 }
 
 /// Fits, noise level and coverage.
-fn looks(on_log: &dyn OnLog, plan: &ValidationPlan, validation: &mut Validation) -> Looks {
+fn evaluate(on_log: &dyn OnLog, plan: &ValidationPlan, validation: &mut Validation) -> Evaluated {
     let mut steps: Vec<usize> = [&[1], &plan.horizons[..]].concat();
     steps.sort_unstable();
     steps.dedup();
-    let mut looks = Looks { one_step: None, free_run: None };
+    let mut evaluated = Evaluated { one_step: None, free_run: None };
     let ahead = steps.into_iter().map(|steps| Horizon::Steps { steps });
     for horizon in ahead.chain(on_log.is_driven().then_some(Horizon::FreeRun)) {
         let start = on_log.natural_start(horizon);
@@ -312,7 +312,7 @@ fn looks(on_log: &dyn OnLog, plan: &ValidationPlan, validation: &mut Validation)
             fit.outside = on_log.outside(index, response, horizon);
             if fit.percent.is_none() {
                 let why = if fit.samples == 0 {
-                    "the stretches without a gap are too short"
+                    "the segments without a gap are too short"
                 } else {
                     "the output is constant, or the response overflows"
                 };
@@ -336,16 +336,16 @@ fn looks(on_log: &dyn OnLog, plan: &ValidationPlan, validation: &mut Validation)
                     validation.coverage.extend(coverage(on_log, index, response, deviations, steps));
                 }
                 if steps == 1 {
-                    looks.one_step = Some(responses);
+                    evaluated.one_step = Some(responses);
                 }
             }
-            Horizon::FreeRun => looks.free_run = Some(responses),
+            Horizon::FreeRun => evaluated.free_run = Some(responses),
         }
     }
-    looks
+    evaluated
 }
 
-/// How often an output lies in the intervals around predictions so many steps ahead, as wide as their deviations say.
+/// How often an output lies in the intervals around predictions this many steps ahead, as wide as their deviations say.
 fn coverage<'a>(
     on_log: &'a dyn OnLog,
     output: usize,
@@ -380,9 +380,9 @@ fn coverage<'a>(
 fn test_residuals(report: &Report, on_log: &dyn OnLog, plan: &ValidationPlan, validation: &mut Validation) {
     // Where that fails, the fit figure has said why.
     let Ok(each) = on_log.tested() else { return };
-    let relation = match (validation.seen, &report.estimation.procedure) {
+    let relation = match (validation.in_sample, &report.estimation.procedure) {
         // The parameters of equations are none of the noise; those of functions are not of the model that the tests know.
-        (Seen::No, _) | (_, Procedure::InnovationsLikelihood(_) | Procedure::ForwardRegression(_)) => {
+        (InSample::No, _) | (_, Procedure::InnovationsLikelihood(_) | Procedure::ForwardRegression(_)) => {
             Relation::Fresh
         }
         (_, Procedure::InstrumentalVariables { .. }) => Relation::Instrumental,
@@ -500,8 +500,8 @@ fn warn(plan: &ValidationPlan, validation: &mut Validation) {
 
 /// The past lags farthest outside their band, three at most, in rising order.
 fn largest(independence: &crate::validate::Independence) -> String {
-    let behind = independence.past.lags + 1;
-    let each = independence.correlation.iter().zip(&independence.band).skip(behind).zip(1_usize..);
+    let after = independence.past.lags + 1;
+    let each = independence.correlation.iter().zip(&independence.band).skip(after).zip(1_usize..);
     let mut outside: Vec<(f64, usize)> = each
         .map(|((value, band), lag)| (value.abs() / band, lag))
         .filter(|(ratio, _)| *ratio > 1.0)

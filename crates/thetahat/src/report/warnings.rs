@@ -1,7 +1,7 @@
 //! What a careful reader of a report should know, in plain words.
 
+use super::fitted_rows::is_exact;
 use super::schema::Report;
-use super::seen::is_exact;
 use crate::estimate::{Procedure, SearchOutcome};
 use crate::figures::{fixed, number, scientific};
 use crate::model::{Orders, PolynomialModel, Structure, cancel, near_cancellation};
@@ -34,7 +34,7 @@ pub(super) fn warnings(report: &Report, model: &PolynomialModel) -> Vec<String> 
         ));
     }
     if data.time_gaps > 0 {
-        warnings.push(format!("jumps of the clock: {}; the log is cut there", data.time_gaps));
+        warnings.push(format!("gaps in the clock: {}; the log is cut there", data.time_gaps));
     }
     if data
         .validation
@@ -58,7 +58,7 @@ pub(super) fn warnings(report: &Report, model: &PolynomialModel) -> Vec<String> 
                 .extend(search_warnings(&SearchOutcome { stability_bound: false, ..outcome.search.clone() }));
             if outcome.search.stability_bound {
                 warnings.push(
-                    "the search ended at the border of stability: A or C has a root on the unit circle; take differences of an \
+                    "the search ended at the stability boundary: A or C has a root on the unit circle; take differences of an \
                      output that wanders without a level, and of one that was differenced too often none; or lower na or nc"
                         .to_owned(),
                 );
@@ -108,7 +108,7 @@ fn search_warnings(search: &SearchOutcome) -> Vec<String> {
     }
     if search.stability_bound {
         warnings.push(
-            "the search ended at the border of stability: C or F has a root on the unit circle; the data want an \
+            "the search ended at the stability boundary: C or F has a root on the unit circle; the data want an \
              unstable or overdifferenced model, so use arx or armax for an unstable plant, or lower nc or nf"
                 .to_owned(),
         );
@@ -132,7 +132,7 @@ pub(super) fn unstable_plant(report: &Report) -> Option<String> {
 }
 
 /// A word on orders that are the largest of their range: a larger one could be better.
-pub(super) fn at_the_border(orders: &Orders, grid: &Grid) -> Option<String> {
+pub(super) fn at_the_stability_boundary(orders: &Orders, grid: &Grid) -> Option<String> {
     let of_inputs = |ranges: &[OrderRange], orders: &[usize]| {
         let range = |input: usize| ranges.get(input).or(ranges.first());
         let at = |(input, order): (usize, &usize)| {

@@ -247,7 +247,7 @@ fn is_stable(model: &PolynomialModel) -> bool {
     model.stable && model.noise_poles.iter().all(|pole| pole.re.hypot(pole.im) < 1.0)
 }
 
-/// C/(A D) e over so many samples.
+/// C/(A D) e over this many samples.
 fn noise(model: &PolynomialModel, samples: usize, start: Start, random: &mut Random) -> Vec<f64> {
     let own = (model.orders.na > 0).then_some(&model.poles);
     let all = own.into_iter().flatten().filter(|pole| pole.polynomial == "a").chain(&model.noise_poles);

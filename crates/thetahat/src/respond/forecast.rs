@@ -67,7 +67,7 @@ pub fn forecast(
     start: Start,
 ) -> Result<Forecast, Error> {
     forecast_if_possible(model, record, inputs, steps, start)?.ok_or_else(|| {
-        Error::data("the last stretch without a gap is too short to forecast from; start from zero, or give more rows")
+        Error::data("the last segment without a gap is too short to forecast from; start from zero, or give more rows")
     })
 }
 
@@ -123,7 +123,7 @@ pub(crate) fn forecast_if_possible(
     Ok(Some(Forecast { values, standard_deviations }))
 }
 
-/// What is known of a stretch of samples: y, w and e.
+/// What is known of a segment of samples: y, w and e.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Known<'a> {
     pub(super) output: &'a [f64],

@@ -10,7 +10,7 @@ use crate::model::PolynomialModel;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum Horizon {
-    /// So many steps ahead of the last measured output.
+    /// This many steps ahead of the last measured output.
     Steps {
         /// At least 1.
         steps: usize,

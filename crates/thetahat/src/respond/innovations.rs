@@ -6,15 +6,15 @@
 //! e(t) = (D(q)/C(q)) w(t)
 //! ```
 //!
-//! (Ljung, System Identification, 2nd ed. 1999, sections 3.2 and 4.2). In the first r samples of a stretch of which
+//! (Ljung, System Identification, 2nd ed. 1999, sections 3.2 and 4.2). In the first r samples of a segment of which
 //! the past is unknown, v = D w is set to zero, and with it e = v/C; r = max(na, nb + nk - 1) + nd, over the inputs
-//! without F. F begins from rest, or with impulses: nf free responses of 1/F, the combination of which makes up for any x
+//! without F. F begins from rest, or with impulses: nf initial-condition responses of 1/F, the combination of which makes up for any x
 //! before, inputs before being zero; or max(nf, nb + nk - 1) of them, which makes up for any such inputs too. This is what estimates
 //! make of their first samples.
 
 use std::ops::Range;
 
-use super::free_response::{Column, UNSEEN, closest_of, impulse_response, until_negligible};
+use super::initial_condition::{Column, UNSEEN, closest_of, impulse_response, until_negligible};
 use super::{NOTHING_LEFT, Start, are_worth, check_inputs, history};
 use crate::Error;
 use crate::data::{Record, measured};
@@ -24,10 +24,10 @@ use crate::regression::{add_filtered, divide, sum_of_squares};
 /// The innovations of one segment.
 #[derive(Debug, Clone)]
 pub(crate) struct Innovations {
-    /// The samples looked at: the segment, and before it those that it starts from.
+    /// The samples used: the segment, and before it those that it starts from.
     pub(crate) rows: Range<usize>,
     /// How many of the first of the rows have e = 0 for want of what was before.
-    pub(super) silent: usize,
+    pub(super) presample: usize,
     /// The samples of the segment that count, if their output was measured.
     pub(crate) span: Range<usize>,
     /// Those that count: the span, but where outputs are missing.
@@ -48,7 +48,7 @@ impl Innovations {
     /// Errors that were found another way, one for each of `rows`.
     pub(super) fn alone(rows: Range<usize>, counted: Vec<Range<usize>>, errors: Vec<f64>) -> Self {
         Self {
-            silent: 0,
+            presample: 0,
             span: rows.clone(),
             rows,
             square: sum_of_squares(&errors),
@@ -68,7 +68,7 @@ impl Innovations {
     }
 }
 
-/// Impulses into 1/F from a sample of a stretch on, for each input.
+/// Impulses into 1/F from a sample of a segment on, for each input.
 #[derive(Debug, Clone)]
 pub(super) struct Impulses {
     pub(super) first: usize,
@@ -86,11 +86,11 @@ impl Impulses {
     }
 }
 
-/// Which impulses are estimated for a stretch.
+/// Which impulses are estimated for a segment.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Basis {
-    /// The first samples of the stretch have no e.
-    silent: usize,
+    /// The first samples of the segment have no e.
+    presample: usize,
     /// The sample that the first impulse is at, and how many there are for each input.
     pub(super) first: usize,
     pub(super) counts: Vec<usize>,
@@ -156,11 +156,11 @@ pub(super) fn of_segments(
     Ok(if worth { more } else { found })
 }
 
-/// For a start from estimated initial conditions: how many samples of a stretch have no e, and where impulses begin. The stretch
+/// For a start from estimated initial conditions: how many samples of a segment have no e, and where impulses begin. The segment
 /// begins with the past that the errors of its segment reach back to.
 fn estimated(model: &PolynomialModel, past: usize, with_inputs: bool) -> (usize, usize) {
-    let silent = past.min(model.orders.history()).max(model.orders.conditioned());
-    (silent, if past > 0 || with_inputs { silent - model.orders.nd } else { 0 })
+    let presample = past.min(model.orders.history()).max(model.orders.conditioned());
+    (presample, if past > 0 || with_inputs { presample - model.orders.nd } else { 0 })
 }
 
 /// The innovations of one segment, if it has enough samples.
@@ -175,13 +175,13 @@ fn of_segment(
 ) -> Result<Option<Innovations>, Error> {
     let conditioned = model.orders.conditioned();
     let ahead = horizon.saturating_sub(1);
-    let (first, silent, skipped) = match start {
+    let (first, presample, skipped) = match start {
         Start::Zero => (segment.start, 0, 0),
         Start::Drop => (history(model, segment, past, ahead), conditioned, conditioned.saturating_add(ahead)),
         Start::Estimate => {
-            let (silent, _) = estimated(model, past, with_inputs);
+            let (presample, _) = estimated(model, past, with_inputs);
             let first = segment.start - past.min(model.orders.history());
-            (first, silent, silent.saturating_add(ahead))
+            (first, presample, presample.saturating_add(ahead))
         }
     };
     let rows = first..segment.end;
@@ -190,11 +190,12 @@ fn of_segment(
     if counted.is_empty() {
         return Ok(None);
     }
-    let after = measured_runs(model, record, &(first.saturating_add(silent).min(segment.end)..segment.end));
+    let after =
+        measured_runs(model, record, &(first.saturating_add(presample).min(segment.end)..segment.end));
     let known = after.iter().map(Range::len).sum::<usize>();
     let mut impulses = Impulses::none(model);
-    let mut basis = Basis { silent, first: 0, counts: vec![0; model.orders.inputs()], gaps: Vec::new() };
-    let (mut disturbance, mut errors) = residuals(model, record, &rows, silent, &impulses);
+    let mut basis = Basis { presample, first: 0, counts: vec![0; model.orders.inputs()], gaps: Vec::new() };
+    let (mut disturbance, mut errors) = residuals(model, record, &rows, presample, &impulses);
     if start == Start::Estimate {
         // Numbers that as many samples determine fit them, whatever they are.
         let (_, origin) = estimated(model, past, with_inputs);
@@ -210,13 +211,24 @@ fn of_segment(
             let ends = after.iter().map(|run| run.start - first).chain([rows.len()]);
             let gaps: Vec<Range<usize>> = starts.zip(ends).map(|(start, end)| start..end).collect();
             let counts = (0..model.orders.inputs()).map(|input| count(model, input, origin, with_inputs));
-            basis = Basis { silent, first: origin, counts: counts.collect(), gaps };
+            basis = Basis { presample, first: origin, counts: counts.collect(), gaps };
             impulses = best(model, &errors, &basis)?;
-            (disturbance, errors) = residuals(model, record, &rows, silent, &impulses);
+            (disturbance, errors) = residuals(model, record, &rows, presample, &impulses);
         }
     }
-    let square = sum_of_squares(&errors[silent.min(rows.len())..]);
-    Ok(Some(Innovations { rows, silent, basis, span, counted, impulses, disturbance, errors, square, known }))
+    let square = sum_of_squares(&errors[presample.min(rows.len())..]);
+    Ok(Some(Innovations {
+        rows,
+        presample,
+        basis,
+        span,
+        counted,
+        impulses,
+        disturbance,
+        errors,
+        square,
+        known,
+    }))
 }
 
 /// The runs of samples that have a measured output: one for models that need past outputs, as their segments miss none.
@@ -227,7 +239,7 @@ fn measured_runs(model: &PolynomialModel, record: &Record<'_>, rows: &Range<usiz
     measured(record.output, rows)
 }
 
-/// x over stretches of the inputs, zeros before them, all as long as one another.
+/// x over segments of the inputs, zeros before them, all as long as one another.
 pub(super) fn driven(
     model: &PolynomialModel,
     inputs: &[&[f64]],
@@ -258,7 +270,7 @@ pub(super) fn residuals(
     model: &PolynomialModel,
     record: &Record<'_>,
     rows: &Range<usize>,
-    silent: usize,
+    presample: usize,
     impulses: &Impulses,
 ) -> (Vec<f64>, Vec<f64>) {
     let inputs: Vec<&[f64]> = record.inputs.iter().map(|u| &u[rows.clone()]).collect();
@@ -266,13 +278,13 @@ pub(super) fn residuals(
     disturbance.iter_mut().for_each(|value| *value = -*value);
     if model.orders.needs_past_outputs() {
         add_filtered(&mut disturbance, rows, &model.a, record.output, rows.start);
-        let errors = whitened(model, &disturbance, silent);
+        let errors = whitened(model, &disturbance, presample);
         return (disturbance, errors);
     }
     let mut errors = vec![0.0; rows.len()];
     for (t, y) in record.output[rows.clone()].iter().enumerate().filter(|(_, y)| !y.is_nan()) {
         disturbance[t] += y;
-        if t >= silent {
+        if t >= presample {
             errors[t] = disturbance[t];
         }
     }
@@ -280,7 +292,7 @@ pub(super) fn residuals(
 }
 
 /// (1/C) of D w, of which the first samples are set to zero.
-fn whitened(model: &PolynomialModel, disturbance: &[f64], silent: usize) -> Vec<f64> {
+fn whitened(model: &PolynomialModel, disturbance: &[f64], presample: usize) -> Vec<f64> {
     let mut errors = if model.d.len() == 1 {
         disturbance.to_vec()
     } else {
@@ -288,7 +300,7 @@ fn whitened(model: &PolynomialModel, disturbance: &[f64], silent: usize) -> Vec<
         add_filtered(&mut errors, &(0..disturbance.len()), &model.d, disturbance, 0);
         errors
     };
-    let (head, tail) = errors.split_at_mut(silent.min(disturbance.len()));
+    let (head, tail) = errors.split_at_mut(presample.min(disturbance.len()));
     head.fill(0.0);
     divide(&model.c, tail);
     errors
@@ -313,10 +325,10 @@ pub(super) fn best(model: &PolynomialModel, errors: &[f64], basis: &Basis) -> Re
     Ok(Impulses { first: basis.first, weights: each.collect() })
 }
 
-/// What unit impulses do to the errors of a stretch, and how many samples of it say something of them.
+/// What unit impulses do to the errors of a segment, and how many samples of it say something of them.
 pub(super) fn free_columns(model: &PolynomialModel, samples: usize, basis: &Basis) -> (usize, Vec<Column>) {
-    let Basis { silent, first, counts, gaps } = basis;
-    let (silent, first) = (*silent, *first);
+    let Basis { presample, first, counts, gaps } = basis;
+    let (presample, first) = (*presample, *first);
     let orders = &model.orders;
     let order = orders.nc + orders.nd;
     let (unknown, most) = (counts.iter().sum::<usize>(), counts.iter().copied().max().unwrap_or(0));
@@ -326,13 +338,13 @@ pub(super) fn free_columns(model: &PolynomialModel, samples: usize, basis: &Basi
         until_negligible(samples, order + f.len(), compute).len() + f.len()
     };
     let lasting = model.f.iter().map(lasting).max().unwrap_or(0) + most;
-    let length = (lasting + silent + orders.nd).max(unknown + silent + 1).min(samples);
+    let length = (lasting + presample + orders.nd).max(unknown + presample + 1).min(samples);
 
     let gain: f64 = model.d.iter().map(|d| d.abs()).sum();
     let column = |response: &[f64], delay: usize| {
         let mut delayed = vec![0.0; (first + delay).min(length)];
         delayed.extend_from_slice(&response[..length - delayed.len()]);
-        let mut values = whitened(model, &delayed, silent);
+        let mut values = whitened(model, &delayed, presample);
         for gap in gaps {
             values[gap.start.min(length)..gap.end.min(length)].fill(0.0);
         }

@@ -44,7 +44,7 @@ pub(crate) trait OnLog {
     /// What is left of each output one step ahead.
     fn tested(&self) -> Result<Vec<Tested<'_>>, Error>;
 
-    /// What is expected behind the last usable row of `rows`, so many steps ahead at most, and the row (0-based) that it begins with;
+    /// What is expected after the last usable row of `rows`, at most this many steps ahead, and the row (0-based) that it begins with;
     /// none where there is nothing to start from, or predictions reach there by themselves.
     fn forecast(
         &self,
@@ -73,12 +73,12 @@ pub(crate) struct Tested<'a> {
 #[derive(Debug)]
 pub(crate) struct PolynomialOnLog<'l> {
     model: &'l PolynomialModel,
-    /// What predictions look at, and what they start from.
+    /// What predictions are made from, and what they start from.
     ahead: Record<'l>,
     start: Start,
     /// What is left one step ahead, once somebody asked.
     innovations: OnceCell<Vec<Innovations>>,
-    /// What free runs look at.
+    /// What free runs are made from.
     free_run: Record<'l>,
 }
 
@@ -105,7 +105,7 @@ impl<'l> PolynomialOnLog<'l> {
         })
     }
 
-    /// Predictions that look at another record, and start from something else.
+    /// Predictions from another record, and start from something else.
     pub(crate) fn with_predictions(self, ahead: Record<'l>, start: Start) -> Self {
         Self { ahead, start, innovations: OnceCell::new(), ..self }
     }
@@ -224,7 +224,7 @@ pub(super) fn known_ahead(
     Ok(if driving.is_empty() && end == log.rows() { steps } else { steps.min(end - first) })
 }
 
-/// The record that a response of a model looks at. It goes on through missing outputs where no past one is needed.
+/// The record that a response of a model is made from. It goes on through missing outputs where no past one is needed.
 pub(crate) fn record_for<'l>(
     model: &PolynomialModel,
     log: &'l Log,

@@ -1,6 +1,6 @@
 use std::ops::Range;
 
-use super::free_response::until_negligible;
+use super::initial_condition::until_negligible;
 use super::innovations::{Innovations, innovations};
 use super::{Response, Start, check_inputs};
 use crate::Error;
@@ -24,7 +24,7 @@ pub(super) const MOST_STEPS: usize = 1_000_000;
 ///
 /// [`Start::Zero`] takes zeros before each segment, and every sample has a prediction. [`Start::Drop`] and
 /// [`Start::Estimate`] leave out the samples without an output k steps before them to look from: the first r + k - 1
-/// of those they look at (for r see [`Start`]). What unknown samples have done to B/F u is nothing to the first two; the
+/// of those they use (for r see [`Start`]). What unknown samples have done to B/F u is nothing to the first two; the
 /// last estimates it from the one-step errors, whatever k is, as estimates with
 /// [`Initial::Estimate`](crate::estimate::Initial::Estimate) do. It leaves out segments with no more samples than there are numbers
 /// to estimate.
@@ -176,7 +176,7 @@ pub(super) fn disturbance_response(model: &PolynomialModel, length: usize) -> Ve
     })
 }
 
-/// The longest stretch of samples that a response may look at.
+/// The longest segment of samples that a response may use.
 pub(crate) fn longest(record: &Record<'_>) -> usize {
     let lengths =
         record.segments.iter().map(Range::len).zip(&record.past).map(|(length, past)| length + past);

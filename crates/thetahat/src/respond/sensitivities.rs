@@ -113,11 +113,11 @@ fn roots(matrix: DMatrix<f64>) -> Vec<(f64, Vec<f64>)> {
         .collect()
 }
 
-/// The signals of a stretch, of which the first `known` samples are measured and others may follow.
+/// The signals of a segment, of which the first `known` samples are measured and others may follow.
 #[derive(Debug)]
 pub(super) struct Paths {
     pub(super) known: usize,
-    pub(super) silent: usize,
+    pub(super) presample: usize,
     basis: Basis,
     pub(super) inputs: Vec<Vec<f64>>,
     pub(super) output: Vec<f64>,
@@ -138,7 +138,7 @@ struct Moved {
 }
 
 impl Paths {
-    /// `inputs`, `output`, `disturbance` and `errors` go as far as they are to be looked at.
+    /// `inputs`, `output`, `disturbance` and `errors` go as far as they are used.
     pub(super) fn new(
         model: &PolynomialModel,
         found: &Innovations,
@@ -161,8 +161,8 @@ impl Paths {
         let responses = (0..inputs.len()).map(response).collect();
         // Where the output is missing, A is 1.
         let output = output.into_iter().map(|y| if y.is_nan() { 0.0 } else { y }).collect();
-        let (known, silent, basis) = (found.rows.len(), found.silent, found.basis.clone());
-        Self { known, silent, basis, inputs, output, disturbance, errors, responses }
+        let (known, presample, basis) = (found.rows.len(), found.presample, found.basis.clone());
+        Self { known, presample, basis, inputs, output, disturbance, errors, responses }
     }
 
     /// The derivative along a change, of impulses into 1/F, and of the errors before the first that is known: of the one
@@ -187,16 +187,16 @@ impl Paths {
         let mut errors = vec![0.0; self.known];
         add_filtered(&mut errors, &known, &model.d, &disturbance, 0);
         add_filtered(&mut errors, &known, &change.d, &self.disturbance, 0);
-        let silent = self.silent.min(self.known);
-        errors[..silent].fill(0.0);
-        let mut noise = vec![0.0; self.known - silent];
-        add_filtered(&mut noise, &(silent..self.known), &change.c, &self.errors, 0);
+        let presample = self.presample.min(self.known);
+        errors[..presample].fill(0.0);
+        let mut noise = vec![0.0; self.known - presample];
+        add_filtered(&mut noise, &(presample..self.known), &change.c, &self.errors, 0);
         if earlier > 0 {
             noise.iter_mut().zip(&model.c[earlier..]).for_each(|(sum, c)| *sum += c);
         }
-        errors[silent..].iter_mut().zip(&noise).for_each(|(error, noise)| *error -= noise);
-        divide(&model.c, &mut errors[silent..]);
-        if let Some(before) = silent.checked_sub(earlier).filter(|before| *before < silent) {
+        errors[presample..].iter_mut().zip(&noise).for_each(|(error, noise)| *error -= noise);
+        divide(&model.c, &mut errors[presample..]);
+        if let Some(before) = presample.checked_sub(earlier).filter(|before| *before < presample) {
             errors[before] = 1.0;
         }
         Moved { x, disturbance, errors }

@@ -1,7 +1,9 @@
 use std::ops::Range;
 
 use super::forecast::{Known, continuation};
-use super::free_response::{Column, Delays, UNSEEN, closest, closest_of, impulse_response, until_negligible};
+use super::initial_condition::{
+    Column, Delays, UNSEEN, closest, closest_of, impulse_response, until_negligible,
+};
 use super::innovations::{Impulses, driven, residuals};
 use super::{NOTHING_LEFT, Response, Start, are_worth, check_inputs, history};
 use crate::Error;
@@ -14,7 +16,7 @@ use crate::regression::{add_filtered, divide, sum};
 /// [`Start::Zero`] takes zeros before each segment. [`Start::Drop`] goes on from measured samples, with e = 0
 /// from the first sample that counts: what they say of the disturbance, which C and D give a memory, dies away from
 /// there. For ARX it is the difference equation run from measured outputs and inputs. [`Start::Estimate`] takes the inputs
-/// that were measured directly before the segment, and adds the combination of free responses
+/// that were measured directly before the segment, and adds the combination of initial-condition responses
 ///
 /// ```text
 /// q^-i (1/A) delta,   i < max(na, nb + nk - 1 of the inputs without F)
@@ -30,11 +32,11 @@ use crate::regression::{add_filtered, divide, sum};
 /// [`Log::driven_record`](crate::data::Log::driven_record)); these samples do not count.
 ///
 /// Signals are deviations from the model's offsets. The output of the record is not read for [`Start::Zero`].
-/// Cost: O(N (na + nb + nf)), and O(N n) more for n free responses that do not die away, O(N n^2) where outputs are missing.
+/// Cost: O(N (na + nb + nf)), and O(N n) more for n initial-condition responses that do not die away, O(N n^2) where outputs are missing.
 ///
 /// # Errors
 /// [`Error::Argument`] if the record does not have the model's inputs; [`Error::Undetermined`] if an initial condition
-/// cannot be told from the data, as for a model so unstable that its free responses overflow.
+/// cannot be told from the data, as for a model so unstable that its initial-condition responses overflow.
 ///
 /// ```
 /// use thetahat::data::Record;
@@ -65,12 +67,12 @@ pub fn simulate(model: &PolynomialModel, record: &Record<'_>, start: Start) -> R
     let mut response = Response::empty(record.output.len());
     let mut free = Free::new(model, record);
     for (segment, past) in record.segments.iter().zip(&record.past) {
-        let reach =
-            (0..model.orders.inputs()).map(|input| model.orders.input_reach(input)).max().unwrap_or(0);
+        let lag =
+            (0..model.orders.inputs()).map(|input| model.orders.maximum_input_lag(input)).max().unwrap_or(0);
         let (before, known) = match start {
             Start::Zero => (0, 0),
             Start::Drop => (segment.start - history(model, segment, *past, 0), conditioned),
-            Start::Estimate => (reach.min(*past), reach.min(*past)),
+            Start::Estimate => (lag.min(*past), lag.min(*past)),
         };
         let first = segment.start - before;
         let run = (first + known).clamp(segment.start, segment.end)..segment.end;
@@ -128,11 +130,11 @@ impl<'a> Free<'a> {
         Self { model, output: record.output, runs: Vec::new(), responses: Vec::new() }
     }
 
-    /// How many free responses of 1/A, and of each 1/(A F_j), make up for what is unknown before a segment.
+    /// How many initial-condition responses of 1/A, and of each 1/(A F_j), make up for what is unknown before a segment.
     fn counts(&self, past: usize, with_inputs: bool) -> Vec<usize> {
         let orders = &self.model.orders;
         let inputs = 0..orders.inputs();
-        let unknown = |input: usize| orders.input_reach(input).saturating_sub(past);
+        let unknown = |input: usize| orders.maximum_input_lag(input).saturating_sub(past);
         let filtered = inputs
             .filter(|&input| orders.nf[input] > 0)
             .map(|input| if with_inputs { orders.nf[input].max(unknown(input)) } else { orders.nf[input] });
@@ -191,7 +193,7 @@ impl<'a> Free<'a> {
         Ok(Some(Completed { run, samples, unknown, square, output }))
     }
 
-    /// Adds the combination of free responses that brings `values` closest to `output`, which may have gaps.
+    /// Adds the combination of initial-condition responses that brings `values` closest to `output`, which may have gaps.
     fn add_closest(
         &self,
         output: &[f64],
@@ -199,7 +201,7 @@ impl<'a> Free<'a> {
         gaps: bool,
         values: &mut [f64],
     ) -> Result<(), Error> {
-        // Behind the last free response there is nothing to fit.
+        // After the last initial-condition response there is nothing to fit.
         let used = || self.responses.iter().zip(counts).filter(|(_, count)| **count > 0);
         let ends = used().map(|(response, count)| response.len() + count);
         let length = ends.max().unwrap_or(0).max(counts.iter().sum::<usize>() + 1).min(output.len());

@@ -9,7 +9,7 @@ use crate::model::PolynomialModel;
 
 /// What a response starts from, in the words of [`Initial`](crate::estimate::Initial) for fits.
 ///
-/// In the first r = max(na, nb + nk - 1 of the inputs without F) + nd samples of a stretch, A, B and D reach back to
+/// In the first r = max(na, nb + nk - 1 of the inputs without F) + nd samples of a segment, A, B and D reach back to
 /// samples that are not there. Unless these are taken as zero, e is, and the r samples do not count. What [`Initial`](crate::estimate::Initial)
 /// says of them holds here too.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -48,7 +48,7 @@ pub(super) fn history(model: &PolynomialModel, segment: &Range<usize>, past: usi
 /// A sum of squared errors below this fraction of the output's is rounding.
 pub(crate) const NOTHING_LEFT: f64 = 1e-28;
 
-/// Whether `more` initial conditions are worth it that lower the sum of squared errors over so many samples:
+/// Whether `more` initial conditions are worth it that lower the sum of squared errors over this many samples:
 /// N ln(V_without/V_with) > n ln N. The same rule for estimates and for what is made of them. `nothing` is a sum that is rounding.
 pub(crate) fn are_worth(samples: usize, without: f64, with: f64, more: usize, nothing: f64) -> bool {
     let samples = samples as f64;

@@ -75,7 +75,7 @@ fn models() -> Vec<PolynomialModel> {
     ]
 }
 
-/// So many signals of `length` samples.
+/// This many signals of `length` samples.
 fn signals(count: usize, length: usize, noise: &mut Noise) -> Vec<Vec<f64>> {
     (0..count).map(|_| noise.take(length)).collect()
 }
@@ -84,7 +84,7 @@ fn views(signals: &[Vec<f64>]) -> Vec<&[f64]> {
     signals.iter().map(Vec::as_slice).collect()
 }
 
-/// Segments of all lengths, and how many samples before each may be looked at.
+/// Segments of all lengths, and how many samples before each may be used.
 fn cut<'a>(output: &'a [f64], inputs: &'a [Vec<f64>]) -> Record<'a> {
     let segments = vec![0..1, 3..60, 61..69, 70..140];
     Record { output, inputs: views(inputs), segments, past: vec![0, 2, 0, 7] }
@@ -98,7 +98,7 @@ fn a_prediction_is_the_difference_equation_run_from_measured_samples() {
         let record = cut(&y, &u);
         for horizon in [1, 2, 5, 40, 1000] {
             for start in [Start::Zero, Start::Drop] {
-                let skipped = if start == Start::Zero { 0 } else { model.orders.reach() + horizon - 1 };
+                let skipped = if start == Start::Zero { 0 } else { model.orders.maximum_lag() + horizon - 1 };
                 let mut expected = vec![f64::NAN; 150];
                 let mut counted = Vec::new();
                 for (segment, past) in record.segments.iter().zip(&record.past) {
@@ -151,7 +151,7 @@ fn a_free_run_is_the_difference_equation() {
             for (segment, past) in record.segments.iter().zip(&record.past) {
                 let (begin, known) = match start {
                     Start::Zero => (segment.start, 0),
-                    _ => (segment.start - past, model.orders.reach()),
+                    _ => (segment.start - past, model.orders.maximum_lag()),
                 };
                 let rows = segment.start.max(begin + known)..segment.end;
                 if rows.is_empty() {
@@ -225,9 +225,9 @@ fn an_estimated_start_is_the_best_there_is() {
         let values = &simulate(&model, &record, Start::Estimate).unwrap().values[40..240];
         let errors: Vec<f64> = y[40..240].iter().zip(values).map(|(y, x)| y - x).collect();
         let size = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
-        // The errors are orthogonal to every free response: moving along one only makes them larger.
+        // The errors are orthogonal to every initial-condition response: moving along one only makes them larger.
         let free = inverse_series(&model.a, 200);
-        for delay in 0..model.orders.reach() {
+        for delay in 0..model.orders.maximum_lag() {
             let slope: f64 = errors[delay..].iter().zip(&free).map(|(e, h)| e * h).sum();
             assert!(slope.abs() < 1e-8 * size(&errors) * size(&free), "{model:?} {delay}");
         }

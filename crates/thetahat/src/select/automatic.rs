@@ -9,7 +9,7 @@ use super::compare::compare;
 use super::delay;
 use super::grid::key;
 use super::ranking::ranked;
-use super::{Automatic, Found, Selection, Task};
+use super::{Automatic, SelectedModel, Selection, Task};
 use crate::Error;
 use crate::data::Record;
 use crate::estimate::{Initial, pays};
@@ -18,7 +18,7 @@ use crate::model::{Orders, Structure};
 /// The highest order of ARX and AR models, and of the others.
 const LONGEST: usize = 10;
 const HIGHEST: usize = 3;
-/// Orders of A or F, of B, of C and of D in models that are looked at for their free runs.
+/// Orders of A or F, of B, of C and of D in models that are compared by their free runs.
 const DIAGONAL_ARX: [[usize; 4]; 8] = [
     [1, 1, 0, 0],
     [2, 2, 0, 0],
@@ -46,7 +46,7 @@ const CONSTANT_ORDERS: [usize; 2] = [2, LONGEST];
 
 /// # Errors
 /// As for [`choose`](super::choose).
-pub(super) fn choose(task: &Task<'_>, automatic: &Automatic) -> Result<Found, Error> {
+pub(super) fn choose(task: &Task<'_>, automatic: &Automatic) -> Result<SelectedModel, Error> {
     let inputs = task.inputs.len();
     if inputs > MOST_INPUTS {
         return Err(Error::argument(
@@ -90,10 +90,10 @@ pub(super) fn choose(task: &Task<'_>, automatic: &Automatic) -> Result<Found, Er
     models.sort_by_key(Orders::parameters);
     let tried = models.clone();
     let outcome = compare(task, models)?;
-    let Found { mut selection, guess } = ranked(task, outcome, None)?;
+    let SelectedModel { mut selection, guess } = ranked(task, outcome, None)?;
     selection.steps.extend(at_the_edge(&selection.chosen.orders, &tried));
     steps.append(&mut selection.steps);
-    Ok(Found { selection: Selection { steps, delays, ..selection }, guess })
+    Ok(SelectedModel { selection: Selection { steps, delays, ..selection }, guess })
 }
 
 /// Orders without some inputs.
@@ -182,8 +182,9 @@ fn diagonal(record: &Record<'_>, structures: &[Structure], nk: &[usize]) -> Resu
         };
         for orders in all {
             let orders = of_structure(*structure, *orders, nk)?;
-            let masked = (0..nk.len()).map(|input| orders.input_reach(input)).fold(orders.na, usize::max);
-            if are_enough(record, orders.parameters(), masked) {
+            let left_out =
+                (0..nk.len()).map(|input| orders.maximum_input_lag(input)).fold(orders.na, usize::max);
+            if are_enough(record, orders.parameters(), left_out) {
                 models.push(orders);
             }
         }
@@ -201,8 +202,9 @@ fn candidates(record: &Record<'_>, structures: &[Structure], nk: &[usize]) -> Re
         let of = |order: usize| of_structure(*structure, [order; 4], nk);
         let fits = |order: &usize| {
             of(*order).is_ok_and(|orders| {
-                let masked = (0..inputs).map(|input| orders.input_reach(input)).fold(*order, usize::max);
-                are_enough(record, orders.parameters(), masked)
+                let left_out =
+                    (0..inputs).map(|input| orders.maximum_input_lag(input)).fold(*order, usize::max);
+                are_enough(record, orders.parameters(), left_out)
             })
         };
         let highest = (2..=most).rev().find(fits).unwrap_or(1);

@@ -1,6 +1,6 @@
 //! The models of a choice, and the samples that all of them are compared on.
 
-use super::Scored;
+use super::Candidate;
 use super::linear::{Columns, Kept, Rows};
 use crate::Error;
 use crate::data::Record;
@@ -8,19 +8,19 @@ use crate::estimate::{Initial, Point, Window, drop_is_not_for_f, estimate_is_for
 use crate::model::Orders;
 use crate::regression::{Presample, sum_of_squares};
 
-/// So many inputs at most: a Gram matrix of all their lags has to fit.
+/// At most this many inputs: a Gram matrix of all their lags has to fit.
 pub(super) const MOST_INPUTS: usize = 100;
-/// So many samples for each parameter at least.
+/// At least this many samples for each parameter.
 const SAMPLES: usize = 4;
-/// So many samples behind those that models reach back to do not count where there is C: what 1/C makes of e = 0 before
-/// them fades there. It would be tens of times the price of a parameter.
+/// Samples skipped after the maximum lag, so that transients of 1/C die away: they would be tens of times the price of a
+/// parameter.
 const FADING: usize = 50;
 /// Of a segment of mean length not more than this part is given to that.
 const LEAST_OF_PIECE: usize = 20;
 
 /// A model on the common samples.
 #[derive(Debug, Clone)]
-pub(super) struct Tried {
+pub(super) struct Trial {
     pub(super) orders: Orders,
     pub(super) point: Option<Point>,
 }
@@ -28,7 +28,7 @@ pub(super) struct Tried {
 /// A model that was compared.
 #[derive(Debug, Clone)]
 pub(super) struct Compared {
-    pub(super) scored: Scored,
+    pub(super) scored: Candidate,
     /// The parameters, if they were searched for.
     pub(super) guess: Option<Vec<f64>>,
     /// The largest modulus of a pole of the plant; infinite where that is not known.
@@ -59,11 +59,11 @@ impl Samples {
         Ok(Self::unknown(record, models.iter()))
     }
 
-    /// The samples behind those that some model reaches back to.
+    /// The samples after the maximum lag of all models.
     pub(super) fn unknown<'m>(record: &Record<'_>, models: impl Iterator<Item = &'m Orders> + Clone) -> Self {
-        // Segments that are too short for the free responses of one model are so for all.
-        let reach = |orders: &Orders| orders.conditioned().max(orders.nf.iter().sum());
-        let silent = models.clone().map(reach).max().unwrap_or(0);
+        // Segments that are too short for the initial-condition responses of one model are so for all.
+        let lag = |orders: &Orders| orders.conditioned().max(orders.nf.iter().sum());
+        let silent = models.clone().map(lag).max().unwrap_or(0);
         let coloured = models.filter(|orders| orders.nc > 0).count() > 0;
         let most = total(record) / record.segments.len().max(1) / LEAST_OF_PIECE;
         let counted = silent + if coloured { FADING.min(most) } else { 0 };
@@ -95,10 +95,10 @@ pub(super) fn energy(record: &Record<'_>) -> f64 {
     record.segments.iter().map(|segment| sum_of_squares(&record.output[segment.clone()])).sum()
 }
 
-/// Whether a record has enough samples for so many parameters, and does not lose more than half of them to the start of its
+/// Whether a record has enough samples for this many parameters, and does not lose more than half of them to the start of its
 /// segments.
-pub(super) fn are_enough(record: &Record<'_>, parameters: usize, masked: usize) -> bool {
-    let left = |segment: &std::ops::Range<usize>| segment.len().saturating_sub(masked);
+pub(super) fn are_enough(record: &Record<'_>, parameters: usize, left_out: usize) -> bool {
+    let left = |segment: &std::ops::Range<usize>| segment.len().saturating_sub(left_out);
     let count: usize = record.segments.iter().map(left).sum();
     count >= SAMPLES * parameters && 2 * count >= total(record)
 }

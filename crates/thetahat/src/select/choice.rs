@@ -122,7 +122,7 @@ impl Select {
         }
     }
 
-    /// Whether it looks at samples that models are not fitted to.
+    /// Whether it evaluates samples that models are not fitted to.
     pub(super) fn is_held_out(self) -> bool {
         !matches!(self, Self::Criterion(_))
     }

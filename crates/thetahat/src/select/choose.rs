@@ -3,7 +3,7 @@ use std::ops::ControlFlow;
 use super::choice::{Choice, Path, Select};
 use super::focus::Focus;
 use super::selection::Selection;
-use super::task::{Found, Task};
+use super::task::{SelectedModel, Task};
 use super::{automatic, compare, ranking};
 use crate::Error;
 use crate::data::Record;
@@ -76,7 +76,7 @@ pub fn choose_orders(
 ///
 /// # Errors
 /// As for [`choose_orders`]; [`Error::Interrupted`] if the monitor says so.
-pub(crate) fn choose(task: &Task<'_>, choice: &Choice) -> Result<Found, Error> {
+pub(crate) fn choose(task: &Task<'_>, choice: &Choice) -> Result<SelectedModel, Error> {
     if task.select == Select::Validation && task.validation.is_none() {
         return Err(Error::argument(
             "select",

@@ -1,21 +1,21 @@
 //! All models on the same samples.
 
-use super::candidates::{Compared, Samples, Tried, energy, rows, total};
+use super::candidates::{Compared, Samples, Trial, energy, rows, total};
 use super::linear::{Columns, Fitted, Scaled};
 use super::search::Family;
-use super::{EXACT, Scored, Select, Task, held_out, unseen};
+use super::{Candidate, EXACT, Select, Task, held_out, held_out_mse};
 use crate::Error;
 use crate::data::Record;
 use crate::estimate::{Common, Initial, Point, stretches};
 use crate::model::Orders;
 
-/// Of records with more samples, models of which some need a search see stretches only: so many, each so long.
+/// Of records with more samples, models of which some need a search see segments only: this many, each so long.
 const LONG: usize = 1 << 16;
-const STRETCHES: usize = 16;
-const STRETCH: usize = 1 << 11;
-/// Of records with more samples, blocks are held out of stretches only: few, so that free runs are long.
+const SEGMENTS: usize = 16;
+const SEGMENT: usize = 1 << 11;
+/// Of records with more samples, blocks are held out of segments only: few, so that free runs are long.
 const MOST_IN_BLOCKS: usize = 1 << 14;
-const STRETCHES_OF_BLOCKS: usize = 4;
+const SEGMENTS_OF_BLOCKS: usize = 4;
 /// Models that were compared.
 pub(super) struct Outcome {
     /// Those that the data determine.
@@ -38,10 +38,10 @@ pub(super) fn compare(task: &Task<'_>, models: Vec<Orders>) -> Result<Outcome, E
     let models: Vec<Orders> = models.iter().map(|orders| task.with_constants(orders)).collect();
     let searched = models.iter().any(|orders| !orders.is_linear());
     let all = total(task.estimation);
-    let thin = if searched && all > LONG { stretches(task.estimation, STRETCHES, STRETCH) } else { None };
+    let thin = if searched && all > LONG { stretches(task.estimation, SEGMENTS, SEGMENT) } else { None };
     if let Some(thin) = &thin {
         remarks.push(format!(
-            "To save time, compared on {} of {all} samples, in {} stretches spread over the log.",
+            "To save time, compared on {} of {all} samples, in {} segments spread over the log.",
             total(thin),
             thin.segments.len()
         ));
@@ -49,13 +49,13 @@ pub(super) fn compare(task: &Task<'_>, models: Vec<Orders>) -> Result<Outcome, E
     let record = thin.as_ref().unwrap_or(task.estimation);
     let samples = Samples::new(record, task.initial, &models)?;
     let count = samples.count(record);
-    let with_unseen = task.select.is_held_out();
+    let is_held_out = task.select.is_held_out();
     let smallest = models.first().map(|orders| task.named(orders));
-    let mut tried: Vec<Tried> = models.into_iter().map(|orders| Tried { orders, point: None }).collect();
+    let mut tried: Vec<Trial> = models.into_iter().map(|orders| Trial { orders, point: None }).collect();
     // Blocks are left where time is up: the answer so far stands.
-    let with_blocks = !with_unseen && task.looks_further();
-    fit_linear(record, &samples, &mut tried, searched || with_unseen || with_blocks)?;
-    // A stretch of a segment begins where the log knows what came before. Its initial conditions are not what the model has to
+    let with_blocks = !is_held_out && task.looks_further();
+    fit_linear(record, &samples, &mut tried, searched || is_held_out || with_blocks)?;
+    // A part of a segment begins where the log knows what came before. Its initial conditions are not what the model has to
     // tell in the whole log: they cost no more than what they take of the noise, one each.
     let own = task.estimation.segments.len() as f64 / record.segments.len().max(1) as f64;
     let price = |orders: &Orders, initial: f64| {
@@ -76,14 +76,14 @@ pub(super) fn compare(task: &Task<'_>, models: Vec<Orders>) -> Result<Outcome, E
         };
         Family::new(&tried, task.inputs.len()).fit(&common, &mut tried, &score)?;
     }
-    let looks = unseen::costs(task, record, &tried)?;
+    let costs = held_out_mse::costs(task, record, &tried)?;
     let scores: Vec<Option<f64>> = tried
         .iter()
-        .zip(&looks)
-        .map(|(Tried { orders, point }, unseen)| {
+        .zip(&costs)
+        .map(|(Trial { orders, point }, held_out_mse)| {
             let Point { cost, initial, .. } = point.as_ref()?;
             let mse = exact(*cost) / count as f64;
-            score(task.select, mse, orders.parameters(), price(orders, *initial), count, *unseen)
+            score(task.select, mse, orders.parameters(), price(orders, *initial), count, *held_out_mse)
         })
         .collect();
     let held_out = if with_blocks && !task.deadline.is_over() {
@@ -95,7 +95,7 @@ pub(super) fn compare(task: &Task<'_>, models: Vec<Orders>) -> Result<Outcome, E
         let mut order: Vec<usize> = (0..tried.len()).filter(|&k| tried[k].point.is_some()).collect();
         order.sort_by(|&a, &b| place(a).total_cmp(&place(b)));
         let most = total(record) > MOST_IN_BLOCKS;
-        let few = if most { stretches(task.estimation, STRETCHES_OF_BLOCKS, STRETCH) } else { None };
+        let few = if most { stretches(task.estimation, SEGMENTS_OF_BLOCKS, SEGMENT) } else { None };
         let record = few.as_ref().unwrap_or(record);
         let samples = Samples::unknown(record, tried.iter().map(|model| &model.orders));
         held_out::figures(task, record, &samples, &tried, &held_out::promising(&order, &tried))?
@@ -103,20 +103,20 @@ pub(super) fn compare(task: &Task<'_>, models: Vec<Orders>) -> Result<Outcome, E
         vec![None; tried.len()]
     };
     let total = tried.len();
-    let figures = looks.into_iter().zip(scores).zip(held_out);
+    let figures = costs.into_iter().zip(scores).zip(held_out);
     let models = tried.into_iter().zip(figures).filter_map(
-        |(Tried { orders, point }, ((unseen, score), held_out))| {
+        |(Trial { orders, point }, ((held_out_mse, score), held_out))| {
             let Point { parameters, cost, .. } = point?;
-            let unseen = if with_unseen { Some(unseen?) } else { None };
+            let held_out_mse = if is_held_out { Some(held_out_mse?) } else { None };
             let radius = if with_blocks { held_out::radius(&orders, &parameters) } else { f64::INFINITY };
             let guess = (!orders.is_linear()).then_some(parameters);
             let orders = task.named(&orders);
             let (held_out, parts) = held_out.unzip();
-            let scored = Scored {
+            let scored = Candidate {
                 structure: orders.structure(),
                 parameters: orders.parameters(),
                 mse: exact(cost) / count as f64,
-                unseen,
+                held_out_mse,
                 held_out,
                 score,
                 orders,
@@ -137,12 +137,12 @@ fn score(
     parameters: usize,
     initial: f64,
     samples: usize,
-    unseen: Option<f64>,
+    held_out_mse: Option<f64>,
 ) -> Option<f64> {
     let raised = mse * (initial / samples as f64).exp();
     match select {
         Select::Criterion(criterion) => criterion.value(raised, parameters, samples),
-        Select::Validation | Select::Cv => unseen,
+        Select::Validation | Select::Cv => held_out_mse,
     }
 }
 
@@ -150,12 +150,12 @@ fn score(
 fn fit_linear(
     record: &Record<'_>,
     samples: &Samples,
-    tried: &mut [Tried],
+    tried: &mut [Trial],
     with_parameters: bool,
 ) -> Result<(), Error> {
     let count = samples.count(record);
-    let fits = |model: &&mut Tried| model.orders.is_linear() && model.orders.parameters() < count;
-    let mut linear: Vec<&mut Tried> = tried.iter_mut().filter(fits).collect();
+    let fits = |model: &&mut Trial| model.orders.is_linear() && model.orders.parameters() < count;
+    let mut linear: Vec<&mut Trial> = tried.iter_mut().filter(fits).collect();
     if linear.is_empty() {
         return Ok(());
     }

@@ -1,4 +1,4 @@
-//! The delays of inputs, from ARX models that are long enough for a disturbance of any colour: of all stretches of lags that
+//! The delays of inputs, from ARX models that are long enough for a disturbance of any colour: of all ranges of lags that
 //! a B may have, the one with the least MDL begins at the delay.
 //!
 //! A coefficient at lag 0 costs twice the price of another one: the input of a sampled plant acts one sample later, as a rule.
@@ -20,7 +20,7 @@ use std::ops::Range;
 use super::candidates::{MOST_INPUTS, Samples, are_enough, rows};
 use super::linear::{Columns, Fitted, Rows, Scaled};
 use super::ranking::number;
-use super::{Delay, Scan, Task};
+use super::{Delay, DelayScore, Task};
 use crate::Error;
 use crate::data::Record;
 use crate::estimate::InformationCriterion;
@@ -44,7 +44,7 @@ struct Long {
     na: usize,
     /// Lags of a B at most.
     lags: usize,
-    /// The first lag behind all windows.
+    /// The first lag after all windows.
     end: usize,
     columns: Columns,
     rows: Rows,
@@ -136,13 +136,13 @@ impl Long {
     }
 
     /// The delays of an input and their MDL, from some lag on.
-    fn table(&self, scan: &[(Range<usize>, f64)], first: usize) -> Vec<Scan> {
-        let mut table: Vec<Scan> = Vec::new();
+    fn table(&self, scan: &[(Range<usize>, f64)], first: usize) -> Vec<DelayScore> {
+        let mut table: Vec<DelayScore> = Vec::new();
         let scanned = scan.iter().filter(|(window, mdl)| !window.is_empty() && mdl.is_finite());
         for (window, mdl) in scanned.filter(|(window, _)| window.start >= first) {
             match table.iter_mut().find(|scan| scan.nk == window.start) {
                 Some(scan) => scan.mdl = scan.mdl.min(*mdl),
-                None => table.push(Scan { nk: window.start, mdl: *mdl }),
+                None => table.push(DelayScore { nk: window.start, mdl: *mdl }),
             }
         }
         table.sort_by_key(|scan| scan.nk);

@@ -20,12 +20,12 @@ pub enum Focus {
     Prediction,
     /// Free runs, driven by the inputs alone.
     Simulation,
-    /// Predictions so many steps ahead.
+    /// Predictions this many steps ahead.
     Steps(usize),
 }
 
 impl Focus {
-    /// How far ahead held-out samples are looked at.
+    /// How far ahead held-out samples are predicted.
     pub fn horizon(self) -> Horizon {
         match self {
             Self::Auto | Self::Simulation => Horizon::FreeRun,
@@ -34,7 +34,7 @@ impl Focus {
         }
     }
 
-    /// Whether models are judged by more than errors one step ahead.
+    /// Whether models are evaluated by more than errors one step ahead.
     pub(super) fn looks_further(self) -> bool {
         !matches!(self, Self::Prediction | Self::Steps(1))
     }

@@ -5,7 +5,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::Task;
-use super::candidates::{Samples, Tried, rows, total};
+use super::candidates::{Samples, Trial, rows, total};
 use super::linear::{Columns, Kept, Rows, Scaled};
 use crate::Error;
 use crate::data::Record;
@@ -14,12 +14,12 @@ use crate::model::Orders;
 use crate::regression::Presample;
 
 /// The linear models among those that have parameters, and all others.
-pub(super) fn parted(tried: &[Tried]) -> (Vec<usize>, Vec<usize>) {
+pub(super) fn parted(tried: &[Trial]) -> (Vec<usize>, Vec<usize>) {
     let fitted = (0..tried.len()).filter(|&k| tried[k].point.is_some());
     fitted.partition(|&k| tried[k].orders.is_linear())
 }
 
-pub(super) fn columns_of(tried: &[Tried], linear: &[usize], inputs: usize) -> Columns {
+pub(super) fn columns_of(tried: &[Trial], linear: &[usize], inputs: usize) -> Columns {
     Columns::new(linear.iter().map(|&k| &tried[k].orders), inputs)
 }
 
@@ -82,7 +82,7 @@ impl<'t, 'r> Folds<'t, 'r> {
         &self,
         task: &Task<'_>,
         samples: &Samples,
-        tried: &[Tried],
+        tried: &[Trial],
     ) -> Result<Vec<Vec<Option<Vec<f64>>>>, Error> {
         let (linear, searched) = parted(tried);
         let columns = columns_of(tried, &linear, self.record.inputs.len());
@@ -112,7 +112,7 @@ impl<'t, 'r> Folds<'t, 'r> {
             let training =
                 Common::new(&training, true, samples.window, task.search, task.deadline, task.monitor)?;
             let found = searched.par_iter().map(|&k| {
-                let Tried { orders, point } = &tried[k];
+                let Trial { orders, point } = &tried[k];
                 let Some(Point { parameters, .. }) = point else { return Ok(None) };
                 training.fit(orders, std::slice::from_ref(parameters), false)
             });

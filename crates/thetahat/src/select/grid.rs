@@ -13,7 +13,7 @@ const MOST_MODELS: usize = 100_000;
 type Place = Vec<usize>;
 
 impl Grid {
-    /// The models for so many inputs, the smallest first, each once.
+    /// The models for this many inputs, the smallest first, each once.
     ///
     /// Combinations that are no model are left out: no coefficient at all, or F without B. An input without B has the
     /// first of its delays.

@@ -1,12 +1,12 @@
 //! How well models simulate samples that they were not fitted to, or predict them several steps ahead.
 //!
-//! The record is cut into thirds. Each model is fitted again to two of them and looked at on the third, with the initial state
+//! The record is cut into thirds. Each model is fitted again to two of them and evaluated on the third, with the initial state
 //! that fits best there. Errors are in standard deviations of the output and count up to five of them, so that a run that leaves the
 //! range of the data does not outweigh all others; a model that is unstable without a third counts as if it had left it.
 
 use rayon::prelude::*;
 
-use super::candidates::{Samples, Tried, total};
+use super::candidates::{Samples, Trial, total};
 use super::folds::Folds;
 use super::{HeldOut, Task};
 use crate::Error;
@@ -18,13 +18,13 @@ use crate::model::{
 use crate::regression::sum;
 use crate::respond::{Horizon, Response, Start, predict, simulate};
 
-/// A record is cut into so many blocks.
+/// A record is cut into this many blocks.
 const BLOCKS: usize = 3;
-/// A block is cut into so many parts: 10 to 30 in all are enough (Schmeiser 1982).
+/// A block is cut into this many parts: 10 to 30 in all are enough (Schmeiser 1982).
 const PARTS: usize = 10;
-/// Errors count up to so many standard deviations of the output.
+/// Errors count up to this many standard deviations of the output.
 const LARGEST: f64 = 5.0;
-/// The error of an unstable refit counts so many times, and is this at least.
+/// The error of an unstable refit counts this many times, and is this at least.
 const UNSTABLE: f64 = 1.5;
 
 /// By how many of its standard errors the mean square of one model exceeds that of another on the same samples.
@@ -52,13 +52,13 @@ pub(super) fn figures(
     task: &Task<'_>,
     record: &Record<'_>,
     samples: &Samples,
-    tried: &[Tried],
+    tried: &[Trial],
     which: &[usize],
 ) -> Result<Vec<Option<Seen>>, Error> {
     let mut figures = vec![None; tried.len()];
     let deviation = deviation(record);
     let folds = Folds::new(record, BLOCKS);
-    let some: Vec<Tried> = which.iter().map(|&k| tried[k].clone()).collect();
+    let some: Vec<Trial> = which.iter().map(|&k| tried[k].clone()).collect();
     if some.is_empty() || deviation == 0.0 || (0..BLOCKS).any(|fold| total(&folds.test(fold)) == 0) {
         return Ok(figures);
     }
@@ -113,9 +113,9 @@ pub(super) fn figures(
     Ok(figures)
 }
 
-/// The models that are looked at: of each structure, delay and number of parameters the one with the least criterion, in the order
+/// The models that are evaluated: of each structure, delay and number of parameters the one with the least criterion, in the order
 /// of their criterion.
-pub(super) fn promising(order: &[usize], tried: &[Tried]) -> Vec<usize> {
+pub(super) fn promising(order: &[usize], tried: &[Trial]) -> Vec<usize> {
     let mut seen: Vec<(Structure, usize, &[usize])> = Vec::new();
     let mut promising = Vec::new();
     for &k in order {
@@ -197,7 +197,7 @@ fn deviation(record: &Record<'_>) -> f64 {
     (sum(values().map(|y| (y - mean).powi(2))) / count).sqrt()
 }
 
-/// The last block behind what comes before it in its segments.
+/// The last block after what comes before it in its segments.
 struct Onward<'r> {
     record: Record<'r>,
     /// The output without the last block.

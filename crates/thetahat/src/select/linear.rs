@@ -29,7 +29,7 @@ use crate::regression::{Lagged, Presample, Taps, condition};
 const MAXIMUM_CONDITION: f64 = 1e5;
 /// Costs keep at least seven digits.
 const DIGITS: f64 = 1e7;
-/// A column of which less than this is left behind those before it depends on them.
+/// A column is dependent if less than this fraction of its norm is orthogonal to the columns before it.
 const DEPENDENT: f64 = 1e-13;
 /// The same for the norm, where columns are made orthogonal.
 const PARALLEL: f64 = 1e-13;
@@ -101,7 +101,7 @@ pub(super) enum Kept {
 }
 
 impl Rows {
-    /// The rows of a record, of which the first `masked` of each segment do not count.
+    /// The rows of a record, of which the first `left_out` of each segment do not count.
     ///
     /// # Errors
     /// [`Error::Data`] if squares leave the range of numbers.
@@ -109,12 +109,12 @@ impl Rows {
         record: &Record<'_>,
         columns: &Columns,
         presample: Presample,
-        masked: usize,
+        left_out: usize,
         kept: Kept,
     ) -> Result<Self, Error> {
         let signals: Vec<&[f64]> =
             std::iter::once(record.output).chain(record.inputs.iter().copied()).collect();
-        let lagged = Lagged::new(&signals, columns.taps(), &record.segments, presample).behind(masked);
+        let lagged = Lagged::new(&signals, columns.taps(), &record.segments, presample).after(left_out);
         match kept {
             Kept::Products => {
                 let (matrix, right, square) = lagged.normal_equations();
@@ -348,13 +348,13 @@ impl<'s> Ladder<'s> {
             self.targets.truncate((common + 1) * self.scaled.size);
         }
         columns[common..].iter().all(|&column| match self.scaled.kept {
-            Kept::Products => self.border(column),
+            Kept::Products => self.extend(column),
             Kept::Factor => self.orthogonalize(column),
         })
     }
 
     /// One more column of a Gram matrix.
-    fn border(&mut self, column: usize) -> bool {
+    fn extend(&mut self, column: usize) -> bool {
         let products = self.scaled.column(column);
         let start = self.factor.len();
         let mut from = 0;

@@ -5,7 +5,7 @@ use std::cmp::Ordering;
 use super::candidates::{Compared, total};
 use super::compare::Outcome;
 use super::winners::{Winners, winners};
-use super::{Best, Focus, Found, Path, Scored, Select, Selection, Task};
+use super::{Best, Candidate, Focus, Path, Select, SelectedModel, Selection, Task};
 use crate::Error;
 use crate::estimate::{Method, estimate_of_channels};
 use crate::figures::{fixed, scientific};
@@ -13,19 +13,19 @@ use crate::respond::Horizon;
 
 /// Models of a table.
 const BEST: usize = 50;
-/// The smallest model within this fraction of the least cost on unseen samples is taken.
+/// The smallest model within this fraction of the least cost on held-out samples is taken.
 const CLOSE: f64 = 0.01;
 
 /// The choice among models that were compared; `path` is none where there was no grid.
 ///
 /// # Errors
 /// What a fit of the smallest model says, if the data determine none.
-pub(super) fn ranked(task: &Task<'_>, outcome: Outcome, path: Option<Path>) -> Result<Found, Error> {
+pub(super) fn ranked(task: &Task<'_>, outcome: Outcome, path: Option<Path>) -> Result<SelectedModel, Error> {
     let Outcome { models: compared, failed, samples, remarks, smallest } = outcome;
-    let by_unseen = task.select.is_held_out();
+    let by_held_out_mse = task.select.is_held_out();
     let mut compared: Vec<&Compared> = compared.iter().collect();
-    compared.sort_by(|a, b| better(&a.scored, &b.scored, by_unseen));
-    let order: Vec<&Scored> = compared.iter().map(|model| &model.scored).collect();
+    compared.sort_by(|a, b| better(&a.scored, &b.scored, by_held_out_mse));
+    let order: Vec<&Candidate> = compared.iter().map(|model| &model.scored).collect();
     let (Some(&first), count) = (order.first(), compared.len()) else {
         if let Some(orders) = smallest {
             let method = Method::PredictionError(task.search.clone());
@@ -41,9 +41,9 @@ pub(super) fn ranked(task: &Task<'_>, outcome: Outcome, path: Option<Path>) -> R
         ));
     };
     let mut chosen = first;
-    if by_unseen {
-        let limit = first.unseen.map_or(f64::INFINITY, |least| least * (1.0 + CLOSE));
-        let close = order.iter().take_while(|model| model.unseen.is_some_and(|cost| cost <= limit));
+    if by_held_out_mse {
+        let limit = first.held_out_mse.map_or(f64::INFINITY, |least| least * (1.0 + CLOSE));
+        let close = order.iter().take_while(|model| model.held_out_mse.is_some_and(|cost| cost <= limit));
         // The best of equal size comes first.
         chosen = close.min_by_key(|model| model.parameters).unwrap_or(&first);
     }
@@ -52,7 +52,7 @@ pub(super) fn ranked(task: &Task<'_>, outcome: Outcome, path: Option<Path>) -> R
         chosen = order[winners.chosen];
     }
     let second = order.iter().find(|model| model.orders != chosen.orders);
-    let mut of_size: Vec<Scored> = Vec::new();
+    let mut of_size: Vec<Candidate> = Vec::new();
     let mut by_size = order.clone();
     by_size.sort_by_key(|model| model.parameters);
     for model in by_size {
@@ -65,10 +65,10 @@ pub(super) fn ranked(task: &Task<'_>, outcome: Outcome, path: Option<Path>) -> R
     if failed > 0 {
         steps.push(format!("The data could not determine {} more.", models(failed)));
     }
-    if by_unseen && first.orders != chosen.orders {
+    if by_held_out_mse && first.orders != chosen.orders {
         steps.push(format!("Least: {}.", described(first, task.select)));
     }
-    let why = if by_unseen { ", the smallest within 1 % of the least" } else { "" };
+    let why = if by_held_out_mse { ", the smallest within 1 % of the least" } else { "" };
     steps.extend(winners.iter().flat_map(|winners| both(winners, &order, task)));
     steps.push(format!("Chosen: {}{why}.", described(chosen, task.select)));
     if let Some(second) = second {
@@ -91,15 +91,15 @@ pub(super) fn ranked(task: &Task<'_>, outcome: Outcome, path: Option<Path>) -> R
             prediction: order[winners.prediction].clone(),
             simulation: order[winners.simulation].clone(),
         }),
-        least: by_unseen.then(|| first.clone()),
+        least: by_held_out_mse.then(|| first.clone()),
         best: order.iter().take(BEST).copied().cloned().collect(),
         of_size,
     };
-    Ok(Found { selection, guess })
+    Ok(SelectedModel { selection, guess })
 }
 
 /// What both winners are, how they differ, and which was taken why.
-fn both(winners: &Winners, order: &[&Scored], task: &Task<'_>) -> Vec<String> {
+fn both(winners: &Winners, order: &[&Candidate], task: &Task<'_>) -> Vec<String> {
     let Winners { prediction, simulation, chosen } = *winners;
     let how = match task.focus.horizon() {
         Horizon::FreeRun => "in free runs".to_owned(),
@@ -108,7 +108,7 @@ fn both(winners: &Winners, order: &[&Scored], task: &Task<'_>) -> Vec<String> {
     let percent = |k: usize| order[k].held_out.map(|seen| fixed(seen.percent(), 1));
     let on_blocks = match percent(prediction) {
         Some(percent) => format!("it fits {percent} % of blocks held out, {how}"),
-        None => "it was not looked at without some of the rows, or these do not determine it".to_owned(),
+        None => "it was not evaluated without some of the rows, or these do not determine it".to_owned(),
     };
     let mut words =
         vec![format!("For prediction: {}; {on_blocks}.", described(order[prediction], task.select))];
@@ -141,10 +141,12 @@ fn both(winners: &Winners, order: &[&Scored], task: &Task<'_>) -> Vec<String> {
 }
 
 /// Exact models first, the smallest of them first; then by score. Of equal ones the smaller, then the one that was made first.
-fn better(a: &Scored, b: &Scored, by_unseen: bool) -> Ordering {
-    let exact = |model: &Scored| if by_unseen { model.unseen == Some(0.0) } else { model.mse == 0.0 };
-    let score =
-        |model: &Scored| if exact(model) { f64::NEG_INFINITY } else { model.score.unwrap_or(f64::INFINITY) };
+fn better(a: &Candidate, b: &Candidate, by_held_out_mse: bool) -> Ordering {
+    let exact =
+        |model: &Candidate| if by_held_out_mse { model.held_out_mse == Some(0.0) } else { model.mse == 0.0 };
+    let score = |model: &Candidate| {
+        if exact(model) { f64::NEG_INFINITY } else { model.score.unwrap_or(f64::INFINITY) }
+    };
     score(a).total_cmp(&score(b)).then(a.parameters.cmp(&b.parameters))
 }
 
@@ -161,7 +163,7 @@ fn named(select: Select) -> &'static str {
 }
 
 /// A model with its score.
-fn described(model: &Scored, select: Select) -> String {
+fn described(model: &Candidate, select: Select) -> String {
     let score = match model.score {
         Some(score) => number(score),
         None => "not defined: the model is exact".to_owned(),

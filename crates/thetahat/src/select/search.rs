@@ -8,15 +8,15 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-use super::candidates::Tried;
+use super::candidates::Trial;
 use super::grid::key;
 use crate::Error;
 use crate::estimate::{Common, Point, extended};
 use crate::model::Orders;
 
-/// So many of the best begin from the data as well.
+/// This many of the best begin from the data as well.
 const BEST: usize = 5;
-/// How often the best are looked for.
+/// How often the best are searched for.
 const ROUNDS: usize = 3;
 /// A cost that is above a neighbour's by more than this fraction is one of a worse minimum.
 const SAME: f64 = 1e-7;
@@ -31,7 +31,7 @@ pub(super) struct Family {
 
 impl Family {
     /// Of models that are sorted by their number of parameters. The coefficients of inputs after the first `inputs` are in all.
-    pub(super) fn new(models: &[Tried], inputs: usize) -> Self {
+    pub(super) fn new(models: &[Trial], inputs: usize) -> Self {
         let places: BTreeMap<Vec<usize>, usize> =
             models.iter().map(|model| key(&model.orders)).zip(0..).collect();
         let place = |orders: Orders| places.get(&key(&orders)).copied();
@@ -56,7 +56,7 @@ impl Family {
     pub(super) fn fit(
         &self,
         common: &Common<'_>,
-        tried: &mut [Tried],
+        tried: &mut [Trial],
         score: &(dyn Fn(&Orders, &Point) -> f64 + Sync),
     ) -> Result<(), Error> {
         for (number, level) in self.levels.iter().enumerate() {
@@ -72,7 +72,7 @@ impl Family {
         for _ in 0..ROUNDS {
             let mut order: Vec<usize> = (0..tried.len()).collect();
             let of = |k: usize| {
-                let Tried { orders, point } = &tried[k];
+                let Trial { orders, point } = &tried[k];
                 point.as_ref().map_or(f64::INFINITY, |point| score(orders, point))
             };
             order.sort_by(|&a, &b| of(a).total_cmp(&of(b)));
@@ -98,7 +98,7 @@ impl Family {
     }
 
     /// Begins again where a neighbour's cost is lower.
-    fn repair(&self, common: &Common<'_>, tried: &mut [Tried]) -> Result<(), Error> {
+    fn repair(&self, common: &Common<'_>, tried: &mut [Trial]) -> Result<(), Error> {
         for level in &self.levels {
             let above = |&&k: &&usize| {
                 let Some(own) = &tried[k].point else { return false };
@@ -116,10 +116,10 @@ impl Family {
     }
 
     /// What a model may begin from: itself, as it was found under other conditions, and its neighbours.
-    fn starts(&self, k: usize, tried: &[Tried]) -> Vec<Vec<f64>> {
+    fn starts(&self, k: usize, tried: &[Trial]) -> Vec<Vec<f64>> {
         let own = tried[k].point.iter().map(|point| point.parameters.clone());
         let others = self.neighbours[k].iter().filter_map(|&other| {
-            let Tried { orders, point } = &tried[other];
+            let Trial { orders, point } = &tried[other];
             Some(extended(orders, &point.as_ref()?.parameters, &tried[k].orders))
         });
         own.chain(others).collect()

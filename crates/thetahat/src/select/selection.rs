@@ -26,24 +26,24 @@ pub struct Selection {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub delays: Vec<Delay>,
     /// The model that was chosen.
-    pub chosen: Scored,
+    pub chosen: Candidate,
     /// The best of the others; none if there was one only.
-    pub second: Option<Scored>,
-    /// The best models for prediction and for simulation, where both were looked for.
+    pub second: Option<Candidate>,
+    /// The best models for prediction and for simulation, where both were searched.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub winners: Option<Best>,
     /// The least cost itself, where the smallest model close to it was chosen.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub least: Option<Scored>,
+    pub least: Option<Candidate>,
     /// The best 50, the best first.
-    pub best: Vec<Scored>,
+    pub best: Vec<Candidate>,
     /// The best of each number of parameters, the smallest first.
-    pub of_size: Vec<Scored>,
+    pub of_size: Vec<Candidate>,
 }
 
 /// A model and what speaks for it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Scored {
+pub struct Candidate {
     /// Which polynomials there are.
     pub structure: Structure,
     /// How long they are.
@@ -54,11 +54,11 @@ pub struct Scored {
     pub mse: f64,
     /// The mean of e^2 on samples that the model was not fitted to: with a validation part, or cross-validation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub unseen: Option<f64>,
-    /// What it does on blocks that it was not fitted to, where that was looked at.
+    pub held_out_mse: Option<f64>,
+    /// What it does on blocks that it was not fitted to, where that was evaluated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub held_out: Option<HeldOut>,
-    /// What it was chosen by, the smaller the better: a criterion, or `unseen`. None where it is not defined.
+    /// What it was chosen by, the smaller the better: a criterion, or `held_out_mse`. None where it is not defined.
     pub score: Option<f64>,
 }
 
@@ -66,9 +66,9 @@ pub struct Scored {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Best {
     /// The stable model with the least criterion.
-    pub prediction: Scored,
-    /// The stable model with the least error on held-out blocks, in free runs or so many steps ahead as the focus says.
-    pub simulation: Scored,
+    pub prediction: Candidate,
+    /// The stable model with the least error on held-out blocks, in free runs or as many steps ahead as the focus says.
+    pub simulation: Candidate,
 }
 
 /// What choices were for before there was a focus.
@@ -88,12 +88,12 @@ pub struct Delay {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub confidence: Option<f64>,
     /// The MDL of models with a delay of 1, 2, … samples; of 0 too where that was taken.
-    pub mdl: Vec<Scan>,
+    pub mdl: Vec<DelayScore>,
 }
 
 /// What a delay costs.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Scan {
+pub struct DelayScore {
     /// The delay.
     pub nk: usize,
     /// MDL of the model with that delay.
@@ -112,7 +112,7 @@ pub struct HeldOut {
     pub unpunished: f64,
     /// How many models without a block are unstable.
     pub unstable: usize,
-    /// Of so many.
+    /// The models fitted, each without a block.
     pub refits: usize,
 }
 

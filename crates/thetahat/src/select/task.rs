@@ -11,7 +11,7 @@ use crate::optimize::{Deadline, Monitor, Search};
 pub(crate) struct Task<'a> {
     pub(crate) estimation: &'a Record<'a>,
     pub(crate) validation: Option<&'a Record<'a>>,
-    /// The inputs' names. Both records have further inputs behind these where a constant or a trend is part of every model.
+    /// The inputs' names. Both records have further inputs after these where a constant or a trend is part of every model.
     pub(crate) inputs: &'a [String],
     pub(crate) select: Select,
     pub(crate) focus: Focus,
@@ -28,7 +28,7 @@ impl<'a> Task<'a> {
         orders.with_constants(self.estimation.inputs.len() - self.inputs.len())
     }
 
-    /// Whether models are judged by more than errors one step ahead.
+    /// Whether models are evaluated by more than errors one step ahead.
     pub(super) fn looks_further(&self) -> bool {
         !self.inputs.is_empty() && self.focus.looks_further()
     }
@@ -51,7 +51,7 @@ impl<'a> Task<'a> {
 
 /// What was chosen.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Found {
+pub(crate) struct SelectedModel {
     pub(crate) selection: Selection,
     /// The parameters of the chosen model, with a constant and a trend where the records have them, if a search found them: a
     /// start for the search on all samples.

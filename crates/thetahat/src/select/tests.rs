@@ -3,9 +3,9 @@
 mod automatic;
 mod focus;
 mod grid;
+mod held_out_mse;
 mod linear;
 mod searched;
-mod unseen;
 
 use std::ops::{ControlFlow, Range};
 
@@ -47,7 +47,7 @@ fn chosen(
     choice: &Choice,
     select: Select,
     initial: Initial,
-) -> Result<Found, Error> {
+) -> Result<SelectedModel, Error> {
     let inputs: Vec<String> = (1..=record.inputs.len()).map(|number| format!("u{number}")).collect();
     let search = Search::default();
     let task = Task {
@@ -65,7 +65,7 @@ fn chosen(
 }
 
 /// A choice by MDL for some purpose.
-fn focused(record: &Record<'_>, choice: &Choice, focus: Focus) -> Result<Found, Error> {
+fn focused(record: &Record<'_>, choice: &Choice, focus: Focus) -> Result<SelectedModel, Error> {
     let inputs: Vec<String> = (1..=record.inputs.len()).map(|number| format!("u{number}")).collect();
     let search = Search::default();
     let task = Task {

@@ -21,7 +21,7 @@ const FAR: f64 = 0.3;
 const GATE: f64 = 0.1;
 const STANDARD_ERRORS: f64 = 2.0;
 const CLEARLY: f64 = 0.1;
-/// A model that simulates has no time constant of more than so many times the samples.
+/// A model that simulates has no time constant of more than this many times the samples.
 const SLOWEST: f64 = 2.0;
 /// Mean squares below this are rounding.
 const NOTHING: f64 = 1e-12;
@@ -36,7 +36,7 @@ pub(super) struct Winners {
     pub(super) chosen: usize,
 }
 
-/// The winners among models in the order of their criterion; none where no model is stable, or none was looked at.
+/// The winners among models in the order of their criterion; none where no model is stable, or none was evaluated.
 ///
 /// What has no figures on blocks, as the data without one do not determine it, may predict; it is not compared.
 pub(super) fn winners(focus: Focus, models: &[&Compared], samples: usize) -> Option<Winners> {

@@ -74,7 +74,7 @@ impl Collecting {
         Some(PerChannel { inputs: inputs.to_vec(), output })
     }
 
-    /// Whether its rows are of so many inputs, and no more than those of another one could be.
+    /// Whether its rows are of this many inputs, and no more than those of another one could be.
     pub(super) fn fits(&self, other: &Self, inputs: usize) -> bool {
         let is_sample = |value: &f64| value.is_nan() || value.abs() <= LARGEST;
         self.enough == other.enough

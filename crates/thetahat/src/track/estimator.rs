@@ -11,7 +11,7 @@ use super::plan::{PerChannel, TrackPlan};
 use crate::model::Orders;
 
 /// Delay lines.
-pub(super) type Lines = Lags<f64, Dyn, Dyn>;
+pub(super) type DelayLines = Lags<f64, Dyn, Dyn>;
 
 /// An estimator of one of the two kinds.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -53,10 +53,10 @@ impl Estimator {
 
     /// The outputs to come, computed in delay lines that are lost; NaN where they depend on a missing sample, or
     /// overflow.
-    pub(super) fn predict(&self, room: &mut Lines, inputs: &[f64], outputs: &mut [f64]) {
+    pub(super) fn predict(&self, workspace: &mut DelayLines, inputs: &[f64], outputs: &mut [f64]) {
         let predicted = match self {
-            Self::Arx(arx) => arx.predict_in(room, inputs, outputs),
-            Self::Armax(armax) => armax.predict_in(room, inputs, outputs),
+            Self::Arx(arx) => arx.predict_in(workspace, inputs, outputs),
+            Self::Armax(armax) => armax.predict_in(workspace, inputs, outputs),
         };
         // After an overflow what is beyond it is NaN already; with inputs of another length nothing was written.
         if let Err(Error::Length { .. } | Error::Infinite { .. }) = predicted {
@@ -71,7 +71,7 @@ impl Estimator {
         }
     }
 
-    pub(super) fn lines(&self) -> &Lines {
+    pub(super) fn lines(&self) -> &DelayLines {
         match self {
             Self::Arx(arx) => arx.lags(),
             Self::Armax(armax) => armax.lags(),

@@ -26,8 +26,8 @@ use thetahat_core::nalgebra::{DMatrix, DVector};
 
 use crate::Error;
 
-/// The number of stretches between points, and half of it for comparison.
-const STRETCHES: usize = 240;
+/// The number of segments between points, and half of it for comparison.
+const SEGMENTS: usize = 240;
 /// The search for a threshold ends once its average run length is this close to the one asked for, relative to it.
 const PRECISION: f64 = 1e-6;
 
@@ -151,8 +151,8 @@ fn threshold(interval: f64, steps: impl Fn(f64) -> Steps + Copy) -> f64 {
 
 /// L for a start at 0, the error in 1/m^2 taken off.
 fn average_run_length(threshold: f64, steps: impl Fn(f64) -> Steps + Copy) -> f64 {
-    let coarse = on_points(STRETCHES / 2, threshold, steps);
-    let fine = on_points(STRETCHES, threshold, steps);
+    let coarse = on_points(SEGMENTS / 2, threshold, steps);
+    let fine = on_points(SEGMENTS, threshold, steps);
     fine + (fine - coarse) / 3.0
 }
 

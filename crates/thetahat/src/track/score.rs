@@ -14,7 +14,7 @@ pub struct TrackScore {
     mean_squared_error: f64,
     mean_output: f64,
     output_variance: f64,
-    judged: u64,
+    evaluated: u64,
     mean_nis: f64,
     mean_log_likelihood: f64,
 }
@@ -29,8 +29,8 @@ impl TrackScore {
         self.mean_output += before * share;
         self.output_variance += (before * (output - self.mean_output) - self.output_variance) * share;
         if innovation.variance.is_finite() {
-            self.judged = self.judged.saturating_add(1);
-            let share = 1.0 / self.judged as f64;
+            self.evaluated = self.evaluated.saturating_add(1);
+            let share = 1.0 / self.evaluated as f64;
             self.mean_nis += (innovation.nis - self.mean_nis) * share;
             self.mean_log_likelihood += (innovation.log_likelihood() - self.mean_log_likelihood) * share;
         }
@@ -39,7 +39,7 @@ impl TrackScore {
     /// Whether its numbers can be those of any samples.
     pub(super) fn is_sound(&self) -> bool {
         let squares = [self.mean_squared_error, self.output_variance, self.mean_nis];
-        self.judged <= self.samples
+        self.evaluated <= self.samples
             && squares.iter().all(|square| square.is_finite() && *square >= 0.0)
             && self.mean_output.is_finite()
             && self.mean_log_likelihood.is_finite()
@@ -63,18 +63,18 @@ impl TrackScore {
     }
 
     /// How many of them had an innovation with a known variance: those that the next two figures are of.
-    pub fn judged(&self) -> u64 {
-        self.judged
+    pub fn evaluated(&self) -> u64 {
+        self.evaluated
     }
 
     /// The mean of e²/S: 1 if the variances are right, above 1 if the tracker is surer than it should be.
     pub fn mean_nis(&self) -> Option<f64> {
-        (self.judged > 0).then_some(self.mean_nis)
+        (self.evaluated > 0).then_some(self.mean_nis)
     }
 
     /// The sum over the samples of ln p(y), the Gaussian log-likelihood of each given those before it. The larger, the
     /// better, among trackers of the same samples.
     pub fn log_likelihood(&self) -> Option<f64> {
-        (self.judged > 0).then_some(self.mean_log_likelihood * self.judged as f64)
+        (self.evaluated > 0).then_some(self.mean_log_likelihood * self.evaluated as f64)
     }
 }

@@ -54,7 +54,7 @@ fn with_the_scales_found_it_is_the_library_to_the_bit() {
     let mut tracker = Tracker::new(&orders(), &TrackPlan::default()).unwrap();
     let tracked = run(&mut tracker, &inputs, &y);
 
-    // The reach is 2, the parameters are 5: 12 rows.
+    // The maximum lag is 2, the parameters are 5: 12 rows.
     let collected = tracked.iter().take_while(|tracked| tracked.action == Action::Collecting).count();
     assert_eq!(collected, 12);
     let largest = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, |a: f64, b| a.max(b.abs()));
@@ -313,7 +313,7 @@ fn the_score_is_its_definition() {
     let near = |found: Option<f64>, expected: f64| {
         assert!((found.unwrap() / expected - 1.0).abs() < 1e-12, "{found:?} {expected}");
     };
-    assert_eq!((score.samples(), score.judged()), (958, 958));
+    assert_eq!((score.samples(), score.evaluated()), (958, 958));
     near(score.mean_squared_error(), mse);
     near(score.fit(), 100.0 * (1.0 - (mse / variance).sqrt()));
     near(score.mean_nis(), mean(&mut counted.iter().map(|t| t.nis)));

@@ -2,7 +2,7 @@ use serde::{Deserialize, Serialize};
 use thetahat_core::{Action, Alarm, ChangeDetector, Chart, Innovation, Real};
 
 use super::collecting::{Collecting, LARGEST, SMALLEST};
-use super::estimator::{Estimator, Lines};
+use super::estimator::{DelayLines, Estimator};
 use super::plan::{PerChannel, TrackPlan};
 use super::run_length::change_detector;
 use super::score::TrackScore;
@@ -54,8 +54,8 @@ pub struct Tracked {
 /// # Scales
 ///
 /// The estimator needs the typical magnitude of each channel, for its prior and its bounds. If the plan does not have
-/// them, the tracker keeps the latest L rows, L being the reach of the orders plus two rows for each parameter and
-/// at least 10, until so many have been seen and every channel has shown a value other than 0 (below 1e-98 counts as 0). So
+/// them, the tracker keeps the latest L rows, L being the maximum lag of the orders plus two rows for each parameter and
+/// at least 10, until there are L and every channel has shown a value other than 0 (below 1e-98 counts as 0). So
 /// long the action is [`Action::Collecting`]. Then the scales are the largest magnitudes that were seen, the rows that were kept
 /// go into the estimator, and from the next row on all is, to the bit, as if the scales had been given and it had started
 /// with the first of these rows.
@@ -105,7 +105,7 @@ pub struct Tracker {
     score: TrackScore,
     /// The latest inputs as the estimator sees them: less their offsets.
     inputs: Vec<f64>,
-    room: Room,
+    workspace: Workspace,
 }
 
 /// Where a tracker stands.
@@ -116,10 +116,10 @@ pub(super) enum Stage {
     Running(Box<Estimator>),
 }
 
-/// Memory for predictions.
+/// Buffers for predictions.
 #[derive(Debug, Clone, Default)]
-struct Room {
-    lines: Option<Lines>,
+struct Workspace {
+    lines: Option<DelayLines>,
     inputs: Vec<f64>,
     outputs: Vec<f64>,
 }
@@ -143,7 +143,7 @@ impl Tracker {
             Estimator::new(orders, plan, plan.scales.as_ref().unwrap_or(&units)).map_err(refused)?;
         let stage = match plan.scales {
             Some(_) => Stage::Running(Box::new(estimator)),
-            None => Stage::Collecting(Collecting::new(orders.reach() + 2 * parameters, &orders.nb)),
+            None => Stage::Collecting(Collecting::new(orders.maximum_lag() + 2 * parameters, &orders.nb)),
         };
         let mut names = orders.names();
         if plan.constant {
@@ -162,7 +162,7 @@ impl Tracker {
             detector: plan.alarm_interval.map(|interval| change_detector(interval, 1)).transpose()?,
             score: TrackScore::default(),
             inputs: vec![f64::NAN; inputs],
-            room: Room::default(),
+            workspace: Workspace::default(),
         })
     }
 
@@ -230,7 +230,7 @@ impl Tracker {
     /// One sample of a tracker that knows its scales; the inputs are in their place.
     fn step(&mut self, output: f64) -> Result<Tracked, Error> {
         let Stage::Running(estimator) = &mut self.stage else { return Ok(Tracked::collecting()) };
-        let lines = self.room.lines.get_or_insert_with(|| estimator.lines().clone());
+        let lines = self.workspace.lines.get_or_insert_with(|| estimator.lines().clone());
         let mut predicted = [f64::NAN];
         estimator.predict(lines, &self.inputs, &mut predicted);
         let [mut predicted] = predicted;
@@ -282,11 +282,11 @@ impl Tracker {
         self.inputs.fill(f64::NAN);
     }
 
-    /// The prediction so many steps ahead: y(k + steps) from the samples up to k, in the output's units. Inputs to come are
+    /// The prediction this many steps ahead: y(k + steps) from the samples up to k, in the output's units. Inputs to come are
     /// held at their latest values.
     ///
     /// NaN if there is none: before there is an estimate, where it depends on a missing sample, or where an unstable
-    /// model overflows. 2 n multiply-adds and moves a step. (The memory for it is taken at the first call with so many steps.)
+    /// model overflows. 2 n multiply-adds and moves a step. (The memory for it is taken at the first call with this many steps.)
     ///
     /// # Errors
     /// [`Error::Argument`] if the steps are not in 1 … 10,000.
@@ -298,7 +298,7 @@ impl Tracker {
         if !self.has_estimate {
             return Ok(f64::NAN);
         }
-        let Room { lines, inputs, outputs } = &mut self.room;
+        let Workspace { lines, inputs, outputs } = &mut self.workspace;
         let lines = lines.get_or_insert_with(|| estimator.lines().clone());
         outputs.resize(steps, f64::NAN);
         inputs.clear();

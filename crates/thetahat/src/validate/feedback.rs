@@ -38,7 +38,7 @@ const ORDERS: [usize; 4] = [10, 5, 2, 1];
 const SAMPLES: usize = 5;
 /// How many past innovations the input may follow.
 const PAST: usize = 5;
-/// The input's own past values: one for so many samples, no fewer and no more than these.
+/// The input's own past values: one for this many samples, no fewer and no more than these.
 const SAMPLES_OF_OWN_PAST: usize = 20;
 const OWN_PAST: [usize; 2] = [10, 40];
 /// Where that many depend on one another, as those of a few sinusoids do.
@@ -55,7 +55,7 @@ const PARTS: usize = 5;
 /// Below this p-value there may be feedback, if as much is explained.
 const LEVEL: f64 = 0.01;
 const EXPLAINED: f64 = 0.005;
-/// An input repeats itself if it does so to this fraction of its largest value; so many comparisons are made for each sample.
+/// An input repeats itself if it does so to this fraction of its largest value; this many comparisons are made for each sample.
 const REPEATED: f64 = 1e-6;
 const COMPARISONS: usize = 20;
 /// Residuals below this fraction of the output, or of the input, are rounding.
@@ -161,7 +161,7 @@ fn repeats(input: &[f64], segments: &[Range<usize>]) -> bool {
     false
 }
 
-/// The same beyond so many past values of the input: none if they depend on one another, or are too many, and nothing if they
+/// The same beyond this many past values of the input: none if they depend on one another, or are too many, and nothing if they
 /// determine it.
 fn beyond(
     own: usize,
@@ -169,8 +169,8 @@ fn beyond(
     innovations: &[f64],
     segments: &[Range<usize>],
 ) -> Option<Option<Feedback>> {
-    let masked = own.max(PAST);
-    let kept = shortened(segments, masked);
+    let left_out = own.max(PAST);
+    let kept = shortened(segments, left_out);
     let rows = || kept.iter().cloned().flatten();
     let count = rows().count();
     if count < SAMPLES * (own + PAST) {
@@ -179,8 +179,8 @@ fn beyond(
     // What the past of the input leaves of a signal.
     let past = [Taps { signal: 1, first: 1, count: own, sign: 1.0 }];
     let left = |signal: &[f64]| -> Option<Vec<f64>> {
-        let solved = solved(&[signal, input], segments, &past, masked)?;
-        Some(residuals(&[signal, input], segments, &past, solved.parameters.as_slice(), masked))
+        let solved = solved(&[signal, input], segments, &past, left_out)?;
+        Some(residuals(&[signal, input], segments, &past, solved.parameters.as_slice(), left_out))
     };
     let mut new = left(input)?;
     let square = |signal: &[f64]| -> f64 { rows().map(|t| signal[t] * signal[t]).sum() };
@@ -211,7 +211,7 @@ fn beyond(
     // What the past of the input tells of e(t - k): five weights for each of its values, and no further signals.
     let told = |lag: usize| {
         let late = [&vec![0.0; lag], &innovations[..innovations.len() - lag]].concat();
-        Some(solved(&[&late, input], segments, &past, masked)?.parameters)
+        Some(solved(&[&late, input], segments, &past, left_out)?.parameters)
     };
     let told: Vec<_> = (1..=PAST).map(told).collect::<Option<_>>()?;
     let regressor = |t: usize| {
@@ -261,9 +261,14 @@ fn evaluated<R: Iterator<Item = usize>>(
 }
 
 /// The regression of `signals[0]` without the first samples of each segment, if there are samples enough for it.
-fn solved(signals: &[&[f64]], segments: &[Range<usize>], taps: &[Taps], masked: usize) -> Option<Regression> {
+fn solved(
+    signals: &[&[f64]],
+    segments: &[Range<usize>],
+    taps: &[Taps],
+    left_out: usize,
+) -> Option<Regression> {
     let parameters: usize = taps.iter().map(|taps| taps.count).sum();
-    let lagged = Lagged::new(signals, taps.to_vec(), segments, Presample::Drop).behind(masked);
+    let lagged = Lagged::new(signals, taps.to_vec(), segments, Presample::Drop).after(left_out);
     if lagged.rows() < SAMPLES * parameters {
         return None;
     }
@@ -276,10 +281,10 @@ fn residuals(
     segments: &[Range<usize>],
     taps: &[Taps],
     parameters: &[f64],
-    masked: usize,
+    left_out: usize,
 ) -> Vec<f64> {
     let mut residuals = vec![0.0; signals[0].len()];
-    for rows in &shortened(segments, masked) {
+    for rows in &shortened(segments, left_out) {
         let into = &mut residuals[rows.clone()];
         into.copy_from_slice(&signals[0][rows.clone()]);
         let mut rest = parameters;
@@ -288,7 +293,7 @@ fn residuals(
             rest = others;
             let weights: Vec<f64> =
                 std::iter::repeat_n(0.0, taps.first).chain(own.iter().map(|theta| -theta)).collect();
-            add_filtered(into, rows, &weights, signals[taps.signal], rows.start - masked);
+            add_filtered(into, rows, &weights, signals[taps.signal], rows.start - left_out);
         }
     }
     residuals

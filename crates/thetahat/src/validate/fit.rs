@@ -11,9 +11,9 @@ use crate::respond::{Horizon, Response, Start};
 pub enum Part {
     /// The model was fitted to them.
     Estimation,
-    /// The fit did not see them.
+    /// The fit did not use them.
     Validation,
-    /// Neither the fit nor the choice of the model saw them.
+    /// Neither the fit nor the choice of the model used them.
     Test,
 }
 
@@ -25,7 +25,7 @@ pub enum Part {
 pub struct Fit {
     /// The output.
     pub output: String,
-    /// The rows looked at, 1-based and inclusive.
+    /// The rows evaluated, 1-based and inclusive.
     pub rows: Vec<Rows>,
     /// What these rows served for; none for a log that the fit did not know.
     #[serde(default, skip_serializing_if = "Option::is_none")]

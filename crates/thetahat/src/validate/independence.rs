@@ -35,7 +35,7 @@ use crate::distribution::{chi_square_tail, two_sided};
 use crate::estimate::{Autoregression, backward_filtered_products};
 use crate::regression::{Lagged, Presample, Taps, sum_of_squares};
 
-/// Directions in which an input has less than the energy of so many of its samples are left out: a sum of few errors is not
+/// Directions in which an input has less than the energy of this many of its samples are left out: a sum of few errors is not
 /// normal, and where an input is not rich they are no more than its ends.
 const RICH: f64 = 10.0;
 
@@ -76,7 +76,7 @@ pub(super) fn independence(
     let past = columns(&[taps]);
     let counted = traces.counted();
     let power: f64 =
-        counted.iter().map(|stretch| sum_of_squares(&traces.signal(signal)[stretch.clone()])).sum();
+        counted.iter().map(|segment| sum_of_squares(&traces.signal(signal)[segment.clone()])).sum();
     let with_error = moments.with_error(&past);
     // sum u(t) e(t - k), k = 0 … M.
     let signals = [traces.signal(signal), traces.signal(Traces::ERROR)];
@@ -140,9 +140,9 @@ fn coloured_products(setting: &Setting<'_>, past: &Taps, all: &[Column]) -> DMat
     let taps = [&[*past], &setting.traces.psi[..]].concat();
     let signals = setting.traces.signals();
     let mut products = DMatrix::zeros(all.len(), all.len());
-    for stretch in &setting.traces.stretches {
+    for segment in &setting.traces.segments {
         products +=
-            backward_filtered_products(&signals, &taps, &stretch.known, &stretch.counted, None, monic);
+            backward_filtered_products(&signals, &taps, &segment.known, &segment.counted, None, monic);
     }
     products * *variance
 }

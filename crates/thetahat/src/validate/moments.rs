@@ -6,9 +6,9 @@
 //! ```
 //!
 //! with x_j = (B_j/F_j) u_j and w = A y - sum_j x_j (Ljung, System Identification, 2nd ed. 1999, section 10.3). All filters
-//! begin from rest at the first sample of a stretch: what that leaves out dies away, and tests need psi to first order
+//! begin from rest at the first sample of a segment: what that leaves out dies away, and tests need psi to first order
 //! only. Each signal is measured from its mean over the samples that count: an offset of the log is no matter of dynamics.
-//! Every sum runs over these samples of every stretch; what stands before a stretch is zero.
+//! Every sum runs over these samples of every segment; what stands before a segment is zero.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -35,7 +35,7 @@ pub(super) struct Column {
 
 /// Samples that follow one another: those known, and of them those that count.
 #[derive(Debug, Clone)]
-pub(super) struct Stretch {
+pub(super) struct Segment {
     pub(super) known: Range<usize>,
     /// One range, but where outputs are missing.
     pub(super) counted: Vec<Range<usize>>,
@@ -47,7 +47,7 @@ pub(super) struct Traces<'a> {
     signals: Vec<Cow<'a, [f64]>>,
     /// psi, in the order of the parameters.
     pub(super) psi: Vec<Taps>,
-    pub(super) stretches: Vec<Stretch>,
+    pub(super) segments: Vec<Segment>,
 }
 
 impl<'a> Traces<'a> {
@@ -63,17 +63,17 @@ impl<'a> Traces<'a> {
     ) -> Self {
         let length = record.output.len();
         let mut error = vec![0.0; length];
-        let mut stretches = Vec::with_capacity(innovations.len());
+        let mut segments = Vec::with_capacity(innovations.len());
         for found in innovations {
             for counted in &found.counted {
                 let own = counted.start - found.rows.start..counted.end - found.rows.start;
                 error[counted.clone()].copy_from_slice(&found.errors[own]);
             }
-            stretches.push(Stretch { known: found.rows.clone(), counted: found.counted.clone() });
+            segments.push(Segment { known: found.rows.clone(), counted: found.counted.clone() });
         }
         let inputs = record.inputs.iter().map(|input| Cow::Borrowed(*input));
         let signals = std::iter::once(Cow::Owned(error)).chain(inputs).collect();
-        let mut traces = Self { signals, psi: Vec::new(), stretches };
+        let mut traces = Self { signals, psi: Vec::new(), segments };
         let orders = &model.orders;
         let linear = orders.is_linear();
         let over = |of: &dyn Fn(&Innovations) -> Vec<f64>| {
@@ -184,18 +184,18 @@ impl<'a> Traces<'a> {
 
     /// The samples that count.
     pub(super) fn counted(&self) -> Vec<Range<usize>> {
-        self.stretches.iter().flat_map(|stretch| stretch.counted.iter().cloned()).collect()
+        self.segments.iter().flat_map(|segment| segment.counted.iter().cloned()).collect()
     }
 
-    /// The same, stretch by stretch.
-    pub(super) fn stretches(&self) -> Vec<&[Range<usize>]> {
-        self.stretches.iter().map(|stretch| stretch.counted.as_slice()).collect()
+    /// The same, segment by segment.
+    pub(super) fn segments(&self) -> Vec<&[Range<usize>]> {
+        self.segments.iter().map(|segment| segment.counted.as_slice()).collect()
     }
 
-    /// The samples of each stretch from the first to the last that counts.
+    /// The samples of each segment from the first to the last that counts.
     pub(super) fn spans(&self) -> Vec<Range<usize>> {
-        let span = |stretch: &Stretch| Some(stretch.counted.first()?.start..stretch.counted.last()?.end);
-        self.stretches.iter().filter_map(span).collect()
+        let span = |segment: &Segment| Some(segment.counted.first()?.start..segment.counted.last()?.end);
+        self.segments.iter().filter_map(span).collect()
     }
 }
 
@@ -228,15 +228,15 @@ impl Moments {
         let signals = traces.signals();
         let size = products.size();
         let mut entries = vec![0.0; size * size];
-        for stretch in &traces.stretches {
-            for counted in &stretch.counted {
-                products.add_ends(&signals, stretch.known.start, counted, &mut entries);
+        for segment in &traces.segments {
+            for counted in &segment.counted {
+                products.add_ends(&signals, segment.known.start, counted, &mut entries);
             }
         }
         let counted = traces
-            .stretches
+            .segments
             .iter()
-            .flat_map(|stretch| stretch.counted.iter().map(|counted| (stretch.known.start, counted.clone())));
+            .flat_map(|segment| segment.counted.iter().map(|counted| (segment.known.start, counted.clone())));
         let mut interior = products.interior(counted);
         products.add_interior(&signals, &vec![usize::MAX; signals.len()], &mut interior, &mut entries);
         Self { products, entries }

@@ -18,13 +18,13 @@ use crate::respond::Innovations;
 
 /// Fewer samples than this, and one for each parameter that was fitted to them, say nothing.
 const FEWEST: usize = 10;
-/// A lag has pairs for at least one in so many samples.
+/// A lag has pairs for at least one in this many samples.
 const PAIRS: usize = 4;
-/// At least so many samples stand for each lag of the autocorrelation, and of an input: with fewer, Ljung and Box's test
+/// At least this many samples stand for each lag of the autocorrelation, and of an input: with fewer, Ljung and Box's test
 /// rejects too often.
 const SAMPLES_PER_LAG: usize = 10;
 const SAMPLES_PER_INPUT_LAG: usize = 5;
-/// How many more lags of an input are looked at than the plant has parameters.
+/// How many more lags of an input are tested than the plant has parameters.
 const MORE_LAGS: usize = 10;
 /// A sum of squared errors below this fraction of the output's is rounding.
 const NOTHING_LEFT: f64 = 1e-24;
@@ -50,7 +50,7 @@ pub struct Residuals {
     pub independence: Vec<Independence>,
 }
 
-/// What the parameters have to do with the samples that are looked at.
+/// What the parameters have to do with the samples that are evaluated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Relation {
     /// They were fitted to them, or to some of them.
@@ -92,7 +92,7 @@ impl fmt::Display for Untestable {
             }
             Self::Apart { samples, pairs } => write!(
                 f,
-                "gaps leave {pairs} of {samples} samples directly behind another one, and tests need a fourth of them; name rows \
+                "gaps leave {pairs} of {samples} samples directly after another one, and tests need a fourth of them; name rows \
                  without gaps"
             ),
             Self::Nothing => {
@@ -129,13 +129,13 @@ impl Residuals {
             return Err(Untestable::Few { samples, needed });
         }
         let outputs: f64 = counted.iter().map(|rows| sum_of_squares(&record.output[rows.clone()])).sum();
-        let stretches = traces.stretches();
-        let usable = |lag: &usize| PAIRS * pairs(&stretches, *lag) >= samples;
+        let segments = traces.segments();
+        let usable = |lag: &usize| PAIRS * pairs(&segments, *lag) >= samples;
         let Some(longest) = (1..=samples / SAMPLES_PER_INPUT_LAG).take_while(usable).last() else {
-            return Err(Untestable::Apart { samples, pairs: pairs(&stretches, 1) });
+            return Err(Untestable::Apart { samples, pairs: pairs(&segments, 1) });
         };
         let lags = lags.min(samples / SAMPLES_PER_LAG).clamp(1, longest);
-        let correlation = Autocorrelation::new(traces.signal(Traces::ERROR), &stretches, lags);
+        let correlation = Autocorrelation::new(traces.signal(Traces::ERROR), &segments, lags);
         let square = correlation.square;
         if !square.is_finite() {
             return Err(Untestable::Range);
@@ -215,8 +215,8 @@ impl Residuals {
     }
 }
 
-/// How many past lags of an input are looked at: as many as of the autocorrelation, and more than the plant has
-/// parameters behind its delay.
+/// How many past lags of an input are tested: as many as of the autocorrelation, and more than the plant has
+/// parameters after its delay.
 fn past_lags(model: &PolynomialModel, input: usize, lags: usize) -> usize {
     let orders = &model.orders;
     let plant = orders.na + orders.nb[input] + orders.nf[input];

@@ -56,12 +56,12 @@ fn close(found: f64, expected: f64, tolerance: f64) -> bool {
 }
 
 #[test]
-fn correlations_are_those_of_pairs_inside_stretches() {
+fn correlations_are_those_of_pairs_inside_segments() {
     let error = Noise(1).take(90);
     // Two of them touch: no pair reaches from one into the other.
     let counted: [Range<usize>; 4] = [2..30, 30..45, 50..53, 60..90];
-    let stretches: Vec<&[Range<usize>]> = counted.iter().map(std::slice::from_ref).collect();
-    let found = Autocorrelation::new(&error, &stretches, 12);
+    let segments: Vec<&[Range<usize>]> = counted.iter().map(std::slice::from_ref).collect();
+    let found = Autocorrelation::new(&error, &segments, 12);
     let square: f64 = counted.iter().cloned().flatten().map(|t| error[t] * error[t]).sum();
     assert_eq!(found.samples, 76);
     assert!(close(found.square, square, 1e-14));
@@ -207,7 +207,7 @@ fn psi_is_the_derivative_of_the_errors() {
                     assert!((value - expected[t]).abs() < 1e-7, "{:?} {index} {t}", model.structure);
                 }
             }
-            // And the sums of products are those of the shifted signals, zero before a stretch.
+            // And the sums of products are those of the shifted signals, zero before a segment.
             let at = |t: usize, start: usize| {
                 if t < start + column.lag { 0.0 } else { column.sign * signal[t - column.lag] }
             };
@@ -512,9 +512,9 @@ fn short_logs_have_fewer_lags() {
         (found.ljung_box.lags, found.anderson.lags, found.independence[0].past.lags)
     };
     assert_eq!(of(std::iter::once(0..400).collect()), (25, 19, 25));
-    // Of an input ten more than the plant has parameters, behind its delay.
+    // Of an input ten more than the plant has parameters, after its delay.
     assert_eq!(of(std::iter::once(0..82).collect()), (8, 4, 15));
-    // Of stretches of eight samples that count, three quarters have a partner six steps before: no more lags.
+    // Of segments of eight samples that count, three quarters have a partner six steps before: no more lags.
     assert_eq!(of((0..40).map(|k| 10 * k..10 * k + 10).collect()), (6, 6, 6));
 }
 

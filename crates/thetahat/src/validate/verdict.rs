@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 /// A test of a hypothesis.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Test {
-    /// The lags that it looks at.
+    /// The lags tested.
     pub lags: usize,
     /// The statistic.
     pub statistic: f64,

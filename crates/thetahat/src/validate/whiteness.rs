@@ -41,7 +41,7 @@ const SAMPLES_PER_ANDERSON_LAG: usize = 20;
 /// The deviation of a correlation that the fit has left none.
 const CERTAIN: f64 = 1e-9;
 
-/// The autocorrelation of errors over stretches without a gap.
+/// The autocorrelation of errors over segments without a gap.
 #[derive(Debug, Clone)]
 pub(super) struct Autocorrelation {
     /// N.
@@ -55,25 +55,25 @@ pub(super) struct Autocorrelation {
 }
 
 impl Autocorrelation {
-    /// O(N K) for K lags; none of them pairs samples of two stretches. `error` is zero where it does not count.
-    pub(super) fn new(error: &[f64], stretches: &[&[Range<usize>]], lags: usize) -> Self {
+    /// O(N K) for K lags; none of them pairs samples of two segments. `error` is zero where it does not count.
+    pub(super) fn new(error: &[f64], segments: &[&[Range<usize>]], lags: usize) -> Self {
         let taps = vec![Taps { signal: 0, first: 1, count: lags, sign: 1.0 }];
         let span = |runs: &&[Range<usize>]| Some(runs.first()?.start..runs.last()?.end);
-        let spans: Vec<Range<usize>> = stretches.iter().filter_map(span).collect();
+        let spans: Vec<Range<usize>> = segments.iter().filter_map(span).collect();
         let (_, sums, square) = Lagged::new(&[error], taps, &spans, Presample::Zero).normal_equations();
         Self {
-            samples: stretches.iter().copied().flatten().map(Range::len).sum(),
+            samples: segments.iter().copied().flatten().map(Range::len).sum(),
             square,
             values: sums.iter().map(|sum| sum / square).collect(),
-            pairs: (1..=lags).map(|lag| pairs(stretches, lag)).collect(),
+            pairs: (1..=lags).map(|lag| pairs(segments, lag)).collect(),
         }
     }
 }
 
-/// How many pairs of samples of one stretch are so many steps apart. A stretch is a list of runs of samples.
-pub(super) fn pairs(stretches: &[&[Range<usize>]], lag: usize) -> usize {
+/// How many pairs of samples of one segment are this many steps apart. A segment is a list of runs of samples.
+pub(super) fn pairs(segments: &[&[Range<usize>]], lag: usize) -> usize {
     let of = |runs: &[Range<usize>]| {
-        // Each run against itself and those from which it is so many steps away: both lists rise.
+        // Each run against itself and those from which it is this many steps away: both lists rise.
         let (mut count, mut first) = (0, 0);
         for run in runs {
             while runs[first].end + lag <= run.start {
@@ -87,7 +87,7 @@ pub(super) fn pairs(stretches: &[&[Range<usize>]], lag: usize) -> usize {
         }
         count
     };
-    stretches.iter().copied().map(of).sum()
+    segments.iter().copied().map(of).sum()
 }
 
 /// X, a row for each lag 1 … L and a column for each parameter. Zero for an unstable A or D, which has no such response.

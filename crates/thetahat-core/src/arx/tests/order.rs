@@ -302,7 +302,7 @@ fn noise_of_the_sensor_pulls_the_poles_in() {
             arx.applied(&[u]).unwrap();
             y = 0.9 * y + 0.08 * u;
         }
-        // Three standard errors of so many samples are 0.007.
+        // Three standard errors of this many samples are 0.007.
         let found = arx.estimator().parameters()[0];
         assert!((found - expected).abs() < 0.007, "{share}: {found}");
     }

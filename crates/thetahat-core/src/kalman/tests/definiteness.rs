@@ -150,7 +150,7 @@ fn in_single_precision_hard_time_updates_are_as_good_as_gram_schmidt() {
 
 const STEPS: usize = 100_000;
 
-/// Runs a filter for so many steps in single precision, and in double until its covariance is steady (as it does not
+/// Runs a filter for this many steps in single precision, and in double until its covariance is steady (as it does not
 /// depend on the data). Returns the largest difference of the two covariances.
 fn run<const N: usize, const M: usize>(
     p: &Square<N>,

@@ -132,7 +132,7 @@ fn harsh<const K: usize>(
 }
 
 /// Many steps in f32 beside f64, both of them sound all the way. Returns how far apart the parameters were at most,
-/// in units of 1/scale, then how far at the ends of the stretches of excitation, and how far from the truth there.
+/// in units of 1/scale, then how far at the ends of the segments of excitation, and how far from the truth there.
 fn endure<const K: usize>(policy: Forgetting<f64>, steps: usize) -> [f64; 3] {
     let scales = SVector::<f64, K>::from_fn(|index, _| [1e-4, 1e4, 1.0, 100.0][index]);
     let mut double = RecursiveLeastSquares::<f64, Const<K>>::new(&scales, policy).unwrap();

@@ -49,7 +49,7 @@ impl Demands {
         let named = inputs.len();
         let (nb, nk) = (orders.nb[..named].to_vec(), orders.nk[..named].to_vec());
         let named = Orders { nb, nk, nf: vec![0; named], ..orders.clone() };
-        // The others have their parameters behind these.
+        // The others have their parameters after these.
         let (names, size) = (named.names(), orders.parameters());
         let mut demands = Self { demands: Vec::new(), limits: Vec::new() };
         for bound in &criterion.bounds {

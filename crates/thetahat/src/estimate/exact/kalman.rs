@@ -315,7 +315,7 @@ impl<'p> Filter<'p> {
     }
 }
 
-/// x <- T x for the companion matrix of a monic polynomial, whose coefficients behind 1 these are.
+/// x <- T x for the companion matrix of a monic polynomial, whose coefficients after 1 these are.
 fn advance(coefficients: &[f64], x: &mut [f64]) {
     let first = x[0];
     let size = x.len();

@@ -94,15 +94,15 @@ pub(super) struct Likelihood<'a> {
 }
 
 impl<'a> Likelihood<'a> {
-    /// Segments without more measured outputs than they have free responses are left out.
+    /// Segments without more measured outputs than they have initial-condition responses are left out.
     pub(super) fn new(record: &Record<'a>, orders: &Orders, lines: usize, begin: Begin) -> Self {
         let driving = 0..orders.inputs() - lines;
-        let reach = driving.map(|input| orders.input_reach(input)).max();
+        let lag = driving.map(|input| orders.maximum_input_lag(input)).max();
         let mut sections = Vec::new();
         for (segment, past) in record.segments.iter().zip(&record.past) {
-            let known = if begin == Begin::Rest { 0 } else { reach.unwrap_or(0).min(*past) };
-            let free = match (begin, reach) {
-                (Begin::Free, Some(reach)) if reach > 0 => orders.na.max(reach - known),
+            let known = if begin == Begin::Rest { 0 } else { lag.unwrap_or(0).min(*past) };
+            let free = match (begin, lag) {
+                (Begin::Free, Some(lag)) if lag > 0 => orders.na.max(lag - known),
                 _ => 0,
             };
             let rows = segment.start - known..segment.end;
@@ -160,8 +160,8 @@ impl<'a> Likelihood<'a> {
 
     /// Where the coefficients of A and C stand among the parameters.
     fn places(&self) -> Vec<usize> {
-        let behind = self.orders.na + self.orders.nb.iter().sum::<usize>();
-        (0..self.orders.na).chain(behind..behind + self.orders.nc).collect()
+        let after = self.orders.na + self.orders.nb.iter().sum::<usize>();
+        (0..self.orders.na).chain(after..after + self.orders.nc).collect()
     }
 }
 
@@ -189,7 +189,7 @@ impl Signals {
     ) -> Self {
         let Polynomials { a, b, .. } = polynomials;
         let rows = section.output.len();
-        let lead = orders.reach().max(1);
+        let lead = orders.maximum_lag().max(1);
         let driving = orders.inputs() - lines;
         let mut beyond = Line::default();
         let mut response = vec![0.0; lead + rows];

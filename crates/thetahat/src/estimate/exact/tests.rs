@@ -469,7 +469,7 @@ fn the_report_is_that_of_its_log_and_criteria_decide_about_a_level() {
     assert_eq!(report.data.segments.len(), 1);
     let validation =
         crate::report::validate(&report, None, &log, &[], &crate::report::ValidationPlan::default());
-    assert_eq!(validation.unwrap().validation.seen, crate::report::Seen::Yes);
+    assert_eq!(validation.unwrap().validation.in_sample, crate::report::InSample::Yes);
     // What the mean leaves open of the level: as much as the error of a level that is estimated.
     assert!(report.polynomials().offset_covariance.is_some());
     // The mean is the level but for its error.

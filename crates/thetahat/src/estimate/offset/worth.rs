@@ -105,13 +105,13 @@ impl OfConstant {
 fn sums(record: &Record<'_>, orders: &Orders, estimate: &Estimate) -> (Vec<f64>, f64) {
     let (skipped, presample) = match estimate.initial() {
         Initial::Zero => (0, Presample::Zero),
-        _ => (orders.reach(), Presample::Drop),
+        _ => (orders.maximum_lag(), Presample::Drop),
     };
     let segments = with_past(record, orders, presample);
     let sums = |signal: &[f64], first: usize, count: usize| {
         let mut sums = vec![0.0; count];
         for segment in segments.iter().filter(|segment| segment.len() > skipped) {
-            // Samples before a segment are zero, or none is looked at.
+            // Samples before a segment are zero, or none is used.
             let rows = |lag: usize| {
                 let begin = (segment.start + skipped).saturating_sub(lag).max(segment.start);
                 begin..segment.end.saturating_sub(lag).max(begin)

@@ -1,7 +1,7 @@
 //! Several inputs through one denominator: y = (sum_j B_j u_j)/A + v, sum v^2 least.
 //!
 //! These are the errors of y = sum_j B_j/F_j u_j + v with all F_j the same, so psi' psi and psi' e of A and B are sums of entries
-//! of theirs: with theta = S (a, b) they are S'GS and S'g. All free responses are those of 1/A; one input has them.
+//! of theirs: with theta = S (a, b) they are S'GS and S'g. All initial-condition responses are those of 1/A; one input has them.
 
 use std::ops::Range;
 
@@ -136,7 +136,7 @@ impl Objective for Shared<'_> {
     }
 }
 
-/// The plant, its parameters in the order of A and B, with its free-run errors and their stretches.
+/// The plant, its parameters in the order of A and B, with its free-run errors and their segments.
 pub(super) fn plant(
     record: &Record<'_>,
     orders: &Orders,

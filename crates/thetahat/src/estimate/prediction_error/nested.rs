@@ -25,9 +25,9 @@ const SAME_COST: f64 = 1e-6;
 const TOLERANCE: f64 = 1e-5;
 /// Models of a lattice at most.
 const MOST_MODELS: usize = 96;
-/// Of a longer record the smaller models see stretches.
+/// Of a longer record the smaller models see segments.
 const LONG: usize = 1 << 12;
-const STRETCHES: usize = 4;
+const SEGMENTS: usize = 4;
 
 /// How many coefficients there are of A, of the longest B, of C, of D and of the longest F.
 type Levels = [usize; 5];
@@ -103,10 +103,10 @@ impl Job<'_> {
     }
 }
 
-/// Stretches of a longer record: enough to see where searches lead.
+/// Segments of a longer record: enough to see where searches lead.
 pub(super) fn thinned<'a>(record: &Record<'a>) -> Option<Record<'a>> {
     let samples: usize = record.segments.iter().map(Range::len).sum();
-    if samples > LONG { stretches(record, STRETCHES, LONG / STRETCHES) } else { None }
+    if samples > LONG { stretches(record, SEGMENTS, LONG / SEGMENTS) } else { None }
 }
 
 /// Recipes are for models without A of which the plant is nearly that of the top, with all of its noise or none; for those

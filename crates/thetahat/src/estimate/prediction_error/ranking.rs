@@ -42,7 +42,7 @@ struct Start {
 }
 
 impl Job<'_> {
-    /// The starts, the best first. If more than one is asked for, searches from so many and takes what the best search found.
+    /// The starts, the best first. If more than one is asked for, searches from this many and takes what the best search found.
     pub(super) fn ranked(
         &self,
         problem: Problem<'_, '_>,
@@ -89,7 +89,7 @@ impl Job<'_> {
             let missing = (self.options.starts + 1).saturating_sub(starts.len());
             let more: Vec<_> = restarts(orders, &best.parameters, self.options.seed, missing).collect();
             let more = more.into_iter().enumerate().map(|(number, mut parameters)| {
-                // A start that has no cost is judged by that.
+                // A start without a cost is ranked by that.
                 let _ = best_linear(predictor, &mut parameters);
                 Start::new(&format!("random-{}", number + 1), parameters, predictor)
             });
@@ -207,7 +207,7 @@ fn sort(starts: &mut [Start]) {
 }
 
 /// Whether searches from these sorted starts may end in different places, or far from where they begin: where they lead is
-/// predicted by a step of Gauss and Newton, for a long record on stretches of it.
+/// predicted by a step of Gauss and Newton, for a long record on segments of it.
 fn is_doubtful(problem: Problem<'_, '_>, starts: &[Start], predictor: &mut Predictor<'_>) -> bool {
     let mut recipes: Vec<(&str, &Start)> = Vec::new();
     for start in starts.iter().filter(|start| start.cost.is_finite()) {

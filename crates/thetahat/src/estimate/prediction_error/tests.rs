@@ -283,7 +283,7 @@ fn a_larger_model_does_not_fit_a_log_worse_than_a_nested_one() {
     }
 }
 
-/// The plant's pole is on the unit circle: a search comes to the border, and goes on along it.
+/// The plant's pole is on the unit circle: a search comes to the boundary, and goes on along it.
 #[test]
 fn a_search_goes_on_along_the_border_of_stability() {
     let mut noise = Noise(11);

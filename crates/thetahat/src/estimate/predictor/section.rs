@@ -10,7 +10,7 @@ use crate::estimate::polynomials::Polynomials;
 use crate::optimize::normal;
 use crate::regression::{Interior, add_filtered, divide, divide_together, product, sum_of_squares};
 
-/// The fraction of a free response, squared, below which what is left of it is rounding.
+/// The fraction of a initial-condition response, squared, below which what is left of it is rounding.
 const UNSEEN: f64 = 1e-22;
 /// The fraction of its largest value below which a response has died away.
 const NEGLIGIBLE: f64 = 1e-20;
@@ -41,24 +41,24 @@ pub(super) struct Section<'a> {
     pub(super) heads: Vec<f64>,
     pub(super) interior: Interior,
     pub(super) entries: Vec<f64>,
-    /// The Gram matrix of the parameters' and free responses' columns, row by row, and psi'e.
+    /// The Gram matrix of the parameters' and initial-condition responses' columns, row by row, and psi'e.
     pub(super) gram: Vec<f64>,
     pub(super) right: Vec<f64>,
     pub(super) corrections: Vec<f64>,
-    /// The weights of the free responses, and those of a trial.
+    /// The weights of the initial-condition responses, and those of a trial.
     pub(super) free: Vec<f64>,
     pub(super) trial: Vec<f64>,
-    /// The factor of the free responses' block, and the step to their optimum: for no change of parameters first, then for
+    /// The factor of the initial-condition responses' block, and the step to their optimum: for no change of parameters first, then for
     /// each parameter.
     pub(super) free_factor: Vec<f64>,
     pub(super) free_steps: Vec<f64>,
-    /// For each free response, the sum of squares below which what D, C and the mask leave of it is rounding.
+    /// For each initial-condition response, the sum of squares below which what D, C and the mask leave of it is rounding.
     pub(super) free_floors: Vec<f64>,
-    /// Free responses that begin before the samples that count, and how far each is known; what follows is nothing.
+    /// Initial-condition responses that begin before the samples that count, and how far each is known; what follows is nothing.
     faded: Vec<f64>,
     faded_lengths: Vec<usize>,
     pub(super) cost: f64,
-    /// By how much the free responses alone can lower the cost.
+    /// By how much the initial-condition responses alone can lower the cost.
     pub(super) free_gain: f64,
 }
 
@@ -75,7 +75,7 @@ impl<'a> Section<'a> {
         let used = |signal: usize| {
             signal == 0 || layout.taps.iter().any(|taps| taps.signal == signal && taps.count > 0)
         };
-        let room = |used: bool| if used { vec![0.0; length] } else { Vec::new() };
+        let buffer = |used: bool| if used { vec![0.0; length] } else { Vec::new() };
         let (parameters, free) = (layout.parameters, layout.free);
         let columns = parameters + free;
         let size = layout.products.size();
@@ -85,11 +85,11 @@ impl<'a> Section<'a> {
             first: rows.start,
             output: &record.output[rows.clone()],
             inputs: record.inputs.iter().map(|input| &input[rows.clone()]).collect(),
-            signals: (0..layout.signals).map(|signal| room(used(signal))).collect(),
+            signals: (0..layout.signals).map(|signal| buffer(used(signal))).collect(),
             supports: vec![usize::MAX; layout.signals],
-            responses: layout.orders.nf.iter().map(|&nf| room(nf > 0)).collect(),
-            disturbance: room(layout.orders.nd > 0),
-            scratch: room(layout.orders.nd > 0),
+            responses: layout.orders.nf.iter().map(|&nf| buffer(nf > 0)).collect(),
+            disturbance: buffer(layout.orders.nd > 0),
+            scratch: buffer(layout.orders.nd > 0),
             heads: vec![0.0; layout.signals * layout.masked],
             interior: layout.products.interior(counted),
             entries: vec![0.0; size * size],
@@ -117,7 +117,7 @@ impl<'a> Section<'a> {
 
     /// Sets the trial weights to those that are best for the polynomials.
     ///
-    /// For free responses that begin before the samples that count: a small change of F changes a faded response many times
+    /// For initial-condition responses that begin before the samples that count: a small change of F changes a faded response many times
     /// over, which no step of the weights to first order follows.
     pub(super) fn project(&mut self, layout: &Layout, polynomials: &Polynomials, negative: &[Vec<f64>]) {
         self.trial.fill(0.0);
@@ -261,7 +261,7 @@ impl<'a> Section<'a> {
         self.eliminate(layout);
     }
 
-    /// The response of (D/(C F_j)) to an impulse where free responses begin, or of 1/C to one at the first that counts, until it has
+    /// The response of (D/(C F_j)) to an impulse where initial-condition responses begin, or of 1/C to one at the first that counts, until it has
     /// died away. Gives the sum of squares of what 1/F_j alone makes of it.
     fn respond(
         &mut self,
@@ -362,7 +362,7 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// Prepares the step of the free responses that is best for any change of the parameters.
+    /// Prepares the step of the initial-condition responses that is best for any change of the parameters.
     fn eliminate(&mut self, layout: &Layout) {
         let (parameters, free) = (layout.parameters, layout.free);
         let count = parameters + free;
@@ -388,7 +388,7 @@ impl<'a> Section<'a> {
         self.free_gain = best.iter().zip(&self.right[parameters..]).map(|(step, right)| step * right).sum();
     }
 
-    /// What makes psi without the free responses of psi and of these.
+    /// What makes psi without the initial-condition responses of psi and of these.
     pub(super) fn without_free(&self, parameters: usize, free: usize) -> DMatrix<f64> {
         DMatrix::from_fn(parameters, parameters + free, |row, column| {
             if column >= parameters {
@@ -399,7 +399,7 @@ impl<'a> Section<'a> {
         })
     }
 
-    /// Adds the part of the normal equations that is left without the free responses.
+    /// Adds the part of the normal equations that is left without the initial-condition responses.
     pub(super) fn add_normal(&self, layout: &Layout, matrix: &mut [f64], right: &mut [f64]) {
         let (parameters, free) = (layout.parameters, layout.free);
         let count = parameters + free;

@@ -29,7 +29,7 @@ impl Predictor<'_> {
 }
 
 impl Section<'_> {
-    /// The normal equations of psi with weights. O(N (p + n)^2) for n free responses.
+    /// The normal equations of psi with weights. O(N (p + n)^2) for n initial-condition responses.
     pub(super) fn weigh(&mut self, layout: &Layout, bound: f64) {
         let columns = self.raw_columns(layout);
         // Zero where samples do not count, as the columns are.

@@ -4,7 +4,7 @@ use thetahat_core::nalgebra::ComplexField;
 
 use super::Candidate;
 use super::mixed::{Coefficients, Data, ROUNDS, starts};
-use super::noise::{Equation, Mixed, behind};
+use super::noise::{Equation, Mixed, after};
 use super::output_error::{OutputError, Start};
 use super::plant::{Input, divided, energy, multiplied};
 use crate::model::{
@@ -14,7 +14,7 @@ use crate::model::{
 
 /// Ways to split a denominator that are tried.
 const SPLITS: usize = 12;
-/// Factors of a denominator that are told apart.
+/// The most factors that a denominator is split into.
 const MOST_PARTS: usize = 12;
 
 impl Data<'_> {
@@ -60,7 +60,7 @@ impl Data<'_> {
         let whole = Orders { na: 0, nf: vec![orders.na + nf], ..orders.clone() };
         let start = Data { orders: &whole, ..*self }.output_error().starts().into_iter().next()?;
         let total = [&[1.0], &start.f[0][..]].concat();
-        let later = behind(self.segments, orders.na);
+        let later = after(self.segments, orders.na);
         let splits = factors(&total, orders.na)?.into_iter().take(SPLITS).enumerate();
         let splits = splits.take_while(|(number, _)| *number == 0 || !self.deadline.is_over());
         let found = splits.filter_map(|(_, (a, f))| {
@@ -116,7 +116,7 @@ impl Data<'_> {
                 f: start.f.clone(),
             };
             best = Some((cost, found));
-            let later = behind(self.segments, orders.na + orders.nd);
+            let later = after(self.segments, orders.na + orders.nd);
             let filtered = OutputError::new(&output, &inputs, &later, without_a, self.deadline);
             let Some(next) = filtered.refined("in-turn", &start) else { break };
             start = next;
@@ -127,7 +127,7 @@ impl Data<'_> {
     /// A as the poles of what the plant leaves; then the plant from A y.
     fn with_noise_poles(&self, first: &Start, without_a: &Orders) -> Option<Candidate> {
         let orders = self.orders;
-        let later = behind(self.segments, orders.na);
+        let later = after(self.segments, orders.na);
         let poles =
             Equation { output: &first.errors, order: orders.na, inputs: Vec::new(), segments: self.segments };
         let Mixed { a, .. } = poles.hannan_rissanen(orders.nc + orders.nd)?;

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::Candidate;
-use super::noise::{Equation, Mixed, behind};
+use super::noise::{Equation, Mixed, after};
 use super::output_error::{OutputError, Start};
 use super::plant::{Equations, Group, Input, Limits, Plant, Point, divided, energy, multiplied};
 use crate::model::Orders;
@@ -144,7 +144,7 @@ impl<'a> Data<'a> {
         if inputs.iter().all(|input| input.count == 0) {
             return None;
         }
-        let group = Group { order: self.orders.na, free: self.orders.reach(), inputs };
+        let group = Group { order: self.orders.na, free: self.orders.maximum_lag(), inputs };
         let plant = Plant { output: self.output, groups: vec![group], segments: self.segments };
         let first =
             plant.iterate(&plant.unit(), Equations::SteiglitzMcBride, None, ITERATIONS, self.deadline)?;
@@ -163,15 +163,15 @@ impl<'a> Data<'a> {
 
     /// Rounds of generalised least squares; the plant and the noise with the lowest sum of squared errors.
     pub(super) fn generalised(&self, equation: &Equation<'_>, start: Mixed) -> Option<(f64, Mixed, Mixed)> {
-        let reach = self.orders.reach();
-        let later = behind(self.segments, reach);
+        let lag = self.orders.maximum_lag();
+        let later = after(self.segments, lag);
         let mut plant = start;
         let mut best: Option<(f64, Mixed, Mixed)> = None;
         for _ in 0..ROUNDS {
             if best.is_some() && self.deadline.is_over() {
                 break;
             }
-            let w = equation.errors(&plant, reach);
+            let w = equation.errors(&plant, lag);
             let Some(noise) = self.noise_of(&w, &later) else { break };
             let cost = energy(&self.whitened(&noise, &w, &later), &later);
             if best.as_ref().is_some_and(|(lowest, ..)| cost >= *lowest) {
@@ -253,8 +253,8 @@ impl<'a> Data<'a> {
         if self.orders.nc + self.orders.nd == 0 {
             return None;
         }
-        // Inputs without F have no free response to make up for unknown samples before a segment.
-        let segments = behind(self.segments, self.orders.conditioned() - self.orders.nd);
+        // Inputs without F have no initial-condition response to make up for unknown samples before a segment.
+        let segments = after(self.segments, self.orders.conditioned() - self.orders.nd);
         let left = energy(&start.errors, &segments);
         let exact = left <= EXACT * energy(self.output, self.segments);
         if exact { None } else { self.noise_of(&start.errors, &segments) }

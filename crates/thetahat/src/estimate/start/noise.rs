@@ -40,7 +40,7 @@ pub(in crate::estimate) struct Mixed {
 
 impl Equation<'_> {
     /// How many samples before the present one it needs.
-    fn reach(&self) -> usize {
+    fn maximum_lag(&self) -> usize {
         self.inputs
             .iter()
             .filter(|input| input.count > 0)
@@ -48,8 +48,8 @@ impl Equation<'_> {
             .fold(self.order, usize::max)
     }
 
-    /// The same for a model of so many coefficients of A and each B.
-    fn reach_of(&self, order: usize) -> usize {
+    /// The same for a model of this many coefficients of A and each B.
+    fn maximum_lag_of(&self, order: usize) -> usize {
         self.inputs
             .iter()
             .filter(|input| input.count > 0)
@@ -57,7 +57,7 @@ impl Equation<'_> {
             .fold(order, usize::max)
     }
 
-    /// How many samples have so many before them in their segment.
+    /// How many samples have `past` others before them in their segment.
     fn left(&self, past: usize) -> usize {
         self.segments.iter().map(|segment| segment.len().saturating_sub(past)).sum()
     }
@@ -124,7 +124,7 @@ impl Equation<'_> {
     pub(in crate::estimate) fn long(&self, order: usize) -> Option<(Mixed, usize)> {
         let samples: usize = self.segments.iter().map(Range::len).sum();
         let mut order = order.min(samples / (5 * (1 + self.inputs.len()))).max(1);
-        while order > 1 && 2 * self.left(self.reach_of(order)) < samples {
+        while order > 1 && 2 * self.left(self.maximum_lag_of(order)) < samples {
             order /= 2;
         }
         // Inputs without B say nothing.
@@ -163,7 +163,7 @@ impl Equation<'_> {
         let samples: usize = self.segments.iter().map(Range::len).sum();
         let mut order = (10.0 * (samples as f64).log10()) as usize;
         // Of short segments a long past leaves too little.
-        let left = |order: usize| self.left(self.reach_of(order) + self.reach().max(nc));
+        let left = |order: usize| self.left(self.maximum_lag_of(order) + self.maximum_lag().max(nc));
         // Residuals of a model no longer than this one are combinations of its regressors.
         let least = self.inputs.iter().map(|input| input.count).fold(self.order, usize::max) + 1;
         while order > least && 2 * left(order) < samples {
@@ -175,20 +175,20 @@ impl Equation<'_> {
             Some(model)
         };
         let Some((long, order)) = self.long(order) else { return plain() };
-        let reach = self.reach_of(order);
-        let residuals = self.errors(&long, reach);
+        let lag = self.maximum_lag_of(order);
+        let residuals = self.errors(&long, lag);
         let total = energy(self.output, self.segments);
         let left = energy(&residuals, self.segments);
         if left <= EXACT * total {
             // Nothing to see of C.
             return plain();
         }
-        let behind = behind(self.segments, reach);
+        let after = after(self.segments, lag);
         let mut signals = self.signals();
         let mut taps = self.taps();
         taps.push(Taps { signal: signals.len(), first: 1, count: nc, sign: 1.0 });
         signals.push(&residuals);
-        let second = Lagged::new(&signals, taps, &behind, Presample::Drop);
+        let second = Lagged::new(&signals, taps, &after, Presample::Drop);
         if second.rows() <= self.parameters() + nc {
             return plain();
         }
@@ -200,7 +200,7 @@ impl Equation<'_> {
 
     /// e = (A y - sum_j B_j u_j)/C, zero where no full regressor is, and its sum of squares.
     fn prediction_errors(&self, model: &Mixed) -> (Vec<f64>, f64) {
-        let equation_errors = self.errors(model, self.reach());
+        let equation_errors = self.errors(model, self.maximum_lag());
         let mut errors = Vec::new();
         divided(&mut errors, &equation_errors, &model.c, self.segments);
         let cost = energy(&errors, self.segments);
@@ -221,8 +221,8 @@ impl Equation<'_> {
         let mut taps = self.taps();
         taps.iter_mut().for_each(|taps| taps.signal += 1);
         taps.push(Taps { signal: filtered.len(), first: 1, count: nc, sign: 1.0 });
-        let behind = behind(self.segments, self.reach());
-        let step = Lagged::new(&signals, taps, &behind, Presample::Drop);
+        let after = after(self.segments, self.maximum_lag());
+        let step = Lagged::new(&signals, taps, &after, Presample::Drop);
         if step.rows() <= self.parameters() + nc {
             return None;
         }
@@ -238,6 +238,6 @@ impl Equation<'_> {
 }
 
 /// Segments without their first samples.
-pub(in crate::estimate) fn behind(segments: &[Range<usize>], samples: usize) -> Vec<Range<usize>> {
+pub(in crate::estimate) fn after(segments: &[Range<usize>], samples: usize) -> Vec<Range<usize>> {
     segments.iter().map(|segment| (segment.start + samples).min(segment.end)..segment.end).collect()
 }

@@ -31,7 +31,7 @@ const SAME_COST: f64 = 1e-9;
 const SAME_PLACE: f64 = 1e-4;
 
 /// F of each input, and the largest modulus above 1 of a root that was reflected.
-type Found = (Vec<Vec<f64>>, Option<f64>);
+type Denominators = (Vec<Vec<f64>>, Option<f64>);
 
 /// Denominators and what follows from them.
 #[derive(Debug, Clone)]
@@ -93,7 +93,7 @@ impl<'a> OutputError<'a> {
         let new = |costs: &[f64], cost: f64, tolerance: f64| {
             costs.iter().all(|other| (other - cost).abs() > tolerance * cost)
         };
-        let recipes: [(_, &dyn Fn() -> Option<Found>); 3] = [
+        let recipes: [(_, &dyn Fn() -> Option<Denominators>); 3] = [
             (["steiglitz-mcbride", "steiglitz-mcbride-refined"], &|| self.common_denominator(0.0)),
             (["low-pass", "low-pass-refined"], &|| self.common_denominator(LOW_PASS)),
             (["long-arx", "long-arx-refined"], &|| self.long_model()),
@@ -151,7 +151,7 @@ impl<'a> OutputError<'a> {
     }
 
     /// Steiglitz and McBride's iteration with one denominator for all inputs, from F = (1 - `pole` q^-1)^n.
-    fn common_denominator(&self, pole: f64) -> Option<Found> {
+    fn common_denominator(&self, pole: f64) -> Option<Denominators> {
         let order = self.orders.iter().copied().max()?;
         // Times G on both sides, F_j G has the common order.
         let input = |(input, own): (&Input<'a>, &usize)| match input.count {
@@ -183,7 +183,7 @@ impl<'a> OutputError<'a> {
     }
 
     /// The same, for each input alone, on what a long ARX model makes of it.
-    fn long_model(&self) -> Option<Found> {
+    fn long_model(&self) -> Option<Denominators> {
         let equation =
             Equation { output: self.output, order: 0, inputs: self.inputs.clone(), segments: self.segments };
         let (Mixed { a, b, .. }, _) = equation.long(LONG)?;
@@ -202,8 +202,8 @@ impl<'a> OutputError<'a> {
         part
     }
 
-    /// F_j from x_j, judged on y without the other parts.
-    fn separate_parts(&self, parts: &[Vec<f64>]) -> Option<Found> {
+    /// F_j from x_j, evaluated on y without the other parts.
+    fn separate_parts(&self, parts: &[Vec<f64>]) -> Option<Denominators> {
         let mut denominators = Vec::new();
         let mut unstable_pole: Option<f64> = None;
         for (j, input) in self.inputs.iter().enumerate() {
@@ -211,9 +211,9 @@ impl<'a> OutputError<'a> {
                 denominators.push(vec![1.0]);
                 continue;
             }
-            let mut judge = self.output.to_vec();
+            let mut target = self.output.to_vec();
             for (_, other) in parts.iter().enumerate().filter(|(k, _)| *k != j) {
-                judge.iter_mut().zip(other).for_each(|(value, other)| *value -= other);
+                target.iter_mut().zip(other).for_each(|(value, other)| *value -= other);
             }
             let group = Group { order: self.orders[j], free: self.free[j], inputs: vec![input.clone()] };
             let plant = Plant { output: &parts[j], groups: vec![group], segments: self.segments };
@@ -221,7 +221,7 @@ impl<'a> OutputError<'a> {
             let mut best = plant.iterate(
                 &unit,
                 Equations::SteiglitzMcBride,
-                Some(&judge),
+                Some(&target),
                 STEIGLITZ_MCBRIDE,
                 self.deadline,
             )?;

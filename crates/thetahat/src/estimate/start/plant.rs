@@ -83,7 +83,7 @@ pub(in crate::estimate) struct Best {
     pub(in crate::estimate) unstable_pole: Option<f64>,
 }
 
-/// Signals at the denominators that were looked at last.
+/// Signals at the latest denominators.
 #[derive(Debug, Clone)]
 pub(in crate::estimate) struct Point<'p, 'a> {
     plant: &'p Plant<'a>,
@@ -126,14 +126,14 @@ impl<'a> Plant<'a> {
         self.groups.iter().map(unit).collect()
     }
 
-    /// Iterates from some denominators, reflecting unstable roots, and keeps those of the lowest cost: on `judge` where
+    /// Iterates from some denominators, reflecting unstable roots, and keeps those of the lowest cost: on `target` where
     /// there is one, else on the plant's own output. O(N p) for each iteration, of which none begins after the deadline.
     /// None if no cost is a number.
     pub(in crate::estimate) fn iterate(
         &self,
         start: &[Vec<f64>],
         equations: Equations,
-        judge: Option<&[f64]>,
+        target: Option<&[f64]>,
         limits: Limits,
         deadline: Deadline,
     ) -> Option<Best> {
@@ -142,7 +142,7 @@ impl<'a> Plant<'a> {
         let (mut next, mut unstable_pole) = (start.to_vec(), None);
         let exact = EXACT * energy(self.output, self.segments);
         for iterations in 0..=limits.iterations {
-            let Some(cost) = point.move_to(&next, judge) else { break };
+            let Some(cost) = point.move_to(&next, target) else { break };
             if best.as_ref().is_none_or(|best| cost < best.cost) {
                 best = Some(Best { denominators: next, cost, unstable_pole });
             }
@@ -180,11 +180,11 @@ impl<'p, 'a> Point<'p, 'a> {
         }
     }
 
-    /// Solves for b and the initial conditions; gives the least sum of squares, for the output `judge` if there is one.
+    /// Solves for b and the initial conditions; gives the least sum of squares, for the output `target` if there is one.
     pub(in crate::estimate) fn move_to(
         &mut self,
         denominators: &[Vec<f64>],
-        judge: Option<&[f64]>,
+        target: Option<&[f64]>,
     ) -> Option<f64> {
         let plant = self.plant;
         self.denominators = denominators.to_vec();
@@ -204,9 +204,9 @@ impl<'p, 'a> Point<'p, 'a> {
         let mut signals: Vec<&[f64]> = vec![plant.output];
         signals.extend(self.filtered.iter().map(Vec::as_slice));
         let mut taps = self.input_taps(1);
-        if let Some(judge) = judge {
+        if let Some(target) = target {
             taps.push(Taps { signal: signals.len(), first: 0, count: 1, sign: 1.0 });
-            signals.push(judge);
+            signals.push(target);
         }
         let reduced = Reduced::new(&signals, &taps, plant.segments, &self.free)?;
         let count = plant.inputs().map(|input| input.count).sum();
@@ -222,7 +222,7 @@ impl<'p, 'a> Point<'p, 'a> {
         let initial = reduced.initial_conditions(&solution.clone().resize_vertically(taps_count(&taps), 0.0));
         self.respond(&initial);
         self.cost = energy(&self.errors, plant.segments);
-        let cost = if judge.is_some() {
+        let cost = if target.is_some() {
             // |y|^2 - c' G^-1 c.
             let mut products = reduced.matrix.view((0, count), (count, 1)).into_owned();
             factor.forward(products.as_mut_slice());

@@ -1,4 +1,4 @@
-//! Reduced equations of lagged signals, from which the free responses of each segment are taken out.
+//! Reduced equations of lagged signals, from which the initial-condition responses of each segment are taken out.
 
 use std::ops::Range;
 
@@ -9,7 +9,7 @@ use crate::regression::{Lagged, Presample, Taps, divide_from};
 
 /// Of a column as a fraction of its square: less than this is rounding, once the columns before it are taken out.
 const ROUNDING: f64 = 1e-14;
-/// Where a free response is below this fraction of its peak, it has died away.
+/// Where a initial-condition response is below this fraction of its peak, it has died away.
 const DIED_AWAY: f64 = 1e-10;
 /// Samples of a response that are computed at once.
 const PIECE: usize = 128;
@@ -80,7 +80,7 @@ impl Factor {
     }
 }
 
-/// Free responses h(t), h(t - 1), … of each of several 1/F, from the first sample of a segment on.
+/// Initial-condition responses h(t), h(t - 1), … of each of several 1/F, from the first sample of a segment on.
 #[derive(Debug, Clone, Default)]
 pub(in crate::estimate) struct Free {
     /// h of each F, as long as the slowest takes to die away.
@@ -148,13 +148,13 @@ fn impulse_response(monic: &[f64], count: usize, longest: usize) -> Vec<f64> {
     response
 }
 
-/// Reduced equations for parameters that all segments share, the free responses of each segment being taken out:
+/// Reduced equations for parameters that all segments share, the initial-condition responses of each segment being taken out:
 ///
 /// ```text
 /// G = sum_s (G_s - K_s' H_s K_s),   g = sum_s (g_s - K_s' h_s),   K_s = H_s^-1 X_s,
 /// ```
 ///
-/// H_s and h_s belonging to the free responses of segment s alone, X_s to both. O(N p), and O(n^3) for each segment.
+/// H_s and h_s belonging to the initial-condition responses of segment s alone, X_s to both. O(N p), and O(n^3) for each segment.
 #[derive(Debug, Clone)]
 pub(in crate::estimate) struct Reduced {
     pub(in crate::estimate) matrix: DMatrix<f64>,
@@ -190,7 +190,7 @@ impl Reduced {
             let taps = [taps, &free.taps(signals.len())].concat();
             let length = free.responses.first().map_or(0, Vec::len);
             for segment in segments {
-                // Behind the free responses there is nothing to take out.
+                // After the initial-condition responses there is nothing to take out.
                 let head = 0..segment.len().min(length);
                 let of_segment = signals.iter().map(|signal| &signal[segment.start..][..head.end]);
                 let both: Vec<&[f64]> =
@@ -221,7 +221,7 @@ impl Reduced {
         self.taken.iter().map(of_segment).collect()
     }
 
-    /// What takes the free responses of a segment out of its columns: `[I, -K']` for columns followed by free responses.
+    /// What takes the initial-condition responses of a segment out of its columns: `[I, -K']` for columns followed by initial-condition responses.
     pub(in crate::estimate) fn combination(&self, segment: usize) -> Option<DMatrix<f64>> {
         let taken = self.taken.get(segment)?;
         let (count, size) = taken.cross.shape();
@@ -232,7 +232,7 @@ impl Reduced {
         }))
     }
 
-    /// The triangular factor of the same columns, free responses taken out, as exact as Householder QR: good for condition
+    /// The triangular factor of the same columns, initial-condition responses taken out, as exact as Householder QR: good for condition
     /// numbers of which the square is beyond rounding. 2 N p^2 flops. None if a sample is out of range.
     pub(in crate::estimate) fn factor(
         signals: &[&[f64]],
@@ -256,7 +256,7 @@ impl Reduced {
             let lagged =
                 Lagged::new(&of_segment, columns.clone(), std::slice::from_ref(&own), Presample::Zero);
             let factor = lagged.factor().ok()?;
-            // What stands below the rows of the free responses.
+            // What stands below the rows of the initial-condition responses.
             let rest = factor.factor().view((count, count), (size, size)).into_owned();
             let rotated = factor.rotated_output().rows(count, size).into_owned();
             let part = LeastSquares::from_factor(&rest, &rotated, factor.residual_norm(), own.end).ok()?;

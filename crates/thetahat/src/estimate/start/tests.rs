@@ -96,7 +96,7 @@ impl Modes<'_> {
         Sample { u: u.split_off(1000), y, b, f }
     }
 
-    /// How many of so many records lead to the minimum that is reached from what made the data.
+    /// How many of this many records lead to the minimum that is reached from what made the data.
     fn successes(&self, seeds: Range<u64>) -> usize {
         let orders = self.orders();
         let found = seeds.filter(|&seed| {

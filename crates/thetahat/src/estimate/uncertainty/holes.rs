@@ -1,6 +1,6 @@
 //! Errors that are not known, as outputs are missing, given those that are.
 //!
-//! With v = e/A the log-likelihood of a stretch is -|A v|^2/(2 sigma^2), A being a lower triangular matrix with the monic
+//! With v = e/A the log-likelihood of a segment is -|A v|^2/(2 sigma^2), A being a lower triangular matrix with the monic
 //! polynomial in its columns. So the missing samples m have, given the others, the mean that makes |A v| least and the covariance
 //! sigma^2 (A'A)_mm^-1, and what is left of |A v|^2 is v'R^-1 v of the known ones (Jones, Technometrics 22 (1980); here by a banded
 //! Cholesky factor). What expectation and maximisation needs of the covariance are the entries within n samples of the diagonal:
@@ -16,13 +16,13 @@ use std::ops::Range;
 
 use thetahat_core::nalgebra::DMatrix;
 
-/// The missing samples of some stretches, up to n lags being of interest.
+/// The missing samples of some segments, up to n lags being of interest.
 #[derive(Debug)]
 pub(super) struct Holes {
-    /// The stretches, and the samples that miss in each.
-    stretches: Vec<(Range<usize>, Vec<usize>)>,
+    /// The segments, and the samples that miss in each.
+    segments: Vec<(Range<usize>, Vec<usize>)>,
     highest: usize,
-    /// The sums over t of cov(v(t - k), v(t - l))/sigma^2, over all t of which n earlier samples are in the stretch.
+    /// The sums over t of cov(v(t - k), v(t - l))/sigma^2, over all t of which n earlier samples are in the segment.
     spread: DMatrix<f64>,
 }
 
@@ -32,12 +32,12 @@ impl Holes {
             let rows = segment.clone().filter(|row| values[*row].is_nan()).collect::<Vec<usize>>();
             (segment.clone(), rows)
         };
-        let stretches = segments.iter().map(missing).filter(|(_, rows)| !rows.is_empty()).collect();
-        Self { stretches, highest, spread: DMatrix::zeros(highest + 1, highest + 1) }
+        let segments = segments.iter().map(missing).filter(|(_, rows)| !rows.is_empty()).collect();
+        Self { segments, highest, spread: DMatrix::zeros(highest + 1, highest + 1) }
     }
 
     pub(super) fn is_empty(&self) -> bool {
-        self.stretches.is_empty()
+        self.segments.is_empty()
     }
 
     pub(super) fn spread(&self) -> &DMatrix<f64> {
@@ -46,9 +46,9 @@ impl Holes {
 
     /// Puts the expected values into the holes of signals, of an autoregression whose order is n at most.
     pub(super) fn fill(&mut self, signals: &mut [Vec<f64>], monic: &[f64]) {
-        let Self { stretches, highest, spread } = self;
+        let Self { segments, highest, spread } = self;
         spread.fill(0.0);
-        for (segment, missing) in &*stretches {
+        for (segment, missing) in &*segments {
             let factor = Banded::new(missing, segment.end, monic, *highest);
             for signal in &mut *signals {
                 missing.iter().for_each(|row| signal[*row] = 0.0);
@@ -79,7 +79,7 @@ impl Holes {
     }
 }
 
-/// (A v)(t), v being zero before the stretch.
+/// (A v)(t), v being zero before the segment.
 fn filtered(signal: &[f64], start: usize, row: usize, monic: &[f64]) -> f64 {
     let known = (row + 1 - start).min(monic.len());
     monic[..known].iter().zip(signal[row + 1 - known..=row].iter().rev()).map(|(a, v)| a * v).sum()
@@ -95,7 +95,7 @@ impl Banded {
     fn new(missing: &[usize], end: usize, monic: &[f64], width: usize) -> Self {
         let entry = |late: usize, early: usize| -> f64 {
             let later = monic.get(late - early..).unwrap_or(&[]);
-            // As far as the stretch goes.
+            // As far as the segment goes.
             later.iter().zip(monic).take(end - late).map(|(b, a)| a * b).sum()
         };
         let mut rows: Vec<Vec<f64>> = Vec::with_capacity(missing.len());

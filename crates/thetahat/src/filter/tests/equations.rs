@@ -352,7 +352,7 @@ fn noises_in_innovations_form_leave_no_doubt() {
     let estimate = filter.step(None, &[], &[f64::NAN]).unwrap();
     assert_eq!(estimate.predicted.values, [1.5]);
     assert_eq!(estimate.predicted.standard_deviations.unwrap(), [0.0]);
-    // Behind a missing row the process noise is unknown again.
+    // After a missing row the process noise is unknown again.
     let estimate = filter.step(None, &[], &[1.0]).unwrap();
     assert_eq!(estimate.predicted.standard_deviations.unwrap(), [1.0]);
 }

@@ -133,7 +133,7 @@ fn bounds_are_those_of_as_many_elements_as_were_measured() {
 
 #[test]
 fn potters_case() {
-    // P0 = I/ε², R = 1, and two readings, h1 = [1, ε] and h2 = [1, 1], one after the other.
+    // P0 = I/ε², R = 1, and two measurements, h1 = [1, ε] and h2 = [1, 1], one after the other.
     let small = 0.5_f64.powi(13);
     let text = format!(
         "sample_time = 1\noutputs = ['a', 'b']\nF = [[1, 0], [0, 1]]\nH = [[1, {small}], [1, 1]]\n\

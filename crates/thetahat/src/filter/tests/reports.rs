@@ -103,7 +103,7 @@ fn a_report_of_a_fit_is_a_model() {
     // The model is right: chi-square of 300 degrees of freedom within 4 standard deviations, but for the first rows.
     assert!((filter.summary().nis.unwrap().mean - 1.0).abs() < 0.4, "{}", filter.summary().nis.unwrap().mean);
 
-    // A log that begins away from the offsets: where it began is found, and nothing else is as surprising as it was.
+    // A log that begins away from the offsets: where it began is found, and no other innovation is as large.
     let late = |start| {
         let model = StateModel::from_report(&identified, start).unwrap();
         let mut filter = StateFilter::new(model, Estimator::Kalman).unwrap();

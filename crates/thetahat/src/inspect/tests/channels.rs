@@ -69,7 +69,7 @@ fn what_is_not_there_is_none() {
     assert_eq!((single.mean, single.trend, single.longest_hold, single.repeated), (Some(5.0), None, 1, 0));
 }
 
-/// The values rounded to so many decimals.
+/// The values rounded to this many decimals.
 fn printed(values: &[f64], decimals: usize) -> Vec<f64> {
     values.iter().map(|value| format!("{value:.decimals$}").parse().unwrap()).collect()
 }
@@ -122,7 +122,7 @@ fn continuous_and_stepped_values_are_not_rounded() {
     }
 }
 
-/// A slow sine between two limits, seen with so many decimals.
+/// A slow sine between two limits, seen with this many decimals.
 fn limited(low: f64, high: f64, decimals: usize) -> Vec<f64> {
     printed(
         &(0..1000).map(|row| (f64::from(row) / 40.0).sin().clamp(low, high)).collect::<Vec<_>>(),
@@ -135,7 +135,7 @@ fn clipped_values_are_saturated() {
     for decimals in [2, 15] {
         let values = limited(-0.7, 0.9, decimals);
         let count = |limit: f64| {
-            // Not the stretches with which the log begins or ends.
+            // Not the segments with which the log begins or ends.
             assert!(values[0] != limit && values[999] != limit);
             values.iter().filter(|value| **value == limit).count()
         };

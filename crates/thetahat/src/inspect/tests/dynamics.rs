@@ -202,7 +202,7 @@ fn the_delay_is_found() {
     }
 }
 
-/// Of delays that are said to be as sure as 0.9, so many are right, and so many are as sure.
+/// Of the delays with a confidence of 0.9 or more: the fraction that is right, and the fraction of all delays that they are.
 #[test]
 fn a_sure_delay_is_right() {
     let (mut sure, mut right, mut all) = (0.0, 0.0, 0.0);
@@ -232,7 +232,7 @@ fn a_sure_delay_is_right() {
 #[test]
 fn a_correlation_is_that_of_its_definition() {
     let (u, y) = (deviations(&normal(11, 100)), deviations(&normal(12, 100)));
-    // White both: the filters do nothing. Two stretches, which no product crosses.
+    // White both: the filters do nothing. Two segments, which no product crosses.
     let segments = [0..60, 65..100];
     let found = delay::correlation("u", &u, &y, &segments);
     let inside = |x: &[f64]| segments.iter().flat_map(|s| x[s.clone()].to_vec()).map(|x| x * x).sum::<f64>();

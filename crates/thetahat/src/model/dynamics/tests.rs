@@ -154,7 +154,7 @@ fn standard_errors_are_the_spread_of_sampled_models() {
     }
     for (figure, (error, square)) in errors(&described).iter().zip(&squares).enumerate() {
         let found = (square / f64::from(runs)).sqrt();
-        // 1.1 % from so many samples, four times, and 1 % for what is not of first order.
+        // 1.1 % from this many samples, four times, and 1 % for what is not of first order.
         assert!((found - error).abs() <= 0.055 * error, "{figure} {found} {error}");
     }
 }

@@ -49,7 +49,7 @@ pub(super) enum Step {
 
 /// The model for any kind of number, with exact derivatives. `z` are the unknown parameters after the change of variable.
 ///
-/// Matrices are column-major. Time is in seconds since the first row. A Jacobian has a column for each state, and behind these
+/// Matrices are column-major. Time is in seconds since the first row. A Jacobian has a column for each state, and after these
 /// one for each parameter if the slice has room for them: there are then n + p of them, else n. The slices' lengths must fit;
 /// nothing is allocated once `work` has grown.
 impl GreyBox {
@@ -159,7 +159,7 @@ impl GreyBox {
     }
 }
 
-/// At least so many numbers to work in.
+/// At least this many numbers to work in.
 fn reserve<S: Number<f64>>(work: &mut Vec<S>, size: usize) -> &mut [S] {
     if work.len() < size {
         work.resize(size, 0.0.into());

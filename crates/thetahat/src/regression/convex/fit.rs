@@ -44,13 +44,13 @@ const ROUNDS: usize = 500;
 const MET: f64 = 1e-11;
 /// Limits this near to b are in the first program, in units of the residuals.
 const NEAR: f64 = 1e-6;
-/// Limits that miss one another by so much, in units of the data, are taken to meet.
+/// Bounds closer than this tolerance, in units of the data, count as equal.
 const POSSIBLE: f64 = 1e-9;
 /// From this part of the samples on a ridge is strong.
 const STRONG: f64 = 1e-3;
-/// Up to so many samples all are in the program of the sum of |e|.
+/// Up to this many samples all are in the program of the sum of |e|.
 const ALL: usize = 1000;
-/// The program of sum |e| begins with so many times (N p)^(2/3) samples.
+/// The program of sum |e| begins with this many times (N p)^(2/3) samples.
 const FREE: f64 = 2.0;
 /// If more than this part of them had a wrong sign, they are chosen again.
 const WRONG: f64 = 0.1;
@@ -226,7 +226,7 @@ impl<'a> Fitting<'a> {
         Ok(program.solve()?.x[size] <= POSSIBLE)
     }
 
-    /// The parameters of the smallest norm under the limits and, with a bound, |e(t)| <= bound. Behind the bound stand
+    /// The parameters of the smallest norm under the limits and, with a bound, |e(t)| <= bound. After the bound stand
     /// parameters that meet all these.
     ///
     /// ```text
@@ -296,7 +296,7 @@ impl<'a> Fitting<'a> {
             let (high, second) = self.farthest(&frame, parameter, &-direction, bound, radius)?;
             Ok(([low, high], first + second))
         });
-        // Collected before a failure is looked at, so that it is the first one whatever the threads.
+        // Collected before a failure is reported, so that it is the first one whatever the threads.
         let extents: Vec<Result<_, Failure>> = extents.collect();
         let extents: Vec<([f64; 2], u32)> = extents.into_iter().collect::<Result<_, _>>()?;
         Ok((extents.iter().map(|(ends, _)| *ends).collect(), extents.iter().map(|(_, steps)| steps).sum()))
@@ -489,7 +489,7 @@ impl<'a> Fitting<'a> {
         if self.target > 0.0 { self.target } else { 1.0 }
     }
 
-    /// theta of a w, behind which there may be other variables.
+    /// theta of a w, after which there may be other variables.
     fn parameters(&self, frame: &Frame, w: &DVector<f64>) -> DVector<f64> {
         &frame.base + &self.spread * w.rows(0, self.sizes.len()) * frame.unit
     }

@@ -17,7 +17,7 @@ pub(super) struct Samples<'a> {
     /// The signal, lag and sign of each regressor.
     columns: Vec<(usize, usize, f64)>,
     segments: Vec<Segment>,
-    /// The largest size of each regressor, and of the target behind them.
+    /// The largest size of each regressor, and of the target after them.
     peaks: Vec<f64>,
     count: usize,
 }

@@ -1,10 +1,10 @@
 //! Fewer points for the same picture.
 //!
-//! The rows are cut into as many equal stretches as the picture can show. Of each only the smallest and the largest value
+//! The rows are cut into as many equal segments as the picture can show. Of each only the smallest and the largest value
 //! stay, in their order: no peak is lost, as it would be by leaving out samples, or made smaller, as by averaging (Steinarsson
 //! 2013, Downsampling Time Series for Visual Representation, section 2).
 
-/// What is told apart beyond this many digits no picture shows.
+/// Digits beyond this are below a pixel.
 const DIGITS: i32 = 7;
 
 /// The points of a line; a NaN interrupts it.
@@ -90,7 +90,7 @@ pub(super) fn rounded(values: &[f64]) -> Vec<f64> {
     values.iter().map(|value| significant(*value, digits)).collect()
 }
 
-/// A number with so many significant digits.
+/// A number with this many significant digits.
 pub(super) fn significant(value: f64, digits: i32) -> f64 {
     let decimals = usize::try_from(digits - 1).unwrap_or(0);
     // The shortest decimal number is what JSON shows.
@@ -140,8 +140,8 @@ mod tests {
         assert_eq!(curve.y.iter().filter(|y| y.is_nan()).count(), 2);
         assert!(!curve.y[0].is_nan() && curve.x[0] == 1.0);
         let around = |row: f64| {
-            let behind = curve.x.iter().position(|x| *x > row).unwrap();
-            curve.y[behind - 1].is_nan() || curve.y[behind].is_nan()
+            let after = curve.x.iter().position(|x| *x > row).unwrap();
+            curve.y[after - 1].is_nan() || curve.y[after].is_nan()
         };
         assert!(around(5000.0) && around(8000.0) && !around(3000.0));
 

@@ -19,12 +19,12 @@ const DETAIL: usize = 1000;
 /// Inputs in the picture of the outputs; the others have one of their own.
 const INPUTS: usize = 5;
 
-/// How many points a curve may have among so many.
+/// How many points each of several curves may have.
 pub(super) fn points(curves: usize) -> usize {
     (ALL_POINTS / curves.max(1)).clamp(20, POINTS)
 }
 
-/// Times that put several logs one behind the other, each with a clock of its own, and a space between them.
+/// Times that put several logs one after the other, each with a clock of its own, and a space between them.
 pub(super) fn timeline(time: &[f64], logs: &[Source], sample_time: f64) -> Vec<f64> {
     let mut shown = time.to_vec();
     let space = sample_time * (2 + time.len() / 100) as f64;
@@ -92,7 +92,7 @@ pub(super) fn outputs(
         String::new()
     };
     let several =
-        if logs.len() > 1 { " The logs stand one behind the other, whenever they were made." } else { "" };
+        if logs.len() > 1 { " The logs stand one after the other, whenever they were made." } else { "" };
     for (index, output) in signals.outputs.iter().enumerate() {
         let which = if signals.outputs.len() > 1 { format!(" {}", output.name) } else { String::new() };
         section.chart(stack(index, output, 0..rows, points).draw(

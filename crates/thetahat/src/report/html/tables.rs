@@ -8,9 +8,9 @@ use crate::figures::{chance, fixed, number, scientific, short, three};
 use crate::inspect::Inspection;
 use crate::model::{EquationsModel, NonlinearArxModel, Orders, PolynomialModel, Root};
 use crate::optimize::Stopped;
-use crate::report::{Estimation, Report, Seen, Validated, Validation};
+use crate::report::{Estimation, InSample, Report, Validated, Validation};
 use crate::respond::Start;
-use crate::select::{Scored, Selection};
+use crate::select::{Candidate, Selection};
 use crate::validate::{Fit, Part};
 
 /// The models of a search that are listed.
@@ -355,7 +355,7 @@ pub(super) fn coverage(who: &str, parts: &[(String, &Validation)]) -> Table {
 
 /// The level of the errors beside that of the model.
 pub(super) fn noise(who: &str, parts: &[(String, &Validation)]) -> Table {
-    let head = [who, "mean of e²", "noise variance of the model", "ratio", "seen by the fit"];
+    let head = [who, "mean of e²", "noise variance of the model", "ratio", "in-sample"];
     let mut table = Table::new("Errors one step ahead", &head);
     for (name, validation) in parts {
         for noise in &validation.noise {
@@ -364,7 +364,7 @@ pub(super) fn noise(who: &str, parts: &[(String, &Validation)]) -> Table {
                 or_dash(noise.mse, number),
                 number(noise.model),
                 or_dash(noise.ratio, three),
-                seen(validation.seen).to_owned(),
+                in_sample(validation.in_sample).to_owned(),
             ]);
         }
     }
@@ -415,8 +415,8 @@ pub(super) fn data(report: &Report) -> Table {
         add("split: validation", parts(&split.validation));
         add("split: test", parts(&split.test));
     }
-    add("stretches without a gap", rows(&data.segments));
-    add("jumps of the clock", data.time_gaps.to_string());
+    add("segments without a gap", rows(&data.segments));
+    add("gaps in the clock", data.time_gaps.to_string());
     for missing in &data.missing {
         add(&format!("missing in {}", missing.channel), missing.rows.to_string());
     }
@@ -426,10 +426,10 @@ pub(super) fn data(report: &Report) -> Table {
 /// The best models of a search.
 pub(super) fn best(selection: &Selection) -> Table {
     let score = super::charts::score(selection.select);
-    let unseen = selection.best.iter().any(|model| model.unseen.is_some());
+    let held_out = selection.best.iter().any(|model| model.held_out_mse.is_some());
     let mut head = vec!["model", "parameters", score, "mean of e²"];
-    if unseen {
-        head.push("mean of e², unseen");
+    if held_out {
+        head.push("mean of e², held out");
     }
     let best = &selection.best[..selection.best.len().min(BEST)];
     let caption = format!(
@@ -438,15 +438,15 @@ pub(super) fn best(selection: &Selection) -> Table {
         legend(best.iter().map(|model| &model.orders))
     );
     let mut table = Table::new(caption, &head);
-    let row = |model: &Scored| {
+    let row = |model: &Candidate| {
         let mut cells = vec![
             model.orders.to_string(),
             model.parameters.to_string(),
             or_dash(model.score, number),
             number(model.mse),
         ];
-        if unseen {
-            cells.push(or_dash(model.unseen, number));
+        if held_out {
+            cells.push(or_dash(model.held_out_mse, number));
         }
         cells
     };
@@ -465,7 +465,7 @@ fn legend<'a>(models: impl Iterator<Item = &'a Orders>) -> String {
 /// Several models side by side.
 pub(super) fn comparison(models: &[(String, &Validated)], criteria: Option<&[Criteria]>) -> Table {
     let mut head: Vec<String> =
-        ["file", "model", "parameters", "stable", "seen by the fit"].map(str::to_owned).to_vec();
+        ["file", "model", "parameters", "stable", "in-sample"].map(str::to_owned).to_vec();
     let mut horizons: Vec<String> = Vec::new();
     let several = models.iter().any(|(_, validated)| validated.validation.noise.len() > 1);
     let said = |fit: &Fit| {
@@ -500,7 +500,7 @@ pub(super) fn comparison(models: &[(String, &Validated)], criteria: Option<&[Cri
             validation.model.clone(),
             validation.parameters.to_string(),
             or_dash(validation.stable, yes),
-            seen(validation.seen).to_owned(),
+            in_sample(validation.in_sample).to_owned(),
         ];
         cells.extend(horizons.iter().map(|horizon| {
             let fit = validation.fit.iter().find(|fit| said(fit) == *horizon);
@@ -657,11 +657,11 @@ fn start(start: Start) -> &'static str {
     }
 }
 
-pub(super) fn seen(seen: Seen) -> &'static str {
-    match seen {
-        Seen::No => "no",
-        Seen::Partly => "partly",
-        Seen::Yes => "yes",
+pub(super) fn in_sample(in_sample: InSample) -> &'static str {
+    match in_sample {
+        InSample::No => "no",
+        InSample::Partly => "partly",
+        InSample::Yes => "yes",
     }
 }
 

@@ -6,7 +6,7 @@ use crate::model::{Quantity, Root};
 
 /// What stands where there is no figure.
 pub(super) const NONE: &str = "–";
-/// A name in a chart takes no more room than so many characters, and less beside an axis.
+/// A name in a chart is no wider than this many characters, and less beside an axis.
 const LONGEST: [usize; 2] = [40, 15];
 
 /// Percent of a whole, to three digits.

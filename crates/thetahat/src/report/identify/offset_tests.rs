@@ -32,7 +32,7 @@ fn driven(u: &[f64], size: f64, seed: u64) -> Vec<f64> {
     each.collect()
 }
 
-/// A step test from rest: so many rows each at 0, 40, 10 and 60, the output 0.9 times the one before and 0.05 times the input.
+/// A step test from rest: this many rows each at 0, 40, 10 and 60, the output 0.9 times the one before and 0.05 times the input.
 fn step_test(seed: u64, size: f64) -> (Vec<f64>, Vec<f64>) {
     let u: Vec<f64> = [0.0, 40.0, 10.0, 60.0].into_iter().flat_map(|u| vec![u; 40]).collect();
     let mut noise = Noise(seed);
@@ -152,9 +152,9 @@ fn the_errors_of_the_fit_are_those_of_the_model() {
                     (evaluated / report.estimation.mse - 1.0).abs() < 1e-9,
                     "{orders} {initial:?} {trend}"
                 );
-                let unjudged =
-                    Unjudged::new(log(&u, &y), &[], &plan, &|_| ControlFlow::Continue(())).unwrap();
-                assert_eq!(unjudged.judged(log(&u, &y)).unwrap(), report, "{orders}");
+                let pending =
+                    PendingEvaluation::new(log(&u, &y), &[], &plan, &|_| ControlFlow::Continue(())).unwrap();
+                assert_eq!(pending.evaluate(log(&u, &y)).unwrap(), report, "{orders}");
             }
         }
     }

@@ -31,9 +31,10 @@ fn figures_that_wait_are_the_same() {
     ];
     for plan in plans {
         let whole = identify(log.clone(), &[], &plan).unwrap();
-        let unjudged = Unjudged::new(log.clone(), &[], &plan, &|_| ControlFlow::Continue(())).unwrap();
-        assert!(unjudged.report().fit.is_empty() && unjudged.report().model == whole.model);
-        assert_eq!(unjudged.judged(log.clone()).unwrap(), whole);
+        let pending =
+            PendingEvaluation::new(log.clone(), &[], &plan, &|_| ControlFlow::Continue(())).unwrap();
+        assert!(pending.report().fit.is_empty() && pending.report().model == whole.model);
+        assert_eq!(pending.evaluate(log.clone()).unwrap(), whole);
     }
 }
 

@@ -20,10 +20,10 @@ pub struct Validation {
     pub report: Option<String>,
     /// The logs, with the rows that each has among all of them.
     pub logs: Vec<Source>,
-    /// The rows looked at.
+    /// The rows evaluated.
     pub rows: Vec<Rows>,
     /// Whether the model was fitted to them.
-    pub seen: Seen,
+    pub in_sample: InSample,
     /// What the model is called, such as ARX(2, 2, 1).
     pub model: String,
     /// How many parameters it has.
@@ -61,7 +61,7 @@ pub struct Validation {
 /// Whether a model was fitted to the rows of a validation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
-pub enum Seen {
+pub enum InSample {
     /// To none of them: another log, or other rows.
     No,
     /// To some.

@@ -70,26 +70,26 @@ fn the_log_of_the_fit_is_known_by_its_errors() {
     ] {
         let report = fitted(log, estimate, orders, initial);
         let what = format!("{:?} {estimate} {initial:?}", report.polynomials().structure);
-        let seen = |text: &str| found(&report, log, &plan(text)).seen;
-        assert_eq!(seen(estimate), Seen::Yes, "{what}");
+        let seen = |text: &str| found(&report, log, &plan(text)).in_sample;
+        assert_eq!(seen(estimate), InSample::Yes, "{what}");
         assert_eq!(
             (seen("301..400"), seen("101..400"), seen("120..150,160..190")),
-            (Seen::No, Seen::Partly, Seen::Yes)
+            (InSample::No, InSample::Partly, InSample::Yes)
         );
         // The offsets of the fit are those that count, whatever the validation takes.
         let other = ValidationPlan { detrend: Some(Detrend::None), ..plan(estimate) };
-        assert_eq!(found(&report, log, &other).seen, Seen::Yes, "{what}");
+        assert_eq!(found(&report, log, &other).in_sample, InSample::Yes, "{what}");
         // One value in another log is another one.
         let mut changed = y.clone();
         changed[150] += 1e-3;
         let found = found(&report, &super::tests::log(&u, &changed), &plan(estimate));
-        assert_eq!(found.seen, Seen::No, "{what}");
+        assert_eq!(found.in_sample, InSample::No, "{what}");
         assert_eq!(found.residuals[0].fitted, 0);
     }
-    // A log that goes on behind the rows of the fit; one that ends before.
+    // A log that goes on after the rows of the fit; one that ends before.
     let report = fitted(&log(&u[..300], &y[..300]), "1..300", arx(), Initial::Auto);
-    assert_eq!(found(&report, &whole, &plan("1..300")).seen, Seen::Yes);
-    assert_eq!(found(&report, &log(&u[..200], &y[..200]), &plan("")).seen, Seen::No);
+    assert_eq!(found(&report, &whole, &plan("1..300")).in_sample, InSample::Yes);
+    assert_eq!(found(&report, &log(&u[..200], &y[..200]), &plan("")).in_sample, InSample::No);
 }
 
 #[test]
@@ -319,5 +319,5 @@ fn a_search_that_did_not_end_is_known_too() {
     let method = Method::PredictionError(search);
     let plan = Plan { method, initial: Initial::Estimate, ..Plan::new(&["u"], "y", orders) };
     let report = identify(log.clone(), &[], &plan).unwrap();
-    assert_eq!(found(&report, &log, &super::tests::plan("")).seen, Seen::Yes);
+    assert_eq!(found(&report, &log, &super::tests::plan("")).in_sample, InSample::Yes);
 }

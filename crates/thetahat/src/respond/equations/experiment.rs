@@ -15,7 +15,7 @@ pub(crate) struct Experiment {
     counted: Vec<Range<usize>>,
     /// Seconds since the first row.
     pub(crate) times: Vec<f64>,
-    /// How the step to each row but the first is taken: as so many equal ones of so many seconds.
+    /// How the step to each row but the first is taken: as a number of equal ones, and the seconds of each.
     steps: Vec<(usize, f64)>,
     /// Row after row; a missing one holds the value before it, 0 before the first.
     inputs: Vec<f64>,

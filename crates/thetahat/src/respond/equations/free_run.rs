@@ -44,7 +44,7 @@ pub(crate) struct FreeRun {
     pub(crate) outputs: Vec<f64>,
 }
 
-/// A run through each stretch of rows that count. None where a response leaves the range of numbers. O(N (n^3 + m n^2)) for each of
+/// A run through each segment of rows that count. None where a response leaves the range of numbers. O(N (n^3 + m n^2)) for each of
 /// a few iterations.
 pub(crate) fn free_run(
     model: &GreyBox,

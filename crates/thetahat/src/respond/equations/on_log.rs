@@ -76,9 +76,9 @@ impl<'l> EquationsOnLog<'l> {
                 into(&mut inputs, experiment.input(row));
             }
         }
-        let stretches: Vec<Range<usize>> = experiments.iter().flat_map(stretches).collect();
+        let segments: Vec<Range<usize>> = experiments.iter().flat_map(segments).collect();
         let counted =
-            outputs.iter().map(|output| stretches.iter().flat_map(|rows| measured(output, rows)).collect());
+            outputs.iter().map(|output| segments.iter().flat_map(|rows| measured(output, rows)).collect());
         let spread = stored.covariance.as_ref().map(|rows| {
             let slopes: Vec<f64> =
                 model.parameters().iter().zip(&z).map(|(unknown, z)| unknown.scale.slope(*z)).collect();
@@ -139,7 +139,7 @@ impl<'l> EquationsOnLog<'l> {
         each.map(|(values, counted)| Response { values, counted: counted.clone() }).collect()
     }
 
-    /// What each experiment is said to be so many steps ahead.
+    /// The predictions of each experiment, `steps` ahead.
     fn ahead(&self, steps: usize) -> Result<Vec<Vec<Predicted<f64>>>, Error> {
         let each = self.experiments.iter().enumerate().map(|(log, experiment)| {
             ahead(&self.model, experiment, &self.z, steps)
@@ -214,7 +214,7 @@ impl<'l> EquationsOnLog<'l> {
 }
 
 /// The rows of a log that count in an experiment.
-fn stretches(experiment: &Experiment) -> impl Iterator<Item = Range<usize>> {
+fn segments(experiment: &Experiment) -> impl Iterator<Item = Range<usize>> {
     let first = experiment.first;
     experiment.counted().iter().map(move |rows| first + rows.start..first + rows.end)
 }
@@ -343,7 +343,7 @@ impl OnLog for EquationsOnLog<'_> {
                 PolynomialModel::from_parameters(&orders, &vec![0.0; inputs], None, 1.0, self.sample_time)?;
             model.inputs.clone_from(&self.stored.inputs);
             model.output = output.clone();
-            let innovations = self.experiments.iter().flat_map(stretches).map(|rows| {
+            let innovations = self.experiments.iter().flat_map(segments).map(|rows| {
                 let own: Vec<f64> =
                     standardised[rows.clone()].iter().map(|e| if e.is_nan() { 0.0 } else { *e }).collect();
                 let inside = |one: &&Range<usize>| rows.start <= one.start && one.end <= rows.end;
@@ -351,7 +351,7 @@ impl OnLog for EquationsOnLog<'_> {
                 Innovations::alone(rows, counted, own)
             });
             let innovations: Vec<Innovations> = innovations.collect();
-            let segments: Vec<Range<usize>> = self.experiments.iter().flat_map(stretches).collect();
+            let segments: Vec<Range<usize>> = self.experiments.iter().flat_map(segments).collect();
             let record = Record {
                 output: standardised,
                 inputs: self.inputs.iter().map(Vec::as_slice).collect(),

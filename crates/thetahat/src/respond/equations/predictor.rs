@@ -7,7 +7,7 @@
 //! e = y - h(x),   S = H P H' + r,   x <- x + P H' e/S,   P <- P - P H' H P/S     H = dh/dx at the predicted state
 //! ```
 //!
-//! Elements of one measurement are used one after the other, all linearised about the predicted state, so that those behind
+//! Elements of one measurement are used one after the other, all linearised about the predicted state, so that those after
 //! the first are corrected for what it moved: e_j = y_j - h_j(x^) - H_j (x - x^). In dual numbers the same operations give
 //! de/dz and dS/dz, exact but for rounding.
 //!
@@ -24,7 +24,7 @@ use thetahat_core::Number;
 
 use crate::model::GreyBox;
 
-/// The estimate of the state and its covariance, and room for a step. Matrices are column after column.
+/// The estimate of the state and its covariance, and the workspace of a step. Matrices are column after column.
 #[derive(Debug, Clone)]
 pub(crate) struct Predictor<S> {
     /// x^.

@@ -163,7 +163,7 @@ pub(crate) fn ahead<S: Number<f64>>(
     Ok(predicted)
 }
 
-/// The outputs of the `steps` rows behind row `base` as they are expected from all that was measured up to it. Behind the end of the
+/// The outputs of the `steps` rows after row `base` as they are expected from all that was measured up to it. After the end of the
 /// experiment the model goes on in its own sample time, which is for models without inputs. One entry for each row and output.
 ///
 /// # Errors

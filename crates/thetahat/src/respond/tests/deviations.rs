@@ -79,8 +79,8 @@ fn parameters_add_the_square_of_what_they_do() {
             }
         };
         // An impulse into 1/F that D takes off again is not seen, but beside these parameters it is.
-        let unseen = model.f.contains(&model.d) && model.d.len() > 1;
-        for &start in starts(&model).iter().filter(|start| !(unseen && **start == Start::Estimate)) {
+        let cancels = model.f.contains(&model.d) && model.d.len() > 1;
+        for &start in starts(&model).iter().filter(|start| !(cancels && **start == Start::Estimate)) {
             // What initial conditions are worth depends on the parameters too, in proportion to the errors: of second order,
             // and not there without errors.
             let record = if start == Start::Estimate {

@@ -16,10 +16,10 @@ fn a_forecast_is_what_the_recursions_give_from_the_end() {
             Record { output: &y, inputs: views(&u), segments: vec![0..50, 70..150], past: vec![0, 12] };
         let future: Vec<&[f64]> = u.iter().map(|u| &u[150..]).collect();
         for start in [Start::Zero, Start::Drop] {
-            let silent = if start == Start::Zero { 0 } else { model.orders.conditioned() };
+            let presample = if start == Start::Zero { 0 } else { model.orders.conditioned() };
             let begin = if start == Start::Zero { 70 } else { 58 };
             let mut expected = y.clone();
-            Recursion::new(&model, &views(&u), begin, silent).run(&mut expected, 150);
+            Recursion::new(&model, &views(&u), begin, presample).run(&mut expected, 150);
             let found = forecast(&model, &record, &future, 20, start).unwrap();
             assert_eq!(found.values.len(), 20);
             for (found, expected) in found.values.iter().zip(&expected[150..]) {

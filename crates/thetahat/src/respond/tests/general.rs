@@ -15,7 +15,7 @@ use crate::respond::{
     Start, innovations::innovations, predict, predict::deviations, prediction_deviation, simulate,
 };
 
-/// One input: nk, B behind it, and F.
+/// One input: nk, B after it, and F.
 pub(super) type Input<'a> = (usize, &'a [f64], &'a [f64]);
 
 /// A y = sum_j B_j/F_j u_j + C/D e.
@@ -74,7 +74,7 @@ pub(super) struct Recursion<'a> {
     pub(super) inputs: &'a [&'a [f64]],
     pub(super) begin: usize,
     /// The first samples without e.
-    pub(super) silent: usize,
+    pub(super) presample: usize,
     /// x_j, w and e before `begin`; none: zero.
     pub(super) x: Vec<Vec<f64>>,
 }
@@ -89,9 +89,9 @@ impl<'a> Recursion<'a> {
         model: &'a PolynomialModel,
         inputs: &'a [&'a [f64]],
         begin: usize,
-        silent: usize,
+        presample: usize,
     ) -> Self {
-        Self { model, inputs, begin, silent, x: vec![Vec::new(); model.f.len()] }
+        Self { model, inputs, begin, presample, x: vec![Vec::new(); model.f.len()] }
     }
 
     /// Replaces y from sample `known` on by what the recursions give with e = 0; gives e.
@@ -115,7 +115,7 @@ impl<'a> Recursion<'a> {
             let past_y = earlier(&model.a, &y[begin..], t);
             if begin + t < known {
                 w[t] = y[begin + t] + past_y - sum[t];
-                e[t] = if t < self.silent { 0.0 } else { w[t] + past_w - past_e };
+                e[t] = if t < self.presample { 0.0 } else { w[t] + past_w - past_e };
             } else {
                 w[t] = past_e - past_w;
                 y[begin + t] = sum[t] + w[t] - past_y;
@@ -134,7 +134,7 @@ fn a_prediction_is_what_the_recursions_give_from_what_is_known() {
         let conditioned = model.orders.conditioned();
         for horizon in [1, 2, 5, 40] {
             for start in [Start::Zero, Start::Drop] {
-                let (silent, skipped) =
+                let (presample, skipped) =
                     if start == Start::Zero { (0, 0) } else { (conditioned, conditioned + horizon - 1) };
                 let mut expected = vec![f64::NAN; 150];
                 let mut counted = Vec::new();
@@ -148,7 +148,7 @@ fn a_prediction_is_what_the_recursions_give_from_what_is_known() {
                     for t in rows {
                         let mut known = y[..=t].to_vec();
                         let until = (t + 1).saturating_sub(horizon).max(begin);
-                        Recursion::new(&model, &record.inputs, begin, silent).run(&mut known, until);
+                        Recursion::new(&model, &record.inputs, begin, presample).run(&mut known, until);
                         expected[t] = known[t];
                     }
                 }
@@ -176,16 +176,16 @@ fn a_free_run_goes_on_from_what_is_known() {
             let mut expected = vec![f64::NAN; 150];
             let mut counted = Vec::new();
             for (segment, past) in record.segments.iter().zip(&record.past) {
-                let (begin, silent) = match start {
+                let (begin, presample) = match start {
                     Start::Zero => (segment.start, 0),
                     _ => (segment.start - past, conditioned),
                 };
-                let rows = segment.start.max(begin + silent)..segment.end;
+                let rows = segment.start.max(begin + presample)..segment.end;
                 if rows.is_empty() {
                     continue;
                 }
                 let mut run = y[..segment.end].to_vec();
-                Recursion::new(&model, &record.inputs, begin, silent).run(&mut run, rows.start);
+                Recursion::new(&model, &record.inputs, begin, presample).run(&mut run, rows.start);
                 expected[rows.clone()].copy_from_slice(&run[rows.clone()]);
                 counted.push(rows);
             }
@@ -277,9 +277,9 @@ fn innovations_are_the_residuals_of_the_estimate() {
 }
 
 /// (1/C) of -D x, of which the first samples are zero: what a change of x does to e.
-fn effect(model: &PolynomialModel, x: &[f64], silent: usize) -> Vec<f64> {
+fn effect(model: &PolynomialModel, x: &[f64], presample: usize) -> Vec<f64> {
     let mut e = vec![0.0; x.len()];
-    for t in silent..x.len() {
+    for t in presample..x.len() {
         e[t] = -x[t] - earlier(&model.d, x, t) - earlier(&model.c, &e, t);
     }
     e
@@ -296,8 +296,8 @@ fn effects_of_the_past(model: &PolynomialModel, length: usize) -> Vec<Vec<f64>> 
             }
             x
         };
-        let behind = |polynomial: &[f64], at: usize| polynomial.get(at).copied().unwrap_or(0.0);
-        effects.extend((1..f.len()).map(|lag| respond(&|t| -behind(f, t + lag))));
+        let after = |polynomial: &[f64], at: usize| polynomial.get(at).copied().unwrap_or(0.0);
+        effects.extend((1..f.len()).map(|lag| respond(&|t| -after(f, t + lag))));
     }
     effects
 }
@@ -357,27 +357,27 @@ fn an_estimated_start_leaves_the_least_errors_that_any_past_can() {
             segments: vec![40..240, 245..252, 260..300],
             past: vec![0; 3],
         };
-        let silent = model.orders.conditioned();
+        let presample = model.orders.conditioned();
         let found = innovations(&model, &record, 1, Start::Estimate).unwrap();
         assert!(found.len() >= 2, "{:?}", model.structure);
         // With what earlier inputs do where that is worth it, in all segments that are long enough, or none.
-        let first = silent - model.orders.nd;
+        let first = presample - model.orders.nd;
         let lefts = found.iter().map(|found| {
             let segment = found.rows.clone();
             let mut known = y[..segment.end].to_vec();
             let from_rest =
-                Recursion::new(&model, &record.inputs, segment.start, silent).run(&mut known, segment.end);
-            let seen = |x: &Vec<f64>| effect(&model, x, silent);
+                Recursion::new(&model, &record.inputs, segment.start, presample).run(&mut known, segment.end);
+            let seen = |x: &Vec<f64>| effect(&model, x, presample);
             let mut effects: Vec<Vec<f64>> =
                 effects_of_the_past(&model, segment.len()).iter().map(seen).collect();
             let narrow = left(&from_rest, &effects);
             let (inputs, more) = effects_of_inputs(&model, segment.len(), first);
             let all = model.orders.nf.iter().sum::<usize>() + more;
-            let fits = segment.len() - silent > all;
+            let fits = segment.len() - presample > all;
             if fits {
                 effects.extend(inputs.iter().map(seen));
             }
-            (segment.len() - silent, narrow, left(&from_rest, &effects), if fits { more } else { 0 })
+            (segment.len() - presample, narrow, left(&from_rest, &effects), if fits { more } else { 0 })
         });
         let lefts: Vec<_> = lefts.collect();
         let samples = lefts.iter().map(|left| left.0).sum::<usize>() as f64;
@@ -392,13 +392,13 @@ fn an_estimated_start_leaves_the_least_errors_that_any_past_can() {
                 continue;
             }
             let segment = found.rows.clone();
-            assert_eq!(found.counted, std::slice::from_ref(&(segment.start + silent..segment.end)));
+            assert_eq!(found.counted, std::slice::from_ref(&(segment.start + presample..segment.end)));
             let mut known = y[..segment.end].to_vec();
             let from_rest =
-                Recursion::new(&model, &record.inputs, segment.start, silent).run(&mut known, segment.end);
+                Recursion::new(&model, &record.inputs, segment.start, presample).run(&mut known, segment.end);
             let effects: Vec<Vec<f64>> = effects_of_the_past(&model, segment.len())
                 .iter()
-                .map(|x| effect(&model, x, silent))
+                .map(|x| effect(&model, x, presample))
                 .collect();
             let cost = found.errors.iter().map(|e| e * e).sum::<f64>();
             assert!((cost / narrow - 1.0).abs() < 1e-9, "{:?} {cost} {narrow}", model.structure);

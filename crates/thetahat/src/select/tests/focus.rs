@@ -11,7 +11,8 @@ fn compared(radius: f64, blocks: f64, onward: f64, unstable: usize) -> Compared 
     let held_out = Some(HeldOut { blocks, onward, unpunished: blocks, unstable, refits: 3 });
     let orders = Orders::arx(1, &[1], &[1]).unwrap();
     let structure = Structure::Arx;
-    let scored = Scored { structure, orders, parameters: 2, mse: 1.0, unseen: None, held_out, score: None };
+    let scored =
+        Candidate { structure, orders, parameters: 2, mse: 1.0, held_out_mse: None, held_out, score: None };
     // As if each part had its share.
     Compared {
         scored,
@@ -192,15 +193,15 @@ fn selection_on_unseen_rows_looks_at_the_horizon() {
             monitor: &|_| ControlFlow::Continue(()),
         };
         let found = choose(&task, &Choice::Known(orders.clone())).unwrap();
-        let unseen = found.selection.chosen.unseen.unwrap();
+        let held_out_mse = found.selection.chosen.held_out_mse.unwrap();
         // The noise that no model simulates: uniform within a half.
-        assert!((0.06..0.11).contains(&unseen), "{select:?} {unseen}");
+        assert!((0.06..0.11).contains(&held_out_mse), "{select:?} {held_out_mse}");
         if select == Select::Validation {
             let model =
                 PolynomialModel::from_parameters(&orders, &found.guess.unwrap(), None, 1.0, 1.0).unwrap();
             let run = simulate(&model, &second, Start::Estimate).unwrap();
             let own = (350..500).map(|t| (y[t] - run.values[t]).powi(2)).sum::<f64>() / 150.0;
-            assert!(close(unseen, own, 1e-9), "{unseen} {own}");
+            assert!(close(held_out_mse, own, 1e-9), "{held_out_mse} {own}");
         }
     }
 }

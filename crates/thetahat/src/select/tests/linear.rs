@@ -22,9 +22,9 @@ fn grid_of_two() -> Grid {
     }
 }
 
-/// The mean of e^2 of one model on the samples behind `first` of each segment.
+/// The mean of e^2 of one model on the samples after `first` of each segment.
 fn mse(record: &Record<'_>, orders: &Orders, first: usize, initial: Initial) -> Option<f64> {
-    let cut = if initial == Initial::Zero { 0 } else { first - orders.reach() };
+    let cut = if initial == Initial::Zero { 0 } else { first - orders.maximum_lag() };
     let long = record.segments.iter().filter(|segment| segment.len() > cut);
     let segments: Vec<_> = long.map(|segment| segment.start + cut..segment.end).collect();
     Some(arx(&super::record(record.output, &record.inputs, &segments), orders, initial).ok()?.mse())
@@ -35,7 +35,7 @@ fn costs_of_a_grid_are_those_of_single_fits_on_common_samples() {
     let ([y, u, v], segments) = signals();
     let record = record(&y, &[&u, &v], &segments);
     for initial in [Initial::Auto, Initial::Drop, Initial::Zero] {
-        let Found { selection, guess } =
+        let SelectedModel { selection, guess } =
             chosen(&record, None, &Choice::Grid(grid_of_two()), Select::MDL, initial).unwrap();
         // The largest reaches back 4 samples; the short segment has two more.
         let samples = if initial == Initial::Zero { 286 } else { 274 };

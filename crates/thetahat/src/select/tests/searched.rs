@@ -2,7 +2,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::*;
 use crate::estimate::{Common, Point};
-use crate::select::candidates::{Samples, Tried};
+use crate::select::candidates::{Samples, Trial};
 use crate::select::search::Family;
 
 fn signals(seed: u64, length: usize) -> (Vec<f64>, Vec<f64>) {
@@ -17,15 +17,15 @@ fn grid(na: OrderRange, nb: OrderRange, nc: OrderRange, nd: OrderRange, nf: Orde
 }
 
 /// All models of a grid, fitted to the same samples.
-fn fitted(record: &Record<'_>, grid: &Grid) -> (Vec<Tried>, usize) {
+fn fitted(record: &Record<'_>, grid: &Grid) -> (Vec<Trial>, usize) {
     let models = grid.orders(1).unwrap();
     let samples = Samples::new(record, Initial::Auto, &models).unwrap();
     let common = Common::new(record, true, samples.window, &Search::default(), Deadline::default(), &|_| {
         ControlFlow::Continue(())
     })
     .unwrap();
-    let mut tried: Vec<Tried> =
-        models.iter().map(|orders| Tried { orders: orders.clone(), point: None }).collect();
+    let mut tried: Vec<Trial> =
+        models.iter().map(|orders| Trial { orders: orders.clone(), point: None }).collect();
     let score = |_: &Orders, point: &Point| point.cost.ln() * 1e3 + 7.0 * point.parameters.len() as f64;
     Family::new(&tried, 1).fit(&common, &mut tried, &score).unwrap();
     (tried, samples.window.counted)
@@ -67,7 +67,7 @@ fn costs_are_sums_over_the_common_samples_and_least() {
     let (tried, first) = fitted(&record, &grid(range(1, 2), range(1, 2), range(1, 2), 0.into(), 0.into()));
     // Two samples are reached back; then what C makes of the beginning fades in a twentieth of the segment.
     assert_eq!(first, 2 + 400 / 20);
-    for Tried { orders, point } in tried {
+    for Trial { orders, point } in tried {
         let Point { parameters, cost, .. } = point.unwrap();
         let of = |theta: &[f64]| {
             let (a, rest) = theta.split_at(orders.na);
@@ -98,7 +98,8 @@ fn a_search_for_each_finds_nothing_lower_among_the_best() {
     let (y, u) = signals(41, 600);
     let record = record(&y, &[&u], std::slice::from_ref(&(0..600)));
     let choice = Choice::Grid(grid(range(1, 3), range(1, 3), range(0, 3), 0.into(), 0.into()));
-    let Found { selection, guess } = chosen(&record, None, &choice, Select::MDL, Initial::Auto).unwrap();
+    let SelectedModel { selection, guess } =
+        chosen(&record, None, &choice, Select::MDL, Initial::Auto).unwrap();
     assert_eq!(selection.chosen.orders, Orders::armax(2, &[2], 2, &[1]).unwrap());
     assert_eq!(guess.unwrap().len(), 6);
     // ARX models stand in the same table, on the same samples.
@@ -186,14 +187,14 @@ fn models_with_f_need_not_begin_at_rest() {
 }
 
 #[test]
-fn long_records_are_compared_on_stretches() {
+fn long_records_are_compared_on_segments() {
     let (y, u) = signals(61, (1 << 16) + 2);
     let record = record(&y, &[&u], std::slice::from_ref(&(0..(1 << 16) + 2)));
     let small = |nc: OrderRange| Choice::Grid(grid(2.into(), 2.into(), nc, 0.into(), 0.into()));
     let of = |choice: &Choice| chosen(&record, None, choice, Select::MDL, Initial::Auto).unwrap().selection;
     let searched = of(&small(2.into()));
     assert_eq!(searched.samples, 16 * (2048 - 2 - 50));
-    assert!(searched.steps[0].contains("16 stretches"), "{:?}", searched.steps);
+    assert!(searched.steps[0].contains("16 segments"), "{:?}", searched.steps);
     // Linear models see them all.
     assert_eq!(of(&small(0.into())).samples, 1 << 16);
 }

@@ -54,7 +54,7 @@ fn thresholds_make_the_intervals_they_are_for() {
     }
 }
 
-/// The number of alarms of each chart in so many Gaussian innovations.
+/// The number of alarms of each chart in this many Gaussian innovations.
 fn alarms(detector: &mut ChangeDetector<f64>, samples: usize) -> [f64; 3] {
     let (mut noise, mut alarms) = (Noise(5), [0.0; 3]);
     for _ in 0..samples {

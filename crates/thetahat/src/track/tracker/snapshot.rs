@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use thetahat_core::{ChangeDetector, SnapshotVersion};
 
-use super::{Room, Stage, Tracker};
+use super::{Stage, Tracker, Workspace};
 use crate::Error;
 use crate::model::Orders;
 use crate::track::{
@@ -71,7 +71,7 @@ impl TryFrom<Snapshot> for Tracker {
             detector,
             score,
             inputs,
-            room: Room::default(),
+            workspace: Workspace::default(),
         };
         if tracker.is_sound() { Ok(tracker) } else { Err(Error::data("its parts do not fit together")) }
     }

@@ -9,7 +9,7 @@ pub(super) fn table(record: &Record<'_>, orders: &Orders, presample: Presample) 
     let mut table = Vec::new();
     for segment in &record.segments {
         for t in segment.clone() {
-            if presample == Presample::Drop && t < segment.start + orders.reach() {
+            if presample == Presample::Drop && t < segment.start + orders.maximum_lag() {
                 continue;
             }
             let past =

@@ -78,7 +78,7 @@ fn derivatives_of_all_functions_are_exact() {
     }
 }
 
-/// Values and Jacobian of a step and of what is seen behind it, by states and parameters.
+/// Values and Jacobian of a step and of what is seen after it, by states and parameters.
 fn step<S: Number<f64>>(model: &GreyBox, x: &[S], z: &[S], t: f64, dt: f64) -> [Vec<S>; 4] {
     let (n, p, m) = (model.states().len(), z.len(), model.outputs().len());
     let zeros = |size| vec![S::from(0.0); size];

@@ -13,7 +13,7 @@ pub(super) enum Goal<'g> {
 }
 
 impl Fitting<'_> {
-    /// The program in w, with the largest |e| behind it for that norm.
+    /// The program in w, with the largest |e| after it for that norm.
     pub(super) fn program(
         &self,
         frame: &Frame,

@@ -69,7 +69,7 @@ fn logs_lead_back_to_the_truth() {
             // A good log says something: 10 % at most.
             assert!(error < 0.1 * truth, "{name} {error}");
         }
-        // chi-square of 800 readings and more: standard deviation below 0.05.
+        // chi-square of 800 measurements and more: standard deviation below 0.05.
         let nis = report.outcome.nis.unwrap();
         assert!((nis.mean / nis.expected - 1.0).abs() < 0.15, "{name} {nis:?}");
         // Binomial: standard deviation below 0.008.

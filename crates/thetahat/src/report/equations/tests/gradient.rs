@@ -35,7 +35,7 @@ fn gradient_and_value_agree() {
     }
 }
 
-/// The updates of this room's predictor, and those of the extended Kalman filter of thetahat-core.
+/// The updates of this module's predictor, and those of the extended Kalman filter of thetahat-core.
 #[test]
 fn value_is_the_likelihood_of_the_filter() {
     for outputs in [1, 2] {

@@ -17,7 +17,7 @@ use crate::validate::Fit;
 /// Of the pendulum's parameters, in their order. None has bounds, so that z is the parameter.
 pub(super) const TRUTH: [f64; 5] = [-0.5, 2.0, 1.5, 0.1, 0.3];
 
-/// A pendulum with this process noise and 1 or 2 outputs, of which the first so many parameters are unknown; a search for
+/// A pendulum with this process noise and 1 or 2 outputs, of which the first parameters, this many, are unknown; a search for
 /// them starts at 0.6 truth + 0.1.
 pub(super) fn pendulum_text(process: f64, outputs: usize, unknown: usize) -> String {
     let names = ["damping", "stiffness", "gain", "square", "drive"];
@@ -51,7 +51,7 @@ pub(super) fn pendulum(outputs: usize, unknown: usize) -> GreyBox {
     GreyBox::from_toml(&pendulum_text(0.002, outputs, unknown)).unwrap()
 }
 
-/// A log of so many rows of a model with these z and one input, with the noises that it tells of times `noise`.
+/// A log of this many rows of a model with these z and one input, with the noises that it tells of times `noise`.
 pub(super) fn log(model: &GreyBox, z: &[f64], rows: usize, seed: u64, noise: f64) -> Recording {
     let (n, m) = (model.states().len(), model.outputs().len());
     let mut random = Noise(seed);

@@ -269,7 +269,7 @@ pub(crate) fn roots(model: &PolynomialModel) -> Drawn {
     chart("In the z plane", words, 520, traces, layout)
 }
 
-/// The border of a root's 95 % region, and a break of the line.
+/// The boundary of a root's 95 % region, and a break of the line.
 ///
 /// With the covariance matrix S = L L' of (re, im): z + sqrt(5.99) L (cos, sin). A real root has an interval.
 fn outline(root: &Root) -> Vec<(f64, f64)> {

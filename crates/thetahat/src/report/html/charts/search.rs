@@ -5,7 +5,7 @@ use super::super::figure::{COLOURS, Drawn, axis, chart, layout, line, significan
 use super::super::object::{Object, marker, scatter, stroke};
 use super::super::text;
 use crate::figures;
-use crate::select::{Scored, Select, Selection};
+use crate::select::{Candidate, Select, Selection};
 
 /// What models were chosen by.
 pub(crate) fn score(select: Select) -> &'static str {
@@ -18,8 +18,8 @@ pub(crate) fn score(select: Select) -> &'static str {
 
 /// The best model of each size.
 pub(crate) fn search(selection: &Selection) -> Drawn {
-    let scored = |models: &[Scored]| -> Vec<(f64, f64, String)> {
-        let one = |model: &Scored| {
+    let scored = |models: &[Candidate]| -> Vec<(f64, f64, String)> {
+        let one = |model: &Candidate| {
             let score = model.score.filter(|score| score.is_finite())?;
             Some((model.parameters as f64, significant(score), model.orders.to_string()))
         };
@@ -56,7 +56,7 @@ pub(crate) fn search(selection: &Selection) -> Drawn {
         .with("yaxis", axis(&format!("{name}, the smaller the better")))
         .with("hovermode", "closest");
     let words = format!(
-        "The least {name} of the models with so many parameters, and the model that was chosen: {}.",
+        "The least {name} for each number of parameters, and the model that was chosen: {}.",
         selection.chosen.orders
     );
     chart("The best of each size", words, 340, traces, layout)

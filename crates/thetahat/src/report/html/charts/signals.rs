@@ -12,7 +12,7 @@ use crate::data::Rows;
 
 /// More panels than these go into a further figure.
 const MOST_PANELS: usize = 8;
-/// More shaded stretches than these are no help.
+/// More shaded segments than these are no help.
 const MOST_SHADES: usize = 40;
 /// The height of a panel, of one that has several curves, and of what else a figure has, in pixels.
 const HEIGHTS: [usize; 3] = [130, 280, 90];
@@ -159,12 +159,12 @@ impl<'a> Stack<'a> {
 
     /// Areas behind the curves, with their names.
     fn shades(&self, shades: &[Shade]) -> (Vec<Value>, Vec<Value>) {
-        let stretches = shades
+        let segments = shades
             .iter()
             .enumerate()
             .flat_map(|(k, shade)| shade.rows.iter().map(move |rows| (k, shade, rows)));
         let (mut shapes, mut labels) = (Vec::new(), Vec::new());
-        for (position, shade, rows) in stretches.take(MOST_SHADES) {
+        for (position, shade, rows) in segments.take(MOST_SHADES) {
             let (Some(first), Some(last)) = (self.time.get(rows.first() - 1), self.time.get(rows.last() - 1))
             else {
                 continue;

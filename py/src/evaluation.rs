@@ -23,7 +23,7 @@ pub(crate) struct Validation {
     alpha: f64,
 }
 
-/// Looks at a log with a model, with the options of `thetahat validate`.
+/// Evaluates a model on a log, with the options of `thetahat validate`.
 #[pyfunction]
 pub(crate) fn validate(
     py: Python<'_>,

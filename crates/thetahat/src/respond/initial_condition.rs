@@ -1,4 +1,4 @@
-//! Free responses: what a filter says of samples before the first, and the combination of them that fits best.
+//! Initial-condition responses: what a filter says of samples before the first, and the combination of them that fits best.
 
 use crate::Error;
 use crate::regression::{Lagged, Presample, Taps, Unsolved, divide, sum};

@@ -31,7 +31,7 @@ fn cost(y: &[f64], u: &[f64], orders: &Orders, theta: &[f64], rows: impl Iterato
 
 /// The pieces without the samples that a model of this grid does not need.
 fn cut(pieces: &[Range<usize>], orders: &Orders) -> Vec<Range<usize>> {
-    pieces.iter().map(|piece| piece.start + 4 - orders.reach()..piece.end).collect()
+    pieces.iter().map(|piece| piece.start + 4 - orders.maximum_lag()..piece.end).collect()
 }
 
 #[test]
@@ -49,20 +49,20 @@ fn validation_is_a_loop_of_single_fits() {
         let found =
             arx(&record(&y, &[&u], &cut(&estimation.segments, orders)), orders, Initial::Drop).unwrap();
         let expected = cost(&y, &u, orders, found.parameters(), (254..300).chain(314..400)) / 132.0;
-        assert!(close(model.unseen.unwrap(), expected, 1e-9), "{model:?} {expected}");
-        assert_eq!(model.score, model.unseen);
+        assert!(close(model.held_out_mse.unwrap(), expected, 1e-9), "{model:?} {expected}");
+        assert_eq!(model.score, model.held_out_mse);
     }
-    judged(&selection);
+    evaluated(&selection);
 }
 
 /// The least comes first, and the smallest within 1 % of it is chosen.
-fn judged(selection: &Selection) {
+fn evaluated(selection: &Selection) {
     let least = selection.least.as_ref().unwrap();
     assert_eq!(least, &selection.best[0]);
-    let limit = 1.01 * least.unseen.unwrap();
-    assert!(selection.chosen.unseen.unwrap() <= limit);
-    let smaller = |model: &&Scored| model.parameters < selection.chosen.parameters;
-    assert!(selection.best.iter().filter(smaller).all(|model| model.unseen.unwrap() > limit));
+    let limit = 1.01 * least.held_out_mse.unwrap();
+    assert!(selection.chosen.held_out_mse.unwrap() <= limit);
+    let smaller = |model: &&Candidate| model.parameters < selection.chosen.parameters;
+    assert!(selection.best.iter().filter(smaller).all(|model| model.held_out_mse.unwrap() > limit));
     assert_ne!(selection.second.as_ref().unwrap().orders, selection.chosen.orders);
 }
 
@@ -71,7 +71,7 @@ fn cross_validation_is_a_loop_over_blocks_in_time() {
     let (y, u) = signals();
     let all = record(&y, &[&u], &[0..150, 150..250, 260..400]);
     let selection = chosen(&all, None, &Choice::Grid(grid()), Select::Cv, Initial::Auto).unwrap().selection;
-    // 390 samples in fifths of 78; the clock jumps at 150.
+    // 390 samples in fifths of 78; the clock has a gap at 150.
     let one = std::slice::from_ref::<Range<usize>>;
     let blocks =
         [one(&(0..78)), &[78..150, 150..156], one(&(156..234)), &[234..250, 260..322], one(&(322..400))];
@@ -85,9 +85,9 @@ fn cross_validation_is_a_loop_over_blocks_in_time() {
             sum += cost(&y, &u, orders, found.parameters(), rows());
             count += rows().count();
         }
-        assert!(close(model.unseen.unwrap(), sum / count as f64, 1e-9), "{model:?}");
+        assert!(close(model.held_out_mse.unwrap(), sum / count as f64, 1e-9), "{model:?}");
     }
-    judged(&selection);
+    evaluated(&selection);
 }
 
 #[test]
@@ -118,10 +118,10 @@ fn models_that_need_a_search_are_validated_too() {
             );
             // e has a variance of 0.03.
             assert!(
-                selection.best.iter().all(|model| close(model.unseen.unwrap(), 0.03, 0.1)),
+                selection.best.iter().all(|model| close(model.held_out_mse.unwrap(), 0.03, 0.1)),
                 "{selection:?}"
             );
-            judged(&selection);
+            evaluated(&selection);
         }
     }
 }

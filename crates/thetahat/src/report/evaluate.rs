@@ -5,9 +5,9 @@ use crate::respond::{Horizon, OnLog};
 use crate::select::Focus;
 use crate::validate::{Fit, Part};
 
-/// Adds the figures of one part of the log: one step ahead, as many as the focus says on rows that the fit did not see, and driven by
+/// Adds the figures of one part of the log: one step ahead, as many as the focus says on held-out rows, and driven by
 /// the inputs alone where there are any.
-pub(super) fn judge(report: &mut Report, on_log: &dyn OnLog, part: Part, focus: Focus) {
+pub(super) fn evaluate(report: &mut Report, on_log: &dyn OnLog, part: Part, focus: Focus) {
     let mut horizons = vec![Horizon::Steps { steps: 1 }];
     if let (Focus::Steps(steps @ 2..), Part::Validation | Part::Test) = (focus, part) {
         horizons.push(Horizon::Steps { steps });
@@ -35,7 +35,7 @@ pub(super) fn judge(report: &mut Report, on_log: &dyn OnLog, part: Part, focus: 
             fit.outside = on_log.outside(index, response, horizon);
             if fit.percent.is_none() {
                 let why = if fit.samples == 0 {
-                    "its stretches without a gap are too short"
+                    "its segments without a gap are too short"
                 } else {
                     "the output is constant there, or the response overflows"
                 };

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::candidates::{Samples, Tried, energy, rows};
+use super::candidates::{Samples, Trial, energy, rows};
 use super::folds::{Folds, columns_of, parted};
 use super::held_out::mean_square;
 use super::linear::Scaled;
@@ -14,7 +14,7 @@ use crate::estimate::Common;
 /// Blocks of a cross-validation.
 const BLOCKS: usize = 5;
 
-/// The mean of e^2 of each model on unseen samples, the same for all; none where the choice does not need it, or the data
+/// The mean of e^2 of each model on held-out samples, the same for all; none where the choice does not need it, or the data
 /// do not determine a model.
 ///
 /// # Errors
@@ -22,7 +22,7 @@ const BLOCKS: usize = 5;
 pub(super) fn costs(
     task: &Task<'_>,
     record: &Record<'_>,
-    tried: &[Tried],
+    tried: &[Trial],
 ) -> Result<Vec<Option<f64>>, Error> {
     // The samples before a piece of a log are not zero, whatever those before its first are taken for.
     let samples = &Samples::unknown(record, tried.iter().map(|model| &model.orders));
@@ -37,7 +37,7 @@ fn validated(
     task: &Task<'_>,
     validation: &Record<'_>,
     samples: &Samples,
-    tried: &[Tried],
+    tried: &[Trial],
 ) -> Result<Vec<Option<f64>>, Error> {
     let count = samples.count(validation);
     if count == 0 {
@@ -45,7 +45,7 @@ fn validated(
     }
     let (linear, searched) = parted(tried);
     if task.looks_further() {
-        let mean = |model: &Tried| {
+        let mean = |model: &Trial| {
             let parameters = &model.point.as_ref()?.parameters;
             mean_square(&model.orders, parameters, validation, task.focus.horizon())
         };
@@ -56,13 +56,13 @@ fn validated(
         let columns = columns_of(tried, &linear, validation.inputs.len());
         let scaled = Scaled::new(&rows(validation, &columns, samples)?);
         for k in linear {
-            let Tried { orders, point } = &tried[k];
+            let Trial { orders, point } = &tried[k];
             costs[k] = point.as_ref().map(|point| scaled.cost_of(&columns, orders, &point.parameters));
         }
     }
     let common = Common::new(validation, true, samples.window, task.search, task.deadline, task.monitor)?;
     let others = searched.par_iter().map(|&k| {
-        let Tried { orders, point } = &tried[k];
+        let Trial { orders, point } = &tried[k];
         point
             .as_ref()
             .and_then(|point| common.mean(orders, &point.parameters))
@@ -83,7 +83,7 @@ fn nothing_to_see(rows: &str, samples: &Samples) -> Error {
     Error::undetermined(
         Vec::new(),
         format!(
-            "no stretch of the {rows} rows is longer than the {} samples that the models reach back; give more rows, or \
+            "no segment of the {rows} rows is longer than the {} samples that the models reach back; give more rows, or \
              lower the orders",
             samples.window.counted
         ),
@@ -94,7 +94,7 @@ fn cross_validated(
     task: &Task<'_>,
     record: &Record<'_>,
     samples: &Samples,
-    tried: &[Tried],
+    tried: &[Trial],
 ) -> Result<Vec<Option<f64>>, Error> {
     let folds = Folds::new(record, BLOCKS);
     let tests: Vec<Record<'_>> = (0..BLOCKS).map(|fold| folds.test(fold)).collect();

@@ -80,17 +80,17 @@ class Validation(_Document):
     alpha: float
 
     def fit(self, horizon: int | None = 1, *, output: str | None = None) -> float:
-        """The fit in percent so many steps ahead, or in a free run (None); NaN where there is none.
+        """The fit in percent ``horizon`` steps ahead, or in a free run (None); NaN where there is none.
 
         Raises
         ------
         ValueError
-            If the validation did not look so far ahead, or there are several outputs and none is named.
+            If the validation did not evaluate that horizon, or there are several outputs and none is named.
         """
         return self._figure("percent", horizon, output)
 
     def mean_absolute_error(self, horizon: int | None = 1, *, output: str | None = None) -> float:
-        """The mean of ``|e|`` so many steps ahead, or in a free run (None), in units of the output; NaN where there is none.
+        """The mean of ``|e|`` ``horizon`` steps ahead, or in a free run (None), in units of the output; NaN where there is none.
 
         It raises as `fit` does.
 
@@ -105,7 +105,7 @@ class Validation(_Document):
         return self._figure("mean_absolute_error", horizon, output)
 
     def largest_error(self, horizon: int | None = 1, *, output: str | None = None) -> float:
-        """The largest ``|e|`` so many steps ahead, or in a free run (None), in units of the output; NaN where there is none.
+        """The largest ``|e|`` ``horizon`` steps ahead, or in a free run (None), in units of the output; NaN where there is none.
 
         It raises as `fit` does.
         """
@@ -122,7 +122,7 @@ class Validation(_Document):
                 return float("nan" if fit[name] is None else fit[name])
         if horizon is None:
             raise ValueError("horizon: a model without inputs has no free run; give a number of steps")
-        raise ValueError(f"horizon: {horizon} was not looked at; validate with horizon={horizon}")
+        raise ValueError(f"horizon: {horizon} was not evaluated; validate with horizon={horizon}")
 
     @property
     def whiteness(self) -> float:
@@ -133,7 +133,7 @@ class Validation(_Document):
 
     @property
     def anderson(self) -> dict[float, float]:
-        """How likely so many autocorrelations of white residuals lie outside their band, by the level of the band.
+        """How likely as many autocorrelations of white residuals lie outside their band, by the level of the band.
 
         The mid-p-value of the count, which is about binomial (Anderson's test); below `alpha` the residuals are not white.
         Empty where they could not be tested. Of several outputs the least.
@@ -287,14 +287,14 @@ def inspect(
     skip_rows: int | None = None,
     missing: str | Sequence[str] | None = None,
 ) -> Inspection:
-    """Look at a log before any fit: its clock, the quality of its channels, excitation, delays and feedback.
+    """Inspect a log before any fit: its clock, the quality of its channels, excitation, delays and feedback.
 
     Parameters
     ----------
     log : Log, or path
         The data, or a CSV file, whose clock may be irregular.
     inputs, output
-        The columns of a file that are inputs and output; without names all columns of numbers are looked at.
+        The columns of a file that are inputs and output; without names all columns of numbers are inspected.
     time, sample_time, resample, time_format, delimiter, comment, encoding, decimal_comma, header, skip_rows, missing
         How a file is read, see `thetahat.ReadOptions`.
 

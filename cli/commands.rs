@@ -5,7 +5,7 @@ mod compare;
 pub(crate) mod demo;
 mod filter;
 mod fit;
-mod grey;
+mod grey_box;
 mod help;
 mod inspect;
 mod respond;

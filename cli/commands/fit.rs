@@ -9,10 +9,10 @@ use thetahat::report::{
 };
 
 use super::search::{Identified, watched};
-use super::{grey, summary};
+use super::{grey_box, summary};
 use crate::args::{FitArguments, FormatArgument};
 use crate::failure::Failure;
-use crate::job::{FitJob, GreyJob};
+use crate::job::{FitJob, GreyBoxJob};
 use crate::log::{self, Clocks, Joined};
 use crate::messages::warn;
 use crate::output;
@@ -21,7 +21,7 @@ use crate::wrap::stdout_width;
 pub(crate) fn fit(arguments: &FitArguments, line: &str) -> Result<(), Failure> {
     let outputs = [&arguments.report, &arguments.html];
     let Identified { report, log, sources } = match &arguments.grey {
-        Some(model) => grey::found(&GreyJob::resolve(arguments, model)?)?,
+        Some(model) => grey_box::found(&GreyBoxJob::resolve(arguments, model)?)?,
         None => found(&FitJob::resolve(arguments)?, arguments.html.is_some())?,
     };
     let json = report.to_json().map_err(|error| Failure::data(error.to_string()))?;

@@ -20,7 +20,7 @@
 //!
 //! Whether a constant is worth its parameter is decided by MDL (Rissanen, Automatica 14, 1978): N ln(V_0/V_1) > ln N. For
 //! models that are linear in their parameters V_1 follows from V_0, the residuals' sum and the normal equations; for others
-//! the decrease that one Gauss-Newton step foretells (Rao's score test, Proc. Cambridge Philosophical Society 44, 1948) says
+//! the decrease that one Gauss-Newton step predicts (Rao's score test, Proc. Cambridge Philosophical Society 44, 1948) says
 //! whether a second search can change the answer. The errors of an output-error model may have any colour, and slow ones look
 //! like an offset: there k^2/var k > ln N is asked for too, with the variance that knows of the colour (Wald's test, which is
 //! the same as the first one where errors are white). Near an integrator a level may be anything beside an initial condition
@@ -50,7 +50,7 @@ use crate::data::{Offset, Record};
 use crate::estimate::Criteria;
 use crate::model::{OffsetCovariance, Orders, Quantity, Structure};
 
-/// A search for a constant begins where a step foretells this fraction of what it must be worth.
+/// A search for a constant begins where a step predicts this fraction of what it must be worth.
 const PROMISING: f64 = 0.5;
 /// A constant that is worth this many times its price needs no comparison with a model without it.
 const CERTAIN: f64 = 2.0;

@@ -105,7 +105,7 @@ Examples:
     /// Say how a fitted model does on a log, and whether anything is left in its residuals
     ///
     /// Fits 1 step ahead, some steps ahead and in a free run; whiteness of the residuals by Ljung and Box's test and by
-    /// Anderson's, whose count decides by its p-value; their independence of past inputs, and a word on feedback; the noise beside the model's own; how often its
+    /// Anderson's, whose count decides by its p-value; their independence of past inputs, and a warning of feedback; the noise beside the model's own; how often its
     /// prediction intervals hold. With --require it is a gate: exit code 6 if the model does not meet it.
     #[command(after_help = "\
 Examples:

@@ -12,7 +12,7 @@ use thetahat::report::{EquationsPlan, NonlinearArxPlan, Plan, Report, Requiremen
 use crate::args::{FitArguments, InspectArguments, ValidateArguments};
 use crate::commands::{Experiments, Tracking, experiments, inspected};
 use crate::failure::Failure;
-use crate::job::{EvaluationJob, FitJob, GreyJob, InspectJob, NarxJob};
+use crate::job::{EvaluationJob, FitJob, GreyBoxJob, InspectJob, NarxJob};
 use crate::replace::replace;
 
 /// Logs that were read as one.
@@ -64,7 +64,7 @@ pub fn plan(options: &[OsString], inputs: Vec<String>, output: String) -> Result
 pub fn equations_plan(options: &[OsString]) -> Result<EquationsPlan, Failure> {
     let log = OsString::from("log");
     let words: Vec<OsString> = options.iter().cloned().chain([log]).collect();
-    Ok(GreyJob::resolve(&arguments("fit", &words)?, Path::new("model"))?.plan)
+    Ok(GreyBoxJob::resolve(&arguments("fit", &words)?, Path::new("model"))?.plan)
 }
 
 /// The plan that `thetahat fit --narx` makes of these options for a log with these channels.

@@ -3,9 +3,10 @@
 mod bode;
 mod compare;
 pub(crate) mod demo;
+mod experiments;
 mod filter;
 mod fit;
-mod grey;
+mod grey_box;
 mod help;
 mod inspect;
 mod narx;
@@ -17,8 +18,8 @@ mod track;
 mod transient;
 mod validate;
 
+pub(crate) use experiments::{Channels, Experiments, experiments};
 pub use filter::consistency;
-pub(crate) use fit::{Channels, Experiments, experiments};
 pub(crate) use inspect::inspected;
 pub use track::{TrackedRow, Tracking};
 

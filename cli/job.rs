@@ -2,7 +2,7 @@
 
 mod filter;
 mod fit;
-mod grey;
+mod grey_box;
 mod inspect;
 mod method;
 mod narx;
@@ -27,7 +27,7 @@ use crate::table;
 
 pub(crate) use filter::FilterJob;
 pub(crate) use fit::FitJob;
-pub(crate) use grey::GreyJob;
+pub(crate) use grey_box::GreyBoxJob;
 pub(crate) use inspect::InspectJob;
 pub(crate) use narx::NarxJob;
 pub(crate) use track::TrackJob;

@@ -3,13 +3,15 @@
 //! The library names them between backticks, as `detrend`, wherever one is advised; here they are options.
 
 /// The arguments of the library that are options, by the name that both have.
-pub(crate) const OPTIONS: [&str; 41] = [
+pub(crate) const OPTIONS: [&str; 49] = [
     "alarm",
     "alpha",
     "alphas",
+    "centres",
     "constant",
     "dc-gain",
     "dead-zone",
+    "degree",
     "detrend",
     "draws",
     "estimate",
@@ -23,13 +25,17 @@ pub(crate) const OPTIONS: [&str; 41] = [
     "lags",
     "max-iterations",
     "method",
+    "most-terms",
     "nf",
     "nk",
     "noise-bound",
     "norm",
+    "nu",
+    "ny",
     "offset",
     "poles",
     "prefilter",
+    "raw-terms",
     "require",
     "resample",
     "ridge",
@@ -40,11 +46,13 @@ pub(crate) const OPTIONS: [&str; 41] = [
     "split",
     "start",
     "step",
+    "terms",
     "time",
     "time-limit",
     "tolerance",
     "trend",
     "validate",
+    "width",
 ];
 
 /// The option that an argument is, if it is one.

@@ -307,7 +307,7 @@ fn every_verb_takes_the_report() {
         "filter model.json log.csv --sample-time 0.1",
     ] {
         let run = folder.run(line);
-        assert_eq!(run.code, 1, "{line}");
+        assert_eq!(run.code, 3, "{line}");
         assert!(
             run.stderr.contains("it predicts, simulates, validates and compares"),
             "{line}: {}",
@@ -375,7 +375,7 @@ fn bad_options_and_logs_are_told() {
         ("--narx poly --estimate 1..20 --ny 5 --nu 5 --terms 66", "functions"),
     ] {
         let run = folder.run(&format!("fit log.csv --sample-time 0.1 {options} --report report.json"));
-        assert!([1, 2].contains(&run.code), "{options}: {}", run.code);
+        assert!([2, 3, 4].contains(&run.code), "{options}: {}", run.code);
         assert!(run.stderr.contains(words), "{options}: {}", run.stderr);
         assert!(!folder.path("report.json").exists(), "{options}");
     }
@@ -401,7 +401,7 @@ fn damaged_reports_are_refused() {
         *bad.pointer_mut(place).expect("it is there") = value;
         folder.write("bad.json", bad.to_string());
         let run = folder.run("validate bad.json log.csv --sample-time 0.1");
-        assert_eq!(run.code, 1, "{place}: {}", run.stdout);
+        assert_eq!(run.code, 3, "{place}: {}", run.stdout);
         assert!(run.stderr.contains("edited or damaged"), "{place}: {}", run.stderr);
     }
 }

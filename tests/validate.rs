@@ -108,7 +108,7 @@ fn the_table_says_what_the_document_says() {
     let folder = folder();
     let table = folder.done("validate arx.json log.csv --rows 301..600").stdout;
     for part in [
-        "arx.json, ARX(2, 2, 1), on log.csv rows 301..600: fresh",
+        "arx.json, ARX(2, 2, 1), on log.csv rows 301..600: held out",
         "\nstable\n",
         "1 step ahead   drop",
         "5 steps ahead  drop",

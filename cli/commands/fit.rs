@@ -1,6 +1,6 @@
 //! `thetahat fit`: from logs to a model and its report.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use thetahat::Document;
 use thetahat::data::{Log, Rows, Source};
@@ -8,12 +8,13 @@ use thetahat::report::{
     Report, Validated, ValidationPlan, fit_page, held_out_runs, identify_monitored, validate,
 };
 
+use super::experiments::{Experiments, experiments};
 use super::search::{Identified, watched};
-use super::{grey, narx, summary};
+use super::{grey_box, narx, summary};
 use crate::args::{FitArguments, FormatArgument};
 use crate::failure::Failure;
-use crate::job::{FitJob, GreyJob, LogJob, NarxJob};
-use crate::log::{self, Clocks, Joined};
+use crate::job::{FitJob, GreyBoxJob, NarxJob};
+use crate::log;
 use crate::messages::warn;
 use crate::output;
 use crate::wrap::stdout_width;
@@ -21,7 +22,7 @@ use crate::wrap::stdout_width;
 pub(crate) fn fit(arguments: &FitArguments, line: &str) -> Result<(), Failure> {
     let outputs = [&arguments.report, &arguments.html];
     let Identified { report, log, sources } = match &arguments.grey {
-        Some(model) => grey::found(&GreyJob::resolve(arguments, model)?)?,
+        Some(model) => grey_box::found(&GreyBoxJob::resolve(arguments, model)?)?,
         None => match arguments.narx.narx {
             Some(map) => narx::found(&NarxJob::resolve(arguments, map)?)?,
             None => found(&FitJob::resolve(arguments)?, arguments.html.is_some())?,
@@ -74,120 +75,4 @@ fn page(report: &Report, log: &Log, sources: &[Source], line: &str) -> Result<St
 /// Reads the logs and fits the model.
 pub(super) fn fitted(job: &FitJob) -> Result<Report, Failure> {
     Ok(found(job, false)?.report)
-}
-
-/// All logs as one, where they came from, and the columns that the model is about.
-pub(crate) struct Experiments {
-    pub(crate) log: Log,
-    pub(crate) sources: Vec<Source>,
-    pub(crate) channels: Channels,
-    /// What the reader should know, in plain words.
-    pub(crate) words: Vec<String>,
-}
-
-/// The columns that the model is about.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct Channels {
-    pub(crate) inputs: Vec<String>,
-    pub(crate) output: String,
-}
-
-/// Which columns are wanted.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Wanted<'a> {
-    /// Named inputs; none: those called u, u1, u2, …
-    pub(crate) inputs: Option<&'a [String]>,
-    /// The named output; none: y.
-    pub(crate) output: Option<&'a str>,
-    /// Whether the model has inputs.
-    pub(crate) driven: bool,
-    /// What asks for a model without inputs.
-    pub(crate) none: &'a str,
-}
-
-/// Reads all logs, one after the other, with any clock or with an even one.
-pub(crate) fn experiments(job: &FitJob, any_clock: bool) -> Result<Experiments, Failure> {
-    let wanted = Wanted {
-        inputs: job.inputs.as_deref(),
-        output: job.output.as_deref(),
-        driven: job.orders.has_inputs(),
-        none: "--nb 0",
-    };
-    read(&job.paths, &job.log, &wanted, any_clock, |inputs| job.orders.of(inputs).map(|_| ()))
-}
-
-/// The same; `check` says whether so many inputs go with the rest.
-pub(super) fn read(
-    paths: &[PathBuf],
-    log: &LogJob,
-    wanted: &Wanted<'_>,
-    any_clock: bool,
-    check: impl Fn(usize) -> Result<(), Failure>,
-) -> Result<Experiments, Failure> {
-    let mut channels: Option<Channels> = None;
-    let Joined { log, sources, words } =
-        log::joined(paths, log, Clocks { any: any_clock, sample_time: None }, |path, header| {
-            let bad = |message: String| Failure::data(format!("{}: {message}", path.display()));
-            let own = Channels::choose(wanted, header).map_err(bad)?;
-            let first = channels.get_or_insert_with(|| own.clone());
-            if own != *first {
-                return Err(bad(format!(
-                    "its inputs are {}, those of the first log {}; name with --input what all have",
-                    log::listed(&own.inputs),
-                    log::listed(&first.inputs)
-                )));
-            }
-            check(own.inputs.len())?;
-            Ok(own.inputs.into_iter().chain([own.output]).collect())
-        })?;
-    Ok(Experiments { log, sources, channels: channels.unwrap_or_default(), words })
-}
-
-impl Channels {
-    /// The named ones, or those called u, u1, u2, … and y.
-    fn choose(wanted: &Wanted<'_>, header: &[String]) -> Result<Self, String> {
-        let there_are = || format!("there are: {}", log::listed(header));
-        let output = match wanted.output {
-            Some(name) => name.to_owned(),
-            None if header.iter().any(|name| name == "y") => "y".to_owned(),
-            None => {
-                return Err(format!("no column is called y; name the output with --output; {}", there_are()));
-            }
-        };
-        if !wanted.driven {
-            return Ok(Self { inputs: Vec::new(), output });
-        }
-        if let Some(inputs) = wanted.inputs {
-            return Ok(Self { inputs: inputs.to_vec(), output });
-        }
-        let inputs = usual_inputs(header);
-        if inputs.is_empty() {
-            return Err(format!(
-                "no column is called u, u1, u2, …; name the inputs with --input, or give {} for a model without; {}",
-                wanted.none,
-                there_are()
-            ));
-        }
-        Ok(Self { inputs, output })
-    }
-}
-
-/// The columns called u, u1, u2, … in this order.
-pub(super) fn usual_inputs(header: &[String]) -> Vec<String> {
-    let mut inputs: Vec<(Option<u32>, String)> = header
-        .iter()
-        .filter_map(|name| {
-            let number = name.strip_prefix('u')?;
-            let number = if number.is_empty() { None } else { Some(plain_number(number)?) };
-            Some((number, name.clone()))
-        })
-        .collect();
-    inputs.sort();
-    inputs.into_iter().map(|(_, name)| name).collect()
-}
-
-/// 1, 2, …: digits without a leading zero.
-fn plain_number(text: &str) -> Option<u32> {
-    let number: u32 = text.parse().ok()?;
-    (number > 0 && number.to_string() == text).then_some(number)
 }

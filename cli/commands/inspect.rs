@@ -8,7 +8,7 @@ use thetahat::inspect::{Inspection, InspectionPlan};
 use thetahat::report::inspection_page;
 use thetahat::{Document, text};
 
-use super::fit::usual_inputs;
+use super::experiments::usual_inputs;
 use super::summary;
 use crate::args::{FormatArgument, InspectArguments};
 use crate::failure::Failure;

@@ -2,7 +2,7 @@
 
 use thetahat::report::fit_nonlinear_arx;
 
-use super::fit::{Wanted, read};
+use super::experiments::{Wanted, read};
 use super::search::Identified;
 use crate::failure::Failure;
 use crate::job::NarxJob;

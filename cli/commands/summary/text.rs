@@ -79,7 +79,7 @@ pub(super) struct Table {
     words: Vec<usize>,
     /// Why there is no figure where there is none.
     none: &'static str,
-    /// What else needs a word.
+    /// What else needs a warning.
     legend: Vec<String>,
 }
 

@@ -3,7 +3,7 @@
 use thetahat::report::Report;
 
 use crate::commands::Channels;
-use crate::commands::fit::usual_inputs;
+use crate::commands::experiments::usual_inputs;
 use crate::job::TrackJob;
 use crate::log::listed;
 

@@ -4,7 +4,7 @@
 //! `make monte-carlo` does the full numbers; `make test` fewer. `MONTE_CARLO` is the number of runs of each kind.
 
 #[path = "monte_carlo/grey.rs"]
-mod grey;
+mod grey_box;
 #[path = "monte_carlo/intervals.rs"]
 mod intervals;
 #[path = "monte_carlo/simulated.rs"]

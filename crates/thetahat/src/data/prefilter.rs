@@ -237,7 +237,7 @@ impl Prefiltered {
         Ok(Record { past: vec![0; record.segments.len()], ..record })
     }
 
-    /// A word where the transient of the filter is longer than what is left out for it, in some of these rows.
+    /// A warning where the transient of the filter is longer than what is left out for it, in some of these rows.
     ///
     /// # Errors
     /// As for [`Log::record`].

@@ -442,7 +442,7 @@ impl<'l> Samples<'l> {
         };
         if !products.is_finite() {
             return Err(Error::data(
-                "sums of products of the regressors leave the range of numbers; take a lower degree, or leave out `raw_terms`, so that                  signals are divided by their scale",
+                "sums of products of the regressors leave the range of numbers; take a lower degree, or leave out `raw-terms`, so that                  signals are divided by their scale",
             ));
         }
         let path = self.path(candidates, &products, &first, most);

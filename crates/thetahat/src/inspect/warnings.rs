@@ -5,7 +5,7 @@ use super::{ChannelQuality, Inspection, InspectionPlan};
 use crate::data::{Regular, Times};
 use crate::figures::{fixed, short};
 
-/// A trend that explains this much of an output is worth a word.
+/// A trend that explains this much of an output is worth a warning.
 const TREND: f64 = 0.25;
 /// A rounding step that is this fraction of the standard deviation is coarse.
 const COARSE: f64 = 0.25;
@@ -15,7 +15,7 @@ const POOR: usize = 10;
 const FEW_CHANGES: f64 = 5.0;
 /// Rows that a sentence lists.
 const LISTED: usize = 5;
-/// Below this confidence a delay is worth a word.
+/// Below this confidence a delay is worth a warning.
 const UNSURE: f64 = 0.5;
 /// Rows from which a fit has a chance.
 const FEW_ROWS: usize = 50;

@@ -24,13 +24,13 @@ const GENERATOR: &str = concat!("thetahat ", env!("CARGO_PKG_VERSION"));
 const LEVELS: [f64; 4] = [0.5, 0.8, 0.95, 0.99];
 /// Fits whose samples differ by more than this fraction have no comparable criteria.
 const AS_MANY: f64 = 0.05;
-/// A mean of the errors above this fraction of their standard deviation is worth a word, if it is as many standard errors
+/// A mean of the errors above this fraction of their standard deviation is worth a warning, if it is as many standard errors
 /// from zero as the second number says.
 const OFF_CENTER: f64 = 0.3;
 const CERTAIN: f64 = 4.0;
 /// Lags that tests may be asked for.
 const MOST_LAGS: usize = 1000;
-/// Ratios of the errors to those expected that are worth a word.
+/// Ratios of the errors to those expected that are worth a warning.
 const LIKELY: std::ops::RangeInclusive<f64> = 0.5..=1.5;
 
 /// A validation and the signals it rests on, for charts.
@@ -88,7 +88,7 @@ pub struct ValidationPlan {
     pub horizons: Vec<usize>,
     /// L, the lags of the tests of residuals: 1 … 1000. Short logs have fewer.
     pub lags: usize,
-    /// Below this p-value there is a word of warning, and Anderson's count is not that of white residuals.
+    /// Below this p-value there is a warning, and Anderson's count is not that of white residuals.
     pub alpha: f64,
     /// The levels of Anderson's test.
     pub alphas: Vec<f64>,
@@ -142,7 +142,7 @@ impl ValidationPlan {
 /// # Errors
 /// [`Error::Data`] for channels or rows that are not there, no row with a value in every channel, a sample time that differs from the
 /// model's by more than 1 %, or a clock that it cannot follow; [`Error::Argument`] as for [`ValidationPlan::check`]. What cannot be
-/// computed of a model on a log, such as the figures of too few samples, is none in the document, with a word why.
+/// computed of a model on a log, such as the figures of too few samples, is none in the document, with a warning that says why.
 ///
 /// ```
 /// use thetahat::data::{Channel, Log};
@@ -407,7 +407,7 @@ fn test_residuals(report: &Report, on_log: &dyn OnLog, plan: &ValidationPlan, va
     }
 }
 
-/// A word on errors that are not centered, which the tests take as an offset and no matter of dynamics.
+/// A warning of errors that are not centered, which the tests take as an offset and no matter of dynamics.
 fn off_center(found: &[Innovations]) -> Option<String> {
     let errors = || found.iter().flat_map(Innovations::counted_errors);
     let samples = errors().count() as f64;
@@ -424,7 +424,7 @@ fn off_center(found: &[Innovations]) -> Option<String> {
     })
 }
 
-/// What is worth a word.
+/// What is worth a warning.
 fn warn(plan: &ValidationPlan, validation: &mut Validation) {
     let mut words = Vec::new();
     if validation.stable == Some(false) && validation.fit.iter().any(|fit| fit.horizon == Horizon::FreeRun) {

@@ -8,7 +8,7 @@ use crate::model::{Orders, PolynomialModel, Structure, cancel, near_cancellation
 use crate::optimize::Stopped;
 use crate::select::{Grid, OrderRange};
 
-/// Condition numbers above this one are worth a word.
+/// Condition numbers above this one are worth a warning.
 const ILL_CONDITIONED: f64 = 1e6;
 /// Below this fit, in percent, a model explains little.
 const POOR: f64 = 50.0;
@@ -86,7 +86,7 @@ pub(super) fn warnings(report: &Report, model: &PolynomialModel) -> Vec<String> 
     warnings
 }
 
-/// What is worth a word of a search.
+/// What is worth a warning of a search.
 fn search_warnings(search: &SearchOutcome) -> Vec<String> {
     let mut warnings = Vec::new();
     let iterations = search.iterations;
@@ -116,7 +116,7 @@ fn search_warnings(search: &SearchOutcome) -> Vec<String> {
     warnings
 }
 
-/// A word on a plant that seems to be unstable, where F, which must be stable, explains little.
+/// A warning of a plant that seems to be unstable, where F, which must be stable, explains little.
 pub(super) fn unstable_plant(report: &Report) -> Option<String> {
     let Procedure::PredictionError(search) = &report.estimation.procedure else { return None };
     let pole = search.unstable_pole?;
@@ -131,7 +131,7 @@ pub(super) fn unstable_plant(report: &Report) -> Option<String> {
     })
 }
 
-/// A word on orders that are the largest of their range: a larger one could be better.
+/// A warning of orders that are the largest of their range: a larger one could be better.
 pub(super) fn at_the_stability_boundary(orders: &Orders, grid: &Grid) -> Option<String> {
     let of_inputs = |ranges: &[OrderRange], orders: &[usize]| {
         let range = |input: usize| ranges.get(input).or(ranges.first());

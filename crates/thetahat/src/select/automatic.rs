@@ -105,7 +105,7 @@ fn without(orders: &Orders, idle: &[usize]) -> Orders {
     orders
 }
 
-/// A word on orders that are the highest that were tried of their structure.
+/// A warning of orders that are the highest that were tried of their structure.
 fn at_the_edge(chosen: &Orders, tried: &[Orders]) -> Option<String> {
     let most = |values: &[usize]| values.iter().copied().max().unwrap_or(0);
     let of = |orders: &Orders| [orders.na, most(&orders.nb), orders.nc, orders.nd, most(&orders.nf)];

@@ -231,7 +231,7 @@ pub(super) fn found(task: &Task<'_>, steps: &mut Vec<String>) -> Result<(Vec<Del
             let name = &delay.input;
             steps.push(if feedback.is_some_and(|feedback| feedback.is_suspected()) {
                 format!(
-                    "{name} and the output go together at once, and past errors of the output foretell {name}: that may be \
+                    "{name} and the output go together at once, and past errors of the output predict {name}: that may be \
                      feedback; `nk` 1 keeps it out."
                 )
             } else {

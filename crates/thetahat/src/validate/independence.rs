@@ -23,7 +23,7 @@
 //! for a sinusoid.
 //!
 //! Future inputs, k < 0, depend on e where there is feedback; each of M lags has M times the chance. They do so too where the model
-//! lacks dynamics and the input foretells itself: what speaks for feedback alone is in `feedback`.
+//! lacks dynamics and the input predicts itself: what speaks for feedback alone is in `feedback`.
 
 use thetahat_core::nalgebra::{DMatrix, DVector};
 

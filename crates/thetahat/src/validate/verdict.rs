@@ -59,7 +59,7 @@ pub struct Independence {
     /// Future inputs, k = -M … -1: where they follow the residuals, there is feedback. Bonferroni's bound over the lags.
     pub feedback: Test,
     /// Whether feedback is suspected: past residuals predict the input beyond its own past, on rows left out too. A model that lacks
-    /// dynamics, and an input that foretells itself, make `feedback` small without that.
+    /// dynamics, and an input that predicts itself, make `feedback` small without that.
     #[serde(default)]
     pub suspected: bool,
 }

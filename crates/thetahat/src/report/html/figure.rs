@@ -108,14 +108,14 @@ pub(super) fn positive_range(values: impl Iterator<Item = f64>) -> (f64, f64) {
 }
 
 /// The colour and the dashes of the curve at a position: a second round has the colours again, but dashed.
-pub(super) fn look(position: usize) -> (&'static str, &'static str) {
+pub(super) fn style(position: usize) -> (&'static str, &'static str) {
     const DASHES: [&str; 4] = ["solid", "dash", "dot", "longdashdot"];
     (COLOURS[position % COLOURS.len()], DASHES[position / COLOURS.len() % DASHES.len()])
 }
 
 /// A line with a name, which is [`text::plain`].
 pub(super) fn line(name: &str, curve: Curve, position: usize) -> Object {
-    let (colour, dash) = look(position);
+    let (colour, dash) = style(position);
     plain_line(name, curve, colour).with("line", stroke(colour, 1.6).with("dash", dash))
 }
 

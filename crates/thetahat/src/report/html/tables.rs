@@ -295,7 +295,7 @@ pub(super) fn tests(who: &str, parts: &[(String, &Validation)]) -> Table {
     table
 }
 
-/// A word where residuals that are not white are no fault.
+/// The remark where residuals that are not white are no fault.
 fn asked(validation: &Validation) -> &'static str {
     if validation.white_expected { "" } else { ", not asked" }
 }

@@ -6,8 +6,8 @@ use serde_json::json;
 
 use super::super::decimate::{Curve, rounded};
 use super::super::figure::{
-    COLOURS, Drawn, NEUTRAL, NORMAL_95, axis, band, chart, layout, line, logarithmic, look, plain_line,
-    positive_range, significant,
+    COLOURS, Drawn, NEUTRAL, NORMAL_95, axis, band, chart, layout, line, logarithmic, plain_line,
+    positive_range, significant, style,
 };
 use super::super::object::{Object, marker, scatter, stroke};
 use super::super::text;
@@ -60,7 +60,7 @@ pub(crate) fn bode(models: &[(String, &PolynomialModel)], input: Option<&str>) -
     let mut traces: Vec<Object> = Vec::new();
     let mut certain = true;
     for (position, name, response) in &found {
-        let (colour, _) = look(*position);
+        let (colour, _) = style(*position);
         let name = if single { "estimate".to_owned() } else { text::plain(name) };
         let x: Vec<f64> = response.points.iter().map(|point| significant(point.frequency)).collect();
         for (axis, turn) in [("y", false), ("y2", true)] {
@@ -171,7 +171,7 @@ fn transient(
         let thin = |values: &[f64]| -> Vec<f64> { values.iter().step_by(width.max(1)).copied().collect() };
         let x = rounded(&thin(&response.time));
         let name = if single { "estimate".to_owned() } else { text::plain(name) };
-        let (colour, _) = look(position);
+        let (colour, _) = style(position);
         if let Some((low, high)) = interval(&response.values, f64::NEG_INFINITY) {
             certain = false;
             let shown = band("95 % band", &x, &thin(&low), &thin(&high), colour);

@@ -173,7 +173,7 @@ impl<'a> Stack<'a> {
             if !(first.is_finite() && last.is_finite()) {
                 continue;
             }
-            let (colour, _) = figure::look(position);
+            let (colour, _) = figure::style(position);
             shapes.push(json!({
                 "type": "rect", "layer": "below", "xref": "x", "yref": "paper",
                 "x0": first, "x1": last, "y0": 0, "y1": 1,

@@ -9,7 +9,7 @@ use crate::memory::PerValue;
 
 /// A model in equations to fit.
 #[derive(Debug)]
-pub(crate) struct GreyJob {
+pub(crate) struct GreyBoxJob {
     pub(crate) model: PathBuf,
     /// The logs, at least one.
     pub(crate) paths: Vec<PathBuf>,
@@ -18,7 +18,7 @@ pub(crate) struct GreyJob {
     pub(crate) plan: EquationsPlan,
 }
 
-impl GreyJob {
+impl GreyBoxJob {
     pub(crate) fn resolve(arguments: &FitArguments, model: &Path) -> Result<Self, Failure> {
         let job = Self {
             model: model.to_owned(),

@@ -6,12 +6,12 @@ use thetahat::report::fit_equations;
 use super::search::{Identified, watched};
 use super::stored;
 use crate::failure::Failure;
-use crate::job::GreyJob;
+use crate::job::GreyBoxJob;
 use crate::log::{self, Clocks, Joined};
 use crate::messages::warn;
 
 /// Reads the logs and fits the model.
-pub(super) fn found(job: &GreyJob) -> Result<Identified, Failure> {
+pub(super) fn found(job: &GreyBoxJob) -> Result<Identified, Failure> {
     let text = stored::text(&job.model)?;
     let model = GreyBox::from_toml(&text)
         .map_err(|error| Failure::data(format!("{}: {error}", job.model.display())))?;

@@ -108,14 +108,14 @@ fn the_table_says_what_the_document_says() {
     let folder = folder();
     let table = folder.done("validate arx.json log.csv --rows 301..600").stdout;
     for part in [
-        "arx.json, ARX(2, 2, 1), on log.csv rows 301..600: fresh",
+        "arx.json, ARX(2, 2, 1), on log.csv rows 301..600: held out",
         "\nstable\n",
         "1 step ahead   drop",
         "5 steps ahead  drop",
         "free run       estimate",
         "\nerrors          mean |e|  largest |e|\n",
         "errors one step ahead: mean square ",
-        "residuals: 300 samples, fresh",
+        "residuals: 300 samples, held out",
         "white (Ljung-Box)        25",
         "independent of past u    25",
         "no feedback to u         25",

@@ -115,7 +115,7 @@ fn the_table_says_what_the_document_says() {
         "free run       estimate",
         "\nerrors          mean |e|  largest |e|\n",
         "errors one step ahead: mean square ",
-        "residuals: 300 samples, fresh",
+        "residuals: 300 samples, held out",
         "white (Ljung-Box)        25",
         "independent of past u    25",
         "no feedback to u         25",

@@ -261,7 +261,8 @@ fn residuals(text: &mut Text, found: &Validation, alpha: f64) {
 
 fn residuals_of(text: &mut Text, found: &Validation, residuals: &Residuals, alpha: f64) {
     let fitted = match residuals.fitted {
-        0 => "fresh".to_owned(),
+        0 if found.in_sample == InSample::No => "held out".to_owned(),
+        0 => "tested as if held out".to_owned(),
         count => format!("{count} parameters fitted to them"),
     };
     let asked = if found.white_expected { "" } else { ", which need not be white" };

@@ -36,7 +36,7 @@ pub struct Residuals {
     pub output: String,
     /// N, the residuals that count.
     pub samples: usize,
-    /// How many parameters the tests take as fitted to these samples: 0 on fresh data.
+    /// How many parameters the tests take as fitted to these samples: 0 on held-out data.
     pub fitted: usize,
     /// The autocorrelation at lags 0, 1, …, M; 1 at lag 0.
     pub autocorrelation: Vec<f64>,

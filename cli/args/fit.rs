@@ -158,7 +158,7 @@ pub(crate) struct NarxArguments {
     pub(crate) most_terms: Option<usize>,
     /// Where radial basis functions stand (rbf): chosen among the samples, at the means of N clusters, at a grid of N in each direction,
     /// or at N pseudo-random points [default: chosen]
-    #[arg(long, value_name = "chosen|kmeans:N|grid:N|random:N", requires = "narx", group = "random")]
+    #[arg(long, value_name = "chosen|kmeans:N|grid:N|random:N", requires = "narx")]
     pub(crate) centres: Option<String>,
     /// sigma of radial basis functions exp(-|z - centre|^2/sigma^2), z in standard deviations [default: so that neighbours overlap]
     #[arg(long, value_name = "SIGMA", requires = "narx", allow_hyphen_values = true)]
@@ -212,10 +212,10 @@ pub(crate) struct SearchArguments {
     #[arg(long, value_name = "C1[,C2]", allow_hyphen_values = true)]
     pub(crate) step: Option<String>,
     /// Search from this many further starts [default: 0]
-    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(..=10_000), group = "random")]
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(..=10_000))]
     pub(crate) starts: Option<u32>,
     /// Which random starts, or which random centres [default: 0]
-    #[arg(long, value_name = "S", requires = "random")]
+    #[arg(long, value_name = "S")]
     pub(crate) seed: Option<u64>,
     /// After so long begin no iteration, and look for no further start
     #[arg(long, value_name = "SECONDS", allow_hyphen_values = true)]

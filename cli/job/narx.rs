@@ -100,8 +100,12 @@ fn map_plan(arguments: &NarxArguments, map: MapArgument, seed: Option<u64>) -> R
     let not_for = |option: &str, other: &str| Err(Failure::usage(format!("{option} is for --narx {other}")));
     match map {
         MapArgument::Poly => {
-            if arguments.centres.is_some() || arguments.width.is_some() || arguments.no_linear {
-                return not_for("--centres, --width and --no-linear", "rbf");
+            if arguments.centres.is_some()
+                || arguments.width.is_some()
+                || arguments.no_linear
+                || seed.is_some()
+            {
+                return not_for("--centres, --width, --no-linear and --seed", "rbf");
             }
             Ok(MapPlan::Polynomial { degree: arguments.degree.unwrap_or(2) })
         }
@@ -110,6 +114,9 @@ fn map_plan(arguments: &NarxArguments, map: MapArgument, seed: Option<u64>) -> R
                 return not_for("--degree", "poly");
             }
             let text = arguments.centres.as_deref().unwrap_or("chosen");
+            if seed.is_some() && !text.starts_with("kmeans") && !text.starts_with("random") {
+                return Err(Failure::usage("--seed is for --centres kmeans:N and random:N"));
+            }
             Ok(MapPlan::Radial {
                 centres: centres(text, seed.unwrap_or(0))?,
                 width: arguments.width,

@@ -14,6 +14,7 @@ pub(super) fn given(arguments: &SearchArguments) -> Option<&'static str> {
         ("--tolerance", arguments.tolerance.is_some()),
         ("--step", arguments.step.is_some()),
         ("--starts", arguments.starts.is_some()),
+        ("--seed", arguments.seed.is_some()),
         ("--time-limit", arguments.time_limit.is_some()),
     ];
     options.into_iter().find_map(|(option, given)| given.then_some(option))
@@ -25,6 +26,9 @@ pub(super) fn given(arguments: &SearchArguments) -> Option<&'static str> {
 /// A usage failure for numbers that make no sense.
 pub(super) fn search(arguments: &SearchArguments) -> Result<Search, Failure> {
     let default = Search::default();
+    if arguments.seed.is_some() && arguments.starts.is_none() {
+        return Err(Failure::usage("--starts is needed with --seed, which says where they are"));
+    }
     let algorithm = match arguments.search {
         None | Some(SearchArgument::Lm) => Algorithm::LevenbergMarquardt,
         Some(SearchArgument::GaussNewton) => Algorithm::GaussNewton,

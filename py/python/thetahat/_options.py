@@ -489,7 +489,7 @@ def _texts(name: str, value: Any, rows: int | None) -> list[str]:
         return [f"{number(name, step)}:{how}{'' if filtered else ':unfiltered'}"]
     if name == "missing":
         return [value] if isinstance(value, str) else [text(name, one) for one in value]
-    if name in ("max_iterations", "starts", "seed", "lags", "skip_rows"):
+    if name in ("max_iterations", "starts", "seed", "lags", "skip_rows", "degree", "terms", "most_terms"):
         return [str(integer(name, value))]
     if name == "horizon":
         every = value if isinstance(value, (list, tuple)) else [value]
@@ -499,7 +499,7 @@ def _texts(name: str, value: Any, rows: int | None) -> list[str]:
         return [",".join(number(name, one) for one in every)]
     if name == "sample_time":
         return [number(name, seconds(name, value))]
-    if name in ("tolerance", "time_limit", "ridge", "noise_bound", "alpha"):
+    if name in ("tolerance", "time_limit", "ridge", "noise_bound", "alpha", "width"):
         return [number(name, value)]
     return [text(name, value)]
 

@@ -153,7 +153,7 @@ impl Candidates {
             Self::Products(monomials) => {
                 Map::Polynomial { terms: places.iter().map(|place| monomials.factors(*place)).collect() }
             }
-            Self::Functions { map, always } => map.some(places.iter().filter(|place| **place >= *always)),
+            Self::Functions { map, .. } => map.some(places),
         }
     }
 

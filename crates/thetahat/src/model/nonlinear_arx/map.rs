@@ -34,14 +34,15 @@ impl Map {
     }
 
     /// Some of its functions beside those of the linear path, by their places among all.
-    pub(crate) fn some<'a>(&self, places: impl Iterator<Item = &'a usize>) -> Self {
+    pub(crate) fn some(&self, places: &[usize]) -> Self {
         match self {
             Self::Polynomial { terms } => {
-                Self::Polynomial { terms: places.filter_map(|place| terms.get(*place).cloned()).collect() }
+                let own = places.iter().filter_map(|place| terms.get(*place).cloned());
+                Self::Polynomial { terms: own.collect() }
             }
             Self::Radial { centres, widths, linear } => {
                 let before = self.parameters(centres.first().map_or(0, Vec::len)) - centres.len();
-                let own: Vec<usize> = places.map(|place| place - before).collect();
+                let own: Vec<usize> = places.iter().filter_map(|place| place.checked_sub(before)).collect();
                 Self::Radial {
                     centres: own.iter().map(|place| centres[*place].clone()).collect(),
                     widths: own.iter().map(|place| widths[*place]).collect(),

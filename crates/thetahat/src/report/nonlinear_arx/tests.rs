@@ -151,19 +151,21 @@ fn radial_functions_approach_what_polynomials_do() {
         input_lags: vec![InputLags { lags: 1, delay: 1 }],
         ..plan()
     };
-    for (centres, linear) in [
-        (Centres::Chosen, true),
-        (Centres::Chosen, false),
-        (Centres::Clusters { count: 12, seed: 0 }, true),
-        (Centres::Grid { each: 4 }, true),
-        (Centres::Random { count: 15, seed: 1 }, true),
+    for (centres, linear, count) in [
+        (Centres::Chosen, true, 4..=40),
+        (Centres::Chosen, false, 4..=40),
+        (Centres::Clusters { count: 12, seed: 0 }, true, 15..=15),
+        (Centres::Grid { each: 4 }, true, 19..=19),
+        (Centres::Grid { each: 4 }, false, 16..=16),
+        (Centres::Random { count: 15, seed: 1 }, true, 18..=18),
     ] {
         let report = fit_nonlinear_arx(&log, &[], &radial(centres, linear)).unwrap();
+        assert!(count.contains(&report.model.parameters().len()), "{centres:?}");
         let free = report
             .fit
             .iter()
             .find(|fit| fit.part == Some(Part::Validation) && fit.horizon == Horizon::FreeRun);
-        assert!(free.unwrap().percent.unwrap() > 75.0, "{centres:?}: {:?}", free.unwrap().percent);
+        assert!(free.unwrap().percent.unwrap() > 85.0, "{centres:?}: {:?}", free.unwrap().percent);
     }
 }
 

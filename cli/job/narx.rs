@@ -91,7 +91,7 @@ impl NarxJob {
         let (nu, nk) = (each("--nu", &self.nu, 2)?, each("--nk", &self.nk, 1)?);
         let input_lags = nu.into_iter().zip(nk).map(|(lags, delay)| InputLags { lags, delay }).collect();
         let plan = NonlinearArxPlan { inputs, output, input_lags, ..self.plan.clone() };
-        plan.check().map_err(|error| Failure::usage(crate::options::with_options(&error.to_string())))?;
+        plan.check().map_err(|error| Failure::option(&error))?;
         Ok(plan)
     }
 }

@@ -1,10 +1,10 @@
 //! From a record and orders to parameters.
 //!
 //! - [`estimate()`] fits the model that [`Orders`] say to a [`Record`] by a [`Method`] and gives an [`Estimate`];
-//!   [`estimate_monitored`] tells a [`Monitor`](crate::optimize::Monitor) of its progress. [`Initial`] says what stands for the samples before the first.
+//!   [`estimate_monitored`] tells a [`Monitor`] of its progress. [`Initial`] says what stands for the samples before the first.
 //! - [`arx`] is its short form for models that are linear in their parameters. [`arx_factor`] gives a triangular factor that merges
 //!   with those of other records.
-//! - Methods have settings: a [`Search`](crate::optimize::Search), [`Robust`] (a [`Loss`]), [`Criterion`] (a
+//! - Methods have settings: a [`Search`], [`Robust`] (a [`Loss`]), [`Criterion`] (a
 //!   [`Norm`], [`Bound`]s and [`GainBound`]s), [`LikelihoodSearch`] for models in equations ([`UnknownParameter`]).
 //!   [`Constant`] says whether the level of the output is estimated too.
 //! - [`Procedure`] says how an estimate was found: by a [`Solver`], or with a [`SearchOutcome`] ([`StartOutcome`]),

@@ -2,7 +2,7 @@
 //!
 //! [`Search`] says how: an [`Algorithm`], a [`Step`], limits. It tells a [`Monitor`] of its [`Progress`], and why it [`Stopped`].
 //!
-//! With the normal equations G step = g of an iteration (see [`Objective`]), scaled so that G has a unit diagonal:
+//! With the normal equations G step = g of an iteration, scaled so that G has a unit diagonal:
 //!
 //! ```text
 //! Levenberg-Marquardt  (G + mu I) step = g,  mu from 1e-8, a tenth where the cost falls as predicted; where it rises, the step

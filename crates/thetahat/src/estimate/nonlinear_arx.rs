@@ -462,6 +462,19 @@ impl<'l> Samples<'l> {
                 ),
             ));
         }
+        if let Count::Given(wanted) = count
+            && *wanted > path.chosen.len()
+        {
+            return Err(Error::undetermined(
+                Vec::new(),
+                format!(
+                    "{wanted} functions are asked for, and {} samples tell {} of {} apart; take fewer `terms`, or more rows",
+                    self.rows.len(),
+                    path.chosen.len(),
+                    candidates.count(self.taps.len())
+                ),
+            ));
+        }
         // What held-out rows say of each length of the path.
         let lengths = path.chosen.len();
         let held_out: Vec<Option<RunFigures>> = match count {

@@ -51,7 +51,8 @@ pub struct Validation {
     /// What is left of each output; not of one of which too few samples count. Models in equations expect errors of another size in each
     /// row: of theirs each is divided by its standard deviation.
     pub residuals: Vec<Residuals>,
-    /// Whether the errors one step ahead hold squares of an input, for each output and each input whose square is not constant.
+    /// Whether the errors one step ahead hold squares of an input, for each output and each input whose square is not
+    /// constant; not of models in equations.
     #[serde(default)]
     pub nonlinear: Vec<Nonlinearity>,
     /// What a careful reader should know, in plain words.

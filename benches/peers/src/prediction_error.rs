@@ -14,8 +14,8 @@ use std::time::Instant;
 
 use thetahat::data::Record;
 use thetahat::estimate::{Initial, Method, estimate};
-use thetahat::optimize::Search;
 use thetahat::model::Orders;
+use thetahat::optimize::Search;
 
 /// Length of the signals.
 const SAMPLES: usize = 1_000_000;

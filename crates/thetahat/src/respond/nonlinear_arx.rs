@@ -138,6 +138,7 @@ impl<'m> Runner<'m> {
 
 /// The next output, less its offset, where one regressor moves through its range and the others stay in the middle of theirs; with where
 /// it is in its range, from 0 to 1.
+#[cfg(feature = "html")]
 pub(crate) fn slice(model: &NonlinearArxModel, place: usize, points: usize) -> Vec<(f64, f64)> {
     let runner = Runner::new(model);
     let middle = |regressor: &crate::model::Regressor| {

@@ -209,20 +209,29 @@ impl NonlinearArxPlan {
 /// functions depend on one another.
 ///
 /// ```
-/// use thetahat::data::{Channel, Log};
+/// use thetahat::data::{Channel, Detrend, Log};
 /// use thetahat::report::{NonlinearArxPlan, fit_nonlinear_arx};
 ///
 /// // y(t) = 0.5 y(t-1) + u(t-1)^2, without noise.
-/// let u: Vec<f64> = (0..200).map(|t| f64::from(t * t % 13) / 6.0 - 1.0).collect();
-/// let mut y = vec![0.0];
-/// for t in 1..u.len() {
-///     y.push(0.5 * y[t - 1] + u[t - 1] * u[t - 1]);
+/// let (mut u, mut y, mut random) = (Vec::new(), vec![0.0], 1_u32);
+/// for t in 0..200 {
+///     random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+///     u.push(f64::from(random >> 16) / 32_768.0 - 1.0);
+///     y.push(0.5 * y[t] + u[t] * u[t]);
 /// }
+/// y.pop();
 /// let channel = |name: &str, values| Channel { name: name.into(), values };
 /// let log = Log::new(vec![channel("u", u), channel("y", y)], 1.0)?;
-/// let plan = NonlinearArxPlan { terms: Some(3), ..NonlinearArxPlan::new(&["u"], "y") };
+/// let plan = NonlinearArxPlan {
+///     terms: Some(2),
+///     raw_terms: true,
+///     detrend: Detrend::None,
+///     ..NonlinearArxPlan::new(&["u"], "y")
+/// };
 /// let report = fit_nonlinear_arx(&log, &[], &plan)?;
-/// assert!(report.fit.iter().all(|fit| fit.percent.is_some_and(|percent| percent > 99.99)));
+/// let [first, second] = report.model.parameters() else { panic!("two terms") };
+/// assert_eq!((first.name.as_str(), second.name.as_str()), ("u(k-1)^2", "y(k-1)"));
+/// assert!((first.value - 1.0).abs() < 1e-12 && (second.value - 0.5).abs() < 1e-12);
 /// # Ok::<(), thetahat::Error>(())
 /// ```
 pub fn fit_nonlinear_arx(log: &Log, sources: &[Source], plan: &NonlinearArxPlan) -> Result<Report, Error> {

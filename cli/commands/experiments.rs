@@ -48,7 +48,7 @@ pub(crate) fn experiments(job: &FitJob, any_clock: bool) -> Result<Experiments, 
     read(&job.paths, &job.log, &wanted, any_clock, |inputs| job.orders.of(inputs).map(|_| ()))
 }
 
-/// The same; `check` says whether so many inputs go with the rest.
+/// The same; `check` says whether the number of inputs goes with the rest.
 pub(super) fn read(
     paths: &[PathBuf],
     log: &LogJob,

@@ -285,15 +285,16 @@ impl Model {
 
     /// For each input and the noise: its name, frequencies, real and imaginary parts, and magnitude and phase with their
     /// standard errors.
-    #[pyo3(signature = (frequencies, points))]
+    #[pyo3(signature = (frequencies, points, output=0))]
     fn frequency_response<'py>(
         &self,
         py: Python<'py>,
         frequencies: Option<&Bound<'py, PyAny>>,
         points: usize,
+        output: usize,
     ) -> PyResult<Vec<(Option<String>, [Column<'py>; 7])>> {
         let model = Arc::clone(&self.model);
-        self.linear(py, "a frequency response")?;
+        self.linear(py, "a frequency response", output)?;
         let frequencies = match frequencies {
             Some(frequencies) => vector("w", frequencies, None)?.as_slice()?.to_vec(),
             None => {
@@ -304,7 +305,7 @@ impl Model {
         };
         let responses = interruptible(py, move |_| {
             let models = model.linear("a frequency response")?;
-            let mut found = frequency_response(&models[0], &frequencies)?;
+            let mut found = frequency_response(&models[output], &frequencies)?;
             // Of equations the noise is not told.
             found.retain(|response| {
                 response.input.is_some() || matches!(*model, thetahat::model::Model::Polynomial(_))
@@ -330,25 +331,27 @@ impl Model {
     }
 
     /// The response to a unit step of an input: its times, values and their standard errors.
-    #[pyo3(signature = (input, samples))]
+    #[pyo3(signature = (input, samples, output=0))]
     fn step_response<'py>(
         &self,
         py: Python<'py>,
         input: usize,
         samples: Option<usize>,
+        output: usize,
     ) -> PyResult<[Column<'py>; 3]> {
-        self.transient(py, move |model| step_response(model, input, samples))
+        self.transient(py, output, move |model| step_response(model, input, samples))
     }
 
     /// The same for an impulse.
-    #[pyo3(signature = (input, samples))]
+    #[pyo3(signature = (input, samples, output=0))]
     fn impulse_response<'py>(
         &self,
         py: Python<'py>,
         input: usize,
         samples: Option<usize>,
+        output: usize,
     ) -> PyResult<[Column<'py>; 3]> {
-        self.transient(py, move |model| impulse_response(model, input, samples))
+        self.transient(py, output, move |model| impulse_response(model, input, samples))
     }
 
     /// F, G, H, D and K of the innovations form.
@@ -371,35 +374,34 @@ impl Model {
         self.model.polynomials(what).map_err(|error| error::batch(py, error))
     }
 
-    /// Refuses a model that is not linear, or has several outputs.
-    fn linear(&self, py: Python<'_>, what: &str) -> PyResult<()> {
+    /// Refuses a model that is not linear, or does not have this output.
+    fn linear(&self, py: Python<'_>, what: &str, output: usize) -> PyResult<()> {
         let models = self.model.linear(what).map_err(|error| error::batch(py, error))?;
-        match &models[..] {
-            [only]
-                if only.inputs.is_empty() && matches!(*self.model, thetahat::model::Model::Equations(_)) =>
-            {
-                Err(PyValueError::new_err(format!("{what} needs inputs, and the model has none")))
-            }
-            [_] => Ok(()),
-            all => Err(PyValueError::new_err(format!(
-                "{what} is of models with one output, and this one has {}; the command line gives those of all",
-                all.len()
-            ))),
+        let Some(own) = models.get(output) else {
+            return Err(PyValueError::new_err(format!(
+                "output: there is no output {output}; there are {}",
+                models.len()
+            )));
+        };
+        if own.inputs.is_empty() && matches!(*self.model, thetahat::model::Model::Equations(_)) {
+            return Err(PyValueError::new_err(format!("{what} needs inputs, and the model has none")));
         }
+        Ok(())
     }
 
     /// The times, the values and their standard errors of a response to an input.
     fn transient<'py>(
         &self,
         py: Python<'py>,
+        output: usize,
         respond: impl FnOnce(&PolynomialModel) -> Result<TransientResponse, thetahat::Error> + Send + 'static,
     ) -> PyResult<[Column<'py>; 3]> {
         let model = Arc::clone(&self.model);
         let what = "a step or impulse response";
-        self.linear(py, what)?;
+        self.linear(py, what, output)?;
         let response = interruptible(py, move |_| {
             let models = model.linear(what)?;
-            respond(&models[0])
+            respond(&models[output])
         })?;
         let values = response.values.iter().map(|quantity| quantity.value).collect();
         let errors = response.values.iter().map(or_nan).collect();

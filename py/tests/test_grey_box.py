@@ -195,6 +195,26 @@ def test_linear_equations_have_responses_and_others_not() -> None:
         model.step_response(3)
 
 
+def test_several_outputs_have_responses_of_their_own() -> None:
+    box = th.GreyBox(DATA / "dc_motor.toml")
+    log = th.read_csv(DATA / "dc_motor.csv", inputs=box.inputs, output=box.outputs, time="t", uniform=False)
+    model = th.grey(log, box, estimate="1..500")
+    constant, friction = model.parameters
+    speed = constant / (1.5 * friction + constant**2)
+    responses = {name: model.step_response(samples=800, output=name) for name in model.outputs}
+    assert abs(responses["speed"].values[-1] / speed - 1) < 1e-3
+    assert abs(responses["i"].values[-1] / (friction * speed / constant) - 1) < 1e-2
+    still = abs(model.frequency_response([1e-3], output=1).values[0, 0])
+    assert abs(still / speed - 1) < 1e-3
+    assert np.allclose(np.cumsum(model.impulse_response(samples=50, output="i").values), responses["i"].values[:50])
+    with pytest.raises(ValueError, match="output: there are several: i, speed"):
+        model.step_response()
+    for output in (2, -1, "torque"):
+        with pytest.raises(ValueError, match="there is no output"):
+            model.step_response(output=output)
+    assert "step of u to speed" in model._repr_html_()
+
+
 def test_wrong_arguments_change_nothing() -> None:
     log = tank_log()
     wrong: list[tuple[dict[str, Any], type[Exception], str]] = [

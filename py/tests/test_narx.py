@@ -59,6 +59,7 @@ def test_every_method_takes_it(tmp_path: Path) -> None:
     model.write_html(page, data)
     assert "Complexity" in page.read_text(encoding="utf-8")
     assert plot.fit(model, data, 3).get_lines()
+    assert "NARX" in model._repr_html_()
     for method in ("step_response", "frequency_response"):
         with pytest.raises(ValueError, match="is of linear models"):
             getattr(model, method)()

@@ -362,7 +362,9 @@ class Model(ReportedModel):
         words += [f"--require={one}" for one in ([require] if isinstance(require, str) else require or ())]
         return Validation._of(_thetahat.validate(self._model, handle("log", log), words))
 
-    def frequency_response(self, w: npt.ArrayLike | None = None, *, points: int = 100) -> FrequencyResponse:
+    def frequency_response(
+        self, w: npt.ArrayLike | None = None, *, points: int = 100, output: int | str | None = None
+    ) -> FrequencyResponse:
         """The response of the output to each input, and to the noise, at some frequencies.
 
         Parameters
@@ -372,6 +374,8 @@ class Model(ReportedModel):
             sample time.
         points : int, default 100
             How many.
+        output : int or str, optional
+            Of which output, where there are several: its position, or its name.
 
         Returns
         -------
@@ -385,9 +389,11 @@ class Model(ReportedModel):
         array([19. , 18.9, 13.4])
         """
         points = _options.count("points", points)
-        return FrequencyResponse(self._model.frequency_response(w, points))
+        return FrequencyResponse(self._model.frequency_response(w, points, self._output(output)))
 
-    def step_response(self, input: int | str = 0, samples: int | None = None) -> TransientResponse:
+    def step_response(
+        self, input: int | str = 0, samples: int | None = None, *, output: int | str | None = None
+    ) -> TransientResponse:
         """The response of the output to a unit step of an input, from rest, counted from 0.
 
         Parameters
@@ -396,6 +402,8 @@ class Model(ReportedModel):
             Which input: its position, or its name.
         samples : int, optional
             How many; until it has settled, unless said otherwise.
+        output : int or str, optional
+            Of which output, where there are several: its position, or its name.
 
         Returns
         -------
@@ -408,16 +416,18 @@ class Model(ReportedModel):
         >>> response.time
         array([0.  , 0.01, 0.02])
         """
-        return TransientResponse(*self._model.step_response(*self._source(input, samples)))
+        return TransientResponse(*self._model.step_response(*self._source(input, samples), self._output(output)))
 
-    def impulse_response(self, input: int | str = 0, samples: int | None = None) -> TransientResponse:
+    def impulse_response(
+        self, input: int | str = 0, samples: int | None = None, *, output: int | str | None = None
+    ) -> TransientResponse:
         """The impulse response from an input: the coefficients g_i of B/(A F) = g_0 + g_1 q^-1 + …
 
         The input is 1 in the sample at time 0 and 0 afterwards. The sums of the response are the step response.
 
         Parameters
         ----------
-        input, samples
+        input, samples, output
             As for `step_response`.
 
         Returns
@@ -437,7 +447,7 @@ class Model(ReportedModel):
         >>> bool(np.allclose(np.cumsum(impulse.values), step.values))
         True
         """
-        return TransientResponse(*self._model.impulse_response(*self._source(input, samples)))
+        return TransientResponse(*self._model.impulse_response(*self._source(input, samples), self._output(output)))
 
     def _source(self, input: int | str, samples: int | None) -> tuple[int, int | None]:
         return self._input(input), None if samples is None else _options.count("samples", samples)
@@ -521,7 +531,16 @@ class Model(ReportedModel):
         return f"Model({self.name}, 1-step fit {shown[-1]['percent']:.2f} % on rows {rows})"
 
     def _repr_html_(self) -> str:
-        steps = [(f"step of {name}", [self.step_response(index).values]) for index, name in enumerate(self.inputs)]
+        try:
+            steps = [
+                (f"step of {name} to {output}" if len(self.outputs) > 1 else f"step of {name}", [response.values])
+                for output in self.outputs
+                for index, name in enumerate(self.inputs)
+                for response in [self.step_response(index, output=output)]
+            ]
+        except ValueError:
+            # What is not linear has no step response of its own.
+            steps = []
         table = _picture.rows(repr(self), steps)
         return f"{table}<pre>{escape(self.summary())}</pre>"
 

@@ -251,6 +251,21 @@ class ReportedModel:
             raise ValueError(f"input: there is no input {index}; the model has {len(self.inputs)}, counted from 0")
         return index
 
+    def _output(self, output: int | str | None) -> int:
+        """The position of an output; the only one needs no name."""
+        if output is None:
+            if len(self.outputs) > 1:
+                raise ValueError(f"output: there are several: {', '.join(self.outputs)}; name one")
+            return 0
+        if isinstance(output, str):
+            if output not in self.outputs:
+                raise ValueError(f"output: there is no output '{output}'; there are: {', '.join(self.outputs)}")
+            return self.outputs.index(output)
+        index = _options.integer("output", output)
+        if not 0 <= index < len(self.outputs):
+            raise ValueError(f"output: there is no output {index}; the model has {len(self.outputs)}, counted from 0")
+        return index
+
     @property
     def method(self) -> str:
         """How the model was estimated."""

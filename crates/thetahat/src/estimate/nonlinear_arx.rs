@@ -1,229 +1,29 @@
 //! Nonlinear ARX models that are linear in their parameters: which functions, and one solve.
 
+mod candidates;
 pub(crate) mod centres;
+mod figures;
 
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use thetahat_core::Error as CoreError;
 use thetahat_core::nalgebra::DVector;
+
+pub(crate) use candidates::Candidates;
+use candidates::Products;
+pub use figures::{RunFigures, TermStep, TermsOutcome};
+use figures::{Sums, run};
 
 use super::{Criteria, InformationCriterion};
 use crate::Error;
 use crate::data::{Log, Rows};
 use crate::model::{Evaluator, Map, NonlinearArxModel, Parameter};
-use crate::regression::{Moments, Monomials, Path, factor_rows, forward, product, sum_of_squares};
-use crate::respond::nonlinear_arx::NonlinearArxOnLog;
-use crate::respond::{Horizon, OnLog, Start};
+use crate::regression::{Moments, Path, factor_rows, forward, product, sum_of_squares};
 
 /// Rows whose functions are in memory at once.
 const ROWS: usize = 512;
 /// Blocks that the estimation rows are cut into, each held out in its turn.
 const BLOCKS: usize = 5;
-/// A choice prefers models whose free run stays within so many times the range of the estimation rows, about its middle.
-const RANGE: f64 = 1.1;
-
-/// How the functions of a nonlinear ARX model were chosen.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct TermsOutcome {
-    /// The functions to choose from.
-    pub candidates: usize,
-    /// What said how many to take: `given`, the word of an information criterion, `validation` (the free run on the validation rows) or
-    /// `cv` (that on five blocks, each by a model of the others).
-    pub selected_by: String,
-    /// What was added to the squares of the functions, in samples; none: nothing.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub ridge: Option<f64>,
-    /// The functions in the order of their choice, those that were not taken too.
-    pub path: Vec<TermStep>,
-}
-
-/// A step of the choice: the model with this term and those before.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct TermStep {
-    /// The function that is added.
-    pub term: String,
-    /// Its error reduction ratio: the share of the sum of squared outputs that it explains beside those before.
-    pub error_reduction: f64,
-    /// Functions that can no longer be told from sums of those chosen.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub aliases: Vec<String>,
-    /// The root mean square of the errors one step ahead on the estimation rows, in units of the output.
-    pub rmse: f64,
-    /// The free run on the estimation rows; none of a step after which functions that are always there are still to come.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub free_run: Option<RunFigures>,
-    /// The free run on the rows that the choice looked at, where there are some; one step ahead where there are no inputs.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub held_out: Option<RunFigures>,
-}
-
-/// What a run of a model misses.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct RunFigures {
-    /// The root mean square error, in units of the output; none where the run leaves the range of numbers.
-    pub rmse: Option<f64>,
-    /// The largest absolute error; none likewise.
-    pub largest_error: Option<f64>,
-    /// Whether the run stays within 1.1 times the range of the estimation rows, about its middle.
-    pub in_range: bool,
-}
-
-impl RunFigures {
-    fn of(model: &NonlinearArxModel, log: &Log, rows: &[Rows]) -> Result<Self, Error> {
-        run(model, log, rows).map(Sums::figures)
-    }
-
-    /// Smaller is better: those out of range come last, and those without a figure after them.
-    fn rank(self) -> (bool, f64) {
-        (!self.in_range, self.rmse.unwrap_or(f64::INFINITY))
-    }
-}
-
-/// What a model misses on some rows of a log: in its free run, or one step ahead where nothing drives it.
-fn run(model: &NonlinearArxModel, log: &Log, rows: &[Rows]) -> Result<Sums, Error> {
-    let [low, high] = model.output_range;
-    let (middle, half) = (f64::midpoint(low, high), RANGE * (high - low) / 2.0);
-    let on_log = NonlinearArxOnLog::new(model, log, rows)?;
-    let horizon = if on_log.is_driven() { Horizon::FreeRun } else { Horizon::Steps { steps: 1 } };
-    let mut sums = Sums::default();
-    for response in on_log.respond(horizon, Start::Drop)? {
-        let measured = on_log.measured(0);
-        for t in response.counted.iter().cloned().flatten() {
-            let (said, error) = (response.values[t], (measured[t] - response.values[t]).abs());
-            sums.count += 1;
-            sums.squares += error * error;
-            // One that is not a number stays one.
-            sums.largest = if error > sums.largest || error.is_nan() { error } else { sums.largest };
-            sums.strays |= said.is_nan() || (said - middle).abs() > half;
-        }
-    }
-    Ok(sums)
-}
-
-/// What figures are made of.
-#[derive(Debug, Clone, Copy, Default)]
-struct Sums {
-    count: usize,
-    squares: f64,
-    largest: f64,
-    strays: bool,
-}
-
-impl Sums {
-    fn add(&mut self, other: Self) {
-        self.count += other.count;
-        self.squares += other.squares;
-        let largest = other.largest;
-        self.largest = if largest > self.largest || largest.is_nan() { largest } else { self.largest };
-        self.strays |= other.strays;
-    }
-
-    fn figures(self) -> RunFigures {
-        let known = |value: f64| Some(value).filter(|value| self.count > 0 && value.is_finite());
-        RunFigures {
-            rmse: known((self.squares / self.count as f64).sqrt()),
-            largest_error: known(self.largest),
-            in_range: self.count > 0 && !self.strays,
-        }
-    }
-}
-
-/// Functions to choose from.
-#[derive(Debug, Clone)]
-pub(crate) enum Candidates {
-    /// Products of regressors.
-    Products(Monomials),
-    /// The functions of a map, of which so many are always taken, the first ones.
-    Functions { map: Map, always: usize },
-}
-
-impl Candidates {
-    pub(crate) fn count(&self, regressors: usize) -> usize {
-        match self {
-            Self::Products(monomials) => monomials.count(),
-            Self::Functions { map, .. } => map.parameters(regressors),
-        }
-    }
-
-    /// The map of some of them, in this order.
-    fn map(&self, places: &[usize]) -> Map {
-        match self {
-            Self::Products(monomials) => {
-                Map::Polynomial { terms: places.iter().map(|place| monomials.factors(*place)).collect() }
-            }
-            Self::Functions { map, .. } => map.some(places),
-        }
-    }
-
-    /// A rank for each: of tied ones that of the lowest degree comes first, then that of the smallest lags.
-    fn preferred(&self, lags: &[usize]) -> Vec<usize> {
-        let key = |place: usize| match self {
-            Self::Products(monomials) => {
-                let factors = monomials.factors(place);
-                (factors.len(), factors.iter().map(|factor| lags[*factor]).sum::<usize>(), place)
-            }
-            Self::Functions { .. } => (0, 0, place),
-        };
-        let mut order: Vec<usize> = (0..self.count(lags.len())).collect();
-        order.sort_by_key(|place| key(*place));
-        let mut ranks = vec![0; order.len()];
-        order.iter().enumerate().for_each(|(rank, place)| ranks[*place] = rank);
-        ranks
-    }
-}
-
-/// Sums of products of candidates, and of candidates and outputs.
-#[derive(Debug, Clone)]
-enum Products {
-    Moments(Moments),
-    Gram { gram: Mat<f64>, cross: Vec<f64>, energy: f64, rows: usize },
-}
-
-impl Products {
-    fn merge(&mut self, other: &Self) {
-        match (self, other) {
-            (Self::Moments(own), Self::Moments(other)) => own.merge(other),
-            (
-                Self::Gram { gram, cross, energy, rows },
-                Self::Gram { gram: others, cross: products, energy: more, rows: further },
-            ) => {
-                *gram += others;
-                cross.iter_mut().zip(products).for_each(|(sum, value)| *sum += value);
-                *energy += more;
-                *rows += further;
-            }
-            // Sums of one set of candidates are of one kind.
-            _ => {}
-        }
-    }
-
-    fn energy(&self) -> f64 {
-        match self {
-            Self::Moments(moments) => moments.energy,
-            Self::Gram { energy, .. } => *energy,
-        }
-    }
-
-    fn rows(&self) -> usize {
-        match self {
-            Self::Moments(moments) => moments.rows,
-            Self::Gram { rows, .. } => *rows,
-        }
-    }
-
-    fn is_finite(&self) -> bool {
-        match self {
-            Self::Moments(moments) => moments.is_finite(),
-            Self::Gram { gram, cross, energy, .. } => {
-                energy.is_finite()
-                    && cross.iter().all(|value| value.is_finite())
-                    && gram.col_iter().all(|column| column.iter().all(|value| value.is_finite()))
-            }
-        }
-    }
-}
 
 /// What says how many functions are taken.
 #[derive(Debug, Clone, PartialEq)]
@@ -364,22 +164,23 @@ impl<'l> Samples<'l> {
         }
     }
 
-    /// The path of a choice among candidates, `most` steps at most. Those of `first` are taken first.
-    fn path(&self, candidates: &Candidates, products: &Products, first: &[usize], most: usize) -> Path {
+    /// The path of a choice among candidates, `most` steps at most. Those that are always there come first.
+    fn path(&self, candidates: &Candidates, products: &Products, most: usize) -> Path {
+        let first: Vec<usize> = (0..candidates.always()).collect();
         let lags: Vec<usize> = self.taps.iter().map(|(_, lag)| *lag).collect();
         let preferred = candidates.preferred(&lags);
-        // A ridge of so many samples: of each function its mean square is added as often.
+        // The ridge adds the mean square of each function this many times.
         let part = 1.0 + self.ridge / products.rows().max(1) as f64;
         let more = |one: usize, other: usize| if one == other { part } else { 1.0 };
         let energy = products.energy();
         match (products, candidates) {
             (Products::Moments(moments), Candidates::Products(monomials)) => {
                 let gram = |one, other| moments.gram(monomials, one, other) * more(one, other);
-                forward(gram, &moments.cross, energy, first, &preferred, most)
+                forward(gram, &moments.cross, energy, &first, &preferred, most)
             }
             (Products::Gram { gram, cross, .. }, _) => {
                 let gram = |one, other| gram[(one, other)] * more(one, other);
-                forward(gram, cross, energy, first, &preferred, most)
+                forward(gram, cross, energy, &first, &preferred, most)
             }
             // Sums of one set of candidates are of one kind.
             _ => Path::default(),
@@ -402,122 +203,47 @@ impl<'l> Samples<'l> {
         NonlinearArxModel { map, parameters: theta.into_iter().map(named).collect(), ..self.head.clone() }
     }
 
-    /// Chooses functions, `most` at most. `rows` are those of the fit, as the log counts them; `refit` whether the model is fitted to
-    /// others too, and the path is that of all.
+    /// Chooses functions, `most` at most. Where `chosen_on` has other samples, such as the first part of a split, held-out rows are
+    /// asked of models that were fitted to those.
     ///
     /// # Errors
-    /// [`Error::Undetermined`] where nothing can be chosen; [`Error::Data`] where sums leave the range of numbers.
+    /// [`Error::Undetermined`] where nothing can be chosen, or less than is asked for; [`Error::Data`] where sums leave the range of
+    /// numbers.
     pub(crate) fn choose(
         &self,
         candidates: &Candidates,
-        first: &[usize],
         most: usize,
         count: &Count,
         chosen_on: Option<&Self>,
     ) -> Result<Chosen, Error> {
-        let always = if let Candidates::Functions { always, .. } = candidates { *always } else { 0 };
+        let always = candidates.always();
         let most = most.max(always).min(self.rows.len().saturating_sub(1));
-        let regressors: Vec<String> = self.head.regressors.iter().map(|one| one.name()).collect();
-        let name = |place: usize| match candidates {
-            Candidates::Products(_) => candidates.map(&[place]).names(&regressors).pop().unwrap_or_default(),
-            Candidates::Functions { map, .. } => {
-                map.names(&regressors).get(place).cloned().unwrap_or_default()
+        let size = self.rows.len().div_ceil(BLOCKS).max(1);
+        let blocks: Vec<(&[usize], Products)> = match count {
+            Count::Blocks => {
+                self.rows.chunks(size).map(|rows| (rows, self.products(candidates, rows))).collect()
             }
+            _ => Vec::new(),
         };
-        let first: Vec<usize> = if always > 0 { (0..always).collect() } else { first.to_vec() };
-        let mut blocks = Vec::new();
-        let products = if *count == Count::Blocks {
-            let size = self.rows.len().div_ceil(BLOCKS).max(1);
-            blocks = self.rows.chunks(size).map(|rows| (rows, self.products(candidates, rows))).collect();
-            let mut whole: Option<Products> = None;
-            for (_, products) in &blocks {
-                match &mut whole {
-                    Some(whole) => whole.merge(products),
-                    None => whole = Some(products.clone()),
-                }
-            }
-            whole.unwrap_or_else(|| self.products(candidates, &[]))
-        } else {
-            self.products(candidates, &self.rows)
-        };
-        if !products.is_finite() {
-            return Err(Error::data(
-                "sums of products of the regressors leave the range of numbers; take a lower degree, or leave out `raw-terms`, so that                  signals are divided by their scale",
-            ));
-        }
-        let path = self.path(candidates, &products, &first, most);
-        if path.chosen.is_empty() {
-            return Err(Error::undetermined(
-                Vec::new(),
-                "no function explains anything of the output on the estimation rows; name rows in which it changes, or other lags",
-            ));
-        }
-        if path.places(always) != first[..always.min(first.len())] {
-            let missing = first.iter().take(always).find(|place| !path.places(always).contains(place));
-            let name = missing.map_or_else(String::new, |place| name(*place));
-            return Err(Error::undetermined(
-                vec![name.clone()],
-                format!(
-                    "{name} is a sum of the other functions on the estimation rows; take other lags, other centres or other rows"
-                ),
-            ));
-        }
-        if let Count::Given(wanted) = count
-            && *wanted > path.chosen.len()
-        {
-            return Err(Error::undetermined(
-                Vec::new(),
-                format!(
-                    "{wanted} functions are asked for, and {} samples tell {} of {} apart; take fewer `terms`, or more rows",
-                    self.rows.len(),
-                    path.chosen.len(),
-                    candidates.count(self.taps.len())
-                ),
-            ));
-        }
-        // What held-out rows say of each length of the path.
+        let products = merged(blocks.iter().map(|(_, products)| products))
+            .unwrap_or_else(|| self.products(candidates, &self.rows));
+        let path = self.path(candidates, &products, most);
+        self.check(candidates, &products, &path, count)?;
         let lengths = path.chosen.len();
-        let held_out: Vec<Option<RunFigures>> = match count {
+        let held_out = match count {
             Count::HeldOut(rows) => {
-                let own = match chosen_on {
-                    Some(others) => {
-                        let products = others.products(candidates, &others.rows);
-                        Some((others, others.path(candidates, &products, &first, most)))
-                    }
-                    None => None,
-                };
-                let (samples, path) = own.as_ref().map_or((self, &path), |(samples, path)| (*samples, path));
-                let each = (1..=lengths).map(|count| {
-                    if count > path.chosen.len() || count < always {
-                        return Ok(None);
-                    }
-                    let model = samples.on_path(candidates, path, count);
-                    RunFigures::of(&model, self.log, rows).map(Some)
-                });
-                each.collect::<Result<_, Error>>()?
+                let samples = chosen_on.unwrap_or(self);
+                let own = chosen_on
+                    .map(|others| others.path(candidates, &others.products(candidates, &others.rows), most));
+                samples.on_rows(candidates, own.as_ref().unwrap_or(&path), rows, lengths)?
             }
-            Count::Blocks => self.on_blocks(candidates, &blocks, &first, lengths)?,
+            Count::Blocks => self.on_blocks(candidates, &blocks, lengths)?,
             Count::Given(_) | Count::Least(_) => vec![None; lengths],
         };
-        let energy = products.energy();
-        let variance = energy * self.head.output_scale.powi(2) / products.rows().max(1) as f64;
-        let rows = as_rows(&self.rows);
-        let mut steps = Vec::new();
-        for (at, chosen) in path.chosen.iter().enumerate() {
-            steps.push(TermStep {
-                term: name(chosen.place),
-                error_reduction: chosen.reduction,
-                aliases: chosen.aliases.iter().map(|place| name(*place)).collect(),
-                rmse: (path.left(at + 1).max(0.0) * variance).sqrt(),
-                free_run: (at + 1 >= always)
-                    .then(|| RunFigures::of(&self.on_path(candidates, &path, at + 1), self.log, &rows))
-                    .transpose()?,
-                held_out: held_out[at],
-            });
-        }
+        let steps = self.steps(candidates, &products, &path, &held_out)?;
         let least = always.clamp(1, lengths);
         let best = match count {
-            Count::Given(count) => (*count).min(lengths),
+            Count::Given(count) => *count,
             Count::Least(criterion) => {
                 let value = |count: &usize| {
                     let mse = steps[*count - 1].rmse.powi(2);
@@ -535,11 +261,99 @@ impl<'l> Samples<'l> {
                 (least..=lengths).min_by(better).unwrap_or(1)
             }
         };
-        let mut places = path.places(best);
-        if let Candidates::Functions { .. } = candidates {
-            places.sort_unstable();
+        Ok(Chosen { map: candidates.map(&candidates.ordered(path.places(best))), steps })
+    }
+
+    /// The names of the regressors.
+    fn names(&self) -> Vec<String> {
+        self.head.regressors.iter().map(|one| one.name()).collect()
+    }
+
+    /// Refuses a path that does not have what is asked for.
+    fn check(
+        &self,
+        candidates: &Candidates,
+        products: &Products,
+        path: &Path,
+        count: &Count,
+    ) -> Result<(), Error> {
+        let always = candidates.always();
+        let undetermined = |message: String| Err(Error::undetermined(Vec::new(), message));
+        if !products.is_finite() {
+            return Err(Error::data(
+                "sums of products of the regressors leave the range of numbers; take a lower degree, or leave out `raw-terms`, so \
+                 that signals are divided by their scale",
+            ));
         }
-        Ok(Chosen { map: candidates.map(&places), steps })
+        if path.chosen.is_empty() {
+            return undetermined(
+                "no function explains anything of the output on the estimation rows; name rows in which it changes, or other lags"
+                    .to_owned(),
+            );
+        }
+        let taken = path.places(always);
+        if let Some(missing) = (0..always).find(|place| !taken.contains(place)) {
+            let name = candidates.name(missing, &self.names());
+            return Err(Error::undetermined(
+                vec![name.clone()],
+                format!(
+                    "{name} is a sum of the other functions on the estimation rows; take other lags, other centres or other rows"
+                ),
+            ));
+        }
+        let Count::Given(wanted) = *count else { return Ok(()) };
+        if wanted < always {
+            return Err(Error::argument(
+                "terms",
+                format!("{wanted} functions are asked for, and {always} are always there; ask for more"),
+            ));
+        }
+        if wanted > path.chosen.len() {
+            return undetermined(format!(
+                "{wanted} functions are asked for, and {} samples tell {} of {} apart; take fewer `terms`, or more rows",
+                self.rows.len(),
+                path.chosen.len(),
+                candidates.count(self.taps.len())
+            ));
+        }
+        Ok(())
+    }
+
+    /// The path as documents have it.
+    fn steps(
+        &self,
+        candidates: &Candidates,
+        products: &Products,
+        path: &Path,
+        held_out: &[Option<RunFigures>],
+    ) -> Result<Vec<TermStep>, Error> {
+        let variance = products.energy() * self.head.output_scale.powi(2) / products.rows().max(1) as f64;
+        let (rows, names) = (as_rows(&self.rows), self.names());
+        let each = path.chosen.iter().zip(held_out).enumerate().map(|(at, (chosen, held_out))| {
+            let run = || RunFigures::of(&self.on_path(candidates, path, at + 1), self.log, &rows);
+            Ok(TermStep {
+                term: candidates.name(chosen.place, &names),
+                error_reduction: chosen.reduction,
+                aliases: chosen.aliases.iter().map(|place| candidates.name(*place, &names)).collect(),
+                rmse: (path.left(at + 1).max(0.0) * variance).sqrt(),
+                free_run: (at + 1 >= candidates.always()).then(run).transpose()?,
+                held_out: *held_out,
+            })
+        });
+        each.collect()
+    }
+
+    /// What rows say of the models of each length of a path; nothing of lengths that the path does not have.
+    fn on_rows(
+        &self,
+        candidates: &Candidates,
+        path: &Path,
+        rows: &[Rows],
+        lengths: usize,
+    ) -> Result<Vec<Option<RunFigures>>, Error> {
+        let there = |count: &usize| (candidates.always()..=path.chosen.len()).contains(count);
+        let figures = |count: usize| RunFigures::of(&self.on_path(candidates, path, count), self.log, rows);
+        (1..=lengths).map(|count| there(&count).then(|| figures(count)).transpose()).collect()
     }
 
     /// The figures of each length of the paths on blocks that these did not see, over all blocks.
@@ -547,19 +361,18 @@ impl<'l> Samples<'l> {
         &self,
         candidates: &Candidates,
         blocks: &[(&[usize], Products)],
-        first: &[usize],
         lengths: usize,
     ) -> Result<Vec<Option<RunFigures>>, Error> {
         let mut sums = vec![Some(Sums::default()); lengths];
         for (place, (rows, _)) in blocks.iter().enumerate() {
-            let mut others =
+            let others =
                 blocks.iter().enumerate().filter(|(other, _)| *other != place).map(|(_, (_, sum))| sum);
-            let Some(mut products) = others.next().cloned() else { return Ok(vec![None; lengths]) };
-            others.for_each(|other| products.merge(other));
-            let path = self.path(candidates, &products, first, lengths);
+            let Some(products) = merged(others) else { return Ok(vec![None; lengths]) };
+            let path = self.path(candidates, &products, lengths);
             let rows = as_rows(rows);
             for (at, sum) in sums.iter_mut().enumerate() {
-                let own = (at < path.chosen.len() && at + 1 >= first.len().min(lengths))
+                let own = (candidates.always()..=path.chosen.len())
+                    .contains(&(at + 1))
                     .then(|| self.on_path(candidates, &path, at + 1));
                 *sum = match (sum.take(), own) {
                     (Some(mut sum), Some(model)) => {
@@ -676,6 +489,13 @@ impl<'l> Samples<'l> {
             },
         })
     }
+}
+
+/// The sums of several sets of rows together; none of none.
+fn merged<'p>(mut parts: impl Iterator<Item = &'p Products>) -> Option<Products> {
+    let mut whole = parts.next()?.clone();
+    parts.for_each(|part| whole.merge(part));
+    Some(whole)
 }
 
 /// Samples as rows of a log.

@@ -152,7 +152,7 @@ impl Moments {
         }
     }
 
-    /// Adds so many rows; `variable` fills the values of a variable from a row on, `target` those of the target.
+    /// Adds `rows` rows; `variable` fills the values of a variable from a row on, `target` those of the target.
     pub(crate) fn add(
         &mut self,
         monomials: &Monomials,

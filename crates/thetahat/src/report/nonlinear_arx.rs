@@ -59,19 +59,19 @@ pub enum MapPlan {
 pub enum Centres {
     /// At samples of the estimation rows, of which forward regression chooses.
     Chosen,
-    /// At the means of so many clusters of the estimation rows.
+    /// At the means of clusters of the estimation rows.
     Clusters {
         /// How many.
         count: usize,
         /// Which random start.
         seed: u64,
     },
-    /// At a grid over the range of the estimation rows, so many in each direction.
+    /// At a grid over the range of the estimation rows.
     Grid {
         /// How many in each direction.
         each: usize,
     },
-    /// At so many pseudo-random points in that range.
+    /// At pseudo-random points in that range.
     Random {
         /// How many.
         count: usize,
@@ -111,7 +111,7 @@ pub struct NonlinearArxPlan {
     /// What makes one number of functions better than another; none: the free run on the validation rows where there are some, else that
     /// on five blocks of the estimation rows.
     pub select: Option<Select>,
-    /// Keeps parameters small: weighs like so many more samples in which the output is 0.
+    /// Keeps parameters small: weighs like this many more samples in which the output is 0.
     pub ridge: f64,
     /// Whether signals keep their own units: else each is divided by its standard deviation over the estimation rows.
     pub raw_terms: bool,
@@ -266,7 +266,7 @@ pub fn fit_nonlinear_arx(log: &Log, sources: &[Source], plan: &NonlinearArxPlan)
         _ => None,
     };
     let most = plan.terms.unwrap_or(plan.most);
-    let Chosen { map, steps } = all.choose(&candidates, &[], most, &count, first_part.as_ref())?;
+    let Chosen { map, steps } = all.choose(&candidates, most, &count, first_part.as_ref())?;
     let Solved { model, mse, condition } = all.solve(map)?;
 
     let missing = names.iter().map(|name| {

@@ -22,7 +22,7 @@ use crate::data::{Log, Record, Rows, measured};
 use crate::distribution::{student_factor, student_two_sided};
 use crate::model::{Evaluator, NonlinearArxModel, Orders, PolynomialModel, Signal};
 
-/// A free run that is so many times as far from zero as any output of the fit is no number any more.
+/// A free run beyond this many times the largest output of the fit is lost.
 const LOST: f64 = 1e6;
 
 /// A model laid out for runs along signals, which are deviations from its offsets.
@@ -257,7 +257,7 @@ impl<'l> NonlinearArxOnLog<'l> {
         })
     }
 
-    /// The samples of each segment that have a prediction so many steps ahead.
+    /// The samples of each segment that have a prediction `steps` ahead.
     fn counted(&self, steps: usize) -> Vec<Range<usize>> {
         let each = self.ahead.segments.iter().zip(&self.ahead.past);
         let each = each.map(|(segment, past)| {

@@ -17,7 +17,7 @@ pub(crate) fn spread(points: &[Vec<f64>], most: usize) -> Vec<Vec<f64>> {
     found
 }
 
-/// A grid over the range of the points, so many in each direction.
+/// A grid over the range of the points, `each` in each direction.
 pub(crate) fn grid(points: &[Vec<f64>], each: usize) -> Vec<Vec<f64>> {
     let mut found = vec![Vec::new()];
     for (low, high) in ranges(points) {

@@ -25,7 +25,7 @@ pub enum Map {
 }
 
 impl Map {
-    /// How many functions there are of so many regressors.
+    /// How many functions there are of this many regressors.
     pub fn parameters(&self, regressors: usize) -> usize {
         match self {
             Self::Polynomial { terms } => terms.len(),
@@ -52,7 +52,7 @@ impl Map {
         }
     }
 
-    /// What it is, of so many parameters.
+    /// What it is, with its number of parameters.
     pub(super) fn describe(&self, parameters: usize) -> String {
         let plural = |count: usize| if count == 1 { "" } else { "s" };
         match self {
@@ -75,7 +75,7 @@ impl Map {
         }
     }
 
-    /// Whether its parts go with so many regressors; else which does not.
+    /// Whether its parts go with this many regressors; else which does not.
     pub(super) fn check(&self, regressors: usize) -> Result<(), String> {
         match self {
             Self::Polynomial { terms } => {

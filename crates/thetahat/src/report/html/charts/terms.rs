@@ -43,7 +43,7 @@ pub(crate) fn complexity(outcome: &TermsOutcome) -> Drawn {
         .with("yaxis", axis("error, in units of the output").with("type", "log"))
         .with("hovermode", "closest");
     let words = format!(
-        "The root mean square and the largest errors of the models with so many functions, of {} to choose from.",
+        "The root mean square and the largest errors against the number of functions, of {} to choose from.",
         outcome.candidates
     );
     chart("Complexity", words, 340, traces, layout)

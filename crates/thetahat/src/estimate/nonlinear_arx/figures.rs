@@ -1,0 +1,119 @@
+//! What a choice of functions looked at, and what its models miss.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::Error;
+use crate::data::{Log, Rows};
+use crate::model::NonlinearArxModel;
+use crate::respond::nonlinear_arx::NonlinearArxOnLog;
+use crate::respond::{Horizon, OnLog, Start};
+
+/// A choice prefers models whose free run stays within this many times the range of the estimation rows, about its middle.
+const RANGE: f64 = 1.1;
+
+/// How the functions of a nonlinear ARX model were chosen.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct TermsOutcome {
+    /// The functions to choose from.
+    pub candidates: usize,
+    /// What said how many to take: `given`, the word of an information criterion, `validation` (the free run on the validation rows) or
+    /// `cv` (that on five blocks, each by a model of the others).
+    pub selected_by: String,
+    /// What was added to the squares of the functions, in samples; none: nothing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ridge: Option<f64>,
+    /// The functions in the order of their choice, those that were not taken too.
+    pub path: Vec<TermStep>,
+}
+
+/// A step of the choice: the model with this term and those before.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct TermStep {
+    /// The function that is added.
+    pub term: String,
+    /// Its error reduction ratio: the share of the sum of squared outputs that it explains beside those before.
+    pub error_reduction: f64,
+    /// Functions that can no longer be told from sums of those chosen.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub aliases: Vec<String>,
+    /// The root mean square of the errors one step ahead on the estimation rows, in units of the output.
+    pub rmse: f64,
+    /// The free run on the estimation rows; none of a step after which functions that are always there are still to come.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub free_run: Option<RunFigures>,
+    /// The free run on the rows that the choice looked at, where there are some; one step ahead where there are no inputs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub held_out: Option<RunFigures>,
+}
+
+/// What a run of a model misses.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct RunFigures {
+    /// The root mean square error, in units of the output; none where the run leaves the range of numbers.
+    pub rmse: Option<f64>,
+    /// The largest absolute error; none likewise.
+    pub largest_error: Option<f64>,
+    /// Whether the run stays within 1.1 times the range of the estimation rows, about its middle.
+    pub in_range: bool,
+}
+
+impl RunFigures {
+    pub(super) fn of(model: &NonlinearArxModel, log: &Log, rows: &[Rows]) -> Result<Self, Error> {
+        run(model, log, rows).map(Sums::figures)
+    }
+
+    /// Smaller is better: those out of range come last, and those without a figure after them.
+    pub(super) fn rank(self) -> (bool, f64) {
+        (!self.in_range, self.rmse.unwrap_or(f64::INFINITY))
+    }
+}
+
+/// What a model misses on some rows of a log: in its free run, or one step ahead where nothing drives it.
+pub(super) fn run(model: &NonlinearArxModel, log: &Log, rows: &[Rows]) -> Result<Sums, Error> {
+    let [low, high] = model.output_range;
+    let (middle, half) = (f64::midpoint(low, high), RANGE * (high - low) / 2.0);
+    let on_log = NonlinearArxOnLog::new(model, log, rows)?;
+    let horizon = if on_log.is_driven() { Horizon::FreeRun } else { Horizon::Steps { steps: 1 } };
+    let mut sums = Sums::default();
+    for response in on_log.respond(horizon, Start::Drop)? {
+        let measured = on_log.measured(0);
+        for t in response.counted.iter().cloned().flatten() {
+            let (said, error) = (response.values[t], (measured[t] - response.values[t]).abs());
+            sums.count += 1;
+            sums.squares += error * error;
+            // One that is not a number stays one.
+            sums.largest = if error > sums.largest || error.is_nan() { error } else { sums.largest };
+            sums.strays |= said.is_nan() || (said - middle).abs() > half;
+        }
+    }
+    Ok(sums)
+}
+
+/// What figures are made of.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Sums {
+    count: usize,
+    squares: f64,
+    largest: f64,
+    strays: bool,
+}
+
+impl Sums {
+    pub(super) fn add(&mut self, other: Self) {
+        self.count += other.count;
+        self.squares += other.squares;
+        let largest = other.largest;
+        self.largest = if largest > self.largest || largest.is_nan() { largest } else { self.largest };
+        self.strays |= other.strays;
+    }
+
+    pub(super) fn figures(self) -> RunFigures {
+        let known = |value: f64| Some(value).filter(|value| self.count > 0 && value.is_finite());
+        RunFigures {
+            rmse: known((self.squares / self.count as f64).sqrt()),
+            largest_error: known(self.largest),
+            in_range: self.count > 0 && !self.strays,
+        }
+    }
+}

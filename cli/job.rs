@@ -29,7 +29,7 @@ pub(crate) use filter::FilterJob;
 pub(crate) use fit::FitJob;
 pub(crate) use grey_box::GreyBoxJob;
 pub(crate) use inspect::InspectJob;
-pub(crate) use narx::NarxJob;
+pub(crate) use narx::{NarxJob, check_linear};
 pub(crate) use track::TrackJob;
 pub(crate) use validate::EvaluationJob;
 

@@ -23,12 +23,12 @@ const CORE: House = House {
         &["dual", "error", "triangle"],
         &["forgetting", "ud"],
         &["dim"],
-        &["innovation", "snapshot", "solution"],
+        &["basis", "innovation", "snapshot", "solution"],
         &["covariance", "detect", "lags", "least_squares"],
         &["rls", "state_space"],
         &["arx", "augmented", "differentiated", "kalman"],
-        &["armax", "ekf", "luenberger", "schedule"],
-        &["smoother"],
+        &["armax", "ekf", "luenberger", "nonlinear_arx", "schedule"],
+        &["recursive_narx", "smoother"],
     ],
 };
 
@@ -73,8 +73,9 @@ const PYTHON: House = House {
         &["error"],
         &["work"],
         &["array"],
-        &["grey_box", "log", "online"],
+        &["grey_box", "log"],
         &["model"],
+        &["online"],
         &["evaluation", "filter", "track"],
     ],
 };

@@ -371,6 +371,8 @@ fn bad_options_and_logs_are_told() {
         ("--narx poly --select validation", "--validate"),
         ("--narx poly --nu 0 --input u", "--nu 0"),
         ("--degree 2", "--narx"),
+        ("--na 1 --nb 1 --degree 2", "--narx"),
+        ("--na 1 --nb 1 --raw-terms", "--narx"),
         ("--narx poly --estimate 1..3", "rows"),
         ("--narx poly --estimate 1..20 --ny 5 --nu 5 --terms 66", "functions"),
     ] {
@@ -403,5 +405,73 @@ fn damaged_reports_are_refused() {
         let run = folder.run("validate bad.json log.csv --sample-time 0.1");
         assert_eq!(run.code, 3, "{place}: {}", run.stdout);
         assert!(run.stderr.contains("edited or damaged"), "{place}: {}", run.stderr);
+    }
+}
+
+/// A fit goes on online, and products of lags are found without one; the state takes up where it was.
+#[test]
+fn trackers_take_functions() {
+    let folder = Folder::with_log(plant(900));
+    let fitted = folder.fit(
+        "log.csv --narx poly --ny 1 --nu 1 --sample-time 0.1 --terms 4 --estimate 1..300 --report model.json",
+    );
+    let names: Vec<&str> = fitted["model"]["parameters"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter_map(|one| one["name"].as_str())
+        .collect();
+    let run = folder
+        .done("track log.csv --warm model.json --forgetting 1 --summary warm.json --format csv -o warm.csv");
+    assert!(run.stderr.contains("NARX polynomial, 4 terms"), "{}", run.stderr);
+    let header = folder.read("warm.csv").lines().next().unwrap().to_owned();
+    assert!(names.iter().all(|name| header.contains(&format!(",{name},"))), "{header}");
+
+    // Without forgetting, all products of lags: y(k-1)/2 + u(k-1) + 0.4 u(k-1)^2 about 3, by their true names.
+    let options = "--narx poly --ny 1 --nu 1 --degree 2 --forgetting 1 --offset y=3 --scale y=1 --scale u=1";
+    folder.done(&format!("track log.csv {options} --summary all.json -o all.jsonl"));
+    let summary: Value = serde_json::from_str(&folder.read("all.json")).unwrap();
+    for parameter in summary["trackers"][0]["parameters"].as_array().unwrap() {
+        let truth = match parameter["name"].as_str().unwrap() {
+            "y(k-1)" => 0.5,
+            "u(k-1)" => 1.0,
+            "u(k-1)^2" => 0.4,
+            _ => 0.0,
+        };
+        let error = (number(parameter, "/value") - truth).abs();
+        assert!(error < 4.0 * number(parameter, "/standard_error"), "{parameter}");
+    }
+    assert_eq!(summary["trackers"][0]["map"]["terms"].as_array().unwrap().len(), 6);
+
+    // In two runs with a state it writes what it writes in one.
+    let text = folder.read("log.csv");
+    let half: String = text.lines().take(400).map(|line| format!("{line}\n")).collect();
+    folder.write("half.csv", half);
+    let with = format!("{options} --state state.json -o parts.jsonl --horizon 5");
+    folder.done(&format!("track half.csv {with}"));
+    folder.write("half.csv", text);
+    folder.done(&format!("track half.csv {with}"));
+    folder.done(&format!("track log.csv {options} --horizon 5 -o whole.jsonl"));
+    assert_eq!(folder.read("parts.jsonl"), folder.read("whole.jsonl"));
+    let other = folder.run(&format!("track half.csv {with} --degree 3"));
+    assert!(other.code != 0 && !other.stderr.is_empty());
+
+    for (options, words) in [
+        ("--narx rbf", "--warm"),
+        ("--narx poly --na 2", "cannot be used with"),
+        ("--narx poly --constant", "cannot be used with"),
+        ("--narx poly --ny 9 --nu 9 --degree 6", "--degree"),
+        ("--narx poly --degree 0", "--degree"),
+        ("--narx poly --ny 0 --nu 0", "orders"),
+        ("--narx poly --nu 1,2", "2 values for 1 inputs"),
+        ("--degree 2 --na 1 --nb 1", "--narx"),
+        ("--warm model.json --narx poly", "cannot be used with"),
+        ("--warm model.json --scale u=1 --scale y=1", "its own scales"),
+        ("--warm model.json --start exact", "--start"),
+    ] {
+        let run = folder.run(&format!("track log.csv {options} -o bad.jsonl"));
+        assert!([2, 3].contains(&run.code), "{options}: {}", run.code);
+        assert!(run.stderr.contains(words), "{options}: {}", run.stderr);
+        assert!(!folder.path("bad.jsonl").exists(), "{options}");
     }
 }

@@ -98,7 +98,7 @@ fn a_warm_start_goes_on_from_a_fit() {
 
     folder.done("fit log.csv --model oe --nb 2 --nf 2 --report oe.json");
     let refusal = folder.refused("track next.csv --warm oe.json", 3);
-    let words = "error: oe.json: the report has OE(2, 2, 1): only AR, ARX, ARMA and ARMAX can be tracked";
+    let words = "error: oe.json: the report has OE(2, 2, 1): only AR, ARX, ARMA, ARMAX and nonlinear ARX can be tracked";
     assert_eq!(refusal, words);
     let run = folder.run("track next.csv --warm model.json --na 3");
     assert!(

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use thetahat::track::Policy;
 
-use super::{LineArguments, LiveClockArguments, LogArguments, Names};
+use super::{LineArguments, LiveClockArguments, LogArguments, MapArgument, Names};
 
 #[derive(Debug, Args)]
 pub(crate) struct TrackArguments {
@@ -42,6 +42,26 @@ pub(crate) struct TrackArguments {
     /// Samples from input to first effect, one value for each input or one for all [default: 1]
     #[arg(long, value_name = "N[,…]", value_delimiter = ',', help_heading = "Model")]
     pub(crate) nk: Vec<usize>,
+    /// Track y(k) = g(past outputs and inputs) + e(k) instead: all products of lags up to a degree (poly). Functions that a fit has chosen
+    /// come from its report, with --warm
+    #[arg(
+        long,
+        value_enum,
+        value_name = "MAP",
+        conflicts_with_all = ["model", "na", "nb", "nc", "constant", "method"],
+        help_heading = "Model"
+    )]
+    pub(crate) narx: Option<MapArgument>,
+    /// Past outputs that g reads: y(k-1), …, y(k-N) [default: 2]
+    #[arg(long, value_name = "N", requires = "narx", help_heading = "Model")]
+    pub(crate) ny: Option<usize>,
+    /// Values of each input that g reads, from --nk on; one number for each input or one for all, 0 for a model without inputs
+    /// [default: 2]
+    #[arg(long, value_name = "N[,…]", value_delimiter = ',', requires = "narx", help_heading = "Model")]
+    pub(crate) nu: Vec<usize>,
+    /// Factors of a product at most [default: 2]
+    #[arg(long, value_name = "D", requires = "narx", help_heading = "Model")]
+    pub(crate) degree: Option<usize>,
     /// Estimate a constant too, for channels of which the offsets are not known; without --offset the first value of each is
     /// taken off
     #[arg(long, help_heading = "Model")]
@@ -67,7 +87,7 @@ pub(crate) struct TrackArguments {
     #[arg(
         long,
         value_name = "REPORT",
-        conflicts_with_all = ["model", "na", "nb", "nc", "nk"],
+        conflicts_with_all = ["model", "na", "nb", "nc", "nk", "narx"],
         help_heading = "Adaptation"
     )]
     pub(crate) warm: Option<PathBuf>,

@@ -13,13 +13,14 @@ use super::search::{Identified, watched};
 use super::{grey_box, narx, summary};
 use crate::args::{FitArguments, FormatArgument};
 use crate::failure::Failure;
-use crate::job::{FitJob, GreyBoxJob, NarxJob};
+use crate::job::{FitJob, GreyBoxJob, NarxJob, check_linear};
 use crate::log;
 use crate::messages::warn;
 use crate::output;
 use crate::wrap::stdout_width;
 
 pub(crate) fn fit(arguments: &FitArguments, line: &str) -> Result<(), Failure> {
+    check_linear(&arguments.narx)?;
     let outputs = [&arguments.report, &arguments.html];
     let Identified { report, log, sources } = match &arguments.grey {
         Some(model) => grey_box::found(&GreyBoxJob::resolve(arguments, model)?)?,

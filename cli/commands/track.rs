@@ -11,6 +11,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use thetahat::Document;
+use thetahat::model::Model;
 use thetahat::report::Report;
 
 use super::{stored, summary};
@@ -33,7 +34,9 @@ pub use tracking::{TrackedRow, Tracking};
 pub(crate) fn track(arguments: &TrackArguments) -> Result<(), Failure> {
     let job = TrackJob::resolve(arguments)?;
     let report = job.warm.as_deref().map(stored::report).transpose()?;
-    if let (Some(path), Some(report)) = (&job.warm, &report) {
+    if let (Some(path), Some(report)) = (&job.warm, &report)
+        && !matches!(report.model, Model::NonlinearArx(_))
+    {
         stored::polynomials(path, &report.model, "a tracker")?;
     }
     let mut run = Run::start(&job, report.as_ref())?;

@@ -96,6 +96,27 @@ impl NarxJob {
     }
 }
 
+/// What is for nonlinear models alone, given for another one: where one option excludes --narx, the parser asks for it no longer.
+pub(crate) fn check_linear(arguments: &NarxArguments) -> Result<(), Failure> {
+    let given = [
+        ("--ny", arguments.ny.is_some()),
+        ("--nu", !arguments.nu.is_empty()),
+        ("--degree", arguments.degree.is_some()),
+        ("--terms", arguments.terms.is_some()),
+        ("--most-terms", arguments.most_terms.is_some()),
+        ("--centres", arguments.centres.is_some()),
+        ("--width", arguments.width.is_some()),
+        ("--no-linear", arguments.no_linear),
+        ("--raw-terms", arguments.raw_terms),
+    ];
+    match given.iter().find(|(_, given)| *given) {
+        Some((option, _)) if arguments.narx.is_none() => {
+            Err(Failure::usage(format!("{option} is for --narx; leave it out, or give --narx")))
+        }
+        _ => Ok(()),
+    }
+}
+
 fn map_plan(arguments: &NarxArguments, map: MapArgument, seed: Option<u64>) -> Result<MapPlan, Failure> {
     let not_for = |option: &str, other: &str| Err(Failure::usage(format!("{option} is for --narx {other}")));
     match map {

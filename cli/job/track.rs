@@ -1,12 +1,14 @@
 use std::path::{Path, PathBuf};
 
-use thetahat::model::Orders;
+use thetahat::model::{Map, Model, Orders, Signal};
 use thetahat::report::Report;
 use thetahat::track::{PerChannel, Policy, TrackMethod, TrackPlan, Tracker};
 
 use super::fit::named_values;
 use super::{LineJob, LogJob, parsed};
-use crate::args::{Names, ResumeArgument, TrackArguments, TrackMethodArgument, TrackModelArgument};
+use crate::args::{
+    MapArgument, Names, ResumeArgument, TrackArguments, TrackMethodArgument, TrackModelArgument,
+};
 use crate::failure::Failure;
 
 /// A model to track.
@@ -30,6 +32,8 @@ pub(crate) struct TrackJob {
     offsets: Vec<(String, f64)>,
     scales: Vec<(String, f64)>,
     orders: Given,
+    /// The degree of the products of lags, of a nonlinear model.
+    degree: Option<usize>,
     method: Option<TrackMethod>,
     policies: Vec<Policy>,
     plan: TrackPlan,
@@ -41,6 +45,13 @@ pub(crate) struct StateJob {
     pub(crate) path: PathBuf,
     pub(crate) save_every: u64,
     pub(crate) resume: ResumeArgument,
+}
+
+/// What trackers start from.
+enum Source<'r> {
+    Report(&'r Report),
+    /// These orders; and of lags of these orders functions, if the model is nonlinear.
+    Nothing(Orders, Option<Map>),
 }
 
 /// Orders as far as they were given.
@@ -74,12 +85,34 @@ impl TrackJob {
             alarm_interval: arguments.alarm,
             ..TrackPlan::default()
         };
-        let orders = Given {
-            model: arguments.model,
-            na: arguments.na,
-            nb: arguments.nb.clone(),
-            nc: arguments.nc,
-            nk: arguments.nk.clone(),
+        if arguments.narx.is_some_and(|map| map != MapArgument::Poly) {
+            return Err(Failure::usage(
+                "--narx: products of lags (poly) are tracked without a fit; other functions come from its report, with --warm",
+            ));
+        }
+        let lags = [
+            ("--ny", arguments.ny.is_some()),
+            ("--nu", !arguments.nu.is_empty()),
+            ("--degree", arguments.degree.is_some()),
+        ];
+        if let (None, Some((option, _))) = (arguments.narx, lags.iter().find(|(_, given)| *given)) {
+            return Err(Failure::usage(format!("{option} is for --narx; leave it out, or give --narx")));
+        }
+        let orders = match arguments.narx {
+            None => Given {
+                model: arguments.model,
+                na: arguments.na,
+                nb: arguments.nb.clone(),
+                nc: arguments.nc,
+                nk: arguments.nk.clone(),
+            },
+            Some(_) => Given {
+                model: None,
+                na: Some(arguments.ny.unwrap_or(2)),
+                nb: if arguments.nu.is_empty() { vec![2] } else { arguments.nu.clone() },
+                nc: None,
+                nk: arguments.nk.clone(),
+            },
         };
         if arguments.warm.is_none() {
             orders.check()?;
@@ -111,6 +144,7 @@ impl TrackJob {
             offsets: named_values("--offset", &arguments.offset)?,
             scales: named_values("--scale", &arguments.scale)?,
             orders,
+            degree: arguments.narx.map(|_| arguments.degree.unwrap_or(2)),
             method: arguments.method.map(|method| match method {
                 TrackMethodArgument::Rls => TrackMethod::Rls,
                 TrackMethodArgument::Els => TrackMethod::Els,
@@ -138,15 +172,23 @@ impl TrackJob {
         output: &str,
         report: Option<&Report>,
     ) -> Result<Vec<Tracker>, Failure> {
-        let model = report.map(|report| report.model.polynomials("a tracker")).transpose();
-        let model = model.map_err(|error| Failure::data(error.to_string()))?;
-        let orders = match model {
-            Some(model) => model.orders.clone(),
-            None => self.orders.of(inputs.len())?,
+        let model = report.map(|report| &report.model);
+        let source = match report {
+            Some(report) => Source::Report(report),
+            None => {
+                let orders = self.orders.of(inputs.len())?;
+                let map = self.degree.map(|degree| Map::polynomial(orders.parameters(), degree)).transpose();
+                Source::Nothing(orders, map.map_err(|error| Failure::option(&error))?)
+            }
+        };
+        let noise = match (&source, model) {
+            (Source::Nothing(orders, _), _) => orders.nc,
+            (Source::Report(_), Some(Model::Polynomial(model))) => model.orders.nc,
+            (Source::Report(_), _) => 0,
         };
         let method = match self.method {
             Some(method) => method,
-            None if orders.nc > 0 => TrackMethod::Rpem,
+            None if noise > 0 => TrackMethod::Rpem,
             None => TrackMethod::Rls,
         };
         let known = |name: &String| inputs.contains(name) || name == output;
@@ -159,15 +201,14 @@ impl TrackJob {
             values.iter().find(|(other, _)| other == name).map(|(_, value)| *value)
         };
         let offsets = (!self.offsets.is_empty()).then(|| {
-            let signals = model.map(|model| (&model.inputs[..], &model.output));
+            let levels =
+                |signals: &[Signal], index: usize| signals.get(index).map(|signal| signal.offset.level);
             let level =
                 |name: &str, stored: Option<f64>| value(&self.offsets, name).or(stored).unwrap_or(0.0);
-            let stored = |index: usize| {
-                signals.and_then(|(inputs, _)| inputs.get(index)).map(|signal| signal.offset.level)
-            };
+            let stored = |index: usize| model.and_then(|model| levels(model.inputs(), index));
             PerChannel {
                 inputs: inputs.iter().enumerate().map(|(index, name)| level(name, stored(index))).collect(),
-                output: level(output, signals.map(|(_, output)| output.offset.level)),
+                output: level(output, model.and_then(|model| levels(model.outputs(), 0))),
             }
         });
         if let Some((name, scale)) = self.scales.iter().find(|(_, scale)| !(1e-98..=1e98).contains(scale)) {
@@ -191,9 +232,12 @@ impl TrackJob {
         let plan = TrackPlan { method, offsets, scales: scales.transpose()?, ..self.plan.clone() };
         let track = |policy: &Policy| {
             let plan = TrackPlan { forgetting: *policy, ..plan.clone() };
-            match report {
-                Some(report) => Tracker::from_report(report, &plan),
-                None => Tracker::new(&orders, &plan),
+            match &source {
+                Source::Report(report) => Tracker::from_report(report, &plan),
+                Source::Nothing(orders, None) => Tracker::new(orders, &plan),
+                Source::Nothing(orders, Some(map)) => {
+                    Tracker::nonlinear(orders, map, &orders.lag_names(inputs, output), &plan)
+                }
             }
             .map_err(|error| match error {
                 thetahat::Error::Report { .. } => {

@@ -16,7 +16,9 @@ mod least_squares;
 mod limits;
 mod luenberger;
 mod model;
+mod narx;
 mod recursive;
+mod recursive_model;
 pub(crate) mod results;
 mod trajectory;
 mod used;
@@ -28,6 +30,8 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use thetahat_core::Error;
 
+use recursive_model::RecursiveModel;
+
 /// Adds all classes of this part.
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     forgetting::register(module)?;
@@ -35,6 +39,7 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<least_squares::RecursiveLeastSquares>()?;
     module.add_class::<arx::RecursiveArx>()?;
     module.add_class::<armax::RecursiveArmax>()?;
+    module.add_class::<narx::RecursiveNarx>()?;
     module.add_class::<recursive::RecursiveTrajectory>()?;
     module.add_class::<model::LinearTransition>()?;
     module.add_class::<model::LinearObservation>()?;
@@ -63,8 +68,18 @@ fn _restore<'py>(py: Python<'py>, class_name: &str, kept: &Bound<'py, PyAny>) ->
         "RecursiveLeastSquares" => {
             any(Bound::new(py, least_squares::RecursiveLeastSquares::of(read(kept)?))?.into_any())
         }
-        "RecursiveArx" => any(Bound::new(py, arx::RecursiveArx::restore(read(kept)?)?)?.into_any()),
-        "RecursiveArmax" => any(Bound::new(py, armax::RecursiveArmax::restore(read(kept)?)?)?.into_any()),
+        "RecursiveArx" => {
+            let model = RecursiveModel::restore(read(kept)?, class_name)?;
+            any(Bound::new(py, arx::RecursiveArx::over(model))?.into_any())
+        }
+        "RecursiveArmax" => {
+            let model = RecursiveModel::restore(read(kept)?, class_name)?;
+            any(Bound::new(py, armax::RecursiveArmax::over(model))?.into_any())
+        }
+        "RecursiveNarx" => {
+            let model = RecursiveModel::restore(read(kept)?, class_name)?;
+            any(Bound::new(py, narx::RecursiveNarx::over(model))?.into_any())
+        }
         "LinearTransition" => any(Bound::new(py, model::LinearTransition { model: read(kept)? })?.into_any()),
         "LinearObservation" => {
             any(Bound::new(py, model::LinearObservation { model: read(kept)? })?.into_any())

@@ -237,7 +237,7 @@ impl Tracker {
     /// Structure and orders, such as ARX(2, 2, 1).
     #[getter]
     fn orders(&self) -> String {
-        self.tracking.trackers().first().map_or_else(String::new, |tracker| tracker.orders().to_string())
+        self.tracking.trackers().first().map_or_else(String::new, thetahat::track::Tracker::model)
     }
 
     /// What is taken from each channel, the output last.

@@ -23,7 +23,7 @@ from sklearn.preprocessing import StandardScaler
 from sklearn.utils.estimator_checks import check_estimator
 
 import thetahat
-from thetahat.sklearn import EXPECTED_FAILED_CHECKS, ARXRegressor
+from thetahat.sklearn import EXPECTED_FAILED_CHECKS, ARXRegressor, NARXRegressor
 
 # a1, a2, then b1 and b2 of the first input, b2 and b3 of the second.
 PARAMETERS = np.array([-1.2, 0.5, 1.0, 0.4, 0.3, -0.2])
@@ -302,3 +302,43 @@ def test_without_scikit_learn_the_module_says_what_to_install() -> None:
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert "pip install thetahat[sklearn]" in done.stderr.splitlines()[-1]
+
+
+def squares(count: int = 600) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """y(k) = 0.5 y(k-1) + u(k-1) + 0.4 u(k-1)^2 + e(k)."""
+    random = np.random.default_rng(3)
+    u = random.uniform(-1, 1, (count, 1))
+    y = np.zeros(count)
+    for k in range(1, count):
+        y[k] = 0.5 * y[k - 1] + u[k - 1, 0] + 0.4 * u[k - 1, 0] ** 2 + 0.02 * random.standard_normal()
+    return u, y
+
+
+def test_nonlinear_models_are_regressors_too() -> None:
+    u, y = squares()
+    regressor = NARXRegressor(ny=1, nu=1, raw_terms=True, detrend="none", terms=3).fit(u, y)
+    found = dict(zip(regressor.model_.parameter_names, regressor.coef_))
+    assert found == pytest.approx({"y(k-1)": 0.5, "u(k-1)": 1.0, "u(k-1)^2": 0.4}, abs=0.01)
+    assert regressor.score(u, y) > 0.98
+    ahead = NARXRegressor(ny=1, nu=1, horizon=2).fit(u, y)
+    assert ahead.score(u, y) > 0.98
+    assert clone(ahead).get_params() == ahead.get_params()
+    np.testing.assert_array_equal(pickle.loads(pickle.dumps(ahead)).predict(u, y), ahead.predict(u, y))
+    radial = NARXRegressor(map="rbf", ny=1, nu=1, centres="grid:3", width=2.0).fit(u, y)
+    assert radial.score(u, y) > 0.95
+    series = NARXRegressor(ny=2, horizon=1).fit(None, y)
+    assert series.n_features_in_ == 0
+    with pytest.raises(ValueError, match="map|narx"):
+        NARXRegressor(map="cubic").fit(u, y)
+    with pytest.raises(ValueError, match="horizon"):
+        NARXRegressor(horizon=0).fit(u, y)
+
+
+def test_a_search_finds_the_degree() -> None:
+    u, y = squares()
+    search = GridSearchCV(NARXRegressor(ny=1, nu=1, horizon=1), {"degree": [1, 2]}, cv=TimeSeriesSplit(3)).fit(u, y)
+    assert search.best_params_ == {"degree": 2}
+
+
+def test_a_nonlinear_regressor_keeps_the_conventions_that_time_allows() -> None:
+    check_estimator(NARXRegressor(ny=1, nu=1, degree=1), expected_failed_checks=EXPECTED_FAILED_CHECKS)

@@ -152,7 +152,7 @@ def test_it_starts_from_a_fit(folder: Path) -> None:
     assert tracker.offsets == {name: level for name, (level, _) in model.offsets.items()}
     same(tracker.run(log), lines)
     assert tracker.state() == state and tracker.to_json() == document
-    with pytest.raises(ValueError, match="^warm: .* only AR, ARX, ARMA and ARMAX can be tracked"):
+    with pytest.raises(ValueError, match="^warm: .* only AR, ARX, ARMA, ARMAX and nonlinear ARX can be tracked"):
         th.Tracker(warm=th.oe(log, 2, 2))
 
 

@@ -15,7 +15,10 @@ pub fn tracking(summary: &TrackSummary, faults: &str, watched: bool, width: usiz
         count => format!(", {count} gaps"),
     };
     if let Some(tracker) = summary.trackers.first() {
-        text.line(&formula(&tracker.orders));
+        match &tracker.map {
+            None => text.line(&formula(&tracker.orders)),
+            Some(map) => text.line(&map.name(tracker.parameters.len())),
+        }
         text.line(&format!("{} rows{faults}{gaps}", summary.rows));
         if tracker.offsets.iter().any(|&offset| offset != 0.0) {
             let shown: Vec<String> = tracker.offsets.iter().map(|&offset| short(offset)).collect();

@@ -131,6 +131,7 @@ impl State {
         }
         let fits = |(mine, new): (&Tracker, &Tracker)| {
             mine.orders() == new.orders()
+                && mine.map() == new.map()
                 && mine.names() == new.names()
                 && mine.plan() == new.plan()
                 && mine.score().samples() <= self.rows
@@ -200,8 +201,8 @@ pub(super) fn setting(job: &TrackJob, channels: &Channels, trackers: &[Tracker])
     let clock = if let Clock::Column { name, .. } = &job.log.clock { name.as_str() } else { "" };
     add("--time", clock.to_owned());
     if let Some(tracker) = trackers.first() {
-        let (orders, plan) = (tracker.orders(), tracker.plan());
-        add("the model", orders.to_string());
+        let plan = tracker.plan();
+        add("the model", tracker.model());
         add("--constant", plan.constant.to_string());
         add("--method", plan.method.to_string());
         add("--start", plan.start.to_string());

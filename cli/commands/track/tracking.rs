@@ -108,6 +108,7 @@ impl Tracking {
         }
         let alike = |tracker: &Tracker| {
             tracker.orders() == first.orders()
+                && tracker.map() == first.map()
                 && tracker.names() == first.names()
                 && tracker.score().samples() <= state.rows
         };

@@ -228,11 +228,17 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
     /// Step 1 of a sample, unchecked. Inputs that are not given yet are missing; `residual` is that of the sample
     /// before.
     pub(crate) fn push(&mut self, inputs: &[T], residual: T) {
+        self.push_each(|input| inputs.get(input).copied().unwrap_or(T::NAN), residual);
+    }
+
+    /// The same with the inputs as a function of their index.
+    #[inline(always)]
+    pub(crate) fn push_each(&mut self, input_of: impl Fn(usize) -> T, residual: T) {
         let mut taps = self.regressor.as_mut_slice().get_mut(self.na..).unwrap_or_default();
         let mut delayed = self.delayed.as_mut_slice();
         for line in in_use(self.lines.as_slice()) {
             let newest = match line.source(self.inputs) {
-                Source::Input(input) => inputs.get(input).copied().unwrap_or(T::NAN),
+                Source::Input(input) => input_of(input),
                 Source::Constant => T::one(),
                 Source::Residual => residual,
             };
@@ -243,11 +249,17 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
 
     /// The inputs of the sample whose step 1 went without them, where no input acts in its own sample.
     pub(crate) fn complete(&mut self, inputs: &[T]) {
+        self.complete_each(|input| inputs.get(input).copied().unwrap_or(T::NAN));
+    }
+
+    /// The same with the inputs as a function of their index.
+    #[inline(always)]
+    pub(crate) fn complete_each(&mut self, input_of: impl Fn(usize) -> T) {
         let mut delayed = self.delayed.as_mut_slice();
         for line in in_use(self.lines.as_slice()) {
             let mine = take(&mut delayed, line.nk.into());
             if let (Source::Input(input), [newest, ..]) = (line.source(self.inputs), mine) {
-                *newest = inputs.get(input).copied().unwrap_or(T::NAN);
+                *newest = input_of(input);
             }
         }
         self.awaiting_inputs = false;
@@ -334,6 +346,23 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
     /// Takes the last `count` elements of φ for 0.
     pub(crate) fn clear_last(&mut self, count: usize) {
         self.regressor.as_mut_slice().iter_mut().rev().take(count).for_each(|tap| *tap = T::zero());
+    }
+
+    /// How long φ is.
+    pub(crate) fn size(&self) -> N {
+        self.regressor.shape_generic().0
+    }
+
+    /// Which input an element of φ is of; `None` for an output, and for what is neither.
+    pub(crate) fn input_of(&self, element: usize) -> Option<usize> {
+        let mut place = element.checked_sub(self.na)?;
+        for line in in_use(self.lines.as_slice()) {
+            match place.checked_sub(line.nb.into()) {
+                Some(further) => place = further,
+                None => return Some(usize::from(line.index)).filter(|index| *index < self.inputs),
+            }
+        }
+        None
     }
 
     /// The number of inputs.

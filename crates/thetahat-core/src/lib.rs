@@ -5,8 +5,10 @@
 //! | parameters of a model | |
 //! |---|---|
 //! | [`RecursiveArx`], [`RecursiveArmax`] | from what is measured and applied, call by call; predict some samples ahead |
+//! | [`RecursiveNarx`] | the same for a weighted sum of functions of lags, a [`Polynomial`] or [`Radial`] [`Basis`] |
 //! | [`RecursiveLeastSquares`] | from any regressors; [`Forgetting`] policies that stay bounded, three ways to [`Start`] |
 //! | [`LeastSquares`] | all rows at once: merges with others, says which columns are at fault |
+//! | [`NonlinearArx`] | a stored nonlinear model: predicts, and gives its slopes for an extended Kalman filter |
 //! | [`Lags`], [`ArxOrders`] | delay lines that make regressors of samples, and know of missing ones |
 //!
 //! | state of a model | |
@@ -101,6 +103,7 @@ extern crate alloc;
 mod armax;
 mod arx;
 mod augmented;
+mod basis;
 mod covariance;
 mod detect;
 #[cfg(feature = "autodiff")]
@@ -118,6 +121,8 @@ mod least_squares;
 mod luenberger;
 #[cfg(test)]
 mod noise;
+mod nonlinear_arx;
+mod recursive_narx;
 mod rls;
 mod scalar;
 mod schedule;
@@ -137,6 +142,7 @@ pub use nalgebra;
 pub use armax::{ArmaxMethod, ArmaxOrders, RecursiveArmax};
 pub use arx::RecursiveArx;
 pub use augmented::{Augmented, ParametricObservation, ParametricTransition, WithoutParameters};
+pub use basis::{Basis, Polynomial, Radial};
 pub use covariance::Covariance;
 pub use detect::{Alarm, ChangeDetector, Chart};
 #[cfg(feature = "autodiff")]
@@ -152,6 +158,8 @@ pub use kalman::KalmanFilter;
 pub use lags::{ArxOrders, InputOrders, Lags};
 pub use least_squares::{LeastSquares, Rank};
 pub use luenberger::LuenbergerObserver;
+pub use nonlinear_arx::{NonlinearArx, Scaling};
+pub use recursive_narx::RecursiveNarx;
 pub use rls::RecursiveLeastSquares;
 pub use scalar::Real;
 pub use schedule::{GainSchedule, SteadyState};

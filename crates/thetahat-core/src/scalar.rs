@@ -44,6 +44,9 @@ pub trait Real: RealField + Copy + sealed::Sealed {
 
     /// The number nearest to `count`.
     fn from_count(count: usize) -> Self;
+
+    /// e to this power, with the same bits on every machine.
+    fn exponential(self) -> Self;
 }
 
 impl Real for f32 {
@@ -56,6 +59,10 @@ impl Real for f32 {
     fn from_count(count: usize) -> f32 {
         count as f32
     }
+
+    fn exponential(self) -> f32 {
+        libm::expf(self)
+    }
 }
 
 impl Real for f64 {
@@ -67,5 +74,9 @@ impl Real for f64 {
 
     fn from_count(count: usize) -> f64 {
         count as f64
+    }
+
+    fn exponential(self) -> f64 {
+        libm::exp(self)
     }
 }

@@ -2,16 +2,17 @@
 
 use std::fmt::Debug;
 
-use serde::Serialize;
 use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use thetahat_core::nalgebra::{
     Const, DMatrix, DVector, Dyn, Matrix2, RowVector2, SVector, Vector1, Vector2, Vector3,
 };
 use thetahat_core::{
-    Action, ArmaxMethod, ArmaxOrders, ArxOrders, ChangeDetector, Covariance, ExtendedKalmanFilter,
+    Action, ArmaxMethod, ArmaxOrders, ArxOrders, Basis, ChangeDetector, Covariance, ExtendedKalmanFilter,
     Forgetting, GainSchedule, Innovation, InputOrders, KalmanFilter, Lags, LeastSquares, LinearObservation,
-    LinearTransition, LuenbergerObserver, RecursiveArmax, RecursiveArx, RecursiveLeastSquares, Start,
+    LinearTransition, LuenbergerObserver, RecursiveArmax, RecursiveArx, RecursiveLeastSquares, RecursiveNarx,
+    Scaling, Start,
 };
 
 const INPUTS: &[InputOrders] = &[InputOrders { nb: 1, nk: 2 }];
@@ -110,6 +111,61 @@ fn recursive_arx_and_armax() {
         let armax: RecursiveArmax<f64, Const<3>, Const<2>> =
             RecursiveArmax::new(&orders, method, 1.0, &[1.0], 0.1, Forgetting::default()).unwrap();
         check(armax, |armax, k| (armax.log_row(output(k), &[value(k)]), *armax.estimator().parameters()));
+    }
+}
+
+/// 1, z and z^2 of each regressor: functions of a user, without numbers of their own.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+struct Squares;
+
+impl Basis<f64> for Squares {
+    fn functions(&self) -> usize {
+        5
+    }
+
+    fn check(&self, regressors: usize) -> Result<(), thetahat_core::Error> {
+        if regressors == 2 {
+            return Ok(());
+        }
+        Err(thetahat_core::Error::Length { argument: "basis", expected: 2, found: regressors })
+    }
+
+    fn each(&self, z: &[f64], mut take: impl FnMut(usize, f64)) {
+        take(0, 1.0);
+        for (i, z) in z.iter().enumerate() {
+            take(2 * i + 1, *z);
+            take(2 * i + 2, z * z);
+        }
+    }
+
+    fn add_slopes(&self, parameters: &[f64], z: &[f64], slopes: &mut [f64]) {
+        for (i, (slope, z)) in slopes.iter_mut().zip(z).enumerate() {
+            *slope += parameters[2 * i + 1] + 2.0 * parameters[2 * i + 2] * z;
+        }
+    }
+}
+
+#[test]
+fn recursive_narx() {
+    let orders = ArxOrders { na: 1, inputs: INPUTS, constant: false };
+    let (level, valve) = (Scaling { offset: 0.5, scale: 2.0 }, Scaling { offset: 0.0, scale: 1.0 });
+    for forgetting in [Forgetting::None, Forgetting::Exponential { factor: 0.95 }] {
+        let fixed: RecursiveNarx<f64, Squares, Const<2>, Const<5>, Const<2>> =
+            RecursiveNarx::new(Squares, &orders, level, &[valve], forgetting).expect("orders");
+        check(fixed, |narx, k| narx.log_row(output(k), &[value(k)]).expect("a sample"));
+        let open: RecursiveNarx<f64, Squares, Dyn, Dyn, Dyn> =
+            RecursiveNarx::new(Squares, &orders, level, &[valve], forgetting).expect("orders");
+        check(open.clone(), |narx, k| narx.log_row(output(k), &[value(k)]).expect("a sample"));
+        refuses(
+            &open,
+            &[
+                ("/output/1", &[json!(0.0), json!(-1.0), json!("NaN")]),
+                ("/output/0", &[json!("inf")]),
+                ("/inputs/2/0/1", &[json!(0.0), json!("inf")]),
+                ("/lags/na", &[json!(2)]),
+                ("/version", &[json!(2)]),
+            ],
+        );
     }
 }
 

@@ -8,7 +8,8 @@
 
 use thetahat_core::nalgebra::{self, Const, Matrix3, RowVector3, SVector, Vector1, Vector3, Vector4};
 use thetahat_core::{
-    Covariance, Forgetting, KalmanFilter, LinearObservation, LinearTransition, Real, RecursiveLeastSquares,
+    ArxOrders, Basis, Covariance, Forgetting, InputOrders, KalmanFilter, LinearObservation, LinearTransition,
+    Polynomial, Real, RecursiveLeastSquares, RecursiveNarx, Scaling,
 };
 
 /// How many steps each run takes.
@@ -225,6 +226,57 @@ fn without_forgetting_the_horizon_is_finite() {
         "no forgetting: rounding exceeds one standard error at {horizon:?}, {largest:.1e} of it at most"
     );
     assert!(horizon.is_none_or(|step| step > 200_000), "{horizon:?}");
+}
+
+/// All products of at most two of y(k-1), y(k-2) and u(k-1): ten terms.
+const PRODUCTS: Polynomial<'_> = Polynomial {
+    factors: &[0, 1, 2, 0, 0, 0, 1, 0, 2, 1, 1, 1, 2, 2, 2],
+    ends: &[0, 1, 2, 3, 5, 7, 9, 11, 13, 15],
+};
+
+/// A nonlinear model of ten terms follows a plant that switches, through silences and held inputs.
+#[test]
+fn recursive_narx() {
+    let orders = ArxOrders { na: 2, inputs: &[InputOrders { nb: 1, nk: 1 }], constant: false };
+    let (output, valve) = (Scaling { offset: 50.0, scale: 20.0 }, Scaling { offset: 1e-3, scale: 1e-3 });
+    let mut plant: RecursiveNarx<f32, Polynomial<'_>, Const<3>, Const<10>> =
+        RecursiveNarx::new(PRODUCTS, &orders, output, &[valve], Forgetting::Exponential { factor: 0.995 })
+            .unwrap();
+    let mut noise = Noise(5);
+    let (mut z, mut worst, mut largest) = ([0.0_f32; 3], 0.0_f32, 0.0_f32);
+    for step in 0..steps() {
+        let gain = if (step + 15_000) / 20_000 % 2 == 0 { 0.5 } else { 0.3 };
+        let theta = [0.02, 0.6, -0.2, gain, -0.05, 0.03, 0.1, 0.0, 0.05, 0.15];
+        let next = PRODUCTS.value(&theta, &z) + 0.01 * noise.next();
+        let now = match input(step) {
+            Input::Silent => 0.0,
+            Input::Held => z[2],
+            Input::Rich => noise.next(),
+        };
+        let missing = step % 997 == 0;
+        let innovation = plant
+            .measured(if missing { f32::NAN } else { output.offset + output.scale * next })
+            .expect("finite numbers");
+        plant.applied(&[valve.offset + valve.scale * now]).expect("finite numbers");
+        z = [next, z[0], now];
+        let parameters = plant.estimator().parameters();
+        assert!(parameters.iter().all(|value| value.is_finite()), "at {step}: {parameters}");
+        if (7_000..9_900).contains(&(step % 20_000)) && innovation.error.is_finite() {
+            worst = worst.max((innovation.error / output.scale).abs());
+        }
+        if step % 1_000 == 999 {
+            let variances = plant.estimator().covariance().variances();
+            assert!(variances.iter().all(|variance| *variance > 0.0), "at {step}: {variances:?}");
+            largest = largest.max(variances.max() / 100.0);
+        }
+        if step % 20_000 == 9_999 {
+            let distance =
+                parameters.iter().zip(theta).map(|(found, truth)| (found - truth).abs()).fold(0.0, f32::max);
+            assert!(distance < 0.1, "at {step}: {parameters}");
+        }
+    }
+    println!("nonlinear ARX: errors {worst} of the scale at most after rich input, P {largest} of its bound");
+    assert!(worst < 0.05 && largest < 2.72, "{worst} {largest}");
 }
 
 /// A filter of three states, driven and measured hard: a prior of 10^8, an accurate sensor and a coarse one,

@@ -35,7 +35,7 @@ pub(crate) use fitted::is_covariance;
 pub use fitted::{OffsetCovariance, Parameter, PolynomialModel, Signal};
 pub use kind::Model;
 pub(crate) use nonlinear_arx::Evaluator;
-pub use nonlinear_arx::{Map, NonlinearArxModel, Regressor};
+pub use nonlinear_arx::{Functions, Map, NonlinearArxModel, Regressor};
 pub(crate) use orders::LARGEST;
 pub use orders::{Orders, Structure};
 pub use quantity::{Interval, Quantity, Root};

@@ -1,6 +1,6 @@
 //! Models that are estimated while the plant runs, row by row.
 //!
-//! - [`Tracker`] estimates an ARX or ARMAX model, predicts, and raises alarms where the plant changes. Each row gives a [`Tracked`].
+//! - [`Tracker`] estimates an ARX, ARMAX or nonlinear ARX model, predicts, and raises alarms where the plant changes. Each row gives a [`Tracked`].
 //! - [`TrackPlan`] says how: the [`TrackMethod`], a [`Policy`] of forgetting, a [`Beginning`], and numbers for each channel
 //!   ([`PerChannel`]).
 //! - [`TrackScore`] says how well it predicted so far, [`TrackerSummary`] what it knows, [`TrackSummary`] is the document of a run.
@@ -24,6 +24,7 @@
 //! # Ok::<(), thetahat::Error>(())
 //! ```
 
+mod checks;
 mod collecting;
 mod estimator;
 mod missing;

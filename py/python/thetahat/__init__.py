@@ -8,7 +8,7 @@ Whatever takes numbers takes arrays of NumPy, lists and tuples, and the series a
 channel also a column. What is None, NaN, NA, null or masked is missing.
 
 Estimators that run with the process take a sample at a time, or a whole array: `RecursiveLeastSquares`, `RecursiveArx`,
-`RecursiveArmax`, `KalmanFilter`, `ExtendedKalmanFilter`, `LuenbergerObserver`. A `ChangeDetector` watches their innovations. A `StateFilter` is a filter of a
+`RecursiveArmax`, `RecursiveNarx`, `KalmanFilter`, `ExtendedKalmanFilter`, `LuenbergerObserver`. A `ChangeDetector` watches their innovations. A `StateFilter` is a filter of a
 fitted or written model and a `Tracker` a recursive model with the channels and offsets of a log, its gaps and its documents.
 
 >>> import thetahat as th
@@ -46,6 +46,7 @@ from thetahat._thetahat import (
     RecursiveArmax,
     RecursiveArx,
     RecursiveLeastSquares,
+    RecursiveNarx,
     RecursiveTrajectory,
     SmoothedTrajectory,
     SteadyState,
@@ -84,6 +85,7 @@ __all__ = [
     "RecursiveArmax",
     "RecursiveArx",
     "RecursiveLeastSquares",
+    "RecursiveNarx",
     "RecursiveTrajectory",
     "SmoothedTrajectory",
     "StateEstimate",

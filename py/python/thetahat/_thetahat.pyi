@@ -1,9 +1,11 @@
 import os
 from collections.abc import Callable, Sequence
-from typing import Any, Literal, final
+from typing import Any, Literal, final, type_check_only
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from thetahat._model import Model as _FittedModel
 
 __all__ = [
     "CRITERIA",
@@ -29,6 +31,7 @@ __all__ = [
     "RecursiveArmax",
     "RecursiveArx",
     "RecursiveLeastSquares",
+    "RecursiveNarx",
     "RecursiveTrajectory",
     "SmoothedTrajectory",
     "StateFilter",
@@ -320,37 +323,14 @@ class RecursiveLeastSquares:
     @adapting.setter
     def adapting(self, value: bool, /) -> None: ...
 
-@final
-class RecursiveArx:
-    def __new__(
-        cls,
-        na: int,
-        nb: int | Sequence[int],
-        nk: int | Sequence[int] = 1,
-        forgetting: float | Forgetting | None = 0.99,
-        *,
-        constant: bool = False,
-        output_scale: float = 1.0,
-        input_scales: ArrayLike | None = None,
-        start: _Start = "standard",
-        blend: int | None = None,
-        parameters: ArrayLike | None = None,
-        covariance: ArrayLike | None = None,
-        dead_zone: float = 0.0,
-        limits: Sequence[tuple[float, float] | None] | None = None,
-    ) -> RecursiveArx: ...
+@type_check_only
+class _RecursiveModel:
     def measured(self, y: float) -> Innovation: ...
     def applied(self, u: ArrayLike) -> None: ...
     def log_row(self, y: float, *, u: ArrayLike | None = None) -> Innovation: ...
     def run(self, y: ArrayLike, *, u: ArrayLike | None = None) -> RecursiveTrajectory: ...
     def predict(self, future_inputs: ArrayLike | None = None, steps: int | None = None) -> _Array: ...
     def gap(self) -> None: ...
-    @property
-    def a(self) -> _Array: ...
-    @property
-    def b(self) -> list[_Array]: ...
-    @property
-    def constant(self) -> float | None: ...
     @property
     def parameters(self) -> _Array: ...
     @property
@@ -372,8 +352,37 @@ class RecursiveArx:
     @adapting.setter
     def adapting(self, value: bool, /) -> None: ...
 
+@type_check_only
+class _RecursivePolynomials(_RecursiveModel):
+    @property
+    def a(self) -> _Array: ...
+    @property
+    def b(self) -> list[_Array]: ...
+    @property
+    def constant(self) -> float | None: ...
+
 @final
-class RecursiveArmax:
+class RecursiveArx(_RecursivePolynomials):
+    def __new__(
+        cls,
+        na: int,
+        nb: int | Sequence[int],
+        nk: int | Sequence[int] = 1,
+        forgetting: float | Forgetting | None = 0.99,
+        *,
+        constant: bool = False,
+        output_scale: float = 1.0,
+        input_scales: ArrayLike | None = None,
+        start: _Start = "standard",
+        blend: int | None = None,
+        parameters: ArrayLike | None = None,
+        covariance: ArrayLike | None = None,
+        dead_zone: float = 0.0,
+        limits: Sequence[tuple[float, float] | None] | None = None,
+    ) -> RecursiveArx: ...
+
+@final
+class RecursiveArmax(_RecursivePolynomials):
     def __new__(
         cls,
         na: int,
@@ -392,40 +401,37 @@ class RecursiveArmax:
         dead_zone: float = 0.0,
         limits: Sequence[tuple[float, float] | None] | None = None,
     ) -> RecursiveArmax: ...
-    def measured(self, y: float) -> Innovation: ...
-    def applied(self, u: ArrayLike) -> None: ...
-    def log_row(self, y: float, *, u: ArrayLike | None = None) -> Innovation: ...
-    def run(self, y: ArrayLike, *, u: ArrayLike | None = None) -> RecursiveTrajectory: ...
-    def predict(self, future_inputs: ArrayLike | None = None, steps: int | None = None) -> _Array: ...
-    def gap(self) -> None: ...
-    @property
-    def a(self) -> _Array: ...
-    @property
-    def b(self) -> list[_Array]: ...
     @property
     def c(self) -> _Array: ...
+
+@final
+class RecursiveNarx(_RecursiveModel):
+    def __new__(
+        cls,
+        ny: int,
+        nu: int | Sequence[int],
+        nk: int | Sequence[int] = 1,
+        forgetting: float | Forgetting | None = 0.99,
+        *,
+        degree: int = 2,
+        terms: Sequence[Sequence[int]] | None = None,
+        output_offset: float = 0.0,
+        output_scale: float = 1.0,
+        input_offsets: ArrayLike | None = None,
+        input_scales: ArrayLike | None = None,
+        start: _Start = "standard",
+        blend: int | None = None,
+        parameters: ArrayLike | None = None,
+        covariance: ArrayLike | None = None,
+        dead_zone: float = 0.0,
+        limits: Sequence[tuple[float, float] | None] | None = None,
+    ) -> RecursiveNarx: ...
+    @staticmethod
+    def from_model(model: _FittedModel, forgetting: float | Forgetting | None = 0.99) -> RecursiveNarx: ...
     @property
-    def constant(self) -> float | None: ...
-    @property
-    def parameters(self) -> _Array: ...
-    @property
-    def covariance(self) -> _Array: ...
-    @property
-    def parameter_covariance(self) -> _Array | None: ...
-    @property
-    def standard_errors(self) -> _Array | None: ...
-    @property
-    def noise_variance(self) -> float | None: ...
-    @property
-    def excitation(self) -> float: ...
-    @property
-    def forgetting(self) -> Forgetting: ...
-    @property
-    def limits(self) -> list[tuple[float, float]] | None: ...
-    @property
-    def adapting(self) -> bool: ...
-    @adapting.setter
-    def adapting(self, value: bool, /) -> None: ...
+    def terms(self) -> list[list[int]]: ...
+    def output_at(self, regressors: ArrayLike) -> float: ...
+    def slopes_at(self, regressors: ArrayLike) -> _Array: ...
 
 @final
 class RecursiveTrajectory:

@@ -186,13 +186,13 @@ class TrackTrajectory:
 
 
 class Tracker:
-    """An ARX or ARMAX model that is estimated while the plant runs: what ``thetahat track`` does.
+    """An ARX, ARMAX or nonlinear ARX model that is estimated while the plant runs: what ``thetahat track`` does.
 
     ::
 
-        A(q) y(k) = sum_j B_j(q) u_j(k) + constant + C(q) e(k)
+        A(q) y(k) = sum_j B_j(q) u_j(k) + constant + C(q) e(k),   or   y(k) = g(past outputs and inputs) + e(k)
 
-    It is a `RecursiveArx` or a `RecursiveArmax` with what a log needs: channels with names and offsets, scales that are found in
+    It is a `RecursiveArx`, a `RecursiveArmax` or a `RecursiveNarx` with what a log needs: channels with names and offsets, scales that are found in
     the first rows, gaps of the clock, predictions and forecasts, figures, detection of changes, a start from a fitted model, and a
     state that is kept in a file.
 
@@ -207,7 +207,15 @@ class Tracker:
     nk : int or sequence of int, default 1
         Samples from input to first effect, one value for each input or one for all.
     warm : Model, optional
-        Start from a fit instead: its orders, parameters, covariance, noise and offsets.
+        Start from a fit instead: its orders or functions, parameters, covariance, noise and offsets.
+    narx : {"poly"}, optional
+        Track a nonlinear model instead: all products of lags up to a degree. Functions that a fit has chosen come with ``warm``.
+    ny : int, default 2
+        With ``narx``: past outputs that are read.
+    nu : int or sequence of int, default 2
+        With ``narx``: values of each input that are read, from ``nk`` on.
+    degree : int, default 2
+        With ``narx``: factors of a product at most.
     inputs : sequence of str, or str, optional
         The channels of the inputs: those of ``warm``; without it u, or u1, u2, … as many as nb has.
     output : str, optional
@@ -279,6 +287,10 @@ class Tracker:
         nk: int | Sequence[int] | None = None,
         *,
         warm: Model | None = None,
+        narx: str | None = None,
+        ny: int | None = None,
+        nu: int | Sequence[int] | None = None,
+        degree: int | None = None,
         inputs: Sequence[str] | str | None = None,
         output: str | None = None,
         offset: Mapping[str, float] | None = None,
@@ -295,19 +307,25 @@ class Tracker:
         from thetahat._model import Model
 
         orders = {"na": na, "nb": nb, "nc": nc, "nk": nk}
+        lags = {"ny": ny, "nu": nu, "degree": degree}
+        for name, value in lags.items():
+            if value is not None and narx is None:
+                raise ValueError(f"{name}: this is for narx='poly'; leave it out")
         named = None if inputs is None else [inputs] if isinstance(inputs, str) else list(inputs)
         if warm is not None:
             if not isinstance(warm, Model):
                 raise TypeError(f"warm: expected a Model, found {type(warm).__name__}")
-            for name, order in orders.items():
+            for name, order in {**orders, "narx": narx}.items():
                 if order is not None:
                     raise ValueError(f"{name}: the orders are those of warm; leave it out")
             named = warm.inputs if named is None else named
             if len(named) != len(warm.inputs):
                 raise ValueError(f"inputs: expected {len(warm.inputs)} names as warm has inputs, found {len(named)}")
         elif named is None:
-            named = _inputs(nb)
+            named = _inputs(nb if narx is None else 2 if nu is None else nu)
         words = _options.order_words(**orders)
+        if narx is not None:
+            words += [f"--narx={_options.text('narx', narx)}", *_options.order_words(**lags)]
         if not isinstance(constant, bool):
             raise TypeError(f"constant: expected True or False, found {constant!r}")
         words += ["--constant"] if constant else []

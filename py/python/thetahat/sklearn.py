@@ -1,4 +1,4 @@
-"""ARX models as estimators of scikit-learn, for its pipelines, searches and scores.
+"""ARX and nonlinear ARX models as estimators of scikit-learn, for its pipelines, searches and scores.
 
 Rows are samples in the order of time, at equal distances. Whatever splits them has to keep that order and to leave no holes:
 `sklearn.model_selection.TimeSeriesSplit` does, shuffled folds do not.
@@ -23,7 +23,7 @@ except ImportError as error:
     )
     raise ImportError(message) from error
 
-from thetahat import Log, Model, _numbers, arx
+from thetahat import Log, Model, NarxOptions, _numbers, arx, narx
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from thetahat._options import Band, Bound, Rows
 
-__all__ = ["EXPECTED_FAILED_CHECKS", "ARXRegressor"]
+__all__ = ["EXPECTED_FAILED_CHECKS", "ARXRegressor", "NARXRegressor"]
 
 EXPECTED_FAILED_CHECKS = {
     "check_methods_sample_order_invariance": "rows are in the order of time",
@@ -64,7 +64,159 @@ _OPTIONS = (
 
 
 # Without stubs of scikit-learn its classes are Any to mypy.
-class ARXRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
+class _Regressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
+    """What the regressors have in common: predictions of a fitted model, and the log of an array."""
+
+    horizon: int | None
+    sample_time: float
+    model_: Model
+
+    def predict(self, X: ArrayLike | None, y: ArrayLike | None = None) -> NDArray[np.float64]:
+        """Predict the output.
+
+        Without a horizon this is the free run: the model is driven by the inputs alone and begins at rest, all deviations zero
+        before the first row. What the system did before is not known to it, so that it needs some rows to come close.
+
+        Parameters
+        ----------
+        X : array_like of shape (n_samples, n_inputs), or None
+            The inputs in the order of time; None for a time series.
+        y : array_like of shape (n_samples,), optional
+            The measured output, of which a prediction with a horizon sees what is that far back. Not read without a horizon,
+            but for its length where there are no inputs.
+
+        Returns
+        -------
+        ndarray of shape (n_samples,)
+            With a horizon, NaN where too little is known to predict from, as in the first rows.
+
+        Raises
+        ------
+        ValueError
+            If there is a horizon and no y, or neither X nor y, or X does not have the inputs of the fit.
+        sklearn.exceptions.NotFittedError
+            If there is no model yet.
+        """
+        check_is_fitted(self)
+        self._check_horizon()
+        inputs = self._inputs(X, reset=False)
+        if self.horizon is None and inputs is not None and self.model_.inputs:
+            return np.asarray(self.model_.simulate(inputs, initial="zero"), dtype=np.float64)
+        if self.horizon is None:
+            if inputs is None and y is None:
+                raise ValueError("y: without inputs it says how many samples to predict; give predict(None, y)")
+            count = len(self._output(y, None) if inputs is None else inputs)
+            level, slope = self.model_.offsets[self.model_.output]
+            return np.asarray(level + slope * self.sample_time * np.arange(count), dtype=np.float64)
+        if y is None:
+            message = (
+                f"y: a prediction {self.horizon} samples ahead starts from measured outputs; give predict(X, y), "
+                "or horizon=None for a free run, which needs none"
+            )
+            raise ValueError(message)
+        log = self._log(inputs, self._output(y, inputs))
+        return np.asarray(self.model_.predict(log, horizon=int(self.horizon)), dtype=np.float64)
+
+    def score(self, X: ArrayLike | None, y: ArrayLike, sample_weight: ArrayLike | None = None) -> float:
+        """The coefficient of determination, R^2, of `predict(X, y)`.
+
+        Parameters
+        ----------
+        X : array_like of shape (n_samples, n_inputs), or None
+            The inputs in the order of time; None for a time series.
+        y : array_like of shape (n_samples,)
+            The measured output.
+        sample_weight : array_like of shape (n_samples,), optional
+            What each sample counts.
+
+        Returns
+        -------
+        float
+            1 - sum (y - y^)^2 / sum (y - mean y)^2 over the samples that have a prediction and a measured output.
+
+        Raises
+        ------
+        ValueError
+            As for `predict`, or if there are not two such samples.
+        """
+        predicted = self.predict(X, y)
+        measured = self._output(y, predicted)
+        known = ~(np.isnan(predicted) | np.isnan(measured))
+        if np.count_nonzero(known) < 2:
+            message = (
+                f"score: of {len(known)} samples {np.count_nonzero(known)} have a prediction and a measured output, "
+                "and R^2 needs two; give more rows"
+            )
+            raise ValueError(message)
+        weights = None if sample_weight is None else np.asarray(sample_weight)[known]
+        return float(r2_score(measured[known], predicted[known], sample_weight=weights))
+
+    def __sklearn_tags__(self) -> Any:
+        tags = super().__sklearn_tags__()
+        # Of rows without an order in time there is nothing to learn.
+        tags.regressor_tags.poor_score = True
+        return tags
+
+    def _check_horizon(self) -> None:
+        horizon = self.horizon
+        if horizon is not None and not (isinstance(horizon, numbers.Integral) and horizon >= 1):
+            message = f"horizon: expected a whole number of samples from 1 on, or None, found {horizon!r}"
+            raise ValueError(message)
+
+    def _inputs(self, X: ArrayLike | None, *, reset: bool) -> NDArray[np.float64] | None:
+        if X is None and reset:
+            self.n_features_in_ = 0
+            # Names of an earlier fit go with its inputs.
+            if hasattr(self, "feature_names_in_"):
+                del self.feature_names_in_
+        if X is None:
+            if self.n_features_in_ > 0:
+                raise ValueError(f"X: expected {self.n_features_in_} inputs, as in the fit, found None")
+            return None
+        # scikit-learn reads what lies behind a mask.
+        inputs: NDArray[np.float64] = validate_data(
+            self,
+            _numbers.array("X", X) if isinstance(X, np.ma.MaskedArray) else X,
+            reset=reset,
+            dtype=np.float64,
+            ensure_min_samples=2 if reset else 1,
+        )
+        return inputs
+
+    def _output(self, y: ArrayLike | None, beside: NDArray[np.float64] | None) -> NDArray[np.float64]:
+        if y is None:
+            message = f"y: {type(self).__name__} requires y to be passed, but the target y is None"
+            raise ValueError(message)
+        checked = check_array(
+            _numbers.array("y", y),
+            dtype=np.float64,
+            ensure_all_finite="allow-nan",
+            ensure_2d=False,
+            input_name="y",
+            estimator=self,
+        )
+        output: NDArray[np.float64] = column_or_1d(checked, warn=True)
+        if beside is not None:
+            check_consistent_length(beside, output)
+        return output
+
+    def _log(self, inputs: NDArray[np.float64] | None, output: NDArray[np.float64]) -> Log:
+        names = getattr(self, "feature_names_in_", None)
+        taken = [] if names is None else [str(name) for name in names]
+        # No input may have the output's name.
+        output_name = "y"
+        while output_name in taken:
+            output_name += "_"
+        return Log(
+            output,
+            inputs,
+            sample_time=self.sample_time,
+            input_names=taken or None,
+            output_name=output_name,
+        )
+
+
+class ARXRegressor(_Regressor):
     """An ARX model, A(q) y(t) = sum_j B_j(q) u_j(t - nk_j) + e(t), by least squares.
 
     Parameters
@@ -195,153 +347,139 @@ class ARXRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         log = self._log(inputs, self._output(y, inputs))
         orders = {"nb": 0} if inputs is None else {"nb": _orders(self.nb), "nk": _orders(self.nk)}
         options: Any = {name: getattr(self, name) for name in _OPTIONS}
-        self.model_: Model = arx(log, na=self.na, **orders, **options)
+        self.model_ = arx(log, na=self.na, **orders, **options)
         self.coef_: NDArray[np.float64] = np.asarray(self.model_.parameters, dtype=np.float64)
         return self
 
-    def predict(self, X: ArrayLike | None, y: ArrayLike | None = None) -> NDArray[np.float64]:
-        """Predict the output.
 
-        Without a horizon this is the free run: the model is driven by the inputs alone and begins at rest, all deviations zero
-        before the first row. What the system did before is not known to it, so that it needs some rows to come close.
+class NARXRegressor(_Regressor):
+    """A nonlinear ARX model, y(k) = g(past outputs and inputs) + e(k), with functions that forward regression chooses.
 
-        Parameters
-        ----------
-        X : array_like of shape (n_samples, n_inputs), or None
-            The inputs in the order of time; None for a time series.
-        y : array_like of shape (n_samples,), optional
-            The measured output, of which a prediction with a horizon sees what is that far back. Not read without a horizon,
-            but for its length where there are no inputs.
+    Parameters
+    ----------
+    map : {"poly", "rbf"}, default="poly"
+        Products of the regressors, or radial basis functions.
+    ny : int, default=2
+        Past outputs that g reads.
+    nu : int or sequence of int, default=2
+        Values of each input that g reads, for all inputs or one for each.
+    nk : int or sequence of int, default=1
+        Samples from an input's change to its first effect, for all inputs or one for each.
+    horizon : int or None, default=None
+        How many samples ahead `predict` and `score` predict. None: the free run, which sees no outputs.
+    sample_time : float, default=1.0
+        Seconds from one sample to the next.
+    degree, terms, most_terms, centres, width, linear, select, ridge, raw_terms, seed, estimate, validate, split, detrend, offset : \
+default=None
+        Which functions, what to fit to and how, as for `thetahat.narx`, see `thetahat.NarxOptions`. Channels are called as the columns
+        of a data frame, else u, or u1, u2, …, and y.
 
-        Returns
-        -------
-        ndarray of shape (n_samples,)
-            With a horizon, NaN where too little is known to predict from, as in the first rows.
+    Attributes
+    ----------
+    model_ : thetahat.Model
+        The fitted model.
+    coef_ : ndarray of shape (n_parameters,)
+        Its parameters, in the order of ``model_.parameter_names``.
+    n_features_in_ : int
+        The number of inputs.
+    feature_names_in_ : ndarray of shape (n_features_in_,)
+        The inputs' names, where X was a dataframe with names that are text.
 
-        Raises
-        ------
-        ValueError
-            If there is a horizon and no y, or neither X nor y, or X does not have the inputs of the fit.
-        sklearn.exceptions.NotFittedError
-            If there is no model yet.
-        """
-        check_is_fitted(self)
-        self._check_horizon()
-        inputs = self._inputs(X, reset=False)
-        if self.horizon is None and inputs is not None and self.model_.inputs:
-            return np.asarray(self.model_.simulate(inputs, initial="zero"), dtype=np.float64)
-        if self.horizon is None:
-            if inputs is None and y is None:
-                raise ValueError("y: without inputs it says how many samples to predict; give predict(None, y)")
-            count = len(self._output(y, None) if inputs is None else inputs)
-            level, slope = self.model_.offsets[self.model_.output]
-            return np.asarray(level + slope * self.sample_time * np.arange(count), dtype=np.float64)
-        if y is None:
-            message = (
-                f"y: a prediction {self.horizon} samples ahead starts from measured outputs; give predict(X, y), "
-                "or horizon=None for a free run, which needs none"
-            )
-            raise ValueError(message)
-        log = self._log(inputs, self._output(y, inputs))
-        return np.asarray(self.model_.predict(log, horizon=int(self.horizon)), dtype=np.float64)
+    Notes
+    -----
+    As for `ARXRegressor`. Where a choice is made by scikit-learn, as by `GridSearchCV` over ``terms``, give ``terms``: without it the
+    model makes its own choice in each fit.
 
-    def score(self, X: ArrayLike | None, y: ArrayLike, sample_weight: ArrayLike | None = None) -> float:
-        """The coefficient of determination, R^2, of `predict(X, y)`.
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thetahat.sklearn import NARXRegressor
+    >>> u = np.random.default_rng(1).uniform(-1, 1, (500, 1))
+    >>> y = np.zeros(500)
+    >>> for t in range(1, 500):
+    ...     y[t] = 0.5 * y[t - 1] + u[t - 1, 0] + 0.3 * u[t - 1, 0] ** 2
+    >>> regressor = NARXRegressor(ny=1, nu=1).fit(u, y)
+    >>> bool(regressor.score(u, y) > 0.99)
+    True
+    """
+
+    def __init__(
+        self,
+        map: str = "poly",
+        ny: int = 2,
+        nu: int | Sequence[int] = 2,
+        nk: int | Sequence[int] = 1,
+        *,
+        horizon: int | None = None,
+        sample_time: float = 1.0,
+        degree: int | None = None,
+        terms: int | None = None,
+        most_terms: int | None = None,
+        centres: str | None = None,
+        width: float | None = None,
+        linear: bool | None = None,
+        select: str | None = None,
+        ridge: float | None = None,
+        raw_terms: bool | None = None,
+        seed: int | None = None,
+        estimate: Rows | None = None,
+        validate: Rows | None = None,
+        split: tuple[float, float, float] | None = None,
+        detrend: str | None = None,
+        offset: Mapping[str, float] | None = None,
+    ) -> None:
+        self.map = map
+        self.ny = ny
+        self.nu = nu
+        self.nk = nk
+        self.horizon = horizon
+        self.sample_time = sample_time
+        self.degree = degree
+        self.terms = terms
+        self.most_terms = most_terms
+        self.centres = centres
+        self.width = width
+        self.linear = linear
+        self.select = select
+        self.ridge = ridge
+        self.raw_terms = raw_terms
+        self.seed = seed
+        self.estimate = estimate
+        self.validate = validate
+        self.split = split
+        self.detrend = detrend
+        self.offset = offset
+
+    def fit(self, X: ArrayLike | None, y: ArrayLike) -> NARXRegressor:
+        """Estimate the model.
 
         Parameters
         ----------
         X : array_like of shape (n_samples, n_inputs), or None
             The inputs in the order of time; None for a time series.
         y : array_like of shape (n_samples,)
-            The measured output.
-        sample_weight : array_like of shape (n_samples,), optional
-            What each sample counts.
+            The output.
 
         Returns
         -------
-        float
-            1 - sum (y - y^)^2 / sum (y - mean y)^2 over the samples that have a prediction and a measured output.
+        NARXRegressor
+            This one, fitted.
 
         Raises
         ------
         ValueError
-            As for `predict`, or if there are not two such samples.
+            If X or y does not have its shape, or a parameter is out of its range.
+        thetahat.EstimationError
+            If the data do not determine the model.
         """
-        predicted = self.predict(X, y)
-        measured = self._output(y, predicted)
-        known = ~(np.isnan(predicted) | np.isnan(measured))
-        if np.count_nonzero(known) < 2:
-            message = (
-                f"score: of {len(known)} samples {np.count_nonzero(known)} have a prediction and a measured output, "
-                "and R^2 needs two; give more rows"
-            )
-            raise ValueError(message)
-        weights = None if sample_weight is None else np.asarray(sample_weight)[known]
-        return float(r2_score(measured[known], predicted[known], sample_weight=weights))
-
-    def __sklearn_tags__(self) -> Any:
-        tags = super().__sklearn_tags__()
-        # Of rows without an order in time there is nothing to learn.
-        tags.regressor_tags.poor_score = True
-        return tags
-
-    def _check_horizon(self) -> None:
-        horizon = self.horizon
-        if horizon is not None and not (isinstance(horizon, numbers.Integral) and horizon >= 1):
-            message = f"horizon: expected a whole number of samples from 1 on, or None, found {horizon!r}"
-            raise ValueError(message)
-
-    def _inputs(self, X: ArrayLike | None, *, reset: bool) -> NDArray[np.float64] | None:
-        if X is None and reset:
-            self.n_features_in_ = 0
-            # Names of an earlier fit go with its inputs.
-            if hasattr(self, "feature_names_in_"):
-                del self.feature_names_in_
-        if X is None:
-            if self.n_features_in_ > 0:
-                raise ValueError(f"X: expected {self.n_features_in_} inputs, as in the fit, found None")
-            return None
-        # scikit-learn reads what lies behind a mask.
-        inputs: NDArray[np.float64] = validate_data(
-            self,
-            _numbers.array("X", X) if isinstance(X, np.ma.MaskedArray) else X,
-            reset=reset,
-            dtype=np.float64,
-            ensure_min_samples=2 if reset else 1,
-        )
-        return inputs
-
-    def _output(self, y: ArrayLike | None, beside: NDArray[np.float64] | None) -> NDArray[np.float64]:
-        if y is None:
-            message = "y: ARXRegressor requires y to be passed, but the target y is None"
-            raise ValueError(message)
-        checked = check_array(
-            _numbers.array("y", y),
-            dtype=np.float64,
-            ensure_all_finite="allow-nan",
-            ensure_2d=False,
-            input_name="y",
-            estimator=self,
-        )
-        output: NDArray[np.float64] = column_or_1d(checked, warn=True)
-        if beside is not None:
-            check_consistent_length(beside, output)
-        return output
-
-    def _log(self, inputs: NDArray[np.float64] | None, output: NDArray[np.float64]) -> Log:
-        names = getattr(self, "feature_names_in_", None)
-        taken = [] if names is None else [str(name) for name in names]
-        # No input may have the output's name.
-        output_name = "y"
-        while output_name in taken:
-            output_name += "_"
-        return Log(
-            output,
-            inputs,
-            sample_time=self.sample_time,
-            input_names=taken or None,
-            output_name=output_name,
-        )
+        self._check_horizon()
+        inputs = self._inputs(X, reset=True)
+        log = self._log(inputs, self._output(y, inputs))
+        lags: Any = {"nu": 0} if inputs is None else {"nu": _orders(self.nu), "nk": _orders(self.nk)}
+        options: Any = {name: getattr(self, name) for name in NarxOptions.__annotations__}
+        self.model_ = narx(log, self.map, ny=int(self.ny), **lags, **options)
+        self.coef_: NDArray[np.float64] = np.asarray(self.model_.parameters, dtype=np.float64)
+        return self
 
 
 def _orders(orders: int | Sequence[int]) -> int | list[int]:

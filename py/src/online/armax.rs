@@ -1,50 +1,16 @@
 //! A recursive ARMAX estimator.
 
-use numpy::{PyArray1, PyArray2};
+use numpy::PyArray1;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use serde::{Deserialize, Serialize};
-use thetahat_core::nalgebra::{Const, Dyn};
-use thetahat_core::{
-    ArmaxMethod, ArmaxOrders, Error, Innovation as StepInnovation, RecursiveArmax as Stepper,
-    RecursiveLeastSquares as LeastSquares,
+use thetahat_core::{ArmaxMethod, ArmaxOrders};
+
+use super::argument::{Whole, failed};
+use super::forgetting::{Memory, STANDARD};
+use super::recursive;
+use super::recursive_model::{
+    Armax, Beginnings, RecursiveModel, RecursivePolynomials, Stepper, orders, scales,
 };
-
-use super::argument::{self, Rows, Whole, failed, room};
-use super::arx::{check_inputs, future, orders, scales};
-use super::forgetting::{Forgetting, Memory, STANDARD};
-use super::innovation::{Innovation, list};
-use super::limits::Limits;
-use super::recursive::{self, Around, RecursiveTrajectory};
-use super::{Reduced, snapshot};
-use crate::array;
-
-/// The stepper, and how many inputs it has.
-#[derive(Clone, Serialize, Deserialize)]
-pub(crate) struct Engine {
-    stepper: Stepper<f64, Dyn, Dyn>,
-    inputs: usize,
-    /// One for each parameter but those of C, or none at all.
-    limits: Limits,
-}
-
-impl Engine {
-    fn measured(&mut self, output: f64) -> Result<StepInnovation<f64>, Error> {
-        let innovation = self.stepper.measured(output)?;
-        self.limits.after(innovation, |limits| self.stepper.keep_within(limits))
-    }
-
-    fn log_row(&mut self, output: f64, inputs: &[f64]) -> Result<StepInnovation<f64>, Error> {
-        let innovation = self.stepper.log_row(output, inputs)?;
-        self.limits.after(innovation, |limits| self.stepper.keep_within(limits))
-    }
-}
-
-impl Around<Dyn, Const<1>> for Engine {
-    fn estimator(&self) -> &LeastSquares<f64, Dyn> {
-        self.stepper.estimator()
-    }
-}
 
 /// An ARMAX model, estimated while the plant runs.
 ///
@@ -110,25 +76,13 @@ impl Around<Dyn, Const<1>> for Engine {
 /// >>> trajectory = series.run(y)
 /// >>> bool(abs(series.c[1] - 0.6) < 0.03)
 /// True
-#[pyclass(module = "thetahat")]
-pub(crate) struct RecursiveArmax {
-    engine: Engine,
-    inputs: Vec<f64>,
-}
+#[pyclass(module = "thetahat", extends = RecursivePolynomials)]
+pub(crate) struct RecursiveArmax;
 
 impl RecursiveArmax {
-    pub(crate) fn of(engine: Engine) -> Self {
-        RecursiveArmax { inputs: vec![0.0; engine.inputs], engine }
-    }
-
-    /// What was read back, checked.
-    pub(crate) fn restore(engine: Engine) -> PyResult<Self> {
-        check_inputs(engine.inputs, |input| engine.stepper.b(input).is_some())?;
-        Ok(Self::of(engine))
-    }
-
-    fn estimator(&self) -> &LeastSquares<f64, Dyn> {
-        self.engine.stepper.estimator()
+    /// The object around what all have in common.
+    pub(super) fn over(model: RecursiveModel) -> PyClassInitializer<Self> {
+        PyClassInitializer::from(model).add_subclass(RecursivePolynomials).add_subclass(Self)
     }
 }
 
@@ -158,7 +112,7 @@ impl RecursiveArmax {
         covariance: Option<&Bound<'_, PyAny>>,
         dead_zone: f64,
         limits: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<Self> {
+    ) -> PyResult<PyClassInitializer<Self>> {
         let one = 1_u8.into_pyobject(py)?.into_any();
         let (others, inputs) = orders(&[("na", na), ("nc", nc)], nb, nk.unwrap_or(&one))?;
         let each = |place: usize| others.get(place).copied().unwrap_or_default();
@@ -173,271 +127,20 @@ impl RecursiveArmax {
                 )));
             }
         };
-        let say = |error| failed(py, error);
-        let n = orders.parameters();
-        let mut stepper = Stepper::new(&orders, method, output_scale, &scales, noise_scale, forgetting.0)
+        let stepper = Armax::new(&orders, method, output_scale, &scales, noise_scale, forgetting.0)
             .and_then(|stepper| stepper.with_dead_zone(dead_zone))
-            .map_err(say)?;
-        if let Some(parameters) = parameters {
-            let parameters = array::finite_vector("parameters", parameters, Some(n))?;
-            stepper = stepper.with_parameters(parameters).map_err(say)?;
-        }
-        if let Some(covariance) = covariance {
-            let covariance = argument::covariance("covariance", covariance, Some(n))?;
-            stepper = stepper.with_covariance(covariance).map_err(say)?;
-        }
-        let limits = Limits::new(limits, n - each(1))?;
-        if !limits.ranges().is_empty() {
-            stepper.keep_within(limits.ranges()).map_err(say)?;
-        }
-        Ok(RecursiveArmax::of(Engine { stepper, inputs: inputs.len(), limits }))
-    }
-
-    /// y(k) arrives: time goes on to k, and the model learns from y(k) and the inputs that were `applied` before.
-    ///
-    /// A controller writes `measured(y)`, computes its input, and writes `applied(u)`, in the order in which things
-    /// happen. A call that is left out is a missing sample: time goes on all the same.
-    ///
-    /// Parameters
-    /// ----------
-    /// y : float
-    ///     The output. NaN is a missing sample.
-    ///
-    /// Returns
-    /// -------
-    /// Innovation
-    ///     What was not predicted, and what was done.
-    ///
-    /// Raises
-    /// ------
-    /// ValueError
-    ///     If a number is infinite or too large, or an input acts on the output of its own sample (nk = 0): `log_row` takes
-    ///     that. Nothing has changed then, time included.
-    fn measured(&mut self, py: Python<'_>, y: &Bound<'_, PyAny>) -> PyResult<Innovation> {
-        let output = argument::number("y", y)?;
-        let innovation = self.engine.measured(output).map_err(|error| failed(py, error))?;
-        Ok(innovation.into())
-    }
-
-    /// u(k): what acts on the plant from now on, until the next measurement.
-    ///
-    /// Parameters
-    /// ----------
-    /// u : float, or array_like with one number for each input
-    ///     The inputs, as the plant got them, so after all limits. NaN is a missing sample.
-    ///
-    /// Raises
-    /// ------
-    /// ValueError
-    ///     If a shape is wrong, a number infinite or too large. Nothing has changed then.
-    fn applied(&mut self, py: Python<'_>, u: &Bound<'_, PyAny>) -> PyResult<()> {
-        argument::sample("u", u, self.engine.inputs, &mut self.inputs)?;
-        self.engine.stepper.applied(&self.inputs).map_err(|error| failed(py, error))
-    }
-
-    /// Take one row of a log: y(k) and u(k), recorded at the same instant.
-    ///
-    /// It is `measured(y)` and then `applied(u)`, to the bit, where every nk is at least 1; with nk = 0 it is the call
-    /// that there is. It is not the one for a controller that knows u(k-1) when y(k) arrives.
-    ///
-    /// Parameters
-    /// ----------
-    /// y : float
-    ///     The output. NaN is a missing sample.
-    /// u : float, or array_like with one number for each input; None without input
-    ///     The inputs. NaN is a missing sample.
-    ///
-    /// Returns
-    /// -------
-    /// Innovation
-    ///     What was not predicted, and what was done.
-    ///
-    /// Raises
-    /// ------
-    /// ValueError
-    ///     If a shape is wrong, a number infinite or too large. Nothing has changed then, time included.
-    #[pyo3(signature = (y, *, u = None))]
-    fn log_row(
-        &mut self,
-        py: Python<'_>,
-        y: &Bound<'_, PyAny>,
-        u: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<Innovation> {
-        let none = py.None().into_bound(py);
-        argument::sample("u", u.unwrap_or(&none), self.engine.inputs, &mut self.inputs)?;
-        let output = argument::number("y", y)?;
-        let innovation = self.engine.log_row(output, &self.inputs).map_err(|error| failed(py, error))?;
-        Ok(innovation.into())
-    }
-
-    /// Take many rows of a log: the same as `log_row` in a loop, to the bit.
-    ///
-    /// The interpreter lock is released meanwhile.
-    ///
-    /// Parameters
-    /// ----------
-    /// y : array_like, shape (N,)
-    ///     The outputs.
-    /// u : array_like, shape (N,) for one input, or (N, inputs); None without input
-    ///     The inputs, recorded at the same instants.
-    ///
-    /// Returns
-    /// -------
-    /// RecursiveTrajectory
-    ///     Parameters and innovations, row by row.
-    ///
-    /// Raises
-    /// ------
-    /// ValueError
-    ///     As for `log_row`; the message names the row, from 0. Nothing has changed then.
-    #[pyo3(signature = (y, *, u = None))]
-    fn run(
-        &mut self,
-        py: Python<'_>,
-        y: &Bound<'_, PyAny>,
-        u: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<RecursiveTrajectory> {
-        let outputs = array::vector("y", y, None)?;
-        let outputs = outputs.as_slice()?;
-        let (rows, columns) = (outputs.len(), self.engine.inputs);
-        let inputs = Rows::new("u", u, Some(rows), columns)?;
-        let inputs = inputs.as_slice()?;
-        let (engine, shape) = (self.engine.clone(), [rows, self.estimator().parameters().len(), 1]);
-        let (engine, trajectory) = recursive::run(py, shape, |record| {
-            record.run(engine, rows, |engine, row, record| {
-                let output = outputs.get(row).copied().unwrap_or(f64::NAN);
-                record.take(&engine.log_row(output, argument::row(inputs, row, columns))?);
-                Ok(())
-            })
-        })?;
-        self.engine = engine;
-        Ok(trajectory)
-    }
-
-    /// Predict the outputs to come, y(k+1), y(k+2), ..., y(k) being the latest one.
-    ///
-    /// Parameters
-    /// ----------
-    /// future_inputs : array_like, shape (steps,) for one input, or (steps, inputs); None without input
-    ///     The inputs to come, as many as outputs. After `measured` of y(k) the first is u(k), which is still to be chosen;
-    ///     after `applied` or `log_row` of u(k) it is u(k+1). (With nk = 1 the last one acts on nothing then, but is there.)
-    /// steps : int, optional
-    ///     How many; it is needed without input only.
-    ///
-    /// Returns
-    /// -------
-    /// ndarray, shape (steps,)
-    ///     The predictions; NaN where one depends on a missing sample.
-    #[pyo3(signature = (future_inputs = None, steps = None))]
-    fn predict<'py>(
-        &self,
-        py: Python<'py>,
-        future_inputs: Option<&Bound<'py, PyAny>>,
-        steps: Option<Whole>,
-    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let (inputs, steps) = future(self.engine.inputs, future_inputs, steps)?;
-        let mut outputs = room(&[steps])?;
-        outputs.resize(steps, 0.0);
-        self.engine.stepper.predict(inputs.as_slice()?, &mut outputs).map_err(|error| failed(py, error))?;
-        Ok(PyArray1::from_vec(py, outputs))
-    }
-
-    /// Tell that an unknown number of samples is missing here.
-    fn gap(&mut self) {
-        self.engine.stepper.gap();
-    }
-
-    /// A(q): 1, a_1 ... a_na.
-    #[getter]
-    fn a<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        recursive::coefficients(py, self.engine.stepper.a())
-    }
-
-    /// B(q) of each input, so that the i-th number multiplies q^-i: nk zeros, then b_0 ... b_(nb-1).
-    #[getter]
-    fn b<'py>(&self, py: Python<'py>) -> Vec<Bound<'py, PyArray1<f64>>> {
-        let each = (0..self.engine.inputs).filter_map(|input| self.engine.stepper.b(input));
-        each.map(|coefficients| recursive::coefficients(py, coefficients)).collect()
+            .map_err(|error| failed(py, error))?;
+        let limited = orders.parameters() - orders.nc;
+        let given = Beginnings { parameters, covariance, limits, limited };
+        RecursiveModel::new(py, Stepper::Armax(stepper), inputs.len(), &given).map(Self::over)
     }
 
     /// C(q): 1, c_1 ... c_nc.
     #[getter]
-    fn c<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        recursive::coefficients(py, self.engine.stepper.c())
-    }
-
-    /// The constant; None if the model has none.
-    #[getter]
-    fn constant(&self) -> Option<f64> {
-        self.engine.stepper.constant()
-    }
-
-    /// The parameters, shape (n,), in the order of the regressor.
-    #[getter]
-    fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        recursive::parameters(py, self.estimator())
-    }
-
-    /// P, shape (n, n): the covariance of the parameters in units of the noise variance.
-    #[getter]
-    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        recursive::covariance(py, self.estimator())
-    }
-
-    /// The covariance of the parameters, shape (n, n); None until the noise variance is known.
-    #[getter]
-    fn parameter_covariance<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
-        recursive::parameter_covariance(py, self.estimator())
-    }
-
-    /// The standard errors, shape (n,); None until the noise variance is known.
-    #[getter]
-    fn standard_errors<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
-        recursive::standard_errors(py, self.estimator())
-    }
-
-    /// The variance of the noise; None until enough samples are in.
-    #[getter]
-    fn noise_variance(&self) -> Option<f64> {
-        self.estimator().noise_variance()
-    }
-
-    /// How much the samples in the memory tell of the parameter they tell least of, 0 to 1.
-    #[getter]
-    fn excitation(&self) -> f64 {
-        self.estimator().excitation()
-    }
-
-    /// The forgetting policy.
-    #[getter]
-    fn forgetting(&self) -> Forgetting {
-        Forgetting { policy: self.estimator().forgetting() }
-    }
-
-    /// The limits of the parameters, a pair (lower, upper) each; None if there are none.
-    #[getter]
-    fn limits(&self) -> Option<Vec<(f64, f64)>> {
-        self.engine.limits.pairs()
-    }
-
-    /// Whether samples correct the estimate. Set it to turn that off and on; samples are taken in all the same.
-    #[getter]
-    fn adapting(&self) -> bool {
-        self.estimator().is_adapting()
-    }
-
-    #[setter]
-    fn set_adapting(&mut self, adapting: bool) {
-        self.engine.stepper.set_adaptation(adapting);
-    }
-
-    fn __repr__(&self) -> String {
-        let (n, inputs) = (self.estimator().parameters().len(), self.engine.inputs);
-        let parameters = list(self.estimator().parameters().as_slice());
-        format!("RecursiveArmax(n={n}, inputs={inputs}, parameters={parameters})")
-    }
-
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py>> {
-        snapshot(py, "RecursiveArmax", &self.engine)
+    fn c<'py>(model: PyRef<'py, Self>, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        match &model.as_super().as_super().engine.stepper {
+            Stepper::Armax(stepper) => recursive::coefficients(py, stepper.c()),
+            Stepper::Arx(_) | Stepper::Narx(_) => recursive::coefficients(py, std::iter::empty()),
+        }
     }
 }

@@ -4,12 +4,13 @@
 //! firmware.
 //!
 //! To add an estimator, implement [`Scenario`] for it in a file of this folder, name it in [`visit_all`], and
-//! give it a row in `budgets.md`. Leave out what needs ln, exp, sin or cos: their last bit differs
-//! between the host's library and the firmware's.
+//! give it a row in `budgets.md`. Leave out what needs ln, sin or cos: their last bit differs
+//! between the host's library and the firmware's. (The exponential of radial functions is the same on both.)
 
 mod detect;
 mod kalman;
 mod least_squares;
+mod nonlinear;
 mod record;
 mod recursive;
 
@@ -70,6 +71,8 @@ pub fn visit_all(visitor: &mut impl Visitor) {
     visitor.visit::<recursive::Recursive<16>>();
     visitor.visit::<recursive::Arx>();
     visitor.visit::<recursive::Armax>();
+    visitor.visit::<nonlinear::Narx>();
+    visitor.visit::<nonlinear::Stored>();
     visitor.visit::<detect::Detector>();
     visitor.visit::<kalman::Kalman<2, 1>>();
     visitor.visit::<kalman::Kalman<4, 2>>();

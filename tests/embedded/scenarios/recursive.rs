@@ -107,7 +107,7 @@ impl Scenario for Armax {
     }
 }
 
-fn recursive_numbers<const N: usize>(
+pub(crate) fn recursive_numbers<const N: usize>(
     estimator: &RecursiveLeastSquares<f32, Const<N>>,
     innovation: &Innovation<f32>,
     mut number: &mut impl FnMut(f32),

@@ -1,15 +1,18 @@
 //! Nonlinear ARX models: y(t) = g(phi(t)) + e(t).
 
+mod functions;
 mod map;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use functions::Functions;
 pub(crate) use map::Evaluator;
 pub use map::Map;
 
 use super::fitted::{only, only_variance};
-use super::{Parameter, Signal, is_covariance};
+use super::orders::lag_name;
+use super::{Orders, Parameter, Signal, is_covariance};
 use crate::Error;
 
 /// A nonlinear ARX model with one output:
@@ -67,10 +70,7 @@ pub struct Regressor {
 impl Regressor {
     /// Such as y(k-1), or u(k) without a lag.
     pub fn name(&self) -> String {
-        match self.lag {
-            0 => format!("{}(k)", self.channel),
-            lag => format!("{}(k-{lag})", self.channel),
-        }
+        lag_name(&self.channel, self.lag)
     }
 }
 
@@ -81,6 +81,32 @@ impl NonlinearArxModel {
             self.inputs.iter().position(|input| input.name == regressor.channel).map_or(0, |input| input + 1)
         };
         self.regressors.iter().map(place).collect()
+    }
+
+    /// Its lags as the orders of an ARX model: na of the output, and nb of each input from nk on.
+    ///
+    /// # Errors
+    /// [`Error::Report`] where regressors are not lags in a row, each channel with one scale, as those of every fit are.
+    pub fn lag_orders(&self) -> Result<Orders, Error> {
+        let sources = self.sources();
+        let of = |source: usize| {
+            let own = sources.iter().zip(&self.regressors).filter(move |(other, _)| **other == source);
+            own.map(|(_, regressor)| (regressor.lag, regressor.scale)).collect::<Vec<(usize, f64)>>()
+        };
+        let channels: Vec<Vec<(usize, f64)>> = (0..=self.inputs.len()).map(of).collect();
+        let firsts: Vec<usize> =
+            channels.iter().map(|lags| lags.first().map_or(1, |(first, _)| *first)).collect();
+        let in_a_row = |(lags, first): (&Vec<(usize, f64)>, &usize)| {
+            lags.iter().enumerate().all(|(at, (lag, scale))| *lag == first + at && *scale == lags[0].1)
+        };
+        let of_output = channels[0].iter().all(|(_, scale)| *scale == self.output_scale) && firsts[0] == 1;
+        if !sources.is_sorted() || !of_output || !channels.iter().zip(&firsts).all(in_a_row) {
+            return Err(Error::report(
+                "the regressors of the report are not lags in a row, each channel with one scale; they cannot be tracked",
+            ));
+        }
+        let counts: Vec<usize> = channels.iter().map(Vec::len).collect();
+        Orders::arx(counts[0], &counts[1..], &firsts[1..])
     }
 
     /// The longest lag of the output; 0 where none is read.
@@ -96,7 +122,7 @@ impl NonlinearArxModel {
 
     /// Such as NARX polynomial of 8 terms.
     pub(crate) fn name(&self) -> String {
-        format!("NARX {}", self.map.describe(self.parameters.len()))
+        self.map.name(self.parameters.len())
     }
 
     /// What only linear models do, asked of this one.

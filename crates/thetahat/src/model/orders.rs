@@ -210,6 +210,15 @@ impl Orders {
         self.na + self.nc + self.nd + self.nb.iter().sum::<usize>() + self.nf.iter().sum::<usize>()
     }
 
+    /// The lags of an ARX regressor by name, those of the output first: y(k-1), u(k-1), …
+    pub fn lag_names(&self, inputs: &[String], output: &str) -> Vec<String> {
+        let mut names: Vec<String> = (1..=self.na).map(|lag| lag_name(output, lag)).collect();
+        for (input, (&nb, &nk)) in inputs.iter().zip(self.nb.iter().zip(&self.nk)) {
+            names.extend((nk..nk + nb).map(|lag| lag_name(input, lag)));
+        }
+        names
+    }
+
     /// The maximum lag of a full ARX regressor: max(na, nb + nk - 1).
     pub fn maximum_lag(&self) -> usize {
         (0..self.inputs()).map(|input| self.maximum_input_lag(input)).fold(self.na, usize::max)
@@ -305,6 +314,11 @@ impl fmt::Display for Orders {
         }
         f.write_str(&written)
     }
+}
+
+/// Such as y(k-1), or u(k) without a lag.
+pub(super) fn lag_name(channel: &str, lag: usize) -> String {
+    if lag == 0 { format!("{channel}(k)") } else { format!("{channel}(k-{lag})") }
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Tracker;
 use crate::Document;
-use crate::model::{Orders, Parameter};
+use crate::model::{Map, Orders, Parameter};
 
 /// What trackers of one log have come to, side by side: the JSON document `thetahat.track/1`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -25,8 +25,11 @@ pub struct TrackSummary {
 pub struct TrackerSummary {
     /// What it forgets, as [`Policy`](crate::track::Policy) is written.
     pub forgetting: String,
-    /// The orders of its model, without the constant.
+    /// The orders of its model, without the constant; of a nonlinear one its lags.
     pub orders: Orders,
+    /// The functions of the lags, in the order of the parameters; none of a linear model.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub map: Option<Map>,
     /// What was taken from the channels: the inputs, then the output.
     pub offsets: Vec<f64>,
     /// The typical magnitudes of the channels, in the same order; none while they were not known.
@@ -62,6 +65,7 @@ impl Tracker {
         TrackerSummary {
             forgetting: self.plan().forgetting.to_string(),
             orders: self.orders().clone(),
+            map: self.map().cloned(),
             offsets: all(&self.offsets().inputs, self.offsets().output),
             scales: self.scales().map(|scales| all(&scales.inputs, scales.output)),
             samples: score.samples(),

@@ -1,6 +1,7 @@
 //! Trackers against the estimators of thetahat-core, against batch fits, and against what they are written to.
 
 mod knowledge;
+mod nonlinear;
 mod plans;
 mod state;
 

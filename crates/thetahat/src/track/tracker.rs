@@ -1,13 +1,14 @@
 use serde::{Deserialize, Serialize};
 use thetahat_core::{Action, Alarm, ChangeDetector, Chart, Innovation, Real};
 
+use super::checks::{check, check_map, refused};
 use super::collecting::{Collecting, LARGEST, SMALLEST};
 use super::estimator::{DelayLines, Estimator};
 use super::plan::{PerChannel, TrackPlan};
 use super::run_length::change_detector;
 use super::score::TrackScore;
 use crate::Error;
-use crate::model::Orders;
+use crate::model::{Map, Orders};
 
 mod snapshot;
 
@@ -40,14 +41,14 @@ pub struct Tracked {
     pub too_large: bool,
 }
 
-/// A model that is estimated while the plant runs: ARX or ARMAX under one forgetting policy.
+/// A model that is estimated while the plant runs: ARX, ARMAX or nonlinear ARX under one forgetting policy.
 ///
 /// ```text
-/// A(q) y(k) = sum_j B_j(q) u_j(k) + constant + C(q) e(k)
+/// A(q) y(k) = sum_j B_j(q) u_j(k) + constant + C(q) e(k),   or   y(k) = g(past outputs and inputs) + e(k)
 /// ```
 ///
-/// It is a [`RecursiveArx`](thetahat_core::RecursiveArx) or a [`RecursiveArmax`](thetahat_core::RecursiveArmax), where
-/// the equations and the sources are, with what a program needs that gets its orders from a person: channels with offsets,
+/// It is a [`RecursiveArx`](thetahat_core::RecursiveArx), a [`RecursiveArmax`](thetahat_core::RecursiveArmax) or a
+/// [`RecursiveNarx`](thetahat_core::RecursiveNarx), where the equations and the sources are, with what a program needs that gets its orders from a person: channels with offsets,
 /// scales that are found, predictions, figures, detection of changes, and a start from the report of a fit. NaN is a
 /// missing sample. Parameters are those of the signals less their offsets.
 ///
@@ -90,6 +91,8 @@ pub struct Tracked {
 #[serde(into = "snapshot::Snapshot", try_from = "snapshot::Snapshot")]
 pub struct Tracker {
     pub(super) orders: Orders,
+    /// The functions of the lags that the orders are of; none: the lags are the regressor.
+    pub(super) map: Option<Map>,
     pub(super) plan: TrackPlan,
     pub(super) names: Vec<String>,
     pub(super) offsets: PerChannel,
@@ -133,24 +136,68 @@ impl Tracker {
     /// n/(n + 1) for n parameters (the constant is one of them); if a scale is not in 1e-98 … 1e98; if another number of the
     /// plan is out of its range.
     pub fn new(orders: &Orders, plan: &TrackPlan) -> Result<Self, Error> {
+        Self::of(orders, None, plan)
+    }
+
+    /// A tracker of a nonlinear ARX model: the parameters of the functions of a map,
+    ///
+    /// ```text
+    /// y(k) = s g(z(k)) + e(k),   g(z) = sum_j theta_j f_j(z)
+    /// ```
+    ///
+    /// where z are lags, na of the output and nb of each input from nk on, as deviations over the scale of their channel, and s is the
+    /// scale of the output. Least squares from the prior, on functions instead of lags. `regressors` name the lags.
+    ///
+    /// # Errors
+    /// As [`Tracker::new`]; [`Error::Argument`] if the map is not of that many lags, if it has more than 1000 functions, and for a
+    /// constant, which is one of its functions.
+    pub fn nonlinear(
+        orders: &Orders,
+        map: &Map,
+        regressors: &[String],
+        plan: &TrackPlan,
+    ) -> Result<Self, Error> {
+        if regressors.len() != orders.parameters() {
+            let message = format!("there are {} names for {} lags", regressors.len(), orders.parameters());
+            return Err(Error::argument("regressors", message));
+        }
+        Self::of(orders, Some((map, map.names(regressors))), plan)
+    }
+
+    /// The same for linear models, and for functions with their names.
+    pub(super) fn of(
+        orders: &Orders,
+        map: Option<(&Map, Vec<String>)>,
+        plan: &TrackPlan,
+    ) -> Result<Self, Error> {
         check(orders, plan)?;
+        let (map, names) = match map {
+            Some((map, names)) => {
+                check_map(orders, map, &names, plan)?;
+                (Some(map), names)
+            }
+            None => {
+                let mut names = orders.names();
+                if plan.constant {
+                    names.insert(names.len() - orders.nc, "constant".to_owned());
+                }
+                (None, names)
+            }
+        };
         let inputs = orders.inputs();
         let zeros = || PerChannel { inputs: vec![0.0; inputs], output: 0.0 };
-        let parameters = orders.parameters() + usize::from(plan.constant);
+        let parameters = names.len();
         // What the scales do not decide is checked at once.
         let units = PerChannel { inputs: vec![1.0; inputs], output: 1.0 };
         let estimator =
-            Estimator::new(orders, plan, plan.scales.as_ref().unwrap_or(&units)).map_err(refused)?;
+            Estimator::new(orders, map, plan, plan.scales.as_ref().unwrap_or(&units)).map_err(refused)?;
         let stage = match plan.scales {
             Some(_) => Stage::Running(Box::new(estimator)),
             None => Stage::Collecting(Collecting::new(orders.maximum_lag() + 2 * parameters, &orders.nb)),
         };
-        let mut names = orders.names();
-        if plan.constant {
-            names.insert(parameters - 1 - orders.nc, "constant".to_owned());
-        }
         Ok(Self {
             orders: orders.clone(),
+            map: map.cloned(),
             plan: plan.clone(),
             names,
             offsets: plan.offsets.clone().unwrap_or_else(zeros),
@@ -256,7 +303,8 @@ impl Tracker {
     /// Goes on from the rows that were collected, with these scales.
     fn start(&mut self, scales: PerChannel) -> Result<(), Error> {
         let Stage::Collecting(collecting) = &self.stage else { return Ok(()) };
-        let mut estimator = Estimator::new(&self.orders, &self.plan, &scales).map_err(refused)?;
+        let mut estimator =
+            Estimator::new(&self.orders, self.map.as_ref(), &self.plan, &scales).map_err(refused)?;
         let (rows, gap) = collecting.rows();
         for row in rows {
             if row.after_gap {
@@ -307,7 +355,8 @@ impl Tracker {
         Ok(outputs.last().map_or(f64::NAN, |&predicted| predicted + self.offsets.output))
     }
 
-    /// The names of the parameters, in their order: those of [`Orders::names`], with `constant` after those of B if there is one.
+    /// The names of the parameters, in their order: those of [`Orders::names`], with `constant` after those of B if there is one; of a
+    /// nonlinear model its functions.
     pub fn names(&self) -> &[String] {
         &self.names
     }
@@ -345,7 +394,7 @@ impl Tracker {
     /// The variance of e, in the output's units squared; none until enough samples are in.
     pub fn noise_variance(&self) -> Option<f64> {
         match &self.stage {
-            Stage::Running(estimator) if self.has_estimate => estimator.least_squares().noise_variance(),
+            Stage::Running(estimator) if self.has_estimate => estimator.noise_variance(),
             _ => None,
         }
     }
@@ -368,12 +417,16 @@ impl Tracker {
     /// Whether its parts fit together, as those of any tracker do that was not edited after it was written.
     pub(super) fn is_sound(&self) -> bool {
         let inputs = self.orders.inputs();
-        let Ok(fresh) = Self::new(&self.orders, &TrackPlan { scales: None, ..self.plan.clone() }) else {
-            return false;
+        let open = TrackPlan { scales: None, ..self.plan.clone() };
+        let fresh = match &self.map {
+            None => Self::new(&self.orders, &open),
+            Some(map) => Self::of(&self.orders, Some((map, self.names.clone())), &open),
         };
+        let Ok(fresh) = fresh else { return false };
         let stage = match (&self.stage, &fresh.stage, &self.scales) {
             (Stage::Running(estimator), _, Some(scales)) => {
-                Estimator::new(&self.orders, &self.plan, scales).is_ok_and(|fresh| estimator.fits(&fresh))
+                Estimator::new(&self.orders, self.map.as_ref(), &self.plan, scales)
+                    .is_ok_and(|fresh| estimator.fits(&fresh))
             }
             (Stage::Collecting(collecting), Stage::Collecting(other), None) => {
                 self.plan.scales.is_none() && collecting.fits(other, inputs)
@@ -405,9 +458,22 @@ impl Tracker {
             && self.score.is_sound()
     }
 
-    /// The orders of the model, without the constant.
+    /// The orders of the model, without the constant; of a nonlinear one its lags.
     pub fn orders(&self) -> &Orders {
         &self.orders
+    }
+
+    /// The functions of a nonlinear model; none of a linear one.
+    pub fn map(&self) -> Option<&Map> {
+        self.map.as_ref()
+    }
+
+    /// What is estimated: structure and orders, or functions, such as ARX(2, 2, 1) or NARX polynomial, 6 terms.
+    pub fn model(&self) -> String {
+        match &self.map {
+            None => self.orders.to_string(),
+            Some(map) => map.name(self.names.len()),
+        }
     }
 
     /// The plan that the tracker was made with; after a report with the offsets, scales and noise scale that follow from it,
@@ -441,88 +507,6 @@ impl Tracked {
 /// Whether the sample corrected an estimate, so that there is one.
 fn corrects(action: Action) -> bool {
     matches!(action, Action::Updated | Action::Capped | Action::Projected)
-}
-
-/// What a plan asks of orders, and all numbers that no estimator checks.
-pub(super) fn check(orders: &Orders, plan: &TrackPlan) -> Result<(), Error> {
-    let inputs = orders.inputs();
-    // Orders are plain data: these may not be any that `Orders::new` made.
-    Orders::new(orders.na, &orders.nb, orders.nc, orders.nd, &orders.nf, &orders.nk)?;
-    if orders.nd > 0 || orders.nf.iter().any(|&nf| nf > 0) {
-        let message = format!("{orders} has D or F; track AR, ARX, ARMA or ARMAX");
-        return Err(Error::argument("orders", message));
-    }
-    match (plan.method.with_noise_model(), orders.nc) {
-        (None, 1..) => {
-            return Err(Error::argument("method", format!("rls has no C, {orders} has; use els or rpem")));
-        }
-        (Some(_), 0) => {
-            let message = format!("{} is for models with C, {orders} has none; use rls", plan.method);
-            return Err(Error::argument("method", message));
-        }
-        _ => {}
-    }
-    if orders.nc > 0 && plan.start.0 != thetahat_core::Start::Standard {
-        let message = format!("{orders} has only the standard start; leave out '{}'", plan.start);
-        return Err(Error::argument("start", message));
-    }
-    let is_scale = |scale: f64| (SMALLEST..=LARGEST).contains(&scale);
-    if let Some(scale) = plan.noise_scale.filter(|&scale| orders.nc > 0 && !is_scale(scale)) {
-        let message =
-            format!("{scale:?} is not in {SMALLEST:e} … {LARGEST:e}; give the typical magnitude of e");
-        return Err(Error::argument("noise-scale", message));
-    }
-    if let Some(offsets) = &plan.offsets {
-        check_channels(
-            "offset",
-            offsets,
-            inputs,
-            f64::is_finite,
-            "is not finite; give what is to be taken off",
-        )?;
-    }
-    if let Some(scales) = &plan.scales {
-        let message = format!("is not in {SMALLEST:e} … {LARGEST:e}; give its typical magnitude");
-        check_channels("scale", scales, inputs, is_scale, &message)?;
-    }
-    Ok(())
-}
-
-/// That each channel has a number that fits.
-fn check_channels(
-    argument: &str,
-    given: &PerChannel,
-    inputs: usize,
-    fits: impl Fn(f64) -> bool,
-    otherwise: &str,
-) -> Result<(), Error> {
-    if given.inputs.len() != inputs {
-        let message =
-            format!("there are {} values for {inputs} inputs; give one for each", given.inputs.len());
-        return Err(Error::argument(argument, message));
-    }
-    let wrong = |channel: &str, value: f64| {
-        Err(Error::argument(argument, format!("that of {channel}, {value:?}, {otherwise}")))
-    };
-    match given.inputs.iter().enumerate().find(|(_, value)| !fits(**value)) {
-        Some((input, &value)) => wrong(&format!("input {}", input + 1), value),
-        None if !fits(given.output) => wrong("the output", given.output),
-        None => Ok(()),
-    }
-}
-
-/// What the estimator does not take from a plan.
-fn refused(error: thetahat_core::Error) -> Error {
-    match error {
-        thetahat_core::Error::OutOfRange { argument: "width", range } => {
-            Error::argument("dead-zone", format!("it must be {range}"))
-        }
-        // All else that has a range and was not checked above is a number of a policy.
-        thetahat_core::Error::OutOfRange { argument, range } => {
-            Error::argument("forgetting", format!("its {} must be {range}", argument.replace('_', " ")))
-        }
-        _ => Error::argument("orders", error.to_string()),
-    }
 }
 
 /// What the estimator does not take as a sample.

@@ -3,11 +3,12 @@
 use thetahat_core::Covariance;
 use thetahat_core::nalgebra::{DMatrix, DVector};
 
+use super::checks::{check, check_map};
 use super::estimator::Estimator;
 use super::plan::{PerChannel, TrackPlan};
-use super::tracker::{Stage, Tracker, check};
+use super::tracker::{Stage, Tracker};
 use crate::Error;
-use crate::model::{Orders, PolynomialModel};
+use crate::model::{Model, NonlinearArxModel, Orders, Parameter, Signal};
 use crate::report::Report;
 
 /// What P_jj of a parameter that nothing is known of is times the square of its scale, as
@@ -15,10 +16,10 @@ use crate::report::Report;
 const PRIOR: f64 = 100.0;
 
 impl Tracker {
-    /// A tracker that starts from what a fit found, a report of AR, ARX, ARMA or ARMAX: its parameters, its covariance
+    /// A tracker that starts from what a fit found, a report of AR, ARX, ARMA, ARMAX or nonlinear ARX: its parameters, its covariance
     /// divided by its noise variance as P, its noise variance and number of samples, its offsets.
     ///
-    /// The orders are those of the report. Scales that the plan does not have
+    /// The orders are those of the report; of a nonlinear model the functions and scales too. Scales that the plan does not have
     /// follow from P: the regressor of parameter j has the magnitude 1/sqrt(N P_jj) at least, N being the number of samples,
     /// and a channel the largest of its parameters'. So there are no rows to collect. The noise scale is the square root of
     /// the noise variance. A constant is not in the report: it starts from 0, and is as free as without a report.
@@ -27,24 +28,32 @@ impl Tracker {
     /// As [`Tracker::new`]; [`Error::Report`] if the report is of another structure; if it has no covariance or a noise variance of 0, or an offset that is a line in time; [`Error::Argument`] if the
     /// plan asks for another start than `standard`.
     pub fn from_report(report: &Report, plan: &TrackPlan) -> Result<Self, Error> {
-        let model = report.model.polynomials("a tracker")?;
-        if model.orders.nd > 0 || model.orders.nf.iter().any(|&nf| nf > 0) {
-            return Err(Error::report(format!(
-                "the report has {}: only AR, ARX, ARMA and ARMAX can be tracked",
-                model.orders
-            )));
-        }
         if plan.start.0 != thetahat_core::Start::Standard {
             let message = format!("'{}' is a start without a report; leave it out", plan.start);
             return Err(Error::argument("start", message));
         }
+        if let Model::NonlinearArx(model) = &report.model {
+            return Self::from_nonlinear(model, report.estimation.samples, plan);
+        }
+        let model = report.model.polynomials("a tracker")?;
+        if model.orders.nd > 0 || model.orders.nf.iter().any(|&nf| nf > 0) {
+            return Err(Error::report(format!(
+                "the report has {}: only AR, ARX, ARMA, ARMAX and nonlinear ARX can be tracked",
+                model.orders
+            )));
+        }
         model.check()?;
         check(&model.orders, plan)?;
-        let relative = relative_covariance(model)?;
+        let relative = relative_covariance(
+            model.covariance.as_deref(),
+            model.noise_variance,
+            model.parameters.len(),
+            model.orders.parameters(),
+        )?;
         let mut plan = plan.clone();
         plan.offsets = Some(match plan.offsets {
             Some(given) => given,
-            None => offsets(model)?,
+            None => offsets(&model.inputs, &model.output)?,
         });
         if plan.scales.is_none() {
             plan.scales = Some(scales(&model.orders, &relative, report.estimation.samples));
@@ -53,27 +62,34 @@ impl Tracker {
         // What was given passed before: what does not pass now is what follows from the report.
         check(&model.orders, &plan).map_err(unusable)?;
         let tracker = Self::new(&model.orders, &plan)?;
-        tracker.with_knowledge(model, &relative, report.estimation.samples)
+        let constant = plan.constant.then_some(model.parameters.len() - model.orders.nc);
+        tracker.with_parameters(
+            &model.parameters,
+            constant,
+            &relative,
+            model.noise_variance,
+            report.estimation.samples,
+        )
     }
 
-    /// The same with what a fit knows.
-    fn with_knowledge(
+    /// The same with what a fit knows: its parameters, and the place of a constant that it does not know of.
+    fn with_parameters(
         mut self,
-        model: &PolynomialModel,
+        known: &[Parameter],
+        constant: Option<usize>,
         relative: &DMatrix<f64>,
+        variance: f64,
         samples: usize,
     ) -> Result<Self, Error> {
         let Stage::Running(estimator) = self.stage else { return Ok(self) };
-        let known = model.parameters.len();
-        let constant = self.plan.constant.then_some(known - self.orders.nc);
         // Where the constant stands, those of C are one place on.
         let place = |index: usize| index + usize::from(constant.is_some_and(|constant| index >= constant));
         let count = self.names.len();
         let mut parameters = DVector::zeros(count);
         let mut covariance = DMatrix::zeros(count, count);
-        for (row, parameter) in model.parameters.iter().enumerate() {
+        for (row, parameter) in known.iter().enumerate() {
             parameters[place(row)] = parameter.value;
-            for column in 0..known {
+            for column in 0..known.len() {
                 covariance[(place(row), place(column))] = relative[(row, column)];
             }
         }
@@ -81,7 +97,6 @@ impl Tracker {
             covariance[(constant, constant)] = PRIOR;
         }
         let covariance = Covariance::new(&covariance).map_err(unusable)?;
-        let variance = model.noise_variance;
         let estimator = match *estimator {
             Estimator::Arx(arx) => arx
                 .with_parameters(parameters)
@@ -91,42 +106,80 @@ impl Tracker {
                 .with_parameters(parameters)
                 .and_then(|armax| armax.with_covariance(covariance)?.with_noise_variance(variance, samples))
                 .map(Estimator::Armax),
+            Estimator::Narx(narx) => narx
+                .with_parameters(parameters)
+                .and_then(|narx| narx.with_covariance(covariance)?.with_noise_variance(variance, samples))
+                .map(Estimator::Narx),
         };
         self.stage = Stage::Running(Box::new(estimator.map_err(unusable)?));
         // The noise variance is known from the start.
         self.settling = 0;
         Ok(self)
     }
+
+    /// The same for a nonlinear model, whose scales are its own.
+    fn from_nonlinear(model: &NonlinearArxModel, samples: usize, plan: &TrackPlan) -> Result<Self, Error> {
+        model.check()?;
+        let orders = model.lag_orders()?;
+        let names: Vec<String> = model.parameters.iter().map(|parameter| parameter.name.clone()).collect();
+        check(&orders, plan)?;
+        check_map(&orders, &model.map, &names, plan)?;
+        if plan.scales.is_some() {
+            return Err(Error::argument("scale", "a nonlinear model has its own scales; leave it out"));
+        }
+        let count = names.len();
+        let square = model.output_scale * model.output_scale;
+        let relative =
+            relative_covariance(model.covariance.as_deref(), model.noise_variance / square, count, count)?;
+        let scale = |name: &str| {
+            let own = model.regressors.iter().find(|regressor| regressor.channel == name);
+            own.map_or(1.0, |regressor| regressor.scale)
+        };
+        let mut plan = plan.clone();
+        plan.offsets = Some(match plan.offsets {
+            Some(given) => given,
+            None => offsets(&model.inputs, &model.output)?,
+        });
+        let inputs = model.inputs.iter().map(|input| scale(&input.name)).collect();
+        plan.scales = Some(PerChannel { inputs, output: model.output_scale });
+        // What was given passed before: what does not pass now is what follows from the report.
+        check(&orders, &plan).map_err(unusable)?;
+        let tracker = Self::of(&orders, Some((&model.map, names)), &plan)?;
+        tracker.with_parameters(&model.parameters, None, &relative, model.noise_variance, samples)
+    }
 }
 
 /// P: the covariance over the noise variance, symmetric to the bit.
-fn relative_covariance(model: &PolynomialModel) -> Result<DMatrix<f64>, Error> {
-    let Some(rows) = &model.covariance else {
+fn relative_covariance(
+    rows: Option<&[Vec<f64>]>,
+    noise_variance: f64,
+    count: usize,
+    expected: usize,
+) -> Result<DMatrix<f64>, Error> {
+    let Some(rows) = rows else {
         return Err(Error::report(
             "the report has no covariance, so that it does not say how sure its model is",
         ));
     };
-    if model.noise_variance <= 0.0 {
+    if noise_variance <= 0.0 {
         return Err(Error::report(
             "the report has a noise variance of 0, so that its covariance does not say how sure its model is; start without it",
         ));
     }
-    let count = model.parameters.len();
-    if count != model.orders.parameters() {
+    if count != expected {
         return Err(Error::report(
             "model.parameters are not as many as its orders make; the report was edited or damaged",
         ));
     }
     let entry = |i: usize, j: usize| rows.get(i).and_then(|row| row.get(j)).copied().unwrap_or(f64::NAN);
     let relative =
-        DMatrix::from_fn(count, count, |i, j| (entry(i, j) / 2.0 + entry(j, i) / 2.0) / model.noise_variance);
+        DMatrix::from_fn(count, count, |i, j| (entry(i, j) / 2.0 + entry(j, i) / 2.0) / noise_variance);
     Ok(relative)
 }
 
 /// The offsets of a report, which are levels.
-fn offsets(model: &PolynomialModel) -> Result<PerChannel, Error> {
-    if let Some(signal) = model.inputs.iter().chain([&model.output]).find(|signal| signal.offset.slope != 0.0)
-    {
+fn offsets(inputs: &[Signal], output: &Signal) -> Result<PerChannel, Error> {
+    if let Some(signal) = inputs.iter().chain([output]).find(|signal| signal.offset.slope != 0.0) {
         return Err(Error::report(format!(
             "the offset of '{}' in the report is a line in the time of its log, which has no meaning beyond it; fit with \
              another way to remove offsets, or give offsets",
@@ -134,8 +187,8 @@ fn offsets(model: &PolynomialModel) -> Result<PerChannel, Error> {
         )));
     }
     Ok(PerChannel {
-        inputs: model.inputs.iter().map(|signal| signal.offset.level).collect(),
-        output: model.output.offset.level,
+        inputs: inputs.iter().map(|signal| signal.offset.level).collect(),
+        output: output.offset.level,
     })
 }
 

@@ -2,6 +2,10 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use thetahat_core::{Basis, Polynomial, Radial};
+
+use crate::Error;
+use crate::regression::Monomials;
 
 /// The functions f_j of a nonlinear ARX model, of n regressors z.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -25,6 +29,18 @@ pub enum Map {
 }
 
 impl Map {
+    /// All products of regressors up to a degree, the constant first, then by their number of factors.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a degree of 0, or if there are too many.
+    pub fn polynomial(regressors: usize, degree: usize) -> Result<Self, Error> {
+        let monomials = Monomials::new(regressors, degree)?;
+        let mut terms: Vec<Vec<usize>> =
+            (0..monomials.count()).map(|place| monomials.factors(place)).collect();
+        terms.sort_by_key(Vec::len);
+        Ok(Self::Polynomial { terms })
+    }
+
     /// How many functions there are of this many regressors.
     pub fn parameters(&self, regressors: usize) -> usize {
         match self {
@@ -52,6 +68,11 @@ impl Map {
         }
     }
 
+    /// Such as NARX polynomial, 8 terms.
+    pub fn name(&self, parameters: usize) -> String {
+        format!("NARX {}", self.describe(parameters))
+    }
+
     /// What it is, with its number of parameters.
     pub(super) fn describe(&self, parameters: usize) -> String {
         let plural = |count: usize| if count == 1 { "" } else { "s" };
@@ -76,7 +97,10 @@ impl Map {
     }
 
     /// Whether its parts go with this many regressors; else which does not.
-    pub(super) fn check(&self, regressors: usize) -> Result<(), String> {
+    pub(crate) fn check(&self, regressors: usize) -> Result<(), String> {
+        if regressors > usize::from(u16::MAX) {
+            return Err("is of too many regressors".to_owned());
+        }
         match self {
             Self::Polynomial { terms } => {
                 match terms.iter().position(|term| term.iter().any(|factor| *factor >= regressors)) {
@@ -113,7 +137,7 @@ fn product(term: &[usize], regressors: &[String]) -> String {
     if parts.is_empty() { "1".to_owned() } else { parts.join("*") }
 }
 
-/// A map laid out to be evaluated along a log, with its parameters. Nothing of it allocates.
+/// A map laid out to be evaluated along a log, with its parameters, by the functions of the core. Nothing of it allocates.
 #[derive(Debug, Clone)]
 pub(crate) struct Evaluator {
     theta: Vec<f64>,
@@ -123,7 +147,7 @@ pub(crate) struct Evaluator {
 #[derive(Debug, Clone)]
 enum Kind {
     /// The factors of all terms one after the other, and where each term ends.
-    Polynomial { factors: Vec<usize>, ends: Vec<usize> },
+    Polynomial { factors: Vec<u16>, ends: Vec<u32> },
     /// The centres one after the other, and 1/sigma^2.
     Radial { centres: Vec<f64>, inverse_squares: Vec<f64>, linear: bool },
 }
@@ -135,10 +159,11 @@ impl Evaluator {
         let kind = match map {
             Map::Polynomial { terms } => {
                 let ends = terms.iter().scan(0, |end, term| {
-                    *end += term.len();
+                    *end += term.len() as u32;
                     Some(*end)
                 });
-                Kind::Polynomial { factors: terms.concat(), ends: ends.collect() }
+                let factors = terms.iter().flatten().map(|factor| *factor as u16);
+                Kind::Polynomial { factors: factors.collect(), ends: ends.collect() }
             }
             Map::Radial { centres, widths, linear } => Kind::Radial {
                 centres: centres.concat(),
@@ -166,25 +191,12 @@ impl Evaluator {
         self.each(z, |j, f| into[j] = f);
     }
 
-    fn each(&self, z: &[f64], mut take: impl FnMut(usize, f64)) {
+    /// Calls `take` with j and f_j(z), in the order of j.
+    pub(crate) fn each(&self, z: &[f64], take: impl FnMut(usize, f64)) {
         match &self.kind {
-            Kind::Polynomial { factors, ends } => {
-                let mut start = 0;
-                for (j, end) in ends.iter().enumerate() {
-                    take(j, factors[start..*end].iter().fold(1.0, |product, factor| product * z[*factor]));
-                    start = *end;
-                }
-            }
+            Kind::Polynomial { factors, ends } => Polynomial { factors, ends }.each(z, take),
             Kind::Radial { centres, inverse_squares, linear } => {
-                let mut first = 0;
-                if *linear {
-                    take(0, 1.0);
-                    z.iter().enumerate().for_each(|(i, z)| take(i + 1, *z));
-                    first = z.len() + 1;
-                }
-                for (j, (centre, inverse)) in centres.chunks_exact(z.len()).zip(inverse_squares).enumerate() {
-                    take(first + j, (-distance(z, centre) * inverse).exp());
-                }
+                radial(z.len(), centres, inverse_squares, *linear).each(z, take);
             }
         }
     }
@@ -194,37 +206,22 @@ impl Evaluator {
         into.fill(0.0);
         match &self.kind {
             Kind::Polynomial { factors, ends } => {
-                let mut start = 0;
-                for (theta, end) in self.theta.iter().zip(ends) {
-                    let own = &factors[start..*end];
-                    for (at, factor) in own.iter().enumerate() {
-                        let others = own.iter().enumerate().filter(|(other, _)| *other != at);
-                        into[*factor] += others.fold(*theta, |product, (_, other)| product * z[*other]);
-                    }
-                    start = *end;
-                }
+                Polynomial { factors, ends }.add_slopes(&self.theta, z, into)
             }
             Kind::Radial { centres, inverse_squares, linear } => {
-                let mut weights = self.theta.iter();
-                if *linear {
-                    weights.next();
-                    into.iter_mut().zip(weights.by_ref()).for_each(|(slope, theta)| *slope = *theta);
-                }
-                let each = centres.chunks_exact(z.len()).zip(inverse_squares);
-                for ((centre, inverse), theta) in each.zip(weights) {
-                    let value = theta * (-distance(z, centre) * inverse).exp();
-                    for ((slope, z), centre) in into.iter_mut().zip(z).zip(centre) {
-                        *slope -= 2.0 * inverse * (z - centre) * value;
-                    }
-                }
+                radial(z.len(), centres, inverse_squares, *linear).add_slopes(&self.theta, z, into);
             }
         }
     }
 }
 
-/// |z - alpha|^2.
-fn distance(z: &[f64], centre: &[f64]) -> f64 {
-    z.iter().zip(centre).map(|(z, centre)| (z - centre) * (z - centre)).sum()
+fn radial<'a>(
+    regressors: usize,
+    centres: &'a [f64],
+    inverse_squares: &'a [f64],
+    linear: bool,
+) -> Radial<'a, f64> {
+    Radial { regressors, centres, inverse_squares, linear }
 }
 
 #[cfg(test)]

@@ -113,7 +113,7 @@ fn reports_that_cannot_be_tracked_are_refused() {
         |report: &Report, plan: &TrackPlan| Tracker::from_report(report, plan).unwrap_err().to_string();
     let plan = unforgetting();
     let oe = fit(&inputs, &y, "1..400", Orders::oe(&[1, 1], &[1, 1], &[1, 0]).unwrap(), Detrend::None);
-    assert!(message(&oe, &plan).contains("only AR, ARX, ARMA and ARMAX"));
+    assert!(message(&oe, &plan).contains("only AR, ARX, ARMA, ARMAX and nonlinear ARX"));
     assert!(message(&report, &exactly(&plan)).starts_with("start"));
     let rpem = TrackPlan { method: TrackMethod::Rpem, ..plan.clone() };
     assert!(message(&report, &rpem).starts_with("method"));

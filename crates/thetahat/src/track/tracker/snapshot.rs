@@ -5,7 +5,7 @@ use thetahat_core::{ChangeDetector, SnapshotVersion};
 
 use super::{Stage, Tracker, Workspace};
 use crate::Error;
-use crate::model::Orders;
+use crate::model::{Map, Orders};
 use crate::track::{
     missing,
     plan::{PerChannel, TrackPlan},
@@ -16,6 +16,8 @@ use crate::track::{
 pub(super) struct Snapshot {
     version: SnapshotVersion,
     orders: Orders,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    map: Option<Map>,
     plan: TrackPlan,
     names: Vec<String>,
     offsets: PerChannel,
@@ -32,11 +34,12 @@ pub(super) struct Snapshot {
 
 impl From<Tracker> for Snapshot {
     fn from(tracker: Tracker) -> Self {
-        let Tracker { orders, plan, names, offsets, unset, scales, stage, .. } = tracker;
+        let Tracker { orders, map, plan, names, offsets, unset, scales, stage, .. } = tracker;
         let Tracker { has_estimate, settling, detector, score, inputs, .. } = tracker;
         Self {
             version: SnapshotVersion,
             orders,
+            map,
             plan,
             names,
             offsets,
@@ -56,10 +59,11 @@ impl TryFrom<Snapshot> for Tracker {
     type Error = Error;
 
     fn try_from(read: Snapshot) -> Result<Self, Error> {
-        let Snapshot { orders, plan, names, offsets, unset, scales, stage, .. } = read;
+        let Snapshot { orders, map, plan, names, offsets, unset, scales, stage, .. } = read;
         let Snapshot { has_estimate, settling, detector, score, inputs, .. } = read;
         let tracker = Self {
             orders,
+            map,
             plan,
             names,
             offsets,

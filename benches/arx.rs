@@ -10,7 +10,7 @@ use criterion::{BenchmarkId, Criterion, Throughput};
 use thetahat::data::{Offset, Record};
 use thetahat::estimate::{Estimate, Initial, arx, arx_factor};
 use thetahat::model::{Orders, Signal};
-use thetahat::respond::{Start, predict, simulate};
+use thetahat::respond::{InitialCondition, predict, simulate};
 
 /// Samples of the longest signals.
 const SAMPLES: usize = 1_000_000;
@@ -63,12 +63,12 @@ fn responses(criterion: &mut Criterion, input: &[f64], output: &[f64]) -> Result
     let mut group = criterion.benchmark_group("respond");
     group.throughput(Throughput::Elements(SAMPLES as u64));
     for horizon in [1, 10] {
-        predict(&model, &record, horizon, Start::Drop)?;
+        predict(&model, &record, horizon, InitialCondition::Drop)?;
         group.bench_function(BenchmarkId::new("predict", horizon), |bencher| {
-            bencher.iter(|| predict(&model, black_box(&record), horizon, Start::Drop));
+            bencher.iter(|| predict(&model, black_box(&record), horizon, InitialCondition::Drop));
         });
     }
-    for (name, start) in [("zero", Start::Zero), ("estimated", Start::Estimate)] {
+    for (name, start) in [("zero", InitialCondition::Zero), ("estimated", InitialCondition::Estimate)] {
         simulate(&model, &record, start)?;
         group.bench_function(BenchmarkId::new("simulate", name), |bencher| {
             bencher.iter(|| simulate(&model, black_box(&record), start));

@@ -15,7 +15,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use thetahat::data::{Interpolation, Resample, Rows};
-use thetahat::respond::Start;
+use thetahat::respond::InitialCondition;
 
 use crate::args::{
     ClockArguments, LineArguments, LineFormatArgument, LiveClockArguments, LogArguments, StartArgument,
@@ -146,12 +146,12 @@ impl LineJob {
 
 impl StartArgument {
     /// The start, unless it is left to the model.
-    pub(crate) fn given(self) -> Option<Start> {
+    pub(crate) fn given(self) -> Option<InitialCondition> {
         match self {
             Self::Auto => None,
-            Self::Drop => Some(Start::Drop),
-            Self::Zero => Some(Start::Zero),
-            Self::Estimate => Some(Start::Estimate),
+            Self::Drop => Some(InitialCondition::Drop),
+            Self::Zero => Some(InitialCondition::Zero),
+            Self::Estimate => Some(InitialCondition::Estimate),
         }
     }
 }

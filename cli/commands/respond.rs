@@ -5,7 +5,7 @@ use std::path::Path;
 
 use thetahat::data::{Detrend, Log};
 use thetahat::report::{Applied, sample};
-use thetahat::respond::{Drawn, Draws, Horizon, Start};
+use thetahat::respond::{Drawn, Draws, Horizon, InitialCondition};
 
 use super::{stored, summary};
 use crate::args::{PredictArguments, RespondArguments, SimulateArguments};
@@ -47,7 +47,7 @@ struct Asked<'a> {
 fn respond(
     arguments: &RespondArguments,
     horizon: Horizon,
-    initial: Option<Start>,
+    initial: Option<InitialCondition>,
     draws: Option<Asked<'_>>,
 ) -> Result<(), Failure> {
     let job = LogJob::resolve(&arguments.log, &arguments.clock)?;
@@ -74,7 +74,7 @@ fn respond(
     });
     let Loaded { log, source, words } = loaded?;
     words.iter().for_each(|word| warn(word));
-    let natural = || if measured { model.natural_start(horizon) } else { Start::Zero };
+    let natural = || if measured { model.natural_start(horizon) } else { InitialCondition::Zero };
     let initial = initial.unwrap_or_else(natural);
     let clock = RowClock { log: &log };
     let sources = [source];

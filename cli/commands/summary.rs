@@ -11,14 +11,14 @@ mod validation;
 
 use thetahat::data::Rows;
 use thetahat::estimate::{
-    Criteria, CriterionOutcome, InformationCriterion, Initial, Norm, Procedure, RobustOutcome, SearchOutcome,
+    ConvexOutcome, Criteria, InformationCriterion, Initial, Norm, Procedure, RobustOutcome, SearchOutcome,
     Solver,
 };
 use thetahat::figures::{error, fixed, number, scientific, short};
 use thetahat::model::{Interval, Model, Orders, PolynomialModel, Quantity, Root, Signal, Structure};
 use thetahat::optimize::{Algorithm, Stopped};
 use thetahat::report::{Estimation, Report};
-use thetahat::respond::Start;
+use thetahat::respond::InitialCondition;
 use thetahat::text::harmless;
 use thetahat::validate::{Fit, Part};
 
@@ -241,7 +241,7 @@ fn robust(text: &mut Text, found: &RobustOutcome, start: Initial) {
 }
 
 /// What was made small and respected, and the box of all that respects it.
-fn criterion(text: &mut Text, outcome: &CriterionOutcome, model: &PolynomialModel, start: Initial) {
+fn criterion(text: &mut Text, outcome: &ConvexOutcome, model: &PolynomialModel, start: Initial) {
     let norm = match outcome.norm {
         Norm::Two => "sum of squared errors",
         Norm::One => "sum of absolute errors",
@@ -362,10 +362,10 @@ fn orders_legend<'a>(models: impl IntoIterator<Item = &'a Orders>) -> String {
     format!("orders: {}", kinds.join(", "))
 }
 
-fn start(start: Start) -> &'static str {
+fn start(start: InitialCondition) -> &'static str {
     match start {
-        Start::Zero => "zero",
-        Start::Drop => "drop",
-        Start::Estimate => "estimate",
+        InitialCondition::Zero => "zero",
+        InitialCondition::Drop => "drop",
+        InitialCondition::Estimate => "estimate",
     }
 }

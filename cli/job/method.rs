@@ -1,4 +1,4 @@
-use thetahat::estimate::{Criterion, Loss, Method, Norm, Robust};
+use thetahat::estimate::{ConvexFit, Loss, Method, Norm, Robust};
 
 use super::orders::OrderJob;
 use super::{parsed, positive, search};
@@ -136,12 +136,12 @@ fn given(arguments: &CriterionArguments) -> Option<&'static str> {
     options.into_iter().find_map(|(option, given)| given.then_some(option))
 }
 
-fn criterion(arguments: &CriterionArguments, norm: Norm) -> Result<Criterion, Failure> {
+fn criterion(arguments: &CriterionArguments, norm: Norm) -> Result<ConvexFit, Failure> {
     let positive =
         |argument, value: Option<f64>| value.map(|value| positive(argument, value, "number")).transpose();
     let bounds = arguments.bound.iter().map(|text| parsed("--bound", text));
     let gains = arguments.dc_gain.iter().map(|text| parsed("--dc-gain", text));
-    Ok(Criterion {
+    Ok(ConvexFit {
         norm,
         ridge: positive("--ridge", arguments.ridge)?.unwrap_or(0.0),
         bounds: bounds.collect::<Result<_, _>>()?,

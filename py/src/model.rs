@@ -12,8 +12,8 @@ use thetahat::estimate::Procedure;
 use thetahat::model::{PolynomialModel, Quantity, StateSpace};
 use thetahat::report::{PendingEvaluation, Report, apply, sample};
 use thetahat::respond::{
-    Draws, Horizon, Start, TransientResponse, frequency_response, impulse_response, logarithmic_frequencies,
-    step_response,
+    Draws, Horizon, InitialCondition, TransientResponse, frequency_response, impulse_response,
+    logarithmic_frequencies, step_response,
 };
 
 use crate::array::{from_matrix, matrix, vector};
@@ -191,7 +191,7 @@ impl Model {
         let model = Arc::clone(&self.model);
         let applied = interruptible(py, move |_| {
             let log = thetahat::data::Log::new(channels, model.sample_time())?;
-            apply(&model, &log, &[], None, Horizon::FreeRun, Start::Zero)
+            apply(&model, &log, &[], None, Horizon::FreeRun, InitialCondition::Zero)
         })?;
         Ok(applied.outputs.into_iter().map(|one| PyArray1::from_vec(py, one.predicted)).collect())
     }
@@ -217,7 +217,7 @@ impl Model {
             (None, Some(inputs)) => {
                 let channels = self.driving(inputs)?;
                 let log = thetahat::data::Log::new(channels, model.sample_time());
-                (Arc::new(log.map_err(|error| error::batch(py, error))?), Start::Zero)
+                (Arc::new(log.map_err(|error| error::batch(py, error))?), InitialCondition::Zero)
             }
             (None, None) => return Err(PyValueError::new_err("u: give inputs, or a log")),
         };
@@ -426,13 +426,15 @@ impl Model {
     }
 
     /// The start of this name, for a log that may have the output.
-    fn start(&self, initial: &str, log: &Log, horizon: Horizon) -> PyResult<Start> {
+    fn start(&self, initial: &str, log: &Log, horizon: Horizon) -> PyResult<InitialCondition> {
         match initial {
-            "auto" if !self.model.outputs().iter().all(|output| log.log.has(&output.name)) => Ok(Start::Zero),
+            "auto" if !self.model.outputs().iter().all(|output| log.log.has(&output.name)) => {
+                Ok(InitialCondition::Zero)
+            }
             "auto" => Ok(self.model.natural_start(horizon)),
-            "drop" => Ok(Start::Drop),
-            "zero" => Ok(Start::Zero),
-            "estimate" => Ok(Start::Estimate),
+            "drop" => Ok(InitialCondition::Drop),
+            "zero" => Ok(InitialCondition::Zero),
+            "estimate" => Ok(InitialCondition::Estimate),
             other => Err(PyValueError::new_err(format!(
                 "initial: '{other}' is none of 'auto', 'drop', 'zero', 'estimate'"
             ))),

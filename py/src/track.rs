@@ -13,7 +13,7 @@ use thetahat_cli::{Failure, TrackedRow, Tracking};
 use crate::array::{matrix, vector};
 use crate::error;
 use crate::model::Model;
-use crate::online::argument::{room, row};
+use crate::online::argument::{reserve, row};
 use crate::online::detector::Alarm;
 use crate::online::forgetting::Memory;
 use crate::online::innovation::{code, names};
@@ -92,7 +92,7 @@ impl Tracker {
             None => (None, String::new(), None),
         };
         let seconds = seconds.as_ref().map(|seconds| seconds.as_slice()).transpose()?;
-        let mut values = room(&[rows, k + 1])?;
+        let mut values = reserve(&[rows, k + 1])?;
         for (at, &output) in outputs.iter().enumerate() {
             let inputs = row(inputs, at, k);
             for (value, name) in inputs
@@ -120,7 +120,7 @@ impl Tracker {
         shapes[6..].fill(deep);
         let results = Results::new(py, shapes)?;
         let mut alarms = Vec::new();
-        let (mut codes, mut too_large) = (room(&[rows, count])?, room(&[rows, count])?);
+        let (mut codes, mut too_large) = (reserve(&[rows, count])?, reserve(&[rows, count])?);
         let unknown = vec![f64::NAN; n];
         let taken = results.write(|mut columns| {
             py.detach(|| {

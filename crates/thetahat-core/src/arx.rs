@@ -9,7 +9,7 @@ use crate::lags::is_infinite;
 use crate::ud::dot;
 use crate::{
     Action, ArxOrders, Covariance, Dimension, Error, Forgetting, Innovation, Lags, Real,
-    RecursiveLeastSquares, Solution, Start,
+    RecursiveLeastSquares, RlsStart, Solution,
 };
 
 /// An ARX model, estimated while the plant runs.
@@ -134,7 +134,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
     /// The same with another start. See [`RecursiveLeastSquares::with_start`].
     ///
     /// Errors: none that can occur.
-    pub fn with_start(self, start: Start) -> Result<Self, Error> {
+    pub fn with_start(self, start: RlsStart) -> Result<Self, Error> {
         Ok(RecursiveArx { estimator: self.estimator.with_start(start)?, ..self })
     }
 

@@ -529,7 +529,7 @@ impl ForgettingPolicy {
 /// [`excitation`](crate::RecursiveLeastSquares::excitation) tells how much that first estimate is worth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Start {
+pub enum RlsStart {
     /// With the prior, which stays in. With forgetting it fades.
     Standard,
     /// Without a prior: regressors are collected until they weigh enough in every direction, and

@@ -6,7 +6,7 @@
 //! |---|---|
 //! | [`RecursiveArx`], [`RecursiveArmax`] | from what is measured and applied, call by call; predict some samples ahead |
 //! | [`RecursiveNarx`] | the same for a weighted sum of functions of lags, a [`Polynomial`] or [`Radial`] [`Basis`] |
-//! | [`RecursiveLeastSquares`] | from any regressors; [`Forgetting`] policies that stay bounded, three ways to [`Start`] |
+//! | [`RecursiveLeastSquares`] | from any regressors; [`Forgetting`] policies that stay bounded, three ways to [`RlsStart`] |
 //! | [`LeastSquares`] | all rows at once: merges with others, says which columns are at fault |
 //! | [`NonlinearArx`] | a stored nonlinear model: predicts, and gives its slopes for an extended Kalman filter |
 //! | [`Lags`], [`ArxOrders`] | delay lines that make regressors of samples, and know of missing ones |
@@ -152,7 +152,7 @@ pub use dim::Dimension;
 pub use dual::{Dual, Number};
 pub use ekf::ExtendedKalmanFilter;
 pub use error::Error;
-pub use forgetting::{Forgetting, ForgettingPolicy, PolicyNumber, PolicyRange, Start};
+pub use forgetting::{Forgetting, ForgettingPolicy, PolicyNumber, PolicyRange, RlsStart};
 pub use innovation::{Action, Innovation};
 pub use kalman::KalmanFilter;
 pub use lags::{ArxOrders, InputOrders, Lags};

@@ -6,7 +6,7 @@ use nalgebra::{Const, OVector};
 
 use crate::{
     Action, ArxOrders, Basis, Covariance, Dimension, Error, Forgetting, Innovation, Lags, NonlinearArx, Real,
-    RecursiveLeastSquares, Scaling, Solution, Start,
+    RecursiveLeastSquares, RlsStart, Scaling, Solution,
 };
 
 /// A nonlinear ARX model, estimated while the plant runs.
@@ -108,7 +108,7 @@ impl<T: Real, B: Basis<T>, Z: Dimension, N: Dimension + Dimension<Const<1>>, D: 
     /// The same with another start. See [`RecursiveLeastSquares::with_start`].
     ///
     /// Errors: none that can occur.
-    pub fn with_start(self, start: Start) -> Result<Self, Error> {
+    pub fn with_start(self, start: RlsStart) -> Result<Self, Error> {
         Ok(RecursiveNarx { estimator: self.estimator.with_start(start)?, ..self })
     }
 

@@ -4,7 +4,7 @@ use nalgebra::{Const, OMatrix, OVector};
 
 use crate::dim::filled;
 use crate::error::{check_entries, check_finite, check_length};
-use crate::forgetting::{Forgetting, Phase, Start};
+use crate::forgetting::{Forgetting, Phase, RlsStart};
 use crate::triangle::{column, column_mut};
 use crate::ud::dot;
 use crate::{Covariance, Dimension, Error, Innovation, Real, Solution, ud};
@@ -33,7 +33,7 @@ pub(crate) use sample::is_small;
 ///
 /// There is no offset and no sign convention: what φ means is the caller's. ([`RecursiveArx`](crate::RecursiveArx)
 /// makes φ from inputs and outputs.) The formulas above are those of exponential forgetting; [`Forgetting`] lists
-/// the others, what each is for, and how each stays bounded. [`Start`] lists the ways to start.
+/// the others, what each is for, and how each stays bounded. [`RlsStart`] lists the ways to start.
 ///
 /// P = U D U' is kept as its factors and updated by formulas that do not subtract variances: it never becomes
 /// indefinite, in `f32` too. And it is bounded, so that neither silence nor a held input makes the estimate
@@ -142,7 +142,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>> RecursiveLeastSquares<T, N> {
     }
 
     /// The same, started from a batch solution: its parameters, (R'R)⁻¹ as P, and its residual variance. The start
-    /// is then [`Start::Standard`].
+    /// is then [`RlsStart::Standard`].
     ///
     /// A log is fitted on a computer; the controller goes on from there.
     ///
@@ -206,7 +206,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>> RecursiveLeastSquares<T, N> {
     /// [`Real::LARGEST_ENTRY`].
     ///
     /// [`Action`](crate::Action) tells what was done: `Updated`; `Capped`, updated and a variance brought back to its bound;
-    /// `Collecting`, see [`Start::Exact`]; `Missing`; `Skipped`, in the dead zone; `Frozen`.
+    /// `Collecting`, see [`RlsStart::Exact`]; `Missing`; `Skipped`, in the dead zone; `Frozen`.
     ///
     /// Errors, after which nothing has changed: [`Error::Infinite`]; [`Error::TooLarge`] for numbers whose products
     /// could overflow (about 7e13 in `f32`, for a scale of 1); [`Error::Length`] (only with `Dyn`).
@@ -342,10 +342,10 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
     ///
     /// ```
     /// use thetahat_core::nalgebra::{Const, Vector2};
-    /// use thetahat_core::{Action, Error, Forgetting, RecursiveLeastSquares, Start};
+    /// use thetahat_core::{Action, Error, Forgetting, RecursiveLeastSquares, RlsStart};
     ///
     /// let mut line: RecursiveLeastSquares<f64, Const<2>> =
-    ///     RecursiveLeastSquares::new(&Vector2::new(1.0, 1.0), Forgetting::None)?.with_start(Start::Exact)?;
+    ///     RecursiveLeastSquares::new(&Vector2::new(1.0, 1.0), Forgetting::None)?.with_start(RlsStart::Exact)?;
     /// assert_eq!(line.update(&Vector2::new(0.0, 1.0), 2.0)?.action, Action::Collecting);
     /// // The second point fixes the line, and no prior pulls at it.
     /// assert_eq!(line.update(&Vector2::new(1.0, 1.0), 5.0)?.action, Action::Updated);
@@ -353,15 +353,15 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
     /// # Ok::<(), Error>(())
     /// ```
     #[inline]
-    pub fn with_start(mut self, start: Start) -> Result<Self, Error> {
+    pub fn with_start(mut self, start: RlsStart) -> Result<Self, Error> {
         // A start that is over leaves shares behind, a batch solution does not.
         if self.phase == Phase::Given || self.phase == Phase::Free && self.shares == 0 {
             return Ok(self);
         }
         (self.phase, self.shares) = match start {
-            Start::Standard => (Phase::Running, 0),
-            Start::Exact => (Phase::Collecting, 1),
-            Start::Mixed { blend } => (Phase::Waiting, blend.max(1)),
+            RlsStart::Standard => (Phase::Running, 0),
+            RlsStart::Exact => (Phase::Collecting, 1),
+            RlsStart::Mixed { blend } => (Phase::Waiting, blend.max(1)),
         };
         self.shares_left = self.shares;
         if !self.phase.is_running() {
@@ -376,7 +376,7 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
         Ok(self)
     }
 
-    /// The same with these parameters, n x m, to start from: a warm start. The start is then [`Start::Standard`],
+    /// The same with these parameters, n x m, to start from: a warm start. The start is then [`RlsStart::Standard`],
     /// whatever [`with_start`](RecursiveLeastSquares::with_start) asks for before or after; if it still was collecting,
     /// P is that of [`new`](RecursiveLeastSquares::new).
     ///
@@ -395,7 +395,7 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
     }
 
     /// The same with this P, n x n, to start from, in units of the noise variance: how sure the parameters of
-    /// [`with_parameters`](RecursiveLeastSquares::with_parameters) are. The start is then [`Start::Standard`], as there.
+    /// [`with_parameters`](RecursiveLeastSquares::with_parameters) are. The start is then [`RlsStart::Standard`], as there.
     ///
     /// A variance of 0 holds a parameter at its value, with every policy. One above the bound is brought back to it, if the policy
     /// forgets.

@@ -12,7 +12,7 @@ use thetahat_core::{
     Action, ArmaxMethod, ArmaxOrders, ArxOrders, Basis, ChangeDetector, Covariance, ExtendedKalmanFilter,
     Forgetting, GainSchedule, Innovation, InputOrders, KalmanFilter, Lags, LeastSquares, LinearObservation,
     LinearTransition, LuenbergerObserver, RecursiveArmax, RecursiveArx, RecursiveLeastSquares, RecursiveNarx,
-    Scaling, Start,
+    RlsStart, Scaling,
 };
 
 const INPUTS: &[InputOrders] = &[InputOrders { nb: 1, nk: 2 }];
@@ -75,7 +75,7 @@ fn change_detector() {
 #[test]
 fn recursive_least_squares() {
     let phi = |k| Vector3::new(value(k), value(3 * k), 1.0);
-    for start in [Start::Standard, Start::Exact, Start::Mixed { blend: 9 }] {
+    for start in [RlsStart::Standard, RlsStart::Exact, RlsStart::Mixed { blend: 9 }] {
         for forgetting in [
             Forgetting::None,
             Forgetting::Exponential { factor: 0.9 },
@@ -481,7 +481,7 @@ fn text(estimator: &impl Serialize) -> String {
 #[test]
 fn a_size_of_another_type_keeps_every_bit() {
     let phi = |k| Vector3::new(value(k), value(3 * k), 1.0);
-    for start in [Start::Standard, Start::Exact, Start::Mixed { blend: 9 }] {
+    for start in [RlsStart::Standard, RlsStart::Exact, RlsStart::Mixed { blend: 9 }] {
         let scales = DVector::repeat(3, 1.0);
         let dynamic = RecursiveLeastSquares::<f64, Dyn>::new(&scales, Forgetting::default()).unwrap();
         let mut dynamic = dynamic.with_start(start).unwrap().with_dead_zone(0.01).unwrap();

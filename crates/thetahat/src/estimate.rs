@@ -4,11 +4,11 @@
 //!   [`estimate_monitored`] tells a [`Monitor`] of its progress. [`Initial`] says what stands for the samples before the first.
 //! - [`arx`] is its short form for models that are linear in their parameters. [`arx_factor`] gives a triangular factor that merges
 //!   with those of other records.
-//! - Methods have settings: a [`Search`], [`Robust`] (a [`Loss`]), [`Criterion`] (a
+//! - Methods have settings: a [`Search`], [`Robust`] (a [`Loss`]), [`ConvexFit`] (a
 //!   [`Norm`], [`Bound`]s and [`GainBound`]s), [`LikelihoodSearch`] for models in equations ([`UnknownParameter`]).
 //!   [`Constant`] says whether the level of the output is estimated too.
 //! - [`Procedure`] says how an estimate was found: by a [`Solver`], or with a [`SearchOutcome`] ([`StartOutcome`]),
-//!   [`CriterionOutcome`], [`RobustOutcome`], [`LikelihoodOutcome`],
+//!   [`ConvexOutcome`], [`RobustOutcome`], [`LikelihoodOutcome`],
 //!   [`EquationsOutcome`] or [`TermsOutcome`] (a path of [`TermStep`]s with their [`RunFigures`]).
 //! - [`Criteria`] are the values of each [`InformationCriterion`].
 //!
@@ -67,7 +67,7 @@ pub use arx::{arx, arx_factor};
 pub(crate) use arx::{enough, estimate_is_for_f};
 pub(crate) use common::{Common, Point, Window};
 pub use criteria::{Criteria, InformationCriterion};
-pub use criterion::{Bound, Criterion, CriterionOutcome, GainBound, Norm};
+pub use criterion::{Bound, ConvexFit, ConvexOutcome, GainBound, Norm};
 pub use equations::{EquationsOutcome, LikelihoodSearch, UnknownParameter};
 pub use exact::LikelihoodOutcome;
 pub use initial::Initial;
@@ -112,7 +112,7 @@ pub enum Procedure {
     /// By a search for the least sum of squared prediction errors.
     PredictionError(SearchOutcome),
     /// By convex optimization.
-    Constrained(CriterionOutcome),
+    Constrained(ConvexOutcome),
     /// By a search for the least sum of a loss that does not follow wild samples.
     Robust(RobustOutcome),
     /// By a search for the largest likelihood of all measured outputs.
@@ -133,7 +133,7 @@ pub enum Method {
     /// Refined instrumental variables, for models of output error (Young 1976).
     RefinedInstrumentalVariables,
     /// Another norm of the errors, or bounds on what the parameters may be, for models that are linear in their parameters.
-    Constrained(Criterion),
+    Constrained(ConvexFit),
     /// A loss of the prediction errors that grows like |e|, for any structure (Huber 1981).
     Robust(Robust),
     /// The largest likelihood of all measured outputs, by the Kalman filter, for A y = B u + C e with a stable A: through missing

@@ -16,7 +16,7 @@
 //! use thetahat::data::{Channel, Log};
 //! use thetahat::model::Orders;
 //! use thetahat::report::{Plan, ValidationPlan, identify, validate};
-//! use thetahat::respond::{Horizon, Start, step_response};
+//! use thetahat::respond::{Horizon, InitialCondition, step_response};
 //!
 //! // A room of 20 degrees with a heater that is switched on and off, one row every minute.
 //! let (mut heater, mut temperature, mut random) = (vec![0.0], vec![20.0], 1_u32);
@@ -44,7 +44,7 @@
 //! assert!(validation.residuals[0].ljung_box.p_value.unwrap() > 0.05);
 //!
 //! // The temperature that the model expects from the heater alone, row by row.
-//! let free_run = report.apply(&log, &[], None, Horizon::FreeRun, Start::Estimate)?;
+//! let free_run = report.apply(&log, &[], None, Horizon::FreeRun, InitialCondition::Estimate)?;
 //! assert_eq!(free_run.outputs[0].predicted.len(), 400);
 //!
 //! // What the heater does when it is switched on: half a degree in the first minute, five in the end.

@@ -1,6 +1,6 @@
 //! How a model responds: to a record of inputs and outputs, to steps, to impulses and to each frequency.
 //!
-//! - [`predict`] gives the k-step prediction, [`simulate`] the free run, which sees the inputs alone; [`Start`] says what they start
+//! - [`predict`] gives the k-step prediction, [`simulate`] the free run, which sees the inputs alone; [`InitialCondition`] says what they start
 //!   from. [`forecast`] goes on after the last sample of a record.
 //! - [`prediction_deviation`] is how far predictions are off because of the noise, [`prediction_deviations`] what uncertain parameters
 //!   add to that. [`draw`] gives random free runs and forecasts of models that the data do not tell apart.
@@ -14,7 +14,7 @@
 //! use thetahat::data::Record;
 //! use thetahat::estimate::{Initial, arx};
 //! use thetahat::model::{Orders, Signal};
-//! use thetahat::respond::{Start, predict, simulate};
+//! use thetahat::respond::{InitialCondition, predict, simulate};
 //!
 //! let u: Vec<f64> = (0..50_u32).map(|t| f64::from(t * t % 7)).collect();
 //! let mut y = vec![0.0];
@@ -24,8 +24,8 @@
 //! let (record, orders) = (Record::new(&y, vec![&u])?, Orders::arx(1, &[1], &[1])?);
 //! let estimate = arx(&record, &orders, Initial::Drop)?;
 //! let model = estimate.to_model(&orders, 1.0, vec![Signal::default()], Signal::default())?;
-//! let next = predict(&model, &record, 1, Start::Drop)?;
-//! let run = simulate(&model, &record, Start::Zero)?;
+//! let next = predict(&model, &record, 1, InitialCondition::Drop)?;
+//! let run = simulate(&model, &record, InitialCondition::Zero)?;
 //! assert!((next.values[40] - y[40]).abs() < 1e-9 && (run.values[40] - y[40]).abs() < 1e-9);
 //! # Ok::<(), thetahat::Error>(())
 //! ```
@@ -36,6 +36,7 @@ mod forecast;
 mod frequency;
 mod horizon;
 mod initial_condition;
+mod initial_responses;
 mod innovations;
 mod kinds;
 mod nis;
@@ -45,7 +46,6 @@ mod predict;
 mod response;
 mod sensitivities;
 mod simulate;
-mod start;
 #[cfg(test)]
 mod tests;
 mod transient;
@@ -54,6 +54,9 @@ pub use draws::{Drawn, Draws, draw};
 pub use forecast::{Forecast, forecast};
 pub use frequency::{FrequencyPoint, FrequencyResponse, frequency_response, logarithmic_frequencies};
 pub use horizon::Horizon;
+pub use initial_condition::InitialCondition;
+pub(crate) use initial_condition::{NOTHING_LEFT, are_worth};
+use initial_condition::{check_inputs, history};
 pub(crate) use innovations::{Innovations, innovations};
 pub(crate) use nis::NisCount;
 pub use nis::NisSummary;
@@ -63,7 +66,4 @@ pub use predict::{predict, prediction_deviation};
 pub use response::Response;
 pub use sensitivities::prediction_deviations;
 pub use simulate::simulate;
-pub use start::Start;
-pub(crate) use start::{NOTHING_LEFT, are_worth};
-use start::{check_inputs, history};
 pub use transient::{TransientResponse, impulse_response, step_response};

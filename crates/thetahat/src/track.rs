@@ -1,7 +1,7 @@
 //! Models that are estimated while the plant runs, row by row.
 //!
 //! - [`Tracker`] estimates an ARX, ARMAX or nonlinear ARX model, predicts, and raises alarms where the plant changes. Each row gives a [`Tracked`].
-//! - [`TrackPlan`] says how: the [`TrackMethod`], a [`Policy`] of forgetting, a [`Beginning`], and numbers for each channel
+//! - [`TrackPlan`] says how: the [`TrackMethod`], a [`Policy`] of forgetting, a [`TrackStart`], and numbers for each channel
 //!   ([`PerChannel`]).
 //! - [`TrackScore`] says how well it predicted so far, [`TrackerSummary`] what it knows, [`TrackSummary`] is the document of a run.
 //! - [`change_detector`] makes a detector with a mean number of samples between false alarms.
@@ -38,7 +38,7 @@ mod tracker;
 mod warm;
 mod words;
 
-pub use plan::{Beginning, PerChannel, Policy, TrackMethod, TrackPlan};
+pub use plan::{PerChannel, Policy, TrackMethod, TrackPlan, TrackStart};
 pub use run_length::change_detector;
 pub use score::TrackScore;
 pub use summary::{TrackSummary, TrackerSummary};

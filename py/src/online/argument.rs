@@ -223,12 +223,12 @@ pub(crate) fn input(value: Option<&Bound<'_, PyAny>>, length: usize) -> PyResult
     Ok(input)
 }
 
-/// Room for so many numbers, or a MemoryError.
-pub(crate) fn room<T>(counts: &[usize]) -> PyResult<Vec<T>> {
+/// An empty vector with memory for this many numbers, or a MemoryError.
+pub(crate) fn reserve<T>(counts: &[usize]) -> PyResult<Vec<T>> {
     let total = counts.iter().try_fold(1_usize, |total, &count| total.checked_mul(count));
-    let mut room = Vec::new();
-    match total.map(|total| room.try_reserve_exact(total)) {
-        Some(Ok(())) => Ok(room),
+    let mut reserved = Vec::new();
+    match total.map(|total| reserved.try_reserve_exact(total)) {
+        Some(Ok(())) => Ok(reserved),
         _ => Err(out_of_memory()),
     }
 }

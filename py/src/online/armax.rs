@@ -9,7 +9,7 @@ use super::argument::{Whole, failed};
 use super::forgetting::{Memory, STANDARD};
 use super::recursive;
 use super::recursive_model::{
-    Armax, Beginnings, RecursiveModel, RecursivePolynomials, Stepper, orders, scales,
+    Armax, RecursiveModel, RecursivePolynomials, StartingPoint, Stepper, orders, scales,
 };
 
 /// An ARMAX model, estimated while the plant runs.
@@ -131,7 +131,7 @@ impl RecursiveArmax {
             .and_then(|stepper| stepper.with_dead_zone(dead_zone))
             .map_err(|error| failed(py, error))?;
         let limited = orders.parameters() - orders.nc;
-        let given = Beginnings { parameters, covariance, limits, limited };
+        let given = StartingPoint { parameters, covariance, limits, limited };
         RecursiveModel::new(py, Stepper::Armax(stepper), inputs.len(), &given).map(Self::over)
     }
 

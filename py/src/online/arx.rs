@@ -7,7 +7,7 @@ use super::argument::{Whole, failed};
 use super::forgetting::{Memory, STANDARD};
 use super::recursive;
 use super::recursive_model::{
-    Arx, Beginnings, RecursiveModel, RecursivePolynomials, Stepper, orders, scales,
+    Arx, RecursiveModel, RecursivePolynomials, StartingPoint, Stepper, orders, scales,
 };
 
 /// An ARX model, estimated while the plant runs.
@@ -116,7 +116,7 @@ impl RecursiveArx {
         let stepper = Arx::new(&orders, output_scale, &scales, forgetting.0)
             .and_then(|stepper| stepper.with_start(start)?.with_dead_zone(dead_zone))
             .map_err(|error| failed(py, error))?;
-        let given = Beginnings { parameters, covariance, limits, limited: orders.parameters() };
+        let given = StartingPoint { parameters, covariance, limits, limited: orders.parameters() };
         RecursiveModel::new(py, Stepper::Arx(stepper), inputs.len(), &given).map(Self::over)
     }
 }

@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use thetahat_core::nalgebra::{Complex, DVector, Dyn};
 use thetahat_core::{LuenbergerObserver as Stepper, Observation, Transition};
 
-use super::argument::{self, check_size, failed, room, shaped};
+use super::argument::{self, check_size, failed, reserve, shaped};
 use super::extended::{explained, input};
 use super::innovation::{self, Innovation, list};
 use super::trajectory::{ObserverTrajectory, Samples, Slices, measurement, returned};
@@ -209,9 +209,9 @@ impl LuenbergerObserver {
         let samples = Samples::new(measurements, m, inputs, [transition.inputs(), observation.inputs()])?;
         let slices = samples.slices()?;
         let mut record = Record {
-            states: room(&[samples.rows, n])?,
-            errors: room(&[samples.rows, m])?,
-            codes: room(&[samples.rows])?,
+            states: reserve(&[samples.rows, n])?,
+            errors: reserve(&[samples.rows, m])?,
+            codes: reserve(&[samples.rows])?,
         };
         let mut stepped = self.observer.clone();
         if let (Used::Linear(transition), Used::Linear(observation)) = (&transition, &observation) {

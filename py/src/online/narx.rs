@@ -10,7 +10,7 @@ use thetahat_core::{ArxOrders, Covariance, InputOrders, Scaling};
 use super::argument::{self, Whole, count, failed};
 use super::forgetting::{Memory, STANDARD};
 use super::recursive;
-use super::recursive_model::{Beginnings, Narx, RecursiveModel, Stepper, orders, scales};
+use super::recursive_model::{Narx, RecursiveModel, StartingPoint, Stepper, orders, scales};
 use crate::array;
 use crate::error;
 use crate::model::Model;
@@ -156,7 +156,7 @@ impl RecursiveNarx {
             .and_then(|stepper| stepper.with_start(start)?.with_dead_zone(dead_zone))
             .map_err(|error| failed(py, error))?;
         let limited = stepper.estimator().parameters().len();
-        let given = Beginnings { parameters, covariance, limits, limited };
+        let given = StartingPoint { parameters, covariance, limits, limited };
         RecursiveModel::new(py, Stepper::Narx(stepper), inputs.len(), &given).map(Self::over)
     }
 
@@ -232,7 +232,7 @@ impl RecursiveNarx {
             })
             .map_err(|error| failed(py, error))?;
         let limited = stepper.estimator().parameters().len();
-        let given = Beginnings { parameters: None, covariance: None, limits: None, limited };
+        let given = StartingPoint { parameters: None, covariance: None, limits: None, limited };
         let model = RecursiveModel::new(py, Stepper::Narx(stepper), inputs.len(), &given)?;
         Bound::new(py, Self::over(model))
     }

@@ -4,9 +4,9 @@ use numpy::{PyArray1, PyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use thetahat_core::nalgebra::{DMatrix, DVector, Dyn};
-use thetahat_core::{Action, Dimension, Error, Innovation, RecursiveLeastSquares, Start};
+use thetahat_core::{Action, Dimension, Error, Innovation, RecursiveLeastSquares, RlsStart};
 
-use super::argument::{Whole, count, room, shaped};
+use super::argument::{Whole, count, reserve, shaped};
 use super::results::{Column, Results};
 use super::{Reduced, Stop, attributes, innovation};
 use crate::array;
@@ -149,7 +149,7 @@ pub(crate) fn run<E: Send>(
         _ => (vec![rows, n, outputs], vec![rows, outputs]),
     };
     let shapes = [by_parameter.clone(), by_parameter, by_output.clone(), by_output, vec![rows]];
-    let (results, codes) = (Results::new(py, shapes)?, room(&[rows])?);
+    let (results, codes) = (Results::new(py, shapes)?, reserve(&[rows])?);
     let taken = results.write(|[parameters, standard_errors, errors, variances, nis]| {
         let mut record = Record { parameters, standard_errors, errors, variances, nis, codes };
         py.detach(|| work(&mut record)).map(|engine| (engine, record.codes))
@@ -204,7 +204,7 @@ where
     Dyn: Dimension<M>,
 {
     let (n, outputs) = shape(estimator);
-    let mut entries = room(&[outputs, n, n])?;
+    let mut entries = reserve(&[outputs, n, n])?;
     for output in 0..outputs {
         let Some(covariance) = estimator.parameter_covariance_of(output) else { return Ok(None) };
         entries.extend_from_slice(covariance.matrix().as_slice());
@@ -234,13 +234,13 @@ where
 }
 
 /// The start of this name.
-pub(crate) fn start(name: &str, blend: Option<Whole>, warm: bool) -> PyResult<Start> {
+pub(crate) fn start(name: &str, blend: Option<Whole>, warm: bool) -> PyResult<RlsStart> {
     let blend = blend.map(|blend| count("blend", blend, 0, usize::from(u16::MAX))).transpose()?;
     let blend = blend.map(|blend| u16::try_from(blend).unwrap_or(u16::MAX));
     let start = match (name, blend) {
-        ("standard", None) => Start::Standard,
-        ("exact", None) => Start::Exact,
-        ("mixed", Some(blend)) => Start::Mixed { blend },
+        ("standard", None) => RlsStart::Standard,
+        ("exact", None) => RlsStart::Exact,
+        ("mixed", Some(blend)) => RlsStart::Mixed { blend },
         ("mixed", None) => {
             return Err(PyValueError::new_err("blend: expected an int with start 'mixed', found None"));
         }
@@ -253,7 +253,7 @@ pub(crate) fn start(name: &str, blend: Option<Whole>, warm: bool) -> PyResult<St
             )));
         }
     };
-    if warm && start != Start::Standard {
+    if warm && start != RlsStart::Standard {
         let message = "start: expected 'standard', as parameters or a covariance are given";
         return Err(PyValueError::new_err(message));
     }

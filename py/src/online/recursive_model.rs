@@ -13,7 +13,7 @@ use thetahat_core::{
     RecursiveLeastSquares as LeastSquares, RecursiveNarx,
 };
 
-use super::argument::{self, LARGEST_SIZE, LONGEST_DELAY, Rows, Whole, count, failed, room};
+use super::argument::{self, LARGEST_SIZE, LONGEST_DELAY, Rows, Whole, count, failed, reserve};
 use super::forgetting::Forgetting;
 use super::innovation::{Innovation, list};
 use super::limits::Limits;
@@ -113,7 +113,7 @@ pub(crate) struct RecursiveModel {
 }
 
 /// What all constructors take to start from.
-pub(super) struct Beginnings<'a, 'py> {
+pub(super) struct StartingPoint<'a, 'py> {
     pub(super) parameters: Option<&'a Bound<'py, PyAny>>,
     pub(super) covariance: Option<&'a Bound<'py, PyAny>>,
     pub(super) limits: Option<&'a Bound<'py, PyAny>>,
@@ -131,7 +131,7 @@ impl RecursiveModel {
         py: Python<'_>,
         stepper: Stepper,
         inputs: usize,
-        given: &Beginnings<'_, '_>,
+        given: &StartingPoint<'_, '_>,
     ) -> PyResult<Self> {
         let n = each!(&stepper, stepper => stepper.estimator()).parameters().len();
         let vector = |value| array::finite_vector("parameters", value, Some(n));
@@ -384,7 +384,7 @@ impl RecursiveModel {
         steps: Option<Whole>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let (inputs, steps) = future(self.engine.inputs, future_inputs, steps)?;
-        let mut outputs = room(&[steps])?;
+        let mut outputs = reserve(&[steps])?;
         outputs.resize(steps, 0.0);
         let inputs = inputs.as_slice()?;
         each!(&self.engine.stepper, stepper => stepper.predict(inputs, &mut outputs))

@@ -8,7 +8,7 @@ use thetahat_core::{
     Covariance, Dimension, Error, ExtendedKalmanFilter, Innovation, Observation, Smoother, Transition,
 };
 
-use super::argument::{self, Rows, room, shaped};
+use super::argument::{self, Rows, reserve, shaped};
 use super::results::{Column, Results};
 use super::{Reduced, Stop, attributes, innovation};
 use crate::array;
@@ -398,7 +398,7 @@ pub(crate) fn recorded<F>(
     let shapes: [&[usize]; 7] =
         [&[rows, n], &[rows, n, n], &[rows, n], &[rows, n, n], &[rows, m], &[rows, m], &[rows]];
     let shapes = shapes.map(<[usize]>::to_vec);
-    let (results, codes) = (Results::new(py, shapes)?, room(&[rows])?);
+    let (results, codes) = (Results::new(py, shapes)?, reserve(&[rows])?);
     let (filter, codes, log_likelihood) = results.write(|columns| {
         let [
             predicted_states,

@@ -9,7 +9,7 @@ use nalgebra::{Const, Vector3, Vector4};
 use crate::noise::Noise;
 use crate::{
     Action, ArxOrders, Covariance, Dimension, Error, Forgetting, InputOrders, Lags, LeastSquares,
-    RecursiveArx, RecursiveLeastSquares, Start,
+    RecursiveArx, RecursiveLeastSquares, RlsStart,
 };
 
 const FORGETTING: Forgetting<f64> = Forgetting::Exponential { factor: 0.98 };
@@ -104,7 +104,7 @@ fn identify<N: Dimension + Dimension<Const<1>>, D: Dimension>(orders: &ArxOrders
     let noise_size = if seed.is_multiple_of(2) { 0.0 } else { 1e-3 };
     let (inputs, outputs) = plant.record(400, noise_size, &mut noise);
     let scales = vec![1.0; orders.inputs.len()];
-    let start = [Start::Standard, Start::Exact, Start::Mixed { blend: 20 }][seed as usize % 3];
+    let start = [RlsStart::Standard, RlsStart::Exact, RlsStart::Mixed { blend: 20 }][seed as usize % 3];
     let mut estimator: RecursiveArx<f64, N, D> =
         RecursiveArx::new(orders, 1.0, &scales, Forgetting::None).unwrap().with_start(start).unwrap();
     let begin = 350;
@@ -116,7 +116,7 @@ fn identify<N: Dimension + Dimension<Const<1>>, D: Dimension>(orders: &ArxOrders
         }
     }
     let truth = plant.parameters();
-    if noise_size == 0.0 && start != Start::Standard {
+    if noise_size == 0.0 && start != RlsStart::Standard {
         let away = estimator.estimator().parameters().iter().zip(&truth).map(|(a, b)| (a - b).abs());
         assert!(away.fold(0.0, f64::max) < 1e-9, "{orders:?} {seed}");
     }
@@ -225,8 +225,10 @@ fn the_exact_start_is_the_batch_fit() {
     let mut noise = Noise(2);
     let plant = Plant::random(&orders, 0, &mut noise);
     let (inputs, outputs) = plant.record(300, 0.1, &mut noise);
-    let mut arx: RecursiveArx<f64, Const<3>> =
-        RecursiveArx::new(&orders, 1.0, &[1.0], Forgetting::None).unwrap().with_start(Start::Exact).unwrap();
+    let mut arx: RecursiveArx<f64, Const<3>> = RecursiveArx::new(&orders, 1.0, &[1.0], Forgetting::None)
+        .unwrap()
+        .with_start(RlsStart::Exact)
+        .unwrap();
     let mut lags: Lags<f64, Const<3>> = Lags::new(&orders).unwrap();
     let mut batch = LeastSquares::<f64, Const<3>>::new();
     for (&u, &y) in inputs[0].iter().zip(&outputs) {

@@ -7,8 +7,8 @@ use nalgebra::{Const, SMatrix, SVector};
 use crate::noise::Noise;
 use crate::nonlinear_arx::tests::{BASIS, INPUTS, ORDERS, OUTPUT};
 use crate::{
-    Action, ArxOrders, Basis, Error, Forgetting, InputOrders, Polynomial, Radial, RecursiveNarx, Scaling,
-    Start,
+    Action, ArxOrders, Basis, Error, Forgetting, InputOrders, Polynomial, Radial, RecursiveNarx, RlsStart,
+    Scaling,
 };
 
 type Estimator = RecursiveNarx<f64, Polynomial<'static>, Const<5>, Const<6>>;
@@ -130,7 +130,7 @@ fn single_precision_and_radial_functions_find_the_plant_too() {
     let mut plant: RecursiveNarx<f32, _, Const<2>, Const<28>> =
         RecursiveNarx::new(basis, &orders, unit, &[unit], Forgetting::None)
             .unwrap()
-            .with_start(Start::Standard)
+            .with_start(RlsStart::Standard)
             .unwrap();
     let mut theta = [0.0; 28];
     (theta[1], theta[2 + 1 + 11], theta[2 + 1 + 13]) = (0.5, -0.8, 1.0);

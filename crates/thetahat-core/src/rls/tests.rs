@@ -13,7 +13,7 @@ use nalgebra::{Const, Matrix2, SMatrix, SVector, Vector1, Vector2, Vector3, Vect
 use crate::noise::Noise;
 use crate::{
     Action, Covariance, Dimension, Error, Forgetting, KalmanFilter, LeastSquares, LinearObservation,
-    LinearTransition, Real, RecursiveLeastSquares, Start, ud,
+    LinearTransition, Real, RecursiveLeastSquares, RlsStart, ud,
 };
 
 type Estimator<T, const K: usize> = RecursiveLeastSquares<T, Const<K>>;
@@ -304,7 +304,7 @@ fn the_exact_start_is_the_batch_solution() {
     let mut compared = 0;
     for seed in 0..10 {
         let data = samples(seed, &theta, 0.3, 30);
-        let mut estimator = estimator(Forgetting::None).with_start(Start::Exact).unwrap();
+        let mut estimator = estimator(Forgetting::None).with_start(RlsStart::Exact).unwrap();
         let mut collected = 0;
         for (index, (phi, y)) in data.iter().enumerate() {
             if estimator.update(phi, *y).unwrap().action == Action::Collecting {
@@ -335,7 +335,7 @@ fn the_noise_variance_after_an_exact_start_is_that_of_the_batch() {
     for seed in 0..40 {
         // Many a sample tells more of the parameters than of the noise. None may be left out.
         let data = samples(seed, &theta, 0.3, 12);
-        for start in [Start::Exact, Start::Mixed { blend: 0 }] {
+        for start in [RlsStart::Exact, RlsStart::Mixed { blend: 0 }] {
             let mut estimator = estimator(Forgetting::None).with_start(start).unwrap();
             let mut problem = LeastSquares::<f64, Const<3>>::new();
             for (phi, y) in &data {
@@ -357,7 +357,7 @@ fn the_noise_variance_after_an_exact_start_is_that_of_the_batch() {
 
     // Once a variance has been brought back to its bound there is a prior again.
     let policy = Forgetting::Exponential { factor: 0.8 };
-    let mut estimator = estimator::<f64, 1>(policy).with_start(Start::Exact).unwrap();
+    let mut estimator = estimator::<f64, 1>(policy).with_start(RlsStart::Exact).unwrap();
     estimator.update(&Vector1::new(1.0), 2.0).unwrap();
     assert_eq!(estimator.phase, super::Phase::Free);
     while estimator.update(&Vector1::new(0.0), 0.0).unwrap().action != Action::Capped {}
@@ -382,7 +382,7 @@ fn the_exact_start_is_accurate_in_single_precision() {
         }
         (estimator.parameters().component_mul(&scales) - SVector::repeat(1.0)).amax()
     };
-    let (standard, exact) = (error(Start::Standard), error(Start::Exact));
+    let (standard, exact) = (error(RlsStart::Standard), error(RlsStart::Exact));
     // Measured: 6e-3 and 6e-8.
     assert!(standard > 1e-3, "{standard}");
     assert!(exact < 1e-5, "{exact}");
@@ -399,9 +399,9 @@ fn the_exact_start_does_not_wait_for_regressors_that_are_nearly_dependent() {
                 (phi, phi.dot(&theta) + noise - d.dot(&theta))
             })
             .collect();
-        let mut exact = estimator::<f64, 3>(Forgetting::None).with_start(Start::Exact).unwrap();
+        let mut exact = estimator::<f64, 3>(Forgetting::None).with_start(RlsStart::Exact).unwrap();
         // The cap must not hold a first estimate that is poor.
-        let mut forgetting = estimator::<f64, 3>(POLICIES[1]).with_start(Start::Exact).unwrap();
+        let mut forgetting = estimator::<f64, 3>(POLICIES[1]).with_start(RlsStart::Exact).unwrap();
         for (k, (phi, y)) in data.iter().enumerate() {
             let action = exact.update(phi, *y).unwrap().action;
             assert_eq!(action, if k < 2 { Action::Collecting } else { Action::Updated });
@@ -414,7 +414,7 @@ fn the_exact_start_does_not_wait_for_regressors_that_are_nearly_dependent() {
         }
     }
     // A warm start has nothing of it.
-    let start = estimator::<f64, 3>(Forgetting::None).with_start(Start::Exact).unwrap();
+    let start = estimator::<f64, 3>(Forgetting::None).with_start(RlsStart::Exact).unwrap();
     let warm = start.with_parameters(theta).unwrap();
     assert_eq!(warm.covariance().variances(), Vector3::repeat(100.0));
 }
@@ -424,8 +424,9 @@ fn the_mixed_start_is_standard_then_exact() {
     let theta = Vector4::new(1.0, -2.0, 50.0, 3.0);
     let data = samples(8, &theta, 0.3, 40);
     let start = |start| estimator(Forgetting::None).with_start(start).unwrap();
-    let (mut standard, mut exact) = (start(Start::Standard), start(Start::Exact));
-    let (mut mixed, mut blended) = (start(Start::Mixed { blend: 0 }), start(Start::Mixed { blend: 10 }));
+    let (mut standard, mut exact) = (start(RlsStart::Standard), start(RlsStart::Exact));
+    let (mut mixed, mut blended) =
+        (start(RlsStart::Mixed { blend: 0 }), start(RlsStart::Mixed { blend: 10 }));
     let mut moment = None;
     for (k, (phi, y)) in data.iter().enumerate() {
         standard.update(phi, *y).unwrap();
@@ -460,7 +461,7 @@ fn nothing_is_forgotten_before_the_start_is_over() {
     // A silent start of any length, then a few samples: the batch solution, to rounding.
     let theta = Vector2::new(3.0, -1.0);
     for policy in POLICIES {
-        let mut estimator = estimator::<f64, 2>(policy).with_start(Start::Exact).unwrap();
+        let mut estimator = estimator::<f64, 2>(policy).with_start(RlsStart::Exact).unwrap();
         for _ in 0..10_000 {
             assert_eq!(estimator.update(&Vector2::new(1.0, 1.0), 2.0).unwrap().action, Action::Collecting);
         }

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::prediction_error::is_determined;
-use super::predictor::{Begin, Predictor};
+use super::predictor::{InitialCondition, Predictor};
 use super::start::candidates;
 use super::stretches::energy;
 use crate::Error;
@@ -24,7 +24,7 @@ const LARGEST_PRICE: f64 = 100.0;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Window {
     /// How many samples the models reach back.
-    pub(crate) silent: usize,
+    pub(crate) left_out: usize,
     /// The first sample that counts.
     pub(crate) counted: usize,
 }
@@ -35,7 +35,7 @@ pub(crate) struct Window {
 #[derive(Clone)]
 pub(crate) struct Common<'a> {
     record: &'a Record<'a>,
-    begin: Begin,
+    begin: InitialCondition,
     window: Window,
     options: Search,
     /// A sum of squares that is nothing.
@@ -71,12 +71,12 @@ impl<'a> Common<'a> {
         let tolerance = options.tolerance.max(SETTLED / samples.max(1) as f64);
         let options = Search { initial_parameters: None, starts: 0, tolerance, ..options.clone() };
         let smallest = NOTHING_LEFT * energy(record);
-        let begin = if free { Begin::Unknown } else { Begin::Zero };
+        let begin = if free { InitialCondition::Unknown } else { InitialCondition::Zero };
         Ok(Self { record, begin, window, options, smallest, deadline, monitor })
     }
 
     fn predictor(&self, orders: &Orders) -> Predictor<'a> {
-        Predictor::counting(self.record, orders, self.begin, self.window.silent, self.window.counted)
+        Predictor::counting(self.record, orders, self.begin, self.window.left_out, self.window.counted)
     }
 
     /// The least sum of squared errors that searches find: one from the best of `starts`, and with `recipes` one from the best

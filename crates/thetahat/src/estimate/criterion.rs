@@ -93,15 +93,15 @@ pub struct GainBound {
 /// Control 27 (1982), who also bound the set by a box).
 ///
 /// ```
-/// use thetahat::estimate::{Criterion, Norm};
+/// use thetahat::estimate::{ConvexFit, Norm};
 ///
-/// assert!(Criterion::default().is_plain());
-/// let criterion = Criterion { norm: Norm::One, bounds: vec!["a1=-1..0".parse()?], ..Criterion::default() };
+/// assert!(ConvexFit::default().is_plain());
+/// let criterion = ConvexFit { norm: Norm::One, bounds: vec!["a1=-1..0".parse()?], ..ConvexFit::default() };
 /// assert!(!criterion.is_plain());
 /// # Ok::<(), thetahat::Error>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Criterion {
+pub struct ConvexFit {
     /// Which norm of e is made small.
     pub norm: Norm,
     /// k, the weight of the sum of squared parameters, in samples. 0: none.
@@ -114,9 +114,9 @@ pub struct Criterion {
     pub noise_bound: Option<f64>,
 }
 
-/// What came of a [`Criterion`].
+/// What came of a [`ConvexFit`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct CriterionOutcome {
+pub struct ConvexOutcome {
     /// Which norm of e was made small.
     pub norm: Norm,
     /// The sum of |e|, the sum of e^2, or the largest |e|, without the ridge: in units of y, or of y squared.
@@ -135,7 +135,7 @@ pub struct CriterionOutcome {
     pub iterations: u32,
 }
 
-/// A fit under a [`Criterion`].
+/// A fit under a [`ConvexFit`].
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Constrained {
     /// theta-hat, in the order of [`Orders::names`].
@@ -149,10 +149,10 @@ pub(crate) struct Constrained {
     /// The condition number of the regressors, and of the rows that a ridge and equations add to them, their columns
     /// scaled to unit norm.
     pub(crate) condition: f64,
-    pub(crate) outcome: CriterionOutcome,
+    pub(crate) outcome: ConvexOutcome,
 }
 
-impl Criterion {
+impl ConvexFit {
     /// Whether this is least squares and nothing else.
     pub fn is_plain(&self) -> bool {
         *self == Self::default()
@@ -257,7 +257,7 @@ fn check_range(argument: &str, words: &str, low: f64, high: f64) -> Result<(), E
     Err(Error::argument(argument, format!("{words}: {wrong}")))
 }
 
-/// Fits A(q) y(t) = sum_j B_j(q) u_j(t - nk_j) + e(t) under a [`Criterion`]. `inputs` are the names of the channels; nothing is
+/// Fits A(q) y(t) = sum_j B_j(q) u_j(t - nk_j) + e(t) under a [`ConvexFit`]. `inputs` are the names of the channels; nothing is
 /// asked of the last inputs if they have none.
 ///
 /// The covariance is, with sigma^2 = sum e^2 / (N - q) and q the number of parameters that the data determine
@@ -287,7 +287,7 @@ pub(crate) fn constrained(
     inputs: &[String],
     orders: &Orders,
     presample: Presample,
-    criterion: &Criterion,
+    criterion: &ConvexFit,
 ) -> Result<Constrained, Error> {
     linear(orders)?;
     let signals = signals(record, orders)?;
@@ -395,10 +395,10 @@ pub(crate) fn constrained(
     .checked(peak(&residuals))
 }
 
-impl Criterion {
+impl ConvexFit {
     /// An outcome in which nothing is active.
-    fn outcome(&self, objective: f64) -> CriterionOutcome {
-        CriterionOutcome {
+    fn outcome(&self, objective: f64) -> ConvexOutcome {
+        ConvexOutcome {
             norm: self.norm,
             objective,
             ridge: self.ridge,

@@ -22,7 +22,7 @@ use crate::respond::{
     NisSummary,
     equations::{Experiment, Failure},
 };
-pub(crate) use likelihood::Criterion;
+pub(crate) use likelihood::LikelihoodObjective;
 use objective::Deviance;
 pub(crate) use uncertainty::listed;
 
@@ -128,7 +128,7 @@ pub(crate) fn largest_likelihood(
     options.check_numbers()?;
     let unknown = model.parameters();
     let names: Vec<String> = unknown.iter().map(|unknown| unknown.name.clone()).collect();
-    let samples = Criterion::new(model, experiments).measurements;
+    let samples = LikelihoodObjective::new(model, experiments).measurements;
     if samples <= names.len() {
         let message = format!(
             "{} unknown parameters need more than {samples} measured values; give a longer log",
@@ -155,7 +155,7 @@ pub(crate) fn largest_likelihood(
         searched.into_iter().nth(best).ok_or_else(|| Error::data("there is no start to search from"))?;
     let found = best.map_err(|failure| failure.error(experiments))?;
 
-    let mut criterion = Criterion::new(model, experiments);
+    let mut criterion = LikelihoodObjective::new(model, experiments);
     criterion.linearize(&found.parameters).map_err(|failure| failure.error(experiments))?;
     let slopes: Vec<f64> =
         unknown.iter().zip(&found.parameters).map(|(unknown, z)| unknown.scale.slope(*z)).collect();

@@ -52,7 +52,7 @@ use crate::model::{
 };
 use crate::optimize::{Deadline, Found, Monitor, Objective, Search, Stopped, best_free, search};
 use crate::respond::{NOTHING_LEFT, are_worth};
-use likelihood::{Begin, Likelihood};
+use likelihood::{InitialCondition, Likelihood};
 
 /// Starts have roots of A and C inside this circle.
 const INSIDE: f64 = 0.99;
@@ -101,16 +101,17 @@ pub(super) fn exact(
         deadline: Deadline::after(options.time_limit),
         monitor,
     };
-    let begin = if driven && initial != Initial::Zero { Begin::Free } else { Begin::Rest };
+    let begin =
+        if driven && initial != Initial::Zero { InitialCondition::Free } else { InitialCondition::Rest };
     let widest = Likelihood::new(record, orders, lines, begin);
     if initial != Initial::Auto || widest.initial_conditions() == 0 {
         enough(&widest, orders)?;
     } else {
-        enough(&Likelihood::new(record, orders, lines, Begin::Rest), orders)?;
+        enough(&Likelihood::new(record, orders, lines, InitialCondition::Rest), orders)?;
     }
     let starts = job.starts()?;
     let in_the_middle = record.past.iter().any(|past| *past > 0);
-    let reached = if initial == Initial::Auto && begin == Begin::Free && !in_the_middle {
+    let reached = if initial == Initial::Auto && begin == InitialCondition::Free && !in_the_middle {
         job.choose(&starts)?
     } else {
         let found = job.best(begin, &starts)?;
@@ -128,7 +129,8 @@ pub(super) fn beside(
     estimate: &Estimate,
     parameters: &[f64],
 ) -> Option<(Vec<Vec<f64>>, Vec<f64>)> {
-    let begin = if estimate.initial() == Initial::Zero { Begin::Rest } else { Begin::Free };
+    let begin =
+        if estimate.initial() == Initial::Zero { InitialCondition::Rest } else { InitialCondition::Free };
     let mut likelihood = Likelihood::new(record, orders, lines, begin);
     let cost = best_free(&mut likelihood, parameters).ok()?;
     likelihood.linearize().ok()?;
@@ -201,7 +203,7 @@ struct Job<'j, 'r> {
 struct Reached<'r> {
     likelihood: Likelihood<'r>,
     found: Found,
-    begin: Begin,
+    begin: InitialCondition,
     starts: Vec<StartOutcome>,
 }
 
@@ -250,7 +252,11 @@ impl<'r> Job<'_, 'r> {
     }
 
     /// The best that searches from these starts find.
-    fn best(&self, begin: Begin, starts: &[(&'static str, Vec<f64>)]) -> Result<Option<Reached<'r>>, Error> {
+    fn best(
+        &self,
+        begin: InitialCondition,
+        starts: &[(&'static str, Vec<f64>)],
+    ) -> Result<Option<Reached<'r>>, Error> {
         let mut best: Option<Reached<'r>> = None;
         let mut outcomes = Vec::new();
         let mut winner = 0;
@@ -278,15 +284,15 @@ impl<'r> Job<'_, 'r> {
 
     /// At rest, or from a state that is estimated where that is worth it.
     fn choose(&self, starts: &[(&'static str, Vec<f64>)]) -> Result<Reached<'r>, Error> {
-        let rest = self.best(Begin::Rest, starts)?;
-        let widest = Likelihood::new(self.record, self.orders, self.lines, Begin::Free);
+        let rest = self.best(InitialCondition::Rest, starts)?;
+        let widest = Likelihood::new(self.record, self.orders, self.lines, InitialCondition::Free);
         let (samples, more) = (widest.samples(), widest.initial_conditions());
         if more == 0 || samples <= self.orders.parameters() + more {
             return rest.ok_or_else(|| hopeless(self.orders));
         }
         let mut from = starts.to_vec();
         from.extend(rest.iter().map(|rest| ("rest", rest.found.parameters.clone())));
-        let free = self.best(Begin::Free, &from)?;
+        let free = self.best(InitialCondition::Free, &from)?;
         match (rest, free) {
             (Some(rest), Some(free)) => {
                 let count = rest.likelihood.samples() as f64;
@@ -327,7 +333,7 @@ impl<'r> Job<'_, 'r> {
             samples,
             mse: squares / count,
             condition,
-            initial: if begin == Begin::Rest { Initial::Zero } else { Initial::Estimate },
+            initial: if begin == InitialCondition::Rest { Initial::Zero } else { Initial::Estimate },
             procedure: Procedure::ExactLikelihood(outcome),
             parameters: found.parameters,
         })

@@ -35,9 +35,9 @@ mod worth;
 
 use std::time::Instant;
 
-use super::predictor::{Begin, Predictor};
+use super::predictor::{InitialCondition, Predictor};
 use super::{
-    Criterion, Estimate, Initial, Method, Monitor, Procedure, Search, arx, estimate_of_channels, exact,
+    ConvexFit, Estimate, Initial, Method, Monitor, Procedure, Search, arx, estimate_of_channels, exact,
     prediction_error,
 };
 use crate::Error;
@@ -146,7 +146,7 @@ impl Task<'_> {
             }
             Method::ExactLikelihood(_) => return self.by_likelihood(beside),
             // All parameters within a bound: a set, and no likelihood.
-            Method::Constrained(Criterion { noise_bound: Some(_), .. }) => return self.plain(None),
+            Method::Constrained(ConvexFit { noise_bound: Some(_), .. }) => return self.plain(None),
             Method::Constrained(_) | Method::PredictionError(_) => {}
         }
         let started = Instant::now();
@@ -208,7 +208,7 @@ impl Task<'_> {
             );
         }
         match self.method {
-            Method::Constrained(Criterion { ridge, .. }) if *ridge > 0.0 => {
+            Method::Constrained(ConvexFit { ridge, .. }) if *ridge > 0.0 => {
                 Some("a ridge would pull the level towards zero; leave one of the two out")
             }
             _ => None,
@@ -366,8 +366,8 @@ impl Task<'_> {
         let known = conditions(without) as f64;
         let from = |begin| {
             let mut predictor = Predictor::new(&record, &orders, begin);
-            if begin == Begin::Unknown && known > predictor.initial_conditions() as f64 {
-                predictor = Predictor::new(&record, &orders, Begin::UnknownInputs);
+            if begin == InitialCondition::Unknown && known > predictor.initial_conditions() as f64 {
+                predictor = Predictor::new(&record, &orders, InitialCondition::UnknownInputs);
             }
             let price = (1.0 + predictor.initial_conditions() as f64 - known) * samples.ln();
             let count = predictor.samples() as f64;
@@ -378,7 +378,7 @@ impl Task<'_> {
         let rests = without.initial() == Initial::Zero;
         // What seemed to begin at rest may have begun elsewhere.
         let open = !rests || self.initial == Initial::Auto && orders.nf.iter().any(|&nf| nf > 0);
-        rests && orders.na == 0 && from(Begin::Zero) || open && from(Begin::Unknown)
+        rests && orders.na == 0 && from(InitialCondition::Zero) || open && from(InitialCondition::Unknown)
     }
 }
 

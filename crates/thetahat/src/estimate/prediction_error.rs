@@ -10,7 +10,7 @@ use thetahat_core::nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use super::arx::{arx, estimate_is_for_f, out_of_range, rows, signals};
 use super::outcome::{SearchOutcome, StartOutcome, search_outcome};
 use super::polynomials::Unusable;
-use super::predictor::{Begin, Predictor};
+use super::predictor::{InitialCondition, Predictor};
 use super::stretches::{energy, thinned};
 use super::uncertainty::{autoregression, backward_filtered_products, coloured, restricted};
 use super::{Estimate, Initial, Procedure};
@@ -34,16 +34,16 @@ pub(crate) fn drop_is_not_for_f() -> Error {
 }
 
 /// How the initial conditions are treated.
-fn begins(record: &Record<'_>, orders: &Orders, initial: Initial) -> Result<(Begin, bool), Error> {
+fn begins(record: &Record<'_>, orders: &Orders, initial: Initial) -> Result<(InitialCondition, bool), Error> {
     let filtered = orders.has_f();
     // In the middle of a log nothing is at rest.
     let measured = record.past.iter().any(|past| *past > 0);
     match initial {
         Initial::Drop if filtered => Err(drop_is_not_for_f()),
-        Initial::Zero => Ok((Begin::Zero, false)),
+        Initial::Zero => Ok((InitialCondition::Zero, false)),
         Initial::Estimate if !filtered => Err(estimate_is_for_f()),
-        Initial::Drop | Initial::Estimate => Ok((Begin::Unknown, false)),
-        Initial::Auto => Ok((Begin::Unknown, filtered && !measured)),
+        Initial::Drop | Initial::Estimate => Ok((InitialCondition::Unknown, false)),
+        Initial::Auto => Ok((InitialCondition::Unknown, filtered && !measured)),
     }
 }
 
@@ -76,15 +76,17 @@ pub(super) fn prediction_error(
         job.choose(record, orders, predictor, &mut beginning)?
     } else {
         let initial = match begin {
-            Begin::Zero => Initial::Zero,
-            Begin::Unknown | Begin::UnknownInputs if orders.has_f() => Initial::Estimate,
-            Begin::Unknown | Begin::UnknownInputs => Initial::Drop,
+            InitialCondition::Zero => Initial::Zero,
+            InitialCondition::Unknown | InitialCondition::UnknownInputs if orders.has_f() => {
+                Initial::Estimate
+            }
+            InitialCondition::Unknown | InitialCondition::UnknownInputs => Initial::Drop,
         };
         let found = job.search_from(problem, &mut predictor, &mut beginning)?;
         let found = found.ok_or_else(|| hopeless(orders))?;
         Reached { predictor, found, initial }
     };
-    if begin != Begin::Zero && Predictor::has_unknown_inputs(record, orders) {
+    if begin != InitialCondition::Zero && Predictor::has_unknown_inputs(record, orders) {
         reached = job.with_inputs(record, orders, reached, &beginning.parameters)?;
     }
     let Reached { predictor, found, initial } = reached;
@@ -104,7 +106,7 @@ struct Reached<'r> {
 struct Problem<'p, 'r> {
     record: &'p Record<'r>,
     orders: &'p Orders,
-    begin: Begin,
+    begin: InitialCondition,
 }
 
 impl<'r> Problem<'_, 'r> {
@@ -126,10 +128,14 @@ impl Job<'_> {
     ///
     /// Of a long record the starts see stretches that are spread over it: what they lead to is close to the end, and a few
     /// iterations on all samples are left.
-    fn beginning(&self, problem: Problem<'_, '_>, predictor: &mut Predictor<'_>) -> Result<Beginning, Error> {
+    fn beginning(
+        &self,
+        problem: Problem<'_, '_>,
+        predictor: &mut Predictor<'_>,
+    ) -> Result<TrackStart, Error> {
         if let Some(thin) = thinned(problem.record) {
             // In the middle of a log nothing is at rest.
-            let problem = Problem { record: &thin, begin: Begin::Unknown, ..problem };
+            let problem = Problem { record: &thin, begin: InitialCondition::Unknown, ..problem };
             let mut small = problem.predictor();
             let near = self.ranked(problem, &mut small).and_then(|mut beginning| {
                 let found = self.search_from(problem, &mut small, &mut beginning)?;
@@ -138,11 +144,11 @@ impl Job<'_> {
             match near {
                 Err(Error::Interrupted) => return Err(Error::Interrupted),
                 Err(_) | Ok(None) => {}
-                Ok(Some((found, Beginning { mut starts, unstable_pole, .. }))) => {
+                Ok(Some((found, TrackStart { mut starts, unstable_pole, .. }))) => {
                     starts[0].reached = Some(found.cost() / small.samples() as f64);
                     let parameters = found.parameters;
                     let samples = Some(small.samples());
-                    return Ok(Beginning {
+                    return Ok(TrackStart {
                         parameters,
                         starts,
                         unstable_pole,
@@ -164,7 +170,7 @@ impl Job<'_> {
         &self,
         problem: Problem<'_, '_>,
         predictor: &mut Predictor<'_>,
-        beginning: &mut Beginning,
+        beginning: &mut TrackStart,
     ) -> Result<Option<Found>, Error> {
         let mut found = match &beginning.found {
             Some(found) => Some(found.clone()),
@@ -200,10 +206,10 @@ impl Job<'_> {
         record: &Record<'r>,
         orders: &Orders,
         mut estimated: Predictor<'r>,
-        beginning: &mut Beginning,
+        beginning: &mut TrackStart,
     ) -> Result<Reached<'r>, Error> {
         let problem = |begin| Problem { record, orders, begin };
-        let mut resting = problem(Begin::Zero).predictor();
+        let mut resting = problem(InitialCondition::Zero).predictor();
         let samples = estimated.samples();
         let rows = resting.samples() as f64;
         let more = estimated.initial_conditions();
@@ -217,7 +223,7 @@ impl Job<'_> {
             beginning.found.is_none() && matches!(costs, (Ok(zero), Ok(free)) if !worth(zero, free));
         let mut at_rest = None;
         if at_rest_first
-            && let Some(found) = self.search_from(problem(Begin::Zero), &mut resting, beginning)?
+            && let Some(found) = self.search_from(problem(InitialCondition::Zero), &mut resting, beginning)?
         {
             let predicted = best_free(&mut estimated, &found.parameters)
                 .map_or(f64::INFINITY, |cost| cost - estimated.predicted_decrease());
@@ -226,7 +232,7 @@ impl Job<'_> {
             }
             at_rest = Some(found);
         }
-        let free = self.search_from(problem(Begin::Unknown), &mut estimated, beginning)?;
+        let free = self.search_from(problem(InitialCondition::Unknown), &mut estimated, beginning)?;
         let Some(free) = free else {
             let found = at_rest.ok_or_else(|| hopeless(orders))?;
             return Ok(Reached { predictor: resting, found, initial: Initial::Zero });
@@ -254,7 +260,7 @@ impl Job<'_> {
         reached: Reached<'r>,
         start: &[f64],
     ) -> Result<Reached<'r>, Error> {
-        let mut wide = Predictor::new(record, orders, Begin::UnknownInputs);
+        let mut wide = Predictor::new(record, orders, InitialCondition::UnknownInputs);
         let samples = wide.samples();
         let mean = |cost: f64, predictor: &Predictor<'_>| cost / predictor.samples() as f64;
         let (given, few) =
@@ -284,7 +290,7 @@ impl Job<'_> {
             return Ok(reached);
         }
         // Not a better place alone.
-        let mut narrow = Predictor::new(record, orders, Begin::Unknown);
+        let mut narrow = Predictor::new(record, orders, InitialCondition::Unknown);
         let same_place = best_free(&mut narrow, &found.parameters);
         if let Ok(cost) = same_place
             && !worth(mean(cost, &narrow), with, narrow.initial_conditions())
@@ -318,7 +324,7 @@ impl Job<'_> {
         orders: &Orders,
         predictor: &Predictor<'_>,
         found: Found,
-        beginning: Beginning,
+        beginning: TrackStart,
         initial: Initial,
     ) -> Result<Estimate, Error> {
         let (size, samples) = (found.parameters.len(), predictor.samples());
@@ -352,7 +358,7 @@ impl Job<'_> {
 }
 
 /// Where the search on the whole record begins.
-struct Beginning {
+struct TrackStart {
     parameters: Vec<f64>,
     /// All starts, the best first.
     starts: Vec<StartOutcome>,
@@ -366,7 +372,7 @@ struct Beginning {
     found: Option<Found>,
 }
 
-impl Beginning {
+impl TrackStart {
     /// Notes the mean of e^2 that the search from the best start reached.
     fn reached(&mut self, cost: f64) {
         if let Some(start) = self.starts.first_mut() {
@@ -426,7 +432,8 @@ pub(super) fn beside(
 
 /// The prediction errors of a record with the initial conditions that an estimate from it has.
 pub(super) fn predictor_of<'r>(record: &Record<'r>, orders: &Orders, estimate: &Estimate) -> Predictor<'r> {
-    let begin = if estimate.initial() == Initial::Zero { Begin::Zero } else { Begin::Unknown };
+    let begin =
+        if estimate.initial() == Initial::Zero { InitialCondition::Zero } else { InitialCondition::Unknown };
     let predictor = Predictor::new(record, orders, begin);
     let conditions = match estimate.procedure() {
         Procedure::PredictionError(outcome) => outcome.initial_conditions,
@@ -434,7 +441,7 @@ pub(super) fn predictor_of<'r>(record: &Record<'r>, orders: &Orders, estimate: &
         _ => 0,
     };
     if conditions > predictor.initial_conditions() {
-        return Predictor::new(record, orders, Begin::UnknownInputs);
+        return Predictor::new(record, orders, InitialCondition::UnknownInputs);
     }
     predictor
 }

@@ -73,7 +73,7 @@ struct Layout {
     own_free: Vec<usize>,
     origin: usize,
     /// r, the first samples of the section in which v = 0; none without C.
-    masked: usize,
+    conditioned: usize,
     /// The first sample that counts, r or later.
     counted: usize,
     /// From where on errors count linearly; none: they count by their squares.
@@ -103,7 +103,7 @@ struct Column {
 
 /// How a segment starts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Begin {
+pub(super) enum InitialCondition {
     /// All earlier samples are zero, and all samples count.
     Zero,
     /// Nothing is known of earlier samples but those that were measured; inputs before these are zero.
@@ -116,27 +116,27 @@ pub(super) enum Begin {
 /// the first that counts.
 #[derive(Debug, Clone, Copy)]
 struct Common {
-    silent: usize,
+    left_out: usize,
     counted: usize,
 }
 
 impl Layout {
     /// That of sections that begin `past` samples before their segment. Where all F are one, their initial-condition responses are those of an
     /// input.
-    fn new(orders: &Orders, begin: Begin, past: usize, common: Option<Common>, one: bool) -> Self {
+    fn new(orders: &Orders, begin: InitialCondition, past: usize, common: Option<Common>, one: bool) -> Self {
         let inputs = orders.inputs();
-        let unknown = begin != Begin::Zero;
-        let silent = common.map_or(past, |common| common.silent);
-        let skipped = if unknown { silent.max(orders.conditioned()) } else { 0 };
-        let masked = if orders.nc > 0 { skipped } else { 0 };
+        let unknown = begin != InitialCondition::Zero;
+        let left_out = common.map_or(past, |common| common.left_out);
+        let skipped = if unknown { left_out.max(orders.conditioned()) } else { 0 };
+        let conditioned = if orders.nc > 0 { skipped } else { 0 };
         let counted = common.map_or(skipped, |common| common.counted.max(skipped));
         // Responses begin with the section where nothing is known of it; models on common samples have responses of the same age.
-        let at_rest = begin == Begin::Unknown && past == 0;
+        let at_rest = begin == InitialCondition::Unknown && past == 0;
         let origin = if unknown && common.is_none() && !at_rest { skipped - orders.nd } else { 0 };
         let free = |input: usize| match begin {
-            Begin::Zero => 0,
-            Begin::Unknown => orders.free_responses(input),
-            Begin::UnknownInputs => orders.free_responses_and_inputs(input, origin),
+            InitialCondition::Zero => 0,
+            InitialCondition::Unknown => orders.free_responses(input),
+            InitialCondition::UnknownInputs => orders.free_responses_and_inputs(input, origin),
         };
         let mut own_free: Vec<usize> = (0..inputs).map(free).collect();
         if one && let Some(first) = own_free.iter().position(|&free| free > 0) {
@@ -166,7 +166,7 @@ impl Layout {
         taps.extend(zero.map(|(&signal, &count)| Taps { signal, first: 0, count, sign: 1.0 }));
         let used = taps.iter().filter(|taps| taps.count > 0);
         let longest = used.map(|taps| taps.first + taps.count - 1).max().unwrap_or(0);
-        let corrections = if masked > 0 { longest } else { 0 };
+        let corrections = if conditioned > 0 { longest } else { 0 };
         taps.push(Taps { signal: impulse, first: 0, count: corrections, sign: 1.0 });
         let products = Products::new(&taps);
         let columns = taps.iter().flat_map(|taps| {
@@ -191,7 +191,7 @@ impl Layout {
             orders: orders.clone(),
             taps,
             products,
-            masked,
+            conditioned,
             counted,
             bound: None,
             output,
@@ -227,23 +227,27 @@ pub(super) struct Predictor<'a> {
 
 impl<'a> Predictor<'a> {
     /// Segments without more samples that count than they have initial-condition responses are left out.
-    pub(super) fn new(record: &Record<'a>, orders: &Orders, begin: Begin) -> Self {
+    pub(super) fn new(record: &Record<'a>, orders: &Orders, begin: InitialCondition) -> Self {
         Self::with(record, orders, begin, false)
     }
 
     /// The same for parameters in which all F are one polynomial.
-    pub(super) fn with_one_denominator(record: &Record<'a>, orders: &Orders, begin: Begin) -> Self {
+    pub(super) fn with_one_denominator(
+        record: &Record<'a>,
+        orders: &Orders,
+        begin: InitialCondition,
+    ) -> Self {
         Self::with(record, orders, begin, true)
     }
 
-    fn with(record: &Record<'a>, orders: &Orders, begin: Begin, one: bool) -> Self {
+    fn with(record: &Record<'a>, orders: &Orders, begin: InitialCondition, one: bool) -> Self {
         let mut layouts = Vec::new();
         let mut sections = Vec::with_capacity(record.segments.len());
         for (segment, past) in record.segments.iter().zip(&record.past) {
-            let past = if begin == Begin::Zero { 0 } else { orders.history().min(*past) };
+            let past = if begin == InitialCondition::Zero { 0 } else { orders.history().min(*past) };
             let rows = segment.start - past..segment.end;
             // Where earlier inputs would be too many unknowns they are zero.
-            for begin in [begin, Begin::Unknown] {
+            for begin in [begin, InitialCondition::Unknown] {
                 let index = layout_of(&mut layouts, orders, begin, past, one);
                 let (_, layout) = &layouts[index];
                 let runs = runs(record, orders, &rows, layout.counted);
@@ -251,7 +255,7 @@ impl<'a> Predictor<'a> {
                     sections.push(Section::new(record, &rows, runs, layout, index));
                     break;
                 }
-                if begin != Begin::UnknownInputs {
+                if begin != InitialCondition::UnknownInputs {
                     break;
                 }
             }
@@ -267,20 +271,22 @@ impl<'a> Predictor<'a> {
         pasts.dedup();
         let free = |begin, past| Layout::new(orders, begin, past, None, false).free;
         orders.has_f()
-            && pasts.iter().any(|past| free(Begin::UnknownInputs, *past) > free(Begin::Unknown, *past))
+            && pasts.iter().any(|past| {
+                free(InitialCondition::UnknownInputs, *past) > free(InitialCondition::Unknown, *past)
+            })
     }
 
-    /// The samples that are the same for all models: at least the first `silent` samples of each segment have e = 0, and at least
+    /// The samples that are the same for all models: at least the first `left_out` samples of each segment have e = 0, and at least
     /// the first `counted` do not count. Segments without a sample that counts, or with no more than the initial-condition responses need, are left out.
     /// What was measured before a segment is not used.
     pub(super) fn counting(
         record: &Record<'a>,
         orders: &Orders,
-        begin: Begin,
-        silent: usize,
+        begin: InitialCondition,
+        left_out: usize,
         counted: usize,
     ) -> Self {
-        let layout = Layout::new(orders, begin, 0, Some(Common { silent, counted }), false);
+        let layout = Layout::new(orders, begin, 0, Some(Common { left_out, counted }), false);
         let needed = layout.counted.max(layout.free);
         let usable = record.segments.iter().filter(|segment| segment.len() > needed);
         let section = |segment: &Range<usize>| {
@@ -524,9 +530,9 @@ impl<'a> Predictor<'a> {
 
 /// Where the layout of sections with this past stands; it is made where there is none yet.
 fn layout_of(
-    layouts: &mut Vec<((Begin, usize), Layout)>,
+    layouts: &mut Vec<((InitialCondition, usize), Layout)>,
     orders: &Orders,
-    begin: Begin,
+    begin: InitialCondition,
     past: usize,
     one: bool,
 ) -> usize {

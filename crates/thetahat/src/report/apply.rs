@@ -6,7 +6,7 @@ use super::suited::{check_offsets, check_sample_time};
 use crate::Error;
 use crate::data::{Detrend, Log, Offset, Rows, checked};
 use crate::model::{Model, PolynomialModel};
-use crate::respond::{Horizon, Response, Start};
+use crate::respond::{Horizon, InitialCondition, Response};
 use crate::validate::Fit;
 
 /// What a model says of a log, in the log's own units.
@@ -42,7 +42,7 @@ pub struct AppliedOutput {
 /// Predicts or simulates a log with a model.
 ///
 /// `rows` are those to respond to; none: all. The model's own offsets are used unless `detrend` says how to find
-/// others on these rows. A free run also works on a log without the model's outputs, from [`Start::Zero`].
+/// others on these rows. A free run also works on a log without the model's outputs, from [`InitialCondition::Zero`].
 ///
 /// A prediction k steps ahead is also a forecast of the k samples after the last usable row, each as many steps
 /// ahead as it lies after that row: of rows asked for that have the inputs but not the output, and, for a model that
@@ -63,7 +63,7 @@ pub fn apply(
     rows: &[Rows],
     detrend: Option<Detrend>,
     horizon: Horizon,
-    initial: Start,
+    initial: InitialCondition,
 ) -> Result<Applied, Error> {
     applied(model, log, rows, detrend, (horizon, initial), &[])
 }
@@ -80,7 +80,7 @@ impl Report {
         rows: &[Rows],
         detrend: Option<Detrend>,
         horizon: Horizon,
-        initial: Start,
+        initial: InitialCondition,
     ) -> Result<Applied, Error> {
         applied(&self.model, log, rows, detrend, (horizon, initial), &rows_of_fit(self, log)?)
     }
@@ -91,7 +91,7 @@ fn applied(
     log: &Log,
     rows: &[Rows],
     detrend: Option<Detrend>,
-    (horizon, initial): (Horizon, Start),
+    (horizon, initial): (Horizon, InitialCondition),
     fitted: &[Rows],
 ) -> Result<Applied, Error> {
     let Prepared { rows, log: deviations, levels } = prepared(model, log, rows, detrend, (horizon, initial))?;
@@ -161,7 +161,7 @@ pub(super) fn prepared(
     log: &Log,
     rows: &[Rows],
     detrend: Option<Detrend>,
-    (horizon, initial): (Horizon, Start),
+    (horizon, initial): (Horizon, InitialCondition),
 ) -> Result<Prepared, Error> {
     check_sample_time(model, log)?;
     let all = vec![Rows::new(1, log.rows())?];
@@ -170,7 +170,8 @@ pub(super) fn prepared(
         log.channel(&input.name)?;
     }
     let absent = model.outputs().iter().find(|output| !log.has(&output.name));
-    if let Some(output) = absent.filter(|_| horizon != Horizon::FreeRun || initial != Start::Zero) {
+    if let Some(output) = absent.filter(|_| horizon != Horizon::FreeRun || initial != InitialCondition::Zero)
+    {
         return Err(Error::data(format!(
             "the log has no output '{}': only a free run from zero can do without it",
             output.name
@@ -226,7 +227,8 @@ mod tests {
     }
 
     fn predicted(model: &PolynomialModel, log: &Log, rows: &[Rows], steps: usize) -> One {
-        one(apply(&model.clone().into(), log, rows, None, Horizon::Steps { steps }, Start::Drop).unwrap())
+        one(apply(&model.clone().into(), log, rows, None, Horizon::Steps { steps }, InitialCondition::Drop)
+            .unwrap())
     }
 
     /// What is said of the only output.
@@ -295,7 +297,14 @@ mod tests {
         assert_eq!(predicted(&model, &log, &rows("4..4"), 2).beyond, 2);
         let none = Log::new(vec![channel("y", &[f64::NAN; 4])], 2.0).unwrap();
         assert_eq!(predicted(&model, &none, &[], 2).beyond, 0);
-        let far = apply(&model.into(), &log, &[], None, Horizon::Steps { steps: usize::MAX }, Start::Drop);
+        let far = apply(
+            &model.into(),
+            &log,
+            &[],
+            None,
+            Horizon::Steps { steps: usize::MAX },
+            InitialCondition::Drop,
+        );
         assert!(matches!(far, Err(Error::Argument { argument, .. }) if argument == "horizon"));
     }
 
@@ -340,12 +349,13 @@ mod tests {
         let model = polynomial.clone().into();
         let y = [5.0, 6.0, 7.0, 5.0, 4.0];
         let log = Log::new(vec![channel("u", &[1.0; 5]), channel("y", &y)], 2.0).unwrap();
-        let run = one(apply(&model, &log, &[], None, Horizon::FreeRun, Start::Estimate).unwrap());
+        let run = one(apply(&model, &log, &[], None, Horizon::FreeRun, InitialCondition::Estimate).unwrap());
         assert_eq!((run.beyond, run.standard_deviations, run.predicted.len()), (0, None, 5));
         let inputs = Log::new(vec![channel("u", &[1.0; 5])], 2.0).unwrap();
-        let run = one(apply(&model, &inputs, &[], None, Horizon::FreeRun, Start::Zero).unwrap());
+        let run = one(apply(&model, &inputs, &[], None, Horizon::FreeRun, InitialCondition::Zero).unwrap());
         assert_eq!((run.measured, run.standard_deviations, run.predicted.len()), (None, None, 5));
-        let zero = one(apply(&model, &log, &[], None, Horizon::Steps { steps: 2 }, Start::Zero).unwrap());
+        let zero =
+            one(apply(&model, &log, &[], None, Horizon::Steps { steps: 2 }, InitialCondition::Zero).unwrap());
         let steps = [1, 2, 2, 2, 2].map(|steps| prediction_deviation(&polynomial, steps).unwrap());
         assert_eq!(zero.standard_deviations.unwrap(), steps);
     }

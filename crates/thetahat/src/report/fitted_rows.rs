@@ -5,17 +5,17 @@ use crate::Error;
 use crate::data::{Log, Record, Rows, digest, inside};
 use crate::estimate::{Initial, Procedure};
 use crate::model::{Orders, PolynomialModel};
-use crate::respond::{Horizon, Start};
+use crate::respond::{Horizon, InitialCondition};
 
 /// What the responses on the rows of the fit start from, as the estimate did.
-pub(super) fn estimation_start(report: &Report, model: &PolynomialModel) -> Start {
+pub(super) fn estimation_start(report: &Report, model: &PolynomialModel) -> InitialCondition {
     match report.estimation.initial {
         // Its filter begins with a covariance: predictions have none.
-        _ if is_exact(report) => Start::natural(model, Horizon::Steps { steps: 1 }),
-        Some(Initial::Zero) => Start::Zero,
+        _ if is_exact(report) => InitialCondition::natural(model, Horizon::Steps { steps: 1 }),
+        Some(Initial::Zero) => InitialCondition::Zero,
         // Without F there is nothing to estimate, and C begins from e = 0 where it does in the fit.
-        _ if !model.orders.is_linear() => Start::Estimate,
-        _ => Start::Drop,
+        _ if !model.orders.is_linear() => InitialCondition::Estimate,
+        _ => InitialCondition::Drop,
     }
 }
 

@@ -11,7 +11,7 @@ use crate::estimate::{self, Beside, Constant, Estimate, Fitted, Initial, Method,
 use crate::model::{Orders, PolynomialModel, Quantity, Signal};
 use crate::optimize::{Deadline, Monitor, Search};
 use crate::regression::sum;
-use crate::respond::{Horizon, PolynomialOnLog, Start, innovations};
+use crate::respond::{Horizon, InitialCondition, PolynomialOnLog, innovations};
 use crate::select::{self, Choice, Focus, Grid, SelectedModel, Task};
 use crate::validate::Part;
 use crate::{Document, Error};
@@ -427,7 +427,7 @@ fn unfiltered_variance(
         Signal::default(),
     )?;
     let record = log.record(&plan.inputs, &plan.output, rows)?;
-    let start = Start::natural(&model, Horizon::Steps { steps: 1 });
+    let start = InitialCondition::natural(&model, Horizon::Steps { steps: 1 });
     let found = innovations(&model, &record, 1, start)?;
     let errors = || found.iter().flat_map(|found| found.counted_errors());
     let (samples, squares) = (errors().count(), sum(errors().map(|e| e * e)));

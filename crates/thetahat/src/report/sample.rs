@@ -2,13 +2,13 @@ use super::apply::{Prepared, of_offsets, prepared};
 use crate::Error;
 use crate::data::{Detrend, Log, Rows};
 use crate::model::Model;
-use crate::respond::{Drawn, Draws, Horizon, Start, draw, record_for};
+use crate::respond::{Drawn, Draws, Horizon, InitialCondition, draw, record_for};
 
 /// Free runs of a model on a log, drawn from what the estimate leaves open.
 ///
 /// They are in the log's own units, with a value for each row of the log; NaN outside the rows asked for, in gaps, and before
-/// a start. But for [`Start::Drop`], which begins anew from measured outputs, they go on where the output alone is missing. `rows` are those to respond to; none: all. Offsets are as for [`apply`](crate::report::apply), and a log without the output
-/// does for [`Start::Zero`]. [`Drawn::bands`] gives the mean and quantiles of each row.
+/// a start. But for [`InitialCondition::Drop`], which begins anew from measured outputs, they go on where the output alone is missing. `rows` are those to respond to; none: all. Offsets are as for [`apply`](crate::report::apply), and a log without the output
+/// does for [`InitialCondition::Zero`]. [`Drawn::bands`] gives the mean and quantiles of each row.
 ///
 /// # Errors
 /// As for [`apply`](crate::report::apply) and [`draw`].
@@ -17,7 +17,7 @@ use crate::respond::{Drawn, Draws, Horizon, Start, draw, record_for};
 /// use thetahat::data::{Channel, Log};
 /// use thetahat::model::Orders;
 /// use thetahat::report::{Plan, identify, sample};
-/// use thetahat::respond::{Draws, Start};
+/// use thetahat::respond::{Draws, InitialCondition};
 ///
 /// let u: Vec<f64> = (0..200).map(|t| f64::from(t * t % 7)).collect();
 /// let mut y = vec![20.0];
@@ -27,7 +27,7 @@ use crate::respond::{Drawn, Draws, Horizon, Start, draw, record_for};
 /// let channel = |name: &str, values| Channel { name: name.into(), values };
 /// let log = Log::new(vec![channel("u", u), channel("y", y)], 0.1)?;
 /// let model = identify(log.clone(), &[], &Plan::new(&["u"], "y", Orders::arx(1, &[1], &[1])?))?.model;
-/// let runs = sample(&model, &log, &[], None, Start::Estimate, &Draws { count: 200, seed: 0 })?;
+/// let runs = sample(&model, &log, &[], None, InitialCondition::Estimate, &Draws { count: 200, seed: 0 })?;
 /// let (mean, bands) = runs.bands(&[0.025, 0.975]);
 /// assert!(bands[0][150] < mean[150] && mean[150] < bands[1][150]);
 /// # Ok::<(), thetahat::Error>(())
@@ -37,7 +37,7 @@ pub fn sample(
     log: &Log,
     rows: &[Rows],
     detrend: Option<Detrend>,
-    initial: Start,
+    initial: InitialCondition,
     draws: &Draws,
 ) -> Result<Drawn, Error> {
     model.polynomials("what is drawn from a fit's uncertainty")?;

@@ -5,7 +5,7 @@ use crate::data::{Channel, Log, Rows};
 use crate::estimate::{Initial, Procedure};
 use crate::model::Orders;
 use crate::regression::noise::Noise;
-use crate::respond::{Horizon, Start};
+use crate::respond::{Horizon, InitialCondition};
 use crate::validate::Part;
 
 fn log(u: &[f64], y: &[f64]) -> Log {
@@ -225,7 +225,7 @@ fn responses_go_on_through_missing_outputs() {
     for orders in [Orders::oe(&[1], &[1], &[1]).unwrap(), Orders::arx(0, &[20], &[1]).unwrap()] {
         let report = fitted(&log, &orders, "", Initial::Auto);
         is_consistent(&report, &log);
-        let start = Start::natural(report.polynomials(), one);
+        let start = InitialCondition::natural(report.polynomials(), one);
         let predicted = apply(&report, &log, one, start);
         let first = if orders.has_f() { 0 } else { 20 };
         assert!(predicted.predicted[first..].iter().all(|value| value.is_finite()));
@@ -238,7 +238,7 @@ fn responses_go_on_through_missing_outputs() {
     }
     // Free runs of other models too: their initial state is found from what is measured.
     let report = fitted(&log, &Orders::arx(1, &[1], &[1]).unwrap(), "", Initial::Auto);
-    let run = apply(&report, &log, Horizon::FreeRun, Start::Estimate);
+    let run = apply(&report, &log, Horizon::FreeRun, InitialCondition::Estimate);
     assert!(run.predicted.iter().all(|value| value.is_finite()));
     assert_eq!(run.fit.unwrap().samples, 276);
     let validation = validate(&report, None, &log, &[], &ValidationPlan::default()).unwrap();

@@ -6,7 +6,7 @@ use oorandom::Rand64;
 use rayon::prelude::*;
 use thetahat_core::nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-use super::{Response, Start, check_inputs, simulate};
+use super::{InitialCondition, Response, check_inputs, simulate};
 use crate::Error;
 use crate::data::Record;
 use crate::model::PolynomialModel;
@@ -57,7 +57,7 @@ pub struct Drawn {
 /// estimate is stable, are drawn again: the normal distribution, cut off where it says what cannot be.
 ///
 /// The noise has run before the first sample of each segment until 1 % of its slowest mode is left, at most 20000 samples;
-/// with [`Start::Zero`], and where its mode lasts, it begins there from rest.
+/// with [`InitialCondition::Zero`], and where its mode lasts, it begins there from rest.
 ///
 /// Cost: that of [`simulate`] for each draw, on all threads; one number for each draw and sample stays in memory.
 ///
@@ -69,7 +69,7 @@ pub struct Drawn {
 /// use thetahat::data::Record;
 /// use thetahat::estimate::{Initial, arx};
 /// use thetahat::model::{Orders, PolynomialModel, Signal};
-/// use thetahat::respond::{Draws, Start, draw};
+/// use thetahat::respond::{Draws, InitialCondition, draw};
 ///
 /// let u: Vec<f64> = (0..200).map(|t| f64::from(t * t % 7)).collect();
 /// let mut y = vec![1.0];
@@ -80,15 +80,15 @@ pub struct Drawn {
 /// let orders = Orders::arx(1, &[1], &[1])?;
 /// let estimate = arx(&record, &orders, Initial::Drop)?;
 /// let model = estimate.to_model(&orders, 1.0, vec![Signal::default()], Signal::default())?;
-/// let runs = draw(&model, &record, Start::Zero, &Draws { count: 50, seed: 1 })?;
+/// let runs = draw(&model, &record, InitialCondition::Zero, &Draws { count: 50, seed: 1 })?;
 /// assert_eq!((runs.values.len(), runs.values[0].len(), runs.unstable), (50, 200, 0));
-/// assert_eq!(runs, draw(&model, &record, Start::Zero, &Draws { count: 50, seed: 1 })?);
+/// assert_eq!(runs, draw(&model, &record, InitialCondition::Zero, &Draws { count: 50, seed: 1 })?);
 /// # Ok::<(), thetahat::Error>(())
 /// ```
 pub fn draw(
     model: &PolynomialModel,
     record: &Record<'_>,
-    start: Start,
+    start: InitialCondition,
     draws: &Draws,
 ) -> Result<Drawn, Error> {
     check_inputs(model, record)?;
@@ -248,12 +248,12 @@ fn is_stable(model: &PolynomialModel) -> bool {
 }
 
 /// C/(A D) e over this many samples.
-fn noise(model: &PolynomialModel, samples: usize, start: Start, random: &mut Random) -> Vec<f64> {
+fn noise(model: &PolynomialModel, samples: usize, start: InitialCondition, random: &mut Random) -> Vec<f64> {
     let own = (model.orders.na > 0).then_some(&model.poles);
     let all = own.into_iter().flatten().filter(|pole| pole.polynomial == "a").chain(&model.noise_poles);
     let slowest = all.map(|pole| pole.re.hypot(pole.im)).fold(0.0, f64::max);
     let memory = (LEFT.ln() / slowest.ln()).ceil() + model.orders.nc as f64;
-    let before = if start == Start::Zero || slowest >= 1.0 { 0.0 } else { memory.min(LONGEST) };
+    let before = if start == InitialCondition::Zero || slowest >= 1.0 { 0.0 } else { memory.min(LONGEST) };
     let before = before as usize;
     let deviation = model.noise_variance.sqrt();
     let e: Vec<f64> = (0..before + samples).map(|_| deviation * random.next()).collect();

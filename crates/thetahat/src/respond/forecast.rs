@@ -1,7 +1,7 @@
 use super::innovations::{driven, of_segments};
 use super::predict::{check_start, check_steps, deviations};
 use super::sensitivities::{Paths, student};
-use super::{Start, check_inputs};
+use super::{InitialCondition, check_inputs};
 use crate::Error;
 use crate::data::Record;
 use crate::model::PolynomialModel;
@@ -41,7 +41,7 @@ pub struct Forecast {
 /// use thetahat::data::Record;
 /// use thetahat::estimate::{Initial, arx};
 /// use thetahat::model::{Orders, PolynomialModel, Signal};
-/// use thetahat::respond::{Start, forecast};
+/// use thetahat::respond::{InitialCondition, forecast};
 ///
 /// let u: Vec<f64> = (0..100).map(|t| f64::from(t * t % 7)).collect();
 /// let mut y = vec![1.0];
@@ -53,7 +53,7 @@ pub struct Forecast {
 /// let estimate = arx(&record, &orders, Initial::Drop)?;
 /// let model = estimate.to_model(&orders, 1.0, vec![Signal::default()], Signal::default())?;
 /// // Two steps ahead; the second needs the input of the first.
-/// let ahead = forecast(&model, &record, &[&[3.0]], 2, Start::Drop)?;
+/// let ahead = forecast(&model, &record, &[&[3.0]], 2, InitialCondition::Drop)?;
 /// let first = 0.8 * y[99] + 0.5 * u[99];
 /// assert!((ahead.values[0] - first).abs() < 1e-9);
 /// assert!((ahead.values[1] - (0.8 * first + 0.5 * 3.0)).abs() < 1e-9);
@@ -64,7 +64,7 @@ pub fn forecast(
     record: &Record<'_>,
     inputs: &[&[f64]],
     steps: usize,
-    start: Start,
+    start: InitialCondition,
 ) -> Result<Forecast, Error> {
     forecast_if_possible(model, record, inputs, steps, start)?.ok_or_else(|| {
         Error::data("the last segment without a gap is too short to forecast from; start from zero, or give more rows")
@@ -77,7 +77,7 @@ pub(crate) fn forecast_if_possible(
     record: &Record<'_>,
     inputs: &[&[f64]],
     steps: usize,
-    start: Start,
+    start: InitialCondition,
 ) -> Result<Option<Forecast>, Error> {
     check_inputs(model, record)?;
     check_start(model, start)?;

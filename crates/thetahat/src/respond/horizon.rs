@@ -3,7 +3,7 @@ use std::fmt;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::Start;
+use super::InitialCondition;
 use crate::model::PolynomialModel;
 
 /// How far ahead a response looks.
@@ -29,12 +29,12 @@ impl fmt::Display for Horizon {
     }
 }
 
-impl Start {
+impl InitialCondition {
     /// What a response to measured data had better start from. Free runs, and predictions with C, D or F, of which
-    /// the filters have a memory: [`Start::Estimate`]. Other predictions, which need no more than a few measured
-    /// samples: [`Start::Drop`].
+    /// the filters have a memory: [`InitialCondition::Estimate`]. Other predictions, which need no more than a few measured
+    /// samples: [`InitialCondition::Drop`].
     ///
-    /// A log without the output leaves only [`Start::Zero`].
+    /// A log without the output leaves only [`InitialCondition::Zero`].
     pub fn natural(model: &PolynomialModel, horizon: Horizon) -> Self {
         match horizon {
             Horizon::Steps { .. } if model.orders.is_linear() => Self::Drop,

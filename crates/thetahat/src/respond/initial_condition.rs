@@ -1,173 +1,56 @@
-//! Initial-condition responses: what a filter says of samples before the first, and the combination of them that fits best.
+use std::ops::Range;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use crate::Error;
-use crate::regression::{Lagged, Presample, Taps, Unsolved, divide, sum};
+use crate::data::Record;
+use crate::model::PolynomialModel;
 
-/// A response has died away when it is below this fraction of its largest value.
-const NEGLIGIBLE: f64 = 1e-20;
-/// An initial condition of which less than this fraction shows in the errors is not seen: what is left of it is rounding.
-pub(super) const UNSEEN: f64 = 1e-11;
-
-/// A response until it has died away, or is not finite any more, or has `length` samples. `compute` gives its
-/// first samples; `order` is how many of them determine all that follow.
-pub(super) fn until_negligible(length: usize, order: usize, compute: impl Fn(usize) -> Vec<f64>) -> Vec<f64> {
-    let (mut known, mut largest) = (0, 0.0_f64);
-    // In growing pieces: a series is cheap, but not for a million samples of nothing.
-    let mut piece = 256.max(order.saturating_mul(4));
-    loop {
-        let mut response = compute(piece.min(length));
-        largest = response[known..].iter().fold(largest, |largest, h| largest.max(h.abs()));
-        known = response.len();
-        if !response.iter().all(|h| h.is_finite()) {
-            return response;
-        }
-        let quiet = response.iter().rev().take_while(|h| h.abs() <= NEGLIGIBLE * largest).count();
-        if quiet > order {
-            response.truncate(known - quiet);
-            return response;
-        }
-        if known >= length {
-            return response;
-        }
-        piece = piece.saturating_mul(4);
-    }
-}
-
-/// The first samples of the impulse response of 1/(P_1 P_2 …), all monic.
-pub(super) fn impulse_response(denominators: &[&[f64]], length: usize) -> Vec<f64> {
-    let mut response = vec![0.0; length];
-    if let Some(first) = response.first_mut() {
-        *first = 1.0;
-    }
-    denominators.iter().for_each(|monic| divide(monic, &mut response));
-    response
-}
-
-/// A signal from rest, delayed by 0, …, `count - 1` samples. What is not there of it is zero.
-#[derive(Debug)]
-pub(super) struct Delays {
-    pub(super) signal: Vec<f64>,
-    pub(super) count: usize,
-}
-
-/// The weights of delayed signals that bring their sum closest to `target`, which is longer than there are delays;
-/// one list for each signal.
+/// What a response starts from, in the words of [`Initial`](crate::estimate::Initial) for fits.
 ///
-/// Delays of a growing response differ by rounding only. Any of them serves: those that add nothing have no weight.
-pub(super) fn closest(target: &[f64], basis: &[Delays]) -> Result<Vec<Vec<f64>>, Error> {
-    let length = target.len();
-    let fit = |signal: &[f64]| {
-        let mut fitted = signal[..signal.len().min(length)].to_vec();
-        fitted.resize(length, 0.0);
-        fitted
-    };
-    let signals: Vec<Vec<f64>> = basis.iter().map(|delays| fit(&delays.signal)).collect();
-    let mut weights: Vec<Vec<f64>> = basis.iter().map(|delays| vec![0.0; delays.count]).collect();
-    if !signals.iter().flatten().chain(target).all(|value| value.is_finite()) {
-        return Err(unknown());
-    }
-    let is_zero = |values: &[f64]| values.iter().all(|value| *value == 0.0);
-    let mut columns: Vec<(usize, usize)> = basis
-        .iter()
-        .enumerate()
-        .flat_map(|(signal, delays)| (0..delays.count).map(move |i| (signal, i)))
-        .filter(|&(signal, delay)| !is_zero(&signals[signal][..length.saturating_sub(delay)]))
-        .collect();
-    if columns.is_empty() || is_zero(target) {
-        return Ok(weights);
-    }
-    let all: Vec<&[f64]> = std::iter::once(target).chain(signals.iter().map(Vec::as_slice)).collect();
-    let whole = 0..length;
-    loop {
-        let next = |a: &(usize, usize), b: &(usize, usize)| a.0 == b.0 && a.1 + 1 == b.1;
-        let run = |run: &[(usize, usize)]| Taps {
-            signal: run[0].0 + 1,
-            first: run[0].1,
-            count: run.len(),
-            sign: 1.0,
-        };
-        let taps = columns.chunk_by(next).map(run).collect();
-        match Lagged::new(&all, taps, std::slice::from_ref(&whole), Presample::Zero).solve() {
-            Ok(solved) => {
-                for (&(signal, delay), weight) in columns.iter().zip(solved.parameters.iter()) {
-                    weights[signal][delay] = *weight;
-                }
-                return Ok(weights);
-            }
-            Err(Unsolved::Deficient(dependent)) if dependent.len() < columns.len() => {
-                for column in dependent.iter().rev() {
-                    columns.remove(*column);
-                }
-            }
-            Err(_) => return Err(unknown()),
-        }
-    }
+/// In the first r = max(na, nb + nk - 1 of the inputs without F) + nd samples of a segment, A, B and D reach back to
+/// samples that are not there. Unless these are taken as zero, e is, and the r samples do not count. What [`Initial`](crate::estimate::Initial)
+/// says of them holds here too.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum InitialCondition {
+    /// Rest: all samples before the first of a segment are zero, and all of the segment count.
+    Zero,
+    /// Nothing but measured samples: those directly before the segment where the log has them, else the segment's first
+    /// ones. The first r of all these do not count. They are all that ARX models need. C and F begin there from rest: samples
+    /// before the segment warm them up, and without such samples their first outputs are wrong where they were not at
+    /// rest.
+    Drop,
+    /// The initial condition that fits best in the least-squares sense: to the segment's output in a free run, of which all
+    /// samples count; to the one-step errors otherwise. The inputs that were measured directly before the segment are used, and for
+    /// predictions the outputs, as far as errors reach back to them: max(na, nb + nk - 1) + nd samples. Where there are
+    /// fewer, the first r of all these do not count in predictions.
+    Estimate,
 }
 
-/// A column of a least-squares problem, and the size below which what is left of it is rounding.
-#[derive(Debug)]
-pub(super) struct Column {
-    pub(super) values: Vec<f64>,
-    pub(super) rounding: f64,
+/// A record must have as many inputs as the model.
+pub(super) fn check_inputs(model: &PolynomialModel, record: &Record<'_>) -> Result<(), Error> {
+    let (expected, found) = (model.b.len(), record.inputs.len());
+    if found == expected {
+        return Ok(());
+    }
+    Err(Error::argument("inputs", format!("the model has {expected} inputs, the record {found}")))
 }
 
-/// The weights of columns that bring their sum closest to `target`. What those before it explain of a column up to
-/// rounding is left out, and its weight is zero.
-///
-/// By the modified Gram-Schmidt process, each column twice, which is as exact as Householder's (Björck, Numerical
-/// Methods for Least Squares Problems, 1996, section 2.4). For few columns without structure: O(N n^2).
-pub(super) fn closest_of(target: &[f64], columns: &[Column]) -> Result<Vec<f64>, Error> {
-    let product = |a: &[f64], b: &[f64]| sum(a.iter().zip(b).map(|(a, b)| a * b));
-    let take = |from: &mut [f64], weight: f64, unit: &[f64]| {
-        from.iter_mut().zip(unit).for_each(|(from, unit)| *from -= weight * unit);
-    };
-    // Unit columns; which of all they are, and what is taken off them to make them orthogonal.
-    let mut units: Vec<Vec<f64>> = Vec::new();
-    let mut triangle: Vec<(usize, Vec<f64>)> = Vec::new();
-    for (index, column) in columns.iter().enumerate() {
-        let mut values = column.values.clone();
-        let mut weights = vec![0.0; units.len()];
-        for _ in 0..2 {
-            for (unit, weight) in units.iter().zip(&mut weights) {
-                let part = product(&values, unit);
-                take(&mut values, part, unit);
-                *weight += part;
-            }
-        }
-        let size = product(&values, &values).sqrt();
-        if !(size.is_finite() && column.rounding.is_finite()) {
-            return Err(unknown());
-        }
-        if size > column.rounding {
-            values.iter_mut().for_each(|value| *value /= size);
-            units.push(values);
-            weights.push(size);
-            triangle.push((index, weights));
-        }
-    }
-    let mut rest = target.to_vec();
-    let mut right: Vec<f64> = Vec::new();
-    for unit in &units {
-        let part = product(&rest, unit);
-        take(&mut rest, part, unit);
-        right.push(part);
-    }
-    if !right.iter().all(|value| value.is_finite()) {
-        return Err(unknown());
-    }
-    let mut solution = vec![0.0; columns.len()];
-    while let (Some((index, weights)), Some(part)) = (triangle.pop(), right.pop()) {
-        let Some((size, above)) = weights.split_last() else { break };
-        let weight = part / size;
-        solution[index] = weight;
-        right.iter_mut().zip(above).for_each(|(right, above)| *right -= weight * above);
-    }
-    Ok(solution)
+/// Where to look from for a start from measured samples, so that a response `ahead` steps ahead begins with the segment.
+pub(super) fn history(model: &PolynomialModel, segment: &Range<usize>, past: usize, ahead: usize) -> usize {
+    let forgets = model.c.len() == 1 && model.f.iter().all(|f| f.len() == 1);
+    let wanted = if forgets { model.orders.conditioned() + ahead } else { usize::MAX };
+    segment.start - past.min(wanted)
 }
 
-fn unknown() -> Error {
-    Error::undetermined(
-        Vec::new(),
-        "the initial condition of a response cannot be told from the data; use zero or drop",
-    )
+/// A sum of squared errors below this fraction of the output's is rounding.
+pub(crate) const NOTHING_LEFT: f64 = 1e-28;
+
+/// Whether `more` initial conditions are worth it that lower the sum of squared errors over this many samples:
+/// N ln(V_without/V_with) > n ln N. The same rule for estimates and for what is made of them. `nothing` is a sum that is rounding.
+pub(crate) fn are_worth(samples: usize, without: f64, with: f64, more: usize, nothing: f64) -> bool {
+    let samples = samples as f64;
+    without > nothing && samples * (without / with).ln() > more as f64 * samples.ln()
 }

@@ -14,8 +14,8 @@
 
 use std::ops::Range;
 
-use super::initial_condition::{Column, UNSEEN, closest_of, impulse_response, until_negligible};
-use super::{NOTHING_LEFT, Start, are_worth, check_inputs, history};
+use super::initial_responses::{Column, UNSEEN, closest_of, impulse_response, until_negligible};
+use super::{InitialCondition, NOTHING_LEFT, are_worth, check_inputs, history};
 use crate::Error;
 use crate::data::{Record, measured};
 use crate::model::PolynomialModel;
@@ -113,7 +113,7 @@ pub(crate) fn innovations(
     model: &PolynomialModel,
     record: &Record<'_>,
     horizon: usize,
-    start: Start,
+    start: InitialCondition,
 ) -> Result<Vec<Innovations>, Error> {
     check_inputs(model, record)?;
     let segments = record.segments.iter().zip(&record.past);
@@ -127,7 +127,7 @@ pub(super) fn of_segments(
     record: &Record<'_>,
     segments: &[(Range<usize>, usize)],
     horizon: usize,
-    start: Start,
+    start: InitialCondition,
 ) -> Result<Vec<Innovations>, Error> {
     let all = |with_inputs: bool| -> Result<Vec<Innovations>, Error> {
         let each = segments.iter().filter_map(|(segment, past)| {
@@ -140,7 +140,7 @@ pub(super) fn of_segments(
         let count = |with_inputs| unknowns(model, estimated(model, *past, with_inputs).1, with_inputs);
         count(true) > count(false)
     };
-    if start != Start::Estimate || !segments.iter().any(matters) {
+    if start != InitialCondition::Estimate || !segments.iter().any(matters) {
         return Ok(found);
     }
     let Ok(more) = all(true) else { return Ok(found) };
@@ -170,15 +170,17 @@ fn of_segment(
     segment: &Range<usize>,
     past: usize,
     horizon: usize,
-    start: Start,
+    start: InitialCondition,
     with_inputs: bool,
 ) -> Result<Option<Innovations>, Error> {
     let conditioned = model.orders.conditioned();
     let ahead = horizon.saturating_sub(1);
     let (first, presample, skipped) = match start {
-        Start::Zero => (segment.start, 0, 0),
-        Start::Drop => (history(model, segment, past, ahead), conditioned, conditioned.saturating_add(ahead)),
-        Start::Estimate => {
+        InitialCondition::Zero => (segment.start, 0, 0),
+        InitialCondition::Drop => {
+            (history(model, segment, past, ahead), conditioned, conditioned.saturating_add(ahead))
+        }
+        InitialCondition::Estimate => {
             let (presample, _) = estimated(model, past, with_inputs);
             let first = segment.start - past.min(model.orders.history());
             (first, presample, presample.saturating_add(ahead))
@@ -196,7 +198,7 @@ fn of_segment(
     let mut impulses = Impulses::none(model);
     let mut basis = Basis { presample, first: 0, counts: vec![0; model.orders.inputs()], gaps: Vec::new() };
     let (mut disturbance, mut errors) = residuals(model, record, &rows, presample, &impulses);
-    if start == Start::Estimate {
+    if start == InitialCondition::Estimate {
         // Numbers that as many samples determine fit them, whatever they are.
         let (_, origin) = estimated(model, past, with_inputs);
         let with_inputs = with_inputs && known > unknowns(model, origin, true);

@@ -3,7 +3,7 @@
 use super::equations::EquationsOnLog;
 use super::nonlinear_arx::NonlinearArxOnLog;
 use super::on_log::{OnLog, PolynomialOnLog};
-use super::{Horizon, Start};
+use super::{Horizon, InitialCondition};
 use crate::Error;
 use crate::data::{Log, Rows};
 use crate::model::Model;
@@ -18,7 +18,7 @@ impl Model {
         &'l self,
         log: &'l Log,
         rows: &[Rows],
-        asked: Option<Start>,
+        asked: Option<InitialCondition>,
         fitted: &[Rows],
     ) -> Result<Box<dyn OnLog + 'l>, Error> {
         Ok(match self {
@@ -28,14 +28,14 @@ impl Model {
         })
     }
 
-    /// What a response to measured data had better start from: see [`Start::natural`]. Models in equations know what their text says of
+    /// What a response to measured data had better start from: see [`InitialCondition::natural`]. Models in equations know what their text says of
     /// their states in the first row of a log; free runs start from the state that explains the outputs best. Nonlinear ARX models start
     /// from measured samples.
-    pub fn natural_start(&self, horizon: Horizon) -> Start {
+    pub fn natural_start(&self, horizon: Horizon) -> InitialCondition {
         match self {
-            Self::Polynomial(model) => Start::natural(model, horizon),
-            Self::Equations(_) => Start::Estimate,
-            Self::NonlinearArx(_) => Start::Drop,
+            Self::Polynomial(model) => InitialCondition::natural(model, horizon),
+            Self::Equations(_) => InitialCondition::Estimate,
+            Self::NonlinearArx(_) => InitialCondition::Drop,
         }
     }
 }

@@ -16,7 +16,7 @@ use std::ops::Range;
 
 use super::on_log::{OnLog, Tested};
 use super::predict::check_steps;
-use super::{Forecast, Horizon, Innovations, Response, Start};
+use super::{Forecast, Horizon, InitialCondition, Innovations, Response};
 use crate::Error;
 use crate::data::{Log, Record, Rows, measured};
 use crate::distribution::{student_factor, student_two_sided};
@@ -294,12 +294,12 @@ impl<'l> NonlinearArxOnLog<'l> {
         self.one_step.get_or_init(|| self.predict(1))
     }
 
-    fn simulate(&self, start: Start) -> Response {
+    fn simulate(&self, start: InitialCondition) -> Response {
         let record = &self.free_run;
         let mut response = Response { values: vec![f64::NAN; record.output.len()], counted: Vec::new() };
         for (segment, past) in record.segments.iter().zip(&record.past) {
             let mut y = record.output[..segment.end].to_vec();
-            let first = if start == Start::Zero {
+            let first = if start == InitialCondition::Zero {
                 let known = segment.start.saturating_sub(self.runner.lags.max(1));
                 y[known..segment.start].fill(0.0);
                 Some(segment.start)
@@ -310,7 +310,7 @@ impl<'l> NonlinearArxOnLog<'l> {
             let Some(first) = first else { continue };
             let rested: Vec<Vec<f64>>;
             let mut inputs: Vec<&[f64]> = record.inputs.clone();
-            if start == Start::Zero {
+            if start == InitialCondition::Zero {
                 let rest = |u: &&[f64]| {
                     let mut u = u[..segment.end].to_vec();
                     u[..segment.start].fill(0.0);
@@ -336,17 +336,17 @@ impl OnLog for NonlinearArxOnLog<'_> {
         self.runner.taps.iter().any(|(source, ..)| *source > 0)
     }
 
-    fn natural_start(&self, _: Horizon) -> Start {
-        Start::Drop
+    fn natural_start(&self, _: Horizon) -> InitialCondition {
+        InitialCondition::Drop
     }
 
     fn measured(&self, _: usize) -> &[f64] {
         self.ahead.output
     }
 
-    fn respond(&self, horizon: Horizon, start: Start) -> Result<Vec<Response>, Error> {
+    fn respond(&self, horizon: Horizon, start: InitialCondition) -> Result<Vec<Response>, Error> {
         let response = match (horizon, start) {
-            (_, Start::Estimate) => {
+            (_, InitialCondition::Estimate) => {
                 return Err(Error::argument(
                     "initial",
                     "nonlinear ARX models start from measured samples, and estimate none; take drop, or zero for a free run from rest",
@@ -362,7 +362,7 @@ impl OnLog for NonlinearArxOnLog<'_> {
         Ok(vec![response])
     }
 
-    fn deviations(&self, steps: usize, _: Start) -> Result<Vec<Vec<f64>>, Error> {
+    fn deviations(&self, steps: usize, _: InitialCondition) -> Result<Vec<Vec<f64>>, Error> {
         let record = &self.ahead;
         let factor = student_factor(self.runner.model.degrees_of_freedom);
         let mut deviations = vec![f64::NAN; record.output.len()];
@@ -413,7 +413,7 @@ impl OnLog for NonlinearArxOnLog<'_> {
         log: &Log,
         rows: &[Rows],
         steps: usize,
-        _: Start,
+        _: InitialCondition,
     ) -> Result<Option<(usize, Vec<Forecast>)>, Error> {
         let record = &self.ahead;
         let (Some(segment), Some(past)) = (record.segments.last(), record.past.last()) else {

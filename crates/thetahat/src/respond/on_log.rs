@@ -7,7 +7,7 @@ use super::forecast::forecast_if_possible;
 use super::innovations::{Innovations, innovations};
 use super::predict::{check_start, check_steps, predicted};
 use super::sensitivities::{deviations_of, prediction_deviations};
-use super::{Forecast, Horizon, Response, Start, predict, simulate};
+use super::{Forecast, Horizon, InitialCondition, Response, predict, simulate};
 use crate::Error;
 use crate::data::{Log, Record, Rows};
 use crate::model::{PolynomialModel, Signal};
@@ -23,16 +23,16 @@ pub(crate) trait OnLog {
     fn is_driven(&self) -> bool;
 
     /// What a response had better start from.
-    fn natural_start(&self, horizon: Horizon) -> Start;
+    fn natural_start(&self, horizon: Horizon) -> InitialCondition;
 
     /// What was measured of an output, as a deviation from its offset.
     fn measured(&self, output: usize) -> &[f64];
 
     /// The responses, as such deviations.
-    fn respond(&self, horizon: Horizon, start: Start) -> Result<Vec<Response>, Error>;
+    fn respond(&self, horizon: Horizon, start: InitialCondition) -> Result<Vec<Response>, Error>;
 
     /// The standard deviations of the errors of predictions, what is open of the parameters in them; NaN where there is none.
-    fn deviations(&self, steps: usize, start: Start) -> Result<Vec<Vec<f64>>, Error>;
+    fn deviations(&self, steps: usize, start: InitialCondition) -> Result<Vec<Vec<f64>>, Error>;
 
     /// How many of these deviations from a prediction the end of an interval lies that holds the output with probability `level`.
     fn quantile(&self, level: f64) -> f64;
@@ -51,7 +51,7 @@ pub(crate) trait OnLog {
         log: &Log,
         rows: &[Rows],
         steps: usize,
-        start: Start,
+        start: InitialCondition,
     ) -> Result<Option<(usize, Vec<Forecast>)>, Error>;
 
     /// The share of the samples of a response for which the model read what lies outside of what it was fitted to; none where that does
@@ -75,7 +75,7 @@ pub(crate) struct PolynomialOnLog<'l> {
     model: &'l PolynomialModel,
     /// What predictions are made from, and what they start from.
     ahead: Record<'l>,
-    start: Start,
+    start: InitialCondition,
     /// What is left one step ahead, once somebody asked.
     innovations: OnceCell<Vec<Innovations>>,
     /// What free runs are made from.
@@ -91,9 +91,9 @@ impl<'l> PolynomialOnLog<'l> {
         model: &'l PolynomialModel,
         log: &'l Log,
         rows: &[Rows],
-        asked: Option<Start>,
+        asked: Option<InitialCondition>,
     ) -> Result<Self, Error> {
-        let start = |horizon| asked.unwrap_or_else(|| Start::natural(model, horizon));
+        let start = |horizon| asked.unwrap_or_else(|| InitialCondition::natural(model, horizon));
         let one = Horizon::Steps { steps: 1 };
         let record = |horizon| record_for(model, log, rows, horizon, start(horizon));
         Ok(Self {
@@ -106,7 +106,7 @@ impl<'l> PolynomialOnLog<'l> {
     }
 
     /// Predictions from another record, and start from something else.
-    pub(crate) fn with_predictions(self, ahead: Record<'l>, start: Start) -> Self {
+    pub(crate) fn with_predictions(self, ahead: Record<'l>, start: InitialCondition) -> Self {
         Self { ahead, start, innovations: OnceCell::new(), ..self }
     }
 
@@ -136,10 +136,10 @@ impl OnLog for PolynomialOnLog<'_> {
         self.model.orders.nb.iter().any(|&nb| nb > 0)
     }
 
-    fn natural_start(&self, horizon: Horizon) -> Start {
+    fn natural_start(&self, horizon: Horizon) -> InitialCondition {
         match horizon {
             Horizon::Steps { .. } => self.start,
-            Horizon::FreeRun => Start::natural(self.model, horizon),
+            Horizon::FreeRun => InitialCondition::natural(self.model, horizon),
         }
     }
 
@@ -147,7 +147,7 @@ impl OnLog for PolynomialOnLog<'_> {
         self.ahead.output
     }
 
-    fn respond(&self, horizon: Horizon, start: Start) -> Result<Vec<Response>, Error> {
+    fn respond(&self, horizon: Horizon, start: InitialCondition) -> Result<Vec<Response>, Error> {
         let record = self.record(horizon);
         let response = match horizon {
             Horizon::Steps { steps: 1 } if start == self.start => {
@@ -160,7 +160,7 @@ impl OnLog for PolynomialOnLog<'_> {
         Ok(vec![response])
     }
 
-    fn deviations(&self, steps: usize, start: Start) -> Result<Vec<Vec<f64>>, Error> {
+    fn deviations(&self, steps: usize, start: InitialCondition) -> Result<Vec<Vec<f64>>, Error> {
         let (model, record) = (self.model, &self.ahead);
         // An open offset makes another model, whose innovations have more inputs.
         if (steps, start) == (1, self.start) && model.offset_covariance.is_none() {
@@ -189,7 +189,7 @@ impl OnLog for PolynomialOnLog<'_> {
         log: &Log,
         rows: &[Rows],
         steps: usize,
-        start: Start,
+        start: InitialCondition,
     ) -> Result<Option<(usize, Vec<Forecast>)>, Error> {
         let (model, record) = (self.model, &self.ahead);
         let Some(first) = record.segments.last().map(|segment| segment.end) else { return Ok(None) };
@@ -230,12 +230,12 @@ pub(crate) fn record_for<'l>(
     log: &'l Log,
     rows: &[Rows],
     horizon: Horizon,
-    start: Start,
+    start: InitialCondition,
 ) -> Result<Record<'l>, Error> {
     let inputs: Vec<String> = model.inputs.iter().map(|input| input.name.clone()).collect();
     let needed = match horizon {
         Horizon::Steps { .. } => model.orders.needs_past_outputs(),
-        Horizon::FreeRun => start == Start::Drop,
+        Horizon::FreeRun => start == InitialCondition::Drop,
     };
     let output = &model.output.name;
     if needed { log.record(&inputs, output, rows) } else { log.driven_record(&inputs, output, rows) }

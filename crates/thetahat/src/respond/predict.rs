@@ -1,8 +1,8 @@
 use std::ops::Range;
 
-use super::initial_condition::until_negligible;
+use super::initial_responses::until_negligible;
 use super::innovations::{Innovations, innovations};
-use super::{Response, Start, check_inputs};
+use super::{InitialCondition, Response, check_inputs};
 use crate::Error;
 use crate::data::Record;
 use crate::model::PolynomialModel;
@@ -22,9 +22,9 @@ pub(super) const MOST_STEPS: usize = 1_000_000;
 /// which is what the equation gives that runs k steps from what was known, with e = 0 (Ljung, System Identification, 2nd
 /// ed. 1999, section 3.2; Åström, Introduction to Stochastic Control Theory, 1970, chapter 6).
 ///
-/// [`Start::Zero`] takes zeros before each segment, and every sample has a prediction. [`Start::Drop`] and
-/// [`Start::Estimate`] leave out the samples without an output k steps before them to look from: the first r + k - 1
-/// of those they use (for r see [`Start`]). What unknown samples have done to B/F u is nothing to the first two; the
+/// [`InitialCondition::Zero`] takes zeros before each segment, and every sample has a prediction. [`InitialCondition::Drop`] and
+/// [`InitialCondition::Estimate`] leave out the samples without an output k steps before them to look from: the first r + k - 1
+/// of those they use (for r see [`InitialCondition`]). What unknown samples have done to B/F u is nothing to the first two; the
 /// last estimates it from the one-step errors, whatever k is, as estimates with
 /// [`Initial::Estimate`](crate::estimate::Initial::Estimate) do. It leaves out segments with no more samples than there are numbers
 /// to estimate.
@@ -36,7 +36,7 @@ pub(super) const MOST_STEPS: usize = 1_000_000;
 /// [`Log::driven_record`](crate::data::Log::driven_record)); these samples do not count.
 ///
 /// # Errors
-/// [`Error::Argument`] if `horizon` is 0, the record does not have the model's inputs, or [`Start::Estimate`] is
+/// [`Error::Argument`] if `horizon` is 0, the record does not have the model's inputs, or [`InitialCondition::Estimate`] is
 /// asked of a model without C, D and F, which has nothing to estimate; [`Error::Undetermined`] if an initial
 /// condition cannot be told from the data, as for a model so unstable that its responses overflow.
 ///
@@ -44,7 +44,7 @@ pub(super) const MOST_STEPS: usize = 1_000_000;
 /// use thetahat::data::Record;
 /// use thetahat::estimate::{Initial, arx};
 /// use thetahat::model::{Orders, PolynomialModel, Signal};
-/// use thetahat::respond::{Start, predict};
+/// use thetahat::respond::{InitialCondition, predict};
 ///
 /// let u: Vec<f64> = (0..100_u32).map(|t| f64::from(t * t % 7)).collect();
 /// let mut y = vec![1.0];
@@ -56,7 +56,7 @@ pub(super) const MOST_STEPS: usize = 1_000_000;
 /// let estimate = arx(&record, &orders, Initial::Drop)?;
 /// let model = estimate.to_model(&orders, 1.0, vec![Signal::default()], Signal::default())?;
 /// // Two steps ahead: from y(48), and from the inputs that are known by then.
-/// let response = predict(&model, &record, 2, Start::Drop)?;
+/// let response = predict(&model, &record, 2, InitialCondition::Drop)?;
 /// let expected = 0.8 * (0.8 * y[48] + 0.5 * u[48]) + 0.5 * u[49];
 /// assert!((response.values[50] - expected).abs() < 1e-9);
 /// // The first two samples have no output two steps before them.
@@ -67,7 +67,7 @@ pub fn predict(
     model: &PolynomialModel,
     record: &Record<'_>,
     horizon: usize,
-    start: Start,
+    start: InitialCondition,
 ) -> Result<Response, Error> {
     if horizon == 0 {
         return Err(no_step());
@@ -183,8 +183,8 @@ pub(crate) fn longest(record: &Record<'_>) -> usize {
     lengths.max().unwrap_or(0)
 }
 
-pub(super) fn check_start(model: &PolynomialModel, start: Start) -> Result<(), Error> {
-    if start == Start::Estimate && model.orders.is_linear() {
+pub(super) fn check_start(model: &PolynomialModel, start: InitialCondition) -> Result<(), Error> {
+    if start == InitialCondition::Estimate && model.orders.is_linear() {
         return Err(Error::argument(
             "initial",
             "estimate is for models with C, D or F, and for free runs: others predict from measured samples alone; use drop, \

@@ -36,7 +36,7 @@ use thetahat_core::nalgebra::{DMatrix, SymmetricEigen};
 
 use super::innovations::{Basis, Impulses, Innovations, best, free_columns, innovations};
 use super::predict::{accumulated, disturbance_response, longest};
-use super::{Start, check_inputs};
+use super::{InitialCondition, check_inputs};
 use crate::Error;
 use crate::data::Record;
 use crate::model::PolynomialModel;
@@ -237,8 +237,12 @@ impl Paths {
 
     /// The variances of a forecast's values that come from parameters and initial states; none where the start has no
     /// estimated ones.
-    pub(super) fn of_forecast(&self, model: &PolynomialModel, start: Start) -> Result<Vec<f64>, Error> {
-        let estimated = start == Start::Estimate;
+    pub(super) fn of_forecast(
+        &self,
+        model: &PolynomialModel,
+        start: InitialCondition,
+    ) -> Result<Vec<f64>, Error> {
+        let estimated = start == InitialCondition::Estimate;
         let mut variances = vec![0.0; self.output.len() - self.known];
         let mut add = |change: &Change, moved: &Moved, scale: f64| {
             let values = self.continued(model, change, moved);
@@ -260,8 +264,12 @@ impl Paths {
     }
 
     /// How many samples before the first known error there are others that C looks back to.
-    fn earlier_errors(&self, model: &PolynomialModel, start: Start) -> std::ops::RangeInclusive<usize> {
-        1..=if start == Start::Zero { 0 } else { model.orders.nc }
+    fn earlier_errors(
+        &self,
+        model: &PolynomialModel,
+        start: InitialCondition,
+    ) -> std::ops::RangeInclusive<usize> {
+        1..=if start == InitialCondition::Zero { 0 } else { model.orders.nc }
     }
 
     /// Impulses whose outer products sum to (Phi'Phi)^-1.
@@ -319,7 +327,7 @@ pub(super) fn student(model: &PolynomialModel, noise: f64, other: f64) -> f64 {
 /// use thetahat::data::Record;
 /// use thetahat::estimate::{Initial, arx};
 /// use thetahat::model::{Orders, PolynomialModel, Signal};
-/// use thetahat::respond::{Start, prediction_deviation, prediction_deviations};
+/// use thetahat::respond::{InitialCondition, prediction_deviation, prediction_deviations};
 ///
 /// let mut y: Vec<f64> = vec![0.0, 1.0];
 /// for t in 2..100 {
@@ -329,7 +337,7 @@ pub(super) fn student(model: &PolynomialModel, noise: f64, other: f64) -> f64 {
 /// let orders = Orders::arx(1, &[], &[])?;
 /// let estimate = arx(&record, &orders, Initial::Drop)?;
 /// let model = estimate.to_model(&orders, 1.0, vec![], Signal::default())?;
-/// let found = prediction_deviations(&model, &record, 1, Start::Drop)?;
+/// let found = prediction_deviations(&model, &record, 1, InitialCondition::Drop)?;
 /// // y^(t) = -a y(t - 1): its error has the variance sigma^2 + y(t - 1)^2 var a, with N - 1 degrees of freedom.
 /// let (variance, degrees) = (model.parameters[0].standard_error.unwrap().powi(2), 99.0 - 1.0);
 /// let expected = (model.noise_variance + y[49] * y[49] * variance) * degrees / (degrees - 2.0);
@@ -341,7 +349,7 @@ pub fn prediction_deviations(
     model: &PolynomialModel,
     record: &Record<'_>,
     horizon: usize,
-    start: Start,
+    start: InitialCondition,
 ) -> Result<Vec<f64>, Error> {
     check_inputs(model, record)?;
     if let Some((model, signals)) = model.with_open_offset(record.output.len()) {
@@ -356,7 +364,7 @@ pub(super) fn deviations_of(
     model: &PolynomialModel,
     record: &Record<'_>,
     horizon: usize,
-    start: Start,
+    start: InitialCondition,
     innovations: &[Innovations],
 ) -> Result<Vec<f64>, Error> {
     let response = disturbance_response(model, horizon);
@@ -381,7 +389,7 @@ pub(super) fn deviations_of(
             add_filtered(&mut values, &counted, response_moved, &paths.errors, 0);
             variances.iter_mut().zip(&values).for_each(|(sum, value)| *sum += scale * value * value);
         };
-        let estimated = start == Start::Estimate && !found.impulses.is_empty();
+        let estimated = start == InitialCondition::Estimate && !found.impulses.is_empty();
         for (change, response_moved) in changes.iter().zip(&moved_responses) {
             add(&paths.moved_by_parameters(model, change, estimated)?, response_moved, 1.0);
         }
@@ -391,7 +399,7 @@ pub(super) fn deviations_of(
         }
         for (position, (row, variance)) in found.span.clone().zip(&variances).enumerate() {
             // From zero the first samples look fewer steps ahead.
-            let ahead = if start == Start::Zero { horizon.min(position + 1) } else { horizon };
+            let ahead = if start == InitialCondition::Zero { horizon.min(position + 1) } else { horizon };
             deviations[row] = student(model, sigma * sizes[ahead - 1], *variance);
         }
     }

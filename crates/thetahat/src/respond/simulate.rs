@@ -1,11 +1,11 @@
 use std::ops::Range;
 
 use super::forecast::{Known, continuation};
-use super::initial_condition::{
+use super::initial_responses::{
     Column, Delays, UNSEEN, closest, closest_of, impulse_response, until_negligible,
 };
 use super::innovations::{Impulses, driven, residuals};
-use super::{NOTHING_LEFT, Response, Start, are_worth, check_inputs, history};
+use super::{InitialCondition, NOTHING_LEFT, Response, are_worth, check_inputs, history};
 use crate::Error;
 use crate::data::{Record, measured};
 use crate::model::PolynomialModel;
@@ -13,9 +13,9 @@ use crate::regression::{add_filtered, divide, sum};
 
 /// The free run of a model: A(q) y^(t) = sum_j (B_j(q)/F_j(q)) u_j(t), driven by the inputs alone.
 ///
-/// [`Start::Zero`] takes zeros before each segment. [`Start::Drop`] goes on from measured samples, with e = 0
+/// [`InitialCondition::Zero`] takes zeros before each segment. [`InitialCondition::Drop`] goes on from measured samples, with e = 0
 /// from the first sample that counts: what they say of the disturbance, which C and D give a memory, dies away from
-/// there. For ARX it is the difference equation run from measured outputs and inputs. [`Start::Estimate`] takes the inputs
+/// there. For ARX it is the difference equation run from measured outputs and inputs. [`InitialCondition::Estimate`] takes the inputs
 /// that were measured directly before the segment, and adds the combination of initial-condition responses
 ///
 /// ```text
@@ -28,10 +28,10 @@ use crate::regression::{add_filtered, divide, sum};
 /// taken to be zero, unless estimating them is worth its parameters by the rule of
 /// [`Initial::Auto`](crate::estimate::Initial::Auto). Segments too short for a start are left out.
 ///
-/// But for [`Start::Drop`], the run goes on where an output is missing (see
+/// But for [`InitialCondition::Drop`], the run goes on where an output is missing (see
 /// [`Log::driven_record`](crate::data::Log::driven_record)); these samples do not count.
 ///
-/// Signals are deviations from the model's offsets. The output of the record is not read for [`Start::Zero`].
+/// Signals are deviations from the model's offsets. The output of the record is not read for [`InitialCondition::Zero`].
 /// Cost: O(N (na + nb + nf)), and O(N n) more for n initial-condition responses that do not die away, O(N n^2) where outputs are missing.
 ///
 /// # Errors
@@ -42,7 +42,7 @@ use crate::regression::{add_filtered, divide, sum};
 /// use thetahat::data::Record;
 /// use thetahat::estimate::{Initial, arx};
 /// use thetahat::model::{Orders, PolynomialModel, Signal};
-/// use thetahat::respond::{Start, simulate};
+/// use thetahat::respond::{InitialCondition, simulate};
 ///
 /// let u: Vec<f64> = (0..100_u32).map(|t| f64::from(t * t % 7)).collect();
 /// let mut y = vec![1.0];
@@ -54,14 +54,18 @@ use crate::regression::{add_filtered, divide, sum};
 /// let estimate = arx(&record, &orders, Initial::Drop)?;
 /// let model = estimate.to_model(&orders, 1.0, vec![Signal::default()], Signal::default())?;
 /// // What began at y = 1 is made up for.
-/// let run = simulate(&model, &record, Start::Estimate)?;
+/// let run = simulate(&model, &record, InitialCondition::Estimate)?;
 /// assert!(run.values.iter().zip(&y).all(|(run, y)| (run - y).abs() < 1e-9));
 /// // From rest, a decaying part is missing.
-/// let run = simulate(&model, &record, Start::Zero)?;
+/// let run = simulate(&model, &record, InitialCondition::Zero)?;
 /// assert!((y[10] - run.values[10] - 0.8_f64.powi(10)).abs() < 1e-9);
 /// # Ok::<(), thetahat::Error>(())
 /// ```
-pub fn simulate(model: &PolynomialModel, record: &Record<'_>, start: Start) -> Result<Response, Error> {
+pub fn simulate(
+    model: &PolynomialModel,
+    record: &Record<'_>,
+    start: InitialCondition,
+) -> Result<Response, Error> {
     check_inputs(model, record)?;
     let conditioned = model.orders.conditioned();
     let mut response = Response::empty(record.output.len());
@@ -70,9 +74,9 @@ pub fn simulate(model: &PolynomialModel, record: &Record<'_>, start: Start) -> R
         let lag =
             (0..model.orders.inputs()).map(|input| model.orders.maximum_input_lag(input)).max().unwrap_or(0);
         let (before, known) = match start {
-            Start::Zero => (0, 0),
-            Start::Drop => (segment.start - history(model, segment, *past, 0), conditioned),
-            Start::Estimate => (lag.min(*past), lag.min(*past)),
+            InitialCondition::Zero => (0, 0),
+            InitialCondition::Drop => (segment.start - history(model, segment, *past, 0), conditioned),
+            InitialCondition::Estimate => (lag.min(*past), lag.min(*past)),
         };
         let first = segment.start - before;
         let run = (first + known).clamp(segment.start, segment.end)..segment.end;
@@ -83,7 +87,7 @@ pub fn simulate(model: &PolynomialModel, record: &Record<'_>, start: Start) -> R
         let inputs: Vec<&[f64]> = record.inputs.iter().map(|u| &u[rows.clone()]).collect();
         let mut x = driven(model, &inputs, rows.len(), &Impulses::none(model));
         let mut values = x.split_off(run.start - first);
-        if start == Start::Drop {
+        if start == InitialCondition::Drop {
             let before = first..run.start;
             let (disturbance, errors) =
                 residuals(model, record, &before, conditioned, &Impulses::none(model));
@@ -92,7 +96,7 @@ pub fn simulate(model: &PolynomialModel, record: &Record<'_>, start: Start) -> R
         } else {
             divide(&model.a, &mut values);
         }
-        if start == Start::Estimate {
+        if start == InitialCondition::Estimate {
             free.runs.push(Run { rows: run, past: *past, values });
             continue;
         }

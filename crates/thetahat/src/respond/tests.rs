@@ -9,7 +9,7 @@ mod transient;
 
 use std::ops::Range;
 
-use super::{Response, Start, predict, simulate};
+use super::{InitialCondition, Response, predict, simulate};
 use crate::data::Record;
 use crate::model::{
     Orders, PolynomialModel,
@@ -97,12 +97,17 @@ fn a_prediction_is_the_difference_equation_run_from_measured_samples() {
         let (u, y) = (signals(model.b.len(), 150, &mut noise), noise.take(150));
         let record = cut(&y, &u);
         for horizon in [1, 2, 5, 40, 1000] {
-            for start in [Start::Zero, Start::Drop] {
-                let skipped = if start == Start::Zero { 0 } else { model.orders.maximum_lag() + horizon - 1 };
+            for start in [InitialCondition::Zero, InitialCondition::Drop] {
+                let skipped = if start == InitialCondition::Zero {
+                    0
+                } else {
+                    model.orders.maximum_lag() + horizon - 1
+                };
                 let mut expected = vec![f64::NAN; 150];
                 let mut counted = Vec::new();
                 for (segment, past) in record.segments.iter().zip(&record.past) {
-                    let begin = if start == Start::Zero { segment.start } else { segment.start - past };
+                    let begin =
+                        if start == InitialCondition::Zero { segment.start } else { segment.start - past };
                     let rows = segment.start.max(begin + skipped)..segment.end;
                     if rows.is_empty() {
                         continue;
@@ -131,12 +136,12 @@ fn no_horizon_is_too_far() {
     let model = model(&with_poles(&[0.9]), &[(1, &[1.0])]);
     let u = [1.0, 2.0, 3.0];
     let record = Record::new(&u, vec![&u]).unwrap();
-    let far = predict(&model, &record, usize::MAX, Start::Zero).unwrap();
-    assert_eq!(far, predict(&model, &record, 3, Start::Zero).unwrap());
-    let run = simulate(&model, &record, Start::Zero).unwrap();
+    let far = predict(&model, &record, usize::MAX, InitialCondition::Zero).unwrap();
+    assert_eq!(far, predict(&model, &record, 3, InitialCondition::Zero).unwrap());
+    let run = simulate(&model, &record, InitialCondition::Zero).unwrap();
     assert!(difference(&far, &run.values) < 1e-15);
-    assert_eq!(predict(&model, &record, usize::MAX, Start::Drop).unwrap().counted, []);
-    assert!(predict(&model, &record, 0, Start::Zero).is_err());
+    assert_eq!(predict(&model, &record, usize::MAX, InitialCondition::Drop).unwrap().counted, []);
+    assert!(predict(&model, &record, 0, InitialCondition::Zero).is_err());
 }
 
 #[test]
@@ -145,12 +150,12 @@ fn a_free_run_is_the_difference_equation() {
     for model in models() {
         let (u, y) = (signals(model.b.len(), 150, &mut noise), noise.take(150));
         let record = cut(&y, &u);
-        for start in [Start::Zero, Start::Drop] {
+        for start in [InitialCondition::Zero, InitialCondition::Drop] {
             let mut expected = vec![f64::NAN; 150];
             let mut counted = Vec::new();
             for (segment, past) in record.segments.iter().zip(&record.past) {
                 let (begin, known) = match start {
-                    Start::Zero => (segment.start, 0),
+                    InitialCondition::Zero => (segment.start, 0),
                     _ => (segment.start - past, model.orders.maximum_lag()),
                 };
                 let rows = segment.start.max(begin + known)..segment.end;
@@ -181,7 +186,7 @@ fn an_estimated_start_makes_up_for_any_past() {
             segments: vec![50..120, 130..150, 200..500],
             past: vec![0; 3],
         };
-        let response = simulate(&model, &record, Start::Estimate).unwrap();
+        let response = simulate(&model, &record, InitialCondition::Estimate).unwrap();
         assert_eq!(response.counted, record.segments);
         assert!(difference(&response, &y) < 1e-10, "{model:?} {}", difference(&response, &y));
     }
@@ -201,11 +206,11 @@ fn growing_and_silent_starts_are_estimated() {
             segments: std::iter::once(60..1000).collect(),
             past: vec![0],
         };
-        let response = simulate(&model, &record, Start::Estimate).unwrap();
+        let response = simulate(&model, &record, InitialCondition::Estimate).unwrap();
         assert!(difference(&response, &y) < 1e-9, "{poles:?} {:e}", difference(&response, &y));
         // From rest there is nothing to estimate.
         let record = Record::new(&y, views(&u)).unwrap();
-        let response = simulate(&model, &record, Start::Estimate).unwrap();
+        let response = simulate(&model, &record, InitialCondition::Estimate).unwrap();
         assert!(difference(&response, &y) < 1e-9, "{poles:?}");
     }
 }
@@ -222,7 +227,7 @@ fn an_estimated_start_is_the_best_there_is() {
             segments: std::iter::once(40..240).collect(),
             past: vec![0],
         };
-        let values = &simulate(&model, &record, Start::Estimate).unwrap().values[40..240];
+        let values = &simulate(&model, &record, InitialCondition::Estimate).unwrap().values[40..240];
         let errors: Vec<f64> = y[40..240].iter().zip(values).map(|(y, x)| y - x).collect();
         let size = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
         // The errors are orthogonal to every initial-condition response: moving along one only makes them larger.
@@ -240,8 +245,8 @@ fn what_overflows_is_an_error_or_infinite_and_never_a_panic() {
     for pole in [2.0, -2.0, 1e200] {
         let model = model(&with_poles(&[pole]), &[(1, &[1.0])]);
         let record = Record::new(&u, vec![&u]).unwrap();
-        assert!(simulate(&model, &record, Start::Estimate).is_err());
-        for start in [Start::Zero, Start::Drop] {
+        assert!(simulate(&model, &record, InitialCondition::Estimate).is_err());
+        for start in [InitialCondition::Zero, InitialCondition::Drop] {
             assert_eq!(simulate(&model, &record, start).unwrap().values.len(), 3000);
             assert_eq!(predict(&model, &record, 2900, start).unwrap().values.len(), 3000);
         }

@@ -63,11 +63,11 @@ impl Samples {
     pub(super) fn unknown<'m>(record: &Record<'_>, models: impl Iterator<Item = &'m Orders> + Clone) -> Self {
         // Segments that are too short for the initial-condition responses of one model are so for all.
         let lag = |orders: &Orders| orders.conditioned().max(orders.nf.iter().sum());
-        let silent = models.clone().map(lag).max().unwrap_or(0);
+        let left_out = models.clone().map(lag).max().unwrap_or(0);
         let coloured = models.filter(|orders| orders.nc > 0).count() > 0;
         let most = total(record) / record.segments.len().max(1) / LEAST_OF_PIECE;
-        let counted = silent + if coloured { FADING.min(most) } else { 0 };
-        Self { window: Window { silent, counted }, presample: Presample::Drop }
+        let counted = left_out + if coloured { FADING.min(most) } else { 0 };
+        Self { window: Window { left_out, counted }, presample: Presample::Drop }
     }
 
     /// How many samples of a record count.

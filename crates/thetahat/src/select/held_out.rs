@@ -16,7 +16,7 @@ use crate::model::{
     polynomial::{is_stable, roots},
 };
 use crate::regression::sum;
-use crate::respond::{Horizon, Response, Start, predict, simulate};
+use crate::respond::{Horizon, InitialCondition, Response, predict, simulate};
 
 /// A record is cut into this many blocks.
 const BLOCKS: usize = 3;
@@ -144,8 +144,8 @@ pub(super) fn mean_square(
 
 fn response(model: &PolynomialModel, record: &Record<'_>, horizon: Horizon) -> Result<Response, Error> {
     match horizon {
-        Horizon::FreeRun => simulate(model, record, Start::Estimate),
-        Horizon::Steps { steps } => predict(model, record, steps, Start::natural(model, horizon)),
+        Horizon::FreeRun => simulate(model, record, InitialCondition::Estimate),
+        Horizon::Steps { steps } => predict(model, record, steps, InitialCondition::natural(model, horizon)),
     }
 }
 
@@ -230,12 +230,12 @@ impl<'r> Onward<'r> {
         let mut pairs = Vec::new();
         if !before.segments.is_empty() {
             let known = Record { output: &self.known, ..before };
-            let run = simulate(model, &known, Start::Estimate).ok()?;
+            let run = simulate(model, &known, InitialCondition::Estimate).ok()?;
             let continued = self.last.segments.iter().filter(|piece| !whole.contains(&piece.start));
             pairs.extend(continued.cloned().flatten().map(|t| (self.record.output[t], run.values[t])));
         }
         if !alone.segments.is_empty() {
-            let run = simulate(model, &alone, Start::Estimate).ok()?;
+            let run = simulate(model, &alone, InitialCondition::Estimate).ok()?;
             pairs.extend(counted(&alone, &run));
         }
         root(pairs.iter().copied(), deviation)

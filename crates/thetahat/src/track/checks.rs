@@ -58,7 +58,7 @@ pub(super) fn check(orders: &Orders, plan: &TrackPlan) -> Result<(), Error> {
         }
         _ => {}
     }
-    if orders.nc > 0 && plan.start.0 != thetahat_core::Start::Standard {
+    if orders.nc > 0 && plan.start.0 != thetahat_core::RlsStart::Standard {
         let message = format!("{orders} has only the standard start; leave out '{}'", plan.start);
         return Err(Error::argument("start", message));
     }

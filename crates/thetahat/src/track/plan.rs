@@ -1,10 +1,10 @@
 use serde::{Deserialize, Serialize};
-use thetahat_core::{ArmaxMethod, Forgetting, Start};
+use thetahat_core::{ArmaxMethod, Forgetting, RlsStart};
 
 /// How a model is tracked.
 ///
 /// ```
-/// use thetahat::track::{Beginning, Policy, TrackPlan};
+/// use thetahat::track::{TrackStart, Policy, TrackPlan};
 ///
 /// let plan = TrackPlan { forgetting: "0.98".parse()?, start: "exact".parse()?, ..TrackPlan::default() };
 /// assert_eq!(plan.forgetting.to_string(), "exponential:0.98");
@@ -17,7 +17,7 @@ pub struct TrackPlan {
     /// What is forgotten.
     pub forgetting: Policy,
     /// What becomes of the prior. A model with C, and one that goes on from a report, has the standard start.
-    pub start: Beginning,
+    pub start: TrackStart,
     /// An innovation of at most this size corrects nothing, in the output's units. 0: no dead zone.
     pub dead_zone: f64,
     /// Whether a constant is estimated beside the model: A y = B u + constant + C e, for signals whose offsets are not known.
@@ -44,7 +44,7 @@ impl Default for TrackPlan {
         Self {
             method: TrackMethod::Rls,
             forgetting: Policy::default(),
-            start: Beginning::default(),
+            start: TrackStart::default(),
             dead_zone: 0.0,
             constant: false,
             offsets: None,
@@ -107,21 +107,21 @@ impl TrackMethod {
 pub struct Policy(pub Forgetting<f64>);
 
 /// How a tracker starts, written as a word: `standard`, `exact`, `mixed` or `mixed:K`, with K samples in which the prior is
-/// taken out. See [`Start`].
+/// taken out. See [`RlsStart`].
 ///
 /// ```
-/// use thetahat::thetahat_core::Start;
-/// use thetahat::track::Beginning;
+/// use thetahat::thetahat_core::RlsStart;
+/// use thetahat::track::TrackStart;
 ///
-/// assert_eq!("mixed:20".parse::<Beginning>()?.0, Start::Mixed { blend: 20 });
+/// assert_eq!("mixed:20".parse::<TrackStart>()?.0, RlsStart::Mixed { blend: 20 });
 /// # Ok::<(), thetahat::Error>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Beginning(pub Start);
+pub struct TrackStart(pub RlsStart);
 
 /// The standard start.
-impl Default for Beginning {
+impl Default for TrackStart {
     fn default() -> Self {
-        Self(Start::Standard)
+        Self(RlsStart::Standard)
     }
 }

@@ -162,7 +162,7 @@ fn without_forgetting_it_ends_at_the_batch_fit() {
     }
 
     // The prior of the standard start pulls at them by (Phi'Phi + S)^-1 S theta, S_jj = scale_j^2/100: nearly P S theta.
-    let mut standard = Tracker::new(&orders(), &TrackPlan { start: Beginning::default(), ..exact }).unwrap();
+    let mut standard = Tracker::new(&orders(), &TrackPlan { start: TrackStart::default(), ..exact }).unwrap();
     run(&mut standard, &inputs, &y);
     let scales = standard.scales().unwrap();
     let scale = [scales.output, scales.output, scales.inputs[0], scales.inputs[0], scales.inputs[1]];

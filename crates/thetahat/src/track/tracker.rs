@@ -204,7 +204,7 @@ impl Tracker {
             unset: vec![true; if plan.constant && plan.offsets.is_none() { inputs + 1 } else { 0 }],
             scales: plan.scales.clone(),
             stage,
-            has_estimate: plan.start.0 != thetahat_core::Start::Exact,
+            has_estimate: plan.start.0 != thetahat_core::RlsStart::Exact,
             settling: 2 * parameters + 20,
             detector: plan.alarm_interval.map(|interval| change_detector(interval, 1)).transpose()?,
             score: TrackScore::default(),

@@ -28,7 +28,7 @@ impl Tracker {
     /// As [`Tracker::new`]; [`Error::Report`] if the report is of another structure; if it has no covariance or a noise variance of 0, or an offset that is a line in time; [`Error::Argument`] if the
     /// plan asks for another start than `standard`.
     pub fn from_report(report: &Report, plan: &TrackPlan) -> Result<Self, Error> {
-        if plan.start.0 != thetahat_core::Start::Standard {
+        if plan.start.0 != thetahat_core::RlsStart::Standard {
             let message = format!("'{}' is a start without a report; leave it out", plan.start);
             return Err(Error::argument("start", message));
         }

@@ -4,9 +4,9 @@ use std::fmt;
 use std::iter;
 use std::str::FromStr;
 
-use thetahat_core::{Forgetting, Start};
+use thetahat_core::{Forgetting, RlsStart};
 
-use super::plan::{Beginning, Policy, TrackMethod};
+use super::plan::{Policy, TrackMethod, TrackStart};
 use crate::Error;
 
 impl FromStr for TrackMethod {
@@ -100,17 +100,17 @@ impl fmt::Display for Policy {
     }
 }
 
-impl FromStr for Beginning {
+impl FromStr for TrackStart {
     type Err = Error;
 
     /// # Errors
     /// [`Error::Argument`] if it is none of them, or K is not in 0 … 65535.
     fn from_str(text: &str) -> Result<Self, Error> {
         let start = match text.split_once(':') {
-            None if text == "standard" => Some(Start::Standard),
-            None if text == "exact" => Some(Start::Exact),
-            None if text == "mixed" => Some(Start::Mixed { blend: 0 }),
-            Some(("mixed", blend)) => blend.parse().ok().map(|blend| Start::Mixed { blend }),
+            None if text == "standard" => Some(RlsStart::Standard),
+            None if text == "exact" => Some(RlsStart::Exact),
+            None if text == "mixed" => Some(RlsStart::Mixed { blend: 0 }),
+            Some(("mixed", blend)) => blend.parse().ok().map(|blend| RlsStart::Mixed { blend }),
             _ => None,
         };
         start.map(Self).ok_or_else(|| {
@@ -122,13 +122,13 @@ impl FromStr for Beginning {
 }
 
 /// As it is read.
-impl fmt::Display for Beginning {
+impl fmt::Display for TrackStart {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.0 {
-            Start::Standard => f.write_str("standard"),
-            Start::Exact => f.write_str("exact"),
-            Start::Mixed { blend: 0 } => f.write_str("mixed"),
-            Start::Mixed { blend } => write!(f, "mixed:{blend}"),
+            RlsStart::Standard => f.write_str("standard"),
+            RlsStart::Exact => f.write_str("exact"),
+            RlsStart::Mixed { blend: 0 } => f.write_str("mixed"),
+            RlsStart::Mixed { blend } => write!(f, "mixed:{blend}"),
         }
     }
 }

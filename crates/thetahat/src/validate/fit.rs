@@ -3,7 +3,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::data::Rows;
 use crate::regression::sum;
-use crate::respond::{Horizon, Response, Start};
+use crate::respond::{Horizon, InitialCondition, Response};
 
 /// What rows serve for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -33,7 +33,7 @@ pub struct Fit {
     /// How far ahead the response looks.
     pub horizon: Horizon,
     /// What it starts from.
-    pub initial: Start,
+    pub initial: InitialCondition,
     /// N: samples without a start, or in a gap, do not count.
     pub samples: usize,
     /// 100 is perfect, 0 is as good as the mean; none where it is not defined: no samples, a constant output, a response
@@ -60,7 +60,7 @@ impl Fit {
         response: &Response,
         rows: &[Rows],
         part: Option<Part>,
-        (horizon, initial): (Horizon, Start),
+        (horizon, initial): (Horizon, InitialCondition),
     ) -> Self {
         let counted = || response.counted.iter().cloned().flatten();
         let samples = response.counted.iter().map(|rows| rows.len()).sum::<usize>();
@@ -127,13 +127,13 @@ mod tests {
         let fit = |record: &Record<'_>, horizon, initial| of(&model, record, horizon, initial);
 
         // One step ahead on the rows of the fit: its own residuals.
-        let (figures, _) = fit(&record, Horizon::Steps { steps: 1 }, Start::Drop);
+        let (figures, _) = fit(&record, Horizon::Steps { steps: 1 }, InitialCondition::Drop);
         assert_eq!(figures.samples, 199);
         assert!((figures.rmse.unwrap() - estimate.mse().sqrt()).abs() < 1e-14);
 
         record.segments = vec![10..12, 20..120];
         record.past = vec![0, 0];
-        let (figures, response) = fit(&record, Horizon::FreeRun, Start::Zero);
+        let (figures, response) = fit(&record, Horizon::FreeRun, InitialCondition::Zero);
         let rows = || (10..12).chain(20..120);
         let mean = rows().map(|t| y[t]).sum::<f64>() / 102.0;
         let error = rows().map(|t| (y[t] - response.values[t]).powi(2)).sum::<f64>();
@@ -147,21 +147,21 @@ mod tests {
         assert_eq!(figures.largest_error, errors.iter().copied().reduce(f64::max));
 
         // What starts naturally counts as much as it can.
-        assert_eq!(Start::natural(&model, Horizon::Steps { steps: 3 }), Start::Drop);
-        assert_eq!(Start::natural(&model, Horizon::FreeRun), Start::Estimate);
+        assert_eq!(InitialCondition::natural(&model, Horizon::Steps { steps: 3 }), InitialCondition::Drop);
+        assert_eq!(InitialCondition::natural(&model, Horizon::FreeRun), InitialCondition::Estimate);
         let orders = Orders::armax(1, &[1], 1, &[1]).unwrap();
         let armax = PolynomialModel::from_parameters(&orders, &[-0.5, 1.0, 0.5], None, 1.0, 1.0).unwrap();
-        let start = Start::natural(&armax, Horizon::Steps { steps: 1 });
-        assert_eq!(start, Start::Estimate);
+        let start = InitialCondition::natural(&armax, Horizon::Steps { steps: 1 });
+        assert_eq!(start, InitialCondition::Estimate);
         assert_eq!(of(&armax, &record, Horizon::Steps { steps: 1 }, start).0.samples, 100);
 
         // No sample is far enough from a start; nothing to explain.
-        let (figures, _) = fit(&record, Horizon::Steps { steps: 300 }, Start::Drop);
+        let (figures, _) = fit(&record, Horizon::Steps { steps: 300 }, InitialCondition::Drop);
         assert_eq!((figures.samples, figures.percent, figures.rmse), (0, None, None));
         assert_eq!((figures.mean_absolute_error, figures.largest_error), (None, None));
         let constant = [1.0; 10];
         let (figures, _) =
-            fit(&Record::new(&constant, vec![&constant]).unwrap(), Horizon::FreeRun, Start::Zero);
+            fit(&Record::new(&constant, vec![&constant]).unwrap(), Horizon::FreeRun, InitialCondition::Zero);
         assert_eq!((figures.samples, figures.percent), (10, None));
     }
 }

@@ -14,7 +14,7 @@ use crate::distribution::{outside as events, two_sided};
 use crate::estimate::{Initial, arx, autoregression};
 use crate::model::{Orders, PolynomialModel, Signal};
 use crate::regression::noise::Noise;
-use crate::respond::{Start, innovations};
+use crate::respond::{InitialCondition, innovations};
 
 /// y(t) = 1.2 y(t-1) - 0.5 y(t-2) + u(t-1) + 0.4 u(t-2) + e(t).
 const A: [f64; 2] = [-1.2, 0.5];
@@ -47,7 +47,7 @@ fn truth() -> PolynomialModel {
 }
 
 fn tested(model: &PolynomialModel, record: &Record<'_>, relation: Relation) -> Result<Residuals, Untestable> {
-    let found = innovations(model, record, 1, Start::Drop).unwrap();
+    let found = innovations(model, record, 1, InitialCondition::Drop).unwrap();
     Residuals::of(model, record, &found, relation, 25, &[0.05, 0.2], 0.05)
 }
 
@@ -168,13 +168,13 @@ fn psi_is_the_derivative_of_the_errors() {
         let record = Record { output: &y, inputs, segments: vec![0..35, 40..80], past: vec![0, 0] };
         let errors = |model: &PolynomialModel| {
             let mut errors = vec![0.0; 80];
-            for found in innovations(model, &record, 1, Start::Zero).unwrap() {
+            for found in innovations(model, &record, 1, InitialCondition::Zero).unwrap() {
                 errors[found.rows].copy_from_slice(&found.errors);
             }
             errors
         };
         let values: Vec<f64> = model.parameters.iter().map(|parameter| parameter.value).collect();
-        let found = innovations(&model, &record, 1, Start::Zero).unwrap();
+        let found = innovations(&model, &record, 1, InitialCondition::Zero).unwrap();
         let traces = Traces::new(&model, &record, &found, false);
         let psi = columns(&traces.psi);
         let moments = Moments::new(&traces, &traces.psi);
@@ -221,7 +221,7 @@ fn psi_is_the_derivative_of_the_errors() {
 fn instruments_are_free_of_noise() {
     let (u, y) = experiment(300, 0.3);
     let record = Record::new(&y, vec![&u]).unwrap();
-    let found = innovations(&truth(), &record, 1, Start::Drop).unwrap();
+    let found = innovations(&truth(), &record, 1, InitialCondition::Drop).unwrap();
     let traces = Traces::new(&truth(), &record, &found, true);
     let (_, clean) = experiment(300, 0.0);
     let signal = traces.signal(traces.psi[0].signal);
@@ -245,7 +245,7 @@ fn past_errors_are_in_psi_as_the_model_has_it() {
         y.push(1.2 * y[t - 1] - 0.5 * y[t - 2] + u[t - 1] + v[t]);
     }
     let record = Record::new(&y, vec![&u]).unwrap();
-    let found = innovations(&model, &record, 1, Start::Zero).unwrap();
+    let found = innovations(&model, &record, 1, InitialCondition::Zero).unwrap();
     let traces = Traces::new(&model, &record, &found, false);
     let error = crate::regression::Taps { signal: Traces::ERROR, first: 1, count: 6, sign: 1.0 };
     let taps = [&traces.psi[..], &[error]].concat();
@@ -331,7 +331,7 @@ fn coloured_residuals_have_the_variance_of_their_colour() {
     (1..samples).for_each(|t| x.push(0.5 * x[t - 1] + u[t - 1]));
     let y: Vec<f64> = x.iter().zip(&e).map(|(x, e)| x + e).collect();
     let record = Record::new(&y, vec![&u]).unwrap();
-    let innovations = innovations(&model, &record, 1, Start::Zero).unwrap();
+    let innovations = innovations(&model, &record, 1, InitialCondition::Zero).unwrap();
     let found = Residuals::of(&model, &record, &innovations, Relation::Fresh, 25, &[], 0.05).unwrap();
     let mean = e.iter().sum::<f64>() / samples as f64;
     let e: Vec<f64> = e.iter().map(|e| e - mean).collect();

@@ -7,7 +7,7 @@ use thetahat::data::{Channel, Log, Record, Rows};
 use thetahat::estimate::{Constant, Initial, Method, estimate};
 use thetahat::model::{Interval, Orders, PolynomialModel, Quantity, Signal};
 use thetahat::report::{Plan, apply, identify};
-use thetahat::respond::{Horizon, Start, forecast, predict, prediction_deviations};
+use thetahat::respond::{Horizon, InitialCondition, forecast, predict, prediction_deviations};
 
 use super::{filtered, runs};
 use crate::simulated::Random;
@@ -81,7 +81,7 @@ fn held(case: &Case, samples: usize, runs: usize) -> [[f64; 3]; 2] {
         let u = &u[before..];
         let record = Record::new(&y[..samples], vec![&u[..samples]]).expect("the case is sound");
         let model = fitted(&record, &case.orders);
-        let start = Start::natural(&model, Horizon::Steps { steps: 1 });
+        let start = InitialCondition::natural(&model, Horizon::Steps { steps: 1 });
         let future = &u[samples..samples + 20];
         let ahead = forecast(&model, &record, &[future], 20, start).expect("the case is sound");
         let fresh = Record::new(&y[samples..], vec![&u[samples..]]).expect("the case is sound");

@@ -31,7 +31,7 @@ fn silence_is_capped_and_shows_in_the_excitation() {
 }
 
 /// Runs of many seeds: the means of σ̂²/σ², of nis, of θ̃'θ̃ over its predicted mean.
-fn calibration(policy: Forgetting<f64>, start: Start, walk: f64, sigma: f64, steps: usize) -> [f64; 3] {
+fn calibration(policy: Forgetting<f64>, start: RlsStart, walk: f64, sigma: f64, steps: usize) -> [f64; 3] {
     const RUNS: usize = 150;
     let (mut noise, mut means) = (Noise(16), [0.0; 3]);
     // Uniform noise of variance 1.
@@ -76,7 +76,7 @@ fn the_noise_variance_and_the_covariance_are_calibrated() {
     ];
     for (policy, walk, tolerance) in cases {
         for steps in [200, 400] {
-            let [noise, nis, covariance] = calibration(policy, Start::Standard, walk, 0.1, steps);
+            let [noise, nis, covariance] = calibration(policy, RlsStart::Standard, walk, 0.1, steps);
             assert!((noise - 1.0).abs() < tolerance, "{policy:?} {steps}: {noise}");
             assert!((nis - 1.0).abs() < tolerance + 0.05, "{policy:?} {steps}: {nis}");
             // The mean of 150 runs; the standard error is 0.06.
@@ -84,7 +84,7 @@ fn the_noise_variance_and_the_covariance_are_calibrated() {
         }
     }
     // With little noise a standard start has errors of its own, an exact one has not.
-    let [noise, ..] = calibration(exponential(0.98), Start::Exact, 0.0, 1e-4, 60);
+    let [noise, ..] = calibration(exponential(0.98), RlsStart::Exact, 0.0, 1e-4, 60);
     assert!((noise - 1.0).abs() < 0.05, "{noise}");
 }
 

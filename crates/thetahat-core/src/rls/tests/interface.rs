@@ -74,7 +74,7 @@ fn a_missing_sample_corrects_nothing() {
 #[test]
 fn a_refused_sample_changes_nothing() {
     for policy in POLICIES.map(convert::<f32>) {
-        for start in [Start::Standard, Start::Exact, Start::Mixed { blend: 3 }] {
+        for start in [RlsStart::Standard, RlsStart::Exact, RlsStart::Mixed { blend: 3 }] {
             let mut estimator = estimator::<f32, 2>(policy).with_start(start).unwrap();
             for k in 0..20 {
                 let before = debug(&estimator);
@@ -203,7 +203,7 @@ fn another_start_knows_nothing_of_the_noise() {
     for (phi, y) in samples(23, &Vector2::new(1.0, 2.0), 0.1, 51) {
         used.update(&phi, y).unwrap();
     }
-    for start in [Start::Standard, Start::Exact] {
+    for start in [RlsStart::Standard, RlsStart::Exact] {
         let fresh = estimator::<f64, 2>(Forgetting::default()).with_start(start).unwrap();
         assert_eq!(debug(&used.clone().with_start(start).unwrap()), debug(&fresh));
     }
@@ -214,7 +214,7 @@ fn what_is_given_to_start_from_stays_whatever_the_order() {
     let parameters = Vector2::new(1.0, 2.0);
     let covariance = Covariance::from_diagonal(&Vector2::new(0.3, 0.2)).unwrap();
     let new = || estimator::<f64, 2>(Forgetting::Exponential { factor: 0.9 });
-    for start in [Start::Standard, Start::Exact, Start::Mixed { blend: 3 }] {
+    for start in [RlsStart::Standard, RlsStart::Exact, RlsStart::Mixed { blend: 3 }] {
         let orders = [
             [
                 new().with_parameters(parameters).unwrap().with_start(start).unwrap(),
@@ -235,7 +235,7 @@ fn what_is_given_to_start_from_stays_whatever_the_order() {
             }
         }
     }
-    let given = new().with_parameters(parameters).unwrap().with_start(Start::Exact).unwrap();
+    let given = new().with_parameters(parameters).unwrap().with_start(RlsStart::Exact).unwrap();
     assert_eq!(*given.parameters(), parameters);
     assert_eq!(given.covariance(), new().covariance());
 }
@@ -382,7 +382,7 @@ fn run_time_sizes_give_the_same_bits() {
     use nalgebra::{DVector, Dyn};
 
     for policy in POLICIES {
-        for start in [Start::Standard, Start::Mixed { blend: 5 }] {
+        for start in [RlsStart::Standard, RlsStart::Mixed { blend: 5 }] {
             let mut fixed = estimator::<f64, 3>(policy).with_start(start).unwrap();
             let mut free: RecursiveLeastSquares<f64, Dyn> =
                 RecursiveLeastSquares::new(&DVector::repeat(3, 1.0), policy)
@@ -430,7 +430,7 @@ fn a_copy_in_another_size_goes_on_with_its_policy_and_start() {
     use nalgebra::{DVector, Dyn};
 
     for policy in POLICIES {
-        for start in [Start::Standard, Start::Exact, Start::Mixed { blend: 5 }] {
+        for start in [RlsStart::Standard, RlsStart::Exact, RlsStart::Mixed { blend: 5 }] {
             let mut fixed = estimator::<f64, 3>(policy).with_start(start).unwrap();
             for (k, (phi, y)) in samples(20, &Vector3::new(1.0, 2.0, 3.0), 0.1, 60).into_iter().enumerate() {
                 let mut copy = fixed.to_size(Dyn(3)).unwrap();

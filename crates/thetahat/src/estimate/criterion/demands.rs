@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use thetahat_core::nalgebra::DVector;
 
-use super::{Criterion, GainBound, check_range};
+use super::{ConvexFit, GainBound, check_range};
 use crate::Error;
 use crate::model::Orders;
 use crate::regression::convex::{Fitting, Limit};
@@ -32,7 +32,7 @@ pub(super) struct Demands {
 impl Demands {
     /// # Errors
     /// [`Error::Argument`] for whatever makes no sense, with the names that do.
-    pub(super) fn new(criterion: &Criterion, inputs: &[String], orders: &Orders) -> Result<Self, Error> {
+    pub(super) fn new(criterion: &ConvexFit, inputs: &[String], orders: &Orders) -> Result<Self, Error> {
         let ridge = criterion.ridge;
         if !(ridge.is_finite() && ridge >= 0.0) {
             return Err(Error::argument(

@@ -51,24 +51,24 @@ fn orders(na: usize, nb: usize) -> Orders {
 }
 
 /// A criterion from what a person writes.
-fn criterion(norm: Norm, bounds: &[&str], dc_gain: &[&str]) -> Criterion {
-    Criterion {
+fn criterion(norm: Norm, bounds: &[&str], dc_gain: &[&str]) -> ConvexFit {
+    ConvexFit {
         norm,
         bounds: bounds.iter().map(|bound| bound.parse().unwrap()).collect(),
         dc_gain: dc_gain.iter().map(|gain| gain.parse().unwrap()).collect(),
-        ..Criterion::default()
+        ..ConvexFit::default()
     }
 }
 
 /// A fit to one segment of which the samples without a past are left out.
-fn fit(y: &[f64], u: &[f64], orders: &Orders, criterion: &Criterion) -> Result<Constrained, Error> {
+fn fit(y: &[f64], u: &[f64], orders: &Orders, criterion: &ConvexFit) -> Result<Constrained, Error> {
     let record = record(y, &[u], &whole(y.len()));
     constrained(&record, &["u".to_owned()], orders, Presample::Drop, criterion)
 }
 
 /// Random bounds and gains that the parameters of `data`, and few others, are near to.
-fn random_demands(noise: &mut Noise, orders: &Orders) -> Criterion {
-    let mut criterion = Criterion::default();
+fn random_demands(noise: &mut Noise, orders: &Orders) -> ConvexFit {
+    let mut criterion = ConvexFit::default();
     for parameter in orders.names() {
         if noise.next() > 0.4 {
             let low = noise.next();
@@ -107,7 +107,7 @@ fn sums_and_largest_errors_equal_those_of_linear_programs() {
         let (y, u) = data(length, &mut noise, size, if case % 2 == 0 { wild } else { even });
         let (na, nb) = [(1, 1), (2, 1), (1, 2), (0, 3), (0, 1), (3, 0)][case % 6];
         let orders = orders(na, nb);
-        let criterion = Criterion {
+        let criterion = ConvexFit {
             norm: [Norm::One, Norm::Infinity][case / 6 % 2],
             ..random_demands(&mut noise, &orders)
         };
@@ -151,7 +151,7 @@ fn parameters_of_few_samples_are_those_of_the_linear_program() {
         let table = table(&record, &orders, Presample::Drop);
         for norm in [Norm::One, Norm::Infinity] {
             let mut reference =
-                Reference::new(&vec![0.0; orders.parameters()], &Criterion::default(), &orders);
+                Reference::new(&vec![0.0; orders.parameters()], &ConvexFit::default(), &orders);
             reference.add_norm(&table, norm);
             let expected = reference.solve().unwrap();
             let found = fit(&y, &u, &orders, &criterion(norm, &[], &[])).unwrap();
@@ -215,7 +215,7 @@ fn the_box_of_two_parameters_is_that_of_the_vertices() {
         (1..25).for_each(|t| y.push(0.7 * y[t - 1] + 2.0 * u[t - 1] + size * noise.next()));
         let table = table(&record(&y, &[&u], &whole(25)), &orders(1, 1), Presample::Drop);
         let bound = size * (1.0 + case as f64 / 20.0);
-        let criterion = Criterion { noise_bound: Some(bound), ..Criterion::default() };
+        let criterion = ConvexFit { noise_bound: Some(bound), ..ConvexFit::default() };
         let found = fit(&y, &u, &orders(1, 1), &criterion).unwrap().outcome.box_.unwrap();
         let expected = box_of_vertices(&table, bound);
         for (found, expected) in found.concat().iter().zip(expected.concat()) {
@@ -234,7 +234,7 @@ fn least_squares_that_respects_the_bounds_is_that_of_arx() {
             let record = record(&y, &[&u], &segments);
             let expected = arx(&record, &orders(2, 2), initial).unwrap();
             let inside = criterion(Norm::Two, &["a1=-3..3", "b1=0.."], &["1..9"]);
-            for criterion in [Criterion::default(), inside] {
+            for criterion in [ConvexFit::default(), inside] {
                 let found =
                     constrained(&record, &["u".to_owned()], &orders(2, 2), presample, &criterion).unwrap();
                 assert_eq!(found.parameters, expected.parameters());
@@ -248,7 +248,7 @@ fn least_squares_that_respects_the_bounds_is_that_of_arx() {
                 assert!(found.covariance.is_some());
             }
             // The same by the other way, with a bound on |e| that holds.
-            let loose = Criterion { noise_bound: Some(100.0), ..Criterion::default() };
+            let loose = ConvexFit { noise_bound: Some(100.0), ..ConvexFit::default() };
             let found = constrained(&record, &["u".to_owned()], &orders(2, 2), presample, &loose).unwrap();
             for (found, expected) in found.parameters.iter().zip(expected.parameters()) {
                 assert!((found - expected).abs() < 1e-12);
@@ -303,7 +303,7 @@ fn a_range_as_narrow_as_rounding_keeps_its_ends_apart() {
             let far = near + away.signum() * 1e-12;
             let bound = Bound { parameter: "a1".into(), low: near.min(far), high: near.max(far) };
             let found =
-                fit(&y, &u, &orders(2, 2), &Criterion { norm, bounds: vec![bound], ..Criterion::default() });
+                fit(&y, &u, &orders(2, 2), &ConvexFit { norm, bounds: vec![bound], ..ConvexFit::default() });
             assert_eq!(found.unwrap().parameters[0], near);
         }
     }
@@ -316,7 +316,7 @@ fn a_noise_bound_holds_against_a_strong_ridge() {
     let table = table(&record(&y, &[&u], &whole(200)), &orders(2, 2), Presample::Drop);
     for norm in ALL {
         for ridge in [1e3, 1e6] {
-            let criterion = Criterion { norm, ridge, noise_bound: Some(2e-6), ..Criterion::default() };
+            let criterion = ConvexFit { norm, ridge, noise_bound: Some(2e-6), ..ConvexFit::default() };
             let found = fit(&y, &u, &orders(2, 2), &criterion).unwrap();
             let largest = norm_of(&table, &found.parameters, Norm::Infinity);
             // All of the bound is used up, to the rounding of e.
@@ -365,7 +365,7 @@ fn a_ridge_is_more_samples() {
     let sizes = DVector::from_fn(4, |column, _| phi.column(column).norm() / (table.len() as f64).sqrt());
     let gram = phi.tr_mul(&phi);
     for ridge in [1e-3, 1.0, 50.0, 1e4] {
-        let criterion = Criterion { ridge, ..Criterion::default() };
+        let criterion = ConvexFit { ridge, ..ConvexFit::default() };
         let found = fit(&y, &u, &orders, &criterion).unwrap();
         let sum = &gram + DMatrix::from_diagonal(&sizes.map(|size| ridge * size * size));
         let inverse = sum.try_inverse().unwrap();
@@ -399,7 +399,7 @@ fn no_small_change_is_better_with_a_ridge() {
     let target = square(|row, _| row.1, 0);
     for norm in [Norm::One, Norm::Infinity] {
         for ridge in [1e-3, 1.0, 50.0, 1e4] {
-            let found = fit(&y, &u, &orders, &Criterion { norm, ridge, ..Criterion::default() }).unwrap();
+            let found = fit(&y, &u, &orders, &ConvexFit { norm, ridge, ..ConvexFit::default() }).unwrap();
             let value = |parameters: &[f64]| {
                 let penalty =
                     |(index, value): (usize, &f64)| (value * square(|row, i| row.0[i], index)).powi(2);
@@ -473,7 +473,7 @@ fn quantised_and_noiseless_records_are_fitted() {
     let orders = orders(2, 2);
     let table = table(&record(&y, &[&u], &whole(150)), &orders, Presample::Drop);
     for norm in [Norm::One, Norm::Infinity] {
-        let mut reference = Reference::new(&[0.0; 4], &Criterion::default(), &orders);
+        let mut reference = Reference::new(&[0.0; 4], &ConvexFit::default(), &orders);
         reference.add_norm(&table, norm);
         let theirs = norm_of(&table, &reference.solve().unwrap(), norm);
         let own = fit(&y, &u, &orders, &criterion(norm, &[], &[])).unwrap().outcome.objective;
@@ -482,7 +482,7 @@ fn quantised_and_noiseless_records_are_fitted() {
     let (y, u) = data(150, &mut noise, 0.0, even);
     for norm in ALL {
         for bound in [None, Some(0.0), Some(1e-9), Some(10.0)] {
-            let criterion = Criterion { norm, noise_bound: bound, ..criterion(norm, &["a2=0.5..1"], &[]) };
+            let criterion = ConvexFit { norm, noise_bound: bound, ..criterion(norm, &["a2=0.5..1"], &[]) };
             let found = fit(&y, &u, &orders, &criterion).unwrap();
             for (found, expected) in found.parameters.iter().zip([-1.2, 0.5, 0.8, 0.3]) {
                 assert!((found - expected).abs() < 1e-12, "{norm} {bound:?} {found}");
@@ -500,7 +500,7 @@ fn units_of_the_channels_scale_the_fit() {
             let scaled =
                 |values: &[f64], unit: f64| values.iter().map(|value| value * unit).collect::<Vec<_>>();
             let gain = |unit: f64| GainBound { input: None, low: unit, high: 2.0 * unit };
-            let of = |unit: f64, gain_unit: f64| Criterion {
+            let of = |unit: f64, gain_unit: f64| ConvexFit {
                 norm,
                 ridge: 2.0,
                 bounds: vec!["a1=-1.1..0".parse().unwrap()],
@@ -571,7 +571,7 @@ fn standard_errors_of_the_sum_of_errors_are_those_of_many_trials() {
     for criterion in [
         criterion(Norm::One, &["a1=-1..0"], &[]),
         criterion(Norm::Infinity, &[], &[]),
-        Criterion { norm: Norm::One, ridge: 1.0, ..Criterion::default() },
+        ConvexFit { norm: Norm::One, ridge: 1.0, ..ConvexFit::default() },
     ] {
         assert_eq!(fit(&y, &u, &orders(2, 2), &criterion).unwrap().covariance, None);
     }
@@ -584,7 +584,7 @@ fn threads_do_not_change_a_bit() {
     for (norm, length) in [(Norm::One, 1500), (Norm::Two, 70_000), (Norm::Infinity, 70_000)] {
         let (y, u) = data(length, &mut noise, 0.1, even);
         let criterion =
-            Criterion { ridge: 3.0, noise_bound: Some(0.3), ..criterion(norm, &["a1=-1.15..0"], &["1..9"]) };
+            ConvexFit { ridge: 3.0, noise_bound: Some(0.3), ..criterion(norm, &["a1=-1.15..0"], &["1..9"]) };
         let results = [1, 3].map(|threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| fit(&y, &u, &orders(2, 2), &criterion).unwrap())
@@ -597,11 +597,11 @@ fn threads_do_not_change_a_bit() {
 fn an_outcome_is_read_back_from_its_json() {
     let mut noise = Noise(16);
     let (y, u) = data(100, &mut noise, 0.1, even);
-    let criterion = Criterion { noise_bound: Some(0.5), ..criterion(Norm::Infinity, &["a1=-1..0"], &[]) };
+    let criterion = ConvexFit { noise_bound: Some(0.5), ..criterion(Norm::Infinity, &["a1=-1..0"], &[]) };
     let outcome = fit(&y, &u, &orders(2, 2), &criterion).unwrap().outcome;
     let json = serde_json::to_string(&outcome).unwrap();
     assert!(json.starts_with("{\"norm\":\"inf\",\"objective\":") && json.contains("\"box\":[[-"), "{json}");
-    assert_eq!(serde_json::from_str::<CriterionOutcome>(&json).unwrap(), outcome);
+    assert_eq!(serde_json::from_str::<ConvexOutcome>(&json).unwrap(), outcome);
 }
 
 #[test]
@@ -619,8 +619,8 @@ fn words_are_read_and_written() {
         "a1=.5...75".parse::<Bound>().unwrap(),
         Bound { parameter: "a1".into(), low: 0.5, high: 0.75 }
     );
-    assert!(Criterion::default().is_plain());
-    assert!(!Criterion { noise_bound: Some(1.0), ..Criterion::default() }.is_plain());
+    assert!(ConvexFit::default().is_plain());
+    assert!(!ConvexFit { noise_bound: Some(1.0), ..ConvexFit::default() }.is_plain());
 }
 
 #[test]

@@ -26,7 +26,7 @@ const LANE: usize = 4;
 
 /// V of a model on some logs, with the memory that it takes.
 #[derive(Debug)]
-pub(crate) struct Criterion<'a> {
+pub(crate) struct LikelihoodObjective<'a> {
     model: &'a GreyBox,
     experiments: &'a [Experiment],
     /// The elements that are measured in rows that count.
@@ -46,7 +46,7 @@ pub(crate) struct Criterion<'a> {
     pub(crate) information: Vec<f64>,
 }
 
-impl<'a> Criterion<'a> {
+impl<'a> LikelihoodObjective<'a> {
     pub(crate) fn new(model: &'a GreyBox, experiments: &'a [Experiment]) -> Self {
         let size = model.parameters().len();
         let lanes = size.div_ceil(LANE);

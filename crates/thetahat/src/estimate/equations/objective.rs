@@ -16,7 +16,7 @@
 //! The search stops when the predicted decrease is below the tolerance times max(N, sum e^2/S), N the elements that were measured. That
 //! is 2 V without its logarithms, which may be of either sign.
 
-use super::likelihood::Criterion;
+use super::likelihood::LikelihoodObjective;
 use crate::model::{GreyBox, equations::Scale};
 use crate::optimize::{Objective, StepRules};
 use crate::respond::equations::{Experiment, Failure};
@@ -24,7 +24,7 @@ use crate::respond::equations::{Experiment, Failure};
 /// -2 ln L as a function of the variables z.
 #[derive(Debug)]
 pub(super) struct Deviance<'a> {
-    criterion: Criterion<'a>,
+    criterion: LikelihoodObjective<'a>,
     /// Which parameters have a bound.
     bounded: Vec<bool>,
     /// Where it was evaluated last.
@@ -40,7 +40,7 @@ impl<'a> Deviance<'a> {
             model.parameters().iter().map(|unknown| unknown.scale != Scale::Free).collect();
         let size = bounded.len();
         Self {
-            criterion: Criterion::new(model, experiments),
+            criterion: LikelihoodObjective::new(model, experiments),
             bounded,
             z: vec![0.0; size],
             matrix: vec![0.0; size * size],
@@ -66,7 +66,7 @@ impl Objective for Deviance<'_> {
 
     fn linearize(&mut self) -> Result<f64, Failure> {
         self.criterion.linearize(&self.z)?;
-        let Criterion { gradient, information, .. } = &self.criterion;
+        let LikelihoodObjective { gradient, information, .. } = &self.criterion;
         let size = gradient.len();
         self.matrix.copy_from_slice(information);
         for (index, gradient) in gradient.iter().enumerate() {

@@ -16,7 +16,7 @@ use crate::regression::{condition, divide, divide_from};
 
 /// What the response to the inputs starts from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Begin {
+pub(super) enum InitialCondition {
     /// Rest: inputs before the segment, and their response, are zero.
     Rest,
     /// An unknown state, estimated for each segment; inputs that were measured before it are used.
@@ -95,14 +95,14 @@ pub(super) struct Likelihood<'a> {
 
 impl<'a> Likelihood<'a> {
     /// Segments without more measured outputs than they have initial-condition responses are left out.
-    pub(super) fn new(record: &Record<'a>, orders: &Orders, lines: usize, begin: Begin) -> Self {
+    pub(super) fn new(record: &Record<'a>, orders: &Orders, lines: usize, begin: InitialCondition) -> Self {
         let driving = 0..orders.inputs() - lines;
         let lag = driving.map(|input| orders.maximum_input_lag(input)).max();
         let mut sections = Vec::new();
         for (segment, past) in record.segments.iter().zip(&record.past) {
-            let known = if begin == Begin::Rest { 0 } else { lag.unwrap_or(0).min(*past) };
+            let known = if begin == InitialCondition::Rest { 0 } else { lag.unwrap_or(0).min(*past) };
             let free = match (begin, lag) {
-                (Begin::Free, Some(lag)) if lag > 0 => orders.na.max(lag - known),
+                (InitialCondition::Free, Some(lag)) if lag > 0 => orders.na.max(lag - known),
                 _ => 0,
             };
             let rows = segment.start - known..segment.end;

@@ -291,17 +291,17 @@ fn it_is_the_gaussian_density() {
     {
         // The past, and how many impulses there are: max(na, nb + nk - 1 - past).
         for (past, begin, free) in [
-            (0, Begin::Rest, 0),
-            (0, Begin::Free, 2),
-            (1, Begin::Free, 2),
-            (7, Begin::Free, 2),
-            (7, Begin::Rest, 0),
+            (0, InitialCondition::Rest, 0),
+            (0, InitialCondition::Free, 2),
+            (1, InitialCondition::Free, 2),
+            (7, InitialCondition::Free, 2),
+            (7, InitialCondition::Rest, 0),
         ] {
             let record = experiment.record(past);
             let mut likelihood = Likelihood::new(&record, &orders(), 0, begin);
             assert_eq!(likelihood.initial_conditions(), free);
             let cost = best_free(&mut likelihood, &theta).unwrap();
-            let (expected, samples) = dense(&experiment, past, begin == Begin::Rest, free, &theta);
+            let (expected, samples) = dense(&experiment, past, begin == InitialCondition::Rest, free, &theta);
             assert_eq!(likelihood.samples(), samples);
             assert!((cost / expected - 1.0).abs() < 1e-9, "{theta:?} {past} {begin:?}: {cost} {expected}");
         }
@@ -319,7 +319,7 @@ fn the_gradient_is_that_of_differences() {
     record.past = vec![0, 3];
     let orders = Orders::armax(2, &[2, 1, 1], 3, &[1, 0, 0]).unwrap();
     let theta = [-1.1, 0.5, 0.6, 0.5, 0.3, -0.2, 0.4, 0.2, -0.3];
-    for begin in [Begin::Rest, Begin::Free] {
+    for begin in [InitialCondition::Rest, InitialCondition::Free] {
         let mut likelihood = Likelihood::new(&record, &orders, 2, begin);
         let cost = best_free(&mut likelihood, &theta).unwrap();
         likelihood.linearize().unwrap();
@@ -429,7 +429,8 @@ fn a_walk_comes_out_as_a_slow_pole_and_what_has_no_likelihood_is_refused() {
     let record = Record::new(&walk, vec![]).unwrap();
     let found = fit(&record, &Orders::arx(1, &[], &[]).unwrap(), Initial::Auto).unwrap();
     assert!((-1.0..-0.97).contains(&found.parameters()[0]), "{:?}", found.parameters());
-    let mut likelihood = Likelihood::new(&record, &Orders::arx(1, &[], &[]).unwrap(), 0, Begin::Rest);
+    let mut likelihood =
+        Likelihood::new(&record, &Orders::arx(1, &[], &[]).unwrap(), 0, InitialCondition::Rest);
     for root in [-1.0, -1.1, f64::NAN] {
         assert!(likelihood.evaluate(&[root]).is_err());
     }

@@ -7,7 +7,7 @@ use crate::Error;
 use crate::data::{Log, Rows};
 use crate::model::NonlinearArxModel;
 use crate::respond::nonlinear_arx::NonlinearArxOnLog;
-use crate::respond::{Horizon, OnLog, Start};
+use crate::respond::{Horizon, InitialCondition, OnLog};
 
 /// A choice prefers models whose free run stays within this many times the range of the estimation rows, about its middle.
 const RANGE: f64 = 1.1;
@@ -76,7 +76,7 @@ pub(super) fn run(model: &NonlinearArxModel, log: &Log, rows: &[Rows]) -> Result
     let on_log = NonlinearArxOnLog::new(model, log, rows)?;
     let horizon = if on_log.is_driven() { Horizon::FreeRun } else { Horizon::Steps { steps: 1 } };
     let mut sums = Sums::default();
-    for response in on_log.respond(horizon, Start::Drop)? {
+    for response in on_log.respond(horizon, InitialCondition::Drop)? {
         let measured = on_log.measured(0);
         for t in response.counted.iter().cloned().flatten() {
             let (said, error) = (response.values[t], (measured[t] - response.values[t]).abs());

@@ -14,7 +14,7 @@ use super::super::instrumental::instrumental_variables;
 use super::super::outcome::{StartOutcome, search_outcome};
 use super::super::polynomials::Unusable;
 use super::super::prediction_error::{flat, prediction_error, root_of};
-use super::super::predictor::{Begin, Predictor};
+use super::super::predictor::{InitialCondition, Predictor};
 use super::super::stretches::{energy, filled};
 use super::super::uncertainty::{coloured, restricted};
 use super::super::{Estimate, Initial, Procedure, drop_is_not_for_f};
@@ -43,7 +43,7 @@ struct Shared<'r> {
 
 impl<'r> Shared<'r> {
     /// `plant` has the denominators of the inputs that share A.
-    fn new(record: &Record<'r>, orders: &Orders, plant: &Orders, begin: Begin) -> Self {
+    fn new(record: &Record<'r>, orders: &Orders, plant: &Orders, begin: InitialCondition) -> Self {
         let orders = Orders { nc: 0, ..orders.clone() };
         let (na, b) = (orders.na, orders.nb.iter().sum::<usize>());
         let denominators = plant.nf.iter().flat_map(|&nf| 0..nf);
@@ -148,7 +148,7 @@ pub(super) fn plant(
     let deadline = Deadline::after(options.time_limit);
     let starts = starts(record, orders, options, monitor)?;
     let smallest = NOTHING_LEFT * energy(record);
-    let from = |begin: Begin| -> Result<Option<Reached<'_>>, Error> {
+    let from = |begin: InitialCondition| -> Result<Option<Reached<'_>>, Error> {
         let mut best: Option<Reached<'_>> = None;
         let mut outcomes = Vec::new();
         let mut winner = 0;
@@ -177,8 +177,11 @@ pub(super) fn plant(
         outcomes.swap(0, winner);
         Ok(best.map(|best| Reached { starts: outcomes, ..best }))
     };
-    let widest =
-        if Predictor::has_unknown_inputs(record, plant) { Begin::UnknownInputs } else { Begin::Unknown };
+    let widest = if Predictor::has_unknown_inputs(record, plant) {
+        InitialCondition::UnknownInputs
+    } else {
+        InitialCondition::Unknown
+    };
     let measured = record.past.iter().any(|past| *past > 0);
     // Whether the second is worth its further unknowns.
     let better = |one: &Reached<'_>, other: &Reached<'_>| {
@@ -189,9 +192,9 @@ pub(super) fn plant(
     };
     let mut begins = match initial {
         Initial::Drop => return Err(drop_is_not_for_f()),
-        Initial::Zero => vec![Begin::Zero],
-        Initial::Auto if !measured => vec![Begin::Zero, Begin::Unknown, widest],
-        Initial::Estimate | Initial::Auto => vec![Begin::Unknown, widest],
+        Initial::Zero => vec![InitialCondition::Zero],
+        Initial::Auto if !measured => vec![InitialCondition::Zero, InitialCondition::Unknown, widest],
+        Initial::Estimate | Initial::Auto => vec![InitialCondition::Unknown, widest],
     };
     begins.dedup();
     let mut reached: Option<Reached<'_>> = None;
@@ -217,7 +220,7 @@ struct Reached<'r> {
     shared: Shared<'r>,
     found: Found,
     starts: Vec<StartOutcome>,
-    begin: Begin,
+    begin: InitialCondition,
 }
 
 /// A and B by name: initial parameters that were given, and those of least squares, of instrumental variables and of noise with a numerator.
@@ -312,7 +315,7 @@ fn finish(
         samples,
         mse: cost / samples as f64,
         condition: Some(condition),
-        initial: if begin == Begin::Zero { Initial::Zero } else { Initial::Estimate },
+        initial: if begin == InitialCondition::Zero { Initial::Zero } else { Initial::Estimate },
         procedure: Procedure::PredictionError(outcome),
         parameters: found.parameters,
     };

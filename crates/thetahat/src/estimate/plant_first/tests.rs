@@ -2,7 +2,7 @@ use super::*;
 use crate::estimate::{Method, estimate, estimate_of_channels};
 use crate::model::PolynomialModel;
 use crate::regression::noise::Noise;
-use crate::respond::{Start, simulate};
+use crate::respond::{InitialCondition, simulate};
 
 fn method(plant_first: bool) -> Method {
     Method::PredictionError(Search { plant_first, tolerance: 1e-12, ..Search::default() })
@@ -176,7 +176,7 @@ fn several_inputs_share_the_denominator_that_simulates() {
     // A stationary point of the free run's errors: a change of any parameter raises them.
     let cost = |parameters: &[f64]| {
         let model = PolynomialModel::from_parameters(&orders, parameters, None, 1.0, 1.0).unwrap();
-        let run = simulate(&model, &record, Start::Estimate).unwrap();
+        let run = simulate(&model, &record, InitialCondition::Estimate).unwrap();
         (0..y.len()).map(|t| (y[t] - run.values[t]).powi(2)).sum::<f64>()
     };
     if found.initial() == Initial::Drop {

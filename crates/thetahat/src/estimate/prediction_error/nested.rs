@@ -12,7 +12,7 @@ use crate::Error;
 use crate::data::Record;
 use crate::estimate::{
     polynomials::extended,
-    predictor::{Begin, Predictor},
+    predictor::{InitialCondition, Predictor},
     start::Plants,
     stretches::{filled, stretches},
 };
@@ -45,7 +45,7 @@ impl Job<'_> {
         }
         let thin = thinned(record);
         // In the middle of a log nothing is at rest.
-        let (record, begin) = thin.as_ref().map_or((record, begin), |thin| (thin, Begin::Unknown));
+        let (record, begin) = thin.as_ref().map_or((record, begin), |thin| (thin, InitialCondition::Unknown));
         let top = levels(orders);
         let bottom = bottom(&top);
         let mut known: BTreeMap<Levels, Vec<f64>> = BTreeMap::new();

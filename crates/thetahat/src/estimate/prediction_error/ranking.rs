@@ -8,10 +8,10 @@
 use rayon::prelude::*;
 
 use super::nested::thinned;
-use super::{Beginning, Job, Problem, hopeless};
+use super::{Job, Problem, TrackStart, hopeless};
 use crate::Error;
 use crate::estimate::outcome::StartOutcome;
-use crate::estimate::predictor::{Begin, Predictor};
+use crate::estimate::predictor::{InitialCondition, Predictor};
 use crate::estimate::restart::restarts;
 use crate::estimate::start::candidates;
 use crate::estimate::stretches::filled;
@@ -47,7 +47,7 @@ impl Job<'_> {
         &self,
         problem: Problem<'_, '_>,
         predictor: &mut Predictor<'_>,
-    ) -> Result<Beginning, Error> {
+    ) -> Result<TrackStart, Error> {
         let Problem { record, orders, .. } = problem;
         let given = self.options.initial_parameters.iter().map(|given| (GIVEN, given.clone()));
         let recipes = filled(record, |record| candidates(record, orders, self.deadline));
@@ -100,14 +100,14 @@ impl Job<'_> {
         if self.options.starts == 0 {
             let parameters = starts[0].parameters.clone();
             let starts = starts.into_iter().map(|start| start.outcome).collect();
-            return Ok(Beginning { parameters, starts, unstable_pole, samples, compared, found: None });
+            return Ok(TrackStart { parameters, starts, unstable_pole, samples, compared, found: None });
         }
         let (winner, found) = self.searched(problem, &mut starts)?;
         starts[..=winner].rotate_right(1);
         let parameters =
             found.as_ref().map_or_else(|| starts[0].parameters.clone(), |f| f.parameters.clone());
         let starts = starts.into_iter().map(|start| start.outcome).collect();
-        Ok(Beginning { parameters, starts, unstable_pole, samples, compared, found })
+        Ok(TrackStart { parameters, starts, unstable_pole, samples, compared, found })
     }
 
     fn nested_starts(
@@ -222,7 +222,7 @@ fn is_doubtful(problem: Problem<'_, '_>, starts: &[Start], predictor: &mut Predi
     let recipes: Vec<&Start> = recipes.into_iter().map(|(_, start)| start).collect();
     match thinned(problem.record) {
         Some(thin) => {
-            let problem = Problem { record: &thin, begin: Begin::Unknown, ..problem };
+            let problem = Problem { record: &thin, begin: InitialCondition::Unknown, ..problem };
             lead_apart(&recipes, &mut problem.predictor())
         }
         None => lead_apart(&recipes, predictor),

@@ -79,7 +79,7 @@ impl<'a> Section<'a> {
         let (parameters, free) = (layout.parameters, layout.free);
         let columns = parameters + free;
         let size = layout.products.size();
-        let counted = runs.iter().map(|run| (layout.masked, run.clone()));
+        let counted = runs.iter().map(|run| (layout.conditioned, run.clone()));
         Self {
             layout: index,
             first: rows.start,
@@ -90,7 +90,7 @@ impl<'a> Section<'a> {
             responses: layout.orders.nf.iter().map(|&nf| buffer(nf > 0)).collect(),
             disturbance: buffer(layout.orders.nd > 0),
             scratch: buffer(layout.orders.nd > 0),
-            heads: vec![0.0; layout.signals * layout.masked],
+            heads: vec![0.0; layout.signals * layout.conditioned],
             interior: layout.products.interior(counted),
             entries: vec![0.0; size * size],
             gram: vec![0.0; columns * columns],
@@ -141,8 +141,8 @@ impl<'a> Section<'a> {
                         multiply(&mut self.scratch[..known], &polynomials.d, piece);
                         piece.copy_from_slice(&self.scratch[..known]);
                     }
-                    piece[..layout.masked].fill(0.0);
-                    divide(&polynomials.c, &mut piece[layout.masked..]);
+                    piece[..layout.conditioned].fill(0.0);
+                    divide(&polynomials.c, &mut piece[layout.conditioned..]);
                     if known == length || is_quiet(piece, memory) {
                         break size;
                     }
@@ -194,7 +194,7 @@ impl<'a> Section<'a> {
         if has_noise_denominator {
             multiply(error, &polynomials.d, &self.disturbance);
         }
-        let (head, tail) = error.split_at_mut(layout.masked);
+        let (head, tail) = error.split_at_mut(layout.conditioned);
         head.fill(0.0);
         divide(&polynomials.c, tail);
         let each = self.runs.iter().map(|run| {
@@ -234,12 +234,12 @@ impl<'a> Section<'a> {
             self.signals[layout.disturbance].copy_from_slice(&self.disturbance);
         }
         for &signal in &layout.filtered {
-            let head = &mut self.signals[signal][..layout.masked];
-            self.heads[signal * layout.masked..][..layout.masked].copy_from_slice(head);
+            let head = &mut self.signals[signal][..layout.conditioned];
+            self.heads[signal * layout.conditioned..][..layout.conditioned].copy_from_slice(head);
             head.fill(0.0);
         }
         if orders.nc > 0 {
-            divide_all(&polynomials.c, &mut self.signals, &layout.filtered, layout.masked);
+            divide_all(&polynomials.c, &mut self.signals, &layout.filtered, layout.conditioned);
         }
         if layout.free > 0 {
             let gain = polynomials.d.iter().map(|d| d.abs()).sum::<f64>();
@@ -270,11 +270,11 @@ impl<'a> Section<'a> {
         signal: usize,
         input: Option<usize>,
     ) -> f64 {
-        let (values, masked) = (&mut self.signals[signal], layout.masked);
+        let (values, conditioned) = (&mut self.signals[signal], layout.conditioned);
         let orders = &layout.orders;
         let memory = 1 + orders.nc + orders.nd + input.map_or(0, |input| orders.nf[input]);
-        let first = if input.is_some() { layout.origin } else { masked };
-        let mut known = (FIRST_PIECE + masked.max(first) + 2 * memory).min(values.len());
+        let first = if input.is_some() { layout.origin } else { conditioned };
+        let mut known = (FIRST_PIECE + conditioned.max(first) + 2 * memory).min(values.len());
         let size = loop {
             let piece = &mut values[..known];
             piece.fill(0.0);
@@ -287,11 +287,11 @@ impl<'a> Section<'a> {
                     multiply(&mut self.scratch[..known], &polynomials.d, piece);
                     piece.copy_from_slice(&self.scratch[..known]);
                 }
-                let (head, _) = piece.split_at_mut(masked);
-                self.heads[signal * masked..][..masked].copy_from_slice(head);
+                let (head, _) = piece.split_at_mut(conditioned);
+                self.heads[signal * conditioned..][..conditioned].copy_from_slice(head);
                 head.fill(0.0);
             }
-            divide(&polynomials.c, &mut piece[masked..]);
+            divide(&polynomials.c, &mut piece[conditioned..]);
             let quiet = is_quiet(piece, memory);
             if quiet || known == values.len() {
                 break size;
@@ -307,10 +307,10 @@ impl<'a> Section<'a> {
 
     /// The Gram matrix of the columns and psi'e.
     fn add_up(&mut self, layout: &Layout) {
-        let (products, masked) = (&layout.products, layout.masked);
+        let (products, conditioned) = (&layout.products, layout.conditioned);
         self.entries.fill(0.0);
         for run in &self.runs {
-            products.add_ends(&self.signals, masked, run, &mut self.entries);
+            products.add_ends(&self.signals, conditioned, run, &mut self.entries);
         }
         products.add_interior(&self.signals, &self.supports, &mut self.interior, &mut self.entries);
         let size = products.size();
@@ -327,13 +327,13 @@ impl<'a> Section<'a> {
                 *place = entry(column, other);
             }
         }
-        if masked > 0 {
+        if conditioned > 0 {
             let width = shifts.len();
             for (weights, column) in self.corrections.chunks_exact_mut(width).zip(columns) {
-                let head = &self.heads[column.signal * masked..][..masked];
+                let head = &self.heads[column.signal * conditioned..][..conditioned];
                 for (k, weight) in weights.iter_mut().enumerate() {
                     // z(r + k - i), zero before the segment.
-                    let from = (masked + k).checked_sub(column.lag).filter(|_| k < column.lag);
+                    let from = (conditioned + k).checked_sub(column.lag).filter(|_| k < column.lag);
                     *weight = from.map_or(0.0, |from| column.sign * head[from]);
                 }
             }

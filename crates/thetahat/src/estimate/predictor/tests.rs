@@ -42,19 +42,19 @@ fn record<'a>(output: &'a [f64], inputs: &'a [Vec<f64>]) -> Record<'a> {
 /// Predictors of models on common samples, and on all samples with what is known before their segments.
 fn predictors<'a>(record: &Record<'a>, orders: &Orders) -> Vec<Predictor<'a>> {
     let common = [
-        (Begin::Zero, 0, 0),
-        (Begin::Zero, 0, 9),
-        (Begin::Unknown, 0, 0),
-        (Begin::Unknown, 0, 9),
-        (Begin::Unknown, 7, 9),
+        (InitialCondition::Zero, 0, 0),
+        (InitialCondition::Zero, 0, 9),
+        (InitialCondition::Unknown, 0, 0),
+        (InitialCondition::Unknown, 0, 9),
+        (InitialCondition::Unknown, 7, 9),
     ];
     // Models are compared on samples of which none is missing.
     let complete = record.output.iter().all(|y| !y.is_nan());
     let common = common.into_iter().filter(|_| complete);
-    let common =
-        common.map(|(begin, silent, counted)| Predictor::counting(record, orders, begin, silent, counted));
+    let common = common
+        .map(|(begin, left_out, counted)| Predictor::counting(record, orders, begin, left_out, counted));
     let known = Record { past: vec![0, 1, 5], ..record.clone() };
-    let own = [Begin::Zero, Begin::Unknown, Begin::UnknownInputs]
+    let own = [InitialCondition::Zero, InitialCondition::Unknown, InitialCondition::UnknownInputs]
         .map(|begin| Predictor::new(&known, orders, begin));
     common.chain(own).collect()
 }
@@ -100,7 +100,8 @@ fn errors_are_those_of_the_difference_equations() {
             let Polynomials { a, b, c, d, f } = Polynomials::new(&orders, &parameters);
             let (mut expected, mut weights): (Vec<f64>, &[f64]) = (Vec::new(), &weights);
             for section in &predictor.sections {
-                let Layout { masked, counted, origin, own_free, .. } = &predictor.layouts[section.layout];
+                let Layout { conditioned, counted, origin, own_free, .. } =
+                    &predictor.layouts[section.layout];
                 // Before the section everything is zero.
                 let at = |x: &[f64], t: usize, lag: usize| if t < lag { 0.0 } else { x[t - lag] };
                 let past =
@@ -125,7 +126,7 @@ fn errors_are_those_of_the_difference_equations() {
                     }
                     w.push(value);
                     let error = value + past(&d, &w, t) - past(&c, &e, t);
-                    e.push(if t < *masked { 0.0 } else { error });
+                    e.push(if t < *conditioned { 0.0 } else { error });
                 }
                 expected.extend(e[*counted..].iter().filter(|e| !e.is_nan()));
             }
@@ -150,10 +151,10 @@ fn sections_begin_with_the_past_that_their_errors_reach_back_to() {
         let each = predictor.sections.iter().map(|section| (section.output.len(), section.free.len()));
         (predictor.samples(), each.collect::<Vec<_>>())
     };
-    assert_eq!(of(Begin::Zero), (134, vec![(60, 0), (14, 0), (60, 0)]));
+    assert_eq!(of(InitialCondition::Zero), (134, vec![(60, 0), (14, 0), (60, 0)]));
     // Without a past the first sample of D w is not there.
-    assert_eq!(of(Begin::Unknown), (133, vec![(60, 1), (17, 1), (65, 1)]));
-    assert_eq!(of(Begin::UnknownInputs), (133, vec![(60, 4), (17, 2), (65, 1)]));
+    assert_eq!(of(InitialCondition::Unknown), (133, vec![(60, 1), (17, 1), (65, 1)]));
+    assert_eq!(of(InitialCondition::UnknownInputs), (133, vec![(60, 4), (17, 2), (65, 1)]));
     assert!(Predictor::has_unknown_inputs(&record, &orders));
     assert!(!Predictor::has_unknown_inputs(&Record { past: vec![5; 3], ..record.clone() }, &orders));
 }
@@ -179,9 +180,9 @@ fn what_was_before_a_segment_is_known_or_estimated() {
         predictor.try_free(&[]);
         predictor.evaluate(&parameters).unwrap()
     };
-    assert!(of(5, Begin::Unknown) < 1e-20 && of(100, Begin::Unknown) < 1e-20);
-    assert!(of(0, Begin::UnknownInputs) < 1e-20 && of(3, Begin::UnknownInputs) < 1e-20);
-    assert!(of(0, Begin::Unknown) > 1e-3 && of(2, Begin::Unknown) > 1e-3);
+    assert!(of(5, InitialCondition::Unknown) < 1e-20 && of(100, InitialCondition::Unknown) < 1e-20);
+    assert!(of(0, InitialCondition::UnknownInputs) < 1e-20 && of(3, InitialCondition::UnknownInputs) < 1e-20);
+    assert!(of(0, InitialCondition::Unknown) > 1e-3 && of(2, InitialCondition::Unknown) > 1e-3);
 }
 
 #[test]
@@ -248,7 +249,7 @@ fn taking_out_the_free_responses_leaves_the_normal_equations_of_their_best_weigh
     let u = [noise.take(140)];
     let y = noise.take(140);
     let record = record(&y, &u);
-    let mut predictor = Predictor::new(&record, &orders, Begin::Unknown);
+    let mut predictor = Predictor::new(&record, &orders, InitialCondition::Unknown);
     let parameters = [0.5, -0.2, 0.3, -0.4, -1.2, 0.5];
     predictor.evaluate(&parameters).unwrap();
     predictor.linearize();
@@ -271,7 +272,7 @@ fn weights_of_responses_that_have_faded_are_the_best() {
     let u = [noise.take(140)];
     let y = noise.take(140);
     let record = record(&y, &u);
-    let mut predictor = Predictor::counting(&record, &orders, Begin::Unknown, 3, 8);
+    let mut predictor = Predictor::counting(&record, &orders, InitialCondition::Unknown, 3, 8);
     // Poles of modulus 0.7, and of 1e-6: of the latter there is nothing to see.
     for f in [[-1.2, 0.5], [0.0, -1e-12]] {
         let parameters = [0.5, -0.2, 0.3, -0.4, f[0], f[1]];

@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 
 use super::*;
-use crate::estimate::{Criterion, Method, Norm, estimate};
+use crate::estimate::{ConvexFit, Method, Norm, estimate};
 use crate::regression::noise::Noise;
 
 fn fitted(record: &Record<'_>, orders: &Orders, loss: Loss) -> (Estimate, RobustOutcome) {
@@ -82,7 +82,7 @@ fn of_arx_the_gradient_of_the_loss_is_zero_and_the_scale_is_that_of_least_absolu
     assert!(outcome.search.costs.windows(2).all(|pair| pair[1] < pair[0]));
 
     // Least absolute errors: those of the linear program, and their scale.
-    let exact = Method::Constrained(Criterion { norm: Norm::One, ..Criterion::default() });
+    let exact = Method::Constrained(ConvexFit { norm: Norm::One, ..ConvexFit::default() });
     let exact = estimate(&record, &orders, &exact, Initial::Auto).unwrap();
     let (smoothed, found) = fitted(&record, &orders, Loss::Absolute);
     let sum = |p: &[f64]| (1..400).map(|t| error(t, p).abs()).sum::<f64>();

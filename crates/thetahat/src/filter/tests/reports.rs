@@ -3,7 +3,7 @@ use crate::filter::{Estimator, InitialState, StateFilter, StateModel, kind::Kind
 use crate::model::{Orders, PolynomialModel};
 use crate::regression::noise::Noise;
 use crate::report::{Plan, identify};
-use crate::respond::{Start, predict};
+use crate::respond::{InitialCondition, predict};
 
 /// Models of all structures: na, nb, nc, nd, nf, nk and their parameters a, b, c, d, f.
 fn models() -> Vec<PolynomialModel> {
@@ -44,7 +44,7 @@ fn predictions_are_those_of_the_difference_equation() {
         let u: Vec<Vec<f64>> = (0..inputs).map(|_| (0..80).map(|_| noise.normal()).collect()).collect();
         let y: Vec<f64> = (0..80).map(|_| noise.normal()).collect();
         let record = Record::new(&y, u.iter().map(Vec::as_slice).collect()).unwrap();
-        let expected = predict(&model, &record, 1, Start::Zero).unwrap().values;
+        let expected = predict(&model, &record, 1, InitialCondition::Zero).unwrap().values;
 
         let mut filter = filter(&model);
         assert_eq!(filter.model().outputs(), ["y"]);

@@ -1,22 +1,26 @@
 //! The tables.
 
+mod inspection;
+mod validation;
+
+pub(super) use inspection::{channels, clock, delays, excitation};
+use validation::asked;
+pub(super) use validation::{anderson, coverage, noise, tests, which};
+
 use super::page::Table;
-use super::text::{complex, or_dash, percent, quantity, rows};
+use super::text::{complex, or_dash, quantity, rows};
 use crate::data::{Rows, Source};
 use crate::estimate::{Criteria, InformationCriterion, Procedure, TermsOutcome};
 use crate::figures::{chance, fixed, number, scientific, short, three};
-use crate::inspect::Inspection;
 use crate::model::{EquationsModel, NonlinearArxModel, Orders, PolynomialModel, Root};
 use crate::optimize::Stopped;
-use crate::report::{Estimation, InSample, Report, Validated, Validation};
-use crate::respond::Start;
+use crate::report::{Estimation, InSample, Report, Validated};
+use crate::respond::InitialCondition;
 use crate::select::{Candidate, Selection};
 use crate::validate::{Fit, Part};
 
 /// The models of a search that are listed.
 const BEST: usize = 20;
-/// Fewer channels than this stand beside each other, more below each other.
-const BESIDE: usize = 5;
 
 pub(super) fn parameters(model: &PolynomialModel) -> Table {
     let mut table = Table::new("Parameters", &["parameter", "value", "standard error"]);
@@ -256,121 +260,6 @@ fn procedure(procedure: &Procedure) -> String {
     }
 }
 
-/// Who, and of which output where there are several.
-pub(super) fn which(who: &str, validation: &Validation, output: &str) -> String {
-    if validation.noise.len() > 1 { format!("{who}, {output}") } else { who.to_owned() }
-}
-
-/// The tests of what is left of several parts, or by several models: `who` says which.
-pub(super) fn tests(who: &str, parts: &[(String, &Validation)]) -> Table {
-    let mut table = Table::new(
-        "Tests of the residuals",
-        &["test", who, "lags", "statistic", "degrees of freedom", "p-value"],
-    );
-    let each = parts.iter().flat_map(|(name, validation)| {
-        validation.residuals.iter().map(move |residuals| (name, validation, residuals))
-    });
-    for (name, validation, residuals) in each {
-        let name = which(name, validation, &residuals.output);
-        let mut add = |label: String, test: &crate::validate::Test| {
-            table.row([
-                label,
-                name.clone(),
-                test.lags.to_string(),
-                fixed(test.statistic, 2),
-                short(test.degrees),
-                or_dash(test.p_value, chance),
-            ]);
-        };
-        add(format!("white (Ljung-Box){}", asked(validation)), &residuals.ljung_box);
-        for independence in &residuals.independence {
-            add(format!("independent of past {}", independence.input), &independence.past);
-            add(format!("no feedback to {}", independence.input), &independence.feedback);
-        }
-        for one in validation.nonlinear.iter().filter(|one| one.output == residuals.output) {
-            add(format!("no {}² in errors", one.input), &one.errors);
-            add(format!("no {}² in squared errors", one.input), &one.squares);
-        }
-    }
-    table
-}
-
-/// The remark where residuals that are not white are no fault.
-fn asked(validation: &Validation) -> &'static str {
-    if validation.white_expected { "" } else { ", not asked" }
-}
-
-/// Anderson's test for each level.
-pub(super) fn anderson(who: &str, parts: &[(String, &Validation)]) -> Table {
-    let mut table = Table::new(
-        "Correlations outside of their band (Anderson)",
-        &["alpha", who, "band", "lags", "outside", "fraction", "p-value", "white"],
-    );
-    let each = parts.iter().flat_map(|(name, validation)| {
-        validation.residuals.iter().map(move |residuals| (name, validation, residuals))
-    });
-    for (name, validation, residuals) in each {
-        for level in &residuals.anderson.levels {
-            table.row([
-                short(level.alpha),
-                which(name, validation, &residuals.output),
-                format!("± {}", three(level.band)),
-                residuals.anderson.lags.to_string(),
-                level.outside.to_string(),
-                three(level.outside as f64 / residuals.anderson.lags as f64),
-                chance(level.p_value),
-                format!("{}{}", yes(level.white), asked(validation)),
-            ]);
-        }
-    }
-    table
-}
-
-/// How often the output lies in its prediction intervals.
-pub(super) fn coverage(who: &str, parts: &[(String, &Validation)]) -> Table {
-    let all = || parts.iter().flat_map(|(_, validation)| &validation.coverage);
-    let mut levels: Vec<f64> = all().map(|one| one.level).collect();
-    levels.sort_by(f64::total_cmp);
-    levels.dedup();
-    let mut head = vec![who.to_owned(), "steps ahead".to_owned()];
-    head.extend(levels.iter().map(|level| format!("{} interval", percent(*level))));
-    head.push("samples".to_owned());
-    let head: Vec<&str> = head.iter().map(String::as_str).collect();
-    let mut table = Table::new("How often the output lies in its prediction intervals", &head);
-    for (name, validation) in parts {
-        let same = |one: &crate::report::Coverage, other: &crate::report::Coverage| {
-            (one.steps, &one.output) == (other.steps, &other.output)
-        };
-        for found in validation.coverage.chunk_by(same) {
-            let at = |level: &f64| found.iter().find(|one| one.level == *level).and_then(|one| one.actual);
-            let name = which(name, validation, &found[0].output);
-            let mut cells = vec![name, found[0].steps.to_string()];
-            cells.extend(levels.iter().map(|level| or_dash(at(level), percent)));
-            cells.push(found[0].samples.to_string());
-            table.row(cells);
-        }
-    }
-    table
-}
-
-/// The level of the errors beside that of the model.
-pub(super) fn noise(who: &str, parts: &[(String, &Validation)]) -> Table {
-    let head = [who, "mean of e²", "noise variance of the model", "ratio", "in-sample"];
-    let mut table = Table::new("Errors one step ahead", &head);
-    for (name, validation) in parts {
-        for noise in &validation.noise {
-            table.row([
-                which(name, validation, &noise.output),
-                or_dash(noise.mse, number),
-                number(noise.model),
-                or_dash(noise.ratio, three),
-                in_sample(validation.in_sample).to_owned(),
-            ]);
-        }
-    }
-    table
-}
-
 pub(super) fn logs(sources: &[Source]) -> Table {
     let mut table = Table::new("Logs", &["file", "rows", "time column", "start", "resampled"]);
     for source in sources {
@@ -536,110 +425,6 @@ pub(super) fn comparison(models: &[(String, &Validated)], criteria: Option<&[Cri
     table.turned()
 }
 
-pub(super) fn clock(inspection: &Inspection) -> Table {
-    let clock = &inspection.clock;
-    let mut table = Table::new("Clock", &["figure", "value"]);
-    let mut add = |name: &str, value: String| table.row([name.to_owned(), value]);
-    add("rows", inspection.rows.to_string());
-    let source = if clock.measured { "" } else { " (the log has no times)" };
-    add("median step", format!("{} s{source}", short(clock.sample_time)));
-    add("shortest and longest step", format!("{} s, {} s", short(clock.steps.0), short(clock.steps.1)));
-    add("jitter", percent(clock.jitter));
-    add("gaps", clock.gaps.to_string());
-    add("has to be resampled", yes(clock.irregular));
-    table
-}
-
-pub(super) fn channels(inspection: &Inspection) -> Table {
-    let head = [
-        "channel",
-        "role",
-        "missing",
-        "smallest",
-        "largest",
-        "mean",
-        "standard deviation",
-        "trend [1/s]",
-        "trend's share",
-        "repeated",
-        "longest hold",
-        "quantization",
-        "at the smallest, largest",
-        "outliers",
-    ];
-    let mut table = Table::new("Quality", &head);
-    for channel in &inspection.channels {
-        let outliers = match (channel.outlier_count, channel.outliers.as_slice()) {
-            (0, _) => "0".to_owned(),
-            (count, rows) => {
-                let shown: Vec<String> = rows.iter().take(3).map(usize::to_string).collect();
-                let more = if shown.len() < count { ", …" } else { "" };
-                format!("{count} (rows {}{more})", shown.join(", "))
-            }
-        };
-        table.row([
-            channel.name.clone(),
-            channel.role.clone().unwrap_or_default(),
-            channel.missing.to_string(),
-            or_dash(channel.minimum, number),
-            or_dash(channel.maximum, number),
-            or_dash(channel.mean, number),
-            or_dash(channel.standard_deviation, number),
-            or_dash(channel.trend, three),
-            or_dash(channel.trend_share, percent),
-            channel.repeated.to_string(),
-            channel.longest_hold.to_string(),
-            channel.quantization.map_or_else(|| "none".to_owned(), short),
-            channel
-                .saturation
-                .map_or_else(|| "no".to_owned(), |rests| format!("{}, {}", rests.low, rests.high)),
-            outliers,
-        ]);
-    }
-    if inspection.channels.len() < BESIDE { table.turned() } else { table }
-}
-
-pub(super) fn excitation(inspection: &Inspection) -> Table {
-    let alike = inspection.excitation.iter().any(|input| input.same_as.is_some());
-    let head = ["input", "persistently exciting of order", "changes at", "the same but for scale and offset"];
-    let mut table = Table::new("Excitation", if alike { &head } else { &head[..3] });
-    for input in &inspection.excitation {
-        let most = if input.order == input.highest { " or more" } else { "" };
-        let mut cells = vec![
-            input.input.clone(),
-            format!("{}{most}", input.order),
-            format!("{} of samples", percent(input.changes)),
-        ];
-        if alike {
-            cells.push(input.same_as.clone().unwrap_or_default());
-        }
-        table.row(cells);
-    }
-    table
-}
-
-/// Delays and feedback.
-pub(super) fn delays(inspection: &Inspection) -> Table {
-    let mut table =
-        Table::new("Delay and feedback", &["input", "delay [samples]", "confidence", "feedback", "p-value"]);
-    for delay in &inspection.delays {
-        let feedback = inspection.feedback.iter().find(|feedback| feedback.input == delay.input);
-        table.row([
-            delay.input.clone(),
-            delay.nk.map_or_else(|| "none found".to_owned(), |nk| nk.to_string()),
-            or_dash(delay.confidence, confidence),
-            or_dash(feedback, |feedback| yes(feedback.found)),
-            or_dash(feedback.and_then(|feedback| feedback.p_value), chance),
-        ]);
-    }
-    table
-}
-
-/// Nothing is as sure as all digits rounded up would have it.
-fn confidence(fraction: f64) -> String {
-    if fraction > 0.9994 { "> 99.9 %".to_owned() } else { percent(fraction) }
-}
-
 /// The part's name.
 pub(super) fn part(part: Part) -> &'static str {
     match part {
@@ -649,11 +434,11 @@ pub(super) fn part(part: Part) -> &'static str {
     }
 }
 
-fn start(start: Start) -> &'static str {
+fn start(start: InitialCondition) -> &'static str {
     match start {
-        Start::Zero => "from zero",
-        Start::Drop => "from measured",
-        Start::Estimate => "start estimated",
+        InitialCondition::Zero => "from zero",
+        InitialCondition::Drop => "from measured",
+        InitialCondition::Estimate => "start estimated",
     }
 }
 

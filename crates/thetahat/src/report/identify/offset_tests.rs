@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::data::{Channel, Record};
-use crate::estimate::{Criterion, estimate};
+use crate::estimate::{ConvexFit, estimate};
 use crate::model::PolynomialModel;
 use crate::optimize::Search;
 use crate::regression::noise::Noise;
@@ -246,8 +246,8 @@ fn no_constant_is_seen_where_there_is_none() {
 #[test]
 fn other_ways_to_estimate_have_a_constant_too() {
     let (u, y) = step_test(30, 0.2);
-    let bounded = Criterion { bounds: vec!["a1=-0.95..-0.8".parse().unwrap()], ..Criterion::default() };
-    let one = Criterion { norm: crate::estimate::Norm::One, ..Criterion::default() };
+    let bounded = ConvexFit { bounds: vec!["a1=-0.95..-0.8".parse().unwrap()], ..ConvexFit::default() };
+    let one = ConvexFit { norm: crate::estimate::Norm::One, ..ConvexFit::default() };
     let (arx, oe) = (Orders::arx(1, &[1], &[1]).unwrap(), Orders::oe(&[1], &[1], &[1]).unwrap());
     let ways = [
         (arx.clone(), Method::InstrumentalVariables, 0.05),
@@ -265,7 +265,7 @@ fn other_ways_to_estimate_have_a_constant_too() {
         }
     }
     // A bound on the gain names the input as it did.
-    let gain = Criterion { dc_gain: vec!["u=0.4..0.45".parse().unwrap()], ..Criterion::default() };
+    let gain = ConvexFit { dc_gain: vec!["u=0.4..0.45".parse().unwrap()], ..ConvexFit::default() };
     let report = fitted(&u, &y, &Plan { method: Method::Constrained(gain), ..plan(&arx) });
     assert!((report.polynomials().dc_gain[0].unwrap().value - 0.45).abs() < 1e-6);
 }
@@ -286,7 +286,7 @@ fn what_cannot_be_had_is_refused_by_name() {
     assert!(of(&no).starts_with("trend: "), "{}", of(&no));
     let band = Plan { prefilter: Some("0.01..0.2".parse().unwrap()), ..plan(&arx) };
     assert!(of(&band).starts_with("constant: a level is not in a band"), "{}", of(&band));
-    let ridge = Criterion { ridge: 1.0, ..Criterion::default() };
+    let ridge = ConvexFit { ridge: 1.0, ..ConvexFit::default() };
     let ridge = Plan { method: Method::Constrained(ridge), ..plan(&arx) };
     assert!(of(&ridge).contains("ridge"), "{}", of(&ridge));
     let joined = Log::join(vec![log(&u, &y), log(&u, &y)]).unwrap();
@@ -377,7 +377,7 @@ fn forecasts_count_the_level() {
     let model = fitted(&u, &y, &Plan { constant: Constant::No, ..plan(&orders) }).polynomials().clone();
     let given = PolynomialModel { offset_covariance: None, ..model.clone() };
     let last = |model: &PolynomialModel, detrend: Option<Detrend>| {
-        let start = crate::respond::Start::Drop;
+        let start = crate::respond::InitialCondition::Drop;
         let (model, horizon) = (model.clone().into(), Horizon::Steps { steps: 20 });
         let applied = crate::report::apply(&model, &log(&u, &y), &[], detrend, horizon, start);
         applied.unwrap().outputs[0].standard_deviations.as_ref().unwrap()[59]

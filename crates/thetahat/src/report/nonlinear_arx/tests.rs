@@ -4,7 +4,7 @@ use crate::estimate::Constant;
 use crate::model::Orders;
 use crate::regression::noise::Noise;
 use crate::report::{Plan, ValidationPlan, identify, validate};
-use crate::respond::Start;
+use crate::respond::InitialCondition;
 
 /// y(t) = 0.5 y(t-1) + u(t-1) + square u(t-1)^2 + cube u(t-1)^3 + e(t), e about normal with a standard deviation of 0.05.
 fn log(rows: usize, seed: u64, square: f64, cube: f64) -> Log {
@@ -77,10 +77,10 @@ fn a_polynomial_of_degree_one_is_an_arx_model() {
         let offset = report.model.outputs()[0].offset.level;
         let on_log = report.model.on_log(&deviations, &rows, None, &[]).unwrap();
         let said = |horizon| -> Vec<f64> {
-            let response = on_log.respond(horizon, Start::Drop).unwrap().remove(0);
+            let response = on_log.respond(horizon, InitialCondition::Drop).unwrap().remove(0);
             response.values.iter().map(|value| value + offset).collect()
         };
-        let deviations = |steps| on_log.deviations(steps, Start::Drop).unwrap().remove(0);
+        let deviations = |steps| on_log.deviations(steps, InitialCondition::Drop).unwrap().remove(0);
         (said(Horizon::Steps { steps: 4 }), said(Horizon::FreeRun), deviations(1), deviations(4))
     };
     let (one, other) = (signals(&nonlinear), signals(&arx));

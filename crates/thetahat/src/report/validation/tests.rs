@@ -7,7 +7,7 @@ use crate::model::Orders;
 use crate::optimize::Search;
 use crate::regression::noise::Noise;
 use crate::report::{Plan, Requirement, identify};
-use crate::respond::Start;
+use crate::respond::InitialCondition;
 
 /// Rows of u and y around 5 and 20: y(t) = 1.2 y(t-1) - 0.5 y(t-2) + u(t-1) + 0.4 u(t-2) + 0.2 e(t).
 fn signals(rows: usize) -> (Vec<f64>, Vec<f64>) {
@@ -122,7 +122,7 @@ fn figures_are_those_of_their_definitions() {
     assert!(output.predicted[299].is_nan() && run[299].is_nan() && run[300].is_finite());
     let square = (300..600).map(|t| (y[t] - run[t]).powi(2)).sum::<f64>();
     assert!((found.fit[3].rmse.unwrap() - (square / 300.0).sqrt()).abs() < 1e-12);
-    assert_eq!(found.fit[3].initial, Start::Estimate);
+    assert_eq!(found.fit[3].initial, InitialCondition::Estimate);
 
     assert!(
         found.white_expected && found.stable == Some(true) && found.warnings.is_empty(),

@@ -27,11 +27,11 @@ const DAMPING: (f64, f64, f64) = (1e-8, 1e-12, 1e12);
 
 /// How a free run begins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Begin {
+pub(crate) enum InitialState {
     /// As the model says.
-    Model,
+    Given,
     /// With the state that explains the outputs best.
-    Best,
+    Estimated,
 }
 
 /// A response to the inputs.
@@ -50,14 +50,14 @@ pub(crate) fn free_run(
     model: &GreyBox,
     experiment: &Experiment,
     z: &[f64],
-    begin: Begin,
+    begin: InitialState,
 ) -> Option<Vec<FreeRun>> {
     let mut filter = Predictor::new(model);
     filter.restart(model);
     let mut reached = 0;
     let mut runs = Vec::new();
     for rows in experiment.counted() {
-        if begin == Begin::Model {
+        if begin == InitialState::Given {
             let mut simulation = Simulation::new(model, experiment, z, rows.clone(), Vec::new());
             let start = model.start().0.to_vec();
             simulation.run(&start, None)?;

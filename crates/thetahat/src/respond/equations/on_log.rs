@@ -7,7 +7,7 @@ use std::ops::Range;
 use thetahat_core::Dual;
 
 use super::experiment::{Experiment, experiments};
-use super::free_run::{Begin, FreeRun, free_run};
+use super::free_run::{FreeRun, InitialState, free_run};
 use super::predictor::Predictor;
 use super::walk::{Failure, Predicted, ahead, beyond, walk};
 use crate::Error;
@@ -15,7 +15,7 @@ use crate::data::{Log, Record, Rows, measured};
 use crate::distribution::two_sided;
 use crate::model::{EquationsModel, GreyBox, Orders, PolynomialModel, Signal};
 use crate::respond::{
-    Forecast, Horizon, Innovations, Response, Start, check_steps,
+    Forecast, Horizon, InitialCondition, Innovations, Response, check_steps,
     on_log::{OnLog, Tested},
 };
 
@@ -153,9 +153,11 @@ impl<'l> EquationsOnLog<'l> {
         let runs: Vec<Option<Vec<f64>>> = self
             .experiments
             .iter()
-            .flat_map(|experiment| match free_run(&self.model, experiment, &self.z, Begin::Best) {
-                Some(runs) => runs.into_iter().map(|run| Some(run.start)).collect(),
-                None => vec![None; experiment.counted().len()],
+            .flat_map(|experiment| {
+                match free_run(&self.model, experiment, &self.z, InitialState::Estimated) {
+                    Some(runs) => runs.into_iter().map(|run| Some(run.start)).collect(),
+                    None => vec![None; experiment.counted().len()],
+                }
             })
             .collect();
         let of_state =
@@ -164,7 +166,7 @@ impl<'l> EquationsOnLog<'l> {
     }
 
     /// The free runs of all experiments.
-    fn free_runs(&self, begin: Begin) -> Result<Vec<Vec<FreeRun>>, Error> {
+    fn free_runs(&self, begin: InitialState) -> Result<Vec<Vec<FreeRun>>, Error> {
         let each = self.experiments.iter().map(|experiment| {
             free_run(&self.model, experiment, &self.z, begin)
                 .ok_or_else(|| Error::data("the free run grows out of the range of numbers"))
@@ -228,16 +230,16 @@ impl OnLog for EquationsOnLog<'_> {
         !self.stored.inputs.is_empty()
     }
 
-    fn natural_start(&self, _: Horizon) -> Start {
-        Start::Estimate
+    fn natural_start(&self, _: Horizon) -> InitialCondition {
+        InitialCondition::Estimate
     }
 
     fn measured(&self, output: usize) -> &[f64] {
         &self.measured[output]
     }
 
-    fn respond(&self, horizon: Horizon, start: Start) -> Result<Vec<Response>, Error> {
-        if start == Start::Drop {
+    fn respond(&self, horizon: Horizon, start: InitialCondition) -> Result<Vec<Response>, Error> {
+        if start == InitialCondition::Drop {
             return Err(Error::argument(
                 "initial",
                 "models in equations start from what they know of their states, and leave out no rows; take zero, which is what the \
@@ -250,7 +252,11 @@ impl OnLog for EquationsOnLog<'_> {
                 Ok(self.responses(self.spread_out(&said, |one| one.value)))
             }
             Horizon::FreeRun => {
-                let begin = if start == Start::Zero { Begin::Model } else { Begin::Best };
+                let begin = if start == InitialCondition::Zero {
+                    InitialState::Given
+                } else {
+                    InitialState::Estimated
+                };
                 let height = self.stored.outputs.len();
                 let mut signals = vec![vec![f64::NAN; self.rows]; height];
                 for (experiment, runs) in self.experiments.iter().zip(self.free_runs(begin)?) {
@@ -267,7 +273,7 @@ impl OnLog for EquationsOnLog<'_> {
         }
     }
 
-    fn deviations(&self, steps: usize, _: Start) -> Result<Vec<Vec<f64>>, Error> {
+    fn deviations(&self, steps: usize, _: InitialCondition) -> Result<Vec<Vec<f64>>, Error> {
         let each = self.experiments.iter().enumerate().map(|(log, experiment)| {
             self.with_open_parameters(
                 log,
@@ -301,7 +307,7 @@ impl OnLog for EquationsOnLog<'_> {
         log: &Log,
         _: &[Rows],
         steps: usize,
-        _: Start,
+        _: InitialCondition,
     ) -> Result<Option<(usize, Vec<Forecast>)>, Error> {
         let Some(last) = self.experiments.len().checked_sub(1) else { return Ok(None) };
         let experiment = &self.experiments[last];

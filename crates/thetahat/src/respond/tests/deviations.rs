@@ -5,7 +5,9 @@ use super::{signals, views, with_poles};
 use crate::data::Record;
 use crate::model::{OffsetCovariance, Orders, PolynomialModel};
 use crate::regression::noise::Noise;
-use crate::respond::{Draws, Start, draw, forecast, predict, prediction_deviation, prediction_deviations};
+use crate::respond::{
+    Draws, InitialCondition, draw, forecast, predict, prediction_deviation, prediction_deviations,
+};
 
 /// A covariance matrix of full rank, small enough that the first order is exact.
 fn covariance(count: usize, noise: &mut Noise) -> Vec<Vec<f64>> {
@@ -44,11 +46,11 @@ fn spread(
     (0..slopes.first().map_or(0, Vec::len)).map(at).collect()
 }
 
-fn starts(model: &PolynomialModel) -> &'static [Start] {
+fn starts(model: &PolynomialModel) -> &'static [InitialCondition] {
     if model.orders.is_linear() {
-        &[Start::Zero, Start::Drop]
+        &[InitialCondition::Zero, InitialCondition::Drop]
     } else {
-        &[Start::Zero, Start::Drop, Start::Estimate]
+        &[InitialCondition::Zero, InitialCondition::Drop, InitialCondition::Estimate]
     }
 }
 
@@ -80,10 +82,12 @@ fn parameters_add_the_square_of_what_they_do() {
         };
         // An impulse into 1/F that D takes off again is not seen, but beside these parameters it is.
         let cancels = model.f.contains(&model.d) && model.d.len() > 1;
-        for &start in starts(&model).iter().filter(|start| !(cancels && **start == Start::Estimate)) {
+        for &start in
+            starts(&model).iter().filter(|start| !(cancels && **start == InitialCondition::Estimate))
+        {
             // What initial conditions are worth depends on the parameters too, in proportion to the errors: of second order,
             // and not there without errors.
-            let record = if start == Start::Estimate {
+            let record = if start == InitialCondition::Estimate {
                 Record {
                     output: &exact,
                     inputs: views(&u),
@@ -126,17 +130,17 @@ fn errors_before_the_first_count_as_far_as_c_remembers_them() {
     let model = model(&[1.0], &[], &[1.0, c], &[1.0]);
     let y = Noise(22).take(12);
     let record = Record::new(&y, vec![]).unwrap();
-    let found = prediction_deviations(&model, &record, 1, Start::Drop).unwrap();
+    let found = prediction_deviations(&model, &record, 1, InitialCondition::Drop).unwrap();
     for (t, found) in found.iter().enumerate() {
         let expected = 0.5 * (1.0 + c.powi(2 * t as i32 + 2)).sqrt();
         assert!((found - expected).abs() < 1e-14, "{t} {found} {expected}");
     }
-    let ahead = forecast(&model, &record, &[], 2, Start::Drop).unwrap().standard_deviations;
+    let ahead = forecast(&model, &record, &[], 2, InitialCondition::Drop).unwrap().standard_deviations;
     assert!((ahead[0] - 0.5 * (1.0 + c.powi(26)).sqrt()).abs() < 1e-14);
     // Two steps ahead no error of before is left.
     assert!((ahead[1] - 0.5 * (1.0 + c * c).sqrt()).abs() < 1e-14);
     // From rest they are known.
-    let rest = prediction_deviations(&model, &record, 1, Start::Zero).unwrap();
+    let rest = prediction_deviations(&model, &record, 1, InitialCondition::Zero).unwrap();
     assert!(rest.iter().all(|deviation| *deviation == 0.5));
 }
 
@@ -148,7 +152,7 @@ fn an_estimated_start_is_uncertain_in_forecasts() {
     let mut noise = Noise(23);
     let (u, y) = (noise.take(40), noise.take(30));
     let record = Record::new(&y, vec![&u[..30]]).unwrap();
-    let ahead = forecast(&model, &record, &[&u[30..]], 10, Start::Estimate).unwrap();
+    let ahead = forecast(&model, &record, &[&u[30..]], 10, InitialCondition::Estimate).unwrap();
     let sum: f64 = (0..30).map(|t| f.powi(2 * t)).sum();
     for (step, found) in ahead.standard_deviations.iter().enumerate() {
         let expected = 0.5 * (1.0 + f.powi(2 * (30 + step as i32)) / sum).sqrt();
@@ -163,7 +167,7 @@ fn degrees_of_freedom_make_intervals_wider() {
     let record = Record::new(&y, vec![]).unwrap();
     let of = |degrees: Option<usize>| {
         let model = PolynomialModel { degrees_of_freedom: degrees, ..model.clone() };
-        prediction_deviations(&model, &record, 3, Start::Drop).unwrap()[10]
+        prediction_deviations(&model, &record, 3, InitialCondition::Drop).unwrap()[10]
     };
     assert_eq!(of(None), prediction_deviation(&model, 3).unwrap());
     assert!((of(Some(10)) / of(None) - 1.25_f64.sqrt()).abs() < 1e-14);
@@ -192,9 +196,9 @@ fn an_open_offset_adds_what_a_constant_and_a_trend_do() {
     // Without A the constant is the level.
     let mut oe = of(Orders::oe(&[1], &[1], &[1]).unwrap(), &[1.0, -0.5]);
     open(&mut oe, &[0.04], None);
-    let found = prediction_deviations(&oe, &record, 3, Start::Zero).unwrap();
+    let found = prediction_deviations(&oe, &record, 3, InitialCondition::Zero).unwrap();
     assert!(found.iter().all(|found| near(*found, 0.29)), "{found:?}");
-    let ahead = forecast(&oe, &record, &[&[1.0; 4]], 4, Start::Zero).unwrap();
+    let ahead = forecast(&oe, &record, &[&[1.0; 4]], 4, InitialCondition::Zero).unwrap();
     assert!(ahead.standard_deviations.iter().all(|found| near(*found, 0.29)));
     // An error of the equation goes through 1/A for as long as the horizon is.
     let mut arx = of(Orders::arx(1, &[1], &[1]).unwrap(), &[-0.5, 1.0]);
@@ -202,23 +206,23 @@ fn an_open_offset_adds_what_a_constant_and_a_trend_do() {
     let (sums, squares) = ([1.0, 1.5, 1.75], [1.0, 1.25, 1.3125]);
     for steps in 1..=3 {
         let variance = 0.25 * squares[steps - 1] + 0.04 * sums[steps - 1] * sums[steps - 1];
-        let found = prediction_deviations(&arx, &record, steps, Start::Drop).unwrap();
+        let found = prediction_deviations(&arx, &record, steps, InitialCondition::Drop).unwrap();
         assert!(found[steps..].iter().all(|found| near(*found, variance)), "{steps}");
-        let ahead = forecast(&arx, &record, &[&[1.0; 3]], 3, Start::Drop).unwrap();
+        let ahead = forecast(&arx, &record, &[&[1.0; 3]], 3, InitialCondition::Drop).unwrap();
         assert!(near(ahead.standard_deviations[steps - 1], variance), "{steps}");
     }
     // A trend counts from the middle on, in seconds.
     open(&mut oe, &[0.0, 0.01], Some(10.0));
-    let found = prediction_deviations(&oe, &record, 1, Start::Zero).unwrap();
+    let found = prediction_deviations(&oe, &record, 1, InitialCondition::Zero).unwrap();
     let variance = |row: usize| 0.25 + 0.01 * (0.5 * row as f64 - 10.0).powi(2);
     assert!(found.iter().enumerate().all(|(row, found)| near(*found, variance(row))));
-    let ahead = forecast(&oe, &record, &[&[1.0; 4]], 4, Start::Zero).unwrap();
+    let ahead = forecast(&oe, &record, &[&[1.0; 4]], 4, InitialCondition::Zero).unwrap();
     for (step, found) in ahead.standard_deviations.iter().enumerate() {
         assert!(near(*found, variance(60 + step)), "{step}");
     }
     // Draws have it too.
     open(&mut oe, &[0.75], None);
-    let runs = draw(&oe, &record, Start::Zero, &Draws { count: 4000, seed: 1 }).unwrap();
+    let runs = draw(&oe, &record, InitialCondition::Zero, &Draws { count: 4000, seed: 1 }).unwrap();
     let errors = |row: usize| {
         let mean = runs.values.iter().map(|run| run[row]).sum::<f64>() / 4000.0;
         runs.values.iter().map(|run| (run[row] - mean).powi(2)).sum::<f64>() / 3999.0

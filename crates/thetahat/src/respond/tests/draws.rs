@@ -4,7 +4,7 @@ use crate::Error;
 use crate::data::{Channel, Log, Record, Rows};
 use crate::model::{Orders, PolynomialModel};
 use crate::regression::noise::Noise;
-use crate::respond::{Draws, Start, draw, simulate};
+use crate::respond::{Draws, InitialCondition, draw, simulate};
 
 fn diagonal(variances: &[f64]) -> Vec<Vec<f64>> {
     let row = |i: usize| (0..variances.len()).map(|j| if i == j { variances[i] } else { 0.0 }).collect();
@@ -26,7 +26,7 @@ fn noise_goes_through_its_model_and_is_stationary_unless_it_starts_at_rest() {
     let y = vec![0.0; 40];
     let record = Record::new(&y, vec![&u]).unwrap();
     let draws = Draws { count: 4000, seed: 3 };
-    for (start, first) in [(Start::Zero, 0.36), (Start::Drop, 1.0)] {
+    for (start, first) in [(InitialCondition::Zero, 0.36), (InitialCondition::Drop, 1.0)] {
         let drawn = draw(&model, &record, start, &draws).unwrap();
         let run = simulate(&model, &record, start).unwrap();
         assert_eq!((drawn.counted.clone(), drawn.varied, drawn.unstable), (run.counted.clone(), false, 0));
@@ -53,7 +53,7 @@ fn parameters_vary_as_their_covariance_says() {
     // u = 1, 0, 0 gives b0, then b1.
     let u = [1.0, 0.0, 0.0];
     let record = Record::new(&[0.0; 3], vec![&u]).unwrap();
-    let drawn = draw(&model, &record, Start::Zero, &Draws { count: 5000, seed: 0 }).unwrap();
+    let drawn = draw(&model, &record, InitialCondition::Zero, &Draws { count: 5000, seed: 0 }).unwrap();
     assert!(drawn.varied);
     let (mean, variance) = moments(drawn.values.iter().map(|values| values[0]));
     assert!((mean - 1.0).abs() < 0.012 && (variance / 0.04 - 1.0).abs() < 0.08, "{mean} {variance}");
@@ -88,17 +88,17 @@ fn the_same_seed_gives_the_same_bits_on_any_number_of_threads() {
     let draws = Draws { count: 64, seed: 9 };
     let of = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let drawn = pool.install(|| draw(&model, &record, Start::Estimate, &draws).unwrap());
+        let drawn = pool.install(|| draw(&model, &record, InitialCondition::Estimate, &draws).unwrap());
         let bits: Vec<u64> = drawn.values.iter().flatten().map(|value| value.to_bits()).collect();
         (bits, drawn.counted)
     };
     let (bits, counted) = of(1);
     assert_eq!((bits.clone(), counted.clone()), of(3));
     assert_eq!(counted, [0..120, 150..300]);
-    let other = draw(&model, &record, Start::Estimate, &Draws { seed: 10, ..draws }).unwrap();
+    let other = draw(&model, &record, InitialCondition::Estimate, &Draws { seed: 10, ..draws }).unwrap();
     assert!(other.values[0][0] != f64::from_bits(bits[0]));
     // The first draws of more are the same ones.
-    let fewer = draw(&model, &record, Start::Estimate, &Draws { count: 5, seed: 9 }).unwrap();
+    let fewer = draw(&model, &record, InitialCondition::Estimate, &Draws { count: 5, seed: 9 }).unwrap();
     let first: Vec<u64> = fewer.values.iter().flatten().map(|value| value.to_bits()).collect();
     assert_eq!(first, bits[..5 * 300]);
 }
@@ -116,7 +116,12 @@ fn unstable_parameters_are_drawn_again_and_counted() {
         )
         .unwrap();
         let u = [1.0; 200];
-        draw(&model, &Record::new(&u, vec![&u]).unwrap(), Start::Zero, &Draws { count: 500, seed: 1 })
+        draw(
+            &model,
+            &Record::new(&u, vec![&u]).unwrap(),
+            InitialCondition::Zero,
+            &Draws { count: 500, seed: 1 },
+        )
     };
     // P(pole > 1) = 0.159, so that each draw is repeated 0.19 times on average.
     let some = drawn(0.99, 1e-4).unwrap();
@@ -136,7 +141,7 @@ fn what_cannot_be_drawn_is_refused() {
     let u = vec![0.0; 2000];
     let record = Record::new(&u, vec![&u]).unwrap();
     for count in [0, 100_001, 100_000] {
-        let error = draw(&model, &record, Start::Zero, &Draws { count, seed: 0 }).unwrap_err();
+        let error = draw(&model, &record, InitialCondition::Zero, &Draws { count, seed: 0 }).unwrap_err();
         assert!(matches!(&error, Error::Argument { argument, .. } if argument == "draws"), "{error}");
     }
 }
@@ -156,9 +161,9 @@ fn runs_go_on_where_an_output_is_missing() {
         let log = Log::new(vec![channel("u", Noise(4).take(30)), channel("y", y)], 1.0).unwrap();
         let record = log.driven_record(&["u".to_owned()], "y", &[Rows::new(1, 30).unwrap()]).unwrap();
         let draws = Draws { count: 2000, seed: 5 };
-        let drawn = draw(&model, &record, Start::Estimate, &draws).unwrap();
+        let drawn = draw(&model, &record, InitialCondition::Estimate, &draws).unwrap();
         assert_eq!(drawn.counted, [0..10, 14..20, 21..30], "{orders}");
-        let run = simulate(&model, &record, Start::Estimate).unwrap();
+        let run = simulate(&model, &record, InitialCondition::Estimate).unwrap();
         let deviation = |row: usize| moments(drawn.values.iter().map(|values| values[row])).1.sqrt();
         // 1/sqrt(1 - 0.64)
         let stationary = if orders.nd > 0 { 1.0 / 0.6 } else { 1.0 };

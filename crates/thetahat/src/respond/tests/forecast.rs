@@ -5,7 +5,7 @@ use super::{signals, views, with_poles};
 use crate::Error;
 use crate::data::Record;
 use crate::regression::noise::Noise;
-use crate::respond::{Start, forecast, predict, prediction_deviation};
+use crate::respond::{InitialCondition, forecast, predict, prediction_deviation};
 
 #[test]
 fn a_forecast_is_what_the_recursions_give_from_the_end() {
@@ -15,9 +15,9 @@ fn a_forecast_is_what_the_recursions_give_from_the_end() {
         let record =
             Record { output: &y, inputs: views(&u), segments: vec![0..50, 70..150], past: vec![0, 12] };
         let future: Vec<&[f64]> = u.iter().map(|u| &u[150..]).collect();
-        for start in [Start::Zero, Start::Drop] {
-            let presample = if start == Start::Zero { 0 } else { model.orders.conditioned() };
-            let begin = if start == Start::Zero { 70 } else { 58 };
+        for start in [InitialCondition::Zero, InitialCondition::Drop] {
+            let presample = if start == InitialCondition::Zero { 0 } else { model.orders.conditioned() };
+            let begin = if start == InitialCondition::Zero { 70 } else { 58 };
             let mut expected = y.clone();
             Recursion::new(&model, &views(&u), begin, presample).run(&mut expected, 150);
             let found = forecast(&model, &record, &future, 20, start).unwrap();
@@ -42,8 +42,11 @@ fn a_forecast_is_the_prediction_of_samples_that_are_still_to_come() {
             past: vec![30],
         };
         let future: Vec<&[f64]> = u.iter().map(|u| &u[100..]).collect();
-        let starts: &[Start] =
-            if model.orders.is_linear() { &[Start::Drop] } else { &[Start::Drop, Start::Estimate] };
+        let starts: &[InitialCondition] = if model.orders.is_linear() {
+            &[InitialCondition::Drop]
+        } else {
+            &[InitialCondition::Drop, InitialCondition::Estimate]
+        };
         for &start in starts {
             let found = forecast(&model, &part(100), &future, 20, start).unwrap();
             for steps in [1, 2, 20] {
@@ -52,7 +55,7 @@ fn a_forecast_is_the_prediction_of_samples_that_are_still_to_come() {
                     (found.standard_deviations[steps - 1], prediction_deviation(&model, steps).unwrap());
                 assert!(deviation == known || (deviation > known && !model.orders.is_linear()));
                 // From an estimated start the later samples have a say in it.
-                if start == Start::Drop {
+                if start == InitialCondition::Drop {
                     let predicted = predict(&model, &part(120), steps, start).unwrap().values[99 + steps];
                     let error = (found.values[steps - 1] - predicted).abs();
                     assert!(
@@ -76,7 +79,7 @@ fn a_forecast_is_the_mean_of_the_futures() {
         let past: Vec<Vec<f64>> = u.iter().map(|u| u[..50].to_vec()).collect();
         let record = Record::new(&y[..50], views(&past)).unwrap();
         let future: Vec<&[f64]> = u.iter().map(|u| &u[50..]).collect();
-        let found = forecast(&model, &record, &future, 10, Start::Zero).unwrap();
+        let found = forecast(&model, &record, &future, 10, InitialCondition::Zero).unwrap();
         let (mut sums, mut squares) = ([0.0; 10], [0.0; 10]);
         let runs = 1000;
         for _ in 0..runs {
@@ -117,7 +120,7 @@ fn an_estimated_start_forecasts_from_the_segment_alone() {
             past: vec![0],
         };
         let future: Vec<&[f64]> = u.iter().map(|u| &u[380..]).collect();
-        let found = forecast(&model, &record, &future, 20, Start::Estimate).unwrap();
+        let found = forecast(&model, &record, &future, 20, InitialCondition::Estimate).unwrap();
         let largest = y.iter().fold(0.0_f64, |largest, y| largest.max(y.abs()));
         for (found, expected) in found.values.iter().zip(&y[380..]) {
             assert!((found - expected).abs() < 1e-9 * largest, "{:?} {found} {expected}", model.structure);
@@ -131,7 +134,7 @@ fn a_forecast_needs_the_inputs_that_act_and_no_more() {
     let model = model(&with_poles(&[0.5]), &[(3, &[1.0, 2.0], one), (1, &[], one)], &[1.0, 0.5], one);
     let (y, u) = (vec![1.0, -1.0, 2.0, 0.5, 1.5], [1.0, 2.0, 3.0, 4.0, 5.0]);
     let record = Record::new(&y, vec![&u, &u]).unwrap();
-    let ahead = |future: &[&[f64]], steps| forecast(&model, &record, future, steps, Start::Zero);
+    let ahead = |future: &[&[f64]], steps| forecast(&model, &record, future, steps, InitialCondition::Zero);
     let expected = ahead(&[&[6.0, 7.0], &[]], 5).unwrap();
     // What comes too late to act is not read.
     assert_eq!(ahead(&[&[6.0, 7.0, 8.0, 9.0, 9.0, f64::NAN], &[]], 5).unwrap().values, expected.values);
@@ -153,7 +156,7 @@ fn there_is_no_forecast_from_too_few_samples() {
         let end = 10 + model.orders.conditioned();
         for segments in [vec![], std::iter::once(10..end).collect()] {
             let record = Record { output: &y, inputs: views(&u), past: vec![0; segments.len()], segments };
-            let found = forecast(model, &record, &future, 3, Start::Drop);
+            let found = forecast(model, &record, &future, 3, InitialCondition::Drop);
             assert!(matches!(found, Err(Error::Data { .. })), "{:?}", model.structure);
         }
     }

@@ -12,7 +12,7 @@ use crate::model::{
 };
 use crate::regression::noise::Noise;
 use crate::respond::{
-    Start, innovations::innovations, predict, predict::deviations, prediction_deviation, simulate,
+    InitialCondition, innovations::innovations, predict, predict::deviations, prediction_deviation, simulate,
 };
 
 /// One input: nk, B after it, and F.
@@ -133,13 +133,17 @@ fn a_prediction_is_what_the_recursions_give_from_what_is_known() {
         let record = cut(&y, &u);
         let conditioned = model.orders.conditioned();
         for horizon in [1, 2, 5, 40] {
-            for start in [Start::Zero, Start::Drop] {
-                let (presample, skipped) =
-                    if start == Start::Zero { (0, 0) } else { (conditioned, conditioned + horizon - 1) };
+            for start in [InitialCondition::Zero, InitialCondition::Drop] {
+                let (presample, skipped) = if start == InitialCondition::Zero {
+                    (0, 0)
+                } else {
+                    (conditioned, conditioned + horizon - 1)
+                };
                 let mut expected = vec![f64::NAN; 150];
                 let mut counted = Vec::new();
                 for (segment, past) in record.segments.iter().zip(&record.past) {
-                    let begin = if start == Start::Zero { segment.start } else { segment.start - past };
+                    let begin =
+                        if start == InitialCondition::Zero { segment.start } else { segment.start - past };
                     let rows = segment.start.max(begin + skipped)..segment.end;
                     if rows.is_empty() {
                         continue;
@@ -172,12 +176,12 @@ fn a_free_run_goes_on_from_what_is_known() {
         let (u, y) = (signals(model.b.len(), 150, &mut noise), noise.take(150));
         let record = cut(&y, &u);
         let conditioned = model.orders.conditioned();
-        for start in [Start::Zero, Start::Drop] {
+        for start in [InitialCondition::Zero, InitialCondition::Drop] {
             let mut expected = vec![f64::NAN; 150];
             let mut counted = Vec::new();
             for (segment, past) in record.segments.iter().zip(&record.past) {
                 let (begin, presample) = match start {
-                    Start::Zero => (segment.start, 0),
+                    InitialCondition::Zero => (segment.start, 0),
                     _ => (segment.start - past, conditioned),
                 };
                 let rows = segment.start.max(begin + presample)..segment.end;
@@ -192,7 +196,7 @@ fn a_free_run_goes_on_from_what_is_known() {
             let response = simulate(&model, &record, start).unwrap();
             assert_eq!(response.counted, counted);
             // Without inputs a run from zero is zero.
-            let error = if model.b.is_empty() && start == Start::Zero {
+            let error = if model.b.is_empty() && start == InitialCondition::Zero {
                 response.values.iter().filter(|value| value.is_finite()).fold(0.0, |a, b| b.abs().max(a))
             } else {
                 difference(&response, &expected)
@@ -227,7 +231,7 @@ fn the_innovations_of_a_models_own_output_come_back() {
         let (u, e) = (signals(model.b.len(), 400, &mut noise), noise.take(400));
         let y = output(&model, &u, &e);
         let record = Record::new(&y, views(&u)).unwrap();
-        let found = innovations(&model, &record, 1, Start::Zero).unwrap();
+        let found = innovations(&model, &record, 1, InitialCondition::Zero).unwrap();
         assert_eq!(found[0].counted, std::slice::from_ref(&(0..400)));
         let worst = found[0].errors.iter().zip(&e).fold(0.0_f64, |worst, (a, b)| worst.max((a - b).abs()));
         let largest = y.iter().fold(1.0_f64, |largest, y| largest.max(y.abs()));
@@ -252,10 +256,12 @@ fn innovations_are_the_residuals_of_the_estimate() {
         Orders::new(1, &[3], 1, 1, &[1], &[1]),
     ] {
         let orders = orders.unwrap();
-        let dropped = if orders.is_linear() { Start::Drop } else { Start::Estimate };
-        for (initial, start) in
-            [(Initial::Zero, Start::Zero), (Initial::Drop, dropped), (Initial::Estimate, Start::Estimate)]
-        {
+        let dropped = if orders.is_linear() { InitialCondition::Drop } else { InitialCondition::Estimate };
+        for (initial, start) in [
+            (Initial::Zero, InitialCondition::Zero),
+            (Initial::Drop, dropped),
+            (Initial::Estimate, InitialCondition::Estimate),
+        ] {
             let found = estimate(&record, &orders, &Method::default(), initial);
             assert_eq!(
                 found.is_ok(),
@@ -358,7 +364,7 @@ fn an_estimated_start_leaves_the_least_errors_that_any_past_can() {
             past: vec![0; 3],
         };
         let presample = model.orders.conditioned();
-        let found = innovations(&model, &record, 1, Start::Estimate).unwrap();
+        let found = innovations(&model, &record, 1, InitialCondition::Estimate).unwrap();
         assert!(found.len() >= 2, "{:?}", model.structure);
         // With what earlier inputs do where that is worth it, in all segments that are long enough, or none.
         let first = presample - model.orders.nd;
@@ -429,11 +435,11 @@ fn an_estimated_start_makes_up_for_any_past() {
             segments: vec![50..120, 130..160, 200..500],
             past: vec![0; 3],
         };
-        let run = simulate(&model, &record, Start::Estimate).unwrap();
+        let run = simulate(&model, &record, InitialCondition::Estimate).unwrap();
         assert_eq!(run.counted, record.segments);
         assert!(difference(&run, &y) < 1e-10, "{:?} {}", model.structure, difference(&run, &y));
         for horizon in [1, 7] {
-            let response = predict(&model, &record, horizon, Start::Estimate).unwrap();
+            let response = predict(&model, &record, horizon, InitialCondition::Estimate).unwrap();
             let counts = |segment: &Range<usize>| {
                 segment.start + model.orders.conditioned() + horizon - 1..segment.end
             };
@@ -457,9 +463,9 @@ fn an_estimated_start_is_the_best_there_is_for_a_free_run() {
             segments: std::iter::once(segment.clone()).collect(),
             past: vec![0],
         };
-        let values = &simulate(&model, &record, Start::Estimate).unwrap().values[segment.clone()];
+        let values = &simulate(&model, &record, InitialCondition::Estimate).unwrap().values[segment.clone()];
         let errors: Vec<f64> = y[segment.clone()].iter().zip(values).map(|(y, x)| y - x).collect();
-        let from_rest = simulate(&model, &record, Start::Zero).unwrap();
+        let from_rest = simulate(&model, &record, InitialCondition::Zero).unwrap();
         let from_rest: Vec<f64> =
             y[segment.clone()].iter().zip(&from_rest.values[segment]).map(|(y, x)| y - x).collect();
         // What each single earlier value of y, u_j and x_j does.
@@ -508,7 +514,7 @@ fn measured_samples_warm_the_filters_up() {
             segments: std::iter::once(1400..1500).collect(),
             past: vec![1300],
         };
-        let response = predict(model, &record, 1, Start::Drop).unwrap();
+        let response = predict(model, &record, 1, InitialCondition::Drop).unwrap();
         let mut worst = 0.0_f64;
         (1400..1500).for_each(|t| worst = worst.max((y[t] - response.values[t] - e[t]).abs()));
         assert!(worst < 1e-9, "{:?} {worst}", model.structure);
@@ -528,7 +534,7 @@ fn the_deviation_of_predictions_is_that_of_many_runs() {
                 let e: Vec<f64> = noise.take(length).iter().map(|e| e * 0.75_f64.sqrt()).collect();
                 let y = output(&model, &u, &e);
                 let record = Record::new(&y, views(&u)).unwrap();
-                let response = predict(&model, &record, horizon, Start::Zero).unwrap();
+                let response = predict(&model, &record, horizon, InitialCondition::Zero).unwrap();
                 // Ten samples apart they are independent.
                 sum += (14..length).step_by(10).map(|t| (y[t] - response.values[t]).powi(2)).sum::<f64>();
             }
@@ -567,9 +573,9 @@ fn what_does_not_fit_is_refused_or_left_out() {
     let bj = &models[4];
     let (y, u) = (vec![1.0; 20], vec![1.0; 20]);
     let record = Record::new(&y, vec![&u]).unwrap();
-    assert!(matches!(predict(bj, &record, 0, Start::Zero), Err(Error::Argument { .. })));
+    assert!(matches!(predict(bj, &record, 0, InitialCondition::Zero), Err(Error::Argument { .. })));
     let several = Record::new(&y, vec![&u, &u]).unwrap();
-    for start in [Start::Zero, Start::Drop, Start::Estimate] {
+    for start in [InitialCondition::Zero, InitialCondition::Drop, InitialCondition::Estimate] {
         assert!(matches!(predict(bj, &several, 1, start), Err(Error::Argument { .. })));
         assert!(matches!(simulate(bj, &several, start), Err(Error::Argument { .. })));
         // One sample, and none.
@@ -586,7 +592,7 @@ fn what_does_not_fit_is_refused_or_left_out() {
     }
     // An ARX model has no start to estimate for its predictions.
     let arx = super::models().remove(0);
-    assert!(matches!(predict(&arx, &record, 1, Start::Estimate), Err(Error::Argument { .. })));
+    assert!(matches!(predict(&arx, &record, 1, InitialCondition::Estimate), Err(Error::Argument { .. })));
 }
 
 #[test]
@@ -602,14 +608,14 @@ fn what_overflows_is_an_error_or_infinite_and_never_a_panic() {
             model(one, &[(1, &[1.0], &with_poles(&[0.5]))], one, &grown),
         ];
         for (index, model) in models.iter().enumerate() {
-            for start in [Start::Zero, Start::Drop] {
+            for start in [InitialCondition::Zero, InitialCondition::Drop] {
                 assert_eq!(simulate(model, &record, start).unwrap().values.len(), 3000);
                 assert_eq!(predict(model, &record, 2900, start).unwrap().values.len(), 3000);
             }
             // D does no harm by itself, as long as its products stay within range.
-            let estimated = predict(model, &record, 5, Start::Estimate);
+            let estimated = predict(model, &record, 5, InitialCondition::Estimate);
             assert_eq!(estimated.is_err(), index < 2 || root == 1e200, "{root} {index}");
-            assert_eq!(simulate(model, &record, Start::Estimate).is_err(), index < 1);
+            assert_eq!(simulate(model, &record, InitialCondition::Estimate).is_err(), index < 1);
         }
     }
 }

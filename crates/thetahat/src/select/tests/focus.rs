@@ -3,7 +3,7 @@ use super::super::winners::winners;
 use super::*;
 use crate::estimate::{Method, estimate};
 use crate::model::PolynomialModel;
-use crate::respond::{Horizon, Start, simulate};
+use crate::respond::{Horizon, InitialCondition, simulate};
 
 const F: [f64; 3] = [1.0, -1.5, 0.7];
 
@@ -96,7 +96,7 @@ fn figures_of_blocks_are_those_of_single_fits() {
         PolynomialModel::from_parameters(&orders, estimate.parameters(), None, 1.0, 1.0).unwrap()
     };
     let error = |model: &PolynomialModel, record: &Record<'_>, rows: Range<usize>| {
-        let run = simulate(model, record, Start::Estimate).unwrap();
+        let run = simulate(model, record, InitialCondition::Estimate).unwrap();
         rows.map(|t| (y[t] - run.values[t]).powi(2)).sum::<f64>()
     };
     let blocks = [0..110, 110..220, 220..330];
@@ -199,7 +199,7 @@ fn selection_on_unseen_rows_looks_at_the_horizon() {
         if select == Select::Validation {
             let model =
                 PolynomialModel::from_parameters(&orders, &found.guess.unwrap(), None, 1.0, 1.0).unwrap();
-            let run = simulate(&model, &second, Start::Estimate).unwrap();
+            let run = simulate(&model, &second, InitialCondition::Estimate).unwrap();
             let own = (350..500).map(|t| (y[t] - run.values[t]).powi(2)).sum::<f64>() / 150.0;
             assert!(close(held_out_mse, own, 1e-9), "{held_out_mse} {own}");
         }

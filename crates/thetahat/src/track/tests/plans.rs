@@ -1,4 +1,4 @@
-use thetahat_core::Start;
+use thetahat_core::RlsStart;
 
 use super::*;
 
@@ -16,8 +16,10 @@ fn what_is_written_is_read_back() {
     for policy in policies.map(Policy) {
         assert_eq!(policy.to_string().parse::<Policy>(), Ok(policy));
     }
-    for start in [Start::Standard, Start::Exact, Start::Mixed { blend: 0 }, Start::Mixed { blend: 65535 }] {
-        assert_eq!(Beginning(start).to_string().parse::<Beginning>(), Ok(Beginning(start)));
+    for start in
+        [RlsStart::Standard, RlsStart::Exact, RlsStart::Mixed { blend: 0 }, RlsStart::Mixed { blend: 65535 }]
+    {
+        assert_eq!(TrackStart(start).to_string().parse::<TrackStart>(), Ok(TrackStart(start)));
     }
     for method in [TrackMethod::Rls, TrackMethod::Els, TrackMethod::Rpem] {
         assert_eq!(method.to_string().parse::<TrackMethod>(), Ok(method));
@@ -51,7 +53,7 @@ fn words_that_mean_nothing_are_refused() {
         assert!(text.parse::<Policy>().is_err(), "{text}");
     }
     for text in ["", "exact:1", "mixed:", "mixed:-1", "mixed:65536", "Standard"] {
-        assert!(text.parse::<Beginning>().is_err(), "{text}");
+        assert!(text.parse::<TrackStart>().is_err(), "{text}");
     }
     assert!("arx".parse::<TrackMethod>().is_err());
 }
@@ -77,7 +79,7 @@ fn plans_that_make_no_tracker_are_refused() {
     assert_eq!(argument(&Orders::oe(&[1], &[1], &[1]).unwrap(), plain.clone()), "orders");
     assert_eq!(argument(&armax, plain.clone()), "method");
     assert_eq!(argument(&orders(), els.clone()), "method");
-    assert_eq!(argument(&armax, TrackPlan { start: Beginning(Start::Exact), ..els.clone() }), "start");
+    assert_eq!(argument(&armax, TrackPlan { start: TrackStart(RlsStart::Exact), ..els.clone() }), "start");
     assert_eq!(argument(&orders(), with(|plan| plan.forgetting = "0.8".parse().unwrap())), "forgetting");
     assert_eq!(argument(&orders(), with(|plan| plan.dead_zone = f64::NAN)), "dead-zone");
     assert_eq!(argument(&orders(), with(|plan| plan.alarm_interval = Some(1.0))), "alarm");

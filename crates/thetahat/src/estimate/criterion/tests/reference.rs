@@ -2,7 +2,7 @@
 
 use microlp::{ComparisonOp, LinearExpr, OptimizationDirection, Problem, Variable};
 
-use super::{Criterion, Norm, Orders, Presample, Record};
+use super::{ConvexFit, Norm, Orders, Presample, Record};
 
 /// phi(t) and y(t) of each sample that counts.
 pub(super) fn table(record: &Record<'_>, orders: &Orders, presample: Presample) -> Vec<(Vec<f64>, f64)> {
@@ -70,7 +70,7 @@ pub(super) struct Reference {
 
 impl Reference {
     /// Parameters with their costs, within the bounds and the gains of the first input.
-    pub(super) fn new(costs: &[f64], criterion: &Criterion, orders: &Orders) -> Self {
+    pub(super) fn new(costs: &[f64], criterion: &ConvexFit, orders: &Orders) -> Self {
         let mut problem = Problem::new(OptimizationDirection::Minimize);
         let mut ends = vec![(f64::NEG_INFINITY, f64::INFINITY); costs.len()];
         for bound in &criterion.bounds {

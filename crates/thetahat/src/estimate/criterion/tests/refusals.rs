@@ -11,13 +11,13 @@ fn options_that_make_no_sense_are_refused() {
     let mut noise = Noise(1);
     let (y, u) = data(50, &mut noise, 0.1, even);
     let orders = orders(1, 1);
-    let bound = |parameter: &str, low, high| Criterion {
+    let bound = |parameter: &str, low, high| ConvexFit {
         bounds: vec![Bound { parameter: parameter.into(), low, high }],
-        ..Criterion::default()
+        ..ConvexFit::default()
     };
-    let gain = |input: Option<&str>, low, high| Criterion {
+    let gain = |input: Option<&str>, low, high| ConvexFit {
         dc_gain: vec![GainBound { input: input.map(str::to_owned), low, high }],
-        ..Criterion::default()
+        ..ConvexFit::default()
     };
     let (nan, infinity) = (f64::NAN, f64::INFINITY);
     let cases = [
@@ -33,19 +33,19 @@ fn options_that_make_no_sense_are_refused() {
         (gain(Some("v"), 0.0, 1.0), "dc-gain: dc-gain v=0..1: there is no input 'v'; there are: u"),
         (gain(None, 2.0, 1.0), "dc-gain: dc-gain 2..1: the low end is above the high one; swap them"),
         (
-            Criterion { ridge: -1.0, ..Criterion::default() },
+            ConvexFit { ridge: -1.0, ..ConvexFit::default() },
             "ridge: -1 is not a weight; give 0 or a positive number",
         ),
         (
-            Criterion { ridge: nan, ..Criterion::default() },
+            ConvexFit { ridge: nan, ..ConvexFit::default() },
             "ridge: NaN is not a weight; give 0 or a positive number",
         ),
         (
-            Criterion { noise_bound: Some(-0.1), ..Criterion::default() },
+            ConvexFit { noise_bound: Some(-0.1), ..ConvexFit::default() },
             "noise-bound: -0.1 is not a size of e; give a positive number in units of the output",
         ),
         (
-            Criterion { noise_bound: Some(infinity), ..Criterion::default() },
+            ConvexFit { noise_bound: Some(infinity), ..ConvexFit::default() },
             "noise-bound: inf is not a size of e; give a positive number in units of the output",
         ),
     ];
@@ -63,19 +63,19 @@ fn options_that_make_no_sense_are_refused() {
     assert_eq!(of(gain(None, 1.0, 1.0)), expected);
     assert!(of(gain(Some("v"), 1.0, 1.0)).ends_with("input 'v' has no B (nb = 0), so that its gain is 0"));
     let three = [&names[..], &["w".to_owned()]].concat();
-    let result = constrained(&record, &three, &two, Presample::Drop, &Criterion::default());
+    let result = constrained(&record, &three, &two, Presample::Drop, &ConvexFit::default());
     assert_eq!(message(result), "inputs: there are 3 names for 2 inputs; give one for each");
     // Nothing is asked of an input without a name, whose coefficient comes last.
     let constant = Orders::arx(1, &[1, 1], &[1, 0]).unwrap();
     let of = |criterion| message(constrained(&record, &names[..1], &constant, Presample::Drop, &criterion));
-    let bound = Criterion { bounds: vec!["b2_0=0..1".parse().unwrap()], ..Criterion::default() };
+    let bound = ConvexFit { bounds: vec!["b2_0=0..1".parse().unwrap()], ..ConvexFit::default() };
     assert!(of(bound).ends_with("there is no parameter 'b2_0'; there are: a1, b1"));
     // Models without an input, and those that are not linear in their parameters.
     let alone = super::record(&y, &[], &whole(50));
     let autoregression = Orders::arx(2, &[], &[]).unwrap();
     let result = constrained(&alone, &[], &autoregression, Presample::Drop, &gain(None, 1.0, 1.0));
     assert!(message(result).ends_with("the model has no input"));
-    let result = fit(&y, &u, &Orders::oe(&[1], &[1], &[1]).unwrap(), &Criterion::default());
+    let result = fit(&y, &u, &Orders::oe(&[1], &[1], &[1]).unwrap(), &ConvexFit::default());
     assert!(matches!(result, Err(Error::Argument { .. })));
 }
 
@@ -134,7 +134,7 @@ fn demands_that_clash_are_named() {
     for norm in ALL {
         for (order, bounds, gains, expected) in cases {
             let demands = criterion(norm, bounds, gains);
-            for criterion in [Criterion { noise_bound: Some(1e9), ..demands.clone() }, demands] {
+            for criterion in [ConvexFit { noise_bound: Some(1e9), ..demands.clone() }, demands] {
                 let result = fit(&y, &u, &orders(order, order), &criterion);
                 assert!(matches!(result, Err(Error::Data { .. })));
                 let expected = format!("infeasible: {expected}; widen or leave out one of them");
@@ -163,7 +163,7 @@ fn a_noise_bound_that_is_too_small_comes_with_one_that_is_not() {
         (&["b2=-1..0.5"], &["u=1..2"], " with dc-gain u=1..2"),
     ] {
         for norm in ALL {
-            let mut criterion = Criterion { noise_bound: Some(0.05), ..criterion(norm, bounds, gains) };
+            let mut criterion = ConvexFit { noise_bound: Some(0.05), ..criterion(norm, bounds, gains) };
             if !with.is_empty() {
                 criterion.noise_bound = Some(0.11);
             }
@@ -187,11 +187,11 @@ fn what_the_data_cannot_determine_is_named() {
     let (y, u) = data(100, &mut noise, 0.1, even);
     let (zero, one) = (vec![0.0; 100], vec![1.0; 100]);
     let undetermined =
-        |u: &[f64], criterion: &Criterion| match fit(&y, u, &orders(2, 2), criterion).unwrap_err() {
+        |u: &[f64], criterion: &ConvexFit| match fit(&y, u, &orders(2, 2), criterion).unwrap_err() {
             Error::Undetermined { parameters, message } => (parameters.join(" "), message),
             other => panic!("{other}"),
         };
-    let ridge = |norm, ridge| Criterion { norm, ridge, ..Criterion::default() };
+    let ridge = |norm, ridge| ConvexFit { norm, ridge, ..ConvexFit::default() };
     for norm in ALL {
         for criterion in [criterion(norm, &[], &[]), criterion(norm, &["a1=-1..0"], &["0..9"])] {
             assert_eq!(undetermined(&zero, &criterion).0, "b1 b2");
@@ -205,7 +205,7 @@ fn what_the_data_cannot_determine_is_named() {
         let found = fit(&y, &one, &orders(2, 2), &ridge(norm, 1.0)).unwrap();
         assert!((found.parameters[2] - found.parameters[3]).abs() < 1e-9);
         // The box has no end where only a ridge decides.
-        let bounded = Criterion { noise_bound: Some(5.0), ..ridge(norm, 1.0) };
+        let bounded = ConvexFit { noise_bound: Some(5.0), ..ridge(norm, 1.0) };
         assert_eq!(undetermined(&one, &bounded).0, "b2");
         // So does a value.
         let fixed = criterion(norm, &["b1=1", "b2=2"], &[]);

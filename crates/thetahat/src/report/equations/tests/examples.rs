@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::models::{Found, experiment, joined};
 use crate::data::{Channel, Recording, Source, Times};
-use crate::estimate::equations::Criterion;
+use crate::estimate::equations::LikelihoodObjective;
 use crate::filter::{Estimator, StateFilter, StateModel};
 use crate::model::{GreyBox, Model};
 use crate::optimize::Stopped;
@@ -88,7 +88,7 @@ fn gradient_of_models_in_equations_is_exact() {
     for name in ["mass_spring_damper", "battery", "dc_motor"] {
         let (model, log) = (model(name), log(&data(name).with_extension("csv")));
         let experiments = [experiment(&model, &log.part("1..200".parse().unwrap()).unwrap())];
-        let mut criterion = Criterion::new(&model, &experiments);
+        let mut criterion = LikelihoodObjective::new(&model, &experiments);
         let z: Vec<f64> = model.parameters().iter().map(|unknown| unknown.start_variable().0 - 0.2).collect();
         criterion.linearize(&z).unwrap();
         let (gradient, value) = (criterion.gradient.clone(), criterion.evaluate(&z).unwrap());
@@ -134,7 +134,7 @@ fn a_missing_row_is_a_longer_step() {
     };
     let z: Vec<f64> = model.parameters().iter().map(|unknown| unknown.start_variable().0).collect();
     let likelihood =
-        |recording| Criterion::new(&model, &[experiment(&model, recording)]).evaluate(&z).unwrap();
+        |recording| LikelihoodObjective::new(&model, &[experiment(&model, recording)]).evaluate(&z).unwrap();
     let (whole, short) = (likelihood(&missing), likelihood(&shorter));
     // The same operations.
     assert!((whole - short).abs() < 1e-12 * whole.abs(), "{whole} {short}");
@@ -192,7 +192,7 @@ fn reports_go_there_and_back() {
     // The fitted model has nothing unknown, and the likelihood of the fit.
     let fitted = stored.with_values().unwrap();
     assert_eq!(fitted.unknown().count(), 0);
-    let value = Criterion::new(&fitted, &[experiment(&fitted, &recording)]).evaluate(&[]).unwrap();
+    let value = LikelihoodObjective::new(&fitted, &[experiment(&fitted, &recording)]).evaluate(&[]).unwrap();
     assert!(text.contains(&format!("\"samples\": {}", report.estimation.samples)));
     let crate::estimate::Procedure::InnovationsLikelihood(outcome) = &report.estimation.procedure else {
         panic!()

@@ -1,7 +1,7 @@
 use thetahat_core::nalgebra::DMatrix;
 
 use super::models::{TRUTH, experiment, holed, log, pendulum, pendulum_text};
-use crate::estimate::equations::Criterion;
+use crate::estimate::equations::LikelihoodObjective;
 use crate::filter::{Estimator, StateFilter, StateModel};
 use crate::model::GreyBox;
 
@@ -11,7 +11,7 @@ fn gradient_and_value_agree() {
         let model = pendulum(outputs, parameters);
         let truth = &TRUTH[..parameters];
         let experiments = [1, 2].map(|seed| experiment(&model, &holed(log(&model, truth, 150, seed, 1.0))));
-        let mut criterion = Criterion::new(&model, &experiments);
+        let mut criterion = LikelihoodObjective::new(&model, &experiments);
         let z: Vec<f64> = truth.iter().map(|truth| 1.1 * truth + 0.05).collect();
         criterion.linearize(&z).unwrap();
         let (gradient, information) = (criterion.gradient.clone(), criterion.information.clone());
@@ -43,7 +43,7 @@ fn value_is_the_likelihood_of_the_filter() {
         let recording = holed(log(&model, &TRUTH, 400, 3, 1.0));
         let experiment = experiment(&model, &recording);
         let z = [-0.4, 1.8, 1.4, 0.12, 0.25];
-        let value = Criterion::new(&model, std::slice::from_ref(&experiment)).evaluate(&z).unwrap();
+        let value = LikelihoodObjective::new(&model, std::slice::from_ref(&experiment)).evaluate(&z).unwrap();
 
         let named: Vec<(&str, f64)> = model.unknown().zip(z).collect();
         let known = StateModel::from(model.with_parameters(&named).unwrap());
@@ -78,7 +78,7 @@ fn a_known_start_and_no_noise_inside_are_output_error() {
             sum += (measured - outputs[index]).powi(2) / variance + (std::f64::consts::TAU * variance).ln();
         }
     }
-    let mut criterion = Criterion::new(&model, &experiments);
+    let mut criterion = LikelihoodObjective::new(&model, &experiments);
     let value = criterion.evaluate(&z).unwrap();
     assert!((value - sum / 2.0).abs() < 1e-12 * value.abs(), "{value} {}", sum / 2.0);
     // And it has a gradient.

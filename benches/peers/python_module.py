@@ -18,8 +18,11 @@ from compare import check, print_table, processor, verdict
 from filterpy.kalman import KalmanFilter
 from scipy.signal import lfilter
 from sippy_unipi import system_identification
+from sysidentpy.basis_function import Polynomial
+from sysidentpy.model_structure_selection import FROLS
+from sysidentpy.parameter_estimation import LeastSquares
 
-PACKAGES = ["thetahat", "NumPy", "padasip", "filterpy", "sippy-unipi"]
+PACKAGES = ["thetahat", "NumPy", "padasip", "filterpy", "sippy-unipi", "sysidentpy"]
 
 
 def main():
@@ -29,7 +32,7 @@ def main():
     print(*(f"{name} {version(name)}" for name in PACKAGES), f"Python {platform.python_version()}", sep=", ")
     print(f"{processor()}, {os.cpu_count()} processors", end="\n\n", flush=True)
     rows = [["work", "peer", "thetahat", "peer's", "ratio", "required", "verdict"]]
-    rows += [recursive(), kalman(), *fits(), *calls()]
+    rows += [recursive(), kalman(), *fits(), *nonlinear(), *calls()]
     print_table(rows)
 
 
@@ -158,6 +161,51 @@ def fits():
 
     mine, yours, *_ = by_turns(lambda: thetahat.armax(small, 2, 2, 2).parameters, iterative, 12, 6)
     yield row("ARMAX(2, 2, 2, 1), N = 10,000", "sippy-unipi, iterative least squares", mine, yours, 50)
+
+
+def nonlinear():
+    """Forward regression of nonlinear ARX models, the whole call: the same terms, and their coefficients."""
+    for samples, lags, degree, candidates, required in [
+        (10_000, 10, 2, 231, 40),
+        (10_000, 10, 3, 1771, 20),
+        (100_000, 6, 3, 455, 100),
+    ]:
+        random = numpy.random.default_rng(1)
+        u, e = random.uniform(-1, 1, samples), 0.1 * random.standard_normal(samples)
+        y = numpy.zeros(samples)
+        for k in range(2, samples):
+            products = 0.3 * u[k - 1] * y[k - 1] + 0.2 * u[k - 2] ** 2 - 0.1 * y[k - 1] ** 2 * u[k - 2]
+            y[k] = 0.6 * y[k - 1] - 0.2 * y[k - 2] + u[k - 1] + products + e[k]
+        log = thetahat.Log(y, u)
+
+        def ours(log=log, lags=lags, degree=degree):
+            return thetahat.narx(log, ny=lags, nu=lags, degree=degree, terms=7, detrend="none", raw_terms=True)
+
+        def theirs(u=u, y=y, lags=lags, degree=degree):
+            model = FROLS(
+                order_selection=False,
+                n_terms=7,
+                ylag=lags,
+                xlag=lags,
+                estimator=LeastSquares(),
+                basis_function=Polynomial(degree=degree),
+            )
+            return model.fit(X=u.reshape(-1, 1), y=y.reshape(-1, 1))
+
+        mine, yours, found, expected = by_turns(ours, theirs, 9, 4)
+        names = [product(term) for term in expected.final_model]
+        coefficients = dict(zip(names, expected.theta.ravel(), strict=True))
+        check("SysIdentPy", [coefficients.get(name, 0.0) for name in found.parameter_names], found.parameters)
+        work = f"{candidates} products, N = {samples:,}"
+        yield row(f"NARX, 7 of {work}", "SysIdentPy, FROLS", mine, yours, required)
+
+
+def product(term):
+    """A term of SysIdentPy by its name here: 1002 is y(k-2), 2001 is u(k-1), 0 no factor."""
+    codes = sorted(int(code) for code in term if code)
+    factors = [f"{'y' if code < 2000 else 'u'}(k-{code % 1000})" for code in codes]
+    powers = {factor: factors.count(factor) for factor in factors}
+    return "*".join(factor if power == 1 else f"{factor}^{power}" for factor, power in powers.items()) or "1"
 
 
 def calls():

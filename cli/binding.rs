@@ -9,7 +9,7 @@ use thetahat::data::{Log, Source};
 use thetahat::inspect::Inspection;
 use thetahat::report::{EquationsPlan, NonlinearArxPlan, Plan, Report, Requirement, ValidationPlan};
 
-use crate::args::{FitArguments, InspectArguments, ValidateArguments};
+use crate::args::{FitArguments, InspectArguments, MapArgument, ValidateArguments};
 use crate::commands::{Experiments, Tracking, experiments, inspected};
 use crate::failure::Failure;
 use crate::job::{EvaluationJob, FitJob, GreyBoxJob, InspectJob, NarxJob};
@@ -79,7 +79,9 @@ pub fn narx_plan(
     let log = OsString::from("log");
     let words: Vec<OsString> = options.iter().cloned().chain([log]).collect();
     let arguments: FitArguments = arguments("fit", &words)?;
-    let map = arguments.narx.narx.ok_or_else(|| Failure::usage("--narx: name the functions, poly or rbf"))?;
+    let map = arguments.narx.narx.ok_or_else(|| {
+        Failure::usage(format!("--narx: name the functions, one of {}", MapArgument::words()))
+    })?;
     let job = NarxJob::resolve(&arguments, map)?;
     job.plan(if job.driven { inputs } else { Vec::new() }, output)
 }

@@ -3,7 +3,7 @@
 //! The library names them between backticks, as `detrend`, wherever one is advised; here they are options.
 
 /// The arguments of the library that are options, by the name that both have.
-pub(crate) const OPTIONS: [&str; 49] = [
+pub(crate) const OPTIONS: [&str; 50] = [
     "alarm",
     "alpha",
     "alphas",
@@ -51,6 +51,7 @@ pub(crate) const OPTIONS: [&str; 49] = [
     "time-limit",
     "tolerance",
     "trend",
+    "units",
     "validate",
     "width",
 ];

@@ -353,7 +353,12 @@ fn forecasts_go_on_with_known_inputs() {
 fn bad_options_and_logs_are_told() {
     let folder = Folder::with_log(plant(60));
     for (options, words) in [
-        ("--narx spline", "spline"),
+        ("--narx cubic", "cubic"),
+        ("--narx spline --units 0", "--units"),
+        ("--narx spline --units 100000", "--units"),
+        ("--narx spline --degree 2", "--degree"),
+        ("--narx poly --units 3", "--units"),
+        ("--na 1 --nb 1 --units 3", "--narx"),
         ("--narx poly --na 2", "cannot be used with"),
         ("--narx poly --degree 0", "degree"),
         ("--narx poly --degree 99", "highest degree"),
@@ -473,5 +478,51 @@ fn trackers_take_functions() {
         assert!([2, 3].contains(&run.code), "{options}: {}", run.code);
         assert!(run.stderr.contains(words), "{options}: {}", run.stderr);
         assert!(!folder.path("bad.jsonl").exists(), "{options}");
+    }
+}
+
+/// An additive function of two regressors, with a bend that products of degree two do not have: splines find it, and every verb takes
+/// them.
+#[test]
+fn splines_find_what_bends() {
+    let mut state = 7_u32;
+    let mut random = || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        f64::from(state >> 8) / f64::from(1 << 23) - 1.0
+    };
+    let u: Vec<f64> = (0..1500).map(|_| random()).collect();
+    let mut y = vec![0.0];
+    for k in 1..1500 {
+        y.push(0.4 * y[k - 1] + (3.0 * u[k - 1]).tanh() + 0.02 * random());
+    }
+    let folder = Folder::with_log(csv(&[("u", &u), ("y", &y)]));
+    let common = "--ny 1 --nu 1 --sample-time 1 --estimate 1..1000 --validate 1001..1500";
+    let fits = |options: &str| {
+        let report = folder.fit(&format!("log.csv {options} {common} --report model.json --html page.html"));
+        number(&report, "/fit/3/percent")
+    };
+    let products = fits("--narx poly --degree 2");
+    let splines = fits("--narx spline --units 7");
+    assert!(splines > 97.0 && splines > products + 5.0, "{splines} {products}");
+    assert!(folder.read("page.html").contains("bend(u(k-1)"));
+    let table = folder.done("validate model.json log.csv --sample-time 1 --rows 1001..1500").stdout;
+    assert!(table.contains("NARX splines"), "{table}");
+    folder.done("simulate model.json log.csv --sample-time 1 -o run.csv");
+    folder.done("predict model.json log.csv --sample-time 1 --horizon 3 -o predicted.csv");
+    folder.done("compare model.json log.csv --sample-time 1");
+    let run = folder.done("track log.csv --warm model.json --forgetting 1 -o tracked.jsonl");
+    assert!(run.stderr.contains("NARX splines"), "{}", run.stderr);
+
+    let good: Value = serde_json::from_str(&folder.read("model.json")).unwrap();
+    for (place, value) in [
+        ("/model/map/knots/0", serde_json::json!([1.0, 0.0, 2.0])),
+        ("/model/map/regressors/0", 9.into()),
+        ("/model/map/regressors", serde_json::json!([])),
+    ] {
+        let mut bad = good.clone();
+        *bad.pointer_mut(place).expect(place) = value;
+        folder.write("bad.json", bad.to_string());
+        let run = folder.run("simulate bad.json log.csv --sample-time 1");
+        assert_eq!(run.code, 3, "{place}: {}", run.stderr);
     }
 }

@@ -179,12 +179,12 @@ def nonlinear():
         log = thetahat.Log(y, u)
 
         def ours(log=log, lags=lags, degree=degree):
-            return thetahat.narx(log, ny=lags, nu=lags, degree=degree, terms=7, detrend="none", raw_terms=True)
+            return thetahat.narx(log, ny=lags, nu=lags, degree=degree, terms=20, detrend="none", raw_terms=True)
 
         def theirs(u=u, y=y, lags=lags, degree=degree):
             model = FROLS(
                 order_selection=False,
-                n_terms=7,
+                n_terms=20,
                 ylag=lags,
                 xlag=lags,
                 estimator=LeastSquares(),
@@ -197,7 +197,7 @@ def nonlinear():
         coefficients = dict(zip(names, expected.theta.ravel(), strict=True))
         check("SysIdentPy", [coefficients.get(name, 0.0) for name in found.parameter_names], found.parameters)
         work = f"{candidates} products, N = {samples:,}"
-        yield row(f"NARX, 7 of {work}", "SysIdentPy, FROLS", mine, yours, required)
+        yield row(f"NARX, 20 of {work}", "SysIdentPy, FROLS", mine, yours, required)
 
 
 def product(term):

@@ -166,6 +166,9 @@ pub(crate) struct NarxArguments {
     /// Leave out the constant and the regressors themselves beside radial basis functions
     #[arg(long, requires = "narx")]
     pub(crate) no_linear: bool,
+    /// Bends of each regressor (spline) [default: 5]
+    #[arg(long, value_name = "N", requires = "narx")]
+    pub(crate) units: Option<usize>,
     /// Leave signals in their own units: else each is divided by its standard deviation
     #[arg(long, requires = "narx")]
     pub(crate) raw_terms: bool,
@@ -177,6 +180,20 @@ pub(crate) enum MapArgument {
     Poly,
     /// Radial basis functions
     Rbf,
+    /// A natural cubic spline of each regressor
+    Spline,
+}
+
+impl MapArgument {
+    /// As it is written on the command line.
+    pub(crate) fn word(self) -> String {
+        self.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
+    }
+
+    /// All of them, as they are written.
+    pub(crate) fn words() -> String {
+        Self::value_variants().iter().map(|map| map.word()).collect::<Vec<_>>().join(", ")
+    }
 }
 
 /// How to choose, where orders are ranges or are not given.

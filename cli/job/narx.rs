@@ -8,6 +8,10 @@ use crate::args::{FitArguments, MapArgument, Names, NarxArguments};
 use crate::failure::Failure;
 use crate::memory::PerValue;
 
+/// Bends of each regressor. Natural splines seldom need more than five knots (Stone, Statistical Science 1, 1986); these have seven, of
+/// which a choice leaves out what is not needed.
+const BENDS: usize = 5;
+
 /// A nonlinear ARX model to fit.
 #[derive(Debug)]
 pub(crate) struct NarxJob {
@@ -107,6 +111,7 @@ pub(crate) fn check_linear(arguments: &NarxArguments) -> Result<(), Failure> {
         ("--centres", arguments.centres.is_some()),
         ("--width", arguments.width.is_some()),
         ("--no-linear", arguments.no_linear),
+        ("--units", arguments.units.is_some()),
         ("--raw-terms", arguments.raw_terms),
     ];
     match given.iter().find(|(_, given)| *given) {
@@ -118,22 +123,22 @@ pub(crate) fn check_linear(arguments: &NarxArguments) -> Result<(), Failure> {
 }
 
 fn map_plan(arguments: &NarxArguments, map: MapArgument, seed: Option<u64>) -> Result<MapPlan, Failure> {
-    let not_for = |option: &str, other: &str| Err(Failure::usage(format!("{option} is for --narx {other}")));
+    use MapArgument::{Poly, Rbf, Spline};
+    let own: [(&str, bool, &[MapArgument]); 6] = [
+        ("--degree", arguments.degree.is_some(), &[Poly]),
+        ("--centres", arguments.centres.is_some(), &[Rbf]),
+        ("--width", arguments.width.is_some(), &[Rbf]),
+        ("--no-linear", arguments.no_linear, &[Rbf]),
+        ("--seed", seed.is_some(), &[Rbf]),
+        ("--units", arguments.units.is_some(), &[Spline]),
+    ];
+    if let Some((option, _, maps)) = own.iter().find(|(_, given, maps)| *given && !maps.contains(&map)) {
+        let names: Vec<String> = maps.iter().map(|map| format!("--narx {}", map.word())).collect();
+        return Err(Failure::usage(format!("{option} is for {}", names.join(" and "))));
+    }
     match map {
-        MapArgument::Poly => {
-            if arguments.centres.is_some()
-                || arguments.width.is_some()
-                || arguments.no_linear
-                || seed.is_some()
-            {
-                return not_for("--centres, --width, --no-linear and --seed", "rbf");
-            }
-            Ok(MapPlan::Polynomial { degree: arguments.degree.unwrap_or(2) })
-        }
-        MapArgument::Rbf => {
-            if arguments.degree.is_some() {
-                return not_for("--degree", "poly");
-            }
+        Poly => Ok(MapPlan::Polynomial { degree: arguments.degree.unwrap_or(2) }),
+        Rbf => {
             let text = arguments.centres.as_deref().unwrap_or("chosen");
             if seed.is_some() && !text.starts_with("kmeans") && !text.starts_with("random") {
                 return Err(Failure::usage("--seed is for --centres kmeans:N and random:N"));
@@ -144,6 +149,7 @@ fn map_plan(arguments: &NarxArguments, map: MapArgument, seed: Option<u64>) -> R
                 linear: !arguments.no_linear,
             })
         }
+        Spline => Ok(MapPlan::Spline { units: arguments.units.unwrap_or(BENDS) }),
     }
 }
 

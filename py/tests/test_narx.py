@@ -90,7 +90,7 @@ def test_radial_functions() -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"map": "spline"}, "map|narx"),
+        ({"map": "cubic"}, "map|narx"),
         ({"degree": 0}, "degree"),
         ({"terms": 0}, "terms"),
         ({"centres": "kmeans:3"}, "centres"),
@@ -103,3 +103,20 @@ def test_radial_functions() -> None:
 def test_bad_arguments_are_told(options: dict[str, object], message: str) -> None:
     with pytest.raises((ValueError, TypeError), match=message):
         th.narx(log(50), **options)  # type: ignore[arg-type]
+
+
+def test_splines_are_a_map_too() -> None:
+    rng = np.random.default_rng(4)
+    u, y = rng.uniform(-1, 1, 800), np.zeros(800)
+    for k in range(1, 800):
+        y[k] = 0.4 * y[k - 1] + np.tanh(3 * u[k - 1]) + 0.02 * rng.standard_normal()
+    model = th.narx(th.Log(y, u, sample_time=1.0), "spline", ny=1, nu=1, units=7)
+    assert any(name.startswith("bend(u(k-1)") for name in model.parameter_names)
+    assert document(model)["model"]["map"]["type"] == "spline"
+    assert np.nanstd(y - model.simulate(th.Log(y, u, sample_time=1.0))) < 0.05
+    online = th.RecursiveNarx.from_model(model)
+    assert len(online.parameters) == len(model.parameters)
+    with pytest.raises(ValueError, match="units"):
+        th.narx(log(), units=3)
+    with pytest.raises(ValueError, match="units"):
+        th.narx(log(), "spline", units=0)

@@ -9,7 +9,7 @@ use crate::{Error, Real};
 /// g(z) = θ_1 f_1(z) + θ_2 f_2(z) + …
 /// ```
 ///
-/// [`Polynomial`] and [`Radial`] are views of numbers that may stand in flash. Any other functions can be given by this
+/// [`Polynomial`], [`Radial`] and [`Spline`] are views of numbers that may stand in flash. Any other functions can be given by this
 /// trait; they are computed without a heap, and each is about 1 where z is, so that one prior serves all.
 pub trait Basis<T: Real> {
     /// How many functions there are.
@@ -197,6 +197,95 @@ impl<T: Real> Basis<T> for Radial<'_, T> {
     }
 }
 
+/// 1, each regressor, and bends of single regressors, so that g is a sum of natural cubic splines, one of each regressor.
+///
+/// A natural cubic spline with the knots k_1 < … < k_K is a cubic between them, has two continuous derivatives, and is a line beyond
+/// the outer knots. Its second derivative is a sum of the K - 2 hats (linear B-splines) of three knots in a row, so that 1, x and the
+/// hats integrated twice are a basis (Hastie, Tibshirani and Friedman, The Elements of Statistical Learning, 2nd ed. 2009, section
+/// 5.2.1, which spans the same with truncated powers). A hat of area 1 integrated twice is a bend: 0 before its first knot, of slope 1
+/// after its last one. Truncated powers grow like x³ and are nearly sums of one another; bends grow like x.
+///
+/// ```
+/// use thetahat_core::{Basis, Spline};
+///
+/// // 1, z_0 and one bend of z_0: 0 up to -1, of slope 1 from 1 on.
+/// let basis = Spline { regressors: 1, bent: &[0], knots: &[[-1.0, 0.0, 1.0]] };
+/// assert_eq!(basis.value(&[0.0, 0.0, 1.0], &[-2.0]), 0.0);
+/// assert_eq!(basis.value(&[0.0, 0.0, 1.0], &[3.0]), 3.0);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spline<'a, T> {
+    /// The number of regressors.
+    pub regressors: usize,
+    /// For each bend its regressor, from 0 on.
+    pub bent: &'a [u16],
+    /// For each bend its knots, rising.
+    pub knots: &'a [[T; 3]],
+}
+
+impl<T: Real> Spline<'_, T> {
+    /// The regressor of each bend, its value and its slope.
+    fn bends(&self, z: &[T]) -> impl Iterator<Item = (usize, T, T)> {
+        self.bent.iter().zip(self.knots).map(|(&bent, &knots)| {
+            let bent = usize::from(bent);
+            let (value, slope) = bend(z.get(bent).copied().unwrap_or(T::NAN), knots);
+            (bent, value, slope)
+        })
+    }
+}
+
+impl<T: Real> Basis<T> for Spline<'_, T> {
+    fn functions(&self) -> usize {
+        self.regressors + 1 + self.knots.len()
+    }
+
+    fn check(&self, regressors: usize) -> Result<(), Error> {
+        check_length("regressors", regressors, self.regressors)?;
+        check_length("knots", self.bent.len(), self.knots.len())?;
+        let needed = self.bent.iter().map(|&bent| usize::from(bent) + 1).max().unwrap_or(0);
+        if needed > regressors {
+            return Err(Error::Length { argument: "bent", expected: regressors, found: needed });
+        }
+        if self.knots.iter().all(|[a, b, c]| a.is_finite() && a < b && b < c && c.is_finite()) {
+            return Ok(());
+        }
+        Err(Error::OutOfRange { argument: "knots", range: "three rising numbers each" })
+    }
+
+    fn each(&self, z: &[T], mut take: impl FnMut(usize, T)) {
+        take(0, T::one());
+        z.iter().enumerate().for_each(|(i, &z)| take(i + 1, z));
+        let first = self.regressors + 1;
+        self.bends(z).enumerate().for_each(|(j, (_, value, _))| take(first + j, value));
+    }
+
+    fn add_slopes(&self, parameters: &[T], z: &[T], slopes: &mut [T]) {
+        let (path, weights) = parameters.split_at_checked(self.regressors + 1).unwrap_or_default();
+        slopes.iter_mut().zip(path.iter().skip(1)).for_each(|(slope, &parameter)| *slope += parameter);
+        for ((bent, _, own), &weight) in self.bends(z).zip(weights) {
+            if let Some(slope) = slopes.get_mut(bent) {
+                *slope += weight * own;
+            }
+        }
+    }
+}
+
+/// The bend of the knots `[a, b, c]`, a < b < c, at x; and its slope.
+fn bend<T: Real>(x: T, [a, b, c]: [T; 3]) -> (T, T) {
+    let three = T::from_count(3);
+    if x <= a {
+        (T::zero(), T::zero())
+    } else if x <= b {
+        let (from, share) = (x - a, T::one() / ((b - a) * (c - a)));
+        (from * from * from * share / three, from * from * share)
+    } else if x < c {
+        let (to, share) = (c - x, T::one() / ((c - b) * (c - a)));
+        (x - (a + b + c) / three + to * to * to * share / three, T::one() - to * to * share)
+    } else {
+        (x - (a + b + c) / three, T::one())
+    }
+}
+
 impl<T: Real, B: Basis<T>> Basis<T> for &B {
     fn functions(&self) -> usize {
         B::functions(self)
@@ -212,5 +301,28 @@ impl<T: Real, B: Basis<T>> Basis<T> for &B {
 
     fn add_slopes(&self, parameters: &[T], z: &[T], slopes: &mut [T]) {
         B::add_slopes(self, parameters, z, slopes);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bend_is_smooth_and_straight_outside() {
+        let knots = [-0.5, 0.1, 1.3];
+        let step = 1e-4;
+        let at = |x: f64| bend(x, knots).0;
+        for k in -30..=30 {
+            let x = f64::from(k) * 0.1;
+            let second = (at(x + step) - 2.0 * at(x) + at(x - step)) / (step * step);
+            // The hat of area 1: its height is 2 over its width.
+            let rise = ((x - knots[0]) / 0.6).min((knots[2] - x) / 1.2).clamp(0.0, 1.0);
+            assert!((second - rise * 2.0 / 1.8).abs() < 1e-3, "{x}: {second}");
+            let slope = (at(x + step) - at(x - step)) / (2.0 * step);
+            assert!((slope - bend(x, knots).1).abs() < 1e-7, "{x}: {slope}");
+        }
+        assert_eq!(bend(-2.0, knots), (0.0, 0.0));
+        assert_eq!(bend(5.0, knots).1, 1.0);
     }
 }

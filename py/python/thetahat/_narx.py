@@ -28,6 +28,7 @@ def narx(
     most_terms: int | None = None,
     centres: str | None = None,
     width: float | None = None,
+    units: int | None = None,
     linear: bool | None = None,
     select: str | None = None,
     ridge: float | None = None,
@@ -47,15 +48,15 @@ def narx(
     ----------
     log : Log
         The data.
-    map : {"poly", "rbf"}
-        Products of the regressors, or radial basis functions.
+    map : {"poly", "rbf", "spline"}
+        Products of the regressors, radial basis functions, or a natural cubic spline of each regressor.
     ny : int
         Past outputs that g reads: y(k-1), ..., y(k-ny).
     nu : int, or one for each input
         Values of the input that g reads, from ``nk`` on; 0 for a time series.
     nk : int, or one for each input
         Samples from input to first effect; 0 where it acts at once.
-    degree, terms, most_terms, centres, width, linear, select, ridge, raw_terms, seed, estimate, validate, split, detrend, offset
+    degree, terms, most_terms, centres, width, units, linear, select, ridge, raw_terms, seed, estimate, validate, split, detrend, offset
         Which functions, what to fit to and how, see `thetahat.NarxOptions`.
 
     Returns

@@ -184,6 +184,8 @@ class NarxOptions(TypedDict, total=False):
         Where radial basis functions stand: ``"chosen"`` among the samples, ``"kmeans:N"``, ``"grid:N"`` or ``"random:N"``.
     width : float
         sigma of exp(-|z - centre|^2/sigma^2), z in standard deviations; so that neighbours overlap, unless it is said.
+    units : int
+        Bends of each regressor, for ``"spline"``: 5.
     linear : bool
         Whether a constant and the regressors themselves stand beside radial basis functions: True.
     raw_terms : bool
@@ -204,6 +206,7 @@ class NarxOptions(TypedDict, total=False):
     select: str
     centres: str
     width: float
+    units: int
     linear: bool
     raw_terms: bool
     seed: int
@@ -489,7 +492,7 @@ def _texts(name: str, value: Any, rows: int | None) -> list[str]:
         return [f"{number(name, step)}:{how}{'' if filtered else ':unfiltered'}"]
     if name == "missing":
         return [value] if isinstance(value, str) else [text(name, one) for one in value]
-    if name in ("max_iterations", "starts", "seed", "lags", "skip_rows", "degree", "terms", "most_terms"):
+    if name in ("max_iterations", "starts", "seed", "lags", "skip_rows", "degree", "terms", "most_terms", "units"):
         return [str(integer(name, value))]
     if name == "horizon":
         every = value if isinstance(value, (list, tuple)) else [value]

@@ -357,8 +357,8 @@ class NARXRegressor(_Regressor):
 
     Parameters
     ----------
-    map : {"poly", "rbf"}, default="poly"
-        Products of the regressors, or radial basis functions.
+    map : {"poly", "rbf", "spline"}, default="poly"
+        Products of the regressors, radial basis functions, or a natural cubic spline of each regressor.
     ny : int, default=2
         Past outputs that g reads.
     nu : int or sequence of int, default=2
@@ -369,8 +369,8 @@ class NARXRegressor(_Regressor):
         How many samples ahead `predict` and `score` predict. None: the free run, which sees no outputs.
     sample_time : float, default=1.0
         Seconds from one sample to the next.
-    degree, terms, most_terms, centres, width, linear, select, ridge, raw_terms, seed, estimate, validate, split, detrend, offset : \
-default=None
+    degree, terms, most_terms, centres, width, units, linear, select, ridge, raw_terms, seed, estimate, validate, split, detrend, \
+offset : default=None
         Which functions, what to fit to and how, as for `thetahat.narx`, see `thetahat.NarxOptions`. Channels are called as the columns
         of a data frame, else u, or u1, u2, …, and y.
 
@@ -417,6 +417,7 @@ default=None
         most_terms: int | None = None,
         centres: str | None = None,
         width: float | None = None,
+        units: int | None = None,
         linear: bool | None = None,
         select: str | None = None,
         ridge: float | None = None,
@@ -439,6 +440,7 @@ default=None
         self.most_terms = most_terms
         self.centres = centres
         self.width = width
+        self.units = units
         self.linear = linear
         self.select = select
         self.ridge = ridge

@@ -242,7 +242,7 @@ impl RecursiveNarx {
     fn terms(model: PyRef<'_, Self>) -> PyResult<Vec<Vec<usize>>> {
         match stepper(&model)?.model().basis().map() {
             Map::Polynomial { terms } => Ok(terms.clone()),
-            Map::Radial { .. } => Ok(Vec::new()),
+            Map::Radial { .. } | Map::Spline { .. } => Ok(Vec::new()),
         }
     }
 

@@ -3,7 +3,7 @@ use std::vec;
 
 use nalgebra::Const;
 
-use crate::{ArxOrders, Basis, Error, InputOrders, NonlinearArx, Polynomial, Radial, Scaling};
+use crate::{ArxOrders, Basis, Error, InputOrders, NonlinearArx, Polynomial, Radial, Scaling, Spline};
 
 /// y(k-1), y(k-2), u1(k-1), u2(k), u2(k-1).
 pub(crate) const ORDERS: ArxOrders<'_> = ArxOrders {
@@ -67,6 +67,8 @@ fn slopes_are_differences_of_outputs() {
             assert!((difference - slopes[i]).abs() < 1e-8, "{i}: {difference} {slopes:?}");
         }
     }
+    let knots = [[-2.0, 0.3, 1.5], [-1.0, -0.5, 0.0]];
+    check(Spline { regressors: 5, bent: &[0, 3], knots: &knots }, &theta, x);
     check(BASIS, &theta, x);
     check(radial(false), &theta, x);
     check(radial(true), &theta, x);
@@ -91,6 +93,10 @@ fn wrong_parts_are_told() {
     let few = ArxOrders { na: 1, inputs: &[], constant: false };
     let error = NonlinearArx::<f64, _, Const<5>>::new(BASIS, &few, OUTPUT, &[]).map(|_| ()).unwrap_err();
     assert_eq!(error, Error::Orders { needed: 1, available: 5 });
+    let falling = Spline { regressors: 5, bent: &[0], knots: &[[0.0, 1.0, 1.0]] };
+    assert!(matches!(Basis::<f64>::check(&falling, 5), Err(Error::OutOfRange { argument: "knots", .. })));
+    let far = Spline { regressors: 5, bent: &[5], knots: &[[0.0, 1.0, 2.0]] };
+    assert!(matches!(Basis::<f64>::check(&far, 5), Err(Error::Length { argument: "bent", .. })));
     let centres = Radial { regressors: 5, centres: &[0.0; 9], inverse_squares: &[1.0; 2], linear: true };
     assert_eq!(
         Basis::<f64>::check(&centres, 5),

@@ -3,6 +3,7 @@
 mod candidates;
 pub(crate) mod centres;
 mod figures;
+pub(crate) mod splines;
 
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
@@ -112,6 +113,11 @@ impl<'l> Samples<'l> {
         self.taps.len()
     }
 
+    /// The least and the largest value of each z.
+    pub(crate) fn ranges(&self) -> Vec<[f64; 2]> {
+        self.head.regressors.iter().map(|one| one.range.map(|end| end / one.scale)).collect()
+    }
+
     /// z of all samples.
     pub(crate) fn points(&self) -> Vec<Vec<f64>> {
         let point =
@@ -199,7 +205,7 @@ impl<'l> Samples<'l> {
             theta = order.iter().map(|at| theta[*at]).collect();
             places.sort_unstable();
         }
-        let map = candidates.map(&places);
+        let map = candidates.map(&places, self.taps.len());
         NonlinearArxModel { map, parameters: theta.into_iter().map(named).collect(), ..self.head.clone() }
     }
 
@@ -261,7 +267,8 @@ impl<'l> Samples<'l> {
                 (least..=lengths).min_by(better).unwrap_or(1)
             }
         };
-        Ok(Chosen { map: candidates.map(&candidates.ordered(path.places(best))), steps })
+        let places = candidates.ordered(path.places(best));
+        Ok(Chosen { map: candidates.map(&places, self.taps.len()), steps })
     }
 
     /// The names of the regressors.

@@ -1,14 +1,16 @@
 //! Fits of nonlinear ARX models.
 
+mod plan;
+
 use std::collections::BTreeMap;
 
 use super::evaluate::evaluate;
 use super::schema::{Data, Estimation, Missing, Report};
 use super::shares::Shares;
-use crate::data::{Detrend, Log, Offset, Rows, Source, Split, digests};
+use crate::data::{Log, Offset, Rows, Source, digests};
 use crate::estimate::{
     Criteria, Procedure, TermsOutcome,
-    nonlinear_arx::{Candidates, Chosen, Count, Samples, Solved, centres},
+    nonlinear_arx::{Candidates, Chosen, Count, Samples, Solved, centres, splines},
 };
 use crate::model::{Map, Model, NonlinearArxModel, Regressor, Signal};
 use crate::regression::Monomials;
@@ -17,177 +19,14 @@ use crate::select::{Focus, Select};
 use crate::validate::Part;
 use crate::{Document, Error};
 
+pub use plan::{Centres, InputLags, MapPlan, NonlinearArxPlan};
+
 /// Below this fraction of a channel's size, what an offset leaves is rounding.
 const ROUNDING: f64 = 1e-13;
-/// Functions that a choice takes at most, unless it is said otherwise.
-const MOST: usize = 40;
 /// Samples that radial basis functions may stand at.
 const CANDIDATES: usize = 1000;
-/// Radial basis functions at most.
+/// Radial basis functions, or bends, at most.
 const MOST_CENTRES: usize = 2000;
-
-/// Which lags of an input a nonlinear ARX model reads: `lags` of them from `delay` on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct InputLags {
-    /// How many.
-    pub lags: usize,
-    /// The shortest one; 0 where the input acts at once.
-    pub delay: usize,
-}
-
-/// The functions that a nonlinear ARX model is made of.
-#[derive(Debug, Clone, PartialEq)]
-pub enum MapPlan {
-    /// Products of regressors up to a degree, of which forward regression chooses.
-    Polynomial {
-        /// The largest number of factors.
-        degree: usize,
-    },
-    /// Radial basis functions.
-    Radial {
-        /// Where they stand.
-        centres: Centres,
-        /// sigma of all of them, in units of the scaled regressors; none: so wide that neighbours overlap.
-        width: Option<f64>,
-        /// Whether a constant and the regressors themselves are functions too.
-        linear: bool,
-    },
-}
-
-/// Where radial basis functions stand.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Centres {
-    /// At samples of the estimation rows, of which forward regression chooses.
-    Chosen,
-    /// At the means of clusters of the estimation rows.
-    Clusters {
-        /// How many.
-        count: usize,
-        /// Which random start.
-        seed: u64,
-    },
-    /// At a grid over the range of the estimation rows.
-    Grid {
-        /// How many in each direction.
-        each: usize,
-    },
-    /// At pseudo-random points in that range.
-    Random {
-        /// How many.
-        count: usize,
-        /// Which points.
-        seed: u64,
-    },
-}
-
-/// What nonlinear ARX model to fit, and how.
-#[derive(Debug, Clone, PartialEq)]
-pub struct NonlinearArxPlan {
-    /// The input channels.
-    pub inputs: Vec<String>,
-    /// The output channel.
-    pub output: String,
-    /// Rows to estimate on; none: all.
-    pub estimate: Vec<Rows>,
-    /// Rows to validate on.
-    pub validate: Vec<Rows>,
-    /// Cuts the rows to estimate on into parts: models are fitted to the first one and compared, the chosen one is fitted again to the
-    /// first two, and judged on the third.
-    pub split: Option<Split>,
-    /// What is taken from each channel.
-    pub detrend: Detrend,
-    /// Channels whose offset is set by hand.
-    pub offsets: Vec<(String, f64)>,
-    /// Past outputs that are read: y(k-1), …, y(k-n).
-    pub output_lags: usize,
-    /// What is read of each input.
-    pub input_lags: Vec<InputLags>,
-    /// The functions.
-    pub map: MapPlan,
-    /// How many functions are taken; none: `select` says it.
-    pub terms: Option<usize>,
-    /// How many functions a choice looks at.
-    pub most: usize,
-    /// What makes one number of functions better than another; none: the free run on the validation rows where there are some, else that
-    /// on five blocks of the estimation rows.
-    pub select: Option<Select>,
-    /// Keeps parameters small: weighs like this many more samples in which the output is 0.
-    pub ridge: f64,
-    /// Whether signals keep their own units: else each is divided by its standard deviation over the estimation rows.
-    pub raw_terms: bool,
-}
-
-impl NonlinearArxPlan {
-    /// All rows, means removed, products of at most two of two past outputs and two past values of each input; further settings as fields.
-    pub fn new(inputs: &[&str], output: &str) -> Self {
-        Self {
-            inputs: inputs.iter().map(|input| (*input).to_owned()).collect(),
-            output: output.to_owned(),
-            estimate: Vec::new(),
-            validate: Vec::new(),
-            split: None,
-            detrend: Detrend::Mean,
-            offsets: Vec::new(),
-            output_lags: 2,
-            input_lags: vec![InputLags { lags: 2, delay: 1 }; inputs.len()],
-            map: MapPlan::Polynomial { degree: 2 },
-            terms: None,
-            most: MOST,
-            select: None,
-            ridge: 0.0,
-            raw_terms: false,
-        }
-    }
-
-    /// Whether the plan makes sense, whatever the log.
-    ///
-    /// # Errors
-    /// [`Error::Argument`] with the argument that does not.
-    pub fn check(&self) -> Result<(), Error> {
-        let names: Vec<&String> = self.inputs.iter().chain([&self.output]).collect();
-        for (position, name) in names.iter().enumerate() {
-            if names[..position].contains(name) {
-                return Err(Error::argument(
-                    "channels",
-                    format!("'{name}' is named twice; a channel has one role"),
-                ));
-            }
-        }
-        if let Some((name, _)) = self.offsets.iter().find(|(name, _)| !names.contains(&name)) {
-            return Err(Error::argument("offset", format!("'{name}' is neither an input nor the output")));
-        }
-        if self.input_lags.len() != self.inputs.len() {
-            return Err(Error::argument(
-                "nu",
-                format!(
-                    "there are lags of {} inputs, and {} inputs",
-                    self.input_lags.len(),
-                    self.inputs.len()
-                ),
-            ));
-        }
-        let longest = self.input_lags.iter().map(|input| input.lags.saturating_add(input.delay));
-        if longest.chain([self.output_lags]).any(|lag| lag > crate::model::LARGEST) {
-            return Err(Error::argument("ny", format!("lags above {} are not read", crate::model::LARGEST)));
-        }
-        if self.output_lags == 0 && self.input_lags.iter().all(|input| input.lags == 0) {
-            return Err(Error::argument(
-                "ny",
-                "the model reads nothing; give lags of the output or of an input",
-            ));
-        }
-        if self.terms == Some(0) || self.most == 0 {
-            return Err(Error::argument("terms", "a model has one function at least"));
-        }
-        if !(self.ridge.is_finite() && self.ridge >= 0.0) {
-            return Err(Error::argument("ridge", format!("{} is not a number from 0 on", self.ridge)));
-        }
-        if self.terms.is_some() && self.select.is_some() {
-            return Err(Error::argument("select", "the number of terms is given; leave out one of the two"));
-        }
-        Ok(())
-    }
-}
 
 /// Fits a nonlinear ARX model that is linear in its parameters,
 ///
@@ -331,6 +170,17 @@ fn candidates(map: &MapPlan, samples: &Samples<'_>) -> Result<Candidates, Error>
     let (centres, width, linear) = match map {
         MapPlan::Polynomial { degree } => {
             return Ok(Candidates::Products(Monomials::new(samples.regressors(), *degree)?));
+        }
+        MapPlan::Spline { units } => {
+            let (regressors, most) = (samples.regressors(), MOST_CENTRES / samples.regressors().max(1));
+            if *units == 0 || *units > most {
+                return Err(Error::argument(
+                    "units",
+                    format!("{units} bends for each of {regressors} regressors; give from 1 to {most}"),
+                ));
+            }
+            let map = splines::map(&samples.ranges(), *units);
+            return Ok(Candidates::Functions { map, always: regressors + 1 });
         }
         MapPlan::Radial { centres, width, linear } => (*centres, *width, *linear),
     };

@@ -41,18 +41,20 @@ impl Candidates {
     /// What one is called, the names of the regressors being given.
     pub(super) fn name(&self, place: usize, regressors: &[String]) -> String {
         match self {
-            Self::Products(_) => self.map(&[place]).names(regressors).pop().unwrap_or_default(),
+            Self::Products(_) => {
+                self.map(&[place], regressors.len()).names(regressors).pop().unwrap_or_default()
+            }
             Self::Functions { map, .. } => map.names(regressors).get(place).cloned().unwrap_or_default(),
         }
     }
 
-    /// The map of some of them, in this order.
-    pub(super) fn map(&self, places: &[usize]) -> Map {
+    /// The map of some of them, in this order, for this many regressors.
+    pub(super) fn map(&self, places: &[usize], regressors: usize) -> Map {
         match self {
             Self::Products(monomials) => {
                 Map::Polynomial { terms: places.iter().map(|place| monomials.factors(*place)).collect() }
             }
-            Self::Functions { map, .. } => map.some(places),
+            Self::Functions { map, .. } => map.some(places, regressors),
         }
     }
 

@@ -2,10 +2,12 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use thetahat_core::{Basis, Polynomial, Radial};
+use thetahat_core::{Basis, Polynomial, Radial, Spline};
 
 use crate::Error;
 use crate::regression::Monomials;
+
+use crate::figures::short;
 
 /// The functions f_j of a nonlinear ARX model, of n regressors z.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -25,6 +27,16 @@ pub enum Map {
         widths: Vec<f64>,
         /// Whether 1 and the regressors come first.
         linear: bool,
+    },
+    /// 1, each regressor, and bends of single regressors, so that g is a sum of natural cubic splines, one of each regressor (Hastie,
+    /// Tibshirani and Friedman 2009, section 5.2.1). A bend of the knots a < b < c is the hat of area 1 over them, integrated twice: it is
+    /// 0 up to a, cubic up to b and from there to c, and z - (a + b + c)/3 after c. So g is a line outside of the knots, where a free run
+    /// may go; other cubic splines are cubics there.
+    Spline {
+        /// For each bend its regressor, from 0 on.
+        regressors: Vec<usize>,
+        /// For each bend its knots.
+        knots: Vec<[f64; 3]>,
     },
 }
 
@@ -46,24 +58,30 @@ impl Map {
         match self {
             Self::Polynomial { terms } => terms.len(),
             Self::Radial { centres, linear, .. } => centres.len() + if *linear { regressors + 1 } else { 0 },
+            Self::Spline { knots, .. } => knots.len() + regressors + 1,
         }
     }
 
-    /// Some of its functions beside those of the linear path, by their places among all.
-    pub(crate) fn some(&self, places: &[usize]) -> Self {
+    /// Some of its functions beside those of the linear path, by their places among all of `count` regressors.
+    pub(crate) fn some(&self, places: &[usize], count: usize) -> Self {
         match self {
             Self::Polynomial { terms } => {
                 let own = places.iter().filter_map(|place| terms.get(*place).cloned());
                 Self::Polynomial { terms: own.collect() }
             }
             Self::Radial { centres, widths, linear } => {
-                let before = self.parameters(centres.first().map_or(0, Vec::len)) - centres.len();
+                let before = self.parameters(count) - centres.len();
                 let own: Vec<usize> = places.iter().filter_map(|place| place.checked_sub(before)).collect();
                 Self::Radial {
                     centres: own.iter().map(|place| centres[*place].clone()).collect(),
                     widths: own.iter().map(|place| widths[*place]).collect(),
                     linear: *linear,
                 }
+            }
+            Self::Spline { regressors, knots } => {
+                let own = places.iter().filter_map(|place| place.checked_sub(count + 1));
+                let (regressors, knots) = own.map(|place| (regressors[place], knots[place])).unzip();
+                Self::Spline { regressors, knots }
             }
         }
     }
@@ -81,17 +99,23 @@ impl Map {
             Self::Radial { centres, .. } => {
                 format!("radial basis functions, {} centre{}", centres.len(), plural(centres.len()))
             }
+            Self::Spline { knots, .. } => format!("splines, {} bend{}", knots.len(), plural(knots.len())),
         }
     }
 
-    /// The functions by name, those of the regressors being given: y(k-1)^2*u(k), or rbf1.
+    /// The functions by name, those of the regressors being given: y(k-1)^2*u(k), rbf1, or bend(u(k), 0.5), where the middle knot is 0.5.
     pub(crate) fn names(&self, regressors: &[String]) -> Vec<String> {
         match self {
             Self::Polynomial { terms } => terms.iter().map(|term| product(term, regressors)).collect(),
             Self::Radial { centres, linear, .. } => {
-                let path = std::iter::once("1".to_owned()).chain(regressors.iter().cloned());
-                let path = path.take(if *linear { regressors.len() + 1 } else { 0 });
+                let path = path(regressors).take(if *linear { regressors.len() + 1 } else { 0 });
                 path.chain((1..=centres.len()).map(|place| format!("rbf{place}"))).collect()
+            }
+            Self::Spline { regressors: own, knots } => {
+                let bends = own.iter().zip(knots).map(|(own, [_, middle, _])| {
+                    format!("bend({}, {})", regressors.get(*own).map_or("?", String::as_str), short(*middle))
+                });
+                path(regressors).chain(bends).collect()
             }
         }
     }
@@ -120,8 +144,26 @@ impl Map {
                 }
                 Ok(())
             }
+            Self::Spline { regressors: own, knots } => {
+                if own.len() != knots.len() {
+                    return Err("knots are not three for each bend".to_owned());
+                }
+                if let Some(place) = own.iter().position(|regressor| *regressor >= regressors) {
+                    return Err(format!("regressors[{place}] is not there"));
+                }
+                let rising = |[a, b, c]: &[f64; 3]| a.is_finite() && a < b && b < c && c.is_finite();
+                match knots.iter().position(|knots| !rising(knots)) {
+                    Some(place) => Err(format!("knots[{place}] are not three rising numbers")),
+                    None => Ok(()),
+                }
+            }
         }
     }
+}
+
+/// The names of the linear path.
+fn path(regressors: &[String]) -> impl Iterator<Item = String> {
+    std::iter::once("1".to_owned()).chain(regressors.iter().cloned())
 }
 
 /// A product by its factors: y(k-1)^2*u(k).
@@ -150,6 +192,8 @@ enum Kind {
     Polynomial { factors: Vec<u16>, ends: Vec<u32> },
     /// The centres one after the other, and 1/sigma^2.
     Radial { centres: Vec<f64>, inverse_squares: Vec<f64>, linear: bool },
+    /// The regressor and the knots of each bend.
+    Spline { bent: Vec<u16>, knots: Vec<[f64; 3]> },
 }
 
 impl Evaluator {
@@ -170,6 +214,10 @@ impl Evaluator {
                 inverse_squares: widths.iter().map(|width| 1.0 / (width * width)).collect(),
                 linear: *linear,
             },
+            Map::Spline { regressors, knots } => {
+                let bent = regressors.iter().map(|regressor| *regressor as u16);
+                Kind::Spline { bent: bent.collect(), knots: knots.clone() }
+            }
         };
         Self { theta, kind }
     }
@@ -198,6 +246,7 @@ impl Evaluator {
             Kind::Radial { centres, inverse_squares, linear } => {
                 radial(z.len(), centres, inverse_squares, *linear).each(z, take);
             }
+            Kind::Spline { bent, knots } => Spline { regressors: z.len(), bent, knots }.each(z, take),
         }
     }
 
@@ -210,6 +259,9 @@ impl Evaluator {
             }
             Kind::Radial { centres, inverse_squares, linear } => {
                 radial(z.len(), centres, inverse_squares, *linear).add_slopes(&self.theta, z, into);
+            }
+            Kind::Spline { bent, knots } => {
+                Spline { regressors: z.len(), bent, knots }.add_slopes(&self.theta, z, into);
             }
         }
     }
@@ -228,12 +280,16 @@ fn radial<'a>(
 mod tests {
     use super::*;
 
-    fn maps() -> [Map; 3] {
+    fn maps() -> [Map; 4] {
         let centres = vec![vec![0.2, -0.4], vec![1.0, 0.3], vec![-0.7, 0.9]];
         [
             Map::Polynomial { terms: vec![vec![], vec![0], vec![0, 0, 1], vec![1, 1]] },
             Map::Radial { centres: centres.clone(), widths: vec![0.8, 1.0, 2.0], linear: false },
             Map::Radial { centres, widths: vec![0.8, 1.0, 2.0], linear: true },
+            Map::Spline {
+                regressors: vec![0, 1, 1],
+                knots: vec![[-1.0, 0.5, 1.0], [-1.5, -1.0, 0.5], [-3.0, -2.5, -2.0]],
+            },
         ]
     }
 
@@ -268,6 +324,10 @@ mod tests {
         let regressors = ["y(k-1)".to_owned(), "u(k)".to_owned()];
         assert_eq!(maps()[0].names(&regressors), ["1", "y(k-1)", "y(k-1)^2*u(k)", "u(k)^2"]);
         assert_eq!(maps()[2].names(&regressors), ["1", "y(k-1)", "u(k)", "rbf1", "rbf2", "rbf3"]);
+        assert_eq!(
+            maps()[3].names(&regressors),
+            ["1", "y(k-1)", "u(k)", "bend(y(k-1), 0.5)", "bend(u(k), -1)", "bend(u(k), -2.5)"]
+        );
     }
 
     #[test]
@@ -275,5 +335,10 @@ mod tests {
         assert!(Map::Polynomial { terms: vec![vec![2]] }.check(2).is_err());
         assert!(Map::Radial { centres: vec![vec![1.0]], widths: vec![1.0], linear: true }.check(2).is_err());
         assert!(Map::Radial { centres: vec![vec![1.0]], widths: vec![], linear: true }.check(1).is_err());
+        for (regressors, knots) in
+            [(vec![0], vec![]), (vec![1], vec![[0.0, 1.0, 2.0]]), (vec![0], vec![[0.0, 0.0, 1.0]])]
+        {
+            assert!(Map::Spline { regressors, knots }.check(1).is_err());
+        }
     }
 }

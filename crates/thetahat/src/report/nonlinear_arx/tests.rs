@@ -1,5 +1,5 @@
 use super::*;
-use crate::data::Channel;
+use crate::data::{Channel, Detrend};
 use crate::estimate::Constant;
 use crate::model::Orders;
 use crate::regression::noise::Noise;

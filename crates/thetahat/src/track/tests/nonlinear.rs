@@ -82,6 +82,7 @@ fn a_report_goes_on() {
     for map in [
         MapPlan::Polynomial { degree: 2 },
         MapPlan::Radial { centres: Centres::Grid { each: 2 }, width: Some(2.0), linear: true },
+        MapPlan::Spline { units: 2 },
     ] {
         let plan = NonlinearArxPlan { map, ..plan() };
         let all = log((u.clone(), y.clone()));
@@ -108,7 +109,9 @@ fn a_report_goes_on() {
             let share = error / parameter.standard_error.unwrap();
             assert!((0.5..0.95).contains(&share), "{} {share}", parameter.name);
         }
-        assert!(tracker.score().fit().unwrap() > 85.0, "{:?}", tracker.score().fit());
+        // A sum of splines does not have what u(t-1) y(t-1) does.
+        let least = if matches!(tracker.map(), Some(Map::Spline { .. })) { 80.0 } else { 85.0 };
+        assert!(tracker.score().fit().unwrap() > least, "{:?}", tracker.score().fit());
     }
 }
 

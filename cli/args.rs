@@ -17,8 +17,8 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 pub(crate) use filter::{EstimatorArgument, FilterArguments, FilterStartArgument};
 pub(crate) use fit::{
     ConstantArgument, CriterionArguments, FitArguments, InitialArgument, LikelihoodArgument, MapArgument,
-    MethodArgument, ModelArgument, ModelArguments, NarxArguments, PathArgument, SearchArgument,
-    SearchArguments,
+    MembershipArgument, MethodArgument, ModelArgument, ModelArguments, NarxArguments, PathArgument,
+    SearchArgument, SearchArguments,
 };
 pub(crate) use inspect::InspectArguments;
 pub(crate) use lines::{LineArguments, LineFormatArgument};

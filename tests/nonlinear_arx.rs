@@ -357,7 +357,20 @@ fn bad_options_and_logs_are_told() {
         ("--narx spline --units 0", "--units"),
         ("--narx spline --units 100000", "--units"),
         ("--narx spline --degree 2", "--degree"),
-        ("--narx poly --units 3", "--units"),
+        ("--narx poly --units 3", "--units is for --narx spline, --narx local and --narx knn"),
+        ("--narx poly --membership gaussian", "--membership"),
+        ("--na 1 --nb 1 --membership gaussian", "--narx"),
+        ("--narx local --units 0", "one local model"),
+        ("--narx local --units 50", "50 local models are asked for"),
+        ("--narx local --terms 5", "--terms"),
+        ("--narx local --membership round", "round"),
+        ("--narx local --degree 2", "--degree"),
+        ("--narx knn --units 58", "57"),
+        ("--narx knn --units 65", "--units"),
+        ("--narx knn --select mdl", "--select"),
+        ("--narx knn --units 3 --select cv", "--select"),
+        ("--narx knn --ridge 1", "--ridge"),
+        ("--narx knn --most-terms 3", "--most-terms"),
         ("--na 1 --nb 1 --units 3", "--narx"),
         ("--narx poly --na 2", "cannot be used with"),
         ("--narx poly --degree 0", "degree"),
@@ -524,5 +537,60 @@ fn splines_find_what_bends() {
         folder.write("bad.json", bad.to_string());
         let run = folder.run("simulate bad.json log.csv --sample-time 1");
         assert_eq!(run.code, 3, "{place}: {}", run.stderr);
+    }
+}
+
+/// Local models and stored samples go through every verb too; samples have no parameters to track.
+#[test]
+fn local_models_and_neighbours_take_every_verb() {
+    let folder = Folder::with_log(plant(900));
+    let common = "--ny 1 --nu 1 --sample-time 0.1 --estimate 1..600 --validate 601..900";
+    for (options, name, kind) in [
+        ("--narx local", "NARX local models", "local"),
+        ("--narx local --membership rectangle --units 4", "NARX local models, 4", "local"),
+        ("--narx local --no-linear --membership trapezoid --most-terms 30", "NARX local models", "local"),
+        ("--narx knn", "NARX nearest neighbours", "neighbours"),
+        ("--narx knn --no-linear --units 5", "NARX nearest neighbours, 5 of 599 samples", "neighbours"),
+    ] {
+        let report = folder.fit(&format!("log.csv {options} {common} --report model.json --html page.html"));
+        assert_eq!(report.pointer("/model/map/type").and_then(Value::as_str), Some(kind), "{options}");
+        let percent = number(&report, "/fit/3/percent");
+        assert!(percent > 75.0, "{options}: {percent}");
+        let page = folder.read("page.html");
+        assert!(page.contains("Complexity") && page.contains("Path of the choice"), "{options}");
+        let run = folder.done("validate model.json log.csv --sample-time 0.1 --rows 601..900");
+        assert!(run.stdout.contains(name) && run.stdout.contains("no u^2 in errors"), "{}", run.stdout);
+        folder.done("compare model.json log.csv --sample-time 0.1 --rows 601..900");
+        let run = folder.done("predict model.json log.csv --sample-time 0.1 --horizon 3");
+        assert_eq!(run.stdout.lines().count(), 901, "{options}");
+        folder.done("simulate model.json log.csv --sample-time 0.1");
+        let run = folder.run("track log.csv --warm model.json --forgetting 1 -o tracked.jsonl");
+        match kind {
+            "neighbours" => {
+                assert_eq!(run.code, 3, "{}", run.stderr);
+                assert!(run.stderr.contains("no parameters to track"), "{}", run.stderr);
+            }
+            _ => assert!(run.code == 0 && run.stderr.contains(name), "{}", run.stderr),
+        }
+        let good: Value = serde_json::from_str(&folder.read("model.json")).unwrap();
+        let edits = match kind {
+            "local" => vec![
+                ("/model/map/boxes/0/0", serde_json::json!([1.0, 1.0])),
+                ("/model/map/domain", serde_json::json!([[0.0, 1.0]])),
+                ("/model/map/membership", "round".into()),
+            ],
+            _ => vec![
+                ("/model/map/count", 0.into()),
+                ("/model/map/count", 600.into()),
+                ("/model/map/points/0", serde_json::json!([1.0])),
+            ],
+        };
+        for (place, value) in edits {
+            let mut bad = good.clone();
+            *bad.pointer_mut(place).expect(place) = value;
+            folder.write("bad.json", bad.to_string());
+            let run = folder.run("simulate bad.json log.csv --sample-time 0.1");
+            assert_eq!(run.code, 3, "{options} {place}: {}", run.stderr);
+        }
     }
 }

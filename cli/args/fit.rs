@@ -153,7 +153,7 @@ pub(crate) struct NarxArguments {
     /// How many functions to take [default: --select says it, by the free run on validation rows, or on blocks of the estimation rows]
     #[arg(long, value_name = "N", requires = "narx", conflicts_with = "select")]
     pub(crate) terms: Option<usize>,
-    /// How many functions to look at [default: 40]
+    /// How many functions to look at [default: 40, and 10 local models]
     #[arg(long, value_name = "N", requires = "narx", conflicts_with = "terms")]
     pub(crate) most_terms: Option<usize>,
     /// Where radial basis functions stand (rbf): chosen among the samples, at the means of N clusters, at a grid of N in each direction,
@@ -163,10 +163,14 @@ pub(crate) struct NarxArguments {
     /// sigma of radial basis functions exp(-|z - centre|^2/sigma^2), z in standard deviations [default: so that neighbours overlap]
     #[arg(long, value_name = "SIGMA", requires = "narx", allow_hyphen_values = true)]
     pub(crate) width: Option<f64>,
-    /// Leave out the constant and the regressors themselves beside radial basis functions
+    /// Leave out the constant and the regressors themselves beside radial basis functions (rbf); constants in place of planes (local), or
+    /// means (knn)
     #[arg(long, requires = "narx")]
     pub(crate) no_linear: bool,
-    /// Bends of each regressor (spline) [default: 5]
+    /// How local models share the space of the regressors (local) [default: gaussian]
+    #[arg(long, value_enum, value_name = "SHAPE", requires = "narx")]
+    pub(crate) membership: Option<MembershipArgument>,
+    /// Bends of each regressor (spline) [default: 5], or how many local models (local) or neighbours (knn) [default: chosen]
     #[arg(long, value_name = "N", requires = "narx")]
     pub(crate) units: Option<usize>,
     /// Leave signals in their own units: else each is divided by its standard deviation
@@ -182,6 +186,20 @@ pub(crate) enum MapArgument {
     Rbf,
     /// A natural cubic spline of each regressor
     Spline,
+    /// Local linear models, grown by splitting the space of the regressors
+    Local,
+    /// The nearest samples of the fit
+    Knn,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum MembershipArgument {
+    /// Each in its box alone
+    Rectangle,
+    /// Sloping edges, which overlap
+    Trapezoid,
+    /// Gaussians, over their sum
+    Gaussian,
 }
 
 impl MapArgument {

@@ -146,7 +146,10 @@ fn estimation(text: &mut Text, estimation: &Estimation, model: &PolynomialModel)
             ));
         }
         Procedure::Constrained(outcome) => criterion(text, outcome, model, start),
-        Procedure::InnovationsLikelihood(_) | Procedure::ForwardRegression(_) => {}
+        Procedure::InnovationsLikelihood(_)
+        | Procedure::ForwardRegression(_)
+        | Procedure::Splits(_)
+        | Procedure::Neighbours(_) => {}
         Procedure::PredictionError(search) => {
             text.line(&format!(
                 "prediction error, {}, {}",

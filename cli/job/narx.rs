@@ -1,10 +1,11 @@
 use std::path::{Path, PathBuf};
 
+use thetahat::model::Membership;
 use thetahat::report::{Centres, InputLags, MapPlan, NonlinearArxPlan};
 
 use super::fit::named_values;
 use super::{LogJob, parsed, rows};
-use crate::args::{FitArguments, MapArgument, Names, NarxArguments};
+use crate::args::{FitArguments, MapArgument, MembershipArgument, Names, NarxArguments};
 use crate::failure::Failure;
 use crate::memory::PerValue;
 
@@ -44,7 +45,7 @@ impl NarxJob {
             output_lags: own.ny.unwrap_or(default.output_lags),
             map: map_plan(own, map, arguments.search.seed)?,
             terms: own.terms,
-            most: own.most_terms.unwrap_or(default.most),
+            most: own.most_terms,
             select: arguments.choice.select,
             ridge: arguments.criterion.ridge.unwrap_or(0.0),
             raw_terms: own.raw_terms,
@@ -111,6 +112,7 @@ pub(crate) fn check_linear(arguments: &NarxArguments) -> Result<(), Failure> {
         ("--centres", arguments.centres.is_some()),
         ("--width", arguments.width.is_some()),
         ("--no-linear", arguments.no_linear),
+        ("--membership", arguments.membership.is_some()),
         ("--units", arguments.units.is_some()),
         ("--raw-terms", arguments.raw_terms),
     ];
@@ -123,18 +125,24 @@ pub(crate) fn check_linear(arguments: &NarxArguments) -> Result<(), Failure> {
 }
 
 fn map_plan(arguments: &NarxArguments, map: MapArgument, seed: Option<u64>) -> Result<MapPlan, Failure> {
-    use MapArgument::{Poly, Rbf, Spline};
-    let own: [(&str, bool, &[MapArgument]); 6] = [
+    use MapArgument::{Knn, Local, Poly, Rbf, Spline};
+    let own: [(&str, bool, &[MapArgument]); 8] = [
         ("--degree", arguments.degree.is_some(), &[Poly]),
         ("--centres", arguments.centres.is_some(), &[Rbf]),
         ("--width", arguments.width.is_some(), &[Rbf]),
-        ("--no-linear", arguments.no_linear, &[Rbf]),
+        ("--no-linear", arguments.no_linear, &[Rbf, Local, Knn]),
+        ("--membership", arguments.membership.is_some(), &[Local]),
+        ("--terms", arguments.terms.is_some(), &[Poly, Rbf, Spline]),
         ("--seed", seed.is_some(), &[Rbf]),
-        ("--units", arguments.units.is_some(), &[Spline]),
+        ("--units", arguments.units.is_some(), &[Spline, Local, Knn]),
     ];
     if let Some((option, _, maps)) = own.iter().find(|(_, given, maps)| *given && !maps.contains(&map)) {
         let names: Vec<String> = maps.iter().map(|map| format!("--narx {}", map.word())).collect();
-        return Err(Failure::usage(format!("{option} is for {}", names.join(" and "))));
+        let names = match names.split_last() {
+            Some((last, others)) if !others.is_empty() => format!("{} and {last}", others.join(", ")),
+            _ => names.concat(),
+        };
+        return Err(Failure::usage(format!("{option} is for {names}")));
     }
     match map {
         Poly => Ok(MapPlan::Polynomial { degree: arguments.degree.unwrap_or(2) }),
@@ -150,6 +158,15 @@ fn map_plan(arguments: &NarxArguments, map: MapArgument, seed: Option<u64>) -> R
             })
         }
         Spline => Ok(MapPlan::Spline { units: arguments.units.unwrap_or(BENDS) }),
+        Local => {
+            let membership = match arguments.membership {
+                Some(MembershipArgument::Rectangle) => Membership::Rectangle,
+                Some(MembershipArgument::Trapezoid) => Membership::Trapezoid,
+                Some(MembershipArgument::Gaussian) | None => Membership::Gaussian,
+            };
+            Ok(MapPlan::Local { membership, planes: !arguments.no_linear, units: arguments.units })
+        }
+        Knn => Ok(MapPlan::Neighbours { planes: !arguments.no_linear, units: arguments.units }),
     }
 }
 

@@ -120,3 +120,29 @@ def test_splines_are_a_map_too() -> None:
         th.narx(log(), units=3)
     with pytest.raises(ValueError, match="units"):
         th.narx(log(), "spline", units=0)
+
+
+@pytest.mark.parametrize(
+    ("map", "options", "kind"),
+    [
+        ("local", {"membership": "trapezoid", "units": 3}, "local"),
+        ("local", {}, "local"),
+        ("knn", {"linear": False}, "neighbours"),
+        ("knn", {"units": 8}, "neighbours"),
+    ],
+)
+def test_local_models_and_neighbours_are_maps_too(map: str, options: dict[str, object], kind: str) -> None:
+    data = log(600)
+    model = th.narx(data, map, ny=1, nu=1, **options)  # type: ignore[arg-type]
+    assert document(model)["model"]["map"]["type"] == kind
+    assert np.nanstd(data["y"] - model.simulate(data)) < 0.5 * np.std(data["y"])
+    if kind == "local":
+        online = th.RecursiveNarx.from_model(model)
+        assert len(online.parameters) == len(model.parameters)
+    else:
+        with pytest.raises(ValueError, match="no parameters to track"):
+            th.RecursiveNarx.from_model(model)
+    with pytest.raises(ValueError, match="membership"):
+        th.narx(data, membership="gaussian")
+    with pytest.raises(ValueError, match="terms"):
+        th.narx(data, map, terms=3)

@@ -1,12 +1,12 @@
 //! What a fit of a nonlinear ARX model found, as a table for people.
 
-use thetahat::estimate::{Procedure, TermStep, TermsOutcome};
+use thetahat::estimate::{Procedure, RunFigures, TermStep, TermsOutcome};
 use thetahat::figures::{error, number, scientific, short};
 use thetahat::model::NonlinearArxModel;
 use thetahat::report::Report;
 use thetahat::text::harmless;
 
-use super::text::{Text, columns, or_dash};
+use super::text::{Table, Text, columns, or_dash};
 use super::{NO_ERROR, criteria, fits, signal};
 
 /// The main figures of a fit of a nonlinear ARX model.
@@ -19,7 +19,28 @@ pub(super) fn table(report: &Report, model: &NonlinearArxModel, width: usize) ->
     let regressors: Vec<String> = model.regressors.iter().map(|one| harmless(&one.name())).collect();
     text.line(&format!("regressors {}{}", regressors.join(", "), scales(model)));
     text.line("");
-    let Procedure::ForwardRegression(outcome) = &report.estimation.procedure else { return text.finish() };
+    let Some(outcome) = report.estimation.procedure.terms() else { return text.finish() };
+    text.table(match report.estimation.procedure {
+        Procedure::ForwardRegression(_) => functions(outcome, model),
+        // Parameters of boxes are many, and samples more: both are in the report.
+        _ => path(outcome),
+    });
+    let estimation = &report.estimation;
+    text.line(&format!(
+        "{} samples, noise variance {}, condition number {}",
+        estimation.samples,
+        number(model.noise_variance),
+        or_dash(estimation.condition, |condition| scientific(condition, 3))
+    ));
+    text.line(&criteria(&estimation.criteria));
+    text.line(&choice(&report.estimation.procedure, outcome));
+    text.line("");
+    fits(&mut text, &report.fit);
+    text.finish()
+}
+
+/// The functions with their parameters, and what the choice says of each.
+fn functions(outcome: &TermsOutcome, model: &NonlinearArxModel) -> Table {
     let held_out = outcome.path.iter().any(|step| step.held_out.is_some());
     let mut head = vec!["function", "parameter", "standard error", "error reduction", "free run"];
     head.extend(held_out.then_some("held out"));
@@ -37,19 +58,28 @@ pub(super) fn table(report: &Report, model: &NonlinearArxModel, width: usize) ->
         cells.extend(held_out.then(|| run(|step| step.held_out.and_then(|run| run.rmse))));
         parameters.row(cells);
     }
-    text.table(parameters);
-    let estimation = &report.estimation;
-    text.line(&format!(
-        "{} samples, noise variance {}, condition number {}",
-        estimation.samples,
-        number(model.noise_variance),
-        or_dash(estimation.condition, |condition| scientific(condition, 3))
-    ));
-    text.line(&criteria(&estimation.criteria));
-    text.line(&choice(outcome, model.parameters.len()));
-    text.line("");
-    fits(&mut text, &report.fit);
-    text.finish()
+    parameters
+}
+
+/// The steps of the choice; that which was taken is marked.
+fn path(outcome: &TermsOutcome) -> Table {
+    let held_out = outcome.path.iter().any(|step| step.held_out.is_some());
+    let mut head = vec!["", "step", "parameters", "RMSE", "free run"];
+    head.extend(held_out.then_some("held out"));
+    let mut steps = columns(&head).words(&[1]).none("a free run over the kept samples would read them");
+    for (at, step) in (1..).zip(&outcome.path) {
+        let run = |run: Option<RunFigures>| or_dash(run.and_then(|run| run.rmse), number);
+        let mut cells = vec![
+            if at == outcome.taken { "*".to_owned() } else { String::new() },
+            harmless(&step.term),
+            step.parameters.to_string(),
+            number(step.rmse),
+            run(step.free_run),
+        ];
+        cells.extend(held_out.then(|| run(step.held_out)));
+        steps.row(cells);
+    }
+    steps
 }
 
 /// What regressors are divided by, where they are.
@@ -69,16 +99,28 @@ fn scales(model: &NonlinearArxModel) -> String {
 }
 
 /// How the functions were chosen.
-fn choice(outcome: &TermsOutcome, taken: usize) -> String {
+fn choice(procedure: &Procedure, outcome: &TermsOutcome) -> String {
     let how = match outcome.selected_by.as_str() {
         "given" => "as many as asked for".to_owned(),
         "validation" => "as many as run best on the validation rows".to_owned(),
         "cv" => "as many as run best on five blocks, each by a model of the others".to_owned(),
         criterion => format!("as many as have the least {criterion}"),
     };
-    format!(
-        "forward regression, {taken} of {} functions, {how} (of {} looked at)",
-        outcome.candidates,
-        outcome.path.len()
-    )
+    let (taken, looked_at) = (outcome.taken, outcome.path.len());
+    match procedure {
+        Procedure::Splits(_) => {
+            format!("local models, grown by splitting: {taken}, {how} (of {looked_at} looked at)")
+        }
+        Procedure::Neighbours(_) => {
+            let asked = outcome.last().map_or_else(String::new, |step| step.term.clone());
+            format!(
+                "{asked} of {} samples, {how}; RMSE: each sample left out in its turn",
+                outcome.candidates
+            )
+        }
+        _ => format!(
+            "forward regression, {taken} of {} functions, {how} (of {looked_at} looked at)",
+            outcome.candidates
+        ),
+    }
 }

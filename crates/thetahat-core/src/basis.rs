@@ -1,5 +1,11 @@
 //! Functions of regressors, of which a nonlinear model is a weighted sum.
 
+mod local;
+mod neighbours;
+
+pub use local::{Local, Membership};
+pub use neighbours::{MOST_NEIGHBOURS, MOST_SLOPES, Neighbours};
+
 use crate::error::check_length;
 use crate::{Error, Real};
 
@@ -9,7 +15,7 @@ use crate::{Error, Real};
 /// g(z) = θ_1 f_1(z) + θ_2 f_2(z) + …
 /// ```
 ///
-/// [`Polynomial`], [`Radial`] and [`Spline`] are views of numbers that may stand in flash. Any other functions can be given by this
+/// [`Polynomial`], [`Radial`], [`Spline`], [`Local`] and [`Neighbours`] are views of numbers that may stand in flash. Any other functions can be given by this
 /// trait; they are computed without a heap, and each is about 1 where z is, so that one prior serves all.
 pub trait Basis<T: Real> {
     /// How many functions there are.

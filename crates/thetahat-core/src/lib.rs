@@ -5,7 +5,7 @@
 //! | parameters of a model | |
 //! |---|---|
 //! | [`RecursiveArx`], [`RecursiveArmax`] | from what is measured and applied, call by call; predict some samples ahead |
-//! | [`RecursiveNarx`] | the same for a weighted sum of functions of lags, a [`Polynomial`], [`Radial`] or [`Spline`] [`Basis`] |
+//! | [`RecursiveNarx`] | the same for a weighted sum of functions of lags, a [`Polynomial`], [`Radial`], [`Spline`] or [`Local`] [`Basis`] |
 //! | [`RecursiveLeastSquares`] | from any regressors; [`Forgetting`] policies that stay bounded, three ways to [`RlsStart`] |
 //! | [`LeastSquares`] | all rows at once: merges with others, says which columns are at fault |
 //! | [`NonlinearArx`] | a stored nonlinear model: predicts, and gives its slopes for an extended Kalman filter |
@@ -142,7 +142,9 @@ pub use nalgebra;
 pub use armax::{ArmaxMethod, ArmaxOrders, RecursiveArmax};
 pub use arx::RecursiveArx;
 pub use augmented::{Augmented, ParametricObservation, ParametricTransition, WithoutParameters};
-pub use basis::{Basis, Polynomial, Radial, Spline};
+pub use basis::{
+    Basis, Local, MOST_NEIGHBOURS, MOST_SLOPES, Membership, Neighbours, Polynomial, Radial, Spline,
+};
 pub use covariance::Covariance;
 pub use detect::{Alarm, ChangeDetector, Chart};
 #[cfg(feature = "autodiff")]

@@ -121,6 +121,22 @@ pub enum Procedure {
     InnovationsLikelihood(EquationsOutcome),
     /// In one step for functions of the regressors, which were chosen one after the other.
     ForwardRegression(TermsOutcome),
+    /// In one step for local models, whose boxes were split one after the other.
+    Splits(TermsOutcome),
+    /// By the samples themselves.
+    Neighbours(TermsOutcome),
+}
+
+impl Procedure {
+    /// The choice of the functions of a nonlinear ARX model.
+    pub fn terms(&self) -> Option<&TermsOutcome> {
+        match self {
+            Self::ForwardRegression(outcome) | Self::Splits(outcome) | Self::Neighbours(outcome) => {
+                Some(outcome)
+            }
+            _ => None,
+        }
+    }
 }
 
 /// How to estimate.
@@ -383,7 +399,9 @@ impl Estimate {
             | Procedure::Robust(_)
             | Procedure::ExactLikelihood(_)
             | Procedure::InnovationsLikelihood(_)
-            | Procedure::ForwardRegression(_) => None,
+            | Procedure::ForwardRegression(_)
+            | Procedure::Splits(_)
+            | Procedure::Neighbours(_) => None,
             Procedure::InstrumentalVariables { .. } | Procedure::RefinedInstrumentalVariables { .. } => {
                 self.covariance
             }

@@ -30,6 +30,7 @@ def narx(
     width: float | None = None,
     units: int | None = None,
     linear: bool | None = None,
+    membership: str | None = None,
     select: str | None = None,
     ridge: float | None = None,
     raw_terms: bool | None = None,
@@ -48,15 +49,17 @@ def narx(
     ----------
     log : Log
         The data.
-    map : {"poly", "rbf", "spline"}
-        Products of the regressors, radial basis functions, or a natural cubic spline of each regressor.
+    map : {"poly", "rbf", "spline", "local", "knn"}
+        Products of the regressors, radial basis functions, a natural cubic spline of each regressor, local linear models grown by
+        splitting, or the nearest samples of the fit.
     ny : int
         Past outputs that g reads: y(k-1), ..., y(k-ny).
     nu : int, or one for each input
         Values of the input that g reads, from ``nk`` on; 0 for a time series.
     nk : int, or one for each input
         Samples from input to first effect; 0 where it acts at once.
-    degree, terms, most_terms, centres, width, units, linear, select, ridge, raw_terms, seed, estimate, validate, split, detrend, offset
+    degree, terms, most_terms, centres, width, units, linear, membership, select, ridge, raw_terms, seed, estimate, validate, split, \
+detrend, offset
         Which functions, what to fit to and how, see `thetahat.NarxOptions`.
 
     Returns

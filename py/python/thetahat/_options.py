@@ -185,9 +185,13 @@ class NarxOptions(TypedDict, total=False):
     width : float
         sigma of exp(-|z - centre|^2/sigma^2), z in standard deviations; so that neighbours overlap, unless it is said.
     units : int
-        Bends of each regressor, for ``"spline"``: 5.
+        Bends of each regressor, for ``"spline"``: 5. How many local models for ``"local"``, or neighbours for ``"knn"``; chosen unless
+        it is said.
     linear : bool
-        Whether a constant and the regressors themselves stand beside radial basis functions: True.
+        Whether a constant and the regressors themselves stand beside radial basis functions; whether local models, and what neighbours
+        say, are planes: True.
+    membership : {"gaussian", "trapezoid", "rectangle"}
+        How local models share the space of the regressors.
     raw_terms : bool
         Leave signals in their own units: else each is divided by its standard deviation.
     seed : int
@@ -208,6 +212,7 @@ class NarxOptions(TypedDict, total=False):
     width: float
     units: int
     linear: bool
+    membership: str
     raw_terms: bool
     seed: int
 

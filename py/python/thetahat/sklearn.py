@@ -357,8 +357,9 @@ class NARXRegressor(_Regressor):
 
     Parameters
     ----------
-    map : {"poly", "rbf", "spline"}, default="poly"
-        Products of the regressors, radial basis functions, or a natural cubic spline of each regressor.
+    map : {"poly", "rbf", "spline", "local", "knn"}, default="poly"
+        Products of the regressors, radial basis functions, a natural cubic spline of each regressor, local linear models grown by
+        splitting, or the nearest samples of the fit.
     ny : int, default=2
         Past outputs that g reads.
     nu : int or sequence of int, default=2
@@ -369,8 +370,8 @@ class NARXRegressor(_Regressor):
         How many samples ahead `predict` and `score` predict. None: the free run, which sees no outputs.
     sample_time : float, default=1.0
         Seconds from one sample to the next.
-    degree, terms, most_terms, centres, width, units, linear, select, ridge, raw_terms, seed, estimate, validate, split, detrend, \
-offset : default=None
+    degree, terms, most_terms, centres, width, units, linear, membership, select, ridge, raw_terms, seed, estimate, validate, split, \
+detrend, offset : default=None
         Which functions, what to fit to and how, as for `thetahat.narx`, see `thetahat.NarxOptions`. Channels are called as the columns
         of a data frame, else u, or u1, u2, …, and y.
 
@@ -419,6 +420,7 @@ offset : default=None
         width: float | None = None,
         units: int | None = None,
         linear: bool | None = None,
+        membership: str | None = None,
         select: str | None = None,
         ridge: float | None = None,
         raw_terms: bool | None = None,
@@ -442,6 +444,7 @@ offset : default=None
         self.width = width
         self.units = units
         self.linear = linear
+        self.membership = membership
         self.select = select
         self.ridge = ridge
         self.raw_terms = raw_terms

@@ -194,6 +194,11 @@ impl RecursiveNarx {
         let KindOfModel::NonlinearArx(own) = &report.model else {
             return Err(refuse("expected a nonlinear ARX model"));
         };
+        if let Map::Neighbours { .. } = own.map {
+            return Err(refuse(
+                "it keeps samples (nearest neighbours), and has no parameters to track; fit another map",
+            ));
+        }
         let lags = own.lag_orders().map_err(|error| error::batch(py, error))?;
         let inputs: Vec<InputOrders> =
             lags.nb.iter().zip(&lags.nk).map(|(&nb, &nk)| InputOrders { nb, nk }).collect();
@@ -242,7 +247,7 @@ impl RecursiveNarx {
     fn terms(model: PyRef<'_, Self>) -> PyResult<Vec<Vec<usize>>> {
         match stepper(&model)?.model().basis().map() {
             Map::Polynomial { terms } => Ok(terms.clone()),
-            Map::Radial { .. } | Map::Spline { .. } => Ok(Vec::new()),
+            _ => Ok(Vec::new()),
         }
     }
 

@@ -3,6 +3,8 @@
 mod candidates;
 pub(crate) mod centres;
 mod figures;
+mod local;
+mod neighbours;
 pub(crate) mod splines;
 
 use faer::linalg::matmul::matmul;
@@ -14,6 +16,7 @@ pub(crate) use candidates::Candidates;
 use candidates::Products;
 pub use figures::{RunFigures, TermStep, TermsOutcome};
 use figures::{Sums, run};
+pub(crate) use local::Growth;
 
 use super::{Criteria, InformationCriterion};
 use crate::Error;
@@ -54,11 +57,40 @@ pub(crate) struct Samples<'l> {
     ridge: f64,
 }
 
-/// What a choice found: a path, and how many of it to take.
+/// What a choice found: a path, and how many steps of it to take.
 #[derive(Debug)]
 pub(crate) struct Chosen {
     pub(crate) map: Map,
     pub(crate) steps: Vec<TermStep>,
+    pub(crate) taken: usize,
+}
+
+impl Count {
+    /// The best step, `least` or a later one, counted from 1.
+    fn best(&self, steps: &[TermStep], least: usize, samples: usize) -> usize {
+        let all = least..=steps.len();
+        match self {
+            Self::Given(count) => *count,
+            Self::Least(criterion) => {
+                let value = |count: &usize| {
+                    let step = &steps[*count - 1];
+                    let criteria = Criteria::new(step.rmse.powi(2), step.parameters, samples);
+                    criteria.of(*criterion).unwrap_or(f64::INFINITY)
+                };
+                all.min_by(|one, other| value(one).total_cmp(&value(other))).unwrap_or(1)
+            }
+            Self::HeldOut(_) | Self::Blocks => {
+                let rank = |count: &usize| {
+                    steps[*count - 1].held_out.map_or((true, f64::INFINITY), RunFigures::rank)
+                };
+                let better = |one: &usize, other: &usize| {
+                    let ((strays, rmse), (others, worse)) = (rank(one), rank(other));
+                    strays.cmp(&others).then(rmse.total_cmp(&worse))
+                };
+                all.min_by(better).unwrap_or(1)
+            }
+        }
+    }
 }
 
 /// A solved regression.
@@ -120,9 +152,22 @@ impl<'l> Samples<'l> {
 
     /// z of all samples.
     pub(crate) fn points(&self) -> Vec<Vec<f64>> {
-        let point =
-            |t: &usize| self.taps.iter().map(|(source, lag)| self.signals[*source][t - lag]).collect();
-        self.rows.iter().map(point).collect()
+        self.rows.iter().map(|t| self.point(*t)).collect()
+    }
+
+    fn point(&self, t: usize) -> Vec<f64> {
+        self.taps.iter().map(|(source, lag)| self.signals[*source][t - lag]).collect()
+    }
+
+    /// The estimation rows in blocks, each held out in its turn.
+    fn blocks(&self) -> impl Iterator<Item = &[usize]> {
+        self.rows.chunks(self.rows.len().div_ceil(BLOCKS).max(1))
+    }
+
+    /// The mean square of the output, in its units.
+    fn mean_square(&self, rows: &[usize]) -> f64 {
+        let values = rows.iter().map(|t| self.signals[0][*t] * self.head.output_scale);
+        values.map(|value| value * value).sum::<f64>() / rows.len().max(1) as f64
     }
 
     fn fill(&self, (source, lag): (usize, usize), rows: &[usize], into: &mut [f64]) {
@@ -224,11 +269,8 @@ impl<'l> Samples<'l> {
     ) -> Result<Chosen, Error> {
         let always = candidates.always();
         let most = most.max(always).min(self.rows.len().saturating_sub(1));
-        let size = self.rows.len().div_ceil(BLOCKS).max(1);
         let blocks: Vec<(&[usize], Products)> = match count {
-            Count::Blocks => {
-                self.rows.chunks(size).map(|rows| (rows, self.products(candidates, rows))).collect()
-            }
+            Count::Blocks => self.blocks().map(|rows| (rows, self.products(candidates, rows))).collect(),
             _ => Vec::new(),
         };
         let products = merged(blocks.iter().map(|(_, products)| products))
@@ -247,28 +289,9 @@ impl<'l> Samples<'l> {
             Count::Given(_) | Count::Least(_) => vec![None; lengths],
         };
         let steps = self.steps(candidates, &products, &path, &held_out)?;
-        let least = always.clamp(1, lengths);
-        let best = match count {
-            Count::Given(count) => *count,
-            Count::Least(criterion) => {
-                let value = |count: &usize| {
-                    let mse = steps[*count - 1].rmse.powi(2);
-                    Criteria::new(mse, *count, products.rows()).of(*criterion).unwrap_or(f64::INFINITY)
-                };
-                (least..=lengths).min_by(|one, other| value(one).total_cmp(&value(other))).unwrap_or(1)
-            }
-            Count::HeldOut(_) | Count::Blocks => {
-                let rank =
-                    |count: &usize| held_out[*count - 1].map_or((true, f64::INFINITY), RunFigures::rank);
-                let better = |one: &usize, other: &usize| {
-                    let ((strays, rmse), (others, worse)) = (rank(one), rank(other));
-                    strays.cmp(&others).then(rmse.total_cmp(&worse))
-                };
-                (least..=lengths).min_by(better).unwrap_or(1)
-            }
-        };
-        let places = candidates.ordered(path.places(best));
-        Ok(Chosen { map: candidates.map(&places, self.taps.len()), steps })
+        let taken = count.best(&steps, always.clamp(1, lengths), products.rows());
+        let places = candidates.ordered(path.places(taken));
+        Ok(Chosen { map: candidates.map(&places, self.taps.len()), steps, taken })
     }
 
     /// The names of the regressors.
@@ -340,6 +363,7 @@ impl<'l> Samples<'l> {
             let run = || RunFigures::of(&self.on_path(candidates, path, at + 1), self.log, &rows);
             Ok(TermStep {
                 term: candidates.name(chosen.place, &names),
+                parameters: at + 1,
                 error_reduction: chosen.reduction,
                 aliases: chosen.aliases.iter().map(|place| candidates.name(*place, &names)).collect(),
                 rmse: (path.left(at + 1).max(0.0) * variance).sqrt(),

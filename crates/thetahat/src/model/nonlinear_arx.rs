@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 pub use functions::Functions;
 pub(crate) use map::Evaluator;
-pub use map::Map;
+pub use map::{Map, Membership};
 
 use super::fitted::{only, only_variance};
 use super::orders::lag_name;

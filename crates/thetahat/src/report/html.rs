@@ -20,10 +20,9 @@ use page::{Block, Page, Section};
 use super::{Report, Validated, Validation};
 use crate::Error;
 use crate::data::{Rows, Source};
-use crate::estimate::Procedure;
 use crate::figures::{self, fixed};
 use crate::inspect::Inspection;
-use crate::model::{EquationsModel, Model, NonlinearArxModel, PolynomialModel};
+use crate::model::{EquationsModel, Map, Model, NonlinearArxModel, PolynomialModel};
 use crate::validate::{Fit, Part, Residuals};
 
 /// The channels of a log of very many that are on its page.
@@ -449,13 +448,16 @@ fn of_model(report: &Report) -> Vec<Section> {
 
 fn of_nonlinear_arx(report: &Report, model: &NonlinearArxModel) -> Vec<Section> {
     let mut choice = Section::new("Choice of functions");
-    if let Procedure::ForwardRegression(outcome) = &report.estimation.procedure {
+    if let Some(outcome) = report.estimation.procedure.terms() {
         choice.chart(charts::complexity(outcome));
-        choice.table(tables::path(outcome, model.parameters.len()));
+        choice.table(tables::path(outcome));
     }
     let mut section = Section::new("Model");
     section.chart(charts::slices(model));
-    section.table(tables::functions(model));
+    // Samples are many, and in the report.
+    if !matches!(model.map, Map::Neighbours { .. }) {
+        section.table(tables::functions(model));
+    }
     section.table(tables::regressors(model));
     section.table(tables::estimation(&report.estimation, Some(model.noise_variance)));
     vec![choice, section]

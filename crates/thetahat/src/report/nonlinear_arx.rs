@@ -10,7 +10,7 @@ use super::shares::Shares;
 use crate::data::{Log, Offset, Rows, Source, digests};
 use crate::estimate::{
     Criteria, Procedure, TermsOutcome,
-    nonlinear_arx::{Candidates, Chosen, Count, Samples, Solved, centres, splines},
+    nonlinear_arx::{Candidates, Chosen, Count, Growth, Samples, Solved, centres, splines},
 };
 use crate::model::{Map, Model, NonlinearArxModel, Regressor, Signal};
 use crate::regression::Monomials;
@@ -91,9 +91,12 @@ pub fn fit_nonlinear_arx(log: &Log, sources: &[Source], plan: &NonlinearArxPlan)
         Samples::new(&deviations, head.clone(), &segments, plan.ridge)
     };
     let all = samples(&estimation)?;
-    let candidates = candidates(&plan.map, &all)?;
     let select = plan.select.unwrap_or(if compared_on.is_empty() { Select::Cv } else { Select::Validation });
-    let (count, selected_by) = match (plan.terms, select) {
+    let given = match plan.map {
+        MapPlan::Local { units, .. } | MapPlan::Neighbours { units, .. } => units,
+        _ => plan.terms,
+    };
+    let (count, selected_by) = match (given, select) {
         (Some(count), _) => (Count::Given(count), "given".to_owned()),
         (None, Select::Criterion(criterion)) => (Count::Least(criterion), criterion.word().to_owned()),
         (None, Select::Validation) => (Count::HeldOut(compared_on), "validation".to_owned()),
@@ -104,9 +107,29 @@ pub fn fit_nonlinear_arx(log: &Log, sources: &[Source], plan: &NonlinearArxPlan)
         (Some(parts), Count::HeldOut(_)) => Some(samples(&parts.estimation)?),
         _ => None,
     };
-    let most = plan.terms.unwrap_or(plan.most);
-    let Chosen { map, steps } = all.choose(&candidates, most, &count, first_part.as_ref())?;
-    let Solved { model, mse, condition } = all.solve(map)?;
+    let (chosen_on, most) = (first_part.as_ref(), plan.steps());
+    let functions: usize;
+    let by: fn(TermsOutcome) -> Procedure;
+    let (Chosen { steps, taken, .. }, Solved { model, mse, condition }) = match plan.map {
+        MapPlan::Local { membership, planes, .. } => {
+            let chosen = all.grow(Growth { membership, planes, most }, &count, chosen_on)?;
+            (functions, by) = (chosen.steps.len(), Procedure::Splits);
+            let solved = all.solve(chosen.map.clone())?;
+            (chosen, solved)
+        }
+        MapPlan::Neighbours { planes, .. } => {
+            let found = all.keep(planes, &count, chosen_on)?;
+            (functions, by) = (found.1.model.parameters.len(), Procedure::Neighbours);
+            found
+        }
+        _ => {
+            let candidates = candidates(&plan.map, &all)?;
+            let chosen = all.choose(&candidates, most, &count, chosen_on)?;
+            (functions, by) = (candidates.count(all.regressors()), Procedure::ForwardRegression);
+            let solved = all.solve(chosen.map.clone())?;
+            (chosen, solved)
+        }
+    };
 
     let missing = names.iter().map(|name| {
         let values = &log.channel(name)?.values;
@@ -130,11 +153,15 @@ pub fn fit_nonlinear_arx(log: &Log, sources: &[Source], plan: &NonlinearArxPlan)
         time_gaps: log.gaps(),
         estimation,
     };
+    // Samples are no parameters: as many as there are of them for each that is asked stand for one.
+    let parameters =
+        steps.get(taken.saturating_sub(1)).map_or(model.parameters.len(), |step| step.parameters);
     let estimation = Estimation {
-        procedure: Procedure::ForwardRegression(TermsOutcome {
-            candidates: candidates.count(all.regressors()),
+        procedure: by(TermsOutcome {
+            candidates: functions,
             selected_by,
             ridge: Some(plan.ridge).filter(|ridge| *ridge > 0.0),
+            taken,
             path: steps,
         }),
         initial: None,
@@ -142,7 +169,7 @@ pub fn fit_nonlinear_arx(log: &Log, sources: &[Source], plan: &NonlinearArxPlan)
         slope: None,
         samples: all.count(),
         mse,
-        criteria: Criteria::new(mse, model.parameters.len(), all.count()),
+        criteria: Criteria::new(mse, parameters, all.count()),
         condition,
     };
     let mut report = Report {
@@ -183,6 +210,10 @@ fn candidates(map: &MapPlan, samples: &Samples<'_>) -> Result<Candidates, Error>
             return Ok(Candidates::Functions { map, always: regressors + 1 });
         }
         MapPlan::Radial { centres, width, linear } => (*centres, *width, *linear),
+        // They are not chosen among functions.
+        MapPlan::Local { .. } | MapPlan::Neighbours { .. } => {
+            return Err(Error::argument("map", "it has no functions to choose from"));
+        }
     };
     if let Some(width) = width.filter(|width| !(width.is_finite() && *width > 0.0)) {
         return Err(Error::argument("width", format!("{width} is not a positive number")));
@@ -313,8 +344,17 @@ fn head(
 /// What a careful reader should know.
 fn warnings(report: &Report, model: &NonlinearArxModel) -> Vec<String> {
     let mut warnings = Vec::new();
-    let Procedure::ForwardRegression(outcome) = &report.estimation.procedure else { return warnings };
-    let taken = &outcome.path[..model.parameters.len().min(outcome.path.len())];
+    let Some(outcome) = report.estimation.procedure.terms() else { return warnings };
+    let taken = &outcome.path[..outcome.taken.min(outcome.path.len())];
+    if let Map::Neighbours { points, .. } = &model.map
+        && points.len() < report.estimation.samples
+    {
+        warnings.push(format!(
+            "the model keeps {} of {} samples, evenly chosen: a distance to each is a cost of every prediction",
+            points.len(),
+            report.estimation.samples
+        ));
+    }
     if let Some(run) = taken.last().and_then(|step| step.free_run).filter(|run| !run.in_range) {
         let what = if run.rmse.is_some() {
             "leaves 1.1 times the range of the output"

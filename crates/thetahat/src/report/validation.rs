@@ -382,9 +382,8 @@ fn test_residuals(report: &Report, on_log: &dyn OnLog, plan: &ValidationPlan, va
     let Ok(each) = on_log.tested() else { return };
     let relation = match (validation.in_sample, &report.estimation.procedure) {
         // The parameters of equations are none of the noise; those of functions are not of the model that the tests know.
-        (InSample::No, _) | (_, Procedure::InnovationsLikelihood(_) | Procedure::ForwardRegression(_)) => {
-            Relation::Fresh
-        }
+        (InSample::No, _) | (_, Procedure::InnovationsLikelihood(_)) => Relation::Fresh,
+        (_, procedure) if procedure.terms().is_some() => Relation::Fresh,
         (_, Procedure::InstrumentalVariables { .. }) => Relation::Instrumental,
         _ => Relation::Fitted,
     };

@@ -20,6 +20,11 @@ pub(super) fn check_map(orders: &Orders, map: &Map, names: &[String], plan: &Tra
             "of a nonlinear model the constant is one of its functions; leave it out",
         ));
     }
+    if let Map::Neighbours { .. } = map {
+        return Err(Error::report(
+            "the model keeps samples (nearest neighbours), and has no parameters to track; fit another map",
+        ));
+    }
     map.check(regressors).map_err(|message| Error::argument("map", message))?;
     let count = map.parameters(regressors);
     if count == 0 || count > MOST_FUNCTIONS {

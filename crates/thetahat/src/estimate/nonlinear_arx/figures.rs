@@ -23,21 +23,35 @@ pub struct TermsOutcome {
     /// What was added to the squares of the functions, in samples; none: nothing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ridge: Option<f64>,
-    /// The functions in the order of their choice, those that were not taken too.
+    /// How many steps of the path the model has; of nearest neighbours, which step it is.
+    pub taken: usize,
+    /// The functions in the order of their choice, those that were not taken too; of local models the splits, and of nearest neighbours
+    /// the numbers that were tried.
     pub path: Vec<TermStep>,
 }
 
-/// A step of the choice: the model with this term and those before.
+impl TermsOutcome {
+    /// The step that the model ends with.
+    pub fn last(&self) -> Option<&TermStep> {
+        self.path.get(self.taken.checked_sub(1)?)
+    }
+}
+
+/// A step of the choice: the model with this term, or split, and those before.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct TermStep {
-    /// The function that is added.
+    /// The function that is added, such as u(k-1)^2; the split of a box, such as split(u(k-1), 0.5); or a number of neighbours.
     pub term: String,
-    /// Its error reduction ratio: the share of the sum of squared outputs that it explains beside those before.
+    /// The parameters of the model; of nearest neighbours, samples for each that is asked.
+    pub parameters: usize,
+    /// Its error reduction ratio: the share of the sum of squared outputs that it explains beside those before; of nearest neighbours,
+    /// the share that they explain.
     pub error_reduction: f64,
     /// Functions that can no longer be told from sums of those chosen.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub aliases: Vec<String>,
-    /// The root mean square of the errors one step ahead on the estimation rows, in units of the output.
+    /// The root mean square of the errors one step ahead on the estimation rows, in units of the output; of nearest neighbours, each
+    /// sample being left out in its turn.
     pub rmse: f64,
     /// The free run on the estimation rows; none of a step after which functions that are always there are still to come.
     #[serde(default, skip_serializing_if = "Option::is_none")]

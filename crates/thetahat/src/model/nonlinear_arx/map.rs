@@ -2,7 +2,10 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use thetahat_core::{Basis, Polynomial, Radial, Spline};
+use thetahat_core::{
+    Basis, Local, MOST_NEIGHBOURS, MOST_SLOPES, Membership as CoreMembership, Neighbours, Polynomial, Radial,
+    Spline,
+};
 
 use crate::Error;
 use crate::regression::Monomials;
@@ -38,6 +41,51 @@ pub enum Map {
         /// For each bend its knots.
         knots: Vec<[f64; 3]>,
     },
+    /// Local models, planes or constants, each weighted by the membership of z in its box over the sum of all (Nelles 2001, section
+    /// 13.3); outside of the domain weights are those of its nearest point.
+    Local {
+        /// What makes weights of boxes.
+        membership: Membership,
+        /// Whether each is a plane, 1 and each regressor: else it is a constant.
+        planes: bool,
+        /// For each local model its box: where the side of each regressor begins and ends.
+        boxes: Vec<Vec<[f64; 2]>>,
+        /// For each regressor its range, which the boxes divide.
+        domain: Vec<[f64; 2]>,
+    },
+    /// Samples, whose outputs are the parameters: those nearest to z give their mean, or a plane through them (Stone 1977; Hastie,
+    /// Tibshirani and Friedman 2009, section 13.3).
+    Neighbours {
+        /// How many are asked.
+        count: usize,
+        /// Whether they give a plane: else their mean.
+        planes: bool,
+        /// z of each.
+        points: Vec<Vec<f64>>,
+    },
+}
+
+/// How the weight of a local model depends on where a point lies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Membership {
+    /// 1 in its box, 0 outside.
+    Rectangle,
+    /// The product, over the regressors, of 1 in the middle half of its box's side, from there a line down to 0 a quarter of a side
+    /// outside.
+    Trapezoid,
+    /// A Gaussian about the middle of its box, with a third of each side for its standard deviations.
+    Gaussian,
+}
+
+impl Membership {
+    pub(crate) fn of_the_core(self) -> CoreMembership {
+        match self {
+            Self::Rectangle => CoreMembership::Rectangle,
+            Self::Trapezoid => CoreMembership::Trapezoid,
+            Self::Gaussian => CoreMembership::Gaussian,
+        }
+    }
 }
 
 impl Map {
@@ -59,6 +107,8 @@ impl Map {
             Self::Polynomial { terms } => terms.len(),
             Self::Radial { centres, linear, .. } => centres.len() + if *linear { regressors + 1 } else { 0 },
             Self::Spline { knots, .. } => knots.len() + regressors + 1,
+            Self::Local { planes, boxes, .. } => boxes.len() * if *planes { regressors + 1 } else { 1 },
+            Self::Neighbours { points, .. } => points.len(),
         }
     }
 
@@ -83,6 +133,8 @@ impl Map {
                 let (regressors, knots) = own.map(|place| (regressors[place], knots[place])).unzip();
                 Self::Spline { regressors, knots }
             }
+            // Those of a local model belong together, and so do all samples.
+            Self::Local { .. } | Self::Neighbours { .. } => self.clone(),
         }
     }
 
@@ -100,10 +152,15 @@ impl Map {
                 format!("radial basis functions, {} centre{}", centres.len(), plural(centres.len()))
             }
             Self::Spline { knots, .. } => format!("splines, {} bend{}", knots.len(), plural(knots.len())),
+            Self::Local { boxes, .. } => format!("local models, {}", boxes.len()),
+            Self::Neighbours { count, points, .. } => {
+                format!("nearest neighbours, {count} of {} samples", points.len())
+            }
         }
     }
 
-    /// The functions by name, those of the regressors being given: y(k-1)^2*u(k), rbf1, or bend(u(k), 0.5), where the middle knot is 0.5.
+    /// The functions by name, those of the regressors being given: y(k-1)^2*u(k), rbf1, bend(u(k), 0.5) where the middle knot is 0.5,
+    /// local1*u(k), or sample1.
     pub(crate) fn names(&self, regressors: &[String]) -> Vec<String> {
         match self {
             Self::Polynomial { terms } => terms.iter().map(|term| product(term, regressors)).collect(),
@@ -116,6 +173,17 @@ impl Map {
                     format!("bend({}, {})", regressors.get(*own).map_or("?", String::as_str), short(*middle))
                 });
                 path(regressors).chain(bends).collect()
+            }
+            Self::Local { planes, boxes, .. } => {
+                let slopes = if *planes { regressors } else { &[] };
+                let each = (1..=boxes.len()).flat_map(|place| {
+                    let own = slopes.iter().map(move |name| format!("local{place}*{name}"));
+                    std::iter::once(format!("local{place}")).chain(own)
+                });
+                each.collect()
+            }
+            Self::Neighbours { points, .. } => {
+                (1..=points.len()).map(|place| format!("sample{place}")).collect()
             }
         }
     }
@@ -157,6 +225,37 @@ impl Map {
                     None => Ok(()),
                 }
             }
+            Self::Local { boxes, domain, .. } => {
+                let rising = |[low, high]: &[f64; 2]| low.is_finite() && low < high && high.is_finite();
+                let fits = |sides: &Vec<[f64; 2]>| sides.len() == regressors && sides.iter().all(rising);
+                if !fits(domain) {
+                    return Err("domain is not two rising numbers for each regressor".to_owned());
+                }
+                match boxes.iter().position(|sides| !fits(sides)) {
+                    Some(place) => {
+                        Err(format!("boxes[{place}] is not two rising numbers for each regressor"))
+                    }
+                    None => Ok(()),
+                }
+            }
+            Self::Neighbours { count, planes, points } => {
+                let point =
+                    |point: &Vec<f64>| point.len() == regressors && point.iter().all(|z| z.is_finite());
+                if let Some(place) = points.iter().position(|own| !point(own)) {
+                    return Err(format!("points[{place}] is no point of {regressors} regressors"));
+                }
+                if *count == 0 || *count > points.len().min(MOST_NEIGHBOURS) {
+                    return Err(format!(
+                        "count is not from 1 to {} of {} points",
+                        points.len().min(MOST_NEIGHBOURS),
+                        points.len()
+                    ));
+                }
+                if *planes && regressors > MOST_SLOPES {
+                    return Err(format!("planes are of {MOST_SLOPES} regressors at most"));
+                }
+                Ok(())
+            }
         }
     }
 }
@@ -194,6 +293,10 @@ enum Kind {
     Radial { centres: Vec<f64>, inverse_squares: Vec<f64>, linear: bool },
     /// The regressor and the knots of each bend.
     Spline { bent: Vec<u16>, knots: Vec<[f64; 3]> },
+    /// The boxes one after the other.
+    Local { membership: CoreMembership, planes: bool, sides: Vec<[f64; 2]>, domain: Vec<[f64; 2]> },
+    /// The points one after the other.
+    Neighbours { count: usize, planes: bool, points: Vec<f64> },
 }
 
 impl Evaluator {
@@ -218,6 +321,15 @@ impl Evaluator {
                 let bent = regressors.iter().map(|regressor| *regressor as u16);
                 Kind::Spline { bent: bent.collect(), knots: knots.clone() }
             }
+            Map::Local { membership, planes, boxes, domain } => Kind::Local {
+                membership: membership.of_the_core(),
+                planes: *planes,
+                sides: boxes.concat(),
+                domain: domain.clone(),
+            },
+            Map::Neighbours { count, planes, points } => {
+                Kind::Neighbours { count: *count, planes: *planes, points: points.concat() }
+            }
         };
         Self { theta, kind }
     }
@@ -229,6 +341,10 @@ impl Evaluator {
 
     /// g(z) = sum_j theta_j f_j(z).
     pub(crate) fn value(&self, z: &[f64]) -> f64 {
+        // Most samples have no weight.
+        if let Kind::Neighbours { count, planes, points } = &self.kind {
+            return neighbours(z.len(), points, *count, *planes).value(&self.theta, z);
+        }
         let mut sum = 0.0;
         self.each(z, |j, f| sum += self.theta[j] * f);
         sum
@@ -247,6 +363,12 @@ impl Evaluator {
                 radial(z.len(), centres, inverse_squares, *linear).each(z, take);
             }
             Kind::Spline { bent, knots } => Spline { regressors: z.len(), bent, knots }.each(z, take),
+            Kind::Local { membership, planes, sides, domain } => {
+                Local { membership: *membership, planes: *planes, sides, domain }.each(z, take);
+            }
+            Kind::Neighbours { count, planes, points } => {
+                neighbours(z.len(), points, *count, *planes).each(z, take);
+            }
         }
     }
 
@@ -263,8 +385,22 @@ impl Evaluator {
             Kind::Spline { bent, knots } => {
                 Spline { regressors: z.len(), bent, knots }.add_slopes(&self.theta, z, into);
             }
+            Kind::Local { membership, planes, sides, domain } => {
+                Local { membership: *membership, planes: *planes, sides, domain }.add_slopes(
+                    &self.theta,
+                    z,
+                    into,
+                );
+            }
+            Kind::Neighbours { count, planes, points } => {
+                neighbours(z.len(), points, *count, *planes).add_slopes(&self.theta, z, into);
+            }
         }
     }
+}
+
+fn neighbours(regressors: usize, points: &[f64], count: usize, planes: bool) -> Neighbours<'_, f64> {
+    Neighbours { regressors, points, count, planes }
 }
 
 fn radial<'a>(
@@ -280,9 +416,21 @@ fn radial<'a>(
 mod tests {
     use super::*;
 
-    fn maps() -> [Map; 4] {
+    fn maps() -> Vec<Map> {
         let centres = vec![vec![0.2, -0.4], vec![1.0, 0.3], vec![-0.7, 0.9]];
-        [
+        let local = |membership, planes| Map::Local {
+            membership,
+            planes,
+            boxes: vec![
+                vec![[-1.0, 0.0], [-1.0, 1.0]],
+                vec![[0.0, 1.0], [-1.0, 0.0]],
+                vec![[0.0, 1.0], [0.0, 1.0]],
+            ],
+            domain: vec![[-1.0, 1.0]; 2],
+        };
+        let points: Vec<Vec<f64>> =
+            (0..20).map(|k| vec![f64::from(k % 5) * 0.3 - 0.7, f64::from(k % 4) * 0.5 - 1.0]).collect();
+        vec![
             Map::Polynomial { terms: vec![vec![], vec![0], vec![0, 0, 1], vec![1, 1]] },
             Map::Radial { centres: centres.clone(), widths: vec![0.8, 1.0, 2.0], linear: false },
             Map::Radial { centres, widths: vec![0.8, 1.0, 2.0], linear: true },
@@ -290,6 +438,12 @@ mod tests {
                 regressors: vec![0, 1, 1],
                 knots: vec![[-1.0, 0.5, 1.0], [-1.5, -1.0, 0.5], [-3.0, -2.5, -2.0]],
             },
+            local(Membership::Rectangle, true),
+            local(Membership::Trapezoid, true),
+            local(Membership::Gaussian, true),
+            local(Membership::Trapezoid, false),
+            Map::Neighbours { count: 3, planes: false, points: points.clone() },
+            Map::Neighbours { count: 20, planes: true, points },
         ]
     }
 
@@ -328,6 +482,9 @@ mod tests {
             maps()[3].names(&regressors),
             ["1", "y(k-1)", "u(k)", "bend(y(k-1), 0.5)", "bend(u(k), -1)", "bend(u(k), -2.5)"]
         );
+        assert_eq!(maps()[4].names(&regressors)[3..6], ["local2", "local2*y(k-1)", "local2*u(k)"]);
+        assert_eq!(maps()[7].names(&regressors), ["local1", "local2", "local3"]);
+        assert_eq!(maps()[9].names(&regressors)[19], "sample20");
     }
 
     #[test]
@@ -339,6 +496,15 @@ mod tests {
             [(vec![0], vec![]), (vec![1], vec![[0.0, 1.0, 2.0]]), (vec![0], vec![[0.0, 0.0, 1.0]])]
         {
             assert!(Map::Spline { regressors, knots }.check(1).is_err());
+        }
+        let (membership, sides) = (Membership::Gaussian, vec![[0.0, 1.0]]);
+        for (boxes, domain) in
+            [(vec![vec![]], sides.clone()), (vec![sides.clone()], vec![]), (vec![vec![[1.0, 1.0]]], sides)]
+        {
+            assert!(Map::Local { membership, planes: true, boxes, domain }.check(1).is_err());
+        }
+        for (count, points) in [(0, vec![vec![0.0]]), (2, vec![vec![0.0]]), (1, vec![vec![]])] {
+            assert!(Map::Neighbours { count, planes: false, points }.check(1).is_err());
         }
     }
 }

@@ -55,10 +55,11 @@ pub(super) fn regressors(model: &NonlinearArxModel) -> Table {
 }
 
 /// The path of a choice of functions.
-pub(super) fn path(outcome: &TermsOutcome, taken: usize) -> Table {
+pub(super) fn path(outcome: &TermsOutcome) -> Table {
     let head = [
         "",
         "function",
+        "parameters",
         "error reduction ratio",
         "RMSE, 1 step ahead",
         "free run",
@@ -68,8 +69,9 @@ pub(super) fn path(outcome: &TermsOutcome, taken: usize) -> Table {
     let mut table = Table::new("Path of the choice", &head);
     for (at, step) in outcome.path.iter().enumerate() {
         table.row([
-            format!("{}{}", at + 1, if at + 1 == taken { " taken" } else { "" }),
+            format!("{}{}", at + 1, if at + 1 == outcome.taken { " taken" } else { "" }),
             step.term.clone(),
+            step.parameters.to_string(),
             scientific(step.error_reduction, 3),
             number(step.rmse),
             or_dash(step.free_run.and_then(|run| run.rmse), number),
@@ -254,6 +256,19 @@ fn procedure(procedure: &Procedure) -> String {
         Procedure::ForwardRegression(outcome) => {
             format!(
                 "forward regression among {} functions, their number by {}",
+                outcome.candidates, outcome.selected_by
+            )
+        }
+        Procedure::Splits(outcome) => {
+            format!(
+                "local models by splits, {} looked at, their number by {}",
+                outcome.path.len(),
+                outcome.selected_by
+            )
+        }
+        Procedure::Neighbours(outcome) => {
+            format!(
+                "{} samples kept, the number of neighbours by {}",
                 outcome.candidates, outcome.selected_by
             )
         }

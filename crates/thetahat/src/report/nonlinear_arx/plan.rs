@@ -2,10 +2,13 @@
 
 use crate::Error;
 use crate::data::{Detrend, Rows, Split};
+use crate::model::Membership;
 use crate::select::Select;
 
-/// Functions that a choice takes at most, unless it is said otherwise.
+/// Functions that a choice looks at, unless it is said otherwise.
 const MOST: usize = 40;
+/// Local models that it looks at.
+const MOST_LOCAL: usize = 10;
 
 /// Which lags of an input a nonlinear ARX model reads: `lags` of them from `delay` on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,6 +40,22 @@ pub enum MapPlan {
     Spline {
         /// Bends of each regressor, at knots that divide its range over the estimation rows evenly.
         units: usize,
+    },
+    /// Local models, grown by splitting boxes of the regressors in half where errors are largest.
+    Local {
+        /// What makes weights of boxes.
+        membership: Membership,
+        /// Whether each is a plane: else it is a constant.
+        planes: bool,
+        /// How many; none: `select` says it.
+        units: Option<usize>,
+    },
+    /// The samples nearest to the regressors.
+    Neighbours {
+        /// Whether they give a plane: else their mean.
+        planes: bool,
+        /// How many; none: `select` says it.
+        units: Option<usize>,
     },
 }
 
@@ -92,8 +111,8 @@ pub struct NonlinearArxPlan {
     pub map: MapPlan,
     /// How many functions are taken; none: `select` says it.
     pub terms: Option<usize>,
-    /// How many functions a choice looks at.
-    pub most: usize,
+    /// How many functions a choice looks at; none: 40, and 10 local models.
+    pub most: Option<usize>,
     /// What makes one number of functions better than another; none: the free run on the validation rows where there are some, else that
     /// on five blocks of the estimation rows.
     pub select: Option<Select>,
@@ -118,10 +137,18 @@ impl NonlinearArxPlan {
             input_lags: vec![InputLags { lags: 2, delay: 1 }; inputs.len()],
             map: MapPlan::Polynomial { degree: 2 },
             terms: None,
-            most: MOST,
+            most: None,
             select: None,
             ridge: 0.0,
             raw_terms: false,
+        }
+    }
+
+    /// How many steps a choice takes at most.
+    pub(super) fn steps(&self) -> usize {
+        match self.map {
+            MapPlan::Local { units, .. } => units.or(self.most).unwrap_or(MOST_LOCAL),
+            _ => self.terms.or(self.most).unwrap_or(MOST),
         }
     }
 
@@ -162,7 +189,33 @@ impl NonlinearArxPlan {
                 "the model reads nothing; give lags of the output or of an input",
             ));
         }
-        if self.terms == Some(0) || self.most == 0 {
+        if let MapPlan::Local { units, .. } | MapPlan::Neighbours { units, .. } = self.map {
+            if self.terms.is_some() {
+                return Err(Error::argument(
+                    "terms",
+                    "local models and neighbours are numbers of `units`; leave it out, or give `units`",
+                ));
+            }
+            if units == Some(0) {
+                return Err(Error::argument(
+                    "units",
+                    "a model has one local model, or asks one neighbour, at least",
+                ));
+            }
+            if units.is_some() && self.select.is_some() {
+                return Err(Error::argument(
+                    "select",
+                    "the number of `units` is given; leave out one of the two",
+                ));
+            }
+            if self.most.is_some() && matches!(self.map, MapPlan::Neighbours { .. }) {
+                return Err(Error::argument("most-terms", "it is not of neighbours; leave it out"));
+            }
+        }
+        if matches!(self.map, MapPlan::Neighbours { .. }) && self.ridge > 0.0 {
+            return Err(Error::argument("ridge", "neighbours are not solved for; leave it out"));
+        }
+        if self.terms == Some(0) || self.most == Some(0) {
             return Err(Error::argument("terms", "a model has one function at least"));
         }
         if !(self.ridge.is_finite() && self.ridge >= 0.0) {

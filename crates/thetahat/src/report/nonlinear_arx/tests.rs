@@ -1,3 +1,6 @@
+mod approximation;
+mod boxes_and_neighbours;
+
 use super::*;
 use crate::data::{Channel, Detrend};
 use crate::estimate::Constant;

@@ -14,7 +14,8 @@ const POINTS: usize = 101;
 /// Errors against the number of parameters.
 pub(crate) fn complexity(outcome: &TermsOutcome) -> Drawn {
     let curve = |name: &str, values: Vec<Option<f64>>, position: usize| -> Option<Object> {
-        let there = (1_usize..).zip(values).filter_map(|(count, value)| Some((count as f64, value?)));
+        let there = outcome.path.iter().zip(values);
+        let there = there.filter_map(|(step, value)| Some((step.parameters as f64, value?)));
         let (x, y): (Vec<f64>, Vec<f64>) = there.unzip();
         (!x.is_empty())
             .then(|| line(name, Curve { x, y: rounded(&y) }, position).with("mode", "lines+markers"))

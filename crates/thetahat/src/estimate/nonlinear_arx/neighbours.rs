@@ -1,0 +1,141 @@
+//! Nearest neighbours: samples are the model, and the choice is how many of them are asked.
+
+use rayon::prelude::*;
+use thetahat_core::{MOST_NEIGHBOURS, MOST_SLOPES, Neighbours};
+
+use super::figures::{Sums, run};
+use super::{Chosen, Count, RunFigures, Samples, Solved, TermStep, as_rows};
+use crate::Error;
+use crate::model::{Map, NonlinearArxModel, Parameter};
+
+/// Samples that are kept, at most: evenly chosen of more.
+const KEPT: usize = 5000;
+/// Numbers of neighbours that are tried.
+const COUNTS: [usize; 10] = [1, 2, 3, 5, 8, 13, 21, 34, 55, 64];
+
+impl Samples<'_> {
+    /// The model of some samples that asks `count` of them; its noise is not known.
+    fn kept(&self, rows: &[usize], count: usize, planes: bool) -> NonlinearArxModel {
+        let kept = rows.len().min(KEPT);
+        let rows: Vec<usize> = (0..kept).map(|place| rows[place * rows.len() / kept]).collect();
+        let points = rows.iter().map(|t| self.point(*t)).collect();
+        let map = Map::Neighbours { count, planes, points };
+        let names = map.names(&self.names());
+        let parameters = names.into_iter().zip(&rows).map(|(name, t)| Parameter {
+            name,
+            value: self.signals[0][*t],
+            standard_error: None,
+        });
+        NonlinearArxModel { parameters: parameters.collect(), map, ..self.head.clone() }
+    }
+
+    /// The mean square of the errors where each kept sample is left out in its turn, in units of the output.
+    fn left_out(&self, model: &NonlinearArxModel) -> f64 {
+        let Map::Neighbours { count, planes, points } = &model.map else { return f64::NAN };
+        let outputs: Vec<f64> = model.parameters.iter().map(|parameter| parameter.value).collect();
+        let (points, samples) = (points.concat(), points.len());
+        let basis =
+            Neighbours { regressors: self.taps.len(), points: &points, count: *count, planes: *planes };
+        let errors: Vec<f64> = (0..samples)
+            .into_par_iter()
+            .map(|place| outputs[place] - basis.left_out(&outputs, place))
+            .collect();
+        let scale = self.head.output_scale;
+        errors.iter().map(|error| error * error).sum::<f64>() * scale * scale / samples.max(1) as f64
+    }
+
+    /// Keeps the samples, and chooses how many of them are asked, unless that is given.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a number that the samples do not have, or a criterion that counts parameters; [`Error::Undetermined`] for
+    /// fewer than two samples.
+    pub(crate) fn keep(
+        &self,
+        planes: bool,
+        count: &Count,
+        chosen_on: Option<&Self>,
+    ) -> Result<(Chosen, Solved), Error> {
+        let samples = self.rows.len().min(KEPT);
+        if samples < 2 {
+            return Err(Error::undetermined(
+                Vec::new(),
+                "neighbours are two samples with all regressors at least; name more rows, or fewer lags",
+            ));
+        }
+        if planes && self.taps.len() > MOST_SLOPES {
+            return Err(Error::argument(
+                "ny",
+                format!(
+                    "a plane is fitted to {MOST_SLOPES} regressors at most, there are {}; take fewer lags, or means in place of planes",
+                    self.taps.len()
+                ),
+            ));
+        }
+        let others = samples - 1;
+        let tried: Vec<usize> = match *count {
+            Count::Given(wanted) if wanted == 0 || wanted > others.min(MOST_NEIGHBOURS) => {
+                return Err(Error::argument(
+                    "units",
+                    format!(
+                        "{wanted} neighbours of {samples} samples; give from 1 to {}",
+                        others.min(MOST_NEIGHBOURS)
+                    ),
+                ));
+            }
+            Count::Given(wanted) => vec![wanted],
+            Count::Least(_) => {
+                return Err(Error::argument(
+                    "select",
+                    "samples are no parameters, so that information criteria do not count them; take validation or cv",
+                ));
+            }
+            _ => COUNTS.into_iter().filter(|count| *count <= others).collect(),
+        };
+        let mut steps = Vec::new();
+        let square = self.mean_square(&self.rows);
+        for &asked in &tried {
+            let mse = self.left_out(&self.kept(&self.rows, asked, planes));
+            let held_out = match count {
+                Count::HeldOut(rows) => {
+                    let others = chosen_on.unwrap_or(self);
+                    // Where fewer samples are chosen on than are asked, nothing is known.
+                    let enough = asked <= others.rows.len();
+                    enough
+                        .then(|| RunFigures::of(&others.kept(&others.rows, asked, planes), self.log, rows))
+                        .transpose()?
+                }
+                Count::Blocks => self.in_blocks(asked, planes)?,
+                _ => None,
+            };
+            steps.push(TermStep {
+                term: format!("{asked} neighbour{}", if asked == 1 { "" } else { "s" }),
+                parameters: samples.div_ceil(asked),
+                error_reduction: 1.0 - mse / square,
+                aliases: Vec::new(),
+                rmse: mse.sqrt(),
+                free_run: None,
+                held_out,
+            });
+        }
+        let taken = if let Count::Given(_) = count { 1 } else { count.best(&steps, 1, samples) };
+        let mut model = self.kept(&self.rows, tried[taken - 1], planes);
+        let mse = steps[taken - 1].rmse.powi(2);
+        model.noise_variance = mse;
+        let map = model.map.clone();
+        Ok((Chosen { map, steps, taken }, Solved { model, mse, condition: None }))
+    }
+
+    /// The free runs on blocks, each by the samples of the others.
+    fn in_blocks(&self, asked: usize, planes: bool) -> Result<Option<RunFigures>, Error> {
+        let mut sums = Sums::default();
+        for block in self.blocks() {
+            let others: Vec<usize> =
+                self.rows.iter().copied().filter(|t| *t < block[0] || *t > block[block.len() - 1]).collect();
+            if others.len() < asked {
+                return Ok(None);
+            }
+            sums.add(run(&self.kept(&others, asked, planes), self.log, &as_rows(block))?);
+        }
+        Ok(Some(sums.figures()))
+    }
+}

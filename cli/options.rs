@@ -3,7 +3,7 @@
 //! The library names them between backticks, as `detrend`, wherever one is advised; here they are options.
 
 /// The arguments of the library that are options, by the name that both have.
-pub(crate) const OPTIONS: [&str; 50] = [
+pub(crate) const OPTIONS: [&str; 51] = [
     "alarm",
     "alpha",
     "alphas",
@@ -46,6 +46,7 @@ pub(crate) const OPTIONS: [&str; 50] = [
     "split",
     "start",
     "step",
+    "term",
     "terms",
     "time",
     "time-limit",

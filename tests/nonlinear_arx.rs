@@ -360,6 +360,12 @@ fn bad_options_and_logs_are_told() {
         ("--narx poly --units 3", "--units is for --narx spline, --narx local and --narx knn"),
         ("--narx poly --membership gaussian", "--membership"),
         ("--na 1 --nb 1 --membership gaussian", "--narx"),
+        ("--narx poly --term y(k-7)", "none of the regressors"),
+        ("--narx poly --term y(k-1) --term y(k-1)", "--term: y(k-1) is given twice"),
+        ("--narx poly --term y(k-1) --terms 3", "cannot be used with"),
+        ("--narx poly --term y(k-1) --degree 3", "cannot be used with"),
+        ("--narx rbf --term y(k-1)", "--term"),
+        ("--na 1 --nb 1 --term y(k-1)", "--narx"),
         ("--narx local --units 0", "one local model"),
         ("--narx local --units 50", "50 local models are asked for"),
         ("--narx local --terms 5", "--terms"),
@@ -399,6 +405,28 @@ fn bad_options_and_logs_are_told() {
         assert!(run.stderr.contains(words), "{options}: {}", run.stderr);
         assert!(!folder.path("report.json").exists(), "{options}");
     }
+}
+
+/// Products that are named are those that a choice finds, with the same parameters, in the order that they are named in.
+#[test]
+fn products_are_taken_by_name() {
+    let folder = Folder::with_log(plant(500));
+    let chosen = folder.fit("log.csv --narx poly --sample-time 0.1 --terms 3 --report model.json");
+    let mut names: Vec<(String, f64)> = chosen["model"]["parameters"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|one| (one["name"].as_str().unwrap().to_owned(), one["value"].as_f64().unwrap()))
+        .collect();
+    names.reverse();
+    let options: String = names.iter().map(|(name, _)| format!(" --term {name}")).collect();
+    let named = folder.fit(&format!("log.csv --narx poly --sample-time 0.1{options} --report named.json"));
+    for (own, (name, value)) in named["model"]["parameters"].as_array().unwrap().iter().zip(&names) {
+        assert_eq!(own["name"].as_str(), Some(name.as_str()));
+        let found = own["value"].as_f64().unwrap();
+        assert!((found - value).abs() < 1e-12 * value.abs().max(1.0), "{name}: {found} {value}");
+    }
+    assert_eq!(named["estimation"]["selected_by"], "given");
 }
 
 /// A report that was edited is refused, whatever is in it.

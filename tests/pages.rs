@@ -16,7 +16,7 @@ const README_LINES: usize = 175;
 const NOT_RUN: [&str; 7] = ["make ", "cargo ", "pip ", "benches/", "tests/", "git ", "cd "];
 
 /// Options of those.
-const FOREIGN_OPTIONS: [&str; 5] = ["--release", "--bench", "--write", "--path", "--open"];
+const FOREIGN_OPTIONS: [&str; 6] = ["--nocapture", "--release", "--bench", "--write", "--path", "--open"];
 
 /// A page: its path from the root of the repository, and its text.
 struct Page {

@@ -153,6 +153,9 @@ pub(crate) struct NarxArguments {
     /// How many functions to take [default: --select says it, by the free run on validation rows, or on blocks of the estimation rows]
     #[arg(long, value_name = "N", requires = "narx", conflicts_with = "select")]
     pub(crate) terms: Option<usize>,
+    /// A product to take, as a report writes it (poly): 1, y(k-1) or 'y(k-1)^2*u(k-1)'; once for each. Without it they are chosen
+    #[arg(long, value_name = "PRODUCT", requires = "narx", conflicts_with_all = ["terms", "most_terms", "select", "degree"])]
+    pub(crate) term: Vec<String>,
     /// How many functions to look at [default: 40, and 10 local models]
     #[arg(long, value_name = "N", requires = "narx", conflicts_with = "terms")]
     pub(crate) most_terms: Option<usize>,

@@ -108,6 +108,7 @@ pub(crate) fn check_linear(arguments: &NarxArguments) -> Result<(), Failure> {
         ("--nu", !arguments.nu.is_empty()),
         ("--degree", arguments.degree.is_some()),
         ("--terms", arguments.terms.is_some()),
+        ("--term", !arguments.term.is_empty()),
         ("--most-terms", arguments.most_terms.is_some()),
         ("--centres", arguments.centres.is_some()),
         ("--width", arguments.width.is_some()),
@@ -126,13 +127,14 @@ pub(crate) fn check_linear(arguments: &NarxArguments) -> Result<(), Failure> {
 
 fn map_plan(arguments: &NarxArguments, map: MapArgument, seed: Option<u64>) -> Result<MapPlan, Failure> {
     use MapArgument::{Knn, Local, Poly, Rbf, Spline};
-    let own: [(&str, bool, &[MapArgument]); 8] = [
+    let own: [(&str, bool, &[MapArgument]); 9] = [
         ("--degree", arguments.degree.is_some(), &[Poly]),
         ("--centres", arguments.centres.is_some(), &[Rbf]),
         ("--width", arguments.width.is_some(), &[Rbf]),
         ("--no-linear", arguments.no_linear, &[Rbf, Local, Knn]),
         ("--membership", arguments.membership.is_some(), &[Local]),
         ("--terms", arguments.terms.is_some(), &[Poly, Rbf, Spline]),
+        ("--term", !arguments.term.is_empty(), &[Poly]),
         ("--seed", seed.is_some(), &[Rbf]),
         ("--units", arguments.units.is_some(), &[Spline, Local, Knn]),
     ];
@@ -145,6 +147,7 @@ fn map_plan(arguments: &NarxArguments, map: MapArgument, seed: Option<u64>) -> R
         return Err(Failure::usage(format!("{option} is for {names}")));
     }
     match map {
+        Poly if !arguments.term.is_empty() => Ok(MapPlan::Products { terms: arguments.term.clone() }),
         Poly => Ok(MapPlan::Polynomial { degree: arguments.degree.unwrap_or(2) }),
         Rbf => {
             let text = arguments.centres.as_deref().unwrap_or("chosen");

@@ -146,3 +146,15 @@ def test_local_models_and_neighbours_are_maps_too(map: str, options: dict[str, o
         th.narx(data, membership="gaussian")
     with pytest.raises(ValueError, match="terms"):
         th.narx(data, map, terms=3)
+
+
+def test_products_are_taken_by_name() -> None:
+    data = log(400)
+    model = th.narx(data, terms=["u(k-1)^2", "y(k-1)", "u(k-1)"])
+    assert list(model.parameter_names) == ["u(k-1)^2", "y(k-1)", "u(k-1)"]
+    with pytest.raises(ValueError, match="term.*none of the regressors"):
+        th.narx(data, terms=["y(k-9)"])
+    with pytest.raises(ValueError, match="terms: there is none"):
+        th.narx(data, terms=[])
+    with pytest.raises(TypeError, match="terms"):
+        th.narx(data, terms=[3])  # type: ignore[list-item]

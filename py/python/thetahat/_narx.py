@@ -24,7 +24,7 @@ def narx(
     nu: Lags = 2,
     nk: Lags = 1,
     degree: int | None = None,
-    terms: int | None = None,
+    terms: int | Sequence[str] | None = None,
     most_terms: int | None = None,
     centres: str | None = None,
     width: float | None = None,

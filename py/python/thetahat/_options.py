@@ -173,8 +173,9 @@ class NarxOptions(TypedDict, total=False):
         What to fit to, what to judge on and what is taken from the channels, see `FitOptions`.
     degree : int
         Factors of a product at most, for ``"poly"``: 2.
-    terms : int
-        How many functions to take; chosen unless it is said.
+    terms : int, or sequence of str
+        How many functions to take; chosen unless it is said. Or products by name, as `Model.parameter_names` has them: ``["1",
+        "y(k-1)", "y(k-1)^2*u(k-1)"]``.
     most_terms : int
         How many functions a choice looks at: 40.
     select : str
@@ -205,7 +206,7 @@ class NarxOptions(TypedDict, total=False):
     offset: Mapping[str, float]
     ridge: float
     degree: int
-    terms: int
+    terms: Union[int, Sequence[str]]
     most_terms: int
     select: str
     centres: str
@@ -304,6 +305,11 @@ def words(allowed: type, arguments: Mapping[str, Any], rows: int | None = None) 
             found += [] if _flag(name, value) else ["--no-header"]
         elif name == "linear":
             found += [] if _flag(name, value) else ["--no-linear"]
+        elif name == "terms" and isinstance(value, (list, tuple)):
+            # The products themselves.
+            if not value:
+                raise ValueError("terms: there is none; name one at least")
+            found += [f"--term={text(name, one)}" for one in value]
         elif name in ("decimal_comma", "trend", "raw_terms"):
             found += [f"--{name.replace('_', '-')}"] if _flag(name, value) else []
         else:

@@ -295,7 +295,7 @@ impl<'l> Samples<'l> {
     }
 
     /// The names of the regressors.
-    fn names(&self) -> Vec<String> {
+    pub(crate) fn names(&self) -> Vec<String> {
         self.head.regressors.iter().map(|one| one.name()).collect()
     }
 

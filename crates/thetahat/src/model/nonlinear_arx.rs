@@ -2,6 +2,7 @@
 
 mod functions;
 mod map;
+mod terms;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -94,6 +94,7 @@ pub fn fit_nonlinear_arx(log: &Log, sources: &[Source], plan: &NonlinearArxPlan)
     let select = plan.select.unwrap_or(if compared_on.is_empty() { Select::Cv } else { Select::Validation });
     let given = match plan.map {
         MapPlan::Local { units, .. } | MapPlan::Neighbours { units, .. } => units,
+        MapPlan::Products { ref terms } => Some(terms.len()),
         _ => plan.terms,
     };
     let (count, selected_by) = match (given, select) {
@@ -197,6 +198,10 @@ fn candidates(map: &MapPlan, samples: &Samples<'_>) -> Result<Candidates, Error>
     let (centres, width, linear) = match map {
         MapPlan::Polynomial { degree } => {
             return Ok(Candidates::Products(Monomials::new(samples.regressors(), *degree)?));
+        }
+        MapPlan::Products { terms } => {
+            let map = Map::products(terms, &samples.names())?;
+            return Ok(Candidates::Functions { map, always: terms.len() });
         }
         MapPlan::Spline { units } => {
             let (regressors, most) = (samples.regressors(), MOST_CENTRES / samples.regressors().max(1));

@@ -7,6 +7,7 @@ use thetahat_core::{
     Spline,
 };
 
+use super::terms::{factors, written};
 use crate::Error;
 use crate::regression::Monomials;
 
@@ -101,6 +102,14 @@ impl Map {
         Ok(Self::Polynomial { terms })
     }
 
+    /// Products as [`Map::names`] writes them, of regressors with these names.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for one that names none of the regressors, is written in another way, or is there twice.
+    pub(crate) fn products(terms: &[String], regressors: &[String]) -> Result<Self, Error> {
+        Ok(Self::Polynomial { terms: factors(terms, regressors)? })
+    }
+
     /// How many functions there are of this many regressors.
     pub fn parameters(&self, regressors: usize) -> usize {
         match self {
@@ -163,7 +172,7 @@ impl Map {
     /// local1*u(k), or sample1.
     pub(crate) fn names(&self, regressors: &[String]) -> Vec<String> {
         match self {
-            Self::Polynomial { terms } => terms.iter().map(|term| product(term, regressors)).collect(),
+            Self::Polynomial { terms } => terms.iter().map(|term| written(term, regressors)).collect(),
             Self::Radial { centres, linear, .. } => {
                 let path = path(regressors).take(if *linear { regressors.len() + 1 } else { 0 });
                 path.chain((1..=centres.len()).map(|place| format!("rbf{place}"))).collect()
@@ -263,19 +272,6 @@ impl Map {
 /// The names of the linear path.
 fn path(regressors: &[String]) -> impl Iterator<Item = String> {
     std::iter::once("1".to_owned()).chain(regressors.iter().cloned())
-}
-
-/// A product by its factors: y(k-1)^2*u(k).
-fn product(term: &[usize], regressors: &[String]) -> String {
-    let mut parts: Vec<String> = Vec::new();
-    let mut rest = term;
-    while let Some(factor) = rest.first() {
-        let power = rest.iter().take_while(|other| *other == factor).count();
-        let name = regressors.get(*factor).map_or("?", String::as_str);
-        parts.push(if power == 1 { name.to_owned() } else { format!("{name}^{power}") });
-        rest = &rest[power..];
-    }
-    if parts.is_empty() { "1".to_owned() } else { parts.join("*") }
 }
 
 /// A map laid out to be evaluated along a log, with its parameters, by the functions of the core. Nothing of it allocates.

@@ -27,6 +27,11 @@ pub enum MapPlan {
         /// The largest number of factors.
         degree: usize,
     },
+    /// Products of regressors that are known.
+    Products {
+        /// As a report writes them: 1, y(k-1), or y(k-1)^2*u(k-1).
+        terms: Vec<String>,
+    },
     /// Radial basis functions.
     Radial {
         /// Where they stand.
@@ -148,6 +153,7 @@ impl NonlinearArxPlan {
     pub(super) fn steps(&self) -> usize {
         match self.map {
             MapPlan::Local { units, .. } => units.or(self.most).unwrap_or(MOST_LOCAL),
+            MapPlan::Products { ref terms } => terms.len(),
             _ => self.terms.or(self.most).unwrap_or(MOST),
         }
     }
@@ -188,6 +194,17 @@ impl NonlinearArxPlan {
                 "ny",
                 "the model reads nothing; give lags of the output or of an input",
             ));
+        }
+        if let MapPlan::Products { terms } = &self.map {
+            if terms.is_empty() {
+                return Err(Error::argument("term", "a model has one function at least"));
+            }
+            if self.terms.is_some() || self.most.is_some() || self.select.is_some() {
+                return Err(Error::argument(
+                    "term",
+                    "the products are given; leave out `terms`, `most-terms` and `select`, which choose",
+                ));
+            }
         }
         if let MapPlan::Local { units, .. } | MapPlan::Neighbours { units, .. } = self.map {
             if self.terms.is_some() {

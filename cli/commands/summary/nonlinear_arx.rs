@@ -114,7 +114,7 @@ fn choice(procedure: &Procedure, outcome: &TermsOutcome) -> String {
         Procedure::Neighbours(_) => {
             let asked = outcome.last().map_or_else(String::new, |step| step.term.clone());
             format!(
-                "{asked} of {} samples, {how}; RMSE: each sample left out in its turn",
+                "{asked} of {} samples, {how}; RMSE: on five blocks, each by the samples of the others",
                 outcome.candidates
             )
         }

@@ -61,15 +61,12 @@ impl<T: Real> Neighbours<'_, T> {
         self.points.get(first..first.saturating_add(self.regressors)).unwrap_or_default()
     }
 
-    /// Of points at the same distance the one that is stored first is nearer. `without` is left out.
-    fn around(&self, z: &[T], without: Option<usize>) -> Around<T> {
+    /// Of points at the same distance the one that is stored first is nearer.
+    fn around(&self, z: &[T]) -> Around<T> {
         let wanted = self.count.clamp(1, MOST_NEIGHBOURS);
         let mut found = [(T::INFINITY, 0_usize); MOST_NEIGHBOURS];
         let mut count = 0;
         for (place, point) in self.points.chunks_exact(self.regressors.max(1)).enumerate() {
-            if without == Some(place) {
-                continue;
-            }
             let limit = if count < wanted { T::INFINITY } else { found[wanted - 1].0 };
             let mut square = T::zero();
             for (&z, &point) in z.iter().zip(point) {
@@ -150,8 +147,8 @@ impl<T: Real> Neighbours<'_, T> {
     }
 
     /// Calls `take` with the place and the weight of each of the nearest, in rising order.
-    fn weights(&self, z: &[T], without: Option<usize>, mut take: impl FnMut(usize, T)) {
-        let around = self.around(z, without);
+    fn weights(&self, z: &[T], mut take: impl FnMut(usize, T)) {
+        let around = self.around(z);
         let share = T::one() / T::from_count(around.count);
         let mut away = [T::zero(); MOST_SLOPES];
         if let Some(factor) = &around.factor {
@@ -165,22 +162,6 @@ impl<T: Real> Neighbours<'_, T> {
             let more = own.map(|((&z, &mean), &away)| (z - mean) * away);
             take(place, more.fold(share, |sum, more| sum + more));
         }
-    }
-
-    /// What the others say where sample `place` is: to judge by, as that sample would not surprise itself.
-    ///
-    /// NaN where there is no other sample.
-    pub fn left_out(&self, parameters: &[T], place: usize) -> T {
-        self.sum(parameters, self.point(place), Some(place))
-    }
-
-    fn sum(&self, parameters: &[T], z: &[T], without: Option<usize>) -> T {
-        let mut sum = None;
-        self.weights(z, without, |place, weight| {
-            let own = parameters.get(place).map_or(T::NAN, |&parameter| weight * parameter);
-            sum = Some(sum.map_or(own, |sum: T| sum + own));
-        });
-        sum.unwrap_or(T::NAN)
     }
 }
 
@@ -207,7 +188,7 @@ impl<T: Real> Basis<T> for Neighbours<'_, T> {
 
     fn each(&self, z: &[T], mut take: impl FnMut(usize, T)) {
         let mut next = 0;
-        self.weights(z, None, |place, weight| {
+        self.weights(z, |place, weight| {
             (next..place).for_each(|other| take(other, T::zero()));
             take(place, weight);
             next = place + 1;
@@ -218,12 +199,17 @@ impl<T: Real> Basis<T> for Neighbours<'_, T> {
     }
 
     fn value(&self, parameters: &[T], z: &[T]) -> T {
-        self.sum(parameters, z, None)
+        let mut sum = None;
+        self.weights(z, |place, weight| {
+            let own = parameters.get(place).map_or(T::NAN, |&parameter| weight * parameter);
+            sum = Some(sum.map_or(own, |sum: T| sum + own));
+        });
+        sum.unwrap_or(T::NAN)
     }
 
     /// Those of the plane: which samples are nearest is taken as it is.
     fn add_slopes(&self, parameters: &[T], z: &[T], slopes: &mut [T]) {
-        let around = self.around(z, None);
+        let around = self.around(z);
         let Some(factor) = &around.factor else { return };
         let mut plane = [T::zero(); MOST_SLOPES];
         for &place in &around.places[..around.count] {
@@ -246,7 +232,6 @@ mod tests {
         let (points, outputs) = ([0.0, 1.0, 2.0, 3.0, 2.0], [10.0, 20.0, 30.0, 40.0, 50.0]);
         let ask = |count| Neighbours { regressors: 1, points: &points, count, planes: false };
         assert_eq!(ask(1).value(&outputs, &[2.1]), 30.0);
-        assert_eq!(ask(1).left_out(&outputs, 2), 50.0);
         assert_eq!(ask(2).value(&outputs, &[0.4]), 15.0);
         assert!((ask(5).value(&outputs, &[0.4]) - 30.0_f64).abs() < 1e-14);
         assert!(ask(1).value(&outputs, &[f64::NAN]).is_nan());

@@ -164,6 +164,11 @@ impl<'l> Samples<'l> {
         self.rows.chunks(self.rows.len().div_ceil(BLOCKS).max(1))
     }
 
+    /// The samples outside of a block.
+    fn others(&self, block: &[usize]) -> Vec<usize> {
+        self.rows.iter().copied().filter(|t| *t < block[0] || *t > block[block.len() - 1]).collect()
+    }
+
     /// The mean square of the output, in its units.
     fn mean_square(&self, rows: &[usize]) -> f64 {
         let values = rows.iter().map(|t| self.signals[0][*t] * self.head.output_scale);

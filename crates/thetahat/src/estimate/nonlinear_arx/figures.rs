@@ -50,8 +50,8 @@ pub struct TermStep {
     /// Functions that can no longer be told from sums of those chosen.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub aliases: Vec<String>,
-    /// The root mean square of the errors one step ahead on the estimation rows, in units of the output; of nearest neighbours, each
-    /// sample being left out in its turn.
+    /// The root mean square of the errors one step ahead on the estimation rows, in units of the output; of nearest neighbours,
+    /// on five blocks of these rows, each by the samples of the others.
     pub rmse: f64,
     /// The free run on the estimation rows; none of a step after which functions that are always there are still to come.
     #[serde(default, skip_serializing_if = "Option::is_none")]

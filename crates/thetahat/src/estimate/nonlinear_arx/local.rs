@@ -169,12 +169,7 @@ impl Samples<'_> {
             Count::Blocks => {
                 let mut sums = vec![Some(Sums::default()); path.len()];
                 for block in self.blocks() {
-                    let others: Vec<usize> = self
-                        .rows
-                        .iter()
-                        .copied()
-                        .filter(|t| *t < block[0] || *t > block[block.len() - 1])
-                        .collect();
+                    let others = self.others(block);
                     let own = self.grown(growth, &others)?;
                     let rows = as_rows(block);
                     for (at, sum) in sums.iter_mut().enumerate() {

@@ -1,12 +1,12 @@
 //! Nearest neighbours: samples are the model, and the choice is how many of them are asked.
 
 use rayon::prelude::*;
-use thetahat_core::{MOST_NEIGHBOURS, MOST_SLOPES, Neighbours};
+use thetahat_core::{MOST_NEIGHBOURS, MOST_SLOPES};
 
 use super::figures::{Sums, run};
-use super::{Chosen, Count, RunFigures, Samples, Solved, TermStep, as_rows};
+use super::{BLOCKS, Chosen, Count, RunFigures, Samples, Solved, TermStep, as_rows};
 use crate::Error;
-use crate::model::{Map, NonlinearArxModel, Parameter};
+use crate::model::{Evaluator, Map, NonlinearArxModel, Parameter};
 
 /// Samples that are kept, at most: evenly chosen of more.
 const KEPT: usize = 5000;
@@ -16,8 +16,7 @@ const COUNTS: [usize; 10] = [1, 2, 3, 5, 8, 13, 21, 34, 55, 64];
 impl Samples<'_> {
     /// The model of some samples that asks `count` of them; its noise is not known.
     fn kept(&self, rows: &[usize], count: usize, planes: bool) -> NonlinearArxModel {
-        let kept = rows.len().min(KEPT);
-        let rows: Vec<usize> = (0..kept).map(|place| rows[place * rows.len() / kept]).collect();
+        let rows = evenly(rows, KEPT);
         let points = rows.iter().map(|t| self.point(*t)).collect();
         let map = Map::Neighbours { count, planes, points };
         let names = map.names(&self.names());
@@ -29,19 +28,25 @@ impl Samples<'_> {
         NonlinearArxModel { parameters: parameters.collect(), map, ..self.head.clone() }
     }
 
-    /// The mean square of the errors where each kept sample is left out in its turn, in units of the output.
-    fn left_out(&self, model: &NonlinearArxModel) -> f64 {
-        let Map::Neighbours { count, planes, points } = &model.map else { return f64::NAN };
-        let outputs: Vec<f64> = model.parameters.iter().map(|parameter| parameter.value).collect();
-        let (points, samples) = (points.concat(), points.len());
-        let basis =
-            Neighbours { regressors: self.taps.len(), points: &points, count: *count, planes: *planes };
-        let errors: Vec<f64> = (0..samples)
-            .into_par_iter()
-            .map(|place| outputs[place] - basis.left_out(&outputs, place))
-            .collect();
-        let scale = self.head.output_scale;
-        errors.iter().map(|error| error * error).sum::<f64>() * scale * scale / samples.max(1) as f64
+    /// The mean square of the errors one step ahead on blocks, each by the samples of the others, in units of the output; none where
+    /// these are too few. Samples that are next in time are near to one another: what they say of each other is not what they say of a
+    /// fresh log (Burman, Chow and Nolan, Biometrika 81, 1994).
+    fn blocks_mse(&self, asked: usize, planes: bool) -> Option<f64> {
+        let (mut squares, mut count) = (0.0, 0_usize);
+        for block in self.blocks() {
+            let others = self.others(block);
+            if others.len() < asked {
+                return None;
+            }
+            let model = self.kept(&others, asked, planes);
+            let theta = model.parameters.iter().map(|parameter| parameter.value).collect();
+            let evaluator = Evaluator::new(&model.map, theta);
+            let square = |t: &usize| (self.signals[0][*t] - evaluator.value(&self.point(*t))).powi(2);
+            let each: Vec<f64> = evenly(block, KEPT / BLOCKS).par_iter().map(square).collect();
+            squares += each.iter().sum::<f64>();
+            count += each.len();
+        }
+        Some(squares * self.head.output_scale.powi(2) / count as f64)
     }
 
     /// Keeps the samples, and chooses how many of them are asked, unless that is given.
@@ -94,7 +99,7 @@ impl Samples<'_> {
         let mut steps = Vec::new();
         let square = self.mean_square(&self.rows);
         for &asked in &tried {
-            let mse = self.left_out(&self.kept(&self.rows, asked, planes));
+            let Some(mse) = self.blocks_mse(asked, planes) else { break };
             let held_out = match count {
                 Count::HeldOut(rows) => {
                     let others = chosen_on.unwrap_or(self);
@@ -117,6 +122,14 @@ impl Samples<'_> {
                 held_out,
             });
         }
+        if steps.is_empty() {
+            return Err(Error::undetermined(
+                Vec::new(),
+                format!(
+                    "{samples} samples are too few: each fifth of them is judged by the others; ask fewer `units`, or name more rows"
+                ),
+            ));
+        }
         let taken = if let Count::Given(_) = count { 1 } else { count.best(&steps, 1, samples) };
         let mut model = self.kept(&self.rows, tried[taken - 1], planes);
         let mse = steps[taken - 1].rmse.powi(2);
@@ -129,8 +142,7 @@ impl Samples<'_> {
     fn in_blocks(&self, asked: usize, planes: bool) -> Result<Option<RunFigures>, Error> {
         let mut sums = Sums::default();
         for block in self.blocks() {
-            let others: Vec<usize> =
-                self.rows.iter().copied().filter(|t| *t < block[0] || *t > block[block.len() - 1]).collect();
+            let others = self.others(block);
             if others.len() < asked {
                 return Ok(None);
             }
@@ -138,4 +150,10 @@ impl Samples<'_> {
         }
         Ok(Some(sums.figures()))
     }
+}
+
+/// Some of them, `most` at most.
+fn evenly(rows: &[usize], most: usize) -> Vec<usize> {
+    let kept = rows.len().min(most);
+    (0..kept).map(|place| rows[place * rows.len() / kept]).collect()
 }

@@ -96,7 +96,7 @@ fn neighbours_are_judged_without_themselves() {
         let Map::Neighbours { count, points, .. } = &model(&report).map else { panic!("another map") };
         assert_eq!((points.len(), outcome.path.len()), (299, 10));
         assert_eq!(outcome.last().unwrap().term, format!("{count} neighbours"));
-        // One neighbour is the sample itself, where it is not left out.
+        // One neighbour would be the sample itself, were its block not left out.
         assert!(outcome.path[0].rmse > 0.1, "{:?}", outcome.path[0]);
         let best = outcome.last().unwrap().held_out.unwrap().rmse.unwrap();
         let each = outcome.path.iter().filter_map(|step| step.held_out.unwrap().rmse);

@@ -9,6 +9,7 @@ pub(crate) mod splines;
 
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
+use rayon::prelude::*;
 use thetahat_core::Error as CoreError;
 use thetahat_core::nalgebra::DVector;
 
@@ -26,6 +27,12 @@ use crate::regression::{Moments, Path, factor_rows, forward, product, sum_of_squ
 
 /// Rows whose functions are in memory at once.
 const ROWS: usize = 512;
+/// Parts of the rows that are summed by themselves, at once: the same ones for any number of threads.
+const PARTS: usize = 8;
+/// Fewer rows are one part.
+const LEAST_PART: usize = 1024;
+/// Numbers in the sums of all parts, at most: 64 MB.
+const MOST_SUMS: usize = 8_000_000;
 /// Blocks that the estimation rows are cut into, each held out in its turn.
 const BLOCKS: usize = 5;
 
@@ -180,7 +187,16 @@ impl<'l> Samples<'l> {
         into.iter_mut().zip(rows).for_each(|(into, t)| *into = signal[t - lag]);
     }
 
+    /// Sums over rows: parts of them at once, and these in their order.
     fn products(&self, candidates: &Candidates, rows: &[usize]) -> Products {
+        let parts = if candidates.sums(self.taps.len()) * PARTS > MOST_SUMS { 1 } else { PARTS };
+        let part = rows.len().div_ceil(parts).max(LEAST_PART);
+        let sums: Vec<Products> =
+            rows.par_chunks(part).map(|rows| self.products_of_part(candidates, rows)).collect();
+        merged(sums.iter()).unwrap_or_else(|| self.products_of_part(candidates, &[]))
+    }
+
+    fn products_of_part(&self, candidates: &Candidates, rows: &[usize]) -> Products {
         match candidates {
             Candidates::Products(monomials) => {
                 let mut moments = Moments::zero(monomials);
@@ -364,7 +380,7 @@ impl<'l> Samples<'l> {
     ) -> Result<Vec<TermStep>, Error> {
         let variance = products.energy() * self.head.output_scale.powi(2) / products.rows().max(1) as f64;
         let (rows, names) = (as_rows(&self.rows), self.names());
-        let each = path.chosen.iter().zip(held_out).enumerate().map(|(at, (chosen, held_out))| {
+        let each = path.chosen.par_iter().zip(held_out).enumerate().map(|(at, (chosen, held_out))| {
             let run = || RunFigures::of(&self.on_path(candidates, path, at + 1), self.log, &rows);
             Ok(TermStep {
                 term: candidates.name(chosen.place, &names),
@@ -389,7 +405,7 @@ impl<'l> Samples<'l> {
     ) -> Result<Vec<Option<RunFigures>>, Error> {
         let there = |count: &usize| (candidates.always()..=path.chosen.len()).contains(count);
         let figures = |count: usize| RunFigures::of(&self.on_path(candidates, path, count), self.log, rows);
-        (1..=lengths).map(|count| there(&count).then(|| figures(count)).transpose()).collect()
+        (1..=lengths).into_par_iter().map(|count| there(&count).then(|| figures(count)).transpose()).collect()
     }
 
     /// The figures of each length of the paths on blocks that these did not see, over all blocks.

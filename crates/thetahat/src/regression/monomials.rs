@@ -91,6 +91,11 @@ impl Monomials {
         self.tuples.len()
     }
 
+    /// How many different numbers their Gram matrix has, and how many more stand in the tiles.
+    pub(crate) fn moments(&self) -> usize {
+        self.tiles.iter().map(|(rows, first)| rows.len() * (self.count() - first)).sum()
+    }
+
     /// The variables that are multiplied, from 0 on; none for the constant.
     pub(crate) fn factors(&self, place: usize) -> Vec<usize> {
         self.tuples[place].iter().filter(|index| **index > 0).map(|index| usize::from(*index) - 1).collect()
@@ -166,7 +171,10 @@ impl Moments {
             let mut y = vec![0.0; some];
             target(first, &mut y);
             self.tiles.par_iter_mut().zip(&monomials.tiles).for_each(|(sum, (rows, column))| {
-                let left = Mat::from_fn(some, rows.len(), |t, row| values[(t, rows[row])]);
+                let mut left = Mat::zeros(some, rows.len());
+                for (mut own, place) in left.col_iter_mut().zip(rows) {
+                    own.copy_from(values.col(*place));
+                }
                 let right = values.as_ref().subcols(*column, values.ncols() - column);
                 matmul(sum.as_mut(), Accum::Add, left.transpose(), right, 1.0, Par::Seq);
             });
@@ -191,7 +199,10 @@ impl Moments {
     /// An entry of the Gram matrix of the monomials.
     pub(crate) fn gram(&self, monomials: &Monomials, one: usize, other: usize) -> f64 {
         let degree = monomials.degree;
-        let mut both = [&monomials.tuples[one][..], &monomials.tuples[other]].concat();
+        let mut both = [0; 2 * MOST_FACTORS];
+        let both = &mut both[..2 * degree];
+        both[..degree].copy_from_slice(&monomials.tuples[one]);
+        both[degree..].copy_from_slice(&monomials.tuples[other]);
         both.sort_unstable();
         let (first, second) = both.split_at(degree);
         let place = |half: &[u16]| monomials.places.get(half).copied();

@@ -68,14 +68,40 @@ impl<'m> Runner<'m> {
     pub(crate) fn run(&self, y: &mut [f64], inputs: &[&[f64]], rows: Range<usize>) -> bool {
         let [low, high] = self.model.output_range;
         let lost = LOST * low.abs().max(high.abs()).max(self.model.output_scale);
+        // Each sample is divided by its scale once, and not for each lag.
+        let mut signals: Vec<(usize, f64)> =
+            self.taps.iter().map(|(source, _, scale)| (*source, *scale)).collect();
+        signals.sort_unstable_by(|one, other| one.0.cmp(&other.0).then(one.1.total_cmp(&other.1)));
+        signals.dedup();
+        let scaled = |(source, scale): &(usize, f64)| {
+            let signal = if *source == 0 { &y[..rows.start] } else { &inputs[*source - 1][..rows.end] };
+            let mut values: Vec<f64> = signal.iter().map(|value| value / scale).collect();
+            values.resize(rows.end, 0.0);
+            values
+        };
+        let mut values: Vec<Vec<f64>> = signals.iter().map(scaled).collect();
+        let place = |own: (usize, f64)| signals.iter().position(|signal| *signal == own).unwrap_or(0);
+        let places = self.taps.iter().map(|(source, _, scale)| place((*source, *scale)));
+        let read: Vec<(usize, usize, usize)> = (places.zip(&self.taps).enumerate())
+            .map(|(regressor, (signal, (_, lag, _)))| (regressor, signal, *lag))
+            .filter(|(regressor, ..)| self.evaluator.reads(*regressor))
+            .collect();
         let mut z = vec![0.0; self.taps.len()];
         for t in rows.clone() {
-            let value = self.next(y, inputs, t, &mut z);
+            for (regressor, signal, lag) in &read {
+                z[*regressor] = t.checked_sub(*lag).map_or(0.0, |at| values[*signal][at]);
+            }
+            let value = self.model.output_scale * self.evaluator.value(&z);
             if value.is_nan() || value.abs() > lost {
                 y[t..rows.end].fill(f64::NAN);
                 return false;
             }
             y[t] = value;
+            for (own, (source, scale)) in values.iter_mut().zip(&signals) {
+                if *source == 0 {
+                    own[t] = value / scale;
+                }
+            }
         }
         true
     }

@@ -22,6 +22,14 @@ impl Candidates {
         }
     }
 
+    /// How many numbers the sums of their products are.
+    pub(super) fn sums(&self, regressors: usize) -> usize {
+        match self {
+            Self::Products(monomials) => monomials.moments(),
+            Self::Functions { map, .. } => map.parameters(regressors).pow(2),
+        }
+    }
+
     /// How many are always there: the first ones.
     pub(super) fn always(&self) -> usize {
         match self {

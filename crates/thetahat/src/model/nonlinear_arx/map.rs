@@ -330,6 +330,16 @@ impl Evaluator {
         Self { theta, kind }
     }
 
+    /// Whether the value may depend on a regressor.
+    pub(crate) fn reads(&self, regressor: usize) -> bool {
+        match &self.kind {
+            Kind::Polynomial { factors, .. } => {
+                factors.iter().any(|factor| usize::from(*factor) == regressor)
+            }
+            _ => true,
+        }
+    }
+
     /// How many functions there are.
     pub(crate) fn parameters(&self) -> usize {
         self.theta.len()

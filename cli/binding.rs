@@ -24,8 +24,8 @@ pub struct Opened {
     pub sources: Vec<Source>,
     /// The input channels: those named, or those called u, u1, u2, …
     pub inputs: Vec<String>,
-    /// The output channel: the one named, or y.
-    pub output: String,
+    /// The output channels: those named, or y.
+    pub outputs: Vec<String>,
     /// What the reader should know, in plain words.
     pub warnings: Vec<String>,
 }
@@ -38,7 +38,7 @@ pub fn read(options: &[OsString], uniform: bool) -> Result<Opened, Failure> {
     let mut job = FitJob::resolve(&arguments("fit", options)?)?;
     job.log.quiet = true;
     let Experiments { log, sources, channels, words } = experiments(&job, !uniform)?;
-    Ok(Opened { log, sources, inputs: channels.inputs, output: channels.output, warnings: words })
+    Ok(Opened { log, sources, inputs: channels.inputs, outputs: channels.outputs, warnings: words })
 }
 
 /// The plan that `thetahat fit` makes of these options for a log with these channels. Orders without inputs leave those
@@ -74,7 +74,7 @@ pub fn equations_plan(options: &[OsString]) -> Result<EquationsPlan, Failure> {
 pub fn narx_plan(
     options: &[OsString],
     inputs: Vec<String>,
-    output: String,
+    outputs: Vec<String>,
 ) -> Result<NonlinearArxPlan, Failure> {
     let log = OsString::from("log");
     let words: Vec<OsString> = options.iter().cloned().chain([log]).collect();
@@ -83,7 +83,7 @@ pub fn narx_plan(
         Failure::usage(format!("--narx: name the functions, one of {}", MapArgument::words()))
     })?;
     let job = NarxJob::resolve(&arguments, map)?;
-    job.plan(if job.driven { inputs } else { Vec::new() }, output)
+    job.plan(if job.driven { inputs } else { Vec::new() }, outputs)
 }
 
 /// How `thetahat validate` evaluates a model with these options, and what it requires.

@@ -18,7 +18,7 @@ mod track;
 mod transient;
 mod validate;
 
-pub(crate) use experiments::{Channels, Experiments, experiments};
+pub(crate) use experiments::{Experiments, experiments};
 pub use filter::consistency;
 pub(crate) use inspect::inspected;
 pub use track::{TrackedRow, Tracking};

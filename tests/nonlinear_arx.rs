@@ -173,7 +173,7 @@ fn terms_and_coefficients_are_those_of_an_independent_program() {
             case.options,
             case.terms.len()
         ));
-        let (path, parameters) = (&report["estimation"]["path"], &report["model"]["parameters"]);
+        let (path, parameters) = (&report["estimation"]["maps"][0]["path"], &report["model"]["parameters"]);
         for (at, (name, value, error, reduction)) in case.terms.iter().enumerate() {
             let (step, parameter) = (&path[at], &parameters[at]);
             assert_eq!(
@@ -426,7 +426,64 @@ fn products_are_taken_by_name() {
         let found = own["value"].as_f64().unwrap();
         assert!((found - value).abs() < 1e-12 * value.abs().max(1.0), "{name}: {found} {value}");
     }
-    assert_eq!(named["estimation"]["selected_by"], "given");
+    assert_eq!(named["estimation"]["maps"][0]["selected_by"], "given");
+}
+
+/// Two outputs are two maps of one model in every verb, and so are expressions of channels.
+#[test]
+fn several_outputs_and_expressions_take_every_verb() {
+    let text = plant(900);
+    let mut state = 5_u32;
+    let mut level = 4.0_f64;
+    let lines = text.lines().skip(1).map(|line| {
+        let u: f64 = line.split(',').next().and_then(|cell| cell.parse().ok()).expect("it is a number");
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        level += 0.3 * (2.0 + u - level.sqrt()) + 1e-3 * (f64::from(state >> 8) / f64::from(1 << 23) - 1.0);
+        format!("{line},{level}\n")
+    });
+    let folder = Folder::with_log(std::iter::once("u,y,z\n".to_owned()).chain(lines).collect::<String>());
+    let options =
+        "--output y,z --narx poly --ny 1,1 --nu 1 --regressor sqrt(z) --sample-time 0.1 --split 60/20/20";
+    let report = folder.fit(&format!("log.csv {options} --html page.html --report model.json"));
+    let names: Vec<&str> = report["model"]["parameters"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter_map(|one| one["name"].as_str())
+        .collect();
+    assert!(names.contains(&"y: u(k-1)^2") && names.contains(&"z: sqrt(z)(k-1)"), "{names:?}");
+    assert_eq!(report["estimation"]["maps"].as_array().map(Vec::len), Some(2));
+    let page = folder.read("page.html");
+    assert!(page.contains("Choice of functions, y") && page.contains("Model, z"));
+    let table = folder.done(&format!("fit log.csv {options}")).stdout;
+    assert!(table.contains("output y") && table.contains("z: forward regression"), "{table}");
+    let run = folder.done("predict model.json log.csv --sample-time 0.1 --horizon 3");
+    let header =
+        "row,measured_y,predicted_y,standard_deviation_y,measured_z,predicted_z,standard_deviation_z";
+    assert_eq!(run.stdout.lines().next(), Some(header));
+    assert_eq!(run.stdout.lines().count(), 901);
+    let run = folder.done("simulate model.json log.csv --sample-time 0.1 -o run.csv");
+    assert!(run.stderr.contains("y: fit ") && run.stderr.contains("z: fit "), "{}", run.stderr);
+    let run = folder.done("simulate model.json log.csv --sample-time 0.1 --clamp -o run.csv");
+    assert!(run.stderr.contains("kept within 1.1 times the range"), "{}", run.stderr);
+    folder.done(
+        "validate model.json log.csv --sample-time 0.1 --rows 721..900 --require fit>=90 --format json",
+    );
+    folder.done("compare model.json log.csv --sample-time 0.1 --rows 721..900");
+    for (line, code, words) in [
+        ("track log.csv --warm model.json -o t.jsonl", 3, "one output"),
+        ("fit log.csv --output y,z --na 1 --nb 1", 2, "--output: a polynomial model has one output"),
+        ("fit log.csv --narx poly --output y,y", 2, "named twice"),
+        ("fit log.csv --narx poly --output y,z --ny 1,2,3", 2, "3 numbers for 2 outputs"),
+        ("fit log.csv --narx poly --regressor sqrt(v)", 2, "unknown name 'v'"),
+        ("fit log.csv --narx poly --regressor sqrt(u) --sample-time 0.1", 3, "sqrt(u) is no number in row"),
+        ("fit log.csv --regressor sqrt(u) --na 1 --nb 1", 2, "--narx"),
+    ] {
+        let run = folder.run(line);
+        assert_eq!(run.code, code, "{line}: {}", run.stderr);
+        assert!(run.stderr.contains(words), "{line}: {}", run.stderr);
+        assert!(!folder.path("t.jsonl").exists(), "{line}");
+    }
 }
 
 /// A report that was edited is refused, whatever is in it.
@@ -439,11 +496,13 @@ fn damaged_reports_are_refused() {
         ("/model/regressors/0/channel", "v".into()),
         ("/model/regressors/0/lag", 0.into()),
         ("/model/regressors/1/scale", 0.into()),
-        ("/model/map/centres/0", serde_json::json!([1.0])),
-        ("/model/map/widths", serde_json::json!([])),
+        ("/model/maps/0/functions/centres/0", serde_json::json!([1.0])),
+        ("/model/maps/0/functions/widths", serde_json::json!([])),
         ("/model/parameters", serde_json::json!([])),
         ("/model/covariance/0", serde_json::json!([1.0])),
-        ("/model/output_scale", (-1).into()),
+        ("/model/maps/0/scale", (-1).into()),
+        ("/model/maps", serde_json::json!([])),
+        ("/model/noise_covariance", serde_json::json!([[1.0, 0.0], [0.0, 1.0]])),
     ] {
         let mut bad = good.clone();
         *bad.pointer_mut(place).expect("it is there") = value;
@@ -556,9 +615,9 @@ fn splines_find_what_bends() {
 
     let good: Value = serde_json::from_str(&folder.read("model.json")).unwrap();
     for (place, value) in [
-        ("/model/map/knots/0", serde_json::json!([1.0, 0.0, 2.0])),
-        ("/model/map/regressors/0", 9.into()),
-        ("/model/map/regressors", serde_json::json!([])),
+        ("/model/maps/0/functions/knots/0", serde_json::json!([1.0, 0.0, 2.0])),
+        ("/model/maps/0/functions/regressors/0", 9.into()),
+        ("/model/maps/0/functions/regressors", serde_json::json!([])),
     ] {
         let mut bad = good.clone();
         *bad.pointer_mut(place).expect(place) = value;
@@ -581,7 +640,11 @@ fn local_models_and_neighbours_take_every_verb() {
         ("--narx knn --no-linear --units 5", "NARX nearest neighbours, 5 of 599 samples", "neighbours"),
     ] {
         let report = folder.fit(&format!("log.csv {options} {common} --report model.json --html page.html"));
-        assert_eq!(report.pointer("/model/map/type").and_then(Value::as_str), Some(kind), "{options}");
+        assert_eq!(
+            report.pointer("/model/maps/0/functions/type").and_then(Value::as_str),
+            Some(kind),
+            "{options}"
+        );
         let percent = number(&report, "/fit/3/percent");
         assert!(percent > 75.0, "{options}: {percent}");
         let page = folder.read("page.html");
@@ -603,14 +666,14 @@ fn local_models_and_neighbours_take_every_verb() {
         let good: Value = serde_json::from_str(&folder.read("model.json")).unwrap();
         let edits = match kind {
             "local" => vec![
-                ("/model/map/boxes/0/0", serde_json::json!([1.0, 1.0])),
-                ("/model/map/domain", serde_json::json!([[0.0, 1.0]])),
-                ("/model/map/membership", "round".into()),
+                ("/model/maps/0/functions/boxes/0/0", serde_json::json!([1.0, 1.0])),
+                ("/model/maps/0/functions/domain", serde_json::json!([[0.0, 1.0]])),
+                ("/model/maps/0/functions/membership", "round".into()),
             ],
             _ => vec![
-                ("/model/map/count", 0.into()),
-                ("/model/map/count", 600.into()),
-                ("/model/map/points/0", serde_json::json!([1.0])),
+                ("/model/maps/0/functions/count", 0.into()),
+                ("/model/maps/0/functions/count", 600.into()),
+                ("/model/maps/0/functions/points/0", serde_json::json!([1.0])),
             ],
         };
         for (place, value) in edits {

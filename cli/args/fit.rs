@@ -17,9 +17,9 @@ pub(crate) struct FitArguments {
     /// Input columns; a name that holds a comma stands between double quotes, as in CSV [default: u, u1, u2, …]
     #[arg(short = 'u', long, value_name = "NAME[,NAME…]", help_heading = "Channels")]
     pub(crate) input: Vec<Names>,
-    /// Output column [default: y]
-    #[arg(short = 'y', long, value_name = "NAME", help_heading = "Channels")]
-    pub(crate) output: Option<String>,
+    /// Output column, with --narx one or more [default: y]
+    #[arg(short = 'y', long, value_name = "NAME[,NAME…]", help_heading = "Channels")]
+    pub(crate) output: Vec<Names>,
     /// Rows to estimate on, 1-based and inclusive, counted through all logs [default: all]
     #[arg(long, value_name = "A..B[,C..D]", value_delimiter = ',', help_heading = "Channels")]
     pub(crate) estimate: Vec<String>,
@@ -141,12 +141,15 @@ pub(crate) struct NarxArguments {
         ]
     )]
     pub(crate) narx: Option<MapArgument>,
-    /// Past outputs that g reads: y(k-1), …, y(k-N) [default: 2]
-    #[arg(long, value_name = "N", requires = "narx")]
-    pub(crate) ny: Option<usize>,
+    /// Past outputs that g reads: y(k-1), …, y(k-N); one number for each output or one for all [default: 2]
+    #[arg(long, value_name = "N[,…]", value_delimiter = ',', requires = "narx")]
+    pub(crate) ny: Vec<usize>,
     /// Values of each input that g reads, from --nk on: u(k-nk), …; one number for each input or one for all [default: 2]
     #[arg(long, value_name = "N[,…]", value_delimiter = ',', requires = "narx")]
     pub(crate) nu: Vec<usize>,
+    /// An expression of the channels that g reads too, such as 'sqrt(u)', at the lags of the channels in it; once for each
+    #[arg(long, value_name = "EXPRESSION", requires = "narx", allow_hyphen_values = true)]
+    pub(crate) regressor: Vec<String>,
     /// Factors of a product at most (poly) [default: 2]
     #[arg(long, value_name = "D", requires = "narx")]
     pub(crate) degree: Option<usize>,

@@ -20,6 +20,9 @@ pub(crate) struct PredictArguments {
 
 #[derive(Debug, Args)]
 pub(crate) struct SimulateArguments {
+    /// Keep what is fed back within 1.1 times the range of the estimation rows, and count how often (nonlinear ARX models)
+    #[arg(long, conflicts_with = "draws")]
+    pub(crate) clamp: bool,
     /// Draw this many runs of what the model leaves open: its noise, and its parameters within their covariance
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub(crate) draws: Option<u32>,

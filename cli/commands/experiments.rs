@@ -21,7 +21,8 @@ pub(crate) struct Experiments {
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Channels {
     pub(crate) inputs: Vec<String>,
-    pub(crate) output: String,
+    /// One at least.
+    pub(crate) outputs: Vec<String>,
 }
 
 /// Which columns are wanted.
@@ -29,8 +30,8 @@ pub(crate) struct Channels {
 pub(crate) struct Wanted<'a> {
     /// Named inputs; none: those called u, u1, u2, …
     pub(crate) inputs: Option<&'a [String]>,
-    /// The named output; none: y.
-    pub(crate) output: Option<&'a str>,
+    /// The named outputs; none: y.
+    pub(crate) outputs: &'a [String],
     /// Whether the model has inputs.
     pub(crate) driven: bool,
     /// What asks for a model without inputs.
@@ -41,7 +42,7 @@ pub(crate) struct Wanted<'a> {
 pub(crate) fn experiments(job: &FitJob, any_clock: bool) -> Result<Experiments, Failure> {
     let wanted = Wanted {
         inputs: job.inputs.as_deref(),
-        output: job.output.as_deref(),
+        outputs: &job.outputs,
         driven: job.orders.has_inputs(),
         none: "--nb 0",
     };
@@ -70,27 +71,32 @@ pub(super) fn read(
                 )));
             }
             check(own.inputs.len())?;
-            Ok(own.inputs.into_iter().chain([own.output]).collect())
+            Ok(own.inputs.into_iter().chain(own.outputs).collect())
         })?;
     Ok(Experiments { log, sources, channels: channels.unwrap_or_default(), words })
 }
 
 impl Channels {
+    /// The inputs, and the output of a model that has one.
+    pub(crate) fn single(mut self) -> (Vec<String>, String) {
+        (self.inputs, self.outputs.pop().unwrap_or_default())
+    }
+
     /// The named ones, or those called u, u1, u2, … and y.
     fn choose(wanted: &Wanted<'_>, header: &[String]) -> Result<Self, String> {
         let there_are = || format!("there are: {}", log::listed(header));
-        let output = match wanted.output {
-            Some(name) => name.to_owned(),
-            None if header.iter().any(|name| name == "y") => "y".to_owned(),
-            None => {
+        let outputs = match wanted.outputs {
+            [] if header.iter().any(|name| name == "y") => vec!["y".to_owned()],
+            [] => {
                 return Err(format!("no column is called y; name the output with --output; {}", there_are()));
             }
+            named => named.to_vec(),
         };
         if !wanted.driven {
-            return Ok(Self { inputs: Vec::new(), output });
+            return Ok(Self { inputs: Vec::new(), outputs });
         }
         if let Some(inputs) = wanted.inputs {
-            return Ok(Self { inputs: inputs.to_vec(), output });
+            return Ok(Self { inputs: inputs.to_vec(), outputs });
         }
         let inputs = usual_inputs(header);
         if inputs.is_empty() {
@@ -100,7 +106,7 @@ impl Channels {
                 there_are()
             ));
         }
-        Ok(Self { inputs, output })
+        Ok(Self { inputs, outputs })
     }
 }
 

@@ -51,10 +51,12 @@ pub(crate) fn fit(arguments: &FitArguments, line: &str) -> Result<(), Failure> {
 
 /// Reads the logs and fits the model.
 fn found(job: &FitJob, keeps_log: bool) -> Result<Identified, Failure> {
+    job.check_output()?;
     let Experiments { log, sources, channels, words } = experiments(job, false)?;
     words.iter().for_each(|word| warn(word));
     let kept = keeps_log.then(|| log.clone());
-    let plan = job.plan(channels.inputs, channels.output)?;
+    let (inputs, output) = channels.single();
+    let plan = job.plan(inputs, output)?;
     let report = watched(|monitor| identify_monitored(log, &sources, &plan, monitor))?;
     Ok(Identified { report: report.map_err(log::failure(&sources))?, log: kept, sources })
 }

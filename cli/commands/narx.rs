@@ -11,15 +11,11 @@ use crate::messages::warn;
 
 /// Reads the logs and fits the model.
 pub(super) fn found(job: &NarxJob) -> Result<Identified, Failure> {
-    let wanted = Wanted {
-        inputs: job.inputs.as_deref(),
-        output: job.output.as_deref(),
-        driven: job.driven,
-        none: "--nu 0",
-    };
+    let wanted =
+        Wanted { inputs: job.inputs.as_deref(), outputs: &job.outputs, driven: job.driven, none: "--nu 0" };
     let found = read(&job.paths, &job.log, &wanted, false, |_| Ok(()))?;
     found.words.iter().for_each(|word| warn(word));
-    let plan = job.plan(found.channels.inputs, found.channels.output)?;
+    let plan = job.plan(found.channels.inputs, found.channels.outputs)?;
     let report =
         fit_nonlinear_arx(&found.log, &found.sources, &plan).map_err(log::failure(&found.sources))?;
     Ok(Identified { report, log: Some(found.log), sources: found.sources })

@@ -27,28 +27,35 @@ pub(crate) fn predict(arguments: &PredictArguments) -> Result<(), Failure> {
             }
         },
     };
-    respond(&arguments.respond, horizon, arguments.initial.given(), None)
+    respond(&arguments.respond, horizon, arguments.initial.given(), &Run::Plain)
 }
 
 pub(crate) fn simulate(arguments: &SimulateArguments) -> Result<(), Failure> {
-    let asked = arguments.draws.map(|count| Asked {
-        draws: Draws { count: count as usize, seed: arguments.seed.unwrap_or(0) },
-        file: arguments.draws_file.as_deref(),
-    });
-    respond(&arguments.respond, Horizon::FreeRun, arguments.initial.given(), asked)
+    let run = match arguments.draws {
+        Some(count) => Run::Drawn(
+            Draws { count: count as usize, seed: arguments.seed.unwrap_or(0) },
+            arguments.draws_file.as_deref(),
+        ),
+        None if arguments.clamp => Run::Clamped,
+        None => Run::Plain,
+    };
+    respond(&arguments.respond, Horizon::FreeRun, arguments.initial.given(), &run)
 }
 
-/// Draws, and where they go.
-struct Asked<'a> {
-    draws: Draws,
-    file: Option<&'a Path>,
+/// What is asked of a response.
+enum Run<'a> {
+    Plain,
+    /// What is fed back stays in a range.
+    Clamped,
+    /// Beside it draws, and where they go.
+    Drawn(Draws, Option<&'a Path>),
 }
 
 fn respond(
     arguments: &RespondArguments,
     horizon: Horizon,
     initial: Option<InitialCondition>,
-    draws: Option<Asked<'_>>,
+    run: &Run<'_>,
 ) -> Result<(), Failure> {
     let job = LogJob::resolve(&arguments.log, &arguments.clock)?;
     let asked = rows("--rows", &arguments.rows)?;
@@ -62,7 +69,7 @@ fn respond(
     let report = stored::report(&arguments.report)?;
     let model = &report.model;
 
-    if draws.is_some() {
+    if let Run::Drawn(..) = run {
         stored::polynomials(&arguments.report, model, "what is drawn from a fit's uncertainty")?;
     }
     let mut measured = true;
@@ -79,14 +86,18 @@ fn respond(
     let clock = RowClock { log: &log };
     let sources = [source];
     let failed = log::failure(&sources);
-    let applied = report.apply(&log, &asked, detrend, horizon, initial).map_err(&failed)?;
-    let drawn = draws
-        .as_ref()
-        .map(|draws| sample(model, &log, &asked, detrend, initial, &draws.draws).map_err(&failed));
-    let drawn = drawn.transpose()?;
+    let applied = match run {
+        Run::Clamped => report.clamped_run(&log, &asked, detrend, initial),
+        Run::Plain | Run::Drawn(..) => report.apply(&log, &asked, detrend, horizon, initial),
+    };
+    let applied = applied.map_err(&failed)?;
+    let drawn = match run {
+        Run::Drawn(draws, _) => Some(sample(model, &log, &asked, detrend, initial, draws).map_err(&failed)?),
+        Run::Plain | Run::Clamped => None,
+    };
     let bands = drawn.as_ref().map(|drawn| drawn.bands(&QUANTILES));
 
-    if let (Some(drawn), Some(Asked { file: Some(file), .. })) = (&drawn, &draws) {
+    if let (Some(drawn), Run::Drawn(_, Some(file))) = (&drawn, run) {
         output::write_csv(file, |csv| runs_as_csv(csv, drawn, &applied, &clock))?;
     }
     output::write_csv(&arguments.out, |csv| rows_as_csv(csv, &applied, bands.as_ref(), &clock))?;
@@ -110,6 +121,19 @@ fn respond(
             Some(fit) => tell(&format!("{of}{}", summary::figure(fit))),
             None => {}
         }
+    }
+    if let Some(clamped) = applied.clamped {
+        let values = if clamped == 1 { "value was" } else { "values were" };
+        tell(&format!("{clamped} {values} kept within 1.1 times the range of the estimation rows"));
+    }
+    // Every output reads the same values.
+    if let Some(outside) = applied.outputs.iter().find_map(|output| output.fit.as_ref()?.outside)
+        && outside > 0.0
+    {
+        tell(&format!(
+            "in {:.1} % of the samples the model read values outside of those of the estimation rows",
+            100.0 * outside
+        ));
     }
     Ok(())
 }

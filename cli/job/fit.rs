@@ -22,8 +22,8 @@ pub(crate) struct FitJob {
     pub(crate) log: LogJob,
     /// Named inputs; none: those called u, u1, u2, …
     pub(crate) inputs: Option<Vec<String>>,
-    /// The named output; none: y.
-    pub(crate) output: Option<String>,
+    /// The named outputs, of a model one; none: y.
+    pub(crate) outputs: Vec<String>,
     pub(crate) estimate: Vec<Rows>,
     pub(crate) validate: Vec<Rows>,
     pub(crate) split: Option<Split>,
@@ -46,7 +46,7 @@ impl FitJob {
             paths: arguments.logs.clone(),
             log: LogJob::resolve(&arguments.log, &arguments.clock)?,
             inputs: Names::all(&arguments.input),
-            output: arguments.output.clone(),
+            outputs: Names::all(&arguments.output).unwrap_or_default(),
             estimate: rows("--estimate", &arguments.estimate)?,
             validate: rows("--validate", &arguments.validate)?,
             detrend: parsed("--detrend", &arguments.detrend)?,
@@ -91,6 +91,16 @@ impl FitJob {
             job.orders.of(inputs.len())?;
         }
         Ok(job)
+    }
+
+    /// Whether there is one output, as every model of polynomials has.
+    pub(crate) fn check_output(&self) -> Result<(), Failure> {
+        if self.outputs.len() < 2 {
+            return Ok(());
+        }
+        Err(Failure::usage(
+            "--output: a polynomial model has one output; fit one after the other, or all at once with --narx or --grey",
+        ))
     }
 
     /// Whether squares are made small and nothing else is asked.

@@ -22,10 +22,11 @@ pub(crate) struct NarxJob {
     pub(crate) log: LogJob,
     /// Named inputs; none: those called u, u1, u2, …
     pub(crate) inputs: Option<Vec<String>>,
-    /// The named output; none: y.
-    pub(crate) output: Option<String>,
+    /// The named outputs; none: y.
+    pub(crate) outputs: Vec<String>,
     /// Whether there are inputs at all.
     pub(crate) driven: bool,
+    ny: Vec<usize>,
     nu: Vec<usize>,
     nk: Vec<usize>,
     /// The rest of the plan: channels and the lags of inputs are open.
@@ -35,14 +36,14 @@ pub(crate) struct NarxJob {
 impl NarxJob {
     pub(crate) fn resolve(arguments: &FitArguments, map: MapArgument) -> Result<Self, Failure> {
         let own = &arguments.narx;
-        let default = NonlinearArxPlan::new(&[], "");
+        let default = NonlinearArxPlan::new(&[], &[]);
         let plan = NonlinearArxPlan {
             estimate: rows("--estimate", &arguments.estimate)?,
             validate: rows("--validate", &arguments.validate)?,
             split: arguments.choice.split.as_deref().map(|text| parsed("--split", text)).transpose()?,
             detrend: parsed("--detrend", &arguments.detrend)?,
             offsets: named_values("--offset", &arguments.offset)?,
-            output_lags: own.ny.unwrap_or(default.output_lags),
+            expressions: own.regressor.clone(),
             map: map_plan(own, map, arguments.search.seed)?,
             terms: own.terms,
             most: own.most_terms,
@@ -62,8 +63,9 @@ impl NarxJob {
             paths: arguments.logs.clone(),
             log: LogJob { per_value: PerValue::Search, ..LogJob::resolve(&arguments.log, &arguments.clock)? },
             inputs: Names::all(&arguments.input),
-            output: arguments.output.clone(),
+            outputs: Names::all(&arguments.output).unwrap_or_default(),
             driven: own.nu.is_empty() || own.nu.iter().any(|lags| *lags > 0),
+            ny: own.ny.clone(),
             nu: own.nu.clone(),
             nk: nk.collect::<Result<_, Failure>>()?,
             plan,
@@ -80,22 +82,25 @@ impl NarxJob {
     }
 
     /// The plan for the channels of a log.
-    pub(crate) fn plan(&self, inputs: Vec<String>, output: String) -> Result<NonlinearArxPlan, Failure> {
-        let each = |option: &str, values: &[usize], default: usize| -> Result<Vec<usize>, Failure> {
-            match values {
-                [] => Ok(vec![default; inputs.len()]),
-                [one] => Ok(vec![*one; inputs.len()]),
-                several if several.len() == inputs.len() => Ok(several.to_vec()),
-                several => Err(Failure::usage(format!(
-                    "{option} has {} numbers for {} inputs; give one for all or one for each",
-                    several.len(),
-                    inputs.len()
-                ))),
-            }
+    pub(crate) fn plan(
+        &self,
+        inputs: Vec<String>,
+        outputs: Vec<String>,
+    ) -> Result<NonlinearArxPlan, Failure> {
+        let each = |option: &str, values: &[usize], default: usize, count: usize, of: &str| match values {
+            [] => Ok(vec![default; count]),
+            [one] => Ok(vec![*one; count]),
+            several if several.len() == count => Ok(several.to_vec()),
+            several => Err(Failure::usage(format!(
+                "{option} has {} numbers for {count} {of}; give one for all or one for each",
+                several.len()
+            ))),
         };
-        let (nu, nk) = (each("--nu", &self.nu, 2)?, each("--nk", &self.nk, 1)?);
+        let nu = each("--nu", &self.nu, 2, inputs.len(), "inputs")?;
+        let nk = each("--nk", &self.nk, 1, inputs.len(), "inputs")?;
+        let output_lags = each("--ny", &self.ny, 2, outputs.len(), "outputs")?;
         let input_lags = nu.into_iter().zip(nk).map(|(lags, delay)| InputLags { lags, delay }).collect();
-        let plan = NonlinearArxPlan { inputs, output, input_lags, ..self.plan.clone() };
+        let plan = NonlinearArxPlan { inputs, outputs, output_lags, input_lags, ..self.plan.clone() };
         plan.check().map_err(|error| Failure::option(&error))?;
         Ok(plan)
     }
@@ -104,8 +109,9 @@ impl NarxJob {
 /// What is for nonlinear models alone, given for another one: where one option excludes --narx, the parser asks for it no longer.
 pub(crate) fn check_linear(arguments: &NarxArguments) -> Result<(), Failure> {
     let given = [
-        ("--ny", arguments.ny.is_some()),
+        ("--ny", !arguments.ny.is_empty()),
         ("--nu", !arguments.nu.is_empty()),
+        ("--regressor", !arguments.regressor.is_empty()),
         ("--degree", arguments.degree.is_some()),
         ("--terms", arguments.terms.is_some()),
         ("--term", !arguments.term.is_empty()),

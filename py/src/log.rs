@@ -87,9 +87,9 @@ impl Log {
     fn read(py: Python<'_>, options: Vec<OsString>, uniform: bool) -> PyResult<(Self, Vec<String>)> {
         let opened = awaited(py, move |_| thetahat_cli::read(&options, uniform))?
             .map_err(|failure| error::program(py, &failure))?;
-        let thetahat_cli::Opened { log, sources, inputs, output, warnings } = opened;
+        let thetahat_cli::Opened { log, sources, inputs, outputs, warnings } = opened;
         let warnings = warnings.iter().map(|warning| error::in_python(warning)).collect();
-        Ok((Self { log: Arc::new(log), sources, inputs, outputs: vec![output] }, warnings))
+        Ok((Self { log: Arc::new(log), sources, inputs, outputs }, warnings))
     }
 
     /// Several experiments as one log.

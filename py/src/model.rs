@@ -78,7 +78,7 @@ pub(crate) fn fit_equations(
 #[pyfunction]
 pub(crate) fn fit_narx(py: Python<'_>, log: &Bound<'_, Log>, options: Vec<OsString>) -> PyResult<Model> {
     let log = log.get();
-    let plan = thetahat_cli::narx_plan(&options, log.inputs.clone(), log.output()?.clone())
+    let plan = thetahat_cli::narx_plan(&options, log.inputs.clone(), log.outputs.clone())
         .map_err(|failure| error::program(py, &failure))?;
     let (channels, sources) = (Arc::clone(&log.log), log.sources.clone());
     let report = interruptible(py, move |_| thetahat::report::fit_nonlinear_arx(&channels, &sources, &plan))?;
@@ -196,6 +196,22 @@ impl Model {
         Ok(applied.outputs.into_iter().map(|one| PyArray1::from_vec(py, one.predicted)).collect())
     }
 
+    /// Of each output, the free run on a log, or from rest on inputs, kept within the range of the fit; and how many values were.
+    #[pyo3(signature = (log, inputs, initial))]
+    fn clamped_run<'py>(
+        &self,
+        py: Python<'py>,
+        log: Option<&Bound<'py, Log>>,
+        inputs: Option<&Bound<'py, PyAny>>,
+        initial: &str,
+    ) -> PyResult<(Vec<Column<'py>>, usize)> {
+        let known = Arc::clone(&self.known);
+        let (log, start) = self.driven(py, log, inputs, initial)?;
+        let applied = interruptible(py, move |_| known.clamped_run(&log, &[], None, start))?;
+        let columns = applied.outputs.into_iter().map(|one| PyArray1::from_vec(py, one.predicted));
+        Ok((columns.collect(), applied.clamped.unwrap_or(0)))
+    }
+
     /// Free runs drawn from what the estimate leaves open, on a log or on inputs, one column for each: a row for each draw. Also
     /// how often parameters were unstable, and whether they vary.
     #[pyo3(signature = (log, inputs, draws, seed, initial))]
@@ -209,18 +225,7 @@ impl Model {
         initial: &str,
     ) -> PyResult<(Bound<'py, PyArray2<f64>>, usize, bool)> {
         let model = Arc::clone(&self.model);
-        let (log, start) = match (log, inputs) {
-            (Some(log), _) => {
-                let start = self.start(initial, log.get(), Horizon::FreeRun)?;
-                (Arc::clone(&log.get().log), start)
-            }
-            (None, Some(inputs)) => {
-                let channels = self.driving(inputs)?;
-                let log = thetahat::data::Log::new(channels, model.sample_time());
-                (Arc::new(log.map_err(|error| error::batch(py, error))?), InitialCondition::Zero)
-            }
-            (None, None) => return Err(PyValueError::new_err("u: give inputs, or a log")),
-        };
+        let (log, start) = self.driven(py, log, inputs, initial)?;
         let draws = Draws { count: draws, seed };
         let drawn = interruptible(py, move |_| sample(&model, &log, &[], None, start, &draws))?;
         let runs = PyArray2::from_vec2(py, &drawn.values)
@@ -438,6 +443,26 @@ impl Model {
             other => Err(PyValueError::new_err(format!(
                 "initial: '{other}' is none of 'auto', 'drop', 'zero', 'estimate'"
             ))),
+        }
+    }
+
+    /// What a free run is on: a log, or inputs from rest.
+    fn driven(
+        &self,
+        py: Python<'_>,
+        log: Option<&Bound<'_, Log>>,
+        inputs: Option<&Bound<'_, PyAny>>,
+        initial: &str,
+    ) -> PyResult<(Arc<thetahat::data::Log>, InitialCondition)> {
+        match (log, inputs) {
+            (Some(log), _) => {
+                Ok((Arc::clone(&log.get().log), self.start(initial, log.get(), Horizon::FreeRun)?))
+            }
+            (None, Some(inputs)) => {
+                let log = thetahat::data::Log::new(self.driving(inputs)?, self.model.sample_time());
+                Ok((Arc::new(log.map_err(|error| error::batch(py, error))?), InitialCondition::Zero))
+            }
+            (None, None) => Err(PyValueError::new_err("u: give inputs, or a log")),
         }
     }
 

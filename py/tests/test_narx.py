@@ -36,7 +36,7 @@ def test_terms_are_those_of_the_plant() -> None:
     found = dict(zip(model.parameter_names, model.parameters))
     assert found == pytest.approx({"y(k-1)": 0.5, "u(k-1)": 1.0, "u(k-1)^2": 0.4}, abs=0.03)
     assert model.kind == "nonlinear-arx"
-    assert document(model)["model"]["map"]["type"] == "polynomial"
+    assert document(model)["model"]["maps"][0]["functions"]["type"] == "polynomial"
 
 
 def test_every_method_takes_it(tmp_path: Path) -> None:
@@ -81,8 +81,8 @@ def test_the_document_is_that_of_the_command_line(tmp_path: Path) -> None:
 
 def test_radial_functions() -> None:
     model = th.narx(log(), "rbf", ny=1, nu=1, centres="kmeans:8", seed=1, estimate=slice(0, 400), validate=slice(400, 600))
-    assert document(model)["model"]["map"]["type"] == "radial"
-    assert len(document(model)["model"]["map"]["centres"]) == 8
+    assert document(model)["model"]["maps"][0]["functions"]["type"] == "radial"
+    assert len(document(model)["model"]["maps"][0]["functions"]["centres"]) == 8
     bare = th.narx(log(), "rbf", ny=1, nu=1, centres="grid:4", linear=False)
     assert len(bare.parameters) <= 16
 
@@ -112,7 +112,7 @@ def test_splines_are_a_map_too() -> None:
         y[k] = 0.4 * y[k - 1] + np.tanh(3 * u[k - 1]) + 0.02 * rng.standard_normal()
     model = th.narx(th.Log(y, u, sample_time=1.0), "spline", ny=1, nu=1, units=7)
     assert any(name.startswith("bend(u(k-1)") for name in model.parameter_names)
-    assert document(model)["model"]["map"]["type"] == "spline"
+    assert document(model)["model"]["maps"][0]["functions"]["type"] == "spline"
     assert np.nanstd(y - model.simulate(th.Log(y, u, sample_time=1.0))) < 0.05
     online = th.RecursiveNarx.from_model(model)
     assert len(online.parameters) == len(model.parameters)
@@ -134,7 +134,7 @@ def test_splines_are_a_map_too() -> None:
 def test_local_models_and_neighbours_are_maps_too(map: str, options: dict[str, object], kind: str) -> None:
     data = log(600)
     model = th.narx(data, map, ny=1, nu=1, **options)  # type: ignore[arg-type]
-    assert document(model)["model"]["map"]["type"] == kind
+    assert document(model)["model"]["maps"][0]["functions"]["type"] == kind
     assert np.nanstd(data["y"] - model.simulate(data)) < 0.5 * np.std(data["y"])
     if kind == "local":
         online = th.RecursiveNarx.from_model(model)
@@ -158,3 +158,65 @@ def test_products_are_taken_by_name() -> None:
         th.narx(data, terms=[])
     with pytest.raises(TypeError, match="terms"):
         th.narx(data, terms=[3])  # type: ignore[list-item]
+
+
+def test_several_outputs_are_a_map_each() -> None:
+    rng = np.random.default_rng(3)
+    u = rng.uniform(-1, 1, 800)
+    y = np.zeros((800, 2))
+    for k in range(1, 800):
+        noise = 0.02 * rng.standard_normal(2)
+        y[k, 0] = 0.5 * y[k - 1, 0] + 0.3 * y[k - 1, 1] + u[k - 1] + noise[0]
+        y[k, 1] = 0.4 * y[k - 1, 1] + u[k - 1] ** 2 + noise[1]
+    data = th.Log(y, u, sample_time=1)
+    model = th.narx(data, ny=[1, 1], nu=1, detrend="none", raw_terms=True, estimate=slice(0, 600))
+    assert model.outputs == ["y1", "y2"]
+    found = dict(zip(model.parameter_names, model.parameters))
+    assert found["y1: y2(k-1)"] == pytest.approx(0.3, abs=0.02)
+    assert found["y2: u(k-1)^2"] == pytest.approx(1.0, abs=0.02)
+    run = model.simulate(data)
+    assert run.shape == (800, 2)
+    assert np.nanstd(y - run, axis=0) == pytest.approx([0.025, 0.022], rel=0.4)
+    lower, upper = model.predict_interval(data, 3)
+    inside = (y > lower) & (y < upper)
+    assert inside[3:].mean() == pytest.approx(0.95, abs=0.03)
+    checked = model.validate(data, rows=slice(600, 800), require=["fit>=90"])
+    assert not checked.unmet
+    assert th.Model.from_json(model.to_json()).to_json() == model.to_json()
+    with pytest.raises(ValueError, match="one output"):
+        th.RecursiveNarx.from_model(model)
+
+
+def test_expressions_are_regressors() -> None:
+    u = np.random.default_rng(5).uniform(2, 6, 500)
+    y = np.full(500, 3.0)
+    for k in range(1, 500):
+        y[k] = y[k - 1] - 0.2 * np.sqrt(y[k - 1]) + 0.1 * u[k - 1]
+    data = th.Log(y, u, sample_time=1)
+    terms = ["y(k-1)", "u(k-1)", "sqrt(y)(k-1)"]
+    model = th.narx(data, ny=1, nu=1, regressors=["sqrt(y)"], terms=terms, detrend="none", raw_terms=True)
+    assert model.parameters == pytest.approx([1.0, 0.1, -0.2], abs=1e-9)
+    assert np.nanmax(np.abs(model.simulate(data) - y)) < 1e-8
+    with pytest.raises(ValueError, match="unknown name 'v'"):
+        th.narx(data, regressors=["sqrt(v)"])
+    with pytest.raises(TypeError, match="regressors"):
+        th.narx(data, regressors="sqrt(u)")  # type: ignore[arg-type]
+
+
+def test_runs_are_kept_within_the_range_on_request() -> None:
+    rng = np.random.default_rng(1)
+    u = 0.05 * rng.uniform(-1, 1, 300)
+    y = np.zeros(300)
+    for k in range(1, 300):
+        y[k] = 0.5 * y[k - 1] + y[k - 1] ** 2 + u[k - 1]
+    data = th.Log(y, u, sample_time=1)
+    model = th.narx(data, ny=1, nu=1, terms=["y(k-1)", "y(k-1)^2", "u(k-1)"], detrend="none", raw_terms=True)
+    far = 20 * u
+    assert np.isnan(model.simulate(far)).any()
+    with pytest.warns(th.EstimationWarning, match="were kept within"):
+        kept = model.simulate(far, clamp=True)
+    assert np.isfinite(kept).all() and np.ptp(kept) <= 1.1 * np.ptp(y) * (1 + 1e-9)
+    with pytest.warns(th.EstimationWarning, match="were kept within"):
+        model.simulate(th.Log(np.zeros(300), far, sample_time=1), clamp=True)
+    with pytest.raises(ValueError, match="nonlinear ARX"):
+        th.arx(data, na=1, nb=1).simulate(u, clamp=True)

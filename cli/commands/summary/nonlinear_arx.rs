@@ -2,7 +2,7 @@
 
 use thetahat::estimate::{Procedure, RunFigures, TermStep, TermsOutcome};
 use thetahat::figures::{error, number, scientific, short};
-use thetahat::model::NonlinearArxModel;
+use thetahat::model::{NonlinearArxModel, Parameter};
 use thetahat::report::Report;
 use thetahat::text::harmless;
 
@@ -12,41 +12,50 @@ use super::{NO_ERROR, criteria, fits, signal};
 /// The main figures of a fit of a nonlinear ARX model.
 pub(super) fn table(report: &Report, model: &NonlinearArxModel, width: usize) -> String {
     let mut text = Text::new(width);
-    text.line(&format!("{}, sample time {} s", report.model.name(), short(model.sample_time)));
+    text.line(&format!("{}, sample time {} s", harmless(&report.model.name()), short(model.sample_time)));
     let signals = model.inputs.iter().map(|input| signal("input", input));
-    let signals: Vec<String> = signals.chain([signal("output", &model.output)]).collect();
+    let outputs = model.outputs.iter().map(|output| signal("output", output));
+    let signals: Vec<String> = signals.chain(outputs).collect();
     text.line(&signals.join(", "));
     let regressors: Vec<String> = model.regressors.iter().map(|one| harmless(&one.name())).collect();
     text.line(&format!("regressors {}{}", regressors.join(", "), scales(model)));
-    text.line("");
-    let Some(outcome) = report.estimation.procedure.terms() else { return text.finish() };
-    text.table(match report.estimation.procedure {
-        Procedure::ForwardRegression(_) => functions(outcome, model),
-        // Parameters of boxes are many, and samples more: both are in the report.
-        _ => path(outcome),
-    });
-    let estimation = &report.estimation;
+    let (estimation, mut parameters) = (&report.estimation, &*model.parameters);
+    for ((outcome, map), output) in estimation.procedure.terms().iter().zip(&model.maps).zip(&model.outputs) {
+        let own;
+        (own, parameters) =
+            parameters.split_at(map.functions.parameters(model.regressors.len()).min(parameters.len()));
+        let of = if model.outputs.len() > 1 { format!("{}: ", output.name) } else { String::new() };
+        text.line("");
+        text.table(match estimation.procedure {
+            Procedure::ForwardRegression(_) => functions(outcome, own, &of),
+            // Parameters of boxes are many, and samples more: both are in the report.
+            _ => path(outcome),
+        });
+        text.line(&format!("{}{}", harmless(&of), choice(&estimation.procedure, outcome)));
+    }
+    let noise: Vec<String> =
+        model.noise_covariance.iter().enumerate().map(|(place, row)| number(row[place])).collect();
     text.line(&format!(
         "{} samples, noise variance {}, condition number {}",
         estimation.samples,
-        number(model.noise_variance),
+        noise.join(", "),
         or_dash(estimation.condition, |condition| scientific(condition, 3))
     ));
     text.line(&criteria(&estimation.criteria));
-    text.line(&choice(&report.estimation.procedure, outcome));
     text.line("");
     fits(&mut text, &report.fit);
     text.finish()
 }
 
 /// The functions with their parameters, and what the choice says of each.
-fn functions(outcome: &TermsOutcome, model: &NonlinearArxModel) -> Table {
+fn functions(outcome: &TermsOutcome, own: &[Parameter], of: &str) -> Table {
     let held_out = outcome.path.iter().any(|step| step.held_out.is_some());
     let mut head = vec!["function", "parameter", "standard error", "error reduction", "free run"];
     head.extend(held_out.then_some("held out"));
     let mut parameters = columns(&head).none(NO_ERROR);
-    for parameter in &model.parameters {
-        let step = outcome.path.iter().find(|step| step.term == parameter.name);
+    for parameter in own {
+        let name = parameter.name.strip_prefix(of).unwrap_or(&parameter.name);
+        let step = outcome.path.iter().find(|step| step.term == name);
         let run = |figure: fn(&TermStep) -> Option<f64>| or_dash(step.and_then(figure), number);
         let mut cells = vec![
             harmless(&parameter.name),

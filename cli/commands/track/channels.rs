@@ -2,17 +2,24 @@
 
 use thetahat::report::Report;
 
-use crate::commands::Channels;
 use crate::commands::experiments::usual_inputs;
 use crate::job::TrackJob;
 use crate::log::listed;
+
+/// The columns that a tracker follows.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct Channels {
+    pub(crate) inputs: Vec<String>,
+    pub(crate) output: String,
+}
 
 /// Those named, those of the report, or those called u, u1, u2, … and y; an error is a message.
 pub(super) fn choose(job: &TrackJob, report: Option<&Report>, header: &[String]) -> Result<Channels, String> {
     let model = report.map(|report| &report.model);
     let output = match (&job.output, model) {
         (Some(name), _) => name.clone(),
-        (None, Some(model)) => model.outputs().iter().map(|output| output.name.clone()).collect(),
+        // A model of several outputs is refused where a tracker is made of it.
+        (None, Some(model)) => model.outputs().first().map_or_else(String::new, |output| output.name.clone()),
         (None, None) if header.iter().any(|name| name == "y") => "y".to_owned(),
         (None, None) => {
             return Err(format!(

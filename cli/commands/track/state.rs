@@ -6,9 +6,9 @@ use serde::{Deserialize, Serialize};
 use thetahat::text;
 use thetahat::track::{PerChannel, TrackSummary, Tracker};
 
+use super::channels::Channels;
 use super::pace::Pace;
 use crate::args::ResumeArgument;
-use crate::commands::Channels;
 use crate::failure::Failure;
 use crate::job::{Clock, TrackJob};
 use crate::line_writer::{Format, Written};

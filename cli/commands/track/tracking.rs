@@ -3,11 +3,11 @@
 use thetahat::report::Report;
 use thetahat::track::{TrackSummary, Tracked, Tracker};
 
+use super::channels::Channels;
 use super::columns::Columns;
 use super::session::{Row, Session};
 use super::state::{self, State};
 use crate::args::TrackArguments;
-use crate::commands::Channels;
 use crate::failure::Failure;
 use crate::job::{Clock, TrackJob};
 use crate::line_writer::{Format, LineWriter, Written};

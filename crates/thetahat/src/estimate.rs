@@ -9,7 +9,7 @@
 //!   [`Constant`] says whether the level of the output is estimated too.
 //! - [`Procedure`] says how an estimate was found: by a [`Solver`], or with a [`SearchOutcome`] ([`StartOutcome`]),
 //!   [`ConvexOutcome`], [`RobustOutcome`], [`LikelihoodOutcome`],
-//!   [`EquationsOutcome`] or [`TermsOutcome`] (a path of [`TermStep`]s with their [`RunFigures`]).
+//!   [`EquationsOutcome`] or [`MapsOutcome`] (for each output a [`TermsOutcome`]: a path of [`TermStep`]s with their [`RunFigures`]).
 //! - [`Criteria`] are the values of each [`InformationCriterion`].
 //!
 //! The methods and their sources are at [`Method`]; the theory is that of Ljung, System Identification, 2nd ed. 1999, chapters 7
@@ -71,7 +71,7 @@ pub use criterion::{Bound, ConvexFit, ConvexOutcome, GainBound, Norm};
 pub use equations::{EquationsOutcome, LikelihoodSearch, UnknownParameter};
 pub use exact::LikelihoodOutcome;
 pub use initial::Initial;
-pub use nonlinear_arx::{RunFigures, TermStep, TermsOutcome};
+pub use nonlinear_arx::{MapsOutcome, RunFigures, TermStep, TermsOutcome};
 pub use offset::Constant;
 pub(crate) use offset::{Beside, Fitted, OutputOffset, Task, pays};
 pub use outcome::{SearchOutcome, StartOutcome};
@@ -120,21 +120,21 @@ pub enum Procedure {
     /// The largest likelihood of the innovations of a model in equations.
     InnovationsLikelihood(EquationsOutcome),
     /// In one step for functions of the regressors, which were chosen one after the other.
-    ForwardRegression(TermsOutcome),
+    ForwardRegression(MapsOutcome),
     /// In one step for local models, whose boxes were split one after the other.
-    Splits(TermsOutcome),
+    Splits(MapsOutcome),
     /// By the samples themselves.
-    Neighbours(TermsOutcome),
+    Neighbours(MapsOutcome),
 }
 
 impl Procedure {
-    /// The choice of the functions of a nonlinear ARX model.
-    pub fn terms(&self) -> Option<&TermsOutcome> {
+    /// The choices of the functions of a nonlinear ARX model, one for each output; none of other models.
+    pub fn terms(&self) -> &[TermsOutcome] {
         match self {
             Self::ForwardRegression(outcome) | Self::Splits(outcome) | Self::Neighbours(outcome) => {
-                Some(outcome)
+                &outcome.maps
             }
-            _ => None,
+            _ => &[],
         }
     }
 }

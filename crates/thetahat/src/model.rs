@@ -6,7 +6,7 @@
 //!   from them with an [`Interval`], and the [`Signal`]s it was fitted to. [`OffsetCovariance`] is what is open of their offsets.
 //! - [`StateSpace`] is the same model as a recursion of first order, for filters and controllers.
 //! - [`GreyBox`] is a model in equations as a person writes it, [`EquationsModel`] one whose parameters were estimated.
-//! - [`NonlinearArxModel`] is a nonlinear map of past outputs and inputs: a [`Map`] of [`Regressor`]s,
+//! - [`NonlinearArxModel`] is a nonlinear map of past outputs and inputs: for each output an [`OutputMap`], a [`Map`] of [`Regressor`]s,
 //!   which may be local models, each with its [`Membership`].
 //! - [`Model`] is a model of any kind: what reports hold.
 //!
@@ -31,12 +31,13 @@ mod quantity;
 mod state_space;
 
 pub(crate) use dynamics::{Block, Blocks, Gradient, cancel, covariance, near_cancellation};
+pub(crate) use equations::{ChannelExpression, ExpressionBuffer};
 pub use equations::{EquationsModel, GreyBox};
 pub(crate) use fitted::is_covariance;
 pub use fitted::{OffsetCovariance, Parameter, PolynomialModel, Signal};
 pub use kind::Model;
 pub(crate) use nonlinear_arx::Evaluator;
-pub use nonlinear_arx::{Functions, Map, Membership, NonlinearArxModel, Regressor};
+pub use nonlinear_arx::{Functions, Map, Membership, NonlinearArxModel, OutputMap, Regressor};
 pub(crate) use orders::LARGEST;
 pub use orders::{Orders, Structure};
 pub use quantity::{Interval, Quantity, Root};

@@ -156,7 +156,7 @@ class Model(ReportedModel):
         deviations = [deviations for _, deviations in found if deviations is not None]
         return _beside([values for values, _ in found]), _beside(deviations) if deviations else None
 
-    def simulate(self, u: _numbers.Columns | Log, *, initial: str = "auto") -> Array:
+    def simulate(self, u: _numbers.Columns | Log, *, initial: str = "auto", clamp: bool = False) -> Array:
         """The free run on inputs, in the units of the log.
 
         Parameters
@@ -166,10 +166,18 @@ class Model(ReportedModel):
         initial : {"auto", "drop", "zero", "estimate"}, default "auto"
             What stands before the first sample, as for `predict`. "auto" is "zero" for inputs alone, and "estimate" for a
             log with the output, as of ``thetahat simulate``.
+        clamp : bool, default False
+            Keep the outputs that a nonlinear ARX model feeds back within 1.1 times the range of the rows of its fit, and warn of how
+            many were: so a run that leaves the data is finite, if not good.
 
         Returns
         -------
         ndarray, shape (N,)
+
+        Warns
+        -----
+        EstimationWarning
+            If values were kept within the range.
 
         Examples
         --------
@@ -180,10 +188,20 @@ class Model(ReportedModel):
         >>> bool(np.isclose(y[-1], model.offsets["y"][0] + (4 - model.offsets["u"][0]) * model.dc_gain()[0]))
         True
         """
+        from thetahat._fit import EstimationWarning
+
+        of_log = isinstance(u, Log)
+        if not of_log and initial not in ("auto", "zero"):
+            raise ValueError(f"initial: inputs alone start from zero, not '{initial}'; give a Log to start from its output")
+        if clamp:
+            log, inputs = (handle("u", u), None) if of_log else (None, self._inputs_of(u))
+            values, kept = self._model.clamped_run(log, inputs, initial)
+            if kept:
+                message = f"{kept} values were kept within 1.1 times the range of the estimation rows"
+                warnings.warn(message, EstimationWarning, stacklevel=2)
+            return _beside(values)
         if isinstance(u, Log):
             return self._predicted(u, None, initial)[0]
-        if initial not in ("auto", "zero"):
-            raise ValueError(f"initial: inputs alone start from zero, not '{initial}'; give a Log to start from its output")
         return _beside(self._model.simulate(self._inputs_of(u)))
 
     def sample(

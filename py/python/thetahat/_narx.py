@@ -13,16 +13,17 @@ from thetahat._model import Model
 from thetahat._options import NarxOptions, Rows
 
 Lags = Union[int, Sequence[int]]
-"""A number for all inputs, or one for each."""
+"""A number for all channels, or one for each."""
 
 
 def narx(
     log: Log,
     map: str = "poly",
     *,
-    ny: int = 2,
+    ny: Lags = 2,
     nu: Lags = 2,
     nk: Lags = 1,
+    regressors: Sequence[str] | None = None,
     degree: int | None = None,
     terms: int | Sequence[str] | None = None,
     most_terms: int | None = None,
@@ -48,18 +49,18 @@ def narx(
     Parameters
     ----------
     log : Log
-        The data.
+        The data. Each of its outputs has a map of its own, of the lags of all channels.
     map : {"poly", "rbf", "spline", "local", "knn"}
         Products of the regressors, radial basis functions, a natural cubic spline of each regressor, local linear models grown by
         splitting, or the nearest samples of the fit.
-    ny : int
+    ny : int, or one for each output
         Past outputs that g reads: y(k-1), ..., y(k-ny).
     nu : int, or one for each input
         Values of the input that g reads, from ``nk`` on; 0 for a time series.
     nk : int, or one for each input
         Samples from input to first effect; 0 where it acts at once.
-    degree, terms, most_terms, centres, width, units, linear, membership, select, ridge, raw_terms, seed, estimate, validate, split, \
-detrend, offset
+    regressors, degree, terms, most_terms, centres, width, units, linear, membership, select, ridge, raw_terms, seed, estimate, \
+validate, split, detrend, offset
         Which functions, what to fit to and how, see `thetahat.NarxOptions`.
 
     Returns
@@ -92,10 +93,7 @@ detrend, offset
     >>> sorted(model.parameter_names)
     ['u(k-1)', 'u(k-1)^2', 'y(k-1)']
     """
-    words = [f"--narx={_options.text('map', map)}", f"--ny={_options.integer('ny', ny)}"]
-    words += _options.order_words(nk=nk)
-    each = [nu] if isinstance(nu, int) else list(nu)
-    words.append(f"--nu={','.join(str(_options.integer('nu', one)) for one in each)}")
+    words = [f"--narx={_options.text('map', map)}", *_options.order_words(ny=ny, nu=nu, nk=nk)]
     words += _options.words(NarxOptions, locals(), len(log) if isinstance(log, Log) else None)
     found = Model._of(_thetahat.fit_narx(handle("log", log), words))
     for warning in found.warnings:

@@ -171,6 +171,8 @@ class NarxOptions(TypedDict, total=False):
     ----------
     estimate, validate, split, detrend, offset, ridge
         What to fit to, what to judge on and what is taken from the channels, see `FitOptions`.
+    regressors : sequence of str
+        Expressions of the channels that g reads too, such as ``"sqrt(u)"``, at the lags of the channels in them.
     degree : int
         Factors of a product at most, for ``"poly"``: 2.
     terms : int, or sequence of str
@@ -205,6 +207,7 @@ class NarxOptions(TypedDict, total=False):
     detrend: str
     offset: Mapping[str, float]
     ridge: float
+    regressors: Sequence[str]
     degree: int
     terms: Union[int, Sequence[str]]
     most_terms: int
@@ -310,6 +313,10 @@ def words(allowed: type, arguments: Mapping[str, Any], rows: int | None = None) 
             if not value:
                 raise ValueError("terms: there is none; name one at least")
             found += [f"--term={text(name, one)}" for one in value]
+        elif name == "regressors":
+            if not isinstance(value, (list, tuple)):
+                raise TypeError(f"regressors: expected a sequence of str, found {value!r}")
+            found += [f"--regressor={text(name, one)}" for one in value]
         elif name in ("decimal_comma", "trend", "raw_terms"):
             found += [f"--{name.replace('_', '-')}"] if _flag(name, value) else []
         else:
@@ -326,11 +333,11 @@ def order_words(**orders: Orders | None) -> list[str]:
         if isinstance(value, np.ndarray):
             value = value.tolist()
         if isinstance(value, (list, tuple)):
-            if name not in ("nb", "nf", "nk", "nu"):
+            if name not in ("nb", "nf", "nk", "nu", "ny"):
                 raise TypeError(f"{name}: expected an int or a range such as range(1, 4), found {value!r}")
             texts = [_order(name, one) for one in value]
             if not texts:
-                raise ValueError(f"{name}: there is none; give one for each input")
+                raise ValueError(f"{name}: there is none; give one for each channel")
             found.append(f"--{name}={','.join(texts)}")
         else:
             found.append(f"--{name}={_order(name, value)}")

@@ -370,8 +370,8 @@ class NARXRegressor(_Regressor):
         How many samples ahead `predict` and `score` predict. None: the free run, which sees no outputs.
     sample_time : float, default=1.0
         Seconds from one sample to the next.
-    degree, terms, most_terms, centres, width, units, linear, membership, select, ridge, raw_terms, seed, estimate, validate, split, \
-detrend, offset : default=None
+    regressors, degree, terms, most_terms, centres, width, units, linear, membership, select, ridge, raw_terms, seed, estimate, \
+validate, split, detrend, offset : default=None
         Which functions, what to fit to and how, as for `thetahat.narx`, see `thetahat.NarxOptions`. Channels are called as the columns
         of a data frame, else u, or u1, u2, …, and y.
 
@@ -413,6 +413,7 @@ detrend, offset : default=None
         *,
         horizon: int | None = None,
         sample_time: float = 1.0,
+        regressors: Sequence[str] | None = None,
         degree: int | None = None,
         terms: int | Sequence[str] | None = None,
         most_terms: int | None = None,
@@ -437,6 +438,7 @@ detrend, offset : default=None
         self.nk = nk
         self.horizon = horizon
         self.sample_time = sample_time
+        self.regressors = regressors
         self.degree = degree
         self.terms = terms
         self.most_terms = most_terms

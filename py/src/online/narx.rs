@@ -194,12 +194,13 @@ impl RecursiveNarx {
         let KindOfModel::NonlinearArx(own) = &report.model else {
             return Err(refuse("expected a nonlinear ARX model"));
         };
-        if let Map::Neighbours { .. } = own.map {
+        let lags = own.lag_orders().map_err(|error| error::batch(py, error))?;
+        let (signal, map) = own.single("a recursion").map_err(|error| error::batch(py, error))?;
+        if let Map::Neighbours { .. } = map.functions {
             return Err(refuse(
                 "it keeps samples (nearest neighbours), and has no parameters to track; fit another map",
             ));
         }
-        let lags = own.lag_orders().map_err(|error| error::batch(py, error))?;
         let inputs: Vec<InputOrders> =
             lags.nb.iter().zip(&lags.nk).map(|(&nb, &nk)| InputOrders { nb, nk }).collect();
         let scaling = |signal: &Signal, scale: f64| {
@@ -214,26 +215,27 @@ impl RecursiveNarx {
         let scalings: Vec<Scaling<f64>> =
             own.inputs.iter().map(|input| scaling(input, scale(&input.name))).collect::<PyResult<_>>()?;
         let orders = ArxOrders { na: lags.na, inputs: &inputs, constant: false };
-        let functions =
-            Functions::new(own.map.clone(), orders.parameters()).map_err(|error| error::batch(py, error))?;
-        let Some(rows) = own.covariance.as_ref().filter(|_| own.noise_variance > 0.0) else {
+        let functions = Functions::new(map.functions.clone(), orders.parameters())
+            .map_err(|error| error::batch(py, error))?;
+        let noise_variance = own.noise_covariance[0][0];
+        let Some(rows) = own.covariance.as_ref().filter(|_| noise_variance > 0.0) else {
             return Err(refuse("it does not say how sure it is: it has no covariance, or no noise"));
         };
         // P is in units of the noise variance of the scaled output.
-        let unit = own.noise_variance / (own.output_scale * own.output_scale);
+        let unit = noise_variance / (map.scale * map.scale);
         let entry = |i: usize, j: usize| (rows[i][j] / 2.0 + rows[j][i] / 2.0) / unit;
         let covariance = DMatrix::from_fn(rows.len(), rows.len(), entry);
         let parameters = DVector::from_iterator(
             own.parameters.len(),
             own.parameters.iter().map(|parameter| parameter.value),
         );
-        let output = scaling(&own.output, own.output_scale)?;
+        let output = scaling(signal, map.scale)?;
         let stepper = Narx::new(functions, &orders, output, &scalings, forgetting.0)
             .and_then(|stepper| {
                 stepper
                     .with_parameters(parameters)?
                     .with_covariance(Covariance::new(&covariance)?)?
-                    .with_noise_variance(own.noise_variance, report.estimation.samples)
+                    .with_noise_variance(noise_variance, report.estimation.samples)
             })
             .map_err(|error| failed(py, error))?;
         let limited = stepper.estimator().parameters().len();

@@ -309,6 +309,13 @@ impl Log {
         Ok(log)
     }
 
+    /// The log with a further channel, which has a value for each row, NaN where there is none.
+    pub(crate) fn with_channel(mut self, channel: Channel) -> Self {
+        debug_assert_eq!(channel.values.len(), self.rows);
+        self.channels.push(channel);
+        self
+    }
+
     /// Whether it is several logs as one, which have no common clock.
     pub(crate) fn is_joined(&self) -> bool {
         !self.boundaries.is_empty()

@@ -3,6 +3,7 @@
 mod candidates;
 pub(crate) mod centres;
 mod figures;
+mod joint;
 mod local;
 mod neighbours;
 pub(crate) mod splines;
@@ -15,14 +16,15 @@ use thetahat_core::nalgebra::DVector;
 
 pub(crate) use candidates::Candidates;
 use candidates::Products;
-pub use figures::{RunFigures, TermStep, TermsOutcome};
+pub use figures::{MapsOutcome, RunFigures, TermStep, TermsOutcome};
 use figures::{Sums, run};
+pub(crate) use joint::{Joint, joint};
 pub(crate) use local::Growth;
 
 use super::{Criteria, InformationCriterion};
 use crate::Error;
 use crate::data::{Log, Rows};
-use crate::model::{Evaluator, Map, NonlinearArxModel, Parameter};
+use crate::model::{Evaluator, Map, NonlinearArxModel, OutputMap, Parameter};
 use crate::regression::{Moments, Path, factor_rows, forward, product, sum_of_squares};
 
 /// Rows whose functions are in memory at once.
@@ -49,13 +51,15 @@ pub(crate) enum Count {
     Blocks,
 }
 
-/// The samples of a fit, and all of the model but its functions.
+/// The samples of a fit, and all of the model of one output but its functions.
 #[derive(Debug)]
 pub(crate) struct Samples<'l> {
     /// Deviations from the offsets.
     log: &'l Log,
     head: NonlinearArxModel,
-    /// The output and the inputs, each divided by its scale.
+    /// What the output is divided by.
+    scale: f64,
+    /// The output, the inputs and the expressions, each divided by its scale.
     signals: Vec<Vec<f64>>,
     /// For each regressor the signal and the lag.
     taps: Vec<(usize, usize)>,
@@ -109,7 +113,7 @@ pub(crate) struct Solved {
 }
 
 impl<'l> Samples<'l> {
-    /// The samples in `segments`, each with the number of measured ones before it; `log` has deviations.
+    /// The samples in `segments`, each with the number of measured ones before it; `log` has deviations, and `head` one output.
     pub(crate) fn new(
         log: &'l Log,
         mut head: NonlinearArxModel,
@@ -120,9 +124,10 @@ impl<'l> Samples<'l> {
             let own = head.regressors.iter().find(|regressor| regressor.channel == channel);
             own.map_or(1.0, |regressor| regressor.scale)
         };
+        let own = head.maps.first().map_or(1.0, |map| map.scale);
         let mut signals = Vec::new();
-        for (place, signal) in std::iter::once(&head.output).chain(&head.inputs).enumerate() {
-            let scale = if place == 0 { head.output_scale } else { scale(&signal.name) };
+        for (place, signal) in head.signals().enumerate() {
+            let scale = if place == 0 { own } else { scale(&signal.name) };
             signals.push(log.channel(&signal.name)?.values.iter().map(|value| value / scale).collect());
         }
         let taps: Vec<(usize, usize)> =
@@ -130,11 +135,13 @@ impl<'l> Samples<'l> {
         let lags = head.lags();
         let each = segments.iter().map(|(rows, past)| rows.start + lags.saturating_sub(*past)..rows.end);
         let rows: Vec<usize> = each.flatten().collect();
-        let mut samples = Self { log, signals, taps, rows, ridge, head: head.clone() };
+        let mut samples = Self { log, scale: own, signals, taps, rows, ridge, head: head.clone() };
         for (place, regressor) in head.regressors.iter_mut().enumerate() {
             regressor.range = samples.range(samples.taps[place], regressor.scale);
         }
-        head.output_range = samples.range((0, 0), head.output_scale);
+        for map in &mut head.maps {
+            map.range = samples.range((0, 0), map.scale);
+        }
         samples.head = head;
         Ok(samples)
     }
@@ -146,6 +153,12 @@ impl<'l> Samples<'l> {
 
     pub(crate) fn count(&self) -> usize {
         self.rows.len()
+    }
+
+    /// The model with these functions and parameters.
+    fn model(&self, functions: Map, parameters: Vec<Parameter>) -> NonlinearArxModel {
+        let own = |map: &OutputMap| OutputMap { functions: functions.clone(), ..map.clone() };
+        NonlinearArxModel { maps: self.head.maps.iter().map(own).collect(), parameters, ..self.head.clone() }
     }
 
     pub(crate) fn regressors(&self) -> usize {
@@ -178,7 +191,7 @@ impl<'l> Samples<'l> {
 
     /// The mean square of the output, in its units.
     fn mean_square(&self, rows: &[usize]) -> f64 {
-        let values = rows.iter().map(|t| self.signals[0][*t] * self.head.output_scale);
+        let values = rows.iter().map(|t| self.signals[0][*t] * self.scale);
         values.map(|value| value * value).sum::<f64>() / rows.len().max(1) as f64
     }
 
@@ -272,7 +285,7 @@ impl<'l> Samples<'l> {
             places.sort_unstable();
         }
         let map = candidates.map(&places, self.taps.len());
-        NonlinearArxModel { map, parameters: theta.into_iter().map(named).collect(), ..self.head.clone() }
+        self.model(map, theta.into_iter().map(named).collect())
     }
 
     /// Chooses functions, `most` at most. Where `chosen_on` has other samples, such as the first part of a split, held-out rows are
@@ -378,7 +391,7 @@ impl<'l> Samples<'l> {
         path: &Path,
         held_out: &[Option<RunFigures>],
     ) -> Result<Vec<TermStep>, Error> {
-        let variance = products.energy() * self.head.output_scale.powi(2) / products.rows().max(1) as f64;
+        let variance = products.energy() * self.scale.powi(2) / products.rows().max(1) as f64;
         let (rows, names) = (as_rows(&self.rows), self.names());
         let each = path.chosen.par_iter().zip(held_out).enumerate().map(|(at, (chosen, held_out))| {
             let run = || RunFigures::of(&self.on_path(candidates, path, at + 1), self.log, &rows);
@@ -506,7 +519,7 @@ impl<'l> Samples<'l> {
             }
         }
         let solution = factor.solve().map_err(failed)?;
-        let scale = self.head.output_scale;
+        let scale = self.scale;
         let theta: Vec<f64> =
             solution.parameters().iter().zip(&sizes).map(|(value, size)| value / size).collect();
         let left: f64 = values
@@ -532,12 +545,10 @@ impl<'l> Samples<'l> {
             mse: left * scale * scale / self.rows.len() as f64,
             condition: Some(condition).filter(|condition| condition.is_finite()),
             model: NonlinearArxModel {
-                map,
-                parameters,
-                noise_variance: variance * scale * scale,
+                noise_covariance: vec![vec![variance * scale * scale]],
                 degrees_of_freedom: Some(degrees),
                 covariance,
-                ..self.head.clone()
+                ..self.model(map, parameters)
             },
         })
     }

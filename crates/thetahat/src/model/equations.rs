@@ -1,5 +1,6 @@
 //! Models of a plant in equations, written by hand in a TOML file, with exact derivatives.
 
+mod channels;
 mod document;
 mod dynamics;
 mod expression;
@@ -12,6 +13,7 @@ mod scale;
 #[cfg(test)]
 pub(crate) mod tests;
 
+pub(crate) use channels::{ChannelExpression, ExpressionBuffer};
 pub(crate) use document::{Document, Entry, Section, suggestion};
 use dynamics::{Functions, Step};
 pub use fitted::EquationsModel;

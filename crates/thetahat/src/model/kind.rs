@@ -58,7 +58,7 @@ impl Model {
         match self {
             Self::Polynomial(model) => std::slice::from_ref(&model.output),
             Self::Equations(model) => &model.outputs,
-            Self::NonlinearArx(model) => std::slice::from_ref(&model.output),
+            Self::NonlinearArx(model) => &model.outputs,
         }
     }
 
@@ -99,7 +99,7 @@ impl Model {
         match self {
             Self::Polynomial(model) => model.orders.nb.iter().any(|&nb| nb > 0),
             Self::Equations(model) => !model.inputs.is_empty(),
-            Self::NonlinearArx(model) => model.sources().iter().any(|source| *source > 0),
+            Self::NonlinearArx(model) => model.is_driven(),
         }
     }
 

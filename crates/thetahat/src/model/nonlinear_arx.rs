@@ -11,54 +11,61 @@ pub use functions::Functions;
 pub(crate) use map::Evaluator;
 pub use map::{Map, Membership};
 
-use super::fitted::{only, only_variance};
+use super::equations::ChannelExpression;
 use super::orders::lag_name;
 use super::{Orders, Parameter, Signal, is_covariance};
 use crate::Error;
 
-/// A nonlinear ARX model with one output:
+/// A nonlinear ARX model: for each output i
 ///
 /// ```text
-/// y(t) = s g(z(t)) + e(t),   z_i(t) = x_i(t - l_i)/s_i,   g(z) = sum_j theta_j f_j(z)
+/// y_i(t) = s_i g_i(z(t)) + e_i(t),   z_r(t) = x_r(t - l_r)/s_r,   g_i(z) = sum_j theta_j f_j(z)
 /// ```
 ///
-/// where x_i is the output or an input as a deviation from its offset, l_i a lag, s_i the scale of that channel, s that of the output,
-/// and f_j the functions of the [`Map`] (Ljung, System Identification, 2nd ed. 1999, section 5.4). Scales and offsets come from the rows
-/// of the estimation, so that z has about the size of 1.
+/// where x_r is an output, an input, or an expression of them, as a deviation from its offset, l_r a lag, s_r the scale of that channel,
+/// s_i that of the output, and f_j the functions of its [`Map`] (Ljung, System Identification, 2nd ed. 1999, section 5.4). Scales and
+/// offsets come from the rows of the estimation, so that z has about the size of 1. All maps read the same z.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct NonlinearArxModel {
     /// Seconds from one sample to the next.
     pub sample_time: f64,
     /// The inputs.
     pub inputs: Vec<Signal>,
-    /// The output: a list of one in the document.
-    #[serde(rename = "outputs", with = "only")]
-    #[schemars(with = "[Signal; 1]")]
-    pub output: Signal,
+    /// The outputs.
+    pub outputs: Vec<Signal>,
+    /// Expressions of inputs and outputs that are read like these, such as sqrt(u). The name of each is its text; it is of the values of the
+    /// channels in their own units.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub expressions: Vec<Signal>,
     /// z, in its order.
     pub regressors: Vec<Regressor>,
-    /// s, in units of the output.
-    pub output_scale: f64,
-    /// The least and the largest output of the estimation rows, as deviations from the offset.
-    pub output_range: [f64; 2],
-    /// The functions f.
-    pub map: Map,
-    /// The variance of e: the sum of squared residuals over N - p. A matrix of one row in the document.
-    #[serde(rename = "noise_covariance", with = "only_variance")]
-    #[schemars(with = "[[f64; 1]; 1]")]
-    pub noise_variance: f64,
-    /// N - p, the degrees of freedom of `noise_variance`.
+    /// g and s of each output.
+    pub maps: Vec<OutputMap>,
+    /// The covariance of e, row by row: the sums of products of residuals over N - p, with the root of both N - p where these differ.
+    pub noise_covariance: Vec<Vec<f64>>,
+    /// N - p of the output with most parameters, the degrees of freedom of `noise_covariance`.
     pub degrees_of_freedom: Option<usize>,
-    /// theta, one for each function, in the order of `covariance`.
+    /// theta, one for each function of each map, in the order of `covariance`.
     pub parameters: Vec<Parameter>,
     /// The covariance matrix of the parameters, row by row; none where no theory gives one.
     pub covariance: Option<Vec<Vec<f64>>>,
 }
 
+/// What a nonlinear ARX model says of one of its outputs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct OutputMap {
+    /// s, in units of the output.
+    pub scale: f64,
+    /// The least and the largest output of the estimation rows, as deviations from the offset.
+    pub range: [f64; 2],
+    /// The functions f.
+    pub functions: Map,
+}
+
 /// A lag of a channel.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Regressor {
-    /// The channel: the output or an input.
+    /// The channel: an output, an input, or an expression.
     pub channel: String,
     /// How many samples before the output it is read.
     pub lag: usize,
@@ -76,19 +83,111 @@ impl Regressor {
 }
 
 impl NonlinearArxModel {
-    /// Where each regressor is read: 0 for the output, 1, 2, … for the inputs.
+    /// What regressors read: outputs, inputs, expressions.
+    pub(crate) fn signals(&self) -> impl Iterator<Item = &Signal> {
+        self.outputs.iter().chain(&self.inputs).chain(&self.expressions)
+    }
+
+    /// Which of [`signals`](Self::signals) each regressor reads.
     pub(crate) fn sources(&self) -> Vec<usize> {
         let place = |regressor: &Regressor| {
-            self.inputs.iter().position(|input| input.name == regressor.channel).map_or(0, |input| input + 1)
+            self.signals().position(|signal| signal.name == regressor.channel).unwrap_or(0)
         };
         self.regressors.iter().map(place).collect()
     }
 
-    /// Its lags as the orders of an ARX model: na of the output, and nb of each input from nk on.
+    /// The expressions, which read channels by their places among outputs and inputs.
     ///
     /// # Errors
-    /// [`Error::Report`] where regressors are not lags in a row, each channel with one scale, as those of every fit are.
+    /// What is wrong with one, in words.
+    pub(crate) fn read_expressions(&self) -> Result<Vec<ChannelExpression>, String> {
+        let names: Vec<&str> =
+            self.outputs.iter().chain(&self.inputs).map(|signal| signal.name.as_str()).collect();
+        let each = self.expressions.iter();
+        each.map(|expression| ChannelExpression::read(&expression.name, &names)).collect()
+    }
+
+    /// Whether anything but outputs is read.
+    pub(crate) fn is_driven(&self) -> bool {
+        let of_outputs = self.outputs.len();
+        // Names that are refused are told where a model is checked.
+        let expressions = self.read_expressions().unwrap_or_default();
+        let driven = |source: usize| match source.checked_sub(of_outputs + self.inputs.len()) {
+            Some(place) => expressions
+                .get(place)
+                .is_some_and(|one| one.channels().iter().any(|channel| *channel >= of_outputs)),
+            None => source >= of_outputs,
+        };
+        self.sources().into_iter().any(driven)
+    }
+
+    /// The model of one of its outputs, to which the others are inputs.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for an output that is not there.
+    pub fn of_output(&self, output: usize) -> Result<Self, Error> {
+        let (Some(signal), Some(map)) = (self.outputs.get(output), self.maps.get(output)) else {
+            let message =
+                format!("{output} is none of the {} outputs, which are counted from 0", self.outputs.len());
+            return Err(Error::argument("output", message));
+        };
+        if self.outputs.len() == 1 {
+            return Ok(self.clone());
+        }
+        let others = self.outputs.iter().filter(|other| *other != signal);
+        let own = self.places().get(output).cloned().unwrap_or_default();
+        let own = own.start.min(self.parameters.len())..own.end.min(self.parameters.len());
+        let mut parameters = self.parameters[own.clone()].to_vec();
+        for parameter in &mut parameters {
+            if let Some(name) = parameter.name.strip_prefix(&format!("{}: ", signal.name)) {
+                parameter.name = name.to_owned();
+            }
+        }
+        let covariance = self.covariance.as_ref();
+        let covariance =
+            covariance.map(|rows| rows[own.clone()].iter().map(|row| row[own.clone()].to_vec()).collect());
+        let variance = self.noise_covariance.get(output).and_then(|row| row.get(output)).copied();
+        Ok(Self {
+            sample_time: self.sample_time,
+            inputs: self.inputs.iter().chain(others).cloned().collect(),
+            outputs: vec![signal.clone()],
+            expressions: self.expressions.clone(),
+            regressors: self.regressors.clone(),
+            maps: vec![map.clone()],
+            noise_covariance: vec![vec![variance.unwrap_or(0.0)]],
+            degrees_of_freedom: self.degrees_of_freedom,
+            parameters,
+            covariance,
+        })
+    }
+
+    /// The model of a single output as such.
+    ///
+    /// # Errors
+    /// [`Error::Report`] where it has several; `what` is of one.
+    pub fn single(&self, what: &str) -> Result<(&Signal, &OutputMap), Error> {
+        match (&*self.outputs, &*self.maps) {
+            ([output], [map]) => Ok((output, map)),
+            _ => Err(Error::report(format!(
+                "{what} is of one output, and the model of the report has {}; fit each of them alone, the others being inputs",
+                self.outputs.len()
+            ))),
+        }
+    }
+
+    /// Its lags as the orders of an ARX model with one output: na of the output, and nb of each input from nk on.
+    ///
+    /// # Errors
+    /// [`Error::Report`] where there are several outputs, or regressors are not lags in a row, each channel with one scale.
     pub fn lag_orders(&self) -> Result<Orders, Error> {
+        let (_, map) = self.single("a recursion")?;
+        if let Some(expression) = self.expressions.first() {
+            return Err(Error::report(format!(
+                "the model of the report reads {}, and a recursion only channels; write its values into the log as a column, and fit with \
+                 that as an input",
+                expression.name
+            )));
+        }
         let sources = self.sources();
         let of = |source: usize| {
             let own = sources.iter().zip(&self.regressors).filter(move |(other, _)| **other == source);
@@ -100,7 +199,7 @@ impl NonlinearArxModel {
         let in_a_row = |(lags, first): (&Vec<(usize, f64)>, &usize)| {
             lags.iter().enumerate().all(|(at, (lag, scale))| *lag == first + at && *scale == lags[0].1)
         };
-        let of_output = channels[0].iter().all(|(_, scale)| *scale == self.output_scale) && firsts[0] == 1;
+        let of_output = channels[0].iter().all(|(_, scale)| *scale == map.scale) && firsts[0] == 1;
         if !sources.is_sorted() || !of_output || !channels.iter().zip(&firsts).all(in_a_row) {
             return Err(Error::report(
                 "the regressors of the report are not lags in a row, each channel with one scale; they cannot be tracked",
@@ -110,20 +209,36 @@ impl NonlinearArxModel {
         Orders::arx(counts[0], &counts[1..], &firsts[1..])
     }
 
-    /// The longest lag of the output; 0 where none is read.
-    pub(crate) fn output_lags(&self) -> usize {
-        let own = self.regressors.iter().filter(|regressor| regressor.channel == self.output.name);
-        own.map(|regressor| regressor.lag).max().unwrap_or(0)
-    }
-
     /// The longest lag of any channel.
     pub(crate) fn lags(&self) -> usize {
         self.regressors.iter().map(|regressor| regressor.lag).max().unwrap_or(0)
     }
 
-    /// Such as NARX polynomial of 8 terms.
+    /// The parameters of each map, by their places.
+    pub(crate) fn places(&self) -> Vec<std::ops::Range<usize>> {
+        let regressors = self.regressors.len();
+        let each = self.maps.iter().scan(0, |first, map| {
+            let end = *first + map.functions.parameters(regressors);
+            Some(std::mem::replace(first, end)..end)
+        });
+        each.collect()
+    }
+
+    /// Such as NARX polynomial, 8 terms; of several outputs with what each has.
     pub(crate) fn name(&self) -> String {
-        self.map.name(self.parameters.len())
+        let regressors = self.regressors.len();
+        let described = |map: &OutputMap| map.functions.describe(map.functions.parameters(regressors));
+        match &*self.maps {
+            [map] => format!("NARX {}", described(map)),
+            maps => {
+                let each: Vec<String> = maps
+                    .iter()
+                    .zip(&self.outputs)
+                    .map(|(map, output)| format!("{} {}", output.name, described(map)))
+                    .collect();
+                format!("NARX {}", each.join("; "))
+            }
+        }
     }
 
     /// What only linear models do, asked of this one.
@@ -140,16 +255,26 @@ impl NonlinearArxModel {
     pub(crate) fn check(&self) -> Result<(), Error> {
         let wrong =
             |what: String| Err(Error::report(format!("model.{what}; the report was edited or damaged")));
-        let channels: Vec<&str> =
-            self.inputs.iter().chain([&self.output]).map(|signal| signal.name.as_str()).collect();
+        let channels: Vec<&str> = self.signals().map(|signal| signal.name.as_str()).collect();
+        if let Some(place) = (1..channels.len()).find(|place| channels[..*place].contains(&channels[*place]))
+        {
+            return wrong(format!("inputs, outputs and expressions have '{}' twice", channels[place]));
+        }
+        if let Err(what) = self.read_expressions() {
+            return wrong(format!("expressions: {what}"));
+        }
+        let outputs = self.outputs.len();
+        if outputs == 0 || self.maps.len() != outputs {
+            return wrong("maps is not one for each output, of which there is one at least".to_owned());
+        }
         if self.regressors.is_empty() {
             return wrong("regressors has none".to_owned());
         }
-        for (place, regressor) in self.regressors.iter().enumerate() {
+        for ((place, regressor), source) in self.regressors.iter().enumerate().zip(self.sources()) {
             if !channels.contains(&regressor.channel.as_str()) {
                 return wrong(format!("regressors[{place}].channel is none of its signals"));
             }
-            if regressor.channel == self.output.name && regressor.lag == 0 {
+            if source < outputs && regressor.lag == 0 {
                 return wrong(format!("regressors[{place}] is the output itself"));
             }
             if !(regressor.scale.is_finite() && regressor.scale > 0.0) {
@@ -159,22 +284,38 @@ impl NonlinearArxModel {
                 return wrong(format!("regressors[{place}].lag is too long"));
             }
         }
+        let of_outputs = |one: &ChannelExpression| one.channels().iter().any(|channel| *channel < outputs);
+        let read = self.read_expressions().unwrap_or_default();
+        let at_once = |regressor: &&Regressor| {
+            let place = self.expressions.iter().position(|own| own.name == regressor.channel);
+            regressor.lag == 0 && place.and_then(|place| read.get(place)).is_some_and(of_outputs)
+        };
+        if let Some(regressor) = self.regressors.iter().find(at_once) {
+            return wrong(format!("regressors has {} of the output itself", regressor.name()));
+        }
         let positive = |value: f64| value.is_finite() && value > 0.0;
-        if !positive(self.sample_time) || !positive(self.output_scale) {
-            return wrong("sample_time or output_scale is not a positive number".to_owned());
+        if !positive(self.sample_time) || !self.maps.iter().all(|map| positive(map.scale)) {
+            return wrong("sample_time or a scale of maps is not a positive number".to_owned());
         }
-        if let Err(what) = self.map.check(self.regressors.len()) {
-            return wrong(format!("map.{what}"));
+        for (place, map) in self.maps.iter().enumerate() {
+            if let Err(what) = map.functions.check(self.regressors.len()) {
+                return wrong(format!("maps[{place}].functions.{what}"));
+            }
         }
-        let count = self.map.parameters(self.regressors.len());
+        let count = self.places().last().map_or(0, |places| places.end);
         if self.parameters.len() != count {
             return wrong(format!("parameters has {} entries for {count} functions", self.parameters.len()));
         }
         if self.parameters.iter().any(|parameter| !parameter.value.is_finite()) {
             return wrong("parameters has values that are no numbers".to_owned());
         }
-        let square = |rows: &Vec<Vec<f64>>| rows.len() == count && rows.iter().all(|row| row.len() == count);
-        if self.covariance.as_ref().is_some_and(|rows| !square(rows) || !is_covariance(rows)) {
+        let square = |rows: &Vec<Vec<f64>>, size: usize| {
+            rows.len() == size && rows.iter().all(|row| row.len() == size)
+        };
+        if !square(&self.noise_covariance, outputs) || !is_covariance(&self.noise_covariance) {
+            return wrong("noise_covariance does not have a row and a column for each output".to_owned());
+        }
+        if self.covariance.as_ref().is_some_and(|rows| !square(rows, count) || !is_covariance(rows)) {
             return wrong("covariance does not have a row and a column for each parameter".to_owned());
         }
         Ok(())

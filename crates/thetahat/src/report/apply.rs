@@ -18,6 +18,8 @@ pub struct Applied {
     pub beyond: usize,
     /// The rows asked for, in rising order.
     pub rows: Vec<Rows>,
+    /// How many values a [clamped run](Report::clamped_run) kept within its range; none otherwise.
+    pub clamped: Option<usize>,
 }
 
 /// What a model says of an output.
@@ -65,7 +67,7 @@ pub fn apply(
     horizon: Horizon,
     initial: InitialCondition,
 ) -> Result<Applied, Error> {
-    applied(model, log, rows, detrend, (horizon, initial), &[])
+    applied(model, log, rows, detrend, (horizon, initial), (&[], false))
 }
 
 impl Report {
@@ -82,7 +84,22 @@ impl Report {
         horizon: Horizon,
         initial: InitialCondition,
     ) -> Result<Applied, Error> {
-        applied(&self.model, log, rows, detrend, (horizon, initial), &rows_of_fit(self, log)?)
+        applied(&self.model, log, rows, detrend, (horizon, initial), (&rows_of_fit(self, log)?, false))
+    }
+
+    /// A free run of a nonlinear ARX model of which each output that is fed back is kept within 1.1 times the range of the estimation rows,
+    /// about its middle: finite, if not good, where the free run leaves the data. `clamped` counts the values that were.
+    ///
+    /// # Errors
+    /// As for [`apply`]; [`Error::Argument`] for models of other kinds.
+    pub fn clamped_run(
+        &self,
+        log: &Log,
+        rows: &[Rows],
+        detrend: Option<Detrend>,
+        initial: InitialCondition,
+    ) -> Result<Applied, Error> {
+        applied(&self.model, log, rows, detrend, (Horizon::FreeRun, initial), (&[], true))
     }
 }
 
@@ -92,12 +109,18 @@ fn applied(
     rows: &[Rows],
     detrend: Option<Detrend>,
     (horizon, initial): (Horizon, InitialCondition),
-    fitted: &[Rows],
+    (fitted, clamp): (&[Rows], bool),
 ) -> Result<Applied, Error> {
     let Prepared { rows, log: deviations, levels } = prepared(model, log, rows, detrend, (horizon, initial))?;
     let model = &of_offsets(model, detrend);
-    let on_log = model.on_log(&deviations, &rows, Some(initial), fitted)?;
+    let on_log = match clamp {
+        true => model.clamped_on_log(&deviations, &rows)?,
+        false => model.on_log(&deviations, &rows, Some(initial), fitted)?,
+    };
     let responses = on_log.respond(horizon, initial)?;
+    let clamped = on_log.clamped();
+    let outside: Vec<Option<f64>> =
+        (0..responses.len()).map(|index| on_log.outside(index, &responses, horizon)).collect();
     let (each, forecast) = match horizon {
         Horizon::FreeRun => (None, None),
         Horizon::Steps { steps } => {
@@ -110,7 +133,9 @@ fn applied(
     let outputs = outputs.map(|(index, ((response, output), level))| {
         let measured = log.channel(&output.name).ok().map(|channel| channel.values.clone());
         let fit = measured.is_some().then(|| {
-            Fit::new(&output.name, on_log.measured(index), &response, &rows, None, (horizon, initial))
+            let fit =
+                Fit::new(&output.name, on_log.measured(index), &response, &rows, None, (horizon, initial));
+            Fit { outside: outside[index], ..fit }
         });
         let Response { values: mut predicted, .. } = response;
         let mut standard_deviations = each.as_mut().and_then(Iterator::next);
@@ -132,7 +157,7 @@ fn applied(
     });
     let outputs: Vec<AppliedOutput> = outputs.collect();
     let beyond = outputs.first().map_or(0, |output| output.predicted.len() - log.rows());
-    Ok(Applied { outputs, beyond, rows })
+    Ok(Applied { outputs, beyond, rows, clamped })
 }
 
 /// The model as it is beside offsets that are its own, or that were found elsewhere: of those it says nothing.

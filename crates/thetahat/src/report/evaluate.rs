@@ -32,7 +32,7 @@ pub(super) fn evaluate(report: &mut Report, on_log: &dyn OnLog, part: Part, focu
         for (index, (response, output)) in responses.iter().zip(on_log.outputs()).enumerate() {
             let measured = on_log.measured(index);
             let mut fit = Fit::new(&output.name, measured, response, &rows, Some(part), (horizon, start));
-            fit.outside = on_log.outside(index, response, horizon);
+            fit.outside = on_log.outside(index, &responses, horizon);
             if fit.percent.is_none() {
                 let why = if fit.samples == 0 {
                     "its segments without a gap are too short"

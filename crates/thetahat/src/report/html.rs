@@ -447,20 +447,32 @@ fn of_model(report: &Report) -> Vec<Section> {
 }
 
 fn of_nonlinear_arx(report: &Report, model: &NonlinearArxModel) -> Vec<Section> {
-    let mut choice = Section::new("Choice of functions");
-    if let Some(outcome) = report.estimation.procedure.terms() {
+    let of = |title: &str, output: usize| match &*model.outputs {
+        [_] => title.to_owned(),
+        outputs => format!("{title}, {}", outputs[output].name),
+    };
+    let mut sections = Vec::new();
+    for (output, outcome) in report.estimation.procedure.terms().iter().enumerate() {
+        let mut choice = Section::new(of("Choice of functions", output));
         choice.chart(charts::complexity(outcome));
         choice.table(tables::path(outcome));
+        sections.push(choice);
     }
-    let mut section = Section::new("Model");
-    section.chart(charts::slices(model));
-    // Samples are many, and in the report.
-    if !matches!(model.map, Map::Neighbours { .. }) {
-        section.table(tables::functions(model));
+    for (output, places) in model.places().into_iter().enumerate() {
+        let mut section = Section::new(of("Model", output));
+        section.chart(charts::slices(model, output));
+        // Samples are many, and in the report.
+        if !matches!(model.maps[output].functions, Map::Neighbours { .. }) {
+            section.table(tables::functions(&model.parameters[places]));
+        }
+        sections.push(section);
     }
+    let mut section = Section::new("Regressors and estimation");
     section.table(tables::regressors(model));
-    section.table(tables::estimation(&report.estimation, Some(model.noise_variance)));
-    vec![choice, section]
+    let noise = if let [only] = &*model.noise_covariance { only.first().copied() } else { None };
+    section.table(tables::estimation(&report.estimation, noise));
+    sections.push(section);
+    sections
 }
 
 fn of_equations(report: &Report, model: &EquationsModel) -> Vec<Section> {

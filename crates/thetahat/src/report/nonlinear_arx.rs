@@ -2,19 +2,23 @@
 
 mod plan;
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use super::evaluate::evaluate;
 use super::schema::{Data, Estimation, Missing, Report};
 use super::shares::Shares;
-use crate::data::{Log, Offset, Rows, Source, digests};
+use crate::data::{Channel, Log, Offset, Rows, Source, digests};
 use crate::estimate::{
-    Criteria, Procedure, TermsOutcome,
-    nonlinear_arx::{Candidates, Chosen, Count, Growth, Samples, Solved, centres, splines},
+    Criteria, MapsOutcome, Procedure, TermsOutcome,
+    nonlinear_arx::{Candidates, Chosen, Count, Growth, Joint, Samples, Solved, centres, joint, splines},
 };
-use crate::model::{Map, Model, NonlinearArxModel, Regressor, Signal};
+use crate::model::{ChannelExpression, Map, Model, NonlinearArxModel, OutputMap, Regressor, Signal};
 use crate::regression::Monomials;
-use crate::respond::{Horizon, nonlinear_arx::NonlinearArxOnLog};
+use crate::respond::{
+    Horizon,
+    nonlinear_arx::{NonlinearArxOnLog, no_number},
+};
 use crate::select::{Focus, Select};
 use crate::validate::Part;
 use crate::{Document, Error};
@@ -65,7 +69,7 @@ const MOST_CENTRES: usize = 2000;
 ///     terms: Some(2),
 ///     raw_terms: true,
 ///     detrend: Detrend::None,
-///     ..NonlinearArxPlan::new(&["u"], "y")
+///     ..NonlinearArxPlan::new(&["u"], &["y"])
 /// };
 /// let report = fit_nonlinear_arx(&log, &[], &plan)?;
 /// let [first, second] = report.model.parameters() else { panic!("two terms") };
@@ -75,62 +79,30 @@ const MOST_CENTRES: usize = 2000;
 /// ```
 pub fn fit_nonlinear_arx(log: &Log, sources: &[Source], plan: &NonlinearArxPlan) -> Result<Report, Error> {
     plan.check()?;
-    let names: Vec<&str> = plan.inputs.iter().chain([&plan.output]).map(String::as_str).collect();
+    let names: Vec<&str> = plan.inputs.iter().chain(&plan.outputs).map(String::as_str).collect();
     names.iter().try_for_each(|name| log.channel(name).map(|_| ()))?;
-    let Shares { estimation, validation, parts } =
-        Shares::of(&plan.estimate, &plan.validate, plan.split, log.rows())?;
-    let compared_on = parts.as_ref().map_or_else(|| validation.clone(), |parts| parts.validation.clone());
-    if plan.select == Some(Select::Validation) && compared_on.is_empty() {
-        return Err(Error::argument("select", "validation needs rows for it; give `validate` or `split`"));
-    }
-    let (signals, deviations) = deviations(log, plan, &names, &estimation)?;
-    let head = head(log, plan, &signals, &deviations, &estimation)?;
-    let samples = |rows: &[Rows]| -> Result<Samples<'_>, Error> {
-        let record = deviations.record(&plan.inputs, &plan.output, rows)?;
-        let segments: Vec<_> = record.segments.into_iter().zip(record.past).collect();
-        Samples::new(&deviations, head.clone(), &segments, plan.ridge)
+    let shares = Shares::of(&plan.estimate, &plan.validate, plan.split, log.rows())?;
+    let expressions = plan.read_expressions()?;
+    let Prepared { whole, signals, deviations } = prepare(log, plan, &expressions, &shares.estimation)?;
+    let head = head(&whole, plan, &signals, &deviations, &expressions, &shares.estimation)?;
+    let fitted = (0..plan.outputs.len())
+        .map(|output| fit_map(plan, &head.of_output(output)?, &deviations, &shares))
+        .collect::<Result<Vec<_>, Error>>()?;
+    let by = match plan.map {
+        MapPlan::Local { .. } => Procedure::Splits,
+        MapPlan::Neighbours { .. } => Procedure::Neighbours,
+        _ => Procedure::ForwardRegression,
     };
-    let all = samples(&estimation)?;
-    let select = plan.select.unwrap_or(if compared_on.is_empty() { Select::Cv } else { Select::Validation });
-    let given = match plan.map {
-        MapPlan::Local { units, .. } | MapPlan::Neighbours { units, .. } => units,
-        MapPlan::Products { ref terms } => Some(terms.len()),
-        _ => plan.terms,
-    };
-    let (count, selected_by) = match (given, select) {
-        (Some(count), _) => (Count::Given(count), "given".to_owned()),
-        (None, Select::Criterion(criterion)) => (Count::Least(criterion), criterion.word().to_owned()),
-        (None, Select::Validation) => (Count::HeldOut(compared_on), "validation".to_owned()),
-        (None, Select::Cv) => (Count::Blocks, "cv".to_owned()),
-    };
-    // With a split the choice looks at models of the first part, and the chosen one is fitted to both.
-    let first_part = match (&parts, &count) {
-        (Some(parts), Count::HeldOut(_)) => Some(samples(&parts.estimation)?),
-        _ => None,
-    };
-    let (chosen_on, most) = (first_part.as_ref(), plan.steps());
-    let functions: usize;
-    let by: fn(TermsOutcome) -> Procedure;
-    let (Chosen { steps, taken, .. }, Solved { model, mse, condition }) = match plan.map {
-        MapPlan::Local { membership, planes, .. } => {
-            let chosen = all.grow(Growth { membership, planes, most }, &count, chosen_on)?;
-            (functions, by) = (chosen.steps.len(), Procedure::Splits);
-            let solved = all.solve(chosen.map.clone())?;
-            (chosen, solved)
-        }
-        MapPlan::Neighbours { planes, .. } => {
-            let found = all.keep(planes, &count, chosen_on)?;
-            (functions, by) = (found.1.model.parameters.len(), Procedure::Neighbours);
-            found
-        }
-        _ => {
-            let candidates = candidates(&plan.map, &all)?;
-            let chosen = all.choose(&candidates, most, &count, chosen_on)?;
-            (functions, by) = (candidates.count(all.regressors()), Procedure::ForwardRegression);
-            let solved = all.solve(chosen.map.clone())?;
-            (chosen, solved)
-        }
-    };
+    // Samples are no parameters: as many as there are of them for each that is asked stand for one.
+    let parameters = fitted.iter().map(|one| {
+        let own = one.outcome.last().map(|step| step.parameters);
+        own.unwrap_or(one.solved.model.parameters.len())
+    });
+    let (parameters, samples) = (parameters.sum(), fitted.first().map_or(0, |one| one.samples.count()));
+    let (maps, parts) = fitted.into_iter().map(|one| (one.outcome, (one.samples, one.solved))).unzip();
+    let joint = joint(&head.inputs, parts)
+        .ok_or_else(|| Error::argument("output", "a model has one output at least"))?;
+    let Joint { model, mse, determinant, condition } = joint;
 
     let missing = names.iter().map(|name| {
         let values = &log.channel(name)?.values;
@@ -139,6 +111,7 @@ pub fn fit_nonlinear_arx(log: &Log, sources: &[Source], plan: &NonlinearArxPlan)
             rows: values.iter().filter(|value| value.is_nan()).count(),
         })
     });
+    let Shares { estimation, validation, parts } = shares;
     let segments = deviations.segments(&names, &estimation)?;
     let data = Data {
         logs: sources.to_vec(),
@@ -154,23 +127,14 @@ pub fn fit_nonlinear_arx(log: &Log, sources: &[Source], plan: &NonlinearArxPlan)
         time_gaps: log.gaps(),
         estimation,
     };
-    // Samples are no parameters: as many as there are of them for each that is asked stand for one.
-    let parameters =
-        steps.get(taken.saturating_sub(1)).map_or(model.parameters.len(), |step| step.parameters);
     let estimation = Estimation {
-        procedure: by(TermsOutcome {
-            candidates: functions,
-            selected_by,
-            ridge: Some(plan.ridge).filter(|ridge| *ridge > 0.0),
-            taken,
-            path: steps,
-        }),
+        procedure: by(MapsOutcome { maps }),
         initial: None,
         level: None,
         slope: None,
-        samples: all.count(),
+        samples,
         mse,
-        criteria: Criteria::new(mse, parameters, all.count()),
+        criteria: Criteria::new(determinant, parameters, samples),
         condition,
     };
     let mut report = Report {
@@ -191,6 +155,72 @@ pub fn fit_nonlinear_arx(log: &Log, sources: &[Source], plan: &NonlinearArxPlan)
     }
     report.warnings.extend(warnings(&report, &model));
     Ok(report)
+}
+
+/// The map of an output, and how it was found.
+struct FittedMap<'l> {
+    samples: Samples<'l>,
+    solved: Solved,
+    outcome: TermsOutcome,
+}
+
+/// Fits the map of the output of `head`, to which the other outputs are inputs.
+fn fit_map<'l>(
+    plan: &NonlinearArxPlan,
+    head: &NonlinearArxModel,
+    deviations: &'l Log,
+    Shares { estimation, validation, parts }: &Shares,
+) -> Result<FittedMap<'l>, Error> {
+    let read: Vec<String> =
+        head.inputs.iter().chain(&head.expressions).map(|signal| signal.name.clone()).collect();
+    let samples = |rows: &[Rows]| -> Result<Samples<'l>, Error> {
+        let record = deviations.record(&read, &head.outputs[0].name, rows)?;
+        let segments: Vec<_> = record.segments.into_iter().zip(record.past).collect();
+        Samples::new(deviations, head.clone(), &segments, plan.ridge)
+    };
+    let compared_on = parts.as_ref().map_or_else(|| validation.clone(), |parts| parts.validation.clone());
+    if plan.select == Some(Select::Validation) && compared_on.is_empty() {
+        return Err(Error::argument("select", "validation needs rows for it; give `validate` or `split`"));
+    }
+    let all = samples(estimation)?;
+    let select = plan.select.unwrap_or(if compared_on.is_empty() { Select::Cv } else { Select::Validation });
+    let given = match plan.map {
+        MapPlan::Local { units, .. } | MapPlan::Neighbours { units, .. } => units,
+        MapPlan::Products { ref terms } => Some(terms.len()),
+        _ => plan.terms,
+    };
+    let (count, selected_by) = match (given, select) {
+        (Some(count), _) => (Count::Given(count), "given".to_owned()),
+        (None, Select::Criterion(criterion)) => (Count::Least(criterion), criterion.word().to_owned()),
+        (None, Select::Validation) => (Count::HeldOut(compared_on), "validation".to_owned()),
+        (None, Select::Cv) => (Count::Blocks, "cv".to_owned()),
+    };
+    // With a split the choice looks at models of the first part, and the chosen one is fitted to both.
+    let first_part = match (parts, &count) {
+        (Some(parts), Count::HeldOut(_)) => Some(samples(&parts.estimation)?),
+        _ => None,
+    };
+    let (chosen_on, most) = (first_part.as_ref(), plan.steps());
+    let (functions, Chosen { steps, taken, .. }, solved) = match plan.map {
+        MapPlan::Local { membership, planes, .. } => {
+            let chosen = all.grow(Growth { membership, planes, most }, &count, chosen_on)?;
+            let solved = all.solve(chosen.map.clone())?;
+            (chosen.steps.len(), chosen, solved)
+        }
+        MapPlan::Neighbours { planes, .. } => {
+            let (chosen, solved) = all.keep(planes, &count, chosen_on)?;
+            (solved.model.parameters.len(), chosen, solved)
+        }
+        _ => {
+            let candidates = candidates(&plan.map, &all)?;
+            let chosen = all.choose(&candidates, most, &count, chosen_on)?;
+            let solved = all.solve(chosen.map.clone())?;
+            (candidates.count(all.regressors()), chosen, solved)
+        }
+    };
+    let ridge = Some(plan.ridge).filter(|ridge| *ridge > 0.0);
+    let outcome = TermsOutcome { candidates: functions, selected_by, ridge, taken, path: steps };
+    Ok(FittedMap { samples: all, solved, outcome })
 }
 
 /// The functions to choose from.
@@ -259,30 +289,53 @@ fn candidates(map: &MapPlan, samples: &Samples<'_>) -> Result<Candidates, Error>
     Ok(Candidates::Functions { map, always })
 }
 
-/// The offsets of the channels, and the log without them.
-fn deviations(
-    log: &Log,
+/// A log with the expressions of the plan as further channels.
+struct Prepared<'l> {
+    /// As it was measured.
+    whole: Cow<'l, Log>,
+    /// The offsets of all channels.
+    signals: BTreeMap<String, Signal>,
+    /// The log without them.
+    deviations: Log,
+}
+
+/// The channels and expressions of a plan, and their offsets.
+fn prepare<'l>(
+    log: &'l Log,
     plan: &NonlinearArxPlan,
-    names: &[&str],
+    expressions: &[ChannelExpression],
     estimation: &[Rows],
-) -> Result<(BTreeMap<String, Signal>, Log), Error> {
-    let segments = log.segments(names, estimation)?;
+) -> Result<Prepared<'l>, Error> {
+    let names: Vec<&str> = plan.channels().collect();
+    let segments = log.segments(&names, estimation)?;
     if segments.is_empty() {
         return Err(Error::data(
             "no estimation row has a value in every channel; name other rows or channels",
         ));
     }
+    let mut whole = Cow::Borrowed(log);
+    let channels = names.iter().map(|name| Ok(log.channel(name)?.values.as_slice()));
+    let channels: Vec<&[f64]> = channels.collect::<Result<_, Error>>()?;
+    for (text, expression) in plan.expressions.iter().zip(expressions) {
+        let mut values = expression.along(&channels, &vec![0.0; channels.len()]);
+        if let Some(row) = segments.iter().cloned().flatten().find(|row| !values[*row].is_finite()) {
+            return Err(no_number(text, row));
+        }
+        values.iter_mut().filter(|value| !value.is_finite()).for_each(|value| *value = f64::NAN);
+        whole = Cow::Owned(whole.into_owned().with_channel(Channel { name: text.clone(), values }));
+    }
     let mut signals = BTreeMap::new();
-    for name in names {
+    for name in names.iter().copied().chain(plan.expressions.iter().map(String::as_str)) {
         let by_hand = plan.offsets.iter().find(|(channel, _)| channel == name);
         let offset = match by_hand {
             Some(&(_, level)) => Offset { level, slope: 0.0 },
-            None => Offset::estimate(plan.detrend, log, name, &segments)?,
+            None => Offset::estimate(plan.detrend, &whole, name, &segments)?,
         };
-        signals.insert((*name).to_owned(), Signal { name: (*name).to_owned(), offset });
+        signals.insert(name.to_owned(), Signal { name: name.to_owned(), offset });
     }
-    let deviations = log.deviations(names.iter().map(|name| (*name, signals[*name].offset)))?;
-    Ok((signals, deviations))
+    let offsets = signals.iter().map(|(name, signal)| (name.as_str(), signal.offset));
+    let deviations = whole.deviations(offsets)?;
+    Ok(Prepared { whole, signals, deviations })
 }
 
 /// The model but its functions: signals, regressors and scales.
@@ -291,12 +344,13 @@ fn head(
     plan: &NonlinearArxPlan,
     signals: &BTreeMap<String, Signal>,
     deviations: &Log,
+    expressions: &[ChannelExpression],
     estimation: &[Rows],
 ) -> Result<NonlinearArxModel, Error> {
     let names: Vec<&str> = signals.keys().map(String::as_str).collect();
     let segments = deviations.segments(&names, estimation)?;
     // The standard deviation over the estimation rows; 1 in the signals' own units.
-    let scale = |name: &str| -> Result<f64, Error> {
+    let scale = |name: &str, role: &str| -> Result<f64, Error> {
         let (own, raw) = (&deviations.channel(name)?.values, &log.channel(name)?.values);
         let values =
             |of: &'_ [f64]| segments.iter().flat_map(|rows| of[rows.clone()].to_vec()).collect::<Vec<f64>>();
@@ -307,39 +361,46 @@ fn head(
             crate::regression::sum(values.iter().map(|value| (value - mean).powi(2))) / values.len() as f64;
         let spread = variance.sqrt();
         if spread.is_nan() || spread <= ROUNDING * size {
-            let role = if name == plan.output { "output" } else { "input" };
             return Err(Error::undetermined(
                 Vec::new(),
                 format!(
                     "{role} '{name}' is constant over the estimation rows: it can determine nothing; name rows in which it changes{}",
-                    if role == "input" { ", or leave it out" } else { "" }
+                    if role == "output" { "" } else { ", or leave it out" }
                 ),
             ));
         }
         Ok(if plan.raw_terms { 1.0 } else { spread })
     };
-    let output_scale = scale(&plan.output)?;
-    let regressor = |channel: &str, lag: usize, scale: f64| Regressor {
-        channel: channel.to_owned(),
-        lag,
-        scale,
-        range: [0.0; 2],
+    let mut regressors: Vec<Regressor> = Vec::new();
+    let mut read = |channel: &str, lags: std::ops::Range<usize>, scale: f64| {
+        regressors.extend(lags.map(|lag| Regressor {
+            channel: channel.to_owned(),
+            lag,
+            scale,
+            range: [0.0; 2],
+        }));
     };
-    let mut regressors: Vec<Regressor> =
-        (1..=plan.output_lags).map(|lag| regressor(&plan.output, lag, output_scale)).collect();
-    for (input, lags) in plan.inputs.iter().zip(&plan.input_lags) {
-        let scale = scale(input)?;
-        regressors.extend((lags.delay..lags.delay + lags.lags).map(|lag| regressor(input, lag, scale)));
+    let mut maps = Vec::new();
+    for (output, lags) in plan.outputs.iter().zip(&plan.output_lags) {
+        let scale = scale(output, "output")?;
+        read(output, 1..lags + 1, scale);
+        maps.push(OutputMap { scale, range: [0.0; 2], functions: Map::Polynomial { terms: Vec::new() } });
     }
+    for (input, lags) in plan.inputs.iter().zip(&plan.input_lags) {
+        read(input, lags.delay..lags.delay + lags.lags, scale(input, "input")?);
+    }
+    for (text, expression) in plan.expressions.iter().zip(expressions) {
+        read(text, plan.lags_of(expression), scale(text, "regressor")?);
+    }
+    let named = |names: &[String]| names.iter().map(|name| signals[name].clone()).collect();
     Ok(NonlinearArxModel {
         sample_time: log.sample_time(),
-        inputs: plan.inputs.iter().map(|input| signals[input].clone()).collect(),
-        output: signals[&plan.output].clone(),
+        inputs: named(&plan.inputs),
+        outputs: named(&plan.outputs),
+        expressions: named(&plan.expressions),
         regressors,
-        output_scale,
-        output_range: [0.0; 2],
-        map: Map::Polynomial { terms: Vec::new() },
-        noise_variance: 0.0,
+        noise_covariance: vec![vec![0.0; maps.len()]; maps.len()],
+        maps,
         degrees_of_freedom: None,
         parameters: Vec::new(),
         covariance: None,
@@ -349,34 +410,42 @@ fn head(
 /// What a careful reader should know.
 fn warnings(report: &Report, model: &NonlinearArxModel) -> Vec<String> {
     let mut warnings = Vec::new();
-    let Some(outcome) = report.estimation.procedure.terms() else { return warnings };
-    let taken = &outcome.path[..outcome.taken.min(outcome.path.len())];
-    if let Map::Neighbours { points, .. } = &model.map
-        && points.len() < report.estimation.samples
+    for ((outcome, map), output) in
+        report.estimation.procedure.terms().iter().zip(&model.maps).zip(&model.outputs)
     {
-        warnings.push(format!(
-            "the model keeps {} of {} samples, evenly chosen: a distance to each is a cost of every prediction",
-            points.len(),
-            report.estimation.samples
-        ));
+        let of = if model.outputs.len() > 1 { format!("{}: ", output.name) } else { String::new() };
+        let taken = &outcome.path[..outcome.taken.min(outcome.path.len())];
+        if let Map::Neighbours { points, .. } = &map.functions
+            && points.len() < report.estimation.samples
+        {
+            warnings.push(format!(
+                "{of}the model keeps {} of {} samples, evenly chosen: a distance to each is a cost of every prediction",
+                points.len(),
+                report.estimation.samples
+            ));
+        }
+        if let Some(run) = taken.last().and_then(|step| step.free_run).filter(|run| !run.in_range) {
+            let what = if run.rmse.is_some() {
+                "leaves 1.1 times the range of the output"
+            } else {
+                "grows without bound"
+            };
+            warnings.push(format!(
+                "{of}the free run on the estimation rows {what}: do not simulate with this model before you have looked at it"
+            ));
+        }
+        let aliases: Vec<&str> = taken.iter().flat_map(|step| &step.aliases).map(String::as_str).collect();
+        if let Some(first) = aliases.first() {
+            let others =
+                if aliases.len() > 1 { format!(" and {} more", aliases.len() - 1) } else { String::new() };
+            warnings.push(format!(
+                "{of}{first}{others} cannot be told from sums of the chosen terms on the estimation rows, as where an input has few levels"
+            ));
+        }
     }
-    if let Some(run) = taken.last().and_then(|step| step.free_run).filter(|run| !run.in_range) {
-        let what = if run.rmse.is_some() {
-            "leaves 1.1 times the range of the output"
-        } else {
-            "grows without bound"
-        };
-        warnings.push(format!("the free run on the estimation rows {what}: do not simulate with this model before you have looked at it"));
-    }
-    let aliases: Vec<&str> = taken.iter().flat_map(|step| &step.aliases).map(String::as_str).collect();
-    if let Some(first) = aliases.first() {
-        let others =
-            if aliases.len() > 1 { format!(" and {} more", aliases.len() - 1) } else { String::new() };
-        warnings.push(format!(
-            "{first}{others} cannot be told from sums of the chosen terms on the estimation rows, as where an input has few levels"
-        ));
-    }
-    for fit in &report.fit {
+    // The first output stands for all: they read the same values.
+    for fit in report.fit.iter().filter(|fit| Some(&fit.output) == model.outputs.first().map(|own| &own.name))
+    {
         if let (Some(outside), Some(part), Horizon::FreeRun) = (fit.outside, fit.part, fit.horizon)
             && outside > 0.1
             && part != Part::Estimation

@@ -309,7 +309,7 @@ fn evaluate(on_log: &dyn OnLog, plan: &ValidationPlan, validation: &mut Validati
         for (index, (response, output)) in responses.iter().zip(on_log.outputs()).enumerate() {
             let (name, measured) = (&output.name, on_log.measured(index));
             let mut fit = Fit::new(name, measured, response, &validation.rows, None, (horizon, start));
-            fit.outside = on_log.outside(index, response, horizon);
+            fit.outside = on_log.outside(index, &responses, horizon);
             if fit.percent.is_none() {
                 let why = if fit.samples == 0 {
                     "the segments without a gap are too short"
@@ -383,7 +383,7 @@ fn test_residuals(report: &Report, on_log: &dyn OnLog, plan: &ValidationPlan, va
     let relation = match (validation.in_sample, &report.estimation.procedure) {
         // The parameters of equations are none of the noise; those of functions are not of the model that the tests know.
         (InSample::No, _) | (_, Procedure::InnovationsLikelihood(_)) => Relation::Fresh,
-        (_, procedure) if procedure.terms().is_some() => Relation::Fresh,
+        (_, procedure) if !procedure.terms().is_empty() => Relation::Fresh,
         (_, Procedure::InstrumentalVariables { .. }) => Relation::Instrumental,
         _ => Relation::Fitted,
     };

@@ -28,6 +28,23 @@ impl Model {
         })
     }
 
+    /// The same with free runs of which the outputs are kept within the range of what the model was fitted to.
+    ///
+    /// # Errors
+    /// As before; [`Error::Argument`] for models that have no such range.
+    pub(crate) fn clamped_on_log<'l>(
+        &'l self,
+        log: &'l Log,
+        rows: &[Rows],
+    ) -> Result<Box<dyn OnLog + 'l>, Error> {
+        match self {
+            Self::NonlinearArx(model) => Ok(Box::new(NonlinearArxOnLog::new(model, log, rows)?.with_clamp())),
+            Self::Polynomial(_) | Self::Equations(_) => {
+                Err(Error::argument("clamp", "it is of nonlinear ARX models; leave it out"))
+            }
+        }
+    }
+
     /// What a response to measured data had better start from: see [`InitialCondition::natural`]. Models in equations know what their text says of
     /// their states in the first row of a log; free runs start from the state that explains the outputs best. Nonlinear ARX models start
     /// from measured samples.

@@ -54,9 +54,14 @@ pub(crate) trait OnLog {
         start: InitialCondition,
     ) -> Result<Option<(usize, Vec<Forecast>)>, Error>;
 
-    /// The share of the samples of a response for which the model read what lies outside of what it was fitted to; none where that does
-    /// not matter.
-    fn outside(&self, _output: usize, _response: &Response, _horizon: Horizon) -> Option<f64> {
+    /// The share of the samples of an output's response for which the model read what lies outside of what it was fitted to; none where
+    /// that does not matter.
+    fn outside(&self, _output: usize, _responses: &[Response], _horizon: Horizon) -> Option<f64> {
+        None
+    }
+
+    /// In how many samples the last free run was kept within the range of what the model was fitted to; none where it is not.
+    fn clamped(&self) -> Option<usize> {
         None
     }
 }

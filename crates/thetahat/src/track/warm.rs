@@ -121,16 +121,18 @@ impl Tracker {
     fn from_nonlinear(model: &NonlinearArxModel, samples: usize, plan: &TrackPlan) -> Result<Self, Error> {
         model.check()?;
         let orders = model.lag_orders()?;
+        let (output, map) = model.single("a recursion")?;
+        let noise_variance = model.noise_covariance[0][0];
         let names: Vec<String> = model.parameters.iter().map(|parameter| parameter.name.clone()).collect();
         check(&orders, plan)?;
-        check_map(&orders, &model.map, &names, plan)?;
+        check_map(&orders, &map.functions, &names, plan)?;
         if plan.scales.is_some() {
             return Err(Error::argument("scale", "a nonlinear model has its own scales; leave it out"));
         }
         let count = names.len();
-        let square = model.output_scale * model.output_scale;
+        let square = map.scale * map.scale;
         let relative =
-            relative_covariance(model.covariance.as_deref(), model.noise_variance / square, count, count)?;
+            relative_covariance(model.covariance.as_deref(), noise_variance / square, count, count)?;
         let scale = |name: &str| {
             let own = model.regressors.iter().find(|regressor| regressor.channel == name);
             own.map_or(1.0, |regressor| regressor.scale)
@@ -138,14 +140,14 @@ impl Tracker {
         let mut plan = plan.clone();
         plan.offsets = Some(match plan.offsets {
             Some(given) => given,
-            None => offsets(&model.inputs, &model.output)?,
+            None => offsets(&model.inputs, output)?,
         });
         let inputs = model.inputs.iter().map(|input| scale(&input.name)).collect();
-        plan.scales = Some(PerChannel { inputs, output: model.output_scale });
+        plan.scales = Some(PerChannel { inputs, output: map.scale });
         // What was given passed before: what does not pass now is what follows from the report.
         check(&orders, &plan).map_err(unusable)?;
-        let tracker = Self::of(&orders, Some((&model.map, names)), &plan)?;
-        tracker.with_parameters(&model.parameters, None, &relative, model.noise_variance, samples)
+        let tracker = Self::of(&orders, Some((&map.functions, names)), &plan)?;
+        tracker.with_parameters(&model.parameters, None, &relative, noise_variance, samples)
     }
 }
 

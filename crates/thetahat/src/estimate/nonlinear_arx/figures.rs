@@ -6,13 +6,20 @@ use serde::{Deserialize, Serialize};
 use crate::Error;
 use crate::data::{Log, Rows};
 use crate::model::NonlinearArxModel;
-use crate::respond::nonlinear_arx::NonlinearArxOnLog;
+use crate::respond::nonlinear_arx::{NonlinearArxOnLog, within};
 use crate::respond::{Horizon, InitialCondition, OnLog};
 
 /// A choice prefers models whose free run stays within this many times the range of the estimation rows, about its middle.
 const RANGE: f64 = 1.1;
 
-/// How the functions of a nonlinear ARX model were chosen.
+/// How the maps of a nonlinear ARX model were chosen.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct MapsOutcome {
+    /// How that of each output was.
+    pub maps: Vec<TermsOutcome>,
+}
+
+/// How the functions of a map were chosen.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct TermsOutcome {
     /// The functions to choose from.
@@ -85,8 +92,7 @@ impl RunFigures {
 
 /// What a model misses on some rows of a log: in its free run, or one step ahead where nothing drives it.
 pub(super) fn run(model: &NonlinearArxModel, log: &Log, rows: &[Rows]) -> Result<Sums, Error> {
-    let [low, high] = model.output_range;
-    let (middle, half) = (f64::midpoint(low, high), RANGE * (high - low) / 2.0);
+    let [low, high] = model.maps.first().map_or([0.0; 2], |map| within(map.range, RANGE));
     let on_log = NonlinearArxOnLog::new(model, log, rows)?;
     let horizon = if on_log.is_driven() { Horizon::FreeRun } else { Horizon::Steps { steps: 1 } };
     let mut sums = Sums::default();
@@ -98,7 +104,7 @@ pub(super) fn run(model: &NonlinearArxModel, log: &Log, rows: &[Rows]) -> Result
             sums.squares += error * error;
             // One that is not a number stays one.
             sums.largest = if error > sums.largest || error.is_nan() { error } else { sums.largest };
-            sums.strays |= said.is_nan() || (said - middle).abs() > half;
+            sums.strays |= !(low..=high).contains(&said);
         }
     }
     Ok(sums)

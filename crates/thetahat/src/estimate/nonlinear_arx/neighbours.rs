@@ -25,7 +25,7 @@ impl Samples<'_> {
             value: self.signals[0][*t],
             standard_error: None,
         });
-        NonlinearArxModel { parameters: parameters.collect(), map, ..self.head.clone() }
+        self.model(map, parameters.collect())
     }
 
     /// The mean square of the errors one step ahead on blocks, each by the samples of the others, in units of the output; none where
@@ -40,13 +40,13 @@ impl Samples<'_> {
             }
             let model = self.kept(&others, asked, planes);
             let theta = model.parameters.iter().map(|parameter| parameter.value).collect();
-            let evaluator = Evaluator::new(&model.map, theta);
+            let evaluator = Evaluator::new(&model.maps[0].functions, theta);
             let square = |t: &usize| (self.signals[0][*t] - evaluator.value(&self.point(*t))).powi(2);
             let each: Vec<f64> = evenly(block, KEPT / BLOCKS).par_iter().map(square).collect();
             squares += each.iter().sum::<f64>();
             count += each.len();
         }
-        Some(squares * self.head.output_scale.powi(2) / count as f64)
+        Some(squares * self.scale.powi(2) / count as f64)
     }
 
     /// Keeps the samples, and chooses how many of them are asked, unless that is given.
@@ -133,8 +133,8 @@ impl Samples<'_> {
         let taken = if let Count::Given(_) = count { 1 } else { count.best(&steps, 1, samples) };
         let mut model = self.kept(&self.rows, tried[taken - 1], planes);
         let mse = steps[taken - 1].rmse.powi(2);
-        model.noise_variance = mse;
-        let map = model.map.clone();
+        model.noise_covariance = vec![vec![mse]];
+        let map = model.maps[0].functions.clone();
         Ok((Chosen { map, steps, taken }, Solved { model, mse, condition: None }))
     }
 

@@ -12,7 +12,7 @@ use super::text::{complex, or_dash, quantity, rows};
 use crate::data::{Rows, Source};
 use crate::estimate::{Criteria, InformationCriterion, Procedure, TermsOutcome};
 use crate::figures::{chance, fixed, number, scientific, short, three};
-use crate::model::{EquationsModel, NonlinearArxModel, Orders, PolynomialModel, Root};
+use crate::model::{EquationsModel, NonlinearArxModel, Orders, Parameter, PolynomialModel, Root};
 use crate::optimize::Stopped;
 use crate::report::{Estimation, InSample, Report, Validated};
 use crate::respond::InitialCondition;
@@ -35,9 +35,9 @@ pub(super) fn parameters(model: &PolynomialModel) -> Table {
 }
 
 /// The same of a nonlinear ARX model.
-pub(super) fn functions(model: &NonlinearArxModel) -> Table {
+pub(super) fn functions(parameters: &[Parameter]) -> Table {
     let mut table = Table::new("Parameters", &["function", "parameter", "standard error"]);
-    for parameter in &model.parameters {
+    for parameter in parameters {
         let error = or_dash(parameter.standard_error, three);
         table.row([parameter.name.clone(), number(parameter.value), error]);
     }
@@ -253,26 +253,24 @@ fn procedure(procedure: &Procedure) -> String {
             outcome.search.iterations,
             stopped(&outcome.search.stopped)
         ),
-        Procedure::ForwardRegression(outcome) => {
-            format!(
-                "forward regression among {} functions, their number by {}",
-                outcome.candidates, outcome.selected_by
-            )
-        }
-        Procedure::Splits(outcome) => {
-            format!(
-                "local models by splits, {} looked at, their number by {}",
-                outcome.path.len(),
-                outcome.selected_by
-            )
-        }
-        Procedure::Neighbours(outcome) => {
-            format!(
-                "{} samples kept, the number of neighbours by {}",
-                outcome.candidates, outcome.selected_by
-            )
-        }
+        Procedure::ForwardRegression(outcome) => each(&outcome.maps, |map| {
+            let (candidates, by) = (map.candidates, &map.selected_by);
+            format!("forward regression among {candidates} functions, their number by {by}")
+        }),
+        Procedure::Splits(outcome) => each(&outcome.maps, |map| {
+            let (looked_at, by) = (map.path.len(), &map.selected_by);
+            format!("local models by splits, {looked_at} looked at, their number by {by}")
+        }),
+        Procedure::Neighbours(outcome) => each(&outcome.maps, |map| {
+            let (kept, by) = (map.candidates, &map.selected_by);
+            format!("{kept} samples kept, the number of neighbours by {by}")
+        }),
     }
+}
+
+/// What is said of the map of each output.
+fn each(maps: &[TermsOutcome], of: impl Fn(&TermsOutcome) -> String) -> String {
+    maps.iter().map(of).collect::<Vec<String>>().join("; ")
 }
 
 pub(super) fn logs(sources: &[Source]) -> Table {

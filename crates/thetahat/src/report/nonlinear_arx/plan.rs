@@ -1,8 +1,10 @@
 //! What nonlinear ARX model to fit.
 
+use std::ops::Range;
+
 use crate::Error;
 use crate::data::{Detrend, Rows, Split};
-use crate::model::Membership;
+use crate::model::{ChannelExpression, Membership};
 use crate::select::Select;
 
 /// Functions that a choice looks at, unless it is said otherwise.
@@ -95,8 +97,11 @@ pub enum Centres {
 pub struct NonlinearArxPlan {
     /// The input channels.
     pub inputs: Vec<String>,
-    /// The output channel.
-    pub output: String,
+    /// The output channels: a map for each, of the lags of all.
+    pub outputs: Vec<String>,
+    /// Expressions of these channels that are regressors too, such as sqrt(u), of their values in their own units. Each is read at the lags
+    /// that all channels in it have: from the longest of their delays to the longest of their lags.
+    pub expressions: Vec<String>,
     /// Rows to estimate on; none: all.
     pub estimate: Vec<Rows>,
     /// Rows to validate on.
@@ -108,8 +113,8 @@ pub struct NonlinearArxPlan {
     pub detrend: Detrend,
     /// Channels whose offset is set by hand.
     pub offsets: Vec<(String, f64)>,
-    /// Past outputs that are read: y(k-1), …, y(k-n).
-    pub output_lags: usize,
+    /// Past values that are read of each output: y(k-1), …, y(k-n).
+    pub output_lags: Vec<usize>,
     /// What is read of each input.
     pub input_lags: Vec<InputLags>,
     /// The functions.
@@ -128,17 +133,19 @@ pub struct NonlinearArxPlan {
 }
 
 impl NonlinearArxPlan {
-    /// All rows, means removed, products of at most two of two past outputs and two past values of each input; further settings as fields.
-    pub fn new(inputs: &[&str], output: &str) -> Self {
+    /// All rows, means removed, products of at most two of two past values of each output and of each input; further settings as fields.
+    pub fn new(inputs: &[&str], outputs: &[&str]) -> Self {
+        let owned = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
         Self {
-            inputs: inputs.iter().map(|input| (*input).to_owned()).collect(),
-            output: output.to_owned(),
+            inputs: owned(inputs),
+            outputs: owned(outputs),
+            expressions: Vec::new(),
             estimate: Vec::new(),
             validate: Vec::new(),
             split: None,
             detrend: Detrend::Mean,
             offsets: Vec::new(),
-            output_lags: 2,
+            output_lags: vec![2; outputs.len()],
             input_lags: vec![InputLags { lags: 2, delay: 1 }; inputs.len()],
             map: MapPlan::Polynomial { degree: 2 },
             terms: None,
@@ -147,6 +154,48 @@ impl NonlinearArxPlan {
             ridge: 0.0,
             raw_terms: false,
         }
+    }
+
+    /// Outputs, then inputs.
+    pub(super) fn channels(&self) -> impl Iterator<Item = &str> {
+        self.outputs.iter().chain(&self.inputs).map(String::as_str)
+    }
+
+    /// The expressions, of the channels in their order.
+    pub(super) fn read_expressions(&self) -> Result<Vec<ChannelExpression>, Error> {
+        let names: Vec<&str> = self.channels().collect();
+        let wrong = |what: String| Error::argument("regressor", what);
+        if let (Detrend::Linear, Some(text)) = (self.detrend, self.expressions.first()) {
+            return Err(wrong(format!(
+                "{text} is of values as they are, and a line that is taken from them changes with time; take another `detrend`"
+            )));
+        }
+        for (position, text) in self.expressions.iter().enumerate() {
+            if self.expressions[..position].contains(text) || names.contains(&text.as_str()) {
+                return Err(wrong(format!("'{text}' is read already; name each once")));
+            }
+        }
+        let read = |text: &String| ChannelExpression::read(text, &names).map_err(wrong);
+        let expressions: Vec<ChannelExpression> =
+            self.expressions.iter().map(read).collect::<Result<_, _>>()?;
+        for (text, expression) in self.expressions.iter().zip(&expressions) {
+            if self.lags_of(expression).is_empty() {
+                return Err(wrong(format!(
+                    "'{text}' is read at the lags that its channels have in common, and they have none; give them lags"
+                )));
+            }
+        }
+        Ok(expressions)
+    }
+
+    /// The lags at which an expression is read: from the longest delay of its channels to the longest of their lags.
+    pub(super) fn lags_of(&self, expression: &ChannelExpression) -> Range<usize> {
+        let of_outputs = self.output_lags.iter().map(|lags| 1..lags + 1);
+        let of_inputs = self.input_lags.iter().map(|input| input.delay..input.delay + input.lags);
+        let all: Vec<Range<usize>> = of_outputs.chain(of_inputs).collect();
+        let own = || expression.channels().iter().filter_map(|channel| all.get(*channel));
+        let first = own().map(|lags| lags.start).max().unwrap_or(0);
+        first..own().map(|lags| lags.end).max().unwrap_or(0)
     }
 
     /// How many steps a choice takes at most.
@@ -163,7 +212,7 @@ impl NonlinearArxPlan {
     /// # Errors
     /// [`Error::Argument`] with the argument that does not.
     pub fn check(&self) -> Result<(), Error> {
-        let names: Vec<&String> = self.inputs.iter().chain([&self.output]).collect();
+        let names: Vec<&str> = self.channels().collect();
         for (position, name) in names.iter().enumerate() {
             if names[..position].contains(name) {
                 return Err(Error::argument(
@@ -172,7 +221,10 @@ impl NonlinearArxPlan {
                 ));
             }
         }
-        if let Some((name, _)) = self.offsets.iter().find(|(name, _)| !names.contains(&name)) {
+        if self.outputs.is_empty() {
+            return Err(Error::argument("output", "a model has one output at least"));
+        }
+        if let Some((name, _)) = self.offsets.iter().find(|(name, _)| !names.contains(&name.as_str())) {
             return Err(Error::argument("offset", format!("'{name}' is neither an input nor the output")));
         }
         if self.input_lags.len() != self.inputs.len() {
@@ -185,16 +237,26 @@ impl NonlinearArxPlan {
                 ),
             ));
         }
+        if self.output_lags.len() != self.outputs.len() {
+            let (lags, outputs) = (self.output_lags.len(), self.outputs.len());
+            return Err(Error::argument(
+                "ny",
+                format!("there are lags of {lags} outputs, and {outputs} outputs"),
+            ));
+        }
         let longest = self.input_lags.iter().map(|input| input.lags.saturating_add(input.delay));
-        if longest.chain([self.output_lags]).any(|lag| lag > crate::model::LARGEST) {
+        if longest.chain(self.output_lags.iter().copied()).any(|lag| lag > crate::model::LARGEST) {
             return Err(Error::argument("ny", format!("lags above {} are not read", crate::model::LARGEST)));
         }
-        if self.output_lags == 0 && self.input_lags.iter().all(|input| input.lags == 0) {
+        if self.output_lags.iter().all(|lags| *lags == 0)
+            && self.input_lags.iter().all(|input| input.lags == 0)
+        {
             return Err(Error::argument(
                 "ny",
                 "the model reads nothing; give lags of the output or of an input",
             ));
         }
+        self.read_expressions()?;
         if let MapPlan::Products { terms } = &self.map {
             if terms.is_empty() {
                 return Err(Error::argument("term", "a model has one function at least"));

@@ -23,7 +23,7 @@ fn log((u, y): (Vec<f64>, Vec<f64>)) -> Log {
 
 fn plan() -> NonlinearArxPlan {
     let lags = vec![InputLags { lags: 1, delay: 1 }];
-    NonlinearArxPlan { output_lags: 1, input_lags: lags, ..NonlinearArxPlan::new(&["u"], "y") }
+    NonlinearArxPlan { output_lags: vec![1], input_lags: lags, ..NonlinearArxPlan::new(&["u"], &["y"]) }
 }
 
 fn about_offsets() -> TrackPlan {
@@ -70,7 +70,7 @@ fn without_forgetting_it_is_the_batch_fit() {
         assert!((one.1 - other.1).abs() < 1e-8, "{one:?} {other:?}");
     }
     let Model::NonlinearArx(model) = &report.model else { panic!("other kind") };
-    assert!((tracker.noise_variance().unwrap() / model.noise_variance - 1.0).abs() < 1e-8);
+    assert!((tracker.noise_variance().unwrap() / model.noise_covariance[0][0] - 1.0).abs() < 1e-8);
     assert_eq!(tracker.model(), "NARX polynomial, 6 terms");
 }
 
@@ -124,14 +124,14 @@ fn predictions_are_those_of_the_model() {
     let mut tracker = Tracker::from_report(&report, &plan).unwrap();
     let Model::NonlinearArx(model) = &report.model else { panic!("other kind") };
     let theta = model.parameters.iter().map(|parameter| parameter.value).collect();
-    let g = Evaluator::new(&model.map, theta);
-    let (input, output) = (model.inputs[0].offset.level, model.output.offset.level);
+    let g = Evaluator::new(&model.maps[0].functions, theta);
+    let (input, output) = (model.inputs[0].offset.level, model.outputs[0].offset.level);
     let mut before = None;
     for (u, y) in u.iter().zip(&y) {
         let tracked = tracker.log_row(*y, &[*u]).unwrap();
         if let Some((u, y)) = before {
             let z = [(y - output) / model.regressors[0].scale, (u - input) / model.regressors[1].scale];
-            assert_eq!(tracked.predicted, model.output_scale * g.value(&z) + output);
+            assert_eq!(tracked.predicted, model.maps[0].scale * g.value(&z) + output);
         }
         before = Some((*u, *y));
     }

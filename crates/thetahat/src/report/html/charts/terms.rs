@@ -51,15 +51,18 @@ pub(crate) fn complexity(outcome: &TermsOutcome) -> Drawn {
 }
 
 /// The next output against each regressor, the others in the middle of what the estimation rows had.
-pub(crate) fn slices(model: &NonlinearArxModel) -> Drawn {
+pub(crate) fn slices(model: &NonlinearArxModel, output: usize) -> Drawn {
     let mut traces: Vec<Object> = Vec::new();
     for (place, regressor) in model.regressors.iter().enumerate() {
-        let (x, y): (Vec<f64>, Vec<f64>) = slice(model, place, POINTS).into_iter().unzip();
+        let (x, y): (Vec<f64>, Vec<f64>) = slice(model, output, place, POINTS).into_iter().unzip();
         traces.push(line(&text::plain(&regressor.name()), Curve { x, y: rounded(&y) }, place));
     }
     let layout = layout()
         .with("xaxis", axis("regressor, from the least (0) to the largest (1) value of the estimation rows"))
-        .with("yaxis", axis(&format!("{} one step ahead, less its offset", text::plain(&model.output.name))))
+        .with(
+            "yaxis",
+            axis(&format!("{} one step ahead, less its offset", text::plain(&model.outputs[output].name))),
+        )
         .with("hovermode", "closest");
     chart(
         "Slices of g",

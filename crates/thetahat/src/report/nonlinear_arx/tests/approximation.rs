@@ -31,11 +31,11 @@ fn distance(log: &Log, map: MapPlan) -> (usize, f64, f64) {
     let plan = NonlinearArxPlan {
         map,
         terms,
-        output_lags: 0,
+        output_lags: vec![0],
         input_lags: vec![InputLags { lags: 1, delay: 0 }],
         estimate: vec![Rows::new(1, 500).unwrap()],
         validate: vec![Rows::new(501, 1501).unwrap()],
-        ..NonlinearArxPlan::new(&["u"], "y")
+        ..NonlinearArxPlan::new(&["u"], &["y"])
     };
     let report = fit_nonlinear_arx(log, &[], &plan).unwrap();
     let fit = report.fit.iter().find(|fit| fit.part == Some(Part::Validation)).unwrap();

@@ -19,7 +19,7 @@ fn folded(rows: usize, spread: f64) -> Log {
 fn local(membership: Membership, units: Option<usize>) -> NonlinearArxPlan {
     NonlinearArxPlan {
         map: MapPlan::Local { membership, planes: true, units },
-        output_lags: 1,
+        output_lags: vec![1],
         input_lags: vec![InputLags { lags: 1, delay: 1 }],
         detrend: Detrend::None,
         ..plan()
@@ -40,15 +40,16 @@ fn a_fold_is_two_planes() {
     log = Log::new(channels, 1.0).unwrap();
     let report = fit_nonlinear_arx(&log, &[], &local(Membership::Rectangle, Some(2))).unwrap();
     let own = model(&report);
-    let Map::Local { boxes, .. } = &own.map else { panic!("another map") };
+    let Map::Local { boxes, .. } = &own.maps[0].functions else { panic!("another map") };
     assert!(boxes[0][1][1].abs() < 1e-12 && boxes[1][1][0].abs() < 1e-12, "{boxes:?}");
-    assert!(own.noise_variance < 1e-24, "{}", own.noise_variance);
+    assert!(own.noise_covariance[0][0] < 1e-24, "{}", own.noise_covariance[0][0]);
     let slope = |place: usize| {
         let z = &own.regressors[1];
-        own.parameters[place].value * own.output_scale / z.scale
+        own.parameters[place].value * own.maps[0].scale / z.scale
     };
     assert!((slope(2) + 1.0).abs() < 1e-10 && (slope(5) - 1.0).abs() < 1e-10);
-    let Procedure::Splits(outcome) = &report.estimation.procedure else { panic!("other procedure") };
+    assert!(matches!(report.estimation.procedure, Procedure::Splits(_)));
+    let outcome = &report.estimation.procedure.terms()[0];
     assert_eq!((outcome.taken, outcome.path.len()), (2, 2));
     assert_eq!(outcome.path[0].term, "plane");
     assert!(outcome.path[1].term.starts_with("split(u(k-1), "), "{}", outcome.path[1].term);
@@ -72,7 +73,7 @@ fn their_number_is_chosen() {
                 ..local(membership, None)
             };
             let report = fit_nonlinear_arx(&log, &[], &plan).unwrap();
-            let outcome = report.estimation.procedure.terms().unwrap();
+            let outcome = &report.estimation.procedure.terms()[0];
             let most = if select.is_some() { 9 } else { 10 };
             assert!((2..=most).contains(&outcome.taken), "{membership:?} {select:?}: {}", outcome.taken);
             assert_eq!(outcome.last().unwrap().parameters, report.model.parameters().len());
@@ -92,8 +93,11 @@ fn neighbours_are_judged_without_themselves() {
             ..local(Membership::Gaussian, None)
         };
         let report = fit_nonlinear_arx(&log, &[], &plan).unwrap();
-        let Procedure::Neighbours(outcome) = &report.estimation.procedure else { panic!("other procedure") };
-        let Map::Neighbours { count, points, .. } = &model(&report).map else { panic!("another map") };
+        assert!(matches!(report.estimation.procedure, Procedure::Neighbours(_)));
+        let outcome = &report.estimation.procedure.terms()[0];
+        let Map::Neighbours { count, points, .. } = &model(&report).maps[0].functions else {
+            panic!("another map")
+        };
         assert_eq!((points.len(), outcome.path.len()), (299, 10));
         assert_eq!(outcome.last().unwrap().term, format!("{count} neighbours"));
         // One neighbour would be the sample itself, were its block not left out.
@@ -101,7 +105,7 @@ fn neighbours_are_judged_without_themselves() {
         let best = outcome.last().unwrap().held_out.unwrap().rmse.unwrap();
         let each = outcome.path.iter().filter_map(|step| step.held_out.unwrap().rmse);
         assert!(each.fold(f64::INFINITY, f64::min) == best);
-        let spread = model(&report).noise_variance.sqrt();
+        let spread = model(&report).noise_covariance[0][0].sqrt();
         let fresh = report.fit.iter().find(|fit| fit.part == Some(Part::Validation)).unwrap().rmse.unwrap();
         assert!((spread / fresh - 1.0).abs() < 0.15, "{spread} {fresh}");
     }
@@ -123,7 +127,7 @@ fn what_they_cannot_be_is_refused() {
     refused(neighbours(Some(65), true), "from 1 to 58");
     refused(NonlinearArxPlan { ridge: 1.0, ..neighbours(None, true) }, "ridge");
     refused(NonlinearArxPlan { most: Some(3), ..neighbours(None, true) }, "most-terms");
-    refused(NonlinearArxPlan { output_lags: 40, ..neighbours(None, true) }, "32 regressors");
+    refused(NonlinearArxPlan { output_lags: vec![40], ..neighbours(None, true) }, "32 regressors");
     let criterion = Select::Criterion(crate::estimate::InformationCriterion::AIC);
     refused(NonlinearArxPlan { select: Some(criterion), ..neighbours(None, true) }, "information criteria");
     refused(NonlinearArxPlan { select: Some(criterion), ..neighbours(Some(3), true) }, "select");
@@ -132,7 +136,7 @@ fn what_they_cannot_be_is_refused() {
     refused(NonlinearArxPlan { terms: Some(3), ..local(Membership::Gaussian, None) }, "terms");
     refused(
         NonlinearArxPlan {
-            output_lags: 25,
+            output_lags: vec![25],
             estimate: vec![Rows::new(1, 40).unwrap()],
             ..local(Membership::Gaussian, None)
         },

@@ -130,6 +130,16 @@ impl<'l> Samples<'l> {
         let lags = head.lags();
         let each = segments.iter().map(|(rows, past)| rows.start + lags.saturating_sub(*past)..rows.end);
         let rows: Vec<usize> = each.flatten().collect();
+        if rows.len() < 2 {
+            return Err(Error::undetermined(
+                Vec::new(),
+                format!(
+                    "too few rows for the lags: two samples at least need all regressors (reaching back {lags}), and {} have them; \
+                     name more rows, or fewer lags",
+                    rows.len()
+                ),
+            ));
+        }
         let mut samples = Self { log, signals, taps, rows, ridge, head: head.clone() };
         for (place, regressor) in head.regressors.iter_mut().enumerate() {
             regressor.range = samples.range(samples.taps[place], regressor.scale);
@@ -331,14 +341,20 @@ impl<'l> Samples<'l> {
         let always = candidates.always();
         let undetermined = |message: String| Err(Error::undetermined(Vec::new(), message));
         if !products.is_finite() {
-            return Err(Error::data(
-                "sums of products of the regressors leave the range of numbers; take a lower degree, or leave out `raw-terms`, so \
-                 that signals are divided by their scale",
-            ));
+            return Err(Error::data(match candidates {
+                Candidates::Products(_) => {
+                    "sums of products of the regressors leave the range of numbers; take a lower degree, or leave out `raw-terms`, so \
+                     that signals are divided by their scale"
+                }
+                Candidates::Functions { .. } => {
+                    "sums of the functions leave the range of numbers; leave out `raw-terms`, so that signals are divided by their scale"
+                }
+            }));
         }
         if path.chosen.is_empty() {
             return undetermined(
-                "no function explains anything of the output on the estimation rows; name rows in which it changes, or other lags"
+                "no function explains anything of the output on the estimation rows; name rows in which it changes, other lags, or a \
+                 smaller `ridge` where there is one"
                     .to_owned(),
             );
         }
@@ -348,7 +364,7 @@ impl<'l> Samples<'l> {
             return Err(Error::undetermined(
                 vec![name.clone()],
                 format!(
-                    "{name} is a sum of the other functions on the estimation rows; take other lags, other centres or other rows"
+                    "{name} is a sum of the other functions on the estimation rows; take fewer lags or centres, or other rows"
                 ),
             ));
         }

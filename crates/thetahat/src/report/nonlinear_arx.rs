@@ -220,8 +220,11 @@ fn candidates(map: &MapPlan, samples: &Samples<'_>) -> Result<Candidates, Error>
             return Err(Error::argument("map", "it has no functions to choose from"));
         }
     };
-    if let Some(width) = width.filter(|width| !(width.is_finite() && *width > 0.0)) {
-        return Err(Error::argument("width", format!("{width} is not a positive number")));
+    if let Some(width) = width.filter(|width| !(*width > 0.0 && (width * width).is_normal())) {
+        return Err(Error::argument(
+            "width",
+            format!("{width:?} is not a positive number that can be squared; about 1 is usual"),
+        ));
     }
     let points = samples.points();
     let (many, wanted) = match centres {
@@ -235,16 +238,18 @@ fn candidates(map: &MapPlan, samples: &Samples<'_>) -> Result<Candidates, Error>
         }
     };
     if wanted == 0 || wanted > many {
-        return Err(Error::argument(
-            "centres",
-            format!("there would be {wanted} centres, for {} samples; give from 1 to {many}", points.len()),
-        ));
-    }
-    if points.is_empty() {
-        return Err(Error::undetermined(
-            Vec::new(),
-            "no estimation row has all regressors; name more rows, or fewer lags",
-        ));
+        let message = match centres {
+            Centres::Grid { each } => format!(
+                "a grid of {each} in each direction of {} regressors has none, or more than {many} points; give another number, or \
+                 fewer lags",
+                samples.regressors()
+            ),
+            _ => format!(
+                "there would be {wanted} centres, for {} samples; give from 1 to {many}",
+                points.len()
+            ),
+        };
+        return Err(Error::argument("centres", message));
     }
     let at = match centres {
         Centres::Chosen => centres::spread(&points, CANDIDATES),
@@ -306,6 +311,12 @@ fn head(
         let variance =
             crate::regression::sum(values.iter().map(|value| (value - mean).powi(2))) / values.len() as f64;
         let spread = variance.sqrt();
+        let varies = values.iter().any(|value| (value - mean).abs() > ROUNDING * size);
+        if varies && !variance.is_normal() {
+            return Err(Error::data(format!(
+                "squares of '{name}' leave the range of numbers; scale the channel towards one"
+            )));
+        }
         if spread.is_nan() || spread <= ROUNDING * size {
             let role = if name == plan.output { "output" } else { "input" };
             return Err(Error::undetermined(

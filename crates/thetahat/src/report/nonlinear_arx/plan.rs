@@ -185,9 +185,14 @@ impl NonlinearArxPlan {
                 ),
             ));
         }
-        let longest = self.input_lags.iter().map(|input| input.lags.saturating_add(input.delay));
-        if longest.chain([self.output_lags]).any(|lag| lag > crate::model::LARGEST) {
-            return Err(Error::argument("ny", format!("lags above {} are not read", crate::model::LARGEST)));
+        let longest = self.input_lags.iter().map(|input| ("nu", input.lags.saturating_add(input.delay)));
+        for (argument, lag) in longest.chain([("ny", self.output_lags)]) {
+            if lag > crate::model::LARGEST {
+                return Err(Error::argument(
+                    argument,
+                    format!("lags above {} are not read", crate::model::LARGEST),
+                ));
+            }
         }
         if self.output_lags == 0 && self.input_lags.iter().all(|input| input.lags == 0) {
             return Err(Error::argument(

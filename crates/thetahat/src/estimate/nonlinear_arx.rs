@@ -474,17 +474,21 @@ impl<'l> Samples<'l> {
         }
         let evaluator = Evaluator::new(&map, vec![0.0; count]);
         let mut values = vec![0.0; (count + 1) * self.rows.len()];
-        let mut z = vec![0.0; self.taps.len()];
-        for (row, t) in values.chunks_exact_mut(count + 1).zip(&self.rows) {
-            for (z, (source, lag)) in z.iter_mut().zip(&self.taps) {
-                *z = self.signals[*source][t - lag];
-            }
-            evaluator.functions(&z, row);
-            row[count] = self.signals[0][*t];
+        let each = values.par_chunks_exact_mut(count + 1).zip(&self.rows).with_min_len(ROWS);
+        each.for_each_init(
+            || vec![0.0; self.taps.len()],
+            |z, (row, t)| {
+                for (z, (source, lag)) in z.iter_mut().zip(&self.taps) {
+                    *z = self.signals[*source][t - lag];
+                }
+                evaluator.functions(z, row);
+                row[count] = self.signals[0][*t];
+            },
+        );
+        let mut squares = vec![0.0; count];
+        for row in values.chunks_exact(count + 1) {
+            squares.iter_mut().zip(row).for_each(|(sum, f)| *sum += f * f);
         }
-        let squares: Vec<f64> = (0..count)
-            .map(|j| values.chunks_exact(count + 1).map(|row| row[j] * row[j]).sum::<f64>())
-            .collect();
         // Columns of one size: a rank is seen, a condition number says something.
         let sizes: Vec<f64> = squares.iter().map(|square| square.sqrt()).collect();
         if let Some(place) = sizes.iter().position(|size| !(*size > 0.0 && size.is_finite())) {

@@ -303,10 +303,9 @@ fn head(
     // The standard deviation over the estimation rows; 1 in the signals' own units.
     let scale = |name: &str| -> Result<f64, Error> {
         let (own, raw) = (&deviations.channel(name)?.values, &log.channel(name)?.values);
-        let values =
-            |of: &'_ [f64]| segments.iter().flat_map(|rows| of[rows.clone()].to_vec()).collect::<Vec<f64>>();
-        let (values, size) =
-            (values(own), values(raw).iter().fold(0.0_f64, |size, value| size.max(value.abs())));
+        let of =
+            |values: &[f64]| segments.iter().map(|rows| &values[rows.clone()]).collect::<Vec<_>>().concat();
+        let (values, size) = (of(own), of(raw).iter().fold(0.0_f64, |size, value| size.max(value.abs())));
         let mean = crate::regression::sum(values.iter().copied()) / values.len() as f64;
         let variance =
             crate::regression::sum(values.iter().map(|value| (value - mean).powi(2))) / values.len() as f64;

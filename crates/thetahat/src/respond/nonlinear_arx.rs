@@ -14,6 +14,8 @@ use std::borrow::Cow;
 use std::cell::OnceCell;
 use std::ops::Range;
 
+use rayon::prelude::*;
+
 use super::on_log::{OnLog, Tested};
 use super::predict::check_steps;
 use super::{Forecast, Horizon, InitialCondition, Innovations, Response};
@@ -24,6 +26,8 @@ use crate::model::{Evaluator, NonlinearArxModel, Orders, PolynomialModel, Signal
 
 /// A free run beyond this many times the largest output of the fit is lost.
 const LOST: f64 = 1e6;
+/// Predictions that are not worth a thread of their own.
+const AT_ONCE: usize = 256;
 
 /// A model laid out for runs along signals, which are deviations from its offsets.
 #[derive(Debug)]
@@ -143,21 +147,22 @@ impl<'m> Runner<'m> {
     }
 
     /// The share of samples of which a regressor lies outside the range of the estimation rows; `y` is what the model reads as its output.
-    fn outside(&self, y: &[f64], inputs: &[&[f64]], rows: impl Iterator<Item = usize>) -> Option<f64> {
-        let mut z = vec![0.0; self.taps.len()];
-        let (mut count, mut beyond) = (0_usize, 0_usize);
-        for t in rows {
-            self.regressors(y, inputs, t, &mut z);
-            let each = z.iter().zip(&self.model.regressors);
-            let inside = |(z, regressor): (&f64, &crate::model::Regressor)| {
-                let [low, high] = regressor.range;
-                let value = z * regressor.scale;
-                let rounding = f64::EPSILON * 4.0 * low.abs().max(high.abs());
-                (low - rounding..=high + rounding).contains(&value) || value.is_nan()
-            };
-            count += 1;
-            beyond += usize::from(!each.clone().all(inside));
-        }
+    fn outside(&self, y: &[f64], inputs: &[&[f64]], rows: &[Range<usize>]) -> Option<f64> {
+        let ends = self.model.regressors.iter().map(|regressor| {
+            let [low, high] = regressor.range;
+            let rounding = f64::EPSILON * 4.0 * low.abs().max(high.abs());
+            (low - rounding, high + rounding)
+        });
+        let taps: Vec<_> = self.taps.iter().zip(ends).collect();
+        let is_beyond = |t: &usize| {
+            taps.iter().any(|((source, lag, _), (low, high))| {
+                let signal = if *source == 0 { y } else { inputs[*source - 1] };
+                let value = t.checked_sub(*lag).map_or(0.0, |at| signal[at]);
+                value < *low || value > *high
+            })
+        };
+        let count: usize = rows.iter().map(Range::len).sum();
+        let beyond = rows.par_iter().cloned().flatten().filter(is_beyond).count();
         (count > 0).then(|| beyond as f64 / count as f64)
     }
 }
@@ -299,9 +304,14 @@ impl<'l> NonlinearArxOnLog<'l> {
         let mut response =
             Response { values: vec![f64::NAN; record.output.len()], counted: self.counted(steps) };
         if steps == 1 {
-            let mut z = vec![0.0; self.runner.taps.len()];
-            for t in response.counted.iter().cloned().flatten() {
-                response.values[t] = self.runner.next(record.output, &record.inputs, t, &mut z);
+            let runner = &self.runner;
+            for rows in &response.counted {
+                let each =
+                    response.values[rows.clone()].par_iter_mut().zip(rows.clone()).with_min_len(AT_ONCE);
+                let room = || vec![0.0; runner.taps.len()];
+                each.for_each_init(room, |z, (value, t)| {
+                    *value = runner.next(record.output, &record.inputs, t, z);
+                });
             }
             return response;
         }
@@ -478,7 +488,7 @@ impl OnLog for NonlinearArxOnLog<'_> {
     }
 
     fn outside(&self, _: usize, response: &Response, horizon: Horizon) -> Option<f64> {
-        let counted = response.counted.iter().cloned().flatten();
+        let counted = &response.counted;
         match horizon {
             Horizon::Steps { .. } => self.runner.outside(self.ahead.output, &self.ahead.inputs, counted),
             Horizon::FreeRun => {

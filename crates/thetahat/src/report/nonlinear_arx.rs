@@ -387,6 +387,16 @@ fn warnings(report: &Report, model: &NonlinearArxModel) -> Vec<String> {
         ));
     }
     for fit in &report.fit {
+        if let (Some(percent), Some(Part::Estimation), Horizon::FreeRun) =
+            (fit.percent, fit.part, fit.horizon)
+            && percent <= 0.0
+        {
+            warnings.push(
+                "the free run on the estimation rows is no better than the mean of the output: take other lags, another map, or \
+                 validation rows that the choice looks at"
+                    .to_owned(),
+            );
+        }
         if let (Some(outside), Some(part), Horizon::FreeRun) = (fit.outside, fit.part, fit.horizon)
             && outside > 0.1
             && part != Part::Estimation

@@ -227,28 +227,37 @@ fn free_runs_are_those_of_an_independent_program() {
     }
 }
 
-/// The coupled drives: two experiments together, the number of terms by the free run on held-out rows.
+/// The coupled drives: two experiments together, the number of terms by the free run on held-out rows. Each part is a log of its own, so
+/// that runs begin inside of it: after its first ten rows, which are the longest lag.
 #[test]
 fn the_coupled_drives_have_as_many_terms_as_run_best() {
-    let log = |columns, rows| cut("ced_uniform.csv", columns, &rows);
-    let drives = [["u11", "z11"], ["u12", "z12"]];
-    let Some(first) = log(drives[0], 1..=500) else { return };
-    let folder = Folder::with_log(first);
-    folder.write("second.csv", log(drives[1], 1..=500).expect("the log is there"));
-    let report = folder.fit(
-        "log.csv second.csv --narx poly --ny 10 --nu 10 --nk 0 --sample-time 0.02 --estimate 1..200,501..700 \
-         --validate 201..400,701..900 --report model.json",
-    );
-    assert_eq!(report["model"]["parameters"].as_array().map(Vec::len), Some(38));
-    for (name, expected) in [("log.csv", 0.0953), ("second.csv", 0.0726)] {
-        let run = folder
-            .done(&format!("validate model.json {name} --rows 401..500 --sample-time 0.02 --format json"));
-        let validation: Value = serde_json::from_str(&run.stdout).expect("it is JSON");
-        let fits = validation["fit"].as_array().expect("there are fits");
-        let free = fits.iter().find(|fit| fit["horizon"]["kind"] == "free-run").expect("there is a free run");
-        // Theirs begins inside the rows and leaves out the first ten, ours begins with the rows before.
-        let found = number(free, "/rmse");
-        assert!((found - expected).abs() < 0.003, "{name}: {found} {expected}");
+    let folder = Folder::new();
+    for (drive, columns) in [["u11", "z11"], ["u12", "z12"]].into_iter().enumerate() {
+        for (part, rows) in [("estimate", 1..=200), ("validate", 201..=400), ("test", 401..=500)] {
+            let Some(log) = cut("ced_uniform.csv", columns, &rows) else { return };
+            folder.write(&format!("{part}{drive}.csv"), log);
+        }
+    }
+    // In a report the validation rows come last.
+    let free_run = |document: &Value| {
+        let fits = document["fit"].as_array().expect("there are fits");
+        number(fits.iter().rfind(|fit| fit["horizon"]["kind"] == "free-run").expect("it ran"), "/rmse")
+    };
+    for (options, terms, validation, test) in
+        [("", 38, 0.2084, [0.0953, 0.0726]), ("--terms 10", 10, 0.2360, [0.1191, 0.1045])]
+    {
+        let report = folder.fit(&format!(
+            "estimate0.csv estimate1.csv validate0.csv validate1.csv --narx poly --ny 10 --nu 10 --nk 0 \
+             --sample-time 0.02 --estimate 1..400 --validate 401..800 {options} --report model.json"
+        ));
+        assert_eq!(report["model"]["parameters"].as_array().map(Vec::len), Some(terms));
+        let found = free_run(&report);
+        assert!((found - validation).abs() < 1e-3, "{terms} terms: {found} {validation}");
+        for (drive, expected) in test.into_iter().enumerate() {
+            let line = format!("validate model.json test{drive}.csv --sample-time 0.02 --format json");
+            let found = free_run(&serde_json::from_str(&folder.done(&line).stdout).expect("it is JSON"));
+            assert!((found - expected).abs() < 1e-3, "{terms} terms, drive {drive}: {found} {expected}");
+        }
     }
 }
 
@@ -405,6 +414,110 @@ fn bad_options_and_logs_are_told() {
         assert!(run.stderr.contains(words), "{options}: {}", run.stderr);
         assert!(!folder.path("report.json").exists(), "{options}");
     }
+}
+
+/// Logs that cannot be used, or not by all maps: a sentence that says what is wrong with what, the exit code, and nothing written.
+#[test]
+fn bad_logs_are_told() {
+    let folder = Folder::new();
+    let log = |name: &str, u: &dyn Fn(usize) -> f64, y: &dyn Fn(usize) -> f64| {
+        let column = |of: &dyn Fn(usize) -> f64| (0..40).map(of).collect::<Vec<f64>>();
+        folder.write(name, csv(&[("u", &column(u)), ("y", &column(y))]));
+    };
+    let wave = |row: usize| ((row * row) % 7) as f64 - 3.0;
+    let other = |row: usize| ((row * row * row) % 11) as f64;
+    log("constant.csv", &wave, &|_| 1.0);
+    log("still.csv", &|_| 1.0, &wave);
+    log("nan.csv", &wave, &|_| f64::NAN);
+    log("huge.csv", &wave, &|row| 1e300 * other(row));
+    log("large.csv", &wave, &|row| 1e20 * other(row));
+    log("spike.csv", &|row| if row == 9 { 1e300 } else { wave(row) }, &other);
+    log("tiny.csv", &|row| 1e-300 * wave(row), &other);
+    log("same.csv", &wave, &wave);
+    log("good.csv", &wave, &other);
+    folder.write("empty.csv", "");
+    folder.write("header.csv", "u,y\n");
+    folder.write("one.csv", "u,y\n1,2\n");
+    folder.write("infinite.csv", "u,y\n1,2\n2,inf\n");
+    let maps = ["poly", "rbf", "spline", "local", "knn"];
+    for (log, options, code, words) in [
+        ("empty", "", 3, "empty.csv: the file is empty"),
+        ("header", "", 3, "header.csv:2:1: there are no data rows"),
+        ("one", "", 4, "one.csv: output 'y' is constant"),
+        ("nan", "", 3, "nan.csv: no estimation row has a value"),
+        ("infinite", "", 3, "infinite.csv:3:3: column 'y'"),
+        ("constant", "", 4, "output 'y' is constant"),
+        ("still", "", 4, "input 'u' is constant"),
+        ("huge", "", 3, "squares of 'y' leave the range of numbers; scale"),
+        ("spike", "", 3, "squares of 'u' leave the range of numbers; scale"),
+        ("tiny", "", 3, "squares of 'u' leave the range of numbers; scale"),
+        ("good", "--nk 50", 4, "too few rows for the lags"),
+        ("good", "--estimate 1..2", 4, "(reaching back 1), and 1 have them"),
+        ("good", "--nk 1001", 2, "--nu: lags above 1000"),
+    ] {
+        for map in maps {
+            let line = format!("fit {log}.csv --narx {map} --ny 1 --nu 1 --sample-time 1 {options}");
+            let said = folder.refused(&format!("{line} --report report.json --html page.html"), code);
+            assert!(said.contains(words), "{line}: {said}");
+        }
+    }
+    for (log, options, code, words) in [
+        ("same", "--narx rbf", 4, "u(k-1) is a sum of the other functions"),
+        ("same", "--narx spline", 4, "u(k-1) is a sum of the other functions"),
+        ("same", "--narx local", 4, "regressors are sums of one another"),
+        ("good", "--narx local --estimate 1..4", 4, "needs 4 samples at least, and there are 3"),
+        ("good", "--narx poly --terms 7", 4, "tell 6 of 6 apart"),
+        ("good", "--narx poly --ridge 1e300", 4, "a smaller --ridge"),
+        ("large", "--narx poly --degree 12 --raw-terms", 3, "take a lower degree"),
+        ("good", "--narx rbf --centres kmeans:40", 2, "40 centres, for 39 samples"),
+        ("good", "--narx rbf --centres grid:99999999999", 2, "--centres: a grid of 99999999999"),
+        ("good", "--narx rbf --width 1e-300", 2, "--width: 1e-300 is not"),
+        ("good", "--narx rbf --width 1e9 --centres kmeans:4", 4, "take fewer lags or centres"),
+        ("good", "--narx knn --units 40", 2, "40 neighbours of 39 samples"),
+        ("good", "--narx knn --units 35", 4, "39 samples are too few"),
+    ] {
+        let line = format!("fit {log}.csv --ny 1 --nu 1 --sample-time 1 {options}");
+        let said = folder.refused(&format!("{line} --report report.json --html page.html"), code);
+        assert!(said.contains(words), "{line}: {said}");
+    }
+    assert!(folder.names().iter().all(|name| name.ends_with(".csv")), "{:?}", folder.names());
+}
+
+/// What a model says of logs that are not like that of its fit, and of a run without bound: rows without a number are empty.
+#[test]
+fn responses_without_bound_are_told() {
+    let folder = Folder::with_log(plant(200));
+    let text = folder.read("log.csv");
+    let rows = |change: &dyn Fn(f64) -> f64| -> String {
+        let row = |line: &str| {
+            let (u, y) = line.split_once(',').expect("there are two columns");
+            format!("{u},{}\n", change(y.parse().expect("a number")))
+        };
+        std::iter::once("u,y\n".to_owned()).chain(text.lines().skip(1).map(row)).collect()
+    };
+    folder.write("huge.csv", rows(&|y| y * 1e300));
+    for map in ["poly", "rbf", "spline", "local", "knn"] {
+        folder.fit(&format!("log.csv --narx {map} --sample-time 0.1 --report {map}.json"));
+        for verb in ["simulate", "predict", "predict --horizon 3"] {
+            let (verb, options) = verb.split_once(' ').unwrap_or((verb, ""));
+            let run = folder.done(&format!("{verb} {map}.json huge.csv --sample-time 0.1 {options}"));
+            assert!(run.stderr.contains("grow beyond the range of numbers"), "{map} {verb}: {}", run.stderr);
+            assert!(!run.stdout.contains("inf") && !run.stdout.contains("NaN"), "{map} {verb}");
+        }
+        let run = folder.done(&format!("validate {map}.json huge.csv --sample-time 0.1"));
+        assert!(run.stderr.contains("the response overflows"), "{map}: {}", run.stderr);
+    }
+    // Ten times the parameters: g is steep, and its free run leaves all bounds.
+    let mut report: Value = serde_json::from_str(&folder.read("poly.json")).expect("it is JSON");
+    for parameter in report["model"]["parameters"].as_array_mut().expect("there are parameters") {
+        parameter["value"] = (10.0 * number(parameter, "/value")).into();
+    }
+    folder.write("steep.json", report.to_string());
+    let run = folder.done("simulate steep.json log.csv --sample-time 0.1");
+    assert!(run.stderr.contains("RMSE none") && run.stderr.contains("grow beyond"), "{}", run.stderr);
+    assert!(run.stdout.lines().last().is_some_and(|line| line.ends_with(',')), "{}", run.stdout);
+    let run = folder.run("validate steep.json log.csv --sample-time 0.1 --require fit>=50");
+    assert_eq!(run.code, 6, "{}", run.stderr);
 }
 
 /// Products that are named are those that a choice finds, with the same parameters, in the order that they are named in.

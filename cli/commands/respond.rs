@@ -115,11 +115,17 @@ fn respond(
     for output in &applied.outputs {
         let of = if applied.outputs.len() > 1 { format!("{}: ", output.name) } else { String::new() };
         match &output.fit {
-            Some(_) if !output.predicted.iter().any(|value| value.is_finite()) => {
+            Some(fit) if fit.samples == 0 && !output.predicted.iter().any(|value| value.is_finite()) => {
                 warn(&format!("{of}no row could be predicted: the segments without a gap are too short"))
             }
             Some(fit) => tell(&format!("{of}{}", summary::figure(fit))),
             None => {}
+        }
+        // Squares of numbers always have a mean.
+        if output.fit.as_ref().is_some_and(|fit| fit.samples > 0 && fit.rmse.is_none()) {
+            warn(&format!(
+                "{of}the response, or the squares of its errors, grow beyond the range of numbers; rows without a number are empty"
+            ));
         }
     }
     if let Some(clamped) = applied.clamped {

@@ -6,6 +6,7 @@ import json
 import pickle
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -103,6 +104,24 @@ def test_radial_functions() -> None:
 def test_bad_arguments_are_told(options: dict[str, object], message: str) -> None:
     with pytest.raises((ValueError, TypeError), match=message):
         th.narx(log(50), **options)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("map", ["poly", "rbf", "spline", "local", "knn"])
+@pytest.mark.parametrize(
+    ("change", "error", "message"),
+    [
+        (lambda y: y * np.nan, ValueError, "no estimation row has a value"),
+        (lambda y: 0 * y, th.EstimationError, "output 'y' is constant"),
+        (lambda y: 1e300 * y, ValueError, "squares of 'y' leave the range of numbers"),
+        (lambda y: 1e-300 * y, ValueError, "squares of 'y' leave the range of numbers"),
+        (lambda y: y[:3], th.EstimationError, "too few rows for the lags"),
+    ],
+)
+def test_bad_logs_are_told(map: str, change: Callable[[Any], Any], error: type[Exception], message: str) -> None:
+    good = log(50)
+    y = change(np.asarray(good["y"]))
+    with pytest.raises(error, match=message):
+        th.narx(th.Log(y, np.asarray(good["u"])[: len(y)], sample_time=1.0), map)
 
 
 def test_splines_are_a_map_too() -> None:

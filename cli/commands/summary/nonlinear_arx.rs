@@ -9,6 +9,9 @@ use thetahat::text::harmless;
 use super::text::{Table, Text, columns, or_dash};
 use super::{NO_ERROR, criteria, fits, signal};
 
+/// Why a step of a choice has no figure.
+const NO_RUN: &str = "functions that are always there are still to come, or the run grows without bound";
+
 /// The main figures of a fit of a nonlinear ARX model.
 pub(super) fn table(report: &Report, model: &NonlinearArxModel, width: usize) -> String {
     let mut text = Text::new(width);
@@ -29,7 +32,8 @@ pub(super) fn table(report: &Report, model: &NonlinearArxModel, width: usize) ->
         text.table(match estimation.procedure {
             Procedure::ForwardRegression(_) => functions(outcome, own, &of),
             // Parameters of boxes are many, and samples more: both are in the report.
-            _ => path(outcome),
+            Procedure::Neighbours(_) => path(outcome, "a free run over the kept samples would read them"),
+            _ => path(outcome, NO_RUN),
         });
         text.line(&format!("{}{}", harmless(&of), choice(&estimation.procedure, outcome)));
     }
@@ -52,7 +56,8 @@ fn functions(outcome: &TermsOutcome, own: &[Parameter], of: &str) -> Table {
     let held_out = outcome.path.iter().any(|step| step.held_out.is_some());
     let mut head = vec!["function", "parameter", "standard error", "error reduction", "free run"];
     head.extend(held_out.then_some("held out"));
-    let mut parameters = columns(&head).none(NO_ERROR);
+    let known = own.iter().all(|parameter| parameter.standard_error.is_some());
+    let mut parameters = columns(&head).none(if known { NO_RUN } else { NO_ERROR });
     for parameter in own {
         let name = parameter.name.strip_prefix(of).unwrap_or(&parameter.name);
         let step = outcome.path.iter().find(|step| step.term == name);
@@ -70,12 +75,12 @@ fn functions(outcome: &TermsOutcome, own: &[Parameter], of: &str) -> Table {
     parameters
 }
 
-/// The steps of the choice; that which was taken is marked.
-fn path(outcome: &TermsOutcome) -> Table {
+/// The steps of the choice; that which was taken is marked. `none` says why a figure is not there.
+fn path(outcome: &TermsOutcome, none: &'static str) -> Table {
     let held_out = outcome.path.iter().any(|step| step.held_out.is_some());
     let mut head = vec!["", "step", "parameters", "RMSE", "free run"];
     head.extend(held_out.then_some("held out"));
-    let mut steps = columns(&head).words(&[1]).none("a free run over the kept samples would read them");
+    let mut steps = columns(&head).words(&[1]).none(none);
     for (at, step) in (1..).zip(&outcome.path) {
         let run = |run: Option<RunFigures>| or_dash(run.and_then(|run| run.rmse), number);
         let mut cells = vec![

@@ -17,7 +17,7 @@ pub fn tracking(summary: &TrackSummary, faults: &str, watched: bool, width: usiz
     if let Some(tracker) = summary.trackers.first() {
         match &tracker.map {
             None => text.line(&formula(&tracker.orders)),
-            Some(map) => text.line(&map.name(tracker.parameters.len())),
+            Some(map) => text.line(&map.name(map.parameters(tracker.orders.parameters()))),
         }
         text.line(&format!("{} rows{faults}{gaps}", summary.rows));
         if tracker.offsets.iter().any(|&offset| offset != 0.0) {

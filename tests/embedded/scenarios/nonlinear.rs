@@ -2,8 +2,8 @@
 
 use thetahat_core::nalgebra::Const;
 use thetahat_core::{
-    ArxOrders, Error, Forgetting, Innovation, InputOrders, NonlinearArx, Polynomial, Radial, RecursiveNarx,
-    Scaling,
+    ArxOrders, Basis, Error, Forgetting, Innovation, InputOrders, Local, Membership, Neighbours,
+    NonlinearArx, Polynomial, Radial, RecursiveNarx, Scaling, Spline,
 };
 
 use crate::record::{Sample, sample};
@@ -57,22 +57,24 @@ impl Scenario for Narx {
     }
 }
 
-const CENTRES: [f32; 12] = [-0.8, -0.6, -1.0, 0.7, 0.4, 1.0, -0.2, 0.1, 0.9, 1.1, 0.8, -0.7];
-const INVERSE_SQUARES: [f32; 4] = [0.25, 0.5, 0.4, 0.3];
-const THETA: [f32; 8] = [0.05, 0.9, -0.3, 0.4, 0.6, -0.5, 0.3, -0.2];
+/// The functions of a stored model, and its parameters.
+pub(crate) trait StoredMap: Basis<f32> + 'static {
+    const NAME: &'static str;
+    const THETA: &'static [f32];
 
-/// A stored model of four radial functions and a linear path: its free run over three samples.
-pub(crate) struct Stored(NonlinearArx<f32, Radial<'static, f32>, Const<3>>);
+    fn map(case: Case) -> Self;
+}
 
-impl Scenario for Stored {
-    const NAME: &'static str = "NonlinearArx, 4 centres";
+/// A stored model: its free run over three samples.
+pub(crate) struct Stored<M: StoredMap>(NonlinearArx<f32, M, Const<3>>);
+
+impl<M: StoredMap> Scenario for Stored<M> {
+    const NAME: &'static str = M::NAME;
     type Input = Sample;
     type Output = [f32; 3];
 
-    fn start(_: Case) -> Result<Self, Error> {
-        let radial =
-            Radial { regressors: 3, centres: &CENTRES, inverse_squares: &INVERSE_SQUARES, linear: true };
-        NonlinearArx::new(radial, &ORDERS, OUTPUT, &[INPUT]).map(Stored)
+    fn start(case: Case) -> Result<Self, Error> {
+        NonlinearArx::new(M::map(case), &ORDERS, OUTPUT, &[INPUT]).map(Stored)
     }
 
     fn input(case: Case, k: usize) -> Sample {
@@ -83,15 +85,93 @@ impl Scenario for Stored {
     fn step(&mut self, sample: &Sample) -> Result<[f32; 3], Error> {
         self.0.log_row(sample.y, &[sample.u])?;
         let mut ahead = [0.0; 3];
-        self.0.predict(&THETA, &[1.0, 0.0, -1.0], &mut ahead)?;
+        self.0.predict(M::THETA, &[1.0, 0.0, -1.0], &mut ahead)?;
         Ok(ahead)
     }
 
     fn numbers(&self, ahead: &[f32; 3], number: &mut impl FnMut(f32)) {
         ahead.iter().copied().for_each(&mut *number);
         let mut slopes = [0.0; 3];
-        if self.0.slopes_at(&THETA, &[0.5, -0.25, 1.0], &mut slopes).is_ok() {
+        if self.0.slopes_at(M::THETA, &[0.5, -0.25, 1.0], &mut slopes).is_ok() {
             slopes.into_iter().for_each(number);
+        }
+    }
+}
+
+/// All ten products.
+impl StoredMap for Polynomial<'static> {
+    const NAME: &'static str = "NonlinearArx, 10 terms";
+    const THETA: &'static [f32] = &[0.05, 0.9, -0.3, 0.4, 0.04, -0.05, 0.03, -0.02, 0.06, 0.01];
+
+    fn map(_: Case) -> Self {
+        PRODUCTS
+    }
+}
+
+/// Four radial functions and a linear path.
+impl StoredMap for Radial<'static, f32> {
+    const NAME: &'static str = "NonlinearArx, 4 centres";
+    const THETA: &'static [f32] = &[0.05, 0.9, -0.3, 0.4, 0.6, -0.5, 0.3, -0.2];
+
+    fn map(_: Case) -> Self {
+        Radial {
+            regressors: 3,
+            centres: &[-0.8, -0.6, -1.0, 0.7, 0.4, 1.0, -0.2, 0.1, 0.9, 1.1, 0.8, -0.7],
+            inverse_squares: &[0.25, 0.5, 0.4, 0.3],
+            linear: true,
+        }
+    }
+}
+
+/// Four bends and a linear path.
+impl StoredMap for Spline<'static, f32> {
+    const NAME: &'static str = "NonlinearArx, 4 bends";
+    const THETA: &'static [f32] = &[0.05, 0.9, -0.3, 0.4, 0.6, -0.5, 0.3, -0.2];
+
+    fn map(_: Case) -> Self {
+        const LOW: [f32; 3] = [-1.0, -0.3, 0.4];
+        const HIGH: [f32; 3] = [-0.3, 0.4, 1.1];
+        Spline { regressors: 3, bent: &[0, 0, 1, 2], knots: &[LOW, HIGH, LOW, HIGH] }
+    }
+}
+
+/// Three planes: by Gaussians in the typical case, by trapezoids in the hard one.
+impl StoredMap for Local<'static, f32> {
+    const NAME: &'static str = "NonlinearArx, 3 planes";
+    const THETA: &'static [f32] = &[0.05, 0.9, -0.3, 0.4, 0.1, 0.7, -0.2, 0.5, -0.1, 0.8, -0.1, 0.3];
+
+    fn map(case: Case) -> Self {
+        const ALL: [f32; 2] = [-1.5, 1.5];
+        const LOW: [f32; 2] = [-1.5, 0.0];
+        const HIGH: [f32; 2] = [0.0, 1.5];
+        let membership = match case {
+            Case::Typical => Membership::Gaussian,
+            Case::Hard => Membership::Trapezoid,
+        };
+        Local {
+            membership,
+            planes: true,
+            sides: &[LOW, ALL, ALL, HIGH, ALL, LOW, HIGH, ALL, HIGH],
+            domain: &[ALL, ALL, ALL],
+        }
+    }
+}
+
+/// Twelve samples, of which five are asked for a plane.
+impl StoredMap for Neighbours<'static, f32> {
+    const NAME: &'static str = "NonlinearArx, 5 of 12 samples";
+    const THETA: &'static [f32] = &[-0.9, 0.7, 0.3, 1.2, -0.4, 0.1, 0.8, -1.1, 0.6, -0.2, 0.5, -0.7];
+
+    fn map(_: Case) -> Self {
+        Neighbours {
+            regressors: 3,
+            points: &[
+                -0.8, -0.6, -1.0, 0.7, 0.4, 1.0, -0.2, 0.1, 0.9, 1.1, 0.8, -0.7, -0.4, -0.9, 0.2, 0.1, 0.3,
+                -0.5, 0.9, 0.2, 0.6, -1.2, -0.7, 0.4, 0.5, 1.0, -0.1, -0.1, -0.5, 0.7, 0.3, -0.2, 0.0, -0.6,
+                0.2, -0.8,
+            ],
+            count: 5,
+            planes: true,
         }
     }
 }

@@ -20,7 +20,7 @@ pub const MOST_SLOPES: usize = 32;
 /// (Stone 1977; Hastie, Tibshirani and Friedman, The Elements of Statistical Learning, 2nd ed. 2009, sections 13.3 and 6.1.1).
 ///
 /// Cost: a distance to each of the samples, and with n regressors k n²/2 + n³/6 multiplications of a plane. On the stack are
-/// [`MOST_NEIGHBOURS`] places and [`MOST_SLOPES`] (`MOST_SLOPES` + 5)/2 numbers.
+/// [`MOST_NEIGHBOURS`] places and distances, and [`MOST_SLOPES`] (`MOST_SLOPES` + 5)/2 numbers: some 4 kB in `f32`.
 ///
 /// ```
 /// use thetahat_core::{Basis, Neighbours};
@@ -40,19 +40,64 @@ pub struct Neighbours<'a, T> {
     pub planes: bool,
 }
 
-/// The places of the nearest, in rising order, and what is known of a plane through them.
+/// The places of the nearest, in rising order, and what is known of a plane through them. It is large: it is filled where it stands.
 struct Around<T> {
     places: [usize; MOST_NEIGHBOURS],
     count: usize,
     /// z̄.
     mean: [T; MOST_SLOPES],
-    /// The lower triangle of the Cholesky factor of S + ρ I, row by row; none where there is no plane.
-    factor: Option<[T; MOST_SLOPES * (MOST_SLOPES + 1) / 2]>,
+    /// The Cholesky factor of S + ρ I, row by row; only where there is a plane.
+    factor: [T; MOST_SLOPES * (MOST_SLOPES + 1) / 2],
+    has_plane: bool,
+}
+
+impl<T: Real> Around<T> {
+    fn nothing() -> Self {
+        Around {
+            places: [usize::MAX; MOST_NEIGHBOURS],
+            count: 0,
+            mean: [T::zero(); MOST_SLOPES],
+            factor: [T::zero(); MOST_SLOPES * (MOST_SLOPES + 1) / 2],
+            has_plane: false,
+        }
+    }
+
+    fn places(&self) -> impl Iterator<Item = usize> {
+        self.places.iter().copied().take(self.count)
+    }
 }
 
 /// Where a row of a triangle begins.
 fn start(row: usize) -> usize {
     row * (row + 1) / 2
+}
+
+/// A row of a lower triangle, with the diagonal last. Every access is total: with indexing, panics stay in the firmware.
+fn row<T>(triangle: &[T], index: usize) -> &[T] {
+    triangle.get(start(index)..start(index + 1)).unwrap_or_default()
+}
+
+/// The sum of products.
+fn product<T: Real>(one: &[T], other: &[T]) -> T {
+    one.iter().zip(other).fold(T::zero(), |sum, (&one, &other)| sum + one * other)
+}
+
+/// A point from the mean.
+fn from_mean<T: Real>(point: &[T], mean: &[T]) -> [T; MOST_SLOPES] {
+    let mut away = [T::zero(); MOST_SLOPES];
+    away.iter_mut().zip(point).zip(mean).for_each(|((away, &z), &mean)| *away = z - mean);
+    away
+}
+
+/// Puts a value before the first one that it precedes; the last one falls out.
+fn insert<'l, V: 'l>(list: impl Iterator<Item = &'l mut V>, mut value: V, precedes: impl Fn(&V, &V) -> bool) {
+    let mut found = false;
+    for own in list {
+        found = found || precedes(&value, own);
+        if found {
+            core::mem::swap(own, &mut value);
+        }
+    }
 }
 
 impl<T: Real> Neighbours<'_, T> {
@@ -61,13 +106,12 @@ impl<T: Real> Neighbours<'_, T> {
         self.points.get(first..first.saturating_add(self.regressors)).unwrap_or_default()
     }
 
-    /// Of points at the same distance the one that is stored first is nearer.
-    fn around(&self, z: &[T]) -> Around<T> {
+    /// Finds the nearest. Of points at the same distance the one that is stored first is nearer.
+    fn look_around(&self, z: &[T], around: &mut Around<T>) {
         let wanted = self.count.clamp(1, MOST_NEIGHBOURS);
-        let mut found = [(T::INFINITY, 0_usize); MOST_NEIGHBOURS];
-        let mut count = 0;
+        let mut found = [(T::INFINITY, usize::MAX); MOST_NEIGHBOURS];
         for (place, point) in self.points.chunks_exact(self.regressors.max(1)).enumerate() {
-            let limit = if count < wanted { T::INFINITY } else { found[wanted - 1].0 };
+            let limit = found.get(wanted - 1).map_or(T::INFINITY, |(square, _)| *square);
             let mut square = T::zero();
             for (&z, &point) in z.iter().zip(point) {
                 square += (z - point) * (z - point);
@@ -76,88 +120,85 @@ impl<T: Real> Neighbours<'_, T> {
                 }
             }
             // One that is not a number is near to nothing.
-            let is_near = square < limit;
-            if !is_near {
-                continue;
+            if square < limit {
+                insert(found.iter_mut().take(wanted), (square, place), |one, other| one.0 < other.0);
             }
-            let mut at = count.min(wanted - 1);
-            while at > 0 && found[at - 1].0 > square {
-                found[at] = found[at - 1];
-                at -= 1;
-            }
-            found[at] = (square, place);
-            count = (count + 1).min(wanted);
         }
-        let mut places = [0; MOST_NEIGHBOURS];
-        places.iter_mut().zip(&found[..count]).for_each(|(into, (_, place))| *into = *place);
-        places[..count].sort_unstable();
-        let mut around = Around { places, count, mean: [T::zero(); MOST_SLOPES], factor: None };
-        if self.planes && count > 0 && self.regressors <= MOST_SLOPES {
-            around.factor = self.plane(&mut around);
+        for (_, place) in found.into_iter().take_while(|(square, _)| *square < T::INFINITY) {
+            around.count += 1;
+            insert(around.places.iter_mut().take(around.count), place, |one, other| one < other);
         }
-        around
+        if self.planes && around.count > 0 && self.regressors <= MOST_SLOPES {
+            around.has_plane = self.plane(around).is_some();
+        }
     }
 
-    /// Sets the mean of the nearest, and gives the factor of S + ρ I; none where all of them are at one point.
-    fn plane(&self, around: &mut Around<T>) -> Option<[T; MOST_SLOPES * (MOST_SLOPES + 1) / 2]> {
+    /// Finds the mean of the nearest, and the factor of S + ρ I; none where all of them are at one point.
+    fn plane(&self, around: &mut Around<T>) -> Option<()> {
+        let Around { places, count, mean, factor, .. } = around;
         let regressors = self.regressors;
-        let (places, share) = (&around.places[..around.count], T::one() / T::from_count(around.count));
-        for &place in places {
-            around.mean.iter_mut().zip(self.point(place)).for_each(|(mean, &z)| *mean += share * z);
+        let (places, share) = (|| places.iter().take(*count), T::one() / T::from_count(*count));
+        for &place in places() {
+            mean.iter_mut().zip(self.point(place)).for_each(|(mean, &z)| *mean += share * z);
         }
-        let mut triangle = [T::zero(); MOST_SLOPES * (MOST_SLOPES + 1) / 2];
-        for &place in places {
-            let point = self.point(place);
-            for i in 0..regressors {
-                let own = point[i] - around.mean[i];
-                for k in 0..=i {
-                    triangle[start(i) + k] += own * (point[k] - around.mean[k]);
-                }
+        for &place in places() {
+            let away = from_mean(self.point(place), mean);
+            for (i, &own) in away.iter().take(regressors).enumerate() {
+                let sums = factor.get_mut(start(i)..start(i + 1))?;
+                sums.iter_mut().zip(&away).for_each(|(sum, &other)| *sum += own * other);
             }
         }
-        let trace = (0..regressors).fold(T::zero(), |sum, i| sum + triangle[start(i) + i]);
+        let diagonal = (0..regressors).filter_map(|i| row(factor, i).last());
+        let trace = diagonal.fold(T::zero(), |sum, &own| sum + own);
         // Squares that are lost in rounding, or no numbers, say nothing of a plane.
         if !(trace >= T::MIN_POSITIVE * T::from_count(100 * regressors) && trace.is_finite()) {
             return None;
         }
         let ridge = trace / T::from_count(100 * regressors);
         for i in 0..regressors {
-            triangle[start(i) + i] += ridge;
-            for k in 0..=i {
-                let explained =
-                    (0..k).fold(T::zero(), |sum, l| sum + triangle[start(i) + l] * triangle[start(k) + l]);
-                let rest = triangle[start(i) + k] - explained;
-                triangle[start(i) + k] = if i == k { rest.sqrt() } else { rest / triangle[start(k) + k] };
+            let (above, below) = factor.split_at_mut_checked(start(i))?;
+            let own = below.get_mut(..=i)?;
+            for k in 0..i {
+                let (pivot, before) = row(above, k).split_last()?;
+                let explained = product(own, before);
+                let entry = own.get_mut(k)?;
+                *entry = (*entry - explained) / *pivot;
             }
+            let (pivot, before) = own.split_last_mut()?;
+            *pivot = (*pivot + ridge - product(before, before)).sqrt();
         }
-        Some(triangle)
+        Some(())
     }
 
     /// (S + ρ I)^-1 times a vector, in its place.
-    fn solve(&self, factor: &[T], vector: &mut [T; MOST_SLOPES]) {
+    fn solve(&self, factor: &[T], vector: &mut [T]) {
         for i in 0..self.regressors {
-            let known = (0..i).fold(T::zero(), |sum, k| sum + factor[start(i) + k] * vector[k]);
-            vector[i] = (vector[i] - known) / factor[start(i) + i];
+            let (known, rest) = vector.split_at_mut_checked(i).unwrap_or_default();
+            if let (Some(own), Some((&pivot, before))) = (rest.first_mut(), row(factor, i).split_last()) {
+                *own = (*own - product(before, known)) / pivot;
+            }
         }
         for i in (0..self.regressors).rev() {
-            let known =
-                (i + 1..self.regressors).fold(T::zero(), |sum, k| sum + factor[start(k) + i] * vector[k]);
-            vector[i] = (vector[i] - known) / factor[start(i) + i];
+            let (rest, known) = vector.split_at_mut_checked(i + 1).unwrap_or_default();
+            let column = (i + 1..self.regressors).filter_map(|k| row(factor, k).get(i));
+            let explained = column.zip(known).fold(T::zero(), |sum, (&entry, known)| sum + entry * *known);
+            if let (Some(own), Some(&pivot)) = (rest.last_mut(), row(factor, i).last()) {
+                *own = (*own - explained) / pivot;
+            }
         }
     }
 
     /// Calls `take` with the place and the weight of each of the nearest, in rising order.
     fn weights(&self, z: &[T], mut take: impl FnMut(usize, T)) {
-        let around = self.around(z);
+        let mut around = Around::nothing();
+        self.look_around(z, &mut around);
         let share = T::one() / T::from_count(around.count);
         let mut away = [T::zero(); MOST_SLOPES];
-        if let Some(factor) = &around.factor {
-            for ((away, &z), &mean) in away.iter_mut().zip(z).zip(&around.mean) {
-                *away = z - mean;
-            }
-            self.solve(factor, &mut away);
+        if around.has_plane {
+            away = from_mean(z, &around.mean);
+            self.solve(&around.factor, &mut away);
         }
-        for &place in &around.places[..around.count] {
+        for place in around.places() {
             let own = self.point(place).iter().zip(&around.mean).zip(&away);
             let more = own.map(|((&z, &mean), &away)| (z - mean) * away);
             take(place, more.fold(share, |sum, more| sum + more));
@@ -209,16 +250,19 @@ impl<T: Real> Basis<T> for Neighbours<'_, T> {
 
     /// Those of the plane: which samples are nearest is taken as it is.
     fn add_slopes(&self, parameters: &[T], z: &[T], slopes: &mut [T]) {
-        let around = self.around(z);
-        let Some(factor) = &around.factor else { return };
+        let mut around = Around::nothing();
+        self.look_around(z, &mut around);
+        if !around.has_plane {
+            return;
+        }
         let mut plane = [T::zero(); MOST_SLOPES];
-        for &place in &around.places[..around.count] {
+        for place in around.places() {
             let output = parameters.get(place).copied().unwrap_or(T::NAN);
             for ((plane, &z), &mean) in plane.iter_mut().zip(self.point(place)).zip(&around.mean) {
                 *plane += output * (z - mean);
             }
         }
-        self.solve(factor, &mut plane);
+        self.solve(&around.factor, &mut plane);
         slopes.iter_mut().zip(plane).for_each(|(slope, own)| *slope += own);
     }
 }

@@ -135,6 +135,16 @@ impl<'l> Samples<'l> {
         let lags = head.lags();
         let each = segments.iter().map(|(rows, past)| rows.start + lags.saturating_sub(*past)..rows.end);
         let rows: Vec<usize> = each.flatten().collect();
+        if rows.len() < 2 {
+            return Err(Error::undetermined(
+                Vec::new(),
+                format!(
+                    "too few rows for the lags: two samples at least need all regressors (reaching back {lags}), and {} have them; \
+                     name more rows, or fewer lags",
+                    rows.len()
+                ),
+            ));
+        }
         let mut samples = Self { log, scale: own, signals, taps, rows, ridge, head: head.clone() };
         for (place, regressor) in head.regressors.iter_mut().enumerate() {
             regressor.range = samples.range(samples.taps[place], regressor.scale);
@@ -344,14 +354,20 @@ impl<'l> Samples<'l> {
         let always = candidates.always();
         let undetermined = |message: String| Err(Error::undetermined(Vec::new(), message));
         if !products.is_finite() {
-            return Err(Error::data(
-                "sums of products of the regressors leave the range of numbers; take a lower degree, or leave out `raw-terms`, so \
-                 that signals are divided by their scale",
-            ));
+            return Err(Error::data(match candidates {
+                Candidates::Products(_) => {
+                    "sums of products of the regressors leave the range of numbers; take a lower degree, or leave out `raw-terms`, so \
+                     that signals are divided by their scale"
+                }
+                Candidates::Functions { .. } => {
+                    "sums of the functions leave the range of numbers; leave out `raw-terms`, so that signals are divided by their scale"
+                }
+            }));
         }
         if path.chosen.is_empty() {
             return undetermined(
-                "no function explains anything of the output on the estimation rows; name rows in which it changes, or other lags"
+                "no function explains anything of the output on the estimation rows; name rows in which it changes, other lags, or a \
+                 smaller `ridge` where there is one"
                     .to_owned(),
             );
         }
@@ -361,7 +377,7 @@ impl<'l> Samples<'l> {
             return Err(Error::undetermined(
                 vec![name.clone()],
                 format!(
-                    "{name} is a sum of the other functions on the estimation rows; take other lags, other centres or other rows"
+                    "{name} is a sum of the other functions on the estimation rows; take fewer lags or centres, or other rows"
                 ),
             ));
         }
@@ -471,17 +487,21 @@ impl<'l> Samples<'l> {
         }
         let evaluator = Evaluator::new(&map, vec![0.0; count]);
         let mut values = vec![0.0; (count + 1) * self.rows.len()];
-        let mut z = vec![0.0; self.taps.len()];
-        for (row, t) in values.chunks_exact_mut(count + 1).zip(&self.rows) {
-            for (z, (source, lag)) in z.iter_mut().zip(&self.taps) {
-                *z = self.signals[*source][t - lag];
-            }
-            evaluator.functions(&z, row);
-            row[count] = self.signals[0][*t];
+        let each = values.par_chunks_exact_mut(count + 1).zip(&self.rows).with_min_len(ROWS);
+        each.for_each_init(
+            || vec![0.0; self.taps.len()],
+            |z, (row, t)| {
+                for (z, (source, lag)) in z.iter_mut().zip(&self.taps) {
+                    *z = self.signals[*source][t - lag];
+                }
+                evaluator.functions(z, row);
+                row[count] = self.signals[0][*t];
+            },
+        );
+        let mut squares = vec![0.0; count];
+        for row in values.chunks_exact(count + 1) {
+            squares.iter_mut().zip(row).for_each(|(sum, f)| *sum += f * f);
         }
-        let squares: Vec<f64> = (0..count)
-            .map(|j| values.chunks_exact(count + 1).map(|row| row[j] * row[j]).sum::<f64>())
-            .collect();
         // Columns of one size: a rank is seen, a condition number says something.
         let sizes: Vec<f64> = squares.iter().map(|square| square.sqrt()).collect();
         if let Some(place) = sizes.iter().position(|size| !(*size > 0.0 && size.is_finite())) {

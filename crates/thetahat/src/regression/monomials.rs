@@ -101,13 +101,12 @@ impl Monomials {
         self.tuples[place].iter().filter(|index| **index > 0).map(|index| usize::from(*index) - 1).collect()
     }
 
-    /// The values of all monomials in some rows, a column for each; `variable` fills those of a variable.
-    fn values(&self, rows: usize, variable: impl Fn(usize, &mut [f64])) -> Mat<f64> {
+    /// Writes the values of all monomials in some rows, a column for each; `variable` fills those of a variable.
+    fn write(&self, rows: usize, variable: impl Fn(usize, &mut [f64]), values: &mut Mat<f64>) {
         let mut variables = vec![1.0; (self.variables + 1) * rows];
         for (index, values) in variables.chunks_exact_mut(rows.max(1)).enumerate().skip(1) {
             variable(index - 1, values);
         }
-        let mut values = Mat::zeros(rows, self.count());
         // The product of all but the last factor stands in the stack, for each length.
         let mut stack = vec![1.0; self.degree * rows];
         let mut before: &[u16] = &[];
@@ -122,10 +121,9 @@ impl Monomials {
                 }
             }
             let product = &stack[(self.degree - 1) * rows..];
-            values.col_as_slice_mut(place).copy_from_slice(&product[..rows]);
+            values.col_as_slice_mut(place)[..rows].copy_from_slice(&product[..rows]);
             before = tuple;
         }
-        values
     }
 }
 
@@ -165,21 +163,22 @@ impl Moments {
         variable: impl Fn(usize, usize, &mut [f64]),
         target: impl Fn(usize, &mut [f64]),
     ) {
+        let mut values = Mat::zeros(ROWS.min(rows), monomials.count());
         for first in (0..rows).step_by(ROWS) {
             let some = ROWS.min(rows - first);
-            let values = monomials.values(some, |index, into| variable(index, first, into));
+            monomials.write(some, |index, into| variable(index, first, into), &mut values);
             let mut y = vec![0.0; some];
             target(first, &mut y);
             self.tiles.par_iter_mut().zip(&monomials.tiles).for_each(|(sum, (rows, column))| {
                 let mut left = Mat::zeros(some, rows.len());
                 for (mut own, place) in left.col_iter_mut().zip(rows) {
-                    own.copy_from(values.col(*place));
+                    own.copy_from(values.col(*place).subrows(0, some));
                 }
-                let right = values.as_ref().subcols(*column, values.ncols() - column);
+                let right = values.as_ref().submatrix(0, *column, some, values.ncols() - column);
                 matmul(sum.as_mut(), Accum::Add, left.transpose(), right, 1.0, Par::Seq);
             });
             for (sum, place) in self.cross.iter_mut().zip(0..) {
-                *sum += super::product(values.col_as_slice(place), &y);
+                *sum += super::product(&values.col_as_slice(place)[..some], &y);
             }
             self.energy += super::sum_of_squares(&y);
         }

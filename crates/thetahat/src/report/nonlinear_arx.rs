@@ -250,8 +250,11 @@ fn candidates(map: &MapPlan, samples: &Samples<'_>) -> Result<Candidates, Error>
             return Err(Error::argument("map", "it has no functions to choose from"));
         }
     };
-    if let Some(width) = width.filter(|width| !(width.is_finite() && *width > 0.0)) {
-        return Err(Error::argument("width", format!("{width} is not a positive number")));
+    if let Some(width) = width.filter(|width| !(*width > 0.0 && (width * width).is_normal())) {
+        return Err(Error::argument(
+            "width",
+            format!("{width:?} is not a positive number that can be squared; about 1 is usual"),
+        ));
     }
     let points = samples.points();
     let (many, wanted) = match centres {
@@ -265,16 +268,18 @@ fn candidates(map: &MapPlan, samples: &Samples<'_>) -> Result<Candidates, Error>
         }
     };
     if wanted == 0 || wanted > many {
-        return Err(Error::argument(
-            "centres",
-            format!("there would be {wanted} centres, for {} samples; give from 1 to {many}", points.len()),
-        ));
-    }
-    if points.is_empty() {
-        return Err(Error::undetermined(
-            Vec::new(),
-            "no estimation row has all regressors; name more rows, or fewer lags",
-        ));
+        let message = match centres {
+            Centres::Grid { each } => format!(
+                "a grid of {each} in each direction of {} regressors has none, or more than {many} points; give another number, or \
+                 fewer lags",
+                samples.regressors()
+            ),
+            _ => format!(
+                "there would be {wanted} centres, for {} samples; give from 1 to {many}",
+                points.len()
+            ),
+        };
+        return Err(Error::argument("centres", message));
     }
     let at = match centres {
         Centres::Chosen => centres::spread(&points, CANDIDATES),
@@ -352,14 +357,19 @@ fn head(
     // The standard deviation over the estimation rows; 1 in the signals' own units.
     let scale = |name: &str, role: &str| -> Result<f64, Error> {
         let (own, raw) = (&deviations.channel(name)?.values, &log.channel(name)?.values);
-        let values =
-            |of: &'_ [f64]| segments.iter().flat_map(|rows| of[rows.clone()].to_vec()).collect::<Vec<f64>>();
-        let (values, size) =
-            (values(own), values(raw).iter().fold(0.0_f64, |size, value| size.max(value.abs())));
+        let of =
+            |values: &[f64]| segments.iter().map(|rows| &values[rows.clone()]).collect::<Vec<_>>().concat();
+        let (values, size) = (of(own), of(raw).iter().fold(0.0_f64, |size, value| size.max(value.abs())));
         let mean = crate::regression::sum(values.iter().copied()) / values.len() as f64;
         let variance =
             crate::regression::sum(values.iter().map(|value| (value - mean).powi(2))) / values.len() as f64;
         let spread = variance.sqrt();
+        let varies = values.iter().any(|value| (value - mean).abs() > ROUNDING * size);
+        if varies && !variance.is_normal() {
+            return Err(Error::data(format!(
+                "squares of '{name}' leave the range of numbers; scale the channel towards one"
+            )));
+        }
         if spread.is_nan() || spread <= ROUNDING * size {
             return Err(Error::undetermined(
                 Vec::new(),
@@ -440,6 +450,18 @@ fn warnings(report: &Report, model: &NonlinearArxModel) -> Vec<String> {
                 if aliases.len() > 1 { format!(" and {} more", aliases.len() - 1) } else { String::new() };
             warnings.push(format!(
                 "{of}{first}{others} cannot be told from sums of the chosen terms on the estimation rows, as where an input has few levels"
+            ));
+        }
+    }
+    for fit in &report.fit {
+        if let (Some(percent), Some(Part::Estimation), Horizon::FreeRun) =
+            (fit.percent, fit.part, fit.horizon)
+            && percent <= 0.0
+        {
+            let of = if model.outputs.len() > 1 { format!("{}: ", fit.output) } else { String::new() };
+            warnings.push(format!(
+                "{of}the free run on the estimation rows is no better than the mean of the output: take other lags, another map, or \
+                 validation rows that the choice looks at"
             ));
         }
     }

@@ -17,6 +17,8 @@ use std::borrow::Cow;
 use std::cell::{Cell, OnceCell};
 use std::ops::Range;
 
+use rayon::prelude::*;
+
 use super::on_log::{OnLog, Tested};
 use super::predict::check_steps;
 use super::{Forecast, Horizon, InitialCondition, Innovations, Response};
@@ -27,6 +29,9 @@ use crate::model::{NonlinearArxModel, Orders, PolynomialModel, Signal};
 use errors::Errors;
 pub(crate) use runner::within;
 use runner::{Runner, Signals, Walk};
+
+/// Samples that are predicted on one thread.
+const PART: usize = 1024;
 
 /// The next output, less its offset, where one regressor moves through its range and the others stay in the middle of theirs; with where
 /// it is in its range, from 0 to 1.
@@ -128,51 +133,32 @@ impl<'l> NonlinearArxOnLog<'l> {
         each.filter(|rows| !rows.is_empty()).collect()
     }
 
-    /// Calls `take` with each sample that has a prediction `steps` ahead, what is said of the outputs there, and the variances of the errors
-    /// if those are wanted.
-    fn ahead(
-        &self,
-        steps: usize,
-        mut errors: Option<&mut Errors>,
-        mut take: impl FnMut(usize, &[f64], &[f64]),
-    ) {
-        let mut walk = Walk::new(&self.runner, errors.is_none());
-        let mut next = vec![0.0; self.runner.outputs()];
-        let mut variances = next.clone();
-        for rows in self.counted(steps) {
-            if steps == 1 {
-                walk.begin(&self.signals, rows.clone(), rows.end, false);
-            }
-            for t in rows {
-                let first = t + 1 - steps;
-                if steps > 1 {
-                    walk.begin(&self.signals, first..t + 1, first, false);
-                }
-                if let Some(errors) = errors.as_deref_mut() {
-                    errors.begin();
-                }
-                for at in first..=t {
-                    walk.read(at);
-                    self.runner.next(&walk.z, &mut next);
-                    if let Some(errors) = errors.as_deref_mut() {
-                        errors.step(&self.runner, &mut walk, at, &mut variances);
-                    }
-                    if steps > 1 {
-                        walk.write(at, &next);
-                    }
-                }
-                take(t, &next, &variances);
-            }
-        }
+    /// The same in parts that are not long.
+    fn parts(&self, steps: usize) -> Vec<Range<usize>> {
+        let each = self.counted(steps).into_iter();
+        let parts = each
+            .flat_map(|rows| rows.clone().step_by(PART).map(move |first| first..rows.end.min(first + PART)));
+        parts.collect()
     }
 
     fn predict(&self, steps: usize) -> Vec<Response> {
-        let rows = self.ahead.output.len();
-        let empty = Response { values: vec![f64::NAN; rows], counted: self.counted(steps) };
-        let mut responses = vec![empty; self.runner.outputs()];
-        self.ahead(steps, None, |t, said, _| {
-            responses.iter_mut().zip(said).for_each(|(response, said)| response.values[t] = *said);
-        });
+        let (runner, signals) = (&self.runner, &self.signals);
+        let empty =
+            Response { values: vec![f64::NAN; self.ahead.output.len()], counted: self.counted(steps) };
+        let mut responses = vec![empty; runner.outputs()];
+        let parts = self.parts(steps);
+        let said: Vec<Vec<f64>> = (parts.par_iter())
+            .map(|rows| {
+                let mut all = Vec::with_capacity(rows.len() * runner.outputs());
+                ahead(runner, signals, rows.clone(), steps, None, |said, _| all.extend(said));
+                all
+            })
+            .collect();
+        for (rows, said) in parts.into_iter().zip(said) {
+            for (t, said) in rows.zip(said.chunks_exact(runner.outputs())) {
+                responses.iter_mut().zip(said).for_each(|(response, said)| response.values[t] = *said);
+            }
+        }
         responses
     }
 
@@ -203,6 +189,43 @@ impl<'l> NonlinearArxOnLog<'l> {
         }
         self.clamped.set(clamped);
         responses
+    }
+}
+
+/// Calls `take` with what is said of the outputs at each of some rows from what is known `steps` before, and with the variances of the
+/// errors if those are wanted.
+fn ahead(
+    runner: &Runner<'_>,
+    signals: &Signals<'_>,
+    rows: Range<usize>,
+    steps: usize,
+    mut errors: Option<&mut Errors>,
+    mut take: impl FnMut(&[f64], &[f64]),
+) {
+    let mut walk = Walk::new(runner, errors.is_none());
+    let (mut next, mut variances) = (vec![0.0; runner.outputs()], vec![0.0; runner.outputs()]);
+    if steps == 1 {
+        walk.begin(signals, rows.clone(), rows.end, false);
+    }
+    for t in rows {
+        let first = t + 1 - steps;
+        if steps > 1 {
+            walk.begin(signals, first..t + 1, first, false);
+        }
+        if let Some(errors) = errors.as_deref_mut() {
+            errors.begin();
+        }
+        for at in first..=t {
+            walk.read(at);
+            runner.next(&walk.z, &mut next);
+            if let Some(errors) = errors.as_deref_mut() {
+                errors.step(runner, &mut walk, at, &mut variances);
+            }
+            if steps > 1 {
+                walk.write(at, &next);
+            }
+        }
+        take(&next, &variances);
     }
 }
 
@@ -239,13 +262,25 @@ impl OnLog for NonlinearArxOnLog<'_> {
     }
 
     fn deviations(&self, steps: usize, _: InitialCondition) -> Result<Vec<Vec<f64>>, Error> {
-        let factor = student_factor(self.runner.model.degrees_of_freedom);
-        let mut deviations = vec![vec![f64::NAN; self.ahead.output.len()]; self.runner.outputs()];
-        let mut errors = Errors::new(&self.runner);
-        self.ahead(steps, Some(&mut errors), |t, _, variances| {
-            let each = deviations.iter_mut().zip(variances);
-            each.for_each(|(deviations, variance)| deviations[t] = factor * variance.sqrt());
-        });
+        let (runner, signals) = (&self.runner, &self.signals);
+        let factor = student_factor(runner.model.degrees_of_freedom);
+        let mut deviations = vec![vec![f64::NAN; self.ahead.output.len()]; runner.outputs()];
+        let parts = self.parts(steps);
+        let found: Vec<Vec<f64>> = (parts.par_iter())
+            .map(|rows| {
+                let (mut all, mut errors) = (Vec::new(), Errors::new(runner));
+                ahead(runner, signals, rows.clone(), steps, Some(&mut errors), |_, variances| {
+                    all.extend(variances);
+                });
+                all
+            })
+            .collect();
+        for (rows, found) in parts.into_iter().zip(found) {
+            for (t, variances) in rows.zip(found.chunks_exact(runner.outputs())) {
+                let each = deviations.iter_mut().zip(variances);
+                each.for_each(|(deviations, variance)| deviations[t] = factor * variance.sqrt());
+            }
+        }
         Ok(deviations)
     }
 

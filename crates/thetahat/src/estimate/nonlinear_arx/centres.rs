@@ -104,8 +104,8 @@ pub(crate) fn map(
             let mean = points.iter().map(|point| point[axis]).sum::<f64>() / count;
             points.iter().map(|point| (point[axis] - mean).powi(2)).sum::<f64>() / count
         };
-        // The root of the mean squared distance of two points.
-        (2.0 * (0..axes).map(variance).sum::<f64>()).sqrt()
+        // The root of the mean squared distance of two points; they may all be one.
+        Some((2.0 * (0..axes).map(variance).sum::<f64>()).sqrt()).filter(|width| *width > 0.0).unwrap_or(1.0)
     };
     let nearest = |place: usize| {
         let others = centres.iter().enumerate().filter(|(other, _)| *other != place);

@@ -224,21 +224,25 @@ impl Samples<'_> {
             total: vec![1.0; rows.len()],
             said: vec![0.0; rows.len()],
         };
-        let too_few = || {
-            Error::undetermined(
-                Vec::new(),
+        let undetermined = || {
+            let needed = if growth.planes { domain.len() + 2 } else { 2 };
+            let why = if rows.len() < needed {
                 format!(
-                    "{} samples do not determine a local model of {} regressors; name more rows, or fewer lags",
-                    rows.len(),
-                    domain.len()
-                ),
-            )
+                    "one local model needs {needed} samples at least, and there are {}; name more rows, or fewer lags",
+                    rows.len()
+                )
+            } else {
+                "regressors are sums of one another on the estimation rows, so that no plane is determined; leave some of them out, or \
+                 name other rows"
+                    .to_owned()
+            };
+            Error::undetermined(Vec::new(), why)
         };
         let whole = field.members(&domain);
-        let mut all = vec![field.fitted(domain.clone(), whole.clone(), &whole).ok_or_else(too_few)?];
+        let mut all = vec![field.fitted(domain.clone(), whole.clone(), &whole).ok_or_else(undetermined)?];
         let mut steps = Vec::new();
         let first = if growth.planes { "plane" } else { "constant" };
-        steps.push(self.solved_step(growth, &all, &domain, rows, first.to_owned()).ok_or_else(too_few)?);
+        steps.push(self.solved_step(growth, &all, &domain, rows, first.to_owned()).ok_or_else(undetermined)?);
         while steps.len() < growth.most {
             field.sum(&all);
             let (squares, each) = field.squares(&all);

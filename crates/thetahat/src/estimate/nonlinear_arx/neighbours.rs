@@ -53,7 +53,7 @@ impl Samples<'_> {
     ///
     /// # Errors
     /// [`Error::Argument`] for a number that the samples do not have, or a criterion that counts parameters; [`Error::Undetermined`] for
-    /// fewer than two samples.
+    /// too few samples to hold some of them out.
     pub(crate) fn keep(
         &self,
         planes: bool,
@@ -61,12 +61,6 @@ impl Samples<'_> {
         chosen_on: Option<&Self>,
     ) -> Result<(Chosen, Solved), Error> {
         let samples = self.rows.len().min(KEPT);
-        if samples < 2 {
-            return Err(Error::undetermined(
-                Vec::new(),
-                "neighbours are two samples with all regressors at least; name more rows, or fewer lags",
-            ));
-        }
         if planes && self.taps.len() > MOST_SLOPES {
             return Err(Error::argument(
                 "ny",

@@ -244,9 +244,14 @@ impl NonlinearArxPlan {
                 format!("there are lags of {lags} outputs, and {outputs} outputs"),
             ));
         }
-        let longest = self.input_lags.iter().map(|input| input.lags.saturating_add(input.delay));
-        if longest.chain(self.output_lags.iter().copied()).any(|lag| lag > crate::model::LARGEST) {
-            return Err(Error::argument("ny", format!("lags above {} are not read", crate::model::LARGEST)));
+        let longest = self.input_lags.iter().map(|input| ("nu", input.lags.saturating_add(input.delay)));
+        for (argument, lag) in longest.chain(self.output_lags.iter().map(|lags| ("ny", *lags))) {
+            if lag > crate::model::LARGEST {
+                return Err(Error::argument(
+                    argument,
+                    format!("lags above {} are not read", crate::model::LARGEST),
+                ));
+            }
         }
         if self.output_lags.iter().all(|lags| *lags == 0)
             && self.input_lags.iter().all(|input| input.lags == 0)

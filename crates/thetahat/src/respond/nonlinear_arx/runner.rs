@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use rayon::prelude::*;
+
 use crate::model::{ChannelExpression, Evaluator, ExpressionBuffer, NonlinearArxModel};
 
 /// A free run beyond this many times the largest output of the fit is lost.
@@ -172,23 +174,20 @@ impl<'m> Runner<'m> {
 
     /// The share of samples of which a regressor lies outside the range of the estimation rows.
     pub(super) fn outside(&self, signals: &Signals<'_>, rows: &[Range<usize>]) -> Option<f64> {
-        let mut walk = Walk::new(self, false);
-        let (mut count, mut beyond) = (0_usize, 0_usize);
-        for rows in rows.iter().filter(|rows| !rows.is_empty()) {
-            walk.begin(signals, rows.clone(), rows.end, false);
-            for t in rows.clone() {
-                walk.read(t);
-                let each = walk.z.iter().zip(&self.model.regressors);
-                let inside = |(z, regressor): (&f64, &crate::model::Regressor)| {
-                    let [low, high] = regressor.range;
-                    let value = z * regressor.scale;
-                    let rounding = f64::EPSILON * 4.0 * low.abs().max(high.abs());
-                    (low - rounding..=high + rounding).contains(&value) || value.is_nan()
-                };
-                count += 1;
-                beyond += usize::from(!each.clone().all(inside));
-            }
-        }
+        let ends = self.model.regressors.iter().map(|regressor| {
+            let [low, high] = regressor.range;
+            let rounding = f64::EPSILON * 4.0 * low.abs().max(high.abs());
+            (low - rounding, high + rounding)
+        });
+        let taps: Vec<_> = self.taps.iter().zip(ends).collect();
+        let is_beyond = |t: &usize| {
+            taps.iter().any(|((source, lag, _), (low, high))| {
+                let value = t.checked_sub(*lag).map_or(0.0, |at| signals.of(*source)[at]);
+                value < *low || value > *high
+            })
+        };
+        let count: usize = rows.iter().map(Range::len).sum();
+        let beyond = rows.par_iter().cloned().flatten().filter(is_beyond).count();
         (count > 0).then(|| beyond as f64 / count as f64)
     }
 }

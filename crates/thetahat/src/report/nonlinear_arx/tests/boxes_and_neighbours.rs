@@ -140,6 +140,6 @@ fn what_they_cannot_be_is_refused() {
             estimate: vec![Rows::new(1, 40).unwrap()],
             ..local(Membership::Gaussian, None)
         },
-        "do not determine",
+        "one local model needs 28 samples",
     );
 }

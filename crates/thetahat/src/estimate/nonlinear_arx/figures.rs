@@ -9,7 +9,8 @@ use crate::model::NonlinearArxModel;
 use crate::respond::nonlinear_arx::{NonlinearArxOnLog, within};
 use crate::respond::{Horizon, InitialCondition, OnLog};
 
-/// A choice prefers models whose free run stays within this many times the range of the estimation rows, about its middle.
+/// A choice prefers models whose free run stays within this many times the range of the estimation rows, and of those it runs over, about
+/// its middle.
 const RANGE: f64 = 1.1;
 
 /// How the maps of a nonlinear ARX model were chosen.
@@ -75,7 +76,7 @@ pub struct RunFigures {
     pub rmse: Option<f64>,
     /// The largest absolute error; none likewise.
     pub largest_error: Option<f64>,
-    /// Whether the run stays within 1.1 times the range of the estimation rows, about its middle.
+    /// Whether the run stays within 1.1 times the range of the output in the estimation rows and in those of the run, about its middle.
     pub in_range: bool,
 }
 
@@ -90,15 +91,19 @@ impl RunFigures {
     }
 }
 
-/// What a model misses on some rows of a log: in its free run, or one step ahead where nothing drives it.
+/// What a model misses on some rows of a log: in its free run, or one step ahead where nothing drives it. A run strays that leaves the
+/// range of the estimation rows and of what was measured in these: a model that follows an output to where it has not been is no worse.
 pub(super) fn run(model: &NonlinearArxModel, log: &Log, rows: &[Rows]) -> Result<Sums, Error> {
-    let [low, high] = model.maps.first().map_or([0.0; 2], |map| within(map.range, RANGE));
     let on_log = NonlinearArxOnLog::new(model, log, rows)?;
     let horizon = if on_log.is_driven() { Horizon::FreeRun } else { Horizon::Steps { steps: 1 } };
     let mut sums = Sums::default();
     for response in on_log.respond(horizon, InitialCondition::Drop)? {
         let measured = on_log.measured(0);
-        for t in response.counted.iter().cloned().flatten() {
+        let counted = || response.counted.iter().cloned().flatten();
+        let range = model.maps.first().map_or([0.0; 2], |map| map.range);
+        let range = counted().fold(range, |[low, high], t| [low.min(measured[t]), high.max(measured[t])]);
+        let [low, high] = within(range, RANGE);
+        for t in counted() {
             let (said, error) = (response.values[t], (measured[t] - response.values[t]).abs());
             sums.count += 1;
             sums.squares += error * error;

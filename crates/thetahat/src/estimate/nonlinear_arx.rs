@@ -146,9 +146,9 @@ impl<'l> Samples<'l> {
             ));
         }
         let mut samples = Self { log, scale: own, signals, taps, rows, ridge, head: head.clone() };
-        for (place, regressor) in head.regressors.iter_mut().enumerate() {
-            regressor.range = samples.range(samples.taps[place], regressor.scale);
-        }
+        head.regressors.par_iter_mut().zip(&samples.taps).for_each(|(regressor, tap)| {
+            regressor.range = samples.range(*tap, regressor.scale);
+        });
         for map in &mut head.maps {
             map.range = samples.range((0, 0), map.scale);
         }

@@ -76,6 +76,9 @@ pub struct RunFigures {
     pub rmse: Option<f64>,
     /// The largest absolute error; none likewise.
     pub largest_error: Option<f64>,
+    /// 100 (1 - |y - y^|/|y - mean y|): the fit, in percent; none likewise, or where the output is constant.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub percent: Option<f64>,
     /// Whether the run stays within 1.1 times the range of the output in the estimation rows and in those of the run, about its middle.
     pub in_range: bool,
 }
@@ -85,9 +88,11 @@ impl RunFigures {
         run(model, log, rows).map(Sums::figures)
     }
 
-    /// Smaller is better: those out of range come last, and those without a figure after them.
+    /// Smaller is better: those out of range come last, and those without a figure after them. To stay in range is no merit of a run that
+    /// is no better than the mean of the output.
     pub(super) fn rank(self) -> (bool, f64) {
-        (!self.in_range, self.rmse.unwrap_or(f64::INFINITY))
+        let is_useless = self.percent.is_some_and(|percent| percent <= 0.0);
+        (!self.in_range || is_useless, self.rmse.unwrap_or(f64::INFINITY))
     }
 }
 
@@ -107,6 +112,8 @@ pub(super) fn run(model: &NonlinearArxModel, log: &Log, rows: &[Rows]) -> Result
             let (said, error) = (response.values[t], (measured[t] - response.values[t]).abs());
             sums.count += 1;
             sums.squares += error * error;
+            sums.level += measured[t];
+            sums.energy += measured[t] * measured[t];
             // One that is not a number stays one.
             sums.largest = if error > sums.largest || error.is_nan() { error } else { sums.largest };
             sums.strays |= !(low..=high).contains(&said);
@@ -120,6 +127,9 @@ pub(super) fn run(model: &NonlinearArxModel, log: &Log, rows: &[Rows]) -> Result
 pub(super) struct Sums {
     count: usize,
     squares: f64,
+    /// The sum of the output, and of its squares: it is a deviation from its mean over the estimation rows.
+    level: f64,
+    energy: f64,
     largest: f64,
     strays: bool,
 }
@@ -128,6 +138,8 @@ impl Sums {
     pub(super) fn add(&mut self, other: Self) {
         self.count += other.count;
         self.squares += other.squares;
+        self.level += other.level;
+        self.energy += other.energy;
         let largest = other.largest;
         self.largest = if largest > self.largest || largest.is_nan() { largest } else { self.largest };
         self.strays |= other.strays;
@@ -135,7 +147,9 @@ impl Sums {
 
     pub(super) fn figures(self) -> RunFigures {
         let known = |value: f64| Some(value).filter(|value| self.count > 0 && value.is_finite());
+        let spread = self.energy - self.level * self.level / self.count as f64;
         RunFigures {
+            percent: known(100.0 * (1.0 - (self.squares / spread).sqrt())).filter(|_| spread > 0.0),
             rmse: known((self.squares / self.count as f64).sqrt()),
             largest_error: known(self.largest),
             in_range: self.count > 0 && !self.strays,

@@ -219,7 +219,7 @@ def test_expressions_are_regressors() -> None:
     with pytest.raises(ValueError, match="unknown name 'v'"):
         th.narx(data, regressors=["sqrt(v)"])
     with pytest.raises(TypeError, match="regressors"):
-        th.narx(data, regressors="sqrt(u)")  # type: ignore[arg-type]
+        th.narx(data, regressors="sqrt(u)")
 
 
 def test_runs_are_kept_within_the_range_on_request() -> None:

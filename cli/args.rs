@@ -16,9 +16,9 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 pub(crate) use filter::{EstimatorArgument, FilterArguments, FilterStartArgument};
 pub(crate) use fit::{
-    ConstantArgument, CriterionArguments, FitArguments, InitialArgument, LikelihoodArgument, MapArgument,
-    MembershipArgument, MethodArgument, ModelArgument, ModelArguments, NarxArguments, PathArgument,
-    SearchArgument, SearchArguments,
+    ConstantArgument, CriterionArguments, FitArguments, InitialArgument, KernelArgument, LikelihoodArgument,
+    MapArgument, MembershipArgument, MethodArgument, ModelArgument, ModelArguments, NarxArguments,
+    PathArgument, SearchArgument, SearchArguments,
 };
 pub(crate) use inspect::InspectArguments;
 pub(crate) use lines::{LineArguments, LineFormatArgument};

@@ -22,6 +22,7 @@ mod forecast;
 mod harness;
 mod html;
 mod identities;
+mod impulse_response;
 mod inspect;
 mod interrupt;
 mod likelihood;

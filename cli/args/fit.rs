@@ -102,6 +102,12 @@ pub(crate) struct ModelArguments {
     /// without orders the data choose]
     #[arg(long, value_name = "N|A..B[,…]", value_delimiter = ',', help_heading = "Model")]
     pub(crate) nk: Vec<String>,
+    /// Taps of an impulse response (--model fir): g(nk), g(nk+1), …; one value for each input or one for all
+    #[arg(long, value_name = "N[,…]", value_delimiter = ',', help_heading = "Model")]
+    pub(crate) taps: Vec<usize>,
+    /// What is known of an impulse response before the data (--model fir): that it decays and is smooth [default: dc]
+    #[arg(long, value_enum, help_heading = "Model")]
+    pub(crate) kernel: Option<KernelArgument>,
     /// How to estimate
     #[arg(long, value_enum, default_value = "pem", help_heading = "Model")]
     pub(crate) method: MethodArgument,
@@ -136,7 +142,7 @@ pub(crate) struct NarxArguments {
         value_enum,
         value_name = "MAP",
         conflicts_with_all = [
-            "model", "na", "nb", "nc", "nd", "nf", "method", "likelihood", "initial", "focus", "constant", "trend", "path", "search",
+            "model", "na", "nb", "nc", "nd", "nf", "taps", "kernel", "method", "likelihood", "initial", "focus", "constant", "trend", "path", "search",
             "max_iterations", "tolerance", "step", "starts", "norm", "bound", "dc_gain", "noise_bound", "prefilter", "time_limit",
         ]
     )]
@@ -302,6 +308,18 @@ pub(crate) enum ModelArgument {
     Bj,
     /// A y = B/F u + C/D e, with any of them
     General,
+    /// An impulse response: y = B u + e of many taps, with --taps
+    Fir,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum KernelArgument {
+    /// Decay and smoothness each have a number of their own, which the likelihood says
+    Dc,
+    /// One number for both
+    Tc,
+    /// Nothing: least squares
+    None,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -146,6 +146,24 @@ fn estimation(text: &mut Text, estimation: &Estimation, model: &PolynomialModel)
             ));
         }
         Procedure::Constrained(outcome) => criterion(text, outcome, model, start),
+        Procedure::Regularised(outcome) => {
+            text.line(&format!(
+                "regularised by the {} kernel of the largest likelihood, {} of {} parameters free, {}",
+                outcome.kernel.name(),
+                short((10.0 * outcome.effective_parameters).round() / 10.0),
+                model.parameters.len(),
+                initial(start, 0)
+            ));
+            for (kernel, input) in outcome.inputs.iter().zip(&model.inputs) {
+                text.line(&format!(
+                    "{}: decay {}, correlation {}, variance of the first tap {} times that of the noise",
+                    harmless(&input.name),
+                    number(kernel.decay),
+                    number(kernel.correlation),
+                    number(kernel.scale)
+                ));
+            }
+        }
         Procedure::InnovationsLikelihood(_)
         | Procedure::ForwardRegression(_)
         | Procedure::Splits(_)
@@ -286,7 +304,9 @@ fn dynamics(text: &mut Text, model: &PolynomialModel) {
     for (pole, time) in model.poles.iter().zip(&model.time_constants) {
         add("pole", pole, Some(*time));
     }
-    model.zeros.iter().flatten().for_each(|zero| add("zero", zero, None));
+    // Those of an impulse response say nothing: it ends where its taps do.
+    let ends = model.orders.na == 0 && model.orders.nf.iter().all(|&nf| nf == 0);
+    model.zeros.iter().flatten().filter(|_| !ends).for_each(|zero| add("zero", zero, None));
     model.noise_poles.iter().for_each(|pole| add("noise pole", pole, None));
     model.noise_zeros.iter().for_each(|zero| add("noise zero", zero, None));
     if count > 0 {

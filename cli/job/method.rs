@@ -1,8 +1,11 @@
-use thetahat::estimate::{ConvexFit, Loss, Method, Norm, Robust};
+use thetahat::estimate::{ConvexFit, Kernel, Loss, Method, Norm, Robust};
 
 use super::orders::OrderJob;
 use super::{parsed, positive, search};
-use crate::args::{CriterionArguments, FitArguments, LikelihoodArgument, MethodArgument};
+use crate::args::{
+    CriterionArguments, FitArguments, KernelArgument, LikelihoodArgument, MethodArgument, ModelArgument,
+    ModelArguments,
+};
 use crate::failure::Failure;
 
 /// How to estimate a model of these orders.
@@ -10,6 +13,21 @@ pub(super) fn method(arguments: &FitArguments, orders: &OrderJob) -> Result<Meth
     let FitArguments { search: of_search, criterion: of_criterion, .. } = arguments;
     let method = arguments.model.method;
     let refused = |option: &str, why: &str| Err(Failure::usage(format!("{option} {why}, so leave it out")));
+    if let Some(kernel) = kernel(&arguments.model) {
+        let exact = arguments.model.likelihood == LikelihoodArgument::Exact;
+        let other = (method != MethodArgument::Pem)
+            .then_some("--method")
+            .or(of_criterion.norm.as_ref().map(|_| "--norm"))
+            .or(given(of_criterion))
+            .or(search::given(of_search))
+            .or(exact.then_some("--likelihood"));
+        return match other {
+            Some(option) => {
+                Err(Failure::usage(format!("{option} goes with --kernel none alone, so leave it out")))
+            }
+            None => Ok(Method::Regularised(kernel)),
+        };
+    }
     let norm = norm(of_criterion.norm.as_deref())?;
     let other_norm = (norm != Asked::Convex(Norm::Two)).then_some("--norm");
     let given = other_norm.or(given(of_criterion));
@@ -69,6 +87,18 @@ pub(super) fn method(arguments: &FitArguments, orders: &OrderJob) -> Result<Meth
             }
             Ok(Method::Constrained(criterion))
         }
+    }
+}
+
+/// What is known of an impulse response before the data, if that is asked for.
+fn kernel(arguments: &ModelArguments) -> Option<Kernel> {
+    if arguments.model != Some(ModelArgument::Fir) {
+        return None;
+    }
+    match arguments.kernel {
+        None | Some(KernelArgument::Dc) => Some(Kernel::Dc),
+        Some(KernelArgument::Tc) => Some(Kernel::Tc),
+        Some(KernelArgument::None) => None,
     }
 }
 

@@ -25,6 +25,7 @@ impl ModelArgument {
             Self::Oe => ("oe", &["--nb", "--nf"]),
             Self::Bj => ("bj", &["--nb", "--nc", "--nd", "--nf"]),
             Self::General => ("general", &["--na", "--nb", "--nc", "--nd", "--nf"]),
+            Self::Fir => ("fir", &["--taps"]),
         }
     }
 
@@ -37,6 +38,9 @@ impl ModelArgument {
             Self::Ar => Ok(Structure::Ar),
             Self::Oe => Ok(Structure::Oe),
             Self::Bj => Ok(Structure::Bj),
+            Self::Fir => {
+                Err(Failure::usage("--model fir needs --taps, such as --taps 70: how long the response is"))
+            }
             Self::General => Err(Failure::usage(
                 "--model general needs orders: it is any of the others; give --na --nb --nc --nd --nf, or no --model for a choice \
                  among the others",
@@ -47,7 +51,7 @@ impl ModelArgument {
 
 impl OrderJob {
     pub(super) fn resolve(arguments: &ModelArguments, path: Option<PathArgument>) -> Result<Self, Failure> {
-        let ModelArguments { na, nb, nc, nd, nf, nk, model, .. } = arguments;
+        let ModelArguments { na, nb, nc, nd, nf, nk, taps, kernel, model, .. } = arguments;
         let (na, nc, nd) = (one("--na", na.as_ref())?, one("--nc", nc.as_ref())?, one("--nd", nd.as_ref())?);
         let (nb, nf, nk) = (each("--nb", nb)?, each("--nf", nf)?, each("--nk", nk)?);
         let given = [
@@ -61,7 +65,20 @@ impl OrderJob {
         let only_no_inputs = no_inputs && given.iter().filter(|(_, given)| *given).count() == 1;
         let open = given.iter().all(|(_, given)| !given) || (model.is_none() && only_no_inputs);
         let (name, has) = model.unwrap_or(ModelArgument::Arx).shape();
-        let takes_inputs = has.contains(&"--nb");
+        let wrong =
+            |what: String| Err(Failure::usage(format!("--model {name} {what}; give {}", has.join(" "))));
+        if let Some((order, _)) = given.iter().find(|(order, given)| *given && !has.contains(order)) {
+            return wrong(format!("does not take {order}"));
+        }
+        if *model == Some(ModelArgument::Fir) && !taps.is_empty() {
+            return Self::impulse_response(taps, nk, path);
+        }
+        if !taps.is_empty() || kernel.is_some() && *model != Some(ModelArgument::Fir) {
+            return Err(Failure::usage(
+                "--taps and --kernel are for --model fir; leave them out, or give it",
+            ));
+        }
+        let takes_inputs = has.contains(&"--nb") || *model == Some(ModelArgument::Fir);
         if !nk.is_empty() && !takes_inputs {
             return Err(Failure::usage(format!(
                 "--model {name} does not take --nk, as it has no inputs; give {}",
@@ -86,11 +103,6 @@ impl OrderJob {
                 inputs: takes_inputs && !no_inputs,
                 nk: nk.iter().map(single).collect::<Result<_, _>>()?,
             });
-        }
-        let wrong =
-            |what: String| Err(Failure::usage(format!("--model {name} {what}; give {}", has.join(" "))));
-        if let Some((order, _)) = given.iter().find(|(order, given)| *given && !has.contains(order)) {
-            return wrong(format!("does not take {order}"));
         }
         // Of a general model, what is not given is not there.
         let missing: Vec<&str> = given
@@ -132,6 +144,34 @@ impl OrderJob {
         if job.is_choice() || !job.has_inputs() {
             job.of(if job.has_inputs() { inputs } else { 0 })?;
         }
+        Ok(job)
+    }
+
+    /// B alone, from the first sample on unless it is said otherwise.
+    fn impulse_response(
+        taps: &[usize],
+        nk: Vec<OrderRange>,
+        path: Option<PathArgument>,
+    ) -> Result<Self, Failure> {
+        if path.is_some() || nk.iter().any(|nk| nk.single().is_none()) {
+            return Err(Failure::usage(
+                "--model fir is one model: give one value after --nk for each input, and no --path",
+            ));
+        }
+        if taps.contains(&0) {
+            return Err(Failure::usage("--taps 0: a response has one tap at least"));
+        }
+        let one = || OrderRange::from(0);
+        let job = Self::Given(Grid {
+            na: one(),
+            nb: taps.iter().map(|taps| OrderRange::from(*taps)).collect(),
+            nc: one(),
+            nd: one(),
+            nf: vec![one()],
+            nk: if nk.is_empty() { vec![one()] } else { nk },
+            path: Path::All,
+        });
+        job.of(taps.len())?;
         Ok(job)
     }
 

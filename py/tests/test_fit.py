@@ -43,6 +43,7 @@ FITS: dict[str, Callable[[th.Log], th.Model]] = {
     "ar": lambda log: th.ar(log, na=4),
     "arma": lambda log: th.arma(log, na=2, nc=1),
     "general": lambda log: th.general(log, na=1, nb=[2, 1], nf=[1, 1], nd=1, nk=[1, 3]),
+    "fir": lambda log: th.fir(log, taps=[40, 40], kernel="tc"),
     "iv": lambda log: th.iv(log, 2, [2, 1], [1, 3]),
     "sriv": lambda log: th.sriv(log, [2, 1], 2, [1, 3]),
 }
@@ -73,9 +74,9 @@ def test_a_model_is_for_what_focus_says() -> None:
 @pytest.mark.parametrize("name", FITS)
 def test_every_structure_fits(log: th.Log, name: str) -> None:
     model = FITS[name](log)
-    assert model.structure == {"iv": "arx", "sriv": "oe"}.get(name, name)
+    assert model.structure == {"fir": "arx", "iv": "arx", "sriv": "oe"}.get(name, name)
     assert len(model.parameters) == len(model.parameter_names) == len(model.standard_errors)
-    if name not in ("ar", "arma"):
+    if name not in ("ar", "arma", "fir"):
         poles = [0.75 + np.sqrt(0.7 - 0.75**2) * 1j, 0.75 - np.sqrt(0.7 - 0.75**2) * 1j]
         near = np.abs(model.poles()[:, None] - np.array(poles)).min(axis=0)
         assert name == "general" or (near < 0.02).all()
@@ -330,7 +331,7 @@ def test_the_document_is_json_with_a_line_break(log: th.Log) -> None:
     assert json.loads(text)["data"]["logs"][0]["file"] == "memory"
 
 
-EVERY_FIT = (th.ar, th.arma, th.armax, th.arx, th.bj, th.iv, th.oe, th.general, th.search, th.sriv)
+EVERY_FIT = (th.ar, th.arma, th.armax, th.arx, th.bj, th.fir, th.iv, th.oe, th.general, th.search, th.sriv)
 
 
 @pytest.mark.parametrize(

@@ -35,6 +35,7 @@ mod criteria;
 mod criterion;
 pub(crate) mod equations;
 mod exact;
+mod impulse_response;
 mod initial;
 mod instrumental;
 pub(crate) mod nonlinear_arx;
@@ -70,6 +71,7 @@ pub use criteria::{Criteria, InformationCriterion};
 pub use criterion::{Bound, ConvexFit, ConvexOutcome, GainBound, Norm};
 pub use equations::{EquationsOutcome, LikelihoodSearch, UnknownParameter};
 pub use exact::LikelihoodOutcome;
+pub use impulse_response::{Kernel, KernelParameters, RegularisedOutcome};
 pub use initial::Initial;
 pub use nonlinear_arx::{MapsOutcome, RunFigures, TermStep, TermsOutcome};
 pub use offset::Constant;
@@ -111,6 +113,8 @@ pub enum Procedure {
     },
     /// By a search for the least sum of squared prediction errors.
     PredictionError(SearchOutcome),
+    /// By regularised least squares, with the kernel of the largest marginal likelihood.
+    Regularised(RegularisedOutcome),
     /// By convex optimization.
     Constrained(ConvexOutcome),
     /// By a search for the least sum of a loss that does not follow wild samples.
@@ -150,6 +154,32 @@ pub enum Method {
     RefinedInstrumentalVariables,
     /// Another norm of the errors, or bounds on what the parameters may be, for models that are linear in their parameters.
     Constrained(ConvexFit),
+    /// Regularised least squares for impulse responses, y = B u + e, with a kernel whose parameters are those of the largest marginal
+    /// likelihood (Chen, Ohlsson and Ljung 2012). The parameters' covariance is that of the posterior distribution. Cost: O(N p) and
+    /// O(p^3) in each of some dozen steps, for p taps.
+    ///
+    /// ```
+    /// use thetahat::data::Record;
+    /// use thetahat::estimate::{Initial, Kernel, Method, estimate};
+    /// use thetahat::model::Orders;
+    ///
+    /// // g(i) = 0.8^i, seen with noise, from few samples for 40 taps.
+    /// let (mut x, mut random) = (0.0, 1_u32);
+    /// let mut next = || {
+    ///     random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+    ///     f64::from(random >> 8) / f64::from(1 << 23) - 1.0
+    /// };
+    /// let u: Vec<f64> = (0..150).map(|_| next()).collect();
+    /// let y: Vec<f64> = u.iter().map(|u| { x = 0.8 * x + u; x + 0.3 * next() }).collect();
+    /// let orders = Orders::arx(0, &[40], &[0])?;
+    /// let record = Record::new(&y, vec![&u])?;
+    /// let found = estimate(&record, &orders, &Method::Regularised(Kernel::Dc), Initial::Drop)?;
+    /// let error = |g: &[f64]| (0..40).map(|i| (g[i as usize] - 0.8_f64.powi(i)).powi(2)).sum::<f64>();
+    /// let plain = estimate(&record, &orders, &Method::default(), Initial::Drop)?;
+    /// assert!(error(found.parameters()) < 0.2 * error(plain.parameters()));
+    /// # Ok::<(), thetahat::Error>(())
+    /// ```
+    Regularised(Kernel),
     /// A loss of the prediction errors that grows like |e|, for any structure (Huber 1981).
     Robust(Robust),
     /// The largest likelihood of all measured outputs, by the Kalman filter, for A y = B u + C e with a stable A: through missing
@@ -258,6 +288,9 @@ pub(crate) fn estimate_of_channels(
         }
         Method::PredictionError(search) => {
             prediction_error::prediction_error(record, orders, initial, search, monitor)
+        }
+        Method::Regularised(kernel) => {
+            impulse_response::impulse_response(record, inputs.len(), orders, initial, *kernel)
         }
         Method::Robust(how) => robust::robust(record, orders, initial, how, monitor),
         Method::ExactLikelihood(search) => {
@@ -396,6 +429,7 @@ impl Estimate {
             }
             Procedure::Robust(_) if orders.structure() == Structure::Oe => self.covariance,
             Procedure::Constrained(_)
+            | Procedure::Regularised(_)
             | Procedure::Robust(_)
             | Procedure::ExactLikelihood(_)
             | Procedure::InnovationsLikelihood(_)
@@ -411,6 +445,11 @@ impl Estimate {
 
     /// Those of the exact likelihood where that was made large: AIC = (2 p - 2 ln L)/N - ln 2 pi - 1, and the others alike.
     pub fn criteria(&self) -> Criteria {
-        Criteria::new(self.cost(), self.parameters.len(), self.samples)
+        // Those that a prior holds are no more free.
+        let parameters = match &self.procedure {
+            Procedure::Regularised(outcome) => outcome.effective_parameters.round() as usize,
+            _ => self.parameters.len(),
+        };
+        Criteria::new(self.cost(), parameters, self.samples)
     }
 }

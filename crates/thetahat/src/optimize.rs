@@ -43,6 +43,7 @@ pub(crate) mod normal;
 mod objective;
 mod options;
 mod outcome;
+mod quasi_newton;
 mod search;
 mod starts;
 #[cfg(test)]
@@ -53,5 +54,6 @@ pub(crate) use objective::{Objective, StepRules};
 pub use options::{Algorithm, Search, Step};
 pub(crate) use outcome::{Deadline, Found};
 pub use outcome::{Monitor, Progress, Stopped};
+pub(crate) use quasi_newton::least;
 pub(crate) use search::{best_free, best_linear, search};
 pub(crate) use starts::{lowest, normal_number};

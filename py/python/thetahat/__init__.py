@@ -1,7 +1,7 @@
 """System identification: models of dynamic systems from logged data.
 
 A log holds measured signals (`Log`, `read_csv`). A fit makes a model of it (`arx`, `armax`, `oe`, `bj`, `ar`, `arma`, `general`,
-`iv`, `sriv`), `search` chooses one, `grey` finds the parameters of a model in equations (`GreyBox`), `narx` fits nonlinear ARX models, `inspect` inspects a log before a fit. A `Model` predicts, simulates, forecasts and is validated.
+`fir`, `iv`, `sriv`), `search` chooses one, `grey` finds the parameters of a model in equations (`GreyBox`), `narx` fits nonlinear ARX models, `inspect` inspects a log before a fit. A `Model` predicts, simulates, forecasts and is validated.
 `thetahat.plot` draws, and `thetahat.sklearn` fits into scikit-learn.
 
 Whatever takes numbers takes arrays of NumPy, lists and tuples, and the series and frames of pandas, Polars and PyArrow; of one
@@ -19,7 +19,7 @@ Model(ARMAX(2, 2, 1, 1), 1-step fit 98.37 % on rows 1..700)
 """
 
 from thetahat._filter import StateEstimate, StateFilter, StateModel, StateTrajectory
-from thetahat._fit import EstimationWarning, ar, arma, armax, arx, bj, general, iv, oe, search, sriv
+from thetahat._fit import EstimationWarning, ar, arma, armax, arx, bj, fir, general, iv, oe, search, sriv
 from thetahat._grey_box import GreyBox, grey
 from thetahat._evaluation import Comparison, Inspection, Validation, compare, inspect
 from thetahat._log import Log, dc_motor, read_csv
@@ -108,6 +108,7 @@ __all__ = [
     "bj",
     "compare",
     "dc_motor",
+    "fir",
     "general",
     "grey",
     "inspect",

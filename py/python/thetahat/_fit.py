@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from thetahat import _options, _thetahat
@@ -445,6 +445,65 @@ def general(
     'general'
     """
     return _fit("general", locals())
+
+
+def fir(
+    log: Log,
+    taps: int | Sequence[int],
+    kernel: str | None = "dc",
+    nk: Orders = 0,
+    *,
+    estimate: Rows | None = None,
+    validate: Rows | None = None,
+    split: tuple[float, float, float] | None = None,
+    detrend: str | None = None,
+    offset: Mapping[str, float] | None = None,
+    initial: str | None = None,
+    constant: str | None = None,
+    trend: bool | None = None,
+) -> Model:
+    """Fit an impulse response, y(t) = g(0) u(t - nk) + g(1) u(t - nk - 1) + ... + e(t), by regularised least squares.
+
+    Parameters
+    ----------
+    log : Log
+        The data.
+    taps : int, or one for each input
+        How many values the response has.
+    kernel : {"dc", "tc"} or None, default "dc"
+        What is known of it before the data: that it decays and is smooth. Decay and smoothness each have a number of their own
+        ("dc"), or one for both ("tc"), which the likelihood says. None is least squares.
+    nk : int, or one for each input, default 0
+        Samples from input to first effect.
+    estimate, validate, split, detrend, offset, initial, constant, trend
+        What to fit to, see `thetahat.FitOptions`.
+
+    Returns
+    -------
+    Model
+        A polynomial model, B alone: its impulse, step and frequency responses have bands.
+
+    Raises
+    ------
+    EstimationError, ValueError
+        As for `arx`.
+
+    Notes
+    -----
+    Chen, Ohlsson and Ljung, Automatica 48, 2012.
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> model = th.fir(th.dc_motor(), taps=30)
+    >>> model.method
+    'regularised'
+    >>> len(model.parameters)
+    30
+    """
+    words = _options.order_words(taps=taps)
+    words.append(f"--kernel={'none' if kernel is None else _options.text('kernel', kernel)}")
+    return _fit("fir", locals(), *words)
 
 
 def iv(

@@ -138,7 +138,10 @@ impl Task<'_> {
         }
         match self.method {
             // These have no sum of squares that is least: the constant's own error says what it is worth.
-            Method::InstrumentalVariables | Method::RefinedInstrumentalVariables | Method::Robust(_) => {
+            Method::InstrumentalVariables
+            | Method::RefinedInstrumentalVariables
+            | Method::Regularised(_)
+            | Method::Robust(_) => {
                 return match self.beside(beside, None) {
                     Ok(Some(WithConstant { fitted, worth: Some(worth), .. })) if worth > 1.0 => Ok(fitted),
                     _ => self.plain(None),
@@ -318,15 +321,17 @@ impl Task<'_> {
             Procedure::LeastSquares { .. } | Procedure::Constrained(_) if !beside.has_trend() => {
                 OfConstant::new(self.record, self.orders, without).map(|of| of.joint(without))
             }
-            Procedure::InstrumentalVariables { .. } | Procedure::Robust(_) => match self.all(beside, None) {
-                Err(Error::Interrupted) => return Err(Error::Interrupted),
-                Ok(all) => all.covariance().map(|rows| {
-                    let from = beside.with_zeros(self.orders, without.parameters());
-                    let step = all.parameters().iter().zip(from).map(|(to, from)| to - from);
-                    (rows.to_vec(), step.collect())
-                }),
-                Err(_) => None,
-            },
+            Procedure::InstrumentalVariables { .. } | Procedure::Regularised(_) | Procedure::Robust(_) => {
+                match self.all(beside, None) {
+                    Err(Error::Interrupted) => return Err(Error::Interrupted),
+                    Ok(all) => all.covariance().map(|rows| {
+                        let from = beside.with_zeros(self.orders, without.parameters());
+                        let step = all.parameters().iter().zip(from).map(|(to, from)| to - from);
+                        (rows.to_vec(), step.collect())
+                    }),
+                    Err(_) => None,
+                }
+            }
             procedure => {
                 let signals = beside.signals();
                 let (record, orders) =

@@ -145,7 +145,7 @@ impl Products {
 }
 
 /// `Phi' Phi`, `Phi' y` and `y' y` of a regression. O(N p) time, O(p^2) memory.
-pub(super) fn gram(lagged: &Lagged<'_>) -> (DMatrix<f64>, DVector<f64>, f64) {
+pub(crate) fn gram(lagged: &Lagged<'_>) -> (DMatrix<f64>, DVector<f64>, f64) {
     let products = Products::new(&lagged.taps);
     let size = products.size();
     let segments = || lagged.segments.iter().map(|segment| (segment.start, lagged.counted(segment)));

@@ -248,6 +248,11 @@ fn procedure(procedure: &Procedure) -> String {
             )
         }
         Procedure::Constrained(outcome) => format!("convex optimization, norm {}", outcome.norm),
+        Procedure::Regularised(outcome) => format!(
+            "regularised by the {} kernel of the largest likelihood, {} of its parameters free",
+            outcome.kernel.name(),
+            fixed(outcome.effective_parameters, 1)
+        ),
         Procedure::InnovationsLikelihood(outcome) => format!(
             "largest likelihood of the innovations, iterations: {}, {}",
             outcome.search.iterations,

@@ -8,6 +8,8 @@ use super::plan::{Estimator, Method};
 pub(super) const EMPTY: f64 = 1e-12;
 /// Inputs of which less than this fraction of the power is their own cannot be told apart.
 const OWN: f64 = 1e-10;
+/// A spectrum of the noise below zero by this fraction of the output's is rounding.
+const ROUNDING: f64 = 1e-9;
 
 /// What a method found.
 pub(super) struct Estimate {
@@ -134,6 +136,8 @@ impl CrossSpectra {
         let output = power(inputs);
         let explained: f64 = scaled.iter().zip(&cross).map(|(g, s)| (g * s.conj()).re).sum();
         let noise = (output - explained).max(0.0);
+        // A lag window may take more from a spectrum than there is: what is left of it then tells nothing.
+        let is_spectrum = output - explained >= -ROUNDING * explained;
         let coherence = if output > 0.0 { (explained / output).clamp(0.0, 1.0) } else { 0.0 };
         let ratio = match estimator {
             Estimator::H1 => 1.0,
@@ -144,7 +148,7 @@ impl CrossSpectra {
         let spread = |inverse: &DMatrix<Complex<f64>>, j: usize| {
             0.5 * noise * inverse[(j, j)].re / (left * unit[j] * unit[j]) * ratio * ratio
         };
-        let variances = (left >= 1.0).then(|| {
+        let variances = (left >= 1.0 && is_spectrum).then(|| {
             let inverse = factor.inverse();
             (0..inputs).map(|j| spread(&inverse, j)).collect()
         });
@@ -153,8 +157,8 @@ impl CrossSpectra {
             responses: scaled.iter().zip(&unit).map(|(g, unit)| g.unscale(*unit).scale(ratio)).collect(),
             variances,
             degrees: (2.0 * left).max(1.0) as usize,
-            noise: Some(noise),
-            coherence: Some(coherence),
+            noise: is_spectrum.then_some(noise),
+            coherence: is_spectrum.then_some(coherence),
         })
     }
 }

@@ -37,8 +37,8 @@ pub(super) fn outside(lines: &[Line], finer: &[Line]) -> Option<Outside> {
     for (line, finer) in lines.iter().zip(finer) {
         let (Ok(coarse), Ok(fine)) = (&line.found, &finer.found) else { continue };
         let (Some(variances), Some(own)) = (&coarse.variances, &fine.variances) else { continue };
-        let all = coarse.responses.iter().zip(&fine.responses).zip(variances.iter().zip(own));
-        let moves = { all }.any(|((g, fine), (variance, own))| {
+        let mut all = coarse.responses.iter().zip(&fine.responses).zip(variances.iter().zip(own));
+        let moves = all.any(|((g, fine), (variance, own))| {
             // A bias is in the noise of the smoother one, too.
             let added = variance.min(*own);
             let distance = (g - fine).norm_sqr() / added;

@@ -148,7 +148,8 @@ fn period(signals: &Signals, rows: &Range<usize>) -> Option<usize> {
     if least > REPEATS {
         return None;
     }
-    let first = (away..=longest).find(|&lag| of(lag) <= (LEAST * least).max(ROUNDING))?;
-    // The bottom of its valley.
-    (first..longest).find(|&lag| of(lag + 1) >= of(lag))
+    let bound = (LEAST * least).max(ROUNDING);
+    let first = (away..=longest).find(|&lag| of(lag) <= bound)?;
+    let valley = (first..=longest).take_while(|&lag| of(lag) <= bound);
+    valley.min_by(|&a, &b| of(a).total_cmp(&of(b))).filter(|&lag| lag < longest)
 }

@@ -1,7 +1,7 @@
 use std::f64::consts::PI;
 use std::ops::Range;
 
-use super::estimate::{Bands, Empty, Estimate, Found};
+use super::estimate::{Bands, Empty, Estimate, Found, Line};
 use super::honesty::{self, Outside};
 use super::plan::{Method, SpectrumPlan};
 use super::response::{BandQuality, MeasuredResponse, NoisePoint};
@@ -104,14 +104,9 @@ fn document(
     Estimate { method, lines, bands, mut words }: Estimate,
 ) -> Result<MeasuredResponse, Error> {
     let sample_time = log.sample_time();
-    let (unit, found) = (signals.units[signals.inputs()], || {
-        lines.iter().filter_map(|line| Some((line.angle, line.found.as_ref().ok()?)))
-    });
-    words.extend(missing(
-        &lines.iter().map(|line| (line.angle, line.found.as_ref().err())).collect::<Vec<_>>(),
-        plan,
-        sample_time,
-    ));
+    let unit = signals.units[signals.inputs()];
+    let found = || lines.iter().filter_map(|line| Some((line.angle, line.found.as_ref().ok()?)));
+    words.extend(missing(&lines, plan, sample_time));
     if found().next().is_none() {
         return Err(Error::undetermined(Vec::new(), words.join("; ")));
     }
@@ -162,29 +157,29 @@ fn document(
 }
 
 /// Which frequencies tell nothing, and why.
-fn missing(lines: &[(f64, Option<&Empty>)], plan: &SpectrumPlan, sample_time: f64) -> Vec<String> {
+fn missing(lines: &[Line], plan: &SpectrumPlan, sample_time: f64) -> Vec<String> {
     let mut kinds: Vec<Empty> = Vec::new();
-    for empty in lines.iter().filter_map(|(_, empty)| *empty) {
+    for empty in lines.iter().filter_map(|line| line.found.as_ref().err()) {
         if !kinds.contains(empty) {
             kinds.push(*empty);
         }
     }
+    let frequencies: Vec<f64> = lines.iter().map(|line| line.angle / sample_time).collect();
     let of_kind = |kind: Empty| {
-        let own: Vec<bool> = lines.iter().map(|(_, empty)| *empty == Some(&kind)).collect();
-        let angles: Vec<f64> = lines.iter().map(|(angle, _)| angle / sample_time).collect();
-        let where_ = ranges(&angles, &own);
+        let own: Vec<bool> = lines.iter().map(|line| line.found.as_ref().err() == Some(&kind)).collect();
+        let places = ranges(&frequencies, &own);
         match kind {
             Empty::Input(input) => {
-                format!("the input '{}' has no power at {where_}: nothing is known there", plan.inputs[input])
+                format!("the input '{}' has no power at {places}: nothing is known there", plan.inputs[input])
             }
             Empty::Together if plan.inputs.len() > 1 => {
                 format!(
-                    "the inputs cannot be told apart at {where_}, where they move together or have no power"
+                    "the inputs cannot be told apart at {places}, where they move together or have no power"
                 )
             }
             Empty::Together => {
                 format!(
-                    "the input '{}' has power at too few lines around {where_}: nothing is known there",
+                    "the input '{}' has power at too few lines around {places}: nothing is known there",
                     plan.inputs[0]
                 )
             }
@@ -218,12 +213,7 @@ fn ranges(frequencies: &[f64], own: &[bool]) -> String {
 }
 
 /// What is to be said of the bands; warns where they are not honest.
-fn quality(
-    bands: &Bands,
-    lines: &[super::estimate::Line],
-    words: &mut Vec<String>,
-    sample_time: f64,
-) -> BandQuality {
+fn quality(bands: &Bands, lines: &[Line], words: &mut Vec<String>, sample_time: f64) -> BandQuality {
     let said = |honest, reason: &str| BandQuality { honest, outside: None, reason: reason.to_owned() };
     match bands {
         Bands::None(reason) => said(None, reason),

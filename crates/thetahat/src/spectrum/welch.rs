@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use rayon::prelude::*;
 use thetahat_core::nalgebra::Complex;
 
-use super::estimate::{Bands, CrossSpectra, Estimate, pairs};
+use super::estimate::{Bands, CrossSpectra, Estimate, Line, pairs};
 use super::plan::{Estimator, Method};
 use super::signals::Signals;
 use crate::Error;
@@ -111,7 +111,7 @@ pub(super) fn welch(
     let bands = if 2 * length <= longest {
         // Each line of the one is every other line of the other.
         let finer = cross_spectra(signals, 2 * length, band).lines(estimator);
-        let kept = |line: &super::estimate::Line| {
+        let kept = |line: &Line| {
             let k = line.angle * length as f64 / TAU;
             (k - k.round()).abs() < 0.25
         };

@@ -157,7 +157,7 @@ fn local(segments: &[Segment], angle: f64, width: f64, largest: &[f64]) -> Resul
     }
     let qr = regressors.qr();
     let (q, r) = (qr.q(), qr.r());
-    if r.diagonal().iter().any(|pivot| !(pivot.norm() > DEPENDENT)) {
+    if !r.diagonal().iter().all(|pivot| pivot.norm() > DEPENDENT) {
         return Err(Empty::Together);
     }
     let along = q.adjoint() * &output;

@@ -23,11 +23,12 @@ def plant(frequencies: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("method", ["lpm", "spa", "welch"])
 def test_the_response_is_that_of_the_plant(method: str) -> None:
-    found = th.spectrum(simulated(), method=method)
+    # Away from the lowest lines, which many frequencies of a whole decade share.
+    found = th.spectrum(simulated(), method=method, frequencies=(0.3, 6))
     assert found.method["name"] == method
     assert found.values.shape == found.magnitude.shape == (1, len(found.frequencies))
     error = np.abs(found.values[0] - plant(found.frequencies))
-    # Windows hide a little near 0.
+    # Windows hide a little.
     assert np.median(error) < 0.05
     inside = (found.magnitude_intervals[0, :, 0] <= np.abs(plant(found.frequencies))) & (
         np.abs(plant(found.frequencies)) <= found.magnitude_intervals[0, :, 1]

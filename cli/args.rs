@@ -7,6 +7,7 @@ mod inspect;
 mod lines;
 mod log;
 mod respond;
+mod spectrum;
 mod track;
 mod validate;
 
@@ -25,6 +26,9 @@ pub(crate) use lines::{LineArguments, LineFormatArgument};
 pub(crate) use log::{ClockArguments, LiveClockArguments, LogArguments, Names};
 pub(crate) use respond::{
     BodeArguments, PredictArguments, RespondArguments, SimulateArguments, StartArgument, TransientArguments,
+};
+pub(crate) use spectrum::{
+    EstimatorOfSpectraArgument, ResponseFormatArgument, SpectrumArguments, SpectrumMethodArgument,
 };
 pub(crate) use track::{ResumeArgument, TrackArguments, TrackMethodArgument, TrackModelArgument};
 pub(crate) use validate::{CompareArguments, EvaluationArguments, ValidateArguments};
@@ -82,6 +86,18 @@ Examples:
   thetahat inspect log.csv --sample-time 0.08
   thetahat inspect log.csv --time t -u heater -y temperature --format json -o inspection.json")]
     Inspect(Box<InspectArguments>),
+    /// The frequency response that a log shows, without a model
+    ///
+    /// From each input to the output, with coherence, the spectrum of the noise and 95 % bands: by local polynomials, by windowed
+    /// covariances (Blackman and Tukey), by averages over windows (Welch), as the plain ratio of the transforms, or for sines by
+    /// correlation over whole periods. Says where the bands are not honest, where an input has no power, and whether it follows the output.
+    /// Several logs are several experiments with one plant.
+    #[command(after_help = "\
+Examples:
+  thetahat spectrum log.csv --sample-time 0.08
+  thetahat spectrum log.csv --method spa --lags 30 --frequencies 0.1..3 --format csv > response.csv
+  thetahat spectrum log.csv --format json -o response.json --html response.html")]
+    Spectrum(Box<SpectrumArguments>),
     /// Predict a log some steps ahead with a fitted model
     ///
     /// Writes CSV: time or row, measured, predicted and the standard deviation of its error, that of the parameters included, in the
@@ -170,9 +186,12 @@ since the first row) and, in [next], dt (seconds of this step). The process nois
     ///
     /// Writes CSV with a row for each input and frequency, and for the noise (input "noise"): input, frequency [rad/s],
     /// magnitude [units of the output per unit of the input] and its standard error, phase [degrees] and its standard error.
+    /// With --over the models stand beside a measured response: at each of its points its magnitude and phase, those of the model, and
+    /// whether the model lies outside of the 95 % region of their difference.
     #[command(after_help = "\
-Example:
-  thetahat bode model.json --frequencies 0.01..3 --points 200 > bode.csv")]
+Examples:
+  thetahat bode model.json --frequencies 0.01..3 --points 200 > bode.csv
+  thetahat bode model.json --over response.json --html bode.html > over.csv")]
     Bode(BodeArguments),
     /// The step response of a fitted model
     ///
@@ -203,7 +222,7 @@ Example:
 Example:
   thetahat schema > thetahat.report.schema.json")]
     Schema {
-        /// The document: what fit, validate, compare, inspect, track or filter writes
+        /// The document: what fit, validate, compare, inspect, spectrum, track or filter writes
         #[arg(value_enum, default_value = "report")]
         document: DocumentArgument,
     },
@@ -242,6 +261,8 @@ pub(crate) enum DocumentArgument {
     Comparison,
     /// What inspect writes
     Inspection,
+    /// What spectrum writes
+    Response,
     /// What track writes at its end
     Track,
     /// What filter writes at its end

@@ -8,11 +8,12 @@ use clap::Args;
 use thetahat::data::{Log, Source};
 use thetahat::inspect::Inspection;
 use thetahat::report::{EquationsPlan, NonlinearArxPlan, Plan, Report, Requirement, ValidationPlan};
+use thetahat::spectrum::SpectrumPlan;
 
 use crate::args::{FitArguments, InspectArguments, MapArgument, ValidateArguments};
 use crate::commands::{Experiments, Tracking, experiments, inspected};
 use crate::failure::Failure;
-use crate::job::{EvaluationJob, FitJob, GreyBoxJob, InspectJob, NarxJob};
+use crate::job::{EvaluationJob, FitJob, GreyBoxJob, InspectJob, NarxJob, SpectrumJob};
 use crate::replace::replace;
 
 /// Logs that were read as one.
@@ -108,6 +109,20 @@ pub fn inspect(options: &[OsString]) -> Result<Inspection, Failure> {
     let mut job = InspectJob::resolve(&arguments)?;
     job.log.quiet = true;
     Ok(inspected(&job, &arguments)?.0)
+}
+
+/// The plan that `thetahat spectrum` makes of these options for a log with these channels.
+///
+/// # Errors
+/// A [`Failure`] as the program would report it.
+pub fn spectrum_plan(
+    options: &[OsString],
+    inputs: Vec<String>,
+    output: String,
+) -> Result<SpectrumPlan, Failure> {
+    let log = OsString::from("log");
+    let words: Vec<OsString> = options.iter().cloned().chain([log]).collect();
+    SpectrumJob::resolve(&arguments("spectrum", &words)?)?.plan(inputs, output)
 }
 
 /// What `thetahat track` does with these options, in memory, for a log with these channels. `report` is where it starts from.

@@ -12,6 +12,7 @@ mod inspect;
 mod narx;
 mod respond;
 mod search;
+mod spectrum;
 mod stored;
 pub(crate) mod summary;
 mod track;
@@ -32,13 +33,14 @@ pub(crate) fn dispatch(arguments: Arguments, line: &str) -> Result<(), Failure> 
     match arguments.command {
         Command::Fit(arguments) => fit::fit(&arguments, line),
         Command::Inspect(arguments) => inspect::inspect(&arguments, line),
+        Command::Spectrum(arguments) => spectrum::spectrum(&arguments, line),
         Command::Predict(arguments) => respond::predict(&arguments),
         Command::Simulate(arguments) => respond::simulate(&arguments),
         Command::Validate(arguments) => validate::validate(&arguments, line),
         Command::Compare(arguments) => compare::compare(&arguments, line),
         Command::Track(arguments) => track::track(&arguments),
         Command::Filter(arguments) => filter::filter(&arguments),
-        Command::Bode(arguments) => bode::bode(&arguments),
+        Command::Bode(arguments) => bode::bode(&arguments, line),
         Command::Step(arguments) => transient::step(&arguments),
         Command::Impulse(arguments) => transient::impulse(&arguments),
         Command::Demo(arguments) => demo::demo(&arguments),

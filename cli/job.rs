@@ -8,6 +8,7 @@ mod method;
 mod narx;
 mod orders;
 mod search;
+mod spectrum;
 mod track;
 mod validate;
 
@@ -30,6 +31,7 @@ pub(crate) use fit::FitJob;
 pub(crate) use grey_box::GreyBoxJob;
 pub(crate) use inspect::InspectJob;
 pub(crate) use narx::{NarxJob, check_linear};
+pub(crate) use spectrum::SpectrumJob;
 pub(crate) use track::TrackJob;
 pub(crate) use validate::EvaluationJob;
 

@@ -3,7 +3,7 @@
 //! The library names them between backticks, as `detrend`, wherever one is advised; here they are options.
 
 /// The arguments of the library that are options, by the name that both have.
-pub(crate) const OPTIONS: [&str; 51] = [
+pub(crate) const OPTIONS: [&str; 56] = [
     "alarm",
     "alpha",
     "alphas",
@@ -13,6 +13,7 @@ pub(crate) const OPTIONS: [&str; 51] = [
     "dead-zone",
     "degree",
     "detrend",
+    "discard",
     "draws",
     "estimate",
     "estimator",
@@ -20,6 +21,7 @@ pub(crate) const OPTIONS: [&str; 51] = [
     "forgetting",
     "frequencies",
     "gain",
+    "half-width",
     "horizon",
     "initial",
     "lags",
@@ -33,6 +35,8 @@ pub(crate) const OPTIONS: [&str; 51] = [
     "nu",
     "ny",
     "offset",
+    "period",
+    "points",
     "poles",
     "prefilter",
     "raw-terms",
@@ -55,6 +59,7 @@ pub(crate) const OPTIONS: [&str; 51] = [
     "units",
     "validate",
     "width",
+    "window",
 ];
 
 /// The option that an argument is, if it is one.

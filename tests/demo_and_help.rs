@@ -3,9 +3,10 @@
 use crate::harness::Folder;
 use crate::signals::{Experiment, csv};
 
-const VERBS: [&str; 15] = [
+const VERBS: [&str; 16] = [
     "fit",
     "inspect",
+    "spectrum",
     "predict",
     "simulate",
     "validate",

@@ -35,7 +35,7 @@ const CORE: House = House {
 const LIBRARY: House = House {
     source: "crates/thetahat/src",
     floors: &[
-        &["distribution", "figures", "text"],
+        &["distribution", "figures", "fourier", "text"],
         &["error"],
         &["document", "optimize", "regression"],
         &["data"],
@@ -44,7 +44,7 @@ const LIBRARY: House = House {
         &["estimate"],
         &["validate"],
         &["select"],
-        &["inspect"],
+        &["inspect", "spectrum"],
         &["report"],
         &["filter", "track"],
     ],

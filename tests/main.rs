@@ -40,6 +40,7 @@ mod robust;
 mod same_file;
 mod several_logs;
 mod signals;
+mod spectrum;
 mod terminal;
 mod track;
 mod track_live;

@@ -16,13 +16,13 @@ import padasip
 import thetahat
 from compare import check, print_table, processor, verdict
 from filterpy.kalman import KalmanFilter
-from scipy.signal import lfilter
+from scipy.signal import coherence, csd, lfilter, welch
 from sippy_unipi import system_identification
 from sysidentpy.basis_function import Polynomial
 from sysidentpy.model_structure_selection import FROLS
 from sysidentpy.parameter_estimation import LeastSquares
 
-PACKAGES = ["thetahat", "NumPy", "padasip", "filterpy", "sippy-unipi", "sysidentpy"]
+PACKAGES = ["thetahat", "NumPy", "SciPy", "padasip", "filterpy", "sippy-unipi", "sysidentpy"]
 
 
 def main():
@@ -32,7 +32,7 @@ def main():
     print(*(f"{name} {version(name)}" for name in PACKAGES), f"Python {platform.python_version()}", sep=", ")
     print(f"{processor()}, {os.cpu_count()} processors", end="\n\n", flush=True)
     rows = [["work", "peer", "thetahat", "peer's", "ratio", "required", "verdict"]]
-    rows += [recursive(), kalman(), *fits(), *nonlinear(), *calls()]
+    rows += [recursive(), kalman(), *fits(), *nonlinear(), *spectra(), *calls()]
     print_table(rows)
 
 
@@ -198,6 +198,31 @@ def nonlinear():
         check("SysIdentPy", [coefficients.get(name, 0.0) for name in found.parameter_names], found.parameters)
         work = f"{candidates} products, N = {samples:,}"
         yield row(f"NARX, 20 of {work}", "SysIdentPy, FROLS", mine, yours, required)
+
+
+def spectra():
+    """Response by H1 and coherence, the whole call: ours with bands, their check at twice the resolution and a test for feedback."""
+    samples = 1_000_000
+    u = numpy.random.standard_normal(samples)
+    y = lfilter([0.0, 0.5], [1.0, -0.8], u) + 0.1 * numpy.random.standard_normal(samples)
+    u, y = u - u.mean(), y - y.mean()
+    log = thetahat.Log(y, u)
+    for window in (256, 1024):
+
+        def ours(window=window):
+            return thetahat.spectrum(log, method="welch", window=window)
+
+        def theirs(window=window):
+            words = {"nperseg": window, "detrend": False}
+            response = csd(u, y, **words)[1] / welch(u, **words)[1]
+            return response, coherence(u, y, **words)[1]
+
+        mine, yours, found, (response, coherent) = by_turns(ours, theirs, 9, 2)
+        inner = slice(1, window // 2)
+        check("SciPy, response", found.values[0].view(float), response[inner].view(float))
+        check("SciPy, coherence", found.coherence, coherent[inner])
+        work = f"H1 and coherence, windows of {window:,}, N = {samples:,}"
+        yield row(work, "SciPy, csd, welch, coherence", mine, yours, 12)
 
 
 def product(term):

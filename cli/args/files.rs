@@ -19,6 +19,10 @@ impl Command {
                 read.push(inspect.path.clone());
                 written.extend([&inspect.out].into_iter().chain(&inspect.html).cloned());
             }
+            Self::Spectrum(spectrum) => {
+                read.extend(spectrum.paths.iter().cloned());
+                written.extend([&spectrum.out].into_iter().chain(&spectrum.html).cloned());
+            }
             Self::Predict(PredictArguments { respond, .. }) => {
                 read.extend([respond.report.clone(), respond.path.clone()]);
                 written.push(respond.out.clone());
@@ -47,8 +51,8 @@ impl Command {
                 written.extend([&filter.lines.out].into_iter().chain(&filter.lines.summary).cloned());
             }
             Self::Bode(bode) => {
-                read.push(bode.report.clone());
-                written.push(bode.out.clone());
+                read.extend(bode.reports.iter().chain(&bode.over).cloned());
+                written.extend([&bode.out].into_iter().chain(&bode.html).cloned());
             }
             Self::Step(transient) | Self::Impulse(transient) => {
                 read.push(transient.report.clone());

@@ -41,9 +41,15 @@ pub(crate) struct SimulateArguments {
 
 #[derive(Debug, Args)]
 pub(crate) struct BodeArguments {
-    /// The report that fit wrote (- for standard input)
-    #[arg(value_name = "REPORT")]
-    pub(crate) report: PathBuf,
+    /// The report that fit wrote (- for standard input); with --over several
+    #[arg(value_name = "REPORT", required = true, num_args = 1..)]
+    pub(crate) reports: Vec<PathBuf>,
+    /// Lay the models over a measured response, the JSON document of spectrum: at its frequencies, beside its points
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["frequencies", "points"])]
+    pub(crate) over: Option<PathBuf>,
+    /// With --over: write a page with charts to a file too
+    #[arg(long, value_name = "FILE", requires = "over")]
+    pub(crate) html: Option<PathBuf>,
     /// Frequencies in radians per second [default: from a thousandth of half the sampling frequency to half of it]
     #[arg(long, value_name = "LOW..HIGH", allow_hyphen_values = true)]
     pub(crate) frequencies: Option<String>,

@@ -1,4 +1,6 @@
-//! `thetahat bode`: what a stored model is to each frequency.
+//! `thetahat bode`: what a stored model is to each frequency, alone or over a measured response.
+
+mod over;
 
 use std::f64::consts::PI;
 
@@ -10,10 +12,16 @@ use crate::args::BodeArguments;
 use crate::failure::Failure;
 use crate::output;
 
-pub(crate) fn bode(arguments: &BodeArguments) -> Result<(), Failure> {
+pub(crate) fn bode(arguments: &BodeArguments, line: &str) -> Result<(), Failure> {
+    if let Some(path) = &arguments.over {
+        return over::over(arguments, path, line);
+    }
+    let [report] = arguments.reports.as_slice() else {
+        return Err(Failure::usage("several reports need --over, which has the frequencies that they share"));
+    };
     let asked = arguments.frequencies.as_deref().map(range).transpose()?;
-    let model = stored::model(&arguments.report)?;
-    let models = stored::linear(&arguments.report, &model, "a frequency response")?;
+    let model = stored::model(report)?;
+    let models = stored::linear(report, &model, "a frequency response")?;
     let nyquist = PI / model.sample_time();
     let (low, high) = asked.unwrap_or((nyquist / 1000.0, nyquist));
     // The ends first: an error then says them as they were given.

@@ -5,6 +5,7 @@ use thetahat::Document;
 use thetahat::filter::FilterSummary;
 use thetahat::inspect::Inspection;
 use thetahat::report::{Comparison, Report, Validation};
+use thetahat::spectrum::MeasuredResponse;
 use thetahat::track::TrackSummary;
 
 use crate::args::{Arguments, DocumentArgument};
@@ -18,6 +19,7 @@ pub(crate) fn schema(document: DocumentArgument) -> Result<(), Failure> {
         DocumentArgument::Validation => Validation::json_schema(),
         DocumentArgument::Comparison => Comparison::json_schema(),
         DocumentArgument::Inspection => Inspection::json_schema(),
+        DocumentArgument::Response => MeasuredResponse::json_schema(),
         DocumentArgument::Track => TrackSummary::json_schema(),
         DocumentArgument::Filter => FilterSummary::json_schema(),
     };

@@ -8,6 +8,7 @@ use std::path::Path;
 use thetahat::Document;
 use thetahat::model::{Model, PolynomialModel};
 use thetahat::report::Report;
+use thetahat::spectrum::MeasuredResponse;
 
 use crate::failure::{Failure, Kind};
 
@@ -45,6 +46,12 @@ pub(super) fn report(path: &Path) -> Result<Report, Failure> {
         _ => failure,
     })?;
     Report::from_json(&text).map_err(|error| bad(error.to_string()))
+}
+
+/// A stored response of spectrum.
+pub(super) fn response(path: &Path) -> Result<MeasuredResponse, Failure> {
+    MeasuredResponse::from_json(&text(path)?)
+        .map_err(|error| Failure::data(format!("{}: {error}", path.display())))
 }
 
 /// The text of a file.

@@ -4,6 +4,7 @@ mod equations;
 mod filtered;
 mod inspection;
 mod nonlinear_arx;
+mod response;
 mod selection;
 mod text;
 mod tracking;
@@ -24,6 +25,7 @@ use thetahat::validate::{Fit, Part};
 
 pub use filtered::filtered;
 pub use inspection::inspection;
+pub use response::response;
 use text::{Text, columns, or_dash, some};
 pub use tracking::tracking;
 pub use validation::{comparison, validation};

@@ -1,4 +1,4 @@
-//! Documents about logs and models: validations, comparisons, inspections.
+//! Documents about logs and models: validations, comparisons, inspections, measured responses.
 
 use std::ffi::OsString;
 use std::sync::Arc;
@@ -107,6 +107,25 @@ pub(crate) fn inspect_file(py: Python<'_>, options: Vec<OsString>) -> PyResult<(
     let found = awaited(py, move |_| thetahat_cli::inspect(&options))?
         .map_err(|failure| error::program(py, &failure))?;
     written(py, &found)
+}
+
+/// The frequency response that a log shows, with the options of `thetahat spectrum`: the document that it writes, and its table.
+#[pyfunction]
+pub(crate) fn spectrum(
+    py: Python<'_>,
+    log: &Bound<'_, Log>,
+    options: Vec<OsString>,
+) -> PyResult<(String, String)> {
+    let log = log.get();
+    let [output] = log.outputs.as_slice() else {
+        return Err(PyValueError::new_err("log: a response is to one output; give a log of one"));
+    };
+    let plan = thetahat_cli::spectrum_plan(&options, log.inputs.clone(), output.clone())
+        .map_err(|failure| error::program(py, &failure))?;
+    let (log, sources) = (Arc::clone(&log.log), log.sources.clone());
+    let found = interruptible(py, move |_| thetahat::spectrum::spectrum(&log, &sources, &plan))?;
+    let json = found.to_json().map_err(|error| error::batch(py, error))?;
+    Ok((json, thetahat_cli::response(&found, thetahat_cli::WIDTH)))
 }
 
 fn written(py: Python<'_>, found: &Inspection) -> PyResult<(String, String)> {

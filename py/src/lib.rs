@@ -44,6 +44,7 @@ fn _thetahat(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(evaluation::compare, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::inspect, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::inspect_file, module)?)?;
+    module.add_function(wrap_pyfunction!(evaluation::spectrum, module)?)?;
     online::register(module)?;
     work::register(module)?;
     module.add_function(wrap_pyfunction!(in_python, module)?)?;

@@ -24,7 +24,6 @@ mod channel;
 mod clock;
 mod delay;
 mod excitation;
-mod fourier;
 mod inspection;
 mod moments;
 mod outliers;

@@ -66,6 +66,7 @@
 //! | [`select`] | which of several models to believe |
 //! | [`respond`] | predictions, free runs, forecasts, step and frequency responses |
 //! | [`validate`] | figures of fit and tests of residuals |
+//! | [`spectrum`] | frequency responses from data, without a model |
 //! | [`report`] | the whole way from a log to a document and its page |
 //! | [`track`] | models that are estimated while the plant runs |
 //! | [`filter`] | states that are estimated while the plant runs |
@@ -87,6 +88,7 @@ mod error;
 pub mod estimate;
 pub mod figures;
 pub mod filter;
+mod fourier;
 pub mod inspect;
 pub mod model;
 pub mod optimize;
@@ -94,6 +96,7 @@ mod regression;
 pub mod report;
 pub mod respond;
 pub mod select;
+pub mod spectrum;
 pub mod text;
 pub mod track;
 pub mod validate;

@@ -1,7 +1,7 @@
 """System identification: models of dynamic systems from logged data.
 
 A log holds measured signals (`Log`, `read_csv`). A fit makes a model of it (`arx`, `armax`, `oe`, `bj`, `ar`, `arma`, `general`,
-`fir`, `iv`, `sriv`), `search` chooses one, `grey` finds the parameters of a model in equations (`GreyBox`), `narx` fits nonlinear ARX models, `inspect` inspects a log before a fit. A `Model` predicts, simulates, forecasts and is validated.
+`fir`, `iv`, `sriv`), `search` chooses one, `grey` finds the parameters of a model in equations (`GreyBox`), `narx` fits nonlinear ARX models, `inspect` inspects a log before a fit, `spectrum` finds its frequency response without a model. A `Model` predicts, simulates, forecasts and is validated.
 `thetahat.plot` draws, and `thetahat.sklearn` fits into scikit-learn.
 
 Whatever takes numbers takes arrays of NumPy, lists and tuples, and the series and frames of pandas, Polars and PyArrow; of one
@@ -25,8 +25,9 @@ from thetahat._evaluation import Comparison, Inspection, Validation, compare, in
 from thetahat._log import Log, dc_motor, read_csv
 from thetahat._model import Model
 from thetahat._narx import narx
-from thetahat._options import EquationsOptions, FitOptions, NarxOptions, ReadOptions, ValidationOptions
+from thetahat._options import EquationsOptions, FitOptions, NarxOptions, ReadOptions, SpectrumOptions, ValidationOptions
 from thetahat._responses import Forecast, FrequencyResponse, StateSpace, TransientResponse
+from thetahat._spectrum import MeasuredResponse, spectrum
 from thetahat._thetahat import (
     Alarm,
     ChangeDetector,
@@ -76,6 +77,7 @@ __all__ = [
     "LinearTransition",
     "Log",
     "LuenbergerObserver",
+    "MeasuredResponse",
     "Model",
     "NarxOptions",
     "NonlinearObservation",
@@ -88,6 +90,7 @@ __all__ = [
     "RecursiveNarx",
     "RecursiveTrajectory",
     "SmoothedTrajectory",
+    "SpectrumOptions",
     "StateEstimate",
     "StateFilter",
     "StateModel",
@@ -117,5 +120,6 @@ __all__ = [
     "oe",
     "read_csv",
     "search",
+    "spectrum",
     "sriv",
 ]

@@ -109,6 +109,48 @@ def to_control(
     )
 
 
+def response_to_control(
+    values: NDArray[np.complex128],
+    frequencies: ArrayLike,
+    sample_time: float,
+    input_names: Sequence[str],
+    output_name: str,
+) -> Any:
+    """A measured response from all inputs to the output, for python-control.
+
+    Parameters
+    ----------
+    values : ndarray, shape (inputs, K)
+        The response from each input.
+    frequencies : array_like, shape (K,)
+        Radians per second.
+    sample_time : float
+        Seconds from one sample to the next.
+    input_names : sequence of str
+        The inputs' names.
+    output_name : str
+        The output's name.
+
+    Returns
+    -------
+    control.FrequencyResponseData
+        In discrete time with ``dt`` the sample time.
+
+    Raises
+    ------
+    ValueError
+        If an input has no response at one of the frequencies.
+    ImportError
+        If python-control is not installed.
+    """
+    if np.isnan(values).any():
+        raise ValueError("the inputs have responses at frequencies of their own: take one input at a time")
+    control = _imported("control", "control")
+    return control.FrequencyResponseData(
+        values[np.newaxis], np.asarray(frequencies), dt=sample_time, inputs=list(input_names), outputs=[output_name]
+    )
+
+
 def state_space_to_scipy(F: ArrayLike, G: ArrayLike, H: ArrayLike, D: ArrayLike, sample_time: float) -> Any:
     """A state space from the inputs to the output, for ``scipy.signal``.
 

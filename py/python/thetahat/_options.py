@@ -248,6 +248,47 @@ class ValidationOptions(TypedDict, total=False):
     alphas: Sequence[float]
 
 
+class SpectrumOptions(TypedDict, total=False):
+    """How a frequency response is estimated from a log.
+
+    Attributes
+    ----------
+    rows : rows
+        The rows to use; all, unless said otherwise. Each range is a segment of its own.
+    detrend : {"mean", "none", "linear", "start:K"}
+        What is taken from each channel first.
+    method : {"lpm", "spa", "welch", "etfe", "sines"}
+        Local polynomials; Blackman and Tukey's windowed covariances; Welch's averages over windows; the plain ratio of the
+        transforms; correlation over whole periods of a stepped or a multi-sine input.
+    frequencies : (float, float) or list of float
+        Frequencies in radians per second: a band as a tuple of two, or for "lpm" and "spa" a list of them.
+    points : int
+        For "lpm" and "spa": how many frequencies of the band.
+    half_width : int
+        For "lpm": lines of the transform on either side of a frequency.
+    lags : int
+        For "spa": lags of the Hann window.
+    window : int
+        For "welch": rows of a window.
+    estimator : {"h1", "h2"}
+        For "welch": where the noise is, in the output or in the input.
+    period, discard : int
+        For "sines": rows of a period, and how many periods to leave out at the beginning.
+    """
+
+    rows: Rows
+    detrend: str
+    method: str
+    frequencies: Union["tuple[float, float]", Sequence[float]]
+    points: int
+    half_width: int
+    lags: int
+    window: int
+    estimator: str
+    period: int
+    discard: int
+
+
 class ReadOptions(TypedDict, total=False):
     """How a file is read.
 
@@ -512,6 +553,16 @@ def _texts(name: str, value: Any, rows: int | None) -> list[str]:
         return [value] if isinstance(value, str) else [text(name, one) for one in value]
     if name in ("max_iterations", "starts", "seed", "lags", "skip_rows", "degree", "terms", "most_terms", "units"):
         return [str(integer(name, value))]
+    if name in ("points", "half_width", "window", "period", "discard"):
+        return [str(integer(name, value))]
+    if name == "frequencies":
+        if isinstance(value, tuple) and len(value) == 2:
+            return ["..".join(number(name, end) for end in value)]
+        if isinstance(value, np.ndarray):
+            value = value.ravel().tolist()
+        if isinstance(value, str) or not isinstance(value, Sequence):
+            raise TypeError(f"{name}: expected a band such as (0.1, 3), or a list of frequencies, found {value!r}")
+        return [",".join(number(name, one) for one in value)]
     if name == "horizon":
         every = value if isinstance(value, (list, tuple)) else [value]
         return [",".join(str(integer(name, one)) for one in every)]

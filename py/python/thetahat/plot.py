@@ -35,6 +35,7 @@ from thetahat._evaluation import Inspection, Validation
 from thetahat._log import Log
 from thetahat._model import Model
 from thetahat._responses import FrequencyResponse, TransientResponse
+from thetahat._spectrum import MeasuredResponse
 from thetahat._thetahat import ChangeTrajectory
 from thetahat._track import TrackTrajectory
 
@@ -59,10 +60,11 @@ Grid = npt.NDArray[Any]
 Models = Union[Model, Sequence[Model], Mapping[str, Model]]
 """A model, several, or several by name."""
 
-Responses = Union[
-    Model, FrequencyResponse, Sequence[Union[Model, FrequencyResponse]], Mapping[str, Union[Model, FrequencyResponse]]
-]
-"""What has a frequency response, or several of them, or several by name."""
+Response = Union[Model, FrequencyResponse, MeasuredResponse]
+"""What has a frequency response."""
+
+Responses = Union[Response, Sequence[Response], Mapping[str, Response]]
+"""One of these, several, or several by name."""
 
 _CRITERIA = {word: name for word, name, _ in _thetahat.CRITERIA} | {
     "validation": "mean of e² on the validation rows",
@@ -258,8 +260,8 @@ def bode(
 
     Parameters
     ----------
-    models : Model or FrequencyResponse, or a sequence of them, or dict of str to them
-        What to draw.
+    models : Model, FrequencyResponse or MeasuredResponse, or a sequence of them, or dict of str to them
+        What to draw; models beside a measured response lie over it.
     w : array_like, optional
         Frequencies in radians per second, as for `thetahat.Model.frequency_response`.
     axes : array_like of Axes, shape (2, sources), optional
@@ -285,11 +287,14 @@ def bode(
     (2, 1)
     >>> axes[1, 0].get_xlabel()
     'frequency [rad/s]'
+    >>> axes = plot.bode({"measured": th.spectrum(log), **models})
     """
     found: list[tuple[str, FrequencyResponse]] = []
-    for name, one in _drawing.named(models, (Model, FrequencyResponse)):
+    for name, one in _drawing.named(models, (Model, FrequencyResponse, MeasuredResponse)):
         if w is not None and not isinstance(one, Model):
-            raise TypeError("w: a FrequencyResponse has its own frequencies; leave it out")
+            raise TypeError(f"w: a {type(one).__name__} has its own frequencies; leave it out")
+        if isinstance(one, MeasuredResponse):
+            one = one.to_frequency_response()
         found.append((name, one.frequency_response(w, points=300) if isinstance(one, Model) else one))
     there_are = list(dict.fromkeys(source for _, response in found for source in response.sources))
     inputs = list(dict.fromkeys(source for _, response in found for source in response.sources[:-1]))

@@ -4,8 +4,8 @@ use std::f64::consts::PI;
 use std::ops::Range;
 
 use super::SpectrumPoint;
-use super::fourier::RealTransform;
 use super::moments::samples;
+use crate::fourier::PairTransform;
 use crate::regression::sum;
 
 /// The longest window, in samples: it gives 513 frequencies.
@@ -39,17 +39,15 @@ pub(super) fn spectrum(
     }
     let window: Vec<f64> = (0..length).map(|t| (PI * t as f64 / length as f64).sin().powi(2)).collect();
     let weight = sum(window.iter().map(|h| h * h));
-    let mut transform = RealTransform::new(length);
-    let mut windowed = vec![0.0; length];
+    let mut transform = PairTransform::new(length);
     let mut powers = vec![0.0; length / 2 + 1];
     let mut count = 0;
     for segment in segments {
         let mut first = segment.start;
         while first + length <= segment.end {
-            for ((into, h), x) in windowed.iter_mut().zip(&window).zip(&deviations[first..first + length]) {
-                *into = h * x;
-            }
-            powers.iter_mut().zip(transform.powers(&windowed)).for_each(|(sum, power)| *sum += power);
+            let own = window.iter().zip(&deviations[first..first + length]);
+            let found = transform.of(own.map(|(h, x)| (h * x, 0.0)));
+            powers.iter_mut().enumerate().for_each(|(k, sum)| *sum += found.at(k).0.norm_sqr());
             count += 1;
             first += length / 2;
         }

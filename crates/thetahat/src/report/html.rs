@@ -10,12 +10,14 @@ mod figure;
 mod object;
 mod outputs;
 mod page;
+mod response;
 mod tables;
 mod text;
 
 use charts::{Marked, Shade, Stack};
 use outputs::{compared_outputs, outputs, points};
 use page::{Block, Page, Section};
+pub use response::response_page;
 
 use super::{Report, Validated, Validation};
 use crate::Error;

@@ -5,7 +5,11 @@ use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::{Complex, ComplexField};
 
 use crate::Error;
-use crate::model::{Block, Blocks, Gradient, PolynomialModel, Quantity, covariance};
+use crate::distribution::two_sided;
+use crate::model::{Block, Blocks, Gradient, Interval, PolynomialModel, Quantity, covariance};
+
+/// 95 % of chi-square for two degrees of freedom.
+const CHI_SQUARE: f64 = 5.991_465;
 
 /// The response of a model from one source to its output, at several frequencies.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -34,6 +38,63 @@ pub struct FrequencyPoint {
     pub magnitude: Quantity,
     /// arg z in radians, continuous in the frequency.
     pub phase: Quantity,
+}
+
+impl FrequencyPoint {
+    /// A response with the covariance matrix of its real and imaginary part. Of its phases the one nearest to `near`, in radians.
+    pub(crate) fn new(
+        frequency: f64,
+        response: Complex<f64>,
+        covariance: Option<[[f64; 2]; 2]>,
+        near: f64,
+    ) -> Self {
+        let (re, im, magnitude) = (response.re, response.im, response.modulus());
+        let (cosine, sine) = (re / magnitude, im / magnitude);
+        let deviation = |x: f64, y: f64| {
+            let [[rr, ri], [_, ii]] = covariance?;
+            let variance = x * x * rr + 2.0 * x * y * ri + y * y * ii;
+            // Not finite where the response is zero.
+            Some(variance.max(0.0).sqrt()).filter(|_| variance.is_finite())
+        };
+        let along = deviation(cosine, sine);
+        let across = deviation(-sine, cosine).map(|across| across / magnitude);
+        let principal = im.atan2(re);
+        let phase = principal + TAU * ((near - principal) / TAU).round();
+        Self {
+            frequency,
+            re,
+            im,
+            covariance,
+            magnitude: Quantity::new(magnitude, along),
+            phase: Quantity::new(phase, across),
+        }
+    }
+
+    /// Whether another response of this frequency, with its own covariance if it has one, lies outside of the 95 % region of this one;
+    /// none without a covariance. The region is as much larger as the interval of the phase is than 1.96 standard errors.
+    pub fn excludes(&self, other: &Self) -> Option<bool> {
+        let [[a, b], [_, c]] = self.covariance?;
+        let [[p, q], [_, r]] = other.covariance.unwrap_or_default();
+        let (a, b, c) = (a + p, b + q, c + r);
+        let (re, im) = (self.re - other.re, self.im - other.im);
+        let determinant = a * c - b * b;
+        let distance = (c * re * re - 2.0 * b * re * im + a * im * im) / determinant;
+        let half = self.phase.interval.and_then(|ends| Some(0.5 * (ends.upper? - ends.lower?)));
+        let wider =
+            half.zip(self.phase.standard_error).map_or(1.0, |(half, error)| half / error / two_sided(0.05));
+        (determinant > 0.0).then_some(distance > CHI_SQUARE * wider * wider)
+    }
+
+    /// The same with intervals of this many standard errors on either side; a magnitude is not below zero.
+    pub(crate) fn with_intervals(mut self, errors: f64) -> Self {
+        for (quantity, least) in [(&mut self.magnitude, 0.0), (&mut self.phase, f64::NEG_INFINITY)] {
+            quantity.interval = quantity.standard_error.map(|error| Interval {
+                lower: Some((quantity.value - errors * error).max(least)),
+                upper: Some(quantity.value + errors * error),
+            });
+        }
+        self
+    }
 }
 
 /// The frequency responses of a model at `frequencies` in radians per second: of each input, then of the noise.
@@ -201,32 +262,13 @@ impl<'a> Transfer<'a> {
             .collect();
         let covariance = parameters.and_then(|parameters| covariance(parameters, &gradient));
 
-        let (re, im, magnitude) = (response.re, response.im, response.modulus());
-        let (cosine, sine) = (re / magnitude, im / magnitude);
-        let deviation = |x: f64, y: f64| {
-            let [[rr, ri], [_, ii]] = covariance?;
-            let variance = x * x * rr + 2.0 * x * y * ri + y * y * ii;
-            // Not finite where the response is zero.
-            Some(variance.max(0.0).sqrt()).filter(|_| variance.is_finite())
-        };
-        let along = deviation(cosine, sine);
-        let across = deviation(-sine, cosine).map(|across| across / magnitude);
-        Ok(FrequencyPoint {
-            frequency,
-            re,
-            im,
-            covariance,
-            magnitude: Quantity::new(magnitude, along),
-            phase: Quantity::new(self.phase(response, angle), across),
-        })
+        Ok(FrequencyPoint::new(frequency, response, covariance, self.turned(angle)))
     }
 
-    /// The phase nearest to that of the roots, which is known as a whole.
-    fn phase(&self, response: Complex<f64>, angle: f64) -> f64 {
+    /// What delay and roots turn from frequency 0 on.
+    fn turned(&self, angle: f64) -> f64 {
         let turned = |roots: &[Complex<f64>]| roots.iter().map(|root| turned_by(*root, angle)).sum::<f64>();
-        let whole = self.sign - self.delay as f64 * angle + turned(&self.zeros) - turned(&self.poles);
-        let principal = response.im.atan2(response.re);
-        principal + TAU * ((whole - principal) / TAU).round()
+        self.sign - self.delay as f64 * angle + turned(&self.zeros) - turned(&self.poles)
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod correlation;
 mod dynamics;
+mod response;
 mod search;
 mod signals;
 mod spectrum;
@@ -9,6 +10,7 @@ mod terms;
 
 pub(super) use correlation::{autocorrelation, compared_autocorrelations, cross_correlation, prewhitened};
 pub(super) use dynamics::{bode, roots, transients};
+pub(super) use response::{measured, measured_noise};
 pub(super) use search::{delays, score, search};
 pub(super) use signals::{Marked, Shade, Stack, outputs};
 pub(super) use spectrum::spectrum;

@@ -1,0 +1,93 @@
+//! `thetahat spectrum`: the frequency response that logs show, without a model.
+
+use std::path::Path;
+
+use thetahat::Document;
+use thetahat::model::Quantity;
+use thetahat::report::response_page;
+use thetahat::spectrum::{MeasuredResponse, spectrum as estimated};
+
+use super::experiments::{Experiments, Wanted, read};
+use super::summary;
+use crate::args::{ResponseFormatArgument, SpectrumArguments};
+use crate::failure::Failure;
+use crate::job::SpectrumJob;
+use crate::messages::warn;
+use crate::wrap::{WIDTH, stdout_width};
+use crate::{log, output};
+
+pub(crate) fn spectrum(arguments: &SpectrumArguments, line: &str) -> Result<(), Failure> {
+    let found = measured(&SpectrumJob::resolve(arguments)?)?;
+    let json = found.to_json().map_err(|error| Failure::data(error.to_string()))?;
+    if let Some(path) = &arguments.html {
+        output::page(path, &response_page(&found, &[], line))?;
+    }
+    // What goes into a file does not depend on the terminal.
+    let width = if arguments.out == Path::new("-") { stdout_width() } else { WIDTH };
+    match arguments.format {
+        ResponseFormatArgument::Csv => {
+            // A table and a document have their warnings in them.
+            found.warnings.iter().for_each(|warning| warn(warning));
+            write_csv(&arguments.out, &found)
+        }
+        ResponseFormatArgument::Json => output::write(&arguments.out, |file| file.write_all(json.as_bytes())),
+        ResponseFormatArgument::Table => {
+            let table = summary::response(&found, width);
+            output::write(&arguments.out, |file| file.write_all(table.as_bytes()))
+        }
+    }
+}
+
+/// Reads the logs and estimates the response.
+fn measured(job: &SpectrumJob) -> Result<MeasuredResponse, Failure> {
+    let wanted = Wanted {
+        inputs: job.inputs.as_deref(),
+        output: job.output.as_deref(),
+        driven: true,
+        none: "no inputs",
+    };
+    let Experiments { log, sources, channels, words } =
+        read(&job.paths, &job.log, &wanted, false, |_| Ok(()))?;
+    let plan = job.plan(channels.inputs, channels.output)?;
+    let mut found = estimated(&log, &sources, &plan).map_err(log::failure(&sources))?;
+    found.warnings.splice(0..0, words);
+    Ok(found)
+}
+
+/// A row for each input and frequency.
+fn write_csv(path: &Path, found: &MeasuredResponse) -> Result<(), Failure> {
+    output::write_csv(path, |csv| {
+        csv.write_record([
+            "input",
+            "frequency",
+            "magnitude",
+            "magnitude_standard_error",
+            "phase",
+            "phase_standard_error",
+            "coherence",
+            "noise",
+        ])?;
+        for response in &found.responses {
+            let name = output::cell(response.input.as_deref().unwrap_or_default());
+            let mut noise = found.noise.iter();
+            for point in &response.points {
+                let of = noise.find(|noise| noise.frequency == point.frequency);
+                let (coherence, density) = of.map_or((None, None), |noise| (noise.coherence, noise.density));
+                let Quantity { value: magnitude, standard_error, .. } = point.magnitude;
+                let (phase, turn) =
+                    (point.phase.value.to_degrees(), point.phase.standard_error.map(f64::to_degrees));
+                csv.serialize((
+                    &name,
+                    point.frequency,
+                    magnitude,
+                    standard_error,
+                    phase,
+                    turn,
+                    coherence,
+                    density,
+                ))?;
+            }
+        }
+        Ok(())
+    })
+}

@@ -40,9 +40,14 @@ use clap::Parser;
 use messages::{say, tell};
 use thetahat::text;
 
-pub use binding::{Opened, equations_plan, inspect, narx_plan, plan, read, track, validation_plan, write};
+pub use binding::{
+    Opened, compare_signals, equations_plan, inspect, narx_plan, plan, read, signal_plan, track,
+    validation_plan, write,
+};
 pub use commands::demo::LOG as DEMO_LOG;
-pub use commands::summary::{comparison, filtered, inspection, table, tracking, validation};
+pub use commands::summary::{
+    comparison, experiment_design, filtered, inspection, table, tracking, validation,
+};
 pub use commands::{TrackedRow, Tracking, consistency};
 pub use failure::{Failure, Kind};
 pub use options::with_options;

@@ -3,11 +3,13 @@
 //! The library names them between backticks, as `detrend`, wherever one is advised; here they are options.
 
 /// The arguments of the library that are options, by the name that both have.
-pub(crate) const OPTIONS: [&str; 51] = [
+pub(crate) const OPTIONS: [&str; 60] = [
     "alarm",
     "alpha",
     "alphas",
+    "band",
     "centres",
+    "channels",
     "constant",
     "dc-gain",
     "dead-zone",
@@ -23,6 +25,7 @@ pub(crate) const OPTIONS: [&str; 51] = [
     "horizon",
     "initial",
     "lags",
+    "length",
     "max-iterations",
     "method",
     "most-terms",
@@ -33,16 +36,21 @@ pub(crate) const OPTIONS: [&str; 51] = [
     "nu",
     "ny",
     "offset",
+    "period",
+    "points",
     "poles",
     "prefilter",
+    "range",
     "raw-terms",
     "require",
     "resample",
     "ridge",
+    "rms",
     "rows",
     "sample-time",
     "scale",
     "select",
+    "signal",
     "split",
     "start",
     "step",
@@ -54,6 +62,7 @@ pub(crate) const OPTIONS: [&str; 51] = [
     "trend",
     "units",
     "validate",
+    "want",
     "width",
 ];
 

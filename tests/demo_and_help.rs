@@ -3,7 +3,7 @@
 use crate::harness::Folder;
 use crate::signals::{Experiment, csv};
 
-const VERBS: [&str; 15] = [
+const VERBS: [&str; 16] = [
     "fit",
     "inspect",
     "predict",
@@ -15,6 +15,7 @@ const VERBS: [&str; 15] = [
     "bode",
     "step",
     "impulse",
+    "design",
     "demo",
     "schema",
     "completions",

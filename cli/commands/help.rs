@@ -2,6 +2,7 @@
 
 use clap::CommandFactory;
 use thetahat::Document;
+use thetahat::design::ExperimentDesign;
 use thetahat::filter::FilterSummary;
 use thetahat::inspect::Inspection;
 use thetahat::report::{Comparison, Report, Validation};
@@ -20,6 +21,7 @@ pub(crate) fn schema(document: DocumentArgument) -> Result<(), Failure> {
         DocumentArgument::Inspection => Inspection::json_schema(),
         DocumentArgument::Track => TrackSummary::json_schema(),
         DocumentArgument::Filter => FilterSummary::json_schema(),
+        DocumentArgument::Design => ExperimentDesign::json_schema(),
     };
     output::print(&format!("{schema:#}\n"))
 }

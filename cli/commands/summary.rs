@@ -1,5 +1,6 @@
 //! A report as a table for people.
 
+mod design;
 mod equations;
 mod filtered;
 mod inspection;
@@ -22,6 +23,8 @@ use thetahat::respond::InitialCondition;
 use thetahat::text::harmless;
 use thetahat::validate::{Fit, Part};
 
+pub use design::experiment_design;
+pub(crate) use design::test_signal;
 pub use filtered::filtered;
 pub use inspection::inspection;
 use text::{Text, columns, or_dash, some};

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::harness::{Folder, numbers};
+use crate::harness::{Folder, number, numbers};
 use crate::signals::{Experiment, Random, csv, plain_log};
 
 /// The columns of a CSV by their names.
@@ -35,7 +35,7 @@ fn a_prbs_has_its_levels_its_clock_and_its_period() {
 fn every_kind_is_written_and_the_seed_decides() {
     let folder = Folder::new();
     for kind in ["prbs", "rbs", "multisine", "chirp", "white", "sines", "steps"] {
-        let line = format!("design --signal {kind} --length 300 --channels 2 --range -3..5");
+        let line = format!("design --signal {kind} --length 600 --channels 2 --range -3..5");
         let run = folder.done(&line);
         assert_eq!(folder.done(&line).stdout, run.stdout, "{kind}");
         let mut one_thread = folder.command(&line);
@@ -108,11 +108,14 @@ fn signals_side_by_side_tell_that_the_best_differs_by_purpose() {
     assert!(table.contains("(wanted)") && table.contains("samples needed"), "{table}");
     let needed = found["signals"][0]["needed"].as_u64().expect("a length");
     // That long, both errors are as small as was wanted.
-    let longer = folder.done(&format!(
-        "design --for model.json --signal prbs --want dc-gain:2%,b1:0.02 --length 1023 --format json"
-    ));
-    let same: Value = serde_json::from_str(&longer.stdout).expect("JSON");
-    assert_eq!(same["signals"][0]["needed"].as_u64(), Some(needed));
+    let line = format!(
+        "design --for model.json --signal prbs --want dc-gain:2%,b1:0.02 --length {needed} --period 1023"
+    );
+    let longer: Value =
+        serde_json::from_str(&folder.done(&format!("{line} --format json")).stdout).expect("JSON");
+    for (figure, error) in numbers(&longer["signals"][0]["standard_errors"]).iter().enumerate() {
+        assert!(*error <= number(&longer, &format!("/figures/{figure}/limit")), "{figure}: {error}");
+    }
     assert!(needed > 1023);
 }
 

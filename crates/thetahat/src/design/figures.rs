@@ -1,5 +1,7 @@
 //! What a signal is as an input.
 
+use std::slice;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -47,7 +49,8 @@ impl SignalFigures {
         let rms = (sum(values.iter().map(|value| (value - mean).powi(2))) / count).sqrt();
         let peak = values.iter().fold(0.0_f64, |peak, value| peak.max((value - mean).abs()));
         let (order, highest) = order_with_mean(values);
-        let spectrum = excitation("", values, &[0..values.len()], sample_time).spectrum;
+        let all = 0..values.len();
+        let spectrum = excitation("", values, slice::from_ref(&all), sample_time).spectrum;
         let crest_factor = Some(peak / rms).filter(|crest| crest.is_finite());
         Self { mean, rms, crest_factor, order, highest, spectrum }
     }

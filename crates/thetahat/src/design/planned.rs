@@ -27,6 +27,8 @@
 //! Before the first sample the plant is at rest at the first value of the signal: v(t) = u(t) - u(0). With the level unknown no
 //! other value would change anything. Samples that a fit needs for its first regressors do not count.
 
+use std::slice;
+
 use thetahat_core::nalgebra::{Cholesky, DMatrix};
 
 use crate::Error;
@@ -308,6 +310,6 @@ fn noise(model: &PolynomialModel) -> DMatrix<f64> {
 /// The sums of products of all columns from a sample on.
 fn products(signals: &[Vec<f64>], taps: Vec<Taps>, first: usize) -> DMatrix<f64> {
     let views: Vec<&[f64]> = signals.iter().map(Vec::as_slice).collect();
-    let segments = [0..views.first().map_or(0, |signal| signal.len())];
-    Lagged::new(&views, taps, &segments, Presample::Drop).after(first).normal_equations().0
+    let all = 0..views.first().map_or(0, |signal| signal.len());
+    Lagged::new(&views, taps, slice::from_ref(&all), Presample::Drop).after(first).normal_equations().0
 }

@@ -1,6 +1,7 @@
 //! How rich an input is.
 
 use std::ops::Range;
+use std::slice;
 
 use rayon::prelude::*;
 use thetahat_core::nalgebra::DMatrix;
@@ -131,7 +132,8 @@ fn unit<I: Iterator<Item = f64>>(values: impl Fn() -> I) -> f64 {
 /// A mean above the largest deviation counts as if it were that: the order does not depend on how large it is, and beside a larger
 /// one the deviations would be rounding.
 pub(crate) fn order_with_mean(values: &[f64]) -> (usize, usize) {
-    let segments = &[0..values.len()];
+    let all = 0..values.len();
+    let segments = slice::from_ref(&all);
     let highest = highest(segments);
     let changes = values.windows(2).filter(|pair| pair[0] != pair[1]).count();
     let scale = moments::scale(values.iter().copied());

@@ -49,7 +49,7 @@ class TestSignal:
         channels, figures, period, frequencies, sample_time = _thetahat.design_signal(words)
         self._name = name
         self.inputs: Array = np.column_stack(channels)
-        self.time: Array = np.arange(len(self.inputs)) * sample_time
+        self.time: Array = np.arange(len(self.inputs), dtype=np.float64) * sample_time
         self.period = period
         self.frequencies = frequencies
         self.mean: Array = np.array([mean for mean, *_ in figures])
@@ -77,10 +77,13 @@ class ExperimentDesign(_Document):
         return [figure["name"] for figure in self.document["figures"]]
 
     @property
-    def standard_errors(self) -> dict[str, dict[str, float | None]]:
-        """Of each signal the standard error that each figure would have; None where the signal leaves it open."""
-        names = self.figures
-        return {one["signal"]: dict(zip(names, one["standard_errors"])) for one in self.document["signals"]}
+    def standard_errors(self) -> dict[str, dict[str, float]]:
+        """Of each signal the standard error that each figure would have; NaN where the signal leaves it open."""
+
+        def errors(values: list[float | None]) -> dict[str, float]:
+            return dict(zip(self.figures, _numbers.of_document(values).tolist()))
+
+        return {one["signal"]: errors(one["standard_errors"]) for one in self.document["signals"]}
 
     @property
     def needed(self) -> dict[str, int | None]:

@@ -1,5 +1,6 @@
 //! The syntax of the command line, a file a verb, and nothing else. `job` says what it means.
 
+mod design;
 mod files;
 mod filter;
 mod fit;
@@ -15,6 +16,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+pub(crate) use design::DesignArguments;
 pub(crate) use filter::{EstimatorArgument, FilterArguments, FilterStartArgument};
 pub(crate) use fit::{
     ConstantArgument, CriterionArguments, FitArguments, InitialArgument, KernelArgument, LikelihoodArgument,
@@ -210,6 +212,19 @@ Example:
 Example:
   thetahat impulse model.json --samples 50 > impulse.csv")]
     Impulse(TransientArguments),
+    /// Make a test signal for an experiment, or say which one a model needs, and for how long
+    ///
+    /// Writes CSV: time and the input, or the inputs u1, u2, …. What the signal is goes to standard error: its period, mean, crest factor,
+    /// order of persistent excitation (a constant has 1, a sinusoid 2) and where its power lies. With --for it compares signals: the
+    /// standard errors that each would give of the model's figures, if model and noise are right, and how many samples it takes
+    /// until they are as small as --want says.
+    #[command(after_help = "\
+Examples:
+  thetahat design --signal prbs:4 --length 2000 --range 20..60 > input.csv
+  thetahat design --signal multisine --band 0.1..10 --sample-time 0.08 --length 1024 -o input.csv
+  thetahat design --for model.json --want 'dc-gain:2%,a1:0.01'
+  thetahat design --for model.json --signal prbs,prbs:4,steps --length 500")]
+    Design(Box<DesignArguments>),
     /// Fit a sample log of a DC motor, carried inside the program
     ///
     /// Writes the log and the report of its fit into a folder and prints the table.
@@ -222,7 +237,7 @@ Example:
 Example:
   thetahat schema > thetahat.report.schema.json")]
     Schema {
-        /// The document: what fit, validate, compare, inspect, spectrum, track or filter writes
+        /// The document: what fit, validate, compare, inspect, spectrum, track, filter or design writes
         #[arg(value_enum, default_value = "report")]
         document: DocumentArgument,
     },
@@ -267,6 +282,8 @@ pub(crate) enum DocumentArgument {
     Track,
     /// What filter writes at its end
     Filter,
+    /// What design writes for a model
+    Design,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -6,14 +6,16 @@ use std::path::Path;
 
 use clap::Args;
 use thetahat::data::{Log, Source};
+use thetahat::design::{ExperimentDesign, SignalPlan};
 use thetahat::inspect::Inspection;
+use thetahat::model::Model;
 use thetahat::report::{EquationsPlan, NonlinearArxPlan, Plan, Report, Requirement, ValidationPlan};
 use thetahat::spectrum::SpectrumPlan;
 
-use crate::args::{FitArguments, InspectArguments, MapArgument, ValidateArguments};
-use crate::commands::{Experiments, Tracking, experiments, inspected};
+use crate::args::{DesignArguments, FitArguments, InspectArguments, MapArgument, ValidateArguments};
+use crate::commands::{Experiments, Tracking, compared_signals, experiments, inspected};
 use crate::failure::Failure;
-use crate::job::{EvaluationJob, FitJob, GreyBoxJob, InspectJob, NarxJob, SpectrumJob};
+use crate::job::{DesignJob, EvaluationJob, FitJob, GreyBoxJob, InspectJob, NarxJob, SpectrumJob};
 use crate::replace::replace;
 
 /// Logs that were read as one.
@@ -123,6 +125,25 @@ pub fn spectrum_plan(
     let log = OsString::from("log");
     let words: Vec<OsString> = options.iter().cloned().chain([log]).collect();
     SpectrumJob::resolve(&arguments("spectrum", &words)?)?.plan(inputs, output)
+}
+
+/// The signal that `thetahat design` makes with these options.
+///
+/// # Errors
+/// A [`Failure`] as the program would report it.
+pub fn signal_plan(options: &[OsString]) -> Result<SignalPlan, Failure> {
+    Ok(DesignJob::resolve(&arguments("design", options)?)?.plan())
+}
+
+/// What `thetahat design --for` says of a model with these options.
+///
+/// # Errors
+/// A [`Failure`] as the program would report it.
+pub fn compare_signals(options: &[OsString], model: &Model) -> Result<ExperimentDesign, Failure> {
+    // The name stands for the model in messages.
+    let words: Vec<OsString> = options.iter().cloned().chain([OsString::from("--for=model")]).collect();
+    let arguments: DesignArguments = arguments("design", &words)?;
+    compared_signals(&arguments, &DesignJob::resolve(&arguments)?, model, Path::new("model"))
 }
 
 /// What `thetahat track` does with these options, in memory, for a log with these channels. `report` is where it starts from.

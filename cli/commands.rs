@@ -3,6 +3,7 @@
 mod bode;
 mod compare;
 pub(crate) mod demo;
+mod design;
 mod experiments;
 mod filter;
 mod fit;
@@ -19,6 +20,7 @@ mod track;
 mod transient;
 mod validate;
 
+pub(crate) use design::compared_signals;
 pub(crate) use experiments::{Experiments, experiments};
 pub use filter::consistency;
 pub(crate) use inspect::inspected;
@@ -43,6 +45,7 @@ pub(crate) fn dispatch(arguments: Arguments, line: &str) -> Result<(), Failure> 
         Command::Bode(arguments) => bode::bode(&arguments, line),
         Command::Step(arguments) => transient::step(&arguments),
         Command::Impulse(arguments) => transient::impulse(&arguments),
+        Command::Design(arguments) => design::design(&arguments),
         Command::Demo(arguments) => demo::demo(&arguments),
         Command::Schema { document } => help::schema(document),
         Command::Completions { shell } => help::completions(shell),

@@ -1,5 +1,6 @@
 //! What a command line means: everything resolved and checked that needs no data.
 
+mod design;
 mod filter;
 mod fit;
 mod grey_box;
@@ -26,6 +27,7 @@ use crate::line_writer::Format;
 use crate::memory::PerValue;
 use crate::table;
 
+pub(crate) use design::DesignJob;
 pub(crate) use filter::FilterJob;
 pub(crate) use fit::FitJob;
 pub(crate) use grey_box::GreyBoxJob;

@@ -41,10 +41,13 @@ use messages::{say, tell};
 use thetahat::text;
 
 pub use binding::{
-    Opened, equations_plan, inspect, narx_plan, plan, read, spectrum_plan, track, validation_plan, write,
+    Opened, compare_signals, equations_plan, inspect, narx_plan, plan, read, signal_plan, spectrum_plan,
+    track, validation_plan, write,
 };
 pub use commands::demo::LOG as DEMO_LOG;
-pub use commands::summary::{comparison, filtered, inspection, response, table, tracking, validation};
+pub use commands::summary::{
+    comparison, experiment_design, filtered, inspection, response, table, tracking, validation,
+};
 pub use commands::{TrackedRow, Tracking, consistency};
 pub use failure::{Failure, Kind};
 pub use options::with_options;

@@ -3,11 +3,13 @@
 //! The library names them between backticks, as `detrend`, wherever one is advised; here they are options.
 
 /// The arguments of the library that are options, by the name that both have.
-pub(crate) const OPTIONS: [&str; 56] = [
+pub(crate) const OPTIONS: [&str; 63] = [
     "alarm",
     "alpha",
     "alphas",
+    "band",
     "centres",
+    "channels",
     "constant",
     "dc-gain",
     "dead-zone",
@@ -25,6 +27,7 @@ pub(crate) const OPTIONS: [&str; 56] = [
     "horizon",
     "initial",
     "lags",
+    "length",
     "max-iterations",
     "method",
     "most-terms",
@@ -39,14 +42,17 @@ pub(crate) const OPTIONS: [&str; 56] = [
     "points",
     "poles",
     "prefilter",
+    "range",
     "raw-terms",
     "require",
     "resample",
     "ridge",
+    "rms",
     "rows",
     "sample-time",
     "scale",
     "select",
+    "signal",
     "split",
     "start",
     "step",
@@ -58,6 +64,7 @@ pub(crate) const OPTIONS: [&str; 56] = [
     "trend",
     "units",
     "validate",
+    "want",
     "width",
     "window",
 ];

@@ -3,7 +3,7 @@
 use crate::harness::Folder;
 use crate::signals::{Experiment, csv};
 
-const VERBS: [&str; 16] = [
+const VERBS: [&str; 17] = [
     "fit",
     "inspect",
     "spectrum",
@@ -16,6 +16,7 @@ const VERBS: [&str; 16] = [
     "bode",
     "step",
     "impulse",
+    "design",
     "demo",
     "schema",
     "completions",

@@ -35,7 +35,7 @@ const CORE: House = House {
 const LIBRARY: House = House {
     source: "crates/thetahat/src",
     floors: &[
-        &["distribution", "figures", "fourier", "text"],
+        &["distribution", "figures", "fourier", "random", "text"],
         &["error"],
         &["document", "optimize", "regression"],
         &["data"],
@@ -45,6 +45,7 @@ const LIBRARY: House = House {
         &["validate"],
         &["select"],
         &["inspect", "spectrum"],
+        &["design"],
         &["report"],
         &["filter", "track"],
     ],
@@ -76,7 +77,7 @@ const PYTHON: House = House {
         &["grey_box", "log"],
         &["model"],
         &["online"],
-        &["evaluation", "filter", "track"],
+        &["design", "evaluation", "filter", "track"],
     ],
 };
 

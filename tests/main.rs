@@ -12,6 +12,7 @@ mod constant;
 mod criterion;
 mod csv_dialects;
 mod demo_and_help;
+mod design;
 mod draws;
 mod equations;
 mod filter;

@@ -58,6 +58,10 @@ impl Command {
                 read.push(transient.report.clone());
                 written.push(transient.out.clone());
             }
+            Self::Design(design) => {
+                read.extend(design.model.clone());
+                written.extend([&design.out].into_iter().chain(&design.spectrum).cloned());
+            }
             Self::Demo(_) | Self::Schema { .. } | Self::Completions { .. } | Self::Man { .. } => {}
         }
         files

@@ -2,6 +2,7 @@
 
 use clap::CommandFactory;
 use thetahat::Document;
+use thetahat::design::ExperimentDesign;
 use thetahat::filter::FilterSummary;
 use thetahat::inspect::Inspection;
 use thetahat::report::{Comparison, Report, Validation};
@@ -22,6 +23,7 @@ pub(crate) fn schema(document: DocumentArgument) -> Result<(), Failure> {
         DocumentArgument::Response => MeasuredResponse::json_schema(),
         DocumentArgument::Track => TrackSummary::json_schema(),
         DocumentArgument::Filter => FilterSummary::json_schema(),
+        DocumentArgument::Design => ExperimentDesign::json_schema(),
     };
     output::print(&format!("{schema:#}\n"))
 }

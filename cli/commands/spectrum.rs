@@ -42,13 +42,14 @@ pub(crate) fn spectrum(arguments: &SpectrumArguments, line: &str) -> Result<(), 
 fn measured(job: &SpectrumJob) -> Result<MeasuredResponse, Failure> {
     let wanted = Wanted {
         inputs: job.inputs.as_deref(),
-        output: job.output.as_deref(),
+        outputs: job.output.as_slice(),
         driven: true,
         none: "no inputs",
     };
     let Experiments { log, sources, channels, words } =
         read(&job.paths, &job.log, &wanted, false, |_| Ok(()))?;
-    let plan = job.plan(channels.inputs, channels.output)?;
+    let (inputs, output) = channels.single();
+    let plan = job.plan(inputs, output)?;
     let mut found = estimated(&log, &sources, &plan).map_err(log::failure(&sources))?;
     found.warnings.splice(0..0, words);
     Ok(found)

@@ -1,5 +1,6 @@
 //! A report as a table for people.
 
+mod design;
 mod equations;
 mod filtered;
 mod inspection;
@@ -23,6 +24,8 @@ use thetahat::respond::InitialCondition;
 use thetahat::text::harmless;
 use thetahat::validate::{Fit, Part};
 
+pub use design::experiment_design;
+pub(crate) use design::test_signal;
 pub use filtered::filtered;
 pub use inspection::inspection;
 pub use response::response;

@@ -1,10 +1,11 @@
 //! The compiled module `thetahat._thetahat`: the engine behind the Python package `thetahat`.
 //!
-//! `log`, `grey_box`, `model` and `evaluation` are the batch half, `online` the steppers, `filter` and `track` the steppers behind
+//! `log`, `grey_box`, `model`, `evaluation` and `design` are the batch half, `online` the steppers, `filter` and `track` the steppers behind
 //! logs. `array` reads and makes NumPy arrays, `error` is
 //! the one map of errors, `work` runs what takes long.
 
 mod array;
+mod design;
 mod error;
 mod evaluation;
 mod filter;
@@ -45,6 +46,8 @@ fn _thetahat(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(evaluation::inspect, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::inspect_file, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::spectrum, module)?)?;
+    module.add_function(wrap_pyfunction!(design::design_signal, module)?)?;
+    module.add_function(wrap_pyfunction!(design::compare_signals, module)?)?;
     online::register(module)?;
     work::register(module)?;
     module.add_function(wrap_pyfunction!(in_python, module)?)?;

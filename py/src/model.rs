@@ -413,6 +413,11 @@ impl Model {
         Ok([response.time, values, errors].map(|column| PyArray1::from_vec(py, column)))
     }
 
+    /// The model itself.
+    pub(crate) fn model(&self) -> &Arc<thetahat::model::Model> {
+        &self.model
+    }
+
     /// The whole report.
     pub(crate) fn report(&self, py: Python<'_>) -> PyResult<Arc<Report>> {
         // The lock is not held while others compute: they may wait for the interpreter, and its owner for the lock.

@@ -38,6 +38,7 @@ mod tests;
 mod warnings;
 mod whitening;
 
+pub(crate) use excitation::{excitation, order_with_mean};
 pub use inspection::{
     ChannelQuality, Clock, DelayEstimate, Excitation, Feedback, Inspection, Saturation, SpectrumPoint,
 };

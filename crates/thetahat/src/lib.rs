@@ -65,6 +65,7 @@
 //! | [`optimize`] | the search that estimates share |
 //! | [`select`] | which of several models to believe |
 //! | [`respond`] | predictions, free runs, forecasts, step and frequency responses |
+//! | [`design`] | test signals, and what an experiment with them is worth |
 //! | [`validate`] | figures of fit and tests of residuals |
 //! | [`spectrum`] | frequency responses from data, without a model |
 //! | [`report`] | the whole way from a log to a document and its page |
@@ -82,6 +83,7 @@
 //! [`track::Tracker`] and a [`filter::StateFilter`] are made of.
 
 pub mod data;
+pub mod design;
 mod distribution;
 mod document;
 mod error;
@@ -92,6 +94,7 @@ mod fourier;
 pub mod inspect;
 pub mod model;
 pub mod optimize;
+mod random;
 mod regression;
 pub mod report;
 pub mod respond;

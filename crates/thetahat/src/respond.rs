@@ -57,6 +57,7 @@ pub use horizon::Horizon;
 pub use initial_condition::InitialCondition;
 pub(crate) use initial_condition::{NOTHING_LEFT, are_worth};
 use initial_condition::{check_inputs, history};
+pub(crate) use initial_responses::until_negligible;
 pub(crate) use innovations::{Innovations, innovations};
 pub(crate) use nis::NisCount;
 pub use nis::NisSummary;

@@ -3,6 +3,8 @@
 //!
 //! `make monte-carlo` does the full numbers; `make test` fewer. `MONTE_CARLO` is the number of runs of each kind.
 
+#[path = "monte_carlo/design.rs"]
+mod design;
 #[path = "monte_carlo/grey.rs"]
 mod grey_box;
 #[path = "monte_carlo/intervals.rs"]

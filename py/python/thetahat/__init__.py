@@ -1,7 +1,7 @@
 """System identification: models of dynamic systems from logged data.
 
 A log holds measured signals (`Log`, `read_csv`). A fit makes a model of it (`arx`, `armax`, `oe`, `bj`, `ar`, `arma`, `general`,
-`fir`, `iv`, `sriv`), `search` chooses one, `grey` finds the parameters of a model in equations (`GreyBox`), `narx` fits nonlinear ARX models, `inspect` inspects a log before a fit, `spectrum` finds its frequency response without a model. A `Model` predicts, simulates, forecasts and is validated.
+`fir`, `iv`, `sriv`), `search` chooses one, `grey` finds the parameters of a model in equations (`GreyBox`), `narx` fits nonlinear ARX models, `inspect` inspects a log before a fit, `spectrum` finds its frequency response without a model, `design` makes test signals for experiments. A `Model` predicts, simulates, forecasts and is validated.
 `thetahat.plot` draws, and `thetahat.sklearn` fits into scikit-learn.
 
 Whatever takes numbers takes arrays of NumPy, lists and tuples, and the series and frames of pandas, Polars and PyArrow; of one
@@ -18,6 +18,7 @@ fitted or written model and a `Tracker` a recursive model with the channels and 
 Model(ARMAX(2, 2, 1, 1), 1-step fit 98.37 % on rows 1..700)
 """
 
+from thetahat._design import ExperimentDesign, TestSignal, design
 from thetahat._filter import StateEstimate, StateFilter, StateModel, StateTrajectory
 from thetahat._fit import EstimationWarning, ar, arma, armax, arx, bj, fir, general, iv, oe, search, sriv
 from thetahat._grey_box import GreyBox, grey
@@ -25,7 +26,7 @@ from thetahat._evaluation import Comparison, Inspection, Validation, compare, in
 from thetahat._log import Log, dc_motor, read_csv
 from thetahat._model import Model
 from thetahat._narx import narx
-from thetahat._options import EquationsOptions, FitOptions, NarxOptions, ReadOptions, SpectrumOptions, ValidationOptions
+from thetahat._options import DesignOptions, EquationsOptions, FitOptions, NarxOptions, ReadOptions, SpectrumOptions, ValidationOptions
 from thetahat._responses import Forecast, FrequencyResponse, StateSpace, TransientResponse
 from thetahat._spectrum import MeasuredResponse, spectrum
 from thetahat._thetahat import (
@@ -60,9 +61,11 @@ __all__ = [
     "ChangeDetector",
     "ChangeTrajectory",
     "Comparison",
+    "DesignOptions",
     "EquationsOptions",
     "EstimationError",
     "EstimationWarning",
+    "ExperimentDesign",
     "ExtendedKalmanFilter",
     "FilterTrajectory",
     "FitOptions",
@@ -97,6 +100,7 @@ __all__ = [
     "StateSpace",
     "StateTrajectory",
     "SteadyState",
+    "TestSignal",
     "TrackTrajectory",
     "Tracked",
     "Tracker",
@@ -111,6 +115,7 @@ __all__ = [
     "bj",
     "compare",
     "dc_motor",
+    "design",
     "fir",
     "general",
     "grey",

@@ -289,6 +289,45 @@ class SpectrumOptions(TypedDict, total=False):
     discard: int
 
 
+class DesignOptions(TypedDict, total=False):
+    """What a test signal has to be.
+
+    Attributes
+    ----------
+    length : int
+        How many samples; 1023, a period of a PRBS, unless said otherwise.
+    range : (float, float)
+        The lowest and the highest value, in units of the input; (-1, 1) unless said otherwise.
+    rms : float
+        A power budget: the root mean square of the deviations from the middle of ``range``, instead of its width.
+    band : (float, float)
+        The lowest and the highest frequency of a multisine, a chirp or stepped sines, in radians per second; all of them unless said
+        otherwise.
+    points : int
+        How many frequencies, each the same factor above the one before: of a multisine, which has every line of its period otherwise,
+        and of stepped sines, which have 10.
+    period : int
+        After how many samples the signal repeats itself: of a PRBS the longest that fits, of a multisine 4096 at most, else the
+        length.
+    channels : int
+        How many signals without correlation: 1, or with a model one for each of its inputs.
+    sample_time : float or timedelta
+        Time from one sample to the next: 1 s, or that of the model.
+    seed : int
+        Which random signal, or where a PRBS begins.
+    """
+
+    length: int
+    range: tuple[float, float]
+    rms: float
+    band: tuple[float, float]
+    points: int
+    period: int
+    channels: int
+    sample_time: Duration
+    seed: int
+
+
 class ReadOptions(TypedDict, total=False):
     """How a file is read.
 
@@ -523,6 +562,13 @@ def _bound(name: str, value: Any) -> str:
     return number(name, value)
 
 
+_WHOLE = frozenset(
+    ["channels", "degree", "discard", "half_width", "lags", "length", "max_iterations", "most_terms", "period", "points", "seed"]
+    + ["skip_rows", "starts", "terms", "units", "window"]
+)
+"""The options that are whole numbers."""
+
+
 def _texts(name: str, value: Any, rows: int | None) -> list[str]:
     if name in ("estimate", "validate", "rows"):
         return [",".join(_rows(name, value, rows))]
@@ -551,9 +597,7 @@ def _texts(name: str, value: Any, rows: int | None) -> list[str]:
         return [f"{number(name, step)}:{how}{'' if filtered else ':unfiltered'}"]
     if name == "missing":
         return [value] if isinstance(value, str) else [text(name, one) for one in value]
-    if name in ("max_iterations", "starts", "seed", "lags", "skip_rows", "degree", "terms", "most_terms", "units"):
-        return [str(integer(name, value))]
-    if name in ("points", "half_width", "window", "period", "discard"):
+    if name in _WHOLE:
         return [str(integer(name, value))]
     if name == "frequencies":
         if isinstance(value, tuple) and len(value) == 2:
@@ -563,6 +607,10 @@ def _texts(name: str, value: Any, rows: int | None) -> list[str]:
         if isinstance(value, str) or not isinstance(value, Sequence):
             raise TypeError(f"{name}: expected a band such as (0.1, 3), or a list of frequencies, found {value!r}")
         return [",".join(number(name, one) for one in value)]
+    if name in ("range", "band"):
+        if not isinstance(value, (tuple, list)) or len(value) != 2:
+            raise TypeError(f"{name}: expected a lower and an upper end, found {value!r}")
+        return [f"{number(name, value[0])}..{number(name, value[1])}"]
     if name == "horizon":
         every = value if isinstance(value, (list, tuple)) else [value]
         return [",".join(str(integer(name, one)) for one in every)]
@@ -571,7 +619,7 @@ def _texts(name: str, value: Any, rows: int | None) -> list[str]:
         return [",".join(number(name, one) for one in every)]
     if name == "sample_time":
         return [number(name, seconds(name, value))]
-    if name in ("tolerance", "time_limit", "ridge", "noise_bound", "alpha", "width"):
+    if name in ("tolerance", "time_limit", "ridge", "noise_bound", "alpha", "width", "rms"):
         return [number(name, value)]
     return [text(name, value)]
 

@@ -1,6 +1,7 @@
 //! How rich an input is.
 
 use std::ops::Range;
+use std::slice;
 
 use rayon::prelude::*;
 use thetahat_core::nalgebra::DMatrix;
@@ -36,7 +37,7 @@ const ALIKE: f64 = 1e-6;
 /// thousandth of the amplitude of the strongest), above is all of a first-order process with a pole at 0.999 sampled as
 /// often as that. Nor is the order above the number of times that the input changes: each step of a
 /// step test is seen once, and to excite persistently is to do so over and over. O(N n + n^3).
-pub(super) fn excitation(
+pub(crate) fn excitation(
     name: &str,
     values: &[f64],
     segments: &[Range<usize>],
@@ -51,7 +52,7 @@ pub(super) fn excitation(
     let unit = unit(|| present().map(|value| scale * value)) / scale;
     Excitation {
         input: name.to_owned(),
-        order: rank(&deviations, segments, highest).min(changes),
+        order: rank(&deviations, segments, highest, Level::Removed).min(changes),
         highest,
         changes: changes as f64 / pairs().count().max(1) as f64,
         spectrum: spectrum::spectrum(&deviations, segments, unit, sample_time),
@@ -125,8 +126,34 @@ fn unit<I: Iterator<Item = f64>>(values: impl Fn() -> I) -> f64 {
     values().fold(0.0, |largest: f64, value| largest.max((value - mean).abs()))
 }
 
-/// The rank of the covariance of this many lags.
-fn rank(deviations: &[f64], segments: &[Range<usize>], lags: usize) -> usize {
+/// The order of persistence of excitation as textbooks count it, the mean being a part of the signal: a constant has order 1, a
+/// sinusoid 2, both together 3; and the highest order tried. Else as [`excitation`].
+///
+/// A mean above the largest deviation counts as if it were that: the order does not depend on how large it is, and beside a larger
+/// one the deviations would be rounding.
+pub(crate) fn order_with_mean(values: &[f64]) -> (usize, usize) {
+    let all = 0..values.len();
+    let segments = slice::from_ref(&all);
+    let highest = highest(segments);
+    let changes = values.windows(2).filter(|pair| pair[0] != pair[1]).count();
+    let scale = moments::scale(values.iter().copied());
+    let scaled = || values.iter().map(|value| scale * value);
+    let (mean, unit) = (moments::mean_of(scaled), unit(scaled));
+    let level = if unit > 0.0 { (mean / unit).clamp(-1.0, 1.0) } else { mean.abs().min(1.0) };
+    let signal: Vec<f64> =
+        moments::deviations(values, segments).iter().map(|deviation| deviation + level).collect();
+    (rank(&signal, segments, highest, Level::Kept).min(changes + 1), highest)
+}
+
+/// What the rank makes of the mean of each lag.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Level {
+    Removed,
+    Kept,
+}
+
+/// The rank of the matrix of products of this many lags.
+fn rank(deviations: &[f64], segments: &[Range<usize>], lags: usize, level: Level) -> usize {
     let ones = vec![1.0; deviations.len()];
     let taps = vec![
         Taps { signal: 0, first: 0, count: lags, sign: 1.0 },
@@ -138,10 +165,13 @@ fn rank(deviations: &[f64], segments: &[Range<usize>], lags: usize) -> usize {
         return 0;
     }
     let (products, _, _) = lagged.normal_equations();
-    let covariance = DMatrix::from_fn(lags, lags, |i, j| {
-        (products[(i, j)] - products[(i, lags)] * products[(j, lags)] / rows as f64) / rows as f64
+    let moments = DMatrix::from_fn(lags, lags, |i, j| match level {
+        Level::Removed => {
+            (products[(i, j)] - products[(i, lags)] * products[(j, lags)] / rows as f64) / rows as f64
+        }
+        Level::Kept => products[(i, j)] / rows as f64,
     });
-    let eigenvalues = covariance.symmetric_eigenvalues();
+    let eigenvalues = moments.symmetric_eigenvalues();
     let largest = eigenvalues.max();
     eigenvalues.iter().filter(|value| **value > TOLERANCE * largest).count()
 }

@@ -152,7 +152,7 @@ fn roles<'a>(
         }
         if roles.insert(name, role).is_some() {
             let message = format!("'{name}' is named twice; a channel has one role");
-            return Err(Error::argument("channels", message));
+            return Err(Error::argument("inputs", message));
         }
     }
     Ok(roles)

@@ -2,7 +2,6 @@
 
 use std::ops::Range;
 
-use oorandom::Rand64;
 use rayon::prelude::*;
 use thetahat_core::nalgebra::{DMatrix, DVector, SymmetricEigen};
 
@@ -10,6 +9,7 @@ use super::{InitialCondition, Response, check_inputs, simulate};
 use crate::Error;
 use crate::data::Record;
 use crate::model::PolynomialModel;
+use crate::random::Random;
 use crate::regression::{add_filtered, divide};
 
 /// The most draws.
@@ -157,31 +157,6 @@ impl Drawn {
     }
 }
 
-/// Gaussian numbers of variance 1 (Box and Muller 1958).
-struct Random(Rand64);
-
-impl Random {
-    /// A stream of its own for each draw.
-    fn of(seed: u64, number: u64) -> Self {
-        let high = mixed(seed);
-        Self(Rand64::new(u128::from(high) << 64 | u128::from(mixed(high ^ number))))
-    }
-
-    fn next(&mut self) -> f64 {
-        // 1 - u is above 0.
-        let radius = (-2.0 * (1.0 - self.0.rand_float()).ln()).sqrt();
-        radius * (std::f64::consts::TAU * self.0.rand_float()).cos()
-    }
-}
-
-/// All bits of a number in every bit (Steele, Lea and Flood 2014, SplitMix64).
-fn mixed(number: u64) -> u64 {
-    let mut bits = number.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    bits ^ (bits >> 31)
-}
-
 /// How the parameters of a model vary.
 struct Spread {
     /// R with P = R R'.
@@ -216,7 +191,7 @@ impl Spread {
     ) -> Result<(Option<PolynomialModel>, usize), Error> {
         let Some(root) = &self.root else { return Ok((None, 0)) };
         for unstable in 0..PATIENCE {
-            let normal = DVector::from_fn(root.ncols(), |_, _| random.next());
+            let normal = DVector::from_fn(root.ncols(), |_, _| random.normal());
             let moved = root * normal;
             let values: Vec<f64> = model
                 .parameters
@@ -256,7 +231,7 @@ fn noise(model: &PolynomialModel, samples: usize, start: InitialCondition, rando
     let before = if start == InitialCondition::Zero || slowest >= 1.0 { 0.0 } else { memory.min(LONGEST) };
     let before = before as usize;
     let deviation = model.noise_variance.sqrt();
-    let e: Vec<f64> = (0..before + samples).map(|_| deviation * random.next()).collect();
+    let e: Vec<f64> = (0..before + samples).map(|_| deviation * random.normal()).collect();
     let mut noise = vec![0.0; e.len()];
     add_filtered(&mut noise, &(0..e.len()), &model.c, &e, 0);
     divide(&model.d, &mut noise);

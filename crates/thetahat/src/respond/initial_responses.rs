@@ -10,7 +10,7 @@ pub(super) const UNSEEN: f64 = 1e-11;
 
 /// A response until it has died away, or is not finite any more, or has `length` samples. `compute` gives its
 /// first samples; `order` is how many of them determine all that follow.
-pub(super) fn until_negligible(length: usize, order: usize, compute: impl Fn(usize) -> Vec<f64>) -> Vec<f64> {
+pub(crate) fn until_negligible(length: usize, order: usize, compute: impl Fn(usize) -> Vec<f64>) -> Vec<f64> {
     let (mut known, mut largest) = (0, 0.0_f64);
     // In growing pieces: a series is cheap, but not for a million samples of nothing.
     let mut piece = 256.max(order.saturating_mul(4));

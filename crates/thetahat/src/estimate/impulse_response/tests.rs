@@ -21,7 +21,7 @@ fn sums(taps: [usize; 2]) -> (Mat<f64>, Vec<f64>, f64, usize) {
     let [y, u, v] = record(200, 0.3);
     let orders = Orders::arx(0, &taps, &[0, 0]).unwrap();
     let signals: Vec<&[f64]> = vec![&y, &u, &v];
-    let segments = [0..200];
+    let segments: Vec<_> = std::iter::once(0..200).collect();
     let lagged = Lagged::new(&signals, super::taps(&orders), &segments, crate::regression::Presample::Drop);
     let (found, cross, energy) = gram(&lagged);
     let size = cross.len();

@@ -1,0 +1,112 @@
+//! Test signals, and what they are worth, for people.
+
+use thetahat::design::{ExperimentDesign, SignalFigures, SignalPlan, SignalWorth, TestSignal};
+use thetahat::figures::{error, fixed, number, short, three};
+
+use super::ROUNDING;
+use super::text::{Text, columns, or_dash};
+
+/// The longest length that is thought of, in words.
+const TOO_LONG: &str = "not with a million samples, or not with this signal";
+
+/// What a signal is, in lines: the whole, then each channel.
+pub(crate) fn test_signal(
+    plan: &SignalPlan,
+    signal: &TestSignal,
+    names: &[String],
+    figures: &[SignalFigures],
+) -> Vec<String> {
+    let mut about = vec![format!("{}: {} samples", plan.waveform, plan.length)];
+    if let Some(period) = signal.period() {
+        about.push(format!("period {period}"));
+    }
+    let frequencies = signal.frequencies();
+    if let [first, .., last] = frequencies {
+        about.push(format!(
+            "{} frequencies from {} to {} rad/s",
+            frequencies.len(),
+            short(*first),
+            short(*last)
+        ));
+    }
+    let channel = |(name, figures): (&String, &SignalFigures)| {
+        let order = if figures.order == figures.highest { " or more" } else { "" };
+        // What is left of a mean of zero is rounding.
+        let mean = if figures.mean.abs() < ROUNDING * figures.rms { 0.0 } else { figures.mean };
+        let mut about = vec![
+            format!("mean {}", short(mean)),
+            format!("RMS {}", short(figures.rms)),
+            format!("crest factor {}", or_dash(figures.crest_factor, |crest| fixed(crest, 3))),
+            format!("order of persistent excitation {}{order}", figures.order),
+        ];
+        if let Some([low, high]) = figures.main_band() {
+            about.push(format!("90 % of its power from {} to {} rad/s", short(low), short(high)));
+        }
+        format!("{name}: {}", about.join(", "))
+    };
+    std::iter::once(about.join(", ")).chain(names.iter().zip(figures).map(channel)).collect()
+}
+
+/// The errors that signals would give, side by side, this many columns wide.
+pub fn experiment_design(found: &ExperimentDesign, width: usize) -> String {
+    let mut text = Text::new(width);
+    text.line(&format!(
+        "{}, sample time {} s: standard errors after {} samples",
+        found.model,
+        short(found.sample_time),
+        found.length
+    ));
+    text.line("");
+    let wanted = !found.wants.is_empty();
+    let mut names = vec!["signal", "RMS", "crest", "order"];
+    names.extend(found.figures.iter().map(|figure| figure.name.as_str()));
+    names.extend(wanted.then_some("samples needed"));
+    let none = if wanted { TOO_LONG } else { "the signal leaves it open" };
+    let mut table = columns(&names).none(none);
+    let mut row = |name: String, cells: Vec<String>, last: String| {
+        let cells = std::iter::once(name).chain(cells).chain(wanted.then_some(last));
+        table.row(cells);
+    };
+    let blank = || vec![String::new(); 3];
+    row(
+        "(value)".to_owned(),
+        blank().into_iter().chain(found.figures.iter().map(|figure| number(figure.value))).collect(),
+        String::new(),
+    );
+    if wanted {
+        let limit = |limit: Option<f64>| limit.map_or_else(String::new, error);
+        row(
+            "(wanted)".to_owned(),
+            blank().into_iter().chain(found.figures.iter().map(|figure| limit(figure.limit))).collect(),
+            String::new(),
+        );
+    }
+    for signal in &found.signals {
+        let mut cells = vec![
+            listed(&signal.rms, |rms| three(*rms)),
+            listed(&signal.crest_factor, |crest| or_dash(*crest, three)),
+            listed(&signal.order, usize::to_string),
+        ];
+        cells.extend((0..found.figures.len()).map(|figure| standard_error(found, signal, figure)));
+        row(signal.signal.clone(), cells, or_dash(signal.needed, |needed| needed.to_string()));
+    }
+    table.legend("*: the least of its column");
+    text.table(table);
+    text.finish()
+}
+
+/// A standard error, with a star where no signal has a smaller one.
+fn standard_error(found: &ExperimentDesign, signal: &SignalWorth, figure: usize) -> String {
+    let of = |signal: &SignalWorth| signal.standard_errors.get(figure).copied().flatten();
+    let least = found.signals.iter().filter_map(of).fold(f64::INFINITY, f64::min);
+    let star = if found.signals.len() > 1 && of(signal) == Some(least) { "*" } else { "" };
+    or_dash(of(signal), |value| format!("{}{star}", error(value)))
+}
+
+/// What all channels have once, else each of them.
+fn listed<T: PartialEq>(values: &[T], shown: impl Fn(&T) -> String) -> String {
+    match values {
+        [first, rest @ ..] if rest.iter().all(|value| value == first) => shown(first),
+        _ => values.iter().map(shown).collect::<Vec<_>>().join(" "),
+    }
+}

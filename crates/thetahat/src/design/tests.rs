@@ -1,0 +1,4 @@
+//! Signals as they have to be.
+
+mod signals;
+mod worth;

@@ -12,7 +12,8 @@
 //! let plan = SignalPlan { length: 1000, band: Some([0.1, 1.0]), ..SignalPlan::new(SignalKind::Multisine) };
 //! let values = TestSignal::new(&plan)?.values(plan.length);
 //! let figures = SignalFigures::of(&values[0], plan.sample_time);
-//! assert!(figures.crest_factor.unwrap() < 1.43 && figures.order == figures.highest);
+//! // 144 sinusoids below a third of half the sampling frequency: the slow ones look alike over a few samples.
+//! assert!(figures.crest_factor.unwrap() < 1.43 && figures.order > 15);
 //! # Ok::<(), thetahat::Error>(())
 //! ```
 

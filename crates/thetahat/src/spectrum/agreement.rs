@@ -48,9 +48,9 @@ impl MeasuredResponse {
     ///     random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
     ///     f64::from(random >> 16) / 32_768.0 - 1.0
     /// };
+    /// u.extend((1..2000).map(|_| next()));
     /// for t in 1..2000 {
     ///     y.push(0.8 * y[t - 1] + 0.5 * u[t - 1] + 0.1 * next());
-    ///     u.push(next());
     /// }
     /// let orders = Orders::arx(1, &[1], &[1])?;
     /// let estimate = arx(&Record::new(&y, vec![&u])?, &orders, Initial::Drop)?;

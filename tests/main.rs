@@ -29,6 +29,7 @@ mod interrupt;
 mod likelihood;
 mod names;
 mod nonlinear_arx;
+mod nonlinear_reference;
 mod output_files;
 mod pages;
 mod predict_simulate;

@@ -190,19 +190,20 @@ class Model(ReportedModel):
         """
         from thetahat._fit import EstimationWarning
 
-        of_log = isinstance(u, Log)
-        if not of_log and initial not in ("auto", "zero"):
-            raise ValueError(f"initial: inputs alone start from zero, not '{initial}'; give a Log to start from its output")
-        if clamp:
-            log, inputs = (handle("u", u), None) if of_log else (None, self._inputs_of(u))
-            values, kept = self._model.clamped_run(log, inputs, initial)
-            if kept:
-                message = f"{kept} values were kept within 1.1 times the range of the estimation rows"
-                warnings.warn(message, EstimationWarning, stacklevel=2)
-            return _beside(values)
         if isinstance(u, Log):
-            return self._predicted(u, None, initial)[0]
-        return _beside(self._model.simulate(self._inputs_of(u)))
+            if not clamp:
+                return self._predicted(u, None, initial)[0]
+            values, kept = self._model.clamped_run(handle("u", u), None, initial)
+        elif initial not in ("auto", "zero"):
+            raise ValueError(f"initial: inputs alone start from zero, not '{initial}'; give a Log to start from its output")
+        elif not clamp:
+            return _beside(self._model.simulate(self._inputs_of(u)))
+        else:
+            values, kept = self._model.clamped_run(None, self._inputs_of(u), initial)
+        if kept:
+            message = f"{kept} values were kept within 1.1 times the range of the estimation rows"
+            warnings.warn(message, EstimationWarning, stacklevel=2)
+        return _beside(values)
 
     def sample(
         self, u: _numbers.Columns | Log, draws: int = 100, *, seed: int = 0, initial: str = "auto"

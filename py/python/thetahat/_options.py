@@ -12,6 +12,7 @@ from statistics import NormalDist
 from typing import Any, Optional, TypedDict, Union
 
 import numpy as np
+from numpy.typing import NDArray
 
 from thetahat import _files
 
@@ -37,6 +38,9 @@ Resample = Union["tuple[Duration, str]", "tuple[Duration, str, str]"]
 
 Band = Union["tuple[float | None, float | None]", str]
 """The lower and the upper end in Hz, either of which may be None; or a text such as "0.1..5"."""
+
+Frequencies = Union["tuple[float, float]", Sequence[float], NDArray[np.float64]]
+"""A band in radians per second as a tuple of its ends, or a list of frequencies."""
 
 
 class FitOptions(TypedDict, total=False):
@@ -279,7 +283,7 @@ class SpectrumOptions(TypedDict, total=False):
     rows: Rows
     detrend: str
     method: str
-    frequencies: Union["tuple[float, float]", Sequence[float]]
+    frequencies: Frequencies
     points: int
     half_width: int
     lags: int

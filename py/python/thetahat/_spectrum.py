@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from thetahat import _numbers, _options, _thetahat
 from thetahat._evaluation import _Document
 from thetahat._log import Log, handle
-from thetahat._options import Rows, SpectrumOptions
+from thetahat._options import Frequencies, Rows, SpectrumOptions
 from thetahat._responses import FrequencyResponse
 
 Array = NDArray[np.float64]
@@ -165,7 +165,7 @@ def spectrum(
     log: Log,
     *,
     method: str | None = None,
-    frequencies: tuple[float, float] | Sequence[float] | None = None,
+    frequencies: Frequencies | None = None,
     points: int | None = None,
     half_width: int | None = None,
     lags: int | None = None,

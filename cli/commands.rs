@@ -11,6 +11,7 @@ mod grey_box;
 mod help;
 mod inspect;
 mod narx;
+mod process;
 mod respond;
 mod search;
 mod spectrum;

@@ -108,6 +108,20 @@ pub(crate) struct ModelArguments {
     /// What is known of an impulse response before the data (--model fir): that it decays and is smooth [default: dc]
     #[arg(long, value_enum, help_heading = "Model")]
     pub(crate) kernel: Option<KernelArgument>,
+    /// What a process in continuous time has (--model process): p, how many lags, then d for a dead time, z a zero, i an integrator, u
+    /// two lags that may be underdamped; or rc1, rc2, rc3 for lags side by side with a direct term, as batteries have them. One for
+    /// each input or one for all; the clock may be irregular
+    #[arg(
+        long,
+        value_name = "p1d|p2du|rc2|…[,…]",
+        value_delimiter = ',',
+        help_heading = "Model",
+        conflicts_with_all = [
+            "na", "nb", "nc", "nd", "nf", "nk", "taps", "kernel", "method", "likelihood", "focus", "constant", "detrend", "prefilter",
+            "path", "select", "seed", "CriterionArguments", "NarxArguments",
+        ]
+    )]
+    pub(crate) structure: Vec<String>,
     /// How to estimate
     #[arg(long, value_enum, default_value = "pem", help_heading = "Model")]
     pub(crate) method: MethodArgument,
@@ -142,7 +156,7 @@ pub(crate) struct NarxArguments {
         value_enum,
         value_name = "MAP",
         conflicts_with_all = [
-            "model", "na", "nb", "nc", "nd", "nf", "taps", "kernel", "method", "likelihood", "initial", "focus", "constant", "trend", "path", "search",
+            "model", "na", "nb", "nc", "nd", "nf", "taps", "kernel", "structure", "method", "likelihood", "initial", "focus", "constant", "trend", "path", "search",
             "max_iterations", "tolerance", "step", "starts", "norm", "bound", "dc_gain", "noise_bound", "prefilter", "time_limit",
         ]
     )]
@@ -310,6 +324,8 @@ pub(crate) enum ModelArgument {
     General,
     /// An impulse response: y = B u + e of many taps, with --taps
     Fir,
+    /// A process in continuous time: gain, lags, dead time, with --structure
+    Process,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -338,7 +354,7 @@ pub(crate) enum InitialArgument {
     Drop,
     /// Zeros
     Zero,
-    /// What was measured before, and what fits best, found with the parameters (models with F, or --likelihood exact with inputs)
+    /// What was measured before, and what fits best, found with the parameters (models with F, processes, or --likelihood exact with inputs)
     Estimate,
 }
 

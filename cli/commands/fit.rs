@@ -10,10 +10,10 @@ use thetahat::report::{
 
 use super::experiments::{Experiments, experiments};
 use super::search::{Identified, watched};
-use super::{grey_box, narx, summary};
+use super::{grey_box, narx, process, summary};
 use crate::args::{FitArguments, FormatArgument};
 use crate::failure::Failure;
-use crate::job::{FitJob, GreyBoxJob, NarxJob, check_linear};
+use crate::job::{FitJob, GreyBoxJob, NarxJob, ProcessJob, check_linear};
 use crate::log;
 use crate::messages::warn;
 use crate::output;
@@ -26,7 +26,10 @@ pub(crate) fn fit(arguments: &FitArguments, line: &str) -> Result<(), Failure> {
         Some(model) => grey_box::found(&GreyBoxJob::resolve(arguments, model)?)?,
         None => match arguments.narx.narx {
             Some(map) => narx::found(&NarxJob::resolve(arguments, map)?)?,
-            None => found(&FitJob::resolve(arguments)?, arguments.html.is_some())?,
+            None => match ProcessJob::resolve(arguments)? {
+                Some(job) => process::found(&job)?,
+                None => found(&FitJob::resolve(arguments)?, arguments.html.is_some())?,
+            },
         },
     };
     let json = report.to_json().map_err(|error| Failure::data(error.to_string()))?;

@@ -5,6 +5,7 @@ mod equations;
 mod filtered;
 mod inspection;
 mod nonlinear_arx;
+mod process;
 mod response;
 mod selection;
 mod text;
@@ -49,6 +50,7 @@ pub fn table(report: &Report, width: usize) -> String {
         Model::Polynomial(model) => model,
         Model::Equations(model) => return equations::table(report, model, width),
         Model::NonlinearArx(model) => return nonlinear_arx::table(report, model, width),
+        Model::Process(model) => return process::table(report, model, width),
     };
     let mut text = Text::new(width);
     selection::selection(&mut text, report);
@@ -172,7 +174,8 @@ fn estimation(text: &mut Text, estimation: &Estimation, model: &PolynomialModel)
         Procedure::InnovationsLikelihood(_)
         | Procedure::ForwardRegression(_)
         | Procedure::Splits(_)
-        | Procedure::Neighbours(_) => {}
+        | Procedure::Neighbours(_)
+        | Procedure::FreeRun(_) => {}
         Procedure::PredictionError(search) => {
             text.line(&format!(
                 "prediction error, {}, {}",

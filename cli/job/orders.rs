@@ -26,6 +26,7 @@ impl ModelArgument {
             Self::Bj => ("bj", &["--nb", "--nc", "--nd", "--nf"]),
             Self::General => ("general", &["--na", "--nb", "--nc", "--nd", "--nf"]),
             Self::Fir => ("fir", &["--taps"]),
+            Self::Process => ("process", &["--structure"]),
         }
     }
 
@@ -41,6 +42,9 @@ impl ModelArgument {
             Self::Fir => {
                 Err(Failure::usage("--model fir needs --taps, such as --taps 70: how long the response is"))
             }
+            Self::Process => Err(Failure::usage(
+                "--model process needs --structure, such as --structure p1d: a gain, a lag and a dead time",
+            )),
             Self::General => Err(Failure::usage(
                 "--model general needs orders: it is any of the others; give --na --nb --nc --nd --nf, or no --model for a choice \
                  among the others",

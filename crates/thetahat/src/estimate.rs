@@ -45,6 +45,7 @@ mod plant_first;
 mod polynomials;
 mod prediction_error;
 mod predictor;
+mod process;
 mod restart;
 mod robust;
 mod start;
@@ -80,6 +81,8 @@ pub use outcome::{SearchOutcome, StartOutcome};
 pub(crate) use plant_first::noise_order;
 pub(crate) use polynomials::extended;
 pub(crate) use prediction_error::drop_is_not_for_f;
+pub use process::ProcessOutcome;
+pub(crate) use process::{Background, ProcessEstimate, least_free_run};
 pub use robust::{Loss, Robust, RobustOutcome};
 pub(crate) use stretches::stretches;
 pub(crate) use uncertainty::{Autoregression, autoregression, backward_filtered_products};
@@ -129,6 +132,8 @@ pub enum Procedure {
     Splits(MapsOutcome),
     /// By the samples themselves.
     Neighbours(MapsOutcome),
+    /// By a search for the least errors of the free run of a process in continuous time.
+    FreeRun(ProcessOutcome),
 }
 
 impl Procedure {
@@ -435,7 +440,8 @@ impl Estimate {
             | Procedure::InnovationsLikelihood(_)
             | Procedure::ForwardRegression(_)
             | Procedure::Splits(_)
-            | Procedure::Neighbours(_) => None,
+            | Procedure::Neighbours(_)
+            | Procedure::FreeRun(_) => None,
             Procedure::InstrumentalVariables { .. } | Procedure::RefinedInstrumentalVariables { .. } => {
                 self.covariance
             }

@@ -27,6 +27,7 @@ mod kind;
 mod nonlinear_arx;
 mod orders;
 pub(crate) mod polynomial;
+mod process;
 mod quantity;
 mod state_space;
 
@@ -40,5 +41,7 @@ pub(crate) use nonlinear_arx::Evaluator;
 pub use nonlinear_arx::{Functions, Map, Membership, NonlinearArxModel, OutputMap, Regressor};
 pub(crate) use orders::LARGEST;
 pub use orders::{Orders, Structure};
+pub(crate) use process::{Chain, Columns, Parts, State, Transition};
+pub use process::{ProcessModel, ProcessStructure};
 pub use quantity::{Interval, Quantity, Root};
 pub use state_space::StateSpace;

@@ -11,6 +11,7 @@ mod lagged;
 mod monomials;
 mod qr;
 mod solve;
+mod span;
 
 #[cfg(test)]
 pub(crate) mod noise;
@@ -26,3 +27,4 @@ pub(crate) use monomials::{Moments, Monomials};
 pub(crate) use qr::factor_rows;
 pub use solve::Solver;
 pub(crate) use solve::{Regression, SAFE_NORMS, Unsolved, condition};
+pub(crate) use span::Span;

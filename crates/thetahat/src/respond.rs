@@ -43,6 +43,7 @@ mod nis;
 pub(crate) mod nonlinear_arx;
 mod on_log;
 mod predict;
+pub(crate) mod process;
 mod response;
 mod sensitivities;
 mod simulate;

@@ -9,6 +9,8 @@ mod design;
 mod grey_box;
 #[path = "monte_carlo/intervals.rs"]
 mod intervals;
+#[path = "monte_carlo/process.rs"]
+mod process;
 #[path = "monte_carlo/simulated.rs"]
 mod simulated;
 

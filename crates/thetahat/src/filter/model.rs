@@ -79,6 +79,10 @@ impl StateModel {
                 "a model in equations says itself where its states start; leave it out, or change its text",
             )),
             Model::Equations(model) => Ok(model.with_values()?.into()),
+            Model::Process(model) => {
+                let start = start.unwrap_or(InitialState::Unknown);
+                Ok(Self { kind: Kind::Linear(Box::new(Linear::of_model(&model.linear()?, start)?)) })
+            }
             Model::NonlinearArx(_) => Err(Error::argument(
                 "model",
                 "a nonlinear ARX model has no state to filter: it predicts, simulates, validates and compares",

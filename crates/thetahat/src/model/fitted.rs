@@ -48,7 +48,7 @@ pub struct OffsetCovariance {
 
 impl OffsetCovariance {
     /// How many numbers there are beside the parameters.
-    fn count(&self) -> usize {
+    pub(super) fn count(&self) -> usize {
         1 + usize::from(self.middle.is_some())
     }
 }

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::equations::EquationsModel;
 use super::fitted::{Parameter, PolynomialModel, Signal};
 use super::nonlinear_arx::NonlinearArxModel;
+use super::process::ProcessModel;
 use crate::Error;
 
 /// An estimated model of any kind.
@@ -23,11 +24,19 @@ pub enum Model {
     Equations(EquationsModel),
     /// y = g(past outputs and inputs) + e.
     NonlinearArx(Box<NonlinearArxModel>),
+    /// Gain, lags and dead time in continuous time.
+    Process(Box<ProcessModel>),
 }
 
 impl From<NonlinearArxModel> for Model {
     fn from(model: NonlinearArxModel) -> Self {
         Self::NonlinearArx(Box::new(model))
+    }
+}
+
+impl From<ProcessModel> for Model {
+    fn from(model: ProcessModel) -> Self {
+        Self::Process(Box::new(model))
     }
 }
 
@@ -50,6 +59,7 @@ impl Model {
             Self::Polynomial(model) => &model.inputs,
             Self::Equations(model) => &model.inputs,
             Self::NonlinearArx(model) => &model.inputs,
+            Self::Process(model) => &model.inputs,
         }
     }
 
@@ -59,6 +69,7 @@ impl Model {
             Self::Polynomial(model) => std::slice::from_ref(&model.output),
             Self::Equations(model) => &model.outputs,
             Self::NonlinearArx(model) => &model.outputs,
+            Self::Process(model) => std::slice::from_ref(&model.output),
         }
     }
 
@@ -73,6 +84,7 @@ impl Model {
             Self::Polynomial(model) => model.sample_time,
             Self::Equations(model) => model.sample_time,
             Self::NonlinearArx(model) => model.sample_time,
+            Self::Process(model) => model.sample_time,
         }
     }
 
@@ -82,6 +94,7 @@ impl Model {
             Self::Polynomial(model) => &model.parameters,
             Self::Equations(model) => &model.parameters,
             Self::NonlinearArx(model) => &model.parameters,
+            Self::Process(model) => &model.parameters,
         }
     }
 
@@ -91,6 +104,7 @@ impl Model {
             Self::Polynomial(model) => model.covariance.as_deref(),
             Self::Equations(model) => model.covariance.as_deref(),
             Self::NonlinearArx(model) => model.covariance.as_deref(),
+            Self::Process(model) => model.covariance.as_deref(),
         }
     }
 
@@ -100,12 +114,13 @@ impl Model {
             Self::Polynomial(model) => model.orders.nb.iter().any(|&nb| nb > 0),
             Self::Equations(model) => !model.inputs.is_empty(),
             Self::NonlinearArx(model) => model.is_driven(),
+            Self::Process(_) => true,
         }
     }
 
     /// Whether it takes logs whose clock is irregular.
     pub fn takes_any_clock(&self) -> bool {
-        matches!(self, Self::Equations(_))
+        matches!(self, Self::Equations(_) | Self::Process(_))
     }
 
     /// What it is called: structure and orders, such as ARX(2, 2, 1), or how many states the equations have.
@@ -117,6 +132,7 @@ impl Model {
                 format!("equations, {count} state{}", if count == 1 { "" } else { "s" })
             }
             Self::NonlinearArx(model) => model.name(),
+            Self::Process(model) => model.name(),
         }
     }
 
@@ -135,11 +151,18 @@ impl Model {
                 ),
             )),
             Self::NonlinearArx(model) => Err(model.is_not_linear(what)),
+            Self::Process(_) => Err(Error::argument(
+                "model",
+                format!(
+                    "{what} is of polynomial models, and this one is a process in continuous time: it predicts, simulates, validates, \
+                     compares and responds to steps and sines"
+                ),
+            )),
         }
     }
 
     /// What the model is from its inputs to each of its outputs, as polynomials: those of its own, or the transfer functions of linear
-    /// equations, of which the noise is not told.
+    /// equations, of which the noise is not told, and of processes whose inputs are held from sample to sample.
     ///
     /// # Errors
     /// [`Error::Argument`] if it is not linear, with what it can do instead; `what` needs it to be.
@@ -148,6 +171,7 @@ impl Model {
             Self::Polynomial(model) => Ok(vec![Cow::Borrowed(&**model)]),
             Self::Equations(model) => Ok(model.linear(what)?.into_iter().map(Cow::Owned).collect()),
             Self::NonlinearArx(model) => Err(model.is_not_linear(what)),
+            Self::Process(model) => Ok(vec![Cow::Owned(model.linear()?)]),
         }
     }
 
@@ -157,6 +181,7 @@ impl Model {
             Self::Polynomial(model) => model.check(),
             Self::Equations(model) => model.check(),
             Self::NonlinearArx(model) => model.check(),
+            Self::Process(model) => model.check(),
         }
     }
 }

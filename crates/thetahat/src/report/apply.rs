@@ -5,7 +5,7 @@ use super::schema::Report;
 use super::suited::{check_offsets, check_sample_time};
 use crate::Error;
 use crate::data::{Detrend, Log, Offset, Rows, checked};
-use crate::model::{Model, PolynomialModel};
+use crate::model::{Model, PolynomialModel, ProcessModel};
 use crate::respond::{Horizon, InitialCondition, Response};
 use crate::validate::Fit;
 
@@ -165,6 +165,9 @@ pub(super) fn of_offsets(model: &Model, detrend: Option<Detrend>) -> Cow<'_, Mod
     match (model, detrend) {
         (Model::Polynomial(model), Some(_)) => {
             Cow::Owned(PolynomialModel { offset_covariance: None, ..(**model).clone() }.into())
+        }
+        (Model::Process(model), Some(_)) => {
+            Cow::Owned(ProcessModel { offset_covariance: None, ..(**model).clone() }.into())
         }
         _ => Cow::Borrowed(model),
     }

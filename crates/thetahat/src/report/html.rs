@@ -24,7 +24,7 @@ use crate::Error;
 use crate::data::{Rows, Source};
 use crate::figures::{self, fixed};
 use crate::inspect::Inspection;
-use crate::model::{EquationsModel, Map, Model, NonlinearArxModel, PolynomialModel};
+use crate::model::{EquationsModel, Map, Model, NonlinearArxModel, PolynomialModel, ProcessModel};
 use crate::validate::{Fit, Part, Residuals};
 
 /// The channels of a log of very many that are on its page.
@@ -288,7 +288,7 @@ fn of(logs: &[Source]) -> String {
 fn headline(model: &Model) -> String {
     match model {
         Model::Polynomial(model) => format!("{}: {}", model.orders, model.orders.equation()),
-        Model::Equations(_) | Model::NonlinearArx(_) => model.name(),
+        Model::Equations(_) | Model::NonlinearArx(_) | Model::Process(_) => model.name(),
     }
 }
 
@@ -433,6 +433,7 @@ fn of_model(report: &Report) -> Vec<Section> {
         Model::Polynomial(model) => model,
         Model::Equations(model) => return of_equations(report, model),
         Model::NonlinearArx(model) => return of_nonlinear_arx(report, model),
+        Model::Process(model) => return of_process(report, model),
     };
     let inputs: Vec<&str> = model.inputs.iter().map(|input| input.name.as_str()).collect();
     let mut sections = responses(&[("estimate".to_owned(), model)], &inputs, true);
@@ -473,6 +474,20 @@ fn of_nonlinear_arx(report: &Report, model: &NonlinearArxModel) -> Vec<Section> 
     section.table(tables::regressors(model));
     let noise = if let [only] = &*model.noise_covariance { only.first().copied() } else { None };
     section.table(tables::estimation(&report.estimation, noise));
+    sections.push(section);
+    sections
+}
+
+fn of_process(report: &Report, model: &ProcessModel) -> Vec<Section> {
+    let linear = report.model.linear("a response").unwrap_or_default();
+    let named: Vec<(String, &PolynomialModel)> =
+        linear.iter().map(|model| ("estimate".to_owned(), &**model)).collect();
+    let inputs: Vec<&str> = model.inputs.iter().map(|input| input.name.as_str()).collect();
+    let mut sections = responses(&named, &inputs, false);
+    let mut section = Section::new("Model");
+    section.table(tables::process_parameters(report, model));
+    linear.iter().for_each(|linear| section.table(tables::signals(linear)));
+    section.table(tables::estimation(&report.estimation, Some(model.noise_variance)));
     sections.push(section);
     sections
 }

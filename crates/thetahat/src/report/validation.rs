@@ -199,6 +199,7 @@ pub fn validate(
 
     let polynomial = if let Model::Polynomial(model) = model { Some(model) } else { None };
     let white_expected = polynomial.is_none_or(|model| model.structure != Structure::Oe)
+        && !matches!(model, Model::Process(_))
         && !matches!(
             report.estimation.procedure,
             Procedure::InstrumentalVariables { .. } | Procedure::RefinedInstrumentalVariables { .. }
@@ -383,6 +384,7 @@ fn test_residuals(report: &Report, on_log: &dyn OnLog, plan: &ValidationPlan, va
     let relation = match (validation.in_sample, &report.estimation.procedure) {
         // The parameters of equations are none of the noise; those of functions are not of the model that the tests know.
         (InSample::No, _) | (_, Procedure::InnovationsLikelihood(_)) => Relation::Fresh,
+        (_, Procedure::FreeRun(_)) => Relation::Fresh,
         (_, procedure) if !procedure.terms().is_empty() => Relation::Fresh,
         (_, Procedure::InstrumentalVariables { .. }) => Relation::Instrumental,
         _ => Relation::Fitted,

@@ -12,7 +12,9 @@ use super::text::{complex, or_dash, quantity, rows};
 use crate::data::{Rows, Source};
 use crate::estimate::{Criteria, InformationCriterion, Procedure, TermsOutcome};
 use crate::figures::{chance, fixed, number, scientific, short, three};
-use crate::model::{EquationsModel, NonlinearArxModel, Orders, Parameter, PolynomialModel, Root};
+use crate::model::{
+    EquationsModel, NonlinearArxModel, Orders, Parameter, PolynomialModel, ProcessModel, Root,
+};
 use crate::optimize::Stopped;
 use crate::report::{Estimation, InSample, Report, Validated};
 use crate::respond::InitialCondition;
@@ -150,6 +152,26 @@ pub(super) fn signals(model: &PolynomialModel) -> Table {
     table
 }
 
+/// The parameters of a process, and how certain they would be if its errors were white.
+pub(super) fn process_parameters(report: &Report, model: &ProcessModel) -> Table {
+    let head = ["parameter", "value", "unit", "standard error", "if errors were white"];
+    let mut table = Table::new("Parameters", &head);
+    let Procedure::FreeRun(outcome) = &report.estimation.procedure else { return table };
+    let units = model.structures.iter().zip(model.of_inputs());
+    let units =
+        units.flat_map(|(structure, own)| own.iter().map(|parameter| structure.unit(&parameter.name)));
+    for ((parameter, white), unit) in model.parameters.iter().zip(&outcome.white_standard_errors).zip(units) {
+        table.row([
+            parameter.name.clone(),
+            number(parameter.value),
+            unit.to_owned(),
+            or_dash(parameter.standard_error, three),
+            or_dash(*white, three),
+        ]);
+    }
+    table
+}
+
 /// The parameters of a model in equations, and what was known of them before.
 pub(super) fn unknown_parameters(report: &Report, model: &EquationsModel) -> Table {
     let head = ["parameter", "value", "standard error", "start", "min", "max", "change of variable"];
@@ -266,6 +288,12 @@ fn procedure(procedure: &Procedure) -> String {
             let (looked_at, by) = (map.path.len(), &map.selected_by);
             format!("local models by splits, {looked_at} looked at, their number by {by}")
         }),
+        Procedure::FreeRun(outcome) => format!(
+            "least errors of the free run, iterations: {}, {}; errors of the colour of an autoregression of order {}",
+            outcome.iterations,
+            stopped(&outcome.stopped),
+            outcome.noise_order
+        ),
         Procedure::Neighbours(outcome) => each(&outcome.maps, |map| {
             let (kept, by) = (map.candidates, &map.selected_by);
             format!("{kept} samples kept, the number of neighbours by {by}")

@@ -1,0 +1,77 @@
+//! What a fit of a process found, as a table for people.
+
+use thetahat::estimate::Procedure;
+use thetahat::figures::{error, number, scientific, short};
+use thetahat::model::ProcessModel;
+use thetahat::report::Report;
+use thetahat::text::harmless;
+
+use super::text::{Text, columns, or_dash};
+use super::{NO_ERROR, counted, criteria, fits, quantity, signal, stopped};
+
+/// The main figures of a fit of a process.
+pub(super) fn table(report: &Report, model: &ProcessModel, width: usize) -> String {
+    let mut text = Text::new(width);
+    text.line(&format!("{}, sample time {} s", report.model.name(), short(model.sample_time)));
+    let formulas: Vec<String> = model.structures.iter().map(|structure| structure.equation()).collect();
+    for (formula, input) in formulas.iter().zip(&model.inputs) {
+        text.line(&format!("G = {formula} from {}", harmless(&input.name)));
+    }
+    let signals = model.inputs.iter().map(|input| signal("input", input));
+    let signals: Vec<String> = signals.chain([signal("output", &model.output)]).collect();
+    text.line(&signals.join(", "));
+    text.line("");
+    let Procedure::FreeRun(outcome) = &report.estimation.procedure else { return text.finish() };
+    let head = ["parameter", "value", "unit", "standard error", "if errors were white"];
+    let mut parameters = columns(&head).words(&[2]).none(NO_ERROR);
+    let units = model.structures.iter().zip(model.of_inputs());
+    let units =
+        units.flat_map(|(structure, own)| own.iter().map(|parameter| structure.unit(&parameter.name)));
+    for ((parameter, white), unit) in model.parameters.iter().zip(&outcome.white_standard_errors).zip(units) {
+        parameters.row([
+            parameter.name.clone(),
+            number(parameter.value),
+            unit.to_owned(),
+            or_dash(parameter.standard_error, error),
+            or_dash(*white, error),
+        ]);
+    }
+    text.table(parameters);
+    let estimation = &report.estimation;
+    text.line(&format!(
+        "{} samples, noise variance {}, condition number {}",
+        estimation.samples,
+        number(model.noise_variance),
+        or_dash(estimation.condition, |condition| scientific(condition, 3))
+    ));
+    if let Some(level) = estimation.level {
+        let slope = estimation.slope.map_or_else(String::new, |slope| {
+            format!(" in the middle of the rows, slope {} a second", quantity(slope))
+        });
+        text.line(&format!(
+            "level of {} estimated with them: {}{slope}",
+            harmless(&model.output.name),
+            quantity(level)
+        ));
+    }
+    text.line(&criteria(&estimation.criteria));
+    let start = match outcome.initial_conditions {
+        0 => "logs begin at rest".to_owned(),
+        1 => "1 initial condition estimated".to_owned(),
+        count => format!("{count} initial conditions estimated"),
+    };
+    text.line(&format!(
+        "least errors of the free run, {}, {}, {start}",
+        counted(outcome.iterations),
+        stopped(outcome.stopped)
+    ));
+    text.line(&match outcome.noise_order {
+        0 => "standard errors of white errors, which the residuals are".to_owned(),
+        order => format!(
+            "standard errors of errors with the colour of the residuals, an autoregression of order {order}"
+        ),
+    });
+    text.line("");
+    fits(&mut text, &report.fit);
+    text.finish()
+}

@@ -1,0 +1,85 @@
+use std::path::{Path, PathBuf};
+
+use thetahat::model::ProcessStructure;
+use thetahat::report::ProcessPlan;
+
+use super::fit::named_values;
+use super::{LogJob, parsed, rows, search};
+use crate::args::{FitArguments, InitialArgument, ModelArgument, Names};
+use crate::failure::Failure;
+use crate::memory::PerValue;
+
+/// A process in continuous time to fit.
+#[derive(Debug)]
+pub(crate) struct ProcessJob {
+    /// The logs, at least one.
+    pub(crate) paths: Vec<PathBuf>,
+    /// How all of them are read.
+    pub(crate) log: LogJob,
+    /// Named inputs; none: those called u, u1, u2, …
+    pub(crate) inputs: Option<Vec<String>>,
+    /// The named outputs, one at most; none: y.
+    pub(crate) outputs: Vec<String>,
+    /// The rest of the plan: channels are open.
+    plan: ProcessPlan,
+}
+
+impl ProcessJob {
+    /// The job, if a process is asked for.
+    pub(crate) fn resolve(arguments: &FitArguments) -> Result<Option<Self>, Failure> {
+        let own = &arguments.model;
+        if own.structure.is_empty() {
+            return Ok(None);
+        }
+        if own.model.is_some_and(|model| model != ModelArgument::Process) {
+            return Err(Failure::usage("--structure is of --model process; leave one of the two out"));
+        }
+        let structures = own
+            .structure
+            .iter()
+            .map(|text| parsed::<ProcessStructure>("--structure", text))
+            .collect::<Result<Vec<_>, _>>()?;
+        let outputs = Names::all(&arguments.output).unwrap_or_default();
+        if outputs.len() > 1 {
+            return Err(Failure::usage("--output: a process has one output; fit one after the other"));
+        }
+        let free_start = match own.initial {
+            InitialArgument::Auto | InitialArgument::Zero => false,
+            InitialArgument::Estimate => true,
+            InitialArgument::Drop => {
+                return Err(Failure::usage(
+                    "--initial drop is for models of past outputs; a process starts from zero, which is at rest, or estimate",
+                ));
+            }
+        };
+        if arguments.logs.iter().filter(|path| *path == Path::new("-")).count() > 1 {
+            return Err(Failure::usage("only one of the logs can come from standard input (-)"));
+        }
+        let plan = ProcessPlan {
+            inputs: Vec::new(),
+            output: String::new(),
+            structures,
+            estimate: rows("--estimate", &arguments.estimate)?,
+            validate: rows("--validate", &arguments.validate)?,
+            split: arguments.choice.split.as_deref().map(|text| parsed("--split", text)).transpose()?,
+            offsets: named_values("--offset", &arguments.offset)?,
+            trend: own.trend,
+            free_start,
+            search: search::search(&arguments.search)?,
+        };
+        Ok(Some(Self {
+            paths: arguments.logs.clone(),
+            log: LogJob { per_value: PerValue::Search, ..LogJob::resolve(&arguments.log, &arguments.clock)? },
+            inputs: Names::all(&arguments.input),
+            outputs,
+            plan,
+        }))
+    }
+
+    /// The plan for the channels of a log.
+    pub(crate) fn plan(&self, inputs: Vec<String>, output: String) -> Result<ProcessPlan, Failure> {
+        let plan = ProcessPlan { inputs, output, ..self.plan.clone() };
+        plan.check().map_err(|error| Failure::option(&error))?;
+        Ok(plan)
+    }
+}

@@ -1,0 +1,270 @@
+//! Processes in continuous time: the least errors of a free run.
+//!
+//! ```text
+//! min over shape, theta, weights of sum e(t)^2,   e = y - sum_j w_j'c_j(t; shape_j, theta_j) - level - slope (t - t_m) - free response
+//! ```
+//!
+//! Gains, level, slope and the free response enter linearly and are least squares for each shape and dead time: variable projection
+//! (Golub and Pereyra 1973), with Kaufman's derivative (1975), psi less its part in the span of these columns. The search moves the logarithms of
+//! time constants, and the dead times. It starts from the best of a grid with one lag, and adds lags one by one.
+//!
+//! Residuals of a plant that nobody drives by noise alone have a colour, and there the covariance of white noise is far too small. It is that
+//! of errors e = v/A(q), A an autoregression of the residuals (see `uncertainty`).
+
+mod objective;
+mod starts;
+#[cfg(test)]
+mod tests;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use thetahat_core::nalgebra::DMatrix;
+
+use super::prediction_error::backward_products;
+use super::uncertainty::{Autoregression, coloured, restricted};
+use crate::Error;
+use crate::model::{Parts, ProcessStructure, is_covariance};
+use crate::optimize::{Algorithm, Deadline, Found, Monitor, Search, Step, Stopped};
+use crate::regression::{Span, condition, sum_of_squares};
+use crate::respond::process::HeldLog;
+pub(crate) use objective::Background;
+use objective::ProcessObjective;
+
+/// How a process was found: by the least errors of its free run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ProcessOutcome {
+    /// The standard errors of the parameters if the errors were white, in their order: those of the model are for errors of any colour.
+    pub white_standard_errors: Vec<Option<f64>>,
+    /// The order of the autoregression that the colour of the errors was taken from.
+    pub noise_order: usize,
+    /// Free responses that were estimated, of logs that do not begin at rest.
+    pub initial_conditions: usize,
+    /// How steps were chosen.
+    pub algorithm: Algorithm,
+    /// The step length of steepest descent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub step: Option<Step>,
+    /// The relative decrease of the cost at which to stop.
+    pub tolerance: f64,
+    /// Iterations allowed, for each start.
+    pub max_iterations: usize,
+    /// Iterations done, from the start that won.
+    pub iterations: usize,
+    /// The mean of e^2 at that start and after each iteration.
+    pub costs: Vec<f64>,
+    /// Why it stopped.
+    pub stopped: Stopped,
+}
+
+/// What was found.
+#[derive(Debug, Clone)]
+pub(crate) struct ProcessEstimate {
+    /// The parameters of all inputs, one after the other.
+    pub(crate) parameters: Vec<f64>,
+    /// The level at the middle of the rows, and the slope, as far as they were estimated.
+    pub(crate) level: Option<f64>,
+    pub(crate) slope: Option<f64>,
+    pub(crate) middle: f64,
+    /// Of the parameters, the level and the slope.
+    pub(crate) covariance: Option<Vec<Vec<f64>>>,
+    pub(crate) noise_variance: f64,
+    /// N, and the unknowns that are estimated.
+    pub(crate) samples: usize,
+    pub(crate) unknowns: usize,
+    pub(crate) mse: f64,
+    pub(crate) condition: Option<f64>,
+    pub(crate) outcome: ProcessOutcome,
+}
+
+/// Fits processes from held inputs, which are deviations, to an output; `output` and `held` are of the same whole log.
+///
+/// # Errors
+/// [`Error::Undetermined`] if there are too few samples, or they do not determine a parameter; [`Error::Data`] if squares leave the
+/// range of numbers; [`Error::Interrupted`] if the monitor says so.
+pub(crate) fn least_free_run(
+    structures: &[ProcessStructure],
+    names: &[String],
+    (held, output): (&[HeldLog], &[f64]),
+    background: Background,
+    options: &Search,
+    monitor: Monitor<'_>,
+) -> Result<ProcessEstimate, Error> {
+    options.check_numbers()?;
+    let mut objective = ProcessObjective::new(structures.to_vec(), held, output, background)?;
+    let samples = objective.outputs().len();
+    let unknowns = names.len() + background.columns(held, structures);
+    if samples <= unknowns {
+        let message = format!(
+            "{unknowns} unknowns need more than {samples} measured values; give a longer log, or a simpler structure"
+        );
+        return Err(Error::undetermined(names.to_vec(), message));
+    }
+    if !sum_of_squares(objective.outputs()).is_finite() {
+        return Err(Error::data("squares of the output leave the range of numbers; scale it towards one"));
+    }
+    let deadline = Deadline::after(options.time_limit);
+    let found = starts::searched(&mut objective, structures, options, deadline, monitor)?;
+    let parts = objective.parts().to_vec();
+    let parameters: Vec<f64> =
+        structures.iter().zip(&parts).flat_map(|(structure, parts)| structure.put_together(parts)).collect();
+    if let Some((name, value)) = names.iter().zip(&parameters).find(|(_, value)| !value.is_finite()) {
+        return Err(Error::undetermined(
+            vec![name.clone()],
+            format!("{name} comes to {value}: the log does not determine it; take a simpler structure"),
+        ));
+    }
+    let squares = sum_of_squares(objective.residuals());
+    let (level, slope) = objective.level();
+    let Uncertainty { covariance, white, colour, condition } =
+        uncertainty(&objective, structures, names, &parts, unknowns, squares)?;
+    let noise_variance = squares / (samples - unknowns) as f64;
+    if !noise_variance.is_finite() {
+        return Err(Error::data("the noise variance overflows; scale the output towards one"));
+    }
+    Ok(ProcessEstimate {
+        parameters,
+        level,
+        slope,
+        middle: objective.middle(),
+        covariance,
+        noise_variance,
+        samples,
+        unknowns,
+        mse: squares / samples as f64,
+        condition,
+        outcome: outcome(options, &found, white, colour.order(), background.free(held, structures), samples),
+    })
+}
+
+fn outcome(
+    options: &Search,
+    found: &Found,
+    white: Vec<Option<f64>>,
+    noise_order: usize,
+    initial_conditions: usize,
+    samples: usize,
+) -> ProcessOutcome {
+    ProcessOutcome {
+        white_standard_errors: white,
+        noise_order,
+        initial_conditions,
+        algorithm: options.algorithm,
+        step: (options.algorithm == Algorithm::Gradient).then_some(options.step),
+        tolerance: options.tolerance,
+        max_iterations: options.max_iterations,
+        iterations: found.costs.len() - 1,
+        costs: found.costs.iter().map(|cost| cost / samples as f64).collect(),
+        stopped: found.stopped,
+    }
+}
+
+/// Where the dead times of outputs that jump with their input stand among the parameters, and which input it is.
+fn jumping_dead_times(structures: &[ProcessStructure]) -> Vec<(usize, usize)> {
+    let mut end = 0;
+    let places = structures.iter().enumerate().filter_map(|(input, structure)| {
+        end += structure.parameters();
+        // It is the last one.
+        (structure.acts_at_once() && structure.has_dead_time()).then_some((end - 1, input))
+    });
+    places.collect()
+}
+
+struct Uncertainty {
+    covariance: Option<Vec<Vec<f64>>>,
+    white: Vec<Option<f64>>,
+    colour: Autoregression,
+    condition: Option<f64>,
+}
+
+/// The covariance of the parameters, the level and the slope, the free responses taken out.
+fn uncertainty(
+    objective: &ProcessObjective<'_>,
+    structures: &[ProcessStructure],
+    names: &[String],
+    parts: &[Parts<f64>],
+    unknowns: usize,
+    squares: f64,
+) -> Result<Uncertainty, Error> {
+    let psi = objective.slopes(structures, parts);
+    let kept = names.len() + objective.background().offsets();
+    // The columns of unit norm, those of the free responses first: what follows is what they leave. Last the dead times of outputs that
+    // jump, which others may stand for: see `past_jumps`.
+    let norms: Vec<f64> = psi.iter().map(|column| sum_of_squares(column).sqrt()).collect();
+    let jumping = jumping_dead_times(structures);
+    let first =
+        (kept..psi.len()).chain((0..kept).filter(|place| !jumping.iter().any(|(own, _)| own == place)));
+    let order: Vec<usize> = first.chain(jumping.iter().map(|(place, _)| *place)).collect();
+    let mut span = Span::default();
+    let mut used = Vec::new();
+    let mut open = Vec::new();
+    for (number, &place) in order.iter().enumerate() {
+        let unit: Vec<f64> = psi[place].iter().map(|value| value / norms[place]).collect();
+        let has = span.take_from(&mut unit.clone());
+        if span.add(unit) {
+            used.push(place);
+        } else if let Some((_, input)) = jumping.iter().find(|(own, _)| *own == place) {
+            // Moved by one second, it is made up for by so much of the others.
+            let mut moves = vec![0.0; kept];
+            let weights = span.weights(&has);
+            for (own, weight) in order[..number].iter().zip(weights).filter(|(own, _)| **own < kept) {
+                moves[*own] = -weight * norms[place] / norms[*own];
+            }
+            moves[place] = 1.0;
+            let [low, high] = objective.gap(*input, parts[*input].dead_time);
+            // As if it could be anywhere in between.
+            open.push((moves, (high - low).powi(2) / 12.0));
+        } else if let Some(name) = names.get(place) {
+            let nothing = 2.0 * objective.least_time_constant();
+            let vanished = parts.iter().any(|parts| parts.shape.iter().any(|value| *value < nothing));
+            let advice = if vanished {
+                "a time constant comes to nothing beside the samples; take one lag less"
+            } else {
+                "other values explain it as well; take a simpler structure, or a log in which the input moves more"
+            };
+            return Err(Error::undetermined(
+                vec![name.clone()],
+                format!("the log does not determine {name}: {advice}"),
+            ));
+        }
+    }
+    let triangle = span.triangle();
+    let condition = condition(&triangle, objective.outputs().len());
+    let size = used.len();
+    let samples = objective.outputs().len();
+    let variance = squares / (samples - unknowns) as f64;
+    let root = triangle.solve_upper_triangular(&DMatrix::identity(size, size)).map(|mut root| {
+        root.row_iter_mut().zip(&used).for_each(|(mut row, place)| row /= norms[*place]);
+        root
+    });
+    let (residuals, columns, segments) = objective.by_segments(&psi, &used);
+    let whole: Vec<usize> = (0..size).collect();
+    let stacked =
+        || whole.iter().map(|column| columns.iter().flat_map(|own| own[*column].clone()).collect()).collect();
+    let colour = restricted(&residuals, stacked, &segments, unknowns);
+    let Some(root) = root else {
+        return Ok(Uncertainty { covariance: None, white: vec![None; names.len()], colour, condition });
+    };
+    let plain = &root * root.transpose() * variance;
+    let products = backward_products(&columns, &colour.monic);
+    let inverse = &root * root.transpose();
+    let spread = coloured(&inverse, colour.variance * colour.inflation(samples, unknowns), &products);
+    let place = |index: usize| used.iter().position(|own| *own == index);
+    // What is open of a jumping dead time alone is in `open`.
+    let is_open = |index: usize| {
+        open.iter().any(|(moves, _): &(Vec<f64>, f64)| place(index).is_none() && moves[index] != 0.0)
+    };
+    let entry = |matrix: &DMatrix<f64>, i: usize, j: usize| {
+        let own = match (place(i), place(j)) {
+            (Some(i), Some(j)) => matrix[(i, j)],
+            (None, _) if is_open(i) => 0.0,
+            (_, None) if is_open(j) => 0.0,
+            _ => return None,
+        };
+        let further = open.iter().map(|(moves, variance)| variance * moves[i] * moves[j]);
+        Some(own + further.sum::<f64>())
+    };
+    let rows: Option<Vec<Vec<f64>>> =
+        (0..kept).map(|i| (0..kept).map(|j| entry(&spread, i, j)).collect()).collect();
+    let white = (0..names.len()).map(|i| entry(&plain, i, i).map(f64::sqrt)).collect();
+    Ok(Uncertainty { covariance: rows.filter(|rows| is_covariance(rows)), white, colour, condition })
+}

@@ -1,0 +1,466 @@
+//! The errors of a free run as a function of the shapes and dead times.
+
+use std::ops::Range;
+
+use crate::Error;
+use crate::model::{Parts, ProcessStructure};
+use crate::optimize::Objective;
+use crate::regression::{Span, product, sum, sum_of_squares};
+use crate::respond::process::{HeldLog, modes, run, sensitivities};
+
+/// Time constants lie between this fraction of the shortest step of the clock, and so many times the longest log.
+const SHORTEST: f64 = 1e-3;
+const LONGEST: f64 = 1e3;
+/// What the damping of a pair may be.
+const LEAST_DAMPING: f64 = 1e-4;
+const LARGEST_DAMPING: f64 = 1e3;
+/// A dead time is at most this fraction of the longest log.
+const LONGEST_DEAD_TIME: f64 = 0.9;
+
+/// What is estimated beside the processes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Background {
+    /// The level of the output.
+    pub(crate) level: bool,
+    /// Its slope.
+    pub(crate) slope: bool,
+    /// The state in which each log begins.
+    pub(crate) free: bool,
+}
+
+impl Background {
+    /// How many columns of level and slope there are.
+    pub(crate) fn offsets(self) -> usize {
+        usize::from(self.level) + usize::from(self.slope)
+    }
+
+    /// Those of free responses.
+    pub(crate) fn free(self, held: &[HeldLog], structures: &[ProcessStructure]) -> usize {
+        if self.free {
+            held.len() * structures.iter().map(ProcessStructure::states).sum::<usize>()
+        } else {
+            0
+        }
+    }
+
+    pub(crate) fn columns(self, held: &[HeldLog], structures: &[ProcessStructure]) -> usize {
+        self.offsets() + self.free(held, structures)
+    }
+}
+
+/// Why parameters have no cost.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Refusal {
+    /// They are outside of their limits.
+    Outside,
+    /// The response is no number.
+    Overflow,
+}
+
+/// The least sum of squared errors that weights, level, slope and free responses leave, by the other parameters:
+/// ln(tau), ln(omega), ln(zeta), and the dead time in seconds, of one input after the other.
+pub(super) struct ProcessObjective<'a> {
+    structures: Vec<ProcessStructure>,
+    /// For each input the dead time that it has if none is searched for.
+    held_dead_times: Vec<Option<f64>>,
+    held: &'a [HeldLog],
+    background: Background,
+    /// The rows that count: in which part, and where in it.
+    rows: Vec<(usize, usize)>,
+    /// The measured outputs in them, less their mean if there is a level.
+    outputs: Vec<f64>,
+    mean: f64,
+    /// Seconds from the middle of the rows, where a slope is estimated.
+    clock: Vec<f64>,
+    middle: f64,
+    longest: f64,
+    shortest: f64,
+    /// Where it stands.
+    point: Vec<f64>,
+    parts: Vec<Parts<f64>>,
+    offsets: Vec<f64>,
+    residuals: Vec<f64>,
+    span: Span,
+    matrix: Vec<f64>,
+    right: Vec<f64>,
+}
+
+impl<'a> ProcessObjective<'a> {
+    /// # Errors
+    /// [`Error::Data`] if no output is measured, or all rows that count have one time.
+    pub(super) fn new(
+        structures: Vec<ProcessStructure>,
+        held: &'a [HeldLog],
+        output: &'a [f64],
+        background: Background,
+    ) -> Result<Self, Error> {
+        let mut rows = Vec::new();
+        let mut outputs = Vec::new();
+        for (part, own) in held.iter().enumerate() {
+            for row in own.counted.iter().cloned().flatten().filter(|row| !output[*row].is_nan()) {
+                rows.push((part, row - own.rows.start));
+                outputs.push(output[row]);
+            }
+        }
+        if rows.is_empty() {
+            return Err(Error::data("the output has no value in the rows to estimate on"));
+        }
+        let count = rows.len() as f64;
+        let mean = if background.level { sum(outputs.iter().copied()) / count } else { 0.0 };
+        outputs.iter_mut().for_each(|value| *value -= mean);
+        let time = |&(part, row): &(usize, usize)| held[part].begins + held[part].times[row];
+        let middle = sum(rows.iter().map(time)) / count;
+        let clock =
+            if background.slope { rows.iter().map(|row| time(row) - middle).collect() } else { Vec::new() };
+        let longest = held.iter().filter_map(|part| part.times.last()).copied().fold(0.0, f64::max);
+        let steps = held.iter().flat_map(|part| part.times.windows(2).map(|pair| pair[1] - pair[0]));
+        let shortest = steps.fold(f64::INFINITY, f64::min);
+        if !(longest > 0.0 && shortest > 0.0 && shortest.is_finite()) {
+            return Err(Error::data("one row is no response; give a longer log"));
+        }
+        let mut objective = Self {
+            structures: Vec::new(),
+            held_dead_times: Vec::new(),
+            held,
+            background,
+            rows,
+            residuals: outputs.clone(),
+            outputs,
+            mean,
+            clock,
+            middle,
+            longest,
+            shortest,
+            point: Vec::new(),
+            parts: Vec::new(),
+            offsets: Vec::new(),
+            span: Span::default(),
+            matrix: Vec::new(),
+            right: Vec::new(),
+        };
+        objective.take(structures);
+        Ok(objective)
+    }
+
+    /// Takes other structures of the same inputs, with all their dead times.
+    pub(super) fn take(&mut self, structures: Vec<ProcessStructure>) {
+        let none = |structure: &ProcessStructure| (!structure.has_dead_time()).then_some(0.0);
+        self.held_dead_times = structures.iter().map(none).collect();
+        self.structures = structures;
+    }
+
+    /// Takes the dead time of an input as known; none: searches for it.
+    pub(super) fn hold_dead_time(&mut self, input: usize, seconds: Option<f64>) {
+        self.held_dead_times[input] = seconds;
+    }
+
+    pub(super) fn background(&self) -> Background {
+        self.background
+    }
+
+    pub(super) fn outputs(&self) -> &[f64] {
+        &self.outputs
+    }
+
+    pub(super) fn residuals(&self) -> &[f64] {
+        &self.residuals
+    }
+
+    pub(super) fn parts(&self) -> &[Parts<f64>] {
+        &self.parts
+    }
+
+    pub(super) fn longest(&self) -> f64 {
+        self.longest
+    }
+
+    pub(super) fn shortest(&self) -> f64 {
+        self.shortest
+    }
+
+    /// The level where the slope is zero, and the slope.
+    pub(super) fn level(&self) -> (Option<f64>, Option<f64>) {
+        let mut own = self.offsets.iter().copied();
+        let level = if self.background.level { own.next().map(|level| level + self.mean) } else { None };
+        (level, if self.background.slope { own.next() } else { None })
+    }
+
+    /// The middle of the rows on their clock, where a slope is estimated.
+    pub(super) fn middle(&self) -> f64 {
+        self.middle
+    }
+
+    /// Where the variables of each input stand: the shape, and the dead time if it is one.
+    pub(super) fn places(&self) -> Vec<(Range<usize>, Option<usize>)> {
+        let mut first = 0;
+        let of = |(structure, known): (&ProcessStructure, &Option<f64>)| {
+            let shape = first..first + structure.lags;
+            first = shape.end + usize::from(known.is_none());
+            (shape.clone(), known.is_none().then_some(shape.end))
+        };
+        self.structures.iter().zip(&self.held_dead_times).map(of).collect()
+    }
+
+    /// Between which dead times no change of an input passes a row that counts: where the output jumps with the input, those in between
+    /// leave the same errors.
+    pub(super) fn gap(&self, input: usize, dead_time: f64) -> [f64; 2] {
+        let mut gap = [0.0, LONGEST_DEAD_TIME * self.longest];
+        let mut next = self.rows.iter().peekable();
+        for (number, part) in self.held.iter().enumerate() {
+            let values = &part.inputs[input];
+            let moves =
+                (1..values.len()).filter(|row| values[*row] != values[row - 1]).map(|row| part.times[row]);
+            let moves: Vec<f64> = moves.collect();
+            while let Some((_, row)) = next.next_if(|(own, _)| *own == number) {
+                for start in &moves {
+                    let apart = part.times[*row] - start;
+                    if apart <= dead_time {
+                        gap[0] = gap[0].max(apart);
+                    } else {
+                        gap[1] = gap[1].min(apart);
+                    }
+                }
+            }
+        }
+        gap
+    }
+
+    /// The shortest time constant that is looked for.
+    pub(super) fn least_time_constant(&self) -> f64 {
+        SHORTEST * self.shortest
+    }
+
+    /// Between which values each variable may lie.
+    pub(super) fn limits(&self) -> Vec<[f64; 2]> {
+        let (short, long) = (self.least_time_constant().ln(), (LONGEST * self.longest).ln());
+        let mut limits = Vec::new();
+        for (structure, known) in self.structures.iter().zip(&self.held_dead_times) {
+            let from = limits.len();
+            limits.resize(from + structure.lags, [short, long]);
+            if structure.is_underdamped() {
+                limits[from] = [-long, -short];
+                limits[from + 1] = [LEAST_DAMPING.ln(), LARGEST_DAMPING.ln()];
+            }
+            limits.extend(known.is_none().then_some([0.0, LONGEST_DEAD_TIME * self.longest]));
+        }
+        limits
+    }
+
+    /// A column over the rows that count, written by a function for each part.
+    fn stacked(
+        &self,
+        count: usize,
+        mut write: impl FnMut(&HeldLog, usize, &mut [Vec<f64>]),
+    ) -> Vec<Vec<f64>> {
+        let mut stacked = vec![Vec::with_capacity(self.rows.len()); count];
+        let mut whole: Vec<Vec<f64>> = vec![Vec::new(); count];
+        let mut next = self.rows.iter().peekable();
+        for (number, part) in self.held.iter().enumerate() {
+            whole.iter_mut().for_each(|column| {
+                column.clear();
+                column.resize(part.times.len(), 0.0);
+            });
+            write(part, number, &mut whole);
+            while let Some((_, row)) = next.next_if(|(own, _)| *own == number) {
+                stacked.iter_mut().zip(&whole).for_each(|(stacked, whole)| stacked.push(whole[*row]));
+            }
+        }
+        stacked
+    }
+
+    /// Level, slope, the columns of each input, then free responses.
+    fn linear_columns(&self, parts: &[Parts<f64>]) -> Vec<Vec<f64>> {
+        let mut columns = Vec::new();
+        if self.background.level {
+            columns.push(vec![1.0; self.rows.len()]);
+        }
+        if self.background.slope {
+            columns.push(self.clock.clone());
+        }
+        for (input, (structure, parts)) in self.structures.iter().zip(parts).enumerate() {
+            columns.extend(self.stacked(structure.columns(), |part, _, whole| {
+                let signals = (part.times.as_slice(), part.inputs[input].as_slice());
+                run(structure, &parts.shape, parts.dead_time, signals, |row, seen| {
+                    whole.iter_mut().zip(seen).for_each(|(column, value)| column[row] = *value);
+                });
+            }));
+        }
+        columns.extend(self.free_columns(parts));
+        columns
+    }
+
+    /// What each log has of a first state of its own.
+    fn free_columns(&self, parts: &[Parts<f64>]) -> Vec<Vec<f64>> {
+        let mut columns = Vec::new();
+        if !self.background.free {
+            return columns;
+        }
+        for own in 0..self.held.len() {
+            for (structure, parts) in self.structures.iter().zip(parts) {
+                columns.extend(self.stacked(structure.states(), |part, number, whole| {
+                    if number == own {
+                        for (column, mode) in
+                            whole.iter_mut().zip(modes(structure, &parts.shape, &part.times))
+                        {
+                            *column = mode;
+                        }
+                    }
+                }));
+            }
+        }
+        columns
+    }
+
+    /// psi in the units of the parameters, then of level, slope and free responses.
+    pub(super) fn slopes(&self, structures: &[ProcessStructure], parts: &[Parts<f64>]) -> Vec<Vec<f64>> {
+        let mut columns = Vec::new();
+        for (input, (structure, parts)) in structures.iter().zip(parts).enumerate() {
+            let mut own = vec![0.0; structure.parameters()];
+            columns.extend(self.stacked(structure.parameters(), |part, _, whole| {
+                let signals = (part.times.as_slice(), part.inputs[input].as_slice());
+                sensitivities(structure, parts, signals, |row, seen, shape, dead_time| {
+                    structure.own_slopes(parts, seen, shape, dead_time, &mut own);
+                    whole.iter_mut().zip(&own).for_each(|(column, value)| column[row] = *value);
+                });
+            }));
+        }
+        if self.background.level {
+            columns.push(vec![1.0; self.rows.len()]);
+        }
+        if self.background.slope {
+            columns.push(self.clock.clone());
+        }
+        columns.extend(self.free_columns(parts));
+        columns
+    }
+
+    /// Residuals and some columns on all rows of each stretch that counts, where no output was measured NaN and zero; the columns of
+    /// each stretch, and where it stands among the residuals.
+    #[expect(clippy::type_complexity, reason = "three lists of one thing each")]
+    pub(super) fn by_segments(
+        &self,
+        psi: &[Vec<f64>],
+        used: &[usize],
+    ) -> (Vec<f64>, Vec<Vec<Vec<f64>>>, Vec<Range<usize>>) {
+        let (mut residuals, mut columns, mut segments) = (Vec::new(), Vec::new(), Vec::new());
+        let mut next = self.rows.iter().zip(0..).peekable();
+        for (number, part) in self.held.iter().enumerate() {
+            for rows in &part.counted {
+                let first = residuals.len();
+                residuals.resize(first + rows.len(), f64::NAN);
+                let mut own = vec![vec![0.0; rows.len()]; used.len()];
+                let end = rows.end - part.rows.start;
+                while let Some(((_, row), sample)) =
+                    next.next_if(|((part, row), _)| *part == number && *row < end)
+                {
+                    let place = row + part.rows.start - rows.start;
+                    residuals[first + place] = self.residuals[sample];
+                    own.iter_mut().zip(used).for_each(|(column, used)| column[place] = psi[*used][sample]);
+                }
+                segments.push(first..residuals.len());
+                columns.push(own);
+            }
+        }
+        (residuals, columns, segments)
+    }
+}
+
+impl Objective for ProcessObjective<'_> {
+    type Refusal = Refusal;
+
+    fn samples(&self) -> usize {
+        self.rows.len()
+    }
+
+    fn evaluate(&mut self, point: &[f64]) -> Result<f64, Refusal> {
+        let inside = |(value, [low, high]): (&f64, [f64; 2])| *value >= low && *value <= high;
+        if !point.iter().zip(self.limits()).all(inside) {
+            return Err(Refusal::Outside);
+        }
+        let mut parts: Vec<Parts<f64>> = self
+            .places()
+            .into_iter()
+            .zip(&self.held_dead_times)
+            .map(|((shape, dead_time), known)| Parts {
+                weights: Vec::new(),
+                shape: point[shape].iter().map(|value| value.exp()).collect(),
+                dead_time: dead_time.map_or(known.unwrap_or(0.0), |place| point[place]),
+            })
+            .collect();
+        let mut span = Span::default();
+        for column in self.linear_columns(&parts) {
+            span.add(column);
+        }
+        self.residuals.clone_from(&self.outputs);
+        let has = span.take_from(&mut self.residuals);
+        let cost = sum_of_squares(&self.residuals);
+        if !cost.is_finite() {
+            return Err(Refusal::Overflow);
+        }
+        let mut weights = span.weights(&has).into_iter();
+        self.offsets = weights.by_ref().take(self.background.offsets()).collect();
+        for (structure, parts) in self.structures.iter().zip(&mut parts) {
+            parts.weights = weights.by_ref().take(structure.columns()).collect();
+        }
+        self.parts = parts;
+        self.span = span;
+        self.point = point.to_vec();
+        Ok(cost)
+    }
+
+    fn linearize(&mut self) -> Result<f64, Refusal> {
+        let mut columns = Vec::with_capacity(self.point.len());
+        for (input, ((structure, parts), known)) in
+            self.structures.iter().zip(&self.parts).zip(&self.held_dead_times).enumerate()
+        {
+            let lags = structure.lags;
+            columns.extend(self.stacked(lags + usize::from(known.is_none()), |part, _, whole| {
+                let signals = (part.times.as_slice(), part.inputs[input].as_slice());
+                sensitivities(structure, parts, signals, |row, _, shape, dead_time| {
+                    for (index, column) in whole.iter_mut().enumerate() {
+                        // By the logarithm of the shape.
+                        column[row] =
+                            if index < lags { shape[index] * parts.shape[index] } else { dead_time };
+                    }
+                });
+            }));
+        }
+        columns.iter_mut().for_each(|column| {
+            self.span.take_from(column);
+        });
+        self.right = columns.iter().map(|column| product(column, &self.residuals)).collect();
+        let limits = self.limits();
+        for (((column, right), value), [low, high]) in
+            columns.iter_mut().zip(&mut self.right).zip(&self.point).zip(limits)
+        {
+            // It would leave through the border that it stands on.
+            if *value <= low && *right < 0.0 || *value >= high && *right > 0.0 {
+                column.fill(0.0);
+                *right = 0.0;
+            }
+        }
+        self.matrix =
+            columns.iter().flat_map(|left| columns.iter().map(|right| product(left, right))).collect();
+        Ok(0.0)
+    }
+
+    fn matrix(&self) -> &[f64] {
+        &self.matrix
+    }
+
+    fn right(&self) -> &[f64] {
+        &self.right
+    }
+
+    fn is_outside(refusal: &Refusal) -> bool {
+        *refusal == Refusal::Outside
+    }
+
+    /// Onto the border. What wants to leave there stays from then on, see `linearize`.
+    fn draw_in(&mut self, from: &[f64], trial: &mut [f64]) -> bool {
+        for (value, [low, high]) in trial.iter_mut().zip(self.limits()) {
+            *value = value.clamp(low, high);
+        }
+        from != trial
+    }
+}

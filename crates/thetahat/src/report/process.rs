@@ -1,0 +1,306 @@
+//! Fits of processes in continuous time.
+
+#[cfg(test)]
+mod tests;
+mod warnings;
+
+use super::evaluate::evaluate;
+use super::schema::{Data, Estimation, Missing, Report};
+use super::shares::Shares;
+use crate::data::{Log, Offset, Rows, Source, Split, digests};
+use crate::estimate::{Background, Criteria, Initial, Procedure, ProcessEstimate, least_free_run};
+use crate::model::{Model, OffsetCovariance, Parameter, ProcessModel, ProcessStructure, Quantity, Signal};
+use crate::optimize::{Monitor, Search};
+use crate::respond::process::{ProcessOnLog, held_logs};
+use crate::select::Focus;
+use crate::validate::Part;
+use crate::{Document, Error};
+
+/// What process to fit, and how.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ProcessPlan {
+    /// The inputs, at least one.
+    pub inputs: Vec<String>,
+    /// The output.
+    pub output: String,
+    /// The structure from each input, or one for all.
+    pub structures: Vec<ProcessStructure>,
+    /// Rows to estimate on; none: all.
+    pub estimate: Vec<Rows>,
+    /// Rows to validate on.
+    pub validate: Vec<Rows>,
+    /// Cuts the rows to estimate on into parts: the fit is to the first two, and evaluated on the third.
+    pub split: Option<Split>,
+    /// Offsets that are known. That of an input is else its first value; that of the output is estimated.
+    pub offsets: Vec<(String, f64)>,
+    /// Whether the output has a slope of its own, in its units per second.
+    pub trend: bool,
+    /// Whether each log begins in a state that is estimated; else at rest.
+    pub free_start: bool,
+    /// How to search; `starts` are further points of the grid, `initial_parameters` and `plant_first` do not apply.
+    pub search: Search,
+}
+
+impl ProcessPlan {
+    /// A plan for one structure from all inputs, with the other choices at their defaults.
+    pub fn new(inputs: &[&str], output: &str, structure: ProcessStructure) -> Self {
+        Self {
+            inputs: inputs.iter().map(|&name| name.to_owned()).collect(),
+            output: output.to_owned(),
+            structures: vec![structure],
+            estimate: Vec::new(),
+            validate: Vec::new(),
+            split: None,
+            offsets: Vec::new(),
+            trend: false,
+            free_start: false,
+            search: Search::default(),
+        }
+    }
+
+    /// Whether the plan makes sense, whatever the log.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] if there is no input, a name comes twice, there are structures for other inputs, or an offset is of another
+    /// channel or not finite.
+    pub fn check(&self) -> Result<(), Error> {
+        if self.inputs.is_empty() {
+            return Err(Error::argument("input", "a process has one input at least"));
+        }
+        let mut names: Vec<&String> = self.inputs.iter().chain([&self.output]).collect();
+        names.sort_unstable();
+        if let Some(pair) = names.windows(2).find(|pair| pair[0] == pair[1]) {
+            return Err(Error::argument(
+                "input",
+                format!("'{}' comes twice; name each channel once", pair[0]),
+            ));
+        }
+        if self.structures.len() != 1 && self.structures.len() != self.inputs.len() {
+            return Err(Error::argument(
+                "structure",
+                format!(
+                    "there are {} for {} inputs; give one for all or one for each",
+                    self.structures.len(),
+                    self.inputs.len()
+                ),
+            ));
+        }
+        for (name, value) in &self.offsets {
+            if !self.inputs.contains(name) && *name != self.output {
+                return Err(Error::argument("offset", format!("the model has no channel '{name}'")));
+            }
+            if !value.is_finite() {
+                return Err(Error::argument("offset", format!("that of '{name}' is {value}")));
+            }
+        }
+        if self.trend && self.offset_of(&self.output).is_some() {
+            return Err(Error::argument(
+                "trend",
+                "it is a line with a level, which the offset of the output is; leave one of them out",
+            ));
+        }
+        Ok(())
+    }
+
+    fn offset_of(&self, name: &str) -> Option<f64> {
+        self.offsets.iter().find(|(own, _)| own == name).map(|(_, value)| *value)
+    }
+
+    /// The structure from each input.
+    fn each(&self) -> Vec<ProcessStructure> {
+        match *self.structures {
+            [one] => vec![one; self.inputs.len()],
+            ref several => several.to_vec(),
+        }
+    }
+}
+
+/// Finds a process in continuous time in a log, or in several that are joined, and reports on it.
+///
+/// ```text
+/// y(t) = y0 + m t + sum_j G_j(s) (u_j(t) - u_j0) + e(t),   G(s) = K (1 + tau_z s)/(s (1 + tau1 s)(1 + tau2 s)…) e^(-theta s)
+/// ```
+///
+/// with the factors that the [structure](ProcessStructure) of an input has. The sum of e^2 over the measured outputs is as small as can
+/// be: gains, y0 and m follow for each shape and dead time (variable projection, Golub and Pereyra 1973), which a Levenberg-Marquardt
+/// search finds from a grid.
+///
+/// **Inputs** are held from each row to the next, and the response is exact at the times of the rows: the clock may be irregular
+/// ([`Log::recorded`]), and a dead time need not be a number of samples. A missing input holds the value before it, a missing output
+/// is left out.
+///
+/// **Start.** The process is at rest in the first row of each log, with the inputs of that row, which are the offsets u_j0 unless others
+/// are given. With `free_start` each log has a state of its own; beside a single step that is nearly the same as the step.
+///
+/// **Standard errors** are for errors of any colour, that of an autoregression of the residuals. Those for white errors, which are
+/// far too small for most plants, stand in [`ProcessOutcome`](crate::estimate::ProcessOutcome).
+///
+/// An iteration costs O(N p^2) for p parameters.
+///
+/// Source: Ljung, System Identification, 2nd ed. 1999, sections 4.3, 9.3 and 10.2; Golub and Pereyra, SIAM J. Numerical Analysis 10
+/// (1973); Kaufman, BIT 15 (1975).
+///
+/// # Errors
+/// [`Error::Argument`] as for [`ProcessPlan::check`], and for rows that are not there; [`Error::Data`] if a channel is not there or
+/// squares leave the range of numbers; [`Error::Undetermined`] for an input that never changes, too few values, and parameters that
+/// the log does not determine; [`Error::Interrupted`] if the monitor says so.
+///
+/// ```
+/// use std::ops::ControlFlow;
+/// use thetahat::data::{Channel, Log};
+/// use thetahat::report::{ProcessPlan, fit_process};
+///
+/// // 2/(1 + 5 s) e^(-1.3 s) after a step at 3 s, on an irregular clock.
+/// let time: Vec<f64> = (0..60).map(|k| f64::from(k) * 0.5 + 0.1 * f64::from(k % 3)).collect();
+/// let u: Vec<f64> = time.iter().map(|t| if *t < 3.0 { 0.0 } else { 1.0 }).collect();
+/// let start = time[u.iter().position(|u| *u > 0.0).unwrap()];
+/// let y = time.iter().map(|t| 20.0 + 2.0 * (1.0 - (-(t - start - 1.3).max(0.0) / 5.0).exp())).collect();
+/// let channel = |name: &str, values| Channel { name: name.into(), values };
+/// let log = Log::recorded(vec![channel("u", u), channel("y", y)], time)?;
+/// let plan = ProcessPlan::new(&["u"], "y", "p1d".parse()?);
+/// let report = fit_process(&log, &[], &plan, &|_| ControlFlow::Continue(()))?;
+/// let found: Vec<f64> = report.model.parameters().iter().map(|parameter| parameter.value).collect();
+/// assert!((found[0] - 2.0).abs() < 1e-6 && (found[1] - 5.0).abs() < 1e-6 && (found[2] - 1.3).abs() < 1e-6);
+/// # Ok::<(), thetahat::Error>(())
+/// ```
+pub fn fit_process(
+    log: &Log,
+    sources: &[Source],
+    plan: &ProcessPlan,
+    monitor: Monitor<'_>,
+) -> Result<Report, Error> {
+    plan.check()?;
+    let names: Vec<&str> = plan.inputs.iter().chain([&plan.output]).map(String::as_str).collect();
+    names.iter().try_for_each(|name| log.channel(name).map(|_| ()))?;
+    let Shares { estimation, validation, parts } =
+        Shares::of(&plan.estimate, &plan.validate, plan.split, log.rows())?;
+    let inputs = plan.inputs.iter().map(|name| {
+        let first = || log.channel(name).ok()?.values.iter().copied().find(|value| !value.is_nan());
+        let level = plan.offset_of(name).or_else(first).unwrap_or(0.0);
+        Signal { name: name.clone(), offset: Offset { level, slope: 0.0 } }
+    });
+    let inputs: Vec<Signal> = inputs.collect();
+    let given = plan.offset_of(&plan.output);
+    let offsets = inputs.iter().map(|input| (input.name.as_str(), input.offset));
+    let output = (plan.output.as_str(), Offset { level: given.unwrap_or(0.0), slope: 0.0 });
+    let deviations = log.deviations(offsets.chain([output]))?;
+    let input_names: Vec<&str> = plan.inputs.iter().map(String::as_str).collect();
+    let held = held_logs(&deviations, &input_names, &estimation)?;
+    for (input, name) in plan.inputs.iter().enumerate() {
+        let mut values = held.iter().flat_map(|part| &part.inputs[input]);
+        let first = values.next();
+        if values.all(|value| Some(value) == first) {
+            return Err(Error::undetermined(
+                Vec::new(),
+                format!(
+                    "input '{name}' never changes: there is no step to learn from; name rows in which it moves, or leave it out"
+                ),
+            ));
+        }
+    }
+    let structures = plan.each();
+    let background = Background { level: given.is_none(), slope: plan.trend, free: plan.free_start };
+    let parameters = ProcessModel::names(&structures, &plan.inputs);
+    let measured = &deviations.channel(&plan.output)?.values;
+    let found =
+        least_free_run(&structures, &parameters, (&held, measured), background, &plan.search, monitor)?;
+    let model = model(plan, log, inputs, structures, &parameters, &found)?;
+
+    let missing = names.iter().map(|name| {
+        let values = &log.channel(name)?.values;
+        let rows = values.iter().filter(|value| value.is_nan()).count();
+        Ok(Missing { channel: (*name).to_owned(), rows })
+    });
+    let segments = held.iter().flat_map(|part| &part.counted).map(Rows::from_positions);
+    let data = Data {
+        logs: sources.to_vec(),
+        digests: digests(log, &names, &estimation)?,
+        rows: log.rows(),
+        sample_time: log.sample_time(),
+        detrend: "none".to_owned(),
+        prefilter: None,
+        validation,
+        split: parts,
+        segments: segments.collect(),
+        missing: missing.collect::<Result<_, Error>>()?,
+        time_gaps: log.gaps(),
+        estimation,
+    };
+    let error = |place: usize| found.covariance.as_ref().map(|rows| rows[place][place].sqrt());
+    let count = parameters.len();
+    let estimation = Estimation {
+        initial: Some(if plan.free_start { Initial::Estimate } else { Initial::Zero }),
+        level: found.level.map(|level| Quantity::new(level, error(count))),
+        slope: found.slope.map(|slope| Quantity::new(slope, error(count + 1))),
+        samples: found.samples,
+        mse: found.mse,
+        criteria: Criteria::new(found.mse, count + background.offsets(), found.samples),
+        condition: found.condition,
+        procedure: Procedure::FreeRun(found.outcome),
+    };
+    let mut report = Report {
+        schema: Report::SCHEMA.to_owned(),
+        generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
+        data,
+        selection: None,
+        warnings: warnings::of_fit(&model, &held, &estimation),
+        model: Model::from(model.clone()),
+        estimation,
+        fit: Vec::new(),
+    };
+    let signals = || model.inputs.iter().chain([&model.output]);
+    let own = log.deviations(signals().map(|signal| (signal.name.as_str(), signal.offset)))?;
+    let on_log = |rows: &[Rows]| ProcessOnLog::new(&model, &own, rows);
+    let fitted = on_log(&report.data.estimation)?;
+    evaluate(&mut report, &fitted, Part::Estimation, Focus::Auto);
+    for (part, rows) in report.data.held_out() {
+        evaluate(&mut report, &on_log(&rows)?, part, Focus::Auto);
+    }
+    Ok(report)
+}
+
+/// The model of what was found.
+fn model(
+    plan: &ProcessPlan,
+    log: &Log,
+    inputs: Vec<Signal>,
+    structures: Vec<ProcessStructure>,
+    names: &[String],
+    found: &ProcessEstimate,
+) -> Result<ProcessModel, Error> {
+    let count = names.len();
+    let covariance = found.covariance.as_ref();
+    let parameters =
+        names.iter().zip(&found.parameters).enumerate().map(|(place, (name, &value))| Parameter {
+            name: name.clone(),
+            value,
+            standard_error: covariance.map(|rows| rows[place][place].sqrt()),
+        });
+    let offset = match (found.level, found.slope) {
+        (Some(level), slope) => {
+            let slope = slope.unwrap_or(0.0);
+            Offset { level: level - slope * found.middle, slope }
+        }
+        _ => Offset { level: plan.offset_of(&plan.output).unwrap_or(0.0), slope: 0.0 },
+    };
+    let own: Option<Vec<Vec<f64>>> =
+        covariance.map(|rows| rows[..count].iter().map(|row| row[..count].to_vec()).collect());
+    let open = covariance.filter(|_| found.level.is_some());
+    let model = ProcessModel {
+        structures,
+        sample_time: log.sample_time(),
+        inputs,
+        output: Signal { name: plan.output.clone(), offset },
+        parameters: parameters.collect(),
+        covariance: own,
+        offset_covariance: open.map(|rows| OffsetCovariance {
+            covariance: rows.clone(),
+            middle: found.slope.map(|_| found.middle),
+        }),
+        noise_variance: found.noise_variance,
+        degrees_of_freedom: Some(found.samples - found.unknowns),
+        free_start: plan.free_start,
+    };
+    model.check()?;
+    Ok(model)
+}

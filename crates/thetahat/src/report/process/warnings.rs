@@ -1,0 +1,86 @@
+//! What a careful reader of a process should know.
+
+use crate::estimate::Procedure;
+use crate::figures::{number, short};
+use crate::model::ProcessModel;
+use crate::optimize::Stopped;
+use crate::report::Estimation;
+use crate::respond::process::HeldLog;
+
+/// A time constant shorter than this part of a sample is not seen, nor one longer than the log.
+const SHORT: f64 = 0.1;
+/// Twice the standard error above the value: the parameter may as well not be there.
+const UNCERTAIN: f64 = 0.5;
+
+pub(super) fn of_fit(model: &ProcessModel, held: &[HeldLog], estimation: &Estimation) -> Vec<String> {
+    let mut words = Vec::new();
+    let longest = held.iter().filter_map(|part| part.times.last()).copied().fold(0.0, f64::max);
+    for (number_of_input, input) in model.inputs.iter().enumerate() {
+        let changes: usize = held
+            .iter()
+            .map(|part| part.inputs[number_of_input].windows(2).filter(|pair| pair[0] != pair[1]).count())
+            .sum();
+        if changes == 1 {
+            words.push(format!(
+                "'{}' has one step: what else moved the output in the same time cannot be told from it; a second step, back or further, \
+                 can show that the gain is the same",
+                input.name
+            ));
+        }
+    }
+    let missing: usize = held.iter().map(|part| part.held).sum();
+    if missing > 0 {
+        words.push(format!("{missing} missing values of inputs hold the value before them"));
+    }
+    for parameter in &model.parameters {
+        let name = &parameter.name;
+        let is = |word: &str| name.starts_with(word);
+        if is("theta") && parameter.value == 0.0 {
+            words.push(format!("{name} comes to zero: the log shows no dead time; a structure without d has one parameter less"));
+            continue;
+        }
+        if is("tau") && !is("tau_z") {
+            if parameter.value > longest {
+                words.push(format!(
+                    "{name} is {} s and the log {} s long: it shows the beginning of the response alone, and the gain is a guess; \
+                     an integrator (i) may say as much, or take a longer log",
+                    number(parameter.value),
+                    short(longest)
+                ));
+                continue;
+            }
+            if parameter.value < SHORT * model.sample_time {
+                words.push(format!(
+                    "{name} is {} s, less than a tenth of a sample: the log does not show it; take one lag less",
+                    number(parameter.value)
+                ));
+                continue;
+            }
+        }
+        if is("zeta") && parameter.value > 1.0 {
+            words.push(format!(
+                "{name} is {}: the pair is two lags; a structure without u says the same",
+                number(parameter.value)
+            ));
+        }
+        if parameter.standard_error.is_some_and(|error| error > UNCERTAIN * parameter.value.abs()) {
+            words.push(format!("{name} is not certain: zero is within twice its standard error"));
+        }
+    }
+    if let Procedure::FreeRun(outcome) = &estimation.procedure {
+        match outcome.stopped {
+            Stopped::MaxIterations | Stopped::TimeLimit => words.push(
+                "the search was stopped before it came to its end: give it more iterations or time"
+                    .to_owned(),
+            ),
+            Stopped::Converged | Stopped::NoDescent => {}
+        }
+        if outcome.initial_conditions > 0 && words.iter().any(|word| word.contains("has one step")) {
+            words.push(
+                "the state that the log begins in is estimated beside a single step, which it resembles: the gain is less certain for it"
+                    .to_owned(),
+            );
+        }
+    }
+    words
+}

@@ -1,0 +1,7 @@
+//! What processes make of a log: exact responses to inputs that are held from row to row.
+
+mod held;
+mod on_log;
+
+pub(crate) use held::{HeldLog, held_logs, modes, run, sensitivities};
+pub(crate) use on_log::ProcessOnLog;

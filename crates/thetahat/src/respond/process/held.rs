@@ -1,0 +1,203 @@
+//! The response of a process to held inputs, at the times of the rows.
+//!
+//! The state moves from row to row with the input of the row before. A dead time theta looks at it theta seconds earlier, between two
+//! rows: y(t) = w'c(t - theta). So
+//!
+//! ```text
+//! dy(t)/dtheta = -w' d/dt c(t - theta)
+//! ```
+//!
+//! which no clock rounds. Derivatives by the shape of the lags are computed in dual numbers.
+
+use std::ops::Range;
+
+use thetahat_core::{Dual, Number};
+
+use crate::Error;
+use crate::data::{Log, Rows, inside};
+use crate::model::{Chain, Columns, Parts, ProcessStructure, State, Transition};
+
+/// The lags of a structure at most, and so the numbers of its shape.
+const LANE: usize = 3;
+/// Steps of a clock that differ by so many roundings of its time are the same.
+const ROUNDINGS: f64 = 8.0;
+
+/// The inputs of a log on its own clock, from its first row on.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct HeldLog {
+    /// Its rows among those of all logs, up to the last that counts.
+    pub(crate) rows: Range<usize>,
+    /// Which of them count, in the same numbers.
+    pub(crate) counted: Vec<Range<usize>>,
+    /// Where its first row stands on the clock of all of them, in seconds.
+    pub(crate) begins: f64,
+    /// Seconds since its first row.
+    pub(crate) times: Vec<f64>,
+    /// For each input a value for each row. A missing one holds the value before it; the first ones have the first that is known.
+    pub(crate) inputs: Vec<Vec<f64>>,
+    /// How many values of inputs are missing.
+    pub(crate) held: usize,
+}
+
+/// Each of the joined logs that has some of the rows.
+///
+/// # Errors
+/// [`Error::Data`] for a channel that is not there, or an input that has no value at all.
+pub(crate) fn held_logs(log: &Log, inputs: &[&str], rows: &[Rows]) -> Result<Vec<HeldLog>, Error> {
+    let of_part = |part: Range<usize>| {
+        let asked = inside(rows, &part);
+        let end = part.start + asked.last()?.end;
+        let counted = asked.into_iter().map(|rows| rows.start + part.start..rows.end + part.start).collect();
+        Some(HeldLog::new(log, inputs, part.start..end, counted))
+    };
+    log.logs().filter_map(of_part).collect()
+}
+
+impl HeldLog {
+    fn new(
+        log: &Log,
+        inputs: &[&str],
+        rows: Range<usize>,
+        counted: Vec<Range<usize>>,
+    ) -> Result<Self, Error> {
+        let times = match log.time() {
+            Some(time) => time[rows.clone()].iter().map(|seconds| seconds - time[rows.start]).collect(),
+            None => (0..rows.len()).map(|row| row as f64 * log.sample_time()).collect(),
+        };
+        let mut missing = 0;
+        let mut held = Vec::with_capacity(inputs.len());
+        for name in inputs {
+            let values = &log.channel(name)?.values[rows.clone()];
+            let Some(first) = values.iter().copied().find(|value| !value.is_nan()) else {
+                let message = format!("input '{name}' has no value in rows {}..{}", rows.start + 1, rows.end);
+                return Err(Error::in_channel(name, None, message));
+            };
+            let mut last = first;
+            let hold = |value: &f64| {
+                missing += usize::from(value.is_nan());
+                last = if value.is_nan() { last } else { *value };
+                last
+            };
+            held.push(values.iter().map(hold).collect());
+        }
+        Ok(Self { begins: log.elapsed(rows.start), rows, counted, times, inputs: held, held: missing })
+    }
+}
+
+/// The last transitions, as clocks repeat their steps.
+struct Steps<'c, S> {
+    chain: &'c Chain<S>,
+    whole: Option<(f64, Transition<S>)>,
+    part: Option<(f64, Transition<S>)>,
+}
+
+impl<'c, S: Number<f64>> Steps<'c, S> {
+    fn take(
+        chain: &'c Chain<S>,
+        kept: &mut Option<(f64, Transition<S>)>,
+        step: f64,
+        time: f64,
+    ) -> Transition<S> {
+        let near = |own: f64| (own - step).abs() <= ROUNDINGS * f64::EPSILON * time.abs();
+        match kept {
+            Some((own, transition)) if near(*own) => *transition,
+            _ => {
+                let transition = chain.transition(step.into());
+                *kept = Some((step, transition));
+                transition
+            }
+        }
+    }
+}
+
+/// Calls `take` for each row with the state at its time less the dead time, and with the input there.
+fn walk<S: Number<f64>>(
+    chain: &Chain<S>,
+    dead_time: f64,
+    times: &[f64],
+    input: &[f64],
+    mut take: impl FnMut(usize, &State<S>, f64),
+) {
+    let mut steps = Steps { chain, whole: None, part: None };
+    let (Some(&start), Some(&first)) = (times.first(), input.first()) else { return };
+    let mut state = chain.at_rest(first, 0.0);
+    let mut at = 0;
+    for (row, time) in times.iter().enumerate() {
+        let seen = time - dead_time;
+        while times.get(at + 1).is_some_and(|next| *next <= seen) {
+            let step = times[at + 1] - times[at];
+            state = Steps::take(steps.chain, &mut steps.whole, step, times[at + 1]).apply(&state, input[at]);
+            at += 1;
+        }
+        let since = seen - times[at];
+        if seen < start {
+            take(row, &chain.at_rest(first, seen - start), first);
+        } else if since == 0.0 {
+            take(row, &state, input[at]);
+        } else {
+            let part = Steps::take(steps.chain, &mut steps.part, since, *time);
+            take(row, &part.apply(&state, input[at]), input[at]);
+        }
+    }
+}
+
+/// Calls `take` with the columns in each row.
+pub(crate) fn run(
+    structure: &ProcessStructure,
+    shape: &[f64],
+    dead_time: f64,
+    (times, input): (&[f64], &[f64]),
+    mut take: impl FnMut(usize, &Columns<f64>),
+) {
+    let chain = structure.chain(shape);
+    walk(&chain, dead_time, times, input, |row, state, u| take(row, &chain.columns(state, u)));
+}
+
+/// Calls `take` with the columns in each row, and with the slopes of their sum by the shape and by the dead time.
+pub(crate) fn sensitivities(
+    structure: &ProcessStructure,
+    parts: &Parts<f64>,
+    (times, input): (&[f64], &[f64]),
+    mut take: impl FnMut(usize, &Columns<f64>, &[f64; LANE], f64),
+) {
+    let mut values = [0.0; LANE];
+    values.iter_mut().zip(&parts.shape).for_each(|(value, own)| *value = *own);
+    let variables = Dual::<f64, LANE>::variables(values);
+    let chain = structure.chain(&variables[..parts.shape.len().min(LANE)]);
+    let timed = structure.has_dead_time();
+    walk(&chain, parts.dead_time, times, input, |row, state, u| {
+        let columns = chain.columns(state, u);
+        let mut slopes = [0.0; LANE];
+        for (weight, column) in parts.weights.iter().zip(&columns) {
+            slopes.iter_mut().zip(column.derivatives).for_each(|(slope, own)| *slope += weight * own);
+        }
+        let by_dead_time = if timed {
+            let rates = chain.rates(state, u);
+            -parts.weights.iter().zip(rates).map(|(weight, rate)| weight * rate.value).sum::<f64>()
+        } else {
+            0.0
+        };
+        take(row, &columns.map(|column| column.value), &slopes, by_dead_time);
+    });
+}
+
+/// The responses to a first state of each lag, one after the other, without an input: what a log that does not begin at rest has of them.
+pub(crate) fn modes(structure: &ProcessStructure, shape: &[f64], times: &[f64]) -> Vec<Vec<f64>> {
+    let chain = structure.chain(shape);
+    let (Some(&start), states) = (times.first(), chain.states()) else { return Vec::new() };
+    let mut kept = None;
+    let mut found = vec![Vec::with_capacity(times.len()); states];
+    for (state, found) in found.iter_mut().enumerate() {
+        let mut last = start;
+        let mut own = chain.at_rest(0.0, 0.0);
+        own[state] = 1.0;
+        for time in times {
+            if *time > last {
+                own = Steps::take(&chain, &mut kept, time - last, *time).apply(&own, 0.0);
+                last = *time;
+            }
+            found.push(chain.end(&own));
+        }
+    }
+    found
+}

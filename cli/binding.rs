@@ -9,13 +9,17 @@ use thetahat::data::{Log, Source};
 use thetahat::design::{ExperimentDesign, SignalPlan};
 use thetahat::inspect::Inspection;
 use thetahat::model::Model;
-use thetahat::report::{EquationsPlan, NonlinearArxPlan, Plan, Report, Requirement, ValidationPlan};
+use thetahat::report::{
+    EquationsPlan, NonlinearArxPlan, Plan, ProcessPlan, Report, Requirement, ValidationPlan,
+};
 use thetahat::spectrum::SpectrumPlan;
 
 use crate::args::{DesignArguments, FitArguments, InspectArguments, MapArgument, ValidateArguments};
 use crate::commands::{Experiments, Tracking, compared_signals, experiments, inspected};
 use crate::failure::Failure;
-use crate::job::{DesignJob, EvaluationJob, FitJob, GreyBoxJob, InspectJob, NarxJob, SpectrumJob};
+use crate::job::{
+    DesignJob, EvaluationJob, FitJob, GreyBoxJob, InspectJob, NarxJob, ProcessJob, SpectrumJob,
+};
 use crate::replace::replace;
 
 /// Logs that were read as one.
@@ -87,6 +91,22 @@ pub fn narx_plan(
     })?;
     let job = NarxJob::resolve(&arguments, map)?;
     job.plan(if job.driven { inputs } else { Vec::new() }, outputs)
+}
+
+/// The plan that `thetahat fit --structure` makes of these options for a log with these channels.
+///
+/// # Errors
+/// A [`Failure`] as the program would report it.
+pub fn process_plan(
+    options: &[OsString],
+    inputs: Vec<String>,
+    output: String,
+) -> Result<ProcessPlan, Failure> {
+    let log = OsString::from("log");
+    let words: Vec<OsString> = options.iter().cloned().chain([log]).collect();
+    let job = ProcessJob::resolve(&arguments("fit", &words)?)?;
+    let job = job.ok_or_else(|| Failure::usage("--structure: name one, such as p1d"))?;
+    job.plan(inputs, output)
 }
 
 /// How `thetahat validate` evaluates a model with these options, and what it requires.

@@ -35,6 +35,7 @@ mod pages;
 mod predict_simulate;
 mod prediction_error;
 mod prefilter;
+mod process;
 mod pseudo_terminal;
 mod public_logs;
 mod report;

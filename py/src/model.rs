@@ -85,6 +85,18 @@ pub(crate) fn fit_narx(py: Python<'_>, log: &Bound<'_, Log>, options: Vec<OsStri
     Ok(Model::of(report))
 }
 
+/// Fits a process in continuous time to a log with the options of `thetahat fit --structure`.
+#[pyfunction]
+pub(crate) fn fit_process(py: Python<'_>, log: &Bound<'_, Log>, options: Vec<OsString>) -> PyResult<Model> {
+    let log = log.get();
+    let plan = thetahat_cli::process_plan(&options, log.inputs.clone(), log.output()?.clone())
+        .map_err(|failure| error::program(py, &failure))?;
+    let (channels, sources) = (Arc::clone(&log.log), log.sources.clone());
+    let report =
+        interruptible(py, move |monitor| thetahat::report::fit_process(&channels, &sources, &plan, monitor))?;
+    Ok(Model::of(report))
+}
+
 #[pymethods]
 impl Model {
     /// Reads the document back.

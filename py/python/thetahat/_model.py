@@ -29,7 +29,7 @@ class Model(ReportedModel):
     Polynomials are written in rising powers of q^-1, which delays by one sample: ``b[j][i]`` multiplies u_j(t - i). Signals
     go in and come out in the units of the log; the offsets that were removed before the fit are part of the model.
 
-    Models are made by `arx`, `armax`, `oe`, `bj`, `ar`, `arma`, `general`, `fir`, `iv`, `sriv`, `search` and `from_json`. They do not
+    Models are made by `arx`, `armax`, `oe`, `bj`, `ar`, `arma`, `general`, `fir`, `process`, `iv`, `sriv`, `search` and `from_json`. They do not
     change; they pickle and copy.
 
     Examples

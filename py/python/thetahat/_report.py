@@ -62,7 +62,7 @@ class ReportedModel:
 
     @property
     def kind(self) -> str:
-        """``"polynomial"``, or ``"equations"`` for a model in equations."""
+        """``"polynomial"``, ``"equations"``, ``"nonlinear-arx"`` or ``"process"``."""
         return str(self._own["kind"])
 
     def _polynomial(self, name: str) -> Any:

@@ -1,0 +1,87 @@
+"""Processes in continuous time: gain, lags, zero, integrator and dead time."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+
+from thetahat import _options, _thetahat
+from thetahat._fit import EstimationWarning
+from thetahat._log import Log, handle
+from thetahat._model import Model
+from thetahat._options import FitOptions, Rows
+
+
+def process(
+    log: Log,
+    structure: str | Sequence[str] = "p1d",
+    *,
+    estimate: Rows | None = None,
+    validate: Rows | None = None,
+    split: tuple[float, float, float] | None = None,
+    offset: Mapping[str, float] | None = None,
+    initial: str | None = None,
+    trend: bool | None = None,
+    search: str | None = None,
+    max_iterations: int | None = None,
+    tolerance: float | None = None,
+    step: float | tuple[float, float] | None = None,
+    starts: int | None = None,
+    time_limit: float | None = None,
+) -> Model:
+    """Fit a process in continuous time, such as y = K e^(-theta s)/(1 + tau s) u, by the least errors of its free run.
+
+    Inputs are held from row to row and the response is exact at the times of the rows: the clock may be irregular, and the dead
+    time need not be a number of samples.
+
+    Parameters
+    ----------
+    log : Log
+        The data, read with ``uniform=False`` if its clock is irregular. It begins at rest, unless ``initial`` says otherwise.
+    structure : str, or one for each input, default "p1d"
+        ``p``, how many lags (0 to 3), and letters: ``d`` with a dead time, ``z`` with a zero, ``i`` with an integrator, ``u`` with two
+        lags that may be underdamped. Or ``rc1``, ``rc2``, ``rc3``: lags side by side with a direct term, as batteries have them.
+    initial : {"zero", "estimate"}
+        Whether each log begins at rest with the inputs of its first row, which is the default, or in a state that is estimated.
+    trend : bool
+        Whether the output has a slope of its own.
+    offset : dict of str to float
+        Offsets that are known. That of an input is else its first value; that of the output is estimated.
+    estimate, validate, split, search, max_iterations, tolerance, step, starts, time_limit
+        What to fit to and how to search, see `thetahat.FitOptions`.
+
+    Returns
+    -------
+    Model
+        Of kind "process". Standard errors are for errors of any colour.
+
+    Raises
+    ------
+    EstimationError, ValueError
+        As for `arx`.
+
+    Warns
+    -----
+    EstimationWarning
+        For what a careful reader of the model should know.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import thetahat as th
+    >>> t = np.arange(100.0)
+    >>> u = np.where(t < 10, 0.0, 1.0)
+    >>> u[60:] = -0.5
+    >>> y = 2 * (t > 11.5) * (1 - np.exp(-(t - 11.5) / 8))
+    >>> y -= 3 * (t > 61.5) * (1 - np.exp(-(t - 61.5) / 8))
+    >>> model = th.process(th.Log(y, u, sample_time=1), "p1d")
+    >>> dict(zip(model.parameter_names, np.round(model.parameters, 3).tolist()))
+    {'K': 2.0, 'tau': 8.0, 'theta': 1.5}
+    """
+    names = [structure] if isinstance(structure, str) else list(structure)
+    words = [f"--structure={','.join(_options.text('structure', name) for name in names)}"]
+    words += _options.words(FitOptions, locals(), len(log) if isinstance(log, Log) else None)
+    found = Model._of(_thetahat.fit_process(handle("log", log), words))
+    for warning in found.warnings:
+        warnings.warn(warning, EstimationWarning, stacklevel=2)
+    return found

@@ -1,0 +1,75 @@
+"""Processes in continuous time, and what every method makes of them."""
+
+from __future__ import annotations
+
+import json
+import pickle
+import warnings
+
+import numpy as np
+import pytest
+
+import thetahat as th
+from thetahat import plot
+
+
+def log(rows: int = 400, noise: float = 0.02) -> th.Log:
+    """A first-order process with a dead time on an irregular clock, from rest."""
+    rng = np.random.default_rng(0)
+    t = np.arange(rows) * 0.5 + 0.2 * np.sin(1.7 * np.arange(rows))
+    u = np.repeat([0.0, 1.0, -0.5, 0.7], rows // 4)
+    y = np.full(rows, 20.0)
+    for start in (rows // 4, rows // 2, 3 * rows // 4):
+        s = np.maximum(t - t[start] - 1.3, 0)
+        y += 2 * (u[start] - u[start - 1]) * (1 - np.exp(-s / 5))
+    return th.Log(y + noise * rng.standard_normal(rows), u, time=t, uniform=False)
+
+
+def test_the_process_is_found_and_every_method_takes_it() -> None:
+    data = log()
+    model = th.process(data, "p1d")
+    assert model.parameter_names == ["K", "tau", "theta"]
+    assert model.parameters == pytest.approx([2, 5, 1.3], abs=0.05)
+    assert model.kind == "process"
+    assert np.all(np.isfinite(model.standard_errors))
+    again = pickle.loads(pickle.dumps(model))
+    assert json.loads(again.to_json()) == json.loads(model.to_json())
+    run = model.simulate(data)
+    assert np.std(run - data.y) < 0.05 * np.std(data.y)
+    assert model.predict(data) == pytest.approx(run)
+    assert np.std(model.residuals(data)) == pytest.approx(0.02, rel=0.2)
+    assert model.validate(data, rows=slice(200, 400), require="fit>=90").document["model"] == "process p1d"
+    assert model.step_response(samples=200).values[-1] == pytest.approx(model.parameters[0], rel=1e-3)
+    assert abs(model.frequency_response([0.001]).values[0]) == pytest.approx(model.parameters[0], rel=0.01)
+    assert "process p1d" in model._repr_html_()
+    plot.step(model)
+
+
+def test_several_inputs_starts_and_lines() -> None:
+    data = log()
+    u = data["u"]
+    v = np.repeat([0.0, 1.0], len(u) // 2)
+    since = np.maximum(data.time - data.time[len(u) // 2], 0)
+    y = data.y + 0.01 * data.time + 3 * (1 - np.exp(-since / 4))
+    both = th.Log(y, {"u": u, "v": v}, time=data.time, uniform=False)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", th.EstimationWarning)
+        model = th.process(both, ["p1d", "p1"], trend=True)
+    assert model.parameter_names == ["K[u]", "tau[u]", "theta[u]", "K[v]", "tau[v]"]
+    assert model.parameters[3:] == pytest.approx([3, 4], rel=0.1)
+    free = th.process(data, "p1d", initial="estimate")
+    assert free.parameters == pytest.approx([2, 5, 1.3], abs=0.05)
+
+
+def test_what_is_wrong_is_told() -> None:
+    data = log()
+    for structure, words in [("p9", "structure"), (["p1d", "p1"], "2 for 1 inputs"), ("", "structure")]:
+        with pytest.raises(ValueError, match=words):
+            th.process(data, structure)
+    constant = th.Log(np.arange(20.0), np.ones(20), sample_time=1)
+    with pytest.raises(th.EstimationError, match="never changes"):
+        th.process(constant)
+    with pytest.raises(TypeError):
+        th.process(data, 3)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="drop"):
+        th.process(data, initial="drop")

@@ -1,0 +1,147 @@
+//! Processes in continuous time on measured step tests, in every verb.
+
+use std::fmt::Write;
+
+use serde_json::Value;
+
+use crate::harness::{Folder, number};
+
+const TCLAB: &str = "log.csv --time t -u q1 -y t1";
+
+fn value(report: &Value, name: &str) -> (f64, f64) {
+    let parameters = report["model"]["parameters"].as_array().expect("a list");
+    let own = parameters.iter().find(|own| own["name"] == name).expect("the parameter is there");
+    (own["value"].as_f64().expect("a number"), own["standard_error"].as_f64().unwrap_or(f64::NAN))
+}
+
+fn near(found: f64, expected: f64, tolerance: f64) {
+    assert!((found / expected - 1.0).abs() < tolerance, "{found} {expected}");
+}
+
+/// An independent program: the exact response of each step, least squares for gain and level, Nelder and Mead for the rest.
+#[test]
+fn a_heater_is_what_an_independent_program_finds() {
+    let folder = Folder::with_log(include_str!("data/public/tclab_siso_step.csv"));
+    let report = folder.fit(&format!("{TCLAB} --model process --structure p1d"));
+    for (name, expected) in [("K", 0.360727), ("tau", 138.0946), ("theta", 14.24183)] {
+        near(value(&report, name).0, expected, 1e-5);
+    }
+    near(number(&report, "/fit/1/rmse"), 0.3811776, 1e-6);
+    near(number(&report, "/estimation/white_standard_errors/1"), 0.39, 0.005);
+    // Its errors are far from white, and so are those of its parameters.
+    assert!(value(&report, "tau").1 > 2.9, "{:?}", value(&report, "tau"));
+    let report = folder.fit(&format!("{TCLAB} --structure p2d"));
+    for (name, expected) in [("K", 0.362616), ("tau1", 136.48185), ("tau2", 9.96608), ("theta", 4.66505)] {
+        near(value(&report, name).0, expected, 1e-5);
+    }
+    near(number(&report, "/fit/1/rmse"), 0.3126266, 1e-6);
+}
+
+/// The first pulse of a battery cell, without rows that repeat a time: an independent program has R0 = 1.755 mOhm, tau = 7.883 and
+/// 224.3 s, rmse 1.29 mV.
+#[test]
+fn a_battery_is_what_an_independent_program_finds() {
+    let mut log = "t,i,v\n".to_owned();
+    let mut last = "";
+    for line in include_str!("data/public/leaf_cell_hppc_25c.csv").lines().skip(356).take(620) {
+        let time = line.split(',').next().expect("a time");
+        if time != last {
+            writeln!(log, "{line}").expect("memory");
+        }
+        last = time;
+    }
+    let folder = Folder::with_log(log);
+    let report = folder.fit("log.csv --time t -u i -y v --structure rc2");
+    near(value(&report, "R0").0, 1.755e-3, 3e-4);
+    near(value(&report, "tau1").0, 7.883, 1e-3);
+    near(value(&report, "tau2").0, 224.3, 1e-3);
+    near(number(&report, "/fit/1/rmse"), 1.29e-3, 2e-3);
+}
+
+#[test]
+fn every_verb_takes_a_process() {
+    let folder = Folder::with_log(include_str!("data/public/tclab_siso_step.csv"));
+    let report = folder.fit(&format!(
+        "{TCLAB} --structure p2d --estimate 1..400 --validate 401..571 --report model.json --html page.html"
+    ));
+    assert_eq!(report["model"]["kind"], "process");
+    assert!(number(&report, "/fit/3/percent") > 50.0, "{report:#}");
+    let table = folder.done(&format!("fit {TCLAB} --structure p2d")).stdout;
+    assert!(table.contains("G = K e^(-theta s)/((1 + tau1 s) (1 + tau2 s)) from q1"), "{table}");
+    assert!(
+        table.contains("if errors were white") && table.contains("rad/s") == table.contains("omega"),
+        "{table}"
+    );
+    let step = folder.done("step model.json").stdout;
+    let last: Vec<f64> =
+        step.lines().last().expect("rows").split(',').filter_map(|cell| cell.parse().ok()).collect();
+    near(last[1], value(&report, "K").0, 0.02);
+    for line in [
+        "impulse model.json",
+        "bode model.json",
+        "predict model.json log.csv --time t --horizon 3",
+        "simulate model.json log.csv --time t",
+        "simulate model.json log.csv --time t --initial estimate",
+        "validate model.json log.csv --time t --rows 401..571 --html validation.html",
+        "compare model.json log.csv --time t --rows 401..571 --html comparison.html",
+    ] {
+        folder.done(line);
+    }
+    // States need an even clock.
+    folder.refused("filter model.json log.csv --time t -o states.csv", 3);
+    folder.done("filter model.json log.csv --sample-time 1 -o states.csv");
+}
+
+/// A tank that fills: its level goes on rising after the step.
+#[test]
+fn an_integrator_and_a_free_start_are_found() {
+    let mut log = "u,y\n".to_owned();
+    let mut level = 3.0;
+    for k in 0..200 {
+        let flow = |k: i32| f64::from(u8::from((20..120).contains(&k)));
+        writeln!(log, "{},{level}", flow(k)).expect("memory");
+        level += 0.5 * flow(k - 4);
+    }
+    let folder = Folder::with_log(log);
+    let report = folder.fit("log.csv --structure p0di --sample-time 0.5");
+    near(value(&report, "K").0, 1.0, 1e-6);
+    near(value(&report, "theta").0, 2.0, 1e-6);
+    near(number(&report, "/estimation/level/value"), 3.0, 1e-6);
+
+    let mut log = "u,y\n".to_owned();
+    for k in 0..200_u32 {
+        let t = f64::from(k);
+        let rise = |start: f64| 2.0 * (1.0 - (-(t - start).max(0.0) / 10.0).exp());
+        writeln!(log, "{},{}", u8::from(k >= 50), 1.0 + 4.0 * (-t / 10.0).exp() + rise(50.0))
+            .expect("memory");
+    }
+    let folder = Folder::with_log(log);
+    let report = folder.fit("log.csv --structure p1 --initial estimate --sample-time 1");
+    near(value(&report, "tau").0, 10.0, 1e-6);
+    assert_eq!(number(&report, "/estimation/initial_conditions"), 1.0);
+}
+
+#[test]
+fn what_cannot_be_is_told() {
+    let folder = Folder::with_log(include_str!("data/public/tclab_siso_step.csv"));
+    for (options, code, words) in [
+        ("--model process", 2, "needs --structure"),
+        ("--structure p7d", 2, "no structure of a process"),
+        ("--model arx --structure p1d", 2, "leave one of the two out"),
+        ("--structure p1d,p1d", 2, "2 for 1 inputs"),
+        ("--structure p1d --initial drop", 2, "--initial drop"),
+        ("--structure p1d --trend --offset t1=3", 2, "leave one of them out"),
+        ("--structure p1d --estimate 1..5", 4, "never changes"),
+        ("--structure p1d --estimate 1..900", 3, "900"),
+    ] {
+        let before = folder.names();
+        let error = folder.refused(&format!("fit {TCLAB} {options} --report model.json"), code);
+        assert!(error.contains(words), "{options}: {error}");
+        assert_eq!(folder.names(), before);
+    }
+    // What is of other models.
+    for option in ["--na 2", "--detrend mean", "--narx poly", "--kernel dc", "--constant yes"] {
+        let run = folder.run(&format!("fit {TCLAB} --structure p1d {option}"));
+        assert!(run.code == 2 && run.stderr.contains("cannot be used with"), "{option}: {}", run.stderr);
+    }
+}

@@ -10,6 +10,7 @@ mod narx;
 mod orders;
 mod search;
 mod spectrum;
+mod step;
 mod track;
 mod validate;
 
@@ -34,6 +35,7 @@ pub(crate) use grey_box::GreyBoxJob;
 pub(crate) use inspect::InspectJob;
 pub(crate) use narx::{NarxJob, check_linear};
 pub(crate) use spectrum::SpectrumJob;
+pub(crate) use step::StepTestJob;
 pub(crate) use track::TrackJob;
 pub(crate) use validate::EvaluationJob;
 

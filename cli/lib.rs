@@ -46,7 +46,7 @@ pub use binding::{
 };
 pub use commands::demo::LOG as DEMO_LOG;
 pub use commands::summary::{
-    comparison, experiment_design, filtered, inspection, response, table, tracking, validation,
+    comparison, experiment_design, filtered, inspection, response, step_test, table, tracking, validation,
 };
 pub use commands::{TrackedRow, Tracking, consistency};
 pub use failure::{Failure, Kind};

@@ -206,7 +206,7 @@ Examples:
     /// [units of the output per unit of the input] and its standard error; the input is 1 from time 0 on, and all is at rest before.
     #[command(after_help = "\
 Examples:
-  thetahat step thetahat-demo/steps.csv --time t
+  thetahat step steps.csv --time t -u heater -y temperature
   thetahat step model.json --samples 200 > step.csv
   thetahat step model.json --impulse --html impulse.html > impulse.csv")]
     Step(Box<StepArguments>),

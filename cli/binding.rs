@@ -11,11 +11,14 @@ use thetahat::inspect::Inspection;
 use thetahat::model::Model;
 use thetahat::report::{EquationsPlan, NonlinearArxPlan, Plan, Report, Requirement, ValidationPlan};
 use thetahat::spectrum::SpectrumPlan;
+use thetahat::step_test::StepTestPlan;
 
 use crate::args::{DesignArguments, FitArguments, InspectArguments, MapArgument, ValidateArguments};
 use crate::commands::{Experiments, Tracking, compared_signals, experiments, inspected};
 use crate::failure::Failure;
-use crate::job::{DesignJob, EvaluationJob, FitJob, GreyBoxJob, InspectJob, NarxJob, SpectrumJob};
+use crate::job::{
+    DesignJob, EvaluationJob, FitJob, GreyBoxJob, InspectJob, NarxJob, SpectrumJob, StepTestJob,
+};
 use crate::replace::replace;
 
 /// Logs that were read as one.
@@ -125,6 +128,16 @@ pub fn spectrum_plan(
     let log = OsString::from("log");
     let words: Vec<OsString> = options.iter().cloned().chain([log]).collect();
     SpectrumJob::resolve(&arguments("spectrum", &words)?)?.plan(inputs, output)
+}
+
+/// The plan that `thetahat step` makes of these options for a log with these channels.
+///
+/// # Errors
+/// A [`Failure`] as the program would report it.
+pub fn step_test_plan(options: &[OsString], input: String, output: String) -> Result<StepTestPlan, Failure> {
+    let log = OsString::from("log");
+    let words: Vec<OsString> = options.iter().cloned().chain([log]).collect();
+    Ok(StepTestJob::resolve(&arguments("step", &words)?)?.plan(input, output))
 }
 
 /// The signal that `thetahat design` makes with these options.

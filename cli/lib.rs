@@ -42,7 +42,7 @@ use thetahat::text;
 
 pub use binding::{
     Opened, compare_signals, equations_plan, inspect, narx_plan, plan, read, signal_plan, spectrum_plan,
-    track, validation_plan, write,
+    step_test_plan, track, validation_plan, write,
 };
 pub use commands::demo::LOG as DEMO_LOG;
 pub use commands::summary::{

@@ -65,8 +65,8 @@ fn steps(text: &mut Text, steps: &[Step]) {
 /// One line for each figure by each way.
 fn figures(text: &mut Text, found: &StepTest) {
     let several = found.summary.iter().any(|of| of.steps > 1);
-    let head = ["figure", "way", "value", "standard error", "trust", "steps", "between steps"];
-    let mut table = columns(if several { &head } else { &head[..5] }).words(&[1, 4]).none(if several {
+    let head = ["figure", "way", "value", "standard error", "spread"];
+    let mut table = columns(if several { &head } else { &head[..4] }).words(&[1]).none(if several {
         "one step has no spread"
     } else {
         "not known"
@@ -77,23 +77,26 @@ fn figures(text: &mut Text, found: &StepTest) {
         let name = of.figure.name();
         let name = if unit.is_empty() { name.to_owned() } else { format!("{name} [{unit}]") };
         let Quantity { value, standard_error, .. } = of.value;
+        let trust = match of.trusted {
+            0 => String::new(),
+            all if all == of.steps => " *".to_owned(),
+            some => format!(" (* in {some})"),
+        };
         let mut cells = vec![
             if name == last { String::new() } else { name.clone() },
-            of.method.title(of.figure).to_owned(),
+            format!("{}{trust}", of.method.title(of.figure)),
             number(value),
             or_dash(standard_error, error),
-            match of.trusted {
-                0 => String::new(),
-                all if all == of.steps => "*".to_owned(),
-                some => format!("* in {some}"),
-            },
         ];
         if several {
-            cells.push(of.steps.to_string());
             cells.push(or_dash(of.spread, error));
         }
         last = name;
         table.row(cells);
+    }
+    table.legend("*: the one to trust");
+    if several {
+        table.legend("value: the mean over the steps; spread: the standard deviation between them");
     }
     let misfits = found.steps.iter().filter_map(|step| step.response.as_ref()?.misfit);
     let misfit =

@@ -182,7 +182,7 @@ fn tangent(response: &Response<'_>, theta: f64, tau: f64, shape: Shape) -> Optio
     let local = at(centre)?;
     let [a, b, c] = local.coefficients;
     let slope = (b + 2.0 * c * x) / half;
-    if !(slope > 0.0) {
+    if slope.is_nan() || slope <= 0.0 {
         return None;
     }
     let value = a + b * x + c * x * x;

@@ -10,6 +10,7 @@ mod step;
 mod terms;
 
 pub(super) use correlation::{autocorrelation, compared_autocorrelations, cross_correlation, prewhitened};
+pub use dynamics::Transient;
 pub(super) use dynamics::{bode, roots, transient, transients};
 pub(super) use response::{measured, measured_noise};
 pub(super) use search::{delays, score, search};

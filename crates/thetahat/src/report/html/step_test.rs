@@ -1,6 +1,6 @@
 //! The pages of steps: of a log, and of a model.
 
-use super::charts::{self, Shade, Stack};
+use super::charts::{self, Shade, Stack, Transient};
 use super::outputs::points;
 use super::page::{Page, Section, Table};
 use super::text::{or_dash, quantity};
@@ -14,15 +14,6 @@ use crate::step_test::{StepSummary, StepTest};
 const MOST: usize = 12;
 /// A chart begins this fraction of the response before the step.
 const BEFORE: f64 = 0.15;
-
-/// What happens at the input of a model.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Transient {
-    /// A step by one unit.
-    Step,
-    /// An impulse of one unit that lasts one sample.
-    Impulse,
-}
 
 /// The page of a step test: the log with its steps, each response with what is read off it, and the figures by each way. `log` is the one
 /// that was evaluated, none for a frequency response. `command` is shown as what made the page.

@@ -10,7 +10,6 @@ use super::super::figure::{
     positive_range, significant, style,
 };
 use super::super::object::{Object, marker, scatter, stroke};
-use super::super::step_test::Transient;
 use super::super::text;
 use crate::model::{PolynomialModel, Quantity, Root};
 use crate::respond::{
@@ -29,6 +28,15 @@ const CHI_SQUARE: f64 = 5.991_465;
 const FARTHEST: f64 = 3.0;
 /// Points of an ellipse and of the unit circle.
 const ROUND: usize = 60;
+
+/// What happens at the input of a model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Transient {
+    /// A step by one unit.
+    Step,
+    /// An impulse of one unit that lasts one sample.
+    Impulse,
+}
 
 /// Magnitude and phase of several models from one input, or from the noise where that is none.
 pub(crate) fn bode(models: &[(String, &PolynomialModel)], input: Option<&str>) -> Drawn {

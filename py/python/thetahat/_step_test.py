@@ -28,7 +28,7 @@ class StepTest(_Document):
     >>> found = th.step_test(th.Log(y, u, sample_time=1.0))
     >>> found
     StepTest(1 step of u, first-order)
-    >>> round(found.value("gain"), 3), round(found.value("time-constant"), 1)
+    >>> round(found.value("gain"), 2), round(found.value("time-constant"), 1)
     (2.0, 20.0)
     """
 

@@ -222,7 +222,11 @@ fn response(section: &Section, jump: &Jump, levels: Levels) -> Result<(StepRespo
     let level = |value: f64, variance: f64| {
         Quantity::new(section.lowest + unit * value, Some(unit * variance.sqrt()))
     };
-    let mut figures = vec![(StepFigure::Gain, StepMethod::Regime, gain(section, jump, &levels))];
+    let gain = gain(section, jump, &levels);
+    if !(gain.value.is_finite() && gain.standard_error.is_some_and(f64::is_finite)) {
+        return Err("the gain leaves the range of numbers: give the channels in other units".to_owned());
+    }
+    let mut figures = vec![(StepFigure::Gain, StepMethod::Regime, gain)];
     figures.extend(read.figures);
     let mut words = read.words;
     let clock = (time[time.len() - 1]) / (time.len() - 1) as f64;
@@ -287,6 +291,9 @@ fn read(time: &[f64], output: &[f64], levels: &Levels) -> Result<Read, String> {
             .to_owned()
     };
     let peak = first_peak(&response);
+    if peak.as_ref().is_some_and(|peak| peak.above.value >= 1.0) {
+        return Err("the output overshoots by more than its whole change, which no damped second order does; fit a model".to_owned());
+    }
     let (middle, rows) = response.half_time().ok_or_else(unusual)?;
     let smoothed = response.smoothed(rows / 4);
     let passed = smoothed.iter().position(|s| *s > 0.9).map_or(middle, |row| time[row]);
@@ -294,6 +301,11 @@ fn read(time: &[f64], output: &[f64], levels: &Levels) -> Result<Read, String> {
         Some(peak) => peak.time.value,
         None => PASSED * passed,
     };
+    if response.time_below(0.9, end) <= response.time_below(0.1, end) {
+        return Err("the output goes from one level to the other within one step of the clock, so that there is no transient to read; \
+                    record faster"
+            .to_owned());
+    }
     let levels = crossings(&response, end).ok_or_else(unusual)?;
     let (shape, misfit, found) = match &peak {
         Some(peak) => {

@@ -134,7 +134,9 @@ impl Response<'_> {
         let k = (most / 4..=most).find(|k| wide(*k))?;
         let smoothed = self.smoothed(k);
         let outside = |s: &f64| (s - 1.0).abs() > SETTLED;
-        let last = smoothed.iter().rposition(outside)?;
+        // Those at the end are over fewer rows.
+        let whole = smoothed.len().saturating_sub(k);
+        let last = smoothed[..whole].iter().rposition(outside)?;
         let next = smoothed.get(last + 1)?;
         let edge = 1.0 + SETTLED.copysign(smoothed[last] - 1.0);
         let slope = (next - smoothed[last]) / (self.time[last + 1] - self.time[last]);

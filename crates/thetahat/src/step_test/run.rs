@@ -39,7 +39,7 @@ impl StepTestPlan {
 ///
 /// Standard errors are to first order in the noise: the standard deviation and the autocorrelation of what is left of the output at rest,
 /// before the step and in the regime, go through the derivatives of each figure by each row, and so do the errors of y0 and y1. They hold for the
-/// model that a way takes for granted; what a wrong one does they do not say, and [`StepResponse::misfit`] does.
+/// model that a way takes for granted; what a wrong one does they do not say, and [`StepResponse::misfit`](super::StepResponse::misfit) does.
 ///
 /// A step without a response that can be evaluated keeps its place, with the reason: the output is not at rest before it, the regime is
 /// not reached, the change is lost in the noise, rows are too few.

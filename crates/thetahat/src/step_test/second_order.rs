@@ -93,7 +93,7 @@ pub(super) fn second_order(
     // A period is twice the time to the peak.
     let about = 2.0 * from_start.value;
     let row = |part: f64| response.time.partition_point(|t| *t < peak.time.value + part * about);
-    let k = (row(0.05) - row(0.0)) / 2;
+    let k = row(0.05).saturating_sub(row(0.0)) / 2;
     let second = highest(response, k, row(1.0 - BESIDE), row(1.0 + BESIDE), |_| peak.half);
     if let Some(second) = second.filter(|second| second.above.value < overshoot) {
         let period = Influence::combined(1.0, &second.time, -1.0, &peak.time);

@@ -118,6 +118,7 @@ fn what_cannot_be_read_off_is_refused() {
             "which is lost in its noise (standard deviation ",
             true,
         ),
+        (timed(&time, step.clone(), step.clone()), "within one step of the clock", true),
         (stepped(&time, &[2.0], first_order(5.0, 0.0), || 0.0), "does not reach a regime", true),
         // Noise hides that it still moves, but not that it has had no time.
         (stepped(&time, &[2.0], first_order(3.0, 0.0), noise(0.2)), "does not reach a regime", true),
@@ -136,6 +137,18 @@ fn what_cannot_be_read_off_is_refused() {
         assert!(error.to_string().contains(says), "{says}: {error}");
         assert_eq!(matches!(error, Error::Undetermined { .. }), undetermined, "{error:?}");
     }
+    // A zero that makes the output jump first.
+    let leads = stepped(
+        &time,
+        &[2.0],
+        |t: f64| if t < 0.0 { 0.0 } else { 1.0 + 3.0 * (-4.0 * t).exp() * (1.0 - (-40.0 * t).exp()) },
+        || 0.0,
+    );
+    assert!(refused(&leads, &plan).to_string().contains("overshoots by more than its whole change"));
+    let lags = stepped(&time, &[2.0], first_order(1.0, 0.0), || 0.0);
+    let large = lags.channel("y").unwrap().values.iter().map(|y| 1e290 * y).collect();
+    let extreme = timed(&time, step.iter().map(|u| 1e-290 * u).collect(), large);
+    assert!(refused(&extreme, &plan).to_string().contains("the gain leaves the range of numbers"));
     let log = timed(&time, step.clone(), step.iter().map(|u| 1e308 * (2.0 * u - 1.0)).collect());
     assert!(refused(&log, &plan).to_string().contains("give them in other units"));
     assert!(refused(&log, &StepTestPlan::new("u", "u")).to_string().contains("each channel has one role"));

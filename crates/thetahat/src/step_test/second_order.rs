@@ -80,12 +80,18 @@ pub(super) fn second_order(
     let length = (PI * PI + log * log).sqrt();
     let damping = peak.above.mapped(-log / length, -PI * PI / (overshoot * length.powi(3)));
     let r = half_time(damping.value);
-    let begins = Influence::combined(1.0 / (1.0 - r), half, -r / (1.0 - r), &peak.time);
-    let [begins, reported] = dead_time(response, begins);
-    let from_start = Influence::combined(1.0, &peak.time, -1.0, &begins);
+    let begins_of = |time: &Influence| Influence::combined(1.0 / (1.0 - r), half, -r / (1.0 - r), time);
+    // The peak is steeper before than after: by its third derivative the parabola over half to either side is late by a omega_d half^2/5,
+    // with a = zeta/sqrt(1 - zeta^2).
+    let skew = damping.value / (1.0 - damping.value * damping.value).sqrt();
+    let angular = PI / (peak.time.value - begins_of(&peak.time).value.max(0.0));
+    let late = skew * angular * peak.half * peak.half / 5.0;
+    let time = Influence { value: peak.time.value - late, ..peak.time.clone() };
+    let [begins, reported] = dead_time(response, begins_of(&time));
+    let from_start = Influence::combined(1.0, &time, -1.0, &begins);
     let mut figures = vec![
         (Overshoot, StepMethod::Peak, peak.above.clone()),
-        (PeakTime, StepMethod::Peak, peak.time.clone()),
+        (PeakTime, StepMethod::Peak, time),
         (DeadTime, StepMethod::TwoPoints, reported),
         (Damping, StepMethod::Peak, damping.clone()),
         (NaturalFrequency, StepMethod::Peak, frequency(PI, &from_start, &damping)),

@@ -62,7 +62,6 @@ fn a_second_order_without_noise() {
         (StepFigure::PeakTime, StepMethod::Peak, std::f64::consts::PI / 3.0 / rest),
         (StepFigure::Period, StepMethod::TwoPeaks, std::f64::consts::TAU / 3.0 / rest),
     ] {
-        // The parabola misses the skew of the peak.
         assert!(
             (of(figure, method) / right - 1.0).abs() < 0.02,
             "{figure:?} {method:?} {}",

@@ -9,6 +9,7 @@ mod lines;
 mod log;
 mod respond;
 mod spectrum;
+mod step;
 mod track;
 mod validate;
 
@@ -32,6 +33,7 @@ pub(crate) use respond::{
 pub(crate) use spectrum::{
     EstimatorOfSpectraArgument, ResponseFormatArgument, SpectrumArguments, SpectrumMethodArgument,
 };
+pub(crate) use step::StepArguments;
 pub(crate) use track::{ResumeArgument, TrackArguments, TrackMethodArgument, TrackModelArgument};
 pub(crate) use validate::{CompareArguments, EvaluationArguments, ValidateArguments};
 
@@ -195,14 +197,19 @@ Examples:
   thetahat bode model.json --frequencies 0.01..3 --points 200 > bode.csv
   thetahat bode model.json --over response.json --html bode.html > over.csv")]
     Bode(BodeArguments),
-    /// The step response of a fitted model
+    /// What a step test shows, or what a fitted model does after a step
     ///
-    /// Writes CSV with a row for each input and time: input, time [s], value [units of the output per unit of the input] and its
-    /// standard error. The input is 1 from time 0 on; all is at rest before.
+    /// Of a log it finds the steps of the input and reads off each response what a course does, each way with its standard error: gain,
+    /// dead time, time constant (tangent, 63.2 %, two points, t-bar plain and weighted), rise and settling time, and of an overshoot
+    /// damping, period and natural frequency. Says which to trust. Of the document of spectrum it takes the time constant from the
+    /// frequency at which the phase is -45 degrees. Of a report it writes CSV with a row for each input and time: input, time [s], value
+    /// [units of the output per unit of the input] and its standard error; the input is 1 from time 0 on, and all is at rest before.
     #[command(after_help = "\
-Example:
-  thetahat step model.json --samples 200 > step.csv")]
-    Step(TransientArguments),
+Examples:
+  thetahat step steps.csv --time t -u heater -y temperature
+  thetahat step model.json --samples 200 > step.csv
+  thetahat step model.json --impulse --html impulse.html > impulse.csv")]
+    Step(Box<StepArguments>),
     /// The impulse response of a fitted model
     ///
     /// Writes CSV with a row for each input and time: input, time [s], value [units of the output per unit of the input] and its
@@ -237,7 +244,7 @@ Example:
 Example:
   thetahat schema > thetahat.report.schema.json")]
     Schema {
-        /// The document: what fit, validate, compare, inspect, spectrum, track, filter or design writes
+        /// The document: what fit, validate, compare, inspect, spectrum, step, track, filter or design writes
         #[arg(value_enum, default_value = "report")]
         document: DocumentArgument,
     },
@@ -278,6 +285,8 @@ pub(crate) enum DocumentArgument {
     Inspection,
     /// What spectrum writes
     Response,
+    /// What step writes of a log
+    Step,
     /// What track writes at its end
     Track,
     /// What filter writes at its end

@@ -13,12 +13,13 @@ use thetahat::report::{
     EquationsPlan, NonlinearArxPlan, Plan, ProcessPlan, Report, Requirement, ValidationPlan,
 };
 use thetahat::spectrum::SpectrumPlan;
+use thetahat::step_test::StepTestPlan;
 
 use crate::args::{DesignArguments, FitArguments, InspectArguments, MapArgument, ValidateArguments};
 use crate::commands::{Experiments, Tracking, compared_signals, experiments, inspected};
 use crate::failure::Failure;
 use crate::job::{
-    DesignJob, EvaluationJob, FitJob, GreyBoxJob, InspectJob, NarxJob, ProcessJob, SpectrumJob,
+    DesignJob, EvaluationJob, FitJob, GreyBoxJob, InspectJob, NarxJob, ProcessJob, SpectrumJob, StepTestJob,
 };
 use crate::replace::replace;
 
@@ -145,6 +146,16 @@ pub fn spectrum_plan(
     let log = OsString::from("log");
     let words: Vec<OsString> = options.iter().cloned().chain([log]).collect();
     SpectrumJob::resolve(&arguments("spectrum", &words)?)?.plan(inputs, output)
+}
+
+/// The plan that `thetahat step` makes of these options for a log with these channels.
+///
+/// # Errors
+/// A [`Failure`] as the program would report it.
+pub fn step_test_plan(options: &[OsString], input: String, output: String) -> Result<StepTestPlan, Failure> {
+    let log = OsString::from("log");
+    let words: Vec<OsString> = options.iter().cloned().chain([log]).collect();
+    Ok(StepTestJob::resolve(&arguments("step", &words)?)?.plan(input, output))
 }
 
 /// The signal that `thetahat design` makes with these options.

@@ -15,6 +15,7 @@ mod process;
 mod respond;
 mod search;
 mod spectrum;
+mod step;
 mod stored;
 pub(crate) mod summary;
 mod track;
@@ -44,8 +45,8 @@ pub(crate) fn dispatch(arguments: Arguments, line: &str) -> Result<(), Failure> 
         Command::Track(arguments) => track::track(&arguments),
         Command::Filter(arguments) => filter::filter(&arguments),
         Command::Bode(arguments) => bode::bode(&arguments, line),
-        Command::Step(arguments) => transient::step(&arguments),
-        Command::Impulse(arguments) => transient::impulse(&arguments),
+        Command::Step(arguments) => step::step(&arguments, line),
+        Command::Impulse(arguments) => transient::impulse(&arguments, line),
         Command::Design(arguments) => design::design(&arguments),
         Command::Demo(arguments) => demo::demo(&arguments),
         Command::Schema { document } => help::schema(document),

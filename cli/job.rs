@@ -11,6 +11,7 @@ mod orders;
 mod process;
 mod search;
 mod spectrum;
+mod step;
 mod track;
 mod validate;
 
@@ -36,6 +37,7 @@ pub(crate) use inspect::InspectJob;
 pub(crate) use narx::{NarxJob, check_linear};
 pub(crate) use process::ProcessJob;
 pub(crate) use spectrum::SpectrumJob;
+pub(crate) use step::StepTestJob;
 pub(crate) use track::TrackJob;
 pub(crate) use validate::EvaluationJob;
 

@@ -69,6 +69,10 @@ fn every_verb_has_examples_and_they_run() {
     let times: Vec<f64> = (0..1000).map(|row| 0.08 * f64::from(row)).collect();
     let folder =
         Folder::with_log(csv(&[("t", &times), ("u", &u), ("y", &y), ("heater", &u), ("temperature", &y)]));
+    let rises = |t: i32| 20.0 + 5.0 * (1.0 - (-f64::from((t - 100).max(0)) / 60.0).exp());
+    let heater: Vec<f64> = (0..1000).map(|t| if t < 100 { 1.0 } else { 3.0 }).collect();
+    let temperature: Vec<f64> = (0..1000).map(rises).collect();
+    folder.write("steps.csv", csv(&[("t", &times), ("heater", &heater), ("temperature", &temperature)]));
     folder.write("sunspots.csv", csv(&[("count", &y)]));
     for day in ["monday.csv", "tuesday.csv"] {
         folder.write(day, csv(&[("u", &u), ("y", &y)]));

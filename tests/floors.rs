@@ -45,7 +45,7 @@ const LIBRARY: House = House {
         &["validate"],
         &["select"],
         &["inspect", "spectrum"],
-        &["design"],
+        &["design", "step_test"],
         &["report"],
         &["filter", "track"],
     ],

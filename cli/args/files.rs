@@ -54,9 +54,13 @@ impl Command {
                 read.extend(bode.reports.iter().chain(&bode.over).cloned());
                 written.extend([&bode.out].into_iter().chain(&bode.html).cloned());
             }
-            Self::Step(transient) | Self::Impulse(transient) => {
-                read.push(transient.report.clone());
-                written.push(transient.out.clone());
+            Self::Step(step) => {
+                read.push(step.path.clone());
+                written.extend([&step.out].into_iter().chain(&step.report).chain(&step.html).cloned());
+            }
+            Self::Impulse(impulse) => {
+                read.push(impulse.report.clone());
+                written.extend([&impulse.out].into_iter().chain(&impulse.html).cloned());
             }
             Self::Design(design) => {
                 read.extend(design.model.clone());

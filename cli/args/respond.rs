@@ -1,4 +1,4 @@
-//! The arguments of predict and simulate, and of step, impulse and bode.
+//! The arguments of predict and simulate, and of impulse and bode.
 
 use std::path::PathBuf;
 
@@ -61,7 +61,6 @@ pub(crate) struct BodeArguments {
     pub(crate) out: PathBuf,
 }
 
-/// What step and impulse share.
 #[derive(Debug, Args)]
 pub(crate) struct TransientArguments {
     /// The report that fit wrote (- for standard input)
@@ -73,6 +72,9 @@ pub(crate) struct TransientArguments {
     /// Write the CSV to a file instead of standard output
     #[arg(short = 'o', long, value_name = "FILE", default_value = "-", hide_default_value = true)]
     pub(crate) out: PathBuf,
+    /// Write a page with charts to a file too
+    #[arg(long, value_name = "FILE")]
+    pub(crate) html: Option<PathBuf>,
 }
 
 /// What predict and simulate share.

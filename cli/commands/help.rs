@@ -7,6 +7,7 @@ use thetahat::filter::FilterSummary;
 use thetahat::inspect::Inspection;
 use thetahat::report::{Comparison, Report, Validation};
 use thetahat::spectrum::MeasuredResponse;
+use thetahat::step_test::StepTest;
 use thetahat::track::TrackSummary;
 
 use crate::args::{Arguments, DocumentArgument};
@@ -21,6 +22,7 @@ pub(crate) fn schema(document: DocumentArgument) -> Result<(), Failure> {
         DocumentArgument::Comparison => Comparison::json_schema(),
         DocumentArgument::Inspection => Inspection::json_schema(),
         DocumentArgument::Response => MeasuredResponse::json_schema(),
+        DocumentArgument::Step => StepTest::json_schema(),
         DocumentArgument::Track => TrackSummary::json_schema(),
         DocumentArgument::Filter => FilterSummary::json_schema(),
         DocumentArgument::Design => ExperimentDesign::json_schema(),

@@ -45,13 +45,22 @@ pub(super) fn report(path: &Path) -> Result<Report, Failure> {
         Kind::Data => bad("this is not a thetahat report: not UTF-8 text".to_owned()),
         _ => failure,
     })?;
-    Report::from_json(&text).map_err(|error| bad(error.to_string()))
+    report_of(path, &text)
+}
+
+/// The report that the text of a file is.
+pub(super) fn report_of(path: &Path, text: &str) -> Result<Report, Failure> {
+    Report::from_json(text).map_err(|error| Failure::data(format!("{}: {error}", path.display())))
 }
 
 /// A stored response of spectrum.
 pub(super) fn response(path: &Path) -> Result<MeasuredResponse, Failure> {
-    MeasuredResponse::from_json(&text(path)?)
-        .map_err(|error| Failure::data(format!("{}: {error}", path.display())))
+    response_of(path, &text(path)?)
+}
+
+/// The response that the text of a file is.
+pub(super) fn response_of(path: &Path, text: &str) -> Result<MeasuredResponse, Failure> {
+    MeasuredResponse::from_json(text).map_err(|error| Failure::data(format!("{}: {error}", path.display())))
 }
 
 /// The text of a file.

@@ -8,6 +8,8 @@ use pyo3::prelude::*;
 use thetahat::Document;
 use thetahat::inspect::{Inspection, InspectionPlan};
 use thetahat::report::{Report, Requirement, Validated};
+use thetahat::spectrum::MeasuredResponse;
+use thetahat::step_test::StepTest;
 
 use crate::error;
 use crate::log::Log;
@@ -126,6 +128,40 @@ pub(crate) fn spectrum(
     let found = interruptible(py, move |_| thetahat::spectrum::spectrum(&log, &sources, &plan))?;
     let json = found.to_json().map_err(|error| error::batch(py, error))?;
     Ok((json, thetahat_cli::response(&found, thetahat_cli::WIDTH)))
+}
+
+/// What the steps of a log show, with the options of `thetahat step`: the document that it writes, and its table.
+#[pyfunction]
+pub(crate) fn step_test(
+    py: Python<'_>,
+    log: &Bound<'_, Log>,
+    options: Vec<OsString>,
+) -> PyResult<(String, String)> {
+    let log = log.get();
+    let ([input], [output]) = (log.inputs.as_slice(), log.outputs.as_slice()) else {
+        return Err(PyValueError::new_err(
+            "log: a step test has one input and one output; take them with log.select(inputs=..., output=...)",
+        ));
+    };
+    let plan = thetahat_cli::step_test_plan(&options, input.clone(), output.clone())
+        .map_err(|failure| error::program(py, &failure))?;
+    let (log, sources) = (Arc::clone(&log.log), log.sources.clone());
+    let found = interruptible(py, move |_| thetahat::step_test::step_test(&log, &sources, &plan))?;
+    step_document(py, &found)
+}
+
+/// The same of the document of a measured response, at the phase of -45 degrees.
+#[pyfunction]
+pub(crate) fn sine_test(py: Python<'_>, response: &str, input: &str) -> PyResult<(String, String)> {
+    let found = MeasuredResponse::from_json(response)
+        .and_then(|response| thetahat::step_test::sine_test(&response, input))
+        .map_err(|error| error::batch(py, error))?;
+    step_document(py, &found)
+}
+
+fn step_document(py: Python<'_>, found: &StepTest) -> PyResult<(String, String)> {
+    let json = found.to_json().map_err(|error| error::batch(py, error))?;
+    Ok((json, thetahat_cli::step_test(found, thetahat_cli::WIDTH)))
 }
 
 fn written(py: Python<'_>, found: &Inspection) -> PyResult<(String, String)> {

@@ -105,10 +105,31 @@ fn dc_motor() -> String {
     csv
 }
 
+/// A step test of a heater: time [s], heater [%], temperature [degC]; a gain of 0.6 degC per %, a time constant of 80 s and a dead time of
+/// 12 s.
+fn heater_steps() -> String {
+    const GAIN: f64 = 0.6;
+    const TIME_CONSTANT: f64 = 80.0;
+    const DEAD_TIME: f64 = 12.0;
+    const LEVELS: [(f64, f64); 4] = [(0.0, 20.0), (100.0, 40.0), (700.0, 20.0), (1300.0, 35.0)];
+    let mut random = Random(1_736);
+    let mut csv = String::from("t,heater,temperature\n");
+    for k in 0..950 {
+        let time = 2.0 * f64::from(k);
+        let heater = LEVELS.iter().rfind(|(from, _)| *from <= time).map_or(0.0, |(_, level)| *level);
+        let risen = |from: f64| 1.0 - (-(time - from - DEAD_TIME).max(0.0) / TIME_CONSTANT).exp();
+        let steps = LEVELS.windows(2).map(|pair| (pair[1].1 - pair[0].1) * risen(pair[1].0));
+        let temperature = 22.0 + GAIN * (20.0 + steps.sum::<f64>()) + 0.12 * random.normal();
+        let _ = writeln!(csv, "{time},{heater},{temperature:.3}");
+    }
+    csv
+}
+
 fn main() -> std::io::Result<()> {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data");
     std::fs::write(folder.join("mass_spring_damper.csv"), mass_spring_damper())?;
     std::fs::write(folder.join("battery.csv"), battery())?;
+    std::fs::write(folder.join("heater_steps.csv"), heater_steps())?;
     std::fs::write(folder.join("dc_motor.csv"), dc_motor())
 }
 
@@ -116,5 +137,6 @@ fn main() -> std::io::Result<()> {
 fn the_logs_beside_this_program_are_what_it_writes() {
     assert!(include_str!("mass_spring_damper.csv") == mass_spring_damper());
     assert!(include_str!("battery.csv") == battery());
+    assert!(include_str!("heater_steps.csv") == heater_steps());
     assert!(include_str!("dc_motor.csv") == dc_motor());
 }

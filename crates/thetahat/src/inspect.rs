@@ -44,3 +44,4 @@ pub use inspection::{
 };
 pub use plan::InspectionPlan;
 pub use run::{inspect, inspect_log};
+pub(crate) use whitening::autoregression;

@@ -68,6 +68,7 @@
 //! | [`design`] | test signals, and what an experiment with them is worth |
 //! | [`validate`] | figures of fit and tests of residuals |
 //! | [`spectrum`] | frequency responses from data, without a model |
+//! | [`step_test`] | what a course reads off the response to a step |
 //! | [`report`] | the whole way from a log to a document and its page |
 //! | [`track`] | models that are estimated while the plant runs |
 //! | [`filter`] | states that are estimated while the plant runs |
@@ -100,6 +101,7 @@ pub mod report;
 pub mod respond;
 pub mod select;
 pub mod spectrum;
+pub mod step_test;
 pub mod text;
 pub mod track;
 pub mod validate;

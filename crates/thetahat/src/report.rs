@@ -9,7 +9,8 @@
 //! - [`compare`] puts several validations side by side in a [`Comparison`]. A [`Requirement`] makes a gate of a validation.
 //! - [`apply`] predicts or simulates a log with a stored model ([`Applied`], [`AppliedOutput`]), [`sample`] draws from it.
 //!   [`held_out_runs`] are the free runs of the models between which a choice was made.
-//! - With the feature `html`, `fit_page`, `validation_page`, `comparison_page`, `inspection_page` and `response_page` make pages with charts.
+//! - With the feature `html`, `fit_page`, `validation_page`, `comparison_page`, `inspection_page`, `response_page`, `step_test_page` and `transient_page`
+//!   (of a `Transient`) make pages with charts.
 //!
 //! ```
 //! use thetahat::Document;
@@ -54,7 +55,10 @@ pub use apply::{Applied, AppliedOutput, apply};
 pub use equations::{EquationsPlan, fit_equations};
 pub use held_out_runs::held_out_runs;
 #[cfg(feature = "html")]
-pub use html::{comparison_page, fit_page, inspection_page, response_page, validation_page};
+pub use html::{
+    Transient, comparison_page, fit_page, inspection_page, response_page, step_test_page, transient_page,
+    validation_page,
+};
 pub use identify::{PendingEvaluation, identify, identify_monitored};
 pub use nonlinear_arx::{Centres, InputLags, MapPlan, NonlinearArxPlan, fit_nonlinear_arx};
 pub use plan::Plan;

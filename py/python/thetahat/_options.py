@@ -293,6 +293,18 @@ class SpectrumOptions(TypedDict, total=False):
     discard: int
 
 
+class StepTestOptions(TypedDict, total=False):
+    """What of a log is a step test.
+
+    Attributes
+    ----------
+    rows : rows
+        The rows to use; all, unless said otherwise. Each range is for itself.
+    """
+
+    rows: Rows
+
+
 class DesignOptions(TypedDict, total=False):
     """What a test signal has to be.
 

@@ -36,6 +36,7 @@ from thetahat._log import Log
 from thetahat._model import Model
 from thetahat._responses import FrequencyResponse, TransientResponse
 from thetahat._spectrum import MeasuredResponse
+from thetahat._step_test import StepTest
 from thetahat._thetahat import ChangeTrajectory
 from thetahat._track import TrackTrajectory
 
@@ -52,6 +53,7 @@ __all__ = [
     "selection",
     "states",
     "step",
+    "step_test",
 ]
 
 Grid = npt.NDArray[Any]
@@ -394,6 +396,66 @@ def impulse(
     'time since the impulse [s]'
     """
     return _transient("impulse", Model.impulse_response, models, input, samples, ax, level)
+
+
+def step_test(test: StepTest, log: Log, ax: Axes | None = None) -> Axes:
+    """The responses of a step test, each from 0 before its step to 1 in the regime.
+
+    Parameters
+    ----------
+    test : StepTest
+        What was read off. Where there is a time constant to trust, the response of a first order lies over the data, and where there is a
+        damping that of a second.
+    log : Log
+        The log that it was read off.
+    ax : Axes, optional
+        Where to draw.
+
+    Returns
+    -------
+    Axes
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import thetahat as th
+    >>> from thetahat import plot
+    >>> t = np.arange(300)
+    >>> log = th.Log(1 - np.exp(-np.maximum(t - 50, 0) / 20), np.where(t < 50, 0.0, 1.0), sample_time=1.0)
+    >>> plot.step_test(th.step_test(log), log).get_xlabel()
+    'time since the step [s]'
+    """
+    _drawing.expect("test", test, StepTest)
+    _drawing.expect("log", log, Log)
+    ax = _drawing.one(ax)
+    time, values = log.time, log.select(output=test.output).y
+    longest = 0.0
+    for number, step in enumerate(test.steps, start=1):
+        response = step["response"]
+        if response is None:
+            continue
+        first, last = step["after"][0] - 1, step["after"][1]
+        before, regime = response["initial"]["value"], response["regime"]["value"]
+        since = time[first:last] - time[first]
+        ax.plot(since, (values[first:last] - before) / (regime - before), ".", label=f"step {number}")
+        longest = max(longest, float(since[-1]))
+    grid = np.linspace(0, longest, 400)
+    figures = {of["figure"] for of in test.document["summary"] if of["trusted"]}
+    if figures & {"time-constant", "damping"} and longest > 0:
+        later = np.maximum(grid - test.value("dead-time"), 0)
+        if "time-constant" in figures:
+            modelled, name = 1 - np.exp(-later / test.value("time-constant")), "first order"
+        else:
+            damping, frequency = test.value("damping"), test.value("natural-frequency")
+            rest = np.sqrt(1 - damping**2)
+            angle = frequency * rest * later
+            decay = np.exp(-damping * frequency * later)
+            modelled, name = 1 - decay * (np.cos(angle) + damping / rest * np.sin(angle)), "second order"
+        ax.plot(grid, modelled, color="black", label=name)
+    ax.set_xlabel("time since the step [s]")
+    ax.set_ylabel(_drawing.shown(f"{test.output}, as a fraction of its change"))
+    ax.legend()
+    return ax
 
 
 def _transient(

@@ -17,7 +17,7 @@ const ROUNDING: f64 = 1e-10;
 ///
 /// The factor of the normal equations of a lower order is a part of that of the highest. Where a lag depends on those before it
 /// (a sum of sinusoids), or nothing but rounding is left, no higher order is tried. O(N).
-pub(super) fn autoregression(signal: &[f64], segments: &[Range<usize>]) -> Vec<f64> {
+pub(crate) fn autoregression(signal: &[f64], segments: &[Range<usize>]) -> Vec<f64> {
     let total = samples(segments);
     let lagged = |count| {
         let taps = vec![Taps { signal: 0, first: 1, count, sign: -1.0 }];

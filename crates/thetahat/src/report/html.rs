@@ -11,13 +11,16 @@ mod object;
 mod outputs;
 mod page;
 mod response;
+mod step_test;
 mod tables;
 mod text;
 
+pub use charts::Transient;
 use charts::{Marked, Shade, Stack};
 use outputs::{compared_outputs, outputs, points};
 use page::{Block, Page, Section};
 pub use response::response_page;
+pub use step_test::{step_test_page, transient_page};
 
 use super::{Report, Validated, Validation};
 use crate::Error;

@@ -6,12 +6,15 @@ mod response;
 mod search;
 mod signals;
 mod spectrum;
+mod step;
 mod terms;
 
 pub(super) use correlation::{autocorrelation, compared_autocorrelations, cross_correlation, prewhitened};
-pub(super) use dynamics::{bode, roots, transients};
+pub use dynamics::Transient;
+pub(super) use dynamics::{bode, roots, transient, transients};
 pub(super) use response::{measured, measured_noise};
 pub(super) use search::{delays, score, search};
 pub(super) use signals::{Marked, Shade, Stack, outputs};
 pub(super) use spectrum::spectrum;
+pub(super) use step::step_response;
 pub(super) use terms::{complexity, slices};

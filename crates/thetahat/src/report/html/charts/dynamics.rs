@@ -29,6 +29,15 @@ const FARTHEST: f64 = 3.0;
 /// Points of an ellipse and of the unit circle.
 const ROUND: usize = 60;
 
+/// What happens at the input of a model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Transient {
+    /// A step by one unit.
+    Step,
+    /// An impulse of one unit that lasts one sample.
+    Impulse,
+}
+
 /// Magnitude and phase of several models from one input, or from the noise where that is none.
 pub(crate) fn bode(models: &[(String, &PolynomialModel)], input: Option<&str>) -> Drawn {
     let mut found: Vec<(usize, &String, FrequencyResponse)> = Vec::new();
@@ -144,20 +153,29 @@ fn interval(values: &[Quantity], lowest: f64) -> Option<(Vec<f64>, Vec<f64>)> {
 
 /// What a unit step of an input does in several models, and what an impulse that lasts one sample does.
 pub(crate) fn transients(models: &[(String, &PolynomialModel)], input: &str) -> [Drawn; 2] {
-    let step = "The output after a step of the input by one unit at time 0, from rest.";
-    let impulse = "The output after an input of one unit in the sample at time 0 alone, from rest.";
-    [
-        transient(models, input, ("Step response", step), step_response),
-        transient(models, input, ("Impulse response", impulse), impulse_response),
-    ]
+    [Transient::Step, Transient::Impulse].map(|what| transient(models, input, what, None))
 }
 
-fn transient(
+/// One of the two, of this many samples or until it has settled.
+pub(crate) fn transient(
     models: &[(String, &PolynomialModel)],
     input: &str,
-    (what, happens): (&str, &str),
-    respond: impl Fn(&PolynomialModel, usize, Option<usize>) -> Result<TransientResponse, Error>,
+    what: Transient,
+    samples: Option<usize>,
 ) -> Drawn {
+    type Respond = fn(&PolynomialModel, usize, Option<usize>) -> Result<TransientResponse, Error>;
+    let (what, happens, respond): (_, _, Respond) = match what {
+        Transient::Step => (
+            "Step response",
+            "The output after a step of the input by one unit at time 0, from rest.",
+            step_response,
+        ),
+        Transient::Impulse => (
+            "Impulse response",
+            "The output after an input of one unit in the sample at time 0 alone, from rest.",
+            impulse_response,
+        ),
+    };
     let single = models.len() == 1;
     let mut traces: Vec<Object> = Vec::new();
     let mut unstable = false;
@@ -165,7 +183,7 @@ fn transient(
     let title = format!("{what} from {input}");
     for (position, (name, model)) in models.iter().enumerate() {
         let Some(number) = model.inputs.iter().position(|signal| signal.name == input) else { continue };
-        let response = respond(model, number, None).map_err(|error| format!("{title}: none, {error}."))?;
+        let response = respond(model, number, samples).map_err(|error| format!("{title}: none, {error}."))?;
         unstable |= !model.stable;
         let width = response.time.len().div_ceil(TRANSIENT_POINTS);
         let thin = |values: &[f64]| -> Vec<f64> { values.iter().step_by(width.max(1)).copied().collect() };

@@ -1,0 +1,51 @@
+//! Identities, the spread of each way, and refusals.
+
+mod refusals;
+mod spread;
+
+use super::{StepFigure, StepMethod, StepTest, StepTestPlan, step_test};
+use crate::data::{Channel, Log};
+use crate::random::Random;
+
+/// A log with a column of times.
+fn timed(time: &[f64], u: Vec<f64>, y: Vec<f64>) -> Log {
+    let channel = |name: &str, values| Channel { name: name.to_owned(), values };
+    Log::recorded(vec![channel("u", u), channel("y", y)], time.to_vec()).unwrap()
+}
+
+/// The response of a plant with a gain of 2 and an offset of 5 to steps at these times, from 1 to 3 and back; `at` is its unit step
+/// response.
+fn stepped(time: &[f64], steps: &[f64], at: impl Fn(f64) -> f64, mut noise: impl FnMut() -> f64) -> Log {
+    let passed = |t: f64| steps.iter().filter(move |step| **step <= t);
+    let sign = |k: usize| if k.is_multiple_of(2) { 1.0 } else { -1.0 };
+    let u = time.iter().map(|t| if passed(*t).count().is_multiple_of(2) { 1.0 } else { 3.0 }).collect();
+    let clean = |t: f64| -> f64 { passed(t).enumerate().map(|(k, step)| 4.0 * sign(k) * at(t - step)).sum() };
+    let y = time.iter().map(|t| 5.0 + clean(*t) + 4.0 * noise()).collect();
+    timed(time, u, y)
+}
+
+fn clock(rows: usize, step: f64) -> Vec<f64> {
+    (0..rows).map(|row| step * row as f64).collect()
+}
+
+/// 1 - exp(-(t - theta)/tau).
+fn first_order(tau: f64, theta: f64) -> impl Fn(f64) -> f64 {
+    move |t| 1.0 - (-(t - theta).max(0.0) / tau).exp()
+}
+
+/// The step response of 1/(1 + 2 zeta s/omega + s^2/omega^2).
+fn second_order(zeta: f64, omega: f64) -> impl Fn(f64) -> f64 {
+    let rest = (1.0 - zeta * zeta).sqrt();
+    move |t| {
+        let angle = omega * rest * t;
+        1.0 - (-zeta * omega * t).exp() * (angle.cos() + zeta / rest * angle.sin())
+    }
+}
+
+fn found(log: &Log) -> StepTest {
+    step_test(log, &[], &StepTestPlan::new("u", "y")).unwrap()
+}
+
+fn value(found: &StepTest, figure: StepFigure, method: StepMethod) -> f64 {
+    found.summary(figure, method).map_or(f64::NAN, |of| of.value.value)
+}

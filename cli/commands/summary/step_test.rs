@@ -2,7 +2,7 @@
 
 use thetahat::figures::{error, fixed, number, short};
 use thetahat::model::Quantity;
-use thetahat::step_test::{Step, StepTest};
+use thetahat::step_test::{FittedProcess, Step, StepTest};
 use thetahat::text::{brief, harmless};
 
 use super::text::{Text, columns, or_dash};
@@ -26,6 +26,9 @@ pub fn step_test(found: &StepTest, width: usize) -> String {
         steps(&mut text, &found.steps);
     }
     figures(&mut text, found);
+    if let Some(process) = &found.process {
+        process_line(&mut text, process);
+    }
     for advice in &found.advice {
         text.line(&harmless(advice));
     }
@@ -62,12 +65,28 @@ fn steps(text: &mut Text, steps: &[Step]) {
     text.table(table);
 }
 
+/// The process of least squares.
+fn process_line(text: &mut Text, process: &FittedProcess) {
+    let each = process.parameters.iter().map(|parameter| {
+        let error =
+            parameter.standard_error.map_or_else(String::new, |spread| format!(" ± {}", error(spread)));
+        format!("{} {}{error}", parameter.name, number(parameter.value))
+    });
+    text.line(&format!(
+        "process {} of least squares, {}: {}, RMSE {}",
+        process.structure,
+        process.structure.equation(),
+        each.collect::<Vec<_>>().join(", "),
+        error(process.rmse)
+    ));
+}
+
 /// One line for each figure by each way.
 fn figures(text: &mut Text, found: &StepTest) {
     let several = found.summary.iter().any(|of| of.steps > 1);
     let head = ["figure", "way", "value", "standard error", "spread"];
     let mut table = columns(if several { &head } else { &head[..4] }).words(&[1]).none(if several {
-        "one step has no spread"
+        "one step, and one fit of all, have no spread"
     } else {
         "not known"
     });

@@ -3,7 +3,8 @@
 //! - [`step_test()`] finds the steps of an input in a [`Log`](crate::data::Log), as a [`StepTestPlan`] says, and evaluates each response.
 //! - [`sine_test`] reads the time constant off a measured frequency response, where its phase is -45 degrees.
 //! - [`StepTest`] is the document: each [`Step`] with its [`StepResponse`], a list of [`StepEstimate`]s (a [`StepFigure`] by a
-//!   [`StepMethod`]), and their [`StepSummary`] over the steps. [`Shape`] says which picture fits.
+//!   [`StepMethod`]), and their [`StepSummary`] over the steps, beside the [`FittedProcess`] of least squares. [`Shape`] says which
+//!   picture fits.
 //!
 //! ```
 //! use thetahat::data::{Channel, Log};
@@ -27,6 +28,7 @@ mod first_order;
 mod influence;
 mod levels;
 mod noise;
+mod process;
 mod response;
 mod run;
 mod second_order;
@@ -34,6 +36,8 @@ mod sines;
 #[cfg(test)]
 mod tests;
 
-pub use document::{Shape, Step, StepEstimate, StepFigure, StepMethod, StepResponse, StepSummary, StepTest};
+pub use document::{
+    FittedProcess, Shape, Step, StepEstimate, StepFigure, StepMethod, StepResponse, StepSummary, StepTest,
+};
 pub use run::{StepTestPlan, step_test};
 pub use sines::sine_test;

@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::data::{Rows, Source};
-use crate::model::Quantity;
+use crate::model::{Parameter, ProcessStructure, Quantity};
 use crate::{Document, Error};
 
 /// What a step test shows: each step, what is read off its response, and the mean over the steps. The JSON document
@@ -25,6 +25,10 @@ pub struct StepTest {
     pub steps: Vec<Step>,
     /// Each figure by each method over the steps that have it.
     pub summary: Vec<StepSummary>,
+    /// The process of least squared errors over all rows; its figures are in `summary` too. None
+    /// where it cannot be had, and of a frequency response.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub process: Option<FittedProcess>,
     /// Which of the figures to trust, and why, in plain words.
     pub advice: Vec<String>,
     /// What a careful reader should know, in plain words.
@@ -116,6 +120,45 @@ pub struct StepSummary {
     pub trusted: usize,
 }
 
+/// A process with the least squared errors over all rows, steps that are left out among them: what
+/// [`fit_process`](crate::report::fit_process) finds.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct FittedProcess {
+    /// Its structure: by the shape that most of the responses have.
+    pub structure: ProcessStructure,
+    /// The parameters, with standard errors for errors of any colour.
+    pub parameters: Vec<Parameter>,
+    /// The output where the input is as in the first row.
+    pub level: Quantity,
+    /// The root mean square of what it leaves, in units of the output.
+    pub rmse: f64,
+}
+
+impl FittedProcess {
+    /// What of it is among the figures of steps, of so many of them.
+    pub(super) fn summary(&self, steps: usize) -> impl Iterator<Item = StepSummary> {
+        self.parameters.iter().filter_map(move |parameter| {
+            let figure = match parameter.name.as_str() {
+                "K" => StepFigure::Gain,
+                "theta" => StepFigure::DeadTime,
+                "tau" => StepFigure::TimeConstant,
+                "zeta" => StepFigure::Damping,
+                "omega" => StepFigure::NaturalFrequency,
+                _ => return None,
+            };
+            let value = Quantity::new(parameter.value, parameter.standard_error);
+            Some(StepSummary {
+                figure,
+                method: StepMethod::LeastSquares,
+                steps,
+                value,
+                spread: None,
+                trusted: 0,
+            })
+        })
+    }
+}
+
 /// What is read off a response.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -168,6 +211,8 @@ pub enum StepMethod {
     TwoPeaks,
     /// The frequency at which the phase is -45 degrees.
     Phase,
+    /// The process of least squared errors over all rows.
+    LeastSquares,
 }
 
 impl StepFigure {
@@ -215,6 +260,7 @@ impl StepMethod {
             (Self::TwoPeaks, StepFigure::Damping) => "logarithmic decrement",
             (Self::TwoPeaks, _) => "two peaks",
             (Self::Phase, _) => "phase of -45 degrees",
+            (Self::LeastSquares, _) => "least squares, all rows",
         }
     }
 }

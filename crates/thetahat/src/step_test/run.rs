@@ -1,13 +1,16 @@
 //! From a log to the document.
 
-use super::document::{Shape, Step, StepFigure, StepMethod, StepSummary, StepTest};
+use super::document::{FittedProcess, Shape, Step, StepFigure, StepMethod, StepSummary, StepTest};
 use super::evaluate::{Section, evaluated};
 use super::levels::jumps;
+use super::process::fitted;
 use crate::data::{Log, Rows, Source, checked};
-use crate::figures::short;
+use crate::figures::{error, short};
 use crate::model::Quantity;
 use crate::{Document, Error};
 
+/// What a process leaves is noise up to so many times its standard deviation.
+const AS_NOISE: f64 = 1.3;
 /// Gains that differ between steps by this many standard errors are not those of one linear plant.
 const DIFFER: f64 = 4.0;
 /// And by this fraction.
@@ -43,6 +46,9 @@ impl StepTestPlan {
 ///
 /// A step without a response that can be evaluated keeps its place, with the reason: the output is not at rest before it, the regime is
 /// not reached, the change is lost in the noise, rows are too few.
+///
+/// Beside them stands the process with the least squared errors over all rows ([`FittedProcess`]): of first order with a dead time, or of
+/// second order, as the responses look.
 ///
 /// Cost: O(N) for each step, times the rows over which the noise is correlated.
 ///
@@ -97,7 +103,21 @@ pub fn step_test(log: &Log, sources: &[Source], plan: &StepTestPlan) -> Result<S
             warnings.push(format!("step {number} is left out: {why}"));
         }
     }
-    let summary = summary(&steps);
+    let mut summary = summary(&steps);
+    let mut advice = advice(&steps);
+    let process = match fitted(log, (&plan.input, &plan.output), &plan.rows, &steps) {
+        Ok(process) => {
+            summary.extend(process.summary(steps.len()));
+            // Those of one figure stand together, whichever step has them.
+            summary.sort_by_key(|of| of.figure);
+            advice.push(beside(&process, &steps));
+            Some(process)
+        }
+        Err(error) => {
+            warnings.push(format!("no process of least squares: {error}"));
+            None
+        }
+    };
     warnings.extend(nonlinear(&steps));
     Ok(StepTest {
         schema: StepTest::SCHEMA.to_owned(),
@@ -105,9 +125,10 @@ pub fn step_test(log: &Log, sources: &[Source], plan: &StepTestPlan) -> Result<S
         logs: sources.to_vec(),
         input: plan.input.clone(),
         output: plan.output.clone(),
-        advice: advice(&steps),
+        advice,
         steps,
         summary,
+        process,
         warnings,
     })
 }
@@ -185,7 +206,10 @@ fn hopeless(steps: &[Step]) -> String {
         .collect();
     let more = reasons.len().saturating_sub(MOST);
     let rest = if more > 0 { format!("; and {more} more") } else { String::new() };
-    format!("no step can be evaluated: {}{rest}", reasons[..reasons.len() - more].join("; "))
+    format!(
+        "no step can be evaluated: {}{rest}; a fit of a process takes responses as far as they go",
+        reasons[..reasons.len() - more].join("; ")
+    )
 }
 
 /// Each figure by each method over the steps that have it, in the order of the steps.
@@ -219,9 +243,28 @@ fn summary(steps: &[Step]) -> Vec<StepSummary> {
             }
         })
         .collect();
-    // Those of one figure stand together, whichever step has them.
     all.sort_by_key(|of| of.figure);
     all
+}
+
+/// What the process of least squares is worth beside what is read off.
+fn beside(process: &FittedProcess, steps: &[Step]) -> String {
+    let noise = steps.iter().filter_map(|step| step.response.as_ref()).map(|response| response.noise);
+    let noise = noise.fold(0.0, f64::max);
+    let structure = process.structure;
+    if process.rmse <= AS_NOISE * noise {
+        return format!(
+            "the process {structure} of least squares leaves {}, about the noise: it uses every row and has the least spread of all, so \
+             take its figures; a fit of this process makes a model of it",
+            error(process.rmse)
+        );
+    }
+    format!(
+        "the process {structure} of least squares leaves {}, {} times the noise: it is not the whole truth over all rows; compare fits \
+         of other processes",
+        error(process.rmse),
+        short((10.0 * process.rmse / noise).round() / 10.0)
+    )
 }
 
 /// Says where the gains of the steps differ by more than noise.

@@ -99,6 +99,7 @@ pub fn sine_test(found: &MeasuredResponse, input: &str) -> Result<StepTest, Erro
         input: input.to_owned(),
         output: found.output.clone(),
         steps: Vec::new(),
+        process: None,
         summary: vec![
             of(StepFigure::Gain, Quantity::new(sign * 2_f64.sqrt() * magnitude, size)),
             of(StepFigure::TimeConstant, Quantity::new(tau, error)),

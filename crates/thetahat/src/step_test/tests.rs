@@ -49,3 +49,38 @@ fn found(log: &Log) -> StepTest {
 fn value(found: &StepTest, figure: StepFigure, method: StepMethod) -> f64 {
     found.summary(figure, method).map_or(f64::NAN, |of| of.value.value)
 }
+
+/// The process beside the figures has the shape of the responses, and is exact where they are.
+#[test]
+fn the_process_of_least_squares_has_the_shape_of_the_responses() {
+    let at = |t: f64, theta: f64| 1.0 - (-(t - theta).max(0.0) / 8.0).exp();
+    let pair = |t: f64| {
+        let t = t.max(0.0);
+        1.0 - (-0.3 * t).exp()
+            * ((0.91_f64.sqrt() * t).cos() + 0.3 / 0.91_f64.sqrt() * (0.91_f64.sqrt() * t).sin())
+    };
+    let u = |t: f64| if (40.0..160.0).contains(&t) { 2.0 } else { 0.0 };
+    let found = |y: &dyn Fn(f64) -> f64| {
+        let time = || (0..560).map(|k| 0.5 * f64::from(k));
+        let channel = |name: &str, values| Channel { name: name.into(), values };
+        let channels = vec![channel("u", time().map(u).collect()), channel("y", time().map(y).collect())];
+        let log = Log::new(channels, 0.5).unwrap();
+        step_test(&log, &[], &StepTestPlan::new("u", "y")).unwrap()
+    };
+    let near = |found: &StepTest, name: &str, expected: f64| {
+        let parameters = &found.process.as_ref().unwrap().parameters;
+        let own = parameters.iter().find(|own| own.name == name).unwrap();
+        assert!((own.value - expected).abs() < 1e-4, "{name}: {}", own.value);
+    };
+    let first = found(&|t| 5.0 + 3.0 * (at(t - 40.0, 1.3) - at(t - 160.0, 1.3)));
+    assert_eq!(first.process.as_ref().unwrap().structure.to_string(), "p1d");
+    for (name, expected) in [("K", 1.5), ("tau", 8.0), ("theta", 1.3)] {
+        near(&first, name, expected);
+    }
+    let beside = first.summary(StepFigure::TimeConstant, StepMethod::LeastSquares).unwrap();
+    assert!((beside.value.value - 8.0).abs() < 1e-4);
+    let second = found(&|t| 5.0 + 3.0 * (pair(t - 40.0) - pair(t - 160.0)));
+    assert_eq!(second.process.as_ref().unwrap().structure.to_string(), "p2du");
+    near(&second, "zeta", 0.3);
+    near(&second, "omega", 1.0);
+}

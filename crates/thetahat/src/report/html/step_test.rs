@@ -8,7 +8,7 @@ use super::{of, tables};
 use crate::data::Log;
 use crate::figures::{number, short, three};
 use crate::model::PolynomialModel;
-use crate::step_test::{StepSummary, StepTest};
+use crate::step_test::{FittedProcess, StepSummary, StepTest};
 
 /// This many responses are drawn of a log with very many steps.
 const MOST: usize = 12;
@@ -29,6 +29,9 @@ pub fn step_test_page(found: &StepTest, log: Option<&Log>, command: &str) -> Str
     page.warnings = &found.warnings;
     let mut section = Section::new("Figures");
     section.table(summaries(found));
+    if let Some(process) = &found.process {
+        section.table(parameters(process));
+    }
     page.sections.push(section);
     if let Some(log) = log {
         page.sections.push(responses(found, log));
@@ -74,6 +77,21 @@ pub fn transient_page(
     }
     page.sections.push(section);
     page.write()
+}
+
+/// The process of least squares.
+fn parameters(process: &FittedProcess) -> Table {
+    let title = format!("Process {} of least squares: {}", process.structure, process.structure.equation());
+    let mut table = Table::new(&title, &["parameter", "value", "unit", "standard error"]);
+    for parameter in &process.parameters {
+        table.row([
+            parameter.name.clone(),
+            number(parameter.value),
+            process.structure.unit(&parameter.name).to_owned(),
+            or_dash(parameter.standard_error, three),
+        ]);
+    }
+    table
 }
 
 /// The log with its steps, and each response.

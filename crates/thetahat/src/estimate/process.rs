@@ -9,7 +9,7 @@
 //! time constants, and the dead times. It starts from the best of a grid with one lag, and adds lags one by one.
 //!
 //! Residuals of a plant that nobody drives by noise alone have a colour, and there the covariance of white noise is far too small. It is that
-//! of errors e = v/A(q), A an autoregression of the residuals (see `uncertainty`).
+//! of errors e = v/A(q), A an autoregression of the residuals (see `uncertainty`), and no standard error is less than that of white errors.
 
 mod objective;
 mod starts;
@@ -216,7 +216,10 @@ fn uncertainty(
         } else if let Some(name) = names.get(place) {
             let nothing = 2.0 * objective.least_time_constant();
             let vanished = parts.iter().any(|parts| parts.shape.iter().any(|value| *value < nothing));
-            let advice = if vanished {
+            let advice = if vanished && !objective.background().free {
+                "a time constant comes to nothing beside the samples; take one lag less, or, if the log does not begin at rest, estimate \
+                 the state that it begins in"
+            } else if vanished {
                 "a time constant comes to nothing beside the samples; take one lag less"
             } else {
                 "other values explain it as well; take a simpler structure, or a log in which the input moves more"
@@ -263,8 +266,15 @@ fn uncertainty(
         let further = open.iter().map(|(moves, variance)| variance * moves[i] * moves[j]);
         Some(own + further.sum::<f64>())
     };
-    let rows: Option<Vec<Vec<f64>>> =
-        (0..kept).map(|i| (0..kept).map(|j| entry(&spread, i, j)).collect()).collect();
+    // What a wrong structure leaves may be foretold by its past so well that nothing seems open. No error is less than for white errors.
+    let larger = |i: usize| {
+        let ratio =
+            entry(&plain, i, i).zip(entry(&spread, i, i)).map(|(plain, spread)| (plain / spread).sqrt());
+        ratio.filter(|ratio| ratio.is_finite()).map_or(1.0, |ratio| ratio.max(1.0))
+    };
+    let larger: Vec<f64> = (0..kept).map(larger).collect();
+    let scaled = |i: usize, j: usize| entry(&spread, i, j).map(|value| larger[i] * larger[j] * value);
+    let rows: Option<Vec<Vec<f64>>> = (0..kept).map(|i| (0..kept).map(|j| scaled(i, j)).collect()).collect();
     let white = (0..names.len()).map(|i| entry(&plain, i, i).map(f64::sqrt)).collect();
     Ok(Uncertainty { covariance: rows.filter(|rows| is_covariance(rows)), white, colour, condition })
 }

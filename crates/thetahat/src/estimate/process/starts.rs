@@ -112,7 +112,9 @@ fn from_best(
     monitor: Monitor<'_>,
 ) -> Result<Found, Error> {
     let mut tried: Vec<(f64, Vec<f64>)> = Vec::new();
-    for candidate in candidates {
+    let limits = objective.limits();
+    for mut candidate in candidates {
+        candidate.iter_mut().zip(&limits).for_each(|(value, [low, high])| *value = value.clamp(*low, *high));
         if let Ok(cost) = objective.evaluate(&candidate) {
             tried.push((cost, candidate));
         }

@@ -2,7 +2,7 @@
 
 use crate::estimate::Procedure;
 use crate::figures::{number, short};
-use crate::model::ProcessModel;
+use crate::model::{Parameter, ProcessModel};
 use crate::optimize::Stopped;
 use crate::report::Estimation;
 use crate::respond::process::HeldLog;
@@ -11,6 +11,13 @@ use crate::respond::process::HeldLog;
 const SHORT: f64 = 0.1;
 /// Twice the standard error above the value: the parameter may as well not be there.
 const UNCERTAIN: f64 = 0.5;
+
+/// Time constants this close are one.
+const SAME: f64 = 1.01;
+
+fn is_lag(name: &str) -> bool {
+    name.starts_with("tau") && !name.starts_with("tau_z")
+}
 
 pub(super) fn of_fit(model: &ProcessModel, held: &[HeldLog], estimation: &Estimation) -> Vec<String> {
     let mut words = Vec::new();
@@ -32,6 +39,16 @@ pub(super) fn of_fit(model: &ProcessModel, held: &[HeldLog], estimation: &Estima
     if missing > 0 {
         words.push(format!("{missing} missing values of inputs hold the value before them"));
     }
+    for (structure, own) in model.structures.iter().zip(model.of_inputs()) {
+        let lags: Vec<&Parameter> = own.iter().filter(|own| is_lag(&own.name)).collect();
+        let same = lags.windows(2).find(|pair| pair[0].value < SAME * pair[1].value);
+        if let (Some(pair), false) = (same, structure.is_underdamped() || structure.is_parallel()) {
+            words.push(format!(
+                "{} and {} are the same: the process may overshoot, which two lags that may be underdamped (u) tell",
+                pair[0].name, pair[1].name
+            ));
+        }
+    }
     for parameter in &model.parameters {
         let name = &parameter.name;
         let is = |word: &str| name.starts_with(word);
@@ -39,7 +56,7 @@ pub(super) fn of_fit(model: &ProcessModel, held: &[HeldLog], estimation: &Estima
             words.push(format!("{name} comes to zero: the log shows no dead time; a structure without d has one parameter less"));
             continue;
         }
-        if is("tau") && !is("tau_z") {
+        if is_lag(name) {
             if parameter.value > longest {
                 words.push(format!(
                     "{name} is {} s and the log {} s long: it shows the beginning of the response alone, and the gain is a guess; \

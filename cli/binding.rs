@@ -110,6 +110,17 @@ pub fn process_plan(
     job.plan(inputs, output)
 }
 
+/// The plan that `thetahat fit --from` makes of these options, for all inputs of a response.
+///
+/// # Errors
+/// A [`Failure`] as the program would report it.
+pub fn response_plan(options: &[OsString]) -> Result<ProcessPlan, Failure> {
+    let from = OsString::from("--from=response");
+    let words: Vec<OsString> = options.iter().cloned().chain([from]).collect();
+    let job = ProcessJob::resolve(&arguments("fit", &words)?)?;
+    job.map(|job| job.plan_of_response()).ok_or_else(|| Failure::usage("--structure: name one, such as p1d"))
+}
+
 /// How `thetahat validate` evaluates a model with these options, and what it requires.
 ///
 /// # Errors

@@ -41,8 +41,8 @@ use messages::{say, tell};
 use thetahat::text;
 
 pub use binding::{
-    Opened, compare_signals, equations_plan, inspect, narx_plan, plan, process_plan, read, signal_plan,
-    spectrum_plan, step_test_plan, track, validation_plan, write,
+    Opened, compare_signals, equations_plan, inspect, narx_plan, plan, process_plan, read, response_plan,
+    signal_plan, spectrum_plan, step_test_plan, track, validation_plan, write,
 };
 pub use commands::demo::LOG as DEMO_LOG;
 pub use commands::summary::{

@@ -92,6 +92,41 @@ fn every_verb_takes_a_process() {
     folder.done("filter model.json log.csv --sample-time 1 -o states.csv");
 }
 
+/// The course's experiment: sines, points, and a process through them.
+#[test]
+fn a_frequency_response_makes_a_process() {
+    let mut log = "u,y\n".to_owned();
+    let (mut y, mut random) = (0.0, 1_u32);
+    let pole = (-0.2_f64).exp();
+    let mut held = 0.0;
+    for k in 0..4000 {
+        if k % 3 == 0 {
+            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            held = if random >> 31 == 0 { 1.0 } else { -1.0 };
+        }
+        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        writeln!(log, "{held},{}", y + 1e-6 * f64::from(random >> 16)).expect("memory");
+        y = pole * y + 2.0 * (1.0 - pole) * held;
+    }
+    let folder = Folder::with_log(log);
+    folder.done("spectrum log.csv --sample-time 1 --format json -o response.json");
+    let report = folder.fit("--from response.json --structure p1d --report model.json");
+    near(value(&report, "K").0, 2.0, 0.01);
+    near(value(&report, "tau").0, 5.0, 0.02);
+    assert!(value(&report, "theta").0 < 0.05 && report["estimation"]["method"] == "frequency-response");
+    let table = folder.done("fit --from response.json --structure p1").stdout;
+    assert!(table.contains("parts of points") && table.contains("by the points alone"), "{table}");
+    folder.done("bode model.json --over response.json");
+    folder.done("validate model.json log.csv --sample-time 1");
+    let error = folder.refused("fit --from response.json --structure p1d -u v", 2);
+    assert!(error.contains("none called 'v'"), "{error}");
+    folder.refused("fit --from log.csv --structure p1d", 3);
+    folder.refused("fit --from nowhere.json --structure p1d", 5);
+    for line in ["fit --from response.json", "fit --from response.json log.csv --structure p1d", "fit"] {
+        assert_eq!(folder.run(line).code, 2, "{line}");
+    }
+}
+
 /// A tank that fills: its level goes on rising after the step.
 #[test]
 fn an_integrator_and_a_free_start_are_found() {

@@ -11,8 +11,16 @@ use super::{ClockArguments, FormatArgument, LogArguments, Names};
 #[derive(Debug, Args)]
 pub(crate) struct FitArguments {
     /// The logs: CSV files, gzip-compressed or not (- for standard input)
-    #[arg(value_name = "LOG", required = true)]
+    #[arg(value_name = "LOG", required_unless_present = "from")]
     pub(crate) logs: Vec<PathBuf>,
+    /// Fit a process to a frequency response instead of logs: the document that spectrum wrote (- for standard input); with --structure
+    #[arg(
+        long,
+        value_name = "RESPONSE",
+        requires = "structure",
+        conflicts_with_all = ["logs", "output", "estimate", "validate", "split", "offset", "trend", "initial", "html", "ClockArguments", "LogArguments"]
+    )]
+    pub(crate) from: Option<PathBuf>,
 
     /// Input columns; a name that holds a comma stands between double quotes, as in CSV [default: u, u1, u2, …]
     #[arg(short = 'u', long, value_name = "NAME[,NAME…]", help_heading = "Channels")]

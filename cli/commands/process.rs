@@ -1,16 +1,28 @@
 //! `thetahat fit --structure`: a process in continuous time.
 
-use thetahat::report::fit_process;
+use thetahat::Error;
+use thetahat::report::{fit_process, fit_process_to_response};
 
 use super::experiments::{Wanted, read};
 use super::search::{Identified, watched};
+use super::stored;
 use crate::failure::Failure;
 use crate::job::ProcessJob;
 use crate::log;
 use crate::messages::warn;
 
-/// Reads the logs and fits the model.
+/// Reads the logs, or the response, and fits the model.
 pub(super) fn found(job: &ProcessJob) -> Result<Identified, Failure> {
+    if let Some(path) = &job.from {
+        let response = stored::response(path)?;
+        let plan = job.plan_of_response();
+        let report = watched(|monitor| fit_process_to_response(&response, &plan, monitor))?;
+        let report = report.map_err(|error| match error {
+            Error::Argument { .. } => Failure::option(&error),
+            _ => log::failure(&response.logs)(error),
+        })?;
+        return Ok(Identified { report, log: None, sources: Vec::new() });
+    }
     let wanted = Wanted {
         inputs: job.inputs.as_deref(),
         outputs: &job.outputs,

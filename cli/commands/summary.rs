@@ -177,7 +177,8 @@ fn estimation(text: &mut Text, estimation: &Estimation, model: &PolynomialModel)
         | Procedure::ForwardRegression(_)
         | Procedure::Splits(_)
         | Procedure::Neighbours(_)
-        | Procedure::FreeRun(_) => {}
+        | Procedure::FreeRun(_)
+        | Procedure::FrequencyResponse(_) => {}
         Procedure::PredictionError(search) => {
             text.line(&format!(
                 "prediction error, {}, {}",

@@ -12,8 +12,10 @@ use crate::memory::PerValue;
 /// A process in continuous time to fit.
 #[derive(Debug)]
 pub(crate) struct ProcessJob {
-    /// The logs, at least one.
+    /// The logs, at least one unless a response is there instead.
     pub(crate) paths: Vec<PathBuf>,
+    /// The document of a frequency response.
+    pub(crate) from: Option<PathBuf>,
     /// How all of them are read.
     pub(crate) log: LogJob,
     /// Named inputs; none: those called u, u1, u2, …
@@ -69,11 +71,17 @@ impl ProcessJob {
         };
         Ok(Some(Self {
             paths: arguments.logs.clone(),
+            from: arguments.from.clone(),
             log: LogJob { per_value: PerValue::Search, ..LogJob::resolve(&arguments.log, &arguments.clock)? },
             inputs: Names::all(&arguments.input),
             outputs,
             plan,
         }))
+    }
+
+    /// The plan for a frequency response, of all its inputs if none are named.
+    pub(crate) fn plan_of_response(&self) -> ProcessPlan {
+        ProcessPlan { inputs: self.inputs.clone().unwrap_or_default(), ..self.plan.clone() }
     }
 
     /// The plan for the channels of a log.

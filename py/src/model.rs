@@ -15,6 +15,7 @@ use thetahat::respond::{
     Draws, Horizon, InitialCondition, TransientResponse, frequency_response, impulse_response,
     logarithmic_frequencies, step_response,
 };
+use thetahat::spectrum::MeasuredResponse;
 
 use crate::array::{from_matrix, matrix, vector};
 use crate::error;
@@ -94,6 +95,21 @@ pub(crate) fn fit_process(py: Python<'_>, log: &Bound<'_, Log>, options: Vec<OsS
     let (channels, sources) = (Arc::clone(&log.log), log.sources.clone());
     let report =
         interruptible(py, move |monitor| thetahat::report::fit_process(&channels, &sources, &plan, monitor))?;
+    Ok(Model::of(report))
+}
+
+/// Fits a process to the document of a frequency response with the options of `thetahat fit --from`.
+#[pyfunction]
+pub(crate) fn fit_process_to_response(
+    py: Python<'_>,
+    response: &str,
+    options: Vec<OsString>,
+) -> PyResult<Model> {
+    let plan = thetahat_cli::response_plan(&options).map_err(|failure| error::program(py, &failure))?;
+    let response = MeasuredResponse::from_json(response).map_err(|error| error::batch(py, error))?;
+    let report = interruptible(py, move |monitor| {
+        thetahat::report::fit_process_to_response(&response, &plan, monitor)
+    })?;
     Ok(Model::of(report))
 }
 

@@ -61,6 +61,21 @@ def test_several_inputs_starts_and_lines() -> None:
     assert free.parameters == pytest.approx([2, 5, 1.3], abs=0.05)
 
 
+def test_a_measured_response_makes_a_process() -> None:
+    rng = np.random.default_rng(1)
+    u = np.repeat(rng.choice([-1.0, 1.0], 800), 5)
+    pole = np.exp(-0.5 / 5)
+    y = np.zeros(len(u))
+    for k in range(1, len(u)):
+        y[k] = pole * y[k - 1] + 2 * (1 - pole) * u[k - 1]
+    response = th.spectrum(th.Log(y + 0.02 * rng.standard_normal(len(u)), u, sample_time=0.5))
+    model = th.process(response, "p1")
+    assert model.parameters == pytest.approx([2, 5], rel=0.01)
+    assert model.method == "frequency-response"
+    with pytest.raises(ValueError, match="--trend|trend"):
+        th.process(response, "p1", trend=True)
+
+
 def test_what_is_wrong_is_told() -> None:
     data = log()
     for structure, words in [("p9", "structure"), (["p1d", "p1"], "2 for 1 inputs"), ("", "structure")]:

@@ -21,8 +21,13 @@ pub(super) fn table(report: &Report, model: &ProcessModel, width: usize) -> Stri
     let signals: Vec<String> = signals.chain([signal("output", &model.output)]).collect();
     text.line(&signals.join(", "));
     text.line("");
-    let Procedure::FreeRun(outcome) = &report.estimation.procedure else { return text.finish() };
-    let head = ["parameter", "value", "unit", "standard error", "if errors were white"];
+    let (outcome, of_points) = match &report.estimation.procedure {
+        Procedure::FreeRun(outcome) => (outcome, false),
+        Procedure::FrequencyResponse(outcome) => (outcome, true),
+        _ => return text.finish(),
+    };
+    let plain = if of_points { "by the points alone" } else { "if errors were white" };
+    let head = ["parameter", "value", "unit", "standard error", plain];
     let mut parameters = columns(&head).words(&[2]).none(NO_ERROR);
     let units = model.structures.iter().zip(model.of_inputs());
     let units =
@@ -38,6 +43,16 @@ pub(super) fn table(report: &Report, model: &ProcessModel, width: usize) -> Stri
     }
     text.table(parameters);
     let estimation = &report.estimation;
+    if of_points {
+        text.line(&format!(
+            "{} parts of points, missed by {} of their standard deviations in the mean, {}, {}",
+            estimation.samples,
+            number(estimation.mse.sqrt()),
+            counted(outcome.iterations),
+            stopped(outcome.stopped)
+        ));
+        return text.finish();
+    }
     text.line(&format!(
         "{} samples, noise variance {}, condition number {}",
         estimation.samples,

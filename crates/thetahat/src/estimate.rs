@@ -82,7 +82,9 @@ pub(crate) use plant_first::noise_order;
 pub(crate) use polynomials::extended;
 pub(crate) use prediction_error::drop_is_not_for_f;
 pub use process::ProcessOutcome;
-pub(crate) use process::{Background, ProcessEstimate, least_free_run};
+pub(crate) use process::{
+    Background, ProcessEstimate, ResponsePoints, least_free_run, least_response_errors,
+};
 pub use robust::{Loss, Robust, RobustOutcome};
 pub(crate) use stretches::stretches;
 pub(crate) use uncertainty::{Autoregression, autoregression, backward_filtered_products};
@@ -134,6 +136,8 @@ pub enum Procedure {
     Neighbours(MapsOutcome),
     /// By a search for the least errors of the free run of a process in continuous time.
     FreeRun(ProcessOutcome),
+    /// By a search for the least errors of the frequency response of a process.
+    FrequencyResponse(ProcessOutcome),
 }
 
 impl Procedure {
@@ -441,7 +445,8 @@ impl Estimate {
             | Procedure::ForwardRegression(_)
             | Procedure::Splits(_)
             | Procedure::Neighbours(_)
-            | Procedure::FreeRun(_) => None,
+            | Procedure::FreeRun(_)
+            | Procedure::FrequencyResponse(_) => None,
             Procedure::InstrumentalVariables { .. } | Procedure::RefinedInstrumentalVariables { .. } => {
                 self.covariance
             }

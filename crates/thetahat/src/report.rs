@@ -2,7 +2,8 @@
 //!
 //! - [`identify`] fits what a [`Plan`] says and gives a [`Report`]; [`identify_monitored`] can be watched and ended, [`PendingEvaluation`] is a
 //!   fit before its figures. [`fit_equations`] does the same for a model in equations with an [`EquationsPlan`],
-//!   [`fit_process`] for a process in continuous time with a [`ProcessPlan`], [`fit_nonlinear_arx`] for a nonlinear ARX model with a [`NonlinearArxPlan`] ([`InputLags`], [`MapPlan`], [`Centres`]).
+//!   [`fit_process`] for a process in continuous time with a [`ProcessPlan`], [`fit_process_to_response`] for one of a measured frequency
+//!   response, [`fit_nonlinear_arx`] for a nonlinear ARX model with a [`NonlinearArxPlan`] ([`InputLags`], [`MapPlan`], [`Centres`]).
 //! - [`Report`] is the JSON document of a fit: its [`Data`] ([`Parts`], [`Missing`]), the model, its [`Estimation`] and its figures.
 //! - [`validate`] tests a report on a log as a [`ValidationPlan`] says. It gives a [`Validated`]: the document, a [`Validation`] with
 //!   [`NoiseLevel`], [`Coverage`] and whether the fit has [`InSample`] the rows, and the [`Signals`] for charts ([`OutputSignals`]).
@@ -62,7 +63,7 @@ pub use html::{
 pub use identify::{PendingEvaluation, identify, identify_monitored};
 pub use nonlinear_arx::{Centres, InputLags, MapPlan, NonlinearArxPlan, fit_nonlinear_arx};
 pub use plan::Plan;
-pub use process::{ProcessPlan, fit_process};
+pub use process::{ProcessPlan, fit_process, fit_process_to_response};
 pub use requirement::Requirement;
 pub use sample::sample;
 pub use schema::{Data, Estimation, Missing, Parts, Report};

@@ -10,10 +10,11 @@ from thetahat._fit import EstimationWarning
 from thetahat._log import Log, handle
 from thetahat._model import Model
 from thetahat._options import FitOptions, Rows
+from thetahat._spectrum import MeasuredResponse
 
 
 def process(
-    log: Log,
+    log: Log | MeasuredResponse,
     structure: str | Sequence[str] = "p1d",
     *,
     estimate: Rows | None = None,
@@ -36,8 +37,9 @@ def process(
 
     Parameters
     ----------
-    log : Log
-        The data, read with ``uniform=False`` if its clock is irregular. It begins at rest, unless ``initial`` says otherwise.
+    log : Log or MeasuredResponse
+        The data, read with ``uniform=False`` if its clock is irregular. It begins at rest, unless ``initial`` says otherwise. Or the
+        frequency response that `spectrum` found, of which the process comes closest to the points, in units of their errors.
     structure : str, or one for each input, default "p1d"
         ``p``, how many lags (0 to 3), and letters: ``d`` with a dead time, ``z`` with a zero, ``i`` with an integrator, ``u`` with two
         lags that may be underdamped. Or ``rc1``, ``rc2``, ``rc3``: lags side by side with a direct term, as batteries have them.
@@ -81,7 +83,10 @@ def process(
     names = [structure] if isinstance(structure, str) else list(structure)
     words = [f"--structure={','.join(_options.text('structure', name) for name in names)}"]
     words += _options.words(FitOptions, locals(), len(log) if isinstance(log, Log) else None)
-    found = Model._of(_thetahat.fit_process(handle("log", log), words))
+    if isinstance(log, MeasuredResponse):
+        found = Model._of(_thetahat.fit_process_to_response(log.to_json(), words))
+    else:
+        found = Model._of(_thetahat.fit_process(handle("log", log), words))
     for warning in found.warnings:
         warnings.warn(warning, EstimationWarning, stacklevel=2)
     return found

@@ -137,7 +137,7 @@ def step_test(log: Log | MeasuredResponse, *, rows: Rows | None = None, input: s
     >>> t = np.arange(300)
     >>> log = th.Log(1 - np.exp(-np.maximum(t - 50, 0) / 20), np.where(t < 50, 0.0, 1.0), sample_time=1.0)
     >>> th.step_test(log).methods("time-constant")
-    ['tangent', 'level', 'two-points', 'plain-average', 'weighted-average']
+    ['tangent', 'level', 'two-points', 'plain-average', 'weighted-average', 'least-squares']
     """
     if isinstance(log, MeasuredResponse):
         if rows is not None:

@@ -27,8 +27,8 @@ use crate::model::{Parts, ProcessStructure, is_covariance};
 use crate::optimize::{Algorithm, Deadline, Found, Monitor, Search, Step, Stopped};
 use crate::regression::{Span, condition, sum_of_squares};
 use crate::respond::process::HeldLog;
-pub(crate) use objective::Background;
 use objective::ProcessObjective;
+pub(crate) use objective::{Background, ResponsePoints};
 
 /// How a process was found: by the least errors of its free run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -65,6 +65,8 @@ pub(crate) struct ProcessEstimate {
     pub(crate) level: Option<f64>,
     pub(crate) slope: Option<f64>,
     pub(crate) middle: f64,
+    /// The fraction of the squared errors that a first state of each log would explain.
+    pub(crate) explained_by_starts: f64,
     /// Of the parameters, the level and the slope.
     pub(crate) covariance: Option<Vec<Vec<f64>>>,
     pub(crate) noise_variance: f64,
@@ -89,10 +91,36 @@ pub(crate) fn least_free_run(
     options: &Search,
     monitor: Monitor<'_>,
 ) -> Result<ProcessEstimate, Error> {
+    let objective = ProcessObjective::new(structures.to_vec(), held, output, background)?;
+    least(objective, structures, names, background.columns(held, structures), options, monitor)
+}
+
+/// Fits processes to measured frequency responses, one for each structure.
+///
+/// # Errors
+/// As for logs.
+pub(crate) fn least_response_errors(
+    structures: &[ProcessStructure],
+    names: &[String],
+    points: &[ResponsePoints],
+    options: &Search,
+    monitor: Monitor<'_>,
+) -> Result<ProcessEstimate, Error> {
+    let objective = ProcessObjective::of_points(structures.to_vec(), points)?;
+    least(objective, structures, names, 0, options, monitor)
+}
+
+fn least(
+    mut objective: ProcessObjective<'_>,
+    structures: &[ProcessStructure],
+    names: &[String],
+    beside: usize,
+    options: &Search,
+    monitor: Monitor<'_>,
+) -> Result<ProcessEstimate, Error> {
     options.check_numbers()?;
-    let mut objective = ProcessObjective::new(structures.to_vec(), held, output, background)?;
     let samples = objective.outputs().len();
-    let unknowns = names.len() + background.columns(held, structures);
+    let unknowns = names.len() + beside;
     if samples <= unknowns {
         let message = format!(
             "{unknowns} unknowns need more than {samples} measured values; give a longer log, or a simpler structure"
@@ -126,13 +154,21 @@ pub(crate) fn least_free_run(
         level,
         slope,
         middle: objective.middle(),
+        explained_by_starts: objective.explained_by_starts(),
         covariance,
         noise_variance,
         samples,
         unknowns,
         mse: squares / samples as f64,
         condition,
-        outcome: outcome(options, &found, white, colour.order(), background.free(held, structures), samples),
+        outcome: outcome(
+            options,
+            &found,
+            white,
+            colour.order(),
+            beside - objective.background().offsets(),
+            samples,
+        ),
     })
 }
 
@@ -174,6 +210,25 @@ struct Uncertainty {
     white: Vec<Option<f64>>,
     colour: Autoregression,
     condition: Option<f64>,
+}
+
+/// The covariance of a fit to points, whose errors are independent: as large as the points say, and larger where they are missed by more.
+fn of_points(
+    root: Option<DMatrix<f64>>,
+    used: &[usize],
+    count: usize,
+    variance: f64,
+    condition: Option<f64>,
+) -> Uncertainty {
+    let colour = Autoregression { monic: vec![1.0], variance };
+    let inverse = root.map(|root| &root * root.transpose());
+    let place = |index: usize| used.iter().position(|own| *own == index);
+    let entry = |i: usize, j: usize| Some(inverse.as_ref()?[(place(i)?, place(j)?)]);
+    let larger = variance.max(1.0);
+    let rows: Option<Vec<Vec<f64>>> =
+        (0..count).map(|i| (0..count).map(|j| Some(larger * entry(i, j)?)).collect()).collect();
+    let white = (0..count).map(|i| entry(i, i).map(f64::sqrt)).collect();
+    Uncertainty { covariance: rows.filter(|rows| is_covariance(rows)), white, colour, condition }
 }
 
 /// The covariance of the parameters, the level and the slope, the free responses taken out.
@@ -239,6 +294,9 @@ fn uncertainty(
         root.row_iter_mut().zip(&used).for_each(|(mut row, place)| row /= norms[*place]);
         root
     });
+    if objective.is_of_points() {
+        return Ok(of_points(root, &used, names.len(), variance, condition));
+    }
     let (residuals, columns, segments) = objective.by_segments(&psi, &used);
     let whole: Vec<usize> = (0..size).collect();
     let stacked =

@@ -1,8 +1,11 @@
 //! Fits of processes in continuous time.
 
+mod response;
 #[cfg(test)]
 mod tests;
 mod warnings;
+
+pub use response::fit_process_to_response;
 
 use super::evaluate::evaluate;
 use super::schema::{Data, Estimation, Missing, Report};
@@ -204,7 +207,8 @@ pub fn fit_process(
     let measured = &deviations.channel(&plan.output)?.values;
     let found =
         least_free_run(&structures, &parameters, (&held, measured), background, &plan.search, monitor)?;
-    let model = model(plan, log, inputs, structures, &parameters, &found)?;
+    let model = model(plan, log.sample_time(), inputs, structures, &parameters, &found)?;
+    let starts = found.explained_by_starts;
 
     let missing = names.iter().map(|name| {
         let values = &log.channel(name)?.values;
@@ -243,7 +247,7 @@ pub fn fit_process(
         generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
         data,
         selection: None,
-        warnings: warnings::of_fit(&model, &held, &estimation),
+        warnings: warnings::of_fit(&model, &held, &estimation, starts),
         model: Model::from(model.clone()),
         estimation,
         fit: Vec::new(),
@@ -262,7 +266,7 @@ pub fn fit_process(
 /// The model of what was found.
 fn model(
     plan: &ProcessPlan,
-    log: &Log,
+    sample_time: f64,
     inputs: Vec<Signal>,
     structures: Vec<ProcessStructure>,
     names: &[String],
@@ -288,7 +292,7 @@ fn model(
     let open = covariance.filter(|_| found.level.is_some());
     let model = ProcessModel {
         structures,
-        sample_time: log.sample_time(),
+        sample_time,
         inputs,
         output: Signal { name: plan.output.clone(), offset },
         parameters: parameters.collect(),

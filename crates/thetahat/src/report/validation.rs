@@ -384,7 +384,7 @@ fn test_residuals(report: &Report, on_log: &dyn OnLog, plan: &ValidationPlan, va
     let relation = match (validation.in_sample, &report.estimation.procedure) {
         // The parameters of equations are none of the noise; those of functions are not of the model that the tests know.
         (InSample::No, _) | (_, Procedure::InnovationsLikelihood(_)) => Relation::Fresh,
-        (_, Procedure::FreeRun(_)) => Relation::Fresh,
+        (_, Procedure::FreeRun(_) | Procedure::FrequencyResponse(_)) => Relation::Fresh,
         (_, procedure) if !procedure.terms().is_empty() => Relation::Fresh,
         (_, Procedure::InstrumentalVariables { .. }) => Relation::Instrumental,
         _ => Relation::Fitted,

@@ -6,7 +6,7 @@ use crate::Error;
 use crate::model::{Parts, ProcessStructure};
 use crate::optimize::Objective;
 use crate::regression::{Span, product, sum, sum_of_squares};
-use crate::respond::process::{HeldLog, modes, run, sensitivities};
+use crate::respond::process::{HeldLog, modes, response_slopes, responses, run, sensitivities};
 
 /// Time constants lie between this fraction of the shortest step of the clock, and so many times the longest log.
 const SHORTEST: f64 = 1e-3;
@@ -48,6 +48,24 @@ impl Background {
     }
 }
 
+/// Measured points of the frequency response from one input.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct ResponsePoints {
+    /// In rad/s, and the points themselves.
+    pub(crate) frequencies: Vec<f64>,
+    pub(crate) values: Vec<[f64; 2]>,
+    /// What each is multiplied by: one over its standard deviation.
+    pub(crate) weights: Vec<f64>,
+    /// How long the input is held, in seconds.
+    pub(crate) sample_time: f64,
+}
+
+impl ResponsePoints {
+    fn measured(&self) -> impl Iterator<Item = f64> {
+        self.values.iter().zip(&self.weights).flat_map(|(value, weight)| value.map(|part| part * weight))
+    }
+}
+
 /// Why parameters have no cost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Refusal {
@@ -59,11 +77,15 @@ pub(super) enum Refusal {
 
 /// The least sum of squared errors that weights, level, slope and free responses leave, by the other parameters:
 /// ln(tau), ln(omega), ln(zeta), and the dead time in seconds, of one input after the other.
+///
+/// It is of logs, or of the points of measured frequency responses, each as its real and its imaginary part.
 pub(super) struct ProcessObjective<'a> {
     structures: Vec<ProcessStructure>,
     /// For each input the dead time that it has if none is searched for.
     held_dead_times: Vec<Option<f64>>,
     held: &'a [HeldLog],
+    /// For each input; none of logs.
+    points: &'a [ResponsePoints],
     background: Background,
     /// The rows that count: in which part, and where in it.
     rows: Vec<(usize, usize)>,
@@ -122,6 +144,7 @@ impl<'a> ProcessObjective<'a> {
             structures: Vec::new(),
             held_dead_times: Vec::new(),
             held,
+            points: &[],
             background,
             rows,
             residuals: outputs.clone(),
@@ -140,6 +163,54 @@ impl<'a> ProcessObjective<'a> {
         };
         objective.take(structures);
         Ok(objective)
+    }
+
+    /// The errors of frequency responses, each divided by its standard deviation.
+    ///
+    /// # Errors
+    /// [`Error::Data`] if there is no point.
+    pub(super) fn of_points(
+        structures: Vec<ProcessStructure>,
+        points: &'a [ResponsePoints],
+    ) -> Result<Self, Error> {
+        let each = || {
+            points
+                .iter()
+                .flat_map(|points| points.frequencies.iter().map(move |own| (*own, points.sample_time)))
+        };
+        let slowest = each().map(|(own, _)| own).filter(|own| *own > 0.0).fold(f64::INFINITY, f64::min);
+        let Some((_, shortest)) = each().next().filter(|_| slowest.is_finite()) else {
+            return Err(Error::data("the response has no point at a frequency above 0"));
+        };
+        let outputs: Vec<f64> = points.iter().flat_map(ResponsePoints::measured).collect();
+        let mut objective = Self {
+            structures: Vec::new(),
+            held_dead_times: Vec::new(),
+            held: &[],
+            points,
+            background: Background { level: false, slope: false, free: false },
+            rows: Vec::new(),
+            residuals: outputs.clone(),
+            outputs,
+            mean: 0.0,
+            clock: Vec::new(),
+            middle: 0.0,
+            longest: std::f64::consts::TAU / slowest,
+            shortest,
+            point: Vec::new(),
+            parts: Vec::new(),
+            offsets: Vec::new(),
+            span: Span::default(),
+            matrix: Vec::new(),
+            right: Vec::new(),
+        };
+        objective.take(structures);
+        Ok(objective)
+    }
+
+    /// Whether it is of frequency responses.
+    pub(super) fn is_of_points(&self) -> bool {
+        !self.points.is_empty()
     }
 
     /// Takes other structures of the same inputs, with all their dead times.
@@ -268,33 +339,102 @@ impl<'a> ProcessObjective<'a> {
         stacked
     }
 
+    /// The columns of an input.
+    fn columns_of(&self, input: usize, structure: &ProcessStructure, parts: &Parts<f64>) -> Vec<Vec<f64>> {
+        if self.is_of_points() {
+            return self.of_input(input, structure.columns(), |own, columns| {
+                let points = (own.frequencies.as_slice(), own.sample_time);
+                responses(structure, &parts.shape, parts.dead_time, points, |row, re, im| {
+                    for (column, (re, im)) in columns.iter_mut().zip(re.iter().zip(im)) {
+                        (column[2 * row], column[2 * row + 1]) = (*re, *im);
+                    }
+                });
+            });
+        }
+        self.stacked(structure.columns(), |part, _, whole| {
+            let signals = (part.times.as_slice(), part.inputs[input].as_slice());
+            run(structure, &parts.shape, parts.dead_time, signals, |row, seen| {
+                whole.iter_mut().zip(seen).for_each(|(column, value)| column[row] = *value);
+            });
+        })
+    }
+
+    /// Columns that `write` makes of the columns of an input and of the slopes of their sum by its shape and dead time, in a row.
+    fn slopes_of(
+        &self,
+        input: usize,
+        structure: &ProcessStructure,
+        parts: &Parts<f64>,
+        count: usize,
+        mut write: impl FnMut(&[f64], &[f64], f64, &mut [f64]),
+    ) -> Vec<Vec<f64>> {
+        let mut own = vec![0.0; count];
+        if self.is_of_points() {
+            return self.of_input(input, count, |points, columns| {
+                let at = (points.frequencies.as_slice(), points.sample_time);
+                response_slopes(structure, parts, at, |row, seen, slopes| {
+                    for (side, (seen, slopes)) in seen.into_iter().zip(slopes).enumerate() {
+                        let [shape @ .., dead_time] = slopes;
+                        write(seen, shape, *dead_time, &mut own);
+                        columns
+                            .iter_mut()
+                            .zip(&own)
+                            .for_each(|(column, value)| column[2 * row + side] = *value);
+                    }
+                });
+            });
+        }
+        self.stacked(count, |part, _, whole| {
+            let signals = (part.times.as_slice(), part.inputs[input].as_slice());
+            sensitivities(structure, parts, signals, |row, seen, shape, dead_time| {
+                write(seen, shape, dead_time, &mut own);
+                whole.iter_mut().zip(&own).for_each(|(column, value)| column[row] = *value);
+            });
+        })
+    }
+
+    /// Columns of the points of an input, which `write` fills, times their weights; zero at those of the other inputs.
+    fn of_input(
+        &self,
+        input: usize,
+        count: usize,
+        write: impl FnOnce(&ResponsePoints, &mut [Vec<f64>]),
+    ) -> Vec<Vec<f64>> {
+        let lengths: Vec<usize> = self.points.iter().map(|points| 2 * points.frequencies.len()).collect();
+        let before: usize = lengths[..input].iter().sum();
+        let points = &self.points[input];
+        let mut own = vec![vec![0.0; lengths[input]]; count];
+        write(points, &mut own);
+        let whole = own.into_iter().map(|own| {
+            let mut column = vec![0.0; self.outputs.len()];
+            let weighted = own.iter().enumerate().map(|(row, value)| value * points.weights[row / 2]);
+            column[before..].iter_mut().zip(weighted).for_each(|(value, own)| *value = own);
+            column
+        });
+        whole.collect()
+    }
+
     /// Level, slope, the columns of each input, then free responses.
     fn linear_columns(&self, parts: &[Parts<f64>]) -> Vec<Vec<f64>> {
         let mut columns = Vec::new();
         if self.background.level {
-            columns.push(vec![1.0; self.rows.len()]);
+            columns.push(vec![1.0; self.outputs.len()]);
         }
         if self.background.slope {
             columns.push(self.clock.clone());
         }
         for (input, (structure, parts)) in self.structures.iter().zip(parts).enumerate() {
-            columns.extend(self.stacked(structure.columns(), |part, _, whole| {
-                let signals = (part.times.as_slice(), part.inputs[input].as_slice());
-                run(structure, &parts.shape, parts.dead_time, signals, |row, seen| {
-                    whole.iter_mut().zip(seen).for_each(|(column, value)| column[row] = *value);
-                });
-            }));
+            columns.extend(self.columns_of(input, structure, parts));
         }
-        columns.extend(self.free_columns(parts));
+        if self.background.free {
+            columns.extend(self.free_columns(parts));
+        }
         columns
     }
 
     /// What each log has of a first state of its own.
     fn free_columns(&self, parts: &[Parts<f64>]) -> Vec<Vec<f64>> {
         let mut columns = Vec::new();
-        if !self.background.free {
-            return columns;
-        }
         for own in 0..self.held.len() {
             for (structure, parts) in self.structures.iter().zip(parts) {
                 columns.extend(self.stacked(structure.states(), |part, number, whole| {
@@ -315,23 +455,35 @@ impl<'a> ProcessObjective<'a> {
     pub(super) fn slopes(&self, structures: &[ProcessStructure], parts: &[Parts<f64>]) -> Vec<Vec<f64>> {
         let mut columns = Vec::new();
         for (input, (structure, parts)) in structures.iter().zip(parts).enumerate() {
-            let mut own = vec![0.0; structure.parameters()];
-            columns.extend(self.stacked(structure.parameters(), |part, _, whole| {
-                let signals = (part.times.as_slice(), part.inputs[input].as_slice());
-                sensitivities(structure, parts, signals, |row, seen, shape, dead_time| {
-                    structure.own_slopes(parts, seen, shape, dead_time, &mut own);
-                    whole.iter_mut().zip(&own).for_each(|(column, value)| column[row] = *value);
-                });
+            let count = structure.parameters();
+            columns.extend(self.slopes_of(input, structure, parts, count, |seen, shape, dead_time, own| {
+                structure.own_slopes(parts, seen, shape, dead_time, own);
             }));
         }
         if self.background.level {
-            columns.push(vec![1.0; self.rows.len()]);
+            columns.push(vec![1.0; self.outputs.len()]);
         }
         if self.background.slope {
             columns.push(self.clock.clone());
         }
-        columns.extend(self.free_columns(parts));
+        if self.background.free {
+            columns.extend(self.free_columns(parts));
+        }
         columns
+    }
+
+    /// The fraction of the squared errors that a first state of each log would explain, where it stands; 0 where it has one.
+    pub(super) fn explained_by_starts(&self) -> f64 {
+        if self.background.free || self.is_of_points() {
+            return 0.0;
+        }
+        let mut span = self.span.clone();
+        for column in self.free_columns(&self.parts) {
+            span.add(column);
+        }
+        let mut left = self.residuals.clone();
+        span.take_from(&mut left);
+        1.0 - sum_of_squares(&left) / sum_of_squares(&self.residuals)
     }
 
     /// Residuals and some columns on all rows of each stretch that counts, where no output was measured NaN and zero; the columns of
@@ -369,7 +521,7 @@ impl Objective for ProcessObjective<'_> {
     type Refusal = Refusal;
 
     fn samples(&self) -> usize {
-        self.rows.len()
+        self.outputs.len()
     }
 
     fn evaluate(&mut self, point: &[f64]) -> Result<f64, Refusal> {
@@ -414,15 +566,12 @@ impl Objective for ProcessObjective<'_> {
             self.structures.iter().zip(&self.parts).zip(&self.held_dead_times).enumerate()
         {
             let lags = structure.lags;
-            columns.extend(self.stacked(lags + usize::from(known.is_none()), |part, _, whole| {
-                let signals = (part.times.as_slice(), part.inputs[input].as_slice());
-                sensitivities(structure, parts, signals, |row, _, shape, dead_time| {
-                    for (index, column) in whole.iter_mut().enumerate() {
-                        // By the logarithm of the shape.
-                        column[row] =
-                            if index < lags { shape[index] * parts.shape[index] } else { dead_time };
-                    }
-                });
+            let count = lags + usize::from(known.is_none());
+            columns.extend(self.slopes_of(input, structure, parts, count, |_, shape, dead_time, own| {
+                for (index, value) in own.iter_mut().enumerate() {
+                    // By the logarithm of the shape.
+                    *value = if index < lags { shape[index] * parts.shape[index] } else { dead_time };
+                }
             }));
         }
         columns.iter_mut().for_each(|column| {

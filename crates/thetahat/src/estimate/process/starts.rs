@@ -65,7 +65,7 @@ pub(super) fn searched(
         }
     }
     for (input, structure) in current.iter().enumerate() {
-        if structure.acts_at_once() && structure.has_dead_time() {
+        if structure.acts_at_once() && structure.has_dead_time() && !objective.is_of_points() {
             found = past_jumps(objective, found, input, options, (deadline, monitor))?;
         }
     }

@@ -1,6 +1,6 @@
 use super::*;
 use crate::data::Offset;
-use crate::respond::process::run;
+use crate::respond::process::{response_slopes, responses, run};
 
 pub(crate) fn model(words: &[&str], values: &[f64]) -> ProcessModel {
     let structures: Vec<ProcessStructure> = words.iter().map(|word| word.parse().unwrap()).collect();
@@ -164,5 +164,57 @@ fn a_damaged_model_is_refused() {
         let mut model = good.clone();
         damage(&mut model);
         assert!(matches!(model.check(), Err(Error::Report { .. })));
+    }
+}
+
+#[test]
+fn frequency_responses_are_those_of_the_polynomials_and_their_slopes_those_of_differences() {
+    let cases: [(&str, &[f64]); 8] = [
+        ("p1d", &[2.0, 3.0, 1.2]),
+        ("p2d", &[1.0, 4.0, 0.3, 0.2]),
+        ("p3d", &[1.0, 4.0, 2.0, 0.3, 0.9]),
+        ("p2du", &[1.0, 2.0, 0.2, 0.7]),
+        ("p3dzu", &[1.0, 2.0, 0.2, 1.5, -0.4, 0.73]),
+        ("p1dz", &[1.0, 2.0, -0.6, 0.7]),
+        ("p1di", &[0.5, 2.0, 0.3]),
+        ("rc2", &[0.1, 1.0, 0.5, 2.0, 8.0]),
+    ];
+    let frequencies = [0.03, 0.4, 2.0, 6.2];
+    for (word, values) in cases {
+        let structure: ProcessStructure = word.parse().unwrap();
+        let response = |values: &[f64]| {
+            let parts = structure.taken_apart(values);
+            let mut found = Vec::new();
+            responses(&structure, &parts.shape, parts.dead_time, (&frequencies, 0.5), |_, re, im| {
+                let sum =
+                    |columns: &[f64]| parts.weights.iter().zip(columns).map(|(w, c)| w * c).sum::<f64>();
+                found.push([sum(re), sum(im)]);
+            });
+            found
+        };
+        let own = response(values);
+        let linear = model(&[word], values).linear().unwrap();
+        let of_polynomials = crate::respond::frequency_response(&linear, &frequencies).unwrap();
+        for (own, point) in own.iter().zip(&of_polynomials[0].points) {
+            let apart = (own[0] - point.re).hypot(own[1] - point.im);
+            assert!(apart < 1e-9 * point.magnitude.value.max(1e-3), "{word} {}: {apart}", point.frequency);
+        }
+        let parts = structure.taken_apart(values);
+        let mut slopes = vec![0.0; values.len()];
+        response_slopes(&structure, &parts, (&frequencies, 0.5), |row, seen, by| {
+            for side in 0..2 {
+                let [shape @ .., dead_time] = by[side];
+                structure.own_slopes(&parts, seen[side], shape, *dead_time, &mut slopes);
+                for (place, slope) in slopes.iter().enumerate() {
+                    let moved = |by: f64| {
+                        let mut values = values.to_vec();
+                        values[place] += by;
+                        response(&values)[row][side]
+                    };
+                    let difference = (moved(1e-6) - moved(-1e-6)) / 2e-6;
+                    assert!((slope - difference).abs() < 1e-7, "{word} {place} {row}: {slope} {difference}");
+                }
+            }
+        });
     }
 }

@@ -156,7 +156,10 @@ pub(super) fn signals(model: &PolynomialModel) -> Table {
 pub(super) fn process_parameters(report: &Report, model: &ProcessModel) -> Table {
     let head = ["parameter", "value", "unit", "standard error", "if errors were white"];
     let mut table = Table::new("Parameters", &head);
-    let Procedure::FreeRun(outcome) = &report.estimation.procedure else { return table };
+    let (Procedure::FreeRun(outcome) | Procedure::FrequencyResponse(outcome)) = &report.estimation.procedure
+    else {
+        return table;
+    };
     let units = model.structures.iter().zip(model.of_inputs());
     let units =
         units.flat_map(|(structure, own)| own.iter().map(|parameter| structure.unit(&parameter.name)));
@@ -288,6 +291,11 @@ fn procedure(procedure: &Procedure) -> String {
             let (looked_at, by) = (map.path.len(), &map.selected_by);
             format!("local models by splits, {looked_at} looked at, their number by {by}")
         }),
+        Procedure::FrequencyResponse(outcome) => format!(
+            "least errors of the frequency response, iterations: {}, {}",
+            outcome.iterations,
+            stopped(&outcome.stopped)
+        ),
         Procedure::FreeRun(outcome) => format!(
             "least errors of the free run, iterations: {}, {}; errors of the colour of an autoregression of order {}",
             outcome.iterations,

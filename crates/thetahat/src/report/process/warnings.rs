@@ -12,6 +12,8 @@ const SHORT: f64 = 0.1;
 /// Twice the standard error above the value: the parameter may as well not be there.
 const UNCERTAIN: f64 = 0.5;
 
+/// So much of the squared errors may be that of a first state by chance, and by their colour.
+const STARTS: f64 = 0.1;
 /// Time constants this close are one.
 const SAME: f64 = 1.01;
 
@@ -19,8 +21,20 @@ fn is_lag(name: &str) -> bool {
     name.starts_with("tau") && !name.starts_with("tau_z")
 }
 
-pub(super) fn of_fit(model: &ProcessModel, held: &[HeldLog], estimation: &Estimation) -> Vec<String> {
+pub(super) fn of_fit(
+    model: &ProcessModel,
+    held: &[HeldLog],
+    estimation: &Estimation,
+    explained_by_starts: f64,
+) -> Vec<String> {
     let mut words = Vec::new();
+    if explained_by_starts > STARTS {
+        words.push(format!(
+            "{:.0} % of the squared errors are what is left of a state in which the log begins: it is not at rest with its first inputs; \
+             estimate the state (initial: estimate)",
+            100.0 * explained_by_starts
+        ));
+    }
     let longest = held.iter().filter_map(|part| part.times.last()).copied().fold(0.0, f64::max);
     for (number_of_input, input) in model.inputs.iter().enumerate() {
         let changes: usize = held
@@ -39,6 +53,28 @@ pub(super) fn of_fit(model: &ProcessModel, held: &[HeldLog], estimation: &Estima
     if missing > 0 {
         words.push(format!("{missing} missing values of inputs hold the value before them"));
     }
+    words.extend(of_parameters(model, longest));
+    if let Procedure::FreeRun(outcome) = &estimation.procedure {
+        match outcome.stopped {
+            Stopped::MaxIterations | Stopped::TimeLimit => words.push(
+                "the search was stopped before it came to its end: give it more iterations or time"
+                    .to_owned(),
+            ),
+            Stopped::Converged | Stopped::NoDescent => {}
+        }
+        if outcome.initial_conditions > 0 && words.iter().any(|word| word.contains("has one step")) {
+            words.push(
+                "the state that the log begins in is estimated beside a single step, which it resembles: the gain is less certain for it"
+                    .to_owned(),
+            );
+        }
+    }
+    words
+}
+
+/// What the parameters say of the structure, of a log as long as this.
+pub(super) fn of_parameters(model: &ProcessModel, longest: f64) -> Vec<String> {
+    let mut words = Vec::new();
     for (structure, own) in model.structures.iter().zip(model.of_inputs()) {
         let lags: Vec<&Parameter> = own.iter().filter(|own| is_lag(&own.name)).collect();
         let same = lags.windows(2).find(|pair| pair[0].value < SAME * pair[1].value);
@@ -82,21 +118,6 @@ pub(super) fn of_fit(model: &ProcessModel, held: &[HeldLog], estimation: &Estima
         }
         if parameter.standard_error.is_some_and(|error| error > UNCERTAIN * parameter.value.abs()) {
             words.push(format!("{name} is not certain: zero is within twice its standard error"));
-        }
-    }
-    if let Procedure::FreeRun(outcome) = &estimation.procedure {
-        match outcome.stopped {
-            Stopped::MaxIterations | Stopped::TimeLimit => words.push(
-                "the search was stopped before it came to its end: give it more iterations or time"
-                    .to_owned(),
-            ),
-            Stopped::Converged | Stopped::NoDescent => {}
-        }
-        if outcome.initial_conditions > 0 && words.iter().any(|word| word.contains("has one step")) {
-            words.push(
-                "the state that the log begins in is estimated beside a single step, which it resembles: the gain is less certain for it"
-                    .to_owned(),
-            );
         }
     }
     words

@@ -18,7 +18,7 @@ use crate::data::{Log, Rows, inside};
 use crate::model::{Chain, Columns, Parts, ProcessStructure, State, Transition};
 
 /// The lags of a structure at most, and so the numbers of its shape.
-const LANE: usize = 3;
+pub(super) const LANE: usize = 3;
 /// Steps of a clock that differ by so many roundings of its time are the same.
 const ROUNDINGS: f64 = 8.0;
 

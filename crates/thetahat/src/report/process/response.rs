@@ -1,0 +1,179 @@
+//! Fits of processes to measured frequency responses.
+
+use super::{ProcessPlan, model};
+use crate::data::Offset;
+use crate::estimate::{Criteria, Procedure, ResponsePoints, least_response_errors};
+use crate::model::{Model, ProcessModel, Signal};
+use crate::optimize::Monitor;
+use crate::report::Report;
+use crate::report::schema::{Data, Estimation, Missing};
+use crate::respond::FrequencyResponse;
+use crate::spectrum::MeasuredResponse;
+use crate::{Document, Error};
+
+/// Finds the process whose frequency response, with an input that is held from sample to sample, comes closest to a measured one:
+///
+/// ```text
+/// min sum_k |G(omega_k) - G_k|^2/var G_k
+/// ```
+///
+/// with the variances of the points; where a point has none, with |G_k|^2 in their place: errors relative to each point. Of the
+/// plan it takes the inputs, none standing for all of them, the structures and the search. Levels are not in a response: offsets are zero.
+///
+/// Standard errors are those of independent points with these variances, and larger where the response misses the points by more.
+///
+/// Source: Pintelon and Schoukens, System Identification: A Frequency Domain Approach, 2nd ed. 2012, section 9.11; Ljung, System
+/// Identification, 2nd ed. 1999, section 7.7.
+///
+/// # Errors
+/// [`Error::Argument`] for what a response does not have (rows, offsets, a slope, a start), and an input that it does not; otherwise as
+/// for [`fit_process`](super::fit_process).
+///
+/// ```
+/// use std::ops::ControlFlow;
+/// use thetahat::data::{Channel, Log};
+/// use thetahat::report::{ProcessPlan, fit_process_to_response};
+/// use thetahat::spectrum::{SpectrumPlan, spectrum};
+///
+/// // 2/(1 + 5 s), sampled each second with a held input.
+/// let (mut u, mut y, mut random) = (vec![0.0], vec![0.0], 1_u32);
+/// let pole = (-0.2_f64).exp();
+/// for t in 1..3000 {
+///     random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+///     y.push(pole * y[t - 1] + 2.0 * (1.0 - pole) * u[t - 1]);
+///     u.push(f64::from(random >> 16) / 32_768.0 - 1.0);
+/// }
+/// let channel = |name: &str, values| Channel { name: name.into(), values };
+/// let log = Log::new(vec![channel("u", u), channel("y", y)], 1.0)?;
+/// let response = spectrum(&log, &[], &SpectrumPlan::new(&["u"], "y"))?;
+/// let plan = ProcessPlan::new(&[], "y", "p1".parse()?);
+/// let report = fit_process_to_response(&response, &plan, &|_| ControlFlow::Continue(()))?;
+/// assert!((report.model.parameters()[1].value - 5.0).abs() < 0.01);
+/// # Ok::<(), thetahat::Error>(())
+/// ```
+pub fn fit_process_to_response(
+    response: &MeasuredResponse,
+    plan: &ProcessPlan,
+    monitor: Monitor<'_>,
+) -> Result<Report, Error> {
+    let measured: Vec<&FrequencyResponse> = match &*plan.inputs {
+        [] => response.responses.iter().collect(),
+        named => named
+            .iter()
+            .map(|name| {
+                response.from_input(name).ok_or_else(|| {
+                    let there = response.responses.iter().filter_map(|own| own.input.as_deref());
+                    Error::argument(
+                        "input",
+                        format!(
+                            "the response has none called '{name}', but: {}",
+                            there.collect::<Vec<_>>().join(", ")
+                        ),
+                    )
+                })
+            })
+            .collect::<Result<_, Error>>()?,
+    };
+    let inputs = measured.iter().filter_map(|own| own.input.clone()).collect();
+    let plan = &ProcessPlan { inputs, output: response.output.clone(), ..plan.clone() };
+    plan.check()?;
+    let of_logs = [
+        ("estimate", !plan.estimate.is_empty()),
+        ("validate", !plan.validate.is_empty()),
+        ("split", plan.split.is_some()),
+        ("offset", !plan.offsets.is_empty()),
+        ("trend", plan.trend),
+        ("initial", plan.free_start),
+    ];
+    if let Some((name, _)) = of_logs.iter().find(|(_, given)| *given) {
+        return Err(Error::argument(
+            name,
+            "a frequency response has no rows, levels or states; leave it out",
+        ));
+    }
+    let points: Vec<ResponsePoints> = measured.iter().map(|own| points(own, response.sample_time)).collect();
+    let structures = plan.each();
+    let names = ProcessModel::names(&structures, &plan.inputs);
+    let found = least_response_errors(&structures, &names, &points, &plan.search, monitor)?;
+    let signal = |name: &String| Signal { name: name.clone(), offset: Offset::default() };
+    let inputs: Vec<Signal> = plan.inputs.iter().map(signal).collect();
+    let own = model(plan, response.sample_time, inputs, structures, &names, &found)?;
+    // What e is in the time of the samples the noise of the response says, if it does.
+    let own = ProcessModel { noise_variance: noise(response), degrees_of_freedom: None, ..own };
+    let rows = response.logs.last().map(|log| log.rows).or_else(|| response.rows.last().copied());
+    let missing = plan.inputs.iter().chain([&plan.output]);
+    let data = Data {
+        logs: response.logs.clone(),
+        digests: Vec::new(),
+        rows: rows.map_or(0, |rows| rows.last()),
+        sample_time: response.sample_time,
+        detrend: response.detrend.clone(),
+        prefilter: None,
+        estimation: response.rows.clone(),
+        validation: Vec::new(),
+        split: None,
+        segments: response.rows.clone(),
+        missing: missing.map(|channel| Missing { channel: channel.clone(), rows: 0 }).collect(),
+        time_gaps: 0,
+    };
+    let estimation = Estimation {
+        initial: None,
+        level: None,
+        slope: None,
+        samples: found.samples,
+        mse: found.mse,
+        criteria: Criteria::new(found.mse, names.len(), found.samples),
+        condition: found.condition,
+        procedure: Procedure::FrequencyResponse(found.outcome),
+    };
+    let mut warnings = super::warnings::of_parameters(&own, f64::INFINITY);
+    if response.bands.honest == Some(false) {
+        warnings.push(format!("the bands of the response are not honest: {}", response.bands.reason));
+    }
+    if found.mse > MISSED {
+        warnings.push(format!(
+            "the response is missed by {} times the standard deviations of its points: the structure is not the whole truth, or they are \
+             too small",
+            crate::figures::short((10.0 * found.mse.sqrt()).round() / 10.0)
+        ));
+    }
+    Ok(Report {
+        schema: Report::SCHEMA.to_owned(),
+        generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
+        data,
+        selection: None,
+        model: Model::from(own),
+        estimation,
+        fit: Vec::new(),
+        warnings,
+    })
+}
+
+/// Mean squares above this, in variances of the points, are worth a warning.
+const MISSED: f64 = 2.0;
+
+fn points(response: &FrequencyResponse, sample_time: f64) -> ResponsePoints {
+    let all = response
+        .points
+        .iter()
+        .filter(|point| point.magnitude.value > 0.0 && point.magnitude.value.is_finite());
+    let known = all.clone().all(|point| point.covariance.is_some_and(|[[re, _], [_, im]]| re + im > 0.0));
+    let weight = |point: &crate::respond::FrequencyPoint| match point.covariance {
+        Some([[re, _], [_, im]]) if known => (2.0 / (re + im)).sqrt(),
+        _ => 1.0 / point.magnitude.value,
+    };
+    ResponsePoints {
+        frequencies: all.clone().map(|point| point.frequency).collect(),
+        values: all.clone().map(|point| [point.re, point.im]).collect(),
+        weights: all.map(weight).collect(),
+        sample_time,
+    }
+}
+
+/// The variance of the noise: the mean of its density times the band.
+fn noise(response: &MeasuredResponse) -> f64 {
+    let known: Vec<f64> = response.noise.iter().filter_map(|point| point.density).collect();
+    let mean = known.iter().sum::<f64>() / known.len() as f64;
+    let variance = mean * std::f64::consts::PI / response.sample_time;
+    if variance.is_finite() { variance } else { 0.0 }
+}

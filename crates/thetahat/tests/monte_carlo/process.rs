@@ -45,7 +45,11 @@ fn held(pole: f64, steps: &[f64], runs: usize) -> [[f64; 3]; 2] {
         let plan = ProcessPlan::new(&["u"], "y", "p1d".parse().expect("a structure"));
         let report =
             fit_process(&log, &[], &plan, &|_| ControlFlow::Continue(())).expect("the case is sound");
-        let Procedure::FreeRun(outcome) = &report.estimation.procedure else { panic!("a process") };
+        let outcome = match &report.estimation.procedure {
+            Procedure::FreeRun(outcome) => Some(outcome),
+            _ => None,
+        };
+        let outcome = outcome.expect("the case is a process");
         for (index, parameter) in report.model.parameters().iter().enumerate() {
             let error = (parameter.value - TRUTH[index]).abs() / QUANTILE;
             let own = [parameter.standard_error, outcome.white_standard_errors[index]];

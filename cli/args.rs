@@ -11,6 +11,7 @@ mod respond;
 mod spectrum;
 mod step;
 mod track;
+mod tune;
 mod validate;
 
 use std::path::PathBuf;
@@ -35,6 +36,7 @@ pub(crate) use spectrum::{
 };
 pub(crate) use step::StepArguments;
 pub(crate) use track::{ResumeArgument, TrackArguments, TrackMethodArgument, TrackModelArgument};
+pub(crate) use tune::{ControllerArgument, TuneArguments};
 pub(crate) use validate::{CompareArguments, EvaluationArguments, ValidateArguments};
 
 const EXIT_CODES: &str = "\
@@ -219,6 +221,16 @@ Examples:
 Example:
   thetahat impulse model.json --samples 50 > impulse.csv")]
     Impulse(TransientArguments),
+    /// PI and PID settings for a fitted process, and the closed loop that they give
+    ///
+    /// By SIMC (Skogestad 2003) and by lambda tuning, from a process that fit --structure found. Beside the settings stands what the loop
+    /// with the fitted process does: steps of the set point and of the load, Ms, gain and phase margin, and the worst Ms within the 95 %
+    /// intervals of the parameters.
+    #[command(after_help = "\
+Examples:
+  thetahat tune heater.json
+  thetahat tune heater.json --lambda 30 --controller pi --html loop.html --responses loop.csv")]
+    Tune(TuneArguments),
     /// Make a test signal for an experiment, or say which one a model needs, and for how long
     ///
     /// Writes CSV: time and the input, or the inputs u1, u2, …. What the signal is goes to standard error: its period, mean, crest factor,
@@ -244,7 +256,7 @@ Example:
 Example:
   thetahat schema > thetahat.report.schema.json")]
     Schema {
-        /// The document: what fit, validate, compare, inspect, spectrum, step, track, filter or design writes
+        /// The document: what fit, validate, compare, inspect, spectrum, step, tune, track, filter or design writes
         #[arg(value_enum, default_value = "report")]
         document: DocumentArgument,
     },
@@ -287,6 +299,8 @@ pub(crate) enum DocumentArgument {
     Response,
     /// What step writes of a log
     Step,
+    /// What tune writes
+    Tuning,
     /// What track writes at its end
     Track,
     /// What filter writes at its end

@@ -14,9 +14,12 @@ use thetahat::report::{
 };
 use thetahat::spectrum::SpectrumPlan;
 use thetahat::step_test::StepTestPlan;
+use thetahat::tune::Tuning;
 
-use crate::args::{DesignArguments, FitArguments, InspectArguments, MapArgument, ValidateArguments};
-use crate::commands::{Experiments, Tracking, compared_signals, experiments, inspected};
+use crate::args::{
+    DesignArguments, FitArguments, InspectArguments, MapArgument, TuneArguments, ValidateArguments,
+};
+use crate::commands::{Experiments, Tracking, compared_signals, experiments, inspected, settings};
 use crate::failure::Failure;
 use crate::job::{
     DesignJob, EvaluationJob, FitJob, GreyBoxJob, InspectJob, NarxJob, ProcessJob, SpectrumJob, StepTestJob,
@@ -167,6 +170,17 @@ pub fn step_test_plan(options: &[OsString], input: String, output: String) -> Re
     let log = OsString::from("log");
     let words: Vec<OsString> = options.iter().cloned().chain([log]).collect();
     Ok(StepTestJob::resolve(&arguments("step", &words)?)?.plan(input, output))
+}
+
+/// What `thetahat tune` says of a model with these options.
+///
+/// # Errors
+/// A [`Failure`] as the program would report it.
+pub fn tuning_of(options: &[OsString], model: &Model) -> Result<Tuning, Failure> {
+    let report = OsString::from("model");
+    let words: Vec<OsString> = options.iter().cloned().chain([report]).collect();
+    let arguments: TuneArguments = arguments("tune", &words)?;
+    settings(&arguments, model, Path::new("model"))
 }
 
 /// The signal that `thetahat design` makes with these options.

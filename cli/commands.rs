@@ -20,6 +20,7 @@ mod stored;
 pub(crate) mod summary;
 mod track;
 mod transient;
+mod tune;
 mod validate;
 
 pub(crate) use design::compared_signals;
@@ -27,6 +28,7 @@ pub(crate) use experiments::{Experiments, experiments};
 pub use filter::consistency;
 pub(crate) use inspect::inspected;
 pub use track::{TrackedRow, Tracking};
+pub(crate) use tune::settings;
 
 use crate::args::{Arguments, Command};
 use crate::failure::Failure;
@@ -47,6 +49,7 @@ pub(crate) fn dispatch(arguments: Arguments, line: &str) -> Result<(), Failure> 
         Command::Bode(arguments) => bode::bode(&arguments, line),
         Command::Step(arguments) => step::step(&arguments, line),
         Command::Impulse(arguments) => transient::impulse(&arguments, line),
+        Command::Tune(arguments) => tune::tune(&arguments, line),
         Command::Design(arguments) => design::design(&arguments),
         Command::Demo(arguments) => demo::demo(&arguments),
         Command::Schema { document } => help::schema(document),

@@ -3,7 +3,7 @@
 use crate::harness::Folder;
 use crate::signals::{Experiment, csv};
 
-const VERBS: [&str; 17] = [
+const VERBS: [&str; 18] = [
     "fit",
     "inspect",
     "spectrum",
@@ -15,6 +15,7 @@ const VERBS: [&str; 17] = [
     "filter",
     "bode",
     "step",
+    "tune",
     "impulse",
     "design",
     "demo",
@@ -87,6 +88,7 @@ fn every_verb_has_examples_and_they_run() {
          a = { start = 0.5, sd = 1, unknown = true, min = -1, max = 1 }\n[next]\nx = '20 + a * (x - 20) + force - 5'\n\
          [outputs]\ny = 'x'\n[noise]\nprocess = { x = 1 }\nmeasurement = { y = 0.5 }\n",
     );
+    folder.done("fit steps.csv --time t -u heater -y temperature --structure p1d --report heater.json");
     for verb in VERBS {
         let examples = examples(&folder.done(&format!("{verb} --help")).stdout);
         assert!(!examples.is_empty(), "{verb}");

@@ -50,5 +50,6 @@ mod track;
 mod track_live;
 mod track_soak;
 mod transient;
+mod tune;
 mod validate;
 mod width;

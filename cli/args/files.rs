@@ -62,6 +62,11 @@ impl Command {
                 read.push(impulse.report.clone());
                 written.extend([&impulse.out].into_iter().chain(&impulse.html).cloned());
             }
+            Self::Tune(tune) => {
+                read.push(tune.report.clone());
+                let more = tune.document.iter().chain(&tune.responses).chain(&tune.html);
+                written.extend([&tune.out].into_iter().chain(more).cloned());
+            }
             Self::Design(design) => {
                 read.extend(design.model.clone());
                 written.extend([&design.out].into_iter().chain(&design.spectrum).cloned());

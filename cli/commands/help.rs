@@ -9,6 +9,7 @@ use thetahat::report::{Comparison, Report, Validation};
 use thetahat::spectrum::MeasuredResponse;
 use thetahat::step_test::StepTest;
 use thetahat::track::TrackSummary;
+use thetahat::tune::Tuning;
 
 use crate::args::{Arguments, DocumentArgument};
 use crate::failure::Failure;
@@ -23,6 +24,7 @@ pub(crate) fn schema(document: DocumentArgument) -> Result<(), Failure> {
         DocumentArgument::Inspection => Inspection::json_schema(),
         DocumentArgument::Response => MeasuredResponse::json_schema(),
         DocumentArgument::Step => StepTest::json_schema(),
+        DocumentArgument::Tuning => Tuning::json_schema(),
         DocumentArgument::Track => TrackSummary::json_schema(),
         DocumentArgument::Filter => FilterSummary::json_schema(),
         DocumentArgument::Design => ExperimentDesign::json_schema(),

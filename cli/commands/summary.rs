@@ -11,6 +11,7 @@ mod selection;
 mod step_test;
 mod text;
 mod tracking;
+mod tuning;
 mod validation;
 
 use thetahat::data::Rows;
@@ -34,6 +35,7 @@ pub use response::response;
 pub use step_test::step_test;
 use text::{Text, columns, or_dash, some};
 pub use tracking::tracking;
+pub use tuning::tuning;
 pub use validation::{comparison, validation};
 
 /// This many of a list are written.

@@ -61,3 +61,17 @@ pub(crate) fn compare_signals(
     let json = found.to_json().map_err(|error| error::batch(py, error))?;
     Ok((json, thetahat_cli::experiment_design(&found, thetahat_cli::WIDTH)))
 }
+
+/// PI and PID settings for a process: the document that `thetahat tune` writes, and its table.
+#[pyfunction]
+pub(crate) fn tune(
+    py: Python<'_>,
+    model: &Bound<'_, Model>,
+    options: Vec<OsString>,
+) -> PyResult<(String, String)> {
+    let model = Arc::clone(model.get().model());
+    let found = awaited(py, move |_| thetahat_cli::tuning_of(&options, &model))?
+        .map_err(|failure| error::program(py, &failure))?;
+    let json = found.to_json().map_err(|error| error::batch(py, error))?;
+    Ok((json, thetahat_cli::tuning(&found, thetahat_cli::WIDTH)))
+}

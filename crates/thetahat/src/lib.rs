@@ -69,6 +69,7 @@
 //! | [`validate`] | figures of fit and tests of residuals |
 //! | [`spectrum`] | frequency responses from data, without a model |
 //! | [`step_test`] | what a course reads off the response to a step |
+//! | [`tune`](mod@tune) | PI and PID settings for a process, and the loop that they give |
 //! | [`report`] | the whole way from a log to a document and its page |
 //! | [`track`] | models that are estimated while the plant runs |
 //! | [`filter`] | states that are estimated while the plant runs |
@@ -104,6 +105,7 @@ pub mod spectrum;
 pub mod step_test;
 pub mod text;
 pub mod track;
+pub mod tune;
 pub mod validate;
 
 pub use document::{Document, is_document};

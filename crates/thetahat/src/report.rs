@@ -58,7 +58,7 @@ pub use held_out_runs::held_out_runs;
 #[cfg(feature = "html")]
 pub use html::{
     Transient, comparison_page, fit_page, inspection_page, response_page, step_test_page, transient_page,
-    validation_page,
+    tuning_page, validation_page,
 };
 pub use identify::{PendingEvaluation, identify, identify_monitored};
 pub use nonlinear_arx::{Centres, InputLags, MapPlan, NonlinearArxPlan, fit_nonlinear_arx};

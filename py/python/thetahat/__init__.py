@@ -1,7 +1,7 @@
 """System identification: models of dynamic systems from logged data.
 
 A log holds measured signals (`Log`, `read_csv`). A fit makes a model of it (`arx`, `armax`, `oe`, `bj`, `ar`, `arma`, `general`,
-`fir`, `iv`, `sriv`), `search` chooses one, `grey` finds the parameters of a model in equations (`GreyBox`), `narx` fits nonlinear ARX models, `process` processes in continuous time, `inspect` inspects a log before a fit, `spectrum` finds its frequency response and `step_test` what its steps show without a model, `design` makes test signals for experiments. A `Model` predicts, simulates, forecasts and is validated.
+`fir`, `iv`, `sriv`), `search` chooses one, `grey` finds the parameters of a model in equations (`GreyBox`), `narx` fits nonlinear ARX models, `process` processes in continuous time, `inspect` inspects a log before a fit, `spectrum` finds its frequency response and `step_test` what its steps show without a model, `design` makes test signals for experiments, `tune` controllers for a process. A `Model` predicts, simulates, forecasts and is validated.
 `thetahat.plot` draws, and `thetahat.sklearn` fits into scikit-learn.
 
 Whatever takes numbers takes arrays of NumPy, lists and tuples, and the series and frames of pandas, Polars and PyArrow; of one
@@ -57,6 +57,7 @@ from thetahat._thetahat import (
     __version__,
 )
 from thetahat._track import Tracked, Tracker, TrackTrajectory
+from thetahat._tune import Tuning, tune
 
 __all__ = [
     "Alarm",
@@ -109,6 +110,7 @@ __all__ = [
     "Tracked",
     "Tracker",
     "TransientResponse",
+    "Tuning",
     "Validation",
     "ValidationOptions",
     "__version__",
@@ -133,4 +135,5 @@ __all__ = [
     "spectrum",
     "sriv",
     "step_test",
+    "tune",
 ]

@@ -14,6 +14,7 @@ mod response;
 mod step_test;
 mod tables;
 mod text;
+mod tuning;
 
 pub use charts::Transient;
 use charts::{Marked, Shade, Stack};
@@ -21,6 +22,7 @@ use outputs::{compared_outputs, outputs, points};
 use page::{Block, Page, Section};
 pub use response::response_page;
 pub use step_test::{step_test_page, transient_page};
+pub use tuning::tuning_page;
 
 use super::{Report, Validated, Validation};
 use crate::Error;

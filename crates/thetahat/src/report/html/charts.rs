@@ -8,6 +8,7 @@ mod signals;
 mod spectrum;
 mod step;
 mod terms;
+mod tuning;
 
 pub(super) use correlation::{autocorrelation, compared_autocorrelations, cross_correlation, prewhitened};
 pub use dynamics::Transient;
@@ -18,3 +19,4 @@ pub(super) use signals::{Marked, Shade, Stack, outputs};
 pub(super) use spectrum::spectrum;
 pub(super) use step::step_response;
 pub(super) use terms::{complexity, slices};
+pub(super) use tuning::closed_loops;

@@ -1,0 +1,81 @@
+//! `thetahat tune`: PI and PID settings for a process.
+
+use std::path::Path;
+
+use thetahat::Document;
+use thetahat::model::Model;
+use thetahat::report::tuning_page;
+use thetahat::tune::{Controller, Tuning, TuningPlan, tune as tuned};
+
+use super::{stored, summary};
+use crate::args::{ControllerArgument, FormatArgument, TuneArguments};
+use crate::failure::Failure;
+use crate::messages::warn;
+use crate::output;
+use crate::wrap::{WIDTH, stdout_width};
+
+pub(crate) fn tune(arguments: &TuneArguments, line: &str) -> Result<(), Failure> {
+    let found = settings(arguments, &stored::model(&arguments.report)?, &arguments.report)?;
+    let json = found.to_json().map_err(|error| Failure::data(error.to_string()))?;
+    if let Some(path) = &arguments.html {
+        output::page(path, &tuning_page(&found, line))?;
+    }
+    if let Some(path) = &arguments.document {
+        output::write(path, |file| file.write_all(json.as_bytes()))?;
+    }
+    if let Some(path) = &arguments.responses {
+        responses(path, &found)?;
+    }
+    for warning in &found.warnings {
+        warn(warning);
+    }
+    // What goes into a file does not depend on the terminal.
+    let width = if arguments.out == Path::new("-") { stdout_width() } else { WIDTH };
+    let text = match arguments.format {
+        FormatArgument::Json => json,
+        FormatArgument::Table => summary::tuning(&found, width),
+    };
+    output::write(&arguments.out, |file| file.write_all(text.as_bytes()))
+}
+
+/// The settings for a model, which messages name by a path.
+pub(crate) fn settings(arguments: &TuneArguments, model: &Model, name: &Path) -> Result<Tuning, Failure> {
+    let Model::Process(process) = model else {
+        return Err(Failure::data(format!(
+            "{}: it is {}, and settings are of a process: fit one (--structure p1d)",
+            name.display(),
+            model.name()
+        )));
+    };
+    let plan = TuningPlan {
+        input: arguments.input.clone(),
+        closed_loop_time: arguments.lambda,
+        controller: arguments.controller.map(|controller| match controller {
+            ControllerArgument::Pi => Controller::Pi,
+            ControllerArgument::Pid => Controller::Pid,
+        }),
+    };
+    tuned(process, &plan).map_err(|error| Failure::about(&error, |_| name.display().to_string()))
+}
+
+/// A row for each setting and time.
+fn responses(path: &Path, found: &Tuning) -> Result<(), Failure> {
+    output::write_csv(path, |csv| {
+        csv.write_record([
+            "rule",
+            "controller",
+            "time",
+            "setpoint_response",
+            "controller_output",
+            "load_response",
+        ])?;
+        for own in &found.settings {
+            let of = &own.closed_loop;
+            let rows = of.setpoint_response.iter().zip(&of.controller_output).zip(&of.load_response);
+            for (time, ((setpoint, moved), load)) in of.time.iter().zip(rows) {
+                csv.serialize((own.rule.name(), own.controller.name(), time, setpoint, moved, load))?;
+            }
+        }
+        Ok(())
+    })
+}

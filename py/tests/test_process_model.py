@@ -42,6 +42,8 @@ def test_the_process_is_found_and_every_method_takes_it() -> None:
     assert model.step_response(samples=200).values[-1] == pytest.approx(model.parameters[0], rel=1e-3)
     assert abs(model.frequency_response([0.001]).values[0]) == pytest.approx(model.parameters[0], rel=0.01)
     assert "process p1d" in model._repr_html_()
+    with pytest.raises(AttributeError, match="this one is a process"):
+        _ = model.orders
     plot.step(model)
 
 

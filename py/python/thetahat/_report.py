@@ -68,9 +68,9 @@ class ReportedModel:
     def _polynomial(self, name: str) -> Any:
         """A part that only models of polynomials have."""
         if name not in self._own:
+            kind = {"equations": "in equations", "nonlinear-arx": "a nonlinear ARX model", "process": "a process"}[self.kind]
             raise AttributeError(
-                f"{name} is of polynomial models, and this one is in {self.kind}: it predicts, simulates, validates, compares "
-                "and filters"
+                f"{name} is of polynomial models, and this one is {kind}: it predicts, simulates, validates and compares"
             )
         return self._own[name]
 

@@ -117,6 +117,21 @@ fn a_frequency_response_makes_a_process() {
     let table = folder.done("fit --from response.json --structure p1").stdout;
     assert!(table.contains("parts of points") && table.contains("by the points alone"), "{table}");
     folder.done("bode model.json --over response.json");
+    folder.done("fit log.csv --sample-time 1 --na 1 --nb 1 --nk 3 --report late.json");
+    let table = folder
+        .done("compare model.json late.json log.csv --sample-time 1 --over response.json --html compare.html")
+        .stdout;
+    assert!(
+        table.contains("outside of the response, u") && table.contains("apart from the response, u [%]"),
+        "{table}"
+    );
+    assert!(folder.read("compare.html").contains("points outside of the response"));
+    let json = folder
+        .done("compare model.json late.json log.csv --sample-time 1 --over response.json --format json")
+        .stdout;
+    let found: Value = serde_json::from_str(&json).expect("a document");
+    let outside = |model: usize| number(&found, &format!("/models/{model}/response/0/outside"));
+    assert!(outside(0) < 30.0 && outside(1) > 100.0, "{table}");
     folder.done("validate model.json log.csv --sample-time 1");
     let error = folder.refused("fit --from response.json --structure p1d -u v", 2);
     assert!(error.contains("none called 'v'"), "{error}");

@@ -36,7 +36,7 @@ impl Command {
                 written.extend(validate.evaluation.out.iter().chain(&validate.evaluation.html).cloned());
             }
             Self::Compare(compare) => {
-                read.extend(compare.reports.iter().chain([&compare.path]).cloned());
+                read.extend(compare.reports.iter().chain([&compare.path]).chain(&compare.over).cloned());
                 written.extend(compare.evaluation.out.iter().chain(&compare.evaluation.html).cloned());
             }
             Self::Track(track) => {

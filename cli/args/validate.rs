@@ -31,6 +31,9 @@ pub(crate) struct CompareArguments {
     /// The log: a CSV file, gzip-compressed or not (- for standard input)
     #[arg(value_name = "LOG", required = true)]
     pub(crate) path: PathBuf,
+    /// Lay the models over a measured frequency response too, the JSON document of spectrum: how many of its points each misses
+    #[arg(long, value_name = "RESPONSE")]
+    pub(crate) over: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) evaluation: EvaluationArguments,
 }

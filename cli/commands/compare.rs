@@ -14,7 +14,7 @@ use crate::wrap::stdout_width;
 
 pub(crate) fn compare(arguments: &CompareArguments, line: &str) -> Result<(), Failure> {
     let evaluation = &arguments.evaluation;
-    let read: Vec<_> = arguments.reports.iter().chain([&arguments.path]).collect();
+    let read: Vec<_> = arguments.reports.iter().chain([&arguments.path]).chain(&arguments.over).collect();
     let job = EvaluationJob::resolve(evaluation, &read)?;
     let reports: Vec<Report> =
         arguments.reports.iter().map(|path| stored::report(path)).collect::<Result<_, _>>()?;
@@ -22,7 +22,17 @@ pub(crate) fn compare(arguments: &CompareArguments, line: &str) -> Result<(), Fa
     let each = arguments.reports.iter().zip(&reports);
     let each =
         each.map(|(path, report)| one(path, report, &loaded, &job.plan).map_err(|failure| failure.of(path)));
-    let found: Vec<Validated> = each.collect::<Result<_, _>>()?;
+    let mut found: Vec<Validated> = each.collect::<Result<_, _>>()?;
+    if let Some(path) = &arguments.over {
+        let response = stored::response(path)?;
+        let each = found.into_iter().zip(&reports).zip(&arguments.reports);
+        found = each
+            .map(|((found, report), path)| {
+                let failed = |error| Failure::data(format!("{}: {error}", path.display()));
+                found.over(&report.model, &response).map_err(failed)
+            })
+            .collect::<Result<_, _>>()?;
+    }
     let comparison = compared(&found).map_err(|error| Failure::option(&error))?;
     let json = comparison.to_json().map_err(|error| Failure::data(error.to_string()))?;
     if let Some(path) = &evaluation.html {

@@ -71,17 +71,23 @@ pub(crate) fn compare(
     models: Vec<(String, Bound<'_, Model>)>,
     log: &Bound<'_, Log>,
     options: Vec<OsString>,
+    over: Option<&str>,
 ) -> PyResult<(String, String)> {
     let (plan, _) =
         thetahat_cli::validation_plan(&options).map_err(|failure| error::program(py, &failure))?;
+    let over = over.map(MeasuredResponse::from_json).transpose().map_err(|error| error::batch(py, error))?;
     let log = log.get();
     let models = models.into_iter().map(|(name, model)| Ok((name, model.get().report(py)?)));
     let models = models.collect::<PyResult<Vec<(String, Arc<Report>)>>>()?;
     let (log, sources) = (Arc::clone(&log.log), log.sources.clone());
     let comparison = interruptible(py, move |_| {
-        let each = models
-            .iter()
-            .map(|(name, report)| thetahat::report::validate(report, Some(name), &log, &sources, &plan));
+        let each = models.iter().map(|(name, report)| {
+            let found = thetahat::report::validate(report, Some(name), &log, &sources, &plan)?;
+            match &over {
+                Some(response) => found.over(&report.model, response),
+                None => Ok(found),
+            }
+        });
         let found: Vec<Validated> = each.collect::<Result<_, _>>()?;
         thetahat::report::compare(&found)
     })?;

@@ -331,7 +331,7 @@ def test_the_document_is_json_with_a_line_break(log: th.Log) -> None:
     assert json.loads(text)["data"]["logs"][0]["file"] == "memory"
 
 
-EVERY_FIT = (th.ar, th.arma, th.armax, th.arx, th.bj, th.fir, th.iv, th.oe, th.general, th.search, th.sriv)
+EVERY_FIT = (th.ar, th.arma, th.armax, th.arx, th.bj, th.fir, th.iv, th.oe, th.general, th.process, th.search, th.sriv)
 
 
 @pytest.mark.parametrize(
@@ -350,7 +350,7 @@ def test_options_are_keyword_parameters(function: Any, options: Any) -> None:
     known = set(options.__annotations__)
     assert shown >= known or (options is th.FitOptions and shown & known and function not in (th.general, th.search))
     # Their types are told once, and each is described where the options are.
-    own, told = get_type_hints(function, localns={"Model": th.Model, "np": np}), get_type_hints(options)
+    own, told = get_type_hints(function, localns={"Model": th.Model, "MeasuredResponse": th.MeasuredResponse, "np": np}), get_type_hints(options)
     for name in shown & known:
         assert own[name] in (told[name], Optional[told[name]]), name
         assert parameters[name].default is None or options is th.ReadOptions

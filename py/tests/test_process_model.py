@@ -74,6 +74,12 @@ def test_a_measured_response_makes_a_process() -> None:
     model = th.process(response, "p1")
     assert model.parameters == pytest.approx([2, 5], rel=0.01)
     assert model.method == "frequency-response"
+    log = th.Log(y, u, sample_time=0.5)
+    found = th.compare({"p1": model, "arx": th.arx(log, 1, 1, nk=4)}, log, over=response)
+    outside = [own["response"][0]["outside"] for own in found.document["models"]]
+    assert outside[0] < 0.1 * outside[1]
+    with pytest.raises(TypeError, match="over"):
+        th.compare([model], log, over=log)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="--trend|trend"):
         th.process(response, "p1", trend=True)
 

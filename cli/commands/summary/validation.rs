@@ -157,6 +157,22 @@ pub fn comparison(comparison: &Comparison, width: usize) -> String {
             or_dash(model.coverage.iter().find(same).and_then(|one| one.actual), percent)
         });
     }
+    let mut inputs: Vec<&str> = Vec::new();
+    for agreement in models.iter().flat_map(|model| &model.response) {
+        if !inputs.contains(&agreement.input.as_str()) {
+            inputs.push(&agreement.input);
+        }
+    }
+    for input in inputs {
+        let own = |model: &Validation| model.response.iter().find(|own| own.input == input).cloned();
+        let name = harmless(input);
+        row(&format!("outside of the response, {name}"), &|model| {
+            or_dash(own(model), |own| format!("{} of {}", own.outside, own.points))
+        });
+        row(&format!("apart from the response, {name} [%]"), &|model| {
+            or_dash(own(model), |own| fixed(100.0 * own.relative_difference, 2))
+        });
+    }
     if let Some(criteria) = &comparison.criteria {
         for criterion in InformationCriterion::all() {
             let each = criteria.iter().map(|criteria| {

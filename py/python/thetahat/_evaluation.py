@@ -15,6 +15,7 @@ from thetahat._options import Duration, ReadOptions, Resample, Rows, ValidationO
 
 if TYPE_CHECKING:
     from thetahat._model import Model
+    from thetahat._spectrum import MeasuredResponse
 
 
 class _Document:
@@ -233,6 +234,7 @@ def compare(
     lags: int | None = None,
     alpha: float | None = None,
     alphas: Sequence[float] | None = None,
+    over: MeasuredResponse | None = None,
 ) -> Comparison:
     """Put several fitted models side by side on a log.
 
@@ -244,6 +246,8 @@ def compare(
         The data.
     rows, detrend, horizon, lags, alpha, alphas
         What to validate on and how, see `thetahat.ValidationOptions`.
+    over : MeasuredResponse, optional
+        A frequency response, as `spectrum` finds it, to lay the models over: how many of its points each misses.
 
     Returns
     -------
@@ -267,7 +271,12 @@ def compare(
         if not isinstance(model, Model):
             raise TypeError(f"models: expected a Model, found {type(model).__name__}")
     handles = [(_options.text("models", name), model._model) for name, model in named.items()]
-    return Comparison(*_thetahat.compare(handles, handle("log", log), words))
+    from thetahat._spectrum import MeasuredResponse
+
+    if over is not None and not isinstance(over, MeasuredResponse):
+        raise TypeError(f"over: expected a MeasuredResponse, found {type(over).__name__}")
+    response = None if over is None else over.to_json()
+    return Comparison(*_thetahat.compare(handles, handle("log", log), words, response))
 
 
 def inspect(

@@ -16,6 +16,7 @@ use crate::figures::{chance, fixed, number};
 use crate::model::{Model, Structure};
 use crate::regression::sum;
 use crate::respond::{Horizon, Innovations, OnLog, Response, Tested, check_steps};
+use crate::spectrum::MeasuredResponse;
 use crate::validate::{Fit, Relation, Residuals, nonlinearities};
 use crate::{Document, Error};
 
@@ -42,6 +43,29 @@ pub struct Validated {
     pub signals: Signals,
     /// What the model was fitted to, and how well.
     fitted: FittedTo,
+}
+
+impl Validated {
+    /// The same with how the model agrees with a measured frequency response.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] if the model is not linear, has another sample time, or none of the channels of the response.
+    pub fn over(mut self, model: &Model, response: &MeasuredResponse) -> Result<Self, Error> {
+        let all = model.linear("a frequency response")?;
+        let own = all.iter().find(|own| own.output.name == response.output);
+        let found = own.map(|own| response.agreement(own)).transpose()?.unwrap_or_default();
+        if found.is_empty() {
+            return Err(Error::argument(
+                "model",
+                format!(
+                    "it has no input of the response to '{}'; compare models of the same channels",
+                    response.output
+                ),
+            ));
+        }
+        self.validation.response = found;
+        Ok(self)
+    }
 }
 
 /// What makes fits comparable: the values of the outputs that they were made to, and how many counted.
@@ -222,6 +246,7 @@ pub fn validate(
         coverage: Vec::new(),
         residuals: Vec::new(),
         nonlinear: Vec::new(),
+        response: Vec::new(),
         warnings: Vec::new(),
         rows,
     };

@@ -429,6 +429,8 @@ pub(super) fn comparison(models: &[(String, &Validated)], criteria: Option<&[Cri
         "too many outside from alpha on",
     ];
     head.extend(tests.map(str::to_owned));
+    let over = models.iter().any(|(_, validated)| !validated.validation.response.is_empty());
+    head.extend(over.then(|| "points outside of the response".to_owned()));
     if criteria.is_some() {
         head.extend(InformationCriterion::all().map(|criterion| format!("{} of the fit", criterion.name())));
     }
@@ -467,6 +469,11 @@ pub(super) fn comparison(models: &[(String, &Validated)], criteria: Option<&[Cri
         cells.push(or_dash(stops.reduce(f64::min), |stops| {
             let stops = if stops.is_finite() { short(stops) } else { "none up to 0.5".to_owned() };
             format!("{stops}{asked}")
+        }));
+        cells.extend(over.then(|| {
+            let each = validation.response.iter();
+            let each = each.map(|own| format!("{}: {} of {}", own.input, own.outside, own.points));
+            or_dash(each.reduce(|all, one| format!("{all}, {one}")), |text| text)
         }));
         if let Some(own) = criteria.and_then(|criteria| criteria.get(index)) {
             cells.extend(InformationCriterion::all().map(|criterion| {

@@ -7,6 +7,7 @@ use crate::Document;
 use crate::data::{Rows, Source};
 use crate::estimate::Criteria;
 use crate::model::{Orders, Structure};
+use crate::spectrum::Agreement;
 use crate::validate::{Fit, Nonlinearity, Residuals};
 
 /// How a stored model does on a log. The JSON document `thetahat.validation/1`.
@@ -55,6 +56,9 @@ pub struct Validation {
     /// constant; not of models in equations.
     #[serde(default)]
     pub nonlinear: Vec<Nonlinearity>,
+    /// How the model agrees with a measured frequency response, for each input that both have, where one was laid beside it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub response: Vec<Agreement>,
     /// What a careful reader should know, in plain words.
     pub warnings: Vec<String>,
 }

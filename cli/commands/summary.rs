@@ -105,23 +105,7 @@ fn signal(role: &str, signal: &Signal) -> String {
 
 /// How the parameters were found, and how well they are determined.
 fn estimation(text: &mut Text, estimation: &Estimation, model: &PolynomialModel) {
-    text.line(&format!(
-        "{} samples, noise variance {}, condition number {}",
-        estimation.samples,
-        number(model.noise_variance),
-        or_dash(estimation.condition, |condition| scientific(condition, 3))
-    ));
-    if let Some(level) = estimation.level {
-        let slope = estimation.slope.map_or_else(String::new, |slope| {
-            format!(" in the middle of the rows, slope {} a second", quantity(slope))
-        });
-        text.line(&format!(
-            "level of {} estimated with them: {}{slope}",
-            harmless(&model.output.name),
-            quantity(level)
-        ));
-    }
-    text.line(&criteria(&estimation.criteria));
+    samples(text, estimation, model.noise_variance, &model.output);
     // Every polynomial model has one.
     let start = estimation.initial.unwrap_or_default();
     match &estimation.procedure {
@@ -189,6 +173,27 @@ fn estimation(text: &mut Text, estimation: &Estimation, model: &PolynomialModel)
             ));
         }
     }
+}
+
+/// The samples, the noise, the level and slope of the output, and the criteria.
+fn samples(text: &mut Text, estimation: &Estimation, noise_variance: f64, output: &Signal) {
+    text.line(&format!(
+        "{} samples, noise variance {}, condition number {}",
+        estimation.samples,
+        number(noise_variance),
+        or_dash(estimation.condition, |condition| scientific(condition, 3))
+    ));
+    if let Some(level) = estimation.level {
+        let slope = estimation.slope.map_or_else(String::new, |slope| {
+            format!(" in the middle of the rows, slope {} a second", quantity(slope))
+        });
+        text.line(&format!(
+            "level of {} estimated with them: {}{slope}",
+            harmless(&output.name),
+            quantity(level)
+        ));
+    }
+    text.line(&criteria(&estimation.criteria));
 }
 
 /// The information criteria.

@@ -1,13 +1,13 @@
 //! What a fit of a process found, as a table for people.
 
 use thetahat::estimate::Procedure;
-use thetahat::figures::{error, number, scientific, short};
+use thetahat::figures::{error, number, short};
 use thetahat::model::ProcessModel;
 use thetahat::report::Report;
 use thetahat::text::harmless;
 
 use super::text::{Text, columns, or_dash};
-use super::{NO_ERROR, counted, criteria, fits, quantity, signal, stopped};
+use super::{NO_ERROR, counted, fits, samples, signal, stopped};
 
 /// The main figures of a fit of a process.
 pub(super) fn table(report: &Report, model: &ProcessModel, width: usize) -> String {
@@ -53,23 +53,7 @@ pub(super) fn table(report: &Report, model: &ProcessModel, width: usize) -> Stri
         ));
         return text.finish();
     }
-    text.line(&format!(
-        "{} samples, noise variance {}, condition number {}",
-        estimation.samples,
-        number(model.noise_variance),
-        or_dash(estimation.condition, |condition| scientific(condition, 3))
-    ));
-    if let Some(level) = estimation.level {
-        let slope = estimation.slope.map_or_else(String::new, |slope| {
-            format!(" in the middle of the rows, slope {} a second", quantity(slope))
-        });
-        text.line(&format!(
-            "level of {} estimated with them: {}{slope}",
-            harmless(&model.output.name),
-            quantity(level)
-        ));
-    }
-    text.line(&criteria(&estimation.criteria));
+    samples(&mut text, estimation, model.noise_variance, &model.output);
     let start = match outcome.initial_conditions {
         0 => "logs begin at rest".to_owned(),
         1 => "1 initial condition estimated".to_owned(),

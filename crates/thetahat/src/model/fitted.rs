@@ -251,6 +251,19 @@ impl PolynomialModel {
     }
 }
 
+/// J P J' for functions of the parameters with these slopes, P being the covariance of the parameters; none where that is not known.
+pub(super) fn propagated(slopes: &[Vec<f64>], covariance: Option<&[Vec<f64>]>) -> Option<Vec<Vec<f64>>> {
+    let covariance = covariance?;
+    let entry = |left: &[f64], right: &[f64]| -> f64 {
+        let of = |(row, left): (&Vec<f64>, &f64)| {
+            left * row.iter().zip(right).map(|(entry, right)| entry * right).sum::<f64>()
+        };
+        covariance.iter().zip(left).map(of).sum()
+    };
+    let row = |left: &Vec<f64>| slopes.iter().map(|right| entry(left, right)).collect();
+    Some(slopes.iter().map(row).collect())
+}
+
 /// Whether a matrix may be a covariance: no variance is below zero, and no combination's by more than rounding.
 ///
 /// On the scale of the standard errors the rounding of P = L S L' is of the size n eps kappa(S), kappa(S) being the ratio of the

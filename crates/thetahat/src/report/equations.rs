@@ -5,9 +5,9 @@ mod tests;
 mod warnings;
 
 use super::evaluate::evaluate;
-use super::schema::{Data, Estimation, Missing, Report};
+use super::schema::{Estimation, Report};
 use super::shares::Shares;
-use crate::data::{Log, Rows, Source, Split, digests};
+use crate::data::{Log, Rows, Source, Split};
 use crate::distribution::chi_square_interval;
 use crate::estimate::{
     Criteria, EquationsOutcome, Procedure,
@@ -139,38 +139,19 @@ pub fn fit_equations(
         );
         return Err(Error::in_channel(name, None, message));
     }
-    let Shares { estimation, validation, parts } =
-        Shares::of(&plan.estimate, &plan.validate, plan.split, log.rows())?;
-    let fitted_to = experiments(model, log, &estimation, &estimation)?;
+    let shares = Shares::of(&plan.estimate, &plan.validate, plan.split, log.rows())?;
+    let fitted_to = experiments(model, log, &shares.estimation, &shares.estimation)?;
     let found = largest_likelihood(model, &fitted_to, &plan.search, monitor)?;
     let Errors { nis, mse } = errors(model, &fitted_to, &found)?;
     let factor = nis.map_or(1.0, |nis| nis.relative().max(1.0));
     let covariance = found.covariance.row_iter().map(|row| row.iter().map(|value| value * factor).collect());
     let fitted = EquationsModel::new(model, &found.values, covariance.collect());
 
-    let missing = names.iter().map(|name| {
-        let values = &log.channel(name)?.values;
-        let rows = values.iter().filter(|value| value.is_nan()).count();
-        Ok(Missing { channel: (*name).to_owned(), rows })
-    });
     let segments = fitted_to.iter().flat_map(|experiment| {
         let rows = experiment.counted().iter();
         rows.map(|rows| Rows::from_positions(&(rows.start + experiment.first..rows.end + experiment.first)))
     });
-    let data = Data {
-        logs: sources.to_vec(),
-        digests: digests(log, &names, &estimation)?,
-        rows: log.rows(),
-        sample_time: log.sample_time(),
-        detrend: "none".to_owned(),
-        prefilter: None,
-        validation,
-        split: parts,
-        segments: segments.collect(),
-        missing: missing.collect::<Result<_, Error>>()?,
-        time_gaps: log.gaps(),
-        estimation,
-    };
+    let data = shares.into_data((log, sources), &names, "none".to_owned(), segments.collect())?;
     let own = EquationsOnLog::new(&fitted, log, &data.estimation, &data.estimation)?;
     let unknown = model.parameters().iter().enumerate();
     let unknown = unknown.map(|(index, unknown)| unknown.reported(found.covariance[(index, index)].sqrt()));

@@ -6,9 +6,9 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use super::evaluate::evaluate;
-use super::schema::{Data, Estimation, Missing, Report};
+use super::schema::{Estimation, Report};
 use super::shares::Shares;
-use crate::data::{Channel, Log, Offset, Rows, Source, digests};
+use crate::data::{Channel, Log, Offset, Rows, Source};
 use crate::estimate::{
     Criteria, MapsOutcome, Procedure, TermsOutcome,
     nonlinear_arx::{Candidates, Chosen, Count, Growth, Joint, Samples, Solved, centres, joint, splines},
@@ -104,29 +104,9 @@ pub fn fit_nonlinear_arx(log: &Log, sources: &[Source], plan: &NonlinearArxPlan)
         .ok_or_else(|| Error::argument("output", "a model has one output at least"))?;
     let Joint { model, mse, determinant, condition } = joint;
 
-    let missing = names.iter().map(|name| {
-        let values = &log.channel(name)?.values;
-        Ok(Missing {
-            channel: (*name).to_owned(),
-            rows: values.iter().filter(|value| value.is_nan()).count(),
-        })
-    });
-    let Shares { estimation, validation, parts } = shares;
-    let segments = deviations.segments(&names, &estimation)?;
-    let data = Data {
-        logs: sources.to_vec(),
-        digests: digests(log, &names, &estimation)?,
-        rows: log.rows(),
-        sample_time: log.sample_time(),
-        detrend: plan.detrend.to_string(),
-        prefilter: None,
-        validation,
-        split: parts,
-        segments: segments.iter().map(Rows::from_positions).collect(),
-        missing: missing.collect::<Result<_, Error>>()?,
-        time_gaps: log.gaps(),
-        estimation,
-    };
+    let segments = deviations.segments(&names, &shares.estimation)?;
+    let segments = segments.iter().map(Rows::from_positions).collect();
+    let data = shares.into_data((log, sources), &names, plan.detrend.to_string(), segments)?;
     let estimation = Estimation {
         procedure: by(MapsOutcome { maps }),
         initial: None,

@@ -8,9 +8,9 @@ mod warnings;
 pub use response::fit_process_to_response;
 
 use super::evaluate::evaluate;
-use super::schema::{Data, Estimation, Missing, Report};
+use super::schema::{Estimation, Report};
 use super::shares::Shares;
-use crate::data::{Log, Offset, Rows, Source, Split, digests};
+use crate::data::{Log, Offset, Rows, Source, Split};
 use crate::estimate::{Background, Criteria, Initial, Procedure, ProcessEstimate, least_free_run};
 use crate::model::{Model, OffsetCovariance, Parameter, ProcessModel, ProcessStructure, Quantity, Signal};
 use crate::optimize::{Monitor, Search};
@@ -175,8 +175,7 @@ pub fn fit_process(
     plan.check()?;
     let names: Vec<&str> = plan.inputs.iter().chain([&plan.output]).map(String::as_str).collect();
     names.iter().try_for_each(|name| log.channel(name).map(|_| ()))?;
-    let Shares { estimation, validation, parts } =
-        Shares::of(&plan.estimate, &plan.validate, plan.split, log.rows())?;
+    let shares = Shares::of(&plan.estimate, &plan.validate, plan.split, log.rows())?;
     let inputs = plan.inputs.iter().map(|name| {
         let first = || log.channel(name).ok()?.values.iter().copied().find(|value| !value.is_nan());
         let level = plan.offset_of(name).or_else(first).unwrap_or(0.0);
@@ -188,7 +187,7 @@ pub fn fit_process(
     let output = (plan.output.as_str(), Offset { level: given.unwrap_or(0.0), slope: 0.0 });
     let deviations = log.deviations(offsets.chain([output]))?;
     let input_names: Vec<&str> = plan.inputs.iter().map(String::as_str).collect();
-    let held = held_logs(&deviations, &input_names, &estimation)?;
+    let held = held_logs(&deviations, &input_names, &shares.estimation)?;
     for (input, name) in plan.inputs.iter().enumerate() {
         let mut values = held.iter().flat_map(|part| &part.inputs[input]);
         let first = values.next();
@@ -210,26 +209,8 @@ pub fn fit_process(
     let model = model(plan, log.sample_time(), inputs, structures, &parameters, &found)?;
     let starts = found.explained_by_starts;
 
-    let missing = names.iter().map(|name| {
-        let values = &log.channel(name)?.values;
-        let rows = values.iter().filter(|value| value.is_nan()).count();
-        Ok(Missing { channel: (*name).to_owned(), rows })
-    });
     let segments = held.iter().flat_map(|part| &part.counted).map(Rows::from_positions);
-    let data = Data {
-        logs: sources.to_vec(),
-        digests: digests(log, &names, &estimation)?,
-        rows: log.rows(),
-        sample_time: log.sample_time(),
-        detrend: "none".to_owned(),
-        prefilter: None,
-        validation,
-        split: parts,
-        segments: segments.collect(),
-        missing: missing.collect::<Result<_, Error>>()?,
-        time_gaps: log.gaps(),
-        estimation,
-    };
+    let data = shares.into_data((log, sources), &names, "none".to_owned(), segments.collect())?;
     let error = |place: usize| found.covariance.as_ref().map(|rows| rows[place][place].sqrt());
     let count = parameters.len();
     let estimation = Estimation {

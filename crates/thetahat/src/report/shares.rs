@@ -1,8 +1,8 @@
 //! Which rows a fit is made to, and which it is evaluated on.
 
-use super::schema::Parts;
+use super::schema::{Data, Missing, Parts};
 use crate::Error;
-use crate::data::{Rows, Split, between, checked};
+use crate::data::{Log, Rows, Source, Split, between, checked, digests};
 
 /// What rows serve for.
 pub(super) struct Shares {
@@ -35,5 +35,37 @@ impl Shares {
         let fitted = between(&estimation, 0, count(&first) + count(&second));
         let parts = Parts { estimation: first, validation: second, test };
         Ok(Self { estimation: fitted, validation, parts: Some(parts) })
+    }
+
+    /// What a fit to these rows of a log was made to: `segments` are the rows of it without a gap, `detrend` says how offsets were found.
+    ///
+    /// # Errors
+    /// [`Error::Data`] for a channel that is not there.
+    pub(super) fn into_data(
+        self,
+        (log, sources): (&Log, &[Source]),
+        names: &[&str],
+        detrend: String,
+        segments: Vec<Rows>,
+    ) -> Result<Data, Error> {
+        let missing = names.iter().map(|name| {
+            let values = &log.channel(name)?.values;
+            let rows = values.iter().filter(|value| value.is_nan()).count();
+            Ok(Missing { channel: (*name).to_owned(), rows })
+        });
+        Ok(Data {
+            logs: sources.to_vec(),
+            digests: digests(log, names, &self.estimation)?,
+            rows: log.rows(),
+            sample_time: log.sample_time(),
+            detrend,
+            prefilter: None,
+            validation: self.validation,
+            split: self.parts,
+            segments,
+            missing: missing.collect::<Result<_, Error>>()?,
+            time_gaps: log.gaps(),
+            estimation: self.estimation,
+        })
     }
 }

@@ -140,27 +140,8 @@ impl<'a> ProcessObjective<'a> {
         if !(longest > 0.0 && shortest > 0.0 && shortest.is_finite()) {
             return Err(Error::data("one row is no response; give a longer log"));
         }
-        let mut objective = Self {
-            structures: Vec::new(),
-            held_dead_times: Vec::new(),
-            held,
-            points: &[],
-            background,
-            rows,
-            residuals: outputs.clone(),
-            outputs,
-            mean,
-            clock,
-            middle,
-            longest,
-            shortest,
-            point: Vec::new(),
-            parts: Vec::new(),
-            offsets: Vec::new(),
-            span: Span::default(),
-            matrix: Vec::new(),
-            right: Vec::new(),
-        };
+        let mut objective =
+            Self { held, rows, mean, clock, middle, ..Self::empty(outputs, background, [shortest, longest]) };
         objective.take(structures);
         Ok(objective)
     }
@@ -183,19 +164,28 @@ impl<'a> ProcessObjective<'a> {
             return Err(Error::data("the response has no point at a frequency above 0"));
         };
         let outputs: Vec<f64> = points.iter().flat_map(ResponsePoints::measured).collect();
-        let mut objective = Self {
+        let background = Background { level: false, slope: false, free: false };
+        let mut objective =
+            Self { points, ..Self::empty(outputs, background, [shortest, std::f64::consts::TAU / slowest]) };
+        objective.take(structures);
+        Ok(objective)
+    }
+
+    /// One without an experiment: what was measured, and the shortest and the longest time in it.
+    fn empty(outputs: Vec<f64>, background: Background, [shortest, longest]: [f64; 2]) -> Self {
+        Self {
             structures: Vec::new(),
             held_dead_times: Vec::new(),
             held: &[],
-            points,
-            background: Background { level: false, slope: false, free: false },
+            points: &[],
+            background,
             rows: Vec::new(),
             residuals: outputs.clone(),
             outputs,
             mean: 0.0,
             clock: Vec::new(),
             middle: 0.0,
-            longest: std::f64::consts::TAU / slowest,
+            longest,
             shortest,
             point: Vec::new(),
             parts: Vec::new(),
@@ -203,9 +193,7 @@ impl<'a> ProcessObjective<'a> {
             span: Span::default(),
             matrix: Vec::new(),
             right: Vec::new(),
-        };
-        objective.take(structures);
-        Ok(objective)
+        }
     }
 
     /// Whether it is of frequency responses.

@@ -204,6 +204,7 @@ fn first_grid(objective: &mut ProcessObjective<'_>) -> Vec<Vec<f64>> {
     places.iter().for_each(|(shape, _)| start[shape.clone()].fill((0.05 * long).max(fastest).ln()));
     let mut candidates = Vec::new();
     let sweeps = if places.len() > 1 { 2 } else { 1 };
+    let mut remaining = sweeps * places.len();
     for _ in 0..sweeps {
         for (shape, dead_time) in &places {
             candidates.clear();
@@ -227,6 +228,11 @@ fn first_grid(objective: &mut ProcessObjective<'_>) -> Vec<Vec<f64>> {
                     }
                     candidates.push(candidate);
                 }
+            }
+            // The last ones are looked at by what searches from them.
+            remaining -= 1;
+            if remaining == 0 {
+                return candidates;
             }
             let cost = |candidate: &Vec<f64>| objective.evaluate(candidate).unwrap_or(f64::INFINITY);
             let costs: Vec<f64> = candidates.iter().map(cost).collect();

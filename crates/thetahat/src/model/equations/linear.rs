@@ -20,7 +20,7 @@ use thetahat_core::{Dual, Number};
 
 use super::{EquationsModel, GreyBox};
 use crate::Error;
-use crate::model::{Orders, PolynomialModel};
+use crate::model::{Orders, PolynomialModel, fitted::propagated};
 
 /// Derivatives that are computed together.
 const LANE: usize = 4;
@@ -64,14 +64,7 @@ impl EquationsModel {
         let each = outputs.map(|(index, (values, output))| {
             let slopes: Vec<Vec<f64>> = slopes.by_ref().take(values.len()).collect();
             let (values, slopes, orders) = self.arranged(values, slopes)?;
-            let spread = |left: &[f64], right: &[f64]| -> Option<f64> {
-                let of = |(row, left): (&Vec<f64>, &f64)| {
-                    left * row.iter().zip(right).map(|(entry, right)| entry * right).sum::<f64>()
-                };
-                Some(self.covariance.as_ref()?.iter().zip(left).map(of).sum())
-            };
-            let row = |left: &Vec<f64>| slopes.iter().map(|right| spread(left, right)).collect();
-            let covariance: Option<Vec<Vec<f64>>> = slopes.iter().map(row).collect();
+            let covariance = propagated(&slopes, self.covariance.as_deref());
             let variance = self.noise_covariance[index][index];
             let time = self.sample_time;
             let model =

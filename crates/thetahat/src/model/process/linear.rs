@@ -16,7 +16,7 @@ use super::ProcessModel;
 use super::chain::MOST_STATES;
 use super::structure::ProcessStructure;
 use crate::Error;
-use crate::model::{Orders, PolynomialModel};
+use crate::model::{Orders, PolynomialModel, fitted::propagated};
 
 /// Derivatives that are computed together: as many as a process has parameters at most.
 const LANE: usize = 7;
@@ -73,14 +73,7 @@ impl ProcessModel {
                 slopes
             })
             .collect();
-        let spread = |left: &[f64], right: &[f64]| -> Option<f64> {
-            let of = |(row, left): (&Vec<f64>, &f64)| {
-                left * row.iter().zip(right).map(|(entry, right)| entry * right).sum::<f64>()
-            };
-            Some(self.covariance.as_ref()?.iter().zip(left).map(of).sum())
-        };
-        let row = |left: &Vec<f64>| slopes.iter().map(|right| spread(left, right)).collect();
-        let covariance: Option<Vec<Vec<f64>>> = slopes.iter().map(row).collect();
+        let covariance = propagated(&slopes, self.covariance.as_deref());
         let model = PolynomialModel::from_parameters(
             &orders,
             &values,

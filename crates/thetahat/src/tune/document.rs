@@ -99,7 +99,7 @@ pub struct ClosedLoop {
     /// The integral of the absolute error after a step of 1 at the input of the process; none of an unstable loop.
     pub load_absolute_error: Option<f64>,
     /// The largest Ms where each parameter, and the directions in which they are least certain together, lie at the ends of their 95 %
-    /// intervals; none where no standard errors are known.
+    /// intervals; none where no standard errors are known, and where the loop is not stable at one of these ends.
     pub worst_peak_sensitivity: Option<f64>,
     /// Seconds, of the responses.
     pub time: Vec<f64>,

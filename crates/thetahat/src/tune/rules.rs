@@ -222,6 +222,11 @@ fn warnings(
             words.push(format!(
                 "{name}: the loop is not stable with the fitted process; take a longer lambda"
             ));
+        } else if model.covariance.is_some() && own.closed_loop.worst_peak_sensitivity.is_none() {
+            words.push(format!(
+                "{name}: the loop is not stable at an end of the 95 % intervals of the parameters; take a longer lambda, or learn more of \
+                 the process"
+            ));
         } else if own.closed_loop.peak_sensitivity > LARGEST_SENSITIVITY {
             words.push(format!(
                 "{name}: Ms is {}, above 2: small errors of the model make the loop oscillate; take a longer lambda",

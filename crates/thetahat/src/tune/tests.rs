@@ -103,6 +103,24 @@ fn integrating_and_inverse_processes_are_held() {
     assert!(quick.warnings.iter().any(|word| word.contains("no dead time")), "{:?}", quick.warnings);
 }
 
+/// A dead time that is hardly known may be twice as long.
+#[test]
+fn a_loop_that_may_be_unstable_is_told() {
+    let mut uncertain = model("p1d", &[1.0, 10.0, 1.0]);
+    uncertain.covariance.iter_mut().for_each(|rows| rows[2][2] = 4.0);
+    let found = tune(&uncertain, &TuningPlan::default()).unwrap();
+    let simc = setting(&found, Rule::Simc, Controller::Pi);
+    assert!(simc.closed_loop.stable && simc.closed_loop.worst_peak_sensitivity.is_none());
+    assert!(
+        found.warnings.iter().any(|word| word.contains("at an end of the 95 % intervals")),
+        "{:?}",
+        found.warnings
+    );
+    uncertain.covariance = None;
+    let found = tune(&uncertain, &TuningPlan::default()).unwrap();
+    assert!(!found.warnings.iter().any(|word| word.contains("at an end")), "{:?}", found.warnings);
+}
+
 #[test]
 fn what_cannot_be_tuned_is_told() {
     let refused = |model: &ProcessModel, plan: &TuningPlan, words: &str| {

@@ -271,13 +271,14 @@ impl<'a> ProcessObjective<'a> {
                 (1..values.len()).filter(|row| values[*row] != values[row - 1]).map(|row| part.times[row]);
             let moves: Vec<f64> = moves.collect();
             while let Some((_, row)) = next.next_if(|(own, _)| *own == number) {
-                for start in &moves {
-                    let apart = part.times[*row] - start;
-                    if apart <= dead_time {
-                        gap[0] = gap[0].max(apart);
-                    } else {
-                        gap[1] = gap[1].min(apart);
-                    }
+                let time = part.times[*row];
+                // The changes that this row sees stand before it by the dead time or more; they rise.
+                let seen = moves.partition_point(|start| time - start > dead_time);
+                if let Some(last) = seen.checked_sub(1).and_then(|last| moves.get(last)) {
+                    gap[1] = gap[1].min(time - last);
+                }
+                if let Some(first) = moves.get(seen) {
+                    gap[0] = gap[0].max(time - first);
                 }
             }
         }

@@ -42,7 +42,7 @@ fn experiment(rows: u32) -> (Vec<f64>, Vec<f64>) {
 
 #[test]
 fn every_structure_is_found_from_its_own_response_on_an_irregular_clock() {
-    let cases: [(&str, &[f64]); 12] = [
+    let cases: [(&str, &[f64]); 13] = [
         ("p1", &[2.0, 3.0]),
         ("p1d", &[2.0, 3.0, 0.83]),
         ("p2d", &[-1.0, 4.0, 0.9, 0.41]),
@@ -53,6 +53,7 @@ fn every_structure_is_found_from_its_own_response_on_an_irregular_clock() {
         ("p2dz", &[1.0, 5.0, 1.0, 2.5, 0.71]),
         ("p1di", &[0.5, 2.0, 0.33]),
         ("p0di", &[0.5, 1.13]),
+        ("p0i", &[0.5]),
         ("rc1", &[0.1, 1.0, 2.5]),
         ("rc2", &[0.1, 1.0, 0.8, 2.0, 12.0]),
     ];

@@ -195,3 +195,32 @@ fn what_cannot_be_is_told() {
         assert!(run.code == 2 && run.stderr.contains("cannot be used with"), "{option}: {}", run.stderr);
     }
 }
+
+/// Who gives nothing but channels gets a process where the log is a step test, and where one does better than polynomial models.
+#[test]
+fn a_step_test_without_orders_is_described_by_a_process() {
+    let folder = Folder::with_log(include_str!("data/public/tclab_siso_step.csv"));
+    let report = folder.fit(TCLAB);
+    assert_eq!(report["model"]["kind"], "process");
+    for (name, expected) in [("K", 0.362616), ("tau1", 136.48185), ("tau2", 9.96608), ("theta", 4.66505)] {
+        near(value(&report, name).0, expected, 1e-5);
+    }
+    let processes = report["selection"]["processes"].as_array().expect("a list");
+    let structures: Vec<&Value> = processes.iter().map(|process| &process["structure"]).collect();
+    // The pair of p2du has more damping than one, which p2d says as well; and there is no integrator beside a lag.
+    assert_eq!(structures, ["p2d", "p1d", "p0di"]);
+    assert_eq!(processes[0]["held_out"]["refits"], 3);
+    let said = folder.done(&format!("fit {TCLAB} --html page.html"));
+    assert!(said.stdout.contains("Taken instead: the process p2d"), "{}", said.stdout);
+    assert!(folder.read("page.html").contains("process: p2d, "));
+    // Whoever asks for something that a process is not gets a polynomial model.
+    for asked in ["--focus prediction", "--model oe", "--nk 1", "--detrend linear", "--initial drop"] {
+        let report = folder.fit(&format!("{TCLAB} {asked}"));
+        assert_eq!(report["model"]["kind"], "polynomial", "{asked}");
+        assert_eq!(report["selection"]["processes"], Value::Null, "{asked}");
+    }
+    // The polynomial model is unlike the process: what is compared are free runs.
+    let half = folder.fit(&format!("{TCLAB} --estimate 1..399 --validate 400..571"));
+    assert_eq!(half["model"]["kind"], "polynomial");
+    assert_eq!(half["selection"]["processes"][0]["structure"], "p2d");
+}

@@ -96,3 +96,20 @@ def test_what_is_wrong_is_told() -> None:
         th.process(data, 3)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="drop"):
         th.process(data, initial="drop")
+
+
+def test_a_choice_on_a_step_test_may_come_to_a_process() -> None:
+    rng = np.random.default_rng(1)
+    t = np.arange(300) * 0.5
+    u = (t >= 30).astype(float)
+    slow = 1 - (1 + (t - 33) / 5) * np.exp(-(t - 33) / 5)
+    y = 20 + np.where(t > 33, 2 * slow, 0) + 0.02 * rng.standard_normal(300)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", th.EstimationWarning)
+        model = th.search(th.Log(y, u, sample_time=0.5))
+    assert model.selection is not None
+    assert [process["structure"] for process in model.selection["processes"]][0] == "p2du"
+    assert model.kind in ("process", "polynomial")
+    plot.selection(model)
+    again = pickle.loads(pickle.dumps(model))
+    assert json.loads(again.to_json()) == json.loads(model.to_json())

@@ -6,12 +6,14 @@ use thetahat::model::ProcessModel;
 use thetahat::report::Report;
 use thetahat::text::harmless;
 
+use super::selection::selection;
 use super::text::{Text, columns, or_dash};
 use super::{NO_ERROR, counted, fits, samples, signal, stopped};
 
 /// The main figures of a fit of a process.
 pub(super) fn table(report: &Report, model: &ProcessModel, width: usize) -> String {
     let mut text = Text::new(width);
+    selection(&mut text, report);
     text.line(&format!("{}, sample time {} s", report.model.name(), short(model.sample_time)));
     let formulas: Vec<String> = model.structures.iter().map(|structure| structure.equation()).collect();
     for (formula, input) in formulas.iter().zip(&model.inputs) {

@@ -83,7 +83,8 @@ pub(crate) use polynomials::extended;
 pub(crate) use prediction_error::drop_is_not_for_f;
 pub use process::ProcessOutcome;
 pub(crate) use process::{
-    Background, ProcessEstimate, ResponsePoints, least_free_run, least_response_errors,
+    Background, FreeRun, ProcessEstimate, ResponsePoints, least_free_run, least_free_run_from,
+    least_response_errors,
 };
 pub use robust::{Loss, Robust, RobustOutcome};
 pub(crate) use stretches::stretches;

@@ -5,7 +5,8 @@
 //!   orders that the data suggest.
 //! - [`Select`] is what makes one model better: an information criterion, or errors on samples that it was not fitted to
 //!   ([`HeldOut`]). [`Focus`] is what the model is for.
-//! - [`Selection`] has every model that was compared ([`Candidate`]), the winners ([`Best`]) and the delays ([`Delay`], [`DelayScore`]).
+//! - [`Selection`] has every model that was compared ([`Candidate`], [`ProcessCandidate`]), the winners ([`Best`]) and the delays
+//!   ([`Delay`], [`DelayScore`]).
 //!
 //! ```
 //! use thetahat::data::Record;
@@ -39,6 +40,7 @@ mod linear;
 mod ranking;
 mod search;
 mod selection;
+mod step_test;
 mod task;
 #[cfg(test)]
 mod tests;
@@ -50,6 +52,7 @@ pub(crate) use choose::choose;
 pub use choose::choose_orders;
 pub(crate) use delay::delays;
 pub use focus::Focus;
-pub use selection::{Best, Candidate, Delay, DelayScore, HeldOut, Selection};
+pub use selection::{Best, Candidate, Delay, DelayScore, HeldOut, ProcessCandidate, Selection};
+pub(crate) use step_test::{is_step_test, processes};
 use task::EXACT;
 pub(crate) use task::{SelectedModel, Task};

@@ -642,7 +642,8 @@ def search(
 ) -> Model:
     """Choose a model among many, all compared on the same samples.
 
-    Without orders the data choose delay, structure and orders. `Model.selection` holds what was compared.
+    Without orders the data choose delay, structure and orders, and a step test may come to a process in continuous time (see `process`).
+    `Model.selection` holds what was compared.
 
     Parameters
     ----------

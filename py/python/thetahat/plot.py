@@ -604,7 +604,7 @@ def selection(model: Model, ax: Axes | None = None) -> Axes:
         "*",
         markersize=14,
         fillstyle="none",
-        label=f"chosen: {model.name}",
+        label=f"chosen: {model.name}" if model.kind == "polynomial" else "best polynomial model",
     )
     if not logarithmic:
         ax.set_yscale("log")

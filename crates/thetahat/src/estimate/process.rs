@@ -56,15 +56,21 @@ pub struct ProcessOutcome {
     pub stopped: Stopped,
 }
 
-/// What was found.
+/// Processes and what is beside them: all that a free run at rest takes.
 #[derive(Debug, Clone)]
-pub(crate) struct ProcessEstimate {
+pub(crate) struct FreeRun {
     /// The parameters of all inputs, one after the other.
     pub(crate) parameters: Vec<f64>,
     /// The level at the middle of the rows, and the slope, as far as they were estimated.
     pub(crate) level: Option<f64>,
     pub(crate) slope: Option<f64>,
     pub(crate) middle: f64,
+}
+
+/// What was found.
+#[derive(Debug, Clone)]
+pub(crate) struct ProcessEstimate {
+    pub(crate) run: FreeRun,
     /// The fraction of the squared errors that a first state of each log would explain.
     pub(crate) explained_by_starts: f64,
     /// Of the parameters, the level and the slope.
@@ -93,6 +99,31 @@ pub(crate) fn least_free_run(
 ) -> Result<ProcessEstimate, Error> {
     let objective = ProcessObjective::new(structures.to_vec(), held, output, background)?;
     least(objective, structures, names, background.columns(held, structures), options, monitor)
+}
+
+/// The same from the parameters of another fit, whose dead times it has, and without any uncertainty. None where a time constant moves
+/// by more than a factor of 1.5: these samples do not determine it.
+///
+/// # Errors
+/// As for [`least_free_run`].
+pub(crate) fn least_free_run_from(
+    start: &[f64],
+    structures: &[ProcessStructure],
+    (held, output): (&[HeldLog], &[f64]),
+    background: Background,
+    options: &Search,
+    monitor: Monitor<'_>,
+) -> Result<Option<FreeRun>, Error> {
+    let mut objective = ProcessObjective::new(structures.to_vec(), held, output, background)?;
+    starts::searched_from(&mut objective, structures, start, options, monitor)?;
+    Ok((!objective.is_at_a_limit()).then(|| free_run(&objective, structures)))
+}
+
+fn free_run(objective: &ProcessObjective<'_>, structures: &[ProcessStructure]) -> FreeRun {
+    let (level, slope) = objective.level();
+    let parameters =
+        structures.iter().zip(objective.parts()).flat_map(|(structure, parts)| structure.put_together(parts));
+    FreeRun { parameters: parameters.collect(), level, slope, middle: objective.middle() }
 }
 
 /// Fits processes to measured frequency responses, one for each structure.
@@ -133,16 +164,14 @@ fn least(
     let deadline = Deadline::after(options.time_limit);
     let found = starts::searched(&mut objective, structures, options, deadline, monitor)?;
     let parts = objective.parts().to_vec();
-    let parameters: Vec<f64> =
-        structures.iter().zip(&parts).flat_map(|(structure, parts)| structure.put_together(parts)).collect();
-    if let Some((name, value)) = names.iter().zip(&parameters).find(|(_, value)| !value.is_finite()) {
+    let run = free_run(&objective, structures);
+    if let Some((name, value)) = names.iter().zip(&run.parameters).find(|(_, value)| !value.is_finite()) {
         return Err(Error::undetermined(
             vec![name.clone()],
             format!("{name} comes to {value}: the log does not determine it; take a simpler structure"),
         ));
     }
     let squares = sum_of_squares(objective.residuals());
-    let (level, slope) = objective.level();
     let Uncertainty { covariance, white, colour, condition } =
         uncertainty(&objective, structures, names, &parts, unknowns, squares)?;
     let noise_variance = squares / (samples - unknowns) as f64;
@@ -150,10 +179,7 @@ fn least(
         return Err(Error::data("the noise variance overflows; scale the output towards one"));
     }
     Ok(ProcessEstimate {
-        parameters,
-        level,
-        slope,
-        middle: objective.middle(),
+        run,
         explained_by_starts: objective.explained_by_starts(),
         covariance,
         noise_variance,

@@ -1,22 +1,26 @@
-//! The free runs of the two winners of a choice on rows that neither was fitted to.
+//! The free runs of the winners of a choice on rows that neither was fitted to.
+
+use std::ops::ControlFlow;
 
 use super::identify::identify;
 use super::plan::Plan;
+use super::process::{ProcessPlan, fit_process};
 use super::schema::Report;
 use super::validation::{Validated, ValidationPlan, validate};
 use crate::Error;
-use crate::data::{Log, Rows, between};
+use crate::data::{Detrend, Log, Rows, between};
 use crate::estimate::Constant;
+use crate::model::Model;
 use crate::respond::Horizon;
 
 /// The rows that a choice was made on are cut into this many parts, of which the last is held out.
 const PARTS: usize = 3;
 
-/// Where a choice found one model for prediction and another for simulation: both, by name, fitted to the first two thirds of the
-/// rows that it was made on, and evaluated on the last third of `log`. None where there was no such choice, and none of a model that
-/// these rows do not determine.
+/// Where a choice found one model for prediction and another for simulation, or took a process: these, by name, fitted to the first
+/// two thirds of the rows that it was made on, and evaluated on the last third of `log`. None where there was no such choice, and
+/// none of a model that these rows do not determine.
 ///
-/// Cost: two fits.
+/// Cost: a fit of each.
 ///
 /// # Errors
 /// [`Error::Argument`] and [`Error::Data`] if the log does not have the report's channels and rows.
@@ -24,7 +28,8 @@ pub fn held_out_runs(report: &Report, log: &Log) -> Result<Vec<(String, Validate
     let Some(selection) = &report.selection else { return Ok(Vec::new()) };
     let Some(winners) = &selection.winners else { return Ok(Vec::new()) };
     let (prediction, simulation) = (&winners.prediction.orders, &winners.simulation.orders);
-    if prediction == simulation || selection.focus.horizon() != Horizon::FreeRun {
+    let process = if let Model::Process(model) = &report.model { Some(model) } else { None };
+    if selection.focus.horizon() != Horizon::FreeRun || (prediction == simulation && process.is_none()) {
         return Ok(Vec::new());
     }
     let data = &report.data;
@@ -32,20 +37,38 @@ pub fn held_out_runs(report: &Report, log: &Log) -> Result<Vec<(String, Validate
     let count: usize = rows.iter().map(Rows::len).sum();
     let last = (PARTS - 1) * count / PARTS;
     let (fitted, left_out) = (between(rows, 0, last), between(rows, last, count));
-    let model = report.model.polynomials("a choice")?;
-    let names: Vec<&str> = model.inputs.iter().map(|input| input.name.as_str()).collect();
+    let names: Vec<&str> = report.model.inputs().iter().map(|input| input.name.as_str()).collect();
+    let Some(output) = report.model.outputs().first().map(|output| output.name.as_str()) else {
+        return Ok(Vec::new());
+    };
     let with_level = report.estimation.level.is_some();
-    let mut runs = Vec::new();
-    for (purpose, orders) in [("for prediction", prediction), ("for simulation", simulation)] {
+    let mut winners = vec![("for prediction", prediction)];
+    winners.extend((prediction != simulation).then_some(("for simulation", simulation)));
+    let refits = winners.into_iter().map(|(purpose, orders)| {
         let plan = Plan {
             estimate: fitted.clone(),
-            detrend: data.detrend.parse()?,
+            detrend: if process.is_some() { Detrend::Mean } else { data.detrend.parse()? },
             prefilter: data.prefilter,
             constant: if with_level { Constant::Yes } else { Constant::No },
             trend: report.estimation.slope.is_some(),
-            ..Plan::new(&names, &model.output.name, orders.clone())
+            ..Plan::new(&names, output, orders.clone())
         };
-        let refit = match identify(log.clone(), &[], &plan) {
+        Ok((format!("{purpose}: {orders}"), identify(log.clone(), &[], &plan)))
+    });
+    let mut refits = refits.collect::<Result<Vec<_>, Error>>()?;
+    if let Some(model) = process {
+        let plan = ProcessPlan {
+            structures: model.structures.clone(),
+            estimate: fitted.clone(),
+            trend: report.estimation.slope.is_some(),
+            ..ProcessPlan::new(&names, output, model.structures[0])
+        };
+        let refit = fit_process(log, &[], &plan, &|_| ControlFlow::Continue(()));
+        refits.push((format!("process: {}", model.structures[0]), refit));
+    }
+    let mut runs = Vec::new();
+    for (name, refit) in refits {
+        let refit = match refit {
             Ok(refit) => refit,
             Err(Error::Undetermined { .. }) => continue,
             Err(error) => return Err(error),
@@ -56,7 +79,7 @@ pub fn held_out_runs(report: &Report, log: &Log) -> Result<Vec<(String, Validate
         let percent = figure.and_then(|fit| fit.percent);
         let percent =
             percent.map_or_else(String::new, |value| format!(", {} %", crate::figures::fixed(value, 1)));
-        runs.push((format!("{purpose}: {orders}{percent}"), validated));
+        runs.push((format!("{name}{percent}"), validated));
     }
     Ok(runs)
 }

@@ -91,8 +91,8 @@ pub fn fit_page(
             let measured = signals.outputs.first().map(|output| (&output.name, &output.measured[rows]));
             section.chart(measured.map_or_else(|| Err(String::new()), |(name, measured)| charts::outputs(
                 "Free runs on rows held out",
-                "Measured output, and what the best model for prediction and the best for simulation make of the inputs alone in \
-                 the last third of the rows. Both were fitted to the other two thirds for this picture.",
+                "Measured output, and what the best models make of the inputs alone in the last third of the rows. Each was fitted \
+                 to the other two thirds for this picture.",
                 stack,
                 name,
                 measured,

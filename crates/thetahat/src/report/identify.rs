@@ -1,3 +1,5 @@
+mod step_test;
+
 use std::ops::{ControlFlow, Range};
 
 use super::evaluate::evaluate;
@@ -8,13 +10,14 @@ use super::shares::Shares;
 use super::warnings::{at_the_stability_boundary, unstable_plant, warnings};
 use crate::data::{Detrend, Log, Offset, Prefiltered, Record, Rows, Source, digests};
 use crate::estimate::{self, Beside, Constant, Estimate, Fitted, Initial, Method, OutputOffset, enough};
-use crate::model::{Orders, PolynomialModel, Quantity, Signal};
+use crate::model::{Orders, PolynomialModel, ProcessStructure, Quantity, Signal};
 use crate::optimize::{Deadline, Monitor, Search};
 use crate::regression::sum;
 use crate::respond::{Horizon, InitialCondition, PolynomialOnLog, innovations};
 use crate::select::{self, Choice, Focus, Grid, SelectedModel, Task};
 use crate::validate::Part;
 use crate::{Document, Error};
+use step_test::StepTest;
 
 /// Below this fraction of a channel's size, what detrending leaves is rounding.
 const ROUNDING: f64 = 1e-13;
@@ -86,6 +89,12 @@ pub fn identify_monitored(
 #[derive(Debug, Clone)]
 pub struct PendingEvaluation {
     report: Report,
+    /// What the figures are of; none: they are there.
+    open: Option<Open>,
+}
+
+#[derive(Debug, Clone)]
+struct Open {
     model: PolynomialModel,
     grid: Option<Grid>,
     focus: Focus,
@@ -112,12 +121,12 @@ impl PendingEvaluation {
     /// # Errors
     /// [`Error::Data`] for channels or rows that are not there.
     pub fn evaluate(self, mut log: Log) -> Result<Report, Error> {
-        let model = &self.model;
+        let Some(Open { model, taken, .. }) = &self.open else { return Ok(self.report) };
         for signal in &model.inputs {
             log.remove(&signal.name, &signal.offset);
         }
         // One after the other as the fit did: their sum has another rounding.
-        for offset in self.taken.iter().filter(|offset| **offset != Offset::default()) {
+        for offset in taken.iter().filter(|offset| **offset != Offset::default()) {
             log.remove(&model.output.name, offset);
         }
         self.evaluate_on(&log)
@@ -125,7 +134,8 @@ impl PendingEvaluation {
 
     /// The same on deviations.
     fn evaluate_on(self, log: &Log) -> Result<Report, Error> {
-        let Self { mut report, model, grid, focus, .. } = self;
+        let Self { mut report, open } = self;
+        let Some(Open { model, grid, focus, .. }) = open else { return Ok(report) };
         let inputs: Vec<String> = model.inputs.iter().map(|input| input.name.clone()).collect();
         // The rows of the fit as it saw them; other rows begin in the middle of a run.
         let seen = estimation_record(&report, &model, log, &inputs)?;
@@ -196,6 +206,11 @@ fn fit(
     });
     let missing = missing.collect::<Result<Vec<_>, Error>>()?;
 
+    let compared = Compared {
+        estimation: parts.as_ref().map_or(&estimation, |parts| &parts.estimation),
+        validation: parts.as_ref().map_or(&validation, |parts| &parts.validation),
+    };
+    let step_test = StepTest::of(&log, plan, compared.estimation)?;
     let padding = log.padding(&names)?;
     // What an input has done while the output was missing is in the output after it.
     let driven = match &plan.choice {
@@ -218,12 +233,13 @@ fn fit(
     let (mut selection, mut orders, guess) = match &plan.choice {
         Choice::Known(orders) => (None, orders.clone(), None),
         Choice::Grid(_) | Choice::Automatic(_) => {
-            let compared = Compared {
-                estimation: parts.as_ref().map_or(&estimation, |parts| &parts.estimation),
-                validation: parts.as_ref().map_or(&validation, |parts| &parts.validation),
-            };
-            let Chosen { found: SelectedModel { selection, mut guess }, with_constant } =
-                selected(&record, plan, &compared, &beside, monitor)?;
+            let Chosen { found, with_constant, process } =
+                selected(&record, plan, &compared, &beside, step_test.as_ref(), monitor)?;
+            let SelectedModel { selection, mut guess } = found;
+            if let Some((structure, test)) = process.zip(step_test) {
+                let report = test.fit(structure, selection, sources, monitor)?;
+                return Ok((PendingEvaluation { report, open: None }, log));
+            }
             if let (Method::PredictionError(search), false) = (&mut method, with_constant) {
                 search.initial_parameters = guess.take();
             }
@@ -336,7 +352,8 @@ fn fit(
         report.warnings.extend(band.warning(&estimation)?);
     }
     let grid = if let Choice::Grid(grid) = &plan.choice { Some(grid.clone()) } else { None };
-    Ok((PendingEvaluation { report, model, grid, focus: plan.focus, taken }, log))
+    let open = Some(Open { model, grid, focus: plan.focus, taken });
+    Ok((PendingEvaluation { report, open }, log))
 }
 
 /// The record that models of these orders are fitted to: it goes on through missing outputs where no past one is needed.
@@ -360,10 +377,11 @@ struct Compared<'a> {
     validation: &'a [Rows],
 }
 
-/// A choice, and whether all models had a constant.
+/// A choice, whether all models had a constant, and the process that is taken instead, if one is.
 struct Chosen {
     found: SelectedModel,
     with_constant: bool,
+    process: Option<ProcessStructure>,
 }
 
 /// The choice among several models. Where a constant is asked for or pays, all of them have one.
@@ -372,6 +390,7 @@ fn selected<'a>(
     plan: &Plan,
     compared: &Compared<'_>,
     beside: &Beside,
+    step_test: Option<&StepTest>,
     monitor: Monitor<'_>,
 ) -> Result<Chosen, Error> {
     let Method::PredictionError(search) = &plan.method else {
@@ -409,7 +428,11 @@ fn selected<'a>(
         let what = if plan.trend { "a constant and a trend" } else { "a constant" };
         found.selection.steps.push(format!("All models were compared with {what} beside them."));
     }
-    Ok(Chosen { found, with_constant })
+    let (found, process) = match step_test {
+        Some(test) => test.compete(&task, found)?,
+        None => (found, None),
+    };
+    Ok(Chosen { found, with_constant, process })
 }
 
 /// The variance of the errors one step ahead of the unfiltered signals, sum e^2/(N - p) over the estimation rows.

@@ -215,8 +215,8 @@ pub fn fit_process(
     let count = parameters.len();
     let estimation = Estimation {
         initial: Some(if plan.free_start { Initial::Estimate } else { Initial::Zero }),
-        level: found.level.map(|level| Quantity::new(level, error(count))),
-        slope: found.slope.map(|slope| Quantity::new(slope, error(count + 1))),
+        level: found.run.level.map(|level| Quantity::new(level, error(count))),
+        slope: found.run.slope.map(|slope| Quantity::new(slope, error(count + 1))),
         samples: found.samples,
         mse: found.mse,
         criteria: Criteria::new(found.mse, count + background.offsets(), found.samples),
@@ -256,21 +256,21 @@ fn model(
     let count = names.len();
     let covariance = found.covariance.as_ref();
     let parameters =
-        names.iter().zip(&found.parameters).enumerate().map(|(place, (name, &value))| Parameter {
+        names.iter().zip(&found.run.parameters).enumerate().map(|(place, (name, &value))| Parameter {
             name: name.clone(),
             value,
             standard_error: covariance.map(|rows| rows[place][place].sqrt()),
         });
-    let offset = match (found.level, found.slope) {
+    let offset = match (found.run.level, found.run.slope) {
         (Some(level), slope) => {
             let slope = slope.unwrap_or(0.0);
-            Offset { level: level - slope * found.middle, slope }
+            Offset { level: level - slope * found.run.middle, slope }
         }
         _ => Offset { level: plan.offset_of(&plan.output).unwrap_or(0.0), slope: 0.0 },
     };
     let own: Option<Vec<Vec<f64>>> =
         covariance.map(|rows| rows[..count].iter().map(|row| row[..count].to_vec()).collect());
-    let open = covariance.filter(|_| found.level.is_some());
+    let open = covariance.filter(|_| found.run.level.is_some());
     let model = ProcessModel {
         structures,
         sample_time,
@@ -280,7 +280,7 @@ fn model(
         covariance: own,
         offset_covariance: open.map(|rows| OffsetCovariance {
             covariance: rows.clone(),
-            middle: found.slope.map(|_| found.middle),
+            middle: found.run.slope.map(|_| found.run.middle),
         }),
         noise_variance: found.noise_variance,
         degrees_of_freedom: Some(found.samples - found.unknowns),

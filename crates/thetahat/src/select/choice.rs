@@ -123,7 +123,7 @@ impl Select {
     }
 
     /// Whether it evaluates samples that models are not fitted to.
-    pub(super) fn is_held_out(self) -> bool {
+    pub(crate) fn is_held_out(self) -> bool {
         !matches!(self, Self::Criterion(_))
     }
 }

@@ -19,7 +19,7 @@ use crate::regression::sum;
 use crate::respond::{Horizon, InitialCondition, Response, predict, simulate};
 
 /// A record is cut into this many blocks.
-const BLOCKS: usize = 3;
+pub(super) const BLOCKS: usize = 3;
 /// A block is cut into this many parts: 10 to 30 in all are enough (Schmeiser 1982).
 const PARTS: usize = 10;
 /// Errors count up to this many standard deviations of the output.
@@ -163,7 +163,7 @@ fn root(pairs: impl Iterator<Item = (f64, f64)> + Clone, deviation: f64) -> Opti
 }
 
 /// The size of an error; NaN is cut off too.
-fn cut((measured, said): (f64, f64), deviation: f64) -> f64 {
+pub(super) fn cut((measured, said): (f64, f64), deviation: f64) -> f64 {
     ((measured - said).abs() / deviation).min(LARGEST)
 }
 
@@ -190,7 +190,7 @@ pub(super) fn radius(orders: &Orders, parameters: &[f64]) -> f64 {
 }
 
 /// The standard deviation of the output.
-fn deviation(record: &Record<'_>) -> f64 {
+pub(super) fn deviation(record: &Record<'_>) -> f64 {
     let values = || record.segments.iter().flat_map(|segment| &record.output[segment.clone()]);
     let count = total(record).max(1) as f64;
     let mean = sum(values().copied()) / count;

@@ -94,6 +94,7 @@ pub(super) fn ranked(task: &Task<'_>, outcome: Outcome, path: Option<Path>) -> R
         least: by_held_out_mse.then(|| first.clone()),
         best: order.iter().take(BEST).copied().cloned().collect(),
         of_size,
+        processes: Vec::new(),
     };
     Ok(SelectedModel { selection, guess })
 }

@@ -2,7 +2,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{Focus, Path, Select};
-use crate::model::{Orders, Structure};
+use crate::model::{Orders, ProcessStructure, Structure};
 
 /// How a model was chosen among others.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -25,7 +25,7 @@ pub struct Selection {
     /// The delay of each input, where it was left to the data.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub delays: Vec<Delay>,
-    /// The model that was chosen.
+    /// The polynomial model that was chosen.
     pub chosen: Candidate,
     /// The best of the others; none if there was one only.
     pub second: Option<Candidate>,
@@ -39,6 +39,27 @@ pub struct Selection {
     pub best: Vec<Candidate>,
     /// The best of each number of parameters, the smallest first.
     pub of_size: Vec<Candidate>,
+    /// The processes in continuous time that were compared with `chosen`, where the log is a step test, the best first. That one is
+    /// the model of the report, or `chosen` is.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub processes: Vec<ProcessCandidate>,
+}
+
+/// A process in continuous time and what speaks for it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ProcessCandidate {
+    /// Its structure from each input.
+    pub structure: ProcessStructure,
+    /// p.
+    pub parameters: usize,
+    /// The mean of e^2 of its free run over the estimation rows, or over about 2000 of them.
+    pub mse: f64,
+    /// MDL of the same.
+    pub mdl: Option<f64>,
+    /// What it does on blocks that it was not fitted to, in the free run from the first row on; none where the rows without one do
+    /// not determine it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub held_out: Option<HeldOut>,
 }
 
 /// A model and what speaks for it.

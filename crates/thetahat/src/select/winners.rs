@@ -11,20 +11,20 @@
 //! 3. An unstable model that has a lower criterion than P is taken where all its refits are unstable too and their errors
 //!    beat those of the choice by [`CLEARLY`] in the logarithm of the mean square: then the plant is unstable.
 
-use super::Focus;
 use super::candidates::Compared;
 use super::held_out::standard_errors;
+use super::{Focus, HeldOut};
 
 /// By how much the logarithm of a mean square must fall, whatever its error.
 const FAR: f64 = 0.3;
 /// By how much where the fall is certain.
-const GATE: f64 = 0.1;
+pub(super) const GATE: f64 = 0.1;
 const STANDARD_ERRORS: f64 = 2.0;
 const CLEARLY: f64 = 0.1;
 /// A model that simulates has no time constant of more than this many times the samples.
 const SLOWEST: f64 = 2.0;
 /// Mean squares below this are rounding.
-const NOTHING: f64 = 1e-12;
+pub(super) const NOTHING: f64 = 1e-12;
 
 /// Which models are the best for what, as positions in a comparison.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,11 +36,19 @@ pub(super) struct Winners {
     pub(super) chosen: usize,
 }
 
+/// The mean of the two logarithms.
+pub(super) fn both(seen: &HeldOut) -> f64 {
+    f64::midpoint(logarithm(seen.blocks), logarithm(seen.onward))
+}
+
+fn logarithm(square: f64) -> f64 {
+    square.max(NOTHING).ln()
+}
+
 /// The winners among models in the order of their criterion; none where no model is stable, or none was evaluated.
 ///
 /// What has no figures on blocks, as the data without one do not determine it, may predict; it is not compared.
 pub(super) fn winners(focus: Focus, models: &[&Compared], samples: usize) -> Option<Winners> {
-    let logarithm = |square: f64| square.max(NOTHING).ln();
     let held_out = |k: usize| models[k].scored.held_out.as_ref();
     let stable = |k: &usize| models[*k].radius < 1.0;
     let fast = |k: &usize| models[*k].radius <= (-1.0 / (SLOWEST * samples as f64)).exp();
@@ -48,8 +56,7 @@ pub(super) fn winners(focus: Focus, models: &[&Compared], samples: usize) -> Opt
     let figures = (0..models.len()).filter(fast).filter_map(|k| Some((held_out(k)?.blocks.max(NOTHING), k)));
     let least = figures.min_by(|(one, _), (other, _)| one.total_cmp(other));
     let simulation = least.map_or(prediction, |(_, k)| k);
-    let both =
-        |k: usize| held_out(k).map(|seen| f64::midpoint(logarithm(seen.blocks), logarithm(seen.onward)));
+    let both = |k: usize| held_out(k).map(both);
     let fall = both(prediction).zip(both(simulation)).map_or(0.0, |(one, other)| one - other);
     let parts = models[prediction].parts.as_ref().zip(models[simulation].parts.as_ref());
     let certain = || parts.is_some_and(|(one, other)| standard_errors(one, other) > STANDARD_ERRORS);

@@ -49,13 +49,13 @@ pub(super) fn fitted(
     let error = |place: usize| found.covariance.as_ref().map(|rows| rows[place][place].sqrt());
     let parameters = names
         .iter()
-        .zip(&found.parameters)
+        .zip(&found.run.parameters)
         .enumerate()
         .map(|(place, (name, &value))| Parameter { name: name.clone(), value, standard_error: error(place) });
     Ok(FittedProcess {
         structure,
         parameters: parameters.collect(),
-        level: Quantity::new(found.level.unwrap_or(0.0), error(names.len())),
+        level: Quantity::new(found.run.level.unwrap_or(0.0), error(names.len())),
         rmse: found.mse.sqrt(),
     })
 }

@@ -14,6 +14,8 @@ const LONGEST: f64 = 1e3;
 /// What the damping of a pair may be.
 const LEAST_DAMPING: f64 = 1e-4;
 const LARGEST_DAMPING: f64 = 1e3;
+/// The logarithm of the largest ratio to what it must stay near to.
+const NEAR: f64 = 0.405;
 /// A dead time is at most this fraction of the longest log.
 const LONGEST_DEAD_TIME: f64 = 0.9;
 
@@ -97,6 +99,8 @@ pub(super) struct ProcessObjective<'a> {
     middle: f64,
     longest: f64,
     shortest: f64,
+    /// What it must stay near to, if to anything.
+    near: Vec<f64>,
     /// Where it stands.
     point: Vec<f64>,
     parts: Vec<Parts<f64>>,
@@ -187,6 +191,7 @@ impl<'a> ProcessObjective<'a> {
             middle: 0.0,
             longest,
             shortest,
+            near: Vec::new(),
             point: Vec::new(),
             parts: Vec::new(),
             offsets: Vec::new(),
@@ -199,6 +204,17 @@ impl<'a> ProcessObjective<'a> {
     /// Whether it is of frequency responses.
     pub(super) fn is_of_points(&self) -> bool {
         !self.points.is_empty()
+    }
+
+    /// Holds the dead times, and keeps the shapes within a factor of 1.5 of a point of them.
+    pub(super) fn stay_near(&mut self, point: &[f64], dead_times: &[f64]) {
+        self.held_dead_times = dead_times.iter().map(|seconds| Some(*seconds)).collect();
+        self.near = point.to_vec();
+    }
+
+    /// Whether a shape stands where it may not go further.
+    pub(super) fn is_at_a_limit(&self) -> bool {
+        self.point.iter().zip(self.limits()).any(|(value, limits)| limits.contains(value))
     }
 
     /// Takes other structures of the same inputs, with all their dead times.
@@ -302,6 +318,9 @@ impl<'a> ProcessObjective<'a> {
                 limits[from + 1] = [LEAST_DAMPING.ln(), LARGEST_DAMPING.ln()];
             }
             limits.extend(known.is_none().then_some([0.0, LONGEST_DEAD_TIME * self.longest]));
+        }
+        for (limits, near) in limits.iter_mut().zip(&self.near) {
+            *limits = limits.map(|limit| limit.clamp(near - NEAR, near + NEAR));
         }
         limits
     }

@@ -103,6 +103,31 @@ pub(super) fn searched(
     Ok(found)
 }
 
+/// Searches near parameters, without a grid and with their dead times. The objective is left at what was found.
+pub(super) fn searched_from(
+    objective: &mut ProcessObjective<'_>,
+    structures: &[ProcessStructure],
+    start: &[f64],
+    options: &Search,
+    monitor: Monitor<'_>,
+) -> Result<Found, Error> {
+    let mut first = 0;
+    let (mut point, mut dead_times) = (Vec::new(), Vec::new());
+    for structure in structures {
+        let own = first..first + structure.parameters();
+        first = own.end;
+        let parts = structure.taken_apart(&start[own]);
+        point.extend(parts.shape.iter().map(|value| value.ln()));
+        dead_times.push(parts.dead_time);
+    }
+    objective.stay_near(&point, &dead_times);
+    let found = from_best(objective, vec![point], options, Deadline::after(options.time_limit), monitor)?;
+    objective.evaluate(&found.parameters).map_err(|_| {
+        Error::data("the response leaves the range of numbers; scale the channels towards one")
+    })?;
+    Ok(found)
+}
+
 /// Searches from the best of some candidates.
 fn from_best(
     objective: &mut ProcessObjective<'_>,

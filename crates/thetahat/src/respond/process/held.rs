@@ -141,6 +141,25 @@ fn walk<S: Number<f64>>(
     }
 }
 
+/// Adds the response of processes that were at rest before the first row of each log to what stands in its rows.
+pub(crate) fn at_rest(
+    structures: &[ProcessStructure],
+    parts: &[Parts<f64>],
+    held: &[HeldLog],
+    response: &mut [f64],
+) {
+    for log in held {
+        let own = &mut response[log.rows.clone()];
+        for ((structure, parts), input) in structures.iter().zip(parts).zip(&log.inputs) {
+            run(structure, &parts.shape, parts.dead_time, (&log.times, input), |row, columns| {
+                let said: f64 =
+                    parts.weights.iter().zip(columns).map(|(weight, column)| weight * column).sum();
+                own[row] += said;
+            });
+        }
+    }
+}
+
 /// Calls `take` with the columns in each row.
 pub(crate) fn run(
     structure: &ProcessStructure,

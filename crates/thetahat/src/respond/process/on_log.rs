@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::cell::OnceCell;
 use std::ops::Range;
 
-use super::held::{HeldLog, held_logs, modes, run, sensitivities};
+use super::held::{HeldLog, at_rest, held_logs, modes, sensitivities};
 use crate::Error;
 use crate::data::{Log, Record, Rows, measured};
 use crate::model::{Orders, Parts, PolynomialModel, ProcessModel, Signal};
@@ -47,18 +47,7 @@ impl<'l> ProcessOnLog<'l> {
     fn run_at_rest(&self) -> &[f64] {
         self.at_rest.get_or_init(|| {
             let mut response = vec![0.0; self.log.rows()];
-            for part in &self.held {
-                let own = &mut response[part.rows.clone()];
-                for ((structure, parts), input) in
-                    self.model.structures.iter().zip(&self.parts).zip(&part.inputs)
-                {
-                    run(structure, &parts.shape, parts.dead_time, (&part.times, input), |row, columns| {
-                        let said: f64 =
-                            parts.weights.iter().zip(columns).map(|(weight, column)| weight * column).sum();
-                        own[row] += said;
-                    });
-                }
-            }
+            at_rest(&self.model.structures, &self.parts, &self.held, &mut response);
             response
         })
     }

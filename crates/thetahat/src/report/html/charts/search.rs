@@ -56,7 +56,7 @@ pub(crate) fn search(selection: &Selection) -> Drawn {
         .with("yaxis", axis(&format!("{name}, the smaller the better")))
         .with("hovermode", "closest");
     let words = format!(
-        "The least {name} for each number of parameters, and the model that was chosen: {}.",
+        "The least {name} for each number of parameters, and the polynomial model that was chosen: {}.",
         selection.chosen.orders
     );
     chart("The best of each size", words, 340, traces, layout)

@@ -616,7 +616,7 @@ def selection(model: Model, ax: Axes | None = None) -> Axes:
 
 
 def inspection(inspection: Inspection, axes: Any = None) -> Grid:
-    """What a log is worth: the spectrum of each input, and its correlation with the output, which shows the delay.
+    """What a log is worth: the spectrum of each input, and its correlation with the output, which shows delay and feedback.
 
     Parameters
     ----------
@@ -661,9 +661,11 @@ def inspection(inspection: Inspection, axes: Any = None) -> Grid:
         title = f"from {name} to {output}"
         delay = delays.get(name)
         if delay is not None:
-            values = _numbers.of_document(delay["correlation"])
+            # At negative lags the input comes after the output.
+            following = delay.get("following", [])
+            values = _numbers.of_document([*reversed(following), *delay["correlation"]])
             band = np.full(len(values), delay["band"], dtype=np.float64)
-            _drawing.correlation(right, np.arange(len(values)), values, band)
+            _drawing.correlation(right, np.arange(len(values)) - len(following), values, band)
             nk = delay["nk"]
             title += ": no delay found" if nk is None else f": a delay of {nk} sample{'' if nk == 1 else 's'}"
         right.set_ylabel("prewhitened correlation")

@@ -6,11 +6,15 @@ use super::moments::samples;
 use super::{DelayEstimate, whitening};
 use crate::Error;
 use crate::data::Record;
+use crate::estimate::{self, Initial, Kernel, Method};
+use crate::model::Orders;
 use crate::regression::{Lagged, Presample, Taps, sum_of_squares};
 use crate::select::{constant_pays, delays};
 
 /// The highest lag tried.
 const HIGHEST: usize = 50;
+/// Impulse responses of so many values in all.
+const WIDEST: usize = 200;
 /// Samples for each lag tried.
 const SAMPLES: usize = 10;
 /// Below this fraction of the square of a signal, what is left of it by its past is rounding.
@@ -44,11 +48,33 @@ pub(super) fn estimate(
         record.inputs.push(&ones);
     }
     let names: Vec<String> = moving.iter().map(|&input| found[input].input.clone()).collect();
-    for (input, delay) in moving.into_iter().zip(delays(&record, &names)?) {
+    for (&input, delay) in moving.iter().zip(delays(&record, &names)?) {
         found[input].confidence = delay.confidence;
         found[input].nk = delay.confidence.map(|_| delay.nk);
     }
+    record.inputs.truncate(moving.len());
+    respond(found, &moving, &record);
     Ok(())
+}
+
+/// Puts in the impulse responses of the inputs of a record, in units of its signals, as far as the highest lag tried. O(N M^2) for M lags of all of them.
+fn respond(found: &mut [DelayEstimate], moving: &[usize], record: &Record<'_>) {
+    let count = samples(&record.segments);
+    let taps = (HIGHEST + 1).min(count / (SAMPLES * moving.len().max(1)));
+    if moving.is_empty() || taps < 2 || taps * moving.len() > WIDEST {
+        return;
+    }
+    let Ok(orders) = Orders::arx(0, &vec![taps; moving.len()], &vec![0; moving.len()]) else { return };
+    let Ok(estimate) = estimate::estimate(record, &orders, &Method::Regularised(Kernel::Dc), Initial::Drop)
+    else {
+        return;
+    };
+    let Some(covariance) = estimate.covariance() else { return };
+    for (own, &input) in moving.iter().enumerate() {
+        let places = own * taps..(own + 1) * taps;
+        found[input].impulse_response = estimate.parameters()[places.clone()].to_vec();
+        found[input].impulse_response_errors = places.map(|place| covariance[place][place].sqrt()).collect();
+    }
 }
 
 /// The correlation of the prewhitened signals:
@@ -63,7 +89,8 @@ pub(super) fn estimate(
 /// both are monic in q^-1: b = A_y/A_u B/F a + noise, which begins at q^-nk.
 ///
 /// As a is white, r(k) has the variance 1/N at lags before the delay, whatever the noise (Bartlett's formula: its sum over
-/// the products of both autocorrelations has one term left). O(N M).
+/// the products of both autocorrelations has one term left). So it has at negative lags, where the input comes after the output, unless
+/// it follows the output. O(N M).
 ///
 /// The signals are deviations, zero outside of the segments. The delay itself is left open: the first correlation that stands out
 /// is often too late where the input is slow.
@@ -78,7 +105,10 @@ pub(super) fn correlation(
         nk: None,
         confidence: None,
         correlation: Vec::new(),
+        following: Vec::new(),
         band: 0.0,
+        impulse_response: Vec::new(),
+        impulse_response_errors: Vec::new(),
     };
     let (of_input, of_output) =
         (whitening::autoregression(input, segments), whitening::autoregression(output, segments));
@@ -99,9 +129,13 @@ pub(super) fn correlation(
     if known || !size.is_normal() {
         return found;
     }
-    let taps = vec![Taps { signal: 1, first: 0, count: lags + 1, sign: 1.0 }];
-    let (_, products, _) = Lagged::new(&[&b, &a], taps, &kept, Presample::Zero).normal_equations();
-    found.correlation = products.iter().map(|product| (product / size).clamp(-1.0, 1.0)).collect();
+    let correlation = |late: &[f64], early: &[f64], first: usize| -> Vec<f64> {
+        let taps = vec![Taps { signal: 1, first, count: lags + 1 - first, sign: 1.0 }];
+        let (_, products, _) = Lagged::new(&[late, early], taps, &kept, Presample::Zero).normal_equations();
+        products.iter().map(|product| (product / size).clamp(-1.0, 1.0)).collect()
+    };
+    found.correlation = correlation(&b, &a, 0);
+    found.following = correlation(&a, &b, 1);
     found.band = BAND / (count as f64).sqrt();
     found
 }

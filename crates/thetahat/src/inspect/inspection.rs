@@ -138,7 +138,7 @@ pub struct SpectrumPoint {
     pub density: f64,
 }
 
-/// The delay from an input, as a fit without orders estimates it, and its prewhitened correlation with the output.
+/// The delay from an input, as a fit without orders estimates it, and what pictures of it and of feedback show.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct DelayEstimate {
     /// The input channel.
@@ -147,10 +147,20 @@ pub struct DelayEstimate {
     pub nk: Option<usize>,
     /// How sure that is: the posterior probability of this delay among 0, 1, …, by the MDL of long ARX models.
     pub confidence: Option<f64>,
-    /// The correlation of the prewhitened signals at lags 0, 1, …
+    /// The correlation of the output with the input before it, both prewhitened, at lags 0, 1, …
     pub correlation: Vec<f64>,
-    /// Half the width of the 95 % band.
+    /// The correlation of the input with the output before it at lags 1, 2, …: none for an input that does not follow the output.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub following: Vec<f64>,
+    /// Half the width of the 95 % band of both.
     pub band: f64,
+    /// The regularised impulse response (DC kernel) of all inputs together at lags 0, 1, …; empty where there are too few rows or too
+    /// many inputs.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub impulse_response: Vec<f64>,
+    /// Its standard errors, for white noise.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub impulse_response_errors: Vec<f64>,
 }
 
 /// Whether an input follows the output.

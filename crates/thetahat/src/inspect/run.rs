@@ -9,7 +9,8 @@ use super::{channel, delay, excitation, moments, rest, warnings};
 use crate::data::{
     Channel, Interpolation, Log, Recording, Regular, Resample, Resampling, Rows, Source, Times, check,
 };
-use crate::validate::feedback::feedback;
+use crate::figures::fixed;
+use crate::validate::feedback::{feedback, unstable_pole};
 use crate::{Document, Error};
 
 /// Says what a log is worth before any fit: its clock, the quality of each channel, how rich the inputs are, their delays,
@@ -218,6 +219,7 @@ fn dynamics(inspection: &mut Inspection, log: &Log, plan: &InspectionPlan) -> Re
     let signals: Vec<&[f64]> = inputs.iter().copied().chain([output]).collect();
     let segments = log.segments_of(&signals, &all);
     inspection.rest = rest::rest(&inputs, output, &segments);
+    let (raw, measured) = (inputs, output);
     let mut signals: Vec<Vec<f64>> =
         signals.iter().map(|values| moments::deviations(values, &segments)).collect();
     // One that repeats another would leave the model open.
@@ -227,8 +229,23 @@ fn dynamics(inspection: &mut Inspection, log: &Log, plan: &InspectionPlan) -> Re
     }
     if let Some((output, inputs)) = signals.split_last() {
         delay::estimate(&mut inspection.delays, inputs, output, &segments)?;
+        let unit = |values: &[f64], own: &[f64]| moments::unit(values, own, &segments);
+        let of_output = unit(measured, output);
+        for ((delay, values), own) in inspection.delays.iter_mut().zip(&raw).zip(inputs) {
+            let ratio = of_output.zip(unit(values, own)).map_or(1.0, |(output, input)| output / input);
+            delay.impulse_response.iter_mut().for_each(|value| *value *= ratio);
+            delay.impulse_response_errors.iter_mut().for_each(|value| *value *= ratio);
+        }
         let verdicts = plan.inputs.iter().zip(feedback(inputs, output, &segments));
         inspection.feedback = verdicts.map(|(input, found)| Feedback::new(input, found)).collect();
+        if let Some([modulus, deviation]) = unstable_pole(inputs, output, &segments) {
+            inspection.warnings.push(format!(
+                "the plant is unstable, with a pole of modulus {} ± {}: something holds its output; fit a model with noise that may be \
+                 unstable (arx, armax), as oe and `method` iv or sriv are biased in a closed loop",
+                fixed(modulus, 4),
+                fixed(deviation, 4)
+            ));
+        }
     }
     for of in inspection.excitation.iter() {
         let Some(first) = &of.same_as else { continue };

@@ -266,6 +266,9 @@ pub fn inspection_page(
         let mut section = Section::new("Delay and feedback");
         for delay in &inspection.delays {
             section.chart(charts::prewhitened(delay));
+            if let Some(response) = charts::impulse_response(delay) {
+                section.chart(response);
+            }
         }
         section.table(tables::delays(inspection));
         page.sections.push(section);

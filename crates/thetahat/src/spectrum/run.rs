@@ -11,7 +11,7 @@ use crate::data::{Log, Rows, Source};
 use crate::distribution::student_two_sided;
 use crate::figures::{fixed, short};
 use crate::respond::{FrequencyPoint, FrequencyResponse};
-use crate::validate::feedback::feedback;
+use crate::validate::feedback::{feedback, unstable_pole};
 use crate::{Document, Error, text};
 
 /// Feedback is looked for in so many of the first rows: it shows in few, and costs more than the spectra.
@@ -265,13 +265,21 @@ fn following(signals: &Signals, plan: &SpectrumPlan) -> Vec<String> {
     let found = feedback(inputs, output, &segments);
     let suspected =
         plan.inputs.iter().zip(found).filter(|(_, found)| found.is_some_and(|of| of.is_suspected()));
-    suspected
+    let unstable = unstable_pole(inputs, output, &segments).map(|[modulus, deviation]| {
+        format!(
+            "the plant is unstable, with a pole of modulus {} ± {}: something holds its output, and a loop biases this response toward \
+             the negative inverse of the controller's; fit a model with noise that may be unstable (arx, armax)",
+            fixed(modulus, 4),
+            fixed(deviation, 4)
+        )
+    });
+    let words = suspected
         .map(|(input, _)| {
             format!(
                 "input '{}' follows past errors of the output: feedback is suspected, and biases this response toward the negative \
                  inverse of the controller's; fit a model with noise (arx, armax, bj), or record the log with the loop open",
                 text::brief(input, 40)
             )
-        })
-        .collect()
+        });
+    words.chain(unstable).collect()
 }

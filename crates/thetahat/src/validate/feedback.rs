@@ -23,13 +23,15 @@
 //!
 //! The effect of e(t) on u(t) itself is left out: it looks like an output that answers the input at once. A controller that sees
 //! the output of the same row is found by what follows, which is weaker. An input that its own past determines or that
-//! repeats itself, and data without noise, tell nothing of it.
+//! repeats itself, and data without noise, tell nothing of it. Nor does a controller that has little noise to answer: then an unstable
+//! plant tells, which would not stay where it is without one ([`unstable_pole`]).
 
 use std::ops::Range;
 
 use thetahat_core::nalgebra::{Cholesky, SMatrix, SVector};
 
 use crate::distribution::chi_square_tail;
+use crate::model::{Orders, PolynomialModel, Root};
 use crate::regression::{Lagged, Presample, Regression, Taps, add_filtered, sum_of_squares};
 
 /// The orders of the model that gives the innovations, the first that the data determine.
@@ -52,6 +54,10 @@ const HELD: f64 = 0.02;
 const ROUNDS: usize = 4;
 /// The parts of the rows that are left out, one after the other.
 const PARTS: usize = 5;
+/// A pole is outside of the unit circle from this many standard errors on.
+const CERTAIN: f64 = 3.0;
+/// And by this much: an integrator without noise is on it to rounding.
+const OUTSIDE: f64 = 1e-4;
 /// Below this p-value there may be feedback, if as much is explained.
 const LEVEL: f64 = 0.01;
 const EXPLAINED: f64 = 0.005;
@@ -91,9 +97,12 @@ pub(crate) fn feedback<S: AsRef<[f64]>>(
     let output = centred(output, segments);
     let inputs: Vec<Vec<f64>> = inputs.iter().map(|input| centred(input.as_ref(), segments)).collect();
     let signals: Vec<&[f64]> = std::iter::once(&output).chain(&inputs).map(Vec::as_slice).collect();
-    let Some((innovations, segments)) = innovations(&signals, segments) else {
+    let Some((model, solved)) = predictor(&signals, segments) else { return vec![None; inputs.len()] };
+    if solved.residual_norm <= ROUNDING * sum_of_squares(&output).sqrt() {
         return vec![None; inputs.len()];
-    };
+    }
+    let innovations = residuals(&signals, segments, &model.taps, solved.parameters.as_slice(), model.order);
+    let segments = shortened(segments, model.order);
     drop(output);
     inputs.iter().map(|input| follows(input, &innovations, &segments)).collect()
 }
@@ -110,8 +119,38 @@ fn centred(signal: &[f64], segments: &[Range<usize>]) -> Vec<f64> {
     centred
 }
 
-/// The residuals of an ARX model of `signals[0]` on the others, and the segments that they fill.
-fn innovations(signals: &[&[f64]], segments: &[Range<usize>]) -> Option<(Vec<f64>, Vec<Range<usize>>)> {
+/// The modulus of the largest pole of that ARX model, and its standard error, where it is more than [`CERTAIN`] of them outside of the
+/// unit circle: the plant is unstable. None else, and where the data determine no such model, or less of its pole. O(N p^2).
+pub(crate) fn unstable_pole<S: AsRef<[f64]>>(
+    inputs: &[S],
+    output: &[f64],
+    segments: &[Range<usize>],
+) -> Option<[f64; 2]> {
+    let signals = std::iter::once(output).chain(inputs.iter().map(AsRef::as_ref));
+    let signals: Vec<Vec<f64>> = signals.map(|signal| centred(signal, segments)).collect();
+    let signals: Vec<&[f64]> = signals.iter().map(Vec::as_slice).collect();
+    let (Predictor { order, .. }, solved) = predictor(&signals, segments)?;
+    let own = solved.covariance.view((0, 0), (order, order));
+    let covariance: Vec<Vec<f64>> = own.row_iter().map(|row| row.iter().copied().collect()).collect();
+    let a: Vec<f64> = solved.parameters.iter().take(order).map(|weight| -weight).collect();
+    let orders = Orders::arx(order, &[], &[]).ok()?;
+    let model = PolynomialModel::from_parameters(&orders, &a, Some(&covariance), 1.0, 1.0).ok()?;
+    // The largest one comes first.
+    let Root { re, im, covariance, .. } = model.poles.first()?;
+    let [[real, both], [_, imaginary]] = (*covariance)?;
+    let modulus = re.hypot(*im);
+    let deviation = (re * re * real + 2.0 * re * im * both + im * im * imaginary).sqrt() / modulus;
+    (modulus > 1.0 + OUTSIDE.max(CERTAIN * deviation)).then_some([modulus, deviation])
+}
+
+/// An ARX model of `signals[0]` on the others.
+struct Predictor {
+    order: usize,
+    taps: Vec<Taps>,
+}
+
+/// The ARX model of the first order that the data determine.
+fn predictor(signals: &[&[f64]], segments: &[Range<usize>]) -> Option<(Predictor, Regression)> {
     // An input that never changes determines nothing.
     let moves = |signal: &usize| signals[*signal].iter().any(|value| *value != 0.0);
     let taps = |order: usize| -> Vec<Taps> {
@@ -119,13 +158,11 @@ fn innovations(signals: &[&[f64]], segments: &[Range<usize>]) -> Option<(Vec<f64
         let input = |signal: usize| Taps { signal, first: 0, count: order + 1, sign: 1.0 };
         std::iter::once(own).chain((1..signals.len()).filter(moves).map(input)).collect()
     };
-    let (order, solved) =
-        ORDERS.into_iter().find_map(|order| Some((order, solved(signals, segments, &taps(order), 0)?)))?;
-    if solved.residual_norm <= ROUNDING * sum_of_squares(signals[0]).sqrt() {
-        return None;
-    }
-    let innovations = residuals(signals, segments, &taps(order), solved.parameters.as_slice(), order);
-    Some((innovations, shortened(segments, order)))
+    ORDERS.into_iter().find_map(|order| {
+        let taps = taps(order);
+        let solved = solved(signals, segments, &taps, 0)?;
+        Some((Predictor { order, taps }, solved))
+    })
 }
 
 /// What past innovations, zero outside of the segments, tell of an input. None where they tell nothing.

@@ -10,7 +10,7 @@ fn log() -> (Vec<f64>, Vec<f64>) {
     (u, y)
 }
 
-fn inspected(recording: Recording, plan: &InspectionPlan) -> Inspection {
+pub(super) fn inspected(recording: Recording, plan: &InspectionPlan) -> Inspection {
     let inspection = inspect(recording, &source(), plan).unwrap();
     // Written and read back it is the same: nothing in it is not a number.
     let back: Inspection = serde_json::from_str(&inspection.to_json().unwrap()).unwrap();

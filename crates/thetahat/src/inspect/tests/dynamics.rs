@@ -241,8 +241,66 @@ fn a_correlation_is_that_of_its_definition() {
         let expected = segments.iter().map(products).sum::<f64>() / (inside(&u) * inside(&y)).sqrt();
         assert!((r - expected).abs() < 1e-14, "{lag}");
     }
-    assert_eq!(found.correlation.len(), 10);
+    for (lag, r) in found.following.iter().enumerate().map(|(place, r)| (place + 1, r)) {
+        let products = |s: &Range<usize>| (s.start + lag..s.end).map(|t| y[t - lag] * u[t]).sum::<f64>();
+        let expected = segments.iter().map(products).sum::<f64>() / (inside(&u) * inside(&y)).sqrt();
+        assert!((r - expected).abs() < 1e-14, "{lag}");
+    }
+    assert_eq!((found.correlation.len(), found.following.len()), (10, 9));
     assert!((found.band - 1.959_963_984_540_054 / 95.0_f64.sqrt()).abs() < 1e-15);
+}
+
+/// 95 % of the lags at which the input follows nothing are in the band, whatever the colours; a controller is not.
+#[test]
+fn what_follows_the_output_is_outside_of_the_band() {
+    let (mut outside, mut all) = (0, 0);
+    for seed in 0..40 {
+        let u = divided(&[-0.9], &normal(seed, 1000));
+        let y = sum_of(&late(&u, 2), 2.0, &divided(&[-1.6, 0.7], &normal(seed + 1000, 1000)));
+        let found = correlation_of(&u, &y);
+        outside += found.following.iter().filter(|r| r.abs() > found.band).count();
+        all += found.following.len();
+    }
+    assert!(
+        (0.03..0.07).contains(&(f64::from(u32::try_from(outside).unwrap()) / all as f64)),
+        "{outside} of {all}"
+    );
+    let (r, e) = (normal(5, 1000), normal(6, 1000));
+    let (mut u, mut y) = (vec![0.0; 1000], vec![0.0; 1000]);
+    for t in 3..1000 {
+        y[t] = 0.8 * y[t - 1] + 0.5 * u[t - 1] + e[t];
+        u[t] = r[t] - 0.8 * y[t - 3];
+    }
+    let found = correlation_of(&u, &y);
+    assert!(found.following[2] < -5.0 * found.band, "{:?}", found.following);
+    assert!(found.following[..2].iter().all(|r| r.abs() < 2.0 * found.band), "{:?}", found.following);
+}
+
+/// The response of all inputs together, which a correlation of one with the output is not.
+#[test]
+fn the_impulse_responses_are_those_of_the_plant() {
+    let (one, e) = (normal(7, 2000), normal(8, 2000));
+    let other = sum_of(&late(&one, 1), 0.5, &normal(9, 2000));
+    let y = sum_of(&sum_of(&late(&one, 2), -1.0, &late(&other, 4)), 0.1, &e);
+    let scaled = |values: &[f64]| -> Vec<f64> { values.iter().map(|value| 30.0 + 7.0 * value).collect() };
+    let channel = |name: &str, values: Vec<f64>| Channel { name: name.into(), values };
+    let channels = vec![channel("one", one), channel("other", scaled(&other)), channel("y", y)];
+    let plan = InspectionPlan {
+        inputs: vec!["one".into(), "other".into()],
+        output: Some("y".into()),
+        resample: None,
+    };
+    let recording = Recording { channels, times: Times::Uniform(1.0) };
+    let found = documents::inspected(recording, &plan);
+    for (input, (delay, gain)) in [(2, 1.0), (4, -1.0 / 7.0)].into_iter().enumerate() {
+        let of = &found.delays[input];
+        assert_eq!((of.impulse_response.len(), of.impulse_response_errors.len()), (51, 51));
+        for (lag, value) in of.impulse_response.iter().enumerate() {
+            let expected = if lag == delay { gain } else { 0.0 };
+            assert!((value - expected).abs() < 0.02, "{input} {lag} {value}");
+        }
+        assert!((0.001..0.01).contains(&(of.impulse_response_errors[delay] / gain.abs())));
+    }
 }
 
 #[test]

@@ -10,7 +10,9 @@ mod step;
 mod terms;
 mod tuning;
 
-pub(super) use correlation::{autocorrelation, compared_autocorrelations, cross_correlation, prewhitened};
+pub(super) use correlation::{
+    autocorrelation, compared_autocorrelations, cross_correlation, impulse_response, prewhitened,
+};
 pub use dynamics::Transient;
 pub(super) use dynamics::{bode, roots, transient, transients};
 pub(super) use response::{measured, measured_noise};

@@ -155,6 +155,32 @@ fn a_loop_is_warned_of() {
     assert!(open.warnings.is_empty(), "{:?}", open.warnings);
 }
 
+/// y(t) = 1.05 y(t-1) + u(t-1) + e(t), u(t) = r(t) - 0.4 y(t): the controller is driven by r and has little noise to answer.
+#[test]
+fn an_unstable_plant_is_held_by_a_loop() {
+    let (r, e) = (noise(31, 3000), noise(32, 3000));
+    let (mut u, mut y): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
+    for t in 0..3000 {
+        let past = |of: &[f64]| if t == 0 { 0.0 } else { of[t - 1] };
+        y.push(1.05 * past(&y) + past(&u) + 0.01 * e[t]);
+        u.push(r[t] - 0.4 * y[t]);
+    }
+    let found = spectrum(&log(&[("u", &u), ("y", &y)]), &[], &SpectrumPlan::new(&["u"], "y")).unwrap();
+    let told = |warning: &String| warning.starts_with("the plant is unstable, with a pole of modulus 1.0");
+    assert!(found.warnings.iter().any(told), "{:?}", found.warnings);
+    // An integrator of an input that ends is none, nor is one without noise.
+    for size in [0.0, 0.1] {
+        let mut sum = 0.0;
+        let add = |(u, e): (&f64, &f64)| {
+            sum += u;
+            sum + size * e
+        };
+        let y: Vec<f64> = r.iter().zip(&e).map(add).collect();
+        let found = spectrum(&log(&[("u", &r), ("y", &y)]), &[], &SpectrumPlan::new(&["u"], "y")).unwrap();
+        assert!(!found.warnings.iter().any(|warning| warning.contains("unstable")), "{:?}", found.warnings);
+    }
+}
+
 #[test]
 fn segments_too_short_beside_the_longest_are_told() {
     let u = noise(28, 1000);

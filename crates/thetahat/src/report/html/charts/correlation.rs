@@ -10,6 +10,8 @@ use crate::validate::{Independence, Residuals};
 
 const HEIGHT: usize = 320;
 const BAND: &str = "95 % band";
+/// Half the width of the band that holds 95 % of a standard normal variable.
+const NORMAL: f64 = 1.959_963_984_540_054;
 
 /// Bars, with another colour and name where they are outside of the band.
 fn bars(lags: &[f64], values: &[f64], half: &[f64]) -> Vec<Object> {
@@ -101,8 +103,10 @@ pub(crate) fn prewhitened(delay: &DelayEstimate) -> Drawn {
     if !delay.correlation.iter().any(|value| value.is_finite()) {
         return Err(format!("There is no correlation of {} with the output.", delay.input));
     }
-    let lags: Vec<f64> = (0..delay.correlation.len()).map(|lag| lag as f64).collect();
-    let traces = bars(&lags, &delay.correlation, &vec![delay.band; lags.len()]);
+    let before = delay.following.len();
+    let values: Vec<f64> = delay.following.iter().rev().chain(&delay.correlation).copied().collect();
+    let lags: Vec<f64> = (0..values.len()).map(|place| place as f64 - before as f64).collect();
+    let traces = bars(&lags, &values, &vec![delay.band; lags.len()]);
     let layout = layout()
         .with("xaxis", axis("lag [samples]"))
         .with("yaxis", axis("correlation"))
@@ -112,7 +116,31 @@ pub(crate) fn prewhitened(delay: &DelayEstimate) -> Drawn {
         None => "No delay was found: at no lag the output surely follows the input.".to_owned(),
     };
     let words = format!(
-        "Correlation of the output with the earlier input, after a filter that makes the input white. {found}"
+        "Correlation of the output with the input so many samples before, after filters that make each of them white. {found} Outside \
+         of the band at negative lags, where the input comes after the output: it follows the output, so there is feedback."
     );
     chart(format!("From {} to the output", delay.input), words, HEIGHT, traces, layout)
+}
+
+/// The impulse response of an input with its band.
+pub(crate) fn impulse_response(delay: &DelayEstimate) -> Option<Drawn> {
+    let values = &delay.impulse_response;
+    if values.is_empty() || values.len() != delay.impulse_response_errors.len() {
+        return None;
+    }
+    let lags: Vec<f64> = (0..values.len()).map(|lag| lag as f64).collect();
+    let edge = |sign: f64| -> Vec<f64> {
+        let of = |(value, error): (&f64, &f64)| value + sign * NORMAL * error;
+        values.iter().zip(&delay.impulse_response_errors).map(of).collect()
+    };
+    let curve = Curve { x: lags.clone(), y: rounded(values) };
+    let name = text::plain(&delay.input);
+    let traces = vec![
+        band(BAND, &lags, &edge(-1.0), &edge(1.0), NEUTRAL),
+        line(&name, curve, 0).with("mode", "lines+markers"),
+    ];
+    let layout = layout().with("xaxis", axis("lag [samples]")).with("yaxis", axis("output per input"));
+    let words = "What one sample of the input does to the output, by regularised least squares (DC kernel). The band is for white noise: \
+                 in coloured noise it is too narrow.";
+    Some(chart(format!("Impulse response from {}", delay.input), words, HEIGHT, traces, layout))
 }

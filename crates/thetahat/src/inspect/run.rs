@@ -10,7 +10,7 @@ use crate::data::{
     Channel, Interpolation, Log, Recording, Regular, Resample, Resampling, Rows, Source, Times, check,
 };
 use crate::figures::fixed;
-use crate::validate::feedback::{feedback, unstable_pole};
+use crate::validate::feedback::feedback;
 use crate::{Document, Error};
 
 /// Says what a log is worth before any fit: its clock, the quality of each channel, how rich the inputs are, their delays,
@@ -236,9 +236,10 @@ fn dynamics(inspection: &mut Inspection, log: &Log, plan: &InspectionPlan) -> Re
             delay.impulse_response.iter_mut().for_each(|value| *value *= ratio);
             delay.impulse_response_errors.iter_mut().for_each(|value| *value *= ratio);
         }
-        let verdicts = plan.inputs.iter().zip(feedback(inputs, output, &segments));
+        let found = feedback(inputs, output, &segments);
+        let verdicts = plan.inputs.iter().zip(found.inputs);
         inspection.feedback = verdicts.map(|(input, found)| Feedback::new(input, found)).collect();
-        if let Some([modulus, deviation]) = unstable_pole(inputs, output, &segments) {
+        if let Some([modulus, deviation]) = found.unstable_pole {
             inspection.warnings.push(format!(
                 "the plant is unstable, with a pole of modulus {} ± {}: something holds its output; fit a model with noise that may be \
                  unstable (arx, armax), as oe and `method` iv or sriv are biased in a closed loop",

@@ -226,7 +226,7 @@ pub(super) fn found(task: &Task<'_>, steps: &mut Vec<String>) -> Result<(Vec<Del
     if delays.iter().any(|delay| delay.nk == 0 && delay.confidence.is_some()) {
         let record = task.estimation;
         let suspicions =
-            feedback::feedback(&record.inputs[..task.inputs.len()], record.output, &record.segments);
+            feedback::feedback(&record.inputs[..task.inputs.len()], record.output, &record.segments).inputs;
         for (delay, feedback) in delays.iter().zip(suspicions).filter(|(delay, _)| delay.nk == 0) {
             let name = &delay.input;
             steps.push(if feedback.is_some_and(|feedback| feedback.is_suspected()) {

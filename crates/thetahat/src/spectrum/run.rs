@@ -11,11 +11,11 @@ use crate::data::{Log, Rows, Source};
 use crate::distribution::student_two_sided;
 use crate::figures::{fixed, short};
 use crate::respond::{FrequencyPoint, FrequencyResponse};
-use crate::validate::feedback::{feedback, unstable_pole};
+use crate::validate::feedback::feedback;
 use crate::{Document, Error, text};
 
 /// Feedback is looked for in so many of the first rows: it shows in few, and costs more than the spectra.
-const FEEDBACK_ROWS: usize = 20_000;
+const FEEDBACK_ROWS: usize = 10_000;
 
 /// The frequency response from the inputs of a log to its output, without a model.
 ///
@@ -264,8 +264,8 @@ fn following(signals: &Signals, plan: &SpectrumPlan) -> Vec<String> {
     let Some((output, inputs)) = channels.split_last() else { return Vec::new() };
     let found = feedback(inputs, output, &segments);
     let suspected =
-        plan.inputs.iter().zip(found).filter(|(_, found)| found.is_some_and(|of| of.is_suspected()));
-    let unstable = unstable_pole(inputs, output, &segments).map(|[modulus, deviation]| {
+        plan.inputs.iter().zip(found.inputs).filter(|(_, found)| found.is_some_and(|of| of.is_suspected()));
+    let unstable = found.unstable_pole.map(|[modulus, deviation]| {
         format!(
             "the plant is unstable, with a pole of modulus {} ± {}: something holds its output, and a loop biases this response toward \
              the negative inverse of the controller's; fit a model with noise that may be unstable (arx, armax)",

@@ -87,24 +87,31 @@ impl Feedback {
     }
 }
 
-/// What the innovations of the output tell of each input: those of an ARX model of order 10 on all inputs, lag 0 included. None
-/// where they are rounding, or the data determine no such model. O(N p).
-pub(crate) fn feedback<S: AsRef<[f64]>>(
-    inputs: &[S],
-    output: &[f64],
-    segments: &[Range<usize>],
-) -> Vec<Option<Feedback>> {
+/// What tells of a loop.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Loop {
+    /// What the innovations of the output tell of each input; none where they are rounding, or the data determine no model.
+    pub(crate) inputs: Vec<Option<Feedback>>,
+    /// The modulus of the plant's largest pole and its standard error, where it is outside of the unit circle for certain.
+    pub(crate) unstable_pole: Option<[f64; 2]>,
+}
+
+/// What an ARX model of order 10 on all inputs, lag 0 included, tells of a loop: its innovations and its poles. O(N p^2).
+pub(crate) fn feedback<S: AsRef<[f64]>>(inputs: &[S], output: &[f64], segments: &[Range<usize>]) -> Loop {
     let output = centred(output, segments);
     let inputs: Vec<Vec<f64>> = inputs.iter().map(|input| centred(input.as_ref(), segments)).collect();
     let signals: Vec<&[f64]> = std::iter::once(&output).chain(&inputs).map(Vec::as_slice).collect();
-    let Some((model, solved)) = predictor(&signals, segments) else { return vec![None; inputs.len()] };
+    let nothing = Loop { inputs: vec![None; inputs.len()], unstable_pole: None };
+    let Some((order, taps, solved)) = predictor(&signals, segments) else { return nothing };
+    let unstable_pole = unstable_pole(order, &solved);
     if solved.residual_norm <= ROUNDING * sum_of_squares(&output).sqrt() {
-        return vec![None; inputs.len()];
+        return Loop { unstable_pole, ..nothing };
     }
-    let innovations = residuals(&signals, segments, &model.taps, solved.parameters.as_slice(), model.order);
-    let segments = shortened(segments, model.order);
+    let innovations = residuals(&signals, segments, &taps, solved.parameters.as_slice(), order);
+    let segments = shortened(segments, order);
     drop(output);
-    inputs.iter().map(|input| follows(input, &innovations, &segments)).collect()
+    let inputs = inputs.iter().map(|input| follows(input, &innovations, &segments)).collect();
+    Loop { inputs, unstable_pole }
 }
 
 /// A signal less its mean over the segments, zero outside.
@@ -119,17 +126,9 @@ fn centred(signal: &[f64], segments: &[Range<usize>]) -> Vec<f64> {
     centred
 }
 
-/// The modulus of the largest pole of that ARX model, and its standard error, where it is more than [`CERTAIN`] of them outside of the
-/// unit circle: the plant is unstable. None else, and where the data determine no such model, or less of its pole. O(N p^2).
-pub(crate) fn unstable_pole<S: AsRef<[f64]>>(
-    inputs: &[S],
-    output: &[f64],
-    segments: &[Range<usize>],
-) -> Option<[f64; 2]> {
-    let signals = std::iter::once(output).chain(inputs.iter().map(AsRef::as_ref));
-    let signals: Vec<Vec<f64>> = signals.map(|signal| centred(signal, segments)).collect();
-    let signals: Vec<&[f64]> = signals.iter().map(Vec::as_slice).collect();
-    let (Predictor { order, .. }, solved) = predictor(&signals, segments)?;
+/// The modulus of the largest pole of an ARX model, and its standard error, where it is more than [`CERTAIN`] of them outside of the
+/// unit circle. None else, and where its standard error is not known.
+fn unstable_pole(order: usize, solved: &Regression) -> Option<[f64; 2]> {
     let own = solved.covariance.view((0, 0), (order, order));
     let covariance: Vec<Vec<f64>> = own.row_iter().map(|row| row.iter().copied().collect()).collect();
     let a: Vec<f64> = solved.parameters.iter().take(order).map(|weight| -weight).collect();
@@ -143,14 +142,8 @@ pub(crate) fn unstable_pole<S: AsRef<[f64]>>(
     (modulus > 1.0 + OUTSIDE.max(CERTAIN * deviation)).then_some([modulus, deviation])
 }
 
-/// An ARX model of `signals[0]` on the others.
-struct Predictor {
-    order: usize,
-    taps: Vec<Taps>,
-}
-
-/// The ARX model of the first order that the data determine.
-fn predictor(signals: &[&[f64]], segments: &[Range<usize>]) -> Option<(Predictor, Regression)> {
+/// The ARX model of `signals[0]` on the others of the first order that the data determine, and its lags.
+fn predictor(signals: &[&[f64]], segments: &[Range<usize>]) -> Option<(usize, Vec<Taps>, Regression)> {
     // An input that never changes determines nothing.
     let moves = |signal: &usize| signals[*signal].iter().any(|value| *value != 0.0);
     let taps = |order: usize| -> Vec<Taps> {
@@ -161,7 +154,7 @@ fn predictor(signals: &[&[f64]], segments: &[Range<usize>]) -> Option<(Predictor
     ORDERS.into_iter().find_map(|order| {
         let taps = taps(order);
         let solved = solved(signals, segments, &taps, 0)?;
-        Some((Predictor { order, taps }, solved))
+        Some((order, taps, solved))
     })
 }
 

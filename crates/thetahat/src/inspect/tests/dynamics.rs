@@ -321,7 +321,7 @@ fn without_a_relation_there_is_no_delay() {
 }
 
 fn feedback_of(input: &[f64], output: &[f64]) -> Option<crate::validate::feedback::Feedback> {
-    feedback(&[input], output, &whole(input))[0]
+    feedback(&[input], output, &whole(input)).inputs[0]
 }
 
 fn is_suspected(input: &[f64], output: &[f64]) -> bool {
@@ -472,6 +472,6 @@ fn where_feedback_cannot_be_said_there_is_none() {
     assert_eq!(feedback_of(&period, &sum_of(&cubes, 0.01, &normal(44, 300))), None);
     // A constant input beside a good one does not spoil it.
     let inputs = [vec![0.0; 300], deviations(&u)];
-    let both = feedback(&inputs, &deviations(&normal(42, 300)), &one(0..300));
+    let both = feedback(&inputs, &deviations(&normal(42, 300)), &one(0..300)).inputs;
     assert!(both[0].is_none() && both[1].is_some());
 }

@@ -15,6 +15,8 @@ use crate::select::{constant_pays, delays};
 const HIGHEST: usize = 50;
 /// Impulse responses of so many values in all.
 const WIDEST: usize = 200;
+/// They are of so many of the first rows, which show as much.
+const RESPONSE_ROWS: usize = 20_000;
 /// Samples for each lag tried.
 const SAMPLES: usize = 10;
 /// Below this fraction of the square of a signal, what is left of it by its past is rounding.
@@ -57,9 +59,18 @@ pub(super) fn estimate(
     Ok(())
 }
 
-/// Puts in the impulse responses of the inputs of a record, in units of its signals, as far as the highest lag tried. O(N M^2) for M lags of all of them.
+/// Puts in the impulse responses of the inputs of a record, in units of its signals, as far as the highest lag tried. O(M^3) for M lags of all of them.
 fn respond(found: &mut [DelayEstimate], moving: &[usize], record: &Record<'_>) {
-    let count = samples(&record.segments);
+    let end = record.output.len().min(RESPONSE_ROWS);
+    let within = record.segments.iter().map(|segment| segment.start..segment.end.min(end));
+    let segments: Vec<Range<usize>> = within.filter(|segment| !segment.is_empty()).collect();
+    let count = samples(&segments);
+    let record = &Record {
+        output: &record.output[..end],
+        inputs: record.inputs.iter().map(|input| &input[..end]).collect(),
+        past: vec![0; segments.len()],
+        segments,
+    };
     let taps = (HIGHEST + 1).min(count / (SAMPLES * moving.len().max(1)));
     if moving.is_empty() || taps < 2 || taps * moving.len() > WIDEST {
         return;

@@ -221,8 +221,8 @@ fn other_pages_are_shown() {
 
     let folder = logged(FILE, [INPUT, OUTPUT], 900, 25.0);
     let path = page(&folder, "inspect --time t", &["-u", INPUT, "-y", OUTPUT, FILE]);
-    // Channels, spectrum, correlation.
-    opened(&mut browser, &path, 3);
+    // Channels, spectrum, correlation, impulse response.
+    opened(&mut browser, &path, 4);
     stands(&mut browser, "main code", BEGINNING);
     stands(&mut browser, ".legend text", "outliers");
     stands(&mut browser, "tbody th", INPUT);
@@ -409,6 +409,7 @@ fn pages_do_without_what_is_missing() {
     assert!(comparison_page(&[complete_report], &[], "").is_err());
     let mut nothing = inspected();
     nothing.delays[0].correlation.clear();
+    nothing.delays[0].impulse_response.clear();
     let page = inspection_page(&nothing, &[], &[], "");
     assert_eq!(charts(&page).len(), 1);
     assert!(page.contains("There is no correlation of u"));

@@ -19,7 +19,7 @@ Model(ARMAX(2, 2, 1, 1), 1-step fit 98.37 % on rows 1..700)
 """
 
 from thetahat._design import ExperimentDesign, TestSignal, design
-from thetahat._filter import StateEstimate, StateFilter, StateModel, StateTrajectory
+from thetahat._filter import StateEstimate, StateFilter, StateTrajectory
 from thetahat._fit import EstimationWarning, ar, arma, armax, arx, bj, fir, general, iv, oe, search, sriv
 from thetahat._grey_box import GreyBox, grey
 from thetahat._evaluation import Comparison, Inspection, Validation, compare, inspect
@@ -30,6 +30,7 @@ from thetahat._options import DesignOptions, EquationsOptions, FitOptions, NarxO
 from thetahat._process import process
 from thetahat._responses import Forecast, FrequencyResponse, StateSpace, TransientResponse
 from thetahat._spectrum import MeasuredResponse, spectrum
+from thetahat._state_model import StateModel
 from thetahat._step_test import StepTest, step_test
 from thetahat._thetahat import (
     Alarm,

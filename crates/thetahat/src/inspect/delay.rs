@@ -59,7 +59,8 @@ pub(super) fn estimate(
     Ok(())
 }
 
-/// Puts in the impulse responses of the inputs of a record, in units of its signals, as far as the highest lag tried. O(M^3) for M lags of all of them.
+/// Puts in the impulse responses of the inputs of a record, in units of its signals, as far as the highest lag tried. O(M^3) for M
+/// lags of all of them.
 fn respond(found: &mut [DelayEstimate], moving: &[usize], record: &Record<'_>) {
     let end = record.output.len().min(RESPONSE_ROWS);
     let within = record.segments.iter().map(|segment| segment.start..segment.end.min(end));

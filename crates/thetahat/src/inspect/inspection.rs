@@ -154,13 +154,27 @@ pub struct DelayEstimate {
     pub following: Vec<f64>,
     /// Half the width of the 95 % band of both.
     pub band: f64,
-    /// The regularised impulse response (DC kernel) of all inputs together at lags 0, 1, …; empty where there are too few rows or too
-    /// many inputs.
+    /// The impulse response at lags 0, 1, … in units of the output for one of the input: that of all inputs together by regularised
+    /// least squares with the kernel DC (Chen, Ohlsson and Ljung 2012), over the first 20,000 rows. Empty where there are too few rows,
+    /// or more than 200 values of all inputs.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub impulse_response: Vec<f64>,
     /// Its standard errors, for white noise.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub impulse_response_errors: Vec<f64>,
+}
+
+impl DelayEstimate {
+    /// Puts the impulse response into other units, if it stays in the range of numbers.
+    pub(super) fn scale(&mut self, factor: f64) {
+        let all = || self.impulse_response.iter().chain(&self.impulse_response_errors);
+        if !factor.is_normal() || all().any(|value| !(factor * value).is_finite()) {
+            self.impulse_response.clear();
+            self.impulse_response_errors.clear();
+        }
+        self.impulse_response.iter_mut().for_each(|value| *value *= factor);
+        self.impulse_response_errors.iter_mut().for_each(|value| *value *= factor);
+    }
 }
 
 /// Whether an input follows the output.

@@ -9,7 +9,6 @@ use super::{channel, delay, excitation, moments, rest, warnings};
 use crate::data::{
     Channel, Interpolation, Log, Recording, Regular, Resample, Resampling, Rows, Source, Times, check,
 };
-use crate::figures::fixed;
 use crate::validate::feedback::feedback;
 use crate::{Document, Error};
 
@@ -232,21 +231,18 @@ fn dynamics(inspection: &mut Inspection, log: &Log, plan: &InspectionPlan) -> Re
         let unit = |values: &[f64], own: &[f64]| moments::unit(values, own, &segments);
         let of_output = unit(measured, output);
         for ((delay, values), own) in inspection.delays.iter_mut().zip(&raw).zip(inputs) {
-            let ratio = of_output.zip(unit(values, own)).map_or(1.0, |(output, input)| output / input);
-            delay.impulse_response.iter_mut().for_each(|value| *value *= ratio);
-            delay.impulse_response_errors.iter_mut().for_each(|value| *value *= ratio);
+            delay.scale(of_output.zip(unit(values, own)).map_or(f64::NAN, |(output, input)| output / input));
         }
         let found = feedback(inputs, output, &segments);
+        let unstable = found.unstable();
         let verdicts = plan.inputs.iter().zip(found.inputs);
         inspection.feedback = verdicts.map(|(input, found)| Feedback::new(input, found)).collect();
-        if let Some([modulus, deviation]) = found.unstable_pole {
-            inspection.warnings.push(format!(
-                "the plant is unstable, with a pole of modulus {} ± {}: something holds its output; fit a model with noise that may be \
-                 unstable (arx, armax), as oe and `method` iv or sriv are biased in a closed loop",
-                fixed(modulus, 4),
-                fixed(deviation, 4)
-            ));
-        }
+        inspection.warnings.extend(unstable.map(|words| {
+            format!(
+                "{words}; fit a model with noise that may be unstable (arx, armax), as oe and `method` iv or sriv are biased in a \
+                 closed loop"
+            )
+        }));
     }
     for of in inspection.excitation.iter() {
         let Some(first) = &of.same_as else { continue };

@@ -56,15 +56,15 @@ pub fn held_out_runs(report: &Report, log: &Log) -> Result<Vec<(String, Validate
         Ok((format!("{purpose}: {orders}"), identify(log.clone(), &[], &plan)))
     });
     let mut refits = refits.collect::<Result<Vec<_>, Error>>()?;
-    if let Some(model) = process {
+    if let Some((model, &structure)) = process.and_then(|model| Some((model, model.structures.first()?))) {
         let plan = ProcessPlan {
             structures: model.structures.clone(),
             estimate: fitted.clone(),
             trend: report.estimation.slope.is_some(),
-            ..ProcessPlan::new(&names, output, model.structures[0])
+            ..ProcessPlan::new(&names, output, structure)
         };
         let refit = fit_process(log, &[], &plan, &|_| ControlFlow::Continue(()));
-        refits.push((format!("process: {}", model.structures[0]), refit));
+        refits.push((format!("process: {structure}"), refit));
     }
     let mut runs = Vec::new();
     for (name, refit) in refits {

@@ -24,7 +24,7 @@ const CLEARLY: f64 = 0.1;
 /// A model that simulates has no time constant of more than this many times the samples.
 const SLOWEST: f64 = 2.0;
 /// Mean squares below this are rounding.
-pub(super) const NOTHING: f64 = 1e-12;
+const NOTHING: f64 = 1e-12;
 
 /// Which models are the best for what, as positions in a comparison.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,7 +41,7 @@ pub(super) fn both(seen: &HeldOut) -> f64 {
     f64::midpoint(logarithm(seen.blocks), logarithm(seen.onward))
 }
 
-fn logarithm(square: f64) -> f64 {
+pub(super) fn logarithm(square: f64) -> f64 {
     square.max(NOTHING).ln()
 }
 

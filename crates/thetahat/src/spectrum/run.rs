@@ -263,16 +263,14 @@ fn following(signals: &Signals, plan: &SpectrumPlan) -> Vec<String> {
     let channels: Vec<&[f64]> = signals.channels.iter().map(|channel| &channel[..end]).collect();
     let Some((output, inputs)) = channels.split_last() else { return Vec::new() };
     let found = feedback(inputs, output, &segments);
-    let suspected =
-        plan.inputs.iter().zip(found.inputs).filter(|(_, found)| found.is_some_and(|of| of.is_suspected()));
-    let unstable = found.unstable_pole.map(|[modulus, deviation]| {
+    let unstable = found.unstable().map(|words| {
         format!(
-            "the plant is unstable, with a pole of modulus {} ± {}: something holds its output, and a loop biases this response toward \
-             the negative inverse of the controller's; fit a model with noise that may be unstable (arx, armax)",
-            fixed(modulus, 4),
-            fixed(deviation, 4)
+            "{words}, and a loop biases this response toward the negative inverse of the controller's; fit a model with noise that may \
+             be unstable (arx, armax)"
         )
     });
+    let suspected =
+        plan.inputs.iter().zip(found.inputs).filter(|(_, found)| found.is_some_and(|of| of.is_suspected()));
     let words = suspected
         .map(|(input, _)| {
             format!(

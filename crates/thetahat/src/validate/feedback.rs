@@ -31,6 +31,7 @@ use std::ops::Range;
 use thetahat_core::nalgebra::{Cholesky, SMatrix, SVector};
 
 use crate::distribution::chi_square_tail;
+use crate::figures::fixed;
 use crate::model::{Orders, PolynomialModel, Root};
 use crate::regression::{Lagged, Presample, Regression, Taps, add_filtered, sum_of_squares};
 
@@ -93,7 +94,17 @@ pub(crate) struct Loop {
     /// What the innovations of the output tell of each input; none where they are rounding, or the data determine no model.
     pub(crate) inputs: Vec<Option<Feedback>>,
     /// The modulus of the plant's largest pole and its standard error, where it is outside of the unit circle for certain.
-    pub(crate) unstable_pole: Option<[f64; 2]>,
+    unstable_pole: Option<[f64; 2]>,
+}
+
+impl Loop {
+    /// What an unstable plant says, in words.
+    pub(crate) fn unstable(&self) -> Option<String> {
+        let [modulus, deviation] = self.unstable_pole?.map(|value| fixed(value, 4));
+        Some(format!(
+            "the plant is unstable, with a pole of modulus {modulus} ± {deviation}: something holds its output"
+        ))
+    }
 }
 
 /// What an ARX model of order 10 on all inputs, lag 0 included, tells of a loop: its innovations and its poles. O(N p^2).

@@ -14,8 +14,8 @@ const LONGEST: f64 = 1e3;
 /// What the damping of a pair may be.
 const LEAST_DAMPING: f64 = 1e-4;
 const LARGEST_DAMPING: f64 = 1e3;
-/// The logarithm of the largest ratio to what it must stay near to.
-const NEAR: f64 = 0.405;
+/// The largest ratio to what it must stay near to.
+const NEAR: f64 = 1.5;
 /// A dead time is at most this fraction of the longest log.
 const LONGEST_DEAD_TIME: f64 = 0.9;
 
@@ -99,7 +99,7 @@ pub(super) struct ProcessObjective<'a> {
     middle: f64,
     longest: f64,
     shortest: f64,
-    /// What it must stay near to, if to anything.
+    /// The shapes that it must stay near to, if to any.
     near: Vec<f64>,
     /// Where it stands.
     point: Vec<f64>,
@@ -206,7 +206,7 @@ impl<'a> ProcessObjective<'a> {
         !self.points.is_empty()
     }
 
-    /// Holds the dead times, and keeps the shapes within a factor of 1.5 of a point of them.
+    /// Holds the dead times, and keeps the shapes within a factor of [`NEAR`] of a point of them.
     pub(super) fn stay_near(&mut self, point: &[f64], dead_times: &[f64]) {
         self.held_dead_times = dead_times.iter().map(|seconds| Some(*seconds)).collect();
         self.near = point.to_vec();
@@ -320,7 +320,7 @@ impl<'a> ProcessObjective<'a> {
             limits.extend(known.is_none().then_some([0.0, LONGEST_DEAD_TIME * self.longest]));
         }
         for (limits, near) in limits.iter_mut().zip(&self.near) {
-            *limits = limits.map(|limit| limit.clamp(near - NEAR, near + NEAR));
+            *limits = limits.map(|limit| limit.clamp(near - NEAR.ln(), near + NEAR.ln()));
         }
         limits
     }

@@ -4,14 +4,13 @@ use super::super::decimate::{Curve, rounded};
 use super::super::figure::{COLOURS, Drawn, NEUTRAL, axis, band, chart, layout, line, significant};
 use super::super::object::{self, Object};
 use super::super::text;
+use crate::distribution::two_sided;
 use crate::figures;
 use crate::inspect::DelayEstimate;
 use crate::validate::{Independence, Residuals};
 
 const HEIGHT: usize = 320;
 const BAND: &str = "95 % band";
-/// Half the width of the band that holds 95 % of a standard normal variable.
-const NORMAL: f64 = 1.959_963_984_540_054;
 
 /// Bars, with another colour and name where they are outside of the band.
 fn bars(lags: &[f64], values: &[f64], half: &[f64]) -> Vec<Object> {
@@ -129,8 +128,9 @@ pub(crate) fn impulse_response(delay: &DelayEstimate) -> Option<Drawn> {
         return None;
     }
     let lags: Vec<f64> = (0..values.len()).map(|lag| lag as f64).collect();
+    let half = two_sided(0.05);
     let edge = |sign: f64| -> Vec<f64> {
-        let of = |(value, error): (&f64, &f64)| value + sign * NORMAL * error;
+        let of = |(value, error): (&f64, &f64)| value + sign * half * error;
         values.iter().zip(&delay.impulse_response_errors).map(of).collect()
     };
     let curve = Curve { x: lags.clone(), y: rounded(values) };

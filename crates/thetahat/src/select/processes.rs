@@ -15,12 +15,15 @@ use rayon::prelude::*;
 use super::candidates::total;
 use super::folds::Folds;
 use super::held_out::{BLOCKS, cut, deviation, mean_square};
-use super::winners::{GATE, NOTHING, both};
+use super::winners::{GATE, both, logarithm};
 use super::{HeldOut, ProcessCandidate, SelectedModel, Selection, Task};
 use crate::Error;
-use crate::estimate::{Background, FreeRun, InformationCriterion, least_free_run, least_free_run_from};
+use crate::estimate::{
+    Background, FreeRun, InformationCriterion, Method, estimate_monitored, least_free_run,
+    least_free_run_from,
+};
 use crate::figures::fixed;
-use crate::model::{ProcessModel, ProcessStructure};
+use crate::model::{Orders, ProcessModel, ProcessStructure};
 use crate::optimize::Search;
 use crate::regression::sum;
 use crate::respond::Horizon;
@@ -56,15 +59,15 @@ fn changes(values: impl Iterator<Item = f64>) -> impl Iterator<Item = usize> {
         .map(|(place, _)| place)
 }
 
-/// A log in whose rows processes are compared.
-struct StepTest<'a> {
+/// The rows in which processes are compared.
+struct Excerpt<'a> {
     held: Cow<'a, [HeldLog]>,
     output: Cow<'a, [f64]>,
     /// Which block a row is of.
     block: Vec<Option<usize>>,
 }
 
-impl<'a> StepTest<'a> {
+impl<'a> Excerpt<'a> {
     /// All rows, or about [`SEEN`] of them.
     fn new(held: &'a [HeldLog], output: &'a [f64], folds: &Folds<'_, '_>) -> Self {
         let mut block = vec![None; output.len()];
@@ -112,14 +115,14 @@ impl<'a> StepTest<'a> {
         kept.map(|(value, block)| if *block == Some(left_out) { f64::NAN } else { *value }).collect()
     }
 
-    /// The mean of the squared errors in a block, cut off, and how many they are.
+    /// The mean of the squared errors in a block, cut off, and how many they are; none without one.
     fn mean_square(
         &self,
         structures: &[ProcessStructure],
         found: &FreeRun,
         block: usize,
         deviation: f64,
-    ) -> (f64, usize) {
+    ) -> Option<(f64, usize)> {
         let mut first = 0;
         let parts = structures.iter().map(|structure| {
             let own: Range<usize> = first..first + structure.parameters();
@@ -140,22 +143,22 @@ impl<'a> StepTest<'a> {
             .filter(|row| !self.output[*row].is_nan())
             .map(|row| cut((self.output[row], response[row]), deviation).powi(2))
             .collect();
-        (sum(own.iter().copied()) / own.len() as f64, own.len())
+        (!own.is_empty()).then(|| (sum(own.iter().copied()) / own.len() as f64, own.len()))
     }
 }
 
-/// What speaks for one structure; none where the log does not determine it, or not without a block.
+/// What speaks for one structure; none where the log does not determine it, or it is another that competes too.
 fn candidate(
     task: &Task<'_>,
-    test: &StepTest<'_>,
+    excerpt: &Excerpt<'_>,
     structure: ProcessStructure,
     background: Background,
     deviation: f64,
 ) -> Result<Option<ProcessCandidate>, Error> {
     let structures = vec![structure; task.inputs.len()];
     let names = ProcessModel::names(&structures, task.inputs);
-    let search = Search { starts: 0, ..task.search.clone() };
-    let seen = (&*test.held, &*test.output);
+    let search = Search { starts: 0, time_limit: task.deadline.left(), ..task.search.clone() };
+    let seen = (&*excerpt.held, &*excerpt.output);
     let whole = least_free_run(&structures, &names, seen, background, &search, task.monitor);
     let Some(whole) = unless_undetermined(whole)? else { return Ok(None) };
     // A pair with more damping is two lags, which compete as such.
@@ -166,14 +169,16 @@ fn candidate(
     let mut held_out = None;
     let (mut squares, mut samples) = (0.0, 0);
     for block in 0..BLOCKS {
-        let (start, output) = (&whole.run.parameters, test.without(block));
-        let seen = (&*test.held, &*output);
+        let (start, output) = (&whole.run.parameters, excerpt.without(block));
+        let seen = (&*excerpt.held, &*output);
         let refit = least_free_run_from(start, &structures, seen, background, &search, task.monitor);
-        let Some(found) = unless_undetermined(refit)?.flatten() else {
+        let found = unless_undetermined(refit)?.flatten();
+        let Some((mean, count)) =
+            found.and_then(|found| excerpt.mean_square(&structures, &found, block, deviation))
+        else {
             held_out = None;
             break;
         };
-        let (mean, count) = test.mean_square(&structures, &found, block, deviation);
         squares += mean * count as f64;
         samples += count;
         let blocks = squares / samples as f64;
@@ -210,12 +215,12 @@ pub(crate) fn processes(
     if deviation == 0.0 || (0..BLOCKS).any(|fold| total(&folds.test(fold)) == 0) {
         return Ok((found, None));
     }
-    let test = StepTest::new(held, output, &folds);
+    let excerpt = Excerpt::new(held, output, &folds);
     let structures = STRUCTURES.iter().filter_map(|word| word.parse().ok());
     let structures: Vec<ProcessStructure> = structures.collect();
     let candidates: Vec<Option<ProcessCandidate>> = structures
         .into_par_iter()
-        .map(|structure| candidate(task, &test, structure, background, deviation))
+        .map(|structure| candidate(task, &excerpt, structure, background, deviation))
         .collect::<Result<_, Error>>()?;
     let mut candidates: Vec<ProcessCandidate> = candidates.into_iter().flatten().collect();
     // What a larger structure adds must be worth its parameters.
@@ -234,10 +239,8 @@ pub(crate) fn processes(
             "The inputs have few steps, so processes in continuous time compete, in free runs from rest on held-out blocks: {}.",
             others.join(", ")
         ));
-        let orders = task.with_constants(&selection.chosen.orders);
-        let own =
-            guess.as_ref().and_then(|guess| mean_square(&orders, guess, task.estimation, Horizon::FreeRun));
-        let (is_taken, why) = verdict(&selection, best, own);
+        let (is_taken, why) =
+            verdict(&selection, best, free_run(task, &selection.chosen.orders, guess.as_deref())?);
         taken = is_taken.then_some(best.structure);
         selection.steps.push(if is_taken {
             format!("Taken instead: the process {}, as {why}.", best.structure)
@@ -256,10 +259,26 @@ fn said(candidate: &ProcessCandidate) -> String {
     }
 }
 
+/// The mean square of the errors of a polynomial model's free run over all rows; none where it grows out of the range of numbers.
+///
+/// # Errors
+/// [`Error::Interrupted`].
+fn free_run(task: &Task<'_>, orders: &Orders, guess: Option<&[f64]>) -> Result<Option<f64>, Error> {
+    let orders = task.with_constants(orders);
+    let square = |parameters: &[f64]| mean_square(&orders, parameters, task.estimation, Horizon::FreeRun);
+    if let Some(guess) = guess {
+        return Ok(square(guess));
+    }
+    // Of models without C, D and F nothing was kept.
+    let method = Method::PredictionError(task.search.clone());
+    let found = estimate_monitored(task.estimation, &orders, &method, task.initial, task.monitor);
+    Ok(unless_undetermined(found)?.and_then(|found| square(found.parameters())))
+}
+
 /// Whether the best process is taken, and why; `free_run` is the mean square of the free run of the polynomial model that was chosen.
 fn verdict(selection: &Selection, best: &ProcessCandidate, free_run: Option<f64>) -> (bool, &'static str) {
     let Some(winners) = &selection.winners else {
-        return (true, "no polynomial model is stable");
+        return (false, "no polynomial model is stable: the plant may be unstable");
     };
     let chosen = &selection.chosen;
     if chosen.held_out.is_some_and(|seen| seen.unstable == seen.refits) {
@@ -267,10 +286,13 @@ fn verdict(selection: &Selection, best: &ProcessCandidate, free_run: Option<f64>
     }
     let (Some(own), Some(before)) = (best.held_out, chosen.held_out) else {
         return match free_run {
-            Some(square) if best.mse.max(NOTHING).ln() > square.max(NOTHING).ln() + GATE => {
+            Some(square) if logarithm(best.mse) > logarithm(square) + GATE => {
                 (false, "the free run of the polynomial model is closer to all rows")
             }
-            _ => (true, "the rows without a block do not determine both, and it is as close to all of them"),
+            Some(_) => {
+                (true, "the rows without a block do not determine both, and it is as close to all of them")
+            }
+            None => (true, "the free run of the polynomial model grows without bound"),
         };
     };
     let best = winners.simulation.held_out.map_or(both(&before), |seen| both(&seen).min(both(&before)));
@@ -315,7 +337,7 @@ mod tests {
         let held = held_logs(&log, &["u"], &[Rows::new(1, 6000).unwrap()]).unwrap();
         let record = Record { segments: held[0].counted.clone(), ..Record::new(&y, vec![&u]).unwrap() };
         let folds = Folds::new(&record, BLOCKS);
-        let seen = StepTest::new(&held, &y, &folds);
+        let seen = Excerpt::new(&held, &y, &folds);
         let [part] = &*seen.held else { unreachable!("one log") };
         assert_eq!((part.rows.clone(), part.times.len()), (0..2001, 2001));
         let step = part.inputs[0].iter().position(|u| *u == 1.0).unwrap();

@@ -43,5 +43,6 @@ pub use inspection::{
     ChannelQuality, Clock, DelayEstimate, Excitation, Feedback, Inspection, Saturation, SpectrumPoint,
 };
 pub use plan::InspectionPlan;
+pub(crate) use quantization::quantization;
 pub use run::{inspect, inspect_log};
 pub(crate) use whitening::autoregression;

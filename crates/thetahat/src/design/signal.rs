@@ -19,6 +19,10 @@ const USUAL_PERIOD: usize = 1 << 12;
 const FREQUENCIES: usize = 10;
 /// The lowest of these has at least so many cycles, where nobody says.
 const CYCLES: f64 = 4.0;
+/// No fewer, of which the first may be a transient.
+const LEAST_CYCLES: f64 = 2.0;
+/// Samples of the shortest period of a sine.
+const SHORTEST: usize = 3;
 
 /// What a test signal has to be.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,7 +38,7 @@ pub struct SignalPlan {
     /// period has, and of stepped sines those up to half the highest.
     pub band: Option<[f64; 2]>,
     /// How many frequencies there are, each the same factor above the one before: of multisines, where None is all lines of the
-    /// period that lie in the band, and of stepped sines, where it is 10.
+    /// period that lie in the band, and of stepped sines, where it is 10, or as many as there is room for.
     pub points: Option<usize>,
     /// How many samples.
     pub length: usize,
@@ -93,7 +97,7 @@ impl TestSignal {
     ///   frequency, with phases that make the peak low (Van der Ouderaa, Schoukens and Renneboog 1988); channels have every
     ///   m-th line each, so that they are not correlated at any lag.
     /// - `chirp`: sin of a phase whose slope rises from the lower to the upper end of the band within a period; channels are shifts.
-    /// - `sines`: each frequency for the same time, rounded to whole cycles within that; one channel after the other, the
+    /// - `sines`: each frequency for the same time, with a period rounded to whole samples; one channel after the other, the
     ///   others in the middle of the range.
     /// - `steps`: up and down with the dwell of the first channel, twice that of the second, and so on (Rademacher functions):
     ///   channels are orthogonal over a period. Without a dwell there is one step for one channel, in the middle of the length.
@@ -418,10 +422,8 @@ fn chirp(plan: &SignalPlan) -> Vec<Vec<f64>> {
     (0..plan.channels).map(shifted).collect()
 }
 
-/// Stepped sines, and their frequencies: those of the first channel, which the others have too.
-fn sines(plan: &SignalPlan) -> Result<Made, Error> {
-    let period = plan.period.unwrap_or(plan.length);
-    let points = plan.points.unwrap_or(FREQUENCIES);
+/// How many samples each of some sines has, and the period of each, which falls.
+fn cycles(plan: &SignalPlan, period: usize, points: usize) -> Result<(usize, Vec<usize>), Error> {
     let block = period / points.saturating_mul(plan.channels);
     let highest = PI / plan.sample_time;
     let one = TAU / (block as f64 * plan.sample_time);
@@ -436,23 +438,50 @@ fn sines(plan: &SignalPlan) -> Result<Made, Error> {
             ),
         ));
     }
-    if low < one * (1.0 - 1e-9) {
+    if low < LEAST_CYCLES * one * (1.0 - 1e-9) {
         return Err(Error::argument(
             "band",
             format!(
-                "each of {points} frequencies for {} channels has {block} of the {period} samples, and at {low} rad/s less than a \
-                 cycle within; begin with a higher one, ask for fewer `points`, or give more samples",
+                "each of {points} frequencies for {} channels has {block} of the {period} samples, and at {low} rad/s less than two \
+                 cycles within; begin with a higher one, ask for fewer `points`, or give more samples",
                 plan.channels
             ),
         ));
     }
-    let most = (block - 1) / 2;
-    let spaced = logarithmic_frequencies(low, high, points)?.into_iter();
-    let cycles: Vec<usize> =
-        spaced.map(|frequency| ((frequency / one).round() as usize).clamp(1, most.max(1))).collect();
-    let sine = |cycles: &usize| -> Vec<f64> {
+    let samples = |frequency: f64| TAU / (frequency * plan.sample_time);
+    // No two of one period.
+    let mut cycles: Vec<usize> = Vec::new();
+    for frequency in logarithmic_frequencies(low, high, points)? {
+        let shorter = cycles.last().map_or(block / 2, |last| last.saturating_sub(1));
+        cycles.push((samples(frequency).round() as usize).min(shorter));
+    }
+    if let Some(short) = cycles.iter().find(|cycle| **cycle < SHORTEST) {
+        return Err(Error::argument(
+            "points",
+            format!(
+                "{points} frequencies with periods of whole samples, no two of one, would go down to {short} samples; ask for fewer, or \
+                 for a lower or a wider band"
+            ),
+        ));
+    }
+    Ok((block, cycles))
+}
+
+/// Stepped sines, and their frequencies: those of the first channel, which the others have too. Each has a period of whole samples, so
+/// that it repeats itself to the bit and an analysis finds the period.
+fn sines(plan: &SignalPlan) -> Result<Made, Error> {
+    let period = plan.period.unwrap_or(plan.length);
+    let (block, cycles) = match plan.points {
+        Some(points) => cycles(plan, period, points)?,
+        // As many as there is room for.
+        None => {
+            let room = (3..=FREQUENCIES).rev().find_map(|points| cycles(plan, period, points).ok());
+            room.map_or_else(|| cycles(plan, period, 2), Ok)?
+        }
+    };
+    let sine = |cycle: &usize| -> Vec<f64> {
         // The angle modulo a cycle: later cycles have the bits of the first.
-        (0..block).map(|t| (TAU * (cycles * t % block) as f64 / block as f64).sin()).collect()
+        (0..block).map(|t| (TAU * (t % cycle) as f64 / *cycle as f64).sin()).collect()
     };
     let all: Vec<f64> = cycles.iter().flat_map(sine).collect();
     let of = |channel: usize| {
@@ -460,7 +489,7 @@ fn sines(plan: &SignalPlan) -> Result<Made, Error> {
         values[channel * all.len()..][..all.len()].copy_from_slice(&all);
         values
     };
-    let frequencies = cycles.iter().map(|cycles| *cycles as f64 * one).collect();
+    let frequencies = cycles.iter().map(|cycle| TAU / (*cycle as f64 * plan.sample_time)).collect();
     Ok(Made { hold: 1, unit: Some((0..plan.channels).map(of).collect()), frequencies })
 }
 

@@ -18,7 +18,7 @@ const CLEAR: f64 = 10.0;
 /// then improved over the whole range and verified on every value. Failing that, it is the greatest common divisor of the
 /// values in units of their last printed place. None where there are fewer than eight different values, or the step is
 /// more than an eighth or less than 2^-24 of the range. O(N).
-pub(super) fn quantization(distinct: &[f64]) -> Option<f64> {
+pub(crate) fn quantization(distinct: &[f64]) -> Option<f64> {
     let (&first, &last) = distinct.first().zip(distinct.last())?;
     let range = last - first;
     if distinct.len() < FEWEST || !range.is_finite() {

@@ -4,6 +4,8 @@ use std::ops::Range;
 
 /// An input that changes at most this many times is one of a step test.
 const FEW_CHANGES: usize = 5;
+/// And it moves in no more than this part of the rows: a step may take several, noise moves in all of them.
+const MOVES: f64 = 0.25;
 /// At rest the standard deviation of an output is no more than this part of its range, and neither is what it moves by: the
 /// difference between the means of the first and the second half.
 const STAYS: f64 = 0.05;
@@ -15,7 +17,13 @@ const FEWEST: usize = 5;
 pub(super) fn rest(inputs: &[&[f64]], output: &[f64], segments: &[Range<usize>]) -> Option<usize> {
     let first = segments.first()?;
     let changes = |input: &[f64]| segments.iter().map(|rows| changes(&input[rows.clone()])).sum::<usize>();
-    if inputs.is_empty() || inputs.iter().any(|input| changes(input) > FEW_CHANGES) {
+    let count: usize = segments.iter().map(Range::len).sum();
+    let moves = |input: &[f64]| {
+        let each = segments.iter().flat_map(|rows| input[rows.clone()].windows(2));
+        each.filter(|pair| pair[0] != pair[1]).count() as f64
+    };
+    let few = |input: &&[f64]| changes(input) <= FEW_CHANGES && moves(input) <= MOVES * count as f64;
+    if inputs.is_empty() || !inputs.iter().all(few) {
         return None;
     }
     let holds = |row: &usize| inputs.iter().all(|input| input[*row] == input[first.start]);

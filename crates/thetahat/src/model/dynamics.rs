@@ -46,6 +46,8 @@ use crate::model::PolynomialModel;
 /// Of sampled polynomials of degree 2 one in six then has a pair where the others have real roots, or the other way
 /// round, and the first order is up to 25 % too small (measured).
 const APART: f64 = 4.0;
+/// By more than this fraction no correlation of the two parts of a root exceeds 1 for rounding alone.
+const ROUNDED: f64 = 1e-6;
 /// A pole and a zero farther apart than this do not cancel, however uncertain they are.
 const NEAR: f64 = 0.1;
 /// How often an interval holds its figure.
@@ -154,7 +156,12 @@ impl Block<'_> {
         let root = |(index, &z): (usize, &Complex<f64>)| {
             let covariance = parameters.and_then(|parameters| {
                 let covariance = covariance(parameters, &self.moved(z))?;
-                let deviation = (covariance[0][0] + covariance[1][1]).sqrt();
+                let [[re, both], [_, im]] = covariance;
+                // No covariance exceeds its deviations: else all of it is rounding.
+                if both.abs() > (1.0 + ROUNDED) * (re * im).sqrt() {
+                    return None;
+                }
+                let deviation = (re + im).sqrt();
                 let simple = others(index).all(|(_, other)| (other - z).modulus() > APART * deviation);
                 simple.then_some(covariance)
             });

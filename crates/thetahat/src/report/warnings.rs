@@ -12,6 +12,9 @@ use crate::select::{Grid, OrderRange};
 const ILL_CONDITIONED: f64 = 1e6;
 /// Below this fit, in percent, a model explains little.
 const POOR: f64 = 50.0;
+/// A last tap of more than this many standard errors, and of this part of the largest, is not zero.
+const CERTAIN: f64 = 3.0;
+const SMALL: f64 = 0.02;
 
 /// What data, model and search call for.
 pub(super) fn warnings(report: &Report, model: &PolynomialModel) -> Vec<String> {
@@ -64,6 +67,7 @@ pub(super) fn warnings(report: &Report, model: &PolynomialModel) -> Vec<String> 
                 );
             }
         }
+        Procedure::Regularised(_) => warnings.extend(cut_off(model)),
         _ => {}
     }
     if let Some((pole, zero)) = near_cancellation(model) {
@@ -84,6 +88,29 @@ pub(super) fn warnings(report: &Report, model: &PolynomialModel) -> Vec<String> 
         ));
     }
     warnings
+}
+
+/// Warns of impulse responses whose last tap is not zero for certain.
+fn cut_off(model: &PolynomialModel) -> impl Iterator<Item = String> {
+    let ends = model.b.iter().zip(&model.orders.nb).scan(0, |end, (b, taps)| {
+        *end += taps;
+        Some((*end, b))
+    });
+    ends.zip(&model.inputs).filter_map(|((end, b), input)| {
+        let last = model.parameters.get(end.checked_sub(1)?)?;
+        let largest = b.iter().fold(0.0_f64, |largest, tap| largest.max(tap.abs()));
+        let size = last.value.abs();
+        (size > CERTAIN * last.standard_error? && size > SMALL * largest).then(|| {
+            format!(
+                "the response of '{}' has not died out at its last tap ({} {}, standard error {}): its gain is that of these taps alone; \
+                 give more `taps`",
+                input.name,
+                last.name,
+                number(last.value),
+                crate::figures::error(last.standard_error.unwrap_or(0.0))
+            )
+        })
+    })
 }
 
 /// What is worth a warning of a search.

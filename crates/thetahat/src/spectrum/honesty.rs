@@ -1,7 +1,7 @@
 //! Whether bands hold what they say: what smoothing hides shows when the resolution is doubled.
 
 use super::estimate::Line;
-use crate::distribution::chi_square_tail;
+use crate::distribution::{binomial_mid_p, chi_square_tail};
 
 /// Of an estimate without bias this part of the points lies outside by chance.
 const CHANCE: f64 = 0.05;
@@ -17,9 +17,11 @@ pub(super) struct Outside {
 }
 
 impl Outside {
-    /// Whether they are as few as chance makes them.
+    /// Whether they are as few as chance makes them: of few points one is soon a tenth.
     pub(super) fn is_chance(&self) -> bool {
-        self.moved.len() as f64 <= MOST * self.compared as f64
+        let count = self.moved.len();
+        count as f64 <= MOST * self.compared as f64
+            || binomial_mid_p(count, self.compared, CHANCE, 1.0) > CHANCE
     }
 }
 

@@ -18,6 +18,8 @@ const LEFT: usize = 19;
 const LEAST_LEFT: usize = 3;
 /// Columns of which less than this fraction is orthogonal to those before depend on them.
 const DEPENDENT: f64 = 1e-6;
+/// An input of which the transient's polynomials leave no more than this fraction has no power of its own.
+const LEAKED: f64 = 0.01;
 
 /// The transforms of one segment, X_k/sqrt(N) for 0 < k < N/2.
 struct Segment {
@@ -37,8 +39,8 @@ struct Segment {
 /// ```
 ///
 /// by least squares. The second polynomial is what a segment's ends leave: its transient, one for each segment. sum |V_k|^2 over its
-/// degrees of freedom is the noise, and what the polynomials miss is in it too. Near 0 and half the sampling frequency the lines are those
-/// next to the end.
+/// degrees of freedom is the noise, and what the polynomials miss is in it too. Beyond 0 and half the sampling frequency
+/// lines are the conjugates of those before.
 ///
 /// Cost: O(N log N), and O(n p^2) for each frequency, with 2 n + 1 lines and p polynomials.
 ///
@@ -111,43 +113,61 @@ pub(super) fn lpm(signals: &Signals, half_width: Option<usize>, angles: &[f64]) 
     Ok(Estimate { method: Method::Lpm { half_width: Some(half_width) }, lines, bands, words })
 }
 
+/// The lines of a segment around the nearest to an angle: those below 0 are the conjugates of those above it, and those beyond half the
+/// sampling frequency of those before. Those two themselves are left out: means are taken off, and the second is real.
+fn around(segment: &Segment, angle: f64) -> impl Iterator<Item = (isize, usize, bool)> {
+    let (length, lines) = (segment.length as isize, segment.spectra[0].len() as isize);
+    let nearest = (angle * segment.length as f64 / TAU).round() as isize;
+    let half_width = segment.half_width as isize;
+    (nearest - half_width..=nearest + half_width).filter_map(move |k| {
+        let folded = k.rem_euclid(length);
+        let turned = folded > lines;
+        let own = if turned { length - folded } else { folded };
+        (1..=lines).contains(&own).then(|| (k, own as usize - 1, turned))
+    })
+}
+
 /// The regression around one frequency. Each segment's transient is taken out of the other columns first.
 fn local(segments: &[Segment], angle: f64, width: f64, largest: &[f64]) -> Result<Found, Empty> {
     let inputs = largest.len();
     let columns = TERMS * inputs;
-    let rows: usize = segments.iter().map(|segment| 2 * segment.half_width + 1).sum();
+    let rows: usize = segments.iter().map(|segment| around(segment, angle).count()).sum();
     // The output is the last column.
     let mut matrix = DMatrix::<Complex<f64>>::zeros(rows, columns + 1);
     let mut power = DMatrix::<Complex<f64>>::zeros(inputs, inputs);
-    let mut before = 0;
+    let (mut before, mut twins) = (0, Vec::new());
     for segment in segments {
-        let own = 2 * segment.half_width + 1;
         let step = TAU / segment.length as f64;
-        let lines = segment.spectra[inputs].len();
-        let nearest = (angle / step).round() as usize;
-        // The first line is k = 1.
-        let first = nearest.saturating_sub(1 + segment.half_width).min(lines - own);
-        let x = |row: usize| ((first + row + 1) as f64 * step - angle) / width;
-        for row in 0..own {
-            let (line, x) = (first + row, x(row));
+        let own: Vec<(isize, usize, bool)> = around(segment, angle).collect();
+        let x = |row: usize| (own[row].0 as f64 * step - angle) / width;
+        for (row, (_, line, turned)) in own.iter().enumerate() {
+            let of = |channel: usize| {
+                let value: Complex<f64> = segment.spectra[channel][*line];
+                if *turned { value.conj() } else { value }
+            };
             for j in 0..inputs {
-                let u = segment.spectra[j][line];
-                (0..TERMS).for_each(|s| matrix[(before + row, TERMS * j + s)] = u * x.powi(s as i32));
-                (0..inputs).for_each(|k| power[(j, k)] += u * segment.spectra[k][line].conj());
+                let u = of(j);
+                (0..TERMS).for_each(|s| matrix[(before + row, TERMS * j + s)] = u * x(row).powi(s as i32));
+                (0..inputs).for_each(|k| power[(j, k)] += u * of(k).conj());
             }
-            matrix[(before + row, columns)] = segment.spectra[inputs][line];
+            matrix[(before + row, columns)] = of(inputs);
+            let twin = own[..row].iter().position(|(_, other, unlike)| other == line && unlike != turned);
+            twins.extend(twin.map(|twin| (before + twin, before + row)));
         }
-        let transient = DMatrix::from_fn(own, TERMS, |row, s| x(row).powi(s as i32)).qr().q();
+        let transient = DMatrix::from_fn(own.len(), TERMS, |row, s| x(row).powi(s as i32)).qr().q();
         let transient = transient.map(|value| Complex::new(value, 0.0));
-        let mut block = matrix.rows_mut(before, own);
+        let mut block = matrix.rows_mut(before, own.len());
         let along = transient.adjoint() * &block;
         block -= &transient * along;
-        before += own;
+        before += own.len();
     }
-    power.unscale_mut(rows as f64);
-    if let Some(empty) = (0..inputs).find(|&j| power[(j, j)].re <= EMPTY * largest[j]) {
+    // What a transient may be tells nothing of the input: power that leaks from other lines is as smooth.
+    let leaks = |j: usize| matrix.column(TERMS * j).norm_squared() <= LEAKED * power[(j, j)].re;
+    let empty = |j: &usize| power[(*j, *j)].re <= EMPTY * largest[*j] * rows as f64 || leaks(*j);
+    if let Some(empty) = (0..inputs).find(empty) {
         return Err(Empty::Input(empty));
     }
+    power.unscale_mut(rows as f64);
     let output = DVector::from_column_slice(matrix.column(columns).as_slice());
     let mut regressors = matrix.remove_column(columns);
     // Powers of x are of one size; those of inputs are not.
@@ -163,7 +183,7 @@ fn local(segments: &[Segment], angle: f64, width: f64, largest: &[f64]) -> Resul
     let along = q.adjoint() * &output;
     let inverse = r.solve_upper_triangular(&DMatrix::identity(columns, columns)).ok_or(Empty::Together)?;
     let solution = &inverse * &along;
-    let left = output - q * along;
+    let left = output - &q * along;
     let degrees = rows - TERMS * segments.len() - columns;
     let noise = left.norm_squared() / degrees as f64;
     let of = |j: usize| solution[TERMS * j].unscale(units[TERMS * j]);
@@ -172,16 +192,21 @@ fn local(segments: &[Segment], angle: f64, width: f64, largest: &[f64]) -> Resul
         .flat_map(|j| (0..inputs).map(move |k| (j, k)))
         .map(|(j, k)| responses[j] * power[(j, k)] * responses[k].conj())
         .sum();
+    // G = a'Y, of which conjugate lines have conjugate noise: E |dG|^2 = sum |a_k|^2 v, E dG^2 = 2 sum a_k a_-k v. The variance is that of
+    // the direction in which it is largest.
     let variance = |j: usize| {
         let row = TERMS * j;
-        0.5 * noise * inverse.row(row).norm_squared() / (units[row] * units[row])
+        let weights = inverse.row(row) * q.adjoint();
+        let both: Complex<f64> = twins.iter().map(|(one, other)| weights[*one] * weights[*other]).sum();
+        0.5 * noise * (weights.norm_squared() + 2.0 * both.norm()) / (units[row] * units[row])
     };
     let whole = explained.re + noise;
     Ok(Found {
         first: 0,
         variances: Some((0..inputs).map(variance).collect()),
         responses,
-        degrees: 2 * degrees,
+        // Conjugate lines are one.
+        degrees: 2 * degrees.saturating_sub(twins.len()).max(1),
         noise: Some(noise),
         coherence: Some(if whole > 0.0 { (explained.re / whole).clamp(0.0, 1.0) } else { 0.0 }),
     })

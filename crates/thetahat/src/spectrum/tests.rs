@@ -327,3 +327,60 @@ fn a_document_is_read_back() {
         "{error}"
     );
 }
+
+#[test]
+fn the_lowest_and_the_highest_lines_are_as_good_as_others() {
+    // A pole at 0.95: the response bends where the first lines lie, a twentieth of a radian from 0.
+    let plant = Plant { b: [0.0, 0.05], a: [-0.95, 0.0] };
+    let u = noise(3, 2000);
+    let y: Vec<f64> = plant.output(&u).iter().zip(noise(4, 2000)).map(|(y, e)| y + 0.01 * e).collect();
+    let lines = [1.0, 2.0, 5.0, 8.0, 990.0, 999.0].map(|line| line * TAU / 2000.0);
+    let at = Frequencies::At(lines.iter().map(|angle| angle / 0.5).collect());
+    let method = Method::Lpm { half_width: None };
+    let found =
+        spectrum(&log(&[("u", &u), ("y", &y)]), &[], &SpectrumPlan { frequencies: at, ..plan(method) });
+    for (point, angle) in found.unwrap().responses[0].points.iter().zip(lines) {
+        let (off, [[re, _], _]) = ((value(point) - plant.at(angle)).norm(), point.covariance.unwrap());
+        assert!(off < 4.0 * re.sqrt(), "{angle}: {off} of {}", re.sqrt());
+        assert!(off < if angle < 1.0 { 0.03 } else { 0.003 }, "{angle}: {off}");
+    }
+}
+
+#[test]
+fn power_that_leaks_is_none() {
+    // One and a third cycles of a sine: at other frequencies there is what the ends of the record leave.
+    let u: Vec<f64> = (0..400).map(|t| (TAU * 1.33 * f64::from(t) / 400.0).sin()).collect();
+    let y: Vec<f64> = SMOOTH.output(&u).iter().zip(noise(5, 400)).map(|(y, e)| y + 0.02 * e).collect();
+    let at = Frequencies::At(vec![1.0, 2.0, 5.0]);
+    let method = Method::Lpm { half_width: None };
+    let found =
+        spectrum(&log(&[("u", &u), ("y", &y)]), &[], &SpectrumPlan { frequencies: at, ..plan(method) });
+    let Err(Error::Undetermined { message, .. }) = found else { panic!("{found:?}") };
+    assert!(message.contains("the input 'u' has no power at 3 of 3 frequencies"), "{message}");
+}
+
+#[test]
+fn every_frequency_of_stepped_sines_that_were_designed_is_found() {
+    use crate::design::{SignalKind, SignalPlan, TestSignal};
+    for (points, length, band) in [(4, 4000, [0.02, 0.4]), (5, 20_000, [0.02, 0.4]), (8, 9000, [0.02, 0.5])] {
+        let design = SignalPlan {
+            points: Some(points),
+            length,
+            band: Some(band),
+            ..SignalPlan::new(SignalKind::Sines)
+        };
+        let signal = TestSignal::new(&design).unwrap();
+        let u = signal.values(length).swap_remove(0);
+        let noise = noise(6, length);
+        let y: Vec<f64> = SMOOTH.output(&u).iter().zip(&noise).map(|(y, e)| y + 0.02 * e).collect();
+        let found = spectrum(&log(&[("u", &u), ("y", &y)]), &[], &plan(SINES)).unwrap();
+        let own: Vec<f64> = found.responses[0].points.iter().map(|point| point.frequency).collect();
+        // Half a second a sample, where the design has one.
+        let expected: Vec<f64> = signal.frequencies().iter().map(|frequency| 2.0 * frequency).collect();
+        assert_eq!(own.len(), points, "{own:?} of {expected:?}");
+        assert!(
+            own.iter().zip(&expected).all(|(own, of)| (own / of - 1.0).abs() < 1e-9),
+            "{own:?} {expected:?}"
+        );
+    }
+}

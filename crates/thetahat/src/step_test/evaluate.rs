@@ -54,6 +54,8 @@ pub(super) struct Section {
     pub(super) output: Vec<f64>,
     pub(super) lowest: f64,
     pub(super) unit: f64,
+    /// What the output is a multiple of, over the unit; 0 of no step.
+    pub(super) step: f64,
 }
 
 /// A step with its response or why it has none, and what a reader should know of it.
@@ -99,7 +101,7 @@ impl Levels {
         let part = |rows: &Range<usize>| &section.output[rows.clone()];
         let mean = |rows: &Range<usize>| part(rows).iter().sum::<f64>() / rows.len() as f64;
         Self {
-            noise: Noise::of(&[part(&before), part(&regime)]),
+            noise: Noise::of(&[part(&before), part(&regime)], section.step),
             values: [mean(&before), mean(&regime)],
             before,
             regime,
@@ -181,7 +183,7 @@ fn moves(time: &[f64], values: &[f64]) -> (f64, f64) {
     let moved: f64 = weights.iter().zip(values).map(|(weight, value)| weight * value).sum();
     let left: Vec<f64> =
         time.iter().zip(values).map(|(t, value)| value - level - moved * (t - middle) / span).collect();
-    let noise = Noise::of(&[&left]);
+    let noise = Noise::of(&[&left], 0.0);
     let white = noise.deviation().powi(2) * weights.iter().map(|weight| weight * weight).sum::<f64>();
     (moved, noise.variance(&weights).max(white).sqrt())
 }

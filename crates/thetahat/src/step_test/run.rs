@@ -6,6 +6,7 @@ use super::levels::jumps;
 use super::process::fitted;
 use crate::data::{Log, Rows, Source, checked};
 use crate::figures::{error, short};
+use crate::inspect::quantization;
 use crate::model::Quantity;
 use crate::{Document, Error};
 
@@ -170,6 +171,10 @@ fn sections(log: &Log, plan: &StepTestPlan) -> Result<Vec<Section>, Error> {
         return Err(Error::data("the channels leave the range of numbers: give them in other units"));
     }
     let unit = if unit > 0.0 { unit } else { 1.0 };
+    let mut distinct: Vec<f64> = all().map(|row| output[*row]).collect();
+    distinct.sort_unstable_by(f64::total_cmp);
+    distinct.dedup();
+    let step = quantization(&distinct).unwrap_or(0.0) / unit;
     let section = |rows: Vec<usize>| Section {
         time: rows.iter().map(|row| log.elapsed(*row)).collect(),
         input: rows.iter().map(|row| input[*row]).collect(),
@@ -177,6 +182,7 @@ fn sections(log: &Log, plan: &StepTestPlan) -> Result<Vec<Section>, Error> {
         rows,
         lowest: ends.0,
         unit,
+        step,
     };
     Ok(sections.into_iter().map(section).collect())
 }

@@ -84,3 +84,23 @@ fn the_process_of_least_squares_has_the_shape_of_the_responses() {
     near(&second, "zeta", 0.3);
     near(&second, "omega", 1.0);
 }
+
+#[test]
+fn rounding_is_noise() {
+    let time = clock(400, 0.5);
+    let exact = stepped(&time, &[50.0], first_order(25.0, 5.0), || 0.0);
+    let rounded = |values: &[f64]| values.iter().map(|value| (4.0 * value).round() / 4.0).collect();
+    let log = timed(
+        &time,
+        exact.channel("u").unwrap().values.clone(),
+        rounded(&exact.channel("y").unwrap().values),
+    );
+    let found = step_test(&log, &[], &StepTestPlan::new("u", "y")).unwrap();
+    let response = found.steps[0].response.as_ref().unwrap();
+    // A quarter over the root of 12.
+    assert!((response.noise - 0.25 / 12.0_f64.sqrt()).abs() < 1e-12, "{}", response.noise);
+    let gain = &response.trusted(StepFigure::Gain).unwrap().value;
+    assert!(
+        (gain.value - 2.0).abs() < 3.0 * gain.standard_error.unwrap() && gain.standard_error.unwrap() > 0.01
+    );
+}

@@ -159,10 +159,13 @@ fn a_chirp_and_stepped_sines_have_the_frequencies_of_their_band() {
     let signal = TestSignal::new(&sines).unwrap();
     let u = &signal.values(1000)[0];
     for (block, frequency) in u.chunks(200).zip(signal.frequencies()) {
-        // Whole cycles: an order of 2, without a mean.
-        assert!((frequency * 200.0 / TAU - (frequency * 200.0 / TAU).round()).abs() < 1e-9);
-        assert!(block.iter().sum::<f64>().abs() < 1e-9);
-        assert_eq!(SignalFigures::of(block, 1.0).order, 2);
+        // Cycles of whole samples, the later ones with the bits of the first: an order of 2, without a mean.
+        let cycle = (TAU / frequency).round() as usize;
+        assert!((TAU / frequency - cycle as f64).abs() < 1e-9);
+        assert!(block.iter().zip(&block[cycle..]).all(|(first, second)| first.to_bits() == second.to_bits()));
+        let whole = &block[..cycle * (200 / cycle)];
+        assert!(whole.iter().sum::<f64>().abs() < 1e-9);
+        assert_eq!(SignalFigures::of(whole, 1.0).order, 2);
     }
     assert!(signal.frequencies()[0] >= 0.094 && signal.frequencies()[4] <= 0.52);
 }
@@ -190,7 +193,7 @@ fn what_makes_no_sense_is_refused_in_one_sentence() {
         (SignalPlan { band: Some([1.0, 0.5]), ..base("chirp") }, "band", "a higher one"),
         (SignalPlan { band: Some([0.1, 1.0]), ..base("prbs") }, "band", "has no band"),
         (SignalPlan { band: Some([0.01, 0.02]), ..base("multisine") }, "band", "0 lines lie in it"),
-        (SignalPlan { band: Some([0.01, 0.5]), ..base("sines") }, "band", "less than a cycle"),
+        (SignalPlan { band: Some([0.01, 0.5]), ..base("sines") }, "band", "less than two cycles"),
         (SignalPlan { points: Some(3), ..base("prbs") }, "points", "no number of frequencies"),
         (SignalPlan { points: Some(1), ..base("sines") }, "points", "at least 2"),
         (SignalPlan { points: Some(usize::MAX), ..base("sines") }, "points", "too few"),

@@ -10,6 +10,9 @@ fn noise_and_no_drift_is_rest() {
     assert_eq!(rest::rest(&[&u], &noisy, &whole(&u)), Some(50));
     let drifting = [(0..50).map(|row| 0.1 * f64::from(row) - 5.0).collect(), noisy[50..].to_vec()].concat();
     assert_eq!(rest::rest(&[&u], &drifting, &whole(&u)), None);
+    // Noise that begins after a rest is no step.
+    let moving = [vec![0.0; 50], normal(9, 150)].concat();
+    assert_eq!(rest::rest(&[&moving], &noisy, &whole(&moving)), None);
 }
 use crate::regression::Lagged;
 

@@ -31,7 +31,7 @@ pub(super) fn of_fit(
     if explained_by_starts > STARTS {
         words.push(format!(
             "{:.0} % of the squared errors are what is left of a state in which the log begins: it is not at rest with its first inputs; \
-             estimate the state (initial: estimate)",
+             estimate the state, with `initial` estimate",
             100.0 * explained_by_starts
         ));
     }

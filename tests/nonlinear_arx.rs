@@ -22,6 +22,40 @@ fn plant(rows: usize) -> String {
 }
 
 #[test]
+fn every_verb_takes_a_network() {
+    let folder = Folder::with_log(plant(700));
+    folder.fit("log.csv --narx tanh --units 2 --ridge 0.1 --sample-time 0.1 --estimate 1..500 --validate 501..700 --html page.html --report model.json");
+    let page = folder.read("page.html");
+    assert!(page.contains("tanh network, 2 units") && page.contains("Slices of g"));
+    let run = folder.done("validate model.json log.csv --sample-time 0.1 --rows 501..700 --require fit>=90");
+    assert!(run.stdout.contains("NARX tanh network, 2 units"), "{}", run.stdout);
+    for line in [
+        "predict model.json log.csv --sample-time 0.1 --horizon 4 --rows 501..700",
+        "simulate model.json log.csv --sample-time 0.1 --clamp",
+        "track log.csv --warm model.json --sample-time 0.1",
+    ] {
+        assert!(folder.done(line).stdout.lines().count() > 200, "{line}");
+    }
+    let auto = folder.fit("log.csv --narx auto --sample-time 0.1 --split 50/30/20");
+    let outcome = &auto["estimation"]["maps"][0];
+    assert_eq!(outcome["path"].as_array().map(Vec::len), Some(8));
+    for (options, words) in [
+        ("--narx tanh --terms 3", "units"),
+        ("--narx poly --starts 3", "--starts"),
+        ("--narx tanh --units 0", "--units"),
+        ("--narx poly --drawn", "--drawn"),
+        ("--narx auto --select mdl", "--select"),
+        ("--narx tanh --select cv", "--select"),
+        ("--narx tanh --units 400", "--units"),
+        ("--narx tanh --focus 0", "--focus"),
+    ] {
+        let run = folder.run(&format!("fit log.csv --sample-time 0.1 {options} --report none.json"));
+        assert!(run.code != 0 && run.stderr.contains(words), "{options}: {}", run.stderr);
+        assert!(run.stderr.lines().count() < 4, "{options}: {}", run.stderr);
+    }
+}
+
+#[test]
 fn every_verb_takes_the_report() {
     let folder = Folder::with_log(plant(900));
     folder.fit("log.csv --narx poly --sample-time 0.1 --split 60/20/20 --html page.html --report model.json");
@@ -110,7 +144,7 @@ fn bad_options_and_logs_are_told() {
         ("--narx spline --units 0", "--units"),
         ("--narx spline --units 100000", "--units"),
         ("--narx spline --degree 2", "--degree"),
-        ("--narx poly --units 3", "--units is for --narx spline, --narx local and --narx knn"),
+        ("--narx poly --units 3", "--units is for --narx spline, --narx local, --narx knn, --narx tanh"),
         ("--narx poly --membership gaussian", "--membership"),
         ("--na 1 --nb 1 --membership gaussian", "--narx"),
         ("--narx poly --term y(k-7)", "none of the regressors"),

@@ -259,3 +259,86 @@ fn the_coupled_drives_have_as_many_terms_as_run_best() {
         }
     }
 }
+
+/// A network of two units for the cascaded tanks, trained for the free run: the optimum that an independent program converged to, from
+/// samples that its scales had been taken from. It is found from at least five of twenty starts.
+#[test]
+fn a_trained_network_is_the_optimum_of_an_independent_program() {
+    let scaled = |log: &str| -> Option<String> {
+        let text = cut(log, ["u", "y"], &(1..=1024))?;
+        let scale = |cell: &str, offset: f64, scale: f64| {
+            (cell.parse::<f64>().expect("it is a number") - offset) / scale
+        };
+        let lines = text.lines().skip(1).map(|line| {
+            let (u, y) = line.split_once(',').expect("there are two");
+            let u = scale(u, 2.824_661_260_17, 0.936_059_559_453);
+            format!("{u:?},{:?}\n", scale(y, 5.441_981_928_96, 2.032_942_234_86))
+        });
+        Some(std::iter::once("u,y\n".to_owned()).chain(lines).collect())
+    };
+    let (Some(log), Some(fresh)) = (scaled("cascaded_tanks_est.csv"), scaled("cascaded_tanks_val.csv"))
+    else {
+        return;
+    };
+    let folder = Folder::with_log(log);
+    folder.write("fresh.csv", fresh);
+    let report = folder.fit(
+        "log.csv --narx tanh --units 2 --ny 3 --nu 3 --ridge 1.024 --starts 19 --raw-terms --detrend none --sample-time 4 --report \
+         model.json",
+    );
+    let training = &report["estimation"]["maps"][0]["training"];
+    let cost = number(training, "/cost");
+    assert!((cost / 12.638_680_485 - 1.0).abs() < 1e-6, "{cost}");
+    let starts = training["starts"].as_array().expect("there are starts");
+    let found = starts.iter().filter_map(Value::as_f64).filter(|start| start / cost - 1.0 < 1e-6).count();
+    assert!(starts.len() == 20 && found >= 5, "{starts:?}");
+    let run = |line: &str, skip: usize| -> f64 {
+        let run = folder.done(line);
+        let errors: Vec<f64> = (run.stdout.lines().skip(1 + skip))
+            .filter_map(|line| {
+                let cells: Vec<&str> = line.split(',').collect();
+                Some(cells[1].parse::<f64>().ok()? - cells[2].parse::<f64>().ok()?)
+            })
+            .collect();
+        2.032_942_234_86 * (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt()
+    };
+    let own = run("simulate model.json log.csv --sample-time 4", 0);
+    assert!((own - 0.199_580_8).abs() < 1e-5, "{own}");
+    let test = run("simulate model.json fresh.csv --sample-time 4", 50);
+    assert!((test - 0.384_180_5).abs() < 1e-4, "{test}");
+}
+
+/// Products trained for the free run, from the least errors one step ahead, and a network; of the Silverbox and of a robot arm.
+#[test]
+fn free_runs_are_trained_to_what_others_reached() {
+    let rmse = |folder: &Folder, fresh: String| -> f64 {
+        folder.write("fresh.csv", fresh);
+        let run = folder.done("validate model.json fresh.csv --sample-time 1 --format json");
+        let document: Value = serde_json::from_str(&run.stdout).expect("it is JSON");
+        let fits = document["fit"].as_array().expect("there are fits");
+        number(fits.iter().rfind(|fit| fit["horizon"]["kind"] == "free-run").expect("it ran"), "/rmse")
+    };
+    let [arm, _, silverbox, ..] = CASES;
+    if let Some(log) = cut(silverbox.log, silverbox.columns, &silverbox.rows) {
+        let folder = Folder::with_log(log);
+        folder.fit(&format!(
+            "log.csv --narx poly {} --terms 20 --focus simulation --sample-time 1 --report model.json",
+            silverbox.options
+        ));
+        for (rows, expected) in
+            [(105_713..=127_400, 0.2425e-3), (101..=40_575, 0.3542e-3), (101..=32_100, 0.2478e-3)]
+        {
+            let Some(fresh) = cut(silverbox.log, silverbox.columns, &rows) else { return };
+            let found = rmse(&folder, fresh);
+            assert!((found / expected - 1.0).abs() < 2e-3, "{found} {expected}");
+        }
+    }
+    let folder =
+        Folder::with_log(cut(arm.log, arm.columns, &arm.rows).expect("the log comes with the tests"));
+    folder.fit(
+        "log.csv --narx tanh --units 4 --ny 6 --nu 6 --nk 0 --ridge 0.05 --sample-time 1 --report model.json",
+    );
+    let found =
+        rmse(&folder, cut(arm.log, arm.columns, &(513..=1024)).expect("the log comes with the tests"));
+    assert!(found < 0.013, "{found}");
+}

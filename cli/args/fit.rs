@@ -141,7 +141,8 @@ pub(crate) struct ModelArguments {
     #[arg(long, value_enum, default_value = "auto", help_heading = "Model")]
     pub(crate) initial: InitialArgument,
     /// What the model is for: prediction (errors one step ahead), simulation (free runs, driven by the inputs alone), or a number
-    /// of steps ahead. auto: prediction, unless without orders another model simulates rows held out from it clearly better
+    /// of steps ahead. auto: prediction, unless without orders another model simulates rows held out from it clearly better; of networks
+    /// and rbf-free simulation where there are inputs
     #[arg(long, value_name = "auto|prediction|simulation|K", default_value = "auto", help_heading = "Model")]
     pub(crate) focus: String,
     /// Estimate the level of the output with the parameters, beside the mean that is taken off: for step tests and other logs
@@ -157,15 +158,15 @@ pub(crate) struct ModelArguments {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Nonlinear ARX")]
 pub(crate) struct NarxArguments {
-    /// Fit y(k) = g(past outputs and inputs) + e(k), with a g that is linear in its parameters; its functions are chosen one by one,
-    /// that which explains most of what is left comes next
+    /// Fit y(k) = g(past outputs and inputs) + e(k): with functions that are chosen one by one, that which explains most of what is left
+    /// comes next, or with a network or radial basis functions that are trained
     #[arg(
         long,
         value_enum,
         value_name = "MAP",
         conflicts_with_all = [
-            "model", "na", "nb", "nc", "nd", "nf", "taps", "kernel", "structure", "method", "likelihood", "initial", "focus", "constant", "trend", "path", "search",
-            "max_iterations", "tolerance", "step", "starts", "norm", "bound", "dc_gain", "noise_bound", "prefilter", "time_limit",
+            "model", "na", "nb", "nc", "nd", "nf", "taps", "kernel", "structure", "method", "likelihood", "initial", "constant", "trend", "path", "norm",
+            "bound", "dc_gain", "noise_bound", "prefilter",
         ]
     )]
     pub(crate) narx: Option<MapArgument>,
@@ -204,9 +205,14 @@ pub(crate) struct NarxArguments {
     /// How local models share the space of the regressors (local) [default: gaussian]
     #[arg(long, value_enum, value_name = "SHAPE", requires = "narx")]
     pub(crate) membership: Option<MembershipArgument>,
-    /// Bends of each regressor (spline) [default: 5], or how many local models (local) or neighbours (knn) [default: chosen]
+    /// Units of a network (tanh, logistic, relu), centres (rbf-free), local models (local) or neighbours (knn) [default: chosen]; bends of
+    /// each regressor (spline) [default: 5]; units that are drawn (step, --drawn) [default: 100]
     #[arg(long, value_name = "N", requires = "narx")]
     pub(crate) units: Option<usize>,
+    /// Draw the weights of the hidden layer of a network, and choose among its units (tanh, logistic, relu); else they are trained. Those of
+    /// step are always drawn
+    #[arg(long, requires = "narx")]
+    pub(crate) drawn: bool,
     /// Leave signals in their own units: else each is divided by its standard deviation
     #[arg(long, requires = "narx")]
     pub(crate) raw_terms: bool,
@@ -224,6 +230,19 @@ pub(crate) enum MapArgument {
     Local,
     /// The nearest samples of the fit
     Knn,
+    /// A network with one hidden layer of hyperbolic tangents
+    Tanh,
+    /// A network of logistic functions
+    Logistic,
+    /// A network of ramps, max(0, a); beside a linear path they are hinges
+    #[value(alias = "hinge")]
+    Relu,
+    /// A network of steps, whose hidden weights are drawn
+    Step,
+    /// Radial basis functions whose centres and widths are trained
+    RbfFree,
+    /// Of polynomials and networks the one with the best free run on rows held out
+    Auto,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -266,12 +285,12 @@ pub(crate) struct ChoiceArguments {
 
 /// How to search, where the model is not linear in its parameters.
 #[derive(Debug, Args)]
-#[command(next_help_heading = "Search (models with C, D or F, and in equations)")]
+#[command(next_help_heading = "Search (models with C, D or F, in equations, and trained)")]
 pub(crate) struct SearchArguments {
     /// How steps are chosen [default: lm]
     #[arg(long, value_enum, value_name = "HOW")]
     pub(crate) search: Option<SearchArgument>,
-    /// Iterations at most, from each start [default: 100]
+    /// Iterations at most, from each start [default: 100, with --narx 200]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(crate) max_iterations: Option<u32>,
     /// Stop where the next step would lower the cost by less than this fraction [default: 1e-8]
@@ -280,7 +299,7 @@ pub(crate) struct SearchArguments {
     /// Step length of the gradient search: C1, or C1/(C2 + l) in iteration l [default: 1]
     #[arg(long, value_name = "C1[,C2]", allow_hyphen_values = true)]
     pub(crate) step: Option<String>,
-    /// Search from this many further starts [default: 0]
+    /// Search from this many further starts [default: 0, with --narx 4]
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(..=10_000))]
     pub(crate) starts: Option<u32>,
     /// Which random starts, or which random centres [default: 0]

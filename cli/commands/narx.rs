@@ -1,9 +1,9 @@
 //! `thetahat fit --narx`: a nonlinear ARX model.
 
-use thetahat::report::fit_nonlinear_arx;
+use thetahat::report::fit_nonlinear_arx_monitored;
 
 use super::experiments::{Wanted, read};
-use super::search::Identified;
+use super::search::{Identified, watched};
 use crate::failure::Failure;
 use crate::job::NarxJob;
 use crate::log;
@@ -16,7 +16,10 @@ pub(super) fn found(job: &NarxJob) -> Result<Identified, Failure> {
     let found = read(&job.paths, &job.log, &wanted, false, |_| Ok(()))?;
     found.words.iter().for_each(|word| warn(word));
     let plan = job.plan(found.channels.inputs, found.channels.outputs)?;
-    let report =
-        fit_nonlinear_arx(&found.log, &found.sources, &plan).map_err(log::failure(&found.sources))?;
-    Ok(Identified { report, log: Some(found.log), sources: found.sources })
+    let report = watched(|monitor| fit_nonlinear_arx_monitored(&found.log, &found.sources, &plan, monitor))?;
+    Ok(Identified {
+        report: report.map_err(log::failure(&found.sources))?,
+        log: Some(found.log),
+        sources: found.sources,
+    })
 }

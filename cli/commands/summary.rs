@@ -163,6 +163,7 @@ fn estimation(text: &mut Text, estimation: &Estimation, model: &PolynomialModel)
         | Procedure::ForwardRegression(_)
         | Procedure::Splits(_)
         | Procedure::Neighbours(_)
+        | Procedure::Training(_)
         | Procedure::FreeRun(_)
         | Procedure::FrequencyResponse(_) => {}
         Procedure::PredictionError(search) => {

@@ -1,11 +1,14 @@
 use std::path::{Path, PathBuf};
 
-use thetahat::model::Membership;
+use thetahat::model::{Activation, Membership};
+use thetahat::optimize::Search;
 use thetahat::report::{Centres, InputLags, MapPlan, NonlinearArxPlan};
+use thetahat::respond::Horizon;
+use thetahat::select::Focus;
 
 use super::fit::named_values;
-use super::{LogJob, parsed, rows};
-use crate::args::{FitArguments, MapArgument, MembershipArgument, Names, NarxArguments};
+use super::{LogJob, parsed, rows, search};
+use crate::args::{FitArguments, MapArgument, MembershipArgument, Names, NarxArguments, SearchArguments};
 use crate::failure::Failure;
 use crate::memory::PerValue;
 
@@ -48,7 +51,9 @@ impl NarxJob {
             terms: own.terms,
             most: own.most_terms,
             select: arguments.choice.select,
-            ridge: arguments.criterion.ridge.unwrap_or(0.0),
+            ridge: arguments.criterion.ridge,
+            focus: focus(&arguments.model.focus)?,
+            search: searched(&arguments.search, map, own, default.search.clone())?,
             raw_terms: own.raw_terms,
             ..default
         };
@@ -121,6 +126,7 @@ pub(crate) fn check_linear(arguments: &NarxArguments) -> Result<(), Failure> {
         ("--no-linear", arguments.no_linear),
         ("--membership", arguments.membership.is_some()),
         ("--units", arguments.units.is_some()),
+        ("--drawn", arguments.drawn),
         ("--raw-terms", arguments.raw_terms),
     ];
     match given.iter().find(|(_, given)| *given) {
@@ -132,17 +138,18 @@ pub(crate) fn check_linear(arguments: &NarxArguments) -> Result<(), Failure> {
 }
 
 fn map_plan(arguments: &NarxArguments, map: MapArgument, seed: Option<u64>) -> Result<MapPlan, Failure> {
-    use MapArgument::{Knn, Local, Poly, Rbf, Spline};
-    let own: [(&str, bool, &[MapArgument]); 9] = [
+    use MapArgument::{Auto, Knn, Local, Logistic, Poly, Rbf, RbfFree, Relu, Spline, Step, Tanh};
+    let own: [(&str, bool, &[MapArgument]); 10] = [
         ("--degree", arguments.degree.is_some(), &[Poly]),
         ("--centres", arguments.centres.is_some(), &[Rbf]),
         ("--width", arguments.width.is_some(), &[Rbf]),
         ("--no-linear", arguments.no_linear, &[Rbf, Local, Knn]),
         ("--membership", arguments.membership.is_some(), &[Local]),
-        ("--terms", arguments.terms.is_some(), &[Poly, Rbf, Spline]),
+        ("--terms", arguments.terms.is_some(), &[Poly, Rbf, Spline, Tanh, Logistic, Relu, Step]),
         ("--term", !arguments.term.is_empty(), &[Poly]),
-        ("--seed", seed.is_some(), &[Rbf]),
-        ("--units", arguments.units.is_some(), &[Spline, Local, Knn]),
+        ("--seed", seed.is_some(), &[Rbf, Tanh, Logistic, Relu, Step, RbfFree, Auto]),
+        ("--units", arguments.units.is_some(), &[Spline, Local, Knn, Tanh, Logistic, Relu, Step, RbfFree]),
+        ("--drawn", arguments.drawn, &[Tanh, Logistic, Relu]),
     ];
     if let Some((option, _, maps)) = own.iter().find(|(_, given, maps)| *given && !maps.contains(&map)) {
         let names: Vec<String> = maps.iter().map(|map| format!("--narx {}", map.word())).collect();
@@ -176,7 +183,47 @@ fn map_plan(arguments: &NarxArguments, map: MapArgument, seed: Option<u64>) -> R
             Ok(MapPlan::Local { membership, planes: !arguments.no_linear, units: arguments.units })
         }
         Knn => Ok(MapPlan::Neighbours { planes: !arguments.no_linear, units: arguments.units }),
+        Tanh => Ok(network(Activation::Tanh, arguments)),
+        Logistic => Ok(network(Activation::Logistic, arguments)),
+        Relu => Ok(network(Activation::Relu, arguments)),
+        Step => Ok(MapPlan::Network { activation: Activation::Step, units: arguments.units, drawn: true }),
+        RbfFree => Ok(MapPlan::FreeRadial { units: arguments.units }),
+        Auto => Ok(MapPlan::Auto),
     }
+}
+
+fn network(activation: Activation, arguments: &NarxArguments) -> MapPlan {
+    MapPlan::Network { activation, units: arguments.units, drawn: arguments.drawn }
+}
+
+/// How far ahead errors are made small, if that is said.
+fn focus(text: &str) -> Result<Option<Horizon>, Failure> {
+    Ok(match parsed::<Focus>("--focus", text)? {
+        Focus::Auto => None,
+        focus => Some(focus.horizon()),
+    })
+}
+
+/// How to search, where a map is trained, or its parameters for longer runs.
+fn searched(
+    arguments: &SearchArguments,
+    map: MapArgument,
+    own: &NarxArguments,
+    default: Search,
+) -> Result<Search, Failure> {
+    use MapArgument::{Auto, Logistic, RbfFree, Relu, Tanh};
+    let trained = matches!(map, Tanh | Logistic | Relu | RbfFree | Auto) && !own.drawn;
+    if arguments.starts.is_some() && !trained {
+        return Err(Failure::usage(
+            "--starts is for maps that are trained: --narx tanh, logistic, relu, rbf-free and auto",
+        ));
+    }
+    let found = search::seeded(arguments)?;
+    Ok(Search {
+        starts: arguments.starts.map_or(default.starts, |_| found.starts),
+        max_iterations: arguments.max_iterations.map_or(default.max_iterations, |_| found.max_iterations),
+        ..found
+    })
 }
 
 fn centres(text: &str, seed: u64) -> Result<Centres, Failure> {

@@ -25,10 +25,18 @@ pub(super) fn given(arguments: &SearchArguments) -> Option<&'static str> {
 /// # Errors
 /// A usage failure for numbers that make no sense.
 pub(super) fn search(arguments: &SearchArguments) -> Result<Search, Failure> {
-    let default = Search::default();
     if arguments.seed.is_some() && arguments.starts.is_none() {
         return Err(Failure::usage("--starts is needed with --seed, which says where they are"));
     }
+    seeded(arguments)
+}
+
+/// The same where a seed may stand alone: there are random starts without being asked for.
+///
+/// # Errors
+/// As for [`search`].
+pub(super) fn seeded(arguments: &SearchArguments) -> Result<Search, Failure> {
+    let default = Search::default();
     let algorithm = match arguments.search {
         None | Some(SearchArgument::Lm) => Algorithm::LevenbergMarquardt,
         Some(SearchArgument::GaussNewton) => Algorithm::GaussNewton,

@@ -82,7 +82,9 @@ pub(crate) fn fit_narx(py: Python<'_>, log: &Bound<'_, Log>, options: Vec<OsStri
     let plan = thetahat_cli::narx_plan(&options, log.inputs.clone(), log.outputs.clone())
         .map_err(|failure| error::program(py, &failure))?;
     let (channels, sources) = (Arc::clone(&log.log), log.sources.clone());
-    let report = interruptible(py, move |_| thetahat::report::fit_nonlinear_arx(&channels, &sources, &plan))?;
+    let report = interruptible(py, move |monitor| {
+        thetahat::report::fit_nonlinear_arx_monitored(&channels, &sources, &plan, monitor)
+    })?;
     Ok(Model::of(report))
 }
 

@@ -239,3 +239,53 @@ def test_runs_are_kept_within_the_range_on_request() -> None:
         model.simulate(th.Log(np.zeros(300), far, sample_time=1), clamp=True)
     with pytest.raises(ValueError, match="nonlinear ARX"):
         th.arx(data, na=1, nb=1).simulate(u, clamp=True)
+
+
+def saturating(rows: int = 700) -> th.Log:
+    """A plant whose drive saturates."""
+    random = np.random.default_rng(5)
+    u = np.repeat(random.normal(size=rows // 7 + 1), 7)[:rows]
+    y = np.zeros(rows)
+    for k in range(1, rows):
+        y[k] = 0.8 * y[k - 1] + 0.4 * np.tanh(1.5 * u[k - 1] - 0.5 * y[k - 1]) + 0.01 * random.normal()
+    return th.Log(y, u, sample_time=0.1)
+
+
+def free_run(model: th.Model, data: th.Log) -> float:
+    """The fit of the free run, in percent."""
+    fits = model.validate(data).document["fit"]
+    percent = next(fit["percent"] for fit in fits if fit["horizon"]["kind"] == "free-run")
+    assert isinstance(percent, float)
+    return percent
+
+
+@pytest.mark.parametrize("map", ["tanh", "logistic", "relu", "rbf-free"])
+def test_trained_maps_run_better_than_a_line(map: str) -> None:
+    data = saturating()
+    line = free_run(th.narx(data[:500], degree=1, terms=4), data[500:])
+    model = th.narx(data[:500], map, units=3, ridge=0.01, starts=2)
+    assert free_run(model, data[500:]) > line + 3
+    again = pickle.loads(pickle.dumps(model))
+    assert np.array_equal(again.simulate(data).simulated, model.simulate(data).simulated, equal_nan=True)
+
+
+def test_auto_says_what_came_second() -> None:
+    model = th.narx(saturating(), "auto", split=(50, 30, 20))
+    path = model.report.document["estimation"]["maps"][0]["path"]
+    assert len(path) == 8 and all("held_out" in step for step in path)
+    assert "tanh" in model.name
+
+
+def test_training_options_are_checked() -> None:
+    data = saturating(200)
+    cases: list[tuple[dict[str, Any], str]] = [
+        ({"map": "tanh", "terms": 3}, "units"),
+        ({"map": "poly", "starts": 3}, "starts"),
+        ({"map": "tanh", "focus": 0}, "focus"),
+        ({"map": "poly", "drawn": True}, "drawn"),
+        ({"map": "tanh", "search": "fast"}, "search"),
+        ({"map": "tanh", "time_limit": -1.0}, "time_limit"),
+    ]
+    for options, words in cases:
+        with pytest.raises(ValueError, match=words):
+            th.narx(data, **options)

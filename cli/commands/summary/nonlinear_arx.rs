@@ -1,13 +1,13 @@
 //! What a fit of a nonlinear ARX model found, as a table for people.
 
-use thetahat::estimate::{Procedure, RunFigures, TermStep, TermsOutcome};
+use thetahat::estimate::{Procedure, RunFigures, TermStep, TermsOutcome, TrainingOutcome};
 use thetahat::figures::{error, number, scientific, short};
 use thetahat::model::{NonlinearArxModel, Parameter};
 use thetahat::report::Report;
 use thetahat::text::harmless;
 
 use super::text::{Table, Text, columns, or_dash};
-use super::{NO_ERROR, criteria, fits, signal};
+use super::{NO_ERROR, counted, criteria, fits, signal, stopped, word};
 
 /// Why a step of a choice has no figure.
 const NO_RUN: &str = "functions that are always there are still to come, or the run grows without bound";
@@ -33,9 +33,13 @@ pub(super) fn table(report: &Report, model: &NonlinearArxModel, width: usize) ->
             Procedure::ForwardRegression(_) => functions(outcome, own, &of),
             // Parameters of boxes are many, and samples more: both are in the report.
             Procedure::Neighbours(_) => path(outcome, "a free run over the kept samples would read them"),
+            Procedure::Training(_) => path(outcome, "no start leads to a run that keeps within bounds"),
             _ => path(outcome, NO_RUN),
         });
         text.line(&format!("{}{}", harmless(&of), choice(&estimation.procedure, outcome)));
+        if let Some(training) = &outcome.training {
+            text.line(&trained(training));
+        }
     }
     let noise: Vec<String> =
         model.noise_covariance.iter().enumerate().map(|(place, row)| number(row[place])).collect();
@@ -112,6 +116,22 @@ fn scales(model: &NonlinearArxModel) -> String {
     format!("; less their offsets, divided: {}", each.join(", "))
 }
 
+/// How a search for all numbers went.
+fn trained(training: &TrainingOutcome) -> String {
+    let starts: Vec<String> =
+        training.starts.iter().map(|cost| or_dash(*cost, |cost| short(cost)).to_string()).collect();
+    let of =
+        if starts.len() > 1 { format!("; costs of the starts {}", starts.join(", ")) } else { String::new() };
+    format!(
+        "errors of the {} made small: {} ({}), {}, cost {}{of}",
+        training.horizon,
+        counted(training.iterations),
+        word(training.algorithm),
+        stopped(training.stopped),
+        number(training.cost)
+    )
+}
+
 /// How the functions were chosen.
 fn choice(procedure: &Procedure, outcome: &TermsOutcome) -> String {
     let how = match outcome.selected_by.as_str() {
@@ -130,6 +150,20 @@ fn choice(procedure: &Procedure, outcome: &TermsOutcome) -> String {
             format!(
                 "{asked} of {} samples, {how}; RMSE: on five blocks, each by the samples of the others",
                 outcome.candidates
+            )
+        }
+        Procedure::Training(_) => {
+            let best = match outcome.selected_by.as_str() {
+                "given" => "as asked for",
+                "validation" => "the one that runs best on the validation rows",
+                "last-rows" => {
+                    "the one that runs best on the last rows, which were held out; then trained on all"
+                }
+                _ => &how,
+            };
+            format!(
+                "trained: {}, {best} (of {looked_at} tried)",
+                outcome.last().map_or("", |step| &step.term)
             )
         }
         _ => format!(

@@ -2,9 +2,11 @@
 
 mod local;
 mod neighbours;
+mod network;
 
 pub use local::{Local, Membership};
 pub use neighbours::{MOST_NEIGHBOURS, MOST_SLOPES, Neighbours};
+pub use network::{Activation, Network};
 
 use crate::error::check_length;
 use crate::{Error, Real};
@@ -15,7 +17,7 @@ use crate::{Error, Real};
 /// g(z) = θ_1 f_1(z) + θ_2 f_2(z) + …
 /// ```
 ///
-/// [`Polynomial`], [`Radial`], [`Spline`], [`Local`] and [`Neighbours`] are views of numbers that may stand in flash. Any other functions can be given by this
+/// [`Polynomial`], [`Radial`], [`Spline`], [`Network`], [`Local`] and [`Neighbours`] are views of numbers that may stand in flash. Any other functions can be given by this
 /// trait; they are computed without a heap, and each is about 1 where z is, so that one prior serves all.
 pub trait Basis<T: Real> {
     /// How many functions there are.

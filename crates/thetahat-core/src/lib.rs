@@ -143,7 +143,8 @@ pub use armax::{ArmaxMethod, ArmaxOrders, RecursiveArmax};
 pub use arx::RecursiveArx;
 pub use augmented::{Augmented, ParametricObservation, ParametricTransition, WithoutParameters};
 pub use basis::{
-    Basis, Local, MOST_NEIGHBOURS, MOST_SLOPES, Membership, Neighbours, Polynomial, Radial, Spline,
+    Activation, Basis, Local, MOST_NEIGHBOURS, MOST_SLOPES, Membership, Neighbours, Network, Polynomial,
+    Radial, Spline,
 };
 pub use covariance::Covariance;
 pub use detect::{Alarm, ChangeDetector, Chart};

@@ -47,6 +47,9 @@ pub trait Real: RealField + Copy + sealed::Sealed {
 
     /// e to this power, with the same bits on every machine.
     fn exponential(self) -> Self;
+
+    /// The hyperbolic tangent, likewise.
+    fn hyperbolic_tangent(self) -> Self;
 }
 
 impl Real for f32 {
@@ -63,6 +66,10 @@ impl Real for f32 {
     fn exponential(self) -> f32 {
         libm::expf(self)
     }
+
+    fn hyperbolic_tangent(self) -> f32 {
+        libm::tanhf(self)
+    }
 }
 
 impl Real for f64 {
@@ -78,5 +85,9 @@ impl Real for f64 {
 
     fn exponential(self) -> f64 {
         libm::exp(self)
+    }
+
+    fn hyperbolic_tangent(self) -> f64 {
+        libm::tanh(self)
     }
 }

@@ -74,7 +74,7 @@ pub use equations::{EquationsOutcome, LikelihoodSearch, UnknownParameter};
 pub use exact::LikelihoodOutcome;
 pub use impulse_response::{Kernel, KernelParameters, RegularisedOutcome};
 pub use initial::Initial;
-pub use nonlinear_arx::{MapsOutcome, RunFigures, TermStep, TermsOutcome};
+pub use nonlinear_arx::{MapsOutcome, RunFigures, TermStep, TermsOutcome, TrainingOutcome};
 pub use offset::Constant;
 pub(crate) use offset::{Beside, Fitted, OutputOffset, Task, pays};
 pub use outcome::{SearchOutcome, StartOutcome};
@@ -135,6 +135,8 @@ pub enum Procedure {
     Splits(MapsOutcome),
     /// By the samples themselves.
     Neighbours(MapsOutcome),
+    /// By a search for all numbers of a map, from several starts.
+    Training(MapsOutcome),
     /// By a search for the least errors of the free run of a process in continuous time.
     FreeRun(ProcessOutcome),
     /// By a search for the least errors of the frequency response of a process.
@@ -145,9 +147,10 @@ impl Procedure {
     /// The choices of the functions of a nonlinear ARX model, one for each output; none of other models.
     pub fn terms(&self) -> &[TermsOutcome] {
         match self {
-            Self::ForwardRegression(outcome) | Self::Splits(outcome) | Self::Neighbours(outcome) => {
-                &outcome.maps
-            }
+            Self::ForwardRegression(outcome)
+            | Self::Splits(outcome)
+            | Self::Neighbours(outcome)
+            | Self::Training(outcome) => &outcome.maps,
             _ => &[],
         }
     }
@@ -446,6 +449,7 @@ impl Estimate {
             | Procedure::ForwardRegression(_)
             | Procedure::Splits(_)
             | Procedure::Neighbours(_)
+            | Procedure::Training(_)
             | Procedure::FreeRun(_)
             | Procedure::FrequencyResponse(_) => None,
             Procedure::InstrumentalVariables { .. } | Procedure::RefinedInstrumentalVariables { .. } => {

@@ -61,7 +61,9 @@ pub use html::{
     tuning_page, validation_page,
 };
 pub use identify::{PendingEvaluation, identify, identify_monitored};
-pub use nonlinear_arx::{Centres, InputLags, MapPlan, NonlinearArxPlan, fit_nonlinear_arx};
+pub use nonlinear_arx::{
+    Centres, InputLags, MapPlan, NonlinearArxPlan, fit_nonlinear_arx, fit_nonlinear_arx_monitored,
+};
 pub use plan::Plan;
 pub use process::{ProcessPlan, fit_process, fit_process_to_response};
 pub use requirement::Requirement;

@@ -35,32 +35,42 @@ def narx(
     select: str | None = None,
     ridge: float | None = None,
     raw_terms: bool | None = None,
+    drawn: bool | None = None,
+    focus: str | int | None = None,
+    search: str | None = None,
+    max_iterations: int | None = None,
+    tolerance: float | None = None,
+    step: float | tuple[float, float] | None = None,
+    starts: int | None = None,
     seed: int | None = None,
+    time_limit: float | None = None,
     estimate: Rows | None = None,
     validate: Rows | None = None,
     split: tuple[float, float, float] | None = None,
     detrend: str | None = None,
     offset: Mapping[str, float] | None = None,
 ) -> Model:
-    """Fit a nonlinear ARX model, y(k) = g(past outputs and inputs) + e(k), with a g that is linear in its parameters.
+    """Fit a nonlinear ARX model, y(k) = g(past outputs and inputs) + e(k).
 
-    Its functions are chosen one by one: that which explains most of what is left comes next.
+    The functions of g are chosen one by one, that which explains most of what is left comes next; or they are those of a network, or radial
+    basis functions, that are trained.
 
     Parameters
     ----------
     log : Log
         The data. Each of its outputs has a map of its own, of the lags of all channels.
-    map : {"poly", "rbf", "spline", "local", "knn"}
+    map : {"poly", "rbf", "spline", "local", "knn", "tanh", "logistic", "relu", "step", "rbf-free", "auto"}
         Products of the regressors, radial basis functions, a natural cubic spline of each regressor, local linear models grown by
-        splitting, or the nearest samples of the fit.
+        splitting, the nearest samples of the fit; a network with one hidden layer of these units, radial basis functions whose centres and
+        widths are trained; or of polynomials and networks the one with the best free run on rows held out.
     ny : int, or one for each output
         Past outputs that g reads: y(k-1), ..., y(k-ny).
     nu : int, or one for each input
         Values of the input that g reads, from ``nk`` on; 0 for a time series.
     nk : int, or one for each input
         Samples from input to first effect; 0 where it acts at once.
-    regressors, degree, terms, most_terms, centres, width, units, linear, membership, select, ridge, raw_terms, seed, estimate, \
-validate, split, detrend, offset
+    regressors, degree, terms, most_terms, centres, width, units, linear, membership, select, ridge, raw_terms, drawn, focus, search, \
+max_iterations, tolerance, step, starts, seed, time_limit, estimate, validate, split, detrend, offset
         Which functions, what to fit to and how, see `thetahat.NarxOptions`.
 
     Returns

@@ -192,8 +192,16 @@ class NarxOptions(TypedDict, total=False):
     width : float
         sigma of exp(-|z - centre|^2/sigma^2), z in standard deviations; so that neighbours overlap, unless it is said.
     units : int
-        Bends of each regressor, for ``"spline"``: 5. How many local models for ``"local"``, or neighbours for ``"knn"``; chosen unless
-        it is said.
+        Units of a network, for ``"tanh"``, ``"logistic"`` and ``"relu"``, centres for ``"rbf-free"``, local models for ``"local"``, or
+        neighbours for ``"knn"``; chosen unless it is said. Bends of each regressor, for ``"spline"``: 5. Units that are drawn: 100.
+    drawn : bool
+        Draw the weights of the hidden layer of a network, and choose among its units; else all weights are trained. Those of ``"step"``
+        are always drawn.
+    focus : {"auto", "prediction", "simulation"} or int
+        Of which errors parameters are made the least: one step ahead, of the free run, or so many steps from what was measured.
+        ``"auto"`` is one step ahead, and for what is trained the free run where there are inputs.
+    search, max_iterations, tolerance, step, starts, time_limit
+        How a training searches, see `FitOptions`: 200 iterations and 4 further starts unless it is said.
     linear : bool
         Whether a constant and the regressors themselves stand beside radial basis functions; whether local models, and what neighbours
         say, are planes: True.
@@ -202,7 +210,7 @@ class NarxOptions(TypedDict, total=False):
     raw_terms : bool
         Leave signals in their own units: else each is divided by its standard deviation.
     seed : int
-        Which random centres.
+        Which random centres, units and starts.
     """
 
     estimate: Rows
@@ -222,7 +230,15 @@ class NarxOptions(TypedDict, total=False):
     linear: bool
     membership: str
     raw_terms: bool
+    drawn: bool
+    focus: Union[str, int]
+    search: str
+    max_iterations: int
+    tolerance: float
+    step: Union[float, tuple[float, float]]
+    starts: int
     seed: int
+    time_limit: float
 
 
 class ValidationOptions(TypedDict, total=False):
@@ -413,7 +429,7 @@ def words(allowed: type, arguments: Mapping[str, Any], rows: int | None = None) 
             if not isinstance(value, (list, tuple)):
                 raise TypeError(f"regressors: expected a sequence of str, found {value!r}")
             found += [f"--regressor={text(name, one)}" for one in value]
-        elif name in ("decimal_comma", "trend", "raw_terms"):
+        elif name in ("decimal_comma", "trend", "raw_terms", "drawn"):
             found += [f"--{name.replace('_', '-')}"] if _flag(name, value) else []
         else:
             found += [f"--{name.replace('_', '-')}={text}" for text in _texts(name, value, rows)]

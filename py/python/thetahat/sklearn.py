@@ -353,13 +353,13 @@ class ARXRegressor(_Regressor):
 
 
 class NARXRegressor(_Regressor):
-    """A nonlinear ARX model, y(k) = g(past outputs and inputs) + e(k), with functions that forward regression chooses.
+    """A nonlinear ARX model, y(k) = g(past outputs and inputs) + e(k), with functions that forward regression chooses, or that are
+    trained.
 
     Parameters
     ----------
-    map : {"poly", "rbf", "spline", "local", "knn"}, default="poly"
-        Products of the regressors, radial basis functions, a natural cubic spline of each regressor, local linear models grown by
-        splitting, or the nearest samples of the fit.
+    map : {"poly", "rbf", "spline", "local", "knn", "tanh", "logistic", "relu", "step", "rbf-free", "auto"}, default="poly"
+        The functions, as for `thetahat.narx`.
     ny : int, default=2
         Past outputs that g reads.
     nu : int or sequence of int, default=2
@@ -370,8 +370,8 @@ class NARXRegressor(_Regressor):
         How many samples ahead `predict` and `score` predict. None: the free run, which sees no outputs.
     sample_time : float, default=1.0
         Seconds from one sample to the next.
-    regressors, degree, terms, most_terms, centres, width, units, linear, membership, select, ridge, raw_terms, seed, estimate, \
-validate, split, detrend, offset : default=None
+    regressors, degree, terms, most_terms, centres, width, units, linear, membership, select, ridge, raw_terms, drawn, focus, search, \
+max_iterations, tolerance, step, starts, seed, time_limit, estimate, validate, split, detrend, offset : default=None
         Which functions, what to fit to and how, as for `thetahat.narx`, see `thetahat.NarxOptions`. Channels are called as the columns
         of a data frame, else u, or u1, u2, …, and y.
 
@@ -425,7 +425,15 @@ validate, split, detrend, offset : default=None
         select: str | None = None,
         ridge: float | None = None,
         raw_terms: bool | None = None,
+        drawn: bool | None = None,
+        focus: str | int | None = None,
+        search: str | None = None,
+        max_iterations: int | None = None,
+        tolerance: float | None = None,
+        step: float | tuple[float, float] | None = None,
+        starts: int | None = None,
         seed: int | None = None,
+        time_limit: float | None = None,
         estimate: Rows | None = None,
         validate: Rows | None = None,
         split: tuple[float, float, float] | None = None,
@@ -450,7 +458,15 @@ validate, split, detrend, offset : default=None
         self.select = select
         self.ridge = ridge
         self.raw_terms = raw_terms
+        self.drawn = drawn
+        self.focus = focus
+        self.search = search
+        self.max_iterations = max_iterations
+        self.tolerance = tolerance
+        self.step = step
+        self.starts = starts
         self.seed = seed
+        self.time_limit = time_limit
         self.estimate = estimate
         self.validate = validate
         self.split = split

@@ -5,7 +5,8 @@
 //!
 //! To add an estimator, implement [`Scenario`] for it in a file of this folder, name it in [`visit_all`], and
 //! give it a row in `budgets.md`. Leave out what needs ln, sin or cos: their last bit differs
-//! between the host's library and the firmware's. (The exponential of [`Radial`] and [`Local`] is the same on both.)
+//! between the host's library and the firmware's. (The exponential of [`Radial`] and [`Local`] is the same on both,
+//! and so is the hyperbolic tangent of [`Network`].)
 
 mod detect;
 mod kalman;
@@ -16,7 +17,7 @@ mod recursive;
 
 use core::fmt;
 
-use thetahat_core::{Error, Local, Neighbours, Polynomial, Radial, Spline};
+use thetahat_core::{Error, Local, Neighbours, Network, Polynomial, Radial, Spline};
 
 /// How often an estimator is stepped in each [`Case`].
 pub const STEPS: usize = 300;
@@ -74,6 +75,7 @@ pub fn visit_all(visitor: &mut impl Visitor) {
     visitor.visit::<nonlinear::Narx>();
     visitor.visit::<nonlinear::Stored<Polynomial<'static>>>();
     visitor.visit::<nonlinear::Stored<Radial<'static, f32>>>();
+    visitor.visit::<nonlinear::Stored<Network<'static, f32>>>();
     visitor.visit::<nonlinear::Stored<Spline<'static, f32>>>();
     visitor.visit::<nonlinear::Stored<Local<'static, f32>>>();
     visitor.visit::<nonlinear::Stored<Neighbours<'static, f32>>>();

@@ -2,8 +2,8 @@
 
 use thetahat_core::nalgebra::Const;
 use thetahat_core::{
-    ArxOrders, Basis, Error, Forgetting, Innovation, InputOrders, Local, Membership, Neighbours,
-    NonlinearArx, Polynomial, Radial, RecursiveNarx, Scaling, Spline,
+    Activation, ArxOrders, Basis, Error, Forgetting, Innovation, InputOrders, Local, Membership,
+    Neighbours, Network, NonlinearArx, Polynomial, Radial, RecursiveNarx, Scaling, Spline,
 };
 
 use crate::record::{Sample, sample};
@@ -119,6 +119,26 @@ impl StoredMap for Radial<'static, f32> {
             centres: &[-0.8, -0.6, -1.0, 0.7, 0.4, 1.0, -0.2, 0.1, 0.9, 1.1, 0.8, -0.7],
             inverse_squares: &[0.25, 0.5, 0.4, 0.3],
             linear: true,
+        }
+    }
+}
+
+/// Four units and a linear path, as a fit on the command line found them: `thetahat fit tests/data/public/robot_arm.csv --sample-time 1
+/// --narx tanh --units 4 --ridge 0.1 --ny 2 --nu 1 --focus prediction`.
+impl StoredMap for Network<'static, f32> {
+    const NAME: &'static str = "NonlinearArx, 4 units";
+    const THETA: &'static [f32] =
+        &[0.00817375, 1.19032, -0.779992, -0.113058, -0.313913, 0.356209, -0.31298, 0.270718];
+
+    fn map(_: Case) -> Self {
+        Network {
+            activation: Activation::Tanh,
+            regressors: 3,
+            weights: &[
+                -0.185519, 0.182955, 0.0123917, 0.171539, -0.261067, 0.0376621, -0.185279, 0.181924,
+                0.0137497, 0.211985, -0.0135819, 0.187176,
+            ],
+            biases: &[-0.00479655, -0.013676, -0.00478868, -0.0251885],
         }
     }
 }

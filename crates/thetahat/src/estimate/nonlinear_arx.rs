@@ -7,6 +7,7 @@ mod joint;
 mod local;
 mod neighbours;
 pub(crate) mod splines;
+mod training;
 
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
@@ -16,10 +17,11 @@ use thetahat_core::nalgebra::DVector;
 
 pub(crate) use candidates::Candidates;
 use candidates::Products;
-pub use figures::{MapsOutcome, RunFigures, TermStep, TermsOutcome};
+pub use figures::{MapsOutcome, RunFigures, TermStep, TermsOutcome, TrainingOutcome};
 use figures::{Sums, run};
 pub(crate) use joint::{Joint, joint};
 pub(crate) use local::Growth;
+pub(crate) use training::{Training, UNASKED, Units};
 
 use super::{Criteria, InformationCriterion};
 use crate::Error;
@@ -74,6 +76,8 @@ pub(crate) struct Chosen {
     pub(crate) map: Map,
     pub(crate) steps: Vec<TermStep>,
     pub(crate) taken: usize,
+    /// The model that was judged on held-out rows; none where there are none, and of maps that no choice compares with others.
+    pub(crate) judged: Option<NonlinearArxModel>,
 }
 
 impl Count {
@@ -163,6 +167,34 @@ impl<'l> Samples<'l> {
 
     pub(crate) fn count(&self) -> usize {
         self.rows.len()
+    }
+
+    /// The rows of the first part of the samples, and of those after it.
+    pub(crate) fn divided(&self, part: f64) -> (Vec<Rows>, Vec<Rows>) {
+        let (before, after) = self.rows.split_at((part * self.rows.len() as f64) as usize);
+        (as_rows(before), as_rows(after))
+    }
+
+    /// What runs of a model over some rows miss.
+    ///
+    /// # Errors
+    /// [`Error::Data`] for rows that are not there.
+    pub(crate) fn run_figures(&self, model: &NonlinearArxModel, rows: &[Rows]) -> Result<RunFigures, Error> {
+        RunFigures::of(model, self.log, rows)
+    }
+
+    /// The mean squared errors of a run of a model over some rows, in blocks of them; infinite where the run grows without bound.
+    ///
+    /// # Errors
+    /// [`Error::Data`] for rows that are not there.
+    pub(crate) fn block_errors(&self, model: &NonlinearArxModel, rows: &[Rows]) -> Result<Vec<f64>, Error> {
+        figures::block_errors(model, self.log, rows)
+    }
+
+    /// Whether an expression of an output is among the regressors.
+    pub(crate) fn reads_expressions_of_outputs(&self) -> bool {
+        let read = self.head.read_expressions().unwrap_or_default();
+        read.iter().any(|expression| expression.channels().contains(&0))
     }
 
     /// The model with these functions and parameters.
@@ -322,20 +354,25 @@ impl<'l> Samples<'l> {
         let path = self.path(candidates, &products, most);
         self.check(candidates, &products, &path, count)?;
         let lengths = path.chosen.len();
-        let held_out = match count {
-            Count::HeldOut(rows) => {
-                let samples = chosen_on.unwrap_or(self);
-                let own = chosen_on
-                    .map(|others| others.path(candidates, &others.products(candidates, &others.rows), most));
-                samples.on_rows(candidates, own.as_ref().unwrap_or(&path), rows, lengths)?
+        let judged_on = chosen_on.unwrap_or(self);
+        let own = match (count, chosen_on) {
+            (Count::HeldOut(_), Some(others)) => {
+                Some(others.path(candidates, &others.products(candidates, &others.rows), most))
             }
+            _ => None,
+        };
+        let judged_path = own.as_ref().unwrap_or(&path);
+        let held_out = match count {
+            Count::HeldOut(rows) => judged_on.on_rows(candidates, judged_path, rows, lengths)?,
             Count::Blocks => self.on_blocks(candidates, &blocks, lengths)?,
             Count::Given(_) | Count::Least(_) => vec![None; lengths],
         };
         let steps = self.steps(candidates, &products, &path, &held_out)?;
         let taken = count.best(&steps, always.clamp(1, lengths), products.rows());
+        let judged = (matches!(count, Count::HeldOut(_)) && taken <= judged_path.chosen.len())
+            .then(|| judged_on.on_path(candidates, judged_path, taken));
         let places = candidates.ordered(path.places(taken));
-        Ok(Chosen { map: candidates.map(&places, self.taps.len()), steps, taken })
+        Ok(Chosen { map: candidates.map(&places, self.taps.len()), steps, taken, judged })
     }
 
     /// The names of the regressors.

@@ -1,5 +1,6 @@
 //! Nonlinear ARX models: y(t) = g(phi(t)) + e(t).
 
+mod evaluator;
 mod functions;
 mod map;
 mod terms;
@@ -7,9 +8,9 @@ mod terms;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub(crate) use evaluator::Evaluator;
 pub use functions::Functions;
-pub(crate) use map::Evaluator;
-pub use map::{Map, Membership};
+pub use map::{Activation, Map, Membership};
 
 use super::equations::ChannelExpression;
 use super::orders::lag_name;
@@ -47,7 +48,9 @@ pub struct NonlinearArxModel {
     pub degrees_of_freedom: Option<usize>,
     /// theta, one for each function of each map, in the order of `covariance`.
     pub parameters: Vec<Parameter>,
-    /// The covariance matrix of the parameters, row by row; none where no theory gives one.
+    /// The covariance matrix of the parameters, row by row; none where no theory gives one. Of one map that was trained, rows of the numbers
+    /// of its functions come after them: alpha and 1/sigma of each radial basis function, or w and b of each unit. It is approximate then:
+    /// that of Gauss and Newton with white errors.
     pub covariance: Option<Vec<Vec<f64>>>,
 }
 
@@ -315,7 +318,9 @@ impl NonlinearArxModel {
         if !square(&self.noise_covariance, outputs) || !is_covariance(&self.noise_covariance) {
             return wrong("noise_covariance does not have a row and a column for each output".to_owned());
         }
-        if self.covariance.as_ref().is_some_and(|rows| !square(rows, count) || !is_covariance(rows)) {
+        let shape = if let [map] = &*self.maps { map.functions.shape().len() } else { 0 };
+        let fits = |rows: &Vec<Vec<f64>>| square(rows, count) || square(rows, count + shape);
+        if self.covariance.as_ref().is_some_and(|rows| !fits(rows) || !is_covariance(rows)) {
             return wrong("covariance does not have a row and a column for each parameter".to_owned());
         }
         Ok(())

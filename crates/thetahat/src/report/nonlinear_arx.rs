@@ -1,5 +1,6 @@
 //! Fits of nonlinear ARX models.
 
+mod map;
 mod plan;
 
 use std::borrow::Cow;
@@ -10,41 +11,40 @@ use super::schema::{Estimation, Report};
 use super::shares::Shares;
 use crate::data::{Channel, Log, Offset, Rows, Source};
 use crate::estimate::{
-    Criteria, MapsOutcome, Procedure, TermsOutcome,
-    nonlinear_arx::{Candidates, Chosen, Count, Growth, Joint, Samples, Solved, centres, joint, splines},
+    Criteria, MapsOutcome, Procedure,
+    nonlinear_arx::{Joint, UNASKED, joint},
 };
 use crate::model::{ChannelExpression, Map, Model, NonlinearArxModel, OutputMap, Regressor, Signal};
-use crate::regression::Monomials;
+use crate::optimize::Monitor;
 use crate::respond::{
     Horizon,
     nonlinear_arx::{NonlinearArxOnLog, no_number},
 };
-use crate::select::{Focus, Select};
+use crate::select::Focus;
 use crate::validate::Part;
 use crate::{Document, Error};
 
+use self::map::fit_map;
 pub use plan::{Centres, InputLags, MapPlan, NonlinearArxPlan};
 
 /// Below this fraction of a channel's size, what an offset leaves is rounding.
 const ROUNDING: f64 = 1e-13;
-/// Samples that radial basis functions may stand at.
-const CANDIDATES: usize = 1000;
-/// Radial basis functions, or bends, at most.
-const MOST_CENTRES: usize = 2000;
 
-/// Fits a nonlinear ARX model that is linear in its parameters,
+/// Fits a nonlinear ARX model,
 ///
 /// ```text
 /// y(t) = sum_j theta_j f_j(z(t)) + e(t)
 /// ```
 ///
-/// where z are lags of the output and of the inputs, each less its offset and divided by its scale, and f_j are functions of the plan's map
-/// that forward regression chooses: the one that explains most of what is left comes next (Chen, Billings and Luo, Int. J. Control 50,
+/// where z are lags of the output and of the inputs, each less its offset and divided by its scale, and f_j are functions of the plan's map.
+/// Of functions that are known forward regression chooses: the one that explains most of what is left comes next (Chen, Billings and Luo, Int. J. Control 50,
 /// 1989). Products are chosen from moments, without a matrix of all of them, and the parameters come from a QR of the chosen ones; their
 /// covariance is that of a linear regression with white noise. How many are taken is what the free run says of rows that they were not
-/// fitted to, an information criterion, or given.
+/// fitted to, an information criterion, or given. Functions with numbers of their own, such as the weights of a network, are trained: a
+/// search from several starts for the least errors of free runs, or of shorter ones.
 ///
-/// Cost: O(N C(n + 2 d, 2 d)) for products of degree d of n regressors, and O(M K^2) for K of M functions.
+/// Cost: O(N C(n + 2 d, 2 d)) for products of degree d of n regressors, and O(M K^2) for K of M functions; of a training
+/// O(N (p^2 + na p)) for each iteration on p numbers.
 ///
 /// # Errors
 /// [`Error::Argument`] for a plan that makes no sense or rows that are not there; [`Error::Data`] for channels that are not there, an
@@ -78,6 +78,19 @@ const MOST_CENTRES: usize = 2000;
 /// # Ok::<(), thetahat::Error>(())
 /// ```
 pub fn fit_nonlinear_arx(log: &Log, sources: &[Source], plan: &NonlinearArxPlan) -> Result<Report, Error> {
+    fit_nonlinear_arx_monitored(log, sources, plan, UNASKED)
+}
+
+/// [`fit_nonlinear_arx`] that tells `monitor` of each iteration of a training, from several threads. The monitor may end it.
+///
+/// # Errors
+/// As for [`fit_nonlinear_arx`]; [`Error::Interrupted`] if the monitor says so.
+pub fn fit_nonlinear_arx_monitored(
+    log: &Log,
+    sources: &[Source],
+    plan: &NonlinearArxPlan,
+    monitor: Monitor<'_>,
+) -> Result<Report, Error> {
     plan.check()?;
     let names: Vec<&str> = plan.inputs.iter().chain(&plan.outputs).map(String::as_str).collect();
     names.iter().try_for_each(|name| log.channel(name).map(|_| ()))?;
@@ -86,11 +99,12 @@ pub fn fit_nonlinear_arx(log: &Log, sources: &[Source], plan: &NonlinearArxPlan)
     let Prepared { whole, signals, deviations } = prepare(log, plan, &expressions, &shares.estimation)?;
     let head = head(&whole, plan, &signals, &deviations, &expressions, &shares.estimation)?;
     let fitted = (0..plan.outputs.len())
-        .map(|output| fit_map(plan, &head.of_output(output)?, &deviations, &shares))
+        .map(|output| fit_map(plan, &head.of_output(output)?, &deviations, &shares, monitor))
         .collect::<Result<Vec<_>, Error>>()?;
     let by = match plan.map {
         MapPlan::Local { .. } => Procedure::Splits,
         MapPlan::Neighbours { .. } => Procedure::Neighbours,
+        _ if plan.trains() => Procedure::Training,
         _ => Procedure::ForwardRegression,
     };
     // Samples are no parameters: as many as there are of them for each that is asked stand for one.
@@ -135,143 +149,6 @@ pub fn fit_nonlinear_arx(log: &Log, sources: &[Source], plan: &NonlinearArxPlan)
     }
     report.warnings.extend(warnings(&report, &model));
     Ok(report)
-}
-
-/// The map of an output, and how it was found.
-struct FittedMap<'l> {
-    samples: Samples<'l>,
-    solved: Solved,
-    outcome: TermsOutcome,
-}
-
-/// Fits the map of the output of `head`, to which the other outputs are inputs.
-fn fit_map<'l>(
-    plan: &NonlinearArxPlan,
-    head: &NonlinearArxModel,
-    deviations: &'l Log,
-    Shares { estimation, validation, parts }: &Shares,
-) -> Result<FittedMap<'l>, Error> {
-    let read: Vec<String> =
-        head.inputs.iter().chain(&head.expressions).map(|signal| signal.name.clone()).collect();
-    let samples = |rows: &[Rows]| -> Result<Samples<'l>, Error> {
-        let record = deviations.record(&read, &head.outputs[0].name, rows)?;
-        let segments: Vec<_> = record.segments.into_iter().zip(record.past).collect();
-        Samples::new(deviations, head.clone(), &segments, plan.ridge)
-    };
-    let compared_on = parts.as_ref().map_or_else(|| validation.clone(), |parts| parts.validation.clone());
-    if plan.select == Some(Select::Validation) && compared_on.is_empty() {
-        return Err(Error::argument("select", "validation needs rows for it; give `validate` or `split`"));
-    }
-    let all = samples(estimation)?;
-    let select = plan.select.unwrap_or(if compared_on.is_empty() { Select::Cv } else { Select::Validation });
-    let given = match plan.map {
-        MapPlan::Local { units, .. } | MapPlan::Neighbours { units, .. } => units,
-        MapPlan::Products { ref terms } => Some(terms.len()),
-        _ => plan.terms,
-    };
-    let (count, selected_by) = match (given, select) {
-        (Some(count), _) => (Count::Given(count), "given".to_owned()),
-        (None, Select::Criterion(criterion)) => (Count::Least(criterion), criterion.word().to_owned()),
-        (None, Select::Validation) => (Count::HeldOut(compared_on), "validation".to_owned()),
-        (None, Select::Cv) => (Count::Blocks, "cv".to_owned()),
-    };
-    // With a split the choice looks at models of the first part, and the chosen one is fitted to both.
-    let first_part = match (parts, &count) {
-        (Some(parts), Count::HeldOut(_)) => Some(samples(&parts.estimation)?),
-        _ => None,
-    };
-    let (chosen_on, most) = (first_part.as_ref(), plan.steps());
-    let (functions, Chosen { steps, taken, .. }, solved) = match plan.map {
-        MapPlan::Local { membership, planes, .. } => {
-            let chosen = all.grow(Growth { membership, planes, most }, &count, chosen_on)?;
-            let solved = all.solve(chosen.map.clone())?;
-            (chosen.steps.len(), chosen, solved)
-        }
-        MapPlan::Neighbours { planes, .. } => {
-            let (chosen, solved) = all.keep(planes, &count, chosen_on)?;
-            (solved.model.parameters.len(), chosen, solved)
-        }
-        _ => {
-            let candidates = candidates(&plan.map, &all)?;
-            let chosen = all.choose(&candidates, most, &count, chosen_on)?;
-            let solved = all.solve(chosen.map.clone())?;
-            (candidates.count(all.regressors()), chosen, solved)
-        }
-    };
-    let ridge = Some(plan.ridge).filter(|ridge| *ridge > 0.0);
-    let outcome = TermsOutcome { candidates: functions, selected_by, ridge, taken, path: steps };
-    Ok(FittedMap { samples: all, solved, outcome })
-}
-
-/// The functions to choose from.
-fn candidates(map: &MapPlan, samples: &Samples<'_>) -> Result<Candidates, Error> {
-    let (centres, width, linear) = match map {
-        MapPlan::Polynomial { degree } => {
-            return Ok(Candidates::Products(Monomials::new(samples.regressors(), *degree)?));
-        }
-        MapPlan::Products { terms } => {
-            let map = Map::products(terms, &samples.names())?;
-            return Ok(Candidates::Functions { map, always: terms.len() });
-        }
-        MapPlan::Spline { units } => {
-            let (regressors, most) = (samples.regressors(), MOST_CENTRES / samples.regressors().max(1));
-            if *units == 0 || *units > most {
-                return Err(Error::argument(
-                    "units",
-                    format!("{units} bends for each of {regressors} regressors; give from 1 to {most}"),
-                ));
-            }
-            let map = splines::map(&samples.ranges(), *units);
-            return Ok(Candidates::Functions { map, always: regressors + 1 });
-        }
-        MapPlan::Radial { centres, width, linear } => (*centres, *width, *linear),
-        // They are not chosen among functions.
-        MapPlan::Local { .. } | MapPlan::Neighbours { .. } => {
-            return Err(Error::argument("map", "it has no functions to choose from"));
-        }
-    };
-    if let Some(width) = width.filter(|width| !(*width > 0.0 && (width * width).is_normal())) {
-        return Err(Error::argument(
-            "width",
-            format!("{width:?} is not a positive number that can be squared; about 1 is usual"),
-        ));
-    }
-    let points = samples.points();
-    let (many, wanted) = match centres {
-        Centres::Chosen => (CANDIDATES, CANDIDATES),
-        Centres::Clusters { count, .. } | Centres::Random { count, .. } => {
-            (points.len().min(MOST_CENTRES), count)
-        }
-        Centres::Grid { each } => {
-            let wanted = (0..samples.regressors()).try_fold(1_usize, |count, _| count.checked_mul(each));
-            (MOST_CENTRES, wanted.unwrap_or(usize::MAX))
-        }
-    };
-    if wanted == 0 || wanted > many {
-        let message = match centres {
-            Centres::Grid { each } => format!(
-                "a grid of {each} in each direction of {} regressors has none, or more than {many} points; give another number, or \
-                 fewer lags",
-                samples.regressors()
-            ),
-            _ => format!(
-                "there would be {wanted} centres, for {} samples; give from 1 to {many}",
-                points.len()
-            ),
-        };
-        return Err(Error::argument("centres", message));
-    }
-    let at = match centres {
-        Centres::Chosen => centres::spread(&points, CANDIDATES),
-        Centres::Clusters { count, seed } => centres::clusters(&points, count, seed),
-        Centres::Grid { each } => centres::grid(&points, each),
-        Centres::Random { count, seed } => centres::random(&points, count, seed),
-    };
-    let chosen = centres == Centres::Chosen;
-    let map = centres::map(at, width, &points, chosen, linear);
-    let path = if linear { samples.regressors() + 1 } else { 0 };
-    let always = if chosen { path } else { map.parameters(samples.regressors()) };
-    Ok(Candidates::Functions { map, always })
 }
 
 /// A log with the expressions of the plan as further channels.

@@ -6,12 +6,15 @@ use serde::{Deserialize, Serialize};
 use crate::Error;
 use crate::data::{Log, Rows};
 use crate::model::NonlinearArxModel;
+use crate::optimize::{Algorithm, Stopped};
 use crate::respond::nonlinear_arx::{NonlinearArxOnLog, within};
 use crate::respond::{Horizon, InitialCondition, OnLog};
 
 /// A choice prefers models whose free run stays within this many times the range of the estimation rows, and of those it runs over, about
 /// its middle.
 const RANGE: f64 = 1.1;
+/// Blocks of held-out rows by which models are compared.
+const COMPARED: usize = 10;
 
 /// How the maps of a nonlinear ARX model were chosen.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -36,6 +39,9 @@ pub struct TermsOutcome {
     /// The functions in the order of their choice, those that were not taken too; of local models the splits, and of nearest neighbours
     /// the numbers that were tried.
     pub path: Vec<TermStep>,
+    /// How the numbers were found, where more was to be found than one solution says.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub training: Option<TrainingOutcome>,
 }
 
 impl TermsOutcome {
@@ -43,6 +49,29 @@ impl TermsOutcome {
     pub fn last(&self) -> Option<&TermStep> {
         self.path.get(self.taken.checked_sub(1)?)
     }
+}
+
+/// How the numbers of a map were found.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct TrainingOutcome {
+    /// How far the runs went of which the errors were made small.
+    pub horizon: Horizon,
+    /// How steps were chosen.
+    pub algorithm: Algorithm,
+    /// The relative decrease of the cost at which to stop.
+    pub tolerance: f64,
+    /// The seed of random starts.
+    pub seed: u64,
+    /// The cost, in squares of the scaled output: squared errors and the ridge.
+    pub cost: f64,
+    /// The norm of the gradient at the end, as the cosine between errors and slopes.
+    pub gradient_norm: f64,
+    /// Iterations of the last search, for the longest runs.
+    pub iterations: usize,
+    /// Why it stopped.
+    pub stopped: Stopped,
+    /// The cost that each start reached, in their order; none where its run grew without bound.
+    pub starts: Vec<Option<f64>>,
 }
 
 /// A step of the choice: the model with this term, or split, and those before.
@@ -90,7 +119,7 @@ impl RunFigures {
 
     /// Smaller is better: those out of range come last, and those without a figure after them. To stay in range is no merit of a run that
     /// is no better than the mean of the output.
-    pub(super) fn rank(self) -> (bool, f64) {
+    pub(crate) fn rank(self) -> (bool, f64) {
         let is_useless = self.percent.is_some_and(|percent| percent <= 0.0);
         (!self.in_range || is_useless, self.rmse.unwrap_or(f64::INFINITY))
     }
@@ -120,6 +149,21 @@ pub(super) fn run(model: &NonlinearArxModel, log: &Log, rows: &[Rows]) -> Result
         }
     }
     Ok(sums)
+}
+
+/// The mean squared errors of a run of a model over blocks of some rows, as [`run`] counts them.
+pub(super) fn block_errors(model: &NonlinearArxModel, log: &Log, rows: &[Rows]) -> Result<Vec<f64>, Error> {
+    let on_log = NonlinearArxOnLog::new(model, log, rows)?;
+    let horizon = if on_log.is_driven() { Horizon::FreeRun } else { Horizon::Steps { steps: 1 } };
+    let mut squares = Vec::new();
+    for response in on_log.respond(horizon, InitialCondition::Drop)? {
+        let measured = on_log.measured(0);
+        let counted = response.counted.iter().cloned().flatten();
+        squares.extend(counted.map(|t| (measured[t] - response.values[t]).powi(2)));
+    }
+    let blocks = squares.chunks(squares.len().div_ceil(COMPARED).max(1));
+    let mean = |block: &[f64]| block.iter().sum::<f64>() / block.len() as f64;
+    Ok(blocks.map(mean).map(|mean| if mean.is_finite() { mean } else { f64::INFINITY }).collect())
 }
 
 /// What figures are made of.

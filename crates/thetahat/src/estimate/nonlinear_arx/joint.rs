@@ -49,7 +49,11 @@ pub(crate) fn joint(inputs: &[Signal], parts: Vec<(Samples<'_>, Solved)>) -> Opt
     let all = 0..parts.len();
     let noise_covariance = all.clone().map(|i| all.clone().map(|j| noise(i, j)).collect()).collect();
     let determinant = correlation.determinant() * parts.iter().map(|(_, solved)| solved.mse).product::<f64>();
-    let covariance = covariance(&parts, &correlation);
+    // Of trained numbers only those of one map are known.
+    let trained = parts.iter().any(|(_, solved)| {
+        solved.model.covariance.as_ref().is_some_and(|rows| rows.len() > solved.model.parameters.len())
+    });
+    let covariance = if trained { None } else { covariance(&parts, &correlation) };
     let degrees_of_freedom = parts.iter().filter_map(|(_, solved)| solved.model.degrees_of_freedom).min();
     let head = parts.first()?.1.model.clone();
     let (mut maps, mut parameters) = (Vec::new(), Vec::new());

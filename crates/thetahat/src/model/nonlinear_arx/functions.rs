@@ -3,7 +3,8 @@
 use serde::{Deserialize, Serialize};
 use thetahat_core::{Basis, Error as CoreError};
 
-use super::map::{Evaluator, Map};
+use super::evaluator::Evaluator;
+use super::map::Map;
 use crate::Error;
 
 /// The functions of a [`Map`], for [`RecursiveNarx`](thetahat_core::RecursiveNarx) and

@@ -3,8 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thetahat_core::{
-    Basis, Local, MOST_NEIGHBOURS, MOST_SLOPES, Membership as CoreMembership, Neighbours, Polynomial, Radial,
-    Spline,
+    Activation as CoreActivation, MOST_NEIGHBOURS, MOST_SLOPES, Membership as CoreMembership,
 };
 
 use super::terms::{factors, written};
@@ -12,6 +11,9 @@ use crate::Error;
 use crate::regression::Monomials;
 
 use crate::figures::short;
+
+/// 1/sigma of the widest radial basis function.
+const SMALLEST: f64 = 1e-100;
 
 /// The functions f_j of a nonlinear ARX model, of n regressors z.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -42,6 +44,16 @@ pub enum Map {
         /// For each bend its knots.
         knots: Vec<[f64; 3]>,
     },
+    /// 1, each regressor, and units f(w_j' z + b_j): a network with one hidden layer beside a linear path (Rumelhart, Hinton and Williams
+    /// 1986). theta are the weights of its output.
+    Network {
+        /// f.
+        activation: Activation,
+        /// w, for each unit one for each regressor.
+        weights: Vec<Vec<f64>>,
+        /// b, one for each unit.
+        biases: Vec<f64>,
+    },
     /// Local models, planes or constants, each weighted by the membership of z in its box over the sum of all (Nelles 2001, section
     /// 13.3); outside of the domain weights are those of its nearest point.
     Local {
@@ -64,6 +76,41 @@ pub enum Map {
         /// z of each.
         points: Vec<Vec<f64>>,
     },
+}
+
+/// What a unit of a network makes of its sum a.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Activation {
+    /// tanh a.
+    Tanh,
+    /// 1/(1 + exp(-a)).
+    Logistic,
+    /// a where it is positive, else 0: beside a linear path a hinge (Breiman 1993).
+    Relu,
+    /// 1 where a is not negative, else 0.
+    Step,
+}
+
+impl Activation {
+    pub(crate) fn of_the_core(self) -> CoreActivation {
+        match self {
+            Self::Tanh => CoreActivation::Tanh,
+            Self::Logistic => CoreActivation::Logistic,
+            Self::Relu => CoreActivation::Relu,
+            Self::Step => CoreActivation::Step,
+        }
+    }
+
+    /// As options and names of models write it.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Tanh => "tanh",
+            Self::Logistic => "logistic",
+            Self::Relu => "relu",
+            Self::Step => "step",
+        }
+    }
 }
 
 /// How the weight of a local model depends on where a point lies.
@@ -116,6 +163,7 @@ impl Map {
             Self::Polynomial { terms } => terms.len(),
             Self::Radial { centres, linear, .. } => centres.len() + if *linear { regressors + 1 } else { 0 },
             Self::Spline { knots, .. } => knots.len() + regressors + 1,
+            Self::Network { biases, .. } => biases.len() + regressors + 1,
             Self::Local { planes, boxes, .. } => boxes.len() * if *planes { regressors + 1 } else { 1 },
             Self::Neighbours { points, .. } => points.len(),
         }
@@ -142,8 +190,54 @@ impl Map {
                 let (regressors, knots) = own.map(|place| (regressors[place], knots[place])).unzip();
                 Self::Spline { regressors, knots }
             }
+            Self::Network { activation, weights, biases } => {
+                let own: Vec<usize> =
+                    places.iter().filter_map(|place| place.checked_sub(count + 1)).collect();
+                Self::Network {
+                    activation: *activation,
+                    weights: own.iter().map(|place| weights[*place].clone()).collect(),
+                    biases: own.iter().map(|place| biases[*place]).collect(),
+                }
+            }
             // Those of a local model belong together, and so do all samples.
             Self::Local { .. } | Self::Neighbours { .. } => self.clone(),
+        }
+    }
+
+    /// The numbers of its functions that training moves, function after function: alpha and 1/sigma of radial basis functions, w and b of
+    /// units. Of other maps, and of steps, none.
+    pub(crate) fn shape(&self) -> Vec<f64> {
+        match self {
+            Self::Radial { centres, widths, .. } => {
+                let each = centres.iter().zip(widths);
+                each.flat_map(|(centre, width)| centre.iter().copied().chain([1.0 / width])).collect()
+            }
+            Self::Network { activation, .. } if *activation == Activation::Step => Vec::new(),
+            Self::Network { weights, biases, .. } => {
+                let each = weights.iter().zip(biases);
+                each.flat_map(|(weights, bias)| weights.iter().copied().chain([*bias])).collect()
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    /// The same functions with other numbers, in the order of [`shape`](Self::shape).
+    pub(crate) fn with_shape(&self, regressors: usize, shape: &[f64]) -> Self {
+        let each = || shape.chunks_exact(regressors + 1);
+        let points = || each().map(|own| own[..regressors].to_vec()).collect();
+        match self {
+            Self::Radial { linear, .. } => Self::Radial {
+                centres: points(),
+                // Where it has grown flat it is as wide as numbers go.
+                widths: each().map(|own| 1.0 / own[regressors].abs().max(SMALLEST)).collect(),
+                linear: *linear,
+            },
+            Self::Network { activation, .. } if *activation != Activation::Step => Self::Network {
+                activation: *activation,
+                weights: points(),
+                biases: each().map(|own| own[regressors]).collect(),
+            },
+            other => other.clone(),
         }
     }
 
@@ -161,6 +255,9 @@ impl Map {
                 format!("radial basis functions, {} centre{}", centres.len(), plural(centres.len()))
             }
             Self::Spline { knots, .. } => format!("splines, {} bend{}", knots.len(), plural(knots.len())),
+            Self::Network { activation, biases, .. } => {
+                format!("{} network, {} unit{}", activation.word(), biases.len(), plural(biases.len()))
+            }
             Self::Local { boxes, .. } => format!("local models, {}", boxes.len()),
             Self::Neighbours { count, points, .. } => {
                 format!("nearest neighbours, {count} of {} samples", points.len())
@@ -169,7 +266,7 @@ impl Map {
     }
 
     /// The functions by name, those of the regressors being given: y(k-1)^2*u(k), rbf1, bend(u(k), 0.5) where the middle knot is 0.5,
-    /// local1*u(k), or sample1.
+    /// unit1, local1*u(k), or sample1.
     pub(crate) fn names(&self, regressors: &[String]) -> Vec<String> {
         match self {
             Self::Polynomial { terms } => terms.iter().map(|term| written(term, regressors)).collect(),
@@ -182,6 +279,9 @@ impl Map {
                     format!("bend({}, {})", regressors.get(*own).map_or("?", String::as_str), short(*middle))
                 });
                 path(regressors).chain(bends).collect()
+            }
+            Self::Network { biases, .. } => {
+                path(regressors).chain((1..=biases.len()).map(|place| format!("unit{place}"))).collect()
             }
             Self::Local { planes, boxes, .. } => {
                 let slopes = if *planes { regressors } else { &[] };
@@ -234,6 +334,19 @@ impl Map {
                     None => Ok(()),
                 }
             }
+            Self::Network { weights, biases, .. } => {
+                let point =
+                    |weights: &Vec<f64>| weights.len() == regressors && weights.iter().all(|w| w.is_finite());
+                if let Some(place) = weights.iter().position(|weights| !point(weights)) {
+                    return Err(format!(
+                        "weights[{place}] is not one number for each of {regressors} regressors"
+                    ));
+                }
+                if biases.len() != weights.len() || !biases.iter().all(|bias| bias.is_finite()) {
+                    return Err("biases is not a number for each unit".to_owned());
+                }
+                Ok(())
+            }
             Self::Local { boxes, domain, .. } => {
                 let rising = |[low, high]: &[f64; 2]| low.is_finite() && low < high && high.is_finite();
                 let fits = |sides: &Vec<[f64; 2]>| sides.len() == regressors && sides.iter().all(rising);
@@ -274,153 +387,10 @@ fn path(regressors: &[String]) -> impl Iterator<Item = String> {
     std::iter::once("1".to_owned()).chain(regressors.iter().cloned())
 }
 
-/// A map laid out to be evaluated along a log, with its parameters, by the functions of the core. Nothing of it allocates.
-#[derive(Debug, Clone)]
-pub(crate) struct Evaluator {
-    theta: Vec<f64>,
-    kind: Kind,
-}
-
-#[derive(Debug, Clone)]
-enum Kind {
-    /// The factors of all terms one after the other, and where each term ends.
-    Polynomial { factors: Vec<u16>, ends: Vec<u32> },
-    /// The centres one after the other, and 1/sigma^2.
-    Radial { centres: Vec<f64>, inverse_squares: Vec<f64>, linear: bool },
-    /// The regressor and the knots of each bend.
-    Spline { bent: Vec<u16>, knots: Vec<[f64; 3]> },
-    /// The boxes one after the other.
-    Local { membership: CoreMembership, planes: bool, sides: Vec<[f64; 2]>, domain: Vec<[f64; 2]> },
-    /// The points one after the other.
-    Neighbours { count: usize, planes: bool, points: Vec<f64> },
-}
-
-impl Evaluator {
-    /// # Panics
-    /// Never for a map that was checked.
-    pub(crate) fn new(map: &Map, theta: Vec<f64>) -> Self {
-        let kind = match map {
-            Map::Polynomial { terms } => {
-                let ends = terms.iter().scan(0, |end, term| {
-                    *end += term.len() as u32;
-                    Some(*end)
-                });
-                let factors = terms.iter().flatten().map(|factor| *factor as u16);
-                Kind::Polynomial { factors: factors.collect(), ends: ends.collect() }
-            }
-            Map::Radial { centres, widths, linear } => Kind::Radial {
-                centres: centres.concat(),
-                inverse_squares: widths.iter().map(|width| 1.0 / (width * width)).collect(),
-                linear: *linear,
-            },
-            Map::Spline { regressors, knots } => {
-                let bent = regressors.iter().map(|regressor| *regressor as u16);
-                Kind::Spline { bent: bent.collect(), knots: knots.clone() }
-            }
-            Map::Local { membership, planes, boxes, domain } => Kind::Local {
-                membership: membership.of_the_core(),
-                planes: *planes,
-                sides: boxes.concat(),
-                domain: domain.clone(),
-            },
-            Map::Neighbours { count, planes, points } => {
-                Kind::Neighbours { count: *count, planes: *planes, points: points.concat() }
-            }
-        };
-        Self { theta, kind }
-    }
-
-    /// Whether the value may depend on a regressor.
-    pub(crate) fn reads(&self, regressor: usize) -> bool {
-        match &self.kind {
-            Kind::Polynomial { factors, .. } => {
-                factors.iter().any(|factor| usize::from(*factor) == regressor)
-            }
-            _ => true,
-        }
-    }
-
-    /// How many functions there are.
-    pub(crate) fn parameters(&self) -> usize {
-        self.theta.len()
-    }
-
-    /// g(z) = sum_j theta_j f_j(z).
-    pub(crate) fn value(&self, z: &[f64]) -> f64 {
-        // Most samples have no weight.
-        if let Kind::Neighbours { count, planes, points } = &self.kind {
-            return neighbours(z.len(), points, *count, *planes).value(&self.theta, z);
-        }
-        let mut sum = 0.0;
-        self.each(z, |j, f| sum += self.theta[j] * f);
-        sum
-    }
-
-    /// f_j(z) for each j.
-    pub(crate) fn functions(&self, z: &[f64], into: &mut [f64]) {
-        self.each(z, |j, f| into[j] = f);
-    }
-
-    /// Calls `take` with j and f_j(z), in the order of j.
-    pub(crate) fn each(&self, z: &[f64], take: impl FnMut(usize, f64)) {
-        match &self.kind {
-            Kind::Polynomial { factors, ends } => Polynomial { factors, ends }.each(z, take),
-            Kind::Radial { centres, inverse_squares, linear } => {
-                radial(z.len(), centres, inverse_squares, *linear).each(z, take);
-            }
-            Kind::Spline { bent, knots } => Spline { regressors: z.len(), bent, knots }.each(z, take),
-            Kind::Local { membership, planes, sides, domain } => {
-                Local { membership: *membership, planes: *planes, sides, domain }.each(z, take);
-            }
-            Kind::Neighbours { count, planes, points } => {
-                neighbours(z.len(), points, *count, *planes).each(z, take);
-            }
-        }
-    }
-
-    /// dg/dz_i for each i.
-    pub(crate) fn slopes(&self, z: &[f64], into: &mut [f64]) {
-        into.fill(0.0);
-        match &self.kind {
-            Kind::Polynomial { factors, ends } => {
-                Polynomial { factors, ends }.add_slopes(&self.theta, z, into)
-            }
-            Kind::Radial { centres, inverse_squares, linear } => {
-                radial(z.len(), centres, inverse_squares, *linear).add_slopes(&self.theta, z, into);
-            }
-            Kind::Spline { bent, knots } => {
-                Spline { regressors: z.len(), bent, knots }.add_slopes(&self.theta, z, into);
-            }
-            Kind::Local { membership, planes, sides, domain } => {
-                Local { membership: *membership, planes: *planes, sides, domain }.add_slopes(
-                    &self.theta,
-                    z,
-                    into,
-                );
-            }
-            Kind::Neighbours { count, planes, points } => {
-                neighbours(z.len(), points, *count, *planes).add_slopes(&self.theta, z, into);
-            }
-        }
-    }
-}
-
-fn neighbours(regressors: usize, points: &[f64], count: usize, planes: bool) -> Neighbours<'_, f64> {
-    Neighbours { regressors, points, count, planes }
-}
-
-fn radial<'a>(
-    regressors: usize,
-    centres: &'a [f64],
-    inverse_squares: &'a [f64],
-    linear: bool,
-) -> Radial<'a, f64> {
-    Radial { regressors, centres, inverse_squares, linear }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::Evaluator;
 
     fn maps() -> Vec<Map> {
         let centres = vec![vec![0.2, -0.4], vec![1.0, 0.3], vec![-0.7, 0.9]];
@@ -433,6 +403,11 @@ mod tests {
                 vec![[0.0, 1.0], [0.0, 1.0]],
             ],
             domain: vec![[-1.0, 1.0]; 2],
+        };
+        let network = |activation| Map::Network {
+            activation,
+            weights: vec![vec![0.7, -1.1], vec![0.2, 0.4], vec![0.9, -0.3]],
+            biases: vec![0.1, -0.4, 0.6],
         };
         let points: Vec<Vec<f64>> =
             (0..20).map(|k| vec![f64::from(k % 5) * 0.3 - 0.7, f64::from(k % 4) * 0.5 - 1.0]).collect();
@@ -450,6 +425,10 @@ mod tests {
             local(Membership::Trapezoid, false),
             Map::Neighbours { count: 3, planes: false, points: points.clone() },
             Map::Neighbours { count: 20, planes: true, points },
+            network(Activation::Tanh),
+            network(Activation::Logistic),
+            network(Activation::Relu),
+            network(Activation::Step),
         ]
     }
 
@@ -480,6 +459,35 @@ mod tests {
     }
 
     #[test]
+    fn gradients_are_differences_of_values() {
+        for map in maps() {
+            let theta: Vec<f64> = (0..map.parameters(2)).map(|j| 0.3 + j as f64 * 0.4).collect();
+            let shape = map.shape();
+            assert_eq!(map.with_shape(2, &shape).shape(), shape);
+            let all: Vec<f64> = theta.iter().chain(&shape).copied().collect();
+            let z = [0.37, -0.81];
+            let mut evaluator = Evaluator::new(&map, theta);
+            let (mut gradient, mut slopes, mut by_gradient) = (vec![0.0; all.len()], [0.0; 2], [0.0; 2]);
+            evaluator.gradient(&z, &mut gradient);
+            evaluator.slopes(&z, &mut slopes);
+            evaluator.slopes_of_gradient(&z, &gradient, &mut by_gradient);
+            for (one, other) in slopes.iter().zip(by_gradient) {
+                assert!((one - other).abs() < 1e-13, "{map:?}: {slopes:?} {by_gradient:?}");
+            }
+            for (place, own) in gradient.iter().enumerate() {
+                let mut moved = |step: f64| {
+                    let mut all = all.clone();
+                    all[place] += step;
+                    evaluator.assign(&all);
+                    evaluator.value(&z)
+                };
+                let difference = (moved(1e-5) - moved(-1e-5)) / 2e-5;
+                assert!((difference - own).abs() < 1e-8, "{map:?} {place}: {difference} {own}");
+            }
+        }
+    }
+
+    #[test]
     fn functions_have_names() {
         let regressors = ["y(k-1)".to_owned(), "u(k)".to_owned()];
         assert_eq!(maps()[0].names(&regressors), ["1", "y(k-1)", "y(k-1)^2*u(k)", "u(k)^2"]);
@@ -491,6 +499,7 @@ mod tests {
         assert_eq!(maps()[4].names(&regressors)[3..6], ["local2", "local2*y(k-1)", "local2*u(k)"]);
         assert_eq!(maps()[7].names(&regressors), ["local1", "local2", "local3"]);
         assert_eq!(maps()[9].names(&regressors)[19], "sample20");
+        assert_eq!(maps()[10].names(&regressors)[2..4], ["u(k)", "unit1"]);
     }
 
     #[test]
@@ -508,6 +517,11 @@ mod tests {
             [(vec![vec![]], sides.clone()), (vec![sides.clone()], vec![]), (vec![vec![[1.0, 1.0]]], sides)]
         {
             assert!(Map::Local { membership, planes: true, boxes, domain }.check(1).is_err());
+        }
+        for (weights, biases) in
+            [(vec![vec![1.0, 2.0]], vec![0.0]), (vec![vec![1.0]], vec![]), (vec![vec![1.0]], vec![f64::NAN])]
+        {
+            assert!(Map::Network { activation: Activation::Tanh, weights, biases }.check(1).is_err());
         }
         for (count, points) in [(0, vec![vec![0.0]]), (2, vec![vec![0.0]]), (1, vec![vec![]])] {
             assert!(Map::Neighbours { count, planes: false, points }.check(1).is_err());

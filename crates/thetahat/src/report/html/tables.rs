@@ -306,6 +306,18 @@ fn procedure(procedure: &Procedure) -> String {
             let (kept, by) = (map.candidates, &map.selected_by);
             format!("{kept} samples kept, the number of neighbours by {by}")
         }),
+        Procedure::Training(outcome) => each(&outcome.maps, |map| {
+            let (tried, by) = (map.candidates, &map.selected_by);
+            let how = map.training.as_ref().map_or_else(String::new, |training| {
+                let starts = training.starts.len();
+                format!(
+                    "; errors of the {} the least of {starts} starts, {}",
+                    training.horizon,
+                    stopped(&training.stopped)
+                )
+            });
+            format!("trained: {tried} tried, the one taken by {by}{how}")
+        }),
     }
 }
 

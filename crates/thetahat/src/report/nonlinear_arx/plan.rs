@@ -4,13 +4,24 @@ use std::ops::Range;
 
 use crate::Error;
 use crate::data::{Detrend, Rows, Split};
-use crate::model::{ChannelExpression, Membership};
+use crate::model::{Activation, ChannelExpression, Membership};
+use crate::optimize::Search;
+use crate::respond::Horizon;
 use crate::select::Select;
 
 /// Functions that a choice looks at, unless it is said otherwise.
 const MOST: usize = 40;
 /// Local models that it looks at.
 const MOST_LOCAL: usize = 10;
+/// Further starts of a training.
+const STARTS: usize = 4;
+/// Its iterations, at most.
+const ITERATIONS: usize = 200;
+
+/// Units of a network, or centres, at most.
+const MOST_UNITS: usize = 2000;
+/// What is foretold from what was measured.
+const ONE: Horizon = Horizon::Steps { steps: 1 };
 
 /// Which lags of an input a nonlinear ARX model reads: `lags` of them from `delay` on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,6 +68,23 @@ pub enum MapPlan {
         /// How many; none: `select` says it.
         units: Option<usize>,
     },
+    /// A network with one hidden layer beside a linear path.
+    Network {
+        /// What its units make of their sums.
+        activation: Activation,
+        /// How many units; none: `select` says it, of 2, 4 and 8. Of units that are drawn, from how many forward regression chooses.
+        units: Option<usize>,
+        /// Whether the weights of the hidden layer are drawn, and forward regression chooses among the units: else all weights are
+        /// trained. Steps, which have no slope, are always drawn.
+        drawn: bool,
+    },
+    /// Radial basis functions beside a linear path, whose centres and widths are trained.
+    FreeRadial {
+        /// How many; none: `select` says it, of 2, 4 and 8.
+        units: Option<usize>,
+    },
+    /// What has the best free run on rows held out: polynomials of degree 1, 2 and 3, and networks of 2 and 4 units.
+    Auto,
     /// The samples nearest to the regressors.
     Neighbours {
         /// Whether they give a plane: else their mean.
@@ -126,8 +154,14 @@ pub struct NonlinearArxPlan {
     /// What makes one number of functions better than another; none: the free run on the validation rows where there are some, else that
     /// on five blocks of the estimation rows.
     pub select: Option<Select>,
-    /// Keeps parameters small: weighs like this many more samples in which the output is 0.
-    pub ridge: f64,
+    /// Keeps parameters small: weighs like this many more samples in which the output is 0. None: nothing, and of trained
+    /// numbers 0.1 or 1, as `select` says.
+    pub ridge: Option<f64>,
+    /// Of which errors parameters are to be the least: one step ahead, so many, or of the free run. None: one step ahead, and of trained
+    /// maps the free run where there are inputs.
+    pub focus: Option<Horizon>,
+    /// How to search, where more is to be found than one solution says.
+    pub search: Search,
     /// Whether signals keep their own units: else each is divided by its standard deviation over the estimation rows.
     pub raw_terms: bool,
 }
@@ -151,7 +185,9 @@ impl NonlinearArxPlan {
             terms: None,
             most: None,
             select: None,
-            ridge: 0.0,
+            ridge: None,
+            focus: None,
+            search: Search { starts: STARTS, max_iterations: ITERATIONS, ..Search::default() },
             raw_terms: false,
         }
     }
@@ -205,6 +241,64 @@ impl NonlinearArxPlan {
             MapPlan::Products { ref terms } => terms.len(),
             _ => self.terms.or(self.most).unwrap_or(MOST),
         }
+    }
+
+    /// Whether the numbers of the functions are trained.
+    pub(super) fn trains(&self) -> bool {
+        match self.map {
+            MapPlan::Network { activation, drawn, .. } => !drawn && activation != Activation::Step,
+            MapPlan::FreeRadial { .. } | MapPlan::Auto => true,
+            _ => false,
+        }
+    }
+
+    /// How far the runs go whose errors are made small, of a map that is trained or not.
+    pub(super) fn horizon(&self, trains: bool) -> Horizon {
+        let driven = self.input_lags.iter().any(|input| input.lags > 0);
+        self.focus.unwrap_or(if trains && driven { Horizon::FreeRun } else { ONE })
+    }
+
+    fn check_training(&self) -> Result<(), Error> {
+        self.search.check_numbers()?;
+        if let Some(Horizon::Steps { steps }) = self.focus
+            && !(1..=crate::model::LARGEST).contains(&steps)
+        {
+            return Err(Error::argument(
+                "focus",
+                format!("{steps} steps are not looked ahead; give from 1 to {}", crate::model::LARGEST),
+            ));
+        }
+        let units = match self.map {
+            MapPlan::Network { units, .. } | MapPlan::FreeRadial { units } => units,
+            _ => None,
+        };
+        if units.is_some_and(|units| units == 0 || units > MOST_UNITS) {
+            return Err(Error::argument("units", format!("give from 1 to {MOST_UNITS} units")));
+        }
+        if !self.trains() {
+            return Ok(());
+        }
+        if self.terms.is_some() || self.most.is_some() {
+            return Err(Error::argument(
+                "terms",
+                "a trained map has a number of `units`, and auto says all by itself; leave it out",
+            ));
+        }
+        let is_auto = self.map == MapPlan::Auto;
+        if self.select == Some(Select::Cv) || is_auto && matches!(self.select, Some(Select::Criterion(_))) {
+            return Err(Error::argument(
+                "select",
+                "trained maps are compared by their free runs on validation rows; give those, or leave it out: then the last rows of the \
+                 estimation are held out",
+            ));
+        }
+        if units.is_some() && self.ridge.is_some() && self.select.is_some() {
+            return Err(Error::argument(
+                "select",
+                "`units` and `ridge` are given, and there is nothing to choose; leave one of them out",
+            ));
+        }
+        Ok(())
     }
 
     /// Whether the plan makes sense, whatever the log.
@@ -296,14 +390,23 @@ impl NonlinearArxPlan {
                 return Err(Error::argument("most-terms", "it is not of neighbours; leave it out"));
             }
         }
-        if matches!(self.map, MapPlan::Neighbours { .. }) && self.ridge > 0.0 {
-            return Err(Error::argument("ridge", "neighbours are not solved for; leave it out"));
+        if matches!(self.map, MapPlan::Neighbours { .. }) {
+            if self.ridge.is_some_and(|ridge| ridge > 0.0) {
+                return Err(Error::argument("ridge", "neighbours are not solved for; leave it out"));
+            }
+            if self.focus.is_some_and(|focus| focus != ONE) {
+                return Err(Error::argument(
+                    "focus",
+                    "neighbours are not trained for longer runs; leave it out",
+                ));
+            }
         }
+        self.check_training()?;
         if self.terms == Some(0) || self.most == Some(0) {
             return Err(Error::argument("terms", "a model has one function at least"));
         }
-        if !(self.ridge.is_finite() && self.ridge >= 0.0) {
-            return Err(Error::argument("ridge", format!("{} is not a number from 0 on", self.ridge)));
+        if let Some(ridge) = self.ridge.filter(|ridge| !(ridge.is_finite() && *ridge >= 0.0)) {
+            return Err(Error::argument("ridge", format!("{ridge} is not a number from 0 on")));
         }
         if self.terms.is_some() && self.select.is_some() {
             return Err(Error::argument("select", "the number of terms is given; leave out one of the two"));

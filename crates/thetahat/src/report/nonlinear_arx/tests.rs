@@ -1,5 +1,6 @@
 mod approximation;
 mod boxes_and_neighbours;
+mod networks;
 mod outputs_and_expressions;
 
 use super::*;
@@ -9,6 +10,7 @@ use crate::model::Orders;
 use crate::regression::noise::Noise;
 use crate::report::{Plan, ValidationPlan, identify, validate};
 use crate::respond::InitialCondition;
+use crate::select::Select;
 
 /// y(t) = 0.5 y(t-1) + u(t-1) + square u(t-1)^2 + cube u(t-1)^3 + e(t), e about normal with a standard deviation of 0.05.
 fn log(rows: usize, seed: u64, square: f64, cube: f64) -> Log {
@@ -225,7 +227,7 @@ fn what_cannot_be_is_refused() {
     let many = NonlinearArxPlan { output_lags: vec![40], map: MapPlan::Polynomial { degree: 6 }, ..plan() };
     refused(&good, many, "too many terms");
     refused(&good, NonlinearArxPlan { terms: Some(0), ..plan() }, "one function at least");
-    refused(&good, NonlinearArxPlan { ridge: -1.0, ..plan() }, "ridge");
+    refused(&good, NonlinearArxPlan { ridge: Some(-1.0), ..plan() }, "ridge");
     refused(
         &good,
         NonlinearArxPlan {

@@ -1,5 +1,7 @@
 //! How far predictions of a nonlinear ARX model may be off, as they are run.
 
+use std::ops::Range;
+
 use super::runner::{Runner, Walk};
 
 /// The covariance of the errors of the last outputs along a run, and their slopes by the parameters.
@@ -28,7 +30,8 @@ impl Errors {
     pub(super) fn new(runner: &Runner<'_>) -> Self {
         let (outputs, lags) = (runner.outputs(), runner.output_lags.max(1));
         let size = outputs * lags;
-        let parameters = runner.model.parameters.len();
+        // With those of trained functions after them.
+        let parameters = runner.model.covariance.as_ref().map_or(runner.model.parameters.len(), Vec::len);
         Self {
             outputs,
             lags,
@@ -91,8 +94,10 @@ impl Errors {
         let (outputs, size) = (self.outputs, self.outputs * self.lags);
         self.weights.fill(0.0);
         for (i, (evaluator, map)) in runner.evaluators.iter().zip(&runner.model.maps).enumerate() {
-            evaluator.functions(&walk.z, &mut self.functions[runner.places[i].clone()]);
-            evaluator.slopes(&walk.z, &mut self.by_regressor);
+            let own = numbers(runner, i, self.functions.len());
+            let functions = &mut self.functions[own];
+            evaluator.gradient(&walk.z, functions);
+            evaluator.slopes_of_gradient(&walk.z, functions, &mut self.by_regressor);
             let weights = &mut self.weights[i * size..(i + 1) * size];
             for ((source, lag, own), slope) in runner.taps.iter().zip(&self.by_regressor) {
                 let slope = map.scale * slope / own;
@@ -115,7 +120,7 @@ impl Errors {
         let (outputs, size) = (self.outputs, self.outputs * self.lags);
         for (i, own) in self.next.iter_mut().enumerate() {
             own.fill(0.0);
-            for place in runner.places[i].clone() {
+            for place in numbers(runner, i, self.functions.len()) {
                 own[place] = runner.model.maps[i].scale * self.functions[place];
             }
             for (weight, slopes) in self.weights[i * size..].iter().zip(&self.slopes) {
@@ -132,4 +137,10 @@ impl Errors {
         self.slopes.rotate_right(outputs);
         self.slopes[..outputs].swap_with_slice(&mut self.next);
     }
+}
+
+/// The places of the numbers of a map among all `count`. Those of trained functions come after the parameters, of one map.
+fn numbers(runner: &Runner<'_>, map: usize, count: usize) -> Range<usize> {
+    let own = runner.places[map].clone();
+    if runner.places.len() == 1 { own.start..count } else { own }
 }

@@ -125,7 +125,7 @@ fn what_they_cannot_be_is_refused() {
     refused(neighbours(Some(0), true), "units");
     refused(neighbours(Some(59), true), "59 neighbours of 59 samples");
     refused(neighbours(Some(65), true), "from 1 to 58");
-    refused(NonlinearArxPlan { ridge: 1.0, ..neighbours(None, true) }, "ridge");
+    refused(NonlinearArxPlan { ridge: Some(1.0), ..neighbours(None, true) }, "ridge");
     refused(NonlinearArxPlan { most: Some(3), ..neighbours(None, true) }, "most-terms");
     refused(NonlinearArxPlan { output_lags: vec![40], ..neighbours(None, true) }, "32 regressors");
     let criterion = Select::Criterion(crate::estimate::InformationCriterion::AIC);

@@ -1,0 +1,183 @@
+//! Trained maps: networks, free radial basis functions, and the choice among all.
+
+use super::*;
+use crate::model::Activation;
+use crate::random::Random;
+use crate::respond::nonlinear_arx::NonlinearArxOnLog;
+use crate::respond::{InitialCondition, OnLog};
+
+/// y(k) = 0.8 y(k-1) + 0.4 tanh(1.5 u(k-1) - 0.5 y(k-1)) + e(k) in units of `scale`; a line without the tanh.
+fn plant(rows: usize, scale: f64, is_line: bool, noise: f64) -> Log {
+    let mut random = Random::of(3, 1);
+    let (mut u, mut y) = (vec![0.0; rows], vec![0.0; rows]);
+    for k in 1..rows {
+        u[k] = if k % 9 == 0 { random.normal() } else { u[k - 1] };
+        let drive = 1.5 * u[k - 1] - 0.5 * y[k - 1];
+        let drive = if is_line { 0.5 * drive } else { drive.tanh() };
+        y[k] = 0.8 * y[k - 1] + 0.4 * drive + noise * random.normal();
+    }
+    y.iter_mut().for_each(|y| *y = 20.0 + scale * *y);
+    let channel = |name: &str, values| Channel { name: name.to_owned(), values };
+    Log::new(vec![channel("u", u), channel("y", y)], 1.0).unwrap()
+}
+
+fn network(activation: Activation, units: Option<usize>) -> MapPlan {
+    MapPlan::Network { activation, units, drawn: false }
+}
+
+fn trained(map: MapPlan) -> NonlinearArxPlan {
+    NonlinearArxPlan { map, ..NonlinearArxPlan::new(&["u"], &["y"]) }
+}
+
+fn free_run(report: &Report, part: Part) -> f64 {
+    let own = report.fit.iter().find(|fit| fit.part == Some(part) && fit.horizon == Horizon::FreeRun);
+    own.unwrap().percent.unwrap()
+}
+
+#[test]
+fn every_trained_map_runs_better_than_a_line() {
+    let log = plant(900, 1.0, false, 0.01);
+    let rows = |plan: NonlinearArxPlan| NonlinearArxPlan {
+        estimate: vec![Rows::new(1, 600).unwrap()],
+        validate: vec![Rows::new(601, 900).unwrap()],
+        ..plan
+    };
+    let line = fit_nonlinear_arx(&log, &[], &rows(trained(MapPlan::Polynomial { degree: 1 }))).unwrap();
+    let line = free_run(&line, Part::Validation);
+    for map in [
+        network(Activation::Tanh, Some(2)),
+        network(Activation::Logistic, Some(2)),
+        network(Activation::Relu, Some(4)),
+        MapPlan::FreeRadial { units: Some(3) },
+    ] {
+        let plan = rows(NonlinearArxPlan { ridge: Some(0.01), ..trained(map.clone()) });
+        let report = fit_nonlinear_arx(&log, &[], &plan).unwrap();
+        let fit = free_run(&report, Part::Validation);
+        // A line leaves 10 % and more.
+        assert!(fit > 94.0 && fit > line + 4.0, "{map:?}: {fit} {line}");
+        let outcome = &report.estimation.procedure.terms()[0];
+        let training = outcome.training.as_ref().unwrap();
+        assert_eq!((training.horizon, training.starts.len()), (Horizon::FreeRun, 5));
+        let again = Report::from_json(&report.to_json().unwrap()).unwrap();
+        assert_eq!(again, report);
+    }
+}
+
+#[test]
+fn without_rows_to_hold_out_the_last_ones_are() {
+    let log = plant(800, 1.0, false, 0.02);
+    let report = fit_nonlinear_arx(&log, &[], &trained(network(Activation::Tanh, None))).unwrap();
+    let outcome = &report.estimation.procedure.terms()[0];
+    // Three sizes, two ridges.
+    assert_eq!((outcome.selected_by.as_str(), outcome.path.len()), ("last-rows", 6));
+    assert!(outcome.path.iter().all(|step| step.held_out.is_some()));
+    // The chosen one is trained on all rows, and from where it was, too.
+    assert_eq!(outcome.training.as_ref().unwrap().starts.len(), 6);
+    assert_eq!(report.estimation.samples, 798);
+}
+
+#[test]
+fn units_and_threads_are_no_matter() {
+    let fit = |scale: f64| {
+        let plan = NonlinearArxPlan { ridge: Some(0.1), ..trained(network(Activation::Tanh, Some(2))) };
+        fit_nonlinear_arx(&plant(500, scale, false, 0.02), &[], &plan).unwrap()
+    };
+    let (one, large) = (fit(1.0), fit(1e6));
+    let values = |report: &Report| -> Vec<f64> {
+        report.model.parameters().iter().map(|parameter| parameter.value).collect()
+    };
+    for (one, large) in values(&one).iter().zip(values(&large)) {
+        assert!((one - large).abs() < 1e-5 * one.abs().max(1.0), "{one} {large}");
+    }
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    assert_eq!(pool.install(|| fit(1.0)).to_json().unwrap(), one.to_json().unwrap());
+}
+
+#[test]
+fn auto_takes_a_line_where_the_plant_is_one_and_a_network_where_it_is_not() {
+    for (is_line, is_network) in [(true, false), (false, true)] {
+        let report =
+            fit_nonlinear_arx(&plant(900, 1.0, is_line, 0.01), &[], &trained(MapPlan::Auto)).unwrap();
+        let outcome = &report.estimation.procedure.terms()[0];
+        let taken = &outcome.last().unwrap().term;
+        assert_eq!(taken.contains("tanh"), is_network, "{taken}");
+        assert!(is_network || taken.starts_with("polynomial of degree 1"), "{taken}");
+        assert_eq!(outcome.candidates, outcome.path.len());
+    }
+}
+
+#[test]
+fn parameters_of_products_are_trained_for_free_runs() {
+    let log = plant(600, 1.0, false, 0.05);
+    let fit = |focus| {
+        let plan = NonlinearArxPlan { terms: Some(6), focus, ..trained(MapPlan::Polynomial { degree: 3 }) };
+        fit_nonlinear_arx(&log, &[], &plan).unwrap()
+    };
+    let (ahead, run) = (fit(None), fit(Some(Horizon::FreeRun)));
+    assert!(free_run(&run, Part::Estimation) > free_run(&ahead, Part::Estimation));
+    assert!(run.estimation.mse > ahead.estimation.mse);
+    assert!(ahead.estimation.procedure.terms()[0].training.is_none());
+}
+
+#[test]
+fn intervals_one_step_ahead_hold_the_output() {
+    let log = plant(1500, 1.0, false, 0.05);
+    let plan = NonlinearArxPlan {
+        estimate: vec![Rows::new(1, 500).unwrap()],
+        ridge: Some(0.01),
+        focus: Some(Horizon::Steps { steps: 1 }),
+        ..trained(network(Activation::Tanh, Some(2)))
+    };
+    let report = fit_nonlinear_arx(&log, &[], &plan).unwrap();
+    let Model::NonlinearArx(model) = &report.model else { panic!("{:?}", report.model) };
+    let offsets = [("u", model.inputs[0].offset), ("y", model.outputs[0].offset)];
+    let deviations = log.deviations(offsets.into_iter()).unwrap();
+    let on_log = NonlinearArxOnLog::new(model, &deviations, &[Rows::new(501, 1500).unwrap()]).unwrap();
+    let said = on_log.respond(Horizon::Steps { steps: 1 }, InitialCondition::Drop).unwrap();
+    let spread = on_log.deviations(1, InitialCondition::Drop).unwrap();
+    let (quantile, measured) = (on_log.quantile(0.95), on_log.measured(0));
+    let held = (500..1500).filter(|t| (measured[*t] - said[0].values[*t]).abs() < quantile * spread[0][*t]);
+    let share = held.count() as f64 / 1000.0;
+    assert!((0.93..=0.97).contains(&share), "{share}");
+}
+
+#[test]
+fn drawn_units_are_chosen() {
+    let log = plant(600, 1.0, false, 0.02);
+    for (activation, drawn) in [(Activation::Step, true), (Activation::Tanh, true), (Activation::Step, false)]
+    {
+        let map = MapPlan::Network { activation, units: Some(50), drawn };
+        let report =
+            fit_nonlinear_arx(&log, &[], &NonlinearArxPlan { terms: Some(8), ..trained(map) }).unwrap();
+        let outcome = &report.estimation.procedure.terms()[0];
+        // A constant, four lags, and three units of fifty.
+        assert_eq!((outcome.candidates, outcome.taken), (55, 8));
+        assert_eq!(report.model.name(), format!("NARX {} network, 3 units", activation.word()));
+        assert!(report.model.parameters().iter().all(|parameter| parameter.standard_error.is_some()));
+    }
+}
+
+#[test]
+fn what_cannot_be_trained_is_refused() {
+    let log = plant(200, 1.0, false, 0.02);
+    let tanh = || trained(network(Activation::Tanh, Some(2)));
+    let refused = |log: &Log, plan: NonlinearArxPlan, words: &str| {
+        let error = fit_nonlinear_arx(log, &[], &plan).unwrap_err().to_string();
+        assert!(error.contains(words), "{error}");
+    };
+    refused(&log, trained(network(Activation::Tanh, Some(0))), "units");
+    refused(&log, trained(network(Activation::Tanh, Some(3000))), "units");
+    refused(&log, NonlinearArxPlan { terms: Some(3), ..tanh() }, "units");
+    refused(&log, NonlinearArxPlan { select: Some(Select::Cv), ..tanh() }, "held out");
+    refused(&log, NonlinearArxPlan { focus: Some(Horizon::Steps { steps: 0 }), ..tanh() }, "0 steps");
+    refused(&log, trained(network(Activation::Tanh, Some(60))), "numbers are trained");
+    refused(
+        &log,
+        NonlinearArxPlan { expressions: vec!["sqrt(y)".to_owned()], ..tanh() },
+        "expressions of an output",
+    );
+    let knn = MapPlan::Neighbours { planes: true, units: Some(5) };
+    refused(&log, NonlinearArxPlan { focus: Some(Horizon::FreeRun), ..trained(knn) }, "neighbours");
+    let stopped = fit_nonlinear_arx_monitored(&log, &[], &tanh(), &|_| std::ops::ControlFlow::Break(()));
+    assert_eq!(stopped, Err(Error::Interrupted));
+}

@@ -36,7 +36,7 @@ fn every_verb_takes_a_network() {
     ] {
         assert!(folder.done(line).stdout.lines().count() > 200, "{line}");
     }
-    let auto = folder.fit("log.csv --narx auto --sample-time 0.1 --split 50/30/20");
+    let auto = folder.fit("log.csv --narx auto --ny 2 --nu 2 --sample-time 0.1 --split 50/30/20");
     let outcome = &auto["estimation"]["maps"][0];
     assert_eq!(outcome["path"].as_array().map(Vec::len), Some(8));
     for (options, words) in [

@@ -236,6 +236,7 @@ fn all_searches_reach_the_same_minimum() {
             // Steepest descent is slow along the cost's flat directions, and slower with ever shorter steps.
             ("--search gradient --max-iterations 5000 --tolerance 1e-10", 1e-4),
             ("--search gradient --step 20,20 --max-iterations 5000 --tolerance 1e-10", 2e-2),
+            ("--search annealing --max-iterations 50 --tolerance 1e-13", 1e-11),
             ("--starts 3 --seed 7 --tolerance 1e-13", 1e-11),
         ] {
             let report = fit(options);

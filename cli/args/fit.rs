@@ -170,7 +170,8 @@ pub(crate) struct NarxArguments {
         ]
     )]
     pub(crate) narx: Option<MapArgument>,
-    /// Past outputs that g reads: y(k-1), …, y(k-N); one number for each output or one for all [default: 2]
+    /// Past outputs that g reads: y(k-1), …, y(k-N); one number for each output or one for all [default: 2, with auto as
+    /// the linear model that the data choose]
     #[arg(long, value_name = "N[,…]", value_delimiter = ',', requires = "narx")]
     pub(crate) ny: Vec<usize>,
     /// Values of each input that g reads, from --nk on: u(k-nk), …; one number for each input or one for all [default: 2]
@@ -423,6 +424,8 @@ pub(crate) enum SearchArgument {
     Newton,
     /// Steepest descent
     Gradient,
+    /// Simulated annealing, then lm from the best point that it met
+    Annealing,
 }
 
 /// What a choice may select by, each with what it is.

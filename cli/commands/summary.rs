@@ -230,6 +230,7 @@ fn word(algorithm: Algorithm) -> &'static str {
         Algorithm::GaussNewton => "gauss-newton",
         Algorithm::Newton => "newton",
         Algorithm::Gradient => "gradient",
+        Algorithm::Annealing => "annealing",
     }
 }
 

@@ -47,6 +47,10 @@ impl NarxJob {
             detrend: parsed("--detrend", &arguments.detrend)?,
             offsets: named_values("--offset", &arguments.offset)?,
             expressions: own.regressor.clone(),
+            lags_chosen: map == MapArgument::Auto
+                && own.ny.is_empty()
+                && own.nu.is_empty()
+                && arguments.model.nk.is_empty(),
             map: map_plan(own, map, arguments.search.seed)?,
             terms: own.terms,
             most: own.most_terms,

@@ -25,7 +25,8 @@ pub(super) fn given(arguments: &SearchArguments) -> Option<&'static str> {
 /// # Errors
 /// A usage failure for numbers that make no sense.
 pub(super) fn search(arguments: &SearchArguments) -> Result<Search, Failure> {
-    if arguments.seed.is_some() && arguments.starts.is_none() {
+    let is_random = arguments.starts.is_some() || arguments.search == Some(SearchArgument::Annealing);
+    if arguments.seed.is_some() && !is_random {
         return Err(Failure::usage("--starts is needed with --seed, which says where they are"));
     }
     seeded(arguments)
@@ -42,6 +43,7 @@ pub(super) fn seeded(arguments: &SearchArguments) -> Result<Search, Failure> {
         Some(SearchArgument::GaussNewton) => Algorithm::GaussNewton,
         Some(SearchArgument::Newton) => Algorithm::Newton,
         Some(SearchArgument::Gradient) => Algorithm::Gradient,
+        Some(SearchArgument::Annealing) => Algorithm::Annealing,
     };
     let step = match &arguments.step {
         Some(_) if algorithm != Algorithm::Gradient => {

@@ -266,12 +266,12 @@ def test_trained_maps_run_better_than_a_line(map: str) -> None:
     model = th.narx(data[:500], map, units=3, ridge=0.01, starts=2)
     assert free_run(model, data[500:]) > line + 3
     again = pickle.loads(pickle.dumps(model))
-    assert np.array_equal(again.simulate(data).simulated, model.simulate(data).simulated, equal_nan=True)
+    assert np.array_equal(again.simulate(data), model.simulate(data), equal_nan=True)
 
 
 def test_auto_says_what_came_second() -> None:
-    model = th.narx(saturating(), "auto", split=(50, 30, 20))
-    path = model.report.document["estimation"]["maps"][0]["path"]
+    model = th.narx(saturating(), "auto", ny=1, nu=1, split=(50, 30, 20))
+    path = document(model)["estimation"]["maps"][0]["path"]
     assert len(path) == 8 and all("held_out" in step for step in path)
     assert "tanh" in model.name
 

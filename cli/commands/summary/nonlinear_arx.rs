@@ -118,8 +118,7 @@ fn scales(model: &NonlinearArxModel) -> String {
 
 /// How a search for all numbers went.
 fn trained(training: &TrainingOutcome) -> String {
-    let starts: Vec<String> =
-        training.starts.iter().map(|cost| or_dash(*cost, |cost| short(cost)).to_string()).collect();
+    let starts: Vec<String> = training.starts.iter().map(|cost| or_dash(*cost, short)).collect();
     let of =
         if starts.len() > 1 { format!("; costs of the starts {}", starts.join(", ")) } else { String::new() };
     format!(

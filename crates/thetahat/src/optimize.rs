@@ -10,6 +10,7 @@
 //! Gauss-Newton         G step = g,  halved until the cost falls
 //! Newton-Raphson       (H + mu I) step = g,  H the Hessian by differences of g, mu the least that makes it positive; halved
 //! steepest descent     step = c1/(c2 + l) g,  halved
+//! simulated annealing  random steps that may raise the cost, the less the later; then Levenberg-Marquardt from the best point met
 //! ```
 //!
 //! (Levenberg 1944; Marquardt 1963; Moré, The Levenberg-Marquardt algorithm: implementation and theory, 1978; Ljung, System
@@ -39,12 +40,14 @@
 //! A cost that no step lowers further ends a search too: at what rounding allows it has converged, else there is
 //! [`NoDescent`](Stopped::NoDescent). Iterations and time have limits.
 
+mod annealing;
 pub(crate) mod normal;
 mod objective;
 mod options;
 mod outcome;
 mod quasi_newton;
 mod search;
+mod solved;
 mod starts;
 #[cfg(test)]
 mod tests;
@@ -55,5 +58,6 @@ pub use options::{Algorithm, Search, Step};
 pub(crate) use outcome::{Deadline, Found};
 pub use outcome::{Monitor, Progress, Stopped};
 pub(crate) use quasi_newton::least;
-pub(crate) use search::{best_free, best_linear, search};
+pub(crate) use search::search;
+pub(crate) use solved::{best_free, best_linear};
 pub(crate) use starts::{lowest, normal_number};

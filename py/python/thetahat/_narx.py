@@ -20,9 +20,9 @@ def narx(
     log: Log,
     map: str = "poly",
     *,
-    ny: Lags = 2,
-    nu: Lags = 2,
-    nk: Lags = 1,
+    ny: Lags | None = None,
+    nu: Lags | None = None,
+    nk: Lags | None = None,
     regressors: Sequence[str] | None = None,
     degree: int | None = None,
     terms: int | Sequence[str] | None = None,
@@ -64,11 +64,12 @@ def narx(
         splitting, the nearest samples of the fit; a network with one hidden layer of these units, radial basis functions whose centres and
         widths are trained; or of polynomials and networks the one with the best free run on rows held out.
     ny : int, or one for each output
-        Past outputs that g reads: y(k-1), ..., y(k-ny).
+        Past outputs that g reads: y(k-1), ..., y(k-ny). 2 unless it is said; where no lags are, ``"auto"`` takes those of the linear model
+        that the data choose.
     nu : int, or one for each input
-        Values of the input that g reads, from ``nk`` on; 0 for a time series.
+        Values of the input that g reads, from ``nk`` on, 2 unless it is said; 0 for a time series.
     nk : int, or one for each input
-        Samples from input to first effect; 0 where it acts at once.
+        Samples from input to first effect, 1 unless it is said; 0 where it acts at once.
     regressors, degree, terms, most_terms, centres, width, units, linear, membership, select, ridge, raw_terms, drawn, focus, search, \
 max_iterations, tolerance, step, starts, seed, time_limit, estimate, validate, split, detrend, offset
         Which functions, what to fit to and how, see `thetahat.NarxOptions`.

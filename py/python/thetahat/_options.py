@@ -91,7 +91,7 @@ class FitOptions(TypedDict, total=False):
         Keeps parameters small: weighs like this many more samples in which the output is 0.
     noise_bound : float
         Let no error exceed this, in units of the output.
-    search : {"lm", "gauss-newton", "newton", "gradient"}
+    search : {"lm", "gauss-newton", "newton", "gradient", "annealing"}
         How steps are chosen: Levenberg and Marquardt's way, unless said otherwise. This and what follows is for models that
         need a search: those with C, D or F.
     max_iterations : int
@@ -140,7 +140,7 @@ class EquationsOptions(TypedDict, total=False):
     ----------
     estimate, validate, split
         Rows to fit to and to validate on, see `FitOptions`. In each log the model begins, as it says, with the first row to fit to.
-    search : {"lm", "gauss-newton", "newton", "gradient"}
+    search : {"lm", "gauss-newton", "newton", "gradient", "annealing"}
         How steps are chosen: Levenberg and Marquardt's way, unless said otherwise.
     max_iterations : int
         Iterations at most, from each start: 100.

@@ -21,6 +21,8 @@ pub enum Algorithm {
     Newton,
     /// Steepest descent, in parameters scaled by the diagonal of the Gauss-Newton matrix.
     Gradient,
+    /// Simulated annealing, and from the best point that it met the way of Levenberg and Marquardt.
+    Annealing,
 }
 
 /// The length of the steps of [`Algorithm::Gradient`]: `c1/(c2 + l)` in iteration l = 0, 1, …; `c1` if there is no `c2`.

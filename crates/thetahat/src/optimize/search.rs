@@ -1,9 +1,10 @@
 //! The search itself.
 
-use super::normal;
+use super::annealing::anneal;
 use super::objective::Objective;
 use super::options::{Algorithm, Search};
 use super::outcome::{Deadline, Found, Monitor, Progress, Stopped};
+use super::solved::{best_free, solve_linear};
 use super::workspace::{LARGEST_DAMPING, SMALLEST_DAMPING, Workspace};
 use crate::Error;
 
@@ -50,14 +51,24 @@ pub(crate) fn search<O: Objective>(
     deadline: Deadline,
     monitor: Monitor<'_>,
 ) -> Result<Result<Found, O::Refusal>, Error> {
-    let cost = match best_free(objective, start) {
+    let mut cost = match best_free(objective, start) {
         Ok(cost) => cost,
         Err(refusal) => return Ok(Err(refusal)),
     };
+    let mut start = start.to_vec();
+    if options.algorithm == Algorithm::Annealing {
+        if let Err(refusal) = anneal(objective, &mut start, cost, options, deadline, monitor)? {
+            return Ok(Err(refusal));
+        }
+        cost = match best_free(objective, &start) {
+            Ok(cost) => cost,
+            Err(refusal) => return Ok(Err(refusal)),
+        };
+    }
     let mut descent = Descent {
         objective,
         workspace: Workspace::new(start.len(), options.algorithm == Algorithm::Newton),
-        parameters: start.to_vec(),
+        parameters: start,
         cost,
         damping: FIRST_DAMPING,
         unstable_steps: 0,
@@ -160,7 +171,7 @@ impl<O: Objective> Descent<'_, O> {
     /// Leaves the direction of an iteration in the workspace, and says how its length is found.
     fn direction(&mut self, options: &Search, iteration: usize) -> Rule {
         match options.algorithm {
-            Algorithm::LevenbergMarquardt => return Rule::Damped,
+            Algorithm::LevenbergMarquardt | Algorithm::Annealing => return Rule::Damped,
             // The step is there already.
             Algorithm::GaussNewton => {}
             Algorithm::Newton => self.workspace.newton_step(self.objective, &self.parameters, self.cost),
@@ -278,51 +289,4 @@ impl<O: Objective> Descent<'_, O> {
         // It has been evaluated before.
         let _ = self.objective.evaluate(&self.parameters);
     }
-}
-
-/// The cost of parameters with the free responses that are best for them.
-pub(crate) fn best_free<O: Objective>(objective: &mut O, parameters: &[f64]) -> Result<f64, O::Refusal> {
-    objective.restart();
-    let cost = objective.evaluate(parameters)?;
-    if objective.initial_conditions() == 0 {
-        return Ok(cost);
-    }
-    objective.linearize()?;
-    objective.try_free(&[]);
-    // Exact, as they enter linearly.
-    objective.evaluate(parameters)
-}
-
-/// The same with the parameters solved for that e is linear in where the others are given. Writes them into `parameters`.
-pub(crate) fn best_linear<O: Objective>(
-    objective: &mut O,
-    parameters: &mut [f64],
-) -> Result<f64, O::Refusal> {
-    let size = parameters.len();
-    solve_linear(objective, parameters, &mut vec![0.0; size * size], &mut vec![0.0; size])
-}
-
-/// The same in memory for a matrix and a step.
-fn solve_linear<O: Objective>(
-    objective: &mut O,
-    parameters: &mut [f64],
-    matrix: &mut [f64],
-    step: &mut [f64],
-) -> Result<f64, O::Refusal> {
-    best_free(objective, parameters)?;
-    objective.linearize()?;
-    let (size, linear) = (parameters.len(), objective.linear());
-    let count = linear.len();
-    let matrix = &mut matrix[..count * count];
-    let whole = objective.matrix().chunks_exact(size).skip(linear.start);
-    for (own, whole) in matrix.chunks_exact_mut(count.max(1)).zip(whole) {
-        own.copy_from_slice(&whole[linear.clone()]);
-    }
-    step.fill(0.0);
-    step[linear.clone()].copy_from_slice(&objective.right()[linear.clone()]);
-    normal::factor(matrix, count);
-    normal::solve(matrix, count, &mut step[linear]);
-    parameters.iter_mut().zip(&*step).for_each(|(value, step)| *value += step);
-    objective.try_free(step);
-    objective.evaluate(parameters)
 }

@@ -192,3 +192,67 @@ fn the_first_of_the_lowest_costs_wins() {
     assert_eq!(lowest([None, Some(&worse), Some(&one), Some(&one)]), Some(2));
     assert_eq!(lowest([None]), None);
 }
+
+/// Two valleys, e = (x^2 - 1, (x + 1)/2): the lowest is at -1, and near 1 there is another.
+#[derive(Default)]
+struct Hills {
+    at: f64,
+    matrix: [f64; 1],
+    right: [f64; 1],
+}
+
+impl Objective for Hills {
+    type Refusal = Beyond;
+
+    fn samples(&self) -> usize {
+        2
+    }
+
+    fn evaluate(&mut self, parameters: &[f64]) -> Result<f64, Beyond> {
+        self.at = parameters[0];
+        Ok((self.at * self.at - 1.0).powi(2) + (0.5 * (self.at + 1.0)).powi(2))
+    }
+
+    fn linearize(&mut self) -> Result<f64, Beyond> {
+        let (e, psi) = ([self.at * self.at - 1.0, 0.5 * (self.at + 1.0)], [-2.0 * self.at, -0.5]);
+        self.right = [psi[0] * e[0] + psi[1] * e[1]];
+        self.matrix = [psi[0] * psi[0] + psi[1] * psi[1]];
+        Ok(0.0)
+    }
+
+    fn matrix(&self) -> &[f64] {
+        &self.matrix
+    }
+
+    fn right(&self) -> &[f64] {
+        &self.right
+    }
+}
+
+#[test]
+fn annealing_leaves_a_valley_that_others_stay_in() {
+    let found = |algorithm, seed| {
+        let options = Search { algorithm, seed, tolerance: 1e-12, ..Search::default() };
+        let mut hills = Hills::default();
+        let monitor: Monitor<'_> = &|_| ControlFlow::Continue(());
+        search(&mut hills, &[1.2], &options, 0.0, Deadline::default(), monitor).unwrap().unwrap().parameters
+            [0]
+    };
+    assert!(found(Algorithm::LevenbergMarquardt, 0) > 0.5);
+    for seed in 0..10 {
+        let x = found(Algorithm::Annealing, seed);
+        assert!((x + 1.0).abs() < 1e-4, "{seed}: {x}");
+        assert_eq!(x.to_bits(), found(Algorithm::Annealing, seed).to_bits());
+    }
+    let options = Search { algorithm: Algorithm::Annealing, ..Search::default() };
+    let stopped =
+        search(
+            &mut Hills::default(),
+            &[1.2],
+            &options,
+            0.0,
+            Deadline::default(),
+            &|_| ControlFlow::Break(()),
+        );
+    assert!(matches!(stopped, Err(Error::Interrupted)));
+}

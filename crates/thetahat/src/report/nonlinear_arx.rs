@@ -1,5 +1,6 @@
 //! Fits of nonlinear ARX models.
 
+mod lags;
 mod map;
 mod plan;
 
@@ -24,6 +25,7 @@ use crate::select::Focus;
 use crate::validate::Part;
 use crate::{Document, Error};
 
+use self::lags::from_a_linear_choice;
 use self::map::fit_map;
 pub use plan::{Centres, InputLags, MapPlan, NonlinearArxPlan};
 
@@ -92,6 +94,14 @@ pub fn fit_nonlinear_arx_monitored(
     monitor: Monitor<'_>,
 ) -> Result<Report, Error> {
     plan.check()?;
+    let chosen;
+    let plan = match plan.lags_chosen {
+        true => {
+            chosen = from_a_linear_choice(log, sources, plan, monitor)?;
+            &chosen
+        }
+        false => plan,
+    };
     let names: Vec<&str> = plan.inputs.iter().chain(&plan.outputs).map(String::as_str).collect();
     names.iter().try_for_each(|name| log.channel(name).map(|_| ()))?;
     let shares = Shares::of(&plan.estimate, &plan.validate, plan.split, log.rows())?;

@@ -145,6 +145,8 @@ pub struct NonlinearArxPlan {
     pub output_lags: Vec<usize>,
     /// What is read of each input.
     pub input_lags: Vec<InputLags>,
+    /// Whether these lags are those of the linear model that the data choose, and what is said of them counts for nothing.
+    pub lags_chosen: bool,
     /// The functions.
     pub map: MapPlan,
     /// How many functions are taken; none: `select` says it.
@@ -181,6 +183,7 @@ impl NonlinearArxPlan {
             offsets: Vec::new(),
             output_lags: vec![2; outputs.len()],
             input_lags: vec![InputLags { lags: 2, delay: 1 }; inputs.len()],
+            lags_chosen: false,
             map: MapPlan::Polynomial { degree: 2 },
             terms: None,
             most: None,

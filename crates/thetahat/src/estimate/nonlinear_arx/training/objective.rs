@@ -165,7 +165,8 @@ impl Objective for RunErrors<'_> {
                 Self::read(z, taps, said, run.start, t, place);
                 said[place] = evaluator.value(z);
                 let error = y[t] - said[place];
-                if !(error.abs() <= LOST) {
+                // One that is no number is lost, too.
+                if error.is_nan() || error.abs() > LOST {
                     return Err(Lost);
                 }
                 cost += error * error;

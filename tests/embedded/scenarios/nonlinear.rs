@@ -2,8 +2,8 @@
 
 use thetahat_core::nalgebra::Const;
 use thetahat_core::{
-    Activation, ArxOrders, Basis, Error, Forgetting, Innovation, InputOrders, Local, Membership,
-    Neighbours, Network, NonlinearArx, Polynomial, Radial, RecursiveNarx, Scaling, Spline,
+    Activation, ArxOrders, Basis, Error, Forgetting, Innovation, InputOrders, Local, Membership, Neighbours,
+    Network, NonlinearArx, Polynomial, Radial, RecursiveNarx, Scaling, Spline,
 };
 
 use crate::record::{Sample, sample};

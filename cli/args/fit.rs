@@ -170,7 +170,7 @@ pub(crate) struct NarxArguments {
         ]
     )]
     pub(crate) narx: Option<MapArgument>,
-    /// Past outputs that g reads: y(k-1), …, y(k-N); one number for each output or one for all [default: 2, with auto as
+    /// Past outputs that g reads: y(k-1), …, y(k-N); one number for each output or one for all [default: 2; with auto also as
     /// the linear model that the data choose]
     #[arg(long, value_name = "N[,…]", value_delimiter = ',', requires = "narx")]
     pub(crate) ny: Vec<usize>,

@@ -64,8 +64,8 @@ def narx(
         splitting, the nearest samples of the fit; a network with one hidden layer of these units, radial basis functions whose centres and
         widths are trained; or of polynomials and networks the one with the best free run on rows held out.
     ny : int, or one for each output
-        Past outputs that g reads: y(k-1), ..., y(k-ny). 2 unless it is said; where no lags are, ``"auto"`` takes those of the linear model
-        that the data choose.
+        Past outputs that g reads: y(k-1), ..., y(k-ny). 2 unless it is said; where no lags are, ``"auto"`` also tries those of the linear
+        model that the data choose.
     nu : int, or one for each input
         Values of the input that g reads, from ``nk`` on, 2 unless it is said; 0 for a time series.
     nk : int, or one for each input

@@ -183,12 +183,13 @@ impl<'l> Samples<'l> {
         RunFigures::of(model, self.log, rows)
     }
 
-    /// The mean squared errors of a run of a model over some rows, in blocks of them; infinite where the run grows without bound.
+    /// The squared errors of a run of a model over some rows, for each row of the log: infinite where it has grown without bound, NaN where
+    /// it does not count.
     ///
     /// # Errors
     /// [`Error::Data`] for rows that are not there.
-    pub(crate) fn block_errors(&self, model: &NonlinearArxModel, rows: &[Rows]) -> Result<Vec<f64>, Error> {
-        figures::block_errors(model, self.log, rows)
+    pub(crate) fn squared_errors(&self, model: &NonlinearArxModel, rows: &[Rows]) -> Result<Vec<f64>, Error> {
+        figures::squared_errors(model, self.log, rows)
     }
 
     /// Whether an expression of an output is among the regressors.

@@ -13,8 +13,6 @@ use crate::respond::{Horizon, InitialCondition, OnLog};
 /// A choice prefers models whose free run stays within this many times the range of the estimation rows, and of those it runs over, about
 /// its middle.
 const RANGE: f64 = 1.1;
-/// Blocks of held-out rows by which models are compared.
-const COMPARED: usize = 10;
 
 /// How the maps of a nonlinear ARX model were chosen.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -151,19 +149,20 @@ pub(super) fn run(model: &NonlinearArxModel, log: &Log, rows: &[Rows]) -> Result
     Ok(sums)
 }
 
-/// The mean squared errors of a run of a model over blocks of some rows, as [`run`] counts them.
-pub(super) fn block_errors(model: &NonlinearArxModel, log: &Log, rows: &[Rows]) -> Result<Vec<f64>, Error> {
+/// The squared errors of a run of a model over some rows, as [`run`] counts them, for each row of the log: infinite where it has grown
+/// without bound, NaN where it does not count.
+pub(super) fn squared_errors(model: &NonlinearArxModel, log: &Log, rows: &[Rows]) -> Result<Vec<f64>, Error> {
     let on_log = NonlinearArxOnLog::new(model, log, rows)?;
     let horizon = if on_log.is_driven() { Horizon::FreeRun } else { Horizon::Steps { steps: 1 } };
-    let mut squares = Vec::new();
+    let mut squares = vec![f64::NAN; log.rows()];
     for response in on_log.respond(horizon, InitialCondition::Drop)? {
         let measured = on_log.measured(0);
-        let counted = response.counted.iter().cloned().flatten();
-        squares.extend(counted.map(|t| (measured[t] - response.values[t]).powi(2)));
+        for t in response.counted.iter().cloned().flatten() {
+            let square = (measured[t] - response.values[t]).powi(2);
+            squares[t] = if square.is_nan() { f64::INFINITY } else { square };
+        }
     }
-    let blocks = squares.chunks(squares.len().div_ceil(COMPARED).max(1));
-    let mean = |block: &[f64]| block.iter().sum::<f64>() / block.len() as f64;
-    Ok(blocks.map(mean).map(|mean| if mean.is_finite() { mean } else { f64::INFINITY }).collect())
+    Ok(squares)
 }
 
 /// What figures are made of.

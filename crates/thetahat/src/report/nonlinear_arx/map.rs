@@ -29,6 +29,8 @@ const FEW: [usize; 2] = [2, 4];
 const DEGREES: [usize; 3] = [1, 2, 3];
 /// Where no rows are held out, this part of the estimation samples, their last, is.
 const HELD_OUT: f64 = 0.3;
+/// Blocks of held-out rows over which they are compared.
+const COMPARED: usize = 10;
 /// What is foretold from what was measured.
 const ONE: Horizon = Horizon::Steps { steps: 1 };
 
@@ -50,14 +52,18 @@ struct Parts<'l> {
     compared: &'static str,
 }
 
-/// Fits the map of the output of `head`, to which the other outputs are inputs.
+/// Fits a linear model to some rows, and gives its row of the table and its squared errors on others, where it takes part.
+pub(super) type Linear<'a> = &'a dyn Fn(&[Rows], &[Rows]) -> Result<Option<(TermStep, Vec<f64>)>, Error>;
+
+/// Fits the map of the output of `head`, to which the other outputs are inputs. None where a linear model is as good.
 pub(super) fn fit_map<'l>(
     plan: &NonlinearArxPlan,
     head: &NonlinearArxModel,
     deviations: &'l Log,
     Shares { estimation, validation, parts }: &Shares,
+    linear: Linear<'_>,
     monitor: Monitor<'_>,
-) -> Result<FittedMap<'l>, Error> {
+) -> Result<Option<FittedMap<'l>>, Error> {
     let read: Vec<String> =
         head.inputs.iter().chain(&head.expressions).map(|signal| signal.name.clone()).collect();
     let ridge = if plan.trains() { 0.0 } else { plan.ridge.unwrap_or(0.0) };
@@ -91,11 +97,15 @@ pub(super) fn fit_map<'l>(
         parts.select = Select::Validation;
         parts.compared = "last-rows";
     }
-    let Fitted { solved, outcome, .. } = match plan.map {
-        MapPlan::Auto => best(plan, &parts, monitor)?,
-        ref map => fit(plan, map, &parts, monitor)?,
+    let fitted = match plan.map {
+        MapPlan::Auto => {
+            let fitted_to = parts.first.as_ref().unwrap_or(&parts.all).divided(1.0).0;
+            let linear = linear(&fitted_to, &parts.held_out)?;
+            best(plan, &parts, linear.as_ref(), monitor)?
+        }
+        ref map => Some(fit(plan, map, &parts, monitor)?),
     };
-    Ok(FittedMap { samples: parts.all, solved, outcome })
+    Ok(fitted.map(|Fitted { solved, outcome, .. }| FittedMap { samples: parts.all, solved, outcome }))
 }
 
 /// A map with its parameters.
@@ -178,14 +188,20 @@ fn fit(
 struct Tried {
     fitted: Fitted,
     step: TermStep,
-    /// The mean squared errors over blocks of the held-out rows.
+    /// The squared errors at each row of the log; NaN where they do not count.
     errors: Vec<f64>,
 }
 
 /// Fits the maps of the choice among all, and takes the first, in the order of their complexity, whose free run on held-out rows is as good
 /// as the best one: the mean difference of squared errors over blocks is within its standard error (Breiman, Friedman, Olshen and Stone,
-/// Classification and Regression Trees, 1984, section 3.4.3, with differences in pairs).
-fn best(plan: &NonlinearArxPlan, parts: &Parts<'_>, monitor: Monitor<'_>) -> Result<Fitted, Error> {
+/// Classification and Regression Trees, 1984, section 3.4.3, with differences in pairs). None where a linear model is: its squared errors
+/// and its row of the table are given.
+fn best(
+    plan: &NonlinearArxPlan,
+    parts: &Parts<'_>,
+    linear: Option<&(TermStep, Vec<f64>)>,
+    monitor: Monitor<'_>,
+) -> Result<Option<Fitted>, Error> {
     let mut kinds = Vec::new();
     let fewest = parts.first.as_ref().map_or(parts.all.count(), |first| first.count().min(parts.all.count()));
     for degree in DEGREES {
@@ -213,26 +229,33 @@ fn best(plan: &NonlinearArxPlan, parts: &Parts<'_>, monitor: Monitor<'_>) -> Res
             Err(error) => refused = refused.or(Some(error)),
         }
     }
-    let rank = |one: &Tried| one.step.held_out.map_or((true, f64::INFINITY), RunFigures::rank);
+    let rank = |step: &TermStep| step.held_out.map_or((true, f64::INFINITY), RunFigures::rank);
     let better = |one: &&Tried, other: &&Tried| {
-        let ((strays, rmse), (others, worse)) = (rank(one), rank(other));
+        let ((strays, rmse), (others, worse)) = (rank(&one.step), rank(&other.step));
         strays.cmp(&others).then(rmse.total_cmp(&worse))
     };
     let Some(least) = tried.iter().min_by(better) else {
+        if linear.is_some() {
+            return Ok(None);
+        }
         return Err(refused.unwrap_or_else(|| Error::data("no map can be fitted to these rows")));
     };
-    let as_good = |one: &Tried| rank(one).0 == rank(least).0 && about(&one.errors, &least.errors);
+    if linear.is_some_and(|(_, errors)| rank(&least.step).0 || about(errors, &least.errors)) {
+        return Ok(None);
+    }
+    let as_good = |one: &Tried| rank(&one.step).0 == rank(&least.step).0 && about(&one.errors, &least.errors);
     let taken = tried.iter().position(as_good).unwrap_or(0);
-    let path: Vec<TermStep> = tried.iter().map(|one| one.step.clone()).collect();
+    let path: Vec<TermStep> =
+        linear.iter().map(|(step, _)| step).chain(tried.iter().map(|one| &one.step)).cloned().collect();
     let fitted = tried.swap_remove(taken).fitted;
     let outcome = TermsOutcome {
         candidates: path.len(),
         selected_by: parts.compared.to_owned(),
-        taken: taken + 1,
+        taken: taken + 1 + usize::from(linear.is_some()),
         path,
         ..fitted.outcome
     };
-    Ok(Fitted { outcome, ..fitted })
+    Ok(Some(Fitted { outcome, ..fitted }))
 }
 
 /// Fits a map of that choice, and judges it on the held-out rows; none where no model of it was judged.
@@ -262,16 +285,22 @@ fn try_one(
     }
     step.free_run = Some(first.run_figures(&judged, &first.divided(1.0).0)?);
     step.held_out = Some(first.run_figures(&judged, &parts.held_out)?);
-    let errors = first.block_errors(&judged, &parts.held_out)?;
+    let errors = first.squared_errors(&judged, &parts.held_out)?;
     Ok(Some(Tried { fitted, step, errors }))
 }
 
-/// Whether errors are no larger than the least ones, by one standard error of their mean difference.
+/// Whether squared errors are no larger than the least ones, by one standard error of their mean difference over blocks of the rows where
+/// both count.
 fn about(errors: &[f64], least: &[f64]) -> bool {
-    let differences: Vec<f64> = errors.iter().zip(least).map(|(one, other)| one - other).collect();
-    let count = differences.len() as f64;
-    let mean = differences.iter().sum::<f64>() / count;
-    let square = differences.iter().map(|difference| (difference - mean).powi(2)).sum::<f64>();
+    let both = errors.iter().zip(least).map(|(one, other)| one - other);
+    let differences: Vec<f64> = both.filter(|difference| !difference.is_nan()).collect();
+    let blocks: Vec<f64> = differences
+        .chunks(differences.len().div_ceil(COMPARED).max(1))
+        .map(|block| block.iter().sum::<f64>() / block.len() as f64)
+        .collect();
+    let count = blocks.len() as f64;
+    let mean = blocks.iter().sum::<f64>() / count;
+    let square = blocks.iter().map(|block| (block - mean).powi(2)).sum::<f64>();
     let deviation = if count > 1.0 { (square / (count - 1.0) / count).sqrt() } else { 0.0 };
     mean <= deviation
 }

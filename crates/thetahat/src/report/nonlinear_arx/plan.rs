@@ -145,7 +145,7 @@ pub struct NonlinearArxPlan {
     pub output_lags: Vec<usize>,
     /// What is read of each input.
     pub input_lags: Vec<InputLags>,
-    /// Whether these lags are those of the linear model that the data choose, and what is said of them counts for nothing.
+    /// Whether those of the linear model that the data choose are tried, too, and taken where the model runs better on rows held out.
     pub lags_chosen: bool,
     /// The functions.
     pub map: MapPlan,

@@ -291,7 +291,7 @@ pub(crate) struct SearchArguments {
     /// How steps are chosen [default: lm]
     #[arg(long, value_enum, value_name = "HOW")]
     pub(crate) search: Option<SearchArgument>,
-    /// Iterations at most, from each start [default: 100, with --narx 200]
+    /// Iterations at most, from each start [default: 100, with --narx 500]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(crate) max_iterations: Option<u32>,
     /// Stop where the next step would lower the cost by less than this fraction [default: 1e-8]

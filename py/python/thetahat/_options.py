@@ -201,7 +201,7 @@ class NarxOptions(TypedDict, total=False):
         Of which errors parameters are made the least: one step ahead, of the free run, or so many steps from what was measured.
         ``"auto"`` is one step ahead, and for what is trained the free run where there are inputs.
     search, max_iterations, tolerance, step, starts, time_limit
-        How a training searches, see `FitOptions`: 200 iterations and 4 further starts unless it is said.
+        How a training searches, see `FitOptions`: 500 iterations and 4 further starts unless it is said.
     linear : bool
         Whether a constant and the regressors themselves stand beside radial basis functions; whether local models, and what neighbours
         say, are planes: True.

@@ -16,7 +16,7 @@ use crate::estimate::{
     nonlinear_arx::{Joint, UNASKED, joint},
 };
 use crate::model::{ChannelExpression, Map, Model, NonlinearArxModel, OutputMap, Regressor, Signal};
-use crate::optimize::Monitor;
+use crate::optimize::{Monitor, Stopped};
 use crate::respond::{
     Horizon,
     nonlinear_arx::{NonlinearArxOnLog, no_number},
@@ -333,6 +333,19 @@ fn warnings(report: &Report, model: &NonlinearArxModel) -> Vec<String> {
             warnings.push(format!(
                 "{of}the free run on the estimation rows {what}: do not simulate with this model before you have looked at it"
             ));
+        }
+        if let Some(training) = outcome.training.as_ref() {
+            let more = match training.stopped {
+                Stopped::MaxIterations => Some("allow more (`max-iterations`)"),
+                Stopped::TimeLimit => Some("allow more time (`time-limit`)"),
+                Stopped::Converged | Stopped::NoDescent => None,
+            };
+            warnings.extend(more.map(|more| {
+                format!(
+                    "{of}the training has not converged in {} iterations: its numbers are not those of least cost; {more}",
+                    training.iterations
+                )
+            }));
         }
         let aliases: Vec<&str> = taken.iter().flat_map(|step| &step.aliases).map(String::as_str).collect();
         if let Some(first) = aliases.first() {

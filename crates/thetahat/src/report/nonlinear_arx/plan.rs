@@ -16,7 +16,7 @@ const MOST_LOCAL: usize = 10;
 /// Further starts of a training.
 const STARTS: usize = 4;
 /// Its iterations, at most.
-const ITERATIONS: usize = 200;
+const ITERATIONS: usize = 500;
 
 /// Units of a network, or centres, at most.
 const MOST_UNITS: usize = 2000;

@@ -113,7 +113,7 @@ fn words_that_the_parser_does_not_know() {
         "--na -1 --nb 2",
         "--na 2.5 --nb 2",
         "--na 2 --nb 2,x",
-        "--model oe --nb 2 --nf 2 --search annealing",
+        "--model oe --nb 2 --nf 2 --search tabu",
         "--model oe --nb 2 --nf 2 --initial guess",
         "--model oe --nb 2 --nf 2 --max-iterations 0",
         "--model oe --nb 2 --nf 2 --max-iterations 99999999999999999999",

@@ -38,7 +38,7 @@ fn every_verb_takes_a_network() {
     }
     let auto = folder.fit("log.csv --narx auto --ny 2 --nu 2 --sample-time 0.1 --split 50/30/20");
     let outcome = &auto["estimation"]["maps"][0];
-    assert_eq!(outcome["path"].as_array().map(Vec::len), Some(9));
+    assert_eq!(outcome["path"].as_array().map(Vec::len), Some(7));
     for (options, words) in [
         ("--narx tanh --terms 3", "units"),
         ("--narx poly --starts 3", "--starts"),

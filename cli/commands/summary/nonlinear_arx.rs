@@ -155,9 +155,6 @@ fn choice(procedure: &Procedure, outcome: &TermsOutcome) -> String {
             let best = match outcome.selected_by.as_str() {
                 "given" => "as asked for",
                 "validation" => "the one that runs best on the validation rows",
-                "last-rows" => {
-                    "the one that runs best on the last rows, which were held out; then trained on all"
-                }
                 _ => &how,
             };
             format!(

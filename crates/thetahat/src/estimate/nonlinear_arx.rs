@@ -21,7 +21,7 @@ pub use figures::{MapsOutcome, RunFigures, TermStep, TermsOutcome, TrainingOutco
 use figures::{Sums, run};
 pub(crate) use joint::{Joint, joint};
 pub(crate) use local::Growth;
-pub(crate) use training::{Training, UNASKED, Units};
+pub(crate) use training::{Training, Units};
 
 use super::{Criteria, InformationCriterion};
 use crate::Error;
@@ -76,8 +76,6 @@ pub(crate) struct Chosen {
     pub(crate) map: Map,
     pub(crate) steps: Vec<TermStep>,
     pub(crate) taken: usize,
-    /// The model that was judged on held-out rows; none where there are none, and of maps that no choice compares with others.
-    pub(crate) judged: Option<NonlinearArxModel>,
 }
 
 impl Count {
@@ -167,29 +165,6 @@ impl<'l> Samples<'l> {
 
     pub(crate) fn count(&self) -> usize {
         self.rows.len()
-    }
-
-    /// The rows of the first part of the samples, and of those after it.
-    pub(crate) fn divided(&self, part: f64) -> (Vec<Rows>, Vec<Rows>) {
-        let (before, after) = self.rows.split_at((part * self.rows.len() as f64) as usize);
-        (as_rows(before), as_rows(after))
-    }
-
-    /// What runs of a model over some rows miss.
-    ///
-    /// # Errors
-    /// [`Error::Data`] for rows that are not there.
-    pub(crate) fn run_figures(&self, model: &NonlinearArxModel, rows: &[Rows]) -> Result<RunFigures, Error> {
-        RunFigures::of(model, self.log, rows)
-    }
-
-    /// The squared errors of a run of a model over some rows, for each row of the log: infinite where it has grown without bound, NaN where
-    /// it does not count.
-    ///
-    /// # Errors
-    /// [`Error::Data`] for rows that are not there.
-    pub(crate) fn squared_errors(&self, model: &NonlinearArxModel, rows: &[Rows]) -> Result<Vec<f64>, Error> {
-        figures::squared_errors(model, self.log, rows)
     }
 
     /// Whether an expression of an output is among the regressors.
@@ -355,25 +330,20 @@ impl<'l> Samples<'l> {
         let path = self.path(candidates, &products, most);
         self.check(candidates, &products, &path, count)?;
         let lengths = path.chosen.len();
-        let judged_on = chosen_on.unwrap_or(self);
-        let own = match (count, chosen_on) {
-            (Count::HeldOut(_), Some(others)) => {
-                Some(others.path(candidates, &others.products(candidates, &others.rows), most))
-            }
-            _ => None,
-        };
-        let judged_path = own.as_ref().unwrap_or(&path);
         let held_out = match count {
-            Count::HeldOut(rows) => judged_on.on_rows(candidates, judged_path, rows, lengths)?,
+            Count::HeldOut(rows) => {
+                let samples = chosen_on.unwrap_or(self);
+                let own = chosen_on
+                    .map(|others| others.path(candidates, &others.products(candidates, &others.rows), most));
+                samples.on_rows(candidates, own.as_ref().unwrap_or(&path), rows, lengths)?
+            }
             Count::Blocks => self.on_blocks(candidates, &blocks, lengths)?,
             Count::Given(_) | Count::Least(_) => vec![None; lengths],
         };
         let steps = self.steps(candidates, &products, &path, &held_out)?;
         let taken = count.best(&steps, always.clamp(1, lengths), products.rows());
-        let judged = (matches!(count, Count::HeldOut(_)) && taken <= judged_path.chosen.len())
-            .then(|| judged_on.on_path(candidates, judged_path, taken));
         let places = candidates.ordered(path.places(taken));
-        Ok(Chosen { map: candidates.map(&places, self.taps.len()), steps, taken, judged })
+        Ok(Chosen { map: candidates.map(&places, self.taps.len()), steps, taken })
     }
 
     /// The names of the regressors.

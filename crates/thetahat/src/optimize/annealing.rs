@@ -13,7 +13,7 @@ const LAST: f64 = 1e-4;
 /// Trials at each temperature.
 const TRIALS: usize = 30;
 
-/// Wanders through the parameters from `point` by random steps d, and leaves there the best of all that were met (Kirkpatrick, Gelatt and
+/// Wanders through the parameters from `point` by random steps d, and leaves there the best of all that were met, of which it gives the cost (Kirkpatrick, Gelatt and
 /// Vecchi, Science 220, 1983; Metropolis and others 1953). A step that raises the cost J by dJ is taken with the probability
 ///
 /// ```text
@@ -32,7 +32,7 @@ pub(super) fn anneal<O: Objective>(
     options: &Search,
     deadline: Deadline,
     monitor: Monitor<'_>,
-) -> Result<Result<(), O::Refusal>, Error> {
+) -> Result<Result<f64, O::Refusal>, Error> {
     if let Err(refusal) = objective.linearize() {
         return Ok(Err(refusal));
     }
@@ -71,5 +71,5 @@ pub(super) fn anneal<O: Objective>(
             }
         }
     }
-    Ok(Ok(()))
+    Ok(best_free(objective, point))
 }

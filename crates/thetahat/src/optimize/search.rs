@@ -51,20 +51,15 @@ pub(crate) fn search<O: Objective>(
     deadline: Deadline,
     monitor: Monitor<'_>,
 ) -> Result<Result<Found, O::Refusal>, Error> {
-    let mut cost = match best_free(objective, start) {
+    let mut start = start.to_vec();
+    let mut cost = best_free(objective, &start);
+    if let (Ok(own), Algorithm::Annealing) = (&cost, options.algorithm) {
+        cost = anneal(objective, &mut start, *own, options, deadline, monitor)?;
+    }
+    let cost = match cost {
         Ok(cost) => cost,
         Err(refusal) => return Ok(Err(refusal)),
     };
-    let mut start = start.to_vec();
-    if options.algorithm == Algorithm::Annealing {
-        if let Err(refusal) = anneal(objective, &mut start, cost, options, deadline, monitor)? {
-            return Ok(Err(refusal));
-        }
-        cost = match best_free(objective, &start) {
-            Ok(cost) => cost,
-            Err(refusal) => return Ok(Err(refusal)),
-        };
-    }
     let mut descent = Descent {
         objective,
         workspace: Workspace::new(start.len(), options.algorithm == Algorithm::Newton),

@@ -1,11 +1,12 @@
 //! Fits of nonlinear ARX models.
 
-mod linear;
+mod auto;
 mod map;
 mod plan;
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::ops::ControlFlow;
 
 use super::evaluate::evaluate;
 use super::schema::{Estimation, Report};
@@ -13,7 +14,7 @@ use super::shares::Shares;
 use crate::data::{Channel, Log, Offset, Rows, Source};
 use crate::estimate::{
     Criteria, MapsOutcome, Procedure,
-    nonlinear_arx::{Joint, UNASKED, joint},
+    nonlinear_arx::{Joint, joint},
 };
 use crate::model::{ChannelExpression, Map, Model, NonlinearArxModel, OutputMap, Regressor, Signal};
 use crate::optimize::{Monitor, Stopped};
@@ -25,7 +26,7 @@ use crate::select::Focus;
 use crate::validate::Part;
 use crate::{Document, Error};
 
-use self::linear::{from_a_linear_choice, judged, taken};
+use self::auto::best;
 use self::map::fit_map;
 pub use plan::{Centres, InputLags, MapPlan, NonlinearArxPlan};
 
@@ -80,7 +81,7 @@ const ROUNDING: f64 = 1e-13;
 /// # Ok::<(), thetahat::Error>(())
 /// ```
 pub fn fit_nonlinear_arx(log: &Log, sources: &[Source], plan: &NonlinearArxPlan) -> Result<Report, Error> {
-    fit_nonlinear_arx_monitored(log, sources, plan, UNASKED)
+    fit_nonlinear_arx_monitored(log, sources, plan, &|_| ControlFlow::Continue(()))
 }
 
 /// [`fit_nonlinear_arx`] that tells `monitor` of each iteration of a training, from several threads. The monitor may end it.
@@ -94,24 +95,33 @@ pub fn fit_nonlinear_arx_monitored(
     monitor: Monitor<'_>,
 ) -> Result<Report, Error> {
     plan.check()?;
-    if plan.lags_chosen {
-        return fit_of_chosen_lags(log, sources, plan, monitor);
+    let plan = &plan.holding_out()?;
+    match plan.map {
+        MapPlan::Auto => best(log, sources, plan, monitor),
+        _ => fit_planned(log, sources, plan, monitor),
     }
+}
+
+/// The fit of a plan that was checked, of one kind of map.
+fn fit_planned(
+    log: &Log,
+    sources: &[Source],
+    plan: &NonlinearArxPlan,
+    monitor: Monitor<'_>,
+) -> Result<Report, Error> {
     let names: Vec<&str> = plan.inputs.iter().chain(&plan.outputs).map(String::as_str).collect();
     names.iter().try_for_each(|name| log.channel(name).map(|_| ()))?;
     let shares = Shares::of(&plan.estimate, &plan.validate, plan.split, log.rows())?;
     let expressions = plan.read_expressions()?;
     let Prepared { whole, signals, deviations } = prepare(log, plan, &expressions, &shares.estimation)?;
     let head = head(&whole, plan, &signals, &deviations, &expressions, &shares.estimation)?;
-    let linear = |rows: &[Rows], held_out: &[Rows]| judged(log, sources, plan, (rows, held_out), monitor);
     let fitted = (0..plan.outputs.len())
-        .map(|output| fit_map(plan, &head.of_output(output)?, &deviations, &shares, &linear, monitor))
-        .collect::<Result<Option<Vec<_>>, Error>>()?;
-    let Some(fitted) = fitted else { return taken(log, sources, plan, monitor) };
+        .map(|output| fit_map(plan, &head.of_output(output)?, &deviations, &shares, monitor))
+        .collect::<Result<Vec<_>, Error>>()?;
     let by = match plan.map {
         MapPlan::Local { .. } => Procedure::Splits,
         MapPlan::Neighbours { .. } => Procedure::Neighbours,
-        _ if plan.trains() => Procedure::Training,
+        _ if plan.map.trained().is_some() => Procedure::Training,
         _ => Procedure::ForwardRegression,
     };
     // Samples are no parameters: as many as there are of them for each that is asked stand for one.
@@ -205,32 +215,6 @@ fn prepare<'l>(
     let offsets = signals.iter().map(|(name, signal)| (name.as_str(), signal.offset));
     let deviations = whole.deviations(offsets)?;
     Ok(Prepared { whole, signals, deviations })
-}
-
-/// The fit with the lags of the plan or those of the linear model that the data choose, whichever runs better on rows held out.
-fn fit_of_chosen_lags(
-    log: &Log,
-    sources: &[Source],
-    plan: &NonlinearArxPlan,
-    monitor: Monitor<'_>,
-) -> Result<Report, Error> {
-    let own = NonlinearArxPlan { lags_chosen: false, ..plan.clone() };
-    let linear = from_a_linear_choice(log, sources, &own, monitor)?;
-    let fit = |plan: &NonlinearArxPlan| fit_nonlinear_arx_monitored(log, sources, plan, monitor);
-    if linear == own {
-        return fit(&own);
-    }
-    let held_out = |report: &Report| {
-        let step = report.estimation.procedure.terms().first().and_then(|outcome| outcome.last());
-        // A linear model stands where no nonlinear one ran better.
-        step.and_then(|step| step.held_out?.rmse).unwrap_or(f64::INFINITY)
-    };
-    match (fit(&own), fit(&linear)) {
-        (Ok(one), Ok(other)) => Ok(if held_out(&other) < held_out(&one) { other } else { one }),
-        (Ok(report), Err(Error::Undetermined { .. } | Error::Argument { .. }))
-        | (Err(Error::Undetermined { .. } | Error::Argument { .. }), Ok(report)) => Ok(report),
-        (Err(error), _) | (_, Err(error)) => Err(error),
-    }
 }
 
 /// The model but its functions: signals, regressors and scales.

@@ -3,7 +3,7 @@
 use super::fitted_rows::is_exact;
 use super::schema::Report;
 use crate::estimate::{Procedure, SearchOutcome};
-use crate::figures::{fixed, number, scientific};
+use crate::figures::{error, fixed, number, scientific};
 use crate::model::{Orders, PolynomialModel, Structure, cancel, near_cancellation};
 use crate::optimize::Stopped;
 use crate::select::{Grid, OrderRange};
@@ -107,7 +107,7 @@ fn cut_off(model: &PolynomialModel) -> impl Iterator<Item = String> {
                 input.name,
                 last.name,
                 number(last.value),
-                crate::figures::error(last.standard_error.unwrap_or(0.0))
+                error(last.standard_error.unwrap_or(0.0))
             )
         })
     })

@@ -19,6 +19,11 @@ pub enum Horizon {
     FreeRun,
 }
 
+impl Horizon {
+    /// From what was measured.
+    pub(crate) const ONE_STEP: Self = Self::Steps { steps: 1 };
+}
+
 impl fmt::Display for Horizon {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

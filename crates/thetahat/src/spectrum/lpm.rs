@@ -131,14 +131,15 @@ fn around(segment: &Segment, angle: f64) -> impl Iterator<Item = (isize, usize, 
 fn local(segments: &[Segment], angle: f64, width: f64, largest: &[f64]) -> Result<Found, Empty> {
     let inputs = largest.len();
     let columns = TERMS * inputs;
-    let rows: usize = segments.iter().map(|segment| around(segment, angle).count()).sum();
+    let lines: Vec<Vec<(isize, usize, bool)>> =
+        segments.iter().map(|segment| around(segment, angle).collect()).collect();
+    let rows: usize = lines.iter().map(Vec::len).sum();
     // The output is the last column.
     let mut matrix = DMatrix::<Complex<f64>>::zeros(rows, columns + 1);
     let mut power = DMatrix::<Complex<f64>>::zeros(inputs, inputs);
     let (mut before, mut twins) = (0, Vec::new());
-    for segment in segments {
+    for (segment, own) in segments.iter().zip(&lines) {
         let step = TAU / segment.length as f64;
-        let own: Vec<(isize, usize, bool)> = around(segment, angle).collect();
         let x = |row: usize| (own[row].0 as f64 * step - angle) / width;
         for (row, (_, line, turned)) in own.iter().enumerate() {
             let of = |channel: usize| {

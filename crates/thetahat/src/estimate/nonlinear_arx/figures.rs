@@ -26,16 +26,16 @@ pub struct MapsOutcome {
 pub struct TermsOutcome {
     /// The functions to choose from.
     pub candidates: usize,
-    /// What said how many to take: `given`, the word of an information criterion, `validation` (the free run on the validation rows) or
-    /// `cv` (that on five blocks, each by a model of the others).
+    /// What said how many to take, or which of those tried: `given`, the word of an information criterion, `validation` (the free run on the
+    /// validation rows) or `cv` (that on five blocks, each by a model of the others).
     pub selected_by: String,
     /// What was added to the squares of the functions, in samples; none: nothing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ridge: Option<f64>,
     /// How many steps of the path the model has; of nearest neighbours, which step it is.
     pub taken: usize,
-    /// The functions in the order of their choice, those that were not taken too; of local models the splits, and of nearest neighbours
-    /// the numbers that were tried.
+    /// The functions in the order of their choice, those that were not taken too; of local models the splits, of nearest neighbours
+    /// the numbers that were tried, and of trained maps the maps that were.
     pub path: Vec<TermStep>,
     /// How the numbers were found, where more was to be found than one solution says.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -75,7 +75,8 @@ pub struct TrainingOutcome {
 /// A step of the choice: the model with this term, or split, and those before.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct TermStep {
-    /// The function that is added, such as u(k-1)^2; the split of a box, such as split(u(k-1), 0.5); or a number of neighbours.
+    /// The function that is added, such as u(k-1)^2; the split of a box, such as split(u(k-1), 0.5); a number of neighbours; or a map that
+    /// was tried, such as 2 tanh units.
     pub term: String,
     /// The parameters of the model; of nearest neighbours, samples for each that is asked.
     pub parameters: usize,
@@ -147,22 +148,6 @@ pub(super) fn run(model: &NonlinearArxModel, log: &Log, rows: &[Rows]) -> Result
         }
     }
     Ok(sums)
-}
-
-/// The squared errors of a run of a model over some rows, as [`run`] counts them, for each row of the log: infinite where it has grown
-/// without bound, NaN where it does not count.
-pub(super) fn squared_errors(model: &NonlinearArxModel, log: &Log, rows: &[Rows]) -> Result<Vec<f64>, Error> {
-    let on_log = NonlinearArxOnLog::new(model, log, rows)?;
-    let horizon = if on_log.is_driven() { Horizon::FreeRun } else { Horizon::Steps { steps: 1 } };
-    let mut squares = vec![f64::NAN; log.rows()];
-    for response in on_log.respond(horizon, InitialCondition::Drop)? {
-        let measured = on_log.measured(0);
-        for t in response.counted.iter().cloned().flatten() {
-            let square = (measured[t] - response.values[t]).powi(2);
-            squares[t] = if square.is_nan() { f64::INFINITY } else { square };
-        }
-    }
-    Ok(squares)
 }
 
 /// What figures are made of.

@@ -201,7 +201,7 @@ impl Samples<'_> {
             before = step.left;
         }
         let taken = count.best(&steps, 1, self.rows.len());
-        Ok(Chosen { map: path[taken - 1].model.maps[0].functions.clone(), steps, taken, judged: None })
+        Ok(Chosen { map: path[taken - 1].model.maps[0].functions.clone(), steps, taken })
     }
 
     /// The models on the way for some samples: one local model, two, and so on. There is one at least.

@@ -129,7 +129,7 @@ impl Samples<'_> {
         let mse = steps[taken - 1].rmse.powi(2);
         model.noise_covariance = vec![vec![mse]];
         let map = model.maps[0].functions.clone();
-        Ok((Chosen { map, steps, taken, judged: None }, Solved { model, mse, condition: None }))
+        Ok((Chosen { map, steps, taken }, Solved { model, mse, condition: None }))
     }
 
     /// The free runs on blocks, each by the samples of the others.

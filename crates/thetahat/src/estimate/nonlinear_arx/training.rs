@@ -5,17 +5,17 @@ mod starts;
 #[cfg(test)]
 mod tests;
 
-use std::ops::ControlFlow;
-
 use rayon::prelude::*;
 use thetahat_core::nalgebra::DMatrix;
 
 use self::objective::RunErrors;
 pub(crate) use self::starts::Units;
+use super::super::start::plant::inverse;
 use super::{Chosen, Count, RunFigures, Samples, Solved, TermStep, TrainingOutcome, as_rows};
 use crate::Error;
-use crate::model::{Activation, Map, Parameter};
-use crate::optimize::{Deadline, Found, Monitor, Search, best_linear, search};
+use crate::figures::short;
+use crate::model::{Activation, Map, NonlinearArxModel, Parameter, is_covariance};
+use crate::optimize::{Deadline, Found, Monitor, Objective, Search, best_linear, lowest, search};
 use crate::respond::Horizon;
 
 /// Iterations one step ahead, and over windows, before those of longer runs.
@@ -48,10 +48,10 @@ struct Trained {
 
 impl Samples<'_> {
     /// Trains functions of which the numbers are free: as many of them, and with the ridge, as `count` says. Of all starts that with the
-    /// least cost is kept.
+    /// least cost is kept. Where `chosen_on` has other samples, these are compared there, and the chosen one is trained on all.
     ///
     /// # Errors
-    /// [`Error::Argument`] for no functions; [`Error::Undetermined`] for too few samples, or where no start leads anywhere;
+    /// [`Error::Undetermined`] for too few samples, or where no start leads anywhere;
     /// [`Error::Interrupted`].
     pub(crate) fn train(
         &self,
@@ -66,53 +66,37 @@ impl Samples<'_> {
         let tried: Vec<(usize, f64)> =
             sizes.iter().flat_map(|size| training.ridges.iter().map(|ridge| (*size, *ridge))).collect();
         let largest = sizes.iter().map(|size| units.numbers(self.regressors(), *size)).max().unwrap_or(0);
-        let fewest = self.count().min(first.count());
-        if largest >= fewest {
-            return Err(Error::undetermined(
-                Vec::new(),
-                format!(
-                    "{largest} numbers are trained, and {fewest} samples have all regressors; take fewer `units`, fewer lags, or more rows"
-                ),
-            ));
-        }
+        first.check_numbers(largest)?;
         let seed = training.search.seed;
         let draws = |samples: &Self, size: usize| -> Vec<Map> {
             let each = 0..=training.search.starts as u64;
             each.map(|start| units.draw(samples, size, seed, start)).collect()
         };
-        // Without rows to hold out the last part of the samples is that.
-        let parts: Vec<(&Self, usize, f64, Map)> = tried
+        let starts: Vec<(Map, f64)> = tried
             .iter()
-            .flat_map(|(size, ridge)| draws(first, *size).into_iter().map(|map| (first, *size, *ridge, map)))
+            .flat_map(|(size, ridge)| draws(first, *size).into_iter().map(|map| (map, *ridge)))
             .collect();
-        let found = parts
-            .into_par_iter()
-            .map(|(samples, _, ridge, map)| samples.train_from(map, ridge, training, deadline))
-            .collect::<Result<Vec<_>, Error>>()?;
-        let each = found.chunks(training.search.starts + 1).map(best);
-        let trained: Vec<Option<Trained>> = each.collect();
-        let mut steps = Vec::new();
-        for ((size, ridge), trained) in tried.iter().zip(&trained) {
-            steps.push(first.tried(units, (*size, *ridge), trained.as_ref(), count)?);
-        }
-        let taken = match count {
-            Count::Given(_) if steps.len() == 1 => 1,
-            _ => count.best(&steps, 1, self.count()),
+        let from_each = |samples: &Self, starts: Vec<(Map, f64)>| {
+            let each = starts.into_par_iter();
+            each.map(|(map, ridge)| samples.train_from(map, ridge, training, deadline))
+                .collect::<Result<Vec<_>, Error>>()
         };
+        let found = from_each(first, starts)?;
+        let trained: Vec<Option<Trained>> = found.chunks(training.search.starts + 1).map(best).collect();
+        let mut steps = Vec::new();
+        for (tried, trained) in tried.iter().zip(&trained) {
+            steps.push(first.tried(units, *tried, trained.as_ref(), count)?);
+        }
+        let taken = count.best(&steps, 1, self.count());
+        let (size, ridge) = tried[taken - 1];
         let mut chosen = trained.into_iter().nth(taken - 1).flatten();
-        let judged = chosen.as_ref().map(|own| first.model(own.map.clone(), first.named(own)));
         if let Some(own) = &chosen
             && chosen_on.is_some()
         {
-            // The chosen one goes on from where it is with all samples, and from fresh starts.
-            let (size, ridge) = tried[taken - 1];
-            let mut starts = vec![own.map.clone()];
-            starts.extend(draws(self, size));
-            let found = starts
-                .into_par_iter()
-                .map(|map| self.train_from(map, ridge, training, deadline))
-                .collect::<Result<Vec<_>, Error>>()?;
-            chosen = best(&found);
+            // It goes on from where it is with all samples, and from fresh starts.
+            let fresh = draws(self, size).into_iter();
+            let starts = std::iter::once(own.map.clone()).chain(fresh).map(|map| (map, ridge));
+            chosen = best(&from_each(self, starts.collect())?);
         }
         let Some(trained) = chosen else {
             return Err(Error::undetermined(
@@ -120,10 +104,9 @@ impl Samples<'_> {
                 "no start leads to a run that keeps within bounds; train for shorter runs (`focus`), take another `ridge`, or other lags",
             ));
         };
-        let ridge = tried[taken - 1].1;
         let outcome = outcome(&trained, training);
         let solved = self.solved(&trained, ridge, training.horizon)?;
-        Ok((Chosen { map: trained.map, steps, taken, judged }, solved, outcome))
+        Ok((Chosen { map: trained.map, steps, taken }, solved, outcome))
     }
 
     /// Trains the parameters of functions that are known, from those of the least errors one step ahead.
@@ -135,6 +118,7 @@ impl Samples<'_> {
         map: Map,
         training: Training<'_>,
     ) -> Result<(Solved, TrainingOutcome), Error> {
+        self.check_numbers(map.parameters(self.regressors()))?;
         let deadline = Deadline::after(training.search.time_limit);
         let ridge = training.ridges.first().copied().unwrap_or(0.0);
         let found = self.train_from(map, ridge, training, deadline)?;
@@ -146,6 +130,20 @@ impl Samples<'_> {
         };
         let outcome = outcome(&trained, training);
         Ok((self.solved(&trained, ridge, training.horizon)?, outcome))
+    }
+
+    /// Refuses more numbers than samples tell apart.
+    fn check_numbers(&self, numbers: usize) -> Result<(), Error> {
+        if numbers < self.count() {
+            return Ok(());
+        }
+        Err(Error::undetermined(
+            Vec::new(),
+            format!(
+                "{numbers} numbers are trained, and {} samples have all regressors; take fewer `units` or `terms`, fewer lags, or more rows",
+                self.count()
+            ),
+        ))
     }
 
     /// Trains from one start: one step ahead, then over windows where samples are many, then over runs of the horizon. None where no
@@ -162,13 +160,10 @@ impl Samples<'_> {
         let smallest = NOTHING * self.rows.iter().map(|t| self.signals[0][*t].powi(2)).sum::<f64>();
         let mut numbers = vec![0.0; linear];
         numbers.extend(map.shape());
-        let one = Horizon::Steps { steps: 1 };
+        let one = Horizon::ONE_STEP;
         let last = training.horizon;
-        {
-            let mut ahead = RunErrors::new(self, &map, one, ridge);
-            if best_linear(&mut ahead, &mut numbers).is_err() {
-                return Ok(None);
-            }
+        if best_linear(&mut RunErrors::new(self, &map, one, ridge), &mut numbers).is_err() {
+            return Ok(None);
         }
         let windows = Horizon::Steps { steps: WINDOW };
         let is_long = match last {
@@ -218,12 +213,8 @@ impl Samples<'_> {
         trained: Option<&Trained>,
         count: &Count,
     ) -> Result<TermStep, Error> {
-        let term = format!(
-            "{} {}{}",
-            size,
-            units.word(size),
-            if ridge > 0.0 { format!(", ridge {}", crate::figures::short(ridge)) } else { String::new() }
-        );
+        let with = if ridge > 0.0 { format!(", ridge {}", short(ridge)) } else { String::new() };
+        let term = format!("{size} {}{with}", units.word(size));
         let parameters = units.numbers(self.regressors(), size);
         let Some(trained) = trained else {
             return Ok(TermStep {
@@ -237,11 +228,9 @@ impl Samples<'_> {
             });
         };
         let model = self.model(trained.map.clone(), self.named(trained));
-        let mut ahead = RunErrors::new(self, &trained.map, Horizon::Steps { steps: 1 }, 0.0);
-        let squares = match crate::optimize::Objective::evaluate(&mut ahead, &trained.found.parameters) {
-            Ok(squares) => squares * self.scale.powi(2) / self.count() as f64,
-            Err(_) => f64::INFINITY,
-        };
+        let mut ahead = RunErrors::new(self, &trained.map, Horizon::ONE_STEP, 0.0);
+        let squares = ahead.evaluate(&trained.found.parameters).unwrap_or(f64::INFINITY);
+        let squares = squares * self.scale.powi(2) / self.count() as f64;
         let held_out = match count {
             Count::HeldOut(rows) => Some(RunFigures::of(&model, self.log, rows)?),
             _ => None,
@@ -270,35 +259,32 @@ impl Samples<'_> {
         let lost =
             |_| Error::data("the run of the trained map leaves the range of numbers; scale the signals");
         let mut runs = RunErrors::new(self, &trained.map, horizon, ridge);
-        use crate::optimize::Objective as _;
         runs.evaluate(numbers).map_err(lost)?;
         let squares = runs.squares();
         let size = numbers.len();
         let degrees = self.count() - size;
         let smooth =
             !matches!(trained.map, Map::Network { activation: Activation::Relu | Activation::Step, .. });
-        let covariance = if smooth && runs.linearize().is_ok() {
-            inverse(runs.matrix(), size).map(|inverse| {
-                let variance = squares / degrees as f64;
-                (0..size).map(|i| (0..size).map(|j| inverse[(i, j)] * variance).collect()).collect()
+        let variance = squares / degrees as f64;
+        let covariance = (smooth && runs.linearize().is_ok())
+            .then(|| inverse(&DMatrix::from_row_slice(size, size, runs.matrix())))
+            .flatten()
+            .map(|inverse| {
+                let row = |i: usize| inverse.row(i).iter().map(|entry| entry * variance).collect();
+                (0..size).map(row).collect::<Vec<Vec<f64>>>()
             })
-        } else {
-            None
-        };
-        let mut ahead = RunErrors::new(self, &trained.map, Horizon::Steps { steps: 1 }, 0.0);
+            .filter(|rows| is_covariance(rows));
+        let mut ahead = RunErrors::new(self, &trained.map, Horizon::ONE_STEP, 0.0);
         let left = ahead.evaluate(numbers).map_err(lost)?;
         let mut parameters = self.named(trained);
-        if let Some(rows) = &covariance {
-            let rows: &Vec<Vec<f64>> = rows;
-            for (place, parameter) in parameters.iter_mut().enumerate() {
-                parameter.standard_error = Some(rows[place][place].sqrt());
-            }
+        for (place, parameter) in parameters.iter_mut().enumerate() {
+            parameter.standard_error = covariance.as_ref().map(|rows| rows[place][place].sqrt());
         }
         let scale = self.scale;
         Ok(Solved {
             mse: left * scale * scale / self.count() as f64,
             condition: None,
-            model: crate::model::NonlinearArxModel {
+            model: NonlinearArxModel {
                 noise_covariance: vec![vec![left / degrees as f64 * scale * scale]],
                 degrees_of_freedom: Some(degrees),
                 covariance,
@@ -311,7 +297,7 @@ impl Samples<'_> {
 /// The start with the least cost, and the cost of each.
 fn best(found: &[Option<(Map, Found)>]) -> Option<Trained> {
     let starts = found.iter().map(|found| found.as_ref().map(|(_, found)| found.cost())).collect();
-    let least = crate::optimize::lowest(found.iter().map(|found| found.as_ref().map(|(_, found)| found)))?;
+    let least = lowest(found.iter().map(|found| found.as_ref().map(|(_, found)| found)))?;
     let (map, found) = found[least].clone()?;
     Some(Trained { map, found, starts })
 }
@@ -330,15 +316,3 @@ fn outcome(trained: &Trained, training: Training<'_>) -> TrainingOutcome {
         starts: starts.clone(),
     }
 }
-
-/// The inverse of a positive definite matrix, scaled to a unit diagonal; none where it is not definite.
-fn inverse(matrix: &[f64], size: usize) -> Option<DMatrix<f64>> {
-    let scale = |i: usize| matrix[i * size + i].sqrt();
-    let scaled = DMatrix::from_fn(size, size, |i, j| matrix[i * size + j] / (scale(i) * scale(j)));
-    let inverse = scaled.cholesky()?.inverse();
-    let inverse = DMatrix::from_fn(size, size, |i, j| inverse[(i, j)] / (scale(i) * scale(j)));
-    inverse.iter().all(|value| value.is_finite()).then_some(inverse)
-}
-
-/// Nobody asks.
-pub(crate) const UNASKED: Monitor<'static> = &|_| ControlFlow::Continue(());

@@ -145,31 +145,28 @@ impl Evaluator {
     /// dg/dtheta_j = f_j(z) for each j, and after them, where `into` goes on, the slope of g by each number of the functions.
     pub(crate) fn gradient(&self, z: &[f64], into: &mut [f64]) {
         let (functions, shape) = into.split_at_mut(self.theta.len());
-        self.functions(z, functions);
         if shape.is_empty() {
+            self.functions(z, functions);
             return;
         }
         let each = shape.chunks_exact_mut(z.len() + 1);
         match &self.kind {
             Kind::Network { activation, weights, biases } => {
-                let outer = &self.theta[z.len() + 1..];
-                let values = &functions[z.len() + 1..];
-                let units = weights.chunks_exact(z.len().max(1)).zip(biases).zip(outer.iter().zip(values));
-                for (own, ((weights, bias), (outer, value))) in each.zip(units) {
-                    let slope = match activation {
-                        Activation::Tanh => 1.0 - value * value,
-                        Activation::Logistic => value * (1.0 - value),
-                        Activation::Relu | Activation::Step => {
-                            let sum = weights.iter().zip(z).fold(*bias, |sum, (weight, z)| sum + weight * z);
-                            activation.at(sum).1
-                        }
-                    };
+                functions[0] = 1.0;
+                functions[1..=z.len()].copy_from_slice(z);
+                let outer = self.theta[z.len() + 1..].iter().zip(&mut functions[z.len() + 1..]);
+                let units = weights.chunks_exact(z.len().max(1)).zip(biases).zip(outer);
+                for (own, ((weights, bias), (outer, function))) in each.zip(units) {
+                    let sum = weights.iter().zip(z).fold(*bias, |sum, (weight, z)| sum + weight * z);
+                    let (value, slope) = activation.at(sum);
+                    *function = value;
                     let slope = outer * slope;
                     own.iter_mut().zip(z).for_each(|(own, z)| *own = slope * z);
                     own[z.len()] = slope;
                 }
             }
             Kind::Radial { centres, inverses, inverse_squares, linear } => {
+                self.functions(z, functions);
                 // f = exp(-|z - alpha|^2 b^2): df/dalpha = 2 f b^2 (z - alpha), df/db = -2 f b |z - alpha|^2.
                 let before = if *linear { z.len() + 1 } else { 0 };
                 let points = centres.chunks_exact(z.len().max(1)).zip(inverses.iter().zip(inverse_squares));
@@ -183,7 +180,8 @@ impl Evaluator {
                     own[z.len()] = -factor * inverse * square;
                 }
             }
-            _ => shape.fill(0.0),
+            // Other maps have no such numbers.
+            _ => {}
         }
     }
 

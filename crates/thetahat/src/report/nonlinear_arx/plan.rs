@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use crate::Error;
 use crate::data::{Detrend, Rows, Split};
+use crate::estimate::nonlinear_arx::Units;
 use crate::model::{Activation, ChannelExpression, Membership};
 use crate::optimize::Search;
 use crate::respond::Horizon;
@@ -20,8 +21,8 @@ const ITERATIONS: usize = 500;
 
 /// Units of a network, or centres, at most.
 const MOST_UNITS: usize = 2000;
-/// What is foretold from what was measured.
-const ONE: Horizon = Horizon::Steps { steps: 1 };
+/// Shares of the rows for estimation, validation and test where trained models are compared and nobody held out any.
+const SPLIT: [f64; 3] = [70.0, 30.0, 0.0];
 
 /// Which lags of an input a nonlinear ARX model reads: `lags` of them from `delay` on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -83,7 +84,8 @@ pub enum MapPlan {
         /// How many; none: `select` says it, of 2, 4 and 8.
         units: Option<usize>,
     },
-    /// What has the best free run on rows held out: polynomials of degree 1, 2 and 3, and networks of 2 and 4 units.
+    /// What has the best free run on rows held out: the linear model that the data choose, polynomials of degree 2 and 3, and networks of 2
+    /// and 4 units. The first whose error is no more than 1.1 times the least is the report: a linear model where it is about as good.
     Auto,
     /// The samples nearest to the regressors.
     Neighbours {
@@ -92,6 +94,19 @@ pub enum MapPlan {
         /// How many; none: `select` says it.
         units: Option<usize>,
     },
+}
+
+impl MapPlan {
+    /// The functions whose numbers are trained, and how many of them, if that is given; none where they are not.
+    pub(super) fn trained(&self) -> Option<(Units, Option<usize>)> {
+        match *self {
+            Self::Network { activation, units, drawn } if !drawn && activation != Activation::Step => {
+                Some((Units::Network(activation), units))
+            }
+            Self::FreeRadial { units } => Some((Units::Radial, units)),
+            _ => None,
+        }
+    }
 }
 
 /// Where radial basis functions stand.
@@ -135,7 +150,7 @@ pub struct NonlinearArxPlan {
     /// Rows to validate on.
     pub validate: Vec<Rows>,
     /// Cuts the rows to estimate on into parts: models are fitted to the first one and compared, the chosen one is fitted again to the
-    /// first two, and judged on the third.
+    /// first two, and judged on the third. None: where trained models are compared, and no rows are to validate on, 70/30/0.
     pub split: Option<Split>,
     /// What is taken from each channel.
     pub detrend: Detrend,
@@ -246,19 +261,33 @@ impl NonlinearArxPlan {
         }
     }
 
-    /// Whether the numbers of the functions are trained.
-    pub(super) fn trains(&self) -> bool {
-        match self.map {
-            MapPlan::Network { activation, drawn, .. } => !drawn && activation != Activation::Step,
-            MapPlan::FreeRadial { .. } | MapPlan::Auto => true,
-            _ => false,
+    /// How far the runs go whose errors are made small.
+    pub(super) fn horizon(&self) -> Horizon {
+        let driven = self.input_lags.iter().any(|input| input.lags > 0);
+        let trains = self.map.trained().is_some() || self.map == MapPlan::Auto;
+        self.focus.unwrap_or(if trains && driven { Horizon::FreeRun } else { Horizon::ONE_STEP })
+    }
+
+    /// Whether several models are trained of which rows held out say which is taken.
+    fn compares_trained(&self) -> bool {
+        match self.map.trained() {
+            Some((_, units)) => units.is_none() || self.ridge.is_none(),
+            None => self.map == MapPlan::Auto,
         }
     }
 
-    /// How far the runs go whose errors are made small, of a map that is trained or not.
-    pub(super) fn horizon(&self, trains: bool) -> Horizon {
-        let driven = self.input_lags.iter().any(|input| input.lags > 0);
-        self.focus.unwrap_or(if trains && driven { Horizon::FreeRun } else { ONE })
+    /// The plan, where trained models are compared and no rows are held out with the last ones held out.
+    ///
+    /// # Errors
+    /// None for a plan that was checked.
+    pub(super) fn holding_out(&self) -> Result<Self, Error> {
+        let [estimation, validation, test] = SPLIT;
+        let needs = self.compares_trained() && self.validate.is_empty() && self.select.is_none();
+        let split = match self.split {
+            None if needs => Some(Split::new(estimation, validation, test)?),
+            given => given,
+        };
+        Ok(Self { split, ..self.clone() })
     }
 
     fn check_training(&self) -> Result<(), Error> {
@@ -271,6 +300,16 @@ impl NonlinearArxPlan {
                 format!("{steps} steps are not looked ahead; give from 1 to {}", crate::model::LARGEST),
             ));
         }
+        let is_auto = self.map == MapPlan::Auto;
+        if is_auto && self.outputs.len() > 1 {
+            return Err(Error::argument(
+                "output",
+                "auto compares models of one output; fit each of them alone, the others being inputs",
+            ));
+        }
+        if self.lags_chosen && !is_auto {
+            return Err(Error::argument("lags_chosen", "lags are chosen with auto; give those of this map"));
+        }
         let units = match self.map {
             MapPlan::Network { units, .. } | MapPlan::FreeRadial { units } => units,
             _ => None,
@@ -278,7 +317,7 @@ impl NonlinearArxPlan {
         if units.is_some_and(|units| units == 0 || units > MOST_UNITS) {
             return Err(Error::argument("units", format!("give from 1 to {MOST_UNITS} units")));
         }
-        if !self.trains() {
+        if self.map.trained().is_none() && !is_auto {
             return Ok(());
         }
         if self.terms.is_some() || self.most.is_some() {
@@ -287,7 +326,6 @@ impl NonlinearArxPlan {
                 "a trained map has a number of `units`, and auto says all by itself; leave it out",
             ));
         }
-        let is_auto = self.map == MapPlan::Auto;
         if self.select == Some(Select::Cv) || is_auto && matches!(self.select, Some(Select::Criterion(_))) {
             return Err(Error::argument(
                 "select",
@@ -295,7 +333,7 @@ impl NonlinearArxPlan {
                  estimation are held out",
             ));
         }
-        if units.is_some() && self.ridge.is_some() && self.select.is_some() {
+        if !self.compares_trained() && self.select.is_some() {
             return Err(Error::argument(
                 "select",
                 "`units` and `ridge` are given, and there is nothing to choose; leave one of them out",
@@ -397,7 +435,7 @@ impl NonlinearArxPlan {
             if self.ridge.is_some_and(|ridge| ridge > 0.0) {
                 return Err(Error::argument("ridge", "neighbours are not solved for; leave it out"));
             }
-            if self.focus.is_some_and(|focus| focus != ONE) {
+            if self.focus.is_some_and(|focus| focus != Horizon::ONE_STEP) {
                 return Err(Error::argument(
                     "focus",
                     "neighbours are not trained for longer runs; leave it out",

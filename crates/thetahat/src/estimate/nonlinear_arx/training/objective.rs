@@ -74,7 +74,7 @@ impl<'s> RunErrors<'s> {
             .map(|(source, lag)| (&*samples.signals[*source], *lag, *source == 0))
             .collect();
         let lags = match horizon {
-            Horizon::Steps { steps: 1 } => 0,
+            Horizon::ONE_STEP => 0,
             _ => taps.iter().filter(|tap| tap.2).map(|tap| tap.1).max().unwrap_or(0),
         };
         let constant = map.names(&samples.names()).iter().position(|name| name == "1");

@@ -7,6 +7,7 @@ use crate::model::{Model, NonlinearArxModel};
 use crate::optimize::Objective;
 use crate::random::Random;
 use crate::report::{InputLags, NonlinearArxPlan, fit_nonlinear_arx};
+use std::ops::ControlFlow;
 
 /// A tank-like log: the output is held back the more the higher it is.
 fn log(rows: usize) -> Log {
@@ -133,8 +134,12 @@ fn training_finds_the_plant_from_most_starts() {
     let head = head(&log);
     let samples = samples(&log, &head);
     let options = Search { starts: 9, max_iterations: 200, ..Search::default() };
-    let training =
-        Training { horizon: Horizon::FreeRun, ridges: &[0.01], search: &options, monitor: UNASKED };
+    let training = Training {
+        horizon: Horizon::FreeRun,
+        ridges: &[0.01],
+        search: &options,
+        monitor: &|_| ControlFlow::Continue(()),
+    };
     let units = Units::Network(Activation::Tanh);
     let (chosen, solved, outcome) = samples.train(units, &[1], training, &Count::Given(1), None).unwrap();
     // Noise of 0.02, filtered by the plant.

@@ -17,8 +17,9 @@ pub(crate) fn complexity(outcome: &TermsOutcome) -> Drawn {
         let there = outcome.path.iter().zip(values);
         let there = there.filter_map(|(step, value)| Some((step.parameters as f64, value?)));
         let (x, y): (Vec<f64>, Vec<f64>) = there.unzip();
-        (!x.is_empty())
-            .then(|| line(name, Curve { x, y: rounded(&y) }, position).with("mode", "lines+markers"))
+        // Maps of which each is another kind are no curve.
+        let mode = if x.is_sorted() { "lines+markers" } else { "markers" };
+        (!x.is_empty()).then(|| line(name, Curve { x, y: rounded(&y) }, position).with("mode", mode))
     };
     let of = |figure: fn(&RunFigures) -> Option<f64>| -> Vec<Option<f64>> {
         outcome.path.iter().map(|step| step.free_run.as_ref().and_then(figure)).collect()
@@ -44,7 +45,7 @@ pub(crate) fn complexity(outcome: &TermsOutcome) -> Drawn {
         .with("yaxis", axis("error, in units of the output").with("type", "log"))
         .with("hovermode", "closest");
     let words = format!(
-        "The root mean square and the largest errors against the number of functions, of {} to choose from.",
+        "The root mean square and the largest errors against the number of parameters, of {} to choose from.",
         outcome.candidates
     );
     chart("Complexity", words, 340, traces, layout)

@@ -1,0 +1,291 @@
+//! The choice among all maps, and the linear model that takes part in it.
+
+use super::fit_planned;
+use super::plan::{InputLags, MapPlan, NonlinearArxPlan};
+use crate::Error;
+use crate::data::{Log, Rows, Source};
+use crate::estimate::{MapsOutcome, Procedure, RunFigures, TermStep};
+use crate::model::{Activation, Model};
+use crate::optimize::Monitor;
+use crate::regression::Monomials;
+use crate::report::shares::Shares;
+use crate::report::{Plan, Report, apply, identify_monitored};
+use crate::respond::nonlinear_arx::within;
+use crate::respond::{Horizon, InitialCondition};
+use crate::select::{Automatic, Choice};
+use crate::validate::{Fit, Part};
+
+/// What is tried beside a linear model: degrees of products, and units of networks.
+const DEGREES: [usize; 2] = [2, 3];
+const UNITS: [usize; 2] = [2, 4];
+/// A simpler model is taken if its error on held-out rows is no more than this many times the least.
+const CLEARLY: f64 = 1.1;
+/// A model whose run leaves this many times the measured range, about its middle, is taken only where all do. Good models of plants that
+/// saturate leave 1.1 times, within which a choice of terms prefers to stay.
+const RANGE: f64 = 2.0;
+
+/// A model that was tried.
+struct Tried {
+    /// None: the linear one.
+    plan: Option<NonlinearArxPlan>,
+    report: Report,
+    step: TermStep,
+}
+
+/// What models are fitted to and judged on in the choice.
+struct Parts<'l> {
+    log: &'l Log,
+    sources: &'l [Source],
+    estimation: Vec<Rows>,
+    held_out: Vec<Rows>,
+    monitor: Monitor<'l>,
+}
+
+/// Fits the linear model that the data choose, products of two degrees, as they are and trained for longer runs, and networks of two sizes,
+/// and takes the first, in this order, whose run over held-out rows has an error of no more than 1.1 times that of the best one. Where lags
+/// are chosen each is tried with those of the plan and with those of the linear model.
+///
+/// # Errors
+/// As for [`fit_nonlinear_arx`](super::fit_nonlinear_arx).
+pub(super) fn best(
+    log: &Log,
+    sources: &[Source],
+    plan: &NonlinearArxPlan,
+    monitor: Monitor<'_>,
+) -> Result<Report, Error> {
+    let shares = Shares::of(&plan.estimate, &plan.validate, plan.split, log.rows())?;
+    let (estimation, held_out) = match shares.parts {
+        Some(parts) => (parts.estimation, parts.validation),
+        None => (shares.estimation, shares.validation),
+    };
+    let parts = Parts { log, sources, estimation, held_out, monitor };
+    let linear = parts.linear(plan)?;
+    let mut plans = Vec::new();
+    let lags = lags(plan, linear.as_ref());
+    for map in maps() {
+        for own in &lags {
+            let kind = |focus| NonlinearArxPlan { map: map.clone(), focus: Some(focus), ..own.clone() };
+            if let MapPlan::Polynomial { degree } = map {
+                // A choice among more products than samples finds what fits by chance.
+                if products(own, degree)? > parts.rows() {
+                    continue;
+                }
+                plans.push(kind(Horizon::ONE_STEP));
+                if plan.horizon() == Horizon::ONE_STEP {
+                    continue;
+                }
+            }
+            plans.push(kind(plan.horizon()));
+        }
+    }
+    let (mut tried, mut refused): (Vec<Tried>, Option<Error>) = (linear.into_iter().collect(), None);
+    for plan in plans {
+        match parts.nonlinear(plan) {
+            Ok(one) => tried.extend(one),
+            Err(Error::Interrupted) => return Err(Error::Interrupted),
+            Err(error) => refused = refused.or(Some(error)),
+        }
+    }
+    let rank = |one: &Tried| one.step.held_out.map_or((true, f64::INFINITY), RunFigures::rank);
+    let better = |one: &(bool, f64), other: &(bool, f64)| one.0.cmp(&other.0).then(one.1.total_cmp(&other.1));
+    let Some((strays, least)) = tried.iter().map(rank).min_by(better) else {
+        return Err(refused.unwrap_or_else(|| Error::data("no model can be fitted to these rows")));
+    };
+    let is_near = |one: &Tried| rank(one).0 == strays && rank(one).1 <= CLEARLY * least;
+    let taken = tried.iter().position(is_near).unwrap_or(0);
+    let path: Vec<TermStep> = tried.iter().map(|one| one.step.clone()).collect();
+    let Tried { plan: own, report, .. } = tried.swap_remove(taken);
+    match own {
+        Some(own) => {
+            // Without a split it was fitted to all estimation rows.
+            let mut report = match plan.split {
+                Some(_) => fit_planned(log, sources, &of_all_rows(own, plan), monitor)?,
+                None => report,
+            };
+            let maps = match &mut report.estimation.procedure {
+                Procedure::ForwardRegression(outcome) | Procedure::Training(outcome) => {
+                    std::mem::take(&mut outcome.maps)
+                }
+                _ => Vec::new(),
+            };
+            let maps = maps.into_iter().map(|mut outcome| {
+                outcome.candidates = path.len();
+                outcome.taken = taken + 1;
+                outcome.path.clone_from(&path);
+                outcome
+            });
+            report.estimation.procedure = Procedure::Training(MapsOutcome { maps: maps.collect() });
+            Ok(report)
+        }
+        None => {
+            let mut report = identify_monitored(log.clone(), sources, &linear_plan(plan), monitor)?;
+            if let Some(selection) = &mut report.selection {
+                selection.steps.push(
+                    "Polynomials and networks were tried as nonlinear ARX models: the error of none is clearly smaller on rows held out."
+                        .to_owned(),
+                );
+            }
+            Ok(report)
+        }
+    }
+}
+
+/// The plan of a model that was tried, for all rows of the choice.
+fn of_all_rows(own: NonlinearArxPlan, plan: &NonlinearArxPlan) -> NonlinearArxPlan {
+    NonlinearArxPlan { estimate: plan.estimate.clone(), validate: Vec::new(), split: plan.split, ..own }
+}
+
+/// The maps, in the order of their complexity.
+fn maps() -> impl Iterator<Item = MapPlan> {
+    let products = DEGREES.into_iter().map(|degree| MapPlan::Polynomial { degree });
+    let networks = UNITS.into_iter().map(|units| MapPlan::Network {
+        activation: Activation::Tanh,
+        units: Some(units),
+        drawn: false,
+    });
+    products.chain(networks)
+}
+
+/// How many products of a degree there are of the regressors of a plan.
+fn products(plan: &NonlinearArxPlan, degree: usize) -> Result<usize, Error> {
+    let inputs = plan.input_lags.iter().map(|input| input.lags);
+    let expressions = plan.read_expressions()?;
+    let expressions = expressions.iter().map(|expression| plan.lags_of(expression).len());
+    let regressors = plan.output_lags.iter().copied().chain(inputs).chain(expressions).sum();
+    Ok(Monomials::new(regressors, degree).map_or(usize::MAX, |all| all.count()))
+}
+
+/// The plan with its lags, and where lags are chosen with those of the linear model too: as many past outputs as A or F reads, and of each
+/// input those of B and the one before them, as a nonlinear plant may answer sooner.
+fn lags(plan: &NonlinearArxPlan, linear: Option<&Tried>) -> Vec<NonlinearArxPlan> {
+    let own = NonlinearArxPlan { lags_chosen: false, ..plan.clone() };
+    let mut plans = vec![own.clone()];
+    // A step test may come to a process, which has no lags.
+    if let Some(Model::Polynomial(linear)) = linear.map(|linear| &linear.report.model)
+        && plan.lags_chosen
+    {
+        let orders = &linear.orders;
+        let past = orders.nf.iter().copied().fold(orders.na, usize::max).max(1);
+        let input_lags = orders.nb.iter().zip(&orders.nk).map(|(&nb, &nk)| {
+            let sooner = nk.min(1);
+            InputLags { lags: nb + sooner, delay: nk - sooner }
+        });
+        let other =
+            NonlinearArxPlan { output_lags: vec![past], input_lags: input_lags.collect(), ..own.clone() };
+        plans.extend(Some(other).filter(|other| *other != own));
+    }
+    plans
+}
+
+/// The plan of a linear model of the same channels and rows, which the data choose.
+fn linear_plan(plan: &NonlinearArxPlan) -> Plan {
+    let inputs: Vec<&str> = plan.inputs.iter().map(String::as_str).collect();
+    let output = plan.outputs.first().map_or("", String::as_str);
+    Plan {
+        estimate: plan.estimate.clone(),
+        validate: plan.validate.clone(),
+        split: plan.split,
+        detrend: plan.detrend,
+        offsets: plan.offsets.clone(),
+        ..Plan::new(&inputs, output, Choice::Automatic(Automatic::default()))
+    }
+}
+
+impl Parts<'_> {
+    fn rows(&self) -> usize {
+        self.estimation.iter().map(Rows::len).sum()
+    }
+
+    /// The linear model; none where these rows determine none.
+    fn linear(&self, plan: &NonlinearArxPlan) -> Result<Option<Tried>, Error> {
+        let own = Plan {
+            estimate: self.estimation.clone(),
+            validate: Vec::new(),
+            split: None,
+            ..linear_plan(plan)
+        };
+        match identify_monitored(self.log.clone(), self.sources, &own, self.monitor) {
+            Ok(report) => {
+                let term = format!("linear: {}", report.model.name());
+                let parameters = report.model.parameters().len();
+                Ok(self.judged(None, report, (term, parameters), InitialCondition::Estimate))
+            }
+            Err(Error::Undetermined { .. }) => Ok(None),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// A nonlinear one; none where it has no run over the rows.
+    fn nonlinear(&self, plan: NonlinearArxPlan) -> Result<Option<Tried>, Error> {
+        let own = NonlinearArxPlan {
+            estimate: self.estimation.clone(),
+            validate: self.held_out.clone(),
+            split: None,
+            ..plan.clone()
+        };
+        let report = fit_planned(self.log, self.sources, &own, self.monitor)?;
+        let (Model::NonlinearArx(model), [outcome]) = (&report.model, report.estimation.procedure.terms())
+        else {
+            return Ok(None);
+        };
+        let Some(last) = outcome.last() else { return Ok(None) };
+        let what = match plan.map {
+            MapPlan::Polynomial { degree } => {
+                let plural = if last.parameters == 1 { "" } else { "s" };
+                let trained = if own.horizon() == Horizon::ONE_STEP { "" } else { ", trained" };
+                format!("polynomial of degree {degree}, {} term{plural}{trained}", last.parameters)
+            }
+            _ => last.term.clone(),
+        };
+        let row = (format!("{what}, of {} lags", model.regressors.len()), last.parameters);
+        Ok(self.judged(Some(plan), report, row, InitialCondition::Drop))
+    }
+
+    /// What the runs of a model over the rows say of it; none where it has none.
+    fn judged(
+        &self,
+        plan: Option<NonlinearArxPlan>,
+        report: Report,
+        (term, parameters): (String, usize),
+        start: InitialCondition,
+    ) -> Option<Tried> {
+        let driven = !report.model.inputs().is_empty();
+        let (horizon, initial) = match driven {
+            true => (Horizon::FreeRun, start),
+            false => (Horizon::ONE_STEP, InitialCondition::Drop),
+        };
+        let run = |rows: &[Rows]| -> Option<RunFigures> {
+            let applied = apply(&report.model, self.log, rows, None, horizon, initial).ok()?;
+            let [said] = &*applied.outputs else { return None };
+            let (measured, fit) = (said.measured.as_ref()?, said.fit.as_ref()?);
+            let range = |values: &[f64], rows: &[Rows]| {
+                let all = rows.iter().flat_map(Rows::positions).map(|t| values[t]);
+                all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
+                    [low.min(value), high.max(value)]
+                })
+            };
+            let [low, high] = within(range(measured, &[&*self.estimation, rows].concat()), RANGE);
+            let [least, largest] = range(&said.predicted, rows);
+            Some(RunFigures {
+                rmse: fit.rmse,
+                largest_error: fit.largest_error,
+                percent: fit.percent,
+                // A linear model that is stable keeps within bounds by itself.
+                in_range: fit.rmse.is_some() && (plan.is_none() || least >= low && largest <= high),
+            })
+        };
+        let (own, fresh) = (run(&self.estimation)?, run(&self.held_out)?);
+        let ahead = |fit: &&Fit| fit.part == Some(Part::Estimation) && fit.horizon == Horizon::ONE_STEP;
+        let percent = report.fit.iter().find(ahead).and_then(|fit| fit.percent).unwrap_or(0.0);
+        let step = TermStep {
+            term,
+            parameters,
+            error_reduction: 1.0 - (1.0 - percent / 100.0).powi(2),
+            aliases: Vec::new(),
+            rmse: report.estimation.mse.sqrt(),
+            free_run: Some(own),
+            held_out: Some(fresh),
+        };
+        Some(Tried { plan, report, step })
+    }
+}

@@ -3,7 +3,7 @@
 //! The library names them between backticks, as `detrend`, wherever one is advised; here they are options.
 
 /// The arguments of the library that are options, by the name that both have.
-pub(crate) const OPTIONS: [&str; 63] = [
+pub(crate) const OPTIONS: [&str; 64] = [
     "alarm",
     "alpha",
     "alphas",
@@ -29,6 +29,7 @@ pub(crate) const OPTIONS: [&str; 63] = [
     "lags",
     "length",
     "max-iterations",
+    "measurement-noise",
     "method",
     "most-terms",
     "nf",

@@ -33,6 +33,7 @@ fn every_verb_takes_a_network() {
         "predict model.json log.csv --sample-time 0.1 --horizon 4 --rows 501..700",
         "simulate model.json log.csv --sample-time 0.1 --clamp",
         "track log.csv --warm model.json --sample-time 0.1",
+        "filter model.json log.csv --measurement-noise 0.1 --smooth",
     ] {
         assert!(folder.done(line).stdout.lines().count() > 200, "{line}");
     }
@@ -52,6 +53,10 @@ fn every_verb_takes_a_network() {
         let run = folder.run(&format!("fit log.csv --sample-time 0.1 {options} --report none.json"));
         assert!(run.code != 0 && run.stderr.contains(words), "{options}: {}", run.stderr);
         assert!(run.stderr.lines().count() < 4, "{options}: {}", run.stderr);
+    }
+    for wrong in ["-1", "nan", "0.1,0.2", "x"] {
+        let said = folder.refused(&format!("filter model.json log.csv --measurement-noise {wrong}"), 2);
+        assert!(said.contains("--measurement-noise"), "{said}");
     }
 }
 

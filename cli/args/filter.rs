@@ -21,6 +21,16 @@ pub(crate) struct FilterArguments {
     /// Where the model of a report starts [default: unknown]
     #[arg(long, value_enum, value_name = "START", help_heading = "Estimator")]
     pub(crate) initial: Option<FilterStartArgument>,
+    /// Standard deviation of white noise in what is measured, in units of each output, beside the noise of the report (nonlinear ARX)
+    /// [default: 0]
+    #[arg(
+        long,
+        value_name = "SD[,SD…]",
+        value_delimiter = ',',
+        allow_hyphen_values = true,
+        help_heading = "Estimator"
+    )]
+    pub(crate) measurement_noise: Vec<f64>,
     /// Where the error of the observer is to have its poles in the z plane, such as 0.4+0.3i,0.4-0.3i
     #[arg(
         long,

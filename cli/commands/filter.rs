@@ -23,6 +23,10 @@ use columns::Columns;
 pub(crate) fn filter(arguments: &FilterArguments) -> Result<(), Failure> {
     let job = FilterJob::resolve(arguments)?;
     let model = read(&job)?;
+    let model = match &*job.measurement_noise {
+        [] => model,
+        deviations => model.with_measurement_noise(deviations).map_err(|error| Failure::option(&error))?,
+    };
     let estimator = job.estimator(&model);
     let filter = StateFilter::new(model, estimator).map_err(|error| match &error {
         thetahat::Error::Argument { argument, message } if argument == "start" => {
@@ -75,7 +79,7 @@ fn read(job: &FilterJob) -> Result<StateModel, Failure> {
     };
     if job.initial.is_some() && says_itself() {
         return Err(Failure::usage(
-            "--initial is for reports of polynomials; a model in a text says itself where it starts",
+            "--initial is for reports of polynomials and nonlinear ARX models; a model in a text says itself where it starts",
         ));
     }
     let model = match report {

@@ -19,6 +19,8 @@ pub(crate) struct FilterJob {
     pub(crate) rows: Option<Rows>,
     /// How a report's model starts, if that was said.
     pub(crate) initial: Option<InitialState>,
+    /// Standard deviations of what is measured; none: those of the model.
+    pub(crate) measurement_noise: Vec<f64>,
     pub(crate) smooth: bool,
     pub(crate) lines: LineJob,
     pub(crate) summary: Option<PathBuf>,
@@ -66,6 +68,7 @@ impl FilterJob {
                 FilterStartArgument::Unknown => InitialState::Unknown,
             }),
             rows: arguments.rows.as_deref().map(|text| parsed("--rows", text)).transpose()?,
+            measurement_noise: arguments.measurement_noise.clone(),
             smooth: arguments.smooth,
             lines: LineJob::resolve(&arguments.lines),
             summary: arguments.lines.summary.clone(),

@@ -2,10 +2,14 @@
 # # An oscillator with a hard spring: from a line to a free run that holds
 #
 # A mass on a spring that gets stiffer the further it is drawn, m y'' + d y' + k y + k3 y^3 = u: the plant of the Silverbox benchmark
-# (Wigren and Schoukens 2013), an electronic circuit, here simulated with the values that are known of it. A linear model misses how the
-# resonance moves with the amplitude. This notebook goes from there to models trained for their free run.
+# (Wigren and Schoukens 2013), an electronic circuit. A linear model misses how the resonance moves with the amplitude. This notebook goes
+# from there to models trained for their free run.
+#
+# With the measured log of the benchmark (columns u and y in volts, from nonlinearbenchmark.org) as a CSV file in the environment variable
+# `SILVERBOX` it takes that, in some minutes, and ends below 0.25 mV. Without it the plant is simulated with the values that are known of it.
 
 # %%
+import os
 import warnings
 
 import numpy as np
@@ -16,8 +20,9 @@ from thetahat import plot
 # %% [markdown]
 # ## The log
 #
-# The input is low-pass noise at 610 Hz; between two samples the plant is integrated in 20 steps (leapfrog). The sensor has noise of
-# 0.2 mV. The first 4000 rows are to fit to, the last 2000 to judge on.
+# Simulated, the input is low-pass noise at 610 Hz; between two samples the plant is integrated in 20 steps (leapfrog). The sensor has
+# noise of 0.2 mV. The first 4000 rows are to fit to, the last 2000 to judge on. Of the measured log the first nine realisations of the
+# multisine are to fit to, and the last one is to judge on.
 
 
 # %%
@@ -35,8 +40,13 @@ def oscillator(rows: int, seed: int = 0) -> th.Log:
     return th.Log(y + 2e-4 * rng.normal(size=rows), u, sample_time=period)
 
 
-log = oscillator(6000)
-known, fresh = log[:4000], log[4000:]
+measured = os.environ.get("SILVERBOX")
+if measured:
+    log = th.read_csv(measured, inputs="u", output="y", sample_time=1 / 610.35)
+    known, fresh, lags, terms = log[40650:105712], log[105712:127400], {"ny": 3, "nu": 3, "nk": 0}, 20
+else:
+    log = oscillator(6000)
+    known, fresh, lags, terms = log[:4000], log[4000:], {"ny": 2, "nu": 2, "nk": 1}, 12
 
 
 def free_run(model: th.Model) -> float:
@@ -48,23 +58,23 @@ def free_run(model: th.Model) -> float:
 # %% [markdown]
 # ## A line
 #
-# Output error is the linear model that simulates best.
+# ARX is the least squares of the next output. Output error is the linear model that simulates best.
 
 # %%
 warnings.simplefilter("ignore", th.EstimationWarning)
-line = th.oe(known, nb=2, nf=2)
-print(f"{line.name}: {free_run(line):.2f} mV")
+arx, line = th.arx(known, na=2, nb=2), th.oe(known, nb=2, nf=2)
+print(f"{arx.name}: {free_run(arx):.3f} mV, {line.name}: {free_run(line):.3f} mV")
 
 # %% [markdown]
 # ## Products, one step ahead and trained
 #
-# Twelve products of degree 3 or less, chosen by forward regression. Their parameters have the least errors one step ahead; trained, the
+# Products of degree 3 or less, chosen by forward regression. Their parameters have the least errors one step ahead; trained, the
 # least errors of the free run.
 
 # %%
-ahead = th.narx(known, degree=3, terms=12)
-products = th.narx(known, degree=3, terms=12, focus="simulation")
-print(f"one step ahead: {free_run(ahead):.2f} mV, trained for the free run: {free_run(products):.2f} mV")
+ahead = th.narx(known, degree=3, terms=terms, **lags)
+products = th.narx(known, degree=3, terms=terms, focus="simulation", **lags)
+print(f"one step ahead: {free_run(ahead):.3f} mV, trained for the free run: {free_run(products):.3f} mV")
 
 # %% [markdown]
 # ## A network
@@ -72,9 +82,9 @@ print(f"one step ahead: {free_run(ahead):.2f} mV, trained for the free run: {fre
 # Eight units, with next to no ridge as rows are many. The same network trained one step ahead drifts off when it runs alone.
 
 # %%
-drifting = th.narx(known, "tanh", units=8, ridge=1e-3, starts=1, focus="prediction")
-network = th.narx(known, "tanh", units=8, ridge=1e-3, starts=1)
-print(f"one step ahead: {free_run(drifting):.2f} mV, trained for the free run: {free_run(network):.2f} mV")
+drifting = th.narx(known, "tanh", units=8, ridge=1e-3, starts=1, focus="prediction", **lags)
+network = th.narx(known, "tanh", units=8, ridge=1e-3, starts=1, **lags)
+print(f"one step ahead: {free_run(drifting):.3f} mV, trained for the free run: {free_run(network):.3f} mV")
 
 # %%
 plot.fit(network, fresh[:400], horizon=None)
@@ -82,9 +92,10 @@ plot.fit(network, fresh[:400], horizon=None)
 # %% [markdown]
 # ## What was learnt
 #
-# The noise is 0.2 mV: a free run cannot be nearer to the measured output than that.
+# The noise is 0.2 mV: a free run cannot be nearer to the measured output than that. ARX takes the noise of the sensor for that of the plant.
 
 # %%
 assert free_run(products) < 0.3 and free_run(network) < 0.3
 assert free_run(products) < free_run(ahead) and free_run(network) < free_run(drifting)
-assert free_run(line) > 5 * free_run(network)
+assert free_run(arx) > free_run(line) > 5 * free_run(network)
+assert not measured or max(free_run(products), free_run(network)) < 0.25

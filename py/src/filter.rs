@@ -49,6 +49,12 @@ impl StateModel {
         Ok(Self { model: model.map_err(|error| PyValueError::new_err(format!("model: {error}")))? })
     }
 
+    /// The same with outputs that are measured with noise.
+    fn with_measurement_noise(&self, deviations: Vec<f64>) -> PyResult<Self> {
+        let model = self.model.clone().with_measurement_noise(&deviations);
+        Ok(Self { model: model.map_err(|error| PyValueError::new_err(error.to_string()))? })
+    }
+
     /// That of equations, of which parameters may be unknown.
     #[staticmethod]
     fn from_grey_box(model: &Bound<'_, GreyBox>) -> Self {

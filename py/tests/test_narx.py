@@ -269,6 +269,24 @@ def test_trained_maps_run_better_than_a_line(map: str) -> None:
     assert np.array_equal(again.simulate(data), model.simulate(data), equal_nan=True)
 
 
+def test_a_filter_bridges_missing_outputs_and_noise() -> None:
+    log = saturating()
+    model = th.narx(log, "tanh", ny=1, nu=1, units=2, ridge=0.1)
+    y = log.y.copy()
+    y[50:60] = np.nan
+    gap = th.StateFilter(model).run(y, log.u)
+    assert gap.state_names == ["y(k)"]
+    assert np.all(np.diff(gap.output_deviations[50:60, 0]) > 0)
+    filter = th.StateFilter(model, initial="zero", measurement_noise=0.5)
+    noisy = filter.run(y, log.u, smooth=True)
+    assert np.all(np.isfinite(noisy.filtered)) and noisy.smoothed is not None
+    again = pickle.loads(pickle.dumps(filter))
+    assert again.step(1.0, 0.5).outputs == filter.step(1.0, 0.5).outputs
+    for wrong in (-1.0, [0.1, 0.2], float("nan")):
+        with pytest.raises(ValueError, match="measurement_noise"):
+            th.StateFilter(model, measurement_noise=wrong)
+
+
 def test_auto_says_what_came_second() -> None:
     model = th.narx(saturating(), "auto", ny=1, nu=1, split=(50, 30, 20))
     path = document(model)["estimation"]["maps"][0]["path"]

@@ -31,6 +31,7 @@
 mod estimate;
 mod estimator;
 mod kind;
+mod lags;
 mod linear;
 mod linearization;
 mod matrices;

@@ -38,8 +38,10 @@ pub(crate) use fitted::is_covariance;
 pub use fitted::{OffsetCovariance, Parameter, PolynomialModel, Signal};
 pub use kind::Model;
 pub(crate) use nonlinear_arx::Evaluator;
-pub use nonlinear_arx::{Activation, Functions, Map, Membership, NonlinearArxModel, OutputMap, Regressor};
-pub(crate) use orders::LARGEST;
+pub use nonlinear_arx::{
+    Activation, Functions, Map, Membership, NonlinearArxModel, OutputMap, Regressor, RunError,
+};
+pub(crate) use orders::{LARGEST, lag_name};
 pub use orders::{Orders, Structure};
 pub(crate) use process::{Chain, Columns, Parts, State, Transition};
 pub use process::{ProcessModel, ProcessStructure};

@@ -218,13 +218,17 @@ class StateFilter:
     Parameters
     ----------
     model : Model, StateModel or GreyBox
-        The model: of a fit, in innovations form, with its offsets; or in matrices or equations.
+        The model: of a fit, in innovations form, with its offsets, or where it is a nonlinear ARX model with its lags as the state, as
+        deviations from the offsets; or in matrices or equations.
     estimator : {"kalman", "ekf", "luenberger"}, optional
         How to estimate: "kalman" for a linear model, else "ekf", the extended Kalman filter, which estimates unknown parameters
         with the state. "luenberger" is an observer, with ``poles`` or ``gain``.
     initial : {"unknown", "zero"}, optional
-        Where a `Model` of polynomials starts: anywhere, so that the first rows tell, which is the default; or at rest, its channels at
-        their offsets. The others say so themselves.
+        Where a `Model` starts: anywhere, so that the first rows tell, which is the default; or at rest, its channels at their offsets.
+        Equations and matrices say so themselves.
+    measurement_noise : float, or array_like of shape (m,), optional
+        Standard deviation of white noise in what is measured, in units of each output, beside the noise of the `Model`, which drives
+        the plant: for nonlinear ARX models, 0 unless it is said. The others say theirs.
     poles : array_like of complex, shape (n,), optional
         Where the error of the observer is to have its poles in the z plane.
     gain : array_like, shape (n, m), optional
@@ -262,7 +266,7 @@ class StateFilter:
     'updated'
     """
 
-    __slots__ = ("_filter", "_gain", "_initial", "_last", "_model", "_poles", "_seen", "estimator")
+    __slots__ = ("_filter", "_gain", "_initial", "_last", "_model", "_noise", "_poles", "_seen", "estimator")
     estimator: str
 
     def __init__(
@@ -271,6 +275,7 @@ class StateFilter:
         estimator: str | None = None,
         *,
         initial: str | None = None,
+        measurement_noise: npt.ArrayLike | None = None,
         poles: npt.ArrayLike | None = None,
         gain: npt.ArrayLike | None = None,
     ) -> None:
@@ -286,13 +291,16 @@ class StateFilter:
             seen = _thetahat.StateModel.from_model(model._model, start)
         else:
             raise TypeError(f"model: expected a Model, a StateModel or a GreyBox, found {type(model).__name__}")
+        if measurement_noise is not None:
+            measurement_noise = _numbers.array("measurement_noise", measurement_noise).reshape(-1).copy()
+            seen = seen.with_measurement_noise(measurement_noise.tolist())
         if estimator is not None:
             _options.text("estimator", estimator)
         self._poles = None if poles is None else _poles(poles)
         self._gain = gain if gain is None else _numbers.array("gain", gain).copy()
         split = None if self._poles is None else (self._poles.real.tolist(), self._poles.imag.tolist())
         self._filter = _thetahat.StateFilter(seen, estimator, split, self._gain)
-        self._model, self._initial, self._seen = model, initial, seen
+        self._model, self._initial, self._noise, self._seen = model, initial, measurement_noise, seen
         self.estimator = ("kalman" if seen.is_linear else "ekf") if estimator is None else estimator
         self._last: _rows.Last | None = None
 
@@ -475,7 +483,7 @@ class StateFilter:
         _thetahat.write(_files.name(path), self.to_json())
 
     def __reduce__(self) -> tuple[Any, ...]:
-        given = (self._model, self.estimator, self._initial, self._poles, self._gain)
+        given = (self._model, self.estimator, self._initial, self._noise, self._poles, self._gain)
         return (_restored, (given, self._filter.snapshot(), self._last))
 
     def __repr__(self) -> str:
@@ -488,8 +496,8 @@ class StateFilter:
 
 def _restored(given: tuple[Any, ...], snapshot: str, last: _rows.Last | None) -> StateFilter:
     """Makes a filter again of what `__reduce__` gave."""
-    model, estimator, initial, poles, gain = given
-    made = StateFilter(model, estimator, initial=initial, poles=poles, gain=gain)
+    model, estimator, initial, noise, poles, gain = given
+    made = StateFilter(model, estimator, initial=initial, measurement_noise=noise, poles=poles, gain=gain)
     made._filter.resume(snapshot)
     made._last = last
     return made

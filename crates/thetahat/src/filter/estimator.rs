@@ -126,7 +126,7 @@ fn observer(model: &StateModel, start: &DVector<f64>, gain: ObserverGain) -> Res
                     placed.map_err(wrong)?;
                     Ok(Engine::Observer { observer, poles: None })
                 }
-                Kind::Grey(_) => {
+                Kind::Grey(_) | Kind::Lags(_) => {
                     Observer::check_poles(&poles).map_err(wrong)?;
                     Ok(Engine::Observer { observer, poles: Some(poles) })
                 }

@@ -1,4 +1,4 @@
-//! The two kinds of models, and the steps of filters and observers over them.
+//! The kinds of models, and the steps of filters and observers over them.
 
 use thetahat_core::nalgebra::{Complex, DMatrix, DVector, Dyn};
 use thetahat_core::{
@@ -6,6 +6,7 @@ use thetahat_core::{
     Transition,
 };
 
+use super::lags::Lags;
 use super::linear::Linear;
 use super::linearization::{Linearization, Work};
 use crate::data::Offset;
@@ -89,11 +90,12 @@ impl Recursion for Smoother<f64, Dyn> {
     }
 }
 
-/// A model in matrices, or in equations.
+/// A model in matrices, in equations, or of lags.
 #[derive(Debug, Clone)]
 pub(super) enum Kind {
     Linear(Box<Linear>),
     Grey(Box<GreyBox>),
+    Lags(Box<Lags>),
 }
 
 impl Kind {
@@ -101,6 +103,7 @@ impl Kind {
     pub(super) fn started(&self) -> Result<Filter, Error> {
         match self {
             Kind::Linear(linear) => Filter::new(linear.start.clone(), linear.start_covariance.clone()),
+            Kind::Lags(lags) => Filter::new(lags.start.clone(), lags.start_covariance.clone()),
             Kind::Grey(grey) => {
                 let (states, deviations) = grey.start();
                 let parameters = || grey.parameters().iter().map(|parameter| parameter.start_variable());
@@ -116,6 +119,7 @@ impl Kind {
     pub(super) fn division(&self, dt: f64) -> Result<Division, crate::Error> {
         match self {
             Kind::Linear(linear) => Ok((whole_steps(dt, linear.sample_time)?, linear.sample_time)),
+            Kind::Lags(lags) => Ok((whole_steps(dt, lags.sample_time)?, lags.sample_time)),
             Kind::Grey(grey) => grey.division(dt),
         }
     }
@@ -125,14 +129,16 @@ impl Kind {
         match self {
             Kind::Linear(linear) => linear.output_noise[(output, output)],
             Kind::Grey(grey) => grey.measurement_variances()[output],
+            Kind::Lags(lags) => lags.output_variances[output],
         }
     }
 
-    /// From one row to the next.
+    /// From one row to the next: inputs are held between them.
     pub(super) fn predict(
         &self,
         filter: &mut impl Recursion,
         from: &Sample,
+        to: &Sample,
         (count, dt): Division,
         work: &mut Work,
     ) -> Result<(), Error> {
@@ -157,6 +163,13 @@ impl Kind {
                         (from.time + index as f64 * dt, filter.filter().state().as_slice());
                     let transition =
                         Linearization::ahead(grey, estimate, from.inputs.as_slice(), time, dt, work)?;
+                    filter.predict(&transition, &from.inputs)?;
+                }
+            }
+            Kind::Lags(lags) => {
+                for index in 1..=count {
+                    let next = if index == count { &to.inputs } else { &from.inputs };
+                    let transition = lags.ahead(filter.filter().state(), from, next);
                     filter.predict(&transition, &from.inputs)?;
                 }
             }
@@ -185,6 +198,10 @@ impl Kind {
                 show(&seen.values, &seen.jacobian);
                 filter.correct(&seen, &at.inputs, &at.outputs)
             }
+            Kind::Lags(lags) => {
+                show(&lags.observation.output(estimate, &at.inputs), &lags.output_matrix);
+                filter.correct(&lags.observation, &at.inputs, &at.outputs)
+            }
         }
     }
 
@@ -194,6 +211,7 @@ impl Kind {
         observer: &mut Observer,
         poles: Option<&DVector<Complex<f64>>>,
         from: &Sample,
+        to: &Sample,
         (count, dt): Division,
         work: &mut Work,
     ) -> Result<(), Error> {
@@ -214,6 +232,14 @@ impl Kind {
                     }
                     observer.update(&transition, &observation, &from.inputs, outputs)?;
                 }
+                Kind::Lags(lags) => {
+                    let next = if index + 1 == count { &to.inputs } else { &from.inputs };
+                    let (transition, seen) = (lags.ahead(observer.state(), from, next), &lags.observation);
+                    if let Some(poles) = poles.filter(|_| index == 0) {
+                        observer.place(&transition, seen, &from.inputs, &self.weights(), poles)?;
+                    }
+                    observer.update(&transition, seen, &from.inputs, outputs)?;
+                }
             }
         }
         Ok(())
@@ -228,6 +254,7 @@ impl Kind {
     ) -> Result<DVector<f64>, Error> {
         Ok(match self {
             Kind::Linear(linear) => linear.observation.output(estimate, &at.inputs),
+            Kind::Lags(lags) => lags.observation.output(estimate, &at.inputs),
             Kind::Grey(grey) => {
                 Linearization::seen(grey, estimate.as_slice(), at.inputs.as_slice(), at.time, work)?.values
             }
@@ -239,6 +266,7 @@ impl Kind {
         let outputs = match self {
             Kind::Linear(linear) => linear.outputs.len(),
             Kind::Grey(grey) => grey.outputs().len(),
+            Kind::Lags(lags) => lags.outputs.len(),
         };
         let noisy = outputs > 1 && (0..outputs).all(|output| self.output_variance(output) > 0.0);
         DVector::from_fn(
@@ -253,6 +281,7 @@ impl Kind {
     pub(super) fn offsets(&self) -> (&[Offset], &[Offset]) {
         match self {
             Kind::Linear(linear) => (&linear.input_offsets, &linear.output_offsets),
+            Kind::Lags(lags) => (&lags.input_offsets, &lags.output_offsets),
             Kind::Grey(_) => (&[], &[]),
         }
     }

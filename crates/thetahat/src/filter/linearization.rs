@@ -1,4 +1,4 @@
-//! A model in equations, evaluated at one estimate: what a filter asks of it there.
+//! A model that is not linear, evaluated at one estimate: what a filter asks of it there.
 
 use thetahat_core::nalgebra::{DMatrix, DVector, Dyn};
 use thetahat_core::{Covariance, Error, Observation, Transition};
@@ -21,7 +21,7 @@ use crate::model::GreyBox;
 pub(super) struct Linearization {
     pub(super) values: DVector<f64>,
     pub(super) jacobian: DMatrix<f64>,
-    noise: Covariance<f64, Dyn>,
+    pub(super) noise: Covariance<f64, Dyn>,
 }
 
 /// Numbers to work in.

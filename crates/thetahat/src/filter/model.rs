@@ -1,4 +1,5 @@
 use super::kind::Kind;
+use super::lags::Lags;
 use super::linear::{InitialState, Linear};
 use super::matrices;
 use crate::Error;
@@ -63,8 +64,9 @@ impl StateModel {
         Ok(GreyBox::from_toml(text)?.into())
     }
 
-    /// The model of a report: polynomials in innovations form, from what `start` says, [`InitialState::Unknown`] without; equations as they are, with the values that were found, from the start that
-    /// they say.
+    /// The model of a report, from what `start` says, [`InitialState::Unknown`] without: polynomials in innovations form; a nonlinear ARX
+    /// model with its lags as the state, as deviations from the offsets, of which an unknown start is anywhere in the range of the rows
+    /// that it was fitted to. Equations are as they are, with the values that were found, from the start that they say.
     ///
     /// # Errors
     /// [`Error::Report`] if the noise variance is 0, or the numbers overflow; [`Error::Argument`] for a start of equations.
@@ -83,11 +85,38 @@ impl StateModel {
                 let start = start.unwrap_or(InitialState::Unknown);
                 Ok(Self { kind: Kind::Linear(Box::new(Linear::of_model(&model.linear()?, start)?)) })
             }
-            Model::NonlinearArx(_) => Err(Error::argument(
-                "model",
-                "a nonlinear ARX model has no state to filter: it predicts, simulates, validates and compares",
-            )),
+            Model::NonlinearArx(model) => {
+                let lags = Lags::of_model(model, start.unwrap_or(InitialState::Unknown));
+                let lags = lags.map_err(|why| Error::report(format!("its model has no filter: {why}")))?;
+                Ok(Self { kind: Kind::Lags(Box::new(lags)) })
+            }
         }
+    }
+
+    /// The same, and outputs that are measured with white noise of these standard deviations, in units of the outputs, beside the noise of
+    /// the report that drives the plant. A nonlinear ARX model measures its outputs exactly unless it is said; other models say theirs.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for another model, another number of outputs, or what is no deviation.
+    pub fn with_measurement_noise(self, deviations: &[f64]) -> Result<Self, Error> {
+        let argument = "measurement_noise";
+        let Kind::Lags(lags) = self.kind else {
+            let message = "it is for reports of nonlinear ARX models: this model says its noises itself";
+            return Err(Error::argument(argument, message));
+        };
+        if deviations.len() != lags.outputs.len() {
+            let message = format!("there are {}, but the model has {}", deviations.len(), lags.outputs.len());
+            return Err(Error::argument(argument, message));
+        }
+        let is_wrong = |deviation: &&f64| !deviation.is_finite() || deviation.is_sign_negative();
+        if let Some(wrong) = deviations.iter().find(is_wrong) {
+            return Err(Error::argument(argument, format!("{wrong} is no standard deviation")));
+        }
+        let variances = deviations.iter().map(|deviation| deviation * deviation).collect();
+        let lags = lags.with_output_variances(variances);
+        Ok(Self {
+            kind: Kind::Lags(Box::new(lags.map_err(|error| Error::argument(argument, error.to_string()))?)),
+        })
     }
 
     /// The names of the states.
@@ -95,6 +124,7 @@ impl StateModel {
         match &self.kind {
             Kind::Linear(linear) => &linear.states,
             Kind::Grey(grey) => grey.states(),
+            Kind::Lags(lags) => &lags.states,
         }
     }
 
@@ -103,6 +133,7 @@ impl StateModel {
         match &self.kind {
             Kind::Linear(linear) => &linear.inputs,
             Kind::Grey(grey) => grey.inputs(),
+            Kind::Lags(lags) => &lags.inputs,
         }
     }
 
@@ -111,13 +142,14 @@ impl StateModel {
         match &self.kind {
             Kind::Linear(linear) => &linear.outputs,
             Kind::Grey(grey) => grey.outputs(),
+            Kind::Lags(lags) => &lags.outputs,
         }
     }
 
     /// The names of the unknown parameters.
     pub fn unknown(&self) -> impl ExactSizeIterator<Item = &str> {
         let parameters = match &self.kind {
-            Kind::Linear(_) => &[],
+            Kind::Linear(_) | Kind::Lags(_) => &[],
             Kind::Grey(grey) => grey.parameters(),
         };
         parameters.iter().map(|parameter| parameter.name.as_str())
@@ -127,7 +159,7 @@ impl StateModel {
     /// bounds.
     pub fn changes_of_variable(&self) -> impl ExactSizeIterator<Item = Option<String>> {
         let parameters = match &self.kind {
-            Kind::Linear(_) => &[],
+            Kind::Linear(_) | Kind::Lags(_) => &[],
             Kind::Grey(grey) => grey.parameters(),
         };
         parameters.iter().map(|parameter| parameter.change_of_variable())
@@ -138,6 +170,7 @@ impl StateModel {
         match &self.kind {
             Kind::Linear(linear) => linear.sample_time,
             Kind::Grey(grey) => grey.sample_time(),
+            Kind::Lags(lags) => lags.sample_time,
         }
     }
 
@@ -147,6 +180,7 @@ impl StateModel {
         match &self.kind {
             Kind::Linear(_) => true,
             Kind::Grey(grey) => grey.is_linear(),
+            Kind::Lags(_) => false,
         }
     }
 }

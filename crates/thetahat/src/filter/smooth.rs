@@ -80,7 +80,7 @@ impl StateFilter {
         let mut previous = None;
         for (division, sample) in history {
             if let Some((previous, division)) = previous.zip(*division) {
-                kind.predict(&mut smoother, previous, division, &mut work).map_err(overflow)?;
+                kind.predict(&mut smoother, previous, sample, division, &mut work).map_err(overflow)?;
                 place += division.0;
             }
             kind.correct(&mut smoother, sample, &mut work, |_, _| ()).map_err(overflow)?;

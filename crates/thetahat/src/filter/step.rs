@@ -194,7 +194,7 @@ impl StateFilter {
         let told = match &mut engine {
             Engine::Filter(filter) => {
                 if let Some((previous, division)) = from {
-                    kind.predict(filter, previous, division, work).map_err(refused)?;
+                    kind.predict(filter, previous, &sample, division, work).map_err(refused)?;
                 }
                 next.predicted(filter).map_err(refused)?;
                 let show = |outputs: &DVector<f64>, h: &DMatrix<f64>| {
@@ -208,7 +208,8 @@ impl StateFilter {
             }
             Engine::Observer { observer, poles } => {
                 if let Some((previous, division)) = from {
-                    kind.observe(observer, poles.as_ref(), previous, division, work).map_err(refused)?;
+                    kind.observe(observer, poles.as_ref(), previous, &sample, division, work)
+                        .map_err(refused)?;
                 }
                 next.predicted.copy_from_slice(observer.state().as_slice());
                 let outputs = kind.outputs(observer.state(), &sample, work).map_err(refused)?;

@@ -1,4 +1,5 @@
 mod equations;
+mod lags;
 mod observers;
 mod reference;
 mod refusals;

@@ -63,6 +63,44 @@ pub struct OutputMap {
     pub range: [f64; 2],
     /// The functions f.
     pub functions: Map,
+    /// The errors of runs over rows that were held out, in rising order of how long ago they began; none where no rows were.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub run_errors: Vec<RunError>,
+}
+
+/// How far runs were off that began at what was measured so many samples before.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct RunError {
+    /// Samples from the last measured output to the one that is predicted.
+    pub steps: usize,
+    /// The root mean square of the errors, in units of the output.
+    pub rmse: f64,
+}
+
+impl OutputMap {
+    /// The root mean square error of runs of so many samples, between those that were measured by the logarithm of their length, and beyond
+    /// the longest that of the longest; none where no rows were held out.
+    ///
+    /// ```
+    /// use thetahat::model::{Map, OutputMap, RunError};
+    ///
+    /// let run_errors = vec![RunError { steps: 1, rmse: 0.1 }, RunError { steps: 100, rmse: 0.5 }];
+    /// let functions = Map::Polynomial { terms: Vec::new() };
+    /// let map = OutputMap { scale: 1.0, range: [0.0; 2], functions, run_errors };
+    /// assert!((map.run_error(10).unwrap() - 0.3).abs() < 1e-12);
+    /// assert_eq!((map.run_error(1), map.run_error(1000)), (Some(0.1), Some(0.5)));
+    /// ```
+    pub fn run_error(&self, steps: usize) -> Option<f64> {
+        let after = self.run_errors.partition_point(|error| error.steps < steps);
+        match (after.checked_sub(1).map(|before| self.run_errors[before]), self.run_errors.get(after)) {
+            (Some(before), Some(after)) => {
+                let log = |steps: usize| (steps as f64).ln();
+                let share = (log(steps) - log(before.steps)) / (log(after.steps) - log(before.steps));
+                Some(before.rmse + share * (after.rmse - before.rmse))
+            }
+            (before, after) => after.copied().or(before).map(|error| error.rmse),
+        }
+    }
 }
 
 /// A lag of a channel.
@@ -301,6 +339,13 @@ impl NonlinearArxModel {
             return wrong("sample_time or a scale of maps is not a positive number".to_owned());
         }
         for (place, map) in self.maps.iter().enumerate() {
+            let each = map.run_errors.iter();
+            let rise = map.run_errors.windows(2).all(|pair| pair[0].steps < pair[1].steps);
+            if !rise
+                || each.clone().any(|error| error.steps == 0 || !error.rmse.is_finite() || error.rmse < 0.0)
+            {
+                return wrong(format!("maps[{place}].run_errors are no errors of longer and longer runs"));
+            }
             if let Err(what) = map.functions.check(self.regressors.len()) {
                 return wrong(format!("maps[{place}].functions.{what}"));
             }

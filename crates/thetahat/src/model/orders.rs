@@ -317,7 +317,7 @@ impl fmt::Display for Orders {
 }
 
 /// Such as y(k-1), or u(k) without a lag.
-pub(super) fn lag_name(channel: &str, lag: usize) -> String {
+pub(crate) fn lag_name(channel: &str, lag: usize) -> String {
     if lag == 0 { format!("{channel}(k)") } else { format!("{channel}(k-{lag})") }
 }
 

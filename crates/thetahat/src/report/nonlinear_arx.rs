@@ -133,11 +133,16 @@ fn fit_planned(
     let (maps, parts) = fitted.into_iter().map(|one| (one.outcome, (one.samples, one.solved))).unzip();
     let joint = joint(&head.inputs, parts)
         .ok_or_else(|| Error::argument("output", "a model has one output at least"))?;
-    let Joint { model, mse, determinant, condition } = joint;
+    let Joint { mut model, mse, determinant, condition } = joint;
 
     let segments = deviations.segments(&names, &shares.estimation)?;
     let segments = segments.iter().map(Rows::from_positions).collect();
     let data = shares.into_data((log, sources), &names, plan.detrend.to_string(), segments)?;
+    let held_out: Vec<Rows> = data.held_out().into_iter().flat_map(|(_, rows)| rows).collect();
+    if !held_out.is_empty() {
+        let errors = NonlinearArxOnLog::new(&model, &deviations, &held_out)?.run_errors();
+        model.maps.iter_mut().zip(errors).for_each(|(map, errors)| map.run_errors = errors);
+    }
     let estimation = Estimation {
         procedure: by(MapsOutcome { maps }),
         initial: None,
@@ -268,7 +273,8 @@ fn head(
     for (output, lags) in plan.outputs.iter().zip(&plan.output_lags) {
         let scale = scale(output, "output")?;
         read(output, 1..lags + 1, scale);
-        maps.push(OutputMap { scale, range: [0.0; 2], functions: Map::Polynomial { terms: Vec::new() } });
+        let functions = Map::Polynomial { terms: Vec::new() };
+        maps.push(OutputMap { scale, range: [0.0; 2], functions, run_errors: Vec::new() });
     }
     for (input, lags) in plan.inputs.iter().zip(&plan.input_lags) {
         read(input, lags.delay..lags.delay + lags.lags, scale(input, "input")?);

@@ -8,7 +8,8 @@
 //! ```
 //!
 //! and the covariance of the errors is that of the first, by its covariance over the last lags, plus g' P g with the second (Ljung,
-//! System Identification, 2nd ed. 1999, section 9.4, for a predictor that is not linear).
+//! System Identification, 2nd ed. 1999, section 9.4, for a predictor that is not linear). That takes e for noise that drives the plant. Where
+//! rows were held out, runs over them say how far those of two samples and more are off, whatever e is: by the length of the run alone.
 
 mod errors;
 mod runner;
@@ -25,10 +26,16 @@ use super::{Forecast, Horizon, InitialCondition, Innovations, Response};
 use crate::Error;
 use crate::data::{Log, Record, Rows, measured};
 use crate::distribution::{student_factor, student_two_sided};
-use crate::model::{NonlinearArxModel, Orders, PolynomialModel, Signal};
+use crate::model::{NonlinearArxModel, Orders, PolynomialModel, RunError, Signal};
 use errors::Errors;
 pub(crate) use runner::within;
 use runner::{Runner, Signals, Walk};
+
+/// How long the runs are of which the errors are measured, and how many samples of each are run at most.
+const RUNS: [usize; 10] = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000];
+const SAMPLES: usize = 50_000;
+/// Fewer runs of a length say little.
+const FEWEST: usize = 20;
 
 /// Samples that are predicted on one thread.
 const PART: usize = 1024;
@@ -162,6 +169,43 @@ impl<'l> NonlinearArxOnLog<'l> {
         responses
     }
 
+    /// The errors of runs over the rows of each output, by their length; none where a run grows without bound.
+    pub(crate) fn run_errors(&self) -> Vec<Vec<RunError>> {
+        let (runner, signals) = (&self.runner, &self.signals);
+        let mut errors = vec![Vec::new(); runner.outputs()];
+        for steps in RUNS {
+            let rows: Vec<usize> = self.counted(steps).into_iter().flatten().collect();
+            let apart = (rows.len() * steps).div_ceil(SAMPLES).max(1);
+            let rows: Vec<usize> = rows.into_iter().step_by(apart).collect();
+            if rows.len() < FEWEST {
+                break;
+            }
+            let squares = |t: &usize| {
+                let mut squares = Vec::new();
+                ahead(runner, signals, *t..*t + 1, steps, None, |said, _| {
+                    let each = said.iter().zip(&signals.outputs);
+                    squares.extend(each.map(|(said, y)| (y[*t] - said).powi(2)));
+                });
+                squares
+            };
+            let squares: Vec<Vec<f64>> = rows.par_iter().map(squares).collect();
+            for (output, errors) in errors.iter_mut().enumerate() {
+                let sum: f64 = squares.iter().map(|squares| squares[output]).sum();
+                errors.push(RunError { steps, rmse: (sum / rows.len() as f64).sqrt() });
+            }
+        }
+        if errors.iter().flatten().any(|error| !error.rmse.is_finite()) {
+            errors.iter_mut().for_each(Vec::clear);
+        }
+        errors
+    }
+
+    /// What runs over held-out rows say of the deviations of each output so many samples ahead. One sample ahead e says it.
+    fn measured_deviations(&self, steps: usize) -> Option<Vec<f64>> {
+        let maps = (steps > 1).then_some(&self.runner.model.maps)?;
+        maps.iter().map(|map| map.run_error(steps)).collect()
+    }
+
     fn one_step(&self) -> &[Response] {
         self.one_step.get_or_init(|| self.predict(1))
     }
@@ -265,6 +309,12 @@ impl OnLog for NonlinearArxOnLog<'_> {
         let (runner, signals) = (&self.runner, &self.signals);
         let factor = student_factor(runner.model.degrees_of_freedom);
         let mut deviations = vec![vec![f64::NAN; self.ahead.output.len()]; runner.outputs()];
+        if let Some(measured) = self.measured_deviations(steps) {
+            for (deviations, measured) in deviations.iter_mut().zip(measured) {
+                self.counted(steps).into_iter().for_each(|rows| deviations[rows].fill(measured));
+            }
+            return Ok(deviations);
+        }
         let parts = self.parts(steps);
         let found: Vec<Vec<f64>> = (parts.par_iter())
             .map(|rows| {
@@ -355,9 +405,12 @@ impl OnLog for NonlinearArxOnLog<'_> {
             self.runner.next(&walk.z, &mut next);
             errors.step(&self.runner, &mut walk, t, &mut variances);
             walk.write(t, &next);
-            for ((forecast, value), variance) in forecasts.iter_mut().zip(&next).zip(&variances) {
-                forecast.values.push(*value);
-                forecast.standard_deviations.push(factor * variance.sqrt());
+            let deviations = self.measured_deviations(t + 1 - first);
+            for (output, forecast) in forecasts.iter_mut().enumerate() {
+                forecast.values.push(next[output]);
+                let propagated = factor * variances[output].sqrt();
+                let deviation = deviations.as_ref().map_or(propagated, |deviations| deviations[output]);
+                forecast.standard_deviations.push(deviation);
             }
         }
         Ok(Some((first, forecasts)))

@@ -153,6 +153,49 @@ fn intervals_one_step_ahead_hold_the_output() {
 }
 
 #[test]
+fn intervals_of_longer_runs_are_measured_on_held_out_rows() {
+    // Noise of the sensor, which does not drive the plant: what the noise along a run would do is too much.
+    let mut random = Random::of(8, 2);
+    let mut log = plant(3000, 1.0, false, 0.0);
+    let noisy = log.channel("y").unwrap().values.iter().map(|y| y + 0.1 * random.normal()).collect();
+    let u = log.channel("u").unwrap().clone();
+    log = Log::new(vec![u, Channel { name: "y".to_owned(), values: noisy }], 1.0).unwrap();
+    let plan = NonlinearArxPlan {
+        estimate: vec![Rows::new(1, 600).unwrap()],
+        validate: vec![Rows::new(601, 1000).unwrap()],
+        ridge: Some(0.01),
+        ..trained(network(Activation::Tanh, Some(2)))
+    };
+    let report = fit_nonlinear_arx(&log, &[], &plan).unwrap();
+    let without =
+        fit_nonlinear_arx(&log, &[], &NonlinearArxPlan { validate: Vec::new(), ..plan.clone() }).unwrap();
+    // What holds the output on rows that neither saw, and how wide it is in the mean.
+    let held = |report: &Report, steps: usize| {
+        let Model::NonlinearArx(model) = &report.model else { panic!("{:?}", report.model) };
+        let offsets = [("u", model.inputs[0].offset), ("y", model.outputs[0].offset)];
+        let deviations = log.deviations(offsets.into_iter()).unwrap();
+        let on_log = NonlinearArxOnLog::new(model, &deviations, &[Rows::new(1101, 3000).unwrap()]).unwrap();
+        let said = on_log.respond(Horizon::Steps { steps }, InitialCondition::Drop).unwrap();
+        let spread = on_log.deviations(steps, InitialCondition::Drop).unwrap();
+        let (quantile, measured) = (on_log.quantile(0.95), on_log.measured(0));
+        let is_held = |t: &usize| (measured[*t] - said[0].values[*t]).abs() < quantile * spread[0][*t];
+        let share = (1300..3000).filter(is_held).count() as f64 / 1700.0;
+        (share, (1300..3000).map(|t| spread[0][t]).sum::<f64>() / 1700.0)
+    };
+    let Model::NonlinearArx(model) = &report.model else { panic!("{:?}", report.model) };
+    let steps: Vec<usize> = model.maps[0].run_errors.iter().map(|error| error.steps).collect();
+    assert_eq!(steps, [1, 2, 5, 10, 20, 50, 100, 200, 500]);
+    for steps in [2, 5, 20, 70, 150] {
+        let ((share, width), (_, other)) = (held(&report, steps), held(&without, steps));
+        assert!((0.92..=0.97).contains(&share), "{steps}: {share}");
+        assert!(steps < 20 || width < 0.9 * other, "{steps}: {width} {other}");
+    }
+    let damaged = report.to_json().unwrap().replace("\"steps\": 5,", "\"steps\": 0,");
+    let error = Report::from_json(&damaged).unwrap_err().to_string();
+    assert!(error.contains("run_errors"), "{error}");
+}
+
+#[test]
 fn drawn_units_are_chosen() {
     let log = plant(600, 1.0, false, 0.02);
     for (activation, drawn) in [(Activation::Step, true), (Activation::Tanh, true), (Activation::Step, false)]

@@ -11,6 +11,7 @@
 # %%
 import os
 import warnings
+from typing import Any
 
 import numpy as np
 
@@ -41,6 +42,7 @@ def oscillator(rows: int, seed: int = 0) -> th.Log:
 
 
 measured = os.environ.get("SILVERBOX")
+lags: dict[str, Any]
 if measured:
     log = th.read_csv(measured, inputs="u", output="y", sample_time=1 / 610.35)
     known, fresh, lags, terms = log[40650:105712], log[105712:127400], {"ny": 3, "nu": 3, "nk": 0}, 20

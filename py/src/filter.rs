@@ -52,7 +52,13 @@ impl StateModel {
     /// The same with outputs that are measured with noise.
     fn with_measurement_noise(&self, deviations: Vec<f64>) -> PyResult<Self> {
         let model = self.model.clone().with_measurement_noise(&deviations);
-        Ok(Self { model: model.map_err(|error| PyValueError::new_err(error.to_string()))? })
+        let model = model.map_err(|error| match error {
+            thetahat::Error::Argument { message, .. } => {
+                PyValueError::new_err(format!("measurement_noise: {message}"))
+            }
+            other => PyValueError::new_err(other.to_string()),
+        })?;
+        Ok(Self { model })
     }
 
     /// That of equations, of which parameters may be unknown.

@@ -169,7 +169,7 @@ impl Kind {
             Kind::Lags(lags) => {
                 for index in 1..=count {
                     let next = if index == count { &to.inputs } else { &from.inputs };
-                    let transition = lags.ahead(filter.filter().state(), from, next);
+                    let transition = lags.ahead(filter.filter().state(), &from.inputs, next);
                     filter.predict(&transition, &from.inputs)?;
                 }
             }
@@ -234,7 +234,8 @@ impl Kind {
                 }
                 Kind::Lags(lags) => {
                     let next = if index + 1 == count { &to.inputs } else { &from.inputs };
-                    let (transition, seen) = (lags.ahead(observer.state(), from, next), &lags.observation);
+                    let (transition, seen) =
+                        (lags.ahead(observer.state(), &from.inputs, next), &lags.observation);
                     if let Some(poles) = poles.filter(|_| index == 0) {
                         observer.place(&transition, seen, &from.inputs, &self.weights(), poles)?;
                     }

@@ -3,7 +3,6 @@
 use thetahat_core::nalgebra::{DMatrix, DVector, Dyn};
 use thetahat_core::{Covariance, Error, LinearObservation};
 
-use super::kind::Sample;
 use super::linear::InitialState;
 use super::linearization::Linearization;
 use crate::data::Offset;
@@ -172,14 +171,19 @@ impl Lags {
         Ok(Self { observation, output_variances, ..self })
     }
 
-    /// The step to the next sample: `from` has the inputs now, `inputs` those there.
-    pub(super) fn ahead(&self, state: &DVector<f64>, from: &Sample, inputs: &DVector<f64>) -> Linearization {
+    /// The step to the next sample, with the inputs now and those there.
+    pub(super) fn ahead(
+        &self,
+        state: &DVector<f64>,
+        now: &DVector<f64>,
+        there: &DVector<f64>,
+    ) -> Linearization {
         let (n, outputs) = (state.len(), self.outputs.len());
         // Where the value of a channel stands that is read so many samples before the next one.
         let at = |channel: usize, lag: usize| match channel.checked_sub(outputs) {
             None => (Some(self.places[channel].0 + lag - 1), 0.0),
-            Some(input) if lag == 0 => (None, inputs[input]),
-            Some(input) if lag == 1 => (None, from.inputs[input]),
+            Some(input) if lag == 0 => (None, there[input]),
+            Some(input) if lag == 1 => (None, now[input]),
             Some(_) => (Some(self.places[channel].0 + lag - 2), 0.0),
         };
         let value = |channel: usize, lag: usize| match at(channel, lag) {
@@ -224,7 +228,7 @@ impl Lags {
             if let Some(input) = channel.checked_sub(outputs)
                 && *count > 0
             {
-                values[*place] = from.inputs[input];
+                values[*place] = now[input];
             }
             for row in place + 1..place + count {
                 values[row] = state[row - 1];

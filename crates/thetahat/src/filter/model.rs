@@ -99,7 +99,7 @@ impl StateModel {
     /// # Errors
     /// [`Error::Argument`] for another model, another number of outputs, or what is no deviation.
     pub fn with_measurement_noise(self, deviations: &[f64]) -> Result<Self, Error> {
-        let argument = "measurement_noise";
+        let argument = "measurement-noise";
         let Kind::Lags(lags) = self.kind else {
             let message = "it is for reports of nonlinear ARX models: this model says its noises itself";
             return Err(Error::argument(argument, message));

@@ -3,7 +3,7 @@
 use thetahat_core::nalgebra::{Complex, DVector};
 
 use crate::data::{Channel, Log, Rows};
-use crate::filter::kind::{Kind, Sample};
+use crate::filter::kind::Kind;
 use crate::filter::{Estimator, InitialState, ObserverGain, StateFilter, StateModel};
 use crate::model::{Activation, Model};
 use crate::random::Random;
@@ -91,15 +91,14 @@ fn its_slopes_are_differences() {
         let Kind::Lags(lags) = &model.kind else { panic!("a nonlinear ARX model has lags") };
         let n = model.states().len();
         let state = DVector::from_fn(n, |place, _| 0.3 - 0.2 * place as f64);
-        let outputs = DVector::zeros(model.outputs().len());
-        let from = Sample { time: 0.0, inputs: DVector::repeat(1, 0.4), outputs };
+        let now = DVector::repeat(1, 0.4);
         let next = DVector::repeat(1, -0.7);
-        let found = lags.ahead(&state, &from, &next).jacobian;
+        let found = lags.ahead(&state, &now, &next).jacobian;
         for column in 0..n {
             let at = |step: f64| {
                 let mut state = state.clone();
                 state[column] += step;
-                lags.ahead(&state, &from, &next).values
+                lags.ahead(&state, &now, &next).values
             };
             let difference = (at(1e-5) - at(-1e-5)) / 2e-5;
             let distance = (difference - found.column(column)).amax();
@@ -200,7 +199,7 @@ fn it_starts_and_observes() {
     for wrong in [-1.0, f64::NAN, f64::INFINITY] {
         assert!(refused(&[wrong]).contains("no standard deviation"), "{}", refused(&[wrong]));
     }
-    assert!(refused(&[1e300]).contains("measurement_noise"), "{}", refused(&[1e300]));
+    assert!(refused(&[1e300]).contains("measurement-noise"), "{}", refused(&[1e300]));
     let linear = StateModel::from_toml(super::NILE).unwrap();
     assert!(linear.with_measurement_noise(&[1.0]).unwrap_err().to_string().contains("nonlinear ARX"));
 }

@@ -37,6 +37,7 @@ mod linearization;
 mod matrices;
 mod model;
 mod row;
+mod sampled;
 mod smooth;
 mod snapshot;
 mod step;

@@ -2,6 +2,7 @@ use thetahat_core::nalgebra::{Complex, DMatrix, DVector};
 
 use super::kind::{Filter, Kind, Observer};
 use super::model::StateModel;
+use super::sampled::Motion;
 use crate::Error;
 use crate::figures::number;
 
@@ -92,8 +93,10 @@ fn observer(model: &StateModel, start: &DVector<f64>, gain: ObserverGain) -> Res
             if !gain.iter().all(|entry: &f64| entry.is_finite()) {
                 return Err(Error::argument("gain", "it must be finite numbers"));
             }
-            if let Kind::Linear(linear) = &model.kind {
-                let error = linear.transition.state_matrix() - &gain * &linear.output_matrix;
+            if let Kind::Sampled(sampled) = &model.kind
+                && let Motion::Linear(linear) = &sampled.motion
+            {
+                let error = linear.transition.state_matrix() - &gain * &sampled.output_matrix;
                 let largest =
                     error.complex_eigenvalues().iter().map(|pole| pole.re.hypot(pole.im)).fold(0.0, f64::max);
                 if largest >= 1.0 {
@@ -118,19 +121,17 @@ fn observer(model: &StateModel, start: &DVector<f64>, gain: ObserverGain) -> Res
             let poles = DVector::from_vec(poles);
             let none = DVector::zeros(model.inputs().len());
             let wrong = |error: thetahat_core::Error| Error::argument("poles", error.to_string());
-            match &model.kind {
-                Kind::Linear(linear) => {
-                    let weights = model.kind.weights();
-                    let placed =
-                        observer.place(&linear.transition, &linear.observation, &none, &weights, &poles);
-                    placed.map_err(wrong)?;
-                    Ok(Engine::Observer { observer, poles: None })
-                }
-                Kind::Grey(_) | Kind::Lags(_) => {
-                    Observer::check_poles(&poles).map_err(wrong)?;
-                    Ok(Engine::Observer { observer, poles: Some(poles) })
-                }
+            if let Kind::Sampled(sampled) = &model.kind
+                && let Motion::Linear(linear) = &sampled.motion
+            {
+                let weights = model.kind.weights();
+                let placed =
+                    observer.place(&linear.transition, &sampled.observation, &none, &weights, &poles);
+                placed.map_err(wrong)?;
+                return Ok(Engine::Observer { observer, poles: None });
             }
+            Observer::check_poles(&poles).map_err(wrong)?;
+            Ok(Engine::Observer { observer, poles: Some(poles) })
         }
     }
 }

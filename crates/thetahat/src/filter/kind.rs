@@ -6,9 +6,8 @@ use thetahat_core::{
     Transition,
 };
 
-use super::lags::Lags;
-use super::linear::Linear;
 use super::linearization::{Linearization, Work};
+use super::sampled::{Motion, Sampled};
 use crate::data::Offset;
 use crate::model::{GreyBox, equations::whole_steps};
 
@@ -90,20 +89,18 @@ impl Recursion for Smoother<f64, Dyn> {
     }
 }
 
-/// A model in matrices, in equations, or of lags.
+/// A model that goes from sample to sample, or in equations.
 #[derive(Debug, Clone)]
 pub(super) enum Kind {
-    Linear(Box<Linear>),
+    Sampled(Box<Sampled>),
     Grey(Box<GreyBox>),
-    Lags(Box<Lags>),
 }
 
 impl Kind {
     /// The filter that stands where the model starts.
     pub(super) fn started(&self) -> Result<Filter, Error> {
         match self {
-            Kind::Linear(linear) => Filter::new(linear.start.clone(), linear.start_covariance.clone()),
-            Kind::Lags(lags) => Filter::new(lags.start.clone(), lags.start_covariance.clone()),
+            Kind::Sampled(sampled) => Filter::new(sampled.start.clone(), sampled.start_covariance.clone()),
             Kind::Grey(grey) => {
                 let (states, deviations) = grey.start();
                 let parameters = || grey.parameters().iter().map(|parameter| parameter.start_variable());
@@ -118,8 +115,10 @@ impl Kind {
     /// How a step of `dt` seconds is taken.
     pub(super) fn division(&self, dt: f64) -> Result<Division, crate::Error> {
         match self {
-            Kind::Linear(linear) => Ok((whole_steps(dt, linear.sample_time)?, linear.sample_time)),
-            Kind::Lags(lags) => Ok((whole_steps(dt, lags.sample_time)?, lags.sample_time)),
+            Kind::Sampled(sampled) => {
+                let sample_time = sampled.names.sample_time;
+                Ok((whole_steps(dt, sample_time)?, sample_time))
+            }
             Kind::Grey(grey) => grey.division(dt),
         }
     }
@@ -127,9 +126,8 @@ impl Kind {
     /// R_ii.
     pub(super) fn output_variance(&self, output: usize) -> f64 {
         match self {
-            Kind::Linear(linear) => linear.output_noise[(output, output)],
+            Kind::Sampled(sampled) => sampled.output_noise[(output, output)],
             Kind::Grey(grey) => grey.measurement_variances()[output],
-            Kind::Lags(lags) => lags.output_variances[output],
         }
     }
 
@@ -143,33 +141,35 @@ impl Kind {
         work: &mut Work,
     ) -> Result<(), Error> {
         match self {
-            Kind::Linear(linear) => {
-                let there: Vec<bool> = from.outputs.iter().map(|output| !output.is_nan()).collect();
-                let mut left = count;
-                if let Some(transition) = linear.after(&there)? {
-                    let outputs =
-                        from.outputs.iter().map(|output| if output.is_nan() { 0.0 } else { *output });
-                    let drives: Vec<f64> = from.inputs.iter().copied().chain(outputs).collect();
-                    filter.predict(transition.as_ref(), &drives.into())?;
-                    left -= 1;
+            Kind::Sampled(sampled) => match &sampled.motion {
+                Motion::Linear(linear) => {
+                    let there: Vec<bool> = from.outputs.iter().map(|output| !output.is_nan()).collect();
+                    let mut left = count;
+                    if let Some(transition) = linear.after(sampled, &there)? {
+                        let outputs =
+                            from.outputs.iter().map(|output| if output.is_nan() { 0.0 } else { *output });
+                        let drives: Vec<f64> = from.inputs.iter().copied().chain(outputs).collect();
+                        filter.predict(transition.as_ref(), &drives.into())?;
+                        left -= 1;
+                    }
+                    for _ in 0..left {
+                        filter.predict(&linear.transition, &from.inputs)?;
+                    }
                 }
-                for _ in 0..left {
-                    filter.predict(&linear.transition, &from.inputs)?;
+                Motion::Lags(lags) => {
+                    for index in 1..=count {
+                        let next = if index == count { &to.inputs } else { &from.inputs };
+                        let transition = lags.ahead(filter.filter().state(), &from.inputs, next);
+                        filter.predict(&transition, &from.inputs)?;
+                    }
                 }
-            }
+            },
             Kind::Grey(grey) => {
                 for index in 0..count {
                     let (time, estimate) =
                         (from.time + index as f64 * dt, filter.filter().state().as_slice());
                     let transition =
                         Linearization::ahead(grey, estimate, from.inputs.as_slice(), time, dt, work)?;
-                    filter.predict(&transition, &from.inputs)?;
-                }
-            }
-            Kind::Lags(lags) => {
-                for index in 1..=count {
-                    let next = if index == count { &to.inputs } else { &from.inputs };
-                    let transition = lags.ahead(filter.filter().state(), &from.inputs, next);
                     filter.predict(&transition, &from.inputs)?;
                 }
             }
@@ -188,19 +188,15 @@ impl Kind {
     ) -> Result<Innovation<f64, DVector<f64>>, Error> {
         let estimate = filter.filter().state();
         match self {
-            Kind::Linear(linear) => {
-                show(&linear.observation.output(estimate, &at.inputs), &linear.output_matrix);
-                filter.correct(&linear.observation, &at.inputs, &at.outputs)
+            Kind::Sampled(sampled) => {
+                show(&sampled.observation.output(estimate, &at.inputs), &sampled.output_matrix);
+                filter.correct(&sampled.observation, &at.inputs, &at.outputs)
             }
             Kind::Grey(grey) => {
                 let seen =
                     Linearization::seen(grey, estimate.as_slice(), at.inputs.as_slice(), at.time, work)?;
                 show(&seen.values, &seen.jacobian);
                 filter.correct(&seen, &at.inputs, &at.outputs)
-            }
-            Kind::Lags(lags) => {
-                show(&lags.observation.output(estimate, &at.inputs), &lags.output_matrix);
-                filter.correct(&lags.observation, &at.inputs, &at.outputs)
             }
         }
     }
@@ -218,28 +214,33 @@ impl Kind {
         let missing = DVector::repeat(from.outputs.len(), f64::NAN);
         for index in 0..count {
             let outputs = if index == 0 { &from.outputs } else { &missing };
+            let place = poles.filter(|_| index == 0);
             match self {
-                Kind::Linear(linear) => {
-                    observer.update(&linear.transition, &linear.observation, &from.inputs, outputs)?;
+                Kind::Sampled(sampled) => {
+                    let seen = &sampled.observation;
+                    match &sampled.motion {
+                        Motion::Linear(linear) => {
+                            observer.update(&linear.transition, seen, &from.inputs, outputs)?;
+                        }
+                        Motion::Lags(lags) => {
+                            let next = if index + 1 == count { &to.inputs } else { &from.inputs };
+                            let transition = lags.ahead(observer.state(), &from.inputs, next);
+                            if let Some(poles) = place {
+                                observer.place(&transition, seen, &from.inputs, &self.weights(), poles)?;
+                            }
+                            observer.update(&transition, seen, &from.inputs, outputs)?;
+                        }
+                    }
                 }
                 Kind::Grey(grey) => {
                     let (time, estimate) = (from.time + index as f64 * dt, observer.state().as_slice());
                     let inputs = from.inputs.as_slice();
                     let transition = Linearization::ahead(grey, estimate, inputs, time, dt, work)?;
                     let observation = Linearization::seen(grey, estimate, inputs, time, work)?;
-                    if let Some(poles) = poles.filter(|_| index == 0) {
+                    if let Some(poles) = place {
                         observer.place(&transition, &observation, &from.inputs, &self.weights(), poles)?;
                     }
                     observer.update(&transition, &observation, &from.inputs, outputs)?;
-                }
-                Kind::Lags(lags) => {
-                    let next = if index + 1 == count { &to.inputs } else { &from.inputs };
-                    let (transition, seen) =
-                        (lags.ahead(observer.state(), &from.inputs, next), &lags.observation);
-                    if let Some(poles) = poles.filter(|_| index == 0) {
-                        observer.place(&transition, seen, &from.inputs, &self.weights(), poles)?;
-                    }
-                    observer.update(&transition, seen, &from.inputs, outputs)?;
                 }
             }
         }
@@ -254,8 +255,7 @@ impl Kind {
         work: &mut Work,
     ) -> Result<DVector<f64>, Error> {
         Ok(match self {
-            Kind::Linear(linear) => linear.observation.output(estimate, &at.inputs),
-            Kind::Lags(lags) => lags.observation.output(estimate, &at.inputs),
+            Kind::Sampled(sampled) => sampled.observation.output(estimate, &at.inputs),
             Kind::Grey(grey) => {
                 Linearization::seen(grey, estimate.as_slice(), at.inputs.as_slice(), at.time, work)?.values
             }
@@ -265,9 +265,8 @@ impl Kind {
     /// How the outputs are weighed where an observer needs one number of them.
     pub(super) fn weights(&self) -> DVector<f64> {
         let outputs = match self {
-            Kind::Linear(linear) => linear.outputs.len(),
+            Kind::Sampled(sampled) => sampled.names.outputs.len(),
             Kind::Grey(grey) => grey.outputs().len(),
-            Kind::Lags(lags) => lags.outputs.len(),
         };
         let noisy = outputs > 1 && (0..outputs).all(|output| self.output_variance(output) > 0.0);
         DVector::from_fn(
@@ -281,8 +280,7 @@ impl Kind {
     /// What is taken from the channels; nothing where there is no offset.
     pub(super) fn offsets(&self) -> (&[Offset], &[Offset]) {
         match self {
-            Kind::Linear(linear) => (&linear.input_offsets, &linear.output_offsets),
-            Kind::Lags(lags) => (&lags.input_offsets, &lags.output_offsets),
+            Kind::Sampled(sampled) => (&sampled.input_offsets, &sampled.output_offsets),
             Kind::Grey(_) => (&[], &[]),
         }
     }

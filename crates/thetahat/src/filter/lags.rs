@@ -1,11 +1,11 @@
 //! Nonlinear ARX models: their state is the lags.
 
+use thetahat_core::Covariance;
 use thetahat_core::nalgebra::{DMatrix, DVector, Dyn};
-use thetahat_core::{Covariance, Error, LinearObservation};
 
 use super::linear::InitialState;
 use super::linearization::Linearization;
-use crate::data::Offset;
+use super::sampled::{Motion, Names, Sampled};
 use crate::model::{
     ChannelExpression, Evaluator, ExpressionBuffer, NonlinearArxModel, Regressor, Signal, lag_name,
 };
@@ -13,7 +13,7 @@ use crate::model::{
 /// The longest state: a step costs its cube.
 const LARGEST: usize = 500;
 
-/// A nonlinear ARX model with a state, as deviations from the offsets of its channels:
+/// The state of a nonlinear ARX model, as deviations from the offsets of its channels:
 ///
 /// ```text
 /// x(k)   = [ y(k) ... y(k-n+1)  u(k-1) ... u(k-m+1) ]'     for each output and each input, as far back as g reads
@@ -26,18 +26,6 @@ const LARGEST: usize = 500;
 /// the covariance that grows with it.
 #[derive(Debug, Clone)]
 pub(super) struct Lags {
-    pub(super) states: Vec<String>,
-    pub(super) inputs: Vec<String>,
-    pub(super) outputs: Vec<String>,
-    pub(super) sample_time: f64,
-    pub(super) input_offsets: Vec<Offset>,
-    pub(super) output_offsets: Vec<Offset>,
-    pub(super) start: DVector<f64>,
-    pub(super) start_covariance: Covariance<f64, Dyn>,
-    pub(super) observation: LinearObservation<f64, Dyn, Dyn, Dyn>,
-    pub(super) output_matrix: DMatrix<f64>,
-    /// R of each output.
-    pub(super) output_variances: Vec<f64>,
     /// Q: that of e where y(k) stands, else 0.
     noise: Covariance<f64, Dyn>,
     /// g of each output, and what it is multiplied by.
@@ -66,7 +54,7 @@ impl Lags {
     ///
     /// # Errors
     /// What is wrong with the model, in words.
-    pub(super) fn of_model(model: &NonlinearArxModel, start: InitialState) -> Result<Self, String> {
+    pub(super) fn of_model(model: &NonlinearArxModel, start: InitialState) -> Result<Sampled, String> {
         let expressions = model.read_expressions()?;
         let maps = model.maps.iter().zip(model.places()).map(|(map, places)| {
             let theta = model.parameters.get(places).unwrap_or_default().iter();
@@ -116,7 +104,7 @@ impl Lags {
             }
         }
         let noise = Covariance::new(&noise).map_err(|error| format!("noise_covariance: {error}"))?;
-        let (start, start_covariance) = match start {
+        let start = match start {
             InitialState::Zero => (DVector::zeros(n), noise.clone()),
             InitialState::Unknown => {
                 let half = ranges.iter().map(|[low, high]| (high - low) / 2.0);
@@ -126,49 +114,35 @@ impl Lags {
                 (DVector::from_iterator(n, middle), covariance.map_err(|error| error.to_string())?)
             }
         };
-        let output_variances = vec![0.0; outputs];
         let mut output_matrix = DMatrix::zeros(outputs, n);
         (0..outputs).for_each(|output| output_matrix[(output, places[output].0)] = 1.0);
-        let observation = observation(&output_matrix, &output_variances, model.inputs.len());
-        let observation = observation.map_err(|error| error.to_string())?;
-        let names = |signals: &[Signal]| -> Vec<String> {
-            signals.iter().map(|signal| signal.name.clone()).collect()
-        };
+        let seen =
+            (output_matrix, DMatrix::zeros(outputs, model.inputs.len()), Covariance::zero(Dyn(outputs)));
+        let names = |signals: &[Signal]| signals.iter().map(|signal| signal.name.clone()).collect();
         let offsets = |signals: &[Signal]| signals.iter().map(|signal| signal.offset).collect();
         let levels = model.outputs.iter().chain(&model.inputs).map(|signal| signal.offset.level);
-        Ok(Self {
-            states,
-            inputs: names(&model.inputs),
-            outputs: names(&model.outputs),
-            sample_time: model.sample_time,
-            input_offsets: offsets(&model.inputs),
-            output_offsets: offsets(&model.outputs),
-            start,
-            start_covariance,
-            observation,
-            output_matrix,
-            output_variances,
+        let expressions = expressions.into_iter().zip(&model.expressions);
+        let motion = Self {
             noise,
             maps,
             regressors: model.regressors.len(),
             taps,
-            expressions: expressions
-                .into_iter()
-                .zip(&model.expressions)
-                .map(|(expression, signal)| (expression, signal.offset.level))
-                .collect(),
+            expressions: expressions.map(|(own, signal)| (own, signal.offset.level)).collect(),
             levels: levels.collect(),
             places,
+        };
+        let names = Names {
+            states,
+            inputs: names(&model.inputs),
+            outputs: names(&model.outputs),
+            sample_time: model.sample_time,
+        };
+        let sampled = Sampled::new(names, start, seen, Motion::Lags(Box::new(motion)));
+        Ok(Sampled {
+            input_offsets: offsets(&model.inputs),
+            output_offsets: offsets(&model.outputs),
+            ..sampled.map_err(|error| error.to_string())?
         })
-    }
-
-    /// The same, and what is measured has white noise of these variances besides.
-    ///
-    /// # Errors
-    /// If one is negative or no number.
-    pub(super) fn with_output_variances(self, output_variances: Vec<f64>) -> Result<Self, Error> {
-        let observation = observation(&self.output_matrix, &output_variances, self.inputs.len())?;
-        Ok(Self { observation, output_variances, ..self })
     }
 
     /// The step to the next sample, with the inputs now and those there.
@@ -178,7 +152,7 @@ impl Lags {
         now: &DVector<f64>,
         there: &DVector<f64>,
     ) -> Linearization {
-        let (n, outputs) = (state.len(), self.outputs.len());
+        let (n, outputs) = (state.len(), self.maps.len());
         // Where the value of a channel stands that is read so many samples before the next one.
         let at = |channel: usize, lag: usize| match channel.checked_sub(outputs) {
             None => (Some(self.places[channel].0 + lag - 1), 0.0),
@@ -237,14 +211,4 @@ impl Lags {
         }
         Linearization { values, jacobian, noise: self.noise.clone() }
     }
-}
-
-/// y = H x + v.
-fn observation(
-    output_matrix: &DMatrix<f64>,
-    variances: &[f64],
-    inputs: usize,
-) -> Result<LinearObservation<f64, Dyn, Dyn, Dyn>, Error> {
-    let noise = Covariance::from_diagonal(&DVector::from_column_slice(variances))?;
-    LinearObservation::new(output_matrix.clone(), noise)?.with_input(DMatrix::zeros(variances.len(), inputs))
 }

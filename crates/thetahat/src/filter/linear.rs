@@ -3,10 +3,10 @@
 use std::borrow::Cow;
 
 use thetahat_core::nalgebra::{Cholesky, DMatrix, DVector, Dyn};
-use thetahat_core::{Covariance, LinearObservation, LinearTransition};
+use thetahat_core::{Covariance, LinearTransition};
 
+use super::sampled::{Motion, Names, Sampled};
 use crate::Error;
-use crate::data::Offset;
 use crate::model::PolynomialModel;
 
 type Transition = LinearTransition<f64, Dyn, Dyn>;
@@ -24,27 +24,11 @@ pub enum InitialState {
     Unknown,
 }
 
-/// A model in matrices, with its noises.
+/// x(k+1) = F x(k) + G u(k) + w(k), with w ~ (0, Q) and cov(w, v) = S.
 #[derive(Debug, Clone)]
 pub(super) struct Linear {
-    pub(super) states: Vec<String>,
-    pub(super) inputs: Vec<String>,
-    pub(super) outputs: Vec<String>,
-    pub(super) sample_time: f64,
-    /// What is taken from the channels, and put back.
-    pub(super) input_offsets: Vec<Offset>,
-    pub(super) output_offsets: Vec<Offset>,
-    /// x0 and P0.
-    pub(super) start: DVector<f64>,
-    pub(super) start_covariance: Covariance<f64, Dyn>,
     /// F, G and Q.
     pub(super) transition: Transition,
-    /// H, D and R.
-    pub(super) observation: LinearObservation<f64, Dyn, Dyn, Dyn>,
-    /// H: the observation keeps it transposed.
-    pub(super) output_matrix: DMatrix<f64>,
-    /// R.
-    pub(super) output_noise: DMatrix<f64>,
     correlation: Option<Correlation>,
 }
 
@@ -75,15 +59,6 @@ pub(super) struct Matrices {
     pub(super) p0: Covariance<f64, Dyn>,
 }
 
-/// The channels of a model and its sample time.
-#[derive(Debug, Clone)]
-pub(super) struct Names {
-    pub(super) states: Vec<String>,
-    pub(super) inputs: Vec<String>,
-    pub(super) outputs: Vec<String>,
-    pub(super) sample_time: f64,
-}
-
 impl Linear {
     /// A model of matrices whose sizes fit. `innovations`: Q = K R K' and S = K R to the bit.
     ///
@@ -93,39 +68,24 @@ impl Linear {
         names: Names,
         matrices: Matrices,
         innovations: bool,
-    ) -> Result<Self, thetahat_core::Error> {
+    ) -> Result<Sampled, thetahat_core::Error> {
         let Matrices { f, g, h, d, q, r, s, x0, p0 } = matrices;
-        let (noise, output_noise) = (q.matrix(), r.matrix());
+        let noise = q.matrix();
         let transition = LinearTransition::new(f, q)?.with_input(g)?;
-        let observation = LinearObservation::new(h.clone(), r)?.with_input(d)?;
-        let offsets = |channels: &[String]| vec![Offset::default(); channels.len()];
-        let mut linear = Self {
-            input_offsets: offsets(&names.inputs),
-            output_offsets: offsets(&names.outputs),
-            states: names.states,
-            inputs: names.inputs,
-            outputs: names.outputs,
-            sample_time: names.sample_time,
-            start: x0,
-            start_covariance: p0,
-            transition,
-            observation,
-            output_matrix: h,
-            output_noise,
-            correlation: None,
+        let motion = Motion::Linear(Box::new(Self { transition: transition.clone(), correlation: None }));
+        let sampled = Sampled::new(names, (x0, p0), (h, d, r), motion)?;
+        let Some(cross) = s.filter(|cross| cross.iter().any(|entry| *entry != 0.0)) else {
+            return Ok(sampled);
         };
-        if let Some(cross) = s.filter(|cross| cross.iter().any(|entry| *entry != 0.0)) {
-            let full = linear.transition.clone();
-            let correlation = Correlation { cross, noise, explained: innovations, full };
-            let all = vec![true; linear.outputs.len()];
-            let full = linear.decorrelated(&correlation, &all)?;
-            linear.correlation = Some(Correlation { full, ..correlation });
-        }
-        Ok(linear)
+        let mut correlation = Correlation { cross, noise, explained: innovations, full: transition.clone() };
+        let all = vec![true; sampled.names.outputs.len()];
+        correlation.full = decorrelated(&transition, &correlation, &sampled, &all)?;
+        let motion = Motion::Linear(Box::new(Self { transition, correlation: Some(correlation) }));
+        Ok(Sampled { motion, ..sampled })
     }
 
     /// A fitted model: Q = K R K', S = K R, R = var e.
-    pub(super) fn of_model(model: &PolynomialModel, start: InitialState) -> Result<Self, Error> {
+    pub(super) fn of_model(model: &PolynomialModel, start: InitialState) -> Result<Sampled, Error> {
         let space = model.state_space();
         let variance = space.noise_variance;
         if variance <= 0.0 {
@@ -135,7 +95,7 @@ impl Linear {
         }
         let n = space.f.nrows();
         let innovation = Covariance::from_diagonal(&DVector::repeat(1, variance));
-        let build = || -> Result<Self, thetahat_core::Error> {
+        let build = || -> Result<Sampled, thetahat_core::Error> {
             let r: Covariance<f64, Dyn> = innovation?;
             let names = Names {
                 states: (1..=n).map(|state| format!("x{state}")).collect(),
@@ -155,7 +115,7 @@ impl Linear {
         };
         let linear = build().map_err(|error| Error::report(format!("its model has no filter: {error}")))?;
         let input_offsets = model.inputs.iter().map(|input| input.offset).collect();
-        Ok(Self { input_offsets, output_offsets: vec![model.output.offset], ..linear })
+        Ok(Sampled { input_offsets, output_offsets: vec![model.output.offset], ..linear })
     }
 
     /// The transition after a row with these outputs there, and what drives it.
@@ -170,49 +130,55 @@ impl Linear {
     /// in which w̄ and v_M are not correlated (Anderson and Moore, Optimal Filtering, 1979, section 5.5): so the time update
     /// and the smoother are those of uncorrelated noises. The inputs of this transition are u and y one after the other. None
     /// if the noises are not correlated, or nothing is there.
-    pub(super) fn after(&self, there: &[bool]) -> Result<Option<Cow<'_, Transition>>, thetahat_core::Error> {
+    pub(super) fn after(
+        &self,
+        sampled: &Sampled,
+        there: &[bool],
+    ) -> Result<Option<Cow<'_, Transition>>, thetahat_core::Error> {
         match &self.correlation {
             Some(correlation) if there.iter().all(|there| *there) => {
                 Ok(Some(Cow::Borrowed(&correlation.full)))
             }
             Some(correlation) if there.iter().any(|there| *there) => {
-                Ok(Some(Cow::Owned(self.decorrelated(correlation, there)?)))
+                Ok(Some(Cow::Owned(decorrelated(&self.transition, correlation, sampled, there)?)))
             }
             _ => Ok(None),
         }
     }
+}
 
-    fn decorrelated(
-        &self,
-        correlation: &Correlation,
-        there: &[bool],
-    ) -> Result<Transition, thetahat_core::Error> {
-        let used: Vec<usize> = (0..there.len()).filter(|&output| there[output]).collect();
-        let cross = correlation.cross.select_columns(&used);
-        let noise = self.output_noise.select_rows(&used).select_columns(&used);
-        let singular = thetahat_core::Error::NotPositive {
-            argument: "R, which must be regular where S is not zero,",
-            index: 0,
-        };
-        // W' = R_M⁻¹ S_M'.
-        let weights = Cholesky::new(noise).ok_or(singular)?.solve(&cross.transpose()).transpose();
-        let (f, g) = (self.transition.state_matrix(), self.transition.input_matrix());
-        let (h, d) = (&self.output_matrix, self.observation.input_matrix());
-        let state_matrix = f - &weights * h.select_rows(&used);
-        let by_input = g - &weights * d.select_rows(&used);
-        let (n, inputs) = by_input.shape();
-        let mut input_matrix = DMatrix::zeros(n, inputs + there.len());
-        input_matrix.columns_mut(0, inputs).copy_from(&by_input);
-        for (column, &output) in used.iter().enumerate() {
-            input_matrix.set_column(inputs + output, &weights.column(column));
-        }
-        let rest = if correlation.explained {
-            Covariance::zero(Dyn(n))
-        } else {
-            remaining(&correlation.noise, &weights, &cross)?
-        };
-        LinearTransition::new(state_matrix, rest)?.with_input(input_matrix)
+/// The transition after a row with these outputs there.
+fn decorrelated(
+    transition: &Transition,
+    correlation: &Correlation,
+    sampled: &Sampled,
+    there: &[bool],
+) -> Result<Transition, thetahat_core::Error> {
+    let used: Vec<usize> = (0..there.len()).filter(|&output| there[output]).collect();
+    let cross = correlation.cross.select_columns(&used);
+    let noise = sampled.output_noise.select_rows(&used).select_columns(&used);
+    let singular = thetahat_core::Error::NotPositive {
+        argument: "R, which must be regular where S is not zero,",
+        index: 0,
+    };
+    // W' = R_M⁻¹ S_M'.
+    let weights = Cholesky::new(noise).ok_or(singular)?.solve(&cross.transpose()).transpose();
+    let (f, g) = (transition.state_matrix(), transition.input_matrix());
+    let (h, d) = (&sampled.output_matrix, sampled.observation.input_matrix());
+    let state_matrix = f - &weights * h.select_rows(&used);
+    let by_input = g - &weights * d.select_rows(&used);
+    let (n, inputs) = by_input.shape();
+    let mut input_matrix = DMatrix::zeros(n, inputs + there.len());
+    input_matrix.columns_mut(0, inputs).copy_from(&by_input);
+    for (column, &output) in used.iter().enumerate() {
+        input_matrix.set_column(inputs + output, &weights.column(column));
     }
+    let rest = if correlation.explained {
+        Covariance::zero(Dyn(n))
+    } else {
+        remaining(&correlation.noise, &weights, &cross)?
+    };
+    LinearTransition::new(state_matrix, rest)?.with_input(input_matrix)
 }
 
 /// Q - W S': a state of which nothing but rounding is left has no noise.

@@ -2,6 +2,7 @@ use super::kind::Kind;
 use super::lags::Lags;
 use super::linear::{InitialState, Linear};
 use super::matrices;
+use super::sampled::{Motion, Sampled};
 use crate::Error;
 use crate::model::{GreyBox, Model, equations::Document};
 use crate::report::Report;
@@ -33,6 +34,12 @@ pub struct StateModel {
     pub(super) kind: Kind,
 }
 
+impl From<Sampled> for StateModel {
+    fn from(model: Sampled) -> Self {
+        Self { kind: Kind::Sampled(Box::new(model)) }
+    }
+}
+
 impl From<GreyBox> for StateModel {
     fn from(model: GreyBox) -> Self {
         Self { kind: Kind::Grey(Box::new(model)) }
@@ -59,7 +66,7 @@ impl StateModel {
         let document = Document::parse(text)?;
         let root = document.root();
         if ["F", "H", "P0"].iter().any(|key| root.get(key).is_some()) {
-            return Ok(Self { kind: Kind::Linear(Box::new(matrices::read(&root)?)) });
+            return Ok(matrices::read(&root)?.into());
         }
         Ok(GreyBox::from_toml(text)?.into())
     }
@@ -74,7 +81,7 @@ impl StateModel {
         match &report.model {
             Model::Polynomial(model) => {
                 let start = start.unwrap_or(InitialState::Unknown);
-                Ok(Self { kind: Kind::Linear(Box::new(Linear::of_model(model, start)?)) })
+                Ok(Linear::of_model(model, start)?.into())
             }
             Model::Equations(_) if start.is_some() => Err(Error::argument(
                 "initial",
@@ -83,12 +90,12 @@ impl StateModel {
             Model::Equations(model) => Ok(model.with_values()?.into()),
             Model::Process(model) => {
                 let start = start.unwrap_or(InitialState::Unknown);
-                Ok(Self { kind: Kind::Linear(Box::new(Linear::of_model(&model.linear()?, start)?)) })
+                Ok(Linear::of_model(&model.linear()?, start)?.into())
             }
             Model::NonlinearArx(model) => {
                 let lags = Lags::of_model(model, start.unwrap_or(InitialState::Unknown));
                 let lags = lags.map_err(|why| Error::report(format!("its model has no filter: {why}")))?;
-                Ok(Self { kind: Kind::Lags(Box::new(lags)) })
+                Ok(lags.into())
             }
         }
     }
@@ -100,56 +107,55 @@ impl StateModel {
     /// [`Error::Argument`] for another model, another number of outputs, or what is no deviation.
     pub fn with_measurement_noise(self, deviations: &[f64]) -> Result<Self, Error> {
         let argument = "measurement-noise";
-        let Kind::Lags(lags) = self.kind else {
-            let message = "it is for reports of nonlinear ARX models: this model says its noises itself";
-            return Err(Error::argument(argument, message));
+        let sampled = match self.kind {
+            Kind::Sampled(sampled) if matches!(sampled.motion, Motion::Lags(_)) => *sampled,
+            _ => {
+                let message = "it is for reports of nonlinear ARX models: this model says its noises itself";
+                return Err(Error::argument(argument, message));
+            }
         };
-        if deviations.len() != lags.outputs.len() {
-            let message = format!("there are {}, but the model has {}", deviations.len(), lags.outputs.len());
+        let outputs = sampled.names.outputs.len();
+        if deviations.len() != outputs {
+            let message = format!("there are {}, but the model has {outputs}", deviations.len());
             return Err(Error::argument(argument, message));
         }
         let is_wrong = |deviation: &&f64| !deviation.is_finite() || deviation.is_sign_negative();
         if let Some(wrong) = deviations.iter().find(is_wrong) {
             return Err(Error::argument(argument, format!("{wrong} is no standard deviation")));
         }
-        let variances = deviations.iter().map(|deviation| deviation * deviation).collect();
-        let lags = lags.with_output_variances(variances);
-        Ok(Self {
-            kind: Kind::Lags(Box::new(lags.map_err(|error| Error::argument(argument, error.to_string()))?)),
-        })
+        let variances: Vec<f64> = deviations.iter().map(|deviation| deviation * deviation).collect();
+        let sampled = sampled.with_output_variances(variances.into());
+        Ok(sampled.map_err(|error| Error::argument(argument, error.to_string()))?.into())
     }
 
     /// The names of the states.
     pub fn states(&self) -> &[String] {
         match &self.kind {
-            Kind::Linear(linear) => &linear.states,
             Kind::Grey(grey) => grey.states(),
-            Kind::Lags(lags) => &lags.states,
+            Kind::Sampled(sampled) => &sampled.names.states,
         }
     }
 
     /// The channels of the inputs.
     pub fn inputs(&self) -> &[String] {
         match &self.kind {
-            Kind::Linear(linear) => &linear.inputs,
             Kind::Grey(grey) => grey.inputs(),
-            Kind::Lags(lags) => &lags.inputs,
+            Kind::Sampled(sampled) => &sampled.names.inputs,
         }
     }
 
     /// The channels of the outputs.
     pub fn outputs(&self) -> &[String] {
         match &self.kind {
-            Kind::Linear(linear) => &linear.outputs,
             Kind::Grey(grey) => grey.outputs(),
-            Kind::Lags(lags) => &lags.outputs,
+            Kind::Sampled(sampled) => &sampled.names.outputs,
         }
     }
 
     /// The names of the unknown parameters.
     pub fn unknown(&self) -> impl ExactSizeIterator<Item = &str> {
         let parameters = match &self.kind {
-            Kind::Linear(_) | Kind::Lags(_) => &[],
+            Kind::Sampled(_) => &[],
             Kind::Grey(grey) => grey.parameters(),
         };
         parameters.iter().map(|parameter| parameter.name.as_str())
@@ -159,7 +165,7 @@ impl StateModel {
     /// bounds.
     pub fn changes_of_variable(&self) -> impl ExactSizeIterator<Item = Option<String>> {
         let parameters = match &self.kind {
-            Kind::Linear(_) | Kind::Lags(_) => &[],
+            Kind::Sampled(_) => &[],
             Kind::Grey(grey) => grey.parameters(),
         };
         parameters.iter().map(|parameter| parameter.change_of_variable())
@@ -168,9 +174,8 @@ impl StateModel {
     /// The length of a sample, in seconds.
     pub fn sample_time(&self) -> f64 {
         match &self.kind {
-            Kind::Linear(linear) => linear.sample_time,
+            Kind::Sampled(sampled) => sampled.names.sample_time,
             Kind::Grey(grey) => grey.sample_time(),
-            Kind::Lags(lags) => lags.sample_time,
         }
     }
 
@@ -178,9 +183,8 @@ impl StateModel {
     /// is exact.
     pub fn is_linear(&self) -> bool {
         match &self.kind {
-            Kind::Linear(_) => true,
+            Kind::Sampled(sampled) => matches!(sampled.motion, Motion::Linear(_)),
             Kind::Grey(grey) => grey.is_linear(),
-            Kind::Lags(_) => false,
         }
     }
 }

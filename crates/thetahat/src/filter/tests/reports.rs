@@ -1,5 +1,5 @@
 use crate::data::{Channel, Log, Offset, Record};
-use crate::filter::{Estimator, InitialState, StateFilter, StateModel, kind::Kind, linear::Linear};
+use crate::filter::{Estimator, InitialState, StateFilter, StateModel, linear::Linear};
 use crate::model::{Orders, PolynomialModel};
 use crate::regression::noise::Noise;
 use crate::report::{Plan, identify};
@@ -27,7 +27,7 @@ fn models() -> Vec<PolynomialModel> {
 
 fn filter(model: &PolynomialModel) -> StateFilter {
     let linear = Linear::of_model(model, InitialState::Zero).unwrap();
-    StateFilter::new(StateModel { kind: Kind::Linear(Box::new(linear)) }, Estimator::Kalman).unwrap()
+    StateFilter::new(linear.into(), Estimator::Kalman).unwrap()
 }
 
 #[test]

@@ -35,7 +35,7 @@ pub struct AppliedOutput {
     pub predicted: Vec<f64>,
     /// The standard deviations of the errors of `predicted`, those of the parameters among them, for the steps that each value
     /// looks ahead, as [`prediction_deviations`](crate::respond::prediction_deviations) and [`forecast`](crate::respond::forecast) have them;
-    /// NaN where there is none. None for a free run.
+    /// NaN where there is none. Of a free run those that a nonlinear ARX model has measured on rows that were held out, else None.
     pub standard_deviations: Option<Vec<f64>>,
     /// How close they are. None if the log does not have the output.
     pub fit: Option<Fit>,
@@ -122,7 +122,7 @@ fn applied(
     let outside: Vec<Option<f64>> =
         (0..responses.len()).map(|index| on_log.outside(index, &responses, horizon)).collect();
     let (each, forecast) = match horizon {
-        Horizon::FreeRun => (None, None),
+        Horizon::FreeRun => (on_log.run_deviations(initial), None),
         Horizon::Steps { steps } => {
             (Some(on_log.deviations(steps, initial)?), on_log.forecast(&deviations, &rows, steps, initial)?)
         }

@@ -210,25 +210,30 @@ impl<'l> NonlinearArxOnLog<'l> {
         self.one_step.get_or_init(|| self.predict(1))
     }
 
+    /// The rows of each free run.
+    fn free_runs(&self, start: InitialCondition) -> impl Iterator<Item = Range<usize>> {
+        let record = &self.free_run;
+        record.segments.iter().zip(&record.past).filter_map(move |(segment, past)| {
+            if start == InitialCondition::Zero {
+                return Some(segment.clone());
+            }
+            let from = segment.start + self.runner.lags.saturating_sub(*past);
+            Some(self.runner.first_known(&self.signals, from, segment.end)?..segment.end)
+        })
+    }
+
     fn simulate(&self, start: InitialCondition) -> Vec<Response> {
         let record = &self.free_run;
         let empty = Response { values: vec![f64::NAN; record.output.len()], counted: Vec::new() };
         let mut responses = vec![empty; self.runner.outputs()];
         let mut clamped = 0;
-        for (segment, past) in record.segments.iter().zip(&record.past) {
+        for rows in self.free_runs(start) {
             let at_rest = start == InitialCondition::Zero;
-            let first = if at_rest {
-                Some(segment.start)
-            } else {
-                let from = segment.start + self.runner.lags.saturating_sub(*past);
-                self.runner.first_known(&self.signals, from, segment.end)
-            };
-            let Some(first) = first else { continue };
-            let run = self.runner.run(&self.signals, first..segment.end, at_rest, self.clamp);
+            let run = self.runner.run(&self.signals, rows.clone(), at_rest, self.clamp);
             clamped += run.clamped;
             for (i, (response, values)) in responses.iter_mut().zip(run.outputs).enumerate() {
-                response.values[first..segment.end].copy_from_slice(&values);
-                response.counted.extend(measured(self.signals.outputs[i], &(first..segment.end)));
+                response.values[rows.clone()].copy_from_slice(&values);
+                response.counted.extend(measured(self.signals.outputs[i], &rows));
             }
         }
         self.clamped.set(clamped);
@@ -332,6 +337,19 @@ impl OnLog for NonlinearArxOnLog<'_> {
             }
         }
         Ok(deviations)
+    }
+
+    fn run_deviations(&self, start: InitialCondition) -> Option<Vec<Vec<f64>>> {
+        let each = self.runner.model.maps.iter().map(|map| {
+            let mut deviations = vec![f64::NAN; self.free_run.output.len()];
+            for rows in self.free_runs(start) {
+                for (t, steps) in rows.zip(1..) {
+                    deviations[t] = map.run_error(steps)?;
+                }
+            }
+            Some(deviations)
+        });
+        each.collect()
     }
 
     fn quantile(&self, level: f64) -> f64 {

@@ -34,6 +34,11 @@ pub(crate) trait OnLog {
     /// The standard deviations of the errors of predictions, what is open of the parameters in them; NaN where there is none.
     fn deviations(&self, steps: usize, start: InitialCondition) -> Result<Vec<Vec<f64>>, Error>;
 
+    /// The same of a free run from that start; none where nothing tells them.
+    fn run_deviations(&self, _start: InitialCondition) -> Option<Vec<Vec<f64>>> {
+        None
+    }
+
     /// How many of these deviations from a prediction the end of an interval lies that holds the output with probability `level`.
     fn quantile(&self, level: f64) -> f64;
 

@@ -37,6 +37,10 @@ fn every_verb_takes_a_network() {
     ] {
         assert!(folder.done(line).stdout.lines().count() > 200, "{line}");
     }
+    // Rows were held out from its fit.
+    let run = folder.done("simulate model.json log.csv --sample-time 0.1").stdout;
+    assert!(run.starts_with("row,measured,predicted,standard_deviation\n"), "{run}");
+    assert!(run.lines().last().is_some_and(|line| line.split(',').all(|value| !value.is_empty())), "{run}");
     let auto = folder.fit("log.csv --narx auto --ny 2 --nu 2 --sample-time 0.1 --split 50/30/20");
     let outcome = &auto["estimation"]["maps"][0];
     assert_eq!(outcome["path"].as_array().map(Vec::len), Some(7));

@@ -269,6 +269,16 @@ def test_trained_maps_run_better_than_a_line(map: str) -> None:
     assert np.array_equal(again.simulate(data), model.simulate(data), equal_nan=True)
 
 
+def test_free_runs_have_intervals_where_rows_were_held_out() -> None:
+    log = saturating()
+    held_out = th.narx(log, "tanh", ny=1, nu=1, units=2, ridge=0.1, estimate="1..400", validate="401..600")
+    low, high = held_out.predict_interval(log, None)
+    run = held_out.predict(log, None)
+    assert np.all(low[5:] < run[5:]) and np.all(run[5:] < high[5:])
+    for other in (th.narx(log, "tanh", ny=1, nu=1, units=2, ridge=0.1), th.arx(log, 1, 1)):
+        assert np.isnan(other.predict_interval(log, None)).all()
+
+
 def test_a_filter_bridges_missing_outputs_and_noise() -> None:
     log = saturating()
     model = th.narx(log, "tanh", ny=1, nu=1, units=2, ridge=0.1)

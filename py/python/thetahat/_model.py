@@ -126,7 +126,7 @@ class Model(ReportedModel):
         return self._predicted(log, horizon, initial)[0]
 
     def predict_interval(
-        self, log: Log, horizon: int = 1, *, level: float = 0.95, initial: str = "auto"
+        self, log: Log, horizon: int | None = 1, *, level: float = 0.95, initial: str = "auto"
     ) -> tuple[Array, Array]:
         """Intervals that hold the output, as far as one knows some steps before.
 
@@ -135,17 +135,17 @@ class Model(ReportedModel):
         Parameters
         ----------
         log, horizon, initial
-            As for `predict`; there are none in a free run.
+            As for `predict`. In a free run (None) there are intervals of nonlinear ARX models of which rows were held out.
         level : float, default 0.95
             The probability with which they hold it.
 
         Returns
         -------
         lower, upper : ndarray, shape (N,), or (N, outputs) where there are several
-            NaN where there is no prediction.
+            NaN where there is none.
         """
         quantile = _options.quantile(level)
-        values, deviations = self._predicted(log, _options.integer("horizon", horizon), initial)
+        values, deviations = self._predicted(log, horizon, initial)
         half = quantile * (np.nan if deviations is None else deviations)
         return values - half, values + half
 

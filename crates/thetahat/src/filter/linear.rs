@@ -64,7 +64,7 @@ impl Linear {
     ///
     /// # Errors
     /// If no noises have these covariances, or a number overflows.
-    pub(super) fn new(
+    pub(super) fn of_matrices(
         names: Names,
         matrices: Matrices,
         innovations: bool,
@@ -111,7 +111,7 @@ impl Linear {
             };
             let x0 = DVector::zeros(n);
             let matrices = Matrices { f: space.f, g: space.g, h: space.h, d: space.d, q, r, s, x0, p0 };
-            Linear::new(names, matrices, true)
+            Linear::of_matrices(names, matrices, true)
         };
         let linear = build().map_err(|error| Error::report(format!("its model has no filter: {error}")))?;
         let input_offsets = model.inputs.iter().map(|input| input.offset).collect();

@@ -148,6 +148,10 @@ impl Samples<'_> {
 
     /// Trains from one start: one step ahead, then over windows where samples are many, then over runs of the horizon. None where no
     /// run from there keeps within bounds.
+    ///
+    /// The parameters of the map are solved for at the start alone, and searched for with the others then. To solve for them after each
+    /// step of the first stage, too (Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973), took fewer steps and more time: as many starts came
+    /// to the same optimum of the cascaded tanks, 3 to 34 % later with 2 to 8 units, and of 65,000 samples 76 % later.
     fn train_from(
         &self,
         map: Map,

@@ -190,6 +190,17 @@ fn intervals_of_longer_runs_are_measured_on_held_out_rows() {
         assert!((0.92..=0.97).contains(&share), "{steps}: {share}");
         assert!(steps < 20 || width < 0.9 * other, "{steps}: {width} {other}");
     }
+    // Of a free run they grow with the time since it began, and without held-out rows there are none.
+    fn beside<'l>(report: &'l Report, log: &'l Log) -> NonlinearArxOnLog<'l> {
+        let Model::NonlinearArx(model) = &report.model else { panic!("{:?}", report.model) };
+        NonlinearArxOnLog::new(model, log, &[Rows::new(1101, 3000).unwrap()]).unwrap()
+    }
+    let run = beside(&report, &log).run_deviations(InitialCondition::Drop).unwrap().remove(0);
+    let first = run.iter().position(|deviation| !deviation.is_nan()).unwrap();
+    for (after, steps) in [(0, 1), (1, 2), (30, 31), (1500, 1501)] {
+        assert_eq!(Some(run[first + after]), model.maps[0].run_error(steps));
+    }
+    assert!(beside(&without, &log).run_deviations(InitialCondition::Drop).is_none());
     let damaged = report.to_json().unwrap().replace("\"steps\": 5,", "\"steps\": 0,");
     let error = Report::from_json(&damaged).unwrap_err().to_string();
     assert!(error.contains("run_errors"), "{error}");

@@ -5,7 +5,8 @@ use thetahat_core::nalgebra::{DMatrix, DVector, Dyn};
 
 use super::linear::InitialState;
 use super::linearization::Linearization;
-use super::sampled::{Motion, Names, Sampled};
+use super::sampled::{Motion, Names, Sampled, check_noise};
+use crate::Error;
 use crate::model::{
     ChannelExpression, Evaluator, ExpressionBuffer, NonlinearArxModel, Regressor, Signal, lag_name,
 };
@@ -53,9 +54,11 @@ impl Lags {
     /// A fitted model, which starts at its offsets, or anywhere within the range of the rows that it was fitted to.
     ///
     /// # Errors
-    /// What is wrong with the model, in words.
-    pub(super) fn of_model(model: &NonlinearArxModel, start: InitialState) -> Result<Sampled, String> {
-        let expressions = model.read_expressions()?;
+    /// [`Error::Report`] where it has no noise, or too many lags, or its numbers overflow.
+    pub(super) fn of_model(model: &NonlinearArxModel, start: InitialState) -> Result<Sampled, Error> {
+        let refused = |why: String| Error::report(format!("its model has no filter: {why}"));
+        model.noise_covariance.iter().enumerate().try_for_each(|(place, row)| check_noise(row[place]))?;
+        let expressions = model.read_expressions().map_err(refused)?;
         let maps = model.maps.iter().zip(model.places()).map(|(map, places)| {
             let theta = model.parameters.get(places).unwrap_or_default().iter();
             (Evaluator::new(&map.functions, theta.map(|one| one.value).collect()), map.scale)
@@ -95,7 +98,7 @@ impl Lags {
         }
         let n = states.len();
         if n > LARGEST {
-            return Err(format!("it reads {n} lags, of which a filter takes {LARGEST}"));
+            return Err(refused(format!("it reads {n} lags, of which a filter takes {LARGEST}")));
         }
         let mut noise = DMatrix::zeros(n, n);
         for (row, of_row) in model.noise_covariance.iter().enumerate() {
@@ -103,7 +106,7 @@ impl Lags {
                 noise[(places[row].0, places[column].0)] = *value;
             }
         }
-        let noise = Covariance::new(&noise).map_err(|error| format!("noise_covariance: {error}"))?;
+        let noise = Covariance::new(&noise).map_err(|error| refused(error.to_string()))?;
         let start = match start {
             InitialState::Zero => (DVector::zeros(n), noise.clone()),
             InitialState::Unknown => {
@@ -111,7 +114,7 @@ impl Lags {
                 let variances: Vec<f64> = half.map(|half| half * half).collect();
                 let middle = ranges.iter().map(|[low, high]| f64::midpoint(*low, *high));
                 let covariance = Covariance::from_diagonal(&variances.into());
-                (DVector::from_iterator(n, middle), covariance.map_err(|error| error.to_string())?)
+                (DVector::from_iterator(n, middle), covariance.map_err(|error| refused(error.to_string()))?)
             }
         };
         let mut output_matrix = DMatrix::zeros(outputs, n);
@@ -141,7 +144,7 @@ impl Lags {
         Ok(Sampled {
             input_offsets: offsets(&model.inputs),
             output_offsets: offsets(&model.outputs),
-            ..sampled.map_err(|error| error.to_string())?
+            ..sampled.map_err(|error| refused(error.to_string()))?
         })
     }
 

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use thetahat_core::nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use thetahat_core::{Covariance, LinearTransition};
 
-use super::sampled::{Motion, Names, Sampled};
+use super::sampled::{Motion, Names, Sampled, check_noise};
 use crate::Error;
 use crate::model::PolynomialModel;
 
@@ -20,7 +20,8 @@ const UNKNOWN: f64 = 1e6;
 pub enum InitialState {
     /// It is 0: the plant is at rest, the channels at their offsets.
     Zero,
-    /// Nothing: each state, which is in units of the output, has a standard deviation of a thousand times that of the noise e.
+    /// Nothing: each state, which is in units of the output, has a standard deviation of a thousand times that of the noise e. The lags of
+    /// a nonlinear ARX model are anywhere in the range of the rows that it was fitted to, half of which is their standard deviation.
     Unknown,
 }
 
@@ -88,11 +89,7 @@ impl Linear {
     pub(super) fn of_model(model: &PolynomialModel, start: InitialState) -> Result<Sampled, Error> {
         let space = model.state_space();
         let variance = space.noise_variance;
-        if variance <= 0.0 {
-            return Err(Error::report(
-                "its noise variance is 0, so that a filter has nothing to weigh the measurements by; simulate the model instead",
-            ));
-        }
+        check_noise(variance)?;
         let n = space.f.nrows();
         let innovation = Covariance::from_diagonal(&DVector::repeat(1, variance));
         let build = || -> Result<Sampled, thetahat_core::Error> {

@@ -93,9 +93,7 @@ impl StateModel {
                 Ok(Linear::of_model(&model.linear()?, start)?.into())
             }
             Model::NonlinearArx(model) => {
-                let lags = Lags::of_model(model, start.unwrap_or(InitialState::Unknown));
-                let lags = lags.map_err(|why| Error::report(format!("its model has no filter: {why}")))?;
-                Ok(lags.into())
+                Ok(Lags::of_model(model, start.unwrap_or(InitialState::Unknown))?.into())
             }
         }
     }

@@ -82,3 +82,13 @@ impl Sampled {
         Ok(Self { input_offsets: self.input_offsets, output_offsets: self.output_offsets, ..fresh })
     }
 }
+
+/// Refuses the noise variance of a report by which nothing can be weighed.
+pub(super) fn check_noise(variance: f64) -> Result<(), crate::Error> {
+    if variance > 0.0 {
+        return Ok(());
+    }
+    Err(crate::Error::report(
+        "its noise variance is 0, so that a filter has nothing to weigh the measurements by; simulate the model instead",
+    ))
+}

@@ -13,8 +13,9 @@ const LAST: f64 = 1e-4;
 /// Trials at each temperature.
 const TRIALS: usize = 30;
 
-/// Wanders through the parameters from `point` by random steps d, and leaves there the best of all that were met, of which it gives the cost (Kirkpatrick, Gelatt and
-/// Vecchi, Science 220, 1983; Metropolis and others 1953). A step that raises the cost J by dJ is taken with the probability
+/// Wanders through the parameters from `point` by random steps d, and leaves there the best of all that were met, of which it gives the cost
+/// (Kirkpatrick, Gelatt and Vecchi, Science 220, 1983; Metropolis and others 1953). A step that raises the cost J by dJ is taken with the
+/// probability
 ///
 /// ```text
 /// exp(-dJ/T),   T falling from 0.3 J to 1e-4 J by the same factor from stage to stage

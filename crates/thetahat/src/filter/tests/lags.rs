@@ -202,6 +202,11 @@ fn it_starts_and_observes() {
         assert!(refused(&[wrong]).contains("no standard deviation"), "{}", refused(&[wrong]));
     }
     assert!(refused(&[1e300]).contains("measurement-noise"), "{}", refused(&[1e300]));
+    let mut silent = report.clone();
+    let Model::NonlinearArx(own) = &mut silent.model else { panic!("{:?}", silent.model) };
+    own.noise_covariance = vec![vec![0.0]];
+    let error = StateModel::from_report(&silent, None).unwrap_err().to_string();
+    assert!(error.starts_with("its noise variance is 0"), "{error}");
     let linear = StateModel::from_toml(super::NILE).unwrap();
     assert!(linear.with_measurement_noise(&[1.0]).unwrap_err().to_string().contains("nonlinear ARX"));
 }

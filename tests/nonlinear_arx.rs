@@ -90,7 +90,7 @@ fn every_verb_takes_the_report() {
             "predict model.json log.csv --sample-time 0.1 --horizon 4",
             "row,measured,predicted,standard_deviation",
         ),
-        ("simulate model.json log.csv --sample-time 0.1", "row,measured,predicted"),
+        ("simulate model.json log.csv --sample-time 0.1", "row,measured,predicted,standard_deviation"),
     ] {
         let run = folder.done(line);
         assert_eq!(run.stdout.lines().next(), Some(columns), "{line}");

@@ -30,6 +30,7 @@
 
 mod estimate;
 mod estimator;
+mod frame;
 mod kind;
 mod lags;
 mod linear;
@@ -37,7 +38,6 @@ mod linearization;
 mod matrices;
 mod model;
 mod row;
-mod sampled;
 mod smooth;
 mod snapshot;
 mod step;
@@ -48,7 +48,7 @@ mod totals;
 
 pub use estimate::{StateEstimate, StateValues};
 pub use estimator::{Estimator, ObserverGain};
-pub use linear::InitialState;
+pub use frame::InitialState;
 pub use model::StateModel;
 pub use smooth::SmoothedStates;
 pub use snapshot::FilterSnapshot;

@@ -1,8 +1,7 @@
 use thetahat_core::nalgebra::{Complex, DMatrix, DVector};
 
-use super::kind::{Filter, Kind, Observer};
+use super::kind::{Filter, Kind, Motion, Observer};
 use super::model::StateModel;
-use super::sampled::Motion;
 use crate::Error;
 use crate::figures::number;
 
@@ -93,10 +92,8 @@ fn observer(model: &StateModel, start: &DVector<f64>, gain: ObserverGain) -> Res
             if !gain.iter().all(|entry: &f64| entry.is_finite()) {
                 return Err(Error::argument("gain", "it must be finite numbers"));
             }
-            if let Kind::Sampled(sampled) = &model.kind
-                && let Motion::Linear(linear) = &sampled.motion
-            {
-                let error = linear.transition.state_matrix() - &gain * &sampled.output_matrix;
+            if let Kind::Sampled(frame, Motion::Linear(linear)) = &model.kind {
+                let error = linear.transition.state_matrix() - &gain * &frame.output_matrix;
                 let largest =
                     error.complex_eigenvalues().iter().map(|pole| pole.re.hypot(pole.im)).fold(0.0, f64::max);
                 if largest >= 1.0 {
@@ -121,12 +118,9 @@ fn observer(model: &StateModel, start: &DVector<f64>, gain: ObserverGain) -> Res
             let poles = DVector::from_vec(poles);
             let none = DVector::zeros(model.inputs().len());
             let wrong = |error: thetahat_core::Error| Error::argument("poles", error.to_string());
-            if let Kind::Sampled(sampled) = &model.kind
-                && let Motion::Linear(linear) = &sampled.motion
-            {
+            if let Kind::Sampled(frame, Motion::Linear(linear)) = &model.kind {
                 let weights = model.kind.weights();
-                let placed =
-                    observer.place(&linear.transition, &sampled.observation, &none, &weights, &poles);
+                let placed = observer.place(&linear.transition, &frame.observation, &none, &weights, &poles);
                 placed.map_err(wrong)?;
                 return Ok(Engine::Observer { observer, poles: None });
             }

@@ -6,8 +6,10 @@ use thetahat_core::{
     Transition,
 };
 
+use super::frame::Frame;
+use super::lags::Lags;
+use super::linear::Linear;
 use super::linearization::{Linearization, Work};
-use super::sampled::{Motion, Sampled};
 use crate::data::Offset;
 use crate::model::{GreyBox, equations::whole_steps};
 
@@ -92,15 +94,22 @@ impl Recursion for Smoother<f64, Dyn> {
 /// A model that goes from sample to sample, or in equations.
 #[derive(Debug, Clone)]
 pub(super) enum Kind {
-    Sampled(Box<Sampled>),
+    Sampled(Box<Frame>, Motion),
     Grey(Box<GreyBox>),
+}
+
+/// How the state of a model goes on that goes from sample to sample.
+#[derive(Debug, Clone)]
+pub(super) enum Motion {
+    Linear(Box<Linear>),
+    Lags(Box<Lags>),
 }
 
 impl Kind {
     /// The filter that stands where the model starts.
     pub(super) fn started(&self) -> Result<Filter, Error> {
         match self {
-            Kind::Sampled(sampled) => Filter::new(sampled.start.clone(), sampled.start_covariance.clone()),
+            Kind::Sampled(frame, _) => Filter::new(frame.start.clone(), frame.start_covariance.clone()),
             Kind::Grey(grey) => {
                 let (states, deviations) = grey.start();
                 let parameters = || grey.parameters().iter().map(|parameter| parameter.start_variable());
@@ -115,8 +124,8 @@ impl Kind {
     /// How a step of `dt` seconds is taken.
     pub(super) fn division(&self, dt: f64) -> Result<Division, crate::Error> {
         match self {
-            Kind::Sampled(sampled) => {
-                let sample_time = sampled.names.sample_time;
+            Kind::Sampled(frame, _) => {
+                let sample_time = frame.names.sample_time;
                 Ok((whole_steps(dt, sample_time)?, sample_time))
             }
             Kind::Grey(grey) => grey.division(dt),
@@ -126,7 +135,7 @@ impl Kind {
     /// R_ii.
     pub(super) fn output_variance(&self, output: usize) -> f64 {
         match self {
-            Kind::Sampled(sampled) => sampled.output_noise[(output, output)],
+            Kind::Sampled(frame, _) => frame.output_noise[(output, output)],
             Kind::Grey(grey) => grey.measurement_variances()[output],
         }
     }
@@ -141,11 +150,11 @@ impl Kind {
         work: &mut Work,
     ) -> Result<(), Error> {
         match self {
-            Kind::Sampled(sampled) => match &sampled.motion {
+            Kind::Sampled(frame, motion) => match motion {
                 Motion::Linear(linear) => {
                     let there: Vec<bool> = from.outputs.iter().map(|output| !output.is_nan()).collect();
                     let mut left = count;
-                    if let Some(transition) = linear.after(sampled, &there)? {
+                    if let Some(transition) = linear.after(frame, &there)? {
                         let outputs =
                             from.outputs.iter().map(|output| if output.is_nan() { 0.0 } else { *output });
                         let drives: Vec<f64> = from.inputs.iter().copied().chain(outputs).collect();
@@ -188,9 +197,9 @@ impl Kind {
     ) -> Result<Innovation<f64, DVector<f64>>, Error> {
         let estimate = filter.filter().state();
         match self {
-            Kind::Sampled(sampled) => {
-                show(&sampled.observation.output(estimate, &at.inputs), &sampled.output_matrix);
-                filter.correct(&sampled.observation, &at.inputs, &at.outputs)
+            Kind::Sampled(frame, _) => {
+                show(&frame.observation.output(estimate, &at.inputs), &frame.output_matrix);
+                filter.correct(&frame.observation, &at.inputs, &at.outputs)
             }
             Kind::Grey(grey) => {
                 let seen =
@@ -216,9 +225,9 @@ impl Kind {
             let outputs = if index == 0 { &from.outputs } else { &missing };
             let place = poles.filter(|_| index == 0);
             match self {
-                Kind::Sampled(sampled) => {
-                    let seen = &sampled.observation;
-                    match &sampled.motion {
+                Kind::Sampled(frame, motion) => {
+                    let seen = &frame.observation;
+                    match motion {
                         Motion::Linear(linear) => {
                             observer.update(&linear.transition, seen, &from.inputs, outputs)?;
                         }
@@ -255,7 +264,7 @@ impl Kind {
         work: &mut Work,
     ) -> Result<DVector<f64>, Error> {
         Ok(match self {
-            Kind::Sampled(sampled) => sampled.observation.output(estimate, &at.inputs),
+            Kind::Sampled(frame, _) => frame.observation.output(estimate, &at.inputs),
             Kind::Grey(grey) => {
                 Linearization::seen(grey, estimate.as_slice(), at.inputs.as_slice(), at.time, work)?.values
             }
@@ -265,7 +274,7 @@ impl Kind {
     /// How the outputs are weighed where an observer needs one number of them.
     pub(super) fn weights(&self) -> DVector<f64> {
         let outputs = match self {
-            Kind::Sampled(sampled) => sampled.names.outputs.len(),
+            Kind::Sampled(frame, _) => frame.names.outputs.len(),
             Kind::Grey(grey) => grey.outputs().len(),
         };
         let noisy = outputs > 1 && (0..outputs).all(|output| self.output_variance(output) > 0.0);
@@ -280,7 +289,7 @@ impl Kind {
     /// What is taken from the channels; nothing where there is no offset.
     pub(super) fn offsets(&self) -> (&[Offset], &[Offset]) {
         match self {
-            Kind::Sampled(sampled) => (&sampled.input_offsets, &sampled.output_offsets),
+            Kind::Sampled(frame, _) => (&frame.input_offsets, &frame.output_offsets),
             Kind::Grey(_) => (&[], &[]),
         }
     }

@@ -3,9 +3,8 @@
 use thetahat_core::Covariance;
 use thetahat_core::nalgebra::{DMatrix, DVector, Dyn};
 
-use super::linear::InitialState;
+use super::frame::{Frame, InitialState, Names, check_noise};
 use super::linearization::Linearization;
-use super::sampled::{Motion, Names, Sampled, check_noise};
 use crate::Error;
 use crate::model::{
     ChannelExpression, Evaluator, ExpressionBuffer, NonlinearArxModel, Regressor, Signal, lag_name,
@@ -55,7 +54,7 @@ impl Lags {
     ///
     /// # Errors
     /// [`Error::Report`] where it has no noise, or too many lags, or its numbers overflow.
-    pub(super) fn of_model(model: &NonlinearArxModel, start: InitialState) -> Result<Sampled, Error> {
+    pub(super) fn of_model(model: &NonlinearArxModel, start: InitialState) -> Result<(Frame, Self), Error> {
         let refused = |why: String| Error::report(format!("its model has no filter: {why}"));
         model.noise_covariance.iter().enumerate().try_for_each(|(place, row)| check_noise(row[place]))?;
         let expressions = model.read_expressions().map_err(refused)?;
@@ -125,7 +124,7 @@ impl Lags {
         let offsets = |signals: &[Signal]| signals.iter().map(|signal| signal.offset).collect();
         let levels = model.outputs.iter().chain(&model.inputs).map(|signal| signal.offset.level);
         let expressions = expressions.into_iter().zip(&model.expressions);
-        let motion = Self {
+        let lags = Self {
             noise,
             maps,
             regressors: model.regressors.len(),
@@ -140,12 +139,9 @@ impl Lags {
             outputs: names(&model.outputs),
             sample_time: model.sample_time,
         };
-        let sampled = Sampled::new(names, start, seen, Motion::Lags(Box::new(motion)));
-        Ok(Sampled {
-            input_offsets: offsets(&model.inputs),
-            output_offsets: offsets(&model.outputs),
-            ..sampled.map_err(|error| refused(error.to_string()))?
-        })
+        let frame = Frame::new(names, start, seen).map_err(|error| refused(error.to_string()))?;
+        let (input_offsets, output_offsets) = (offsets(&model.inputs), offsets(&model.outputs));
+        Ok((Frame { input_offsets, output_offsets, ..frame }, lags))
     }
 
     /// The step to the next sample, with the inputs now and those there.

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use thetahat_core::nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use thetahat_core::{Covariance, LinearTransition};
 
-use super::sampled::{Motion, Names, Sampled, check_noise};
+use super::frame::{Frame, InitialState, Names, check_noise};
 use crate::Error;
 use crate::model::PolynomialModel;
 
@@ -14,16 +14,6 @@ type Transition = LinearTransition<f64, Dyn, Dyn>;
 /// Prior variance of an unknown state, in units of the variance of e. One row leaves a millionth of it: a smoother loses six
 /// digits, a filter none.
 const UNKNOWN: f64 = 1e6;
-
-/// What is known of the state in which the model of a report starts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum InitialState {
-    /// It is 0: the plant is at rest, the channels at their offsets.
-    Zero,
-    /// Nothing: each state, which is in units of the output, has a standard deviation of a thousand times that of the noise e. The lags of
-    /// a nonlinear ARX model are anywhere in the range of the rows that it was fitted to, half of which is their standard deviation.
-    Unknown,
-}
 
 /// x(k+1) = F x(k) + G u(k) + w(k), with w ~ (0, Q) and cov(w, v) = S.
 #[derive(Debug, Clone)]
@@ -69,30 +59,28 @@ impl Linear {
         names: Names,
         matrices: Matrices,
         innovations: bool,
-    ) -> Result<Sampled, thetahat_core::Error> {
+    ) -> Result<(Frame, Self), thetahat_core::Error> {
         let Matrices { f, g, h, d, q, r, s, x0, p0 } = matrices;
         let noise = q.matrix();
         let transition = LinearTransition::new(f, q)?.with_input(g)?;
-        let motion = Motion::Linear(Box::new(Self { transition: transition.clone(), correlation: None }));
-        let sampled = Sampled::new(names, (x0, p0), (h, d, r), motion)?;
+        let frame = Frame::new(names, (x0, p0), (h, d, r))?;
         let Some(cross) = s.filter(|cross| cross.iter().any(|entry| *entry != 0.0)) else {
-            return Ok(sampled);
+            return Ok((frame, Self { transition, correlation: None }));
         };
         let mut correlation = Correlation { cross, noise, explained: innovations, full: transition.clone() };
-        let all = vec![true; sampled.names.outputs.len()];
-        correlation.full = decorrelated(&transition, &correlation, &sampled, &all)?;
-        let motion = Motion::Linear(Box::new(Self { transition, correlation: Some(correlation) }));
-        Ok(Sampled { motion, ..sampled })
+        let all = vec![true; frame.names.outputs.len()];
+        correlation.full = decorrelated(&transition, &correlation, &frame, &all)?;
+        Ok((frame, Self { transition, correlation: Some(correlation) }))
     }
 
     /// A fitted model: Q = K R K', S = K R, R = var e.
-    pub(super) fn of_model(model: &PolynomialModel, start: InitialState) -> Result<Sampled, Error> {
+    pub(super) fn of_model(model: &PolynomialModel, start: InitialState) -> Result<(Frame, Self), Error> {
         let space = model.state_space();
         let variance = space.noise_variance;
         check_noise(variance)?;
         let n = space.f.nrows();
         let innovation = Covariance::from_diagonal(&DVector::repeat(1, variance));
-        let build = || -> Result<Sampled, thetahat_core::Error> {
+        let build = || -> Result<(Frame, Linear), thetahat_core::Error> {
             let r: Covariance<f64, Dyn> = innovation?;
             let names = Names {
                 states: (1..=n).map(|state| format!("x{state}")).collect(),
@@ -110,9 +98,10 @@ impl Linear {
             let matrices = Matrices { f: space.f, g: space.g, h: space.h, d: space.d, q, r, s, x0, p0 };
             Linear::of_matrices(names, matrices, true)
         };
-        let linear = build().map_err(|error| Error::report(format!("its model has no filter: {error}")))?;
+        let (frame, linear) =
+            build().map_err(|error| Error::report(format!("its model has no filter: {error}")))?;
         let input_offsets = model.inputs.iter().map(|input| input.offset).collect();
-        Ok(Sampled { input_offsets, output_offsets: vec![model.output.offset], ..linear })
+        Ok((Frame { input_offsets, output_offsets: vec![model.output.offset], ..frame }, linear))
     }
 
     /// The transition after a row with these outputs there, and what drives it.
@@ -129,7 +118,7 @@ impl Linear {
     /// if the noises are not correlated, or nothing is there.
     pub(super) fn after(
         &self,
-        sampled: &Sampled,
+        frame: &Frame,
         there: &[bool],
     ) -> Result<Option<Cow<'_, Transition>>, thetahat_core::Error> {
         match &self.correlation {
@@ -137,7 +126,7 @@ impl Linear {
                 Ok(Some(Cow::Borrowed(&correlation.full)))
             }
             Some(correlation) if there.iter().any(|there| *there) => {
-                Ok(Some(Cow::Owned(decorrelated(&self.transition, correlation, sampled, there)?)))
+                Ok(Some(Cow::Owned(decorrelated(&self.transition, correlation, frame, there)?)))
             }
             _ => Ok(None),
         }
@@ -148,12 +137,12 @@ impl Linear {
 fn decorrelated(
     transition: &Transition,
     correlation: &Correlation,
-    sampled: &Sampled,
+    frame: &Frame,
     there: &[bool],
 ) -> Result<Transition, thetahat_core::Error> {
     let used: Vec<usize> = (0..there.len()).filter(|&output| there[output]).collect();
     let cross = correlation.cross.select_columns(&used);
-    let noise = sampled.output_noise.select_rows(&used).select_columns(&used);
+    let noise = frame.output_noise.select_rows(&used).select_columns(&used);
     let singular = thetahat_core::Error::NotPositive {
         argument: "R, which must be regular where S is not zero,",
         index: 0,
@@ -161,7 +150,7 @@ fn decorrelated(
     // W' = R_M⁻¹ S_M'.
     let weights = Cholesky::new(noise).ok_or(singular)?.solve(&cross.transpose()).transpose();
     let (f, g) = (transition.state_matrix(), transition.input_matrix());
-    let (h, d) = (&sampled.output_matrix, sampled.observation.input_matrix());
+    let (h, d) = (&frame.output_matrix, frame.observation.input_matrix());
     let state_matrix = f - &weights * h.select_rows(&used);
     let by_input = g - &weights * d.select_rows(&used);
     let (n, inputs) = by_input.shape();

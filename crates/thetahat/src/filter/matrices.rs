@@ -3,8 +3,8 @@
 use thetahat_core::Covariance;
 use thetahat_core::nalgebra::{DMatrix, DVector, Dyn};
 
+use super::frame::{Frame, Names};
 use super::linear::{Linear, Matrices};
-use super::sampled::{Names, Sampled};
 use crate::Error;
 use crate::model::equations::{Entry, Section};
 
@@ -12,7 +12,7 @@ use crate::model::equations::{Entry, Section};
 type Shape<'a> = ((usize, &'a str), (usize, &'a str));
 
 /// Reads a model whose file has F.
-pub(super) fn read(root: &Section<'_>) -> Result<Sampled, Error> {
+pub(super) fn read(root: &Section<'_>) -> Result<(Frame, Linear), Error> {
     root.allow(&[
         "sample_time",
         "states",

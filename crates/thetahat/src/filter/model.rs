@@ -1,8 +1,8 @@
-use super::kind::Kind;
+use super::frame::{Frame, InitialState};
+use super::kind::{Kind, Motion};
 use super::lags::Lags;
-use super::linear::{InitialState, Linear};
+use super::linear::Linear;
 use super::matrices;
-use super::sampled::{Motion, Sampled};
 use crate::Error;
 use crate::model::{GreyBox, Model, equations::Document};
 use crate::report::Report;
@@ -34,9 +34,15 @@ pub struct StateModel {
     pub(super) kind: Kind,
 }
 
-impl From<Sampled> for StateModel {
-    fn from(model: Sampled) -> Self {
-        Self { kind: Kind::Sampled(Box::new(model)) }
+impl From<(Frame, Linear)> for StateModel {
+    fn from((frame, linear): (Frame, Linear)) -> Self {
+        Self { kind: Kind::Sampled(Box::new(frame), Motion::Linear(Box::new(linear))) }
+    }
+}
+
+impl From<(Frame, Lags)> for StateModel {
+    fn from((frame, lags): (Frame, Lags)) -> Self {
+        Self { kind: Kind::Sampled(Box::new(frame), Motion::Lags(Box::new(lags))) }
     }
 }
 
@@ -105,14 +111,11 @@ impl StateModel {
     /// [`Error::Argument`] for another model, another number of outputs, or what is no deviation.
     pub fn with_measurement_noise(self, deviations: &[f64]) -> Result<Self, Error> {
         let argument = "measurement-noise";
-        let sampled = match self.kind {
-            Kind::Sampled(sampled) if matches!(sampled.motion, Motion::Lags(_)) => *sampled,
-            _ => {
-                let message = "it is for reports of nonlinear ARX models: this model says its noises itself";
-                return Err(Error::argument(argument, message));
-            }
+        let Kind::Sampled(frame, Motion::Lags(lags)) = self.kind else {
+            let message = "it is for reports of nonlinear ARX models: this model says its noises itself";
+            return Err(Error::argument(argument, message));
         };
-        let outputs = sampled.names.outputs.len();
+        let outputs = frame.names.outputs.len();
         if deviations.len() != outputs {
             let message = format!("there are {}, but the model has {outputs}", deviations.len());
             return Err(Error::argument(argument, message));
@@ -122,15 +125,15 @@ impl StateModel {
             return Err(Error::argument(argument, format!("{wrong} is no standard deviation")));
         }
         let variances: Vec<f64> = deviations.iter().map(|deviation| deviation * deviation).collect();
-        let sampled = sampled.with_output_variances(variances.into());
-        Ok(sampled.map_err(|error| Error::argument(argument, error.to_string()))?.into())
+        let frame = frame.with_output_variances(variances.into());
+        Ok((frame.map_err(|error| Error::argument(argument, error.to_string()))?, *lags).into())
     }
 
     /// The names of the states.
     pub fn states(&self) -> &[String] {
         match &self.kind {
             Kind::Grey(grey) => grey.states(),
-            Kind::Sampled(sampled) => &sampled.names.states,
+            Kind::Sampled(frame, _) => &frame.names.states,
         }
     }
 
@@ -138,7 +141,7 @@ impl StateModel {
     pub fn inputs(&self) -> &[String] {
         match &self.kind {
             Kind::Grey(grey) => grey.inputs(),
-            Kind::Sampled(sampled) => &sampled.names.inputs,
+            Kind::Sampled(frame, _) => &frame.names.inputs,
         }
     }
 
@@ -146,14 +149,14 @@ impl StateModel {
     pub fn outputs(&self) -> &[String] {
         match &self.kind {
             Kind::Grey(grey) => grey.outputs(),
-            Kind::Sampled(sampled) => &sampled.names.outputs,
+            Kind::Sampled(frame, _) => &frame.names.outputs,
         }
     }
 
     /// The names of the unknown parameters.
     pub fn unknown(&self) -> impl ExactSizeIterator<Item = &str> {
         let parameters = match &self.kind {
-            Kind::Sampled(_) => &[],
+            Kind::Sampled(..) => &[],
             Kind::Grey(grey) => grey.parameters(),
         };
         parameters.iter().map(|parameter| parameter.name.as_str())
@@ -163,7 +166,7 @@ impl StateModel {
     /// bounds.
     pub fn changes_of_variable(&self) -> impl ExactSizeIterator<Item = Option<String>> {
         let parameters = match &self.kind {
-            Kind::Sampled(_) => &[],
+            Kind::Sampled(..) => &[],
             Kind::Grey(grey) => grey.parameters(),
         };
         parameters.iter().map(|parameter| parameter.change_of_variable())
@@ -172,7 +175,7 @@ impl StateModel {
     /// The length of a sample, in seconds.
     pub fn sample_time(&self) -> f64 {
         match &self.kind {
-            Kind::Sampled(sampled) => sampled.names.sample_time,
+            Kind::Sampled(frame, _) => frame.names.sample_time,
             Kind::Grey(grey) => grey.sample_time(),
         }
     }
@@ -181,7 +184,7 @@ impl StateModel {
     /// is exact.
     pub fn is_linear(&self) -> bool {
         match &self.kind {
-            Kind::Sampled(sampled) => matches!(sampled.motion, Motion::Linear(_)),
+            Kind::Sampled(_, motion) => matches!(motion, Motion::Linear(_)),
             Kind::Grey(grey) => grey.is_linear(),
         }
     }

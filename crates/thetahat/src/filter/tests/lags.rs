@@ -3,8 +3,7 @@
 use thetahat_core::nalgebra::{Complex, DVector};
 
 use crate::data::{Channel, Log, Rows};
-use crate::filter::kind::Kind;
-use crate::filter::sampled::Motion;
+use crate::filter::kind::{Kind, Motion};
 use crate::filter::{Estimator, InitialState, ObserverGain, StateFilter, StateModel};
 use crate::model::{Activation, Model};
 use crate::random::Random;
@@ -89,8 +88,9 @@ fn outputs_that_are_all_there_give_predictions_one_step_ahead() {
 fn its_slopes_are_differences() {
     for report in reports() {
         let model = StateModel::from_report(&report, None).unwrap();
-        let Kind::Sampled(sampled) = &model.kind else { panic!("a nonlinear ARX model has samples") };
-        let Motion::Lags(lags) = &sampled.motion else { panic!("a nonlinear ARX model has lags") };
+        let Kind::Sampled(_, Motion::Lags(lags)) = &model.kind else {
+            panic!("a nonlinear ARX model has lags")
+        };
         let n = model.states().len();
         let state = DVector::from_fn(n, |place, _| 0.3 - 0.2 * place as f64);
         let now = DVector::repeat(1, 0.4);

@@ -1,15 +1,23 @@
-//! Models that go from sample to sample, and of which the outputs are linear in the state.
+//! What models that go from sample to sample have in common: channels, start, and outputs that are linear in the state.
 
 use thetahat_core::nalgebra::{DMatrix, DVector, Dyn};
 use thetahat_core::{Covariance, Error, LinearObservation};
 
-use super::lags::Lags;
-use super::linear::Linear;
 use crate::data::Offset;
 
-/// y(k) = H x(k) + D u(k) + v(k), v ~ (0, R), of deviations from the offsets of the channels, with x from a [`Motion`].
+/// What is known of the state in which the model of a report starts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum InitialState {
+    /// It is 0: the plant is at rest, the channels at their offsets.
+    Zero,
+    /// Nothing: each state, which is in units of the output, has a standard deviation of a thousand times that of the noise e. The lags of
+    /// a nonlinear ARX model are anywhere in the range of the rows that it was fitted to, half of which is their standard deviation.
+    Unknown,
+}
+
+/// y(k) = H x(k) + D u(k) + v(k), v ~ (0, R), of deviations from the offsets of the channels.
 #[derive(Debug, Clone)]
-pub(super) struct Sampled {
+pub(super) struct Frame {
     pub(super) names: Names,
     /// What is taken from the channels, and put back.
     pub(super) input_offsets: Vec<Offset>,
@@ -23,7 +31,6 @@ pub(super) struct Sampled {
     pub(super) output_matrix: DMatrix<f64>,
     /// R.
     pub(super) output_noise: DMatrix<f64>,
-    pub(super) motion: Motion,
 }
 
 /// The channels of a model and its sample time.
@@ -35,17 +42,10 @@ pub(super) struct Names {
     pub(super) sample_time: f64,
 }
 
-/// How the state goes on.
-#[derive(Debug, Clone)]
-pub(super) enum Motion {
-    Linear(Box<Linear>),
-    Lags(Box<Lags>),
-}
-
 /// What is known of the state at the first row: x0 and P0.
 pub(super) type Start = (DVector<f64>, Covariance<f64, Dyn>);
 
-impl Sampled {
+impl Frame {
     /// A model whose channels have no offsets.
     ///
     /// # Errors
@@ -54,7 +54,6 @@ impl Sampled {
         names: Names,
         (start, start_covariance): Start,
         (h, d, r): (DMatrix<f64>, DMatrix<f64>, Covariance<f64, Dyn>),
-        motion: Motion,
     ) -> Result<Self, Error> {
         let offsets = |channels: &[String]| vec![Offset::default(); channels.len()];
         Ok(Self {
@@ -66,7 +65,6 @@ impl Sampled {
             output_noise: r.matrix(),
             observation: LinearObservation::new(h.clone(), r)?.with_input(d)?,
             output_matrix: h,
-            motion,
         })
     }
 
@@ -75,10 +73,10 @@ impl Sampled {
     /// # Errors
     /// If one is negative or no number.
     pub(super) fn with_output_variances(self, variances: DVector<f64>) -> Result<Self, Error> {
-        let Self { names, start, start_covariance, output_matrix, observation, motion, .. } = self;
+        let Self { names, start, start_covariance, output_matrix, observation, .. } = self;
         let seen =
             (output_matrix, observation.input_matrix().clone(), Covariance::from_diagonal(&variances)?);
-        let fresh = Self::new(names, (start, start_covariance), seen, motion)?;
+        let fresh = Self::new(names, (start, start_covariance), seen)?;
         Ok(Self { input_offsets: self.input_offsets, output_offsets: self.output_offsets, ..fresh })
     }
 }

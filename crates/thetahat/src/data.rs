@@ -3,6 +3,7 @@
 //! - [`Log`] holds [`Channel`]s with one value for each row. It is built from values in memory, with a sample time or with a time for
 //!   each row. A missing value is NaN. [`Log::join`] puts several experiments one after the other.
 //! - [`Record`] borrows the signals of a log that an estimate sees: an output, the inputs, and the segments without a gap.
+//!   A [`JointRecord`] has any number of outputs.
 //! - [`Rows`] and [`Split`] say which rows serve for what. Rows are counted from 1, and a range includes both ends.
 //! - [`Detrend`] finds the [`Offset`] of each channel, [`Prefilter`] is a band of frequencies.
 //! - [`Recording`] and its [`Times`] are a log with any clock. [`Resample`] puts it on a uniform one by [`Interpolation`], after a
@@ -21,6 +22,7 @@
 //! ```
 
 mod digest;
+mod joint_record;
 mod log;
 mod offset;
 mod prefilter;
@@ -35,6 +37,7 @@ mod split;
 mod tests;
 
 pub(crate) use digest::{digest, digests, inside};
+pub use joint_record::JointRecord;
 pub use log::{Channel, Interpolation, Log};
 pub(crate) use log::{GAP, JITTER, check, measured};
 pub use offset::Offset;

@@ -4,6 +4,8 @@
 //!   [`estimate_monitored`] tells a [`Monitor`] of its progress. [`Initial`] says what stands for the samples before the first.
 //! - [`arx`] is its short form for models that are linear in their parameters. [`arx_factor`] gives a triangular factor that merges
 //!   with those of other records.
+//! - [`subspace()`] finds the states of a record with several outputs ([`SubspaceOptions`]); of the [`Subspace`] a
+//!   [`StateSpace`](crate::model::StateSpace) of any order is read off, and an [`OrderScore`] says how well it predicts.
 //! - Methods have settings: a [`Search`], [`Robust`] (a [`Loss`]), [`ConvexFit`] (a
 //!   [`Norm`], [`Bound`]s and [`GainBound`]s), [`LikelihoodSearch`] for models in equations ([`UnknownParameter`]).
 //!   [`Constant`] says whether the level of the output is estimated too.
@@ -50,6 +52,7 @@ mod restart;
 mod robust;
 mod start;
 mod stretches;
+mod subspace;
 #[cfg(test)]
 mod tests;
 mod uncertainty;
@@ -88,6 +91,7 @@ pub(crate) use process::{
 };
 pub use robust::{Loss, Robust, RobustOutcome};
 pub(crate) use stretches::stretches;
+pub use subspace::{OrderScore, Subspace, SubspaceOptions, subspace};
 pub(crate) use uncertainty::{Autoregression, autoregression, backward_filtered_products};
 
 /// How an estimate was found.

@@ -76,7 +76,7 @@ impl Linear {
     /// A fitted model: Q = K R K', S = K R, R = var e.
     pub(super) fn of_model(model: &PolynomialModel, start: InitialState) -> Result<(Frame, Self), Error> {
         let space = model.state_space();
-        let variance = space.noise_variance;
+        let variance = model.noise_variance;
         check_noise(variance)?;
         let n = space.f.nrows();
         let innovation = Covariance::from_diagonal(&DVector::repeat(1, variance));

@@ -2,29 +2,30 @@ use thetahat_core::nalgebra::DMatrix;
 
 use crate::model::PolynomialModel;
 
-/// A model in innovations form, x of n states and u of m inputs:
+/// A model in innovations form, x of n states, u of m inputs and y of l outputs:
 ///
 /// ```text
 /// x(t+1) = F x(t) + G u(t) + K e(t)
-/// y(t)   = H x(t) + D u(t) + e(t),   var e = noise_variance
+/// y(t)   = H x(t) + D u(t) + e(t),   cov e = noise_covariance
 /// ```
 ///
 /// (Ljung, System Identification, 2nd ed. 1999, section 4.3). y and u are deviations from the model's offsets, so that the
-/// state at rest is zero. F and D here are matrices, not the polynomials of these letters. Made by [`PolynomialModel::state_space`].
+/// state at rest is zero. F and D here are matrices, not the polynomials of these letters. Made by [`PolynomialModel::state_space`], and
+/// from signals by [`subspace`](crate::estimate::subspace()).
 #[derive(Debug, Clone, PartialEq)]
 pub struct StateSpace {
     /// F, n x n: what becomes of the state.
     pub f: DMatrix<f64>,
     /// G, n x m: what the inputs do to the state.
     pub g: DMatrix<f64>,
-    /// H, 1 x n: the output of a state.
+    /// H, l x n: the outputs of a state.
     pub h: DMatrix<f64>,
-    /// D, 1 x m: what the inputs do to the output at once. Zero for an input with nk above 0.
+    /// D, l x m: what the inputs do to the outputs at once. Zero for an input with nk above 0.
     pub d: DMatrix<f64>,
-    /// K, n x 1: what the innovation does to the state.
+    /// K, n x l: what the innovations do to the state.
     pub k: DMatrix<f64>,
-    /// The variance of e.
-    pub noise_variance: f64,
+    /// The covariance of e, l x l.
+    pub noise_covariance: DMatrix<f64>,
     /// Seconds from one sample to the next.
     pub sample_time: f64,
 }
@@ -133,7 +134,7 @@ impl PolynomialModel {
             h,
             d: direct.columns(0, inputs).into_owned(),
             k: gains.columns(inputs, 1).into_owned(),
-            noise_variance: self.noise_variance,
+            noise_covariance: DMatrix::from_element(1, 1, self.noise_variance),
             sample_time: self.sample_time,
         }
     }
@@ -265,7 +266,7 @@ mod tests {
             assert_eq!(space.f.shape(), (states, states), "{:?}", model.orders);
             assert_eq!((space.g.shape(), space.h.shape()), ((states, inputs), (1, states)));
             assert_eq!((space.d.shape(), space.k.shape()), ((1, inputs), (states, 1)));
-            assert_eq!((space.noise_variance, space.sample_time), (0.25, 0.5));
+            assert_eq!((space.noise_covariance[(0, 0)], space.sample_time), (0.25, 0.5));
             for (input, (b, f)) in model.b.iter().zip(&model.f).enumerate() {
                 let gain = space.g.columns(input, 1).into_owned();
                 let found = impulse_response(&space, gain, space.d[(0, input)], 40);

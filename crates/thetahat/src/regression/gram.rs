@@ -142,20 +142,54 @@ impl Products {
             add_diagonal_ends(signals, diagonal, start, rows, &interior, self.size, entries);
         }
     }
+
+    /// All entries over some segments, each given by its first sample and the samples that count.
+    fn entries(
+        &self,
+        signals: &[&[f64]],
+        segments: impl Iterator<Item = (usize, Range<usize>)> + Clone,
+    ) -> Vec<f64> {
+        let mut entries = vec![0.0; self.size * self.size];
+        for (start, rows) in segments.clone() {
+            self.add_ends(signals, start, &rows, &mut entries);
+        }
+        let mut interior = self.interior(segments.filter(|(_, rows)| !rows.is_empty()));
+        let supports = vec![usize::MAX; signals.len()];
+        self.add_interior(signals, &supports, &mut interior, &mut entries);
+        entries
+    }
+}
+
+/// The Gram matrix of z(t), z(t-1), …, z(t-L) over the samples of which all lags lie in their segment, z being the values of all signals,
+/// and how many these samples are. O(N q^2 L) time for q signals, O(q^2 L^2) memory.
+pub(crate) fn joint_gram(
+    signals: &[&[f64]],
+    segments: &[Range<usize>],
+    longest: usize,
+) -> (DMatrix<f64>, usize) {
+    let taps = |signal| Taps { signal, first: 0, count: longest + 1, sign: 1.0 };
+    let taps: Vec<Taps> = (0..signals.len()).map(taps).collect();
+    let products = Products::new(&taps);
+    let counted = || {
+        let later = |segment: &Range<usize>| (segment.start + longest).min(segment.end)..segment.end;
+        segments.iter().map(move |segment| (segment.start, later(segment)))
+    };
+    let entries = products.entries(signals, counted());
+    let size = products.size();
+    let place = |column: usize| products.position(column % signals.len(), column / signals.len());
+    let matrix = DMatrix::from_fn(size, size, |row, column| {
+        let (a, b) = (place(row), place(column));
+        entries[a.min(b) * size + a.max(b)]
+    });
+    (matrix, counted().map(|(_, rows)| rows.len()).sum())
 }
 
 /// `Phi' Phi`, `Phi' y` and `y' y` of a regression. O(N p) time, O(p^2) memory.
 pub(crate) fn gram(lagged: &Lagged<'_>) -> (DMatrix<f64>, DVector<f64>, f64) {
     let products = Products::new(&lagged.taps);
     let size = products.size();
-    let segments = || lagged.segments.iter().map(|segment| (segment.start, lagged.counted(segment)));
-    let mut entries = vec![0.0; size * size];
-    for (start, rows) in segments() {
-        products.add_ends(&lagged.signals, start, &rows, &mut entries);
-    }
-    let mut interior = products.interior(segments().filter(|(_, rows)| !rows.is_empty()));
-    let supports = vec![usize::MAX; lagged.signals.len()];
-    products.add_interior(&lagged.signals, &supports, &mut interior, &mut entries);
+    let counted = lagged.segments.iter().map(|segment| (segment.start, lagged.counted(segment)));
+    let entries = products.entries(&lagged.signals, counted);
 
     let columns: Vec<(usize, f64)> =
         lagged.columns().map(|(signal, lag, sign)| (products.position(signal, lag), sign)).collect();

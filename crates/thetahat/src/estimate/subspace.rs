@@ -1,0 +1,471 @@
+//! State-space models of any number of outputs by a subspace method.
+
+mod innovations;
+mod riccati;
+#[cfg(test)]
+mod tests;
+mod vector_arx;
+
+use thetahat_core::nalgebra::{Cholesky, DMatrix};
+
+use crate::Error;
+use crate::data::JointRecord;
+use crate::model::StateSpace;
+use crate::optimize::normal;
+use vector_arx::{ROUNDING, VectorArx, log_determinant};
+
+/// The largest past horizon that the data may choose.
+const LONGEST_PAST: usize = 40;
+/// Samples for each lagged signal of the longest past that the data may choose.
+const SAMPLES_A_LAG: usize = 5;
+/// The largest order that is offered by itself.
+const HIGHEST_ORDER: usize = 20;
+
+/// What a subspace method is told. By default the data say all of it.
+///
+/// ```
+/// use thetahat::estimate::SubspaceOptions;
+///
+/// let options = SubspaceOptions { feedthrough: Some(false), ..SubspaceOptions::default() };
+/// assert_eq!(options.past, None);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct SubspaceOptions {
+    /// p, the past samples that the state is made of. By default that of the least AIC, 40 at most.
+    pub past: Option<usize>,
+    /// Whether the inputs act on the outputs at once, so that D is estimated. By default where that lowers MDL; but not where past outputs
+    /// tell of the inputs, which are fed back then: with a controller that acts at once, u(t) tells of y(t) whatever D is.
+    pub feedthrough: Option<bool>,
+}
+
+/// The state of a record at all orders: what a [`StateSpace`] of each is read off.
+#[derive(Debug, Clone)]
+pub struct Subspace {
+    past: usize,
+    feedthrough: bool,
+    inputs: usize,
+    outputs: usize,
+    scales: Vec<f64>,
+    singular_values: Vec<f64>,
+    highest: usize,
+    /// The mean products of x(t), x(t+1), u(t) and y(t), x of the highest order.
+    moments: DMatrix<f64>,
+}
+
+/// How well a model of some order predicts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OrderScore {
+    /// n.
+    pub order: usize,
+    /// MDL of the prediction errors; none where the model has no stable predictor.
+    pub mdl: Option<f64>,
+}
+
+/// Finds the states of a record by SSARX.
+///
+/// Signals are divided by their root mean squares. With z = [u; y] a long vector ARX model
+///
+/// ```text
+/// y(t) = D u(t) + M_1 z(t-1) + … + M_p z(t-p) + e(t)
+/// ```
+///
+/// is fitted by least squares. As M_j = H (F - K H)^(j-1) [G - K D, K], what the past says of the next p outputs, less what later
+/// samples add, is
+///
+/// ```text
+/// Gamma x(t) = | M_1  M_2  …  M_p |
+///              | M_2  M_3  …  0   | z_past(t),   Gamma = [H; H (F - K H); H (F - K H)^2; …]
+///              | …                |
+/// ```
+///
+/// Weighted by the root W of the inverse covariance of e, and by the root L of the products of the past, its singular values are those of
+/// W Gamma K_p L = U S V', and the state of order n is x = S^½ V' L^-1 z_past with its first n rows. This is SSARX (Jansson, Subspace
+/// identification and ARX modeling, IFAC SYSID 2003; Chiuso, Automatica 43, 2007): other than with MOESP, N4SID and CVA, nothing is projected
+/// on future inputs, so that it is consistent where the inputs are fed back.
+///
+/// The matrices follow by least squares, H and D from y on [x; u], and F, G and K from x(t+1) on [x; u; e] with the residuals
+/// e of the former. Where a controller feeds y(t) back to u(t), u(t) and e(t) are correlated: without e beside them, G and F would be
+/// biased.
+///
+/// Everything comes from the lagged products of all signals, so that the data are read once: O(N q^2 p) for q signals, then O((q p)^3).
+/// Singular values below a millionth of the largest have few exact digits.
+///
+/// # Errors
+/// [`Error::Argument`] for a past of 0; [`Error::Data`] for a record without outputs; [`Error::Undetermined`] where there are too few
+/// samples for the lagged signals, or a signal is zero.
+///
+/// ```
+/// use thetahat::data::JointRecord;
+/// use thetahat::estimate::{SubspaceOptions, subspace};
+///
+/// // x(t+1) = 0.8 x(t) + u1(t) + 0.5 u2(t) of which two sensors see once and twice as much, the second the second input too.
+/// let mut random = 1_u32;
+/// let mut sample = || {
+///     random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+///     f64::from(random >> 16) / 32_768.0 - 1.0
+/// };
+/// let (mut u, mut y, mut x) = ([vec![], vec![]], [vec![], vec![]], 0.0);
+/// for _ in 0..2000 {
+///     let (u1, u2) = (sample(), sample());
+///     y[0].push(x + 0.1 * sample());
+///     y[1].push(2.0 * x + u2 + 0.1 * sample());
+///     u[0].push(u1);
+///     u[1].push(u2);
+///     x = 0.8 * x + u1 + 0.5 * u2;
+/// }
+/// let record = JointRecord::new(vec![&u[0], &u[1]], vec![&y[0], &y[1]])?;
+/// let found = subspace(&record, &SubspaceOptions::default())?;
+/// assert!(found.feedthrough());
+/// let order = found.order(&record, 1..=6)?;
+/// assert_eq!(order, 1);
+/// let model = found.state_space(order, 1.0)?;
+/// assert!((model.f[(0, 0)] - 0.8).abs() < 0.01);
+/// assert!((model.d[(1, 1)] - 1.0).abs() < 0.02);
+/// # Ok::<(), thetahat::Error>(())
+/// ```
+pub fn subspace(record: &JointRecord<'_>, options: &SubspaceOptions) -> Result<Subspace, Error> {
+    if record.outputs.is_empty() {
+        return Err(Error::data("the record has no outputs; it needs at least one"));
+    }
+    let past = match options.past {
+        Some(0) => {
+            return Err(Error::argument(
+                "past",
+                "it is 0, and a state is made of past samples; take 1 or more",
+            ));
+        }
+        Some(past) => past,
+        None => longest_past(record)?,
+    };
+    enough(record, past)?;
+    let mut regression = VectorArx::new(record, past).ok_or_else(|| silent(record, past))?;
+    if options.past.is_none() {
+        let past = regression.akaike(options.feedthrough != Some(false));
+        if past < regression.past {
+            regression = VectorArx::new(record, past).ok_or_else(|| silent(record, past))?;
+        }
+    }
+    let driven = regression.inputs > 0;
+    let feedthrough = driven && options.feedthrough.unwrap_or_else(|| regression.has_feedthrough());
+    Subspace::new(&regression, feedthrough)
+}
+
+/// The samples that have so many before them in their segment.
+fn samples(record: &JointRecord<'_>, past: usize) -> usize {
+    record.segments.iter().map(|segment| segment.len().saturating_sub(past)).sum()
+}
+
+/// The signals of a regression with such a past: z(t-1), …, z(t-p), u(t) and y(t).
+fn signals(record: &JointRecord<'_>, past: usize) -> usize {
+    (record.inputs.len() + record.outputs.len()).saturating_mul(past.saturating_add(1))
+}
+
+/// The longest past that the data may choose.
+///
+/// # Errors
+/// If there are too few samples for any.
+fn longest_past(record: &JointRecord<'_>) -> Result<usize, Error> {
+    let fits = |past: &usize| samples(record, *past) >= SAMPLES_A_LAG * signals(record, *past);
+    if let Some(past) = (1..=LONGEST_PAST).rev().find(fits) {
+        return Ok(past);
+    }
+    enough(record, 1).map(|()| 1)
+}
+
+/// # Errors
+/// [`Error::Undetermined`] if there are not more samples than lagged signals.
+fn enough(record: &JointRecord<'_>, past: usize) -> Result<(), Error> {
+    let (samples, signals) = (samples(record, past), signals(record, past));
+    if samples > signals {
+        return Ok(());
+    }
+    Err(Error::undetermined(
+        Vec::new(),
+        format!(
+            "a past of {past} makes {signals} lagged signals, and {samples} samples have it before them in their segment; there must be \
+             more samples than signals: give more rows, or fewer channels"
+        ),
+    ))
+}
+
+/// Which signal has no products.
+fn silent(record: &JointRecord<'_>, past: usize) -> Error {
+    let is_silent = |signal: &&[f64]| {
+        let used = record.segments.iter().filter(|segment| segment.len() > past);
+        let largest = used
+            .flat_map(|segment| &signal[segment.start + past..segment.end])
+            .fold(0.0_f64, |largest, value| largest.max(value.abs()));
+        !crate::regression::SAFE_NORMS.contains(&largest)
+    };
+    let found = record.signals().iter().position(is_silent).unwrap_or(0);
+    let inputs = record.inputs.len();
+    let name = if found < inputs {
+        format!("input {}", found + 1)
+    } else {
+        format!("output {}", found - inputs + 1)
+    };
+    Error::undetermined(
+        Vec::new(),
+        format!(
+            "{name} is zero, or too large or too small for its squares; leave it out, or give it in other units"
+        ),
+    )
+}
+
+impl Subspace {
+    fn new(regression: &VectorArx, feedthrough: bool) -> Result<Self, Error> {
+        let VectorArx { inputs, outputs, past, .. } = *regression;
+        let width = regression.width();
+        let (coefficients, covariance) = regression.coefficients(feedthrough);
+        let rounding = DMatrix::identity(outputs, outputs) * ROUNDING;
+        let left = Cholesky::new(covariance + rounding);
+        // Rows of Gamma K_p are the coefficients, moved by one lag each.
+        let mut map = DMatrix::zeros(outputs * past, width * past);
+        let whitened =
+            left.and_then(|factor| factor.l().solve_lower_triangular(&coefficients)).ok_or_else(|| {
+                Error::undetermined(Vec::new(), "the outputs depend on one another; leave one out")
+            })?;
+        for block in 0..past {
+            let known = width * (past - block);
+            let from = whitened.columns(width * block, known);
+            map.view_mut((outputs * block, 0), (outputs, known)).copy_from(&from);
+        }
+        let factor = regression.past_factor();
+        let weighted = map * &factor;
+        let (rows, columns) = weighted.shape();
+        let same = faer::Mat::from_fn(rows, columns, |row, column| weighted[(row, column)]);
+        let decomposed = same.thin_svd().map_err(|_| {
+            Error::undetermined(Vec::new(), "the singular values of the past do not converge")
+        })?;
+        let singular_values: Vec<f64> = decomposed.S().column_vector().iter().copied().collect();
+        let seen = |value: &&f64| **value > f64::EPSILON * singular_values[0];
+        let highest = singular_values.iter().take_while(seen).count().min(outputs * past);
+        if highest == 0 {
+            return Err(Error::undetermined(
+                Vec::new(),
+                "the past says nothing of the outputs: there are no states to be found",
+            ));
+        }
+        // T L = S^½ V', row by row from the last column of L on.
+        let right = decomposed.V();
+        let mut states = DMatrix::zeros(highest, columns);
+        for state in 0..highest {
+            let root = singular_values[state].sqrt();
+            for column in (0..columns).rev() {
+                let later = column + 1..columns;
+                let explained: f64 = later.map(|k| states[(state, k)] * factor[(k, column)]).sum();
+                if factor[(column, column)] > 0.0 {
+                    states[(state, column)] =
+                        (root * right[(column, state)] - explained) / factor[(column, column)];
+                }
+            }
+        }
+        let mut rows = DMatrix::zeros(2 * highest + width, width * (past + 1));
+        rows.view_mut((0, width), (highest, columns)).copy_from(&states);
+        rows.view_mut((highest, 0), (highest, columns)).copy_from(&states);
+        rows.view_mut((2 * highest, 0), (width, width)).fill_with_identity();
+        let moments = &rows * &regression.products * rows.transpose();
+        Ok(Self {
+            past,
+            feedthrough,
+            inputs,
+            outputs,
+            scales: regression.scales.clone(),
+            singular_values,
+            highest,
+            moments,
+        })
+    }
+
+    /// p, the past samples that the states are made of.
+    pub fn past(&self) -> usize {
+        self.past
+    }
+
+    /// Whether the inputs act on the outputs at once.
+    pub fn feedthrough(&self) -> bool {
+        self.feedthrough
+    }
+
+    /// The singular values of what the past says of the outputs to come, falling: in units of the deviation of e.
+    pub fn singular_values(&self) -> &[f64] {
+        &self.singular_values
+    }
+
+    /// The highest order of which there is a model.
+    pub fn highest_order(&self) -> usize {
+        self.highest
+    }
+
+    /// The model of an order, one sample every `sample_time` seconds. Over the samples its states are uncorrelated, and the variance of each
+    /// is its singular value. Where the least squares leave F - K H unstable, K and the covariance of e are those of the stationary Kalman
+    /// filter. O(n^3).
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for an order that is 0 or above the highest; [`Error::Undetermined`] where no gain gives a stable predictor.
+    pub fn state_space(&self, order: usize, sample_time: f64) -> Result<StateSpace, Error> {
+        if order == 0 || order > self.highest {
+            return Err(Error::argument(
+                "order",
+                format!("it is {order}; the data tell of orders from 1 to {}", self.highest),
+            ));
+        }
+        self.scaled(order, sample_time).map(|model| self.in_units(model)).ok_or_else(|| {
+            Error::undetermined(
+                Vec::new(),
+                format!("the model of order {order} has no stable predictor; take another order"),
+            )
+        })
+    }
+
+    /// The model of scaled signals; none where it has no stable predictor.
+    fn scaled(&self, order: usize, sample_time: f64) -> Option<StateSpace> {
+        let (m, l) = (self.inputs, self.outputs);
+        let direct = if self.feedthrough { m } else { 0 };
+        let (next, inputs) = (self.highest, 2 * self.highest);
+        let outputs = inputs + m;
+        let size = self.moments.nrows();
+
+        // y = H x + D u + e.
+        let regressors: Vec<usize> = (0..order).chain(inputs..inputs + direct).collect();
+        let products = self.moments.select_rows(&regressors).select_columns(&regressors);
+        let right = self.moments.select_rows(&regressors).columns(outputs, l).into_owned();
+        let seen = solved(&products, right).transpose();
+        let mut d = DMatrix::zeros(l, m);
+        d.columns_mut(0, direct).copy_from(&seen.columns(order, direct));
+
+        // x(t+1) = F x + G u + K e, e as rows of the moments.
+        let mut rows = DMatrix::zeros(order + m + l, size);
+        rows.view_mut((0, 0), (order, order)).fill_with_identity();
+        rows.view_mut((order, inputs), (m + l, m + l)).fill_with_identity();
+        for (place, regressor) in regressors.iter().enumerate() {
+            rows.view_mut((order + m, *regressor), (l, 1)).copy_from(&(-seen.column(place)));
+        }
+        let through = &rows * &self.moments;
+        let products = &through * rows.transpose();
+        let right = through.columns(next, order).into_owned();
+        let after = self.moments.view((next, next), (order, order));
+        let moved = solved(&products, right.clone()).transpose();
+        let rest = after - &moved * right;
+        let model = StateSpace {
+            f: moved.columns(0, order).into_owned(),
+            g: moved.columns(order, m).into_owned(),
+            h: seen.columns(0, order).into_owned(),
+            d,
+            k: moved.columns(order + m, l).into_owned(),
+            noise_covariance: products.view((order + m, order + m), (l, l)).into_owned(),
+            sample_time,
+        };
+        let is_predictor = |model: &StateSpace| riccati::is_stable(&(&model.f - &model.k * &model.h));
+        if is_predictor(&model) {
+            return Some(model);
+        }
+        let rounding = |size: usize, scale: f64| DMatrix::identity(size, size) * (ROUNDING * scale);
+        let rest = (&rest + rest.transpose()) * 0.5 + rounding(order, after.trace());
+        let noise_covariance = &model.noise_covariance + rounding(l, 1.0);
+        let model = riccati::stationary(&StateSpace { noise_covariance, ..model }, &rest)?;
+        is_predictor(&model).then_some(model)
+    }
+
+    /// A model of the signals in their own units.
+    fn in_units(&self, mut model: StateSpace) -> StateSpace {
+        let (inputs, outputs) = self.scales.split_at(self.inputs);
+        for (column, scale) in inputs.iter().enumerate() {
+            model.g.column_mut(column).unscale_mut(*scale);
+            model.d.column_mut(column).unscale_mut(*scale);
+        }
+        for (output, scale) in outputs.iter().enumerate() {
+            model.h.row_mut(output).scale_mut(*scale);
+            model.d.row_mut(output).scale_mut(*scale);
+            model.k.column_mut(output).unscale_mut(*scale);
+            model.noise_covariance.row_mut(output).scale_mut(*scale);
+            model.noise_covariance.column_mut(output).scale_mut(*scale);
+        }
+        model
+    }
+
+    /// How well the models of some orders predict the record, each segment from the state that fits it best:
+    ///
+    /// ```text
+    /// MDL = N ln det cov e + k ln N,   k = n (m + 2 l) + l m with feedthrough
+    /// ```
+    ///
+    /// with e in units of the root mean squares of the outputs (Rissanen 1978; k is the number of free parameters of a canonical form, Ljung,
+    /// System Identification, 2nd ed. 1999, section 4A). O(N n (n + m + 2 l)) for each order.
+    ///
+    /// # Errors
+    /// [`Error::Data`] for a record with other numbers of inputs and outputs; [`Error::Argument`] for an order that is 0 or above the highest.
+    pub fn scores(
+        &self,
+        record: &JointRecord<'_>,
+        orders: impl IntoIterator<Item = usize>,
+    ) -> Result<Vec<OrderScore>, Error> {
+        let (m, l) = (self.inputs, self.outputs);
+        if (record.inputs.len(), record.outputs.len()) != (m, l) {
+            return Err(Error::data(format!(
+                "the record has {} inputs and {} outputs, the model {m} and {l}",
+                record.inputs.len(),
+                record.outputs.len()
+            )));
+        }
+        let samples = samples(record, 0) as f64;
+        let score = |order: usize| {
+            let model = match self.state_space(order, 1.0) {
+                Ok(model) => model,
+                Err(Error::Undetermined { .. }) => return Ok(OrderScore { order, mdl: None }),
+                Err(error) => return Err(error),
+            };
+            let outputs = &self.scales[m..];
+            let mdl = innovations::products(&model, record).map(|mut products| {
+                for (output, scale) in outputs.iter().enumerate() {
+                    products.row_mut(output).unscale_mut(*scale);
+                    products.column_mut(output).unscale_mut(*scale);
+                }
+                let direct = if self.feedthrough { l * m } else { 0 };
+                let parameters = (order * (m + 2 * l) + direct) as f64;
+                samples * log_determinant(&(products / samples)) + parameters * samples.ln()
+            });
+            Ok(OrderScore { order, mdl: mdl.filter(|mdl| mdl.is_finite()) })
+        };
+        orders.into_iter().map(score).collect()
+    }
+
+    /// The order of the least MDL among some, those above the highest left out.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] if there is none in the range; [`Error::Undetermined`] where no model of them has a stable predictor.
+    pub fn order(
+        &self,
+        record: &JointRecord<'_>,
+        orders: std::ops::RangeInclusive<usize>,
+    ) -> Result<usize, Error> {
+        let orders = *orders.start()..=(*orders.end()).min(self.highest);
+        if orders.is_empty() {
+            return Err(Error::argument(
+                "order",
+                format!("the range is empty; the data tell of orders from 1 to {}", self.highest),
+            ));
+        }
+        let scores = self.scores(record, orders)?;
+        let known = scores.iter().filter_map(|score| Some((score.order, score.mdl?)));
+        known.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(order, _)| order).ok_or_else(|| {
+            Error::undetermined(Vec::new(), "no model of these orders has a stable predictor; take others")
+        })
+    }
+
+    /// The orders that are offered where none are asked for.
+    pub fn orders(&self) -> std::ops::RangeInclusive<usize> {
+        1..=self.highest.min(HIGHEST_ORDER)
+    }
+}
+
+/// X of the symmetric `products` X = right; zero for what depends on others.
+fn solved(products: &DMatrix<f64>, mut right: DMatrix<f64>) -> DMatrix<f64> {
+    let size = products.nrows();
+    let mut factor = products.as_slice().to_vec();
+    normal::factor(&mut factor, size);
+    for mut column in right.column_iter_mut() {
+        normal::solve(&factor, size, column.as_mut_slice());
+    }
+    right
+}

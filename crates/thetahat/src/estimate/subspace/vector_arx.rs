@@ -1,0 +1,191 @@
+//! Vector ARX models of all lengths from one Gram matrix.
+
+use std::ops::Range;
+
+use thetahat_core::nalgebra::{Cholesky, DMatrix};
+
+use crate::data::JointRecord;
+use crate::optimize::normal;
+use crate::regression::joint_gram;
+
+/// What is left of a variance by rounding in a Gram matrix, as a fraction of it.
+pub(super) const ROUNDING: f64 = 1e-13;
+
+/// y(t) = D u(t) + M_1 z(t-1) + … + M_p z(t-p) + e(t) with z = [u; y]: m inputs, l outputs, q = m + l.
+///
+/// The lagged products of all signals, each divided by its root mean square, are the normal equations of this regression for every p. A
+/// Cholesky factor of them, with y(t) last, holds the sums of squares of all these p at once: what the columns beyond those of p and the
+/// diagonal block leave of y.
+#[derive(Debug)]
+pub(super) struct VectorArx {
+    pub(super) inputs: usize,
+    pub(super) outputs: usize,
+    /// The largest p.
+    pub(super) past: usize,
+    /// The samples that the products are sums of.
+    pub(super) samples: usize,
+    /// The products of z(t), …, z(t-p), lag by lag, over the number of samples.
+    pub(super) products: DMatrix<f64>,
+    /// The root mean squares of u and y.
+    pub(super) scales: Vec<f64>,
+}
+
+/// A Cholesky factor of some lagged signals, in which dependent ones are left out.
+#[derive(Debug)]
+struct Factor {
+    /// L, row by row.
+    entries: Vec<f64>,
+    size: usize,
+}
+
+impl Factor {
+    /// An entry of L, zero in the columns that are left out.
+    fn entry(&self, row: usize, column: usize) -> f64 {
+        let entry = self.entries[row * self.size + column];
+        if entry.is_finite() { entry } else { 0.0 }
+    }
+
+    /// What the first `known` signals leave of those from `first` on.
+    fn left(&self, first: usize, known: usize) -> DMatrix<f64> {
+        let count = self.size - first;
+        DMatrix::from_fn(count, count, |i, j| {
+            let together = known..=first + i.min(j);
+            together.map(|k| self.entry(first + i, k) * self.entry(first + j, k)).sum()
+        })
+    }
+}
+
+/// ln det of a covariance of signals of unit variance, as far as rounding lets it be seen.
+pub(super) fn log_determinant(covariance: &DMatrix<f64>) -> f64 {
+    let size = covariance.nrows();
+    let seen = covariance + DMatrix::identity(size, size) * ROUNDING;
+    Cholesky::new(seen)
+        .map_or(f64::INFINITY, |factor| factor.l_dirty().diagonal().iter().map(|root| 2.0 * root.ln()).sum())
+}
+
+impl VectorArx {
+    /// None where a signal is zero at all of these samples, or its squares leave the range of numbers.
+    pub(super) fn new(record: &JointRecord<'_>, past: usize) -> Option<Self> {
+        let (mut products, samples) = joint_gram(&record.signals(), &record.segments, past);
+        products /= samples as f64;
+        let (inputs, outputs) = (record.inputs.len(), record.outputs.len());
+        let width = inputs + outputs;
+        let scales: Vec<f64> = (0..width).map(|signal| products[(signal, signal)].sqrt()).collect();
+        if !scales.iter().all(|scale| crate::regression::SAFE_NORMS.contains(scale)) {
+            return None;
+        }
+        for column in 0..products.ncols() {
+            for row in 0..products.nrows() {
+                products[(row, column)] /= scales[row % width] * scales[column % width];
+            }
+        }
+        Some(Self { inputs, outputs, past, samples, products, scales })
+    }
+
+    pub(super) fn width(&self) -> usize {
+        self.inputs + self.outputs
+    }
+
+    /// The places of z(t-1), …, z(t-p).
+    pub(super) fn lags(&self, past: usize) -> Range<usize> {
+        self.width()..self.width() * (past + 1)
+    }
+
+    /// The places of u(t), and of y(t).
+    fn now(&self) -> (Range<usize>, Range<usize>) {
+        (0..self.inputs, self.inputs..self.width())
+    }
+
+    fn factor(&self, places: &[usize]) -> Factor {
+        let size = places.len();
+        let mut entries = vec![0.0; size * size];
+        for (row, entries) in entries.chunks_exact_mut(size).enumerate() {
+            for (entry, column) in entries.iter_mut().zip(&places[..=row]) {
+                *entry = self.products[(places[row], *column)];
+            }
+        }
+        normal::factor(&mut entries, size);
+        Factor { entries, size }
+    }
+
+    /// The p of the least AIC = N ln det cov e + 2 k, with k parameters (Akaike 1974). O((q p)^3).
+    pub(super) fn akaike(&self, feedthrough: bool) -> usize {
+        let (u, y) = self.now();
+        let direct = if feedthrough { self.inputs } else { 0 };
+        let places: Vec<usize> = u.take(direct).chain(self.lags(self.past)).chain(y).collect();
+        let factor = self.factor(&places);
+        let first = places.len() - self.outputs;
+        let criterion = |past: usize| {
+            let known = direct + self.width() * past;
+            let parameters = known * self.outputs;
+            self.samples as f64 * log_determinant(&factor.left(first, known)) + 2.0 * parameters as f64
+        };
+        let all = (1..=self.past).map(|past| (past, criterion(past)));
+        all.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(1, |(past, _)| past)
+    }
+
+    /// Whether u(t) is worth its m l parameters of y(t) by MDL, and past outputs say nothing of u(t): where they do, the inputs are fed
+    /// back, and u(t) may tell of y(t) because it depends on it.
+    pub(super) fn has_feedthrough(&self) -> bool {
+        let (u, y) = self.now();
+        let before = self.lags(self.past).len();
+        let places: Vec<usize> = self.lags(self.past).chain(u.clone()).chain(y).collect();
+        let factor = self.factor(&places);
+        let first = places.len() - self.outputs;
+        let fall = log_determinant(&factor.left(first, before))
+            - log_determinant(&factor.left(first, before + self.inputs));
+        self.is_worth(fall, self.inputs * self.outputs) && !self.is_fed_back()
+    }
+
+    /// Whether a fall of ln det is worth so many parameters by MDL (Rissanen 1978).
+    fn is_worth(&self, fall: f64, parameters: usize) -> bool {
+        let samples = self.samples as f64;
+        samples * fall > parameters as f64 * samples.ln()
+    }
+
+    /// Whether past outputs tell of the inputs what past inputs do not (Granger, Econometrica 37, 1969), with any number of lags.
+    fn is_fed_back(&self) -> bool {
+        let is_input = |place: &usize| place % self.width() < self.inputs;
+        (1..=self.past).any(|past| {
+            let (own, others): (Vec<usize>, Vec<usize>) = self.lags(past).partition(is_input);
+            let (u, _) = self.now();
+            let places: Vec<usize> = own.iter().chain(&others).copied().chain(u).collect();
+            let factor = self.factor(&places);
+            let (known, first) = (own.len(), own.len() + others.len());
+            let fall =
+                log_determinant(&factor.left(first, known)) - log_determinant(&factor.left(first, first));
+            self.is_worth(fall, self.inputs * others.len())
+        })
+    }
+
+    /// M_1 … M_p side by side, l x q p, and the covariance of e.
+    pub(super) fn coefficients(&self, feedthrough: bool) -> (DMatrix<f64>, DMatrix<f64>) {
+        let (u, y) = self.now();
+        let direct = if feedthrough { self.inputs } else { 0 };
+        let places: Vec<usize> = u.take(direct).chain(self.lags(self.past)).chain(y).collect();
+        let factor = self.factor(&places);
+        let known = places.len() - self.outputs;
+        let mut solved = DMatrix::zeros(self.outputs, known);
+        // L' theta = l, from the last row of L' on.
+        for output in 0..self.outputs {
+            for column in (0..known).rev() {
+                let later = column + 1..known;
+                let explained: f64 = later.map(|k| factor.entry(k, column) * solved[(output, k)]).sum();
+                let pivot = factor.entry(column, column);
+                if pivot > 0.0 {
+                    solved[(output, column)] = (factor.entry(known + output, column) - explained) / pivot;
+                }
+            }
+        }
+        (solved.columns(direct, known - direct).into_owned(), factor.left(known, known))
+    }
+
+    /// L of the products of z(t-1), …, z(t-p) = L L', with zeros in the columns of what depends on others.
+    pub(super) fn past_factor(&self) -> DMatrix<f64> {
+        let places: Vec<usize> = self.lags(self.past).collect();
+        let factor = self.factor(&places);
+        DMatrix::from_fn(places.len(), places.len(), |row, column| {
+            if column > row { 0.0 } else { factor.entry(row, column) }
+        })
+    }
+}

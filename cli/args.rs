@@ -21,9 +21,9 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 pub(crate) use design::DesignArguments;
 pub(crate) use filter::{EstimatorArgument, FilterArguments, FilterStartArgument};
 pub(crate) use fit::{
-    ConstantArgument, CriterionArguments, FitArguments, InitialArgument, KernelArgument, LikelihoodArgument,
-    MapArgument, MembershipArgument, MethodArgument, ModelArgument, ModelArguments, NarxArguments,
-    PathArgument, SearchArgument, SearchArguments,
+    ConstantArgument, CriterionArguments, FeedthroughArgument, FitArguments, InitialArgument, KernelArgument,
+    LikelihoodArgument, MapArgument, MembershipArgument, MethodArgument, ModelArgument, ModelArguments,
+    NarxArguments, PathArgument, SearchArgument, SearchArguments,
 };
 pub(crate) use inspect::InspectArguments;
 pub(crate) use lines::{LineArguments, LineFormatArgument};

@@ -10,7 +10,7 @@ use thetahat::design::{ExperimentDesign, SignalPlan};
 use thetahat::inspect::Inspection;
 use thetahat::model::Model;
 use thetahat::report::{
-    EquationsPlan, NonlinearArxPlan, Plan, ProcessPlan, Report, Requirement, ValidationPlan,
+    EquationsPlan, NonlinearArxPlan, Plan, ProcessPlan, Report, Requirement, StateSpacePlan, ValidationPlan,
 };
 use thetahat::spectrum::SpectrumPlan;
 use thetahat::step_test::StepTestPlan;
@@ -22,7 +22,8 @@ use crate::args::{
 use crate::commands::{Experiments, Tracking, compared_signals, experiments, inspected, settings};
 use crate::failure::Failure;
 use crate::job::{
-    DesignJob, EvaluationJob, FitJob, GreyBoxJob, InspectJob, NarxJob, ProcessJob, SpectrumJob, StepTestJob,
+    DesignJob, EvaluationJob, FitJob, GreyBoxJob, InspectJob, NarxJob, ProcessJob, SpectrumJob,
+    StateSpaceJob, StepTestJob,
 };
 use crate::replace::replace;
 
@@ -95,6 +96,22 @@ pub fn narx_plan(
     })?;
     let job = NarxJob::resolve(&arguments, map)?;
     job.plan(if job.driven { inputs } else { Vec::new() }, outputs)
+}
+
+/// The plan that `thetahat fit --model ss` makes of these options for a log with these channels.
+///
+/// # Errors
+/// A [`Failure`] as the program would report it.
+pub fn state_space_plan(
+    options: &[OsString],
+    inputs: Vec<String>,
+    outputs: Vec<String>,
+) -> Result<StateSpacePlan, Failure> {
+    let log = OsString::from("log");
+    let words: Vec<OsString> = options.iter().cloned().chain([log]).collect();
+    let job = StateSpaceJob::resolve(&arguments("fit", &words)?)?;
+    let job = job.ok_or_else(|| Failure::usage("--model: give ss"))?;
+    job.plan(inputs, outputs)
 }
 
 /// The plan that `thetahat fit --structure` makes of these options for a log with these channels.

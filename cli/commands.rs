@@ -15,6 +15,7 @@ mod process;
 mod respond;
 mod search;
 mod spectrum;
+mod state_space;
 mod step;
 mod stored;
 pub(crate) mod summary;

@@ -42,7 +42,7 @@ use thetahat::text;
 
 pub use binding::{
     Opened, compare_signals, equations_plan, inspect, narx_plan, plan, process_plan, read, response_plan,
-    signal_plan, spectrum_plan, step_test_plan, track, tuning_of, validation_plan, write,
+    signal_plan, spectrum_plan, state_space_plan, step_test_plan, track, tuning_of, validation_plan, write,
 };
 pub use commands::demo::LOG as DEMO_LOG;
 pub use commands::summary::{

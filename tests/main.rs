@@ -44,6 +44,7 @@ mod same_file;
 mod several_logs;
 mod signals;
 mod spectrum;
+mod state_space;
 mod step;
 mod terminal;
 mod track;

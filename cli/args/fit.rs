@@ -25,7 +25,7 @@ pub(crate) struct FitArguments {
     /// Input columns; a name that holds a comma stands between double quotes, as in CSV [default: u, u1, u2, …]
     #[arg(short = 'u', long, value_name = "NAME[,NAME…]", help_heading = "Channels")]
     pub(crate) input: Vec<Names>,
-    /// Output column, with --narx one or more [default: y]
+    /// Output column; with --model ss and --narx one or more [default: y]
     #[arg(short = 'y', long, value_name = "NAME[,NAME…]", help_heading = "Channels")]
     pub(crate) output: Vec<Names>,
     /// Rows to estimate on, 1-based and inclusive, counted through all logs [default: all]
@@ -61,6 +61,8 @@ pub(crate) struct FitArguments {
     #[command(flatten)]
     pub(crate) model: ModelArguments,
     #[command(flatten)]
+    pub(crate) states: StateSpaceArguments,
+    #[command(flatten)]
     pub(crate) narx: NarxArguments,
     #[command(flatten)]
     pub(crate) choice: ChoiceArguments,
@@ -88,7 +90,7 @@ pub(crate) struct FitArguments {
 /// Which model, and what its estimate starts from.
 #[derive(Debug, Args)]
 pub(crate) struct ModelArguments {
-    /// The model structure [default: arx; without orders the data choose]
+    /// The model structure [default: arx; without orders the data choose; with several outputs ss]
     #[arg(long, value_enum, help_heading = "Model")]
     pub(crate) model: Option<ModelArgument>,
     /// Coefficients of A: past outputs
@@ -152,6 +154,32 @@ pub(crate) struct ModelArguments {
     /// Estimate a slope of the output with the parameters too, and its level with it: for drift
     #[arg(long, help_heading = "Model")]
     pub(crate) trend: bool,
+}
+
+/// A state-space model.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "State space (--model ss)")]
+pub(crate) struct StateSpaceArguments {
+    /// States, or a range among which the least MDL chooses [default: 1..20]
+    #[arg(long, value_name = "N|A..B")]
+    pub(crate) order: Option<String>,
+    /// Past samples that the states are made of [default: those of the least AIC, 40 at most]
+    #[arg(long, value_name = "P", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub(crate) past: Option<u32>,
+    /// Whether inputs act on the outputs in the same sample. auto: where that lowers MDL and no controller is seen that feeds outputs back to
+    /// the inputs [default: auto]
+    #[arg(long, value_enum)]
+    pub(crate) feedthrough: Option<FeedthroughArgument>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum FeedthroughArgument {
+    /// The data say it
+    Auto,
+    /// They do: D is estimated
+    Yes,
+    /// They do not: D is zero
+    No,
 }
 
 /// A nonlinear ARX model.
@@ -354,6 +382,8 @@ pub(crate) enum ModelArgument {
     Fir,
     /// A process in continuous time: gain, lags, dead time, with --structure
     Process,
+    /// State space: x(t+1) = F x + G u + K e, y = H x + D u + e, with any number of outputs
+    Ss,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

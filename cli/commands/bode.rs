@@ -4,8 +4,8 @@ mod over;
 
 use std::f64::consts::PI;
 
-use thetahat::model::{Model, Quantity};
-use thetahat::respond::{frequency_response, logarithmic_frequencies};
+use thetahat::model::Quantity;
+use thetahat::respond::logarithmic_frequencies;
 
 use super::stored;
 use crate::args::BodeArguments;
@@ -26,13 +26,13 @@ pub(crate) fn bode(arguments: &BodeArguments, line: &str) -> Result<(), Failure>
     let (low, high) = asked.unwrap_or((nyquist / 1000.0, nyquist));
     // The ends first: an error then says them as they were given.
     let responses = models.iter().map(|model| {
-        let found = frequency_response(model, &[low, high])
+        let found = (model.frequency_response(&[low, high]))
             .and_then(|_| logarithmic_frequencies(low, high, arguments.points as usize))
-            .and_then(|frequencies| frequency_response(model, &frequencies));
-        Ok((&model.output.name, found.map_err(|error| Failure::option(&error))?))
+            .and_then(|frequencies| model.frequency_response(&frequencies));
+        Ok((&model.output().name, found.map_err(|error| Failure::option(&error))?))
     });
     let responses = responses.collect::<Result<Vec<_>, Failure>>()?;
-    let (several, has_noise) = (models.len() > 1, matches!(model, Model::Polynomial(_)));
+    let several = models.len() > 1;
     output::write_csv(&arguments.out, |csv| {
         let output = several.then_some("output").into_iter();
         csv.write_record(output.chain([
@@ -44,7 +44,7 @@ pub(crate) fn bode(arguments: &BodeArguments, line: &str) -> Result<(), Failure>
             "phase_standard_error",
         ]))?;
         let all = responses.iter().flat_map(|(output, each)| each.iter().map(move |one| (output, one)));
-        for (output, response) in all.filter(|(_, response)| has_noise || response.input.is_some()) {
+        for (output, response) in all {
             let output = several.then(|| output::cell(output));
             let name = output::cell(response.input.as_deref().unwrap_or("noise"));
             for point in &response.points {

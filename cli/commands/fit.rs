@@ -10,10 +10,10 @@ use thetahat::report::{
 
 use super::experiments::{Experiments, experiments};
 use super::search::{Identified, watched};
-use super::{grey_box, narx, process, summary};
+use super::{grey_box, narx, process, state_space, summary};
 use crate::args::{FitArguments, FormatArgument};
 use crate::failure::Failure;
-use crate::job::{FitJob, GreyBoxJob, NarxJob, ProcessJob, check_linear};
+use crate::job::{FitJob, GreyBoxJob, NarxJob, ProcessJob, StateSpaceJob, check_linear};
 use crate::log;
 use crate::messages::warn;
 use crate::output;
@@ -28,7 +28,10 @@ pub(crate) fn fit(arguments: &FitArguments, line: &str) -> Result<(), Failure> {
             Some(map) => narx::found(&NarxJob::resolve(arguments, map)?)?,
             None => match ProcessJob::resolve(arguments)? {
                 Some(job) => process::found(&job)?,
-                None => found(&FitJob::resolve(arguments)?, arguments.html.is_some())?,
+                None => match StateSpaceJob::resolve(arguments)? {
+                    Some(job) => state_space::found(&job)?,
+                    None => found(&FitJob::resolve(arguments)?, arguments.html.is_some())?,
+                },
             },
         },
     };

@@ -1,12 +1,11 @@
 //! What `fit` wrote, read back.
 
-use std::borrow::Cow;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
 use thetahat::Document;
-use thetahat::model::{Model, PolynomialModel};
+use thetahat::model::{LinearModel, Model, PolynomialModel};
 use thetahat::report::Report;
 use thetahat::spectrum::MeasuredResponse;
 
@@ -30,11 +29,7 @@ pub(super) fn polynomials<'m>(
 }
 
 /// What a stored model is from its inputs to each output, if it is linear: `what` needs it to be.
-pub(super) fn linear<'m>(
-    path: &Path,
-    model: &'m Model,
-    what: &str,
-) -> Result<Vec<Cow<'m, PolynomialModel>>, Failure> {
+pub(super) fn linear<'m>(path: &Path, model: &'m Model, what: &str) -> Result<Vec<LinearModel<'m>>, Failure> {
     model.linear(what).map_err(|error| Failure::data(format!("{}: {error}", path.display())))
 }
 

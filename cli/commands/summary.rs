@@ -8,6 +8,7 @@ mod nonlinear_arx;
 mod process;
 mod response;
 mod selection;
+mod state_space;
 mod step_test;
 mod text;
 mod tracking;
@@ -55,6 +56,7 @@ pub fn table(report: &Report, width: usize) -> String {
         Model::Equations(model) => return equations::table(report, model, width),
         Model::NonlinearArx(model) => return nonlinear_arx::table(report, model, width),
         Model::Process(model) => return process::table(report, model, width),
+        Model::StateSpace(model) => return state_space::table(report, model, width),
     };
     let mut text = Text::new(width);
     selection::selection(&mut text, report);
@@ -165,7 +167,8 @@ fn estimation(text: &mut Text, estimation: &Estimation, model: &PolynomialModel)
         | Procedure::Neighbours(_)
         | Procedure::Training(_)
         | Procedure::FreeRun(_)
-        | Procedure::FrequencyResponse(_) => {}
+        | Procedure::FrequencyResponse(_)
+        | Procedure::Subspace(_) => {}
         Procedure::PredictionError(search) => {
             text.line(&format!(
                 "prediction error, {}, {}",

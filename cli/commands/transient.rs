@@ -2,10 +2,8 @@
 
 use std::path::Path;
 
-use thetahat::Error;
-use thetahat::model::{Model, PolynomialModel, Quantity};
+use thetahat::model::{LinearModel, Model, Quantity};
 use thetahat::report::{Transient, transient_page};
-use thetahat::respond::{TransientResponse, impulse_response, step_response};
 
 use super::stored;
 use crate::args::TransientArguments;
@@ -18,13 +16,10 @@ pub(super) struct What {
     name: &'static str,
     article: &'static str,
     kind: Transient,
-    respond: fn(&PolynomialModel, usize, Option<usize>) -> Result<TransientResponse, Error>,
 }
 
-pub(super) const STEP: What =
-    What { name: "step", article: "a", kind: Transient::Step, respond: step_response };
-pub(super) const IMPULSE: What =
-    What { name: "impulse", article: "an", kind: Transient::Impulse, respond: impulse_response };
+pub(super) const STEP: What = What { name: "step", article: "a", kind: Transient::Step };
+pub(super) const IMPULSE: What = What { name: "impulse", article: "an", kind: Transient::Impulse };
 
 pub(crate) fn impulse(arguments: &TransientArguments, line: &str) -> Result<(), Failure> {
     let model = stored::model(&arguments.report)?;
@@ -52,14 +47,17 @@ pub(super) fn respond(
     }
     let mut responses = Vec::new();
     for model in &models {
-        for input in 0..model.inputs.len() {
-            let response = (what.respond)(model, input, samples);
+        for input in 0..model.inputs().len() {
+            let response = match what.kind {
+                Transient::Step => model.step_response(input, samples),
+                Transient::Impulse => model.impulse_response(input, samples),
+            };
             let response = response.map_err(|error| Failure::data(format!("{shown}: {error}")))?;
-            responses.push((&model.output.name, response));
+            responses.push((&model.output().name, response));
         }
     }
     if let Some(path) = page {
-        let named: Vec<&PolynomialModel> = models.iter().map(|model| &**model).collect();
+        let named: Vec<&LinearModel<'_>> = models.iter().collect();
         output::page(path, &transient_page(&named, what.kind, samples, &shown.to_string(), line))?;
     }
     let several = models.len() > 1;

@@ -27,6 +27,7 @@ impl ModelArgument {
             Self::General => ("general", &["--na", "--nb", "--nc", "--nd", "--nf"]),
             Self::Fir => ("fir", &["--taps"]),
             Self::Process => ("process", &["--structure"]),
+            Self::Ss => ("ss", &["--order"]),
         }
     }
 
@@ -44,6 +45,9 @@ impl ModelArgument {
             }
             Self::Process => Err(Failure::usage(
                 "--model process needs --structure, such as --structure p1d: a gain, a lag and a dead time",
+            )),
+            Self::Ss => Err(Failure::usage(
+                "--model ss has no polynomials, and is fitted alone; take another --model here",
             )),
             Self::General => Err(Failure::usage(
                 "--model general needs orders: it is any of the others; give --na --nb --nc --nd --nf, or no --model for a choice \

@@ -43,6 +43,7 @@ fn _thetahat(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(model::fit_narx, module)?)?;
     module.add_function(wrap_pyfunction!(model::fit_process, module)?)?;
     module.add_function(wrap_pyfunction!(model::fit_process_to_response, module)?)?;
+    module.add_function(wrap_pyfunction!(model::fit_state_space, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::validate, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::compare, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::inspect, module)?)?;

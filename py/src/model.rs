@@ -9,12 +9,9 @@ use pyo3::prelude::*;
 use thetahat::Document;
 use thetahat::data::Channel;
 use thetahat::estimate::Procedure;
-use thetahat::model::{PolynomialModel, Quantity, StateSpace};
+use thetahat::model::{LinearModel, PolynomialModel, Quantity, StateSpace};
 use thetahat::report::{PendingEvaluation, Report, apply, sample};
-use thetahat::respond::{
-    Draws, Horizon, InitialCondition, TransientResponse, frequency_response, impulse_response,
-    logarithmic_frequencies, step_response,
-};
+use thetahat::respond::{Draws, Horizon, InitialCondition, TransientResponse, logarithmic_frequencies};
 use thetahat::spectrum::MeasuredResponse;
 
 use crate::array::{from_matrix, matrix, vector};
@@ -97,6 +94,21 @@ pub(crate) fn fit_process(py: Python<'_>, log: &Bound<'_, Log>, options: Vec<OsS
     let (channels, sources) = (Arc::clone(&log.log), log.sources.clone());
     let report =
         interruptible(py, move |monitor| thetahat::report::fit_process(&channels, &sources, &plan, monitor))?;
+    Ok(Model::of(report))
+}
+
+/// Fits a state-space model to a log with the options of `thetahat fit --model ss`.
+#[pyfunction]
+pub(crate) fn fit_state_space(
+    py: Python<'_>,
+    log: &Bound<'_, Log>,
+    options: Vec<OsString>,
+) -> PyResult<Model> {
+    let log = log.get();
+    let plan = thetahat_cli::state_space_plan(&options, log.inputs.clone(), log.outputs.clone())
+        .map_err(|failure| error::program(py, &failure))?;
+    let (channels, sources) = (Arc::clone(&log.log), log.sources.clone());
+    let report = interruptible(py, move |_| thetahat::report::fit_state_space(&channels, &sources, &plan))?;
     Ok(Model::of(report))
 }
 
@@ -339,13 +351,7 @@ impl Model {
             }
         };
         let responses = interruptible(py, move |_| {
-            let models = model.linear("a frequency response")?;
-            let mut found = frequency_response(&models[output], &frequencies)?;
-            // Of equations the noise is not told.
-            found.retain(|response| {
-                response.input.is_some() || matches!(*model, thetahat::model::Model::Polynomial(_))
-            });
-            Ok(found)
+            model.linear("a frequency response")?[output].frequency_response(&frequencies)
         })?;
         let columns = responses.into_iter().map(|response| {
             let column = |of: &dyn Fn(&thetahat::respond::FrequencyPoint) -> f64| {
@@ -374,7 +380,7 @@ impl Model {
         samples: Option<usize>,
         output: usize,
     ) -> PyResult<[Column<'py>; 3]> {
-        self.transient(py, output, move |model| step_response(model, input, samples))
+        self.transient(py, output, move |model| model.step_response(input, samples))
     }
 
     /// The same for an impulse.
@@ -386,12 +392,15 @@ impl Model {
         samples: Option<usize>,
         output: usize,
     ) -> PyResult<[Column<'py>; 3]> {
-        self.transient(py, output, move |model| impulse_response(model, input, samples))
+        self.transient(py, output, move |model| model.impulse_response(input, samples))
     }
 
     /// F, G, H, D and K of the innovations form.
     fn state_space<'py>(&self, py: Python<'py>) -> PyResult<[Bound<'py, PyArray2<f64>>; 5]> {
-        let StateSpace { f, g, h, d, k, .. } = self.polynomials(py, "the innovations form")?.state_space();
+        let StateSpace { f, g, h, d, k, .. } = match &*self.model {
+            thetahat::model::Model::StateSpace(model) => model.matrices(),
+            _ => self.polynomials(py, "the innovations form")?.state_space(),
+        };
         let array = |matrix| from_matrix(py, matrix);
         Ok([array(&f)?, array(&g)?, array(&h)?, array(&d)?, array(&k)?])
     }
@@ -418,7 +427,7 @@ impl Model {
                 models.len()
             )));
         };
-        if own.inputs.is_empty() && matches!(*self.model, thetahat::model::Model::Equations(_)) {
+        if own.inputs().is_empty() && matches!(*self.model, thetahat::model::Model::Equations(_)) {
             return Err(PyValueError::new_err(format!("{what} needs inputs, and the model has none")));
         }
         Ok(())
@@ -429,7 +438,7 @@ impl Model {
         &self,
         py: Python<'py>,
         output: usize,
-        respond: impl FnOnce(&PolynomialModel) -> Result<TransientResponse, thetahat::Error> + Send + 'static,
+        respond: impl FnOnce(&LinearModel<'_>) -> Result<TransientResponse, thetahat::Error> + Send + 'static,
     ) -> PyResult<[Column<'py>; 3]> {
         let model = Arc::clone(&self.model);
         let what = "a step or impulse response";

@@ -116,7 +116,7 @@ def test_control_runs_the_state_space(numerator: list[float], denominator: list[
     control = pytest.importorskip("control")
     u = signals(1)[0]
     matrices = observer_form(numerator, denominator)
-    system = _convert.state_space_to_control(*matrices, SAMPLE_TIME, ["u"], "y")
+    system = _convert.state_space_to_control(*matrices, SAMPLE_TIME, ["u"], ["y"])
     assert isinstance(system, control.StateSpace)
     assert (system.dt, system.input_labels, system.output_labels) == (SAMPLE_TIME, ["u"], ["y"])
     assert system.nstates == np.shape(matrices[0])[0]
@@ -151,7 +151,7 @@ def test_a_time_series_has_no_transfer_function() -> None:
         lambda: _convert.to_scipy([], [], 1.0),
         lambda: _convert.to_control([], [], 1.0, [], "y"),
         lambda: _convert.state_space_to_scipy([[0.5]], none, [[1.0]], none, 1.0),
-        lambda: _convert.state_space_to_control([[0.5]], none, [[1.0]], none, 1.0, [], "y"),
+        lambda: _convert.state_space_to_control([[0.5]], none, [[1.0]], none, 1.0, [], ["y"]),
     ]
     for call in calls:
         with pytest.raises(ValueError, match="no inputs.*state_space"):

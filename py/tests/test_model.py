@@ -200,7 +200,7 @@ def test_the_innovations_form_predicts_the_same(motor: th.Log) -> None:
         predicted[t] = (form.H @ x + form.D[:, 0] * u[t])[0]
         x = form.F @ x + form.G[:, 0] * u[t] + form.K[:, 0] * (y[t] - predicted[t])
     assert np.allclose(predicted + model.offsets["y"][0], model.predict(motor, 1, initial="zero"), atol=1e-9)
-    assert form.noise_variance == model.noise_variance
+    assert form.noise_covariance.tolist() == [[model.noise_variance]]
 
 
 def test_statsmodels_agrees(motor: th.Log) -> None:

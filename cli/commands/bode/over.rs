@@ -1,9 +1,8 @@
 //! Models over a measured response.
 
-use std::borrow::Cow;
 use std::path::Path;
 
-use thetahat::model::{Model, PolynomialModel};
+use thetahat::model::{LinearModel, Model};
 use thetahat::report::response_page;
 use thetahat::respond::{FrequencyPoint, FrequencyResponse};
 use thetahat::spectrum::MeasuredResponse;
@@ -44,8 +43,8 @@ pub(super) fn over(arguments: &BodeArguments, path: &Path, line: &str) -> Result
         }
         overlaid.push((name, found.overlaid(model).map_err(failed)?));
     }
-    let models: Vec<(String, &PolynomialModel)> =
-        models.iter().map(|(name, model)| (name.clone(), model.as_ref())).collect();
+    let models: Vec<(String, &LinearModel<'_>)> =
+        models.iter().map(|(name, model)| (name.clone(), model)).collect();
     if let Some(html) = &arguments.html {
         output::page(html, &response_page(&found, &models, line))?;
     }
@@ -58,9 +57,9 @@ fn of_output<'m>(
     report: &Path,
     model: &'m Model,
     found: &MeasuredResponse,
-) -> Result<Cow<'m, PolynomialModel>, Failure> {
+) -> Result<LinearModel<'m>, Failure> {
     let all = stored::linear(report, model, "a frequency response")?;
-    all.into_iter().find(|model| model.output.name == found.output).ok_or_else(|| {
+    all.into_iter().find(|model| model.output().name == found.output).ok_or_else(|| {
         Failure::data(format!(
             "{}: the model has no output '{}', of which the response is; give a model of the same channels",
             report.display(),

@@ -272,6 +272,18 @@ fn residuals(text: &mut Text, found: &Validation, alpha: f64) {
         text.line("residuals: not tested");
         text.line("");
     }
+    if let Some(test) = &found.portmanteau {
+        let p = or_dash(test.p_value, chance);
+        let verdict = if test.p_value.is_some_and(|p| p < alpha) { "not white" } else { "white" };
+        text.line(&format!(
+            "residuals of all outputs together: {verdict} at {}, {} lags, statistic {}, {} degrees, p-value {p}",
+            short(alpha),
+            test.lags,
+            fixed(test.statistic, 2),
+            short(test.degrees)
+        ));
+        text.line("");
+    }
     found.residuals.iter().for_each(|residuals| residuals_of(text, found, residuals, alpha));
 }
 
@@ -315,7 +327,7 @@ fn residuals_of(text: &mut Text, found: &Validation, residuals: &Residuals, alph
         add(format!("no feedback to {input}"), feedback, ["none seen", "suspected"][usize::from(*suspected)]);
     }
     // Of a linear model only where there is something to see.
-    let says = |test: &Test| found.structure.is_none() || rejected(test);
+    let says = |test: &Test| (found.structure.is_none() && found.stable.is_none()) || rejected(test);
     for one in found.nonlinear.iter().filter(|one| one.output == residuals.output) {
         let input = harmless(&one.input);
         for (what, test) in [("errors", &one.errors), ("squared errors", &one.squares)] {

@@ -11,7 +11,7 @@
 //!   [`Constant`] says whether the level of the output is estimated too.
 //! - [`Procedure`] says how an estimate was found: by a [`Solver`], or with a [`SearchOutcome`] ([`StartOutcome`]),
 //!   [`ConvexOutcome`], [`RobustOutcome`], [`LikelihoodOutcome`],
-//!   [`EquationsOutcome`] or [`MapsOutcome`] (for each output a [`TermsOutcome`]: a path of [`TermStep`]s with their [`RunFigures`]).
+//!   [`EquationsOutcome`], [`SubspaceOutcome`] or [`MapsOutcome`] (for each output a [`TermsOutcome`]: a path of [`TermStep`]s with their [`RunFigures`]).
 //! - [`Criteria`] are the values of each [`InformationCriterion`].
 //!
 //! The methods and their sources are at [`Method`]; the theory is that of Ljung, System Identification, 2nd ed. 1999, chapters 7
@@ -91,7 +91,8 @@ pub(crate) use process::{
 };
 pub use robust::{Loss, Robust, RobustOutcome};
 pub(crate) use stretches::stretches;
-pub use subspace::{OrderScore, Subspace, SubspaceOptions, subspace};
+pub use subspace::{OrderScore, Subspace, SubspaceOptions, SubspaceOutcome, subspace};
+pub(crate) use subspace::{best as best_order, products_of_innovations};
 pub(crate) use uncertainty::{Autoregression, autoregression, backward_filtered_products};
 
 /// How an estimate was found.
@@ -145,6 +146,8 @@ pub enum Procedure {
     FreeRun(ProcessOutcome),
     /// By a search for the least errors of the frequency response of a process.
     FrequencyResponse(ProcessOutcome),
+    /// By a subspace method: the states first, then the matrices.
+    Subspace(SubspaceOutcome),
 }
 
 impl Procedure {
@@ -455,7 +458,8 @@ impl Estimate {
             | Procedure::Neighbours(_)
             | Procedure::Training(_)
             | Procedure::FreeRun(_)
-            | Procedure::FrequencyResponse(_) => None,
+            | Procedure::FrequencyResponse(_)
+            | Procedure::Subspace(_) => None,
             Procedure::InstrumentalVariables { .. } | Procedure::RefinedInstrumentalVariables { .. } => {
                 self.covariance
             }

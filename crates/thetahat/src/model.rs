@@ -4,11 +4,12 @@
 //!   [`Structure`] (Ljung, System Identification: Theory for the User, 2nd ed. 1999, section 4.2).
 //! - [`PolynomialModel`] has the polynomials, each [`Parameter`] with its standard error, every [`Root`] and [`Quantity`] that follows
 //!   from them with an [`Interval`], and the [`Signal`]s it was fitted to. [`OffsetCovariance`] is what is open of their offsets.
-//! - [`StateSpace`] is the same model as a recursion of first order, for filters and controllers.
+//! - [`StateSpace`] is the same model as a recursion of first order, for filters and controllers; [`StateSpaceModel`] is one that was
+//!   estimated as such, with any number of outputs.
 //! - [`GreyBox`] is a model in equations as a person writes it, [`EquationsModel`] one whose parameters were estimated.
 //! - [`NonlinearArxModel`] is a nonlinear map of past outputs and inputs: for each output an [`OutputMap`], a [`Map`] of [`Regressor`]s,
 //!   which may be local models, each with its [`Membership`].
-//! - [`Model`] is a model of any kind: what reports hold.
+//! - [`Model`] is a model of any kind: what reports hold. [`LinearModel`] is one output of a linear one.
 //!
 //! ```
 //! use thetahat::model::{Orders, Structure};
@@ -24,6 +25,7 @@ mod dynamics;
 pub(crate) mod equations;
 mod fitted;
 mod kind;
+mod linear;
 mod nonlinear_arx;
 mod orders;
 pub(crate) mod polynomial;
@@ -37,6 +39,7 @@ pub use equations::{EquationsModel, GreyBox};
 pub(crate) use fitted::is_covariance;
 pub use fitted::{OffsetCovariance, Parameter, PolynomialModel, Signal};
 pub use kind::Model;
+pub use linear::LinearModel;
 pub(crate) use nonlinear_arx::Evaluator;
 pub use nonlinear_arx::{
     Activation, Functions, Map, Membership, NonlinearArxModel, OutputMap, Regressor, RunError,
@@ -46,4 +49,4 @@ pub use orders::{Orders, Structure};
 pub(crate) use process::{Chain, Columns, Parts, State, Transition};
 pub use process::{ProcessModel, ProcessStructure};
 pub use quantity::{Interval, Quantity, Root};
-pub use state_space::StateSpace;
+pub use state_space::{StateSpace, StateSpaceModel, ZerosPolesGain};

@@ -3,11 +3,11 @@
 //! - [`identify`] fits what a [`Plan`] says and gives a [`Report`]; [`identify_monitored`] can be watched and ended, [`PendingEvaluation`] is a
 //!   fit before its figures. [`fit_equations`] does the same for a model in equations with an [`EquationsPlan`],
 //!   [`fit_process`] for a process in continuous time with a [`ProcessPlan`], [`fit_process_to_response`] for one of a measured frequency
-//!   response, [`fit_nonlinear_arx`] for a nonlinear ARX model with a [`NonlinearArxPlan`] ([`InputLags`], [`MapPlan`], [`Centres`]).
+//!   response, [`fit_state_space`] for a model with any number of outputs with a [`StateSpacePlan`], [`fit_nonlinear_arx`] for a nonlinear ARX model with a [`NonlinearArxPlan`] ([`InputLags`], [`MapPlan`], [`Centres`]).
 //! - [`Report`] is the JSON document of a fit: its [`Data`] ([`Parts`], [`Missing`]), the model, its [`Estimation`] and its figures.
 //! - [`validate`] tests a report on a log as a [`ValidationPlan`] says. It gives a [`Validated`]: the document, a [`Validation`] with
 //!   [`NoiseLevel`], [`Coverage`] and whether the fit has [`InSample`] the rows, and the [`Signals`] for charts ([`OutputSignals`]).
-//! - [`compare`] puts several validations side by side in a [`Comparison`]. A [`Requirement`] makes a gate of a validation.
+//! - [`compare`] puts several validations side by side in a [`Comparison`]. A [`Requirement`] (a [`Demand`] of an output or of all) makes a gate of a validation.
 //! - [`apply`] predicts or simulates a log with a stored model ([`Applied`], [`AppliedOutput`]), [`sample`] draws from it.
 //!   [`held_out_runs`] are the free runs of the models between which a choice was made.
 //! - With the feature `html`, `fit_page`, `validation_page`, `comparison_page`, `inspection_page`, `response_page`, `step_test_page` and `transient_page`
@@ -46,6 +46,7 @@ mod requirement;
 mod sample;
 mod schema;
 mod shares;
+mod state_space;
 mod suited;
 #[cfg(test)]
 mod tests;
@@ -66,9 +67,10 @@ pub use nonlinear_arx::{
 };
 pub use plan::Plan;
 pub use process::{ProcessPlan, fit_process, fit_process_to_response};
-pub use requirement::Requirement;
+pub use requirement::{Demand, Requirement};
 pub use sample::sample;
 pub use schema::{Data, Estimation, Missing, Parts, Report};
+pub use state_space::{StateSpacePlan, fit_state_space};
 pub use validation::{
     Comparison, Coverage, InSample, NoiseLevel, OutputSignals, Signals, Validated, Validation,
     ValidationPlan, compare, validate,

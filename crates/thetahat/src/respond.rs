@@ -39,6 +39,7 @@ mod initial_condition;
 mod initial_responses;
 mod innovations;
 mod kinds;
+mod linear;
 mod nis;
 pub(crate) mod nonlinear_arx;
 mod on_log;
@@ -47,6 +48,7 @@ pub(crate) mod process;
 mod response;
 mod sensitivities;
 mod simulate;
+pub(crate) mod state_space;
 #[cfg(test)]
 mod tests;
 mod transient;

@@ -31,6 +31,7 @@ mod fit;
 mod independence;
 mod moments;
 mod nonlinear;
+mod portmanteau;
 mod residuals;
 #[cfg(test)]
 mod tests;
@@ -40,6 +41,7 @@ mod whiteness;
 pub use fit::{Fit, Part};
 pub use nonlinear::Nonlinearity;
 pub(crate) use nonlinear::nonlinearities;
+pub(crate) use portmanteau::portmanteau;
 pub(crate) use residuals::Relation;
 pub use residuals::Residuals;
 pub use verdict::{Anderson, AndersonLevel, Independence, Test};

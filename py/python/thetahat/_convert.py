@@ -152,7 +152,7 @@ def response_to_control(
 
 
 def state_space_to_scipy(F: ArrayLike, G: ArrayLike, H: ArrayLike, D: ArrayLike, sample_time: float) -> Any:
-    """A state space from the inputs to the output, for ``scipy.signal``.
+    """A state space from the inputs to the outputs, for ``scipy.signal``.
 
     Parameters
     ----------
@@ -184,9 +184,9 @@ def state_space_to_control(
     D: ArrayLike,
     sample_time: float,
     input_names: Sequence[str],
-    output_name: str,
+    output_names: Sequence[str],
 ) -> Any:
-    """A state space from the inputs to the output, for python-control.
+    """A state space from the inputs to the outputs, for python-control.
 
     Parameters
     ----------
@@ -196,8 +196,8 @@ def state_space_to_control(
         Seconds from one sample to the next.
     input_names : sequence of str
         The inputs' names, in the order of the columns of G.
-    output_name : str
-        The output's name.
+    output_names : sequence of str
+        The outputs' names, in the order of the rows of H.
 
     Returns
     -------
@@ -216,7 +216,7 @@ def state_space_to_control(
         *matrices,
         sample_time,
         inputs=list(input_names),
-        outputs=[output_name],
+        outputs=list(output_names),
         # Whatever the user's defaults are: the states are those of the model.
         remove_useless_states=False,
     )

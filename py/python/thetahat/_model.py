@@ -321,7 +321,7 @@ class Model(ReportedModel):
 
         Returns
         -------
-        ndarray, shape (N,)
+        ndarray, shape (N,), of several outputs (N, outputs)
             NaN where there is no prediction, or no measured output.
 
         Examples
@@ -333,7 +333,7 @@ class Model(ReportedModel):
         True
         """
         values = self.predict(log, horizon, initial=initial)
-        return log[self.output] - values
+        return _beside([log[output] for output in self.outputs]) - values
 
     def validate(
         self,
@@ -481,7 +481,7 @@ class Model(ReportedModel):
         (2, 2)
         """
         matrices = self._model.state_space()
-        return StateSpace(*matrices, self.noise_variance, self.sample_time, self.inputs, self.output)
+        return StateSpace(*matrices, self.noise_covariance, self.sample_time, self.inputs, self.outputs)
 
     def to_scipy(self) -> Any:
         """The plant as a discrete transfer function of SciPy; of several inputs, a list of them.
@@ -489,22 +489,26 @@ class Model(ReportedModel):
         Returns
         -------
         scipy.signal.dlti, or a list of them
-            B/(A F) of each input, in deviations from the offsets.
+            B/(A F) of each input, in deviations from the offsets; of a model in state space its matrices.
         """
         from thetahat import _convert
 
+        if self.kind == "state-space":
+            return self.to_state_space().to_scipy()
         return _convert.to_scipy(self.b, self._denominators(), self.sample_time)
 
     def to_control(self) -> Any:
-        """The plant as a transfer function of python-control, with one output and the inputs by name.
+        """The plant for python-control, with inputs and outputs by name.
 
         Returns
         -------
-        control.TransferFunction
-            B/(A F) of each input, in deviations from the offsets.
+        control.TransferFunction or control.StateSpace
+            B/(A F) of each input, in deviations from the offsets; of a model in state space its matrices.
         """
         from thetahat import _convert
 
+        if self.kind == "state-space":
+            return self.to_state_space().to_control()
         return _convert.to_control(self.b, self._denominators(), self.sample_time, self.inputs, self.output)
 
     def _denominators(self) -> list[Array]:

@@ -417,9 +417,9 @@ def words(allowed: type, arguments: Mapping[str, Any], rows: int | None = None) 
             continue
         if name == "header":
             # The command line says it the other way round.
-            found += [] if _flag(name, value) else ["--no-header"]
+            found += [] if flag(name, value) else ["--no-header"]
         elif name == "linear":
-            found += [] if _flag(name, value) else ["--no-linear"]
+            found += [] if flag(name, value) else ["--no-linear"]
         elif name == "terms" and isinstance(value, (list, tuple)):
             # The products themselves.
             if not value:
@@ -430,7 +430,7 @@ def words(allowed: type, arguments: Mapping[str, Any], rows: int | None = None) 
                 raise TypeError(f"regressors: expected a sequence of str, found {value!r}")
             found += [f"--regressor={text(name, one)}" for one in value]
         elif name in ("decimal_comma", "trend", "raw_terms", "drawn"):
-            found += [f"--{name.replace('_', '-')}"] if _flag(name, value) else []
+            found += [f"--{name.replace('_', '-')}"] if flag(name, value) else []
         else:
             found += [f"--{name.replace('_', '-')}={text}" for text in _texts(name, value, rows)]
     return found
@@ -531,7 +531,7 @@ def resampling(name: str, value: Any) -> tuple[float, str, bool]:
     return seconds(name, value[0]), text(name, value[1]), len(value) == 2
 
 
-def _flag(name: str, value: Any) -> bool:
+def flag(name: str, value: Any) -> bool:
     if not isinstance(value, bool):
         raise TypeError(f"{name}: expected True or False, found {value!r}")
     return value

@@ -62,13 +62,19 @@ class ReportedModel:
 
     @property
     def kind(self) -> str:
-        """``"polynomial"``, ``"equations"``, ``"nonlinear-arx"`` or ``"process"``."""
+        """``"polynomial"``, ``"equations"``, ``"nonlinear-arx"``, ``"process"`` or ``"state-space"``."""
         return str(self._own["kind"])
 
     def _polynomial(self, name: str) -> Any:
-        """A part that only models of polynomials have."""
-        if name not in self._own:
-            kind = {"equations": "in equations", "nonlinear-arx": "a nonlinear ARX model", "process": "a process"}[self.kind]
+        """A part that only models of polynomials have; of those in state space what follows from its poles."""
+        shared = ("stable", "poles", "time_constants", "dc_gain")
+        if name not in self._own or (self.kind == "state-space" and name not in shared):
+            kind = {
+                "equations": "in equations",
+                "nonlinear-arx": "a nonlinear ARX model",
+                "process": "a process",
+                "state-space": "in state space",
+            }[self.kind]
             raise AttributeError(
                 f"{name} is of polynomial models, and this one is {kind}: it predicts, simulates, validates and compares"
             )
@@ -86,24 +92,28 @@ class ReportedModel:
 
     @property
     def parameters(self) -> Array:
-        """The estimates, shape (p,), in the order of `parameter_names`."""
-        return np.array([parameter["value"] for parameter in self._own["parameters"]])
+        """The estimates, shape (p,), in the order of `parameter_names`; none in state space, where coordinates are a choice."""
+        return np.array([parameter["value"] for parameter in self._entries])
 
     @property
     def parameter_names(self) -> list[str]:
         """Such as ``a1`` or ``b3``: the letter of the polynomial and the power of q^-1."""
-        return [parameter["name"] for parameter in self._own["parameters"]]
+        return [parameter["name"] for parameter in self._entries]
 
     @property
     def standard_errors(self) -> Array:
         """The square roots of the parameters' variances, shape (p,); NaN where no theory gives one."""
-        return _numbers.of_document([parameter["standard_error"] for parameter in self._own["parameters"]])
+        return _numbers.of_document([parameter["standard_error"] for parameter in self._entries])
+
+    @property
+    def _entries(self) -> list[dict[str, Any]]:
+        return list(self._own.get("parameters", []))
 
     @property
     def covariance(self) -> Array | None:
         """The covariance matrix of the parameters, shape (p, p); None where no theory gives one."""
-        covariance = self._own["covariance"]
-        return None if covariance is None else np.array(covariance).reshape(2 * (len(self._own["parameters"]),))
+        covariance = self._own.get("covariance")
+        return None if covariance is None else np.array(covariance).reshape(2 * (len(self._entries),))
 
     def confidence_interval(self, level: float = 0.95) -> Array:
         """The intervals that hold the parameters with this probability, shape (p, 2).
@@ -190,7 +200,7 @@ class ReportedModel:
         return bool(self._polynomial("stable"))
 
     def poles(self) -> npt.NDArray[np.complex128]:
-        """The roots of A and of each F in the z plane."""
+        """The roots of A and of each F in the z plane; in state space the eigenvalues of F."""
         return _roots(self._polynomial("poles"))
 
     def zeros(self, input: int | str = 0) -> npt.NDArray[np.complex128]:
@@ -205,12 +215,13 @@ class ReportedModel:
         """The roots of C."""
         return _roots(self._polynomial("noise_zeros"))
 
-    def dc_gain(self, input: int | str = 0) -> tuple[float, float]:
+    def dc_gain(self, input: int | str = 0, *, output: int | str | None = None) -> tuple[float, float]:
         """The static gain from an input and its standard error; NaN at an integrator.
 
-        Near an integrator the gain is far from normal; `dc_gain_interval` holds there too.
+        Near an integrator the gain is far from normal; `dc_gain_interval` holds there too. ``output`` says to which, where there are
+        several.
         """
-        gain = self._polynomial("dc_gain")[self._input(input)]
+        gain = self._gain(input, output)
         if gain is None:
             return (np.nan, np.nan)
         return (float(gain["value"]), float("nan" if gain["standard_error"] is None else gain["standard_error"]))
@@ -220,7 +231,12 @@ class ReportedModel:
         constants = self._polynomial("time_constants")
         return _numbers.of_document([None if constant is None else constant["value"] for constant in constants])
 
-    def dc_gain_interval(self, input: int | str = 0) -> Array:
+    def _gain(self, input: int | str, output: int | str | None) -> dict[str, Any] | None:
+        gains, place = self._polynomial("dc_gain"), self._output(output)
+        found: dict[str, Any] | None = (gains[place] if self.kind == "state-space" else gains)[self._input(input)]
+        return found
+
+    def dc_gain_interval(self, input: int | str = 0, *, output: int | str | None = None) -> Array:
         """The interval that holds the static gain with a probability of 95 %, shape (2,), by Fieller's theorem.
 
         Infinite where it has no end, as near an integrator; NaN where there is no gain or no standard error.
@@ -231,7 +247,7 @@ class ReportedModel:
         >>> th.arx(th.dc_motor(), na=2, nb=2).dc_gain_interval().round(1)
         array([18.3, 19.6])
         """
-        return _interval(self._polynomial("dc_gain")[self._input(input)])
+        return _interval(self._gain(input, output))
 
     def time_constant_intervals(self) -> Array:
         """The intervals that hold the `time_constants` with a probability of 95 % each, shape (n, 2).
@@ -315,6 +331,10 @@ class ReportedModel:
         if self.method in ("exact-likelihood", "innovations-likelihood"):
             known = self._estimation["log_likelihood"]
             return np.nan if known is None else float(known)
+        if self.kind == "state-space":
+            # The determinant of the covariance of the errors stands in the criteria.
+            size, determinant = len(self.outputs), self.criteria["aic"] - 2 * self._estimated / self.samples
+            return float(-self.samples / 2 * (size * (np.log(2 * np.pi) + 1) + determinant))
         return -self.samples / 2 * (np.log(2 * np.pi) + np.log(self.mse) + 1) if self.mse > 0 else np.nan
 
     @property
@@ -348,7 +368,7 @@ class ReportedModel:
     @property
     def _estimated(self) -> int:
         levels = [self._estimation.get(name) for name in ("level", "slope")]
-        return len(self.parameters) + sum(level is not None for level in levels)
+        return int(self._own.get("free_parameters", len(self._entries))) + sum(level is not None for level in levels)
 
     @property
     def fits(self) -> list[dict[str, Any]]:

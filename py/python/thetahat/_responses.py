@@ -136,17 +136,17 @@ class TransientResponse:
 class StateSpace(NamedTuple):
     """The innovations form, x(t+1) = F x(t) + G u(t) + K e(t), y(t) = H x(t) + D u(t) + e(t), in deviations from the offsets.
 
-    A Kalman filter takes it with Q = K K' var e, S = K var e and R = var e, of which K is the steady gain.
+    A Kalman filter takes it with Q = K R K', S = K R and R = cov e, of which K is the steady gain.
 
     Attributes
     ----------
-    F, G, H, D, K : ndarray, shapes (n, n), (n, inputs), (1, n), (1, inputs), (n, 1)
+    F, G, H, D, K : ndarray, shapes (n, n), (n, inputs), (outputs, n), (outputs, inputs), (n, outputs)
         The matrices.
-    noise_variance : float
-        The variance of e.
+    noise_covariance : ndarray, shape (outputs, outputs)
+        The covariance of e.
     sample_time : float
         Seconds from one sample to the next.
-    inputs, output : list of str, str
+    inputs, outputs : list of str
         The names of the channels.
 
     Examples
@@ -164,10 +164,10 @@ class StateSpace(NamedTuple):
     H: Array
     D: Array
     K: Array
-    noise_variance: float
+    noise_covariance: Array
     sample_time: float
     inputs: list[str]
-    output: str
+    outputs: list[str]
 
     def to_scipy(self) -> Any:
         """The response to the inputs as a discrete `scipy.signal.StateSpace`."""
@@ -180,4 +180,4 @@ class StateSpace(NamedTuple):
         from thetahat import _convert
 
         matrices = (self.F, self.G, self.H, self.D)
-        return _convert.state_space_to_control(*matrices, self.sample_time, self.inputs, self.output)
+        return _convert.state_space_to_control(*matrices, self.sample_time, self.inputs, self.outputs)

@@ -113,7 +113,13 @@ def log(log: Log, axes: Any = None) -> Grid:
 
 
 def fit(
-    models: Models, log: Log, horizon: int | None = None, ax: Axes | None = None, *, level: float = 0.95
+    models: Models,
+    log: Log,
+    horizon: int | None = None,
+    ax: Axes | None = None,
+    *,
+    output: int | str | None = None,
+    level: float = 0.95,
 ) -> Axes:
     """The measured output, and what models say of it.
 
@@ -129,6 +135,8 @@ def fit(
         Steps ahead; None is a free run: the inputs alone drive the model.
     ax : Axes, optional
         Where to draw.
+    output : int or str, optional
+        Which output, where models have several: its position, or its name.
     level : float, default 0.95
         The probability with which the band holds the measured output. A free run has no band: nothing is known of how its
         noise began.
@@ -153,7 +161,8 @@ def fit(
     _drawing.expect("log", log, Log)
     named = _drawing.named(models, (Model,))
     # A channel of the log is found by its name, as a prediction finds it.
-    measured = {model.output: log[model.output] for _, model in named}
+    which = {name: model._output(output) for name, model in named}
+    measured = {model.outputs[which[name]]: log[model.outputs[which[name]]] for name, model in named}
     ax = _drawing.one(ax)
     for name, values in measured.items():
         time, values = _drawing.broken(log, values)
@@ -163,14 +172,16 @@ def fit(
     bands = []
     drawn_all = []
     for name, model in named:
-        values = model.predict(log, horizon)
-        percent = _drawing.percent(measured[model.output], values)
+        place = which[name]
+        values = _column(model.predict(log, horizon), place)
+        percent = _drawing.percent(measured[model.outputs[place]], values)
         time, drawn = _drawing.broken(log, values)
         drawn_all.append(drawn)
         label = _drawing.shown(f"{name}, {far}" + (f": {_drawing.fixed(percent, 2)} %" if isfinite(percent) else ""))
         (line,) = ax.plot(time, drawn, linewidth=1.0, label=label, **_drawing.lone(drawn))
         if horizon is not None:
-            low, high = (_drawing.broken(log, end)[1] for end in model.predict_interval(log, horizon, level=level))
+            ends = model.predict_interval(log, horizon, level=level)
+            low, high = (_drawing.broken(log, _column(end, place))[1] for end in ends)
             bands.append(_drawing.band(ax, time, low, high, line.get_color()))
     _drawing.label_one(bands, level)
     _drawing.boundaries(ax, log)
@@ -180,6 +191,11 @@ def fit(
     # To find the best place takes long in a long log.
     ax.legend(loc="best" if len(log) <= 20_000 else "upper right")
     return ax
+
+
+def _column(values: npt.NDArray[np.float64], place: int) -> npt.NDArray[np.float64]:
+    """That of an output, where there are several."""
+    return values if values.ndim == 1 else values[:, place]
 
 
 def residuals(of: Validation | Model, log: Log | None = None, axes: Any = None) -> Grid:
@@ -251,6 +267,7 @@ def bode(
     axes: Any = None,
     *,
     sources: Sequence[str] | str | None = None,
+    output: int | str | None = None,
     level: float = 0.95,
 ) -> Grid:
     """Magnitude and phase over frequency.
@@ -266,6 +283,8 @@ def bode(
     sources : str or sequence of str, optional
         The inputs to draw the responses to, or ``"noise"``; all inputs, unless said otherwise, or the noise where there are
         none.
+    output : int or str, optional
+        Of which output, where models have several: its position, or its name.
     level : float, default 0.95
         The probability with which the bands hold the response at a frequency.
 
@@ -292,9 +311,10 @@ def bode(
             raise TypeError(f"w: a {type(one).__name__} has its own frequencies; leave it out")
         if isinstance(one, MeasuredResponse):
             one = one.to_frequency_response()
-        found.append((name, one.frequency_response(w, points=300) if isinstance(one, Model) else one))
+        found.append((name, one.frequency_response(w, points=300, output=output) if isinstance(one, Model) else one))
     there_are = list(dict.fromkeys(source for _, response in found for source in response.sources))
-    inputs = list(dict.fromkeys(source for _, response in found for source in response.sources[:-1]))
+    # The noise comes last, where a model says what becomes of it.
+    inputs = [source for source in there_are if source != "noise"]
     wanted = [sources] if isinstance(sources, str) else list(inputs or there_are if sources is None else sources)
     for source in wanted:
         if source not in there_are:
@@ -336,6 +356,7 @@ def step(
     samples: int | None = None,
     ax: Axes | None = None,
     *,
+    output: int | str | None = None,
     level: float = 0.95,
 ) -> Axes:
     """The response of the output to a unit step of an input, from rest.
@@ -350,6 +371,8 @@ def step(
         How many; until each has settled, unless said otherwise.
     ax : Axes, optional
         Where to draw.
+    output : int or str, optional
+        Of which output, where models have several: its position, or its name.
     level : float, default 0.95
         The probability with which the band holds the response at a time.
 
@@ -365,17 +388,23 @@ def step(
     >>> ax.get_ylabel()
     'y per unit of u'
     """
-    return _transient("step", Model.step_response, models, input, samples, ax, level)
+    return _transient("step", Model.step_response, models, input, samples, ax, output, level)
 
 
 def impulse(
-    models: Models, input: int | str = 0, samples: int | None = None, ax: Axes | None = None, *, level: float = 0.95
+    models: Models,
+    input: int | str = 0,
+    samples: int | None = None,
+    ax: Axes | None = None,
+    *,
+    output: int | str | None = None,
+    level: float = 0.95,
 ) -> Axes:
     """The impulse responses of models, with their bands.
 
     Parameters
     ----------
-    models, input, samples, ax, level
+    models, input, samples, ax, output, level
         As for `step`.
 
     Returns
@@ -390,7 +419,7 @@ def impulse(
     >>> ax.get_xlabel()
     'time since the impulse [s]'
     """
-    return _transient("impulse", Model.impulse_response, models, input, samples, ax, level)
+    return _transient("impulse", Model.impulse_response, models, input, samples, ax, output, level)
 
 
 def step_test(test: StepTest, log: Log, ax: Axes | None = None) -> Axes:
@@ -455,11 +484,12 @@ def step_test(test: StepTest, log: Log, ax: Axes | None = None) -> Axes:
 
 def _transient(
     what: str,
-    respond: Callable[[Model, int, Union[int, None]], TransientResponse],
+    respond: Callable[..., TransientResponse],
     models: Models,
     input: int | str,
     samples: int | None,
     ax: Axes | None,
+    output: int | str | None,
     level: float,
 ) -> Axes:
     half = _options.quantile(level)
@@ -468,8 +498,8 @@ def _transient(
         if isinstance(input, str) and input not in model.inputs:
             raise ValueError(f"input: {name} has no input {input}; there are: {', '.join(model.inputs) or 'none'}")
         index = model.inputs.index(input) if isinstance(input, str) else input
-        response = respond(model, index, samples)
-        found.append((name, response, f"{model.output} per unit of {model.inputs[index]}"))
+        response = respond(model, index, samples, output=output)
+        found.append((name, response, f"{model.outputs[model._output(output)]} per unit of {model.inputs[index]}"))
     ax = _drawing.one(ax)
     bands = []
     for name, response, _ in found:

@@ -49,6 +49,27 @@ impl<'a> JointRecord<'a> {
         Ok(Self { inputs, outputs, segments: std::iter::once(0..length).collect() })
     }
 
+    /// The same with inputs that wait so many samples: sample t has u_j(t - delay). Segments begin with the first sample that has all of them.
+    pub(crate) fn delayed(self, delays: &[usize]) -> Self {
+        let longest = delays.iter().copied().max().unwrap_or(0);
+        let samples = self.outputs.first().map_or(0, |output| output.len());
+        let longest = longest.min(samples);
+        let inputs = self.inputs.into_iter().zip(delays);
+        Self {
+            inputs: inputs
+                .map(|(input, delay)| {
+                    let delay = (*delay).min(longest);
+                    &input[longest - delay..samples - delay]
+                })
+                .collect(),
+            outputs: self.outputs.into_iter().map(|output| &output[longest..]).collect(),
+            segments: (self.segments.into_iter())
+                .filter(|segment| segment.len() > longest)
+                .map(|segment| segment.start..segment.end - longest)
+                .collect(),
+        }
+    }
+
     /// Inputs, then outputs.
     pub(crate) fn signals(&self) -> Vec<&'a [f64]> {
         self.inputs.iter().chain(&self.outputs).copied().collect()

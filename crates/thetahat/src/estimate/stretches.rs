@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::data::{Record, measured};
+use crate::data::{JointRecord, Record, measured};
 use crate::regression::sum_of_squares;
 
 /// From so many samples on, starts see stretches of the record only.
@@ -16,12 +16,27 @@ pub(super) fn thinned<'a>(record: &Record<'a>) -> Option<Record<'a>> {
     if total < LONG { None } else { stretches(record, STRETCHES, STRETCH) }
 }
 
+/// The same of a record with several outputs, in longer stretches.
+pub(super) fn thinned_joint<'a>(record: &JointRecord<'a>) -> Option<JointRecord<'a>> {
+    let total: usize = record.segments.iter().map(Range::len).sum();
+    let segments = if total < LONG { None } else { spread(&record.segments, STRETCHES, 4 * STRETCH) }?;
+    Some(JointRecord { segments, ..record.clone() })
+}
+
 /// So many stretches of at most so many samples, spread evenly over a record; none if of short segments less than half
 /// of that would be left.
 pub(crate) fn stretches<'a>(record: &Record<'a>, count: usize, length: usize) -> Option<Record<'a>> {
-    let total: usize = record.segments.iter().map(Range::len).sum();
+    let segments = spread(&record.segments, count, length)?;
+    let (output, inputs) = (record.output, record.inputs.clone());
+    let past = vec![0; segments.len()];
+    Some(Record { output, inputs, segments, past })
+}
+
+/// The rows of such stretches.
+fn spread(all: &[Range<usize>], count: usize, length: usize) -> Option<Vec<Range<usize>>> {
+    let total: usize = all.iter().map(Range::len).sum();
     let mut segments = Vec::with_capacity(count);
-    let (mut before, mut rest) = (0, record.segments.iter().peekable());
+    let (mut before, mut rest) = (0, all.iter().peekable());
     for position in (0..count).map(|k| k * (total / count)) {
         while let Some(segment) = rest.next_if(|segment| before + segment.len() <= position) {
             before += segment.len();
@@ -32,9 +47,7 @@ pub(crate) fn stretches<'a>(record: &Record<'a>, count: usize, length: usize) ->
         }
     }
     let kept: usize = segments.iter().map(Range::len).sum();
-    let (output, inputs) = (record.output, record.inputs.clone());
-    let past = vec![0; segments.len()];
-    (2 * kept > count * length).then_some(Record { output, inputs, segments, past })
+    (2 * kept > count * length).then_some(segments)
 }
 
 /// The sum of squares of the output over all segments.

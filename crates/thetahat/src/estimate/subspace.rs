@@ -6,18 +6,27 @@ mod riccati;
 mod tests;
 mod vector_arx;
 
+use std::ops::RangeInclusive;
+
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::{Cholesky, DMatrix};
 
+use super::stretches::thinned_joint;
 use crate::Error;
 use crate::data::JointRecord;
 use crate::model::StateSpace;
 use crate::optimize::normal;
+pub(crate) use innovations::products as products_of_innovations;
 use vector_arx::{ROUNDING, VectorArx, log_determinant};
 
 /// The largest past horizon that the data may choose.
 const LONGEST_PAST: usize = 40;
 /// Samples for each lagged signal of the longest past that the data may choose.
 const SAMPLES_A_LAG: usize = 5;
+/// The variance of e, in squares of the outputs, below which nothing is left of them.
+const NOTHING_LEFT: f64 = 1e-16;
 /// The largest order that is offered by itself.
 const HIGHEST_ORDER: usize = 20;
 
@@ -52,8 +61,23 @@ pub struct Subspace {
     moments: DMatrix<f64>,
 }
 
+/// How a state-space model was found by a subspace method.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct SubspaceOutcome {
+    /// p, the past samples that the state is made of.
+    pub past: usize,
+    /// Whether the inputs act on the outputs at once, so that D was estimated.
+    pub feedthrough: bool,
+    /// Whether that was asked for; else the data said it.
+    pub feedthrough_given: bool,
+    /// The largest singular values of what the past says of the outputs to come, in units of the deviation of e.
+    pub singular_values: Vec<f64>,
+    /// What the order was chosen among; empty if it was given.
+    pub orders: Vec<OrderScore>,
+}
+
 /// How well a model of some order predicts.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct OrderScore {
     /// n.
     pub order: usize,
@@ -391,7 +415,8 @@ impl Subspace {
     /// ```
     ///
     /// with e in units of the root mean squares of the outputs (Rissanen 1978; k is the number of free parameters of a canonical form, Ljung,
-    /// System Identification, 2nd ed. 1999, section 4A). O(N n (n + m + 2 l)) for each order.
+    /// System Identification, 2nd ed. 1999, section 4A). Of what the last states still leave of noise-free outputs, 1e-8 of their root mean
+    /// squares is nothing. Records of 2^18 samples and more are looked at in eight stretches of 2^14. O(N (n + l) (n + m + l)) for each order.
     ///
     /// # Errors
     /// [`Error::Data`] for a record with other numbers of inputs and outputs; [`Error::Argument`] for an order that is 0 or above the highest.
@@ -408,7 +433,10 @@ impl Subspace {
                 record.outputs.len()
             )));
         }
-        let samples = samples(record, 0) as f64;
+        let samples_in = |record: &JointRecord<'_>| samples(record, 0) as f64;
+        let all = samples_in(record);
+        let thinned = thinned_joint(record);
+        let looked_at = thinned.as_ref().unwrap_or(record);
         let score = |order: usize| {
             let model = match self.state_space(order, 1.0) {
                 Ok(model) => model,
@@ -416,29 +444,31 @@ impl Subspace {
                 Err(error) => return Err(error),
             };
             let outputs = &self.scales[m..];
-            let mdl = innovations::products(&model, record).map(|mut products| {
+            let mdl = innovations::products(&model, looked_at).map(|mut products| {
                 for (output, scale) in outputs.iter().enumerate() {
                     products.row_mut(output).unscale_mut(*scale);
                     products.column_mut(output).unscale_mut(*scale);
                 }
-                let direct = if self.feedthrough { l * m } else { 0 };
-                let parameters = (order * (m + 2 * l) + direct) as f64;
-                samples * log_determinant(&(products / samples)) + parameters * samples.ln()
+                let mean = products / samples_in(looked_at) + DMatrix::identity(l, l) * NOTHING_LEFT;
+                all * log_determinant(&mean) + self.free_parameters(order) as f64 * all.ln()
             });
             Ok(OrderScore { order, mdl: mdl.filter(|mdl| mdl.is_finite()) })
         };
-        orders.into_iter().map(score).collect()
+        let orders: Vec<usize> = orders.into_iter().collect();
+        orders.into_par_iter().map(score).collect()
+    }
+
+    /// k, the free parameters of a canonical form: n (m + 2 l), and l m with feedthrough.
+    pub fn free_parameters(&self, order: usize) -> usize {
+        let (m, l) = (self.inputs, self.outputs);
+        order * (m + 2 * l) + if self.feedthrough { l * m } else { 0 }
     }
 
     /// The order of the least MDL among some, those above the highest left out.
     ///
     /// # Errors
     /// [`Error::Argument`] if there is none in the range; [`Error::Undetermined`] where no model of them has a stable predictor.
-    pub fn order(
-        &self,
-        record: &JointRecord<'_>,
-        orders: std::ops::RangeInclusive<usize>,
-    ) -> Result<usize, Error> {
+    pub fn order(&self, record: &JointRecord<'_>, orders: RangeInclusive<usize>) -> Result<usize, Error> {
         let orders = *orders.start()..=(*orders.end()).min(self.highest);
         if orders.is_empty() {
             return Err(Error::argument(
@@ -446,17 +476,24 @@ impl Subspace {
                 format!("the range is empty; the data tell of orders from 1 to {}", self.highest),
             ));
         }
-        let scores = self.scores(record, orders)?;
-        let known = scores.iter().filter_map(|score| Some((score.order, score.mdl?)));
-        known.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(order, _)| order).ok_or_else(|| {
-            Error::undetermined(Vec::new(), "no model of these orders has a stable predictor; take others")
-        })
+        best(&self.scores(record, orders)?)
     }
 
     /// The orders that are offered where none are asked for.
-    pub fn orders(&self) -> std::ops::RangeInclusive<usize> {
+    pub fn orders(&self) -> RangeInclusive<usize> {
         1..=self.highest.min(HIGHEST_ORDER)
     }
+}
+
+/// The order of the least MDL.
+///
+/// # Errors
+/// [`Error::Undetermined`] where no model has one.
+pub(crate) fn best(scores: &[OrderScore]) -> Result<usize, Error> {
+    let known = scores.iter().filter_map(|score| Some((score.order, score.mdl?)));
+    known.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(order, _)| order).ok_or_else(|| {
+        Error::undetermined(Vec::new(), "no model of these orders has a stable predictor; take others")
+    })
 }
 
 /// X of the symmetric `products` X = right; zero for what depends on others.

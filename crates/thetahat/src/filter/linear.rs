@@ -7,11 +7,11 @@ use thetahat_core::{Covariance, LinearTransition};
 
 use super::frame::{Frame, InitialState, Names, check_noise};
 use crate::Error;
-use crate::model::PolynomialModel;
+use crate::model::{PolynomialModel, Signal, StateSpace};
 
 type Transition = LinearTransition<f64, Dyn, Dyn>;
 
-/// Prior variance of an unknown state, in units of the variance of e. One row leaves a millionth of it: a smoother loses six
+/// Prior variance of an unknown state, in units of the variance of e where it is seen. One row leaves a millionth of it: a smoother loses six
 /// digits, a filter none.
 const UNKNOWN: f64 = 1e6;
 
@@ -73,35 +73,50 @@ impl Linear {
         Ok((frame, Self { transition, correlation: Some(correlation) }))
     }
 
-    /// A fitted model: Q = K R K', S = K R, R = var e.
+    /// A fitted model of polynomials: see [`of_innovations`](Self::of_innovations).
     pub(super) fn of_model(model: &PolynomialModel, start: InitialState) -> Result<(Frame, Self), Error> {
-        let space = model.state_space();
-        let variance = model.noise_variance;
-        check_noise(variance)?;
+        let outputs = std::slice::from_ref(&model.output);
+        Self::of_innovations(model.state_space(), (&model.inputs, outputs), start)
+    }
+
+    /// A fitted model in innovations form: Q = K R K', S = K R, R = cov e.
+    pub(super) fn of_innovations(
+        space: StateSpace,
+        (inputs, outputs): (&[Signal], &[Signal]),
+        start: InitialState,
+    ) -> Result<(Frame, Self), Error> {
+        let noise = &space.noise_covariance;
+        noise.diagonal().iter().try_for_each(|variance| check_noise(*variance))?;
         let n = space.f.nrows();
-        let innovation = Covariance::from_diagonal(&DVector::repeat(1, variance));
+        let name = |signal: &Signal| signal.name.clone();
+        // Of the output of which the least is seen in a state.
+        let seen = |output: usize| noise[(output, output)] / space.h.row(output).amax().powi(2);
+        let scale = (0..noise.nrows()).map(seen).filter(|scale| scale.is_finite()).fold(0.0, f64::max);
         let build = || -> Result<(Frame, Linear), thetahat_core::Error> {
-            let r: Covariance<f64, Dyn> = innovation?;
+            let r: Covariance<f64, Dyn> = match noise.nrows() {
+                1 => Covariance::from_diagonal(&noise.diagonal())?,
+                _ => Covariance::new(noise)?,
+            };
             let names = Names {
                 states: (1..=n).map(|state| format!("x{state}")).collect(),
-                inputs: model.inputs.iter().map(|input| input.name.clone()).collect(),
-                outputs: vec![model.output.name.clone()],
+                inputs: inputs.iter().map(name).collect(),
+                outputs: outputs.iter().map(name).collect(),
                 sample_time: space.sample_time,
             };
             let q = r.transformed(&space.k)?;
-            let s = Some(&space.k * variance);
+            let s = Some(&space.k * noise);
             let p0 = match start {
                 InitialState::Zero => Covariance::zero(Dyn(n)),
-                InitialState::Unknown => Covariance::from_diagonal(&DVector::repeat(n, UNKNOWN * variance))?,
+                InitialState::Unknown => Covariance::from_diagonal(&DVector::repeat(n, UNKNOWN * scale))?,
             };
             let x0 = DVector::zeros(n);
-            let matrices = Matrices { f: space.f, g: space.g, h: space.h, d: space.d, q, r, s, x0, p0 };
-            Linear::of_matrices(names, matrices, true)
+            let StateSpace { f, g, h, d, .. } = space.clone();
+            Linear::of_matrices(names, Matrices { f, g, h, d, q, r, s, x0, p0 }, true)
         };
         let (frame, linear) =
             build().map_err(|error| Error::report(format!("its model has no filter: {error}")))?;
-        let input_offsets = model.inputs.iter().map(|input| input.offset).collect();
-        Ok((Frame { input_offsets, output_offsets: vec![model.output.offset], ..frame }, linear))
+        let offsets = |signals: &[Signal]| signals.iter().map(|signal| signal.offset).collect();
+        Ok((Frame { input_offsets: offsets(inputs), output_offsets: offsets(outputs), ..frame }, linear))
     }
 
     /// The transition after a row with these outputs there, and what drives it.

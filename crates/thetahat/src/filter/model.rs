@@ -77,7 +77,7 @@ impl StateModel {
         Ok(GreyBox::from_toml(text)?.into())
     }
 
-    /// The model of a report, from what `start` says, [`InitialState::Unknown`] without: polynomials in innovations form; a nonlinear ARX
+    /// The model of a report, from what `start` says, [`InitialState::Unknown`] without: polynomials and state space in innovations form; a nonlinear ARX
     /// model with its lags as the state, as deviations from the offsets, of which an unknown start is anywhere in the range of the rows
     /// that it was fitted to. Equations are as they are, with the values that were found, from the start that they say.
     ///
@@ -97,6 +97,11 @@ impl StateModel {
             Model::Process(model) => {
                 let start = start.unwrap_or(InitialState::Unknown);
                 Ok(Linear::of_model(&model.linear()?, start)?.into())
+            }
+            Model::StateSpace(model) => {
+                let start = start.unwrap_or(InitialState::Unknown);
+                let signals = (&*model.inputs, &*model.outputs);
+                Ok(Linear::of_innovations(model.matrices(), signals, start)?.into())
             }
             Model::NonlinearArx(model) => {
                 Ok(Lags::of_model(model, start.unwrap_or(InitialState::Unknown))?.into())

@@ -1,14 +1,14 @@
 //! The kinds of models.
 
-use std::borrow::Cow;
-
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::equations::EquationsModel;
 use super::fitted::{Parameter, PolynomialModel, Signal};
+use super::linear::LinearModel;
 use super::nonlinear_arx::NonlinearArxModel;
 use super::process::ProcessModel;
+use super::state_space::StateSpaceModel;
 use crate::Error;
 
 /// An estimated model of any kind.
@@ -26,6 +26,14 @@ pub enum Model {
     NonlinearArx(Box<NonlinearArxModel>),
     /// Gain, lags and dead time in continuous time.
     Process(Box<ProcessModel>),
+    /// A recursion of a state, with any number of outputs.
+    StateSpace(Box<StateSpaceModel>),
+}
+
+impl From<StateSpaceModel> for Model {
+    fn from(model: StateSpaceModel) -> Self {
+        Self::StateSpace(Box::new(model))
+    }
 }
 
 impl From<NonlinearArxModel> for Model {
@@ -60,6 +68,7 @@ impl Model {
             Self::Equations(model) => &model.inputs,
             Self::NonlinearArx(model) => &model.inputs,
             Self::Process(model) => &model.inputs,
+            Self::StateSpace(model) => &model.inputs,
         }
     }
 
@@ -70,6 +79,7 @@ impl Model {
             Self::Equations(model) => &model.outputs,
             Self::NonlinearArx(model) => &model.outputs,
             Self::Process(model) => std::slice::from_ref(&model.output),
+            Self::StateSpace(model) => &model.outputs,
         }
     }
 
@@ -85,16 +95,27 @@ impl Model {
             Self::Equations(model) => model.sample_time,
             Self::NonlinearArx(model) => model.sample_time,
             Self::Process(model) => model.sample_time,
+            Self::StateSpace(model) => model.sample_time,
         }
     }
 
-    /// The parameters, in the order of the covariance.
+    /// The parameters, in the order of the covariance. A state-space model has none: the entries of its matrices depend on the coordinates of
+    /// the state.
     pub fn parameters(&self) -> &[Parameter] {
         match self {
             Self::Polynomial(model) => &model.parameters,
             Self::Equations(model) => &model.parameters,
             Self::NonlinearArx(model) => &model.parameters,
             Self::Process(model) => &model.parameters,
+            Self::StateSpace(_) => &[],
+        }
+    }
+
+    /// How many numbers of it the data say.
+    pub fn free_parameters(&self) -> usize {
+        match self {
+            Self::StateSpace(model) => model.free_parameters,
+            _ => self.parameters().len(),
         }
     }
 
@@ -105,6 +126,7 @@ impl Model {
             Self::Equations(model) => model.covariance.as_deref(),
             Self::NonlinearArx(model) => model.covariance.as_deref(),
             Self::Process(model) => model.covariance.as_deref(),
+            Self::StateSpace(_) => None,
         }
     }
 
@@ -115,6 +137,7 @@ impl Model {
             Self::Equations(model) => !model.inputs.is_empty(),
             Self::NonlinearArx(model) => model.is_driven(),
             Self::Process(_) => true,
+            Self::StateSpace(model) => !model.inputs.is_empty(),
         }
     }
 
@@ -133,6 +156,7 @@ impl Model {
             }
             Self::NonlinearArx(model) => model.name(),
             Self::Process(model) => model.name(),
+            Self::StateSpace(model) => model.name(),
         }
     }
 
@@ -158,20 +182,33 @@ impl Model {
                      compares and responds to steps and sines"
                 ),
             )),
+            Self::StateSpace(_) => Err(Error::argument(
+                "model",
+                format!(
+                    "{what} is of polynomial models, and this one is in state space: it predicts, simulates, validates, compares, \
+                     filters and responds to steps and sines"
+                ),
+            )),
         }
     }
 
-    /// What the model is from its inputs to each of its outputs, as polynomials: those of its own, or the transfer functions of linear
-    /// equations, of which the noise is not told, and of processes whose inputs are held from sample to sample.
+    /// What the model is from its inputs to each of its outputs: of linear equations, and of processes whose inputs are held from sample to
+    /// sample, their transfer functions.
     ///
     /// # Errors
     /// [`Error::Argument`] if it is not linear, with what it can do instead; `what` needs it to be.
-    pub fn linear(&self, what: &str) -> Result<Vec<Cow<'_, PolynomialModel>>, Error> {
+    pub fn linear(&self, what: &str) -> Result<Vec<LinearModel<'_>>, Error> {
         match self {
-            Self::Polynomial(model) => Ok(vec![Cow::Borrowed(&**model)]),
-            Self::Equations(model) => Ok(model.linear(what)?.into_iter().map(Cow::Owned).collect()),
+            Self::Polynomial(model) => Ok(vec![LinearModel::Polynomial(model)]),
+            Self::Equations(model) => {
+                let each = model.linear(what)?.into_iter();
+                Ok(each.map(|model| LinearModel::Transfer(Box::new(model))).collect())
+            }
             Self::NonlinearArx(model) => Err(model.is_not_linear(what)),
-            Self::Process(model) => Ok(vec![Cow::Owned(model.linear()?)]),
+            Self::Process(model) => Ok(vec![LinearModel::Transfer(Box::new(model.linear()?))]),
+            Self::StateSpace(model) => {
+                Ok((0..model.outputs.len()).map(|output| LinearModel::StateSpace(model, output)).collect())
+            }
         }
     }
 
@@ -182,6 +219,7 @@ impl Model {
             Self::Equations(model) => model.check(),
             Self::NonlinearArx(model) => model.check(),
             Self::Process(model) => model.check(),
+            Self::StateSpace(model) => model.check(),
         }
     }
 }

@@ -1,6 +1,13 @@
+mod eigen;
+mod fitted;
+mod zeros;
+
 use thetahat_core::nalgebra::DMatrix;
 
+use crate::Error;
 use crate::model::PolynomialModel;
+pub use fitted::StateSpaceModel;
+pub use zeros::ZerosPolesGain;
 
 /// A model in innovations form, x of n states, u of m inputs and y of l outputs:
 ///
@@ -28,6 +35,49 @@ pub struct StateSpace {
     pub noise_covariance: DMatrix<f64>,
     /// Seconds from one sample to the next.
     pub sample_time: f64,
+}
+
+impl StateSpace {
+    /// # Errors
+    /// [`Error::Argument`] for matrices whose shapes do not fit or that are not finite, and a sample time that is not above 0.
+    fn check(&self) -> Result<(), Error> {
+        fit_together([
+            ("F", &self.f),
+            ("G", &self.g),
+            ("H", &self.h),
+            ("D", &self.d),
+            ("K", &self.k),
+            ("noise_covariance", &self.noise_covariance),
+        ])?;
+        if self.sample_time > 0.0 && self.sample_time.is_finite() {
+            return Ok(());
+        }
+        let message = format!("the sample time is {} s; it must be above 0 and finite", self.sample_time);
+        Err(Error::argument("model", message))
+    }
+}
+
+/// # Errors
+/// [`Error::Argument`] if the matrices of a model, those of [`StateSpace`] in their order, are not finite or not of shapes that fit.
+fn fit_together(matrices: [(&str, &DMatrix<f64>); 6]) -> Result<(), Error> {
+    let [(state, transition), _, _, (direct, feedthrough), _, _] = matrices;
+    let (n, l, m) = (transition.nrows(), feedthrough.nrows(), feedthrough.ncols());
+    let shapes = [(n, n), (n, m), (l, n), (l, m), (n, l), (l, l)];
+    for ((name, matrix), (rows, columns)) in matrices.into_iter().zip(shapes) {
+        if matrix.shape() != (rows, columns) {
+            let (found, across) = matrix.shape();
+            return Err(Error::argument(
+                "model",
+                format!(
+                    "{name} is {found} x {across}, not {rows} x {columns}: {state} has {n} rows, and {direct} is {l} x {m}"
+                ),
+            ));
+        }
+        if !matrix.iter().all(|value| value.is_finite()) {
+            return Err(Error::argument("model", format!("{name} has an entry that is not a finite number")));
+        }
+    }
+    Ok(())
 }
 
 /// What drives a model, an input or e: its numerator, and the denominator that it has beside A, empty without one.

@@ -27,9 +27,12 @@ pub use tuning::tuning_page;
 use super::{Report, Validated, Validation};
 use crate::Error;
 use crate::data::{Rows, Source};
+use crate::estimate::Procedure;
 use crate::figures::{self, fixed};
 use crate::inspect::Inspection;
-use crate::model::{EquationsModel, Map, Model, NonlinearArxModel, PolynomialModel, ProcessModel};
+use crate::model::{
+    EquationsModel, LinearModel, Map, Model, NonlinearArxModel, ProcessModel, StateSpaceModel,
+};
 use crate::validate::{Fit, Part, Residuals};
 
 /// The channels of a log of very many that are on its page.
@@ -148,8 +151,17 @@ pub fn comparison_page(reports: &[Report], validated: &[Validated], command: &st
     let named: Vec<(String, &Validated)> = names.iter().cloned().zip(validated).collect();
     let each = || names.iter().zip(reports);
     page.lead = each().map(|(name, report)| format!("{name} is {}", headline(&report.model))).collect();
-    let models: Vec<(String, &PolynomialModel)> =
-        each().filter_map(|(name, report)| Some((name.clone(), polynomials(&report.model)?))).collect();
+    let several = reports.iter().any(|report| report.model.outputs().len() > 1);
+    let mut linear: Vec<(String, LinearModel<'_>)> = Vec::new();
+    for (name, report) in each() {
+        // What is not linear has no responses of this kind.
+        for model in report.model.linear("a response").unwrap_or_default() {
+            let of = if several { format!(" to {}", model.output().name) } else { String::new() };
+            linear.push((format!("{name}{of}"), model));
+        }
+    }
+    let models: Vec<(String, &LinearModel<'_>)> =
+        linear.iter().map(|(name, model)| (name.clone(), model)).collect();
     let warnings: Vec<String> = named
         .iter()
         .flat_map(|(name, validated)| {
@@ -180,13 +192,14 @@ pub fn comparison_page(reports: &[Report], validated: &[Validated], command: &st
     page.sections.push(section);
 
     let mut inputs: Vec<&str> = Vec::new();
-    for input in models.iter().flat_map(|(_, model)| &model.inputs) {
+    for input in models.iter().flat_map(|(_, model)| model.inputs()) {
         if !inputs.contains(&input.name.as_str()) {
             inputs.push(&input.name);
         }
     }
     if !models.is_empty() {
-        page.sections.extend(responses(&models, &inputs, true));
+        let has_noise = models.iter().any(|(_, model)| model.has_noise());
+        page.sections.extend(responses(&models, &inputs, has_noise));
     }
     let mut section = Section::new("Data");
     section.table(tables::logs(logs));
@@ -296,24 +309,27 @@ fn of(logs: &[Source]) -> String {
 fn headline(model: &Model) -> String {
     match model {
         Model::Polynomial(model) => format!("{}: {}", model.orders, model.orders.equation()),
-        Model::Equations(_) | Model::NonlinearArx(_) | Model::Process(_) => model.name(),
+        Model::Equations(_) | Model::NonlinearArx(_) | Model::Process(_) | Model::StateSpace(_) => {
+            model.name()
+        }
     }
-}
-
-fn polynomials(model: &Model) -> Option<&PolynomialModel> {
-    if let Model::Polynomial(model) = model { Some(model) } else { None }
 }
 
 /// The model in a sentence, and how close it comes.
 fn lead(model: &Model, fits: &[Fit]) -> Vec<String> {
-    let stable = polynomials(model).map_or("", |model| if model.stable { ", stable" } else { ", unstable" });
+    let stable = match model {
+        Model::Polynomial(model) => Some(model.stable),
+        Model::StateSpace(model) => Some(model.stable),
+        _ => None,
+    };
+    let stable = stable.map_or("", |stable| if stable { ", stable" } else { ", unstable" });
     let several = model.outputs().len() > 1;
     let mut lead = vec![
         format!("{}.", headline(model)),
         format!(
             "Sample time {} s, {} parameters{stable}.",
             figures::short(model.sample_time()),
-            model.parameters().len()
+            model.free_parameters()
         ),
     ];
     let figure = |fit: &Fit| {
@@ -442,9 +458,11 @@ fn of_model(report: &Report) -> Vec<Section> {
         Model::Equations(model) => return of_equations(report, model),
         Model::NonlinearArx(model) => return of_nonlinear_arx(report, model),
         Model::Process(model) => return of_process(report, model),
+        Model::StateSpace(model) => return of_state_space(report, model),
     };
     let inputs: Vec<&str> = model.inputs.iter().map(|input| input.name.as_str()).collect();
-    let mut sections = responses(&[("estimate".to_owned(), model)], &inputs, true);
+    let linear = LinearModel::Polynomial(model);
+    let mut sections = responses(&[("estimate".to_owned(), &linear)], &inputs, true);
     let mut section = Section::new("Poles and zeros");
     section.chart(charts::roots(model));
     section.table(tables::roots(model));
@@ -488,13 +506,17 @@ fn of_nonlinear_arx(report: &Report, model: &NonlinearArxModel) -> Vec<Section> 
 
 fn of_process(report: &Report, model: &ProcessModel) -> Vec<Section> {
     let linear = report.model.linear("a response").unwrap_or_default();
-    let named: Vec<(String, &PolynomialModel)> =
-        linear.iter().map(|model| ("estimate".to_owned(), &**model)).collect();
+    let named: Vec<(String, &LinearModel<'_>)> =
+        linear.iter().map(|model| ("estimate".to_owned(), model)).collect();
     let inputs: Vec<&str> = model.inputs.iter().map(|input| input.name.as_str()).collect();
     let mut sections = responses(&named, &inputs, false);
     let mut section = Section::new("Model");
     section.table(tables::process_parameters(report, model));
-    linear.iter().for_each(|linear| section.table(tables::signals(linear)));
+    for linear in &linear {
+        if let LinearModel::Transfer(linear) = linear {
+            section.table(tables::signals(linear));
+        }
+    }
     section.table(tables::estimation(&report.estimation, Some(model.noise_variance)));
     sections.push(section);
     sections
@@ -509,8 +531,8 @@ fn of_equations(report: &Report, model: &EquationsModel) -> Vec<Section> {
     section.blocks.push(Block::Command(model.equations.clone()));
     // Equations that are not linear have no responses of this kind.
     let linear = report.model.linear("a response").unwrap_or_default();
-    let named: Vec<(String, &PolynomialModel)> =
-        linear.iter().map(|model| (format!("to {}", model.output.name), &**model)).collect();
+    let named: Vec<(String, &LinearModel<'_>)> =
+        linear.iter().map(|model| (format!("to {}", model.output().name), model)).collect();
     let inputs: Vec<&str> = model.inputs.iter().map(|input| input.name.as_str()).collect();
     let mut sections = match named.is_empty() || inputs.is_empty() {
         true => Vec::new(),
@@ -520,8 +542,35 @@ fn of_equations(report: &Report, model: &EquationsModel) -> Vec<Section> {
     sections
 }
 
+fn of_state_space(report: &Report, model: &StateSpaceModel) -> Vec<Section> {
+    let linear = report.model.linear("a response").unwrap_or_default();
+    let named: Vec<(String, &LinearModel<'_>)> =
+        linear.iter().map(|model| (format!("to {}", model.output().name), model)).collect();
+    let inputs: Vec<&str> = model.inputs.iter().map(|input| input.name.as_str()).collect();
+    let mut sections = Vec::new();
+    if let Procedure::Subspace(outcome) = &report.estimation.procedure {
+        let mut section = Section::new("Order");
+        section.chart(charts::singular_values(outcome, model.order()));
+        if !outcome.orders.is_empty() {
+            section.chart(charts::orders(outcome, model.order()));
+        }
+        sections.push(section);
+    }
+    sections.extend(responses(&named, &inputs, model.outputs.len() == 1));
+    let mut section = Section::new("Poles");
+    section.chart(charts::eigenvalues(model));
+    section.table(tables::eigenvalues(model));
+    sections.push(section);
+    let mut section = Section::new("Model");
+    section.table(tables::signals_and_gains(model));
+    section.table(tables::noise_of_outputs(model));
+    section.table(tables::estimation(&report.estimation, None));
+    sections.push(section);
+    sections
+}
+
 /// Bode plots, step and impulse responses.
-fn responses(models: &[(String, &PolynomialModel)], inputs: &[&str], has_noise: bool) -> Vec<Section> {
+fn responses(models: &[(String, &LinearModel<'_>)], inputs: &[&str], has_noise: bool) -> Vec<Section> {
     let mut frequency = Section::new("Frequency response");
     let mut transient = Section::new("Step and impulse response");
     for input in inputs {

@@ -11,22 +11,39 @@ use crate::validate::{Fit, Residuals};
 
 /// What there is to ask for.
 const WORDS: &str = "white, independent, stable, fit>=P, fit@K>=P, coverage>=P (P in percent, K steps ahead), mean-error<=E, \
-     largest-error<=E, mean-error@K<=E and largest-error@K<=E (E in units of the output)";
+     largest-error<=E, mean-error@K<=E and largest-error@K<=E (E in units of the output); of one output with its name between brackets, \
+     such as fit[y2]>=P";
 /// The level of the intervals of which the coverage is asked.
 const LEVEL: f64 = 0.95;
 
-/// What a model must do on a log to be taken.
+/// What a model must do on a log to be taken: of all its outputs, or of one.
 ///
 /// ```
-/// use thetahat::report::Requirement;
+/// use thetahat::report::{Demand, Requirement};
 ///
 /// let requirement: Requirement = "fit@5>=80".parse()?;
-/// assert_eq!(requirement, Requirement::Fit { steps: Some(5), percent: 80.0 });
+/// assert_eq!(requirement.demand, Demand::Fit { steps: Some(5), percent: 80.0 });
+/// assert_eq!("fit[y2]>=70".parse::<Requirement>()?.output.as_deref(), Some("y2"));
 /// assert!("fast".parse::<Requirement>().is_err());
 /// # Ok::<(), thetahat::Error>(())
 /// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Requirement {
+    /// What is asked.
+    pub demand: Demand,
+    /// The output it is asked of, written between brackets behind the first word, such as `fit[y2]@5>=80`; none: of each.
+    pub output: Option<String>,
+}
+
+impl From<Demand> for Requirement {
+    fn from(demand: Demand) -> Self {
+        Self { demand, output: None }
+    }
+}
+
+/// What is asked of a model.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Requirement {
+pub enum Demand {
     /// `white`: Ljung and Box's test does not reject white residuals.
     White,
     /// `independent`: no test says that residuals depend on a past input. The level is shared among the inputs (Bonferroni).
@@ -62,6 +79,27 @@ pub enum Requirement {
 }
 
 impl FromStr for Requirement {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        // A name may hold any sign: it ends with the last bracket.
+        let Some((before, (name, behind))) =
+            text.split_once('[').and_then(|(before, rest)| Some((before, rest.rsplit_once(']')?)))
+        else {
+            return Ok(Self { demand: text.parse()?, output: None });
+        };
+        let demand: Demand = format!("{before}{behind}").parse()?;
+        if demand == Demand::Stable {
+            return Err(Error::argument(
+                "require",
+                "a model is stable as a whole; ask for stable without an output",
+            ));
+        }
+        Ok(Self { demand, output: Some(name.to_owned()) })
+    }
+}
+
+impl FromStr for Demand {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self, Error> {
@@ -116,6 +154,15 @@ fn ahead(text: &str) -> Option<usize> {
 
 impl fmt::Display for Requirement {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Some(output) = &self.output else { return self.demand.fmt(f) };
+        let demand = self.demand.to_string();
+        let end = demand.find(['@', '>', '<']).unwrap_or(demand.len());
+        write!(f, "{}[{output}]{}", &demand[..end], &demand[end..])
+    }
+}
+
+impl fmt::Display for Demand {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::White => f.write_str("white"),
             Self::Independent => f.write_str("independent"),
@@ -134,6 +181,46 @@ impl fmt::Display for Requirement {
 impl Requirement {
     /// How many steps ahead it looks, where it says so.
     pub fn steps(&self) -> Option<usize> {
+        self.demand.steps()
+    }
+
+    /// Whether it can be asked of a model at all.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for white residuals of a model that says nothing of the noise, for independence of inputs that there are not,
+    /// and for an output that the model does not have.
+    pub fn check(&self, report: &Report) -> Result<(), Error> {
+        let names = || report.model.outputs().iter().map(|output| output.name.as_str());
+        if let Some(output) = &self.output
+            && !names().any(|name| name == output)
+        {
+            let names: Vec<&str> = names().collect();
+            return Err(Error::argument(
+                "require",
+                format!("{self}: the model has no output '{output}'; it has {}", names.join(", ")),
+            ));
+        }
+        self.demand.check(report)
+    }
+
+    /// What is missing, in words with the figure; none where it is met. What cannot be told is not met. Tests reject below
+    /// `alpha`.
+    pub fn unmet(&self, validation: &Validation, alpha: f64) -> Option<String> {
+        let Some(name) = &self.output else {
+            return self.demand.missing(validation, alpha).map(|missing| format!("{self}: {missing}"));
+        };
+        let mut own = validation.clone();
+        own.fit.retain(|fit| fit.output == *name);
+        own.noise.retain(|noise| noise.output == *name);
+        own.coverage.retain(|coverage| coverage.output == *name);
+        own.residuals.retain(|residuals| residuals.output == *name);
+        self.demand.missing(&own, alpha).map(|missing| format!("{self}: {missing}"))
+    }
+}
+
+impl Demand {
+    /// How many steps ahead it looks, where it says so.
+    fn steps(&self) -> Option<usize> {
         match self {
             Self::Fit { steps, .. } | Self::MeanError { steps, .. } | Self::LargestError { steps, .. } => {
                 *steps
@@ -142,12 +229,7 @@ impl Requirement {
         }
     }
 
-    /// Whether it can be asked of a model at all.
-    ///
-    /// # Errors
-    /// [`Error::Argument`] for white residuals of a model that says nothing of the noise, and for independence of
-    /// inputs that there are not.
-    pub fn check(&self, report: &Report) -> Result<(), Error> {
+    fn check(&self, report: &Report) -> Result<(), Error> {
         let refused = |message: &str| Err(Error::argument("require", message));
         let oe = matches!(&report.model, Model::Polynomial(model) if model.structure == Structure::Oe);
         let kind = match report.estimation.procedure {
@@ -165,18 +247,18 @@ impl Requirement {
             (Self::Independent, _) if !report.model.is_driven() => {
                 refused("independent: the model has no inputs; ask for white")
             }
+            (Self::Stable, _) if matches!(report.model, Model::StateSpace(_)) => Ok(()),
             (Self::Stable, _) => report.model.polynomials("stable: a pole").map(|_| ()),
             _ => Ok(()),
         }
     }
 
-    /// What is missing, in words with the figure; none where it is met. What cannot be told is not met. Tests reject below
-    /// `alpha`.
-    pub fn unmet(&self, validation: &Validation, alpha: f64) -> Option<String> {
+    /// What is missing, in words.
+    fn missing(&self, validation: &Validation, alpha: f64) -> Option<String> {
         // One word for each output that lacks something.
         let several = validation.noise.len() > 1;
         let of = |output: &str| if several { format!("'{output}': ") } else { String::new() };
-        let untested = || Some(format!("{self}: the residuals could not be tested"));
+        let untested = || Some("the residuals could not be tested".to_owned());
         let tested_all = validation.residuals.len() >= validation.noise.len().max(1);
         let failed: Vec<String> = match *self {
             Self::White | Self::Independent if !tested_all => return untested(),
@@ -245,7 +327,7 @@ impl Requirement {
                 let asked = |one: &&Coverage| one.steps == 1 && one.level == LEVEL;
                 let each: Vec<&Coverage> = validation.coverage.iter().filter(asked).collect();
                 if each.is_empty() {
-                    return Some(format!("{self}: no interval could be told"));
+                    return Some("no interval could be told".to_owned());
                 }
                 each.iter()
                     .filter_map(|one| match one.actual.map(|actual| 100.0 * actual) {
@@ -260,7 +342,7 @@ impl Requirement {
                     .collect()
             }
         };
-        (!failed.is_empty()).then(|| format!("{self}: {}", failed.join(", ")))
+        (!failed.is_empty()).then(|| failed.join(", "))
     }
 }
 

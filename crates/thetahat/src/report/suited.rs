@@ -19,7 +19,7 @@ pub(super) fn check_sample_time(model: &Model, log: &Log) -> Result<(), Error> {
 /// Models in equations describe signals as they are.
 pub(super) fn check_offsets(model: &Model) -> Result<(), Error> {
     match model {
-        Model::Polynomial(_) | Model::NonlinearArx(_) | Model::Process(_) => Ok(()),
+        Model::Polynomial(_) | Model::NonlinearArx(_) | Model::Process(_) | Model::StateSpace(_) => Ok(()),
         Model::Equations(_) => Err(Error::argument(
             "detrend",
             "a model in equations describes signals as they are, and takes nothing from them; leave it out",

@@ -17,7 +17,7 @@ use crate::model::{Model, Structure};
 use crate::regression::sum;
 use crate::respond::{Horizon, Innovations, OnLog, Response, Tested, check_steps};
 use crate::spectrum::MeasuredResponse;
-use crate::validate::{Fit, Relation, Residuals, nonlinearities};
+use crate::validate::{Fit, Relation, Residuals, nonlinearities, portmanteau};
 use crate::{Document, Error};
 
 const GENERATOR: &str = concat!("thetahat ", env!("CARGO_PKG_VERSION"));
@@ -29,6 +29,8 @@ const AS_MANY: f64 = 0.05;
 /// from zero as the second number says.
 const OFF_CENTER: f64 = 0.3;
 const CERTAIN: f64 = 4.0;
+/// So many samples stand for each lag of the test of all outputs together.
+const PORTMANTEAU: usize = 10;
 /// Lags that tests may be asked for.
 const MOST_LAGS: usize = 1000;
 /// Ratios of the errors to those expected that are worth a warning.
@@ -52,7 +54,7 @@ impl Validated {
     /// [`Error::Argument`] if the model is not linear, has another sample time, or none of the channels of the response.
     pub fn over(mut self, model: &Model, response: &MeasuredResponse) -> Result<Self, Error> {
         let all = model.linear("a frequency response")?;
-        let own = all.iter().find(|own| own.output.name == response.output);
+        let own = all.iter().find(|own| own.output().name == response.output);
         let found = own.map(|own| response.agreement(own)).transpose()?.unwrap_or_default();
         if found.is_empty() {
             return Err(Error::argument(
@@ -235,16 +237,21 @@ pub fn validate(
         logs: sources.to_vec(),
         in_sample: seen,
         model: model.name(),
-        parameters: model.parameters().len(),
+        parameters: model.free_parameters(),
         structure: polynomial.map(|model| model.structure),
         orders: polynomial.map(|model| model.orders.clone()),
-        stable: polynomial.map(|model| model.stable),
+        stable: match model {
+            Model::Polynomial(model) => Some(model.stable),
+            Model::StateSpace(model) => Some(model.stable),
+            _ => None,
+        },
         driven: on_log.is_driven(),
         white_expected,
         fit: Vec::new(),
         noise: Vec::new(),
         coverage: Vec::new(),
         residuals: Vec::new(),
+        portmanteau: None,
         nonlinear: Vec::new(),
         response: Vec::new(),
         warnings: Vec::new(),
@@ -410,6 +417,7 @@ fn test_residuals(report: &Report, on_log: &dyn OnLog, plan: &ValidationPlan, va
         // The parameters of equations are none of the noise; those of functions are not of the model that the tests know.
         (InSample::No, _) | (_, Procedure::InnovationsLikelihood(_)) => Relation::Fresh,
         (_, Procedure::FreeRun(_) | Procedure::FrequencyResponse(_)) => Relation::Fresh,
+        (_, Procedure::Subspace(_)) => Relation::Fresh,
         (_, procedure) if !procedure.terms().is_empty() => Relation::Fresh,
         (_, Procedure::InstrumentalVariables { .. }) => Relation::Instrumental,
         _ => Relation::Fitted,
@@ -417,6 +425,14 @@ fn test_residuals(report: &Report, on_log: &dyn OnLog, plan: &ValidationPlan, va
     let mut alphas = plan.alphas.clone();
     alphas.sort_unstable_by(f64::total_cmp);
     alphas.dedup();
+    let together: Vec<&[Innovations]> = each.iter().map(|one| &*one.innovations).collect();
+    let fitted = match (&report.model, validation.in_sample) {
+        // F and K of a canonical form.
+        (Model::StateSpace(model), InSample::Yes) => 2 * model.order() * together.len(),
+        _ => 0,
+    };
+    let samples: usize = each.first().map_or(0, |one| one.innovations.iter().map(|own| own.counted_errors().count()).sum());
+    validation.portmanteau = portmanteau(&together, plan.lags.min(samples / PORTMANTEAU), fitted);
     for Tested { model, record, innovations } in &each {
         match Residuals::of(model, record, innovations, relation, plan.lags, &alphas, plan.alpha) {
             Ok(residuals) => {
@@ -481,6 +497,17 @@ fn warn(plan: &ValidationPlan, validation: &mut Validation) {
             number(*model)
         ));
     }
+    if validation.white_expected
+        && let Some(test) = &validation.portmanteau
+        && let Some(p) = test.p_value.filter(|p| *p < plan.alpha)
+        && validation.residuals.iter().all(|one| one.ljung_box.p_value.is_none_or(|p| p >= plan.alpha))
+    {
+        words.push(format!(
+            "the residuals of the outputs together are not white ({} lags, p-value {}): the past of one tells of another",
+            test.lags,
+            chance(p)
+        ));
+    }
     for residuals in &validation.residuals {
         let of = of(&residuals.output);
         let rejected = |p: Option<f64>| p.filter(|p| *p < plan.alpha);
@@ -513,8 +540,8 @@ fn warn(plan: &ValidationPlan, validation: &mut Validation) {
             }
         }
     }
-    // Of a linear model it is no fault, and the table says it.
-    let is_nonlinear = validation.structure.is_none();
+    // Of a model with poles it is no fault, and the table says it.
+    let is_nonlinear = validation.stable.is_none();
     for found in validation.nonlinear.iter().filter(|_| is_nonlinear) {
         let of = of(&found.output);
         if let Some(p) = found.errors.p_value.filter(|p| *p < plan.alpha) {

@@ -146,18 +146,7 @@ pub fn frequency_response(
     model: &PolynomialModel,
     frequencies: &[f64],
 ) -> Result<Vec<FrequencyResponse>, Error> {
-    // pi/T itself may be computed in several ways.
-    let highest = PI / model.sample_time;
-    let inside = |frequency: f64| frequency >= 0.0 && frequency <= highest * (1.0 + 4.0 * f64::EPSILON);
-    if let Some(wrong) = frequencies.iter().find(|frequency| !inside(**frequency)) {
-        return Err(Error::argument(
-            "frequencies",
-            format!(
-                "{wrong} rad/s is not between 0 and {highest} rad/s, half the sampling frequency; beyond it a sampled \
-                 model says nothing new"
-            ),
-        ));
-    }
+    check_frequencies(frequencies, model.sample_time)?;
     let blocks = Blocks::of(model);
     let inputs = blocks.b.iter().zip(&blocks.f).zip(&model.inputs);
     let inputs = inputs.map(|((b, f), input)| (Some(input.name.clone()), b, f));
@@ -173,6 +162,31 @@ pub fn frequency_response(
             })
         })
         .collect()
+}
+
+/// Refuses frequencies outside of 0 … pi/T.
+pub(super) fn check_frequencies(frequencies: &[f64], sample_time: f64) -> Result<(), Error> {
+    // pi/T itself may be computed in several ways.
+    let highest = PI / sample_time;
+    let inside = |frequency: f64| frequency >= 0.0 && frequency <= highest * (1.0 + 4.0 * f64::EPSILON);
+    if let Some(wrong) = frequencies.iter().find(|frequency| !inside(**frequency)) {
+        return Err(Error::argument(
+            "frequencies",
+            format!(
+                "{wrong} rad/s is not between 0 and {highest} rad/s, half the sampling frequency; beyond it a sampled \
+                 model says nothing new"
+            ),
+        ));
+    }
+    Ok(())
+}
+
+/// There is no response at the frequency of a pole.
+pub(super) fn has_pole(frequency: f64) -> Error {
+    Error::argument(
+        "frequencies",
+        format!("the model has a pole at {frequency} rad/s: it has no response there; leave it out"),
+    )
 }
 
 /// `count` frequencies from `first` to `last`, each the same factor above the one before.
@@ -207,28 +221,44 @@ pub fn logarithmic_frequencies(first: f64, last: f64, count: usize) -> Result<Ve
 struct Transfer<'a> {
     numerator: &'a Block<'a>,
     denominators: [&'a Block<'a>; 2],
+    turns: Turns,
+}
+
+/// How a response g q^-delay prod (1 - z_i q^-1)/prod (1 - p_i q^-1) turns from frequency 0 on.
+pub(super) struct Turns {
     zeros: Vec<Complex<f64>>,
     poles: Vec<Complex<f64>>,
-    /// The power of q^-1 that the numerator begins with.
     delay: usize,
     /// The phase at frequency 0, integrators apart.
     sign: f64,
 }
 
-impl<'a> Transfer<'a> {
-    fn new(numerator: &'a Block<'a>, a: &'a Block<'a>, other: &'a Block<'a>) -> Result<Self, Error> {
-        let zeros = numerator.zeros()?;
-        let poles = [a.zeros()?, other.zeros()?].concat();
-        let delay = numerator.coefficients.iter().take_while(|value| **value == 0.0).count();
-        let lead = numerator.coefficients.get(delay).copied().unwrap_or(0.0);
+impl Turns {
+    pub(super) fn new(gain: f64, delay: usize, zeros: Vec<Complex<f64>>, poles: Vec<Complex<f64>>) -> Self {
         // Of a real root r > 1, 1 - r is negative; a complex one comes with its conjugate.
         let odd = |roots: &[Complex<f64>]| {
             roots.iter().filter(|root| root.im == 0.0 && root.re > 1.0).count() % 2 == 1
         };
         // So a root that passes from inside to outside at q = 1 changes the phase at other frequencies little.
-        let above = if (lead < 0.0) != odd(&zeros) { PI } else { 0.0 };
+        let above = if (gain < 0.0) != odd(&zeros) { PI } else { 0.0 };
         let sign = above - if odd(&poles) { PI } else { 0.0 };
-        Ok(Self { numerator, denominators: [a, other], zeros, poles, delay, sign })
+        Self { zeros, poles, delay, sign }
+    }
+
+    /// What delay and roots turn.
+    pub(super) fn at(&self, angle: f64) -> f64 {
+        let turned = |roots: &[Complex<f64>]| roots.iter().map(|root| turned_by(*root, angle)).sum::<f64>();
+        self.sign - self.delay as f64 * angle + turned(&self.zeros) - turned(&self.poles)
+    }
+}
+
+impl<'a> Transfer<'a> {
+    fn new(numerator: &'a Block<'a>, a: &'a Block<'a>, other: &'a Block<'a>) -> Result<Self, Error> {
+        let poles = [a.zeros()?, other.zeros()?].concat();
+        let delay = numerator.coefficients.iter().take_while(|value| **value == 0.0).count();
+        let lead = numerator.coefficients.get(delay).copied().unwrap_or(0.0);
+        let turns = Turns::new(lead, delay, numerator.zeros()?, poles);
+        Ok(Self { numerator, denominators: [a, other], turns })
     }
 
     fn at(
@@ -249,10 +279,7 @@ impl<'a> Transfer<'a> {
         let response = a.zip(other).map(|(a, other)| above * a * other);
         let (Some(a), Some(other), Some(response)) = (a, other, response.filter(|r| r.modulus().is_finite()))
         else {
-            return Err(Error::argument(
-                "frequencies",
-                format!("the model has a pole at {frequency} rad/s: it has no response there; leave it out"),
-            ));
+            return Err(has_pole(frequency));
         };
         let gradient: Gradient = self
             .numerator
@@ -262,13 +289,7 @@ impl<'a> Transfer<'a> {
             .collect();
         let covariance = parameters.and_then(|parameters| covariance(parameters, &gradient));
 
-        Ok(FrequencyPoint::new(frequency, response, covariance, self.turned(angle)))
-    }
-
-    /// What delay and roots turn from frequency 0 on.
-    fn turned(&self, angle: f64) -> f64 {
-        let turned = |roots: &[Complex<f64>]| roots.iter().map(|root| turned_by(*root, angle)).sum::<f64>();
-        self.sign - self.delay as f64 * angle + turned(&self.zeros) - turned(&self.poles)
+        Ok(FrequencyPoint::new(frequency, response, covariance, self.turns.at(angle)))
     }
 }
 

@@ -46,7 +46,7 @@ pub(crate) struct Innovations {
 
 impl Innovations {
     /// Errors that were found another way, one for each of `rows`.
-    pub(super) fn alone(rows: Range<usize>, counted: Vec<Range<usize>>, errors: Vec<f64>) -> Self {
+    pub(crate) fn alone(rows: Range<usize>, counted: Vec<Range<usize>>, errors: Vec<f64>) -> Self {
         Self {
             presample: 0,
             span: rows.clone(),

@@ -4,6 +4,7 @@ use super::equations::EquationsOnLog;
 use super::nonlinear_arx::NonlinearArxOnLog;
 use super::on_log::{OnLog, PolynomialOnLog};
 use super::process::ProcessOnLog;
+use super::state_space::StateSpaceOnLog;
 use super::{Horizon, InitialCondition};
 use crate::Error;
 use crate::data::{Log, Rows};
@@ -27,6 +28,7 @@ impl Model {
             Self::Equations(model) => Box::new(EquationsOnLog::new(model, log, rows, fitted)?),
             Self::NonlinearArx(model) => Box::new(NonlinearArxOnLog::new(model, log, rows)?),
             Self::Process(model) => Box::new(ProcessOnLog::new(model, log, rows)?),
+            Self::StateSpace(model) => Box::new(StateSpaceOnLog::new(model, log, rows, asked)?),
         })
     }
 
@@ -41,19 +43,19 @@ impl Model {
     ) -> Result<Box<dyn OnLog + 'l>, Error> {
         match self {
             Self::NonlinearArx(model) => Ok(Box::new(NonlinearArxOnLog::new(model, log, rows)?.with_clamp())),
-            Self::Polynomial(_) | Self::Equations(_) | Self::Process(_) => {
+            Self::Polynomial(_) | Self::Equations(_) | Self::Process(_) | Self::StateSpace(_) => {
                 Err(Error::argument("clamp", "it is of nonlinear ARX models; leave it out"))
             }
         }
     }
 
     /// What a response to measured data had better start from: see [`InitialCondition::natural`]. Models in equations know what their text says of
-    /// their states in the first row of a log; free runs start from the state that explains the outputs best. Nonlinear ARX models start
+    /// their states in the first row of a log; free runs start from the state that explains the outputs best, as state-space models do. Nonlinear ARX models start
     /// from measured samples, processes at rest, as they were fitted.
     pub fn natural_start(&self, horizon: Horizon) -> InitialCondition {
         match self {
             Self::Polynomial(model) => InitialCondition::natural(model, horizon),
-            Self::Equations(_) => InitialCondition::Estimate,
+            Self::Equations(_) | Self::StateSpace(_) => InitialCondition::Estimate,
             Self::NonlinearArx(_) => InitialCondition::Drop,
             Self::Process(model) if model.free_start => InitialCondition::Estimate,
             Self::Process(_) => InitialCondition::Zero,

@@ -172,7 +172,7 @@ fn gradient(columns: &[(&Block<'_>, f64, Vec<f64>)], t: usize) -> Gradient {
 }
 
 /// How many samples a response takes, from the number of coefficients of its B and its poles.
-fn lasting(coefficients: usize, poles: &[Complex<f64>]) -> usize {
+pub(super) fn lasting(coefficients: usize, poles: &[Complex<f64>]) -> usize {
     let (mut settling, mut growing, mut lasts) = (0.0_f64, f64::INFINITY, false);
     for pole in poles {
         let rate = pole.modulus().ln();

@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 
 use super::response::MeasuredResponse;
 use crate::Error;
-use crate::model::PolynomialModel;
-use crate::respond::{FrequencyPoint, FrequencyResponse, frequency_response};
+use crate::model::LinearModel;
+use crate::respond::{FrequencyPoint, FrequencyResponse};
 
 /// How many points of a measured response a model agrees with.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -40,7 +40,7 @@ impl MeasuredResponse {
     /// ```
     /// use thetahat::data::{Channel, Log, Record};
     /// use thetahat::estimate::{Initial, arx};
-    /// use thetahat::model::{Orders, Signal};
+    /// use thetahat::model::{LinearModel, Orders, Signal};
     /// use thetahat::spectrum::{SpectrumPlan, spectrum};
     ///
     /// let (mut u, mut y, mut random) = (vec![0.0], vec![0.0], 1_u32);
@@ -58,11 +58,11 @@ impl MeasuredResponse {
     /// let model = estimate.to_model(&orders, 1.0, vec![name("u")], name("y"))?;
     /// let channel = |name: &str, values| Channel { name: name.into(), values };
     /// let log = Log::new(vec![channel("u", u), channel("y", y)], 1.0)?;
-    /// let agreement = &spectrum(&log, &[], &SpectrumPlan::new(&["u"], "y"))?.agreement(&model)?[0];
+    /// let agreement = &spectrum(&log, &[], &SpectrumPlan::new(&["u"], "y"))?.agreement(&LinearModel::Polynomial(&model))?[0];
     /// assert!(agreement.outside < agreement.points / 5);
     /// # Ok::<(), thetahat::Error>(())
     /// ```
-    pub fn agreement(&self, model: &PolynomialModel) -> Result<Vec<Agreement>, Error> {
+    pub fn agreement(&self, model: &LinearModel<'_>) -> Result<Vec<Agreement>, Error> {
         let of_input = |of_model: &FrequencyResponse| {
             let measured = self.from_input(of_model.input.as_deref()?)?;
             let pairs = || measured.points.iter().zip(&of_model.points);
@@ -88,22 +88,23 @@ impl MeasuredResponse {
     ///
     /// # Errors
     /// As for [`agreement`](Self::agreement).
-    pub fn overlaid(&self, model: &PolynomialModel) -> Result<Vec<FrequencyResponse>, Error> {
-        if (model.sample_time / self.sample_time - 1.0).abs() > 0.01 {
+    pub fn overlaid(&self, model: &LinearModel<'_>) -> Result<Vec<FrequencyResponse>, Error> {
+        if (model.sample_time() / self.sample_time - 1.0).abs() > 0.01 {
             return Err(Error::argument(
                 "model",
                 format!(
                     "its sample time is {} s, that of the response {} s: only responses of one clock can be compared",
-                    model.sample_time, self.sample_time
+                    model.sample_time(),
+                    self.sample_time
                 ),
             ));
         }
-        let highest = PI / model.sample_time;
+        let highest = PI / model.sample_time();
         let mut all = Vec::new();
         for measured in &self.responses {
             let frequencies: Vec<f64> =
                 measured.points.iter().map(|point| point.frequency.min(highest)).collect();
-            let of_model = frequency_response(model, &frequencies)?;
+            let of_model = model.frequency_response(&frequencies)?;
             let Some(mut own) =
                 of_model.into_iter().find(|of| of.input.is_some() && of.input == measured.input)
             else {

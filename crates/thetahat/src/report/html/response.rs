@@ -4,14 +4,14 @@ use super::page::{Page, Section, Table};
 use super::{charts, of, tables};
 use crate::data::Rows;
 use crate::figures::{fixed, short};
-use crate::model::PolynomialModel;
+use crate::model::LinearModel;
 use crate::spectrum::{Agreement, MeasuredResponse};
 
 /// The page of a measured response: magnitude, phase and coherence from each input with their bands, models over them, and the spectrum
 /// of the noise. `command` is shown as what made the page.
 pub fn response_page(
     found: &MeasuredResponse,
-    models: &[(String, &PolynomialModel)],
+    models: &[(String, &LinearModel<'_>)],
     command: &str,
 ) -> String {
     let title = format!("Response of {}{}", found.output, of(&found.logs));
@@ -52,7 +52,7 @@ pub fn response_page(
 }
 
 /// How models agree with what was measured.
-fn agreements(found: &MeasuredResponse, models: &[(String, &PolynomialModel)]) -> Table {
+fn agreements(found: &MeasuredResponse, models: &[(String, &LinearModel<'_>)]) -> Table {
     let caption = "Models and measured points: how many lie outside of the 95 % region of their difference, by chance 5 %";
     let mut table = Table::new(caption, &["model", "input", "points", "outside", "outside [%]"]);
     for (name, model) in models {

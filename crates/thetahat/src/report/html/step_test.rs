@@ -7,7 +7,7 @@ use super::text::{or_dash, quantity};
 use super::{of, tables};
 use crate::data::Log;
 use crate::figures::{number, short, three};
-use crate::model::PolynomialModel;
+use crate::model::LinearModel;
 use crate::step_test::{FittedProcess, StepSummary, StepTest};
 
 /// This many responses are drawn of a log with very many steps.
@@ -48,10 +48,10 @@ pub fn step_test_page(found: &StepTest, log: Option<&Log>, command: &str) -> Str
     page.write()
 }
 
-/// The page of what a model does after a step or an impulse of each input, from the polynomials to each output. `samples` are those of
+/// The page of what a model does after a step or an impulse of each input, one entry for each output. `samples` are those of
 /// the chart; none: until it has settled. `name` is what the model is called.
 pub fn transient_page(
-    models: &[&PolynomialModel],
+    models: &[&LinearModel<'_>],
     what: Transient,
     samples: Option<usize>,
     name: &str,
@@ -65,11 +65,11 @@ pub fn transient_page(
     let mut page = Page::new(format!("{kind} of {name}"), command, generator);
     let mut section = Section::new(kind);
     for model in models {
-        for input in &model.inputs {
+        for input in model.inputs() {
             let named = [("estimate".to_owned(), *model)];
             section.chart(charts::transient(&named, &input.name, what, samples).map(|mut chart| {
                 if models.len() > 1 {
-                    chart.title.push_str(&format!(" to {}", model.output.name));
+                    chart.title.push_str(&format!(" to {}", model.output().name));
                 }
                 chart
             }));

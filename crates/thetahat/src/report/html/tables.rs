@@ -13,7 +13,8 @@ use crate::data::{Rows, Source};
 use crate::estimate::{Criteria, InformationCriterion, Procedure, TermsOutcome};
 use crate::figures::{chance, fixed, number, scientific, short, three};
 use crate::model::{
-    EquationsModel, NonlinearArxModel, Orders, Parameter, PolynomialModel, ProcessModel, Root,
+    EquationsModel, NonlinearArxModel, Orders, Parameter, PolynomialModel, ProcessModel, Quantity, Root,
+    Signal, StateSpaceModel,
 };
 use crate::optimize::Stopped;
 use crate::report::{Estimation, InSample, Report, Validated};
@@ -148,6 +149,66 @@ pub(super) fn signals(model: &PolynomialModel) -> Table {
     {
         let offset = signal.offset;
         table.row([signal.name.clone(), role.to_owned(), number(offset.level), short(offset.slope), gain]);
+    }
+    table
+}
+
+/// The poles of a state-space model, and those of its predictor.
+pub(super) fn eigenvalues(model: &StateSpaceModel) -> Table {
+    let mut table = Table::new("Poles", &["root", "value", "modulus", "time constant [s]"]);
+    for (pole, time) in model.poles.iter().zip(&model.time_constants) {
+        let modulus = number(pole.re.hypot(pole.im));
+        table.row(["pole".to_owned(), complex(pole), modulus, or_dash(*time, quantity)]);
+    }
+    for pole in &model.predictor_poles {
+        let modulus = number(pole.re.hypot(pole.im));
+        table.row(["pole of the predictor".to_owned(), complex(pole), modulus, String::new()]);
+    }
+    table
+}
+
+/// The channels of a state-space model with their offsets, and the static gain from each input to each output.
+pub(super) fn signals_and_gains(model: &StateSpaceModel) -> Table {
+    let to = model.outputs.iter().map(|output| format!("static gain to {}", output.name));
+    let head: Vec<String> = ["channel", "role", "offset", "trend [1/s]", "delay"]
+        .map(str::to_owned)
+        .into_iter()
+        .chain(to)
+        .collect();
+    let head: Vec<&str> = head.iter().map(String::as_str).collect();
+    let mut table = Table::new("Signals", &head);
+    let row = |signal: &Signal, role: &str, delay: String, gains: Vec<String>| {
+        let own =
+            [signal.name.clone(), role.to_owned(), number(signal.offset.level), short(signal.offset.slope)];
+        own.into_iter().chain([delay]).chain(gains).collect::<Vec<String>>()
+    };
+    for (place, (input, delay)) in model.inputs.iter().zip(&model.delays).enumerate() {
+        let gain = |gains: &Vec<Option<Quantity>>| {
+            gains.get(place).copied().flatten().map_or_else(|| "none (integrator)".to_owned(), quantity)
+        };
+        table.row(row(input, "input", delay.to_string(), model.dc_gain.iter().map(gain).collect()));
+    }
+    for output in &model.outputs {
+        table.row(row(output, "output", String::new(), vec![String::new(); model.outputs.len()]));
+    }
+    table
+}
+
+/// The deviations of the innovations, and how they are correlated.
+pub(super) fn noise_of_outputs(model: &StateSpaceModel) -> Table {
+    let with = model.outputs.iter().map(|output| format!("correlation with {}", output.name));
+    let head: Vec<String> =
+        ["innovations of", "deviation"].map(str::to_owned).into_iter().chain(with).collect();
+    let head: Vec<&str> = head.iter().map(String::as_str).collect();
+    let mut table = Table::new("Noise", &head);
+    let noise = &model.noise_covariance;
+    for (i, output) in model.outputs.iter().enumerate() {
+        let correlation = |j: usize| {
+            let product = noise[i][i] * noise[j][j];
+            if product > 0.0 { fixed(noise[i][j] / product.sqrt(), 3) } else { "–".to_owned() }
+        };
+        let each = (0..model.outputs.len()).map(correlation);
+        table.row([output.name.clone(), number(noise[i][i].max(0.0).sqrt())].into_iter().chain(each));
     }
     table
 }
@@ -301,6 +362,11 @@ fn procedure(procedure: &Procedure) -> String {
             outcome.iterations,
             stopped(&outcome.stopped),
             outcome.noise_order
+        ),
+        Procedure::Subspace(outcome) => format!(
+            "subspace (SSARX) from a past of {} samples, {}",
+            outcome.past,
+            if outcome.feedthrough { "inputs act at once" } else { "no feedthrough" }
         ),
         Procedure::Neighbours(outcome) => each(&outcome.maps, |map| {
             let (kept, by) = (map.candidates, &map.selected_by);

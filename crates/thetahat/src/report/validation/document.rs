@@ -8,7 +8,7 @@ use crate::data::{Rows, Source};
 use crate::estimate::Criteria;
 use crate::model::{Orders, Structure};
 use crate::spectrum::Agreement;
-use crate::validate::{Fit, Nonlinearity, Residuals};
+use crate::validate::{Fit, Nonlinearity, Residuals, Test};
 
 /// How a stored model does on a log. The JSON document `thetahat.validation/1`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -52,6 +52,9 @@ pub struct Validation {
     /// What is left of each output; not of one of which too few samples count. Models in equations expect errors of another size in each
     /// row: of theirs each is divided by its standard deviation.
     pub residuals: Vec<Residuals>,
+    /// Whether the residuals of several outputs are white together (Hosking 1980); none of one output.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub portmanteau: Option<Test>,
     /// Whether the errors one step ahead hold squares of an input, for each output and each input whose square is not
     /// constant; not of models in equations.
     #[serde(default)]

@@ -6,7 +6,7 @@ use crate::estimate::{Initial, Method};
 use crate::model::Orders;
 use crate::optimize::Search;
 use crate::regression::noise::Noise;
-use crate::report::{Plan, Requirement, identify};
+use crate::report::{Demand, Plan, Requirement, identify};
 use crate::respond::InitialCondition;
 
 /// Rows of u and y around 5 and 20: y(t) = 1.2 y(t-1) - 0.5 y(t-2) + u(t-1) + 0.4 u(t-2) + 0.2 e(t).
@@ -190,7 +190,7 @@ fn what_is_wrong_is_said() {
         let independence = &mut two.residuals[0].independence;
         independence.push(independence[0].clone());
         independence[1].past.p_value = Some(p);
-        Requirement::Independent.unmet(&two, 0.05)
+        Requirement::from(Demand::Independent).unmet(&two, 0.05)
     };
     assert_eq!(of(0.03), None);
     assert!(of(0.02).unwrap().contains("p-value 0.0200, below 0.025"));
@@ -225,6 +225,9 @@ fn requirements_are_read_and_refused() {
         "mean-error@0<=1",
         "error<=1",
         "largest-error<=inf",
+        "fit[y>=3",
+        "blue[y]",
+        "stable[y]",
     ] {
         let error = wrong.parse::<Requirement>().unwrap_err();
         assert!(
@@ -232,26 +235,31 @@ fn requirements_are_read_and_refused() {
             "{wrong}: {error}"
         );
     }
-    assert_eq!(" fit@3 >= 80 ".parse(), Ok(Requirement::Fit { steps: Some(3), percent: 80.0 }));
-    let mean = Requirement::MeanError { steps: None, limit: 0.5 };
-    let largest = Requirement::LargestError { steps: Some(2), limit: 0.0 };
+    assert_eq!(" fit@3 >= 80 ".parse(), Ok(Demand::Fit { steps: Some(3), percent: 80.0 }));
+    let mean = Demand::MeanError { steps: None, limit: 0.5 };
+    let largest = Demand::LargestError { steps: Some(2), limit: 0.0 };
     assert_eq!("mean-error<=0.5".parse(), Ok(mean));
     assert_eq!("largest-error@2 <= 0".parse(), Ok(largest));
     assert_eq!([mean, largest].map(|one| one.to_string()), ["mean-error<=0.5", "largest-error@2<=0"]);
+    // Of one output; a name may hold brackets.
+    for (text, output) in [("fit[y2]@3>=80", "y2"), ("white[a[1]]", "a[1]"), ("mean-error[y]<=0.5", "y")] {
+        let one: Requirement = text.parse().unwrap();
+        assert_eq!((one.output.as_deref(), one.to_string().as_str()), (Some(output), text));
+    }
     let (u, y) = signals(300);
     let log = log(&u, &y);
     let oe = fitted(&log, "1..300", Orders::oe(&[2], &[2], &[1]).unwrap(), Initial::Auto);
-    let text = Requirement::White.check(&oe).unwrap_err().to_string();
+    let text = Requirement::from(Demand::White).check(&oe).unwrap_err().to_string();
     assert!(text.contains("of output error") && text.contains("ask for independent"), "{text}");
-    assert!(Requirement::Independent.check(&oe).is_ok());
+    assert!(Requirement::from(Demand::Independent).check(&oe).is_ok());
     assert!(!found(&oe, &log, &plan("")).white_expected);
     let ar = fitted(&log, "1..300", Orders::arx(2, &[], &[]).unwrap(), Initial::Auto);
-    assert!(Requirement::Independent.check(&ar).unwrap_err().to_string().contains("no inputs"));
-    assert!(Requirement::White.check(&ar).is_ok());
+    assert!(Requirement::from(Demand::Independent).check(&ar).unwrap_err().to_string().contains("no inputs"));
+    assert!(Requirement::from(Demand::White).check(&ar).is_ok());
     // A series has no free run: one step ahead is meant.
     let found = found(&ar, &log, &plan(""));
     assert!(found.fit.iter().all(|fit| fit.horizon != Horizon::FreeRun));
-    assert_eq!(Requirement::Fit { steps: None, percent: 20.0 }.unmet(&found, 0.05), None);
+    assert_eq!(Requirement::from(Demand::Fit { steps: None, percent: 20.0 }).unmet(&found, 0.05), None);
 }
 
 #[test]

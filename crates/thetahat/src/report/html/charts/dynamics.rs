@@ -11,11 +11,8 @@ use super::super::figure::{
 };
 use super::super::object::{Object, marker, scatter, stroke};
 use super::super::text;
-use crate::model::{PolynomialModel, Quantity, Root};
-use crate::respond::{
-    FrequencyResponse, TransientResponse, frequency_response, impulse_response, logarithmic_frequencies,
-    step_response,
-};
+use crate::model::{LinearModel, PolynomialModel, Quantity, Root, StateSpaceModel};
+use crate::respond::{FrequencyResponse, TransientResponse, logarithmic_frequencies};
 use crate::{Error, figures};
 
 /// Frequencies of a Bode plot.
@@ -38,8 +35,23 @@ pub enum Transient {
     Impulse,
 }
 
+impl Transient {
+    /// The response of a model to it.
+    fn of(
+        self,
+        model: &LinearModel<'_>,
+        input: usize,
+        samples: Option<usize>,
+    ) -> Result<TransientResponse, Error> {
+        match self {
+            Self::Step => model.step_response(input, samples),
+            Self::Impulse => model.impulse_response(input, samples),
+        }
+    }
+}
+
 /// Magnitude and phase of several models from one input, or from the noise where that is none.
-pub(crate) fn bode(models: &[(String, &PolynomialModel)], input: Option<&str>) -> Drawn {
+pub(crate) fn bode(models: &[(String, &LinearModel<'_>)], input: Option<&str>) -> Drawn {
     let mut found: Vec<(usize, &String, FrequencyResponse)> = Vec::new();
     let mut refused = Vec::new();
     for (position, (name, model)) in models.iter().enumerate() {
@@ -110,19 +122,21 @@ pub(crate) fn bode(models: &[(String, &PolynomialModel)], input: Option<&str>) -
 }
 
 /// Whether the model adds e to the output as it is.
-fn is_white(model: &PolynomialModel) -> bool {
-    (model.orders.na, model.orders.nc, model.orders.nd) == (0, 0, 0)
+fn is_white(model: &LinearModel<'_>) -> bool {
+    match model {
+        LinearModel::Polynomial(model) => (model.orders.na, model.orders.nc, model.orders.nd) == (0, 0, 0),
+        LinearModel::Transfer(_) => true,
+        LinearModel::StateSpace(model, _) => model.k.iter().flatten().all(|gain| *gain == 0.0),
+    }
 }
 
 /// The response from one source; none if the model does not have it.
-fn response(model: &PolynomialModel, input: Option<&str>) -> Result<Option<FrequencyResponse>, String> {
-    let highest = PI / model.sample_time;
-    let roots = model.poles.iter().chain(&model.noise_poles).map(|root| 1.0 - root.re.hypot(root.im));
-    let slowest = roots.map(f64::abs).filter(|distance| *distance > 0.0).fold(1.0, f64::min);
-    let lowest = (slowest / model.sample_time / 10.0).clamp(highest / 1e6, highest / 1e3);
+fn response(model: &LinearModel<'_>, input: Option<&str>) -> Result<Option<FrequencyResponse>, String> {
+    let highest = PI / model.sample_time();
+    let lowest = (model.slowest() / model.sample_time() / 10.0).clamp(highest / 1e6, highest / 1e3);
     let said = |error: crate::Error| error.to_string();
     let frequencies = logarithmic_frequencies(lowest, highest, FREQUENCIES).map_err(said)?;
-    let responses = frequency_response(model, &frequencies).map_err(said)?;
+    let responses = model.frequency_response(&frequencies).map_err(said)?;
     Ok(responses.into_iter().find(|response| response.input.as_deref() == input))
 }
 
@@ -152,39 +166,35 @@ fn interval(values: &[Quantity], lowest: f64) -> Option<(Vec<f64>, Vec<f64>)> {
 }
 
 /// What a unit step of an input does in several models, and what an impulse that lasts one sample does.
-pub(crate) fn transients(models: &[(String, &PolynomialModel)], input: &str) -> [Drawn; 2] {
+pub(crate) fn transients(models: &[(String, &LinearModel<'_>)], input: &str) -> [Drawn; 2] {
     [Transient::Step, Transient::Impulse].map(|what| transient(models, input, what, None))
 }
 
 /// One of the two, of this many samples or until it has settled.
 pub(crate) fn transient(
-    models: &[(String, &PolynomialModel)],
+    models: &[(String, &LinearModel<'_>)],
     input: &str,
     what: Transient,
     samples: Option<usize>,
 ) -> Drawn {
-    type Respond = fn(&PolynomialModel, usize, Option<usize>) -> Result<TransientResponse, Error>;
-    let (what, happens, respond): (_, _, Respond) = match what {
-        Transient::Step => (
-            "Step response",
-            "The output after a step of the input by one unit at time 0, from rest.",
-            step_response,
-        ),
+    let (title, happens) = match what {
+        Transient::Step => {
+            ("Step response", "The output after a step of the input by one unit at time 0, from rest.")
+        }
         Transient::Impulse => (
             "Impulse response",
             "The output after an input of one unit in the sample at time 0 alone, from rest.",
-            impulse_response,
         ),
     };
     let single = models.len() == 1;
     let mut traces: Vec<Object> = Vec::new();
     let mut unstable = false;
     let mut certain = true;
-    let title = format!("{what} from {input}");
+    let title = format!("{title} from {input}");
     for (position, (name, model)) in models.iter().enumerate() {
-        let Some(number) = model.inputs.iter().position(|signal| signal.name == input) else { continue };
-        let response = respond(model, number, samples).map_err(|error| format!("{title}: none, {error}."))?;
-        unstable |= !model.stable;
+        let Some(number) = model.inputs().iter().position(|signal| signal.name == input) else { continue };
+        let response = what.of(model, number, samples).map_err(|error| format!("{title}: none, {error}."))?;
+        unstable |= !model.stable();
         let width = response.time.len().div_ceil(TRANSIENT_POINTS);
         let thin = |values: &[f64]| -> Vec<f64> { values.iter().step_by(width.max(1)).copied().collect() };
         let x = rounded(&thin(&response.time));
@@ -213,14 +223,30 @@ pub(crate) fn transient(
     chart(title, words, 340, traces, layout)
 }
 
+/// Roots with what they are, a symbol and the place of their colour.
+type Group<'m> = (&'m str, Vec<&'m Root>, &'m str, usize);
+
 /// Poles and zeros in the z plane.
 pub(crate) fn roots(model: &PolynomialModel) -> Drawn {
-    let groups: [(&str, Vec<&Root>, &str, usize); 4] = [
+    let groups = [
         ("poles", model.poles.iter().collect(), "x-thin", 0),
         ("zeros", model.zeros.iter().flatten().collect(), "circle-open", 1),
         ("noise poles", model.noise_poles.iter().collect(), "cross-thin", 2),
         ("noise zeros", model.noise_zeros.iter().collect(), "diamond-open", 3),
     ];
+    z_plane(&groups, model.sample_time)
+}
+
+/// The poles of a state-space model, and those of its predictor.
+pub(crate) fn eigenvalues(model: &StateSpaceModel) -> Drawn {
+    let groups = [
+        ("poles", model.poles.iter().collect(), "x-thin", 0),
+        ("poles of the predictor", model.predictor_poles.iter().collect(), "diamond-open", 3),
+    ];
+    z_plane(&groups, model.sample_time)
+}
+
+fn z_plane(groups: &[Group<'_>], sample_time: f64) -> Drawn {
     let all = || groups.iter().flat_map(|(_, roots, _, _)| roots.iter());
     if all().next().is_none() {
         return Err("The model has neither poles nor zeros.".to_owned());
@@ -234,7 +260,7 @@ pub(crate) fn roots(model: &PolynomialModel) -> Drawn {
     let circle = plain_line("unit circle", Curve { x, y }, NEUTRAL).with("hoverinfo", "skip");
     let mut traces: Vec<Object> = vec![circle];
     let mut certain = true;
-    for (name, roots, symbol, position) in &groups {
+    for (name, roots, symbol, position) in groups {
         if roots.is_empty() {
             continue;
         }
@@ -251,7 +277,7 @@ pub(crate) fn roots(model: &PolynomialModel) -> Drawn {
             roots.iter().map(|root| (significant(root.re), significant(root.im))).unzip();
         let words = roots.iter().map(|root| {
             let (modulus, angle) = (root.re.hypot(root.im), root.im.atan2(root.re).abs());
-            let frequency = angle / model.sample_time;
+            let frequency = angle / sample_time;
             format!(
                 "{} of {}<br>modulus {}<br>angle {} rad, {} rad/s",
                 text::complex(root),

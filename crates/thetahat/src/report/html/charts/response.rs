@@ -8,8 +8,8 @@ use super::super::figure::{
 };
 use super::super::object::{Object, marker};
 use super::super::text;
-use crate::model::{PolynomialModel, Quantity};
-use crate::respond::{FrequencyPoint, frequency_response};
+use crate::model::{LinearModel, Quantity};
+use crate::respond::FrequencyPoint;
 use crate::spectrum::MeasuredResponse;
 
 /// Points nearer than this factor are one in a picture.
@@ -21,7 +21,7 @@ const FEW: usize = 60;
 pub(crate) fn measured(
     found: &MeasuredResponse,
     input: &str,
-    models: &[(String, &PolynomialModel)],
+    models: &[(String, &LinearModel<'_>)],
 ) -> Drawn {
     let title = format!("Response from {input}");
     let Some(response) = found.from_input(input).filter(|response| !response.points.is_empty()) else {
@@ -62,7 +62,7 @@ pub(crate) fn measured(
     add("measured", &points, 0, true);
     let mut refused = String::new();
     for (position, (name, model)) in models.iter().enumerate() {
-        match frequency_response(model, &frequencies) {
+        match model.frequency_response(&frequencies) {
             Ok(responses) => {
                 if let Some(of) = responses.iter().find(|of| of.input.as_deref() == Some(input)) {
                     add(&text::plain(name), &of.points.iter().collect::<Vec<_>>(), position + 1, false);

@@ -20,6 +20,18 @@ pub(in crate::report::html) fn tests(who: &str, parts: &[(String, &Validation)])
     let each = parts.iter().flat_map(|(name, validation)| {
         validation.residuals.iter().map(move |residuals| (name, validation, residuals))
     });
+    for (name, validation) in parts {
+        if let Some(test) = &validation.portmanteau {
+            table.row([
+                format!("all outputs white together{}", asked(validation)),
+                name.clone(),
+                test.lags.to_string(),
+                fixed(test.statistic, 2),
+                short(test.degrees),
+                or_dash(test.p_value, chance),
+            ]);
+        }
+    }
     for (name, validation, residuals) in each {
         let name = which(name, validation, &residuals.output);
         let mut add = |label: String, test: &crate::validate::Test| {

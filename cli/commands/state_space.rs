@@ -1,0 +1,22 @@
+//! `thetahat fit --model ss`: a model in state space.
+
+use thetahat::report::fit_state_space;
+
+use super::experiments::{Wanted, read};
+use super::search::Identified;
+use crate::failure::Failure;
+use crate::job::StateSpaceJob;
+use crate::log;
+use crate::messages::warn;
+
+/// Reads the logs and fits the model.
+pub(super) fn found(job: &StateSpaceJob) -> Result<Identified, Failure> {
+    let wanted =
+        Wanted { inputs: job.inputs.as_deref(), outputs: &job.outputs, driven: job.driven, none: "--nb 0" };
+    let found = read(&job.paths, &job.log, &wanted, false, |_| Ok(()))?;
+    found.words.iter().for_each(|word| warn(word));
+    let plan = job.plan(found.channels.inputs, found.channels.outputs)?;
+    let report = fit_state_space(&found.log, &found.sources, &plan);
+    let report = report.map_err(log::failure(&found.sources))?;
+    Ok(Identified { report, log: Some(found.log), sources: found.sources })
+}

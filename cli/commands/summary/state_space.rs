@@ -1,0 +1,132 @@
+//! What a fit of a state-space model found, as a table for people.
+
+use thetahat::estimate::{Procedure, SubspaceOutcome};
+use thetahat::figures::{fixed, number, short, three};
+use thetahat::model::StateSpaceModel;
+use thetahat::report::Report;
+use thetahat::text::harmless;
+
+use super::text::{self, Text, columns, or_dash};
+use super::{MOST, criteria, fits, quantity, signal};
+
+/// Why an order has no figure, a pole no time constant, or two outputs no correlation.
+const NO_PREDICTOR: &str = "no model of this order has a stable predictor";
+const NO_TIME: &str = "no time constant goes with a pole on or outside of the unit circle, or at 0";
+const INTEGRATES: &str = "the model integrates";
+const NO_NOISE: &str = "nothing is left of an output";
+
+/// The main figures of a fit in state space.
+pub(super) fn table(report: &Report, model: &StateSpaceModel, width: usize) -> String {
+    let mut text = Text::new(width);
+    text.line(&format!("{}, sample time {} s", report.model.name(), short(model.sample_time)));
+    text.line("x(t+1) = F x + G u + K e, y = H x + D u + e");
+    let signals = model.inputs.iter().map(|input| signal("input", input));
+    let outputs = model.outputs.iter().map(|output| signal("output", output));
+    text.line(&signals.chain(outputs).collect::<Vec<String>>().join(", "));
+    let estimation = &report.estimation;
+    if let Procedure::Subspace(outcome) = &estimation.procedure {
+        text.line(&found(outcome));
+        text.line("");
+        states(&mut text, outcome, model.order());
+    }
+    text.line(&format!("{} samples, {} free parameters", estimation.samples, model.free_parameters));
+    text.line(&criteria(&estimation.criteria));
+    text.line("");
+    poles(&mut text, model);
+    gains(&mut text, model);
+    noise(&mut text, model);
+    text.line(if model.stable { "stable" } else { "unstable" });
+    text.line("");
+    fits(&mut text, &report.fit);
+    text.finish()
+}
+
+/// How the states were found.
+fn found(outcome: &SubspaceOutcome) -> String {
+    let feedthrough = match (outcome.feedthrough, outcome.feedthrough_given) {
+        (true, true) => "inputs act at once, as asked for",
+        (false, true) => "no input acts at once, as asked for",
+        (true, false) => "inputs act at once, which lowers MDL",
+        (false, false) => "no input acts at once",
+    };
+    format!("subspace method SSARX, a past of {} samples; {feedthrough}", outcome.past)
+}
+
+/// The singular values, and the order's choice.
+fn states(text: &mut Text, outcome: &SubspaceOutcome, order: usize) {
+    let scored: Vec<(usize, Option<f64>)> =
+        outcome.orders.iter().map(|score| (score.order, score.mdl)).collect();
+    let least = scored.iter().filter_map(|(_, mdl)| *mdl).fold(f64::INFINITY, f64::min);
+    let head = ["", "order", "singular value", "MDL above the least"];
+    let head = if scored.is_empty() { &head[..3] } else { &head[..] };
+    let mut table = columns(head).none(NO_PREDICTOR);
+    let shown = outcome.singular_values.len().min((order + MOST / 2).max(MOST));
+    for (place, value) in (1..).zip(&outcome.singular_values[..shown]) {
+        let mark = if place == order { "*" } else { "" };
+        let mut cells = vec![mark.to_owned(), place.to_string(), number(*value)];
+        if !scored.is_empty() {
+            let score = scored.iter().find(|(order, _)| *order == place);
+            cells.push(match score {
+                Some((_, mdl)) => or_dash(*mdl, |mdl| fixed(mdl - least, 1)),
+                None => String::new(),
+            });
+        }
+        table.row(cells);
+    }
+    text.table(table);
+}
+
+fn poles(text: &mut Text, model: &StateSpaceModel) {
+    let mut table = columns(&["pole", "modulus", "time constant [s]"]).none(NO_TIME);
+    // One of a pair stands for both.
+    for (pole, time) in model.poles.iter().zip(&model.time_constants).filter(|(pole, _)| pole.im >= 0.0) {
+        let value = text::complex(pole);
+        let value = if pole.im > 0.0 { format!("{value} and conjugate") } else { value };
+        table.row([value, three(pole.re.hypot(pole.im)), or_dash(*time, |time| number(time.value))]);
+    }
+    if !model.poles.is_empty() {
+        text.table(table);
+    }
+}
+
+fn gains(text: &mut Text, model: &StateSpaceModel) {
+    if model.inputs.is_empty() {
+        return;
+    }
+    let head: Vec<String> = std::iter::once("DC gain from".to_owned())
+        .chain(model.outputs.iter().map(|output| format!("to {}", harmless(&output.name))))
+        .collect();
+    let head: Vec<&str> = head.iter().map(String::as_str).collect();
+    let mut table = columns(&head).none(INTEGRATES);
+    for (place, input) in model.inputs.iter().enumerate() {
+        let gains = model.dc_gain.iter().map(|gains| or_dash(gains.get(place).copied().flatten(), quantity));
+        table.row(std::iter::once(harmless(&input.name)).chain(gains));
+    }
+    text.table(table);
+}
+
+/// The deviations of the innovations, and their correlations.
+fn noise(text: &mut Text, model: &StateSpaceModel) {
+    let covariance = &model.noise_covariance;
+    let deviation = |place: usize| covariance[place][place].max(0.0).sqrt();
+    if let [output] = &*model.outputs {
+        text.line(&format!("innovations of {}: deviation {}", harmless(&output.name), number(deviation(0))));
+        return;
+    }
+    let head: Vec<String> = ["innovations of", "deviation"]
+        .map(str::to_owned)
+        .into_iter()
+        .chain(model.outputs.iter().map(|output| format!("correlation with {}", harmless(&output.name))))
+        .collect();
+    let head: Vec<&str> = head.iter().map(String::as_str).collect();
+    let mut table = columns(&head).none(NO_NOISE);
+    for (place, output) in model.outputs.iter().enumerate() {
+        let correlation = |other: usize| {
+            let product = deviation(place) * deviation(other);
+            or_dash((product > 0.0).then(|| covariance[place][other] / product), |value| fixed(value, 3))
+        };
+        let own = [harmless(&output.name), number(deviation(place))];
+        table.row(own.into_iter().chain((0..model.outputs.len()).map(correlation)));
+    }
+    text.table(table);
+}

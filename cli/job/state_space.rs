@@ -1,0 +1,181 @@
+use std::ops::RangeInclusive;
+use std::path::{Path, PathBuf};
+
+use thetahat::estimate::SubspaceOptions;
+use thetahat::report::StateSpacePlan;
+
+use super::fit::named_values;
+use super::{LogJob, parsed, rows};
+use crate::args::{
+    ConstantArgument, FeedthroughArgument, FitArguments, InitialArgument, LikelihoodArgument, MethodArgument,
+    ModelArgument, Names,
+};
+use crate::failure::Failure;
+use crate::memory::PerValue;
+
+/// A state-space model to fit.
+#[derive(Debug)]
+pub(crate) struct StateSpaceJob {
+    /// The logs, at least one.
+    pub(crate) paths: Vec<PathBuf>,
+    /// How all of them are read.
+    pub(crate) log: LogJob,
+    /// Named inputs; none: those called u, u1, u2, …
+    pub(crate) inputs: Option<Vec<String>>,
+    /// The named outputs; none: y.
+    pub(crate) outputs: Vec<String>,
+    /// Whether there are inputs at all.
+    pub(crate) driven: bool,
+    /// Samples that inputs wait: none, one for all or one for each.
+    delays: Vec<usize>,
+    /// The rest of the plan: channels are open.
+    plan: StateSpacePlan,
+}
+
+impl StateSpaceJob {
+    /// The job, if a model in state space is asked for, or several outputs and no other model.
+    pub(crate) fn resolve(arguments: &FitArguments) -> Result<Option<Self>, Failure> {
+        let (own, model) = (&arguments.states, &arguments.model);
+        let outputs = Names::all(&arguments.output).unwrap_or_default();
+        let given = own.order.is_some() || own.past.is_some() || own.feedthrough.is_some();
+        // A model without inputs is asked for as of all structures.
+        let without_inputs = matches!(&*model.nb, [nb] if nb.trim() == "0");
+        let coefficients = [&model.na, &model.nc, &model.nd].into_iter().any(Option::is_some);
+        let orders = coefficients || !model.nf.is_empty() || (!model.nb.is_empty() && !without_inputs);
+        match model.model {
+            Some(ModelArgument::Ss) => {}
+            None if !orders && outputs.len() > 1 => {}
+            _ if given => {
+                return Err(Failure::usage(
+                    "--order, --past and --feedthrough are for --model ss; leave them out, or give --model ss",
+                ));
+            }
+            _ => return Ok(None),
+        }
+        refuse_others(arguments)?;
+        let inputs = Names::all(&arguments.input);
+        if without_inputs && inputs.is_some() {
+            return Err(Failure::usage("--nb 0 makes a model without inputs; leave out --input or --nb"));
+        }
+        if arguments.logs.iter().filter(|path| *path == Path::new("-")).count() > 1 {
+            return Err(Failure::usage("only one of the logs can come from standard input (-)"));
+        }
+        let plan = StateSpacePlan {
+            estimate: rows("--estimate", &arguments.estimate)?,
+            validate: rows("--validate", &arguments.validate)?,
+            split: arguments.choice.split.as_deref().map(|text| parsed("--split", text)).transpose()?,
+            detrend: parsed("--detrend", &arguments.detrend)?,
+            offsets: named_values("--offset", &arguments.offset)?,
+            orders: own.order.as_deref().map(range).transpose()?,
+            subspace: SubspaceOptions {
+                past: own.past.map(|past| past as usize),
+                feedthrough: match own.feedthrough.unwrap_or(FeedthroughArgument::Auto) {
+                    FeedthroughArgument::Auto => None,
+                    FeedthroughArgument::Yes => Some(true),
+                    FeedthroughArgument::No => Some(false),
+                },
+            },
+            ..StateSpacePlan::new(&[], &[])
+        };
+        let delay = |text: &String| {
+            text.trim().parse().map_err(|_| {
+                Failure::usage(format!(
+                    "--nk {text}: with --model ss give a number for each input, such as --nk 3"
+                ))
+            })
+        };
+        Ok(Some(Self {
+            paths: arguments.logs.clone(),
+            log: LogJob { per_value: PerValue::Search, ..LogJob::resolve(&arguments.log, &arguments.clock)? },
+            inputs,
+            outputs,
+            driven: !without_inputs,
+            delays: model.nk.iter().map(delay).collect::<Result<_, Failure>>()?,
+            plan,
+        }))
+    }
+
+    /// The plan for the channels of a log. Without feedthrough an input acts one sample later by itself.
+    pub(crate) fn plan(&self, inputs: Vec<String>, outputs: Vec<String>) -> Result<StateSpacePlan, Failure> {
+        let count = inputs.len();
+        let delays = match &*self.delays {
+            [] => Vec::new(),
+            [one] => vec![*one; count],
+            several if several.len() == count => several.to_vec(),
+            several => {
+                return Err(Failure::usage(format!(
+                    "--nk has {} numbers for {count} inputs; give one for all or one for each",
+                    several.len()
+                )));
+            }
+        };
+        let mut plan = StateSpacePlan { inputs, outputs, ..self.plan.clone() };
+        // u(t - nk) acts on y(t): through D if some input acts at once, else through G.
+        if !delays.is_empty() {
+            let at_once = delays.contains(&0) || plan.subspace.feedthrough == Some(true);
+            if delays.contains(&0) && plan.subspace.feedthrough == Some(false) {
+                return Err(Failure::usage(
+                    "--nk 0 says that an input acts at once, and --feedthrough no that none does; leave one out",
+                ));
+            }
+            plan.subspace.feedthrough = Some(at_once);
+            plan.delays = delays.iter().map(|delay| delay - usize::from(!at_once)).collect();
+        }
+        plan.check().map_err(|error| Failure::option(&error))?;
+        Ok(plan)
+    }
+}
+
+/// What other models have.
+fn refuse_others(arguments: &FitArguments) -> Result<(), Failure> {
+    let (model, search, criterion) = (&arguments.model, &arguments.search, &arguments.criterion);
+    let given = [
+        ("--na", model.na.is_some()),
+        ("--nb", !matches!(&*model.nb, []) && !matches!(&*model.nb, [nb] if nb.trim() == "0")),
+        ("--nc", model.nc.is_some()),
+        ("--nd", model.nd.is_some()),
+        ("--nf", !model.nf.is_empty()),
+        ("--taps", !model.taps.is_empty()),
+        ("--kernel", model.kernel.is_some()),
+        ("--structure", !model.structure.is_empty()),
+        ("--method", model.method != MethodArgument::Pem),
+        ("--likelihood", model.likelihood != LikelihoodArgument::Conditional),
+        ("--initial", !matches!(model.initial, InitialArgument::Auto | InitialArgument::Estimate)),
+        ("--focus", model.focus != "auto" && model.focus != "prediction"),
+        ("--constant", model.constant != ConstantArgument::Auto),
+        ("--trend", model.trend),
+        ("--prefilter", arguments.prefilter.is_some()),
+        ("--path", arguments.choice.path.is_some()),
+        ("--select", arguments.choice.select.is_some()),
+        ("--search", search.search.is_some()),
+        ("--max-iterations", search.max_iterations.is_some()),
+        ("--tolerance", search.tolerance.is_some()),
+        ("--step", search.step.is_some()),
+        ("--starts", search.starts.is_some()),
+        ("--seed", search.seed.is_some()),
+        ("--time-limit", search.time_limit.is_some()),
+        ("--norm", criterion.norm.is_some()),
+        ("--bound", !criterion.bound.is_empty()),
+        ("--dc-gain", !criterion.dc_gain.is_empty()),
+        ("--ridge", criterion.ridge.is_some()),
+        ("--noise-bound", criterion.noise_bound.is_some()),
+    ];
+    match given.iter().find(|(_, given)| *given) {
+        Some((option, _)) => Err(Failure::usage(format!(
+            "{option} is not for models in state space (--model ss, or several outputs); leave it out"
+        ))),
+        None => Ok(()),
+    }
+}
+
+/// N, or A..B.
+fn range(text: &str) -> Result<RangeInclusive<usize>, Failure> {
+    let number = |text: &str| text.trim().parse::<usize>().ok();
+    let found = match text.split_once("..") {
+        Some((first, last)) => number(first).zip(number(last)),
+        None => number(text).map(|order| (order, order)),
+    };
+    found.filter(|(first, last)| *first > 0 && first <= last).map(|(first, last)| first..=last).ok_or_else(
+        || Failure::usage(format!("--order {text}: write it as N or A..B, from 1 on, such as 4 or 1..10")),
+    )
+}

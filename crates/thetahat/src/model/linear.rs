@@ -1,0 +1,60 @@
+use super::fitted::{PolynomialModel, Signal};
+use super::state_space::StateSpaceModel;
+
+/// What a linear model is from its inputs to one of its outputs.
+#[derive(Debug, Clone, PartialEq)]
+pub enum LinearModel<'m> {
+    /// Polynomials that were fitted, with their noise.
+    Polynomial(&'m PolynomialModel),
+    /// A transfer function from each input, which follows from a model of another kind; of the noise it says nothing.
+    Transfer(Box<PolynomialModel>),
+    /// An output of a state-space model, counted from 0.
+    StateSpace(&'m StateSpaceModel, usize),
+}
+
+impl LinearModel<'_> {
+    /// The inputs.
+    pub fn inputs(&self) -> &[Signal] {
+        match self {
+            Self::Polynomial(model) => &model.inputs,
+            Self::Transfer(model) => &model.inputs,
+            Self::StateSpace(model, _) => &model.inputs,
+        }
+    }
+
+    /// The output.
+    pub fn output(&self) -> &Signal {
+        match self {
+            Self::Polynomial(model) => &model.output,
+            Self::Transfer(model) => &model.output,
+            Self::StateSpace(model, output) => &model.outputs[*output],
+        }
+    }
+
+    /// Seconds from one sample to the next.
+    pub fn sample_time(&self) -> f64 {
+        match self {
+            Self::Polynomial(model) => model.sample_time,
+            Self::Transfer(model) => model.sample_time,
+            Self::StateSpace(model, _) => model.sample_time,
+        }
+    }
+
+    /// Whether all poles lie inside the unit circle.
+    pub fn stable(&self) -> bool {
+        match self {
+            Self::Polynomial(model) => model.stable,
+            Self::Transfer(model) => model.stable,
+            Self::StateSpace(model, _) => model.stable,
+        }
+    }
+
+    /// Whether it has one noise and says what becomes of it. Of a state-space model each output has a noise of its own, and all may reach it.
+    pub fn has_noise(&self) -> bool {
+        match self {
+            Self::Polynomial(_) => true,
+            Self::Transfer(_) => false,
+            Self::StateSpace(model, _) => model.outputs.len() == 1,
+        }
+    }
+}

@@ -1,0 +1,283 @@
+//! Fits of state-space models.
+
+#[cfg(test)]
+mod tests;
+mod warnings;
+
+use std::ops::RangeInclusive;
+
+use super::evaluate::evaluate;
+use super::schema::{Estimation, Report};
+use super::shares::Shares;
+use crate::data::{Detrend, Log, Offset, Rows, Source, Split};
+use crate::estimate::{
+    Criteria, Initial, Procedure, SubspaceOptions, SubspaceOutcome, best_order, products_of_innovations,
+    subspace,
+};
+use crate::model::{Model, Signal, StateSpaceModel};
+use crate::respond::state_space::StateSpaceOnLog;
+use crate::select::Focus;
+use crate::validate::Part;
+use crate::{Document, Error};
+
+/// Singular values that a report keeps.
+const MOST_VALUES: usize = 40;
+
+/// Which state-space model to fit, and to which part of a log.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StateSpacePlan {
+    /// The input channels; none for a time series.
+    pub inputs: Vec<String>,
+    /// The output channels, at least one.
+    pub outputs: Vec<String>,
+    /// Rows to estimate on; none: all.
+    pub estimate: Vec<Rows>,
+    /// Rows to validate on.
+    pub validate: Vec<Rows>,
+    /// Cuts the rows to estimate on into parts: the fit is made to the first two, and evaluated on the third.
+    pub split: Option<Split>,
+    /// What is taken from each channel.
+    pub detrend: Detrend,
+    /// Channels whose offset is set by hand.
+    pub offsets: Vec<(String, f64)>,
+    /// The orders among which the least MDL chooses; none: those from 1 to 20 of which the data tell.
+    pub orders: Option<RangeInclusive<usize>>,
+    /// How the states are found.
+    pub subspace: SubspaceOptions,
+    /// For each input the samples that it waits before the plant sees it; none: they do not wait.
+    pub delays: Vec<usize>,
+}
+
+impl StateSpacePlan {
+    /// All rows, means removed, everything else as the data say; further settings as fields.
+    ///
+    /// ```
+    /// use thetahat::report::StateSpacePlan;
+    ///
+    /// let plan = StateSpacePlan { orders: Some(4..=4), ..StateSpacePlan::new(&["u"], &["y1", "y2"]) };
+    /// assert!(plan.check().is_ok());
+    /// ```
+    pub fn new(inputs: &[&str], outputs: &[&str]) -> Self {
+        let owned = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
+        Self {
+            inputs: owned(inputs),
+            outputs: owned(outputs),
+            estimate: Vec::new(),
+            validate: Vec::new(),
+            split: None,
+            detrend: Detrend::Mean,
+            offsets: Vec::new(),
+            orders: None,
+            subspace: SubspaceOptions::default(),
+            delays: Vec::new(),
+        }
+    }
+
+    /// Whether the plan makes sense, whatever the log.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for no outputs, a channel that is there twice, an empty range of orders or order 0, a past of 0, and delays that
+    /// are not one for each input.
+    pub fn check(&self) -> Result<(), Error> {
+        if self.outputs.is_empty() {
+            return Err(Error::argument("output", "there is none; name at least one"));
+        }
+        let mut names: Vec<&str> = self.channels().collect();
+        names.sort_unstable();
+        if let Some(pair) = names.windows(2).find(|pair| pair[0] == pair[1]) {
+            return Err(Error::argument("output", format!("'{}' is there twice; name it once", pair[0])));
+        }
+        if let Some((name, _)) = self.offsets.iter().find(|(name, _)| !names.contains(&name.as_str())) {
+            return Err(Error::argument("offset", format!("'{name}' is no input or output of the model")));
+        }
+        if let Some(orders) = &self.orders
+            && (*orders.start() == 0 || orders.is_empty())
+        {
+            let (first, last) = (orders.start(), orders.end());
+            return Err(Error::argument(
+                "order",
+                format!("{first}..{last} is no range of orders; they begin with 1, such as 1..10"),
+            ));
+        }
+        if self.subspace.past == Some(0) {
+            return Err(Error::argument(
+                "past",
+                "it is 0, and a state is made of past samples; take 1 or more",
+            ));
+        }
+        if self.inputs.is_empty() && self.subspace.feedthrough == Some(true) {
+            return Err(Error::argument("feedthrough", "without inputs there is none; leave it out"));
+        }
+        if !self.delays.is_empty() && self.delays.len() != self.inputs.len() {
+            return Err(Error::argument(
+                "delays",
+                format!(
+                    "there are {} for {} inputs; give one for each",
+                    self.delays.len(),
+                    self.inputs.len()
+                ),
+            ));
+        }
+        Ok(())
+    }
+
+    fn channels(&self) -> impl Iterator<Item = &str> {
+        self.inputs.iter().chain(&self.outputs).map(String::as_str)
+    }
+}
+
+/// Fits a state-space model,
+///
+/// ```text
+/// x(t+1) = F x(t) + G u(t) + K e(t)
+/// y(t)   = H x(t) + D u(t) + e(t)
+/// ```
+///
+/// with any number of inputs and outputs by a subspace method: see [`subspace`]. The order is that of least MDL, or given. Segments without a
+/// missing value are each used from their first sample on, and predictions and free runs start each from the state that explains it best.
+///
+/// Cost: O(N q^2 p) for q channels and a past of p samples, and O(N (n + l) (n + q)) for each order n that is looked at.
+///
+/// # Errors
+/// [`Error::Argument`] as for [`StateSpacePlan::check`], and for rows or orders that are not there; [`Error::Data`] for channels that are
+/// not there, an irregular clock, or sums that leave the range of numbers; [`Error::Undetermined`] if rows are too few, a channel is
+/// constant, outputs depend on one another, or no model has a stable predictor.
+///
+/// ```
+/// use thetahat::data::{Channel, Log};
+/// use thetahat::report::{StateSpacePlan, fit_state_space};
+///
+/// // x(t+1) = 0.8 x(t) + u(t), of which two sensors see once and twice as much, with some noise.
+/// let mut random = 1_u32;
+/// let mut sample = || {
+///     random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+///     f64::from(random >> 16) / 32_768.0 - 1.0
+/// };
+/// let (mut u, mut y1, mut y2, mut x) = (vec![], vec![], vec![], 0.0);
+/// for _ in 0..1000 {
+///     u.push(sample());
+///     y1.push(5.0 + x + 0.1 * sample());
+///     y2.push(2.0 * x + 0.1 * sample());
+///     x = 0.8 * x + u[u.len() - 1];
+/// }
+/// let channel = |name: &str, values| Channel { name: name.into(), values };
+/// let log = Log::new(vec![channel("u", u), channel("y1", y1), channel("y2", y2)], 0.1)?;
+/// let report = fit_state_space(&log, &[], &StateSpacePlan::new(&["u"], &["y1", "y2"]))?;
+/// assert_eq!(report.model.name(), "state space of order 1");
+/// let step = report.model.linear("a step response")?[1].step_response(0, Some(100))?;
+/// assert!((step.values[99].value - 2.0 / (1.0 - 0.8)).abs() < 0.2);
+/// # Ok::<(), thetahat::Error>(())
+/// ```
+pub fn fit_state_space(log: &Log, sources: &[Source], plan: &StateSpacePlan) -> Result<Report, Error> {
+    plan.check()?;
+    let names: Vec<&str> = plan.channels().collect();
+    names.iter().try_for_each(|name| log.channel(name).map(|_| ()))?;
+    let shares = Shares::of(&plan.estimate, &plan.validate, plan.split, log.rows())?;
+    let segments = log.segments(&names, &shares.estimation)?;
+    if segments.is_empty() {
+        return Err(Error::data(
+            "no estimation row has a value in every channel; name other rows or channels",
+        ));
+    }
+    let signal = |name: &String| -> Result<Signal, Error> {
+        let values = &log.channel(name)?.values;
+        let mut rows = segments.iter().cloned().flatten();
+        let first = rows.next().map(|row| values[row]);
+        if rows.all(|row| Some(values[row]) == first) {
+            return Err(Error::undetermined(
+                Vec::new(),
+                format!(
+                    "'{name}' is constant over the estimation rows: it can determine nothing; name rows in which it changes, or leave \
+                     it out"
+                ),
+            ));
+        }
+        let by_hand = plan.offsets.iter().find(|(channel, _)| channel == name);
+        let offset = match by_hand {
+            Some(&(_, level)) => Offset { level, slope: 0.0 },
+            None => Offset::estimate(plan.detrend, log, name, &segments)?,
+        };
+        Ok(Signal { name: name.clone(), offset })
+    };
+    let inputs = plan.inputs.iter().map(signal).collect::<Result<Vec<_>, Error>>()?;
+    let outputs = plan.outputs.iter().map(signal).collect::<Result<Vec<_>, Error>>()?;
+    let signals = inputs.iter().chain(&outputs).map(|signal| (signal.name.as_str(), signal.offset));
+    let deviations = log.deviations(signals)?;
+
+    let delays = if plan.delays.is_empty() { vec![0; inputs.len()] } else { plan.delays.clone() };
+    let record = deviations.joint_record(&plan.inputs, &plan.outputs, &shares.estimation)?.delayed(&delays);
+    let found = subspace(&record, &plan.subspace)?;
+    let (asked, offered) = (plan.orders.clone(), found.orders());
+    let orders = asked.unwrap_or(offered);
+    let orders = *orders.start()..=(*orders.end()).min(found.highest_order());
+    if orders.is_empty() {
+        return Err(Error::argument(
+            "order",
+            format!("the data tell of orders up to {}; ask for one of these", found.highest_order()),
+        ));
+    }
+    let (order, scores) = if orders.start() == orders.end() {
+        (*orders.start(), Vec::new())
+    } else {
+        let scores = found.scores(&record, orders)?;
+        (best_order(&scores)?, scores)
+    };
+    let mut matrices = found.state_space(order, log.sample_time())?;
+    let samples = record.segments.iter().map(std::ops::Range::len).sum::<usize>();
+    let products = products_of_innovations(&matrices, &record)
+        .ok_or_else(|| Error::data("the errors one step ahead leave the range of numbers"))?;
+    let free = found.free_parameters(order);
+    let degrees = samples.checked_sub(free.div_ceil(outputs.len())).filter(|degrees| *degrees > 0);
+    let Some(degrees) = degrees else {
+        return Err(Error::undetermined(
+            Vec::new(),
+            format!(
+                "a model of order {order} has {free} free parameters, and {samples} samples of {} outputs are too few for them; give \
+                 more rows, or ask for a lower order",
+                outputs.len()
+            ),
+        ));
+    };
+    let mean = &products / samples as f64;
+    matrices.noise_covariance = &products / degrees as f64;
+    // A covariance is symmetric to the bit.
+    matrices.noise_covariance.fill_lower_triangle_with_upper_triangle();
+    let model = StateSpaceModel::new((inputs, outputs), delays, &matrices, free, Some(degrees))?;
+    model.check()?;
+
+    let segments = segments.iter().map(Rows::from_positions).collect();
+    let data = shares.into_data((log, sources), &names, plan.detrend.to_string(), segments)?;
+    let estimation = Estimation {
+        procedure: Procedure::Subspace(SubspaceOutcome {
+            past: found.past(),
+            feedthrough: found.feedthrough(),
+            feedthrough_given: plan.subspace.feedthrough.is_some(),
+            singular_values: found.singular_values().iter().copied().take(MOST_VALUES).collect(),
+            orders: scores,
+        }),
+        initial: Some(Initial::Estimate),
+        level: None,
+        slope: None,
+        samples,
+        mse: mean.trace() / mean.nrows() as f64,
+        criteria: Criteria::new(mean.determinant(), free, samples),
+        condition: None,
+    };
+    let mut report = Report {
+        schema: Report::SCHEMA.to_owned(),
+        generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
+        data,
+        selection: None,
+        warnings: warnings::of_fit(&model, &estimation, &found.orders()),
+        model: Model::from(model.clone()),
+        estimation,
+        fit: Vec::new(),
+    };
+    let on_log = |rows: &[Rows]| StateSpaceOnLog::new(&model, &deviations, rows, None);
+    let own = on_log(&report.data.estimation)?;
+    evaluate(&mut report, &own, Part::Estimation, Focus::Auto);
+    for (part, rows) in report.data.held_out() {
+        evaluate(&mut report, &on_log(&rows)?, part, Focus::Auto);
+    }
+    Ok(report)
+}

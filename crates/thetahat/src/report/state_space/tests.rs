@@ -1,0 +1,164 @@
+use super::*;
+use crate::data::Channel;
+use crate::regression::noise::Noise;
+use crate::report::{Requirement, ValidationPlan, validate};
+use crate::respond::Horizon;
+
+/// x(t+1) = F x + G u + K e, y = H x + e with two outputs that rest at 10 and -3, and the log's rows.
+fn log(rows: usize, noise: f64) -> Log {
+    let mut random = Noise(7);
+    let mut x = [0.0, 0.0];
+    let mut all: [Vec<f64>; 4] = Default::default();
+    for _ in 0..rows {
+        let u = [random.next(), random.next()];
+        let e = [noise * random.next(), 0.5 * noise * random.next()];
+        let y = [x[0] + e[0], 0.5 * x[0] + x[1] + e[1]];
+        x = [
+            0.7 * x[0] + 0.2 * x[1] + u[0] + 0.3 * e[0],
+            -0.2 * x[0] + 0.6 * x[1] + 0.5 * u[0] - u[1] + 0.2 * e[1],
+        ];
+        for (values, value) in all.iter_mut().zip([u[0], u[1], 10.0 + y[0], -3.0 + y[1]]) {
+            values.push(value);
+        }
+    }
+    let names = ["u1", "u2", "y1", "y2"];
+    let channels = names.into_iter().zip(all).map(|(name, values)| Channel { name: name.to_owned(), values });
+    Log::new(channels.collect(), 0.5).unwrap()
+}
+
+fn plan() -> StateSpacePlan {
+    StateSpacePlan::new(&["u1", "u2"], &["y1", "y2"])
+}
+
+fn model(report: &Report) -> &StateSpaceModel {
+    let Model::StateSpace(model) = &report.model else { panic!("{:?}", report.model) };
+    model
+}
+
+#[test]
+fn the_model_that_made_a_log_is_found() {
+    let report = fit_state_space(&log(2000, 0.3), &[], &plan()).unwrap();
+    let found = model(&report);
+    assert_eq!((found.order(), found.stable, found.free_parameters), (2, true, 12));
+    // The eigenvalues of F are 0.65 +- 0.1937 i.
+    assert!((found.poles[0].re - 0.65).abs() < 0.02 && (found.poles[0].im - 0.1937).abs() < 0.02);
+    let exact = |output: usize, input: usize| {
+        // H (I - F)^-1 G.
+        let determinant = 0.3 * 0.4 + 0.2 * 0.2;
+        let g = [[1.0, 0.0], [0.5, -1.0]];
+        let x = [
+            (0.4 * g[0][input] + 0.2 * g[1][input]) / determinant,
+            (-0.2 * g[0][input] + 0.3 * g[1][input]) / determinant,
+        ];
+        [x[0], 0.5 * x[0] + x[1]][output]
+    };
+    for output in 0..2 {
+        for input in 0..2 {
+            let gain = found.dc_gain[output][input].unwrap().value;
+            assert!((gain - exact(output, input)).abs() < 0.05, "{output} {input}: {gain}");
+        }
+    }
+    assert!((found.outputs[0].offset.level - 10.0).abs() < 0.3);
+    // Uniform errors of these bounds; one step ahead the same figures in a validation.
+    for (output, bound) in [(0, 0.3_f64), (1, 0.15)] {
+        let ratio = found.noise_covariance[output][output] / (bound * bound / 3.0);
+        assert!((0.9..1.1).contains(&ratio), "{ratio}");
+    }
+    let stored = Report::from_json(&report.to_json().unwrap()).unwrap();
+    assert_eq!(stored, report);
+    let validated =
+        validate(&stored, None, &log(2000, 0.3), &[], &ValidationPlan::default()).unwrap().validation;
+    let figure = |fits: &[crate::validate::Fit], output: &str, horizon| {
+        fits.iter().find(|fit| fit.output == output && fit.horizon == horizon).unwrap().percent.unwrap()
+    };
+    for output in ["y1", "y2"] {
+        for horizon in [Horizon::Steps { steps: 1 }, Horizon::FreeRun] {
+            let [fitted, again] = [&report.fit, &validated.fit].map(|fits| figure(fits, output, horizon));
+            assert_eq!(fitted.to_bits(), again.to_bits());
+        }
+    }
+    let met = |text: &str| text.parse::<Requirement>().unwrap().unmet(&validated, 0.01);
+    for text in ["stable", "white", "independent", "fit[y1]>=60", "fit[y2]@1>=60", "coverage[y2]>=90"] {
+        assert_eq!(met(text), None, "{text}");
+    }
+    assert!(met("fit[y2]>=99.9").unwrap().starts_with("fit[y2]>=99.9: the fit is "));
+    assert!(
+        "fit[y3]>=1"
+            .parse::<Requirement>()
+            .unwrap()
+            .check(&report)
+            .unwrap_err()
+            .to_string()
+            .contains("no output 'y3'")
+    );
+}
+
+#[test]
+fn noise_free_logs_give_the_plant_itself() {
+    let report = fit_state_space(&log(400, 0.0), &[], &plan()).unwrap();
+    assert_eq!(model(&report).order(), 2);
+    assert!(report.fit.iter().all(|fit| fit.percent.unwrap() > 99.9999), "{:?}", report.fit);
+}
+
+#[test]
+fn a_series_has_no_inputs() {
+    let plan = StateSpacePlan::new(&[], &["y1", "y2"]);
+    let report = fit_state_space(&log(1500, 0.3), &[], &plan).unwrap();
+    assert!(report.fit.iter().all(|fit| fit.horizon == Horizon::Steps { steps: 1 }));
+    assert!(model(&report).dc_gain.iter().all(Vec::is_empty));
+    assert!(report.fit[0].percent.unwrap() > 10.0);
+}
+
+#[test]
+fn delays_are_those_of_the_plan() {
+    let log = log(1500, 0.1);
+    let mut channels: Vec<Channel> =
+        ["u1", "u2", "y1", "y2"].map(|name| log.channel(name).unwrap().clone()).to_vec();
+    // The first input acts four samples later than it is written.
+    channels[0].values.rotate_left(4);
+    let late = Log::new(channels, 0.5).unwrap();
+    let rows = vec!["1..1490".parse().unwrap()];
+    let delayed = StateSpacePlan { delays: vec![4, 0], estimate: rows, ..plan() };
+    let report = fit_state_space(&late, &[], &delayed).unwrap();
+    assert_eq!((model(&report).order(), model(&report).f.len()), (2, 6));
+    let step = report.model.linear("a step").unwrap()[0].step_response(0, Some(8)).unwrap();
+    assert!(step.values[..5].iter().all(|value| value.value.abs() < 1e-12));
+    assert!((step.values[5].value - 1.0).abs() < 0.05);
+}
+
+#[test]
+fn what_makes_no_sense_is_refused() {
+    let log = log(300, 0.3);
+    let refused = |change: fn(&mut StateSpacePlan)| {
+        let mut plan = plan();
+        change(&mut plan);
+        fit_state_space(&log, &[], &plan).unwrap_err().to_string()
+    };
+    assert!(refused(|plan| plan.outputs.clear()).contains("there is none"));
+    assert!(refused(|plan| plan.outputs.push("u1".to_owned())).contains("'u1' is there twice"));
+    assert!(refused(|plan| plan.outputs.push("y9".to_owned())).contains("y9"));
+    assert!(refused(|plan| plan.orders = Some(0..=3)).contains("order"));
+    assert!(refused(|plan| plan.orders = Some(500..=600)).contains("the data tell of orders up to"));
+    assert!(refused(|plan| plan.subspace.past = Some(0)).contains("past"));
+    assert!(refused(|plan| plan.subspace.past = Some(200)).contains("more samples than signals"));
+    assert!(refused(|plan| plan.delays = vec![1]).contains("one for each"));
+    assert!(refused(|plan| plan.delays = vec![1000, 0]).contains("more rows"));
+    assert!(refused(|plan| plan.offsets = vec![("x".to_owned(), 1.0)]).contains("'x' is no input"));
+    assert!(refused(|plan| plan.estimate = vec!["1..6".parse().unwrap()]).contains("more rows"));
+    assert!(
+        refused(|plan| {
+            plan.inputs.clear();
+            plan.subspace.feedthrough = Some(true);
+        })
+        .contains("feedthrough")
+    );
+    let constant = |name: &str| {
+        let mut channels: Vec<Channel> =
+            ["u1", "u2", "y1", "y2"].map(|name| log.channel(name).unwrap().clone()).to_vec();
+        let own = channels.iter_mut().find(|channel| channel.name == name).unwrap();
+        own.values.fill(4.0);
+        let log = Log::new(channels, 0.5).unwrap();
+        fit_state_space(&log, &[], &plan()).unwrap_err().to_string()
+    };
+    assert!(constant("u2").contains("'u2' is constant") && constant("y1").contains("'y1' is constant"));
+}

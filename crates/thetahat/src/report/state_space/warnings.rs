@@ -1,0 +1,57 @@
+//! What a careful reader of a state-space fit should know.
+
+use std::ops::RangeInclusive;
+
+use crate::estimate::{Procedure, SubspaceOutcome};
+use crate::figures::fixed;
+use crate::model::StateSpaceModel;
+use crate::report::Estimation;
+
+/// Fewer values of the outputs for each free parameter say little.
+const VALUES_A_PARAMETER: usize = 5;
+
+/// Of a fit whose data offered such orders.
+pub(super) fn of_fit(
+    model: &StateSpaceModel,
+    estimation: &Estimation,
+    offered: &RangeInclusive<usize>,
+) -> Vec<String> {
+    let mut warnings = Vec::new();
+    let Procedure::Subspace(SubspaceOutcome { orders, .. }) = &estimation.procedure else { return warnings };
+    let (order, outputs) = (model.order(), model.outputs.len());
+    let values = estimation.samples * outputs;
+    if values < VALUES_A_PARAMETER * model.free_parameters {
+        warnings.push(format!(
+            "order {order} has {} free parameters, and there are {values} values of the outputs: they say little of it; give more rows, or \
+             ask for a lower order",
+            model.free_parameters
+        ));
+    }
+    if let (Some(last), Some(first)) = (orders.last(), orders.first()) {
+        if order == last.order && last.order > first.order && last.order < *offered.end() {
+            warnings.push(format!(
+                "the order that fits best, {order}, is the highest of the range: a higher one may fit better; widen the range"
+            ));
+        } else if order == last.order && last.order > first.order {
+            warnings.push(format!(
+                "the order that fits best, {order}, is the highest that was looked at: give a range with higher ones, or leave trends and \
+                 slow drifts out of the log"
+            ));
+        }
+        let refused = orders.iter().filter(|score| score.mdl.is_none()).count();
+        if refused > 0 {
+            warnings.push(format!(
+                "{refused} of the {} orders have no model with a stable predictor, and were left out",
+                orders.len()
+            ));
+        }
+    }
+    if !model.stable {
+        let largest = model.poles.first().map_or(1.0, |pole| pole.re.hypot(pole.im));
+        warnings.push(format!(
+            "the model is unstable, its largest pole has modulus {}: free runs and responses grow without bound",
+            fixed(largest, 4)
+        ));
+    }
+    warnings
+}

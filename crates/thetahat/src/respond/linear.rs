@@ -1,0 +1,63 @@
+//! Responses of an output of a linear model, whatever its kind.
+
+use super::{FrequencyResponse, TransientResponse};
+use super::{frequency_response, impulse_response, state_space, step_response};
+use crate::Error;
+use crate::model::LinearModel;
+
+impl LinearModel<'_> {
+    /// The responses to sines of `frequencies` in radians per second: from each input, then from the noise if the model
+    /// [says it](LinearModel::has_noise). See [`frequency_response`].
+    ///
+    /// # Errors
+    /// As for [`frequency_response`].
+    pub fn frequency_response(&self, frequencies: &[f64]) -> Result<Vec<FrequencyResponse>, Error> {
+        let mut found = match self {
+            Self::Polynomial(model) => frequency_response(model, frequencies)?,
+            Self::Transfer(model) => frequency_response(model, frequencies)?,
+            Self::StateSpace(model, output) => state_space::frequency_response(model, *output, frequencies)?,
+        };
+        found.retain(|response| response.input.is_some() || self.has_noise());
+        Ok(found)
+    }
+
+    /// The response to a unit step of an input, counted from 0. See [`step_response`].
+    ///
+    /// # Errors
+    /// As for [`step_response`].
+    pub fn step_response(&self, input: usize, samples: Option<usize>) -> Result<TransientResponse, Error> {
+        match self {
+            Self::Polynomial(model) => step_response(model, input, samples),
+            Self::Transfer(model) => step_response(model, input, samples),
+            Self::StateSpace(model, output) => {
+                state_space::transient(model, (*output, input), samples, |_| 1.0)
+            }
+        }
+    }
+
+    /// The response to an impulse of an input, counted from 0. See [`impulse_response`].
+    ///
+    /// # Errors
+    /// As for [`impulse_response`].
+    pub fn impulse_response(&self, input: usize, samples: Option<usize>) -> Result<TransientResponse, Error> {
+        match self {
+            Self::Polynomial(model) => impulse_response(model, input, samples),
+            Self::Transfer(model) => impulse_response(model, input, samples),
+            Self::StateSpace(model, output) => {
+                state_space::transient(model, (*output, input), samples, |t| f64::from(u8::from(t == 0)))
+            }
+        }
+    }
+
+    /// The modulus nearest to 1 of its poles, as a distance from there; 1 without any.
+    #[cfg(feature = "html")]
+    pub(crate) fn slowest(&self) -> f64 {
+        let roots = match self {
+            Self::Polynomial(model) => [&model.poles[..], &model.noise_poles].concat(),
+            Self::Transfer(model) => [&model.poles[..], &model.noise_poles].concat(),
+            Self::StateSpace(model, _) => model.poles.clone(),
+        };
+        let distances = roots.iter().map(|root| (1.0 - root.re.hypot(root.im)).abs());
+        distances.filter(|distance| *distance > 0.0).fold(1.0, f64::min)
+    }
+}

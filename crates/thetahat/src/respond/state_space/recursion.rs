@@ -1,0 +1,154 @@
+use std::ops::Range;
+
+use thetahat_core::nalgebra::{DMatrix, DVector};
+
+use crate::model::StateSpace;
+use crate::optimize::normal;
+
+/// A model that is stepped along the rows of a log.
+///
+/// Row by row it makes [x(t+1); y(t)] of [x(t); u(t)], with e = 0; or, as a predictor, [x(t+1); e(t)] of [x(t); u(t); y(t)] with
+///
+/// ```text
+/// x(t+1) = (F - K H) x(t) + (G - K D) u(t) + K y(t),   e(t) = y(t) - H x(t) - D u(t)
+/// ```
+///
+/// A step is one product with a matrix, (n + l) (n + m + l) multiply-adds, in memory of its own.
+#[derive(Debug, Clone)]
+pub(crate) struct Recursion {
+    states: usize,
+    signals: usize,
+    /// The matrix, column by column.
+    columns: Vec<f64>,
+    /// What is left of a state one row later: F, or F - K H.
+    between: DMatrix<f64>,
+    /// H.
+    seen: DMatrix<f64>,
+    /// One over the deviations of e, which outputs are compared in.
+    weights: Vec<f64>,
+    /// Whether it is fed with what was measured.
+    predicts: bool,
+    state: Vec<f64>,
+    /// The next state, and what comes out.
+    next: Vec<f64>,
+}
+
+impl Recursion {
+    /// Driven by inputs and what was measured; gives innovations.
+    pub(crate) fn predictor(model: &StateSpace) -> Self {
+        let StateSpace { f, g, h, d, k, .. } = model;
+        let l = h.nrows();
+        let mut matrix = DMatrix::zeros(f.nrows() + l, f.nrows() + g.ncols() + l);
+        let between = f - k * h;
+        let (n, m) = g.shape();
+        matrix.view_mut((0, 0), (n, n)).copy_from(&between);
+        matrix.view_mut((0, n), (n, m)).copy_from(&(g - k * d));
+        matrix.view_mut((0, n + m), (n, l)).copy_from(k);
+        matrix.view_mut((n, 0), (l, n)).copy_from(&-h);
+        matrix.view_mut((n, n), (l, m)).copy_from(&-d);
+        matrix.view_mut((n, n + m), (l, l)).fill_with_identity();
+        Self::of(model, &matrix, between, true)
+    }
+
+    /// Driven by the inputs alone; gives outputs.
+    pub(crate) fn simulator(model: &StateSpace) -> Self {
+        let StateSpace { f, g, h, d, .. } = model;
+        let (n, m) = g.shape();
+        let l = h.nrows();
+        let mut matrix = DMatrix::zeros(n + l, n + m);
+        matrix.view_mut((0, 0), (n, n)).copy_from(f);
+        matrix.view_mut((0, n), (n, m)).copy_from(g);
+        matrix.view_mut((n, 0), (l, n)).copy_from(h);
+        matrix.view_mut((n, n), (l, m)).copy_from(d);
+        Self::of(model, &matrix, f.clone(), false)
+    }
+
+    fn of(model: &StateSpace, matrix: &DMatrix<f64>, between: DMatrix<f64>, predicts: bool) -> Self {
+        let (rows, columns) = matrix.shape();
+        let states = model.f.nrows();
+        let weight = |variance: f64| if variance > 0.0 { 1.0 / variance.sqrt() } else { 1.0 };
+        Self {
+            states,
+            signals: columns - states,
+            columns: matrix.as_slice().to_vec(),
+            between,
+            seen: model.h.clone(),
+            weights: model.noise_covariance.diagonal().iter().map(|variance| weight(*variance)).collect(),
+            predicts,
+            state: vec![0.0; states],
+            next: vec![0.0; rows],
+        }
+    }
+
+    /// The state before the next step.
+    pub(crate) fn state(&self) -> &[f64] {
+        &self.state
+    }
+
+    /// Goes on from another state.
+    pub(crate) fn start(&mut self, state: &[f64]) {
+        self.state.copy_from_slice(state);
+    }
+
+    /// What comes out of a row: the innovations, or the outputs. The signals are inputs, then outputs as far as it is fed with them.
+    pub(crate) fn step(&mut self, signals: &[&[f64]], row: usize) -> &[f64] {
+        let (of_states, of_signals) = self.columns.split_at(self.states * self.next.len());
+        let size = self.next.len();
+        self.next.fill(0.0);
+        let mut add = |column: &[f64], value: f64| {
+            self.next.iter_mut().zip(column).for_each(|(next, entry)| *next += entry * value);
+        };
+        for (column, value) in of_states.chunks_exact(size).zip(&self.state) {
+            add(column, *value);
+        }
+        for (column, signal) in of_signals.chunks_exact(size).zip(&signals[..self.signals]) {
+            add(column, signal[row]);
+        }
+        let (state, out) = self.next.split_at(self.states);
+        self.state.copy_from_slice(state);
+        out
+    }
+
+    /// Starts a segment from the state that explains its outputs best: with M(t) = H A^t, A the matrix of the recursion, what is left of them
+    /// is r(t) - M(t) x(0), with r what is left from rest, and the state that of weighted least squares. `outputs` may miss values. Rows count
+    /// as long as the state is seen in them. O(T n (n + m + l + l n)) for T of these.
+    pub(crate) fn start_at_best(&mut self, signals: &[&[f64]], outputs: &[&[f64]], rows: Range<usize>) {
+        let n = self.states;
+        let (mut matrix, mut right) = (DMatrix::zeros(n, n), DVector::zeros(n));
+        let (mut seen, mut left) = (self.seen.clone(), vec![0.0; outputs.len()]);
+        let mut after = seen.clone();
+        let mut weighted = seen.clone();
+        let first = seen.norm();
+        self.state.fill(0.0);
+        for row in rows {
+            left.copy_from_slice(self.step(signals, row));
+            for (place, output) in outputs.iter().enumerate() {
+                if !self.predicts {
+                    left[place] = output[row] - left[place];
+                }
+                // A missing output says nothing.
+                let weight = if output[row].is_nan() { 0.0 } else { self.weights[place] };
+                left[place] = if weight == 0.0 { 0.0 } else { weight * left[place] };
+                weighted.row_mut(place).zip_apply(&seen.row(place), |entry, seen| *entry = weight * seen);
+            }
+            matrix.gemm_tr(1.0, &weighted, &weighted, 1.0);
+            for (place, left) in left.iter().enumerate() {
+                right
+                    .iter_mut()
+                    .zip(weighted.row(place).iter())
+                    .for_each(|(sum, entry)| *sum += entry * left);
+            }
+            after.gemm(1.0, &seen, &self.between, 0.0);
+            std::mem::swap(&mut seen, &mut after);
+            let size = seen.norm();
+            if size <= f64::EPSILON * first || !size.is_finite() {
+                break;
+            }
+        }
+        // The matrix is symmetric.
+        let mut factor = matrix.as_slice().to_vec();
+        normal::factor(&mut factor, n);
+        normal::solve(&factor, n, right.as_mut_slice());
+        self.state.copy_from_slice(right.as_slice());
+    }
+}

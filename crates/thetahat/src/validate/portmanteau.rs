@@ -1,0 +1,117 @@
+//! Whether the residuals of several outputs are white together.
+
+use thetahat_core::nalgebra::{Cholesky, DMatrix};
+
+use super::verdict::Test;
+use crate::distribution::chi_square_tail;
+use crate::regression::sum;
+use crate::respond::Innovations;
+
+/// The portmanteau test of the residuals e of l outputs: with C_h = 1/N sum e(t) e(t-h)', e less their means,
+///
+/// ```text
+/// Q = N^2 sum_{0 < h <= L} tr(C_h' C_0^-1 C_h C_0^-1)/N_h
+/// ```
+///
+/// is chi-square with l^2 L degrees of freedom where they are white, N_h being how many pairs are h samples apart (Hosking, J. American
+/// Statistical Association 75, 1980), less `fitted` for as many parameters of the noise that were fitted to these samples. It sees what
+/// tests of single outputs do not: that one output's error is known from another's past.
+///
+/// `outputs` has the innovations of each output, in the same segments. None for fewer than two, segments of their own, or outputs of which
+/// nothing is left. O(N l^2 L).
+pub(crate) fn portmanteau(outputs: &[&[Innovations]], lags: usize, fitted: usize) -> Option<Test> {
+    let (first, others) = outputs.split_first().filter(|(_, others)| !others.is_empty())?;
+    let same = |other: &&[Innovations]| {
+        other.len() == first.len() && other.iter().zip(*first).all(|(other, own)| other.counted == own.counted)
+    };
+    if !others.iter().all(same) {
+        return None;
+    }
+    // The runs that count of each output, less their mean.
+    let samples: usize = first.iter().flat_map(|own| &own.counted).map(std::ops::Range::len).sum();
+    let centred = outputs.iter().map(|output| {
+        let mean = sum(output.iter().flat_map(Innovations::counted_errors).copied()) / samples as f64;
+        let runs = output.iter().flat_map(|own| {
+            let at = own.rows.start;
+            own.counted.iter().map(move |rows| &own.errors[rows.start - at..rows.end - at])
+        });
+        runs.map(|run| run.iter().map(|error| error - mean).collect::<Vec<f64>>()).collect::<Vec<_>>()
+    });
+    let centred: Vec<Vec<Vec<f64>>> = centred.collect();
+    let size = outputs.len();
+    let products = |lag: usize| {
+        let entry = |i: usize, j: usize| {
+            let runs = centred[i].iter().zip(&centred[j]).filter(|(run, _)| run.len() > lag);
+            let each = runs.map(|(now, before)| {
+                now[lag..].iter().zip(before).map(|(now, before)| now * before).sum::<f64>()
+            });
+            each.sum::<f64>() / samples as f64
+        };
+        DMatrix::from_fn(size, size, entry)
+    };
+    let degrees = (size * size * lags) as f64 - fitted as f64;
+    let whole = Cholesky::new(products(0)).filter(|_| degrees > 0.0)?;
+    let mut statistic = 0.0;
+    for lag in 1..=lags {
+        let pairs: usize = centred[0].iter().map(|run| run.len().saturating_sub(lag)).sum();
+        if pairs == 0 {
+            return None;
+        }
+        let lagged = products(lag);
+        let trace = (whole.solve(&lagged.transpose()) * whole.solve(&lagged)).trace();
+        statistic += (samples * samples) as f64 * trace / pairs as f64;
+    }
+    let p_value = chi_square_tail(statistic, degrees);
+    statistic.is_finite().then_some(Test { lags, statistic, degrees, p_value })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::regression::noise::Noise;
+
+    fn innovations(errors: Vec<f64>) -> Vec<Innovations> {
+        vec![Innovations::alone(0..errors.len(), vec![0..errors.len()], errors)]
+    }
+
+    #[test]
+    fn white_errors_pass_as_often_as_they_should() {
+        let mut noise = Noise(3);
+        let mut rejected = 0;
+        for _ in 0..400 {
+            let all: Vec<(f64, f64)> = (0..300).map(|_| (noise.next(), noise.next())).collect();
+            // Correlated in the same sample, and nowhere else.
+            let first = innovations(all.iter().map(|(a, _)| 5.0 + a).collect());
+            let second = innovations(all.iter().map(|(a, b)| a + 0.5 * b).collect());
+            let found = portmanteau(&[&first, &second], 10, 0).unwrap();
+            assert_eq!((found.lags, found.degrees), (10, 40.0));
+            rejected += usize::from(found.p_value.unwrap() < 0.05);
+        }
+        assert!((8..=34).contains(&rejected), "{rejected} of 400 at 5 %");
+    }
+
+    #[test]
+    fn it_sees_what_one_output_knows_of_another() {
+        let mut noise = Noise(4);
+        let all: Vec<f64> = (0..1001).map(|_| noise.next()).collect();
+        let second: Vec<f64> = (1..1001).map(|t| 0.3 * all[t - 1] + noise.next()).collect();
+        let (first, second) = (innovations(all[1..].to_vec()), innovations(second));
+        assert!(portmanteau(&[&first, &second], 10, 0).unwrap().p_value.unwrap() < 1e-6);
+        // In numbers: of one lag with C_0 = I it is N^2/(N - 1) times the sum of the squares of C_1.
+        let plain: [Vec<f64>; 2] = [vec![1.0, 1.0, -1.0, -1.0], vec![1.0, -1.0, -1.0, 1.0]];
+        let [first, second] = plain.map(innovations);
+        let found = portmanteau(&[&first, &second], 1, 1).unwrap();
+        // C_1 = [[1, 3], [-3, -1]]/4 with e(t) e(t-1)'.
+        assert!((found.statistic - 16.0 / 3.0 * 20.0 / 16.0).abs() < 1e-12 && found.degrees == 3.0, "{found:?}");
+    }
+
+    #[test]
+    fn what_cannot_be_tested_is_none() {
+        let (one, short) = (innovations(vec![1.0, -1.0, 2.0]), innovations(vec![1.0, -1.0]));
+        assert_eq!(portmanteau(&[&one], 1, 0), None);
+        assert_eq!(portmanteau(&[&one, &short], 1, 0), None);
+        assert_eq!(portmanteau(&[&one, &one], 1, 0), None);
+        assert_eq!(portmanteau(&[&one, &innovations(vec![0.5, 1.0, 0.0])], 3, 0), None);
+        assert_eq!(portmanteau(&[&one, &innovations(vec![0.5, 1.0, 0.0])], 1, 4), None);
+    }
+}

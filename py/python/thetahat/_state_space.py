@@ -1,0 +1,92 @@
+"""Models in state space, with any number of outputs."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from typing import Union
+
+from thetahat import _options, _thetahat
+from thetahat._fit import EstimationWarning
+from thetahat._log import Log, handle
+from thetahat._model import Model
+from thetahat._options import FitOptions, Rows
+
+
+def ss(
+    log: Log,
+    order: int | range | None = None,
+    *,
+    nk: Union[int, Sequence[int], None] = None,
+    past: int | None = None,
+    feedthrough: bool | None = None,
+    estimate: Rows | None = None,
+    validate: Rows | None = None,
+    split: tuple[float, float, float] | None = None,
+    detrend: str | None = None,
+    offset: Mapping[str, float] | None = None,
+) -> Model:
+    """Fit a state-space model, x(t+1) = F x(t) + G u(t) + K e(t), y(t) = H x(t) + D u(t) + e(t), by a subspace method.
+
+    The states are found first, from a long vector ARX model (SSARX), then the matrices by least squares. It is consistent where a
+    controller feeds outputs back to the inputs.
+
+    Parameters
+    ----------
+    log : Log
+        The data, with any number of inputs and outputs. Without inputs it is a time series.
+    order : int or range, optional
+        How many states; or among how many to choose by MDL: ``range(1, 11)`` are 1 to 10. From 1 to 20 unless it is said.
+    nk : int, or one for each input, optional
+        Samples from input to first effect. Without it an input acts one sample later, or at once if ``feedthrough`` says so.
+    past : int, optional
+        Past samples that the states are made of; those of the least AIC, unless it is said.
+    feedthrough : bool, optional
+        Whether inputs act on the outputs at once. Where it lowers MDL and the inputs are not fed back, unless it is said.
+    estimate, validate, split, detrend, offset
+        What to fit to, see `thetahat.FitOptions`.
+
+    Returns
+    -------
+    Model
+        Its `Model.kind` is ``"state-space"``.
+
+    Raises
+    ------
+    EstimationError
+        If the data cannot determine the states: too few rows, a constant channel, outputs that depend on one another.
+    ValueError
+        If an argument does not make sense, or no row to fit to has a value in every channel.
+
+    Warns
+    -----
+    EstimationWarning
+        For what a careful reader of the model should know.
+
+    References
+    ----------
+    Jansson, Subspace identification and ARX modeling, IFAC SYSID 2003. Chiuso, Automatica 43, 2007.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import thetahat as th
+    >>> rng = np.random.default_rng(0)
+    >>> u, x = rng.normal(size=(1000, 2)), np.zeros(1001)
+    >>> for k in range(1000):
+    ...     x[k + 1] = 0.8 * x[k] + u[k, 0] - 0.5 * u[k, 1]
+    >>> y = np.column_stack([x[:-1], 2 * x[:-1]]) + 0.1 * rng.normal(size=(1000, 2))
+    >>> model = th.ss(th.Log(y, u, sample_time=1))
+    >>> model.name, model.poles().real.round(2).tolist()
+    ('state space of order 1', [0.8])
+    >>> [round(model.dc_gain("u2", output="y2")[0], 1), model.to_state_space().H.shape]
+    [-5.0, (2, 1)]
+    """
+    words = ["--model=ss", *_options.order_words(order=order, nk=nk)]
+    words += [] if past is None else [f"--past={_options.count('past', past)}"]
+    words += [] if feedthrough is None else [f"--feedthrough={'yes' if _options.flag('feedthrough', feedthrough) else 'no'}"]
+    words += _options.words(FitOptions, locals(), len(log) if isinstance(log, Log) else None)
+    found = Model._of(_thetahat.fit_state_space(handle("log", log), words))
+    for warning in found.warnings:
+        warnings.warn(warning, EstimationWarning, stacklevel=2)
+    return found

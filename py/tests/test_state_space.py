@@ -1,0 +1,141 @@
+"""Models in state space with several outputs, and what every method makes of them."""
+
+from __future__ import annotations
+
+import json
+import pickle
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import thetahat as th
+from thetahat import plot
+
+Array = npt.NDArray[np.float64]
+
+F = np.array([[0.7, 0.2], [-0.2, 0.6]])
+G = np.array([[1.0, 0.0], [0.5, -1.0]])
+H = np.array([[1.0, 0.0], [0.5, 1.0]])
+K = np.array([[0.3, 0.0], [0.0, 0.2]])
+
+
+def signals(rows: int = 1500, noise: float = 0.2) -> tuple[Array, Array]:
+    rng = np.random.default_rng(0)
+    u, e, x = rng.standard_normal((rows, 2)), noise * rng.standard_normal((rows, 2)), np.zeros(2)
+    y = np.zeros((rows, 2))
+    for k in range(rows):
+        y[k] = H @ x + e[k]
+        x = F @ x + G @ u[k] + K @ e[k]
+    return u, y + [10, -3]
+
+
+def log(rows: int = 1500) -> th.Log:
+    u, y = signals(rows)
+    return th.Log(y, u, sample_time=0.5)
+
+
+def data_outputs(data: th.Log) -> Array:
+    return np.column_stack([data[name] for name in ("y1", "y2")])
+
+
+def test_the_plant_is_found_and_every_method_takes_it() -> None:
+    data = log()
+    model = th.ss(data, estimate=slice(0, 1000), validate=slice(1000, 1500))
+    assert (model.kind, model.name, model.method) == ("state-space", "state space of order 2", "subspace")
+    assert model.poles() == pytest.approx(np.linalg.eigvals(F), abs=0.03)
+    assert model.stable and model.time_constants().shape == (2,)
+    gains = H @ np.linalg.solve(np.eye(2) - F, G)
+    for i, output in enumerate(model.outputs):
+        for j, name in enumerate(model.inputs):
+            assert model.dc_gain(name, output=output)[0] == pytest.approx(gains[i, j], abs=0.1)
+            step = model.step_response(name, 100, output=i).values
+            assert step[-1] == pytest.approx(gains[i, j], abs=0.1)
+            response = model.frequency_response([1e-4], output=output)
+            assert abs(response.values[j][0]) == pytest.approx(abs(gains[i, j]), abs=0.1)
+    assert model.noise_covariance == pytest.approx(0.04 * np.eye(2), abs=0.01)
+    assert model.parameters.size == 0 and model.covariance is None
+    with pytest.raises(AttributeError, match="this one is in state space"):
+        _ = model.orders
+    with pytest.raises(ValueError, match="output: there are several"):
+        model.dc_gain()
+
+    again = pickle.loads(pickle.dumps(model))
+    assert json.loads(again.to_json()) == json.loads(model.to_json())
+    assert model.predict(data).shape == model.residuals(data).shape == (1500, 2)
+    assert np.std(model.residuals(data), axis=0) == pytest.approx([0.2, 0.2], rel=0.1)
+    assert model.simulate(data).shape == (1500, 2)
+    low, high = model.predict_interval(data, 3)
+    inside = (low[2:] <= data_outputs(data)[2:]) & (data_outputs(data)[2:] <= high[2:])
+    assert np.mean(inside, axis=0) == pytest.approx([0.95, 0.95], abs=0.03)
+    forecast = model.forecast(data[:1400], 5, data.u[1400:1405])
+    assert forecast.values.shape == forecast.standard_deviations.shape == (5, 2)
+    validation = model.validate(data, rows=slice(1000, 1500), require=["fit[y1]>=60", "white", "stable"])
+    assert {fit["output"] for fit in validation.document["fit"]} == {"y1", "y2"}
+    with pytest.raises(ValueError, match="no output 'y9'"):
+        model.validate(data, require="fit[y9]>=1")
+    # ln L of Gaussian errors.
+    known = len(data[:1000]) * (np.log(np.linalg.det(model.noise_covariance)) + 2 * np.log(2 * np.pi) + 2)
+    assert model.log_likelihood == pytest.approx(-known / 2, rel=0.01)
+    assert "state space of order 2" in model._repr_html_()
+    for draw in (plot.step, plot.impulse, plot.bode):
+        draw(model, output="y2")
+        with pytest.raises(ValueError, match="output: there are several"):
+            draw(model)
+    assert plot.bode(model, output=0).shape == (2, 2)
+    plot.fit(model, data, 5, output="y1")
+
+
+def test_matrices_predict_as_the_model_does() -> None:
+    data = log()
+    model = th.ss(data, 2)
+    form = model.to_state_space()
+    u = data.u - [model.offsets[name][0] for name in model.inputs]
+    level = np.array([model.offsets[name][0] for name in model.outputs])
+    x, predicted = np.zeros(len(form.F)), np.zeros((len(data), 2))
+    measured = data_outputs(data) - level
+    for t in range(len(data)):
+        predicted[t] = form.H @ x + form.D @ u[t]
+        x = form.F @ x + form.G @ u[t] + form.K @ (measured[t] - predicted[t])
+    assert np.allclose(predicted + level, model.predict(data, initial="zero"), atol=1e-9)
+    control = pytest.importorskip("control")
+    plant = model.to_control()
+    assert isinstance(plant, control.StateSpace)
+    assert (plant.input_labels, plant.output_labels) == (["u1", "u2"], ["y1", "y2"])
+    assert model.to_scipy().dt == 0.5
+
+
+def test_options_are_those_of_the_command_line() -> None:
+    data = log()
+    model = th.ss(data, range(1, 5), past=8, feedthrough=True, nk=[1, 0])
+    assert (model.document["estimation"]["past"], model.document["estimation"]["feedthrough"]) == (8, True)
+    assert len(model.document["estimation"]["orders"]) == 4
+    series = th.ss(th.Log(signals()[1], sample_time=1), 2)
+    assert series.inputs == [] and series.predict(th.Log(signals()[1], sample_time=1)).shape == (1500, 2)
+    assert th.ss(th.Log(signals()[1][:, 0], signals()[0], sample_time=1), 2).output == "y"
+    for wrong, words in (
+        (lambda: th.ss(data, 0), "order"),
+        (lambda: th.ss(data, past=0), "past"),
+        (lambda: th.ss(data, nk=[1, 2, 3]), "nk"),
+        (lambda: th.ss(data, feedthrough=False, nk=0), "nk"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            wrong()
+    with pytest.raises(TypeError, match="feedthrough"):
+        th.ss(data, feedthrough="yes")  # type: ignore[arg-type]
+    with pytest.raises(th.EstimationError, match="more samples than signals"):
+        th.ss(data[:20], past=10)
+
+
+def test_a_filter_and_a_frame_take_it() -> None:
+    pandas = pytest.importorskip("pandas")
+    u, y = signals()
+    frame = pandas.DataFrame({"heat": u[:, 0], "fan": u[:, 1], "hot": y[:, 0], "cold": y[:, 1]})
+    frame.index = pandas.date_range("2026-01-01", periods=len(frame), freq="500ms")
+    data = th.Log.from_dataframe(frame, inputs=["heat", "fan"], output=["hot", "cold"])
+    model = th.ss(data, 2)
+    assert model.outputs == ["hot", "cold"] and model.sample_time == 0.5
+    estimated = th.StateFilter(model).run(data)
+    assert len(estimated) == len(data) and "x1" in estimated.to_pandas().columns
+    one = th.Log.from_dataframe(frame, inputs=["heat", "fan"], output="hot")
+    assert th.ss(one, 2).output == "hot"

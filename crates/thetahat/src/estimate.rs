@@ -4,7 +4,7 @@
 //!   [`estimate_monitored`] tells a [`Monitor`] of its progress. [`Initial`] says what stands for the samples before the first.
 //! - [`arx`] is its short form for models that are linear in their parameters. [`arx_factor`] gives a triangular factor that merges
 //!   with those of other records.
-//! - [`subspace()`] finds the states of a record with several outputs ([`SubspaceOptions`]); of the [`Subspace`] a
+//! - [`subspace()`] finds the states of a record with several outputs ([`SubspaceOptions`] with a [`Weighting`]); of the [`Subspace`] a
 //!   [`StateSpace`](crate::model::StateSpace) of any order is read off, and an [`OrderScore`] says how well it predicts.
 //! - Methods have settings: a [`Search`], [`Robust`] (a [`Loss`]), [`ConvexFit`] (a
 //!   [`Norm`], [`Bound`]s and [`GainBound`]s), [`LikelihoodSearch`] for models in equations ([`UnknownParameter`]).
@@ -91,7 +91,7 @@ pub(crate) use process::{
 };
 pub use robust::{Loss, Robust, RobustOutcome};
 pub(crate) use stretches::stretches;
-pub use subspace::{OrderScore, Subspace, SubspaceOptions, SubspaceOutcome, subspace};
+pub use subspace::{OrderScore, Subspace, SubspaceOptions, SubspaceOutcome, Weighting, subspace};
 pub(crate) use subspace::{best as best_order, products_of_innovations};
 pub(crate) use uncertainty::{Autoregression, autoregression, backward_filtered_products};
 

@@ -13,6 +13,8 @@ mod intervals;
 mod process;
 #[path = "monte_carlo/simulated.rs"]
 mod simulated;
+#[path = "monte_carlo/subspace.rs"]
+mod subspace;
 
 use thetahat::data::Record;
 use thetahat::estimate::{Initial, Method, Procedure, estimate};

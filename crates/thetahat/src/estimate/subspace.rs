@@ -5,13 +5,14 @@ mod riccati;
 #[cfg(test)]
 mod tests;
 mod vector_arx;
+mod weighting;
 
 use std::ops::RangeInclusive;
 
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use thetahat_core::nalgebra::{Cholesky, DMatrix};
+use thetahat_core::nalgebra::DMatrix;
 
 use super::stretches::thinned_joint;
 use crate::Error;
@@ -19,7 +20,9 @@ use crate::data::JointRecord;
 use crate::model::StateSpace;
 use crate::optimize::normal;
 pub(crate) use innovations::products as products_of_innovations;
-use vector_arx::{ROUNDING, VectorArx, log_determinant};
+use vector_arx::{ROUNDING, VectorArx, divided, log_determinant};
+use weighting::Weighted;
+pub use weighting::Weighting;
 
 /// The largest past horizon that the data may choose.
 const LONGEST_PAST: usize = 40;
@@ -40,8 +43,12 @@ const HIGHEST_ORDER: usize = 20;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct SubspaceOptions {
+    /// What the singular values are of. By default SSARX.
+    pub weighting: Weighting,
     /// p, the past samples that the state is made of. By default that of the least AIC, 40 at most.
     pub past: Option<usize>,
+    /// s, the samples of the future that the past is asked of. By default p. For SSARX p at most: more would change nothing.
+    pub future: Option<usize>,
     /// Whether the inputs act on the outputs at once, so that D is estimated. By default where that lowers MDL; but not where past outputs
     /// tell of the inputs, which are fed back then: with a controller that acts at once, u(t) tells of y(t) whatever D is.
     pub feedthrough: Option<bool>,
@@ -50,7 +57,9 @@ pub struct SubspaceOptions {
 /// The state of a record at all orders: what a [`StateSpace`] of each is read off.
 #[derive(Debug, Clone)]
 pub struct Subspace {
+    weighting: Weighting,
     past: usize,
+    future: usize,
     feedthrough: bool,
     inputs: usize,
     outputs: usize,
@@ -64,13 +73,17 @@ pub struct Subspace {
 /// How a state-space model was found by a subspace method.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SubspaceOutcome {
+    /// What the singular values are of.
+    pub weighting: Weighting,
     /// p, the past samples that the state is made of.
     pub past: usize,
+    /// s, the samples of the future that it tells of.
+    pub future: usize,
     /// Whether the inputs act on the outputs at once, so that D was estimated.
     pub feedthrough: bool,
     /// Whether that was asked for; else the data said it.
     pub feedthrough_given: bool,
-    /// The largest singular values of what the past says of the outputs to come, in units of the deviation of e.
+    /// The largest singular values of what the past says of the outputs to come: see [`Subspace::singular_values`].
     pub singular_values: Vec<f64>,
     /// What the order was chosen among; empty if it was given.
     pub orders: Vec<OrderScore>,
@@ -85,15 +98,15 @@ pub struct OrderScore {
     pub mdl: Option<f64>,
 }
 
-/// Finds the states of a record by SSARX.
+/// Finds the states of a record by a subspace method: SSARX unless the options name another [`Weighting`].
 ///
-/// Signals are divided by their root mean squares. With z = [u; y] a long vector ARX model
+/// Signals are divided by their root mean squares. For SSARX a long vector ARX model with z = [u; y],
 ///
 /// ```text
 /// y(t) = D u(t) + M_1 z(t-1) + … + M_p z(t-p) + e(t)
 /// ```
 ///
-/// is fitted by least squares. As M_j = H (F - K H)^(j-1) [G - K D, K], what the past says of the next p outputs, less what later
+/// is fitted by least squares. As M_j = H (F - K H)^(j-1) [G - K D, K], what the past says of the next s outputs, less what later
 /// samples add, is
 ///
 /// ```text
@@ -103,19 +116,20 @@ pub struct OrderScore {
 /// ```
 ///
 /// Weighted by the root W of the inverse covariance of e, and by the root L of the products of the past, its singular values are those of
-/// W Gamma K_p L = U S V', and the state of order n is x = S^½ V' L^-1 z_past with its first n rows. This is SSARX (Jansson, Subspace
-/// identification and ARX modeling, IFAC SYSID 2003; Chiuso, Automatica 43, 2007): other than with MOESP, N4SID and CVA, nothing is projected
-/// on future inputs, so that it is consistent where the inputs are fed back.
+/// W Gamma K_p L = U S V', and the state of order n is x = S^½ V' L^-1 z_past with its first n rows. (Jansson, Subspace identification
+/// and ARX modeling, IFAC SYSID 2003; Chiuso, Automatica 43, 2007.) Other than with MOESP, N4SID and CVA, whose equations are at
+/// [`Weighting`], nothing is projected on future inputs, so that it is consistent where the inputs are fed back.
 ///
 /// The matrices follow by least squares, H and D from y on [x; u], and F, G and K from x(t+1) on [x; u; e] with the residuals
 /// e of the former. Where a controller feeds y(t) back to u(t), u(t) and e(t) are correlated: without e beside them, G and F would be
 /// biased.
 ///
-/// Everything comes from the lagged products of all signals, so that the data are read once: O(N q^2 p) for q signals, then O((q p)^3).
+/// Everything comes from the lagged products of all signals: O(N q^2 p) for q signals, then O((q p)^3); for the classical weightings with
+/// p + s in the place of p. Where p is not given, those of the longest past come first.
 /// Singular values below a millionth of the largest have few exact digits.
 ///
 /// # Errors
-/// [`Error::Argument`] for a past of 0; [`Error::Data`] for a record without outputs; [`Error::Undetermined`] where there are too few
+/// [`Error::Argument`] for a past or a future of 0; [`Error::Data`] for a record without outputs; [`Error::Undetermined`] where there are too few
 /// samples for the lagged signals, or a signal is zero.
 ///
 /// ```
@@ -151,17 +165,16 @@ pub fn subspace(record: &JointRecord<'_>, options: &SubspaceOptions) -> Result<S
     if record.outputs.is_empty() {
         return Err(Error::data("the record has no outputs; it needs at least one"));
     }
-    let past = match options.past {
-        Some(0) => {
+    for (name, horizon) in [("past", options.past), ("future", options.future)] {
+        if horizon == Some(0) {
             return Err(Error::argument(
-                "past",
-                "it is 0, and a state is made of past samples; take 1 or more",
+                name,
+                "it is 0, and a state is what past samples say of future ones; take 1 or more",
             ));
         }
-        Some(past) => past,
-        None => longest_past(record)?,
-    };
-    enough(record, past)?;
+    }
+    let past = options.past.map_or_else(|| longest_past(record), Ok)?;
+    enough(record, past, None)?;
     let mut regression = VectorArx::new(record, past).ok_or_else(|| silent(record, past))?;
     if options.past.is_none() {
         let past = regression.akaike(options.feedthrough != Some(false));
@@ -169,9 +182,13 @@ pub fn subspace(record: &JointRecord<'_>, options: &SubspaceOptions) -> Result<S
             regression = VectorArx::new(record, past).ok_or_else(|| silent(record, past))?;
         }
     }
+    let future = options.future.unwrap_or(regression.past);
+    if options.weighting != Weighting::Ssarx {
+        enough(record, regression.past, Some(future))?;
+    }
     let driven = regression.inputs > 0;
     let feedthrough = driven && options.feedthrough.unwrap_or_else(|| regression.has_feedthrough());
-    Subspace::new(&regression, feedthrough)
+    Subspace::new(record, &regression, options.weighting, future, feedthrough)
 }
 
 /// The samples that have so many before them in their segment.
@@ -193,21 +210,26 @@ fn longest_past(record: &JointRecord<'_>) -> Result<usize, Error> {
     if let Some(past) = (1..=LONGEST_PAST).rev().find(fits) {
         return Ok(past);
     }
-    enough(record, 1).map(|()| 1)
+    enough(record, 1, None).map(|()| 1)
 }
 
 /// # Errors
-/// [`Error::Undetermined`] if there are not more samples than lagged signals.
-fn enough(record: &JointRecord<'_>, past: usize) -> Result<(), Error> {
-    let (samples, signals) = (samples(record, past), signals(record, past));
+/// [`Error::Undetermined`] if there are not more samples than lagged signals of a past, and of a future where one is projected on.
+fn enough(record: &JointRecord<'_>, past: usize, future: Option<usize>) -> Result<(), Error> {
+    let lags = past.saturating_add(future.map_or(0, |future| future - 1));
+    let (samples, signals) = (samples(record, lags), signals(record, lags));
     if samples > signals {
         return Ok(());
     }
+    let (horizons, make, have) = match future {
+        Some(future) => (format!("a past of {past} and a future of {future}"), "make", "have both in"),
+        None => (format!("a past of {past}"), "makes", "have it before them in"),
+    };
     Err(Error::undetermined(
         Vec::new(),
         format!(
-            "a past of {past} makes {signals} lagged signals, and {samples} samples have it before them in their segment; there must be \
-             more samples than signals: give more rows, or fewer channels"
+            "{horizons} {make} {signals} lagged signals, and {samples} samples {have} their segment; there must be more samples than \
+             signals: give more rows, or fewer channels"
         ),
     ))
 }
@@ -237,24 +259,17 @@ fn silent(record: &JointRecord<'_>, past: usize) -> Error {
 }
 
 impl Subspace {
-    fn new(regression: &VectorArx, feedthrough: bool) -> Result<Self, Error> {
+    fn new(
+        record: &JointRecord<'_>,
+        regression: &VectorArx,
+        weighting: Weighting,
+        future: usize,
+        feedthrough: bool,
+    ) -> Result<Self, Error> {
         let VectorArx { inputs, outputs, past, .. } = *regression;
         let width = regression.width();
-        let (coefficients, covariance) = regression.coefficients(feedthrough);
-        let rounding = DMatrix::identity(outputs, outputs) * ROUNDING;
-        let left = Cholesky::new(covariance + rounding);
-        // Rows of Gamma K_p are the coefficients, moved by one lag each.
-        let mut map = DMatrix::zeros(outputs * past, width * past);
-        let whitened =
-            left.and_then(|factor| factor.l().solve_lower_triangular(&coefficients)).ok_or_else(|| {
-                Error::undetermined(Vec::new(), "the outputs depend on one another; leave one out")
-            })?;
-        for block in 0..past {
-            let known = width * (past - block);
-            let from = whitened.columns(width * block, known);
-            map.view_mut((outputs * block, 0), (outputs, known)).copy_from(&from);
-        }
-        let factor = regression.past_factor();
+        let future = future.min(weighting.longest_future(past));
+        let Weighted { map, factor } = weighting.weighted(record, regression, future, feedthrough)?;
         let weighted = map * &factor;
         let (rows, columns) = weighted.shape();
         let same = faer::Mat::from_fn(rows, columns, |row, column| weighted[(row, column)]);
@@ -263,34 +278,28 @@ impl Subspace {
         })?;
         let singular_values: Vec<f64> = decomposed.S().column_vector().iter().copied().collect();
         let seen = |value: &&f64| **value > f64::EPSILON * singular_values[0];
-        let highest = singular_values.iter().take_while(seen).count().min(outputs * past);
+        let highest = singular_values.iter().take_while(seen).count();
         if highest == 0 {
             return Err(Error::undetermined(
                 Vec::new(),
                 "the past says nothing of the outputs: there are no states to be found",
             ));
         }
-        // T L = S^½ V', row by row from the last column of L on.
+        // T R = S^½ V'.
         let right = decomposed.V();
-        let mut states = DMatrix::zeros(highest, columns);
-        for state in 0..highest {
-            let root = singular_values[state].sqrt();
-            for column in (0..columns).rev() {
-                let later = column + 1..columns;
-                let explained: f64 = later.map(|k| states[(state, k)] * factor[(k, column)]).sum();
-                if factor[(column, column)] > 0.0 {
-                    states[(state, column)] =
-                        (root * right[(column, state)] - explained) / factor[(column, column)];
-                }
-            }
-        }
+        let roots = DMatrix::from_fn(highest, columns, |state, column| {
+            singular_values[state].sqrt() * right[(column, state)]
+        });
+        let states = divided(roots, &factor);
         let mut rows = DMatrix::zeros(2 * highest + width, width * (past + 1));
         rows.view_mut((0, width), (highest, columns)).copy_from(&states);
         rows.view_mut((highest, 0), (highest, columns)).copy_from(&states);
         rows.view_mut((2 * highest, 0), (width, width)).fill_with_identity();
         let moments = &rows * &regression.products * rows.transpose();
         Ok(Self {
+            weighting,
             past,
+            future,
             feedthrough,
             inputs,
             outputs,
@@ -301,9 +310,19 @@ impl Subspace {
         })
     }
 
+    /// What the singular values are of.
+    pub fn weighting(&self) -> Weighting {
+        self.weighting
+    }
+
     /// p, the past samples that the states are made of.
     pub fn past(&self) -> usize {
         self.past
+    }
+
+    /// s, the samples of the future that the states tell of.
+    pub fn future(&self) -> usize {
+        self.future
     }
 
     /// Whether the inputs act on the outputs at once.
@@ -311,7 +330,8 @@ impl Subspace {
         self.feedthrough
     }
 
-    /// The singular values of what the past says of the outputs to come, falling: in units of the deviation of e.
+    /// The singular values of what the past says of the outputs to come, falling: for SSARX in units of the deviation of e, for MOESP and
+    /// N4SID in those of the outputs, and for CVA correlations.
     pub fn singular_values(&self) -> &[f64] {
         &self.singular_values
     }

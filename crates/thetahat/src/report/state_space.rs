@@ -249,7 +249,9 @@ pub fn fit_state_space(log: &Log, sources: &[Source], plan: &StateSpacePlan) -> 
     let data = shares.into_data((log, sources), &names, plan.detrend.to_string(), segments)?;
     let estimation = Estimation {
         procedure: Procedure::Subspace(SubspaceOutcome {
+            weighting: found.weighting(),
             past: found.past(),
+            future: found.future(),
             feedthrough: found.feedthrough(),
             feedthrough_given: plan.subspace.feedthrough.is_some(),
             singular_values: found.singular_values().iter().copied().take(MOST_VALUES).collect(),

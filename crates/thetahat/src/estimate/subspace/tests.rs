@@ -5,7 +5,7 @@ use super::*;
 use crate::random::Random;
 
 /// Two inputs, two outputs, four states of two lightly damped modes.
-fn plant() -> StateSpace {
+pub(super) fn plant() -> StateSpace {
     StateSpace {
         f: DMatrix::from_row_slice(
             4,
@@ -22,9 +22,9 @@ fn plant() -> StateSpace {
 }
 
 /// u and y, N samples each, of a plant whose inputs are u = r - feedback y, r of variance 1.
-struct Run {
-    inputs: Vec<Vec<f64>>,
-    outputs: Vec<Vec<f64>>,
+pub(super) struct Run {
+    pub(super) inputs: Vec<Vec<f64>>,
+    pub(super) outputs: Vec<Vec<f64>>,
 }
 
 impl Run {
@@ -48,11 +48,11 @@ impl Run {
         Self { inputs, outputs }
     }
 
-    fn open(model: &StateSpace, count: usize, seed: u64, noise: f64) -> Self {
+    pub(super) fn open(model: &StateSpace, count: usize, seed: u64, noise: f64) -> Self {
         Self::new(model, count, seed, noise, &DMatrix::zeros(model.g.ncols(), model.h.nrows()))
     }
 
-    fn record(&self) -> JointRecord<'_> {
+    pub(super) fn record(&self) -> JointRecord<'_> {
         JointRecord::new(
             self.inputs.iter().map(Vec::as_slice).collect(),
             self.outputs.iter().map(Vec::as_slice).collect(),
@@ -74,7 +74,7 @@ fn markov(model: &StateSpace) -> DMatrix<f64> {
     all
 }
 
-fn distance(found: &StateSpace, truth: &StateSpace) -> f64 {
+pub(super) fn distance(found: &StateSpace, truth: &StateSpace) -> f64 {
     (markov(found) - markov(truth)).norm() / markov(truth).norm()
 }
 
@@ -217,7 +217,7 @@ fn the_gain_is_that_of_a_stationary_filter() {
 #[test]
 fn what_cannot_be_told_is_said() {
     let run = Run::open(&plant(), 300, 8, 1.0);
-    let options = |past| SubspaceOptions { past: Some(past), feedthrough: None };
+    let options = |past| SubspaceOptions { past: Some(past), ..SubspaceOptions::default() };
     let message = |record: &JointRecord<'_>, options: &SubspaceOptions| {
         subspace(record, options).unwrap_err().to_string()
     };

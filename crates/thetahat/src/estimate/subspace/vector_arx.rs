@@ -32,17 +32,38 @@ pub(super) struct VectorArx {
 
 /// A Cholesky factor of some lagged signals, in which dependent ones are left out.
 #[derive(Debug)]
-struct Factor {
+pub(super) struct Factor {
     /// L, row by row.
     entries: Vec<f64>,
     size: usize,
 }
 
 impl Factor {
+    /// L of the products of the signals at these places.
+    pub(super) fn new(products: &DMatrix<f64>, places: &[usize]) -> Self {
+        let size = places.len();
+        let mut entries = vec![0.0; size * size];
+        for (row, entries) in entries.chunks_exact_mut(size).enumerate() {
+            for (entry, column) in entries.iter_mut().zip(&places[..=row]) {
+                *entry = products[(places[row], *column)];
+            }
+        }
+        normal::factor(&mut entries, size);
+        Self { entries, size }
+    }
+
     /// An entry of L, zero in the columns that are left out.
     fn entry(&self, row: usize, column: usize) -> f64 {
         let entry = self.entries[row * self.size + column];
         if entry.is_finite() { entry } else { 0.0 }
+    }
+
+    /// Some rows and columns of L.
+    pub(super) fn block(&self, rows: Range<usize>, columns: Range<usize>) -> DMatrix<f64> {
+        DMatrix::from_fn(rows.len(), columns.len(), |i, j| {
+            let (row, column) = (rows.start + i, columns.start + j);
+            if column > row { 0.0 } else { self.entry(row, column) }
+        })
     }
 
     /// What the first `known` signals leave of those from `first` on.
@@ -63,23 +84,50 @@ pub(super) fn log_determinant(covariance: &DMatrix<f64>) -> f64 {
         .map_or(f64::INFINITY, |factor| factor.l_dirty().diagonal().iter().map(|root| 2.0 * root.ln()).sum())
 }
 
+/// X of X L = right for a lower triangular L, zero in the columns where L is.
+pub(super) fn divided(mut right: DMatrix<f64>, factor: &DMatrix<f64>) -> DMatrix<f64> {
+    for column in (0..factor.ncols()).rev() {
+        let (mut own, later) = right.columns_range_pair_mut(column, column + 1..);
+        own.gemv(-1.0, &later, &factor.view_range(column + 1.., column), 1.0);
+        let pivot = factor[(column, column)];
+        own *= if pivot > 0.0 { pivot.recip() } else { 0.0 };
+    }
+    right
+}
+
+/// The mean products of z(t), …, z(t-longest), lag by lag, and the number of samples.
+fn mean_products(record: &JointRecord<'_>, longest: usize) -> (DMatrix<f64>, usize) {
+    let (products, samples) = joint_gram(&record.signals(), &record.segments, longest);
+    (products / samples as f64, samples)
+}
+
+/// Products of signals that are divided by their scales.
+fn rescaled(mut products: DMatrix<f64>, scales: &[f64]) -> DMatrix<f64> {
+    for column in 0..products.ncols() {
+        for row in 0..products.nrows() {
+            products[(row, column)] /= scales[row % scales.len()] * scales[column % scales.len()];
+        }
+    }
+    products
+}
+
 impl VectorArx {
     /// None where a signal is zero at all of these samples, or its squares leave the range of numbers.
     pub(super) fn new(record: &JointRecord<'_>, past: usize) -> Option<Self> {
-        let (mut products, samples) = joint_gram(&record.signals(), &record.segments, past);
-        products /= samples as f64;
+        let (products, samples) = mean_products(record, past);
         let (inputs, outputs) = (record.inputs.len(), record.outputs.len());
-        let width = inputs + outputs;
-        let scales: Vec<f64> = (0..width).map(|signal| products[(signal, signal)].sqrt()).collect();
+        let scales: Vec<f64> =
+            (0..inputs + outputs).map(|signal| products[(signal, signal)].sqrt()).collect();
         if !scales.iter().all(|scale| crate::regression::SAFE_NORMS.contains(scale)) {
             return None;
         }
-        for column in 0..products.ncols() {
-            for row in 0..products.nrows() {
-                products[(row, column)] /= scales[row % width] * scales[column % width];
-            }
-        }
+        let products = rescaled(products, &scales);
         Some(Self { inputs, outputs, past, samples, products, scales })
+    }
+
+    /// The products of more lags of the same record, with the same scales.
+    pub(super) fn longer(&self, record: &JointRecord<'_>, longest: usize) -> DMatrix<f64> {
+        rescaled(mean_products(record, longest).0, &self.scales)
     }
 
     pub(super) fn width(&self) -> usize {
@@ -96,24 +144,12 @@ impl VectorArx {
         (0..self.inputs, self.inputs..self.width())
     }
 
-    fn factor(&self, places: &[usize]) -> Factor {
-        let size = places.len();
-        let mut entries = vec![0.0; size * size];
-        for (row, entries) in entries.chunks_exact_mut(size).enumerate() {
-            for (entry, column) in entries.iter_mut().zip(&places[..=row]) {
-                *entry = self.products[(places[row], *column)];
-            }
-        }
-        normal::factor(&mut entries, size);
-        Factor { entries, size }
-    }
-
     /// The p of the least AIC = N ln det cov e + 2 k, with k parameters (Akaike 1974). O((q p)^3).
     pub(super) fn akaike(&self, feedthrough: bool) -> usize {
         let (u, y) = self.now();
         let direct = if feedthrough { self.inputs } else { 0 };
         let places: Vec<usize> = u.take(direct).chain(self.lags(self.past)).chain(y).collect();
-        let factor = self.factor(&places);
+        let factor = Factor::new(&self.products, &places);
         let first = places.len() - self.outputs;
         let criterion = |past: usize| {
             let known = direct + self.width() * past;
@@ -130,7 +166,7 @@ impl VectorArx {
         let (u, y) = self.now();
         let before = self.lags(self.past).len();
         let places: Vec<usize> = self.lags(self.past).chain(u.clone()).chain(y).collect();
-        let factor = self.factor(&places);
+        let factor = Factor::new(&self.products, &places);
         let first = places.len() - self.outputs;
         let fall = log_determinant(&factor.left(first, before))
             - log_determinant(&factor.left(first, before + self.inputs));
@@ -150,7 +186,7 @@ impl VectorArx {
             let (own, others): (Vec<usize>, Vec<usize>) = self.lags(past).partition(is_input);
             let (u, _) = self.now();
             let places: Vec<usize> = own.iter().chain(&others).copied().chain(u).collect();
-            let factor = self.factor(&places);
+            let factor = Factor::new(&self.products, &places);
             let (known, first) = (own.len(), own.len() + others.len());
             let fall =
                 log_determinant(&factor.left(first, known)) - log_determinant(&factor.left(first, first));
@@ -163,29 +199,16 @@ impl VectorArx {
         let (u, y) = self.now();
         let direct = if feedthrough { self.inputs } else { 0 };
         let places: Vec<usize> = u.take(direct).chain(self.lags(self.past)).chain(y).collect();
-        let factor = self.factor(&places);
+        let factor = Factor::new(&self.products, &places);
         let known = places.len() - self.outputs;
-        let mut solved = DMatrix::zeros(self.outputs, known);
-        // L' theta = l, from the last row of L' on.
-        for output in 0..self.outputs {
-            for column in (0..known).rev() {
-                let later = column + 1..known;
-                let explained: f64 = later.map(|k| factor.entry(k, column) * solved[(output, k)]).sum();
-                let pivot = factor.entry(column, column);
-                if pivot > 0.0 {
-                    solved[(output, column)] = (factor.entry(known + output, column) - explained) / pivot;
-                }
-            }
-        }
+        let seen = factor.block(known..places.len(), 0..known);
+        let solved = divided(seen, &factor.block(0..known, 0..known));
         (solved.columns(direct, known - direct).into_owned(), factor.left(known, known))
     }
 
     /// L of the products of z(t-1), …, z(t-p) = L L', with zeros in the columns of what depends on others.
     pub(super) fn past_factor(&self) -> DMatrix<f64> {
         let places: Vec<usize> = self.lags(self.past).collect();
-        let factor = self.factor(&places);
-        DMatrix::from_fn(places.len(), places.len(), |row, column| {
-            if column > row { 0.0 } else { factor.entry(row, column) }
-        })
+        Factor::new(&self.products, &places).block(0..places.len(), 0..places.len())
     }
 }

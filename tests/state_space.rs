@@ -44,7 +44,10 @@ fn free_run() -> Value {
 fn two_outputs_are_fitted_together() {
     let folder = motor();
     let report = folder.fit(&format!("{MOTOR} --estimate 1..700 --validate 701..1000"));
-    assert_eq!((&report["model"]["kind"], &report["estimation"]["method"]), (&"state-space".into(), &"subspace".into()));
+    assert_eq!(
+        (&report["model"]["kind"], &report["estimation"]["method"]),
+        (&"state-space".into(), &"subspace".into())
+    );
     for output in ["i", "speed"] {
         for horizon in [ahead(1), free_run()] {
             assert!(percent(&report, output, &horizon, Some("validation")) > 90.0, "{output} {horizon}");
@@ -56,12 +59,19 @@ fn two_outputs_are_fitted_together() {
         mdl(a).total_cmp(&mdl(b))
     });
     let order = order.expect("orders were compared")["order"].as_u64().expect("a number");
-    let again = folder.fit(&format!("{MOTOR} --estimate 1..700 --validate 701..1000 --model ss --order {order}"));
+    let again =
+        folder.fit(&format!("{MOTOR} --estimate 1..700 --validate 701..1000 --model ss --order {order}"));
     assert_eq!(again["model"], report["model"]);
     // One output goes the same way.
     let one = folder.fit("log.csv --time t -u u -y speed --model ss --order 1..5 --past 10 --feedthrough no");
     assert_eq!((number(&one, "/estimation/past"), &one["estimation"]["feedthrough"]), (10.0, &false.into()));
     assert!(percent(&one, "speed", &ahead(1), Some("estimation")) > 98.0);
+    // The classical methods find the same plant.
+    for weighting in ["moesp", "n4sid", "cva"] {
+        let other = folder.fit(&format!("{MOTOR} --order 3 --past 10 --weighting {weighting}"));
+        assert_eq!(other["estimation"]["weighting"], weighting);
+        assert!(percent(&other, "speed", &free_run(), Some("estimation")) > 95.0, "{weighting}");
+    }
     // A series has no inputs.
     let series = folder.fit("log.csv --time t -y i,speed --nb 0");
     assert_eq!(series["model"]["inputs"], serde_json::json!([]));
@@ -72,7 +82,9 @@ fn two_outputs_are_fitted_together() {
 fn every_verb_takes_its_report() {
     let folder = fitted();
     let table = folder.run(&format!("fit {MOTOR} --estimate 1..700")).stdout;
-    for word in ["state space of order", "singular value", "DC gain from", "to speed", "innovations of", "free run"] {
+    for word in
+        ["state space of order", "singular value", "DC gain from", "to speed", "innovations of", "free run"]
+    {
         assert!(table.contains(word), "{word}: {table}");
     }
     let report: Value = serde_json::from_str(&folder.read("r.json")).expect("JSON");
@@ -86,7 +98,9 @@ fn every_verb_takes_its_report() {
         }
     }
     folder.done("predict r.json log.csv --time t --rows 701..1000 --horizon 5 --out p.csv");
-    assert!(folder.read("p.csv").starts_with("time,measured_i,predicted_i,standard_deviation_i,measured_speed,"));
+    assert!(
+        folder.read("p.csv").starts_with("time,measured_i,predicted_i,standard_deviation_i,measured_speed,")
+    );
     folder.done("simulate r.json log.csv --time t --out s.csv");
     assert!(folder.read("s.csv").starts_with("time,measured_i,predicted_i,measured_speed,predicted_speed"));
     folder.done("bode r.json --points 5 --out b.csv");
@@ -106,7 +120,10 @@ fn every_verb_takes_its_report() {
         let page = folder.read(page);
         assert!(page.contains("speed") && !page.contains("NaN"), "{}", page.len());
     }
-    assert!(folder.read("r.html").contains("Singular values") && folder.read("r.html").contains("Choice of the order"));
+    assert!(
+        folder.read("r.html").contains("Singular values")
+            && folder.read("r.html").contains("Choice of the order")
+    );
 }
 
 #[test]
@@ -117,7 +134,8 @@ fn a_filter_that_knows_all_outputs_predicts_as_the_model_does() {
     let column = |file: &str, name: &str| -> Vec<f64> {
         let text = folder.read(file);
         let mut lines = text.lines();
-        let place = lines.next().expect("a header").split(',').position(|own| own == name).expect("the column");
+        let place =
+            lines.next().expect("a header").split(',').position(|own| own == name).expect("the column");
         lines.map(|line| line.split(',').nth(place).expect("a cell").parse().unwrap_or(f64::NAN)).collect()
     };
     for name in ["predicted_i", "predicted_speed"] {
@@ -144,12 +162,13 @@ fn what_other_models_have_is_refused() {
     for (options, word) in [
         ("--model ss --na 2", "--na is not for models in state space"),
         ("--model ss --method iv", "--method"),
-        ("--model ss --constant yes", "--constant"),
         ("--model ss --search newton", "--search"),
         ("--model ss --ridge 1", "--ridge"),
         ("--model ss --order 0", "--order 0"),
         ("--model ss --order 5..2", "--order 5..2"),
         ("--model ss --nk x", "--nk x"),
+        ("--model ss --weighting pem", "--weighting"),
+        ("--weighting cva", "--model ss"),
         ("--model ss --nk 0 --feedthrough no", "--nk 0"),
         ("--model ss --nk 1,2", "--nk has 2 numbers for 1 inputs"),
         ("--model arx --order 2", "--model ss"),
@@ -195,14 +214,21 @@ fn public_logs_are_predicted_as_well_as_by_others() {
     for (name, options, outputs, rows, demanded) in [
         // Measured in closed loop, and the arm acts within a sample.
         ("cd_player_arm", "--split 50/0/50 --feedthrough yes", vec!["y1", "y2"], "1025..2048", [94.8, 84.3]),
-        ("evaporator", "--estimate 1..3300 --detrend none --order 8 --past 20", vec!["y1", "y2", "y3"], "3301..6305", [79.3, 73.7]),
+        (
+            "evaporator",
+            "--estimate 1..3300 --detrend none --order 8 --past 20",
+            vec!["y1", "y2", "y3"],
+            "3301..6305",
+            [79.3, 73.7],
+        ),
     ] {
         let Ok(log) = std::fs::read(format!("../shared/data/{name}.csv")) else {
             println!("../shared/data/{name}.csv is absent: not tested");
             continue;
         };
         let folder = Folder::with_log(log);
-        folder.done(&format!("fit log.csv -y {} --sample-time 1 {options} --report r.json", outputs.join(",")));
+        folder
+            .done(&format!("fit log.csv -y {} --sample-time 1 {options} --report r.json", outputs.join(",")));
         let found = validated(&folder, &format!("--sample-time 1 --rows {rows} --horizon 5"));
         for (steps, demanded) in [1, 5].into_iter().zip(demanded) {
             let reached = mean(&found, &ahead(steps), None, &outputs);

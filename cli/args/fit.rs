@@ -166,6 +166,12 @@ pub(crate) struct StateSpaceArguments {
     /// Past samples that the states are made of [default: those of the least AIC, 40 at most]
     #[arg(long, value_name = "P", value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub(crate) past: Option<u32>,
+    /// Future samples that the states are to tell of [default: as many as past ones]
+    #[arg(long, value_name = "S", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub(crate) future: Option<u32>,
+    /// Which subspace method: ssarx, right in closed loop too; or moesp, n4sid, cva, which project on future inputs [default: ssarx]
+    #[arg(long, value_name = "METHOD")]
+    pub(crate) weighting: Option<String>,
     /// Whether inputs act on the outputs in the same sample. auto: where that lowers MDL and no controller is seen that feeds outputs back to
     /// the inputs [default: auto]
     #[arg(long, value_enum)]

@@ -1,7 +1,7 @@
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
-use thetahat::estimate::SubspaceOptions;
+use thetahat::estimate::{Constant, SubspaceOptions};
 use thetahat::report::StateSpacePlan;
 
 use super::fit::named_values;
@@ -37,7 +37,14 @@ impl StateSpaceJob {
     pub(crate) fn resolve(arguments: &FitArguments) -> Result<Option<Self>, Failure> {
         let (own, model) = (&arguments.states, &arguments.model);
         let outputs = Names::all(&arguments.output).unwrap_or_default();
-        let given = own.order.is_some() || own.past.is_some() || own.feedthrough.is_some();
+        let given = [
+            ("--order", own.order.is_some()),
+            ("--past", own.past.is_some()),
+            ("--future", own.future.is_some()),
+            ("--weighting", own.weighting.is_some()),
+            ("--feedthrough", own.feedthrough.is_some()),
+        ];
+        let given = given.iter().find(|(_, given)| *given).map(|(option, _)| option);
         // A model without inputs is asked for as of all structures.
         let without_inputs = matches!(&*model.nb, [nb] if nb.trim() == "0");
         let coefficients = [&model.na, &model.nc, &model.nd].into_iter().any(Option::is_some);
@@ -45,12 +52,14 @@ impl StateSpaceJob {
         match model.model {
             Some(ModelArgument::Ss) => {}
             None if !orders && outputs.len() > 1 => {}
-            _ if given => {
-                return Err(Failure::usage(
-                    "--order, --past and --feedthrough are for --model ss; leave them out, or give --model ss",
-                ));
-            }
-            _ => return Ok(None),
+            _ => match given {
+                Some(option) => {
+                    return Err(Failure::usage(format!(
+                        "{option} is for --model ss; leave it out, or give --model ss"
+                    )));
+                }
+                None => return Ok(None),
+            },
         }
         refuse_others(arguments)?;
         let inputs = Names::all(&arguments.input);
@@ -68,12 +77,25 @@ impl StateSpaceJob {
             offsets: named_values("--offset", &arguments.offset)?,
             orders: own.order.as_deref().map(range).transpose()?,
             subspace: SubspaceOptions {
+                weighting: own
+                    .weighting
+                    .as_deref()
+                    .map(|text| parsed("--weighting", text))
+                    .transpose()?
+                    .unwrap_or_default(),
                 past: own.past.map(|past| past as usize),
+                future: own.future.map(|future| future as usize),
                 feedthrough: match own.feedthrough.unwrap_or(FeedthroughArgument::Auto) {
                     FeedthroughArgument::Auto => None,
                     FeedthroughArgument::Yes => Some(true),
                     FeedthroughArgument::No => Some(false),
                 },
+                constant: false,
+            },
+            constant: match model.constant {
+                ConstantArgument::Auto => Constant::Auto,
+                ConstantArgument::Yes => Constant::Yes,
+                ConstantArgument::No => Constant::No,
             },
             ..StateSpacePlan::new(&[], &[])
         };
@@ -142,7 +164,6 @@ fn refuse_others(arguments: &FitArguments) -> Result<(), Failure> {
         ("--likelihood", model.likelihood != LikelihoodArgument::Conditional),
         ("--initial", !matches!(model.initial, InitialArgument::Auto | InitialArgument::Estimate)),
         ("--focus", model.focus != "auto" && model.focus != "prediction"),
-        ("--constant", model.constant != ConstantArgument::Auto),
         ("--trend", model.trend),
         ("--prefilter", arguments.prefilter.is_some()),
         ("--path", arguments.choice.path.is_some()),

@@ -110,12 +110,15 @@ def test_options_are_those_of_the_command_line() -> None:
     model = th.ss(data, range(1, 5), past=8, feedthrough=True, nk=[1, 0])
     assert (model.document["estimation"]["past"], model.document["estimation"]["feedthrough"]) == (8, True)
     assert len(model.document["estimation"]["orders"]) == 4
+    for weighting in ("moesp", "n4sid", "cva"):
+        assert th.ss(data, 2, weighting=weighting, past=8, future=10).poles().real == pytest.approx([0.65, 0.65], abs=0.03)
     series = th.ss(th.Log(signals()[1], sample_time=1), 2)
     assert series.inputs == [] and series.predict(th.Log(signals()[1], sample_time=1)).shape == (1500, 2)
     assert th.ss(th.Log(signals()[1][:, 0], signals()[0], sample_time=1), 2).output == "y"
     for wrong, words in (
         (lambda: th.ss(data, 0), "order"),
         (lambda: th.ss(data, past=0), "past"),
+        (lambda: th.ss(data, weighting="pem"), "weighting"),
         (lambda: th.ss(data, nk=[1, 2, 3]), "nk"),
         (lambda: th.ss(data, feedthrough=False, nk=0), "nk"),
     ):

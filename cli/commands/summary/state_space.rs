@@ -49,7 +49,9 @@ fn found(outcome: &SubspaceOutcome) -> String {
         (true, false) => "inputs act at once, which lowers MDL",
         (false, false) => "no input acts at once",
     };
-    format!("subspace method SSARX, a past of {} samples; {feedthrough}", outcome.past)
+    let method = outcome.weighting.to_string().to_uppercase();
+    let levels = if outcome.constant { "; levels of the outputs estimated with the matrices" } else { "" };
+    format!("subspace method {method}, a past of {} samples; {feedthrough}{levels}", outcome.past)
 }
 
 /// The singular values, and the order's choice.

@@ -18,13 +18,16 @@ def ss(
     order: int | range | None = None,
     *,
     nk: Union[int, Sequence[int], None] = None,
+    weighting: str | None = None,
     past: int | None = None,
+    future: int | None = None,
     feedthrough: bool | None = None,
     estimate: Rows | None = None,
     validate: Rows | None = None,
     split: tuple[float, float, float] | None = None,
     detrend: str | None = None,
     offset: Mapping[str, float] | None = None,
+    constant: str | None = None,
 ) -> Model:
     """Fit a state-space model, x(t+1) = F x(t) + G u(t) + K e(t), y(t) = H x(t) + D u(t) + e(t), by a subspace method.
 
@@ -39,11 +42,13 @@ def ss(
         How many states; or among how many to choose by MDL: ``range(1, 11)`` are 1 to 10. From 1 to 20 unless it is said.
     nk : int, or one for each input, optional
         Samples from input to first effect. Without it an input acts one sample later, or at once if ``feedthrough`` says so.
-    past : int, optional
-        Past samples that the states are made of; those of the least AIC, unless it is said.
+    weighting : {"ssarx", "moesp", "n4sid", "cva"}, optional
+        Which subspace method. All but the first project on future inputs, and are biased where inputs are fed back.
+    past, future : int, optional
+        Past samples that the states are made of, those of the least AIC unless it is said, and future ones that they tell of: as many.
     feedthrough : bool, optional
         Whether inputs act on the outputs at once. Where it lowers MDL and the inputs are not fed back, unless it is said.
-    estimate, validate, split, detrend, offset
+    estimate, validate, split, detrend, offset, constant
         What to fit to, see `thetahat.FitOptions`.
 
     Returns
@@ -83,7 +88,9 @@ def ss(
     [-5.0, (2, 1)]
     """
     words = ["--model=ss", *_options.order_words(order=order, nk=nk)]
+    words += [] if weighting is None else [f"--weighting={_options.text('weighting', weighting)}"]
     words += [] if past is None else [f"--past={_options.count('past', past)}"]
+    words += [] if future is None else [f"--future={_options.count('future', future)}"]
     words += [] if feedthrough is None else [f"--feedthrough={'yes' if _options.flag('feedthrough', feedthrough) else 'no'}"]
     words += _options.words(FitOptions, locals(), len(log) if isinstance(log, Log) else None)
     found = Model._of(_thetahat.fit_state_space(handle("log", log), words))

@@ -12,7 +12,7 @@ use std::ops::RangeInclusive;
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use thetahat_core::nalgebra::DMatrix;
+use thetahat_core::nalgebra::{DMatrix, DVector};
 
 use super::stretches::thinned_joint;
 use crate::Error;
@@ -30,6 +30,8 @@ const LONGEST_PAST: usize = 40;
 const SAMPLES_A_LAG: usize = 5;
 /// The variance of e, in squares of the outputs, below which nothing is left of them.
 const NOTHING_LEFT: f64 = 1e-16;
+/// A level this many root mean squares away says that the outputs integrate.
+const FARTHEST: f64 = 1e4;
 /// The largest order that is offered by itself.
 const HIGHEST_ORDER: usize = 20;
 
@@ -52,6 +54,8 @@ pub struct SubspaceOptions {
     /// Whether the inputs act on the outputs at once, so that D is estimated. By default where that lowers MDL; but not where past outputs
     /// tell of the inputs, which are fed back then: with a controller that acts at once, u(t) tells of y(t) whatever D is.
     pub feedthrough: Option<bool>,
+    /// Whether there is a constant in each equation, from which the [levels](Subspace::levels) of the outputs follow.
+    pub constant: bool,
 }
 
 /// The state of a record at all orders: what a [`StateSpace`] of each is read off.
@@ -66,8 +70,10 @@ pub struct Subspace {
     scales: Vec<f64>,
     singular_values: Vec<f64>,
     highest: usize,
-    /// The mean products of x(t), x(t+1), u(t) and y(t), x of the highest order.
+    /// The mean products of x(t), x(t+1), u(t) and y(t), x of the highest order; with a constant those of deviations from the means.
     moments: DMatrix<f64>,
+    /// These means.
+    means: Option<DVector<f64>>,
 }
 
 /// How a state-space model was found by a subspace method.
@@ -83,6 +89,8 @@ pub struct SubspaceOutcome {
     pub feedthrough: bool,
     /// Whether that was asked for; else the data said it.
     pub feedthrough_given: bool,
+    /// Whether the levels of the outputs were estimated with the matrices; they are part of the outputs' offsets.
+    pub constant: bool,
     /// The largest singular values of what the past says of the outputs to come: see [`Subspace::singular_values`].
     pub singular_values: Vec<f64>,
     /// What the order was chosen among; empty if it was given.
@@ -175,11 +183,12 @@ pub fn subspace(record: &JointRecord<'_>, options: &SubspaceOptions) -> Result<S
     }
     let past = options.past.map_or_else(|| longest_past(record), Ok)?;
     enough(record, past, None)?;
-    let mut regression = VectorArx::new(record, past).ok_or_else(|| silent(record, past))?;
+    let constant = options.constant;
+    let mut regression = VectorArx::new(record, past, constant).ok_or_else(|| silent(record, past))?;
     if options.past.is_none() {
         let past = regression.akaike(options.feedthrough != Some(false));
         if past < regression.past {
-            regression = VectorArx::new(record, past).ok_or_else(|| silent(record, past))?;
+            regression = VectorArx::new(record, past, constant).ok_or_else(|| silent(record, past))?;
         }
     }
     let future = options.future.unwrap_or(regression.past);
@@ -296,6 +305,7 @@ impl Subspace {
         rows.view_mut((highest, 0), (highest, columns)).copy_from(&states);
         rows.view_mut((2 * highest, 0), (width, width)).fill_with_identity();
         let moments = &rows * &regression.products * rows.transpose();
+        let means = regression.means.as_ref().map(|means| &rows * means);
         Ok(Self {
             weighting,
             past,
@@ -307,6 +317,7 @@ impl Subspace {
             singular_values,
             highest,
             moments,
+            means,
         })
     }
 
@@ -328,6 +339,11 @@ impl Subspace {
     /// Whether the inputs act on the outputs at once.
     pub fn feedthrough(&self) -> bool {
         self.feedthrough
+    }
+
+    /// Whether there is a constant in each equation.
+    pub fn has_constant(&self) -> bool {
+        self.means.is_some()
     }
 
     /// The singular values of what the past says of the outputs to come, falling: for SSARX in units of the deviation of e, for MOESP and
@@ -359,6 +375,31 @@ impl Subspace {
                 Vec::new(),
                 format!("the model of order {order} has no stable predictor; take another order"),
             )
+        })
+    }
+
+    /// Where the outputs of the model of an order stay while the inputs stay at zero, in units of the outputs: zero without a constant. With
+    /// it, of y = H x + D u + c_y + e and x(t+1) = F x + G u + K e + c_x,
+    ///
+    /// ```text
+    /// H (I - F)^-1 c_x + c_y
+    /// ```
+    ///
+    /// None for an order without a model, and where F has an eigenvalue of 1: outputs that integrate stay nowhere. O(n^3).
+    pub fn levels(&self, order: usize) -> Option<Vec<f64>> {
+        let Some(means) = &self.means else { return Some(vec![0.0; self.outputs]) };
+        let model = if (1..=self.highest).contains(&order) { self.scaled(order, 1.0) } else { None }?;
+        let (next, inputs) = (self.highest, 2 * self.highest);
+        let (x, after) = (means.rows(0, order), means.rows(next, order));
+        let (u, y) = (means.rows(inputs, self.inputs), means.rows(inputs + self.inputs, self.outputs));
+        let of_outputs = y - &model.h * x - &model.d * u;
+        let of_states = after - &model.f * x - &model.g * u;
+        let at_rest = (DMatrix::identity(order, order) - &model.f).lu().solve(&of_states)?;
+        let levels = &model.h * at_rest + of_outputs;
+        // Farther away than any sample has been is nowhere.
+        let near = levels.iter().all(|level| level.abs() < FARTHEST);
+        near.then(|| {
+            levels.iter().zip(&self.scales[self.inputs..]).map(|(level, scale)| level * scale).collect()
         })
     }
 
@@ -464,7 +505,9 @@ impl Subspace {
                 Err(error) => return Err(error),
             };
             let outputs = &self.scales[m..];
-            let mdl = innovations::products(&model, looked_at).map(|mut products| {
+            let levels = self.levels(order);
+            let products = levels.and_then(|levels| innovations::products(&model, looked_at, &levels));
+            let mdl = products.map(|mut products| {
                 for (output, scale) in outputs.iter().enumerate() {
                     products.row_mut(output).unscale_mut(*scale);
                     products.column_mut(output).unscale_mut(*scale);
@@ -478,10 +521,11 @@ impl Subspace {
         orders.into_par_iter().map(score).collect()
     }
 
-    /// k, the free parameters of a canonical form: n (m + 2 l), and l m with feedthrough.
+    /// k, the free parameters of a canonical form: n (m + 2 l), l m with feedthrough, and l levels.
     pub fn free_parameters(&self, order: usize) -> usize {
         let (m, l) = (self.inputs, self.outputs);
-        order * (m + 2 * l) + if self.feedthrough { l * m } else { 0 }
+        let levels = if self.means.is_some() { l } else { 0 };
+        order * (m + 2 * l) + if self.feedthrough { l * m } else { 0 } + levels
     }
 
     /// The order of the least MDL among some, those above the highest left out.

@@ -9,12 +9,12 @@ use std::ops::RangeInclusive;
 use super::evaluate::evaluate;
 use super::schema::{Estimation, Report};
 use super::shares::Shares;
-use crate::data::{Detrend, Log, Offset, Rows, Source, Split};
+use crate::data::{Detrend, JointRecord, Log, Offset, Rows, Source, Split};
 use crate::estimate::{
-    Criteria, Initial, Procedure, SubspaceOptions, SubspaceOutcome, best_order, products_of_innovations,
-    subspace,
+    Constant, Criteria, Initial, OrderScore, Procedure, Subspace, SubspaceOptions, SubspaceOutcome,
+    best_order, products_of_innovations, subspace,
 };
-use crate::model::{Model, Signal, StateSpaceModel};
+use crate::model::{Model, Quantity, Signal, StateSpaceModel};
 use crate::respond::state_space::StateSpaceOnLog;
 use crate::select::Focus;
 use crate::validate::Part;
@@ -44,6 +44,10 @@ pub struct StateSpacePlan {
     pub orders: Option<RangeInclusive<usize>>,
     /// How the states are found.
     pub subspace: SubspaceOptions,
+    /// Whether the levels of the outputs are estimated with the matrices: where the outputs would stay if the inputs stayed at their offsets.
+    /// A mean is not it where a log begins or ends far from there. Auto: where it lowers MDL, unless nothing is taken from the channels
+    /// ([`Detrend::None`]) or an output's offset is set by hand.
+    pub constant: Constant,
     /// For each input the samples that it waits before the plant sees it; none: they do not wait.
     pub delays: Vec<usize>,
 }
@@ -69,6 +73,7 @@ impl StateSpacePlan {
             offsets: Vec::new(),
             orders: None,
             subspace: SubspaceOptions::default(),
+            constant: Constant::Auto,
             delays: Vec::new(),
         }
     }
@@ -200,31 +205,34 @@ pub fn fit_state_space(log: &Log, sources: &[Source], plan: &StateSpacePlan) -> 
         Ok(Signal { name: name.clone(), offset })
     };
     let inputs = plan.inputs.iter().map(signal).collect::<Result<Vec<_>, Error>>()?;
-    let outputs = plan.outputs.iter().map(signal).collect::<Result<Vec<_>, Error>>()?;
+    let mut outputs = plan.outputs.iter().map(signal).collect::<Result<Vec<_>, Error>>()?;
     let signals = inputs.iter().chain(&outputs).map(|signal| (signal.name.as_str(), signal.offset));
     let deviations = log.deviations(signals)?;
 
     let delays = if plan.delays.is_empty() { vec![0; inputs.len()] } else { plan.delays.clone() };
     let record = deviations.joint_record(&plan.inputs, &plan.outputs, &shares.estimation)?.delayed(&delays);
-    let found = subspace(&record, &plan.subspace)?;
-    let (asked, offered) = (plan.orders.clone(), found.orders());
-    let orders = asked.unwrap_or(offered);
-    let orders = *orders.start()..=(*orders.end()).min(found.highest_order());
-    if orders.is_empty() {
-        return Err(Error::argument(
-            "order",
-            format!("the data tell of orders up to {}; ask for one of these", found.highest_order()),
-        ));
-    }
-    let (order, scores) = if orders.start() == orders.end() {
-        (*orders.start(), Vec::new())
-    } else {
-        let scores = found.scores(&record, orders)?;
-        (best_order(&scores)?, scores)
+    let given =
+        plan.detrend == Detrend::None || plan.offsets.iter().any(|(name, _)| plan.outputs.contains(name));
+    let constant = if plan.constant == Constant::Auto && given { Constant::No } else { plan.constant };
+    let with = |constant: bool| Found::new(&record, plan, constant);
+    let Found { subspace: found, order, scores, .. } = match constant {
+        Constant::No => with(false)?,
+        Constant::Yes => with(true)?,
+        Constant::Auto => {
+            let plain = with(false)?;
+            // What has no level, as an integrator, is fitted without.
+            with(true).ok().filter(|other| other.mdl < plain.mdl).unwrap_or(plain)
+        }
     };
+    let levels = found.levels(order).ok_or_else(|| {
+        Error::undetermined(
+            Vec::new(),
+            "outputs that integrate have no level: leave the constant out (`constant` no)",
+        )
+    })?;
     let mut matrices = found.state_space(order, log.sample_time())?;
     let samples = record.segments.iter().map(std::ops::Range::len).sum::<usize>();
-    let products = products_of_innovations(&matrices, &record)
+    let products = products_of_innovations(&matrices, &record, &levels)
         .ok_or_else(|| Error::data("the errors one step ahead leave the range of numbers"))?;
     let free = found.free_parameters(order);
     let degrees = samples.checked_sub(free.div_ceil(outputs.len())).filter(|degrees| *degrees > 0);
@@ -242,6 +250,9 @@ pub fn fit_state_space(log: &Log, sources: &[Source], plan: &StateSpacePlan) -> 
     matrices.noise_covariance = &products / degrees as f64;
     // A covariance is symmetric to the bit.
     matrices.noise_covariance.fill_lower_triangle_with_upper_triangle();
+    for (output, level) in outputs.iter_mut().zip(&levels) {
+        output.offset.level += level;
+    }
     let model = StateSpaceModel::new((inputs, outputs), delays, &matrices, free, Some(degrees))?;
     model.check()?;
 
@@ -254,11 +265,16 @@ pub fn fit_state_space(log: &Log, sources: &[Source], plan: &StateSpacePlan) -> 
             future: found.future(),
             feedthrough: found.feedthrough(),
             feedthrough_given: plan.subspace.feedthrough.is_some(),
+            constant: found.has_constant(),
             singular_values: found.singular_values().iter().copied().take(MOST_VALUES).collect(),
             orders: scores,
         }),
         initial: Some(Initial::Estimate),
-        level: None,
+        level: if let ([output], true) = (&*model.outputs, found.has_constant()) {
+            Some(Quantity::new(output.offset.level, None))
+        } else {
+            None
+        },
         slope: None,
         samples,
         mse: mean.trace() / mean.nrows() as f64,
@@ -275,6 +291,9 @@ pub fn fit_state_space(log: &Log, sources: &[Source], plan: &StateSpacePlan) -> 
         estimation,
         fit: Vec::new(),
     };
+    let signals =
+        model.inputs.iter().chain(&model.outputs).map(|signal| (signal.name.as_str(), signal.offset));
+    let deviations = log.deviations(signals)?;
     let on_log = |rows: &[Rows]| StateSpaceOnLog::new(&model, &deviations, rows, None);
     let own = on_log(&report.data.estimation)?;
     evaluate(&mut report, &own, Part::Estimation, Focus::Auto);
@@ -282,4 +301,35 @@ pub fn fit_state_space(log: &Log, sources: &[Source], plan: &StateSpacePlan) -> 
         evaluate(&mut report, &on_log(&rows)?, part, Focus::Auto);
     }
     Ok(report)
+}
+
+/// The states of a record, and the order that was given or chosen.
+struct Found {
+    subspace: Subspace,
+    order: usize,
+    /// What the order was chosen among; none if it was given.
+    scores: Vec<OrderScore>,
+    /// That of the order.
+    mdl: f64,
+}
+
+impl Found {
+    fn new(record: &JointRecord<'_>, plan: &StateSpacePlan, constant: bool) -> Result<Self, Error> {
+        let subspace = subspace(record, &SubspaceOptions { constant, ..plan.subspace })?;
+        let (asked, highest) =
+            (plan.orders.clone().unwrap_or_else(|| subspace.orders()), subspace.highest_order());
+        let orders = *asked.start()..=(*asked.end()).min(highest);
+        if orders.is_empty() {
+            return Err(Error::argument(
+                "order",
+                format!("the data tell of orders up to {highest}; ask for one of these"),
+            ));
+        }
+        let given = asked.start() == asked.end();
+        let scores = subspace.scores(record, orders)?;
+        let order = if given { *asked.start() } else { best_order(&scores)? };
+        let own = scores.iter().find(|score| score.order == order).and_then(|score| score.mdl);
+        let mdl = own.unwrap_or(f64::INFINITY);
+        Ok(Self { subspace, order, scores: if given { Vec::new() } else { scores }, mdl })
+    }
 }

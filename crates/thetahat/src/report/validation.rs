@@ -431,7 +431,8 @@ fn test_residuals(report: &Report, on_log: &dyn OnLog, plan: &ValidationPlan, va
         (Model::StateSpace(model), InSample::Yes) => 2 * model.order() * together.len(),
         _ => 0,
     };
-    let samples: usize = each.first().map_or(0, |one| one.innovations.iter().map(|own| own.counted_errors().count()).sum());
+    let samples: usize =
+        each.first().map_or(0, |one| one.innovations.iter().map(|own| own.counted_errors().count()).sum());
     validation.portmanteau = portmanteau(&together, plan.lags.min(samples / PORTMANTEAU), fitted);
     for Tested { model, record, innovations } in &each {
         match Residuals::of(model, record, innovations, relation, plan.lags, &alphas, plan.alpha) {

@@ -22,7 +22,8 @@ use crate::respond::Innovations;
 pub(crate) fn portmanteau(outputs: &[&[Innovations]], lags: usize, fitted: usize) -> Option<Test> {
     let (first, others) = outputs.split_first().filter(|(_, others)| !others.is_empty())?;
     let same = |other: &&[Innovations]| {
-        other.len() == first.len() && other.iter().zip(*first).all(|(other, own)| other.counted == own.counted)
+        other.len() == first.len()
+            && other.iter().zip(*first).all(|(other, own)| other.counted == own.counted)
     };
     if !others.iter().all(same) {
         return None;
@@ -102,7 +103,10 @@ mod tests {
         let [first, second] = plain.map(innovations);
         let found = portmanteau(&[&first, &second], 1, 1).unwrap();
         // C_1 = [[1, 3], [-3, -1]]/4 with e(t) e(t-1)'.
-        assert!((found.statistic - 16.0 / 3.0 * 20.0 / 16.0).abs() < 1e-12 && found.degrees == 3.0, "{found:?}");
+        assert!(
+            (found.statistic - 16.0 / 3.0 * 20.0 / 16.0).abs() < 1e-12 && found.degrees == 3.0,
+            "{found:?}"
+        );
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use thetahat_core::nalgebra::{Cholesky, DMatrix};
+use thetahat_core::nalgebra::{Cholesky, DMatrix, DVector};
 
 use crate::data::JointRecord;
 use crate::optimize::normal;
@@ -24,8 +24,11 @@ pub(super) struct VectorArx {
     pub(super) past: usize,
     /// The samples that the products are sums of.
     pub(super) samples: usize,
-    /// The products of z(t), …, z(t-p), lag by lag, over the number of samples.
+    /// The products of z(t), …, z(t-p), lag by lag, over the number of samples; with a constant in the regression those of the deviations
+    /// from their means.
     pub(super) products: DMatrix<f64>,
+    /// These means, where there is a constant.
+    pub(super) means: Option<DVector<f64>>,
     /// The root mean squares of u and y.
     pub(super) scales: Vec<f64>,
 }
@@ -95,10 +98,29 @@ pub(super) fn divided(mut right: DMatrix<f64>, factor: &DMatrix<f64>) -> DMatrix
     right
 }
 
-/// The mean products of z(t), …, z(t-longest), lag by lag, and the number of samples.
-fn mean_products(record: &JointRecord<'_>, longest: usize) -> (DMatrix<f64>, usize) {
-    let (products, samples) = joint_gram(&record.signals(), &record.segments, longest);
-    (products / samples as f64, samples)
+/// The mean products of z(t), …, z(t-longest), lag by lag, the number of samples, and the means if products are to be those of deviations
+/// from them.
+fn mean_products(
+    record: &JointRecord<'_>,
+    longest: usize,
+    centred: bool,
+) -> (DMatrix<f64>, usize, Option<DVector<f64>>) {
+    let signals = record.signals();
+    let (products, samples) = joint_gram(&signals, &record.segments, longest);
+    let mut products = products / samples as f64;
+    let means = centred.then(|| {
+        let mean = |lag: usize, signal: &[f64]| {
+            let used = record.segments.iter().filter(|segment| segment.len() > longest);
+            let rows = used.flat_map(|segment| &signal[segment.start + longest - lag..segment.end - lag]);
+            crate::regression::sum(rows.copied()) / samples as f64
+        };
+        let each = (0..=longest).flat_map(|lag| signals.iter().map(move |signal| mean(lag, signal)));
+        DVector::from_iterator(signals.len() * (longest + 1), each)
+    });
+    if let Some(means) = &means {
+        products.ger(-1.0, means, means, 1.0);
+    }
+    (products, samples, means)
 }
 
 /// Products of signals that are divided by their scales.
@@ -113,8 +135,8 @@ fn rescaled(mut products: DMatrix<f64>, scales: &[f64]) -> DMatrix<f64> {
 
 impl VectorArx {
     /// None where a signal is zero at all of these samples, or its squares leave the range of numbers.
-    pub(super) fn new(record: &JointRecord<'_>, past: usize) -> Option<Self> {
-        let (products, samples) = mean_products(record, past);
+    pub(super) fn new(record: &JointRecord<'_>, past: usize, constant: bool) -> Option<Self> {
+        let (products, samples, means) = mean_products(record, past, constant);
         let (inputs, outputs) = (record.inputs.len(), record.outputs.len());
         let scales: Vec<f64> =
             (0..inputs + outputs).map(|signal| products[(signal, signal)].sqrt()).collect();
@@ -122,12 +144,16 @@ impl VectorArx {
             return None;
         }
         let products = rescaled(products, &scales);
-        Some(Self { inputs, outputs, past, samples, products, scales })
+        let means = means.map(|mut means| {
+            means.iter_mut().zip(scales.iter().cycle()).for_each(|(mean, scale)| *mean /= scale);
+            means
+        });
+        Some(Self { inputs, outputs, past, samples, products, means, scales })
     }
 
     /// The products of more lags of the same record, with the same scales.
     pub(super) fn longer(&self, record: &JointRecord<'_>, longest: usize) -> DMatrix<f64> {
-        rescaled(mean_products(record, longest).0, &self.scales)
+        rescaled(mean_products(record, longest, self.means.is_some()).0, &self.scales)
     }
 
     pub(super) fn width(&self) -> usize {

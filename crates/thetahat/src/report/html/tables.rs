@@ -364,7 +364,8 @@ fn procedure(procedure: &Procedure) -> String {
             outcome.noise_order
         ),
         Procedure::Subspace(outcome) => format!(
-            "subspace (SSARX) from a past of {} samples, {}",
+            "subspace ({}) from a past of {} samples, {}",
+            outcome.weighting.to_string().to_uppercase(),
             outcome.past,
             if outcome.feedthrough { "inputs act at once" } else { "no feedthrough" }
         ),

@@ -162,3 +162,49 @@ fn what_makes_no_sense_is_refused() {
     };
     assert!(constant("u2").contains("'u2' is constant") && constant("y1").contains("'y1' is constant"));
 }
+
+#[test]
+fn a_log_that_starts_at_rest_tells_where_outputs_stay() {
+    // A step response: the mean is far from where the output stays without an input.
+    let mut random = Noise(5);
+    let mut x = [0.0, 0.0];
+    let (mut u, mut y1, mut y2) = (Vec::new(), Vec::new(), Vec::new());
+    for row in 0..600 {
+        let input = if row < 60 { 0.0 } else { 1.0 + 0.2 * f64::from(row / 40 % 3) };
+        u.push(input);
+        y1.push(20.0 + x[0] + 0.02 * random.next());
+        y2.push(-5.0 + x[0] + x[1] + 0.02 * random.next());
+        x = [0.9 * x[0] + 0.1 * input, 0.8 * x[1] + 0.2 * x[0]];
+    }
+    let channel = |name: &str, values| Channel { name: name.to_owned(), values };
+    let log = Log::new(vec![channel("u", u), channel("y1", y1), channel("y2", y2)], 1.0).unwrap();
+    let plan = StateSpacePlan::new(&["u"], &["y1", "y2"]);
+    let report = fit_state_space(&log, &[], &plan).unwrap();
+    let found = model(&report);
+    let Procedure::Subspace(outcome) = &report.estimation.procedure else {
+        panic!("{:?}", report.estimation)
+    };
+    assert!(outcome.constant && found.order() == 2, "{outcome:?}");
+    // Where it would stay at the input's offset.
+    for (output, level, gain) in [(0, 20.0, 1.0), (1, -5.0, 2.0)] {
+        let expected = level + gain * found.inputs[0].offset.level;
+        assert!((found.outputs[output].offset.level - expected).abs() < 0.02, "{output}");
+        assert!((found.dc_gain[output][0].unwrap().value - gain).abs() < 0.02);
+    }
+    assert!((found.poles[0].re - 0.9).abs() < 0.01 && (found.poles[1].re - 0.8).abs() < 0.03);
+    // Without, a state stands for the level.
+    let without =
+        fit_state_space(&log, &[], &StateSpacePlan { constant: Constant::No, ..plan.clone() }).unwrap();
+    assert!(model(&without).order() > 2);
+    // What integrates has no level.
+    let mut sum = 0.0;
+    let (mut u, mut y) = (Vec::new(), Vec::new());
+    for _ in 0..500 {
+        u.push(random.next());
+        y.push(sum + 0.01 * random.next());
+        sum += u[u.len() - 1];
+    }
+    let log = Log::new(vec![channel("u", u), channel("y", y)], 1.0).unwrap();
+    let integrator = fit_state_space(&log, &[], &StateSpacePlan::new(&["u"], &["y"])).unwrap();
+    assert!((model(&integrator).poles[0].re - 1.0).abs() < 0.01);
+}

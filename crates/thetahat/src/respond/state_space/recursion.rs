@@ -20,6 +20,8 @@ pub(crate) struct Recursion {
     signals: usize,
     /// The matrix, column by column.
     columns: Vec<f64>,
+    /// What is there whatever state and signals are.
+    constant: Vec<f64>,
     /// What is left of a state one row later: F, or F - K H.
     between: DMatrix<f64>,
     /// H.
@@ -63,6 +65,15 @@ impl Recursion {
         Self::of(model, &matrix, f.clone(), false)
     }
 
+    /// A predictor of outputs that are measured from elsewhere: y - level in the place of y.
+    pub(crate) fn from_levels(mut self, levels: &[f64]) -> Self {
+        let columns = self.columns.chunks_exact(self.next.len()).rev();
+        for (column, level) in columns.zip(levels.iter().rev()) {
+            self.constant.iter_mut().zip(column).for_each(|(sum, entry)| *sum -= entry * level);
+        }
+        self
+    }
+
     fn of(model: &StateSpace, matrix: &DMatrix<f64>, between: DMatrix<f64>, predicts: bool) -> Self {
         let (rows, columns) = matrix.shape();
         let states = model.f.nrows();
@@ -71,6 +82,7 @@ impl Recursion {
             states,
             signals: columns - states,
             columns: matrix.as_slice().to_vec(),
+            constant: vec![0.0; rows],
             between,
             seen: model.h.clone(),
             weights: model.noise_covariance.diagonal().iter().map(|variance| weight(*variance)).collect(),
@@ -94,7 +106,7 @@ impl Recursion {
     pub(crate) fn step(&mut self, signals: &[&[f64]], row: usize) -> &[f64] {
         let (of_states, of_signals) = self.columns.split_at(self.states * self.next.len());
         let size = self.next.len();
-        self.next.fill(0.0);
+        self.next.copy_from_slice(&self.constant);
         let mut add = |column: &[f64], value: f64| {
             self.next.iter_mut().zip(column).for_each(|(next, entry)| *next += entry * value);
         };

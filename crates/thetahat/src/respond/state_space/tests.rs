@@ -77,7 +77,9 @@ fn it_responds_to_frequencies_and_steps_as_its_polynomials_do() {
             assert!(apart(&values(&found.values), &values(&expected.values)) < 1e-12);
         }
     }
-    assert_eq!(model.step_response(0, None).unwrap().values.len(), 31);
+    let whole = model.step_response(0, None).unwrap();
+    let (last, gain) = (whole.values.last().unwrap().value, states.dc_gain[0][0].unwrap().value);
+    assert!((20..60).contains(&whole.values.len()) && (last / gain - 1.0).abs() < 0.01);
     let gains: Vec<f64> = states.dc_gain[0].iter().map(|gain| gain.unwrap().value).collect();
     let expected: Vec<f64> = polynomials.dc_gain.iter().map(|gain| gain.unwrap().value).collect();
     assert!(apart(&gains, &expected) < 1e-12);

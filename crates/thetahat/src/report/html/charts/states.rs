@@ -24,10 +24,8 @@ pub(crate) fn singular_values(outcome: &SubspaceOutcome, order: usize) -> Drawn 
         .with("xaxis", axis("state"))
         .with("yaxis", axis("singular value").with("type", "log"))
         .with("bargap", 0.2);
-    let words = format!(
-        "How much of the outputs to come each state says, in units of the deviation of the innovations, from a past of {} samples.",
-        outcome.past
-    );
+    let words =
+        format!("How much of the outputs to come each state says, from a past of {} samples.", outcome.past);
     chart("Singular values", words, 340, traces, layout)
 }
 

@@ -127,6 +127,7 @@ impl Weighting {
             Self::Cva => {
                 let Projected { mut map, factor, covariance, .. } =
                     Projected::new(record, regression, future);
+                // Outputs without noise have a singular covariance; what rounding leaves of it must not look like correlation.
                 let rounding = DMatrix::identity(map.nrows(), map.nrows()) * ROUNDING;
                 let left = Cholesky::new(covariance + rounding);
                 left.filter(|left| left.l_dirty().solve_lower_triangular_mut(&mut map))

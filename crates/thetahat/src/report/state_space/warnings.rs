@@ -10,6 +10,9 @@ use crate::report::Estimation;
 /// Fewer values of the outputs for each free parameter say little.
 const VALUES_A_PARAMETER: usize = 5;
 
+/// Errors of two outputs are one where no more of their squared correlation is missing.
+const TOGETHER: f64 = 1e-6;
+
 /// Of a fit whose data offered such orders.
 pub(super) fn of_fit(
     model: &StateSpaceModel,
@@ -43,6 +46,19 @@ pub(super) fn of_fit(
             warnings.push(format!(
                 "{refused} of the {} orders have no model with a stable predictor, and were left out",
                 orders.len()
+            ));
+        }
+    }
+    let noise = &model.noise_covariance;
+    for (second, output) in model.outputs.iter().enumerate() {
+        let same = |first: &usize| {
+            let product = noise[*first][*first] * noise[second][second];
+            product > 0.0 && noise[*first][second].powi(2) > (1.0 - TOGETHER) * product
+        };
+        if let Some(first) = (0..second).find(same) {
+            warnings.push(format!(
+                "'{}' is known from '{}': their errors are the same but for a factor; leave one out",
+                output.name, model.outputs[first].name
             ));
         }
     }

@@ -86,16 +86,17 @@ fn singular_values_are_those_of_the_data_matrices() {
     let (l22, l32, l33) = (block(a..b, a..b), block(b..c, a..b), block(b..c, b..c));
     let theta = &l32 * l22.try_inverse().unwrap();
     let root = (&l32 * l32.transpose() + &l33 * l33.transpose()).cholesky().unwrap().l();
-    for (weighting, expected) in [
-        (Weighting::Moesp, l32.clone()),
-        (Weighting::N4sid, theta * block(a..b, 0..b)),
-        (Weighting::Cva, root.solve_lower_triangular(&l32).unwrap()),
+    // Correlations are told from rounding by what is added to the covariance.
+    for (weighting, expected, tolerance) in [
+        (Weighting::Moesp, l32.clone(), 1e-12),
+        (Weighting::N4sid, theta * block(a..b, 0..b), 1e-12),
+        (Weighting::Cva, root.solve_lower_triangular(&l32).unwrap(), 1e-10),
     ] {
         let found = subspace(&run.record(), &options(weighting, past, future)).unwrap();
         assert_eq!((found.weighting(), found.past(), found.future()), (weighting, past, future));
         let expected = expected.singular_values();
         assert_eq!(found.singular_values().len(), expected.len());
-        assert_values(found.singular_values(), expected.as_slice(), 1e-12 * expected[0]);
+        assert_values(found.singular_values(), expected.as_slice(), tolerance * expected[0]);
     }
 }
 
@@ -114,9 +115,13 @@ fn the_hair_dryer_has_the_values_of_slicot() {
     let record = JointRecord::new(vec![&channels[0]], vec![&channels[1]]).unwrap();
     let regression = VectorArx::new(&record, 15, false).unwrap();
     let Weighted { map, factor } = Weighting::Moesp.weighted(&record, &regression, 15, false).unwrap();
-    let gamma = (map * factor).svd(true, false).u.unwrap();
-    let (above, below) = (gamma.view((0, 0), (14, 4)), gamma.view((1, 0), (14, 4)));
-    let shifted = above.into_owned().svd(true, true).solve(&below, 0.0).unwrap();
+    let weighted = map * factor;
+    let (rows, columns) = weighted.shape();
+    let same = faer::Mat::from_fn(rows, columns, |row, column| weighted[(row, column)]);
+    let decomposed = same.thin_svd().unwrap();
+    let gamma = DMatrix::from_fn(rows, 4, |row, column| decomposed.U()[(row, column)]);
+    let (above, below) = (gamma.rows(0, 14), gamma.rows(1, 14));
+    let shifted = (above.transpose() * above).cholesky().unwrap().solve(&(above.transpose() * below));
     let mut poles: Vec<(f64, f64)> = shifted.complex_eigenvalues().iter().map(|p| (p.re, p.im)).collect();
     poles.sort_by(|a, b| a.partial_cmp(b).unwrap());
     let expected = [(0.4758, -0.1999), (0.4758, 0.1999), (0.7456, 0.0), (0.9610, 0.0)];

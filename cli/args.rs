@@ -7,6 +7,7 @@ mod fit;
 mod inspect;
 mod lines;
 mod log;
+mod reduce;
 mod respond;
 mod spectrum;
 mod step;
@@ -28,6 +29,7 @@ pub(crate) use fit::{
 pub(crate) use inspect::InspectArguments;
 pub(crate) use lines::{LineArguments, LineFormatArgument};
 pub(crate) use log::{ClockArguments, LiveClockArguments, LogArguments, Names};
+pub(crate) use reduce::ReduceArguments;
 pub(crate) use respond::{
     BodeArguments, PredictArguments, RespondArguments, SimulateArguments, StartArgument, TransientArguments,
 };
@@ -221,6 +223,16 @@ Examples:
 Example:
   thetahat impulse model.json --samples 50 > impulse.csv")]
     Impulse(TransientArguments),
+    /// Leave out the states of a fitted model that matter least
+    ///
+    /// By balanced truncation. Without --order it prints the Hankel singular values, how much of its inputs each state passes on to the outputs,
+    /// and how far the frequency response may be off where only so many states are kept. With --order it writes the report of the
+    /// reduced model, which all verbs take.
+    #[command(after_help = "\
+Examples:
+  thetahat reduce model.json
+  thetahat reduce model.json --order 1 -o reduced.json")]
+    Reduce(ReduceArguments),
     /// PI and PID settings for a fitted process, and the closed loop that they give
     ///
     /// By SIMC (Skogestad 2003) and by lambda tuning, from a process that fit --structure found. Beside the settings stands what the loop

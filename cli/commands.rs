@@ -12,6 +12,7 @@ mod help;
 mod inspect;
 mod narx;
 mod process;
+mod reduce;
 mod respond;
 mod search;
 mod spectrum;
@@ -50,6 +51,7 @@ pub(crate) fn dispatch(arguments: Arguments, line: &str) -> Result<(), Failure> 
         Command::Bode(arguments) => bode::bode(&arguments, line),
         Command::Step(arguments) => step::step(&arguments, line),
         Command::Impulse(arguments) => transient::impulse(&arguments, line),
+        Command::Reduce(arguments) => reduce::reduce(&arguments),
         Command::Tune(arguments) => tune::tune(&arguments, line),
         Command::Design(arguments) => design::design(&arguments),
         Command::Demo(arguments) => demo::demo(&arguments),

@@ -3,7 +3,7 @@
 use crate::harness::Folder;
 use crate::signals::{Experiment, csv};
 
-const VERBS: [&str; 18] = [
+const VERBS: [&str; 19] = [
     "fit",
     "inspect",
     "spectrum",
@@ -15,6 +15,7 @@ const VERBS: [&str; 18] = [
     "filter",
     "bode",
     "step",
+    "reduce",
     "tune",
     "impulse",
     "design",

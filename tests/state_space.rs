@@ -212,6 +212,29 @@ fn logs_that_say_too_little_are_refused() {
     assert!(!folder.names().contains(&"r.json".to_owned()));
 }
 
+#[test]
+fn states_that_matter_least_are_left_out() {
+    let folder = motor();
+    folder.done(&format!("fit {MOTOR} --order 4 --report r.json"));
+    let table = folder.done("reduce r.json").stdout;
+    assert!(table.contains("Hankel singular value") && table.lines().count() > 5, "{table}");
+    let reduced = folder.done("reduce r.json --order 2 --out s.json");
+    assert!(reduced.stderr.contains("reduced from 4 to 2 states"), "{reduced:?}");
+    let fit = |report: &str| {
+        let run = folder.done(&format!("validate {report} log.csv --time t --format json"));
+        percent(&serde_json::from_str(&run.stdout).expect("JSON"), "speed", &free_run(), None)
+    };
+    assert!(fit("s.json") > fit("r.json") - 3.0, "{} {}", fit("s.json"), fit("r.json"));
+    // Polynomials have a recursion too; equations keep their own states.
+    folder.done("fit log.csv --time t -u u -y speed --na 4 --nb 4 --report p.json");
+    folder.done("reduce p.json --order 2 --out q.json");
+    folder.done("predict q.json log.csv --time t --out p.csv");
+    folder.done("fit log.csv --time t -u u -y speed --narx poly --report n.json");
+    assert!(folder.refused("reduce n.json", 3).contains("states are left out of models in state space"));
+    assert!(folder.refused("reduce r.json --order 9 --out x.json", 2).contains("--order"));
+    assert!(!folder.names().contains(&"x.json".to_owned()));
+}
+
 /// Logs whose licence is not clear: with the figures that SIPPY and ControlSystemIdentification.jl reach.
 #[test]
 fn public_logs_are_predicted_as_well_as_by_others() {

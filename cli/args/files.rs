@@ -62,6 +62,10 @@ impl Command {
                 read.push(impulse.report.clone());
                 written.extend([&impulse.out].into_iter().chain(&impulse.html).cloned());
             }
+            Self::Reduce(reduce) => {
+                read.push(reduce.report.clone());
+                written.push(reduce.out.clone());
+            }
             Self::Tune(tune) => {
                 read.push(tune.report.clone());
                 let more = tune.document.iter().chain(&tune.responses).chain(&tune.html);

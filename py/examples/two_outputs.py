@@ -94,7 +94,9 @@ for output in arm_model.outputs:
 def lqg(model: th.Model, effort: float) -> float:
     """The largest modulus of a pole of the closed loop with an observer, and of the plant."""
     plant, form = model.to_control(), model.to_state_space()
-    weights = form.H.T @ np.diag(1 / np.diag(form.noise_covariance)) @ form.H
+    # Outputs in units of their noise.
+    seen = form.H / np.sqrt(np.diag(form.noise_covariance))[:, np.newaxis]
+    weights = seen.T @ seen
     gain, _, _ = control.dlqr(plant.A, plant.B, weights, effort * np.eye(plant.ninputs))
     F, G, H, D, K = form.F, form.G, form.H, form.D, form.K
     # u = -L x^, x^(t+1) = F x^ + G u + K (y - H x^ - D u).

@@ -395,6 +395,17 @@ impl Model {
         self.transient(py, output, move |model| model.impulse_response(input, samples))
     }
 
+    /// How much of its inputs each state passes on to the outputs.
+    fn hankel_singular_values(&self, py: Python<'_>) -> PyResult<Vec<f64>> {
+        self.report(py)?.hankel_singular_values().map_err(|error| error::batch(py, error))
+    }
+
+    /// The model with fewer states.
+    fn reduced(&self, py: Python<'_>, order: usize) -> PyResult<Self> {
+        let (report, _) = self.report(py)?.reduced(order).map_err(|error| error::batch(py, error))?;
+        Ok(Self::of(report))
+    }
+
     /// F, G, H, D and K of the innovations form.
     fn state_space<'py>(&self, py: Python<'py>) -> PyResult<[Bound<'py, PyArray2<f64>>; 5]> {
         let StateSpace { f, g, h, d, k, .. } = match &*self.model {

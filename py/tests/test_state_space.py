@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import pickle
+from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
@@ -75,8 +76,9 @@ def test_the_plant_is_found_and_every_method_takes_it() -> None:
     with pytest.raises(ValueError, match="no output 'y9'"):
         model.validate(data, require="fit[y9]>=1")
     # ln L of Gaussian errors.
-    known = len(data[:1000]) * (np.log(np.linalg.det(model.noise_covariance)) + 2 * np.log(2 * np.pi) + 2)
-    assert model.log_likelihood == pytest.approx(-known / 2, rel=0.01)
+    share = model.document["model"]["degrees_of_freedom"] / 1000
+    known = 1000 * (np.log(np.linalg.det(share * model.noise_covariance)) + 2 * np.log(2 * np.pi) + 2)
+    assert model.log_likelihood == pytest.approx(-known / 2, rel=1e-9)
     assert "state space of order 2" in model._repr_html_()
     for draw in (plot.step, plot.impulse, plot.bode):
         draw(model, output="y2")
@@ -84,6 +86,22 @@ def test_the_plant_is_found_and_every_method_takes_it() -> None:
             draw(model)
     assert plot.bode(model, output=0).shape == (2, 2)
     plot.fit(model, data, 5, output="y1")
+
+
+def test_states_that_matter_least_are_left_out() -> None:
+    data = log()
+    model = th.ss(data, 5)
+    values = model.hankel_singular_values()
+    assert values.shape == (5,) and np.all(np.diff(values) <= 0)
+    less = model.reduced(2)
+    assert less.name == "state space of order 2" and "from 5 to 2 states" in less.warnings[0]
+    assert less.poles() == pytest.approx(np.linalg.eigvals(F), abs=0.05)
+    assert np.nanstd(less.residuals(data), axis=0) == pytest.approx([0.2, 0.2], rel=0.1)
+    for wrong in (0, 9):
+        with pytest.raises(ValueError, match="order"):
+            model.reduced(wrong)
+    with pytest.raises(ValueError, match="states are left out of"):
+        th.narx(data).reduced(1)
 
 
 def test_matrices_predict_as_the_model_does() -> None:
@@ -115,13 +133,14 @@ def test_options_are_those_of_the_command_line() -> None:
     series = th.ss(th.Log(signals()[1], sample_time=1), 2)
     assert series.inputs == [] and series.predict(th.Log(signals()[1], sample_time=1)).shape == (1500, 2)
     assert th.ss(th.Log(signals()[1][:, 0], signals()[0], sample_time=1), 2).output == "y"
-    for wrong, words in (
+    calls: list[tuple[Callable[[], th.Model], str]] = [
         (lambda: th.ss(data, 0), "order"),
         (lambda: th.ss(data, past=0), "past"),
         (lambda: th.ss(data, weighting="pem"), "weighting"),
         (lambda: th.ss(data, nk=[1, 2, 3]), "nk"),
         (lambda: th.ss(data, feedthrough=False, nk=0), "nk"),
-    ):
+    ]
+    for wrong, words in calls:
         with pytest.raises(ValueError, match=words):
             wrong()
     with pytest.raises(TypeError, match="feedthrough"):

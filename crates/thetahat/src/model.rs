@@ -4,8 +4,9 @@
 //!   [`Structure`] (Ljung, System Identification: Theory for the User, 2nd ed. 1999, section 4.2).
 //! - [`PolynomialModel`] has the polynomials, each [`Parameter`] with its standard error, every [`Root`] and [`Quantity`] that follows
 //!   from them with an [`Interval`], and the [`Signal`]s it was fitted to. [`OffsetCovariance`] is what is open of their offsets.
-//! - [`StateSpace`] is the same model as a recursion of first order, for filters and controllers; [`StateSpaceModel`] is one that was
-//!   estimated as such, with any number of outputs.
+//! - [`StateSpace`] is the same model as a recursion of first order, for filters and controllers: of fewer states ([`Reduced`]), in
+//!   continuous time ([`ContinuousStateSpace`]) as a [`Hold`] says, or as [`ZerosPolesGain`] of one input and output.
+//!   [`StateSpaceModel`] is one that was estimated as such, with any number of outputs.
 //! - [`GreyBox`] is a model in equations as a person writes it, [`EquationsModel`] one whose parameters were estimated.
 //! - [`NonlinearArxModel`] is a nonlinear map of past outputs and inputs: for each output an [`OutputMap`], a [`Map`] of [`Regressor`]s,
 //!   which may be local models, each with its [`Membership`].
@@ -49,4 +50,4 @@ pub use orders::{Orders, Structure};
 pub(crate) use process::{Chain, Columns, Parts, State, Transition};
 pub use process::{ProcessModel, ProcessStructure};
 pub use quantity::{Interval, Quantity, Root};
-pub use state_space::{StateSpace, StateSpaceModel, ZerosPolesGain};
+pub use state_space::{ContinuousStateSpace, Hold, Reduced, StateSpace, StateSpaceModel, ZerosPolesGain};

@@ -7,6 +7,7 @@
 //! - [`Report`] is the JSON document of a fit: its [`Data`] ([`Parts`], [`Missing`]), the model, its [`Estimation`] and its figures.
 //! - [`validate`] tests a report on a log as a [`ValidationPlan`] says. It gives a [`Validated`]: the document, a [`Validation`] with
 //!   [`NoiseLevel`], [`Coverage`] and whether the fit has [`InSample`] the rows, and the [`Signals`] for charts ([`OutputSignals`]).
+//! - [`Report::reduced`] is a report of a model with fewer states.
 //! - [`compare`] puts several validations side by side in a [`Comparison`]. A [`Requirement`] (a [`Demand`] of an output or of all) makes a gate of a validation.
 //! - [`apply`] predicts or simulates a log with a stored model ([`Applied`], [`AppliedOutput`]), [`sample`] draws from it.
 //!   [`held_out_runs`] are the free runs of the models between which a choice was made.
@@ -42,6 +43,7 @@ mod identify;
 mod nonlinear_arx;
 mod plan;
 mod process;
+mod reduce;
 mod requirement;
 mod sample;
 mod schema;

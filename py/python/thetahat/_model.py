@@ -483,6 +483,45 @@ class Model(ReportedModel):
         matrices = self._model.state_space()
         return StateSpace(*matrices, self.noise_covariance, self.sample_time, self.inputs, self.outputs)
 
+    def hankel_singular_values(self) -> Array:
+        """How much of its inputs each state of the innovations form passes on to the outputs, falling; infinite where a pole does not decay.
+
+        Of models in state space and of polynomials, inputs and noise counted together.
+        """
+        return np.array(self._model.hankel_singular_values())
+
+    def reduced(self, order: int) -> Model:
+        """The model with so many states, by balanced truncation: its frequency response is off by no more than twice the sum of the
+        `hankel_singular_values` that are left out.
+
+        Parameters
+        ----------
+        order : int
+            How many states to keep.
+
+        Returns
+        -------
+        Model
+            In state space; it has no figures of a fit of its own, so validate it.
+
+        Raises
+        ------
+        ValueError
+            If the model has no such form, or not so many states, or poles that are always kept are more.
+
+        References
+        ----------
+        Moore, IEEE Transactions on Automatic Control 26, 1981. Enns, 23rd Conference on Decision and Control, 1984.
+
+        Examples
+        --------
+        >>> import thetahat as th
+        >>> model = th.arx(th.dc_motor(), na=4, nb=4)
+        >>> model.reduced(2).name
+        'state space of order 2'
+        """
+        return Model._of(self._model.reduced(_options.count("order", order)))
+
     def to_scipy(self) -> Any:
         """The plant as a discrete transfer function of SciPy; of several inputs, a list of them.
 

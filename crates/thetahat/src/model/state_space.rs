@@ -1,11 +1,16 @@
+mod balance;
+mod continuous;
 mod eigen;
 mod fitted;
+mod logarithm;
 mod zeros;
 
 use thetahat_core::nalgebra::DMatrix;
 
 use crate::Error;
 use crate::model::PolynomialModel;
+pub use balance::Reduced;
+pub use continuous::{ContinuousStateSpace, Hold};
 pub use fitted::StateSpaceModel;
 pub use zeros::ZerosPolesGain;
 

@@ -2,11 +2,21 @@
 
 use thetahat_core::nalgebra::{Complex, ComplexField, DMatrix, DVector};
 
-use crate::Error;
+use crate::{Error, figures};
 
 /// The same matrix for faer.
 pub(super) fn faer_of(matrix: &DMatrix<f64>) -> faer::Mat<f64> {
     faer::Mat::from_fn(matrix.nrows(), matrix.ncols(), |row, column| matrix[(row, column)])
+}
+
+/// The same matrix for nalgebra.
+pub(super) fn nalgebra_of(matrix: faer::MatRef<'_, f64>) -> DMatrix<f64> {
+    DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |row, column| matrix[(row, column)])
+}
+
+/// X of A X = B by an LU factor; none where A is singular. Of no rows there is none to divide by.
+pub(super) fn solved(a: DMatrix<f64>, b: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    if a.is_empty() { Some(b.clone()) } else { a.lu().solve(b) }
 }
 
 /// Rounding of a matrix of this size as a fraction of its norm.
@@ -34,7 +44,7 @@ pub(super) fn eigenvalues(matrix: &DMatrix<f64>) -> Result<Vec<Complex<f64>>, Er
 pub(super) fn pencil(a: DMatrix<f64>, b: DMatrix<f64>) -> Result<Vec<Complex<f64>>, Error> {
     let Deflated { a, b, at_zero } = deflated(a, b)?;
     let inverted = SHIFTS.iter().filter_map(|&shift| {
-        let inverse = (&a - &b * shift).lu().solve(&b)?;
+        let inverse = solved(&a - &b * shift, &b)?;
         let size = inverse.norm();
         size.is_finite().then_some((shift, inverse, size))
     });
@@ -105,6 +115,16 @@ fn in_order(mut found: Vec<Complex<f64>>, at_zero: usize) -> Vec<Complex<f64>> {
 
 fn diverges() -> Error {
     Error::undetermined(Vec::new(), "the eigenvalues of the model do not converge")
+}
+
+/// An eigenvalue in an error.
+pub(super) fn named(value: Complex<f64>) -> String {
+    let real = figures::short(value.re);
+    if value.im == 0.0 {
+        return real;
+    }
+    let sign = if value.im > 0.0 { '+' } else { '-' };
+    format!("{real} {sign} {}i", figures::short(value.im.abs()))
 }
 
 /// The unit axis a for which (I - 2 a a') v has one entry only, and what that entry is. None for v = 0.

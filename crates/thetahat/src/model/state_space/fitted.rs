@@ -3,7 +3,7 @@ use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::{Complex, DMatrix};
 
 use super::StateSpace;
-use super::eigen::eigenvalues;
+use super::eigen::{eigenvalues, solved};
 use crate::Error;
 use crate::distribution::{student_factor, student_two_sided};
 use crate::model::{Quantity, Root, Signal};
@@ -250,8 +250,7 @@ impl StateSpace {
 fn static_gain(matrices: &StateSpace, poles: &[Complex<f64>], inputs: usize) -> Vec<Vec<Option<Quantity>>> {
     let n = matrices.f.nrows();
     let integrates = poles.iter().any(|pole| (pole.re - 1.0).hypot(pole.im) < INTEGRATOR);
-    let solved =
-        if integrates { None } else { (DMatrix::identity(n, n) - &matrices.f).lu().solve(&matrices.g) };
+    let solved = if integrates { None } else { solved(DMatrix::identity(n, n) - &matrices.f, &matrices.g) };
     let gain = solved.map(|x| &matrices.h * x + &matrices.d);
     let entry = |output: usize, input: usize| {
         let value = gain.as_ref().map(|gain| gain[(output, input)]).filter(|value| value.is_finite());

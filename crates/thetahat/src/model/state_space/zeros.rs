@@ -324,7 +324,8 @@ mod tests {
                     .unwrap();
                 let expected = (model.h.row(output).map(|value| Complex::new(value, 0.0)) * state)[0]
                     + model.d[(output, input)];
-                assert!((transfer.at(z) - expected).modulus() < 1e-13 * expected.modulus());
+                let apart = (transfer.at(z) - expected).modulus() / expected.modulus();
+                assert!(apart < 1e-12, "{output} {input} {z}: {apart}");
             }
         }
     }
@@ -370,7 +371,7 @@ mod tests {
         // 2 z^-2 - 3 z^-3 + z^-4 = (2 z^2 - 3 z + 1) / z^4.
         assert_eq!(found.poles, vec![Complex::new(0.0, 0.0); 4]);
         assert!(apart(&found.zeros, &complex(&[(1.0, 0.0), (0.5, 0.0)])) < 1e-14);
-        assert_eq!((found.delay(), (found.gain - 2.0).abs() < 1e-15), (2, true));
+        assert_eq!((found.delay(), (found.gain - 2.0).abs() < 1e-14), (2, true));
     }
 
     #[test]

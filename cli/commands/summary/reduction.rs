@@ -1,0 +1,27 @@
+//! What each state of a model is worth, as a table for people.
+
+use thetahat::figures::number;
+
+use super::text::{Text, columns, or_dash};
+
+/// Why a state has no figure.
+const KEPT: &str = "its pole does not decay, and it is always kept";
+
+/// The Hankel singular values of a model, and the bounds of the errors where only so many states are kept.
+pub(crate) fn hankel_singular_values(values: &[f64], width: usize) -> String {
+    let mut text = Text::new(width);
+    let mut table = columns(&["states", "Hankel singular value", "error at most"]).none(KEPT);
+    for (place, value) in values.iter().enumerate() {
+        let known = Some(*value).filter(|value| value.is_finite());
+        // Small ones first.
+        let left: f64 = values[place + 1..].iter().rev().sum();
+        let bound = Some(2.0 * left).filter(|bound| bound.is_finite());
+        table.row([(place + 1).to_string(), or_dash(known, number), or_dash(bound, number)]);
+    }
+    text.table(table);
+    text.line(
+        "error: of the frequency response from the inputs, and the noise in units of its deviation, to the outputs, where so many states are \
+         kept (the largest singular value at any frequency)",
+    );
+    text.finish()
+}

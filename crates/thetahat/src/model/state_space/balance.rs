@@ -1,0 +1,633 @@
+//! Models of fewer states by balanced truncation.
+
+use thetahat_core::nalgebra::{Cholesky, ComplexField, DMatrix, SymmetricEigen};
+
+use super::{StateSpace, eigen};
+use crate::{Error, figures};
+
+/// Poles of larger modulus are kept: they last for 10^5 samples, or grow.
+const LASTING: f64 = 1.0 - 1e-5;
+/// Doublings after which a sum that exists has converged.
+const DOUBLINGS: usize = 60;
+/// Newton steps after which the sign of a matrix is known.
+const STEPS: usize = 100;
+
+/// A model of fewer states, and what that costs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reduced {
+    /// The model. Its states are balanced, the most important first, after those of poles that are kept.
+    pub model: StateSpace,
+    /// An upper bound of what the truncation does to the frequency response from [u; e], e in units of its deviation, to y: of the
+    /// largest singular value of the difference at any frequency, in the units of y by those of u. It is twice the sum of the Hankel
+    /// singular values that are left out. No model with so many states has a difference below the first of them.
+    pub error_bound: f64,
+}
+
+/// Coordinates x = `right` z, z = `left` x.
+struct Coordinates {
+    right: DMatrix<f64>,
+    left: DMatrix<f64>,
+}
+
+/// Balanced coordinates of a model.
+struct Balance {
+    /// Those of the poles that are kept.
+    lasting: Coordinates,
+    /// Those of the others.
+    decaying: Coordinates,
+    /// Of the others, falling; one for each state.
+    singular_values: Vec<f64>,
+}
+
+impl StateSpace {
+    /// The Hankel singular values of the model, falling: how much of its inputs each state in balanced coordinates passes on to its
+    /// outputs. Infinity for each pole that is kept; zero, or rounding, for states that are not needed.
+    ///
+    /// [`StateSpace::reduced`] has the equations. O(n^3).
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for matrices whose shapes do not fit, or that are not finite; [`Error::Undetermined`] where a decomposition
+    /// does not converge.
+    ///
+    /// ```
+    /// use thetahat::model::{Orders, PolynomialModel};
+    ///
+    /// // The pole 0.9, and one at 0.5 that (1 - 0.5 q^-1) in B and C takes away.
+    /// let orders = Orders::armax(2, &[2], 1, &[1])?;
+    /// let model = PolynomialModel::from_parameters(&orders, &[-1.4, 0.45, 1.0, -0.5, -0.5], None, 1.0, 1.0)?;
+    /// let values = model.state_space().hankel_singular_values()?;
+    /// assert!(values[0] > 1.0 && values[1] < 1e-12);
+    /// # Ok::<(), thetahat::Error>(())
+    /// ```
+    pub fn hankel_singular_values(&self) -> Result<Vec<f64>, Error> {
+        let balance = self.balance()?;
+        let mut values = vec![f64::INFINITY; balance.lasting.left.nrows()];
+        values.extend(balance.singular_values);
+        Ok(values)
+    }
+
+    /// The same model in balanced coordinates, without the states that are not needed: both its Gramians are the diagonal matrix of its
+    /// Hankel singular values. O(n^3).
+    ///
+    /// # Errors
+    /// Those of [`StateSpace::reduced`].
+    pub fn balanced(&self) -> Result<Self, Error> {
+        let balance = self.balance()?;
+        let needed = balance.needed();
+        self.truncated(&balance, needed)
+    }
+
+    /// The model with so many states by balanced truncation.
+    ///
+    /// The inputs are u and e together, e in units of its deviation, W(z) = H (z I - F)^-1 B + [D, L] with B = [G, K L] and
+    /// L L' = noise_covariance: a state that predictions need is as important as one that the inputs move. The Gramians
+    ///
+    /// ```text
+    /// P = F P F' + B B'   (how far inputs of unit energy move a state),   Q = F' Q F + H' H   (the energy of the outputs of a state)
+    /// ```
+    ///
+    /// are computed as roots, P = S S' and Q = R R', by doubling with a QR decomposition each time, so that the small ones keep their
+    /// digits:
+    ///
+    /// ```text
+    /// S_{i+1} = [S_i, F_i S_i],   F_{i+1} = F_i^2,   S_0 = B
+    /// ```
+    ///
+    /// (Smith, SIAM J. Applied Math. 16, 1968; Penzl, SIAM J. Sci. Comput. 21, 2000). With R' S = U Sigma V' and the first r columns of
+    /// each, x = S V Sigma^-½ z and z = Sigma^-½ U' R' x: both Gramians of z are Sigma, the Hankel singular values (Moore, IEEE Trans.
+    /// Automatic Control 26, 1981; Tombs and Postlethwaite, Int. J. Control 46, 1987). What is left out changes W by no more than twice
+    /// their sum (Enns 1984; Glover, Int. J. Control 39, 1984; for samples Al-Saggaf and Franklin, IEEE Trans. Automatic Control 32,
+    /// 1987), and what is left is stable (Pernebo and Silverman, IEEE Trans. Automatic Control 27, 1982). The part of u alone obeys the same
+    /// bound. The static gain changes within it too.
+    ///
+    /// Integrators, unstable poles, and poles of a modulus above 1 - 10^-5 have no Gramians: they are kept as they are, split from
+    /// the others by the sign of a matrix (Roberts, Int. J. Control 32, 1980), and count among the states.
+    ///
+    /// Where truncation leaves an unstable predictor F - K H, K and noise_covariance are replaced by those of the stable one whose noise
+    /// has the same spectrum. With A = F - K H, and A_u and H_u what A and H are on its unstable subspace V:
+    ///
+    /// ```text
+    /// A_u' Y A_u = Y + H_u' R^-1 H_u,   P = V Y^-1 V',   innovations of cov M = H P H' + R,   K + A P H' M^-1,   R = noise_covariance
+    /// ```
+    ///
+    /// (Anderson and Moore, Optimal Filtering, 1979, section 9.3: P is the stabilising solution of the Riccati equation of the filter.)
+    /// The bound is that of the noise before. O(n^3).
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for an order below the number of poles that are kept or above that of the states that are needed, matrices
+    /// whose shapes do not fit or that are not finite; [`Error::Undetermined`] where a decomposition does not converge, or no predictor is
+    /// stable.
+    ///
+    /// ```
+    /// use thetahat::model::{Orders, PolynomialModel};
+    ///
+    /// // Poles at 0.9 and 0.1, of which the first does nearly all.
+    /// let orders = Orders::arx(2, &[2], &[1])?;
+    /// let model = PolynomialModel::from_parameters(&orders, &[-1.0, 0.09, 1.0, -0.12], None, 0.01, 1.0)?;
+    /// let reduced = model.state_space().reduced(1)?;
+    /// assert!((reduced.model.f[(0, 0)] - 0.9).abs() < 0.01);
+    /// let gain = |space: &thetahat::model::StateSpace| Ok::<f64, thetahat::Error>(space.transfer(0, 0)?.at(1.0.into()).re);
+    /// assert!((gain(&reduced.model)? - gain(&model.state_space())?).abs() < reduced.error_bound);
+    /// # Ok::<(), thetahat::Error>(())
+    /// ```
+    pub fn reduced(&self, order: usize) -> Result<Reduced, Error> {
+        let balance = self.balance()?;
+        let (kept, needed) = (balance.lasting.left.nrows(), balance.needed());
+        if order < kept {
+            let poles = eigen::eigenvalues(&self.f)?;
+            let lasting = poles.iter().filter(|pole| pole.modulus() > LASTING);
+            let names: Vec<String> = lasting.map(|pole| eigen::named(*pole)).collect();
+            return Err(Error::argument(
+                "order",
+                format!(
+                    "it is {order}; the poles {} do not decay and are kept, so that it must be {kept} at least",
+                    names.join(", ")
+                ),
+            ));
+        }
+        if order > needed {
+            return Err(Error::argument(
+                "order",
+                format!("it is {order}; the model needs {needed} of its {} states", self.f.nrows()),
+            ));
+        }
+        let error_bound = 2.0 * balance.singular_values[order - kept..].iter().rev().sum::<f64>();
+        Ok(Reduced { model: self.truncated(&balance, order)?, error_bound })
+    }
+
+    fn balance(&self) -> Result<Balance, Error> {
+        self.check()?;
+        let Parts { inside, outside } = split(&self.f, LASTING)?;
+        let size = inside.left.nrows();
+        let f = &inside.left * &self.f * &inside.right;
+        let (m, l) = (self.g.ncols(), self.h.nrows());
+        let mut b = DMatrix::zeros(size, m + l);
+        b.columns_mut(0, m).copy_from(&(&inside.left * &self.g));
+        b.columns_mut(m, l).copy_from(&(&inside.left * &self.k * root(&self.noise_covariance)));
+        let reached = gramian(f.clone(), b)?;
+        let seen = gramian(f.transpose(), (&self.h * &inside.right).transpose())?;
+        let product = seen.tr_mul(&reached);
+        let mut singular_values = Vec::<f64>::new();
+        let (mut right, mut left) = (DMatrix::zeros(size, 0), DMatrix::zeros(0, size));
+        if !product.is_empty() {
+            let decomposed = eigen::faer_of(&product)
+                .thin_svd()
+                .map_err(|_| Error::undetermined(Vec::new(), "the Hankel singular values do not converge"))?;
+            singular_values.extend(decomposed.S().column_vector().iter());
+            let largest = singular_values.first().copied().unwrap_or(0.0);
+            let needed = singular_values.iter().take_while(|value| **value > eigen::rounding(size) * largest);
+            let needed = needed.count();
+            let of = |factor: DMatrix<f64>, vectors: faer::MatRef<'_, f64>| {
+                let mut directions = factor * eigen::nalgebra_of(vectors.subcols(0, needed));
+                let scaled = directions.column_iter_mut().zip(&singular_values);
+                scaled.for_each(|(mut column, value)| column.unscale_mut(value.sqrt()));
+                directions
+            };
+            right = of(reached, decomposed.V());
+            left = of(seen, decomposed.U()).transpose();
+        }
+        singular_values.resize(size, 0.0);
+        let decaying = Coordinates { right: &inside.right * right, left: left * &inside.left };
+        Ok(Balance { lasting: outside, decaying, singular_values })
+    }
+
+    /// In balanced coordinates, the first `order` of them.
+    fn truncated(&self, balance: &Balance, order: usize) -> Result<Self, Error> {
+        let kept = balance.lasting.left.nrows();
+        let states = order - kept;
+        let n = self.f.nrows();
+        let mut right = DMatrix::zeros(n, order);
+        right.columns_mut(0, kept).copy_from(&balance.lasting.right);
+        right.columns_mut(kept, states).copy_from(&balance.decaying.right.columns(0, states));
+        let mut left = DMatrix::zeros(order, n);
+        left.rows_mut(0, kept).copy_from(&balance.lasting.left);
+        left.rows_mut(kept, states).copy_from(&balance.decaying.left.rows(0, states));
+        let mut f = &left * &self.f * &right;
+        // The two parts know nothing of each other.
+        f.view_mut((0, kept), (kept, states)).fill(0.0);
+        f.view_mut((kept, 0), (states, kept)).fill(0.0);
+        let model = Self { f, g: &left * &self.g, h: &self.h * right, k: left * &self.k, ..self.clone() };
+        model.with_stable_predictor()
+    }
+
+    /// The same model of y with innovations of which F - K H is stable.
+    ///
+    /// # Errors
+    /// [`Error::Undetermined`] where there are none.
+    fn with_stable_predictor(self) -> Result<Self, Error> {
+        let between = &self.f - &self.k * &self.h;
+        let stable = |matrix: &DMatrix<f64>| {
+            let largest = eigen::eigenvalues(matrix)?.first().map_or(0.0, |value| value.modulus());
+            Ok::<bool, Error>(largest < 1.0)
+        };
+        if stable(&between)? {
+            return Ok(self);
+        }
+        let without =
+            || Error::undetermined(Vec::new(), "no gain gives a stable predictor; take another order");
+        let unstable = split(&between, 1.0)?.outside;
+        let inverse = (&unstable.left * &between * &unstable.right).try_inverse().ok_or_else(without)?;
+        let seen = &self.h * &unstable.right * &inverse;
+        let noise = &self.noise_covariance;
+        let weighted = Cholesky::new(noise.clone()).ok_or_else(without)?;
+        let whitened = weighted.l().solve_lower_triangular(&seen).ok_or_else(without)?;
+        // Y = sum over k of A_u^-k' H_u' R^-1 H_u A_u^-k.
+        let factor = gramian(inverse.transpose(), whitened.transpose()).map_err(|_| without())?;
+        let information = &factor * factor.transpose();
+        let covariance = Cholesky::new(information).ok_or_else(without)?.solve(&unstable.right.transpose());
+        let covariance = &unstable.right * covariance;
+        let innovation = &self.h * &covariance * self.h.transpose() + noise;
+        let innovation = (&innovation + innovation.transpose()) * 0.5;
+        let gain = Cholesky::new(innovation.clone()).ok_or_else(without)?;
+        let gain = gain.solve(&(&self.h * covariance.transpose() * between.transpose())).transpose();
+        let found = Self { k: &self.k + gain, noise_covariance: innovation, ..self };
+        if stable(&(&found.f - &found.k * &found.h))? { Ok(found) } else { Err(without()) }
+    }
+}
+
+impl Balance {
+    /// The poles that are kept, and the states of the others that inputs reach and outputs see.
+    fn needed(&self) -> usize {
+        self.lasting.left.nrows() + self.decaying.left.nrows()
+    }
+}
+
+/// S of X = S S', X = F X F' + B B' for a stable F.
+fn gramian(mut f: DMatrix<f64>, b: DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
+    let mut root = compressed(b);
+    for _ in 0..DOUBLINGS {
+        let further = &f * &root;
+        let (size, before) = (further.norm(), root.norm());
+        if !(size + before).is_finite() {
+            break;
+        }
+        if size <= f64::EPSILON * f64::EPSILON * before {
+            return Ok(root);
+        }
+        let mut both = DMatrix::zeros(root.nrows(), root.ncols() + further.ncols());
+        both.columns_mut(0, root.ncols()).copy_from(&root);
+        both.columns_mut(root.ncols(), further.ncols()).copy_from(&further);
+        root = compressed(both);
+        f = &f * &f;
+    }
+    Err(Error::undetermined(
+        Vec::new(),
+        "the Gramian of a state does not converge: the model is near unstable",
+    ))
+}
+
+/// S with S S' as it is, and no more columns than rows.
+fn compressed(factor: DMatrix<f64>) -> DMatrix<f64> {
+    if factor.ncols() <= factor.nrows() || factor.is_empty() {
+        factor
+    } else {
+        factor.transpose().qr().unpack_r().transpose()
+    }
+}
+
+/// L of L L', for a covariance that may be singular.
+fn root(covariance: &DMatrix<f64>) -> DMatrix<f64> {
+    if covariance.is_empty() {
+        return covariance.clone();
+    }
+    let symmetric = (covariance + covariance.transpose()) * 0.5;
+    let SymmetricEigen { mut eigenvectors, eigenvalues } = SymmetricEigen::new(symmetric);
+    for (mut column, value) in eigenvectors.column_iter_mut().zip(eigenvalues.iter()) {
+        column.scale_mut(value.max(0.0).sqrt());
+    }
+    eigenvectors
+}
+
+/// The invariant subspaces of a matrix.
+struct Parts {
+    /// Of eigenvalues inside a circle.
+    inside: Coordinates,
+    /// Of those on it and outside.
+    outside: Coordinates,
+}
+
+/// The invariant subspaces of the eigenvalues inside a circle and of the others. With r between the two, the sign of
+/// (F/r - I)(F/r + I)^-1 is -I on the one and I on the other (Roberts 1980), by Newton's X <- (X + X^-1)/2 with scaled determinants
+/// (Higham, Functions of Matrices, 2008, section 5.5).
+fn split(matrix: &DMatrix<f64>, radius: f64) -> Result<Parts, Error> {
+    let n = matrix.nrows();
+    let identity = DMatrix::<f64>::identity(n, n);
+    let none = || Coordinates { right: DMatrix::zeros(n, 0), left: DMatrix::zeros(0, n) };
+    let all = || Coordinates { right: identity.clone(), left: identity.clone() };
+    let moduli: Vec<f64> = eigen::eigenvalues(matrix)?.iter().map(|value| value.modulus()).collect();
+    let outside = moduli.iter().filter(|modulus| **modulus >= radius).count();
+    if outside == 0 {
+        return Ok(Parts { inside: all(), outside: none() });
+    }
+    if outside == n {
+        return Ok(Parts { inside: none(), outside: all() });
+    }
+    let failed = || {
+        Error::undetermined(
+            Vec::new(),
+            format!(
+                "poles of modulus {} and {} cannot be told apart",
+                figures::short(moduli[outside - 1]),
+                figures::short(moduli[outside])
+            ),
+        )
+    };
+    // Poles at 0 have no geometric mean.
+    let between = (moduli[outside - 1] * moduli[outside]).sqrt().max(0.5 * moduli[outside - 1]);
+    let scaled = matrix / between;
+    let inverse = (&scaled + &identity).try_inverse().ok_or_else(failed)?;
+    let mut sign = (scaled - &identity) * inverse;
+    let mut known = false;
+    for _ in 0..STEPS {
+        let factors = sign.clone().lu();
+        let exponent = -1.0 / n as f64;
+        // The product of powers, as the determinant itself may overflow.
+        let scale: f64 = factors.u().diagonal().iter().map(|pivot| pivot.abs().powf(exponent)).product();
+        let inverse = factors.try_inverse().ok_or_else(failed)?;
+        let next = (&sign * scale + inverse / scale) * 0.5;
+        let (step, size) = ((&next - &sign).norm(), next.norm());
+        sign = next;
+        if !size.is_finite() {
+            return Err(failed());
+        }
+        // Each step doubles the digits.
+        if step <= 1e-8 * size {
+            known = true;
+            break;
+        }
+    }
+    // The projections on the two, and bases of what they project on.
+    let basis = |projection: DMatrix<f64>, count: usize| {
+        let decomposed = eigen::faer_of(&projection).svd().map_err(|_| failed())?;
+        Ok::<_, Error>(eigen::nalgebra_of(decomposed.U().subcols(0, count)))
+    };
+    if !known || ((sign.trace() - (2 * outside) as f64 + n as f64).abs() > 0.5) {
+        return Err(failed());
+    }
+    let first = basis((&identity + &sign) * 0.5, outside)?;
+    let last = basis((&identity - &sign) * 0.5, n - outside)?;
+    let mut right = DMatrix::zeros(n, n);
+    right.columns_mut(0, outside).copy_from(&first);
+    right.columns_mut(outside, n - outside).copy_from(&last);
+    let left = right.try_inverse().ok_or_else(failed)?;
+    Ok(Parts {
+        outside: Coordinates { right: first, left: left.rows(0, outside).into_owned() },
+        inside: Coordinates { right: last, left: left.rows(outside, n - outside).into_owned() },
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::PI;
+
+    use thetahat_core::nalgebra::Complex;
+
+    use super::*;
+    use crate::model::{Orders, PolynomialModel};
+
+    fn rows(rows: &[&[f64]]) -> DMatrix<f64> {
+        DMatrix::from_fn(rows.len(), rows[0].len(), |row, column| rows[row][column])
+    }
+
+    fn two_by_two() -> StateSpace {
+        StateSpace {
+            f: rows(&[
+                &[0.9, 0.3, 0.0, 0.0],
+                &[-0.3, 0.7, 0.1, 0.0],
+                &[0.0, 0.0, 0.5, -0.4],
+                &[0.05, 0.0, 0.4, 0.5],
+            ]),
+            g: rows(&[&[1.0, 0.0], &[0.5, -1.0], &[0.2, 0.7], &[0.0, 1.0]]),
+            h: rows(&[&[1.0, 0.0, 2.0, 0.0], &[0.0, 1.0, -1.0, 0.3]]),
+            d: rows(&[&[0.0, 0.3], &[0.1, 0.0]]),
+            k: rows(&[&[0.5, 0.1], &[0.1, 0.4], &[0.2, -0.1], &[0.0, 0.2]]),
+            noise_covariance: rows(&[&[0.5, 0.1], &[0.1, 0.2]]),
+            sample_time: 1.0,
+        }
+    }
+
+    /// From u and e, e in units of its deviation, to y.
+    fn response(model: &StateSpace, z: Complex<f64>) -> DMatrix<Complex<f64>> {
+        let complex = |matrix: &DMatrix<f64>| matrix.map(|value| Complex::new(value, 0.0));
+        let n = model.f.nrows();
+        let inside = (DMatrix::<Complex<f64>>::identity(n, n) * z - complex(&model.f)).try_inverse().unwrap();
+        let root = root(&model.noise_covariance);
+        let (m, l) = (model.g.ncols(), model.h.nrows());
+        let mut found = DMatrix::zeros(l, m + l);
+        let inputs = complex(&model.h) * &inside * complex(&model.g) + complex(&model.d);
+        found.columns_mut(0, m).copy_from(&inputs);
+        let noise = complex(&model.h) * inside * complex(&(&model.k * &root)) + complex(&root);
+        found.columns_mut(m, l).copy_from(&noise);
+        found
+    }
+
+    /// The largest singular value of the difference at many frequencies.
+    fn apart(one: &StateSpace, other: &StateSpace) -> f64 {
+        let points = (0..=4000).map(|k| Complex::from_polar(1.0, PI * (f64::from(k) + 1e-3) / 4000.1));
+        let size = |difference: DMatrix<Complex<f64>>| difference.svd(false, false).singular_values[0];
+        points.map(|z| size(response(one, z) - response(other, z))).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn hankel_singular_values_are_those_of_scipy() {
+        // scipy 1.17.1: roots of the eigenvalues of P Q, both by scipy.linalg.solve_discrete_lyapunov.
+        let expected = [5.4352008786710435, 3.7470056566925134, 1.6649051461545135, 0.8955869441944786];
+        let found = two_by_two().hankel_singular_values().unwrap();
+        for (found, expected) in found.iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-13, "{found} {expected}");
+        }
+        // The same program with numpy's frequency responses: the error of truncation at 4001 frequencies.
+        for (order, error) in [(1, 6.181581334648759), (2, 2.2222798694568264), (3, 1.3939685241731303)] {
+            let reduced = two_by_two().reduced(order).unwrap();
+            let found = apart(&two_by_two(), &reduced.model);
+            assert!((found - error).abs() < 1e-4 * error, "{order}: {found}");
+            assert!(found <= reduced.error_bound && found >= expected[order], "{order}: {found}");
+        }
+    }
+
+    #[test]
+    fn both_gramians_are_the_hankel_singular_values() {
+        let model = two_by_two();
+        let found = model.balanced().unwrap();
+        assert!(apart(&model, &found) < 1e-12);
+        let values = model.hankel_singular_values().unwrap();
+        let expected = DMatrix::from_diagonal(&values.into());
+        let b = &found.k * root(&found.noise_covariance);
+        let driven = &found.g * found.g.transpose() + &b * b.transpose();
+        let moved = &found.f * &expected * found.f.transpose() + driven;
+        assert!((moved - &expected).amax() < 1e-12);
+        let seen = found.f.transpose() * &expected * &found.f + found.h.transpose() * &found.h;
+        assert!((seen - &expected).amax() < 1e-12);
+    }
+
+    #[test]
+    fn states_that_are_not_needed_go_without_a_trace() {
+        let model = two_by_two();
+        // Two more states: one that nothing reaches, one that nothing sees; then other coordinates.
+        let mut f = DMatrix::zeros(6, 6);
+        f.view_mut((0, 0), (4, 4)).copy_from(&model.f);
+        f[(0, 4)] = 0.4;
+        f[(4, 4)] = 0.8;
+        f[(5, 5)] = -0.7;
+        f[(5, 1)] = 1.5;
+        let mut g = model.g.clone().insert_rows(4, 2, 0.0);
+        g[(5, 0)] = 2.0;
+        let k = model.k.clone().insert_rows(4, 2, 0.0);
+        let mut h = model.h.clone().insert_columns(4, 2, 0.0);
+        h[(1, 4)] = 3.0;
+        let change = DMatrix::from_fn(6, 6, |row, column| {
+            let entry = ((3 * row + 5 * column) % 7) as f64 - 3.0;
+            if row == column { 9.0 + entry } else { entry }
+        });
+        let inverse = change.clone().try_inverse().unwrap();
+        let larger = StateSpace {
+            f: &change * f * &inverse,
+            g: &change * g,
+            k: &change * k,
+            h: h * inverse,
+            ..model.clone()
+        };
+        let values = larger.hankel_singular_values().unwrap();
+        assert!(values[3] > 0.8 && values[4] < 1e-12 && values.len() == 6, "{values:?}");
+        let reduced = larger.balanced().unwrap();
+        assert_eq!(reduced.f.nrows(), 4);
+        assert!(apart(&reduced, &model) < 1e-10);
+        assert_eq!(
+            larger.reduced(5).unwrap_err().to_string(),
+            "order: it is 5; the model needs 4 of its 6 states"
+        );
+    }
+
+    #[test]
+    fn an_all_pass_has_equal_values() {
+        // (1 - 0.8 z)(1 + 0.5 z)/((z - 0.8)(z + 0.5)), all of modulus 1 on the circle.
+        let orders = Orders::arx(2, &[3], &[0]).unwrap();
+        let parameters = [-0.3, -0.4, -0.4, -0.3, 1.0];
+        let model = PolynomialModel::from_parameters(&orders, &parameters, None, 1.0, 1.0).unwrap();
+        let mut space = model.state_space();
+        space.k.fill(0.0);
+        for value in space.hankel_singular_values().unwrap() {
+            assert!((value - 1.0).abs() < 1e-13, "{value}");
+        }
+    }
+
+    #[test]
+    fn small_values_keep_their_digits() {
+        let poles: Vec<f64> = (0..6).map(|k| 0.5 + 0.08 * f64::from(k)).collect();
+        let model = StateSpace {
+            f: DMatrix::from_diagonal(&poles.clone().into()),
+            g: DMatrix::from_element(6, 1, 1.0),
+            h: DMatrix::from_element(1, 6, 1.0),
+            d: rows(&[&[0.0]]),
+            k: DMatrix::zeros(6, 1),
+            noise_covariance: rows(&[&[1.0]]),
+            sample_time: 1.0,
+        };
+        let values = model.hankel_singular_values().unwrap();
+        // P = Q with P_ij = 1/(1 - p_i p_j), so that the values are the eigenvalues of P, and their product Cauchy's determinant.
+        let mut logarithm = 0.0;
+        for (i, one) in poles.iter().enumerate() {
+            logarithm -= (1.0 - one * one).ln();
+            for other in &poles[..i] {
+                logarithm += 2.0 * ((one - other) / (1.0 - one * other)).abs().ln();
+            }
+        }
+        let trace: f64 = poles.iter().map(|pole| 1.0 / (1.0 - pole * pole)).sum();
+        assert!((values.iter().sum::<f64>() - trace).abs() < 1e-13 * trace);
+        let found: f64 = values.iter().map(|value| value.ln()).sum();
+        assert!((found - logarithm).abs() < 1e-10, "{values:?} {found} {logarithm}");
+        let reduced = model.reduced(3).unwrap();
+        let error = apart(&model, &reduced.model);
+        assert!(error <= reduced.error_bound && error >= values[3], "{error}");
+    }
+
+    #[test]
+    fn poles_that_do_not_decay_are_kept() {
+        let stable = two_by_two();
+        // A double integrator and an unstable pair beside it, all mixed.
+        let mut f = DMatrix::zeros(8, 8);
+        f.view_mut((0, 0), (4, 4)).copy_from(&stable.f);
+        f.view_mut((4, 4), (2, 2)).copy_from(&rows(&[&[1.0, 0.5], &[0.0, 1.0]]));
+        f.view_mut((6, 6), (2, 2)).copy_from(&rows(&[&[1.1, 0.4], &[-0.4, 1.1]]));
+        let mut g = stable.g.clone().insert_rows(4, 4, 0.3);
+        g[(5, 1)] = -0.4;
+        let mut h = stable.h.clone().insert_columns(4, 4, 0.5);
+        h[(0, 7)] = 0.1;
+        // K places the poles of the predictor: a Kalman gain would; here that of the stable part is enough to test the response to u.
+        let k = stable.k.clone().insert_rows(4, 4, 0.0);
+        let change = DMatrix::from_fn(8, 8, |row, column| {
+            let entry = ((3 * row + 5 * column) % 11) as f64 - 5.0;
+            if row == column { 15.0 + entry } else { entry }
+        });
+        let inverse = change.clone().try_inverse().unwrap();
+        let whole = StateSpace {
+            f: &change * f * &inverse,
+            g: &change * g,
+            k: &change * k,
+            h: h * inverse,
+            ..stable.clone()
+        };
+        let values = whole.hankel_singular_values().unwrap();
+        assert_eq!(values[..4], [f64::INFINITY; 4]);
+        for (found, expected) in values[4..].iter().zip(stable.hankel_singular_values().unwrap()) {
+            assert!((found - expected).abs() < 1e-8, "{found} {expected}");
+        }
+        let error = whole.reduced(3).unwrap_err().to_string();
+        assert!(
+            error.contains("1.1 + 0.4i, 1.1 - 0.4i, 1") && error.ends_with("it must be 4 at least"),
+            "{error}"
+        );
+        let balance = whole.balance().unwrap();
+        assert_eq!(balance.needed(), 8);
+        let Coordinates { left, right } = &balance.lasting;
+        let kept = eigen::eigenvalues(&(left * &whole.f * right)).unwrap();
+        assert!((kept[0] - Complex::new(1.1, 0.4)).modulus() < 1e-10, "{kept:?}");
+        // What is left out is what is left out of the stable part.
+        let expected = stable.reduced(2).unwrap();
+        assert!((values[6..].iter().sum::<f64>() * 2.0 - expected.error_bound).abs() < 1e-7);
+    }
+
+    #[test]
+    fn an_unstable_predictor_becomes_the_stable_one_of_the_same_noise() {
+        // C = 1 + 2.5 q^-1 + q^-2 = (1 + 2 q^-1)(1 + 0.5 q^-1): the same noise as that of 2 (1 + 0.5 q^-1)^2.
+        let orders = Orders::armax(2, &[1], 2, &[1]).unwrap();
+        let unstable = [-1.2, 0.52, 1.0, 2.5, 1.0];
+        let space = |parameters: &[f64], variance| {
+            PolynomialModel::from_parameters(&orders, parameters, None, variance, 1.0).unwrap().state_space()
+        };
+        let found = space(&unstable, 1.0).with_stable_predictor().unwrap();
+        let expected = space(&[-1.2, 0.52, 1.0, 1.0, 0.25], 4.0);
+        assert!((&found.k - &expected.k).amax() < 1e-13, "{}", found.k);
+        assert!((&found.noise_covariance - &expected.noise_covariance).amax() < 1e-13);
+        // Two outputs: the spectrum stays.
+        let model = two_by_two();
+        let wild = StateSpace { k: &model.k * 6.0, ..model };
+        let found = wild.clone().with_stable_predictor().unwrap();
+        assert!(wild != found);
+        for frequency in [0.01, 0.4, 2.0] {
+            let z = Complex::from_polar(1.0, frequency);
+            let spectrum = |model: &StateSpace| {
+                let noise = response(model, z).columns(2, 2).into_owned();
+                &noise * noise.adjoint()
+            };
+            let (one, other) = (spectrum(&wild), spectrum(&found));
+            assert!((&one - &other).norm() < 1e-11 * other.norm());
+        }
+        // Without noise there is nothing to whiten.
+        let error = space(&unstable, 0.0).with_stable_predictor().unwrap_err().to_string();
+        assert_eq!(error, "no gain gives a stable predictor; take another order");
+    }
+
+    #[test]
+    fn a_model_without_states_stays_as_it_is() {
+        let orders = Orders::arx(0, &[1], &[0]).unwrap();
+        let gain = PolynomialModel::from_parameters(&orders, &[2.0], None, 3.0, 0.5).unwrap().state_space();
+        assert!(gain.hankel_singular_values().unwrap().is_empty());
+        let reduced = gain.reduced(0).unwrap();
+        assert_eq!((&reduced.model, reduced.error_bound), (&gain, 0.0));
+        // All states left out: the gains at once are left.
+        let static_part = two_by_two().reduced(0).unwrap();
+        assert_eq!(static_part.model.f.nrows(), 0);
+        assert!(apart(&two_by_two(), &static_part.model) <= static_part.error_bound);
+    }
+}

@@ -1,0 +1,125 @@
+//! Reports of models with fewer states.
+
+use super::Report;
+use crate::Error;
+use crate::estimate::Criteria;
+use crate::figures::number;
+use crate::model::{Model, Signal, StateSpace, StateSpaceModel};
+
+impl Report {
+    /// The Hankel singular values of its model, falling: see [`StateSpace::hankel_singular_values`].
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a model that is neither in state space nor of polynomials; as for
+    /// [`StateSpace::hankel_singular_values`].
+    pub fn hankel_singular_values(&self) -> Result<Vec<f64>, Error> {
+        innovations_form(&self.model)?.hankel_singular_values()
+    }
+
+    /// The report with a model of so many states by balanced truncation, and a bound of what that does to the frequency response: see
+    /// [`StateSpace::reduced`]. It keeps what it says of the data, and has no figures of a fit: validate it.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a model that is neither in state space nor of polynomials; as for [`StateSpace::reduced`].
+    ///
+    /// ```
+    /// use thetahat::data::{Channel, Log};
+    /// use thetahat::report::{StateSpacePlan, fit_state_space};
+    ///
+    /// // Poles at 0.9 and 0.1, of which the first does nearly all.
+    /// let (mut u, mut y, mut x, mut random) = (vec![], vec![], [0.0, 0.0], 1_u32);
+    /// for _ in 0..500 {
+    ///     random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+    ///     u.push(f64::from(random >> 16) / 32_768.0 - 1.0);
+    ///     y.push(x[0] + 0.1 * x[1]);
+    ///     x = [0.9 * x[0] + u[u.len() - 1], 0.1 * x[1] + u[u.len() - 1]];
+    /// }
+    /// let channel = |name: &str, values| Channel { name: name.into(), values };
+    /// let log = Log::new(vec![channel("u", u), channel("y", y)], 1.0)?;
+    /// let plan = StateSpacePlan { orders: Some(2..=2), ..StateSpacePlan::new(&["u"], &["y"]) };
+    /// let report = fit_state_space(&log, &[], &plan)?;
+    /// let (reduced, bound) = report.reduced(1)?;
+    /// assert_eq!(reduced.model.name(), "state space of order 1");
+    /// assert!((bound / (2.0 * report.hankel_singular_values()?[1]) - 1.0).abs() < 1e-9);
+    /// # Ok::<(), thetahat::Error>(())
+    /// ```
+    pub fn reduced(&self, order: usize) -> Result<(Self, f64), Error> {
+        let space = innovations_form(&self.model)?;
+        let states = space.f.nrows();
+        let found = space.reduced(order)?;
+        let own = |signals: &[Signal]| signals.to_vec();
+        let (inputs, outputs) = (own(self.model.inputs()), own(self.model.outputs()));
+        let (m, l) = (inputs.len(), outputs.len());
+        let direct = if found.model.d.iter().any(|entry| *entry != 0.0) { l * m } else { 0 };
+        let degrees = match &self.model {
+            Model::Polynomial(model) => model.degrees_of_freedom,
+            Model::StateSpace(model) => model.degrees_of_freedom,
+            _ => None,
+        };
+        let free = order * (m + 2 * l) + direct;
+        let model = StateSpaceModel::new((inputs, outputs), vec![0; m], &found.model, free, degrees)?;
+        let mut report = Self { model: model.into(), fit: Vec::new(), selection: None, ..self.clone() };
+        // They were those of another model.
+        report.estimation.criteria = Criteria::new(f64::NAN, free, report.estimation.samples);
+        report.warnings = vec![format!(
+            "the model was reduced from {states} to {order} states: its frequency response is off by {} at most, the noise in units of its \
+             deviation",
+            number(found.error_bound)
+        )];
+        Ok((report, found.error_bound))
+    }
+}
+
+/// The recursion of a model.
+fn innovations_form(model: &Model) -> Result<StateSpace, Error> {
+    match model {
+        Model::Polynomial(model) => Ok(model.state_space()),
+        Model::StateSpace(model) => Ok(model.matrices()),
+        Model::Equations(_) | Model::NonlinearArx(_) | Model::Process(_) => Err(Error::argument(
+            "model",
+            format!(
+                "states are left out of models in state space and of polynomials, and this one is {}",
+                model.name()
+            ),
+        )),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::data::{Channel, Log};
+    use crate::model::Orders;
+    use crate::regression::noise::Noise;
+    use crate::report::{Plan, Report, ValidationPlan, identify, validate};
+    use crate::{Document, Error};
+
+    #[test]
+    fn a_reduced_report_goes_on_as_others_do() {
+        let mut noise = Noise(2);
+        let (mut u, mut y) = (Vec::new(), vec![0.0, 0.0]);
+        for t in 0..400 {
+            u.push(noise.next());
+            if t > 1 {
+                y.push(1.3 * y[t - 1] - 0.4 * y[t - 2] + u[t - 1] + 0.1 * noise.next());
+            }
+        }
+        let channel = |name: &str, values| Channel { name: name.to_owned(), values };
+        let log = Log::new(vec![channel("u", u), channel("y", y)], 1.0).unwrap();
+        let plan = Plan::new(&["u"], "y", Orders::arx(4, &[4], &[1]).unwrap());
+        let report = identify(log.clone(), &[], &plan).unwrap();
+        let values = report.hankel_singular_values().unwrap();
+        assert!(values.len() == 4 && values.is_sorted_by(|a, b| a >= b));
+        let (reduced, bound) = report.reduced(2).unwrap();
+        assert!((bound - 2.0 * (values[2] + values[3])).abs() < 1e-9 * bound);
+        let stored = Report::from_json(&reduced.to_json().unwrap()).unwrap();
+        let percent = |report: &Report| {
+            let found = validate(report, None, &log, &[], &ValidationPlan::default()).unwrap().validation;
+            found.fit.iter().map(|fit| fit.percent.unwrap()).collect::<Vec<f64>>()
+        };
+        for (whole, less) in percent(&report).into_iter().zip(percent(&stored)) {
+            assert!(less > whole - 5.0, "{whole} {less}");
+        }
+        assert!(reduced.warnings[0].contains("from 4 to 2 states"));
+        assert!(matches!(report.reduced(9), Err(Error::Argument { .. })));
+    }
+}

@@ -3,7 +3,7 @@
 //! The library names them between backticks, as `detrend`, wherever one is advised; here they are options.
 
 /// The arguments of the library that are options, by the name that both have.
-pub(crate) const OPTIONS: [&str; 64] = [
+pub(crate) const OPTIONS: [&str; 69] = [
     "alarm",
     "alpha",
     "alphas",
@@ -19,9 +19,11 @@ pub(crate) const OPTIONS: [&str; 64] = [
     "draws",
     "estimate",
     "estimator",
+    "feedthrough",
     "focus",
     "forgetting",
     "frequencies",
+    "future",
     "gain",
     "half-width",
     "horizon",
@@ -39,6 +41,8 @@ pub(crate) const OPTIONS: [&str; 64] = [
     "nu",
     "ny",
     "offset",
+    "order",
+    "past",
     "period",
     "points",
     "poles",
@@ -66,6 +70,7 @@ pub(crate) const OPTIONS: [&str; 64] = [
     "units",
     "validate",
     "want",
+    "weighting",
     "width",
     "window",
 ];
@@ -73,8 +78,11 @@ pub(crate) const OPTIONS: [&str; 64] = [
 /// The option that an argument is, if it is one.
 pub(crate) fn option_of(argument: &str) -> Option<&'static str> {
     // One at a time.
-    let name = if argument == "bounds" { return Some("bound") } else { argument };
-    OPTIONS.into_iter().find(|option| *option == name)
+    match argument {
+        "bounds" => Some("bound"),
+        "delays" => Some("nk"),
+        name => OPTIONS.into_iter().find(|option| *option == name),
+    }
 }
 
 /// A message of the library with its arguments as options: `detrend` mean is --detrend mean.

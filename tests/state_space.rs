@@ -209,6 +209,9 @@ fn logs_that_say_too_little_are_refused() {
     );
     let refusal = folder.run("fit dependent.csv -u u -y y1,y3 --sample-time 1 --report r.json");
     assert!(refusal.code == 4 && refusal.stderr.contains("'y3' is constant"), "{refusal:?}");
+    folder.write("huge.csv", "u,y1,y2\n1,2e200,1\n3,-1e200,4\n2,7e200,1\n5,1,2\n");
+    let refusal = folder.refused("fit huge.csv -u u -y y1,y2 --sample-time 1 --report r.json", 3);
+    assert!(refusal.contains("squares of 'y1' leave the range of numbers"), "{refusal}");
     assert!(!folder.names().contains(&"r.json".to_owned()));
 }
 

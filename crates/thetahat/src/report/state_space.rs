@@ -15,6 +15,7 @@ use crate::estimate::{
     best_order, products_of_innovations, subspace,
 };
 use crate::model::{Model, Quantity, Signal, StateSpaceModel};
+use crate::regression::SAFE_NORMS;
 use crate::respond::state_space::StateSpaceOnLog;
 use crate::select::Focus;
 use crate::validate::Part;
@@ -202,6 +203,14 @@ pub fn fit_state_space(log: &Log, sources: &[Source], plan: &StateSpacePlan) -> 
             Some(&(_, level)) => Offset { level, slope: 0.0 },
             None => Offset::estimate(plan.detrend, log, name, &segments)?,
         };
+        let rows = segments.iter().cloned().flatten();
+        let largest =
+            rows.map(|row| (values[row] - offset.at(log.elapsed(row))).abs()).fold(0.0_f64, f64::max);
+        if !SAFE_NORMS.contains(&largest) {
+            return Err(Error::data(format!(
+                "squares of '{name}' leave the range of numbers; scale the channel towards one"
+            )));
+        }
         Ok(Signal { name: name.clone(), offset })
     };
     let inputs = plan.inputs.iter().map(signal).collect::<Result<Vec<_>, Error>>()?;

@@ -72,7 +72,8 @@ mod tests {
     use crate::regression::noise::Noise;
 
     fn innovations(errors: Vec<f64>) -> Vec<Innovations> {
-        vec![Innovations::alone(0..errors.len(), vec![0..errors.len()], errors)]
+        let rows = 0..errors.len();
+        vec![Innovations::alone(rows.clone(), std::iter::once(rows).collect(), errors)]
     }
 
     #[test]

@@ -11,7 +11,7 @@ use crate::respond::state_space::Recursion;
 pub(crate) fn products(model: &StateSpace, record: &JointRecord<'_>, levels: &[f64]) -> Option<DMatrix<f64>> {
     let outputs = record.outputs.len();
     let mut sums = vec![0.0; outputs * outputs];
-    let mut predictor = Recursion::predictor(model).from_levels(levels);
+    let mut predictor = Recursion::predictor(model).with_levels(levels);
     let signals = record.signals();
     for segment in &record.segments {
         predictor.start_at_best(&signals, &record.outputs, segment.clone());

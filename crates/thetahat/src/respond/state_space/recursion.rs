@@ -66,7 +66,7 @@ impl Recursion {
     }
 
     /// A predictor of outputs that are measured from elsewhere: y - level in the place of y.
-    pub(crate) fn from_levels(mut self, levels: &[f64]) -> Self {
+    pub(crate) fn with_levels(mut self, levels: &[f64]) -> Self {
         let columns = self.columns.chunks_exact(self.next.len()).rev();
         for (column, level) in columns.zip(levels.iter().rev()) {
             self.constant.iter_mut().zip(column).for_each(|(sum, entry)| *sum -= entry * level);

@@ -235,7 +235,8 @@ fn dependent_signals_do_no_harm() {
     let copy: Vec<f64> = u.iter().map(|u| 2.0 * u).collect();
     let late: Vec<f64> = [0.0].iter().chain(&u[..299]).copied().collect();
     let sine: Vec<f64> = (0..300).map(|t| (0.3 * f64::from(t)).sin()).collect();
-    let cases: [(Vec<&[f64]>, Vec<&[f64]>); 8] = [
+    type Signals<'a> = Vec<&'a [f64]>;
+    let cases: [(Signals<'_>, Signals<'_>); 8] = [
         (vec![u], vec![y, y]),
         (vec![u, u], vec![y]),
         (vec![u], vec![&constant]),

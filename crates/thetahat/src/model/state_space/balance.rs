@@ -50,12 +50,20 @@ impl StateSpace {
     /// does not converge.
     ///
     /// ```
-    /// use thetahat::model::{Orders, PolynomialModel};
+    /// use thetahat::model::StateSpace;
+    /// use thetahat::thetahat_core::nalgebra::DMatrix;
     ///
-    /// // The pole 0.9, and one at 0.5 that (1 - 0.5 q^-1) in B and C takes away.
-    /// let orders = Orders::armax(2, &[2], 1, &[1])?;
-    /// let model = PolynomialModel::from_parameters(&orders, &[-1.4, 0.45, 1.0, -0.5, -0.5], None, 1.0, 1.0)?;
-    /// let values = model.state_space().hankel_singular_values()?;
+    /// // A pole at 0.9, and one at 0.5 that nothing moves.
+    /// let model = StateSpace {
+    ///     f: DMatrix::from_row_slice(2, 2, &[0.9, 0.0, 0.0, 0.5]),
+    ///     g: DMatrix::from_row_slice(2, 1, &[1.0, 0.0]),
+    ///     h: DMatrix::from_row_slice(1, 2, &[1.0, 1.0]),
+    ///     d: DMatrix::zeros(1, 1),
+    ///     k: DMatrix::zeros(2, 1),
+    ///     noise_covariance: DMatrix::from_element(1, 1, 1.0),
+    ///     sample_time: 1.0,
+    /// };
+    /// let values = model.hankel_singular_values()?;
     /// assert!(values[0] > 1.0 && values[1] < 1e-12);
     /// # Ok::<(), thetahat::Error>(())
     /// ```
@@ -119,15 +127,23 @@ impl StateSpace {
     /// stable.
     ///
     /// ```
-    /// use thetahat::model::{Orders, PolynomialModel};
+    /// use thetahat::model::StateSpace;
+    /// use thetahat::thetahat_core::nalgebra::DMatrix;
     ///
     /// // Poles at 0.9 and 0.1, of which the first does nearly all.
-    /// let orders = Orders::arx(2, &[2], &[1])?;
-    /// let model = PolynomialModel::from_parameters(&orders, &[-1.0, 0.09, 1.0, -0.12], None, 0.01, 1.0)?;
-    /// let reduced = model.state_space().reduced(1)?;
+    /// let model = StateSpace {
+    ///     f: DMatrix::from_row_slice(2, 2, &[0.9, 0.0, 0.0, 0.1]),
+    ///     g: DMatrix::from_row_slice(2, 1, &[1.0, 1.0]),
+    ///     h: DMatrix::from_row_slice(1, 2, &[1.0, 0.1]),
+    ///     d: DMatrix::zeros(1, 1),
+    ///     k: DMatrix::zeros(2, 1),
+    ///     noise_covariance: DMatrix::from_element(1, 1, 0.01),
+    ///     sample_time: 1.0,
+    /// };
+    /// let reduced = model.reduced(1)?;
     /// assert!((reduced.model.f[(0, 0)] - 0.9).abs() < 0.01);
-    /// let gain = |space: &thetahat::model::StateSpace| Ok::<f64, thetahat::Error>(space.transfer(0, 0)?.at(1.0.into()).re);
-    /// assert!((gain(&reduced.model)? - gain(&model.state_space())?).abs() < reduced.error_bound);
+    /// let gain = |space: &StateSpace| Ok::<f64, thetahat::Error>(space.transfer(0, 0)?.at(1.0.into()).re);
+    /// assert!((gain(&reduced.model)? - gain(&model)?).abs() < reduced.error_bound);
     /// # Ok::<(), thetahat::Error>(())
     /// ```
     pub fn reduced(&self, order: usize) -> Result<Reduced, Error> {

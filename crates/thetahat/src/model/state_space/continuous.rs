@@ -102,13 +102,21 @@ impl StateSpace {
     /// matrices whose shapes do not fit or that are not finite.
     ///
     /// ```
-    /// use thetahat::model::{Hold, Orders, PolynomialModel};
+    /// use thetahat::model::{Hold, StateSpace};
+    /// use thetahat::thetahat_core::nalgebra::DMatrix;
     ///
     /// // dy/dt = -y + u, sampled every 0.1 s, has the pole e^-0.1.
     /// let pole = (-0.1_f64).exp();
-    /// let orders = Orders::arx(1, &[1], &[1])?;
-    /// let model = PolynomialModel::from_parameters(&orders, &[-pole, 1.0 - pole], None, 1.0, 0.1)?;
-    /// let continuous = model.state_space().to_continuous(Hold::Zero)?;
+    /// let model = StateSpace {
+    ///     f: DMatrix::from_row_slice(1, 1, &[pole]),
+    ///     g: DMatrix::from_row_slice(1, 1, &[1.0 - pole]),
+    ///     h: DMatrix::from_row_slice(1, 1, &[1.0]),
+    ///     d: DMatrix::zeros(1, 1),
+    ///     k: DMatrix::zeros(1, 1),
+    ///     noise_covariance: DMatrix::from_element(1, 1, 1.0),
+    ///     sample_time: 0.1,
+    /// };
+    /// let continuous = model.to_continuous(Hold::Zero)?;
     /// assert!((continuous.a[(0, 0)] + 1.0).abs() < 1e-12 && (continuous.b[(0, 0)] - 1.0).abs() < 1e-12);
     ///
     /// let slower = continuous.sampled(0.5, Hold::Zero)?;

@@ -56,11 +56,20 @@ impl StateSpace {
     /// converge.
     ///
     /// ```
-    /// use thetahat::model::{Orders, PolynomialModel};
+    /// use thetahat::model::StateSpace;
+    /// use thetahat::thetahat_core::nalgebra::DMatrix;
     ///
     /// // A pole at 0.8, and a delay that keeps one sample of the input.
-    /// let model = PolynomialModel::from_parameters(&Orders::arx(1, &[1], &[2])?, &[-0.8, 0.5], None, 1.0, 1.0)?;
-    /// let poles = model.state_space().poles()?;
+    /// let model = StateSpace {
+    ///     f: DMatrix::from_row_slice(2, 2, &[0.8, 1.0, 0.0, 0.0]),
+    ///     g: DMatrix::from_row_slice(2, 1, &[0.0, 0.5]),
+    ///     h: DMatrix::from_row_slice(1, 2, &[1.0, 0.0]),
+    ///     d: DMatrix::zeros(1, 1),
+    ///     k: DMatrix::zeros(2, 1),
+    ///     noise_covariance: DMatrix::from_element(1, 1, 1.0),
+    ///     sample_time: 1.0,
+    /// };
+    /// let poles = model.poles()?;
     /// assert!((poles[0].re - 0.8).abs() < 1e-15 && poles[1].re == 0.0);
     /// # Ok::<(), thetahat::Error>(())
     /// ```
@@ -91,12 +100,20 @@ impl StateSpace {
     /// not finite; [`Error::Undetermined`] where the eigenvalues do not converge.
     ///
     /// ```
-    /// use thetahat::model::{Orders, PolynomialModel};
+    /// use thetahat::model::StateSpace;
+    /// use thetahat::thetahat_core::nalgebra::DMatrix;
     ///
     /// // y(t) = 1.5 y(t-1) - 0.7 y(t-2) + 2 u(t-1) - u(t-2): W(z) = 2 (z - 0.5) / (z^2 - 1.5 z + 0.7).
-    /// let orders = Orders::arx(2, &[2], &[1])?;
-    /// let model = PolynomialModel::from_parameters(&orders, &[-1.5, 0.7, 2.0, -1.0], None, 1.0, 1.0)?;
-    /// let transfer = model.state_space().transfer(0, 0)?;
+    /// let model = StateSpace {
+    ///     f: DMatrix::from_row_slice(2, 2, &[1.5, 1.0, -0.7, 0.0]),
+    ///     g: DMatrix::from_row_slice(2, 1, &[2.0, -1.0]),
+    ///     h: DMatrix::from_row_slice(1, 2, &[1.0, 0.0]),
+    ///     d: DMatrix::zeros(1, 1),
+    ///     k: DMatrix::zeros(2, 1),
+    ///     noise_covariance: DMatrix::from_element(1, 1, 1.0),
+    ///     sample_time: 1.0,
+    /// };
+    /// let transfer = model.transfer(0, 0)?;
     /// assert!((transfer.zeros[0].re - 0.5).abs() < 1e-14 && (transfer.gain - 2.0).abs() < 1e-14);
     /// assert_eq!((transfer.poles.len(), transfer.delay()), (2, 1));
     /// assert!((transfer.at(1.0.into()).re - 5.0).abs() < 1e-12);

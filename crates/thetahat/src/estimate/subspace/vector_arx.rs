@@ -109,13 +109,23 @@ fn mean_products(
     let (products, samples) = joint_gram(&signals, &record.segments, longest);
     let mut products = products / samples as f64;
     let means = centred.then(|| {
-        let mean = |lag: usize, signal: &[f64]| {
-            let used = record.segments.iter().filter(|segment| segment.len() > longest);
-            let rows = used.flat_map(|segment| &signal[segment.start + longest - lag..segment.end - lag]);
-            crate::regression::sum(rows.copied()) / samples as f64
-        };
-        let each = (0..=longest).flat_map(|lag| signals.iter().map(move |signal| mean(lag, signal)));
-        DVector::from_iterator(signals.len() * (longest + 1), each)
+        let used = || record.segments.iter().filter(|segment| segment.len() > longest);
+        let mut means = DVector::zeros(signals.len() * (longest + 1));
+        for (place, signal) in signals.iter().enumerate() {
+            let rows = used().flat_map(|segment| &signal[segment.start + longest..segment.end]);
+            let mut total = crate::regression::sum(rows.copied());
+            for lag in 0..=longest {
+                means[lag * signals.len() + place] = total / samples as f64;
+                // One sample later the rows begin and end one earlier.
+                if lag < longest {
+                    let moved = used().map(|segment| {
+                        signal[segment.start + longest - lag - 1] - signal[segment.end - lag - 1]
+                    });
+                    total += moved.sum::<f64>();
+                }
+            }
+        }
+        means
     });
     if let Some(means) = &means {
         products.ger(-1.0, means, means, 1.0);

@@ -32,8 +32,8 @@ use crate::data::JointRecord;
 /// 30, 1994; CVA: Larimore, American Control Conference 1983, and Conference on Decision and Control 1990). Without inputs there is no U_f.
 ///
 /// Where inputs are fed back, U_f tells of the noise, and the classical methods are biased: with N = 1000 samples of a plant of order 2
-/// in a loop, the median relative error of the impulse response was 0.10 for SSARX, 0.13 for CVA, and 0.23 for MOESP and N4SID. In open loop
-/// all four are alike.
+/// in a loop, the median relative error of the impulse response of 100 runs was 0.10 for SSARX and CVA, 0.22 for N4SID and 0.23 for MOESP. In
+/// open loop all four are alike.
 ///
 /// F and H follow by least squares from the states for all of them. Those that the classical methods read off the rows of
 /// Gamma = W^-1 U S^½, F = Gamma_up^+ Gamma_down, predict no better: on the evaporator of DaISy (order 8, p = s = 26) MOESP has a mean fit of

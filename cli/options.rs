@@ -3,7 +3,7 @@
 //! The library names them between backticks, as `detrend`, wherever one is advised; here they are options.
 
 /// The arguments of the library that are options, by the name that both have.
-pub(crate) const OPTIONS: [&str; 69] = [
+pub(crate) const OPTIONS: [&str; 70] = [
     "alarm",
     "alpha",
     "alphas",
@@ -20,6 +20,7 @@ pub(crate) const OPTIONS: [&str; 69] = [
     "estimate",
     "estimator",
     "feedthrough",
+    "refine",
     "focus",
     "forgetting",
     "frequencies",

@@ -270,3 +270,51 @@ fn public_logs_are_predicted_as_well_as_by_others() {
         }
     }
 }
+
+#[test]
+fn refined_models_have_standard_errors_everywhere() {
+    let folder = motor();
+    for (refine, horizon) in [("prediction", ahead(1)), ("simulation", free_run())] {
+        let plain = folder.fit(&format!("{MOTOR} --order 2"));
+        let refined = folder.fit(&format!("{MOTOR} --order 2 --refine {refine}"));
+        let search = &refined["estimation"]["refinement"]["search"];
+        assert_eq!(search["stopped"], "converged", "{search}");
+        let costs = search["costs"].as_array().expect("a list");
+        assert!(costs.last().and_then(Value::as_f64) <= costs[0].as_f64());
+        for output in ["i", "speed"] {
+            let [plain, refined] =
+                [&plain, &refined].map(|report| percent(report, output, &horizon, Some("estimation")));
+            assert!(refined > plain - 0.05, "{refine} {output}: {plain} {refined}");
+        }
+        let model = &refined["model"];
+        // n (m + 2 l) entries vary.
+        assert_eq!(model["covariance"]["entries"].as_array().expect("a list").len(), 2 * (1 + 4));
+        assert!(model["dc_gain"][1][0]["standard_error"].as_f64() > Some(0.0));
+        assert!(model["poles"][0]["covariance"][0][0].as_f64() > Some(0.0));
+    }
+    let run =
+        folder.done(&format!("fit {MOTOR} --order 2 --refine prediction --report r.json --html r.html"));
+    assert!(run.stdout.contains("refined for the least errors of predictions one step ahead"), "{run:?}");
+    assert!(run.stdout.contains("pole      standard error  modulus"), "{run:?}");
+    // The last column but one of what is said of magnitudes, and the last of steps.
+    let errors = |line: &str, column: usize| -> Vec<Option<f64>> {
+        let run = folder.done(line);
+        run.stdout.lines().skip(1).map(|row| row.split(',').nth(column)?.parse().ok()).collect()
+    };
+    for (verb, column) in [("bode", 4), ("step", 4), ("impulse", 4)] {
+        let found = errors(&format!("{verb} r.json"), column);
+        assert!(found.len() > 20 && found.iter().all(Option::is_some), "{verb}: {found:?}");
+    }
+    // Fewer states are another model.
+    folder.done("reduce r.json --order 1 --out s.json");
+    assert!(errors("bode s.json", 4).iter().all(Option::is_none));
+    for (options, word) in [
+        ("--refine both", "--refine"),
+        ("--search newton", "--refine is needed with --search"),
+        ("--refine prediction --starts 3", "--starts is not for models in state space"),
+        ("--refine prediction --tolerance 0", "--tolerance"),
+    ] {
+        let refusal = folder.run(&format!("fit {MOTOR} {options}"));
+        assert!(refusal.code == 2 && refusal.stderr.contains(word), "{options}: {refusal:?}");
+    }
+}

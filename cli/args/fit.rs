@@ -176,6 +176,10 @@ pub(crate) struct StateSpaceArguments {
     /// the inputs [default: auto]
     #[arg(long, value_enum)]
     pub(crate) feedthrough: Option<FeedthroughArgument>,
+    /// Search from there for the least errors one step ahead (prediction) or of the free run (simulation): poles, gains and responses then
+    /// have standard errors
+    #[arg(long, value_name = "prediction|simulation")]
+    pub(crate) refine: Option<String>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -1,9 +1,9 @@
 //! `thetahat fit --model ss`: a model in state space.
 
-use thetahat::report::fit_state_space;
+use thetahat::report::fit_state_space_monitored;
 
 use super::experiments::{Wanted, read};
-use super::search::Identified;
+use super::search::{Identified, watched};
 use crate::failure::Failure;
 use crate::job::StateSpaceJob;
 use crate::log;
@@ -16,7 +16,7 @@ pub(super) fn found(job: &StateSpaceJob) -> Result<Identified, Failure> {
     let found = read(&job.paths, &job.log, &wanted, false, |_| Ok(()))?;
     found.words.iter().for_each(|word| warn(word));
     let plan = job.plan(found.channels.inputs, found.channels.outputs)?;
-    let report = fit_state_space(&found.log, &found.sources, &plan);
+    let report = watched(|monitor| fit_state_space_monitored(&found.log, &found.sources, &plan, monitor))?;
     let report = report.map_err(log::failure(&found.sources))?;
     Ok(Identified { report, log: Some(found.log), sources: found.sources })
 }

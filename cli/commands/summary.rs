@@ -248,7 +248,7 @@ fn outcome(search: &SearchOutcome) -> String {
     let costs = search.starts.first().and_then(|start| start.cost).zip(search.costs.first());
     let followed = search.start_samples.is_none()
         && search.starts.iter().skip(1).any(|start| start.reached.is_some())
-        && costs.is_some_and(|(start, first)| *first < (1.0 - ROUNDING) * start);
+        && costs.is_some_and(|(start, first)| *first < start - ROUNDING * start.abs());
     let compared = if followed { " after a comparison of starts" } else { "" };
     format!("{iterations} ({algorithm}) from {}{compared}, {stopped}{boundary}", search.start)
 }

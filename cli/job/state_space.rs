@@ -5,7 +5,7 @@ use thetahat::estimate::{Constant, SubspaceOptions};
 use thetahat::report::StateSpacePlan;
 
 use super::fit::named_values;
-use super::{LogJob, parsed, rows};
+use super::{LogJob, parsed, rows, search};
 use crate::args::{
     ConstantArgument, FeedthroughArgument, FitArguments, InitialArgument, LikelihoodArgument, MethodArgument,
     ModelArgument, Names,
@@ -43,6 +43,7 @@ impl StateSpaceJob {
             ("--future", own.future.is_some()),
             ("--weighting", own.weighting.is_some()),
             ("--feedthrough", own.feedthrough.is_some()),
+            ("--refine", own.refine.is_some()),
         ];
         let given = given.iter().find(|(_, given)| *given).map(|(option, _)| option);
         // A model without inputs is asked for as of all structures.
@@ -97,6 +98,8 @@ impl StateSpaceJob {
                 ConstantArgument::Yes => Constant::Yes,
                 ConstantArgument::No => Constant::No,
             },
+            refine: own.refine.as_deref().map(|text| parsed("--refine", text)).transpose()?,
+            search: search::search(&arguments.search)?,
             ..StateSpacePlan::new(&[], &[])
         };
         let delay = |text: &String| {
@@ -151,6 +154,18 @@ impl StateSpaceJob {
 /// What other models have.
 fn refuse_others(arguments: &FitArguments) -> Result<(), Failure> {
     let (model, search, criterion) = (&arguments.model, &arguments.search, &arguments.criterion);
+    let searches = arguments.states.refine.is_some();
+    match search::given(search) {
+        Some(option) if !searches => {
+            return Err(Failure::usage(format!("--refine is needed with {option}, which is for a search")));
+        }
+        Some(option @ ("--starts" | "--seed")) => {
+            return Err(Failure::usage(format!(
+                "{option} is not for models in state space, whose starts are subspace methods; leave it out"
+            )));
+        }
+        _ => {}
+    }
     let given = [
         ("--na", model.na.is_some()),
         ("--nb", !matches!(&*model.nb, []) && !matches!(&*model.nb, [nb] if nb.trim() == "0")),
@@ -168,13 +183,6 @@ fn refuse_others(arguments: &FitArguments) -> Result<(), Failure> {
         ("--prefilter", arguments.prefilter.is_some()),
         ("--path", arguments.choice.path.is_some()),
         ("--select", arguments.choice.select.is_some()),
-        ("--search", search.search.is_some()),
-        ("--max-iterations", search.max_iterations.is_some()),
-        ("--tolerance", search.tolerance.is_some()),
-        ("--step", search.step.is_some()),
-        ("--starts", search.starts.is_some()),
-        ("--seed", search.seed.is_some()),
-        ("--time-limit", search.time_limit.is_some()),
         ("--norm", criterion.norm.is_some()),
         ("--bound", !criterion.bound.is_empty()),
         ("--dc-gain", !criterion.dc_gain.is_empty()),

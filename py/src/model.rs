@@ -108,7 +108,9 @@ pub(crate) fn fit_state_space(
     let plan = thetahat_cli::state_space_plan(&options, log.inputs.clone(), log.outputs.clone())
         .map_err(|failure| error::program(py, &failure))?;
     let (channels, sources) = (Arc::clone(&log.log), log.sources.clone());
-    let report = interruptible(py, move |_| thetahat::report::fit_state_space(&channels, &sources, &plan))?;
+    let report = interruptible(py, move |monitor| {
+        thetahat::report::fit_state_space_monitored(&channels, &sources, &plan, monitor)
+    })?;
     Ok(Model::of(report))
 }
 

@@ -161,3 +161,16 @@ def test_a_filter_and_a_frame_take_it() -> None:
     assert len(estimated) == len(data) and "x1" in estimated.to_pandas().columns
     one = th.Log.from_dataframe(frame, inputs=["heat", "fan"], output="hot")
     assert th.ss(one, 2).output == "hot"
+
+
+def test_refined_models_have_standard_errors(motor):
+    plain = th.ss(motor, 2)
+    assert plain.dc_gain("u", output="speed")[1] is None
+    for refine in ("prediction", "simulation"):
+        model = th.ss(motor, 2, refine=refine, max_iterations=50, tolerance=1e-9)
+        gain, error = model.dc_gain("u", output="speed")
+        assert 0 < error < 0.01 * gain
+        step = model.step_response(output="speed")
+        assert np.all(np.asarray(step.standard_error)[1:] > 0)
+    with pytest.raises(ValueError, match="refine"):
+        th.ss(motor, 2, refine="both")

@@ -1,17 +1,19 @@
 //! What a fit of a state-space model found, as a table for people.
 
-use thetahat::estimate::{Procedure, SubspaceOutcome};
+use thetahat::estimate::{Procedure, RefinementOutcome, SubspaceOutcome};
 use thetahat::figures::{fixed, number, short, three};
 use thetahat::model::StateSpaceModel;
 use thetahat::report::Report;
 use thetahat::text::harmless;
 
 use super::text::{self, Text, columns, or_dash};
-use super::{MOST, criteria, fits, quantity, signal};
+use super::{MOST, criteria, fits, interval, quantity, signal};
 
 /// Why an order has no figure, a pole no time constant, or two outputs no correlation.
 const NO_PREDICTOR: &str = "no model of this order has a stable predictor";
 const NO_TIME: &str = "no time constant goes with a pole on or outside of the unit circle, or at 0";
+const NO_ERROR: &str = "no time constant goes with a pole on or outside of the unit circle, or at 0; no standard error with poles that \
+                         are too close for one";
 const INTEGRATES: &str = "the model integrates";
 const NO_NOISE: &str = "nothing is left of an output";
 
@@ -26,6 +28,13 @@ pub(super) fn table(report: &Report, model: &StateSpaceModel, width: usize) -> S
     let estimation = &report.estimation;
     if let Procedure::Subspace(outcome) = &estimation.procedure {
         text.line(&found(outcome));
+        if let Some(RefinementOutcome { errors, search }) = &outcome.refinement {
+            text.line(&format!(
+                "refined for the least errors of {}: {}",
+                errors.of(),
+                super::outcome(search)
+            ));
+        }
         text.line("");
         states(&mut text, outcome, model.order());
     }
@@ -79,12 +88,19 @@ fn states(text: &mut Text, outcome: &SubspaceOutcome, order: usize) {
 }
 
 fn poles(text: &mut Text, model: &StateSpaceModel) {
-    let mut table = columns(&["pole", "modulus", "time constant [s]"]).none(NO_TIME);
+    let known = model.covariance.is_some();
+    let all = ["pole", "standard error", "modulus", "time constant [s]", "95 % interval"];
+    let few = ["pole", "modulus", "time constant [s]"];
+    let mut table =
+        if known { columns(&all).words(&[4]).none(NO_ERROR) } else { columns(&few).none(NO_TIME) };
     // One of a pair stands for both.
     for (pole, time) in model.poles.iter().zip(&model.time_constants).filter(|(pole, _)| pole.im >= 0.0) {
         let value = text::complex(pole);
         let value = if pole.im > 0.0 { format!("{value} and conjugate") } else { value };
-        table.row([value, three(pole.re.hypot(pole.im)), or_dash(*time, |time| number(time.value))]);
+        let spread = known.then(|| text::spread(pole));
+        let interval = known.then(|| or_dash(time.and_then(|time| time.interval), interval));
+        let figures = [three(pole.re.hypot(pole.im)), or_dash(*time, |time| number(time.value))];
+        table.row(std::iter::once(value).chain(spread).chain(figures).chain(interval));
     }
     if !model.poles.is_empty() {
         text.table(table);

@@ -11,7 +11,7 @@
 //!   [`Constant`] says whether the level of the output is estimated too.
 //! - [`Procedure`] says how an estimate was found: by a [`Solver`], or with a [`SearchOutcome`] ([`StartOutcome`]),
 //!   [`ConvexOutcome`], [`RobustOutcome`], [`LikelihoodOutcome`],
-//!   [`EquationsOutcome`], [`SubspaceOutcome`] or [`MapsOutcome`] (for each output a [`TermsOutcome`]: a path of [`TermStep`]s with their [`RunFigures`]).
+//!   [`EquationsOutcome`], [`SubspaceOutcome`] (with a [`RefinementOutcome`] where it was followed by a search for what [`Refine`] says) or [`MapsOutcome`] (for each output a [`TermsOutcome`]: a path of [`TermStep`]s with their [`RunFigures`]).
 //! - [`Criteria`] are the values of each [`InformationCriterion`].
 //!
 //! The methods and their sources are at [`Method`]; the theory is that of Ljung, System Identification, 2nd ed. 1999, chapters 7
@@ -48,6 +48,7 @@ mod polynomials;
 mod prediction_error;
 mod predictor;
 mod process;
+mod refinement;
 mod restart;
 mod robust;
 mod start;
@@ -89,6 +90,8 @@ pub(crate) use process::{
     Background, FreeRun, ProcessEstimate, ResponsePoints, least_free_run, least_free_run_from,
     least_response_errors,
 };
+pub use refinement::{Refine, RefinementOutcome};
+pub(crate) use refinement::{Refinement, RefinementStart, refined};
 pub use robust::{Loss, Robust, RobustOutcome};
 pub(crate) use stretches::stretches;
 pub use subspace::{OrderScore, Subspace, SubspaceOptions, SubspaceOutcome, Weighting, subspace};

@@ -34,7 +34,9 @@ mod process;
 mod quantity;
 mod state_space;
 
-pub(crate) use dynamics::{Block, Blocks, Gradient, cancel, covariance, near_cancellation};
+pub(crate) use dynamics::{
+    Block, Blocks, Gradient, cancel, covariance, is_simple, near_cancellation, standard_error,
+};
 pub(crate) use equations::{ChannelExpression, ExpressionBuffer};
 pub use equations::{EquationsModel, GreyBox};
 pub(crate) use fitted::is_covariance;
@@ -50,4 +52,8 @@ pub use orders::{Orders, Structure};
 pub(crate) use process::{Chain, Columns, Parts, State, Transition};
 pub use process::{ProcessModel, ProcessStructure};
 pub use quantity::{Interval, Quantity, Root};
-pub use state_space::{ContinuousStateSpace, Hold, Reduced, StateSpace, StateSpaceModel, ZerosPolesGain};
+pub use state_space::{
+    ContinuousStateSpace, Entry, EntryCovariance, Hold, Reduced, StateSpace, StateSpaceMatrix,
+    StateSpaceModel, ZerosPolesGain,
+};
+pub(crate) use state_space::{Path, Sizes, across_coordinates, flat, is_stable};

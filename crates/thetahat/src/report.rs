@@ -3,7 +3,7 @@
 //! - [`identify`] fits what a [`Plan`] says and gives a [`Report`]; [`identify_monitored`] can be watched and ended, [`PendingEvaluation`] is a
 //!   fit before its figures. [`fit_equations`] does the same for a model in equations with an [`EquationsPlan`],
 //!   [`fit_process`] for a process in continuous time with a [`ProcessPlan`], [`fit_process_to_response`] for one of a measured frequency
-//!   response, [`fit_state_space`] for a model with any number of outputs with a [`StateSpacePlan`], [`fit_nonlinear_arx`] for a nonlinear ARX model with a [`NonlinearArxPlan`] ([`InputLags`], [`MapPlan`], [`Centres`]).
+//!   response, [`fit_state_space`] ([`fit_state_space_monitored`]) for a model with any number of outputs with a [`StateSpacePlan`], [`fit_nonlinear_arx`] for a nonlinear ARX model with a [`NonlinearArxPlan`] ([`InputLags`], [`MapPlan`], [`Centres`]).
 //! - [`Report`] is the JSON document of a fit: its [`Data`] ([`Parts`], [`Missing`]), the model, its [`Estimation`] and its figures.
 //! - [`validate`] tests a report on a log as a [`ValidationPlan`] says. It gives a [`Validated`]: the document, a [`Validation`] with
 //!   [`NoiseLevel`], [`Coverage`] and whether the fit has [`InSample`] the rows, and the [`Signals`] for charts ([`OutputSignals`]).
@@ -72,7 +72,7 @@ pub use process::{ProcessPlan, fit_process, fit_process_to_response};
 pub use requirement::{Demand, Requirement};
 pub use sample::sample;
 pub use schema::{Data, Estimation, Missing, Parts, Report};
-pub use state_space::{StateSpacePlan, fit_state_space};
+pub use state_space::{StateSpacePlan, fit_state_space, fit_state_space_monitored};
 pub use validation::{
     Comparison, Coverage, InSample, NoiseLevel, OutputSignals, Signals, Validated, Validation,
     ValidationPlan, compare, validate,

@@ -22,6 +22,11 @@ def ss(
     past: int | None = None,
     future: int | None = None,
     feedthrough: bool | None = None,
+    refine: str | None = None,
+    search: str | None = None,
+    max_iterations: int | None = None,
+    tolerance: float | None = None,
+    time_limit: float | None = None,
     estimate: Rows | None = None,
     validate: Rows | None = None,
     split: tuple[float, float, float] | None = None,
@@ -48,6 +53,11 @@ def ss(
         Past samples that the states are made of, those of the least AIC unless it is said, and future ones that they tell of: as many.
     feedthrough : bool, optional
         Whether inputs act on the outputs at once. Where it lowers MDL and the inputs are not fed back, unless it is said.
+    refine : {"prediction", "simulation"}, optional
+        Search from there for the model of the least errors one step ahead, or of the free run. Poles, gains and responses then have
+        standard errors.
+    search, max_iterations, tolerance, time_limit
+        How to search, see `thetahat.FitOptions`.
     estimate, validate, split, detrend, offset, constant
         What to fit to, see `thetahat.FitOptions`.
 
@@ -86,12 +96,17 @@ def ss(
     ('state space of order 1', [0.8])
     >>> [round(model.dc_gain("u2", output="y2")[0], 1), model.to_state_space().H.shape]
     [-5.0, (2, 1)]
+    >>> refined = th.ss(th.Log(y, u, sample_time=1), 1, refine="prediction")
+    >>> value, error = refined.dc_gain("u2", output="y2")
+    >>> abs(value + 5) < 3 * error
+    True
     """
     words = ["--model=ss", *_options.order_words(order=order, nk=nk)]
     words += [] if weighting is None else [f"--weighting={_options.text('weighting', weighting)}"]
     words += [] if past is None else [f"--past={_options.count('past', past)}"]
     words += [] if future is None else [f"--future={_options.count('future', future)}"]
     words += [] if feedthrough is None else [f"--feedthrough={'yes' if _options.flag('feedthrough', feedthrough) else 'no'}"]
+    words += [] if refine is None else [f"--refine={_options.text('refine', refine)}"]
     words += _options.words(FitOptions, locals(), len(log) if isinstance(log, Log) else None)
     found = Model._of(_thetahat.fit_state_space(handle("log", log), words))
     for warning in found.warnings:

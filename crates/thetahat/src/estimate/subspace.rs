@@ -3,7 +3,7 @@
 mod innovations;
 mod riccati;
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;
 mod vector_arx;
 mod weighting;
 
@@ -14,10 +14,11 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::{DMatrix, DVector};
 
+use super::refinement::RefinementOutcome;
 use super::stretches::thinned_joint;
 use crate::Error;
 use crate::data::JointRecord;
-use crate::model::StateSpace;
+use crate::model::{StateSpace, is_stable};
 use crate::optimize::normal;
 pub(crate) use innovations::products as products_of_innovations;
 use vector_arx::{ROUNDING, VectorArx, divided, log_determinant};
@@ -95,6 +96,9 @@ pub struct SubspaceOutcome {
     pub singular_values: Vec<f64>,
     /// What the order was chosen among; empty if it was given.
     pub orders: Vec<OrderScore>,
+    /// The search that followed, if there was one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub refinement: Option<RefinementOutcome>,
 }
 
 /// How well a model of some order predicts.
@@ -358,8 +362,12 @@ impl Subspace {
     }
 
     /// The model of an order, one sample every `sample_time` seconds. Over the samples its states are uncorrelated, and the variance of each
-    /// is its singular value. Where the least squares leave F - K H unstable, K and the covariance of e are those of the stationary Kalman
-    /// filter. O(n^3).
+    /// is its singular value.
+    ///
+    /// What the least squares leave of x(t+1) and y(t) is a noise of the states and one of the outputs. K and the covariance of e are those of
+    /// the stationary Kalman filter of these (Van Overschee and De Moor, Subspace Identification for Linear Systems, 1996, section 4.4): below
+    /// the order of the plant it predicts better than the K of the regression, which has all past samples at hand where the model has its
+    /// states only. At the plant's own order both are the same. Where no stationary filter exists, K is that of the regression. O(n^3).
     ///
     /// # Errors
     /// [`Error::Argument`] for an order that is 0 or above the highest; [`Error::Undetermined`] where no gain gives a stable predictor.
@@ -441,15 +449,13 @@ impl Subspace {
             noise_covariance: products.view((order + m, order + m), (l, l)).into_owned(),
             sample_time,
         };
-        let is_predictor = |model: &StateSpace| riccati::is_stable(&(&model.f - &model.k * &model.h));
-        if is_predictor(&model) {
-            return Some(model);
-        }
+        let is_predictor = |model: &StateSpace| is_stable(&(&model.f - &model.k * &model.h));
         let rounding = |size: usize, scale: f64| DMatrix::identity(size, size) * (ROUNDING * scale);
         let rest = (&rest + rest.transpose()) * 0.5 + rounding(order, after.trace());
         let noise_covariance = &model.noise_covariance + rounding(l, 1.0);
-        let model = riccati::stationary(&StateSpace { noise_covariance, ..model }, &rest)?;
-        is_predictor(&model).then_some(model)
+        let uncertain = StateSpace { noise_covariance, ..model.clone() };
+        let filtered = riccati::stationary(&uncertain, &rest).filter(is_predictor);
+        filtered.or_else(|| is_predictor(&model).then_some(model))
     }
 
     /// A model of the signals in their own units.

@@ -51,7 +51,7 @@ const ROUNDED: f64 = 1e-6;
 /// A pole and a zero farther apart than this do not cancel, however uncertain they are.
 const NEAR: f64 = 0.1;
 /// How often an interval holds its figure.
-const LEVEL: f64 = 0.95;
+pub(super) const LEVEL: f64 = 0.95;
 /// Where the t-statistic of a root at 1 lies below in 2.5 % of logs, a constant being estimated too (Fuller, Introduction to
 /// Statistical Time Series, 1976, table 8.5.2). The normal distribution has 1.96 there.
 const UNIT_ROOT: f64 = 3.12;
@@ -152,23 +152,22 @@ impl Block<'_> {
     /// The roots with their uncertainty.
     fn roots(&self, parameters: Option<&[Vec<f64>]>) -> Result<Vec<Root>, Error> {
         let zeros = self.zeros()?;
-        let others = |index: usize| zeros.iter().enumerate().filter(move |(other, _)| *other != index);
         let root = |(index, &z): (usize, &Complex<f64>)| {
-            let covariance = parameters.and_then(|parameters| {
-                let covariance = covariance(parameters, &self.moved(z))?;
-                let [[re, both], [_, im]] = covariance;
-                // No covariance exceeds its deviations: else all of it is rounding.
-                if both.abs() > (1.0 + ROUNDED) * (re * im).sqrt() {
-                    return None;
-                }
-                let deviation = (re + im).sqrt();
-                let simple = others(index).all(|(_, other)| (other - z).modulus() > APART * deviation);
-                simple.then_some(covariance)
-            });
+            let covariance = parameters.and_then(|parameters| covariance(parameters, &self.moved(z)));
+            let covariance = covariance.filter(|covariance| is_simple(index, &zeros, covariance));
             Root { polynomial: self.name.clone(), re: z.re, im: z.im, covariance }
         };
         Ok(zeros.iter().enumerate().map(root).collect())
     }
+}
+
+/// Whether one of some roots has a covariance to first order: whether no other lies within four of its standard deviations.
+pub(crate) fn is_simple(index: usize, roots: &[Complex<f64>], [[re, both], [_, im]]: &[[f64; 2]; 2]) -> bool {
+    // No covariance exceeds its deviations: else all of it is rounding.
+    let is_one = both.abs() <= (1.0 + ROUNDED) * (re * im).sqrt();
+    let deviation = (re + im).sqrt();
+    let apart = |other: usize| (roots[other] - roots[index]).modulus() > APART * deviation;
+    is_one && (0..roots.len()).filter(|other| *other != index).all(apart)
 }
 
 /// The derivative of a polynomial, of which the highest power comes first.
@@ -296,7 +295,7 @@ fn ratio([n, d]: [f64; 2], [[nn, nd], [_, dd]]: [[f64; 2]; 2], quantile: f64, po
 }
 
 /// -T/ln|z|, none outside the unit circle.
-fn time_constant(pole: &Root, sample_time: f64, quantile: f64) -> Option<Quantity> {
+pub(super) fn time_constant(pole: &Root, sample_time: f64, quantile: f64) -> Option<Quantity> {
     let modulus = pole.value().modulus();
     let value = -sample_time / modulus.ln();
     let known = pole.covariance.filter(|_| modulus > 0.0);

@@ -3,6 +3,7 @@ mod continuous;
 mod eigen;
 mod fitted;
 mod logarithm;
+mod uncertainty;
 mod zeros;
 
 use thetahat_core::nalgebra::DMatrix;
@@ -11,7 +12,11 @@ use crate::Error;
 use crate::model::PolynomialModel;
 pub use balance::Reduced;
 pub use continuous::{ContinuousStateSpace, Hold};
+pub(crate) use eigen::is_stable;
+pub(crate) use fitted::Path;
 pub use fitted::StateSpaceModel;
+pub use uncertainty::{Entry, EntryCovariance, StateSpaceMatrix};
+pub(crate) use uncertainty::{Sizes, across_coordinates, flat};
 pub use zeros::ZerosPolesGain;
 
 /// A model in innovations form, x of n states, u of m inputs and y of l outputs:

@@ -46,7 +46,8 @@ pub enum Stopped {
 pub struct Progress {
     /// Iterations done from this start.
     pub iteration: usize,
-    /// The cost for each sample, as the mean of e^2; for a model in equations the negative logarithm of the likelihood.
+    /// The cost for each sample, as the mean of e^2; for a model in equations the negative logarithm of the likelihood,
+    /// for one in state space ln det cov e.
     pub cost: f64,
 }
 

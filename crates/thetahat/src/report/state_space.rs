@@ -4,17 +4,19 @@
 mod tests;
 mod warnings;
 
-use std::ops::RangeInclusive;
+use std::ops::{ControlFlow, RangeInclusive};
 
 use super::evaluate::evaluate;
 use super::schema::{Estimation, Report};
 use super::shares::Shares;
 use crate::data::{Detrend, JointRecord, Log, Offset, Rows, Source, Split};
 use crate::estimate::{
-    Constant, Criteria, Initial, OrderScore, Procedure, Subspace, SubspaceOptions, SubspaceOutcome,
-    best_order, products_of_innovations, subspace,
+    Constant, Criteria, Initial, OrderScore, Procedure, Refine, Refinement, RefinementOutcome,
+    RefinementStart, Subspace, SubspaceOptions, SubspaceOutcome, Weighting, best_order,
+    products_of_innovations, refined, subspace,
 };
 use crate::model::{Model, Quantity, Signal, StateSpaceModel};
+use crate::optimize::{Monitor, Search};
 use crate::regression::SAFE_NORMS;
 use crate::respond::state_space::StateSpaceOnLog;
 use crate::select::Focus;
@@ -51,6 +53,11 @@ pub struct StateSpacePlan {
     pub constant: Constant,
     /// For each input the samples that it waits before the plant sees it; none: they do not wait.
     pub delays: Vec<usize>,
+    /// Whose errors a search makes small, from the model of the subspace method and from that of another weighting; none: there is no
+    /// search. With it poles, gains and responses have standard errors.
+    pub refine: Option<Refine>,
+    /// How to search.
+    pub search: Search,
 }
 
 impl StateSpacePlan {
@@ -76,6 +83,8 @@ impl StateSpacePlan {
             subspace: SubspaceOptions::default(),
             constant: Constant::Auto,
             delays: Vec::new(),
+            refine: None,
+            search: Search::default(),
         }
     }
 
@@ -111,6 +120,7 @@ impl StateSpacePlan {
                 "it is 0, and a state is made of past samples; take 1 or more",
             ));
         }
+        self.search.check_numbers()?;
         if self.inputs.is_empty() && self.subspace.feedthrough == Some(true) {
             return Err(Error::argument("feedthrough", "without inputs there is none; leave it out"));
         }
@@ -142,7 +152,11 @@ impl StateSpacePlan {
 /// with any number of inputs and outputs by a subspace method: see [`subspace`]. The order is that of least MDL, or given. Segments without a
 /// missing value are each used from their first sample on, and predictions and free runs start each from the state that explains it best.
 ///
-/// Cost: O(N q^2 p) for q channels and a past of p samples, and O(N (n + l) (n + q)) for each order n that is looked at.
+/// With [`refine`](StateSpacePlan::refine) a search follows for the model of the least ln det cov e, whose e are errors one step ahead or those
+/// of the free run; all entries of the matrices move but along changes of coordinates, and poles, gains and responses have standard errors.
+///
+/// Cost: O(N q^2 p) for q channels and a past of p samples, and O(N (n + l) (n + q)) for each order n that is looked at. An iteration of a
+/// search takes O(N r n (n + q)) for r = n (m + 2 l) directions.
 ///
 /// # Errors
 /// [`Error::Argument`] as for [`StateSpacePlan::check`], and for rows or orders that are not there; [`Error::Data`] for channels that are
@@ -175,6 +189,19 @@ impl StateSpacePlan {
 /// # Ok::<(), thetahat::Error>(())
 /// ```
 pub fn fit_state_space(log: &Log, sources: &[Source], plan: &StateSpacePlan) -> Result<Report, Error> {
+    fit_state_space_monitored(log, sources, plan, &|_| ControlFlow::Continue(()))
+}
+
+/// As [`fit_state_space`], telling a monitor of the progress of the search.
+///
+/// # Errors
+/// As for [`fit_state_space`], and [`Error::Interrupted`] if the monitor breaks.
+pub fn fit_state_space_monitored(
+    log: &Log,
+    sources: &[Source],
+    plan: &StateSpacePlan,
+    monitor: Monitor<'_>,
+) -> Result<Report, Error> {
     plan.check()?;
     let names: Vec<&str> = plan.channels().collect();
     names.iter().try_for_each(|name| log.channel(name).map(|_| ()))?;
@@ -233,7 +260,7 @@ pub fn fit_state_space(log: &Log, sources: &[Source], plan: &StateSpacePlan) -> 
             with(true).ok().filter(|other| other.mdl < plain.mdl).unwrap_or(plain)
         }
     };
-    let levels = found.levels(order).ok_or_else(|| {
+    let mut levels = found.levels(order).ok_or_else(|| {
         Error::undetermined(
             Vec::new(),
             "outputs that integrate have no level: leave the constant out (`constant` no)",
@@ -241,8 +268,6 @@ pub fn fit_state_space(log: &Log, sources: &[Source], plan: &StateSpacePlan) -> 
     })?;
     let mut matrices = found.state_space(order, log.sample_time())?;
     let samples = record.segments.iter().map(std::ops::Range::len).sum::<usize>();
-    let products = products_of_innovations(&matrices, &record, &levels)
-        .ok_or_else(|| Error::data("the errors one step ahead leave the range of numbers"))?;
     let free = found.free_parameters(order);
     let degrees = samples.checked_sub(free.div_ceil(outputs.len())).filter(|degrees| *degrees > 0);
     let Some(degrees) = degrees else {
@@ -255,6 +280,23 @@ pub fn fit_state_space(log: &Log, sources: &[Source], plan: &StateSpacePlan) -> 
             ),
         ));
     };
+    let (mut covariance, mut refinement) = (None, None);
+    if let Some(refine) = plan.refine {
+        let start = RefinementStart { name: found.weighting().to_string(), model: matrices, levels };
+        let starts: Vec<RefinementStart> =
+            std::iter::once(start).chain(other_start(&record, &found, order, log)).collect();
+        let what = Refinement {
+            refine,
+            feedthrough: found.feedthrough(),
+            constant: found.has_constant(),
+            degrees_of_freedom: degrees,
+        };
+        let found = refined(&record, &starts, what, &plan.search, monitor)?;
+        refinement = Some(RefinementOutcome { errors: refine, search: found.search });
+        (matrices, levels, covariance) = (found.model, found.levels, found.covariance);
+    }
+    let products = products_of_innovations(&matrices, &record, &levels)
+        .ok_or_else(|| Error::data("the errors one step ahead leave the range of numbers"))?;
     let mean = &products / samples as f64;
     matrices.noise_covariance = &products / degrees as f64;
     // A covariance is symmetric to the bit.
@@ -262,7 +304,10 @@ pub fn fit_state_space(log: &Log, sources: &[Source], plan: &StateSpacePlan) -> 
     for (output, level) in outputs.iter_mut().zip(&levels) {
         output.offset.level += level;
     }
-    let model = StateSpaceModel::new((inputs, outputs), delays, &matrices, free, Some(degrees))?;
+    let mut model = StateSpaceModel::new((inputs, outputs), delays, &matrices, free, Some(degrees))?;
+    if let Some(covariance) = covariance {
+        model = model.with_covariance(covariance);
+    }
     model.check()?;
 
     let segments = segments.iter().map(Rows::from_positions).collect();
@@ -277,6 +322,7 @@ pub fn fit_state_space(log: &Log, sources: &[Source], plan: &StateSpacePlan) -> 
             constant: found.has_constant(),
             singular_values: found.singular_values().iter().copied().take(MOST_VALUES).collect(),
             orders: scores,
+            refinement,
         }),
         initial: Some(Initial::Estimate),
         level: if let ([output], true) = (&*model.outputs, found.has_constant()) {
@@ -310,6 +356,26 @@ pub fn fit_state_space(log: &Log, sources: &[Source], plan: &StateSpacePlan) -> 
         evaluate(&mut report, &on_log(&rows)?, part, Focus::Auto);
     }
     Ok(report)
+}
+
+/// A model of another weighting to start from: what is near the one minimum may be far from another. None where it has no such model.
+fn other_start(
+    record: &JointRecord<'_>,
+    found: &Subspace,
+    order: usize,
+    log: &Log,
+) -> Option<RefinementStart> {
+    let weighting = if found.weighting() == Weighting::Ssarx { Weighting::Cva } else { Weighting::Ssarx };
+    let options = SubspaceOptions {
+        weighting,
+        past: Some(found.past()),
+        future: None,
+        feedthrough: Some(found.feedthrough()),
+        constant: found.has_constant(),
+    };
+    let other = subspace(record, &options).ok()?;
+    let (model, levels) = (other.state_space(order, log.sample_time()).ok()?, other.levels(order)?);
+    Some(RefinementStart { name: weighting.to_string(), model, levels })
 }
 
 /// The states of a record, and the order that was given or chosen.

@@ -7,14 +7,6 @@ use crate::model::StateSpace;
 /// Doublings after which a solution that exists has converged: of an eigenvalue 1 - 1e-9 is nothing left.
 const DOUBLINGS: usize = 60;
 
-/// Whether all eigenvalues lie inside the unit circle.
-pub(super) fn is_stable(matrix: &DMatrix<f64>) -> bool {
-    let (rows, columns) = matrix.shape();
-    let same = faer::Mat::from_fn(rows, columns, |row, column| matrix[(row, column)]);
-    let eigenvalues = same.eigenvalues();
-    eigenvalues.is_ok_and(|eigenvalues| eigenvalues.iter().all(|value| value.re.hypot(value.im) < 1.0))
-}
-
 /// The model with the gain and the covariance of the innovations of a stationary Kalman filter,
 ///
 /// ```text

@@ -1,11 +1,11 @@
 use thetahat_core::nalgebra::{DMatrix, DVector};
 
-use super::riccati::{is_stable, stationary};
+use super::riccati::stationary;
 use super::*;
 use crate::random::Random;
 
 /// Two inputs, two outputs, four states of two lightly damped modes.
-pub(super) fn plant() -> StateSpace {
+pub(in crate::estimate) fn plant() -> StateSpace {
     StateSpace {
         f: DMatrix::from_row_slice(
             4,
@@ -22,9 +22,9 @@ pub(super) fn plant() -> StateSpace {
 }
 
 /// u and y, N samples each, of a plant whose inputs are u = r - feedback y, r of variance 1.
-pub(super) struct Run {
-    pub(super) inputs: Vec<Vec<f64>>,
-    pub(super) outputs: Vec<Vec<f64>>,
+pub(in crate::estimate) struct Run {
+    pub(in crate::estimate) inputs: Vec<Vec<f64>>,
+    pub(in crate::estimate) outputs: Vec<Vec<f64>>,
 }
 
 impl Run {
@@ -48,11 +48,11 @@ impl Run {
         Self { inputs, outputs }
     }
 
-    pub(super) fn open(model: &StateSpace, count: usize, seed: u64, noise: f64) -> Self {
+    pub(in crate::estimate) fn open(model: &StateSpace, count: usize, seed: u64, noise: f64) -> Self {
         Self::new(model, count, seed, noise, &DMatrix::zeros(model.g.ncols(), model.h.nrows()))
     }
 
-    pub(super) fn record(&self) -> JointRecord<'_> {
+    pub(in crate::estimate) fn record(&self) -> JointRecord<'_> {
         JointRecord::new(
             self.inputs.iter().map(Vec::as_slice).collect(),
             self.outputs.iter().map(Vec::as_slice).collect(),
@@ -74,7 +74,7 @@ fn markov(model: &StateSpace) -> DMatrix<f64> {
     all
 }
 
-pub(super) fn distance(found: &StateSpace, truth: &StateSpace) -> f64 {
+pub(in crate::estimate) fn distance(found: &StateSpace, truth: &StateSpace) -> f64 {
     (markov(found) - markov(truth)).norm() / markov(truth).norm()
 }
 
@@ -261,4 +261,19 @@ fn what_cannot_be_told_is_said() {
     if let Ok(found) = subspace(&constant, &SubspaceOptions::default()) {
         assert!(found.scores(&constant, found.orders()).is_ok());
     }
+}
+
+#[test]
+fn a_predictor_of_too_low_an_order_knows_its_errors() -> Result<(), Error> {
+    let run = Run::open(&plant(), 4000, 11, 1.0);
+    let record = run.record();
+    let found = subspace(&record, &SubspaceOptions::default())?;
+    for order in [2, 3, 4] {
+        let model = found.state_space(order, 1.0)?;
+        let seen = products_of_innovations(&model, &record, &[0.0, 0.0]).ok_or(Error::data("no errors"))?;
+        let apart = log_determinant(&(seen / 4000.0)) - log_determinant(&model.noise_covariance);
+        // The gain of a regression on all past samples leaves 2 more at order 2.
+        assert!(apart.abs() < 0.35, "{order}: {apart}");
+    }
+    Ok(())
 }

@@ -36,6 +36,11 @@ pub(super) fn eigenvalues(matrix: &DMatrix<f64>) -> Result<Vec<Complex<f64>>, Er
     Ok(in_order(standard(&b.tr_mul(&a))?, at_zero))
 }
 
+/// Whether all eigenvalues lie inside the unit circle.
+pub(crate) fn is_stable(matrix: &DMatrix<f64>) -> bool {
+    standard(matrix).is_ok_and(|found| found.iter().all(|value| value.modulus() < 1.0))
+}
+
 /// The finite z with det(A - z B) = 0, in the order of [`eigenvalues`].
 ///
 /// With a shift s they are s + 1/mu for the eigenvalues mu of (A - s B)^-1 B, those at infinity having mu = 0: so B may be singular (Saad,

@@ -1,12 +1,14 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use thetahat_core::nalgebra::{Complex, DMatrix};
+use thetahat_core::nalgebra::{Complex, DMatrix, DVector};
 
-use super::StateSpace;
 use super::eigen::{eigenvalues, solved};
+use super::uncertainty::spread;
+use super::{Entry, EntryCovariance, StateSpace, StateSpaceMatrix};
 use crate::Error;
 use crate::distribution::{student_factor, student_two_sided};
-use crate::model::{Quantity, Root, Signal};
+use crate::model::dynamics::{LEVEL, time_constant};
+use crate::model::{Quantity, Root, Signal, standard_error};
 
 /// Eigenvalues closer to 1 than this are an integrator.
 const INTEGRATOR: f64 = 1e-9;
@@ -19,7 +21,7 @@ const INTEGRATOR: f64 = 1e-9;
 /// ```
 ///
 /// y and u are deviations from the signals' offsets. The coordinates of x are a matter of choice, so that entries of the matrices have no
-/// errors of their own.
+/// errors of their own; see [`EntryCovariance`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct StateSpaceModel {
     /// Seconds from one sample to the next.
@@ -42,6 +44,9 @@ pub struct StateSpaceModel {
     pub k: Vec<Vec<f64>>,
     /// The covariance of e: the sum of its products over the degrees of freedom.
     pub noise_covariance: Vec<Vec<f64>>,
+    /// How uncertain the matrices are; none where no theory says it, as after a subspace method.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub covariance: Option<EntryCovariance>,
     /// N - p/l for N samples of l outputs and p free parameters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub degrees_of_freedom: Option<usize>,
@@ -78,10 +83,6 @@ impl StateSpaceModel {
         let StateSpace { f, g, h, d, k, noise_covariance, sample_time } = matrices;
         let poles = eigenvalues(f)?;
         let predictor_poles = eigenvalues(&(f - k * h))?;
-        let time_constant = |pole: &Complex<f64>| {
-            let rate = -pole.re.hypot(pole.im).ln();
-            (rate > 0.0 && rate.is_finite()).then(|| Quantity::new(sample_time / rate, None))
-        };
         let roots = |of: &str, values: &[Complex<f64>]| -> Vec<Root> {
             let root = |value: &Complex<f64>| Root {
                 polynomial: of.to_owned(),
@@ -91,7 +92,7 @@ impl StateSpaceModel {
             };
             values.iter().map(root).collect()
         };
-        Ok(Self {
+        let mut model = Self {
             sample_time: *sample_time,
             delays,
             f: rows(f),
@@ -100,16 +101,76 @@ impl StateSpaceModel {
             d: rows(d),
             k: rows(k),
             noise_covariance: rows(noise_covariance),
+            covariance: None,
             degrees_of_freedom,
             free_parameters,
             dc_gain: static_gain(matrices, &poles, inputs.len()),
             stable: poles.iter().all(|pole| pole.re.hypot(pole.im) < 1.0),
-            time_constants: poles.iter().map(time_constant).collect(),
+            time_constants: Vec::new(),
             poles: roots("f", &poles),
             predictor_poles: roots("f - k h", &predictor_poles),
             inputs,
             outputs,
-        })
+        };
+        model.time_constants = model.times();
+        Ok(model)
+    }
+
+    /// The same with the covariance of the entries of the plant, without the states that wait, and the errors of what follows from them.
+    pub(crate) fn with_covariance(mut self, covariance: EntryCovariance) -> Self {
+        let covariance = covariance.delayed(self.order(), &self.delays);
+        let matrices = self.matrices();
+        let StateSpace { f, g, h, k, .. } = &matrices;
+        let zero = Complex::new(0.0, 0.0);
+        spread(&mut self.poles, f, &covariance, |entry, left, right| match entry.matrix {
+            StateSpaceMatrix::F => left[entry.row] * right[entry.column],
+            _ => zero,
+        });
+        // dA = dF - dK H - K dH.
+        spread(
+            &mut self.predictor_poles,
+            &(f - k * h),
+            &covariance,
+            |&Entry { matrix, row, column }, left, right| {
+                let seen = |output: usize| {
+                    h.row(output).iter().zip(right).map(|(h, v)| v * *h).sum::<Complex<f64>>()
+                };
+                let back = |output: usize| {
+                    k.column(output).iter().zip(left).map(|(k, w)| w * *k).sum::<Complex<f64>>()
+                };
+                match matrix {
+                    StateSpaceMatrix::F => left[row] * right[column],
+                    StateSpaceMatrix::K => -left[row] * seen(column),
+                    StateSpaceMatrix::H => -back(row) * right[column],
+                    StateSpaceMatrix::G | StateSpaceMatrix::D => zero,
+                }
+            },
+        );
+        let n = f.nrows();
+        let still = DMatrix::identity(n, n) - f;
+        let complex = |matrix: DMatrix<f64>| matrix.map(|entry| Complex::new(entry, 0.0));
+        let (states, weights) = (solved(still.clone(), g), solved(still.transpose(), &h.transpose()));
+        if let (Some(states), Some(weights)) = (states.map(complex), weights.map(complex)) {
+            for (output, gains) in self.dc_gain.iter_mut().enumerate() {
+                for (input, gain) in gains.iter_mut().enumerate() {
+                    let path = Path { output, input: Some(input) };
+                    let (weights, states) =
+                        (weights.column(output).into_owned(), states.column(input).into_owned());
+                    let gradient = covariance.gradient(|entry| path.slope(entry, &weights, &states));
+                    if let Some(gain) = gain {
+                        gain.standard_error = standard_error(Some(&covariance.values), &gradient);
+                    }
+                }
+            }
+        }
+        self.covariance = Some(covariance);
+        self.time_constants = self.times();
+        self
+    }
+
+    fn times(&self) -> Vec<Option<Quantity>> {
+        let quantile = self.quantile(LEVEL);
+        self.poles.iter().map(|pole| time_constant(pole, self.sample_time, quantile)).collect()
     }
 
     /// The matrices.
@@ -189,6 +250,9 @@ impl StateSpaceModel {
         if offsets.into_iter().any(|value| !value.is_finite()) {
             return wrong("an offset is not finite".to_owned());
         }
+        if self.covariance.as_ref().is_some_and(|covariance| !covariance.fits(&self.matrices())) {
+            return wrong("covariance is not one of entries of the matrices".to_owned());
+        }
         let waiting = self.delays.iter().try_fold(0_usize, |sum, delay| sum.checked_add(*delay));
         if self.delays.len() != m || waiting.is_none_or(|waiting| waiting > n) {
             return wrong("delays are not one for each input, and states for their samples".to_owned());
@@ -243,6 +307,39 @@ impl StateSpace {
             first += delay;
         }
         Self { f, g, h, d, k, noise_covariance: self.noise_covariance.clone(), sample_time: self.sample_time }
+    }
+}
+
+/// From a source to an output: an input, or with a single output its noise.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Path {
+    pub(crate) output: usize,
+    pub(crate) input: Option<usize>,
+}
+
+impl Path {
+    /// How the response h (q I - F)^-1 g + d moves with an entry, with weights w' = h (q I - F)^-1 and states v = (q I - F)^-1 g:
+    ///
+    /// ```text
+    /// dh v + w' dF v + w' dg + dd
+    /// ```
+    pub(crate) fn slope(
+        self,
+        &Entry { matrix, row, column }: &Entry,
+        weights: &DVector<Complex<f64>>,
+        states: &DVector<Complex<f64>>,
+    ) -> Complex<f64> {
+        let is_source = match self.input {
+            Some(input) => matches!(matrix, StateSpaceMatrix::G | StateSpaceMatrix::D) && column == input,
+            None => matrix == StateSpaceMatrix::K,
+        };
+        match matrix {
+            StateSpaceMatrix::F => weights[row] * states[column],
+            StateSpaceMatrix::H if row == self.output => states[column],
+            StateSpaceMatrix::G | StateSpaceMatrix::K if is_source => weights[row],
+            StateSpaceMatrix::D if is_source && row == self.output => Complex::new(1.0, 0.0),
+            _ => Complex::new(0.0, 0.0),
+        }
     }
 }
 

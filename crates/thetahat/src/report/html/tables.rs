@@ -10,7 +10,7 @@ pub(super) use validation::{anderson, coverage, noise, tests, which};
 use super::page::Table;
 use super::text::{complex, or_dash, quantity, rows};
 use crate::data::{Rows, Source};
-use crate::estimate::{Criteria, InformationCriterion, Procedure, TermsOutcome};
+use crate::estimate::{Criteria, InformationCriterion, Procedure, RefinementOutcome, TermsOutcome};
 use crate::figures::{chance, fixed, number, scientific, short, three};
 use crate::model::{
     EquationsModel, NonlinearArxModel, Orders, Parameter, PolynomialModel, ProcessModel, Quantity, Root,
@@ -115,14 +115,10 @@ pub(super) fn fits(fits: &[Fit]) -> Table {
 pub(super) fn roots(model: &PolynomialModel) -> Table {
     let mut table = Table::new("Roots", &["root", "value", "standard error", "modulus", "time constant [s]"]);
     let mut add = |role: &str, root: &Root, time: Option<String>| {
-        let spread = root.covariance.map(|[[re, _], [_, im]]| {
-            let re_error = three(re.sqrt());
-            if root.im == 0.0 { re_error } else { format!("{re_error}, {}i", three(im.sqrt())) }
-        });
         table.row([
             format!("{role} of {}", root.polynomial.to_uppercase()),
             complex(root),
-            spread.unwrap_or_else(|| "–".to_owned()),
+            spread(root),
             number(root.re.hypot(root.im)),
             time.unwrap_or_default(),
         ]);
@@ -135,6 +131,14 @@ pub(super) fn roots(model: &PolynomialModel) -> Table {
     model.noise_poles.iter().for_each(|pole| add("noise pole", pole, None));
     model.noise_zeros.iter().for_each(|zero| add("noise zero", zero, None));
     table
+}
+
+/// The standard error of a root, that of each of its parts.
+fn spread(root: &Root) -> String {
+    or_dash(root.covariance, |[[re, _], [_, im]]| {
+        let re_error = three(re.sqrt());
+        if root.im == 0.0 { re_error } else { format!("{re_error}, {}i", three(im.sqrt())) }
+    })
 }
 
 /// The channels with their offsets and static gains.
@@ -155,15 +159,15 @@ pub(super) fn signals(model: &PolynomialModel) -> Table {
 
 /// The poles of a state-space model, and those of its predictor.
 pub(super) fn eigenvalues(model: &StateSpaceModel) -> Table {
-    let mut table = Table::new("Poles", &["root", "value", "modulus", "time constant [s]"]);
+    let mut table = Table::new("Poles", &["root", "value", "standard error", "modulus", "time constant [s]"]);
+    let mut add = |role: &str, pole: &Root, time: String| {
+        let modulus = number(pole.re.hypot(pole.im));
+        table.row([role.to_owned(), complex(pole), spread(pole), modulus, time]);
+    };
     for (pole, time) in model.poles.iter().zip(&model.time_constants) {
-        let modulus = number(pole.re.hypot(pole.im));
-        table.row(["pole".to_owned(), complex(pole), modulus, or_dash(*time, quantity)]);
+        add("pole", pole, or_dash(*time, quantity));
     }
-    for pole in &model.predictor_poles {
-        let modulus = number(pole.re.hypot(pole.im));
-        table.row(["pole of the predictor".to_owned(), complex(pole), modulus, String::new()]);
-    }
+    model.predictor_poles.iter().for_each(|pole| add("pole of the predictor", pole, String::new()));
     table
 }
 
@@ -364,10 +368,19 @@ fn procedure(procedure: &Procedure) -> String {
             outcome.noise_order
         ),
         Procedure::Subspace(outcome) => format!(
-            "subspace ({}) from a past of {} samples, {}",
+            "subspace ({}) from a past of {} samples, {}{}",
             outcome.weighting.to_string().to_uppercase(),
             outcome.past,
-            if outcome.feedthrough { "inputs act at once" } else { "no feedthrough" }
+            if outcome.feedthrough { "inputs act at once" } else { "no feedthrough" },
+            outcome.refinement.as_ref().map_or_else(
+                String::new,
+                |RefinementOutcome { errors, search }| format!(
+                    "; refined for the least errors of {}, iterations: {}, {}",
+                    errors.of(),
+                    search.iterations,
+                    stopped(&search.stopped)
+                )
+            )
         ),
         Procedure::Neighbours(outcome) => each(&outcome.maps, |map| {
             let (kept, by) = (map.candidates, &map.selected_by);

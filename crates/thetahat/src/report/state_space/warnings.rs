@@ -2,9 +2,10 @@
 
 use std::ops::RangeInclusive;
 
-use crate::estimate::{Procedure, SubspaceOutcome};
+use crate::estimate::{Procedure, RefinementOutcome, SubspaceOutcome};
 use crate::figures::fixed;
 use crate::model::StateSpaceModel;
+use crate::optimize::Stopped;
 use crate::report::Estimation;
 
 /// Fewer values of the outputs for each free parameter say little.
@@ -20,7 +21,9 @@ pub(super) fn of_fit(
     offered: &RangeInclusive<usize>,
 ) -> Vec<String> {
     let mut warnings = Vec::new();
-    let Procedure::Subspace(SubspaceOutcome { orders, .. }) = &estimation.procedure else { return warnings };
+    let Procedure::Subspace(SubspaceOutcome { orders, refinement, .. }) = &estimation.procedure else {
+        return warnings;
+    };
     let (order, outputs) = (model.order(), model.outputs.len());
     let values = estimation.samples * outputs;
     if values < VALUES_A_PARAMETER * model.free_parameters {
@@ -47,6 +50,24 @@ pub(super) fn of_fit(
                 "{refused} of the {} orders have no model with a stable predictor, and were left out",
                 orders.len()
             ));
+        }
+    }
+    if let Some(RefinementOutcome { search, .. }) = refinement {
+        match search.stopped {
+            Stopped::MaxIterations => warnings.push(format!(
+                "the search stopped after {} iterations before it had converged; allow more (`max-iterations`)",
+                search.iterations
+            )),
+            Stopped::TimeLimit => warnings
+                .push("the search ran out of time before it had converged; allow more (`time-limit`)".to_owned()),
+            Stopped::Converged | Stopped::NoDescent => {}
+        }
+        if model.covariance.is_none() {
+            warnings.push(
+                "the log does not see all directions in which the matrices may vary: poles, gains and responses have no standard errors; ask \
+                 for a lower order"
+                    .to_owned(),
+            );
         }
     }
     let noise = &model.noise_covariance;

@@ -4,7 +4,10 @@ use thetahat_core::nalgebra::{Complex, ComplexField, DMatrix, DVector};
 
 use super::Recursion;
 use crate::Error;
-use crate::model::{Quantity, StateSpace, StateSpaceModel};
+use crate::model::{
+    EntryCovariance, Gradient, Path, Quantity, StateSpace, StateSpaceMatrix, StateSpaceModel, covariance,
+    standard_error,
+};
 use crate::respond::{
     FrequencyPoint, FrequencyResponse, TransientResponse,
     frequency::{Turns, check_frequencies, has_pole},
@@ -34,10 +37,11 @@ pub(crate) fn frequency_response(
     // e acts as an input does: at once on its own output, and through K.
     let noise =
         (h.nrows() == 1).then(|| StateSpace { g: k.clone(), d: DMatrix::identity(1, 1), ..own.clone() });
-    let inputs = (0..m).map(|input| (&own, input));
-    let sources: Vec<(&StateSpace, usize)> = inputs.chain(noise.iter().map(|noise| (noise, 0))).collect();
-    let turns = sources.iter().map(|(space, source)| {
-        let transfer = space.transfer(output, *source)?;
+    let inputs = (0..m).map(|input| (&own, Path { output, input: Some(input) }));
+    let noise = noise.iter().map(|noise| (noise, Path { output, input: None }));
+    let sources: Vec<(&StateSpace, Path)> = inputs.chain(noise).collect();
+    let turns = sources.iter().map(|(space, path)| {
+        let transfer = space.transfer(output, path.input.unwrap_or(0))?;
         Ok(Turns::new(transfer.gain, transfer.delay(), transfer.zeros, transfer.poles))
     });
     let turns = turns.collect::<Result<Vec<Turns>, Error>>()?;
@@ -52,22 +56,27 @@ pub(crate) fn frequency_response(
         if poles.iter().any(|pole| (q - pole).modulus() < 16.0 * f64::EPSILON * (1 + n) as f64) {
             return Err(has_pole(frequency));
         }
-        // (q I - F)' w = H'.
+        // (q I - F)' w = H', and with errors (q I - F) v = G.
         let matrix = DMatrix::from_fn(n, n, |row, column| {
             let diagonal = if row == column { q } else { Complex::new(0.0, 0.0) };
             diagonal - f[(column, row)]
         });
+        let known = model.covariance.as_ref().filter(|_| n > 0);
+        let forward = known.map(|known| (known, matrix.transpose().lu()));
         let solved = if n == 0 { Some(seen.clone()) } else { matrix.lu().solve(&seen) };
         let through = solved.ok_or_else(|| has_pole(frequency))?;
-        for ((points, turns), (space, source)) in found.iter_mut().zip(&turns).zip(&sources) {
-            let enters = space.g.column(*source);
-            let path = through.iter().zip(enters.iter());
-            let response: Complex<f64> = path.map(|(weight, entry)| weight * *entry).sum();
-            let response = response + space.d[(output, *source)];
+        for ((points, turns), (space, path)) in found.iter_mut().zip(&turns).zip(&sources) {
+            let source = path.input.unwrap_or(0);
+            let enters = space.g.column(source).map(|entry| Complex::new(entry, 0.0));
+            let response = through.dot(&enters) + space.d[(output, source)];
             if !response.modulus().is_finite() {
                 return Err(has_pole(frequency));
             }
-            points.push(FrequencyPoint::new(frequency, response, None, turns.at(angle)));
+            let spread = forward.as_ref().and_then(|(known, forward)| {
+                let states = forward.solve(&enters)?;
+                covariance(&known.values, &known.gradient(|entry| path.slope(entry, &through, &states)))
+            });
+            points.push(FrequencyPoint::new(frequency, response, spread, turns.at(angle)));
         }
     }
     let names = model.inputs.iter().map(|input| Some(input.name.clone())).chain([None]);
@@ -98,13 +107,73 @@ pub(crate) fn transient(
     let still = vec![0.0; samples];
     let signals: Vec<&[f64]> =
         (0..inputs).map(|other| if other == input { &*source } else { &*still }).collect();
-    let mut simulator = Recursion::simulator(&model.matrices());
-    let values = (0..samples).map(|row| simulator.step(&signals, row)[output]);
-    let values: Vec<Quantity> =
-        values.take_while(|value| value.is_finite()).map(|value| Quantity::new(value, None)).collect();
+    let matrices = model.matrices();
+    let mut simulator = Recursion::simulator(&matrices);
+    let mut slopes = model
+        .covariance
+        .as_ref()
+        .map(|known| Slopes::new(&matrices, known, Path { output, input: Some(input) }));
+    let mut values = Vec::with_capacity(samples);
+    for (row, source) in source.iter().enumerate() {
+        let error = slopes.as_mut().and_then(|slopes| slopes.step(simulator.state(), *source));
+        let value = simulator.step(&signals, row)[output];
+        if !value.is_finite() {
+            break;
+        }
+        values.push(Quantity::new(value, error));
+    }
     Ok(TransientResponse {
         input: signal.name.clone(),
         time: (0..values.len()).map(|t| t as f64 * model.sample_time).collect(),
         values,
     })
+}
+
+/// How a response moves with the free entries of a model: with the states X of their slopes
+///
+/// ```text
+/// X(t+1) = F X(t) + dF x(t) + dG u(t),   dy = H X(t) + dH x(t) + dD u(t)
+/// ```
+struct Slopes<'m> {
+    model: &'m StateSpace,
+    known: &'m EntryCovariance,
+    path: Path,
+    /// X, a column for each entry.
+    states: DMatrix<f64>,
+    next: DMatrix<f64>,
+}
+
+impl<'m> Slopes<'m> {
+    fn new(model: &'m StateSpace, known: &'m EntryCovariance, path: Path) -> Self {
+        let states = DMatrix::zeros(model.f.nrows(), known.entries.len());
+        Self { model, known, path, next: states.clone(), states }
+    }
+
+    /// The standard error of the output of a state and the source, before the next step. O(n^2 r + r^2) for r entries.
+    fn step(&mut self, state: &[f64], source: f64) -> Option<f64> {
+        let StateSpace { f, h, .. } = self.model;
+        let Path { output, input } = self.path;
+        let through = h.row(output) * &self.states;
+        let direct = |matrix: StateSpaceMatrix, row: usize, column: usize| match matrix {
+            StateSpaceMatrix::H if row == output => state[column],
+            StateSpaceMatrix::D if row == output && Some(column) == input => source,
+            _ => 0.0,
+        };
+        let all = self.known.entries.iter().zip(through.iter());
+        let gradient: Gradient = all
+            .map(|(entry, through)| through + direct(entry.matrix, entry.row, entry.column))
+            .map(|slope| Complex::new(slope, 0.0))
+            .enumerate()
+            .collect();
+        self.next.gemm(1.0, f, &self.states, 0.0);
+        for (place, entry) in self.known.entries.iter().enumerate() {
+            self.next[(entry.row, place)] += match entry.matrix {
+                StateSpaceMatrix::F => state[entry.column],
+                StateSpaceMatrix::G if Some(entry.column) == input => source,
+                _ => continue,
+            };
+        }
+        std::mem::swap(&mut self.states, &mut self.next);
+        standard_error(Some(&self.known.values), &gradient)
+    }
 }

@@ -3,7 +3,7 @@
 //! The library names them between backticks, as `detrend`, wherever one is advised; here they are options.
 
 /// The arguments of the library that are options, by the name that both have.
-pub(crate) const OPTIONS: [&str; 70] = [
+pub(crate) const OPTIONS: [&str; 71] = [
     "alarm",
     "alpha",
     "alphas",
@@ -11,6 +11,7 @@ pub(crate) const OPTIONS: [&str; 70] = [
     "centres",
     "channels",
     "constant",
+    "couple",
     "dc-gain",
     "dead-zone",
     "degree",

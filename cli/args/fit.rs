@@ -25,7 +25,7 @@ pub(crate) struct FitArguments {
     /// Input columns; a name that holds a comma stands between double quotes, as in CSV [default: u, u1, u2, …]
     #[arg(short = 'u', long, value_name = "NAME[,NAME…]", help_heading = "Channels")]
     pub(crate) input: Vec<Names>,
-    /// Output column; with --model ss and --narx one or more [default: y]
+    /// Output column; with --model ss, --model arx and --narx one or more [default: y]
     #[arg(short = 'y', long, value_name = "NAME[,NAME…]", help_heading = "Channels")]
     pub(crate) output: Vec<Names>,
     /// Rows to estimate on, 1-based and inclusive, counted through all logs [default: all]
@@ -90,12 +90,16 @@ pub(crate) struct FitArguments {
 /// Which model, and what its estimate starts from.
 #[derive(Debug, Args)]
 pub(crate) struct ModelArguments {
-    /// The model structure [default: arx; without orders the data choose; with several outputs ss]
+    /// The model structure [default: arx; without orders the data choose; with several outputs and no orders ss]
     #[arg(long, value_enum, help_heading = "Model")]
     pub(crate) model: Option<ModelArgument>,
     /// Coefficients of A: past outputs
     #[arg(long, value_name = "N|A..B", help_heading = "Model")]
     pub(crate) na: Option<String>,
+    /// Which past outputs an output depends on, where an ARX model has several: full, those of all; none, its own; auto, what has the least
+    /// MDL [default: auto]
+    #[arg(long, value_name = "full|none|auto", help_heading = "Model")]
+    pub(crate) couple: Option<String>,
     /// Coefficients of B: inputs; one value for each input or one for all, 0 for a model without inputs
     #[arg(long, value_name = "N|A..B[,…]", value_delimiter = ',', help_heading = "Model")]
     pub(crate) nb: Vec<String>,

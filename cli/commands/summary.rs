@@ -170,7 +170,8 @@ fn estimation(text: &mut Text, estimation: &Estimation, model: &PolynomialModel)
         | Procedure::Training(_)
         | Procedure::FreeRun(_)
         | Procedure::FrequencyResponse(_)
-        | Procedure::Subspace(_) => {}
+        | Procedure::Subspace(_)
+        | Procedure::VectorArx(_) => {}
         Procedure::PredictionError(search) => {
             text.line(&format!(
                 "prediction error, {}, {}",

@@ -1,7 +1,7 @@
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
-use thetahat::estimate::{Constant, SubspaceOptions};
+use thetahat::estimate::{Constant, SubspaceOptions, VectorArxInputs, VectorArxOptions};
 use thetahat::report::StateSpacePlan;
 
 use super::fit::named_values;
@@ -12,6 +12,11 @@ use crate::args::{
 };
 use crate::failure::Failure;
 use crate::memory::PerValue;
+
+/// The orders of an ARX model that are looked at where none are given.
+const CHOSEN_LAGS: RangeInclusive<usize> = 1..=8;
+/// More lags than anybody has.
+const MOST_LAGS: usize = 200;
 
 /// A state-space model to fit.
 #[derive(Debug)]
@@ -50,9 +55,28 @@ impl StateSpaceJob {
         let without_inputs = matches!(&*model.nb, [nb] if nb.trim() == "0");
         let coefficients = [&model.na, &model.nc, &model.nd].into_iter().any(Option::is_some);
         let orders = coefficients || !model.nf.is_empty() || (!model.nb.is_empty() && !without_inputs);
+        let noise = model.nc.is_some() || model.nd.is_some() || !model.nf.is_empty();
+        let is_arx = outputs.len() > 1
+            && match model.model {
+                Some(ModelArgument::Arx) => true,
+                None => orders && !noise,
+                _ => false,
+            };
+        if !is_arx && model.couple.is_some() {
+            return Err(Failure::usage(
+                "--couple is for ARX models with several outputs: --model arx and --output y1,y2; leave it out",
+            ));
+        }
         match model.model {
             Some(ModelArgument::Ss) => {}
             None if !orders && outputs.len() > 1 => {}
+            _ if is_arx => {
+                if let Some(option) = given {
+                    return Err(Failure::usage(format!(
+                        "{option} is for --model ss, and not for ARX models with several outputs; leave it out"
+                    )));
+                }
+            }
             _ => match given {
                 Some(option) => {
                     return Err(Failure::usage(format!(
@@ -62,7 +86,7 @@ impl StateSpaceJob {
                 None => return Ok(None),
             },
         }
-        refuse_others(arguments)?;
+        refuse_others(arguments, is_arx)?;
         let inputs = Names::all(&arguments.input);
         if without_inputs && inputs.is_some() {
             return Err(Failure::usage("--nb 0 makes a model without inputs; leave out --input or --nb"));
@@ -100,6 +124,7 @@ impl StateSpaceJob {
             },
             refine: own.refine.as_deref().map(|text| parsed("--refine", text)).transpose()?,
             search: search::search(&arguments.search)?,
+            arx: if is_arx { Some(arx(arguments, without_inputs)?) } else { None },
             ..StateSpacePlan::new(&[], &[])
         };
         let delay = |text: &String| {
@@ -135,8 +160,19 @@ impl StateSpaceJob {
             }
         };
         let mut plan = StateSpacePlan { inputs, outputs, ..self.plan.clone() };
-        // u(t - nk) acts on y(t): through D if some input acts at once, else through G.
-        if !delays.is_empty() {
+        if let Some(arx) = &mut plan.arx {
+            if let VectorArxInputs::Each(nb) = &arx.nb
+                && nb.len() != count
+            {
+                return Err(Failure::usage(format!(
+                    "--nb has {} numbers for {count} inputs; give one for all or one for each",
+                    nb.len()
+                )));
+            }
+            arx.direct = delays.contains(&0);
+            plan.delays = delays.iter().map(|delay| delay - usize::from(!arx.direct)).collect();
+        } else if !delays.is_empty() {
+            // u(t - nk) acts on y(t): through D if some input acts at once, else through G.
             let at_once = delays.contains(&0) || plan.subspace.feedthrough == Some(true);
             if delays.contains(&0) && plan.subspace.feedthrough == Some(false) {
                 return Err(Failure::usage(
@@ -151,8 +187,46 @@ impl StateSpaceJob {
     }
 }
 
+/// Among which ARX models with several outputs the data choose.
+fn arx(arguments: &FitArguments, without_inputs: bool) -> Result<VectorArxOptions, Failure> {
+    let model = &arguments.model;
+    let range = |option: &str, text: &String| -> Result<RangeInclusive<usize>, Failure> {
+        let number = |text: &str| text.trim().parse::<usize>().ok().filter(|number| *number <= MOST_LAGS);
+        let found = match text.split_once("..") {
+            Some((first, last)) => number(first).zip(number(last)),
+            None => number(text).map(|order| (order, order)),
+        };
+        found.filter(|(first, last)| first <= last).map(|(first, last)| first..=last).ok_or_else(|| {
+            Failure::usage(format!(
+                "{option} {text}: write it as N or A..B, {MOST_LAGS} at most, such as 2 or 1..8"
+            ))
+        })
+    };
+    let nb = model.nb.iter().map(|text| range("--nb", text)).collect::<Result<Vec<_>, Failure>>()?;
+    let each =
+        || nb.iter().map(|nb| (nb.start() == nb.end()).then_some(*nb.start())).collect::<Option<Vec<_>>>();
+    let nb = match &*nb {
+        _ if without_inputs => VectorArxInputs::Alike(0..=0),
+        [] => VectorArxInputs::Alike(CHOSEN_LAGS),
+        [one] => VectorArxInputs::Alike(one.clone()),
+        _ => VectorArxInputs::Each(each().ok_or_else(|| {
+            Failure::usage("--nb: with several outputs give one range for all inputs, or a number for each")
+        })?),
+    };
+    Ok(VectorArxOptions {
+        na: model.na.as_ref().map_or(Ok(CHOSEN_LAGS), |text| range("--na", text))?,
+        nb,
+        coupling: match model.couple.as_deref() {
+            None | Some("auto") => None,
+            Some(text) => Some(parsed("--couple", text)?),
+        },
+        direct: false,
+        constant: false,
+    })
+}
+
 /// What other models have.
-fn refuse_others(arguments: &FitArguments) -> Result<(), Failure> {
+fn refuse_others(arguments: &FitArguments, is_arx: bool) -> Result<(), Failure> {
     let (model, search, criterion) = (&arguments.model, &arguments.search, &arguments.criterion);
     let searches = arguments.states.refine.is_some();
     match search::given(search) {
@@ -167,8 +241,8 @@ fn refuse_others(arguments: &FitArguments) -> Result<(), Failure> {
         _ => {}
     }
     let given = [
-        ("--na", model.na.is_some()),
-        ("--nb", !matches!(&*model.nb, []) && !matches!(&*model.nb, [nb] if nb.trim() == "0")),
+        ("--na", !is_arx && model.na.is_some()),
+        ("--nb", !is_arx && !matches!(&*model.nb, []) && !matches!(&*model.nb, [nb] if nb.trim() == "0")),
         ("--nc", model.nc.is_some()),
         ("--nd", model.nd.is_some()),
         ("--nf", !model.nf.is_empty()),
@@ -191,7 +265,7 @@ fn refuse_others(arguments: &FitArguments) -> Result<(), Failure> {
     ];
     match given.iter().find(|(_, given)| *given) {
         Some((option, _)) => Err(Failure::usage(format!(
-            "{option} is not for models in state space (--model ss, or several outputs); leave it out"
+            "{option} is not for models in state space and of several outputs; leave it out"
         ))),
         None => Ok(()),
     }

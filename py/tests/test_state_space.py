@@ -163,14 +163,19 @@ def test_a_filter_and_a_frame_take_it() -> None:
     assert th.ss(one, 2).output == "hot"
 
 
-def test_refined_models_have_standard_errors(motor):
-    plain = th.ss(motor, 2)
-    assert plain.dc_gain("u", output="speed")[1] is None
+def test_refined_models_have_standard_errors() -> None:
+    data = log()
+    assert np.isnan(th.ss(data, 2).dc_gain("u1", output="y1")[1])
+    truth = H @ np.linalg.solve(np.eye(2) - F, G)
     for refine in ("prediction", "simulation"):
-        model = th.ss(motor, 2, refine=refine, max_iterations=50, tolerance=1e-9)
-        gain, error = model.dc_gain("u", output="speed")
-        assert 0 < error < 0.01 * gain
-        step = model.step_response(output="speed")
-        assert np.all(np.asarray(step.standard_error)[1:] > 0)
+        model = th.ss(data, 2, refine=refine, max_iterations=50, tolerance=1e-9)
+        for output in range(2):
+            for source in range(2):
+                gain, error = model.dc_gain(source, output=output)
+                assert 0 < error < 0.1
+                assert abs(gain - truth[output, source]) < 4 * error
+        step = model.step_response("u2", output="y2")
+        assert np.all(step.standard_errors[1:] > 0)
+        assert np.all(model.frequency_response([0.1, 1.0], output="y1").magnitude_errors > 0)
     with pytest.raises(ValueError, match="refine"):
-        th.ss(motor, 2, refine="both")
+        th.ss(data, 2, refine="both")

@@ -1,8 +1,8 @@
 //! What a fit of a state-space model found, as a table for people.
 
-use thetahat::estimate::{Procedure, RefinementOutcome, SubspaceOutcome};
+use thetahat::estimate::{Coupling, Procedure, RefinementOutcome, SubspaceOutcome, VectorArxOutcome};
 use thetahat::figures::{fixed, number, short, three};
-use thetahat::model::StateSpaceModel;
+use thetahat::model::{Quantity, StateSpaceModel};
 use thetahat::report::Report;
 use thetahat::text::harmless;
 
@@ -14,6 +14,7 @@ const NO_PREDICTOR: &str = "no model of this order has a stable predictor";
 const NO_TIME: &str = "no time constant goes with a pole on or outside of the unit circle, or at 0";
 const NO_ERROR: &str = "no time constant goes with a pole on or outside of the unit circle, or at 0; no standard error with poles that \
                          are too close for one";
+const NOT_COUPLED: &str = "without coupling an output does not depend on the past of others";
 const INTEGRATES: &str = "the model integrates";
 const NO_NOISE: &str = "nothing is left of an output";
 
@@ -21,7 +22,10 @@ const NO_NOISE: &str = "nothing is left of an output";
 pub(super) fn table(report: &Report, model: &StateSpaceModel, width: usize) -> String {
     let mut text = Text::new(width);
     text.line(&format!("{}, sample time {} s", report.model.name(), short(model.sample_time)));
-    text.line("x(t+1) = F x + G u + K e, y = H x + D u + e");
+    text.line(match &report.estimation.procedure {
+        Procedure::VectorArx(_) => "A(q) y = B(q) u + e, as x(t+1) = F x + G u + K e, y = H x + D u + e",
+        _ => "x(t+1) = F x + G u + K e, y = H x + D u + e",
+    });
     let signals = model.inputs.iter().map(|input| signal("input", input));
     let outputs = model.outputs.iter().map(|output| signal("output", output));
     text.line(&signals.chain(outputs).collect::<Vec<String>>().join(", "));
@@ -37,6 +41,11 @@ pub(super) fn table(report: &Report, model: &StateSpaceModel, width: usize) -> S
         }
         text.line("");
         states(&mut text, outcome, model.order());
+    }
+    if let Procedure::VectorArx(outcome) = &estimation.procedure {
+        text.line(&orders(outcome));
+        text.line("");
+        coefficients(&mut text, outcome, model);
     }
     text.line(&format!("{} samples, {} free parameters", estimation.samples, model.free_parameters));
     text.line(&criteria(&estimation.criteria));
@@ -61,6 +70,44 @@ fn found(outcome: &SubspaceOutcome) -> String {
     let method = outcome.weighting.to_string().to_uppercase();
     let levels = if outcome.constant { "; levels of the outputs estimated with the matrices" } else { "" };
     format!("subspace method {method}, a past of {} samples; {feedthrough}{levels}", outcome.past)
+}
+
+/// The orders of an ARX model, and among how many models it was chosen.
+fn orders(outcome: &VectorArxOutcome) -> String {
+    let VectorArxOutcome { na, nb, nk, coupling, constant, tried, .. } = outcome;
+    let list = |numbers: &[usize]| numbers.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
+    let inputs = if nb.is_empty() { String::new() } else { format!(", nb {}, nk {}", list(nb), list(nk)) };
+    let coupling = match coupling {
+        Coupling::Full => "A full",
+        Coupling::None => "A diagonal",
+    };
+    let levels = if *constant { "; levels of the outputs estimated with the coefficients" } else { "" };
+    let chosen =
+        if tried.is_empty() { String::new() } else { format!("; the least MDL of {} models", tried.len()) };
+    format!("least squares, na {na}{inputs}, {coupling}{levels}{chosen}")
+}
+
+/// A row for each coefficient, a column for the equation of each output.
+fn coefficients(text: &mut Text, outcome: &VectorArxOutcome, model: &StateSpaceModel) {
+    let head: Vec<String> = std::iter::once("coefficient".to_owned())
+        .chain(model.outputs.iter().map(|output| format!("equation of {}", harmless(&output.name))))
+        .collect();
+    let head: Vec<&str> = head.iter().map(String::as_str).collect();
+    let mut table = columns(&head).none(NOT_COUPLED);
+    let shown = |value: &Quantity| or_dash(value.standard_error.map(|_| *value), quantity);
+    for (lag, rows) in (1..).zip(&outcome.a) {
+        for (place, output) in model.outputs.iter().enumerate() {
+            let name = format!("A{lag} {}", harmless(&output.name));
+            table.row(std::iter::once(name).chain(rows.iter().map(|row| shown(&row[place]))));
+        }
+    }
+    for ((input, lags), first) in model.inputs.iter().zip(&outcome.b).zip(&outcome.nk) {
+        for (lag, values) in (*first..).zip(lags) {
+            let name = format!("B{lag} {}", harmless(&input.name));
+            table.row(std::iter::once(name).chain(values.iter().map(shown)));
+        }
+    }
+    text.table(table);
 }
 
 /// The singular values, and the order's choice.

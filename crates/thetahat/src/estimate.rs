@@ -11,7 +11,8 @@
 //!   [`Constant`] says whether the level of the output is estimated too.
 //! - [`Procedure`] says how an estimate was found: by a [`Solver`], or with a [`SearchOutcome`] ([`StartOutcome`]),
 //!   [`ConvexOutcome`], [`RobustOutcome`], [`LikelihoodOutcome`],
-//!   [`EquationsOutcome`], [`SubspaceOutcome`] (with a [`RefinementOutcome`] where it was followed by a search for what [`Refine`] says) or [`MapsOutcome`] (for each output a [`TermsOutcome`]: a path of [`TermStep`]s with their [`RunFigures`]).
+//!   [`EquationsOutcome`], [`SubspaceOutcome`] (with a [`RefinementOutcome`] where it was followed by a search for what [`Refine`] says), [`VectorArxOutcome`]
+//!   (of [`VectorArxOptions`] with [`VectorArxInputs`] and a [`Coupling`]; a [`VectorArxScore`] for each model) or [`MapsOutcome`] (for each output a [`TermsOutcome`]: a path of [`TermStep`]s with their [`RunFigures`]).
 //! - [`Criteria`] are the values of each [`InformationCriterion`].
 //!
 //! The methods and their sources are at [`Method`]; the theory is that of Ljung, System Identification, 2nd ed. 1999, chapters 7
@@ -57,6 +58,7 @@ mod subspace;
 #[cfg(test)]
 mod tests;
 mod uncertainty;
+mod vector_arx;
 
 use std::ops::ControlFlow;
 
@@ -97,6 +99,8 @@ pub(crate) use stretches::stretches;
 pub use subspace::{OrderScore, Subspace, SubspaceOptions, SubspaceOutcome, Weighting, subspace};
 pub(crate) use subspace::{best as best_order, products_of_innovations};
 pub(crate) use uncertainty::{Autoregression, autoregression, backward_filtered_products};
+pub(crate) use vector_arx::vector_arx;
+pub use vector_arx::{Coupling, VectorArxInputs, VectorArxOptions, VectorArxOutcome, VectorArxScore};
 
 /// How an estimate was found.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -151,6 +155,8 @@ pub enum Procedure {
     FrequencyResponse(ProcessOutcome),
     /// By a subspace method: the states first, then the matrices.
     Subspace(SubspaceOutcome),
+    /// Of several outputs at once, by least squares: A(q) y = B(q) u + e with matrices for coefficients.
+    VectorArx(VectorArxOutcome),
 }
 
 impl Procedure {
@@ -462,7 +468,8 @@ impl Estimate {
             | Procedure::Training(_)
             | Procedure::FreeRun(_)
             | Procedure::FrequencyResponse(_)
-            | Procedure::Subspace(_) => None,
+            | Procedure::Subspace(_)
+            | Procedure::VectorArx(_) => None,
             Procedure::InstrumentalVariables { .. } | Procedure::RefinedInstrumentalVariables { .. } => {
                 self.covariance
             }

@@ -1,10 +1,10 @@
 //! State-space models of any number of outputs by a subspace method.
 
 mod innovations;
+mod lagged_products;
 mod riccati;
 #[cfg(test)]
 pub(super) mod tests;
-mod vector_arx;
 mod weighting;
 
 use std::ops::RangeInclusive;
@@ -21,7 +21,8 @@ use crate::data::JointRecord;
 use crate::model::{StateSpace, is_stable};
 use crate::optimize::normal;
 pub(crate) use innovations::products as products_of_innovations;
-use vector_arx::{ROUNDING, VectorArx, divided, log_determinant};
+use lagged_products::ROUNDING;
+pub(super) use lagged_products::{Factor, LaggedProducts, divided, log_determinant};
 use weighting::Weighted;
 pub use weighting::Weighting;
 
@@ -188,11 +189,11 @@ pub fn subspace(record: &JointRecord<'_>, options: &SubspaceOptions) -> Result<S
     let past = options.past.map_or_else(|| longest_past(record), Ok)?;
     enough(record, past, None)?;
     let constant = options.constant;
-    let mut regression = VectorArx::new(record, past, constant).ok_or_else(|| silent(record, past))?;
+    let mut regression = LaggedProducts::new(record, past, constant).ok_or_else(|| silent(record, past))?;
     if options.past.is_none() {
         let past = regression.akaike(options.feedthrough != Some(false));
         if past < regression.past {
-            regression = VectorArx::new(record, past, constant).ok_or_else(|| silent(record, past))?;
+            regression = LaggedProducts::new(record, past, constant).ok_or_else(|| silent(record, past))?;
         }
     }
     let future = options.future.unwrap_or(regression.past);
@@ -248,7 +249,7 @@ fn enough(record: &JointRecord<'_>, past: usize, future: Option<usize>) -> Resul
 }
 
 /// Which signal has no products.
-fn silent(record: &JointRecord<'_>, past: usize) -> Error {
+pub(super) fn silent(record: &JointRecord<'_>, past: usize) -> Error {
     let is_silent = |signal: &&[f64]| {
         let used = record.segments.iter().filter(|segment| segment.len() > past);
         let largest = used
@@ -274,12 +275,12 @@ fn silent(record: &JointRecord<'_>, past: usize) -> Error {
 impl Subspace {
     fn new(
         record: &JointRecord<'_>,
-        regression: &VectorArx,
+        regression: &LaggedProducts,
         weighting: Weighting,
         future: usize,
         feedthrough: bool,
     ) -> Result<Self, Error> {
-        let VectorArx { inputs, outputs, past, .. } = *regression;
+        let LaggedProducts { inputs, outputs, past, .. } = *regression;
         let width = regression.width();
         let future = future.min(weighting.longest_future(past));
         let Weighted { map, factor } = weighting.weighted(record, regression, future, feedthrough)?;

@@ -563,6 +563,9 @@ fn of_state_space(report: &Report, model: &StateSpaceModel) -> Vec<Section> {
     sections.push(section);
     let mut section = Section::new("Model");
     section.table(tables::signals_and_gains(model));
+    if let Procedure::VectorArx(outcome) = &report.estimation.procedure {
+        section.table(tables::matrix_coefficients(outcome, model));
+    }
     section.table(tables::noise_of_outputs(model));
     section.table(tables::estimation(&report.estimation, None));
     sections.push(section);

@@ -1,5 +1,6 @@
 //! Fits of state-space models.
 
+mod estimated;
 #[cfg(test)]
 mod tests;
 mod warnings;
@@ -9,12 +10,8 @@ use std::ops::{ControlFlow, RangeInclusive};
 use super::evaluate::evaluate;
 use super::schema::{Estimation, Report};
 use super::shares::Shares;
-use crate::data::{Detrend, JointRecord, Log, Offset, Rows, Source, Split};
-use crate::estimate::{
-    Constant, Criteria, Initial, OrderScore, Procedure, Refine, Refinement, RefinementOutcome,
-    RefinementStart, Subspace, SubspaceOptions, SubspaceOutcome, Weighting, best_order,
-    products_of_innovations, refined, subspace,
-};
+use crate::data::{Detrend, Log, Offset, Rows, Source, Split};
+use crate::estimate::{Constant, Criteria, Initial, Refine, SubspaceOptions, VectorArxOptions};
 use crate::model::{Model, Quantity, Signal, StateSpaceModel};
 use crate::optimize::{Monitor, Search};
 use crate::regression::SAFE_NORMS;
@@ -22,9 +19,7 @@ use crate::respond::state_space::StateSpaceOnLog;
 use crate::select::Focus;
 use crate::validate::Part;
 use crate::{Document, Error};
-
-/// Singular values that a report keeps.
-const MOST_VALUES: usize = 40;
+use estimated::Estimated;
 
 /// Which state-space model to fit, and to which part of a log.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,6 +48,9 @@ pub struct StateSpacePlan {
     pub constant: Constant,
     /// For each input the samples that it waits before the plant sees it; none: they do not wait.
     pub delays: Vec<usize>,
+    /// An ARX model in the place of one of a subspace method, whose options then do not count; [`constant`](Self::constant) decides on
+    /// its constant.
+    pub arx: Option<VectorArxOptions>,
     /// Whose errors a search makes small, from the model of the subspace method and from that of another weighting; none: there is no
     /// search. With it poles, gains and responses have standard errors.
     pub refine: Option<Refine>,
@@ -83,6 +81,7 @@ impl StateSpacePlan {
             subspace: SubspaceOptions::default(),
             constant: Constant::Auto,
             delays: Vec::new(),
+            arx: None,
             refine: None,
             search: Search::default(),
         }
@@ -121,6 +120,9 @@ impl StateSpacePlan {
             ));
         }
         self.search.check_numbers()?;
+        if self.arx.is_some() && self.refine.is_some() {
+            return Err(Error::argument("refine", "an ARX model is its own least errors; leave it out"));
+        }
         if self.inputs.is_empty() && self.subspace.feedthrough == Some(true) {
             return Err(Error::argument("feedthrough", "without inputs there is none; leave it out"));
         }
@@ -151,6 +153,8 @@ impl StateSpacePlan {
 ///
 /// with any number of inputs and outputs by a subspace method: see [`subspace`]. The order is that of least MDL, or given. Segments without a
 /// missing value are each used from their first sample on, and predictions and free runs start each from the state that explains it best.
+///
+/// With [`arx`](StateSpacePlan::arx) the model is an ARX model with a matrix polynomial A(q), by least squares.
 ///
 /// With [`refine`](StateSpacePlan::refine) a search follows for the model of the least ln det cov e, whose e are errors one step ahead or those
 /// of the free run; all entries of the matrices move but along changes of coordinates, and poles, gains and responses have standard errors.
@@ -250,57 +254,22 @@ pub fn fit_state_space_monitored(
     let given =
         plan.detrend == Detrend::None || plan.offsets.iter().any(|(name, _)| plan.outputs.contains(name));
     let constant = if plan.constant == Constant::Auto && given { Constant::No } else { plan.constant };
-    let with = |constant: bool| Found::new(&record, plan, constant);
-    let Found { subspace: found, order, scores, .. } = match constant {
-        Constant::No => with(false)?,
-        Constant::Yes => with(true)?,
-        Constant::Auto => {
-            let plain = with(false)?;
-            // What has no level, as an integrator, is fitted without.
-            with(true).ok().filter(|other| other.mdl < plain.mdl).unwrap_or(plain)
-        }
+    let found = match &plan.arx {
+        Some(arx) => estimated::by_arx(&record, (arx, &delays), constant, log)?,
+        None => estimated::by_subspace(&record, plan, constant, (log, monitor))?,
     };
-    let mut levels = found.levels(order).ok_or_else(|| {
-        Error::undetermined(
-            Vec::new(),
-            "outputs that integrate have no level: leave the constant out (`constant` no)",
-        )
-    })?;
-    let mut matrices = found.state_space(order, log.sample_time())?;
-    let samples = record.segments.iter().map(std::ops::Range::len).sum::<usize>();
-    let free = found.free_parameters(order);
-    let degrees = samples.checked_sub(free.div_ceil(outputs.len())).filter(|degrees| *degrees > 0);
-    let Some(degrees) = degrees else {
-        return Err(Error::undetermined(
-            Vec::new(),
-            format!(
-                "a model of order {order} has {free} free parameters, and {samples} samples of {} outputs are too few for them; give \
-                 more rows, or ask for a lower order",
-                outputs.len()
-            ),
-        ));
-    };
-    let (mut covariance, mut refinement) = (None, None);
-    if let Some(refine) = plan.refine {
-        let start = RefinementStart { name: found.weighting().to_string(), model: matrices, levels };
-        let starts: Vec<RefinementStart> =
-            std::iter::once(start).chain(other_start(&record, &found, order, log)).collect();
-        let what = Refinement {
-            refine,
-            feedthrough: found.feedthrough(),
-            constant: found.has_constant(),
-            degrees_of_freedom: degrees,
-        };
-        let found = refined(&record, &starts, what, &plan.search, monitor)?;
-        refinement = Some(RefinementOutcome { errors: refine, search: found.search });
-        (matrices, levels, covariance) = (found.model, found.levels, found.covariance);
-    }
-    let products = products_of_innovations(&matrices, &record, &levels)
-        .ok_or_else(|| Error::data("the errors one step ahead leave the range of numbers"))?;
-    let mean = &products / samples as f64;
-    matrices.noise_covariance = &products / degrees as f64;
-    // A covariance is symmetric to the bit.
-    matrices.noise_covariance.fill_lower_triangle_with_upper_triangle();
+    let Estimated {
+        matrices,
+        levels,
+        covariance,
+        procedure,
+        free,
+        degrees,
+        samples,
+        mean,
+        has_levels,
+        offered,
+    } = found;
     for (output, level) in outputs.iter_mut().zip(&levels) {
         output.offset.level += level;
     }
@@ -313,19 +282,9 @@ pub fn fit_state_space_monitored(
     let segments = segments.iter().map(Rows::from_positions).collect();
     let data = shares.into_data((log, sources), &names, plan.detrend.to_string(), segments)?;
     let estimation = Estimation {
-        procedure: Procedure::Subspace(SubspaceOutcome {
-            weighting: found.weighting(),
-            past: found.past(),
-            future: found.future(),
-            feedthrough: found.feedthrough(),
-            feedthrough_given: plan.subspace.feedthrough.is_some(),
-            constant: found.has_constant(),
-            singular_values: found.singular_values().iter().copied().take(MOST_VALUES).collect(),
-            orders: scores,
-            refinement,
-        }),
+        procedure,
         initial: Some(Initial::Estimate),
-        level: if let ([output], true) = (&*model.outputs, found.has_constant()) {
+        level: if let ([output], true) = (&*model.outputs, has_levels) {
             Some(Quantity::new(output.offset.level, None))
         } else {
             None
@@ -341,7 +300,7 @@ pub fn fit_state_space_monitored(
         generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
         data,
         selection: None,
-        warnings: warnings::of_fit(&model, &estimation, &found.orders()),
+        warnings: warnings::of_fit(&model, &estimation, &offered),
         model: Model::from(model.clone()),
         estimation,
         fit: Vec::new(),
@@ -356,55 +315,4 @@ pub fn fit_state_space_monitored(
         evaluate(&mut report, &on_log(&rows)?, part, Focus::Auto);
     }
     Ok(report)
-}
-
-/// A model of another weighting to start from: what is near the one minimum may be far from another. None where it has no such model.
-fn other_start(
-    record: &JointRecord<'_>,
-    found: &Subspace,
-    order: usize,
-    log: &Log,
-) -> Option<RefinementStart> {
-    let weighting = if found.weighting() == Weighting::Ssarx { Weighting::Cva } else { Weighting::Ssarx };
-    let options = SubspaceOptions {
-        weighting,
-        past: Some(found.past()),
-        future: None,
-        feedthrough: Some(found.feedthrough()),
-        constant: found.has_constant(),
-    };
-    let other = subspace(record, &options).ok()?;
-    let (model, levels) = (other.state_space(order, log.sample_time()).ok()?, other.levels(order)?);
-    Some(RefinementStart { name: weighting.to_string(), model, levels })
-}
-
-/// The states of a record, and the order that was given or chosen.
-struct Found {
-    subspace: Subspace,
-    order: usize,
-    /// What the order was chosen among; none if it was given.
-    scores: Vec<OrderScore>,
-    /// That of the order.
-    mdl: f64,
-}
-
-impl Found {
-    fn new(record: &JointRecord<'_>, plan: &StateSpacePlan, constant: bool) -> Result<Self, Error> {
-        let subspace = subspace(record, &SubspaceOptions { constant, ..plan.subspace })?;
-        let (asked, highest) =
-            (plan.orders.clone().unwrap_or_else(|| subspace.orders()), subspace.highest_order());
-        let orders = *asked.start()..=(*asked.end()).min(highest);
-        if orders.is_empty() {
-            return Err(Error::argument(
-                "order",
-                format!("the data tell of orders up to {highest}; ask for one of these"),
-            ));
-        }
-        let given = asked.start() == asked.end();
-        let scores = subspace.scores(record, orders)?;
-        let order = if given { *asked.start() } else { best_order(&scores)? };
-        let own = scores.iter().find(|score| score.order == order).and_then(|score| score.mdl);
-        let mdl = own.unwrap_or(f64::INFINITY);
-        Ok(Self { subspace, order, scores: if given { Vec::new() } else { scores }, mdl })
-    }
 }

@@ -417,7 +417,7 @@ fn test_residuals(report: &Report, on_log: &dyn OnLog, plan: &ValidationPlan, va
         // The parameters of equations are none of the noise; those of functions are not of the model that the tests know.
         (InSample::No, _) | (_, Procedure::InnovationsLikelihood(_)) => Relation::Fresh,
         (_, Procedure::FreeRun(_) | Procedure::FrequencyResponse(_)) => Relation::Fresh,
-        (_, Procedure::Subspace(_)) => Relation::Fresh,
+        (_, Procedure::Subspace(_) | Procedure::VectorArx(_)) => Relation::Fresh,
         (_, procedure) if !procedure.terms().is_empty() => Relation::Fresh,
         (_, Procedure::InstrumentalVariables { .. }) => Relation::Instrumental,
         _ => Relation::Fitted,

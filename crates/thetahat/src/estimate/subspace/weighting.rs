@@ -10,7 +10,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::{Cholesky, DMatrix};
 
-use super::vector_arx::{Factor, ROUNDING, VectorArx, divided};
+use super::lagged_products::{Factor, LaggedProducts, ROUNDING, divided};
 use crate::Error;
 use crate::data::JointRecord;
 
@@ -105,7 +105,7 @@ impl Weighting {
     pub(super) fn weighted(
         self,
         record: &JointRecord<'_>,
-        regression: &VectorArx,
+        regression: &LaggedProducts,
         future: usize,
         feedthrough: bool,
     ) -> Result<Weighted, Error> {
@@ -168,8 +168,8 @@ pub(super) struct Weighted {
 
 impl Weighted {
     /// W Gamma K_p of SSARX: its rows are the coefficients of a long ARX model, moved by one lag each.
-    fn shifted(regression: &VectorArx, future: usize, feedthrough: bool) -> Option<Self> {
-        let VectorArx { outputs, past, .. } = *regression;
+    fn shifted(regression: &LaggedProducts, future: usize, feedthrough: bool) -> Option<Self> {
+        let LaggedProducts { outputs, past, .. } = *regression;
         let width = regression.width();
         let (coefficients, covariance) = regression.coefficients(feedthrough);
         let rounding = DMatrix::identity(outputs, outputs) * ROUNDING;
@@ -199,8 +199,8 @@ struct Projected {
 }
 
 impl Projected {
-    fn new(record: &JointRecord<'_>, regression: &VectorArx, future: usize) -> Self {
-        let VectorArx { inputs, past, .. } = *regression;
+    fn new(record: &JointRecord<'_>, regression: &LaggedProducts, future: usize) -> Self {
+        let LaggedProducts { inputs, past, .. } = *regression;
         let width = regression.width();
         let products = regression.longer(record, past + future - 1);
         // The latest sample of the future has lag 0.

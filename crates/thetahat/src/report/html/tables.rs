@@ -10,7 +10,9 @@ pub(super) use validation::{anderson, coverage, noise, tests, which};
 use super::page::Table;
 use super::text::{complex, or_dash, quantity, rows};
 use crate::data::{Rows, Source};
-use crate::estimate::{Criteria, InformationCriterion, Procedure, RefinementOutcome, TermsOutcome};
+use crate::estimate::{
+    Criteria, InformationCriterion, Procedure, RefinementOutcome, TermsOutcome, VectorArxOutcome,
+};
 use crate::figures::{chance, fixed, number, scientific, short, three};
 use crate::model::{
     EquationsModel, NonlinearArxModel, Orders, Parameter, PolynomialModel, ProcessModel, Quantity, Root,
@@ -382,6 +384,13 @@ fn procedure(procedure: &Procedure) -> String {
                 )
             )
         ),
+        Procedure::VectorArx(outcome) => format!(
+            "least squares of all outputs, ARX with na {}, nb {}, nk {}, coupling {}",
+            outcome.na,
+            list(&outcome.nb),
+            list(&outcome.nk),
+            outcome.coupling
+        ),
         Procedure::Neighbours(outcome) => each(&outcome.maps, |map| {
             let (kept, by) = (map.candidates, &map.selected_by);
             format!("{kept} samples kept, the number of neighbours by {by}")
@@ -399,6 +408,33 @@ fn procedure(procedure: &Procedure) -> String {
             format!("trained: {tried} tried, the one taken by {by}{how}")
         }),
     }
+}
+
+fn list(numbers: &[usize]) -> String {
+    numbers.iter().map(ToString::to_string).collect::<Vec<String>>().join(", ")
+}
+
+/// The coefficients of an ARX model with several outputs: a row for each equation and regressor.
+pub(super) fn matrix_coefficients(outcome: &VectorArxOutcome, model: &StateSpaceModel) -> Table {
+    let mut table = Table::new("Coefficients", &["equation of", "coefficient", "value", "standard error"]);
+    for (place, output) in model.outputs.iter().enumerate() {
+        let mut add = |of: String, value: &Quantity| {
+            if let Some(error) = value.standard_error {
+                table.row([output.name.clone(), of, number(value.value), three(error)]);
+            }
+        };
+        for (lag, rows) in (1..).zip(&outcome.a) {
+            for (other, value) in model.outputs.iter().zip(&rows[place]) {
+                add(format!("A{lag}, {}", other.name), value);
+            }
+        }
+        for ((input, coefficients), first) in model.inputs.iter().zip(&outcome.b).zip(&outcome.nk) {
+            for (lag, values) in (*first..).zip(coefficients) {
+                add(format!("B{lag}, {}", input.name), &values[place]);
+            }
+        }
+    }
+    table
 }
 
 /// What is said of the map of each output.

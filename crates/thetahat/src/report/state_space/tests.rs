@@ -1,3 +1,4 @@
+use crate::estimate::Procedure;
 use super::*;
 use crate::data::Channel;
 use crate::regression::noise::Noise;

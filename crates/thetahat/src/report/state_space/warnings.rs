@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use crate::estimate::{Procedure, RefinementOutcome, SubspaceOutcome};
+use crate::estimate::{Procedure, RefinementOutcome, SubspaceOutcome, VectorArxOutcome, VectorArxScore};
 use crate::figures::fixed;
 use crate::model::StateSpaceModel;
 use crate::optimize::Stopped;
@@ -21,18 +21,50 @@ pub(super) fn of_fit(
     offered: &RangeInclusive<usize>,
 ) -> Vec<String> {
     let mut warnings = Vec::new();
-    let Procedure::Subspace(SubspaceOutcome { orders, refinement, .. }) = &estimation.procedure else {
-        return warnings;
-    };
-    let (order, outputs) = (model.order(), model.outputs.len());
+    let outputs = model.outputs.len();
     let values = estimation.samples * outputs;
     if values < VALUES_A_PARAMETER * model.free_parameters {
         warnings.push(format!(
-            "order {order} has {} free parameters, and there are {values} values of the outputs: they say little of it; give more rows, or \
-             ask for a lower order",
+            "the model has {} free parameters, and there are {values} values of the outputs: they say little of it; give more rows, or \
+             ask for lower orders",
             model.free_parameters
         ));
     }
+    match &estimation.procedure {
+        Procedure::Subspace(outcome) => of_subspace(&mut warnings, model, outcome, offered),
+        Procedure::VectorArx(outcome) => of_arx(&mut warnings, outcome),
+        _ => {}
+    }
+    let noise = &model.noise_covariance;
+    for (second, output) in model.outputs.iter().enumerate() {
+        let same = |first: &usize| {
+            let product = noise[*first][*first] * noise[second][second];
+            product > 0.0 && noise[*first][second].powi(2) > (1.0 - TOGETHER) * product
+        };
+        if let Some(first) = (0..second).find(same) {
+            warnings.push(format!(
+                "'{}' is known from '{}': their errors are the same but for a factor; leave one out",
+                output.name, model.outputs[first].name
+            ));
+        }
+    }
+    if !model.stable {
+        let largest = model.poles.first().map_or(1.0, |pole| pole.re.hypot(pole.im));
+        warnings.push(format!(
+            "the model is unstable, its largest pole has modulus {}: free runs and responses grow without bound",
+            fixed(largest, 4)
+        ));
+    }
+    warnings
+}
+
+fn of_subspace(
+    warnings: &mut Vec<String>,
+    model: &StateSpaceModel,
+    SubspaceOutcome { orders, refinement, .. }: &SubspaceOutcome,
+    offered: &RangeInclusive<usize>,
+) {
+    let order = model.order();
     if let (Some(last), Some(first)) = (orders.last(), orders.first()) {
         if order == last.order && last.order > first.order && last.order < *offered.end() {
             warnings.push(format!(
@@ -70,25 +102,20 @@ pub(super) fn of_fit(
             );
         }
     }
-    let noise = &model.noise_covariance;
-    for (second, output) in model.outputs.iter().enumerate() {
-        let same = |first: &usize| {
-            let product = noise[*first][*first] * noise[second][second];
-            product > 0.0 && noise[*first][second].powi(2) > (1.0 - TOGETHER) * product
-        };
-        if let Some(first) = (0..second).find(same) {
+}
+
+fn of_arx(warnings: &mut Vec<String>, outcome: &VectorArxOutcome) {
+    let VectorArxOutcome { na, nb, tried, .. } = outcome;
+    let most = |of: fn(&VectorArxScore) -> usize| tried.iter().map(of).max().unwrap_or(0);
+    let least = |of: fn(&VectorArxScore) -> usize| tried.iter().map(of).min().unwrap_or(0);
+    let past: fn(&VectorArxScore) -> usize = |score| score.na;
+    let of_inputs: fn(&VectorArxScore) -> usize = |score| score.nb.iter().copied().max().unwrap_or(0);
+    let own = [("na", *na, past), ("nb", nb.iter().copied().max().unwrap_or(0), of_inputs)];
+    for (name, value, of) in own {
+        if value == most(of) && most(of) > least(of) {
             warnings.push(format!(
-                "'{}' is known from '{}': their errors are the same but for a factor; leave one out",
-                output.name, model.outputs[first].name
+                "`{name}` {value}, which fits best, is the highest of the range: a higher one may fit better; widen the range"
             ));
         }
     }
-    if !model.stable {
-        let largest = model.poles.first().map_or(1.0, |pole| pole.re.hypot(pole.im));
-        warnings.push(format!(
-            "the model is unstable, its largest pole has modulus {}: free runs and responses grow without bound",
-            fixed(largest, 4)
-        ));
-    }
-    warnings
 }

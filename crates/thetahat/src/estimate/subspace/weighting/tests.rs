@@ -113,7 +113,7 @@ fn the_hair_dryer_has_the_values_of_slicot() {
 
     // The poles by the shift of Gamma, which are not ours, are those of the same program: the vectors are right too.
     let record = JointRecord::new(vec![&channels[0]], vec![&channels[1]]).unwrap();
-    let regression = VectorArx::new(&record, 15, false).unwrap();
+    let regression = LaggedProducts::new(&record, 15, false).unwrap();
     let Weighted { map, factor } = Weighting::Moesp.weighted(&record, &regression, 15, false).unwrap();
     let weighted = map * factor;
     let (rows, columns) = weighted.shape();

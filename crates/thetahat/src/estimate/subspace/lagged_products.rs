@@ -1,4 +1,4 @@
-//! Vector ARX models of all lengths from one Gram matrix.
+//! The lagged products of all signals of a record, and the vector ARX models of all lengths that they hold.
 
 use std::ops::Range;
 
@@ -17,25 +17,25 @@ pub(super) const ROUNDING: f64 = 1e-13;
 /// Cholesky factor of them, with y(t) last, holds the sums of squares of all these p at once: what the columns beyond those of p and the
 /// diagonal block leave of y.
 #[derive(Debug)]
-pub(super) struct VectorArx {
-    pub(super) inputs: usize,
-    pub(super) outputs: usize,
+pub(in crate::estimate) struct LaggedProducts {
+    pub(in crate::estimate) inputs: usize,
+    pub(in crate::estimate) outputs: usize,
     /// The largest p.
     pub(super) past: usize,
     /// The samples that the products are sums of.
-    pub(super) samples: usize,
+    pub(in crate::estimate) samples: usize,
     /// The products of z(t), …, z(t-p), lag by lag, over the number of samples; with a constant in the regression those of the deviations
     /// from their means.
-    pub(super) products: DMatrix<f64>,
+    pub(in crate::estimate) products: DMatrix<f64>,
     /// These means, where there is a constant.
-    pub(super) means: Option<DVector<f64>>,
+    pub(in crate::estimate) means: Option<DVector<f64>>,
     /// The root mean squares of u and y.
-    pub(super) scales: Vec<f64>,
+    pub(in crate::estimate) scales: Vec<f64>,
 }
 
 /// A Cholesky factor of some lagged signals, in which dependent ones are left out.
 #[derive(Debug)]
-pub(super) struct Factor {
+pub(in crate::estimate) struct Factor {
     /// L, row by row.
     entries: Vec<f64>,
     size: usize,
@@ -43,7 +43,7 @@ pub(super) struct Factor {
 
 impl Factor {
     /// L of the products of the signals at these places.
-    pub(super) fn new(products: &DMatrix<f64>, places: &[usize]) -> Self {
+    pub(in crate::estimate) fn new(products: &DMatrix<f64>, places: &[usize]) -> Self {
         let size = places.len();
         let mut entries = vec![0.0; size * size];
         for (row, entries) in entries.chunks_exact_mut(size).enumerate() {
@@ -62,7 +62,7 @@ impl Factor {
     }
 
     /// Some rows and columns of L.
-    pub(super) fn block(&self, rows: Range<usize>, columns: Range<usize>) -> DMatrix<f64> {
+    pub(in crate::estimate) fn block(&self, rows: Range<usize>, columns: Range<usize>) -> DMatrix<f64> {
         DMatrix::from_fn(rows.len(), columns.len(), |i, j| {
             let (row, column) = (rows.start + i, columns.start + j);
             if column > row { 0.0 } else { self.entry(row, column) }
@@ -80,7 +80,7 @@ impl Factor {
 }
 
 /// ln det of a covariance of signals of unit variance, as far as rounding lets it be seen.
-pub(super) fn log_determinant(covariance: &DMatrix<f64>) -> f64 {
+pub(in crate::estimate) fn log_determinant(covariance: &DMatrix<f64>) -> f64 {
     let size = covariance.nrows();
     let seen = covariance + DMatrix::identity(size, size) * ROUNDING;
     Cholesky::new(seen)
@@ -88,7 +88,7 @@ pub(super) fn log_determinant(covariance: &DMatrix<f64>) -> f64 {
 }
 
 /// X of X L = right for a lower triangular L, zero in the columns where L is.
-pub(super) fn divided(mut right: DMatrix<f64>, factor: &DMatrix<f64>) -> DMatrix<f64> {
+pub(in crate::estimate) fn divided(mut right: DMatrix<f64>, factor: &DMatrix<f64>) -> DMatrix<f64> {
     for column in (0..factor.ncols()).rev() {
         let (mut own, later) = right.columns_range_pair_mut(column, column + 1..);
         own.gemv(-1.0, &later, &factor.view_range(column + 1.., column), 1.0);
@@ -143,9 +143,9 @@ fn rescaled(mut products: DMatrix<f64>, scales: &[f64]) -> DMatrix<f64> {
     products
 }
 
-impl VectorArx {
+impl LaggedProducts {
     /// None where a signal is zero at all of these samples, or its squares leave the range of numbers.
-    pub(super) fn new(record: &JointRecord<'_>, past: usize, constant: bool) -> Option<Self> {
+    pub(in crate::estimate) fn new(record: &JointRecord<'_>, past: usize, constant: bool) -> Option<Self> {
         let (products, samples, means) = mean_products(record, past, constant);
         let (inputs, outputs) = (record.inputs.len(), record.outputs.len());
         let scales: Vec<f64> =
@@ -166,7 +166,7 @@ impl VectorArx {
         rescaled(mean_products(record, longest, self.means.is_some()).0, &self.scales)
     }
 
-    pub(super) fn width(&self) -> usize {
+    pub(in crate::estimate) fn width(&self) -> usize {
         self.inputs + self.outputs
     }
 

@@ -1,0 +1,218 @@
+//! Matrices from a record: by a subspace method, with a search behind it, or as an ARX model.
+
+use std::ops::RangeInclusive;
+
+use thetahat_core::nalgebra::DMatrix;
+
+use super::StateSpacePlan;
+use crate::Error;
+use crate::data::{JointRecord, Log};
+use crate::estimate::{
+    Constant, OrderScore, Procedure, Refinement, RefinementOutcome, RefinementStart, Subspace,
+    SubspaceOptions, SubspaceOutcome, VectorArxOptions, Weighting, best_order, products_of_innovations,
+    refined, subspace, vector_arx,
+};
+use crate::model::{EntryCovariance, StateSpace};
+use crate::optimize::Monitor;
+
+/// Singular values that a report keeps.
+const MOST_VALUES: usize = 40;
+
+/// What was estimated from a record.
+pub(super) struct Estimated {
+    pub(super) matrices: StateSpace,
+    pub(super) levels: Vec<f64>,
+    /// Whether these were estimated.
+    pub(super) has_levels: bool,
+    pub(super) covariance: Option<EntryCovariance>,
+    pub(super) procedure: Procedure,
+    /// The free parameters, and the degrees of freedom of the errors.
+    pub(super) free: usize,
+    pub(super) degrees: usize,
+    /// The samples that have errors, and the mean products of these.
+    pub(super) samples: usize,
+    pub(super) mean: DMatrix<f64>,
+    /// The orders that the data offered to choose among.
+    pub(super) offered: RangeInclusive<usize>,
+}
+
+/// What has the least MDL, with levels or without; what has no level, as an integrator, is fitted without.
+fn with_levels<T>(
+    constant: Constant,
+    find: impl Fn(bool) -> Result<T, Error>,
+    mdl: impl Fn(&T) -> f64,
+) -> Result<T, Error> {
+    match constant {
+        Constant::No => find(false),
+        Constant::Yes => find(true),
+        Constant::Auto => {
+            let plain = find(false)?;
+            Ok(find(true).ok().filter(|other| mdl(other) < mdl(&plain)).unwrap_or(plain))
+        }
+    }
+}
+
+/// N - p/l.
+fn degrees(what: &str, free: usize, samples: usize, outputs: usize) -> Result<usize, Error> {
+    let degrees = samples.checked_sub(free.div_ceil(outputs)).filter(|degrees| *degrees > 0);
+    degrees.ok_or_else(|| {
+        Error::undetermined(
+            Vec::new(),
+            format!(
+                "{what} has {free} free parameters, and {samples} samples of {outputs} outputs are too few for them; give more rows, or \
+                 ask for a lower order"
+            ),
+        )
+    })
+}
+
+/// The model with errors of this mean square.
+fn with_noise(matrices: StateSpace, mean: &DMatrix<f64>, samples: usize, degrees: usize) -> StateSpace {
+    let mut noise_covariance = mean * (samples as f64 / degrees as f64);
+    // A covariance is symmetric to the bit.
+    noise_covariance.fill_lower_triangle_with_upper_triangle();
+    StateSpace { noise_covariance, ..matrices }
+}
+
+fn integrates() -> Error {
+    Error::undetermined(
+        Vec::new(),
+        "outputs that integrate have no level: leave the constant out (`constant` no)",
+    )
+}
+
+/// An ARX model with several outputs.
+pub(super) fn by_arx(
+    record: &JointRecord<'_>,
+    (options, delays): (&VectorArxOptions, &[usize]),
+    constant: Constant,
+    log: &Log,
+) -> Result<Estimated, Error> {
+    let find = |constant: bool| {
+        let found = vector_arx(record, &VectorArxOptions { constant, ..options.clone() }, log.sample_time())?;
+        if found.levels.iter().all(|level| level.is_finite()) { Ok(found) } else { Err(integrates()) }
+    };
+    let mut found = with_levels(constant, find, |found| found.mdl)?;
+    found.outcome.nk.iter_mut().zip(delays).for_each(|(nk, delay)| *nk += delay);
+    let (samples, mean) = (found.samples, found.space.noise_covariance.clone());
+    let degrees = degrees("the model", found.free_parameters, samples, record.outputs.len())?;
+    Ok(Estimated {
+        matrices: with_noise(found.space, &mean, samples, degrees),
+        levels: found.levels,
+        has_levels: found.outcome.constant,
+        covariance: Some(found.covariance),
+        procedure: Procedure::VectorArx(found.outcome),
+        free: found.free_parameters,
+        degrees,
+        samples,
+        mean,
+        offered: 0..=0,
+    })
+}
+
+/// The states of a record, and a search from there if one is asked for.
+pub(super) fn by_subspace(
+    record: &JointRecord<'_>,
+    plan: &StateSpacePlan,
+    constant: Constant,
+    (log, monitor): (&Log, Monitor<'_>),
+) -> Result<Estimated, Error> {
+    let Found { subspace: found, order, scores, .. } =
+        with_levels(constant, |constant| Found::new(record, plan, constant), |found| found.mdl)?;
+    let mut levels = found.levels(order).ok_or_else(integrates)?;
+    let mut matrices = found.state_space(order, log.sample_time())?;
+    let samples = record.segments.iter().map(std::ops::Range::len).sum::<usize>();
+    let free = found.free_parameters(order);
+    let degrees = degrees(&format!("a model of order {order}"), free, samples, record.outputs.len())?;
+    let (mut covariance, mut refinement) = (None, None);
+    if let Some(refine) = plan.refine {
+        let start = RefinementStart { name: found.weighting().to_string(), model: matrices, levels };
+        let starts: Vec<RefinementStart> =
+            std::iter::once(start).chain(other_start(record, &found, order, log)).collect();
+        let what = Refinement {
+            refine,
+            feedthrough: found.feedthrough(),
+            constant: found.has_constant(),
+            degrees_of_freedom: degrees,
+        };
+        let found = refined(record, &starts, what, &plan.search, monitor)?;
+        refinement = Some(RefinementOutcome { errors: refine, search: found.search });
+        (matrices, levels, covariance) = (found.model, found.levels, found.covariance);
+    }
+    let products = products_of_innovations(&matrices, record, &levels)
+        .ok_or_else(|| Error::data("the errors one step ahead leave the range of numbers"))?;
+    let mean = products / samples as f64;
+    Ok(Estimated {
+        matrices: with_noise(matrices, &mean, samples, degrees),
+        levels,
+        has_levels: found.has_constant(),
+        covariance,
+        procedure: Procedure::Subspace(SubspaceOutcome {
+            weighting: found.weighting(),
+            past: found.past(),
+            future: found.future(),
+            feedthrough: found.feedthrough(),
+            feedthrough_given: plan.subspace.feedthrough.is_some(),
+            constant: found.has_constant(),
+            singular_values: found.singular_values().iter().copied().take(MOST_VALUES).collect(),
+            orders: scores,
+            refinement,
+        }),
+        free,
+        degrees,
+        samples,
+        mean,
+        offered: found.orders(),
+    })
+}
+
+/// A model of another weighting to start from: what is near the one minimum may be far from another. None where it has no such model.
+fn other_start(
+    record: &JointRecord<'_>,
+    found: &Subspace,
+    order: usize,
+    log: &Log,
+) -> Option<RefinementStart> {
+    let weighting = if found.weighting() == Weighting::Ssarx { Weighting::Cva } else { Weighting::Ssarx };
+    let options = SubspaceOptions {
+        weighting,
+        past: Some(found.past()),
+        future: None,
+        feedthrough: Some(found.feedthrough()),
+        constant: found.has_constant(),
+    };
+    let other = subspace(record, &options).ok()?;
+    let (model, levels) = (other.state_space(order, log.sample_time()).ok()?, other.levels(order)?);
+    Some(RefinementStart { name: weighting.to_string(), model, levels })
+}
+
+/// The states of a record, and the order that was given or chosen.
+struct Found {
+    subspace: Subspace,
+    order: usize,
+    /// What the order was chosen among; none if it was given.
+    scores: Vec<OrderScore>,
+    /// That of the order.
+    mdl: f64,
+}
+
+impl Found {
+    fn new(record: &JointRecord<'_>, plan: &StateSpacePlan, constant: bool) -> Result<Self, Error> {
+        let subspace = subspace(record, &SubspaceOptions { constant, ..plan.subspace })?;
+        let (asked, highest) =
+            (plan.orders.clone().unwrap_or_else(|| subspace.orders()), subspace.highest_order());
+        let orders = *asked.start()..=(*asked.end()).min(highest);
+        if orders.is_empty() {
+            return Err(Error::argument(
+                "order",
+                format!("the data tell of orders up to {highest}; ask for one of these"),
+            ));
+        }
+        let given = asked.start() == asked.end();
+        let scores = subspace.scores(record, orders)?;
+        let order = if given { *asked.start() } else { best_order(&scores)? };
+        let own = scores.iter().find(|score| score.order == order).and_then(|score| score.mdl);
+        let mdl = own.unwrap_or(f64::INFINITY);
+        Ok(Self { subspace, order, scores: if given { Vec::new() } else { scores }, mdl })
+    }
+}

@@ -98,7 +98,7 @@ pub fn narx_plan(
     job.plan(if job.driven { inputs } else { Vec::new() }, outputs)
 }
 
-/// The plan that `thetahat fit --model ss` makes of these options for a log with these channels.
+/// The plan that `thetahat fit --model ss`, or with several outputs `--model arx`, makes of these options for a log with these channels.
 ///
 /// # Errors
 /// A [`Failure`] as the program would report it.
@@ -109,7 +109,7 @@ pub fn state_space_plan(
 ) -> Result<StateSpacePlan, Failure> {
     let log = OsString::from("log");
     let words: Vec<OsString> = options.iter().cloned().chain([log]).collect();
-    let job = StateSpaceJob::resolve(&arguments("fit", &words)?)?;
+    let job = StateSpaceJob::resolve(&arguments("fit", &words)?, outputs.len() > 1)?;
     let job = job.ok_or_else(|| Failure::usage("--model: give ss"))?;
     job.plan(inputs, outputs)
 }

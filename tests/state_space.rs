@@ -177,8 +177,8 @@ fn what_other_models_have_is_refused() {
         let refusal = folder.run(&format!("fit log.csv --time t -u u -y speed {options}"));
         assert!(refusal.code == 2 && refusal.stderr.contains(word), "{options}: {refusal:?}");
     }
-    let several = folder.run(&format!("fit {MOTOR} --na 2 --nb 2"));
-    assert!(several.code == 2 && several.stderr.contains("--model ss"), "{several:?}");
+    let several = folder.run(&format!("fit {MOTOR} --na 2 --nb 2 --nc 1"));
+    assert!(several.code == 2 && several.stderr.contains("--nc"), "{several:?}");
 }
 
 #[test]
@@ -317,4 +317,86 @@ fn refined_models_have_standard_errors_everywhere() {
         let refusal = folder.run(&format!("fit {MOTOR} {options}"));
         assert!(refusal.code == 2 && refusal.stderr.contains(word), "{options}: {refusal:?}");
     }
+}
+
+#[test]
+fn an_arx_model_has_several_outputs() {
+    let folder = motor();
+    let report = folder.fit(&format!("{MOTOR} --na 1..4 --nb 1..4 --estimate 1..700 --validate 701..1000"));
+    let found = &report["estimation"];
+    assert_eq!((&found["method"], &report["model"]["kind"]), (&"vector-arx".into(), &"state-space".into()));
+    assert_eq!(found["tried"].as_array().map(Vec::len), Some(32));
+    let (na, nb) = (number(&report, "/estimation/na"), number(&report, "/estimation/nb/0"));
+    for output in ["i", "speed"] {
+        assert!(percent(&report, output, &free_run(), Some("validation")) > 90.0, "{output} {na} {nb}");
+    }
+    // One model of these has the figures of the choice.
+    let again = folder.fit(&format!(
+        "{MOTOR} --model arx --na {na} --nb {nb} --couple {} --estimate 1..700",
+        found["coupling"].as_str().expect("a word")
+    ));
+    let entry = number(&again, "/estimation/a/0/0/0/value");
+    assert!((entry - number(&report, "/estimation/a/0/0/0/value")).abs() < 0.05, "{entry}");
+    assert_eq!(again["estimation"]["tried"].as_array().map(Vec::len), Some(0));
+    let table = folder
+        .done(&format!("fit {MOTOR} --model arx --couple none --na 2 --nb 2 --report r.json --html r.html"));
+    assert!(table.stdout.contains("A diagonal") && table.stdout.contains("equation of speed"), "{table:?}");
+    for line in [
+        "predict r.json log.csv --time t --horizon 5 --out p.csv",
+        "simulate r.json log.csv --time t --out s.csv",
+        "filter r.json log.csv --time t --out f.csv",
+        "validate r.json log.csv --time t --html v.html",
+        "compare r.json log.csv --time t",
+        "bode r.json",
+        "step r.json",
+        "reduce r.json --order 2 --out q.json",
+    ] {
+        folder.done(line);
+    }
+    // An input that waits is known to.
+    let waits = folder.fit(&format!("{MOTOR} --na 2 --nb 2 --nk 3"));
+    assert_eq!(waits["estimation"]["nk"], serde_json::json!([3]));
+    assert_eq!(waits["model"]["delays"], serde_json::json!([2]));
+    for (options, word) in [
+        ("--couple some --na 1", "--couple"),
+        ("--na 2 --nb 1,2", "--nb has 2 numbers for 1 inputs"),
+        ("--na 999", "--na 999"),
+        ("--na 0 --nb 1..2,1", "--nb"),
+        ("--na 2 --order 3", "--order is for --model ss"),
+        ("--na 2 --refine prediction", "--refine is for --model ss"),
+        ("--na 2 --ridge 1", "--ridge is not for"),
+    ] {
+        let refusal = folder.run(&format!("fit {MOTOR} {options}"));
+        assert!(refusal.code == 2 && refusal.stderr.contains(word), "{options}: {refusal:?}");
+    }
+    let refusal = folder.run("fit log.csv --time t -u u -y i --na 2 --nb 2 --couple full");
+    assert!(refusal.code == 2 && refusal.stderr.contains("--couple is for"), "{refusal:?}");
+    let refusal =
+        folder.refused(&format!("fit {MOTOR} --na 150 --nb 150 --estimate 1..300 --report x.json"), 4);
+    assert!(refusal.contains("lower orders") && !folder.names().contains(&"x.json".to_owned()), "{refusal}");
+}
+
+/// The figures that a least-squares fit of all rows has.
+#[test]
+fn the_evaporator_has_the_coefficients_that_others_find() {
+    let Ok(log) = std::fs::read("../shared/data/evaporator.csv") else {
+        println!("../shared/data/evaporator.csv is absent: not tested");
+        return;
+    };
+    let folder = Folder::with_log(log);
+    folder.done(
+        "fit log.csv -y y1,y2,y3 --sample-time 1 --model arx --na 2 --nb 2 --nk 1 --couple full --detrend none --report r.json",
+    );
+    let report: Value = serde_json::from_str(&folder.read("r.json")).expect("JSON");
+    for (place, expected) in [-0.516213, -0.706059, -0.868360].into_iter().enumerate() {
+        let found = number(&report, &format!("/estimation/a/0/{place}/{place}/value"));
+        assert!((found - expected).abs() < 1e-6, "{found}");
+    }
+    let (samples, degrees) =
+        (number(&report, "/estimation/samples"), number(&report, "/model/degrees_of_freedom"));
+    for (place, expected) in [0.06742262, 0.23212252, 0.02445426].into_iter().enumerate() {
+        let found = number(&report, &format!("/model/noise_covariance/{place}/{place}")) * degrees / samples;
+        assert!((found - expected).abs() < 1e-8, "{found}");
+    }
+    assert_eq!(samples, 6303.0);
 }

@@ -28,7 +28,7 @@ pub(crate) fn fit(arguments: &FitArguments, line: &str) -> Result<(), Failure> {
             Some(map) => narx::found(&NarxJob::resolve(arguments, map)?)?,
             None => match ProcessJob::resolve(arguments)? {
                 Some(job) => process::found(&job)?,
-                None => match StateSpaceJob::resolve(arguments)? {
+                None => match StateSpaceJob::resolve(arguments, false)? {
                     Some(job) => state_space::found(&job)?,
                     None => found(&FitJob::resolve(arguments)?, arguments.html.is_some())?,
                 },

@@ -38,8 +38,9 @@ pub(crate) struct StateSpaceJob {
 }
 
 impl StateSpaceJob {
-    /// The job, if a model in state space is asked for, or several outputs and no other model.
-    pub(crate) fn resolve(arguments: &FitArguments) -> Result<Option<Self>, Failure> {
+    /// The job, if a model in state space is asked for, or several outputs and no other model than ARX. A log that is there already may
+    /// have several outputs without their names.
+    pub(crate) fn resolve(arguments: &FitArguments, has_several: bool) -> Result<Option<Self>, Failure> {
         let (own, model) = (&arguments.states, &arguments.model);
         let outputs = Names::all(&arguments.output).unwrap_or_default();
         let given = [
@@ -56,7 +57,8 @@ impl StateSpaceJob {
         let coefficients = [&model.na, &model.nc, &model.nd].into_iter().any(Option::is_some);
         let orders = coefficients || !model.nf.is_empty() || (!model.nb.is_empty() && !without_inputs);
         let noise = model.nc.is_some() || model.nd.is_some() || !model.nf.is_empty();
-        let is_arx = outputs.len() > 1
+        let has_several = has_several || outputs.len() > 1;
+        let is_arx = has_several
             && match model.model {
                 Some(ModelArgument::Arx) => true,
                 None => orders && !noise,
@@ -69,7 +71,7 @@ impl StateSpaceJob {
         }
         match model.model {
             Some(ModelArgument::Ss) => {}
-            None if !orders && outputs.len() > 1 => {}
+            None if !orders && has_several => {}
             _ if is_arx => {
                 if let Some(option) = given {
                     return Err(Failure::usage(format!(

@@ -224,7 +224,7 @@ def test_it_keeps_the_conventions_of_scikit_learn_that_time_allows() -> None:
 
 def test_it_takes_every_option_of_the_fit() -> None:
     u, y = data(level=5.0)
-    options = set(inspect.signature(thetahat.arx).parameters) - {"log", "na", "nb", "nk"}
+    options = set(inspect.signature(thetahat.arx).parameters) - {"log", "na", "nb", "nk", "couple"}
     assert options <= set(ARXRegressor().get_params())
     log = thetahat.Log(y, u)
     given: Any = {"estimate": slice(100, 700), "detrend": "none", "initial": "zero", "norm": 1, "ridge": 0.5}

@@ -179,3 +179,26 @@ def test_refined_models_have_standard_errors() -> None:
         assert np.all(model.frequency_response([0.1, 1.0], output="y1").magnitude_errors > 0)
     with pytest.raises(ValueError, match="refine"):
         th.ss(data, 2, refine="both")
+
+
+def test_an_arx_model_has_several_outputs() -> None:
+    data = log()
+    model = th.arx(data, na=range(1, 5), nb=range(1, 5))
+    found = model.document["estimation"]
+    assert model.kind == "state-space" and found["method"] == "vector-arx" and len(found["tried"]) == 32
+    truth = H @ np.linalg.solve(np.eye(2) - F, G)
+    for output in range(2):
+        for source in range(2):
+            gain, error = model.dc_gain(source, output=output)
+            assert error > 0 and abs(gain - truth[output, source]) < 4 * error
+    # Without coupling each output is fitted as if it were alone.
+    apart = th.arx(data, na=2, nb=2, couple="none", constant="no").document["estimation"]
+    alone = th.arx(th.Log(data["y1"], {name: data[name] for name in ("u1", "u2")}, sample_time=0.5), 2, 2, constant="no")
+    assert [apart["a"][lag][0][0]["value"] for lag in range(2)] == pytest.approx(alone.parameters[:2])
+    assert apart["a"][0][0][1]["standard_error"] is None
+    with pytest.raises(ValueError, match="couple"):
+        th.arx(data, 2, 2, couple="some")
+    with pytest.raises(ValueError, match="couple"):
+        th.arx(th.dc_motor(), 2, 2, couple="full")
+    with pytest.raises(ValueError, match="prefilter"):
+        th.arx(data, 2, 2, prefilter=(0.1, 0.5))

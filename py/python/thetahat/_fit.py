@@ -9,7 +9,7 @@ from typing import Any
 from thetahat import _options, _thetahat
 from thetahat._log import Log, handle
 from thetahat._model import Model
-from thetahat._options import Band, Bound, FitOptions, Orders, Rows
+from thetahat._options import Band, Bound, FitOptions, Order, Orders, Rows
 
 
 class EstimationWarning(UserWarning):
@@ -18,10 +18,11 @@ class EstimationWarning(UserWarning):
 
 def arx(
     log: Log,
-    na: int,
+    na: Order,
     nb: Orders,
     nk: Orders = 1,
     *,
+    couple: str | None = None,
     estimate: Rows | None = None,
     validate: Rows | None = None,
     split: tuple[float, float, float] | None = None,
@@ -41,16 +42,22 @@ def arx(
 ) -> Model:
     """Fit an ARX model, A(q) y(t) = B(q) u(t) + e(t), by least squares.
 
+    With several outputs A and B are polynomials with matrices for coefficients; the model is one in state space that has them, and
+    its report names them.
+
     Parameters
     ----------
     log : Log
         The data.
     na : int
-        Coefficients of A: past outputs.
+        Coefficients of A: past outputs; with several outputs a range too, among which the least MDL chooses.
     nb : int, or one for each input
         Coefficients of B.
     nk : int, or one for each input
         Samples from input to first effect.
+    couple : {"full", "none", "auto"}, optional
+        With several outputs: whether an output depends on the past of all or of its own. "auto", which is taken unless it is said: what
+        has the least MDL.
     estimate, validate, split, detrend, offset, prefilter, initial, likelihood, constant, trend, focus, norm, bound, dc_gain,
     ridge, noise_bound
         What to fit to and how, see `thetahat.FitOptions`.
@@ -84,7 +91,30 @@ def arx(
     array([-1.5407,  0.5765,  0.3601,  0.3174])
     >>> model.parameter_names
     ['a1', 'a2', 'b1', 'b2']
+
+    With two outputs, of which the second follows the first:
+
+    >>> import numpy as np
+    >>> rng = np.random.default_rng(0)
+    >>> u, y = rng.normal(size=500), np.zeros((500, 2))
+    >>> for k in range(1, 500):
+    ...     y[k] = [0.8 * y[k - 1, 0] + u[k - 1], 0.5 * y[k - 1, 1] + 0.3 * y[k - 1, 0]]
+    ...     y[k] += 0.1 * rng.normal(size=2)
+    >>> found = th.arx(th.Log(y, u, sample_time=1), na=1, nb=1)
+    >>> [[round(entry["value"], 1) for entry in row] for row in found.document["estimation"]["a"][0]]
+    [[-0.8, 0.0], [-0.3, -0.5]]
     """
+    if isinstance(log, Log) and len(log.outputs) > 1:
+        options = {name: value for name, value in locals().items() if name not in ("na", "nb", "nk")}
+        coupling = [] if couple is None else [f"--couple={_options.text('couple', couple)}"]
+        words = ["--model=arx", *_options.order_words(na=na, nb=nb, nk=nk), *coupling]
+        words += _options.words(FitOptions, options, len(log))
+        found = Model._of(_thetahat.fit_state_space(handle("log", log), words))
+        for warning in found.warnings:
+            warnings.warn(warning, EstimationWarning, stacklevel=2)
+        return found
+    if couple is not None:
+        raise ValueError("couple: it is for logs with several outputs; leave it out")
     return _fit("arx", locals())
 
 

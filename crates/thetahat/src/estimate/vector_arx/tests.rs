@@ -30,7 +30,11 @@ fn signals(rows: usize, noise: f64, levels: [f64; 2], seed: u64) -> [Vec<f64>; 3
     [u, first, second]
 }
 
-fn options(na: RangeInclusive<usize>, nb: RangeInclusive<usize>, coupling: Option<Coupling>) -> VectorArxOptions {
+fn options(
+    na: RangeInclusive<usize>,
+    nb: RangeInclusive<usize>,
+    coupling: Option<Coupling>,
+) -> VectorArxOptions {
     VectorArxOptions { na, nb: VectorArxInputs::Alike(nb), coupling, direct: false, constant: false }
 }
 
@@ -52,7 +56,11 @@ fn exact_data_give_the_coefficients() -> Result<(), Error> {
             assert!((found.outcome.b[0][lag][output].value - B[lag][output][0]).abs() < 1e-6);
         }
     }
-    assert!((found.levels[0] - 3.0).abs() < 1e-5 && (found.levels[1] + 2.0).abs() < 1e-5, "{:?}", found.levels);
+    assert!(
+        (found.levels[0] - 3.0).abs() < 1e-5 && (found.levels[1] + 2.0).abs() < 1e-5,
+        "{:?}",
+        found.levels
+    );
     Ok(())
 }
 
@@ -141,7 +149,9 @@ fn what_cannot_be_solved_is_refused() -> Result<(), Error> {
     let doubled: Vec<f64> = first.iter().map(|value| 2.0 * value).collect();
     let dependent = [u.clone(), first.clone(), doubled];
     let refused = vector_arx(&record(&dependent)?, &options(1..=1, 1..=1, Some(Coupling::Full)), 1.0);
-    assert!(refused.is_err_and(|error| error.to_string().contains("output 2(k-1) follows from the regressors")));
+    assert!(
+        refused.is_err_and(|error| error.to_string().contains("output 2(k-1) follows from the regressors"))
+    );
     let short = [u[..8].to_vec(), first[..8].to_vec(), u[1..9].to_vec()];
     let refused = vector_arx(&record(&short)?, &options(2..=2, 2..=2, None), 1.0);
     assert!(refused.is_err_and(|error| error.to_string().contains("there must be more")));

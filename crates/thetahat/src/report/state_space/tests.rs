@@ -1,6 +1,6 @@
-use crate::estimate::Procedure;
 use super::*;
 use crate::data::Channel;
+use crate::estimate::Procedure;
 use crate::regression::noise::Noise;
 use crate::report::{Requirement, ValidationPlan, validate};
 use crate::respond::Horizon;

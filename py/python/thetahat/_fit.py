@@ -101,8 +101,10 @@ def arx(
     ...     y[k] = [0.8 * y[k - 1, 0] + u[k - 1], 0.5 * y[k - 1, 1] + 0.3 * y[k - 1, 0]]
     ...     y[k] += 0.1 * rng.normal(size=2)
     >>> found = th.arx(th.Log(y, u, sample_time=1), na=1, nb=1)
-    >>> [[round(entry["value"], 1) for entry in row] for row in found.document["estimation"]["a"][0]]
-    [[-0.8, 0.0], [-0.3, -0.5]]
+    >>> [round(entry["value"], 1) for entry in found.document["estimation"]["a"][0][1]]
+    [-0.3, -0.5]
+    >>> [round(float(gain), 1) for gain in (found.dc_gain("u1", output="y1")[0], found.dc_gain("u1", output="y2")[0])]
+    [5.0, 3.0]
     """
     if isinstance(log, Log) and len(log.outputs) > 1:
         options = {name: value for name, value in locals().items() if name not in ("na", "nb", "nk")}

@@ -1,5 +1,6 @@
 //! The syntax of the command line, a file a verb, and nothing else. `job` says what it means.
 
+mod convert;
 mod design;
 mod files;
 mod filter;
@@ -19,6 +20,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+pub(crate) use convert::ConvertArguments;
 pub(crate) use design::DesignArguments;
 pub(crate) use filter::{EstimatorArgument, FilterArguments, FilterStartArgument};
 pub(crate) use fit::{
@@ -233,6 +235,18 @@ Examples:
   thetahat reduce model.json
   thetahat reduce model.json --order 1 -o reduced.json")]
     Reduce(ReduceArguments),
+    /// A fitted model at another sample time, or in continuous time
+    ///
+    /// With zoh and foh by the logarithm of the transition matrix, so that the samples of the model stay what they were; tustin maps any poles
+    /// but bends frequencies. Poles at or left of 0 have no counterpart in continuous time: they are named, and only whole multiples of the sample
+    /// time are left. Delays are taken off before, and with zoh they may be any fraction of a sample. Models of polynomials, in state space and
+    /// of processes become models in state space. One in continuous time goes with any log: the verbs sample it as the log is.
+    #[command(after_help = "\
+Examples:
+  thetahat convert model.json --to continuous
+  thetahat convert model.json --to 0.5 -o slower.json
+  thetahat convert model.json --to continuous --hold tustin -o continuous.json")]
+    Convert(ConvertArguments),
     /// PI and PID settings for a fitted process, and the closed loop that they give
     ///
     /// By SIMC (Skogestad 2003) and by lambda tuning, from a process that fit --structure found. Beside the settings stands what the loop

@@ -2,6 +2,7 @@
 
 mod bode;
 mod compare;
+mod convert;
 pub(crate) mod demo;
 mod design;
 mod experiments;
@@ -52,6 +53,7 @@ pub(crate) fn dispatch(arguments: Arguments, line: &str) -> Result<(), Failure> 
         Command::Step(arguments) => step::step(&arguments, line),
         Command::Impulse(arguments) => transient::impulse(&arguments, line),
         Command::Reduce(arguments) => reduce::reduce(&arguments),
+        Command::Convert(arguments) => convert::convert(&arguments),
         Command::Tune(arguments) => tune::tune(&arguments, line),
         Command::Design(arguments) => design::design(&arguments),
         Command::Demo(arguments) => demo::demo(&arguments),

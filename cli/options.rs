@@ -3,7 +3,7 @@
 //! The library names them between backticks, as `detrend`, wherever one is advised; here they are options.
 
 /// The arguments of the library that are options, by the name that both have.
-pub(crate) const OPTIONS: [&str; 71] = [
+pub(crate) const OPTIONS: [&str; 73] = [
     "alarm",
     "alpha",
     "alphas",
@@ -28,6 +28,7 @@ pub(crate) const OPTIONS: [&str; 71] = [
     "future",
     "gain",
     "half-width",
+    "hold",
     "horizon",
     "initial",
     "lags",
@@ -67,6 +68,7 @@ pub(crate) const OPTIONS: [&str; 71] = [
     "terms",
     "time",
     "time-limit",
+    "to",
     "tolerance",
     "trend",
     "units",

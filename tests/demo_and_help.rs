@@ -3,7 +3,7 @@
 use crate::harness::Folder;
 use crate::signals::{Experiment, csv};
 
-const VERBS: [&str; 19] = [
+const VERBS: [&str; 20] = [
     "fit",
     "inspect",
     "spectrum",
@@ -16,6 +16,7 @@ const VERBS: [&str; 19] = [
     "bode",
     "step",
     "reduce",
+    "convert",
     "tune",
     "impulse",
     "design",

@@ -337,7 +337,11 @@ fn modelled(orders: Orders) -> (Report, Validated) {
 fn polynomials(report: &mut Report) -> &mut PolynomialModel {
     match &mut report.model {
         Model::Polynomial(model) => Some(&mut **model),
-        Model::Equations(_) | Model::NonlinearArx(_) | Model::Process(_) | Model::StateSpace(_) => None,
+        Model::Equations(_)
+        | Model::NonlinearArx(_)
+        | Model::Process(_)
+        | Model::StateSpace(_)
+        | Model::ContinuousStateSpace(_) => None,
     }
     .expect("the case is sound")
 }

@@ -66,6 +66,10 @@ impl Command {
                 read.push(reduce.report.clone());
                 written.push(reduce.out.clone());
             }
+            Self::Convert(convert) => {
+                read.push(convert.report.clone());
+                written.extend(convert.out.clone());
+            }
             Self::Tune(tune) => {
                 read.push(tune.report.clone());
                 let more = tune.document.iter().chain(&tune.responses).chain(&tune.html);

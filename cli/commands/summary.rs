@@ -1,5 +1,6 @@
 //! A report as a table for people.
 
+mod continuous;
 mod design;
 mod equations;
 mod filtered;
@@ -51,6 +52,14 @@ const NO_ROOT_ERROR: &str =
     "no standard error is known, or no time constant goes with a pole on or outside of the unit circle";
 const NO_FIT: &str = "the output is constant, no sample counts, or the response overflows";
 
+/// The model of a report that was converted, which has no figures of a fit, this many columns wide.
+pub(crate) fn converted(report: &Report, width: usize) -> String {
+    match &report.model {
+        Model::StateSpace(model) => state_space::model_alone(report, model, width),
+        _ => table(report, width),
+    }
+}
+
 /// The report's main figures, this many columns wide.
 pub fn table(report: &Report, width: usize) -> String {
     let model = match &report.model {
@@ -59,6 +68,7 @@ pub fn table(report: &Report, width: usize) -> String {
         Model::NonlinearArx(model) => return nonlinear_arx::table(report, model, width),
         Model::Process(model) => return process::table(report, model, width),
         Model::StateSpace(model) => return state_space::table(report, model, width),
+        Model::ContinuousStateSpace(model) => return continuous::table(report, model, width),
     };
     let mut text = Text::new(width);
     selection::selection(&mut text, report);

@@ -408,6 +408,16 @@ impl Model {
         Ok(Self::of(report))
     }
 
+    /// The model in continuous time or at another sample time.
+    #[pyo3(signature = (to, hold))]
+    fn converted(&self, py: Python<'_>, to: &str, hold: Option<&str>) -> PyResult<Self> {
+        let found = (to.parse::<thetahat::model::TimeBase>())
+            .and_then(|to| Ok((to, hold.map(str::parse::<thetahat::model::Hold>).transpose()?)));
+        let (to, hold) = found.map_err(|error| error::batch(py, error))?;
+        let report = self.report(py)?.converted(to, hold).map_err(|error| error::batch(py, error))?;
+        Ok(Self::of(report))
+    }
+
     /// F, G, H, D and K of the innovations form.
     fn state_space<'py>(&self, py: Python<'py>) -> PyResult<[Bound<'py, PyArray2<f64>>; 5]> {
         let StateSpace { f, g, h, d, k, .. } = match &*self.model {

@@ -202,3 +202,36 @@ def test_an_arx_model_has_several_outputs() -> None:
         th.arx(th.dc_motor(), 2, 2, couple="full")
     with pytest.raises(ValueError, match="prefilter"):
         th.arx(data, 2, 2, prefilter=(0.1, 0.5))
+
+
+def test_continuous_time_is_that_of_scipy() -> None:
+    signal = pytest.importorskip("scipy.signal")
+    data = log()
+    model = th.ss(data, 2)
+    form = model.to_state_space()
+    for hold, method in (("zoh", "zoh"), ("foh", "foh"), ("tustin", "bilinear")):
+        continuous = model.converted("continuous", hold)
+        assert continuous.kind == "continuous-state-space" and continuous.stable
+        plant = continuous.to_scipy()
+        assert isinstance(plant, signal.StateSpace) and plant.dt is None
+        sampled = signal.cont2discrete((plant.A, plant.B, plant.C, plant.D), 0.5, method)
+        for found, known in zip(sampled, (form.F, form.G, form.H, form.D)):
+            assert found == pytest.approx(known, abs=1e-9)
+        again = continuous.converted(0.2)
+        known = signal.cont2discrete((plant.A, plant.B, plant.C, plant.D), 0.2, method)
+        slow = again.to_state_space()
+        for found, expected in zip((slow.F, slow.G, slow.H, slow.D), known):
+            assert found == pytest.approx(expected, abs=1e-9)
+        assert continuous.noise_covariance == pytest.approx(model.noise_covariance, rel=1e-9) or hold == "tustin"
+    continuous = model.converted("continuous")
+    assert continuous.poles() == pytest.approx(np.log(model.poles()) / 0.5, abs=1e-9)
+    assert continuous.dc_gain("u1", output="y2")[0] == pytest.approx(model.dc_gain("u1", output="y2")[0])
+    assert continuous.predict(data) == pytest.approx(model.predict(data), abs=1e-6)
+    control = pytest.importorskip("control")
+    assert isinstance(continuous.to_control(), control.StateSpace) and continuous.to_control().dt == 0
+    with pytest.raises(ValueError, match="neither the word continuous"):
+        model.converted("slow")
+    with pytest.raises(ValueError, match="is none of zoh, foh and tustin"):
+        model.converted(1.0, "ramp")
+    with pytest.raises(ValueError, match="has a delay"):
+        th.ss(data, 2, nk=3).converted("continuous").to_scipy()

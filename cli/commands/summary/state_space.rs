@@ -18,17 +18,17 @@ const NOT_COUPLED: &str = "without coupling an output does not depend on the pas
 const INTEGRATES: &str = "the model integrates";
 const NO_NOISE: &str = "nothing is left of an output";
 
+/// The recursion.
+const EQUATION: &str = "x(t+1) = F x + G u + K e, y = H x + D u + e";
+
 /// The main figures of a fit in state space.
 pub(super) fn table(report: &Report, model: &StateSpaceModel, width: usize) -> String {
     let mut text = Text::new(width);
-    text.line(&format!("{}, sample time {} s", report.model.name(), short(model.sample_time)));
-    text.line(match &report.estimation.procedure {
+    let equation = match &report.estimation.procedure {
         Procedure::VectorArx(_) => "A(q) y = B(q) u + e, as x(t+1) = F x + G u + K e, y = H x + D u + e",
-        _ => "x(t+1) = F x + G u + K e, y = H x + D u + e",
-    });
-    let signals = model.inputs.iter().map(|input| signal("input", input));
-    let outputs = model.outputs.iter().map(|output| signal("output", output));
-    text.line(&signals.chain(outputs).collect::<Vec<String>>().join(", "));
+        _ => EQUATION,
+    };
+    head(&mut text, report, model, equation);
     let estimation = &report.estimation;
     if let Procedure::Subspace(outcome) = &estimation.procedure {
         text.line(&found(outcome));
@@ -50,13 +50,36 @@ pub(super) fn table(report: &Report, model: &StateSpaceModel, width: usize) -> S
     text.line(&format!("{} samples, {} free parameters", estimation.samples, model.free_parameters));
     text.line(&criteria(&estimation.criteria));
     text.line("");
-    poles(&mut text, model);
-    gains(&mut text, model);
-    noise(&mut text, model);
-    text.line(if model.stable { "stable" } else { "unstable" });
+    figures(&mut text, model);
     text.line("");
     fits(&mut text, &report.fit);
     text.finish()
+}
+
+/// The same without what a fit says.
+pub(super) fn model_alone(report: &Report, model: &StateSpaceModel, width: usize) -> String {
+    let mut text = Text::new(width);
+    head(&mut text, report, model, EQUATION);
+    text.line("");
+    figures(&mut text, model);
+    text.finish()
+}
+
+/// What it is, and of what.
+fn head(text: &mut Text, report: &Report, model: &StateSpaceModel, equation: &str) {
+    text.line(&format!("{}, sample time {} s", report.model.name(), short(model.sample_time)));
+    text.line(equation);
+    let signals = model.inputs.iter().map(|input| signal("input", input));
+    let outputs = model.outputs.iter().map(|output| signal("output", output));
+    text.line(&signals.chain(outputs).collect::<Vec<String>>().join(", "));
+}
+
+/// What follows from the matrices.
+fn figures(text: &mut Text, model: &StateSpaceModel) {
+    poles(text, model);
+    gains(text, model);
+    noise(text, model);
+    text.line(if model.stable { "stable" } else { "unstable" });
 }
 
 /// How the states were found.

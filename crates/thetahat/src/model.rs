@@ -6,7 +6,8 @@
 //!   from them with an [`Interval`], and the [`Signal`]s it was fitted to. [`OffsetCovariance`] is what is open of their offsets.
 //! - [`StateSpace`] is the same model as a recursion of first order, for filters and controllers: of fewer states ([`Reduced`]), in
 //!   continuous time ([`ContinuousStateSpace`]) as a [`Hold`] says, or as [`ZerosPolesGain`] of one input and output.
-//!   [`StateSpaceModel`] is one that was estimated as such, with any number of outputs.
+//!   [`StateSpaceModel`] is one that was estimated as such, with any number of outputs, [`ContinuousStateSpaceModel`] what a fitted model
+//!   is in continuous time, and [`TimeBase`] what one is converted to.
 //! - [`GreyBox`] is a model in equations as a person writes it, [`EquationsModel`] one whose parameters were estimated.
 //! - [`NonlinearArxModel`] is a nonlinear map of past outputs and inputs: for each output an [`OutputMap`], a [`Map`] of [`Regressor`]s,
 //!   which may be local models, each with its [`Membership`].
@@ -22,6 +23,7 @@
 //! ```
 
 mod assembly;
+mod convert;
 mod dynamics;
 pub(crate) mod equations;
 mod fitted;
@@ -34,6 +36,7 @@ mod process;
 mod quantity;
 mod state_space;
 
+pub use convert::TimeBase;
 pub(crate) use dynamics::{
     Block, Blocks, Gradient, cancel, covariance, is_simple, near_cancellation, standard_error,
 };
@@ -53,7 +56,7 @@ pub(crate) use process::{Chain, Columns, Parts, State, Transition};
 pub use process::{ProcessModel, ProcessStructure};
 pub use quantity::{Interval, Quantity, Root};
 pub use state_space::{
-    ContinuousStateSpace, Entry, EntryCovariance, Hold, Reduced, StateSpace, StateSpaceMatrix,
-    StateSpaceModel, ZerosPolesGain,
+    ContinuousStateSpace, ContinuousStateSpaceModel, Entry, EntryCovariance, Hold, Reduced, StateSpace,
+    StateSpaceMatrix, StateSpaceModel, ZerosPolesGain,
 };
-pub(crate) use state_space::{Path, Sizes, across_coordinates, flat, is_stable};
+pub(crate) use state_space::{Path, Sizes, across_coordinates, flat, is_stable, riccati};

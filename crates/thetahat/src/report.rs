@@ -33,6 +33,7 @@
 //! ```
 
 mod apply;
+mod convert;
 mod equations;
 mod evaluate;
 mod fitted_rows;

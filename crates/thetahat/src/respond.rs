@@ -30,6 +30,7 @@
 //! # Ok::<(), thetahat::Error>(())
 //! ```
 
+mod continuous;
 mod draws;
 pub(crate) mod equations;
 mod forecast;

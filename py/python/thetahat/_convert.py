@@ -151,20 +151,20 @@ def response_to_control(
     )
 
 
-def state_space_to_scipy(F: ArrayLike, G: ArrayLike, H: ArrayLike, D: ArrayLike, sample_time: float) -> Any:
+def state_space_to_scipy(F: ArrayLike, G: ArrayLike, H: ArrayLike, D: ArrayLike, sample_time: float | None) -> Any:
     """A state space from the inputs to the outputs, for ``scipy.signal``.
 
     Parameters
     ----------
     F, G, H, D : array_like of two dimensions
         x(t+1) = F x(t) + G u(t), y(t) = H x(t) + D u(t). SciPy calls them A, B, C and D.
-    sample_time : float
-        Seconds from one sample to the next.
+    sample_time : float or None
+        Seconds from one sample to the next; None in continuous time.
 
     Returns
     -------
     scipy.signal.StateSpace
-        In discrete time, with ``dt`` the sample time.
+        With ``dt`` the sample time, in continuous time without.
 
     Raises
     ------
@@ -174,7 +174,8 @@ def state_space_to_scipy(F: ArrayLike, G: ArrayLike, H: ArrayLike, D: ArrayLike,
         If SciPy is not installed.
     """
     matrices = _matrices(F, G, H, D)
-    return _imported("scipy.signal", "scipy").StateSpace(*matrices, dt=sample_time)
+    clock = {} if sample_time is None else {"dt": sample_time}
+    return _imported("scipy.signal", "scipy").StateSpace(*matrices, **clock)
 
 
 def state_space_to_control(
@@ -182,7 +183,7 @@ def state_space_to_control(
     G: ArrayLike,
     H: ArrayLike,
     D: ArrayLike,
-    sample_time: float,
+    sample_time: float | None,
     input_names: Sequence[str],
     output_names: Sequence[str],
 ) -> Any:
@@ -192,8 +193,8 @@ def state_space_to_control(
     ----------
     F, G, H, D : array_like of two dimensions
         x(t+1) = F x(t) + G u(t), y(t) = H x(t) + D u(t). python-control calls them A, B, C and D.
-    sample_time : float
-        Seconds from one sample to the next.
+    sample_time : float or None
+        Seconds from one sample to the next; None in continuous time.
     input_names : sequence of str
         The inputs' names, in the order of the columns of G.
     output_names : sequence of str
@@ -202,7 +203,7 @@ def state_space_to_control(
     Returns
     -------
     control.StateSpace
-        In discrete time, with ``dt`` the sample time. A state that nothing reaches stays.
+        With ``dt`` the sample time, in continuous time 0. A state that nothing reaches stays.
 
     Raises
     ------
@@ -214,7 +215,7 @@ def state_space_to_control(
     matrices = _matrices(F, G, H, D)
     return _imported("control", "control").StateSpace(
         *matrices,
-        sample_time,
+        0 if sample_time is None else sample_time,
         inputs=list(input_names),
         outputs=list(output_names),
         # Whatever the user's defaults are: the states are those of the model.

@@ -522,16 +522,60 @@ class Model(ReportedModel):
         """
         return Model._of(self._model.reduced(_options.count("order", order)))
 
+    def converted(self, to: float | str, hold: str | None = None) -> Model:
+        """The model in continuous time, or at another sample time.
+
+        Of polynomials, in state space and of processes; the result is in state space. A model in continuous time goes with a log of any sample
+        time.
+
+        Parameters
+        ----------
+        to : float, timedelta or "continuous"
+            A sample time in seconds, or the word.
+        hold : {"zoh", "foh", "tustin"}, optional
+            What inputs do between samples: they keep their values, follow straight lines, or the bilinear transformation. That of a model in
+            continuous time, else ``"zoh"``.
+
+        Returns
+        -------
+        Model
+            Its `kind` is ``"state-space"`` or ``"continuous-state-space"``. It has no figures of a fit of its own, so validate it.
+
+        Raises
+        ------
+        ValueError
+            If the model is not linear, or one of its poles has no counterpart: it is named.
+
+        References
+        ----------
+        Franklin, Powell and Workman, Digital Control of Dynamic Systems, 3rd ed. 1998, sections 4.3 and 6.3.
+
+        Examples
+        --------
+        >>> import thetahat as th
+        >>> model = th.ss(th.dc_motor(), 2)
+        >>> continuous = model.converted("continuous")
+        >>> continuous.name
+        'continuous state space of order 2'
+        >>> continuous.converted(0.05).sample_time
+        0.05
+        """
+        word = to if isinstance(to, str) else repr(_options.seconds("to", to))
+        return Model._of(self._model.converted(word, None if hold is None else _options.text("hold", hold)))
+
     def to_scipy(self) -> Any:
         """The plant as a discrete transfer function of SciPy; of several inputs, a list of them.
 
         Returns
         -------
         scipy.signal.dlti, or a list of them
-            B/(A F) of each input, in deviations from the offsets; of a model in state space its matrices.
+            B/(A F) of each input, in deviations from the offsets; of a model in state space its matrices, in continuous time a
+            `scipy.signal.lti`.
         """
         from thetahat import _convert
 
+        if self.kind == "continuous-state-space":
+            return _convert.state_space_to_scipy(*self._continuous_matrices(), None)
         if self.kind == "state-space":
             return self.to_state_space().to_scipy()
         return _convert.to_scipy(self.b, self._denominators(), self.sample_time)
@@ -542,13 +586,25 @@ class Model(ReportedModel):
         Returns
         -------
         control.TransferFunction or control.StateSpace
-            B/(A F) of each input, in deviations from the offsets; of a model in state space its matrices.
+            B/(A F) of each input, in deviations from the offsets; of a model in state space its matrices, in continuous time with ``dt``
+            0.
         """
         from thetahat import _convert
 
+        if self.kind == "continuous-state-space":
+            return _convert.state_space_to_control(*self._continuous_matrices(), None, self.inputs, self.outputs)
         if self.kind == "state-space":
             return self.to_state_space().to_control()
         return _convert.to_control(self.b, self._denominators(), self.sample_time, self.inputs, self.output)
+
+    def _continuous_matrices(self) -> tuple[Array, Array, Array, Array]:
+        own = self._own
+        if any(own["delays"]):
+            raise ValueError("the model has a delay, which matrices in continuous time cannot have; take converted(seconds)")
+        order, inputs, outputs = len(own["a"]), len(self.inputs), len(self.outputs)
+        shapes = {"a": (order, order), "b": (order, inputs), "c": (outputs, order), "d": (outputs, inputs)}
+        a, b, c, d = (np.reshape(np.array(own[name], dtype=np.float64), shape) for name, shape in shapes.items())
+        return a, b, c, d
 
     def _denominators(self) -> list[Array]:
         return [np.convolve(self.a, f) for f in self.f]

@@ -14,6 +14,8 @@ from thetahat import _numbers, _options, _thetahat
 
 Array = npt.NDArray[np.float64]
 
+_STATES = ("state-space", "continuous-state-space")
+
 
 class ReportedModel:
     """What the report of a fit says; `thetahat.Model` adds what can be computed with it."""
@@ -62,18 +64,19 @@ class ReportedModel:
 
     @property
     def kind(self) -> str:
-        """``"polynomial"``, ``"equations"``, ``"nonlinear-arx"``, ``"process"`` or ``"state-space"``."""
+        """``"polynomial"``, ``"equations"``, ``"nonlinear-arx"``, ``"process"``, ``"state-space"`` or ``"continuous-state-space"``."""
         return str(self._own["kind"])
 
     def _polynomial(self, name: str) -> Any:
         """A part that only models of polynomials have; of those in state space what follows from its poles."""
         shared = ("stable", "poles", "time_constants", "dc_gain")
-        if name not in self._own or (self.kind == "state-space" and name not in shared):
+        if name not in self._own or (self.kind in _STATES and name not in shared):
             kind = {
                 "equations": "in equations",
                 "nonlinear-arx": "a nonlinear ARX model",
                 "process": "a process",
                 "state-space": "in state space",
+                "continuous-state-space": "in continuous time",
             }[self.kind]
             raise AttributeError(
                 f"{name} is of polynomial models, and this one is {kind}: it predicts, simulates, validates and compares"
@@ -158,17 +161,21 @@ class ReportedModel:
     @property
     def noise_variance(self) -> float:
         """The variance of e: the sum of squared residuals over N - p. Of equations that of the measurement."""
-        [[variance]] = self._own["noise_covariance"] if len(self.outputs) == 1 else [[np.nan]]
+        [[variance]] = self.noise_covariance if len(self.outputs) == 1 else [[np.nan]]
         return float(variance)
 
     @property
     def noise_covariance(self) -> Array:
-        """The covariance matrix of the noise of the outputs, shape (outputs, outputs)."""
+        """The covariance matrix of the noise of the outputs, shape (outputs, outputs); of a model in continuous time as samples every
+        `sample_time` seconds see it.
+        """
+        if self.kind == "continuous-state-space":
+            return np.array(self._own["noise_intensity"]) / self.sample_time
         return np.array(self._own["noise_covariance"])
 
     @property
     def sample_time(self) -> float:
-        """Seconds from one sample to the next."""
+        """Seconds from one sample to the next; of a model in continuous time those of the model that it was made from."""
         return float(self._own["sample_time"])
 
     @property
@@ -196,11 +203,11 @@ class ReportedModel:
 
     @property
     def stable(self) -> bool:
-        """Whether all poles lie inside the unit circle."""
+        """Whether all poles lie inside the unit circle; in continuous time left of the imaginary axis."""
         return bool(self._polynomial("stable"))
 
     def poles(self) -> npt.NDArray[np.complex128]:
-        """The roots of A and of each F in the z plane; in state space the eigenvalues of F."""
+        """The roots of A and of each F in the z plane; in state space the eigenvalues of F, in continuous time of A."""
         return _roots(self._polynomial("poles"))
 
     def zeros(self, input: int | str = 0) -> npt.NDArray[np.complex128]:
@@ -233,7 +240,7 @@ class ReportedModel:
 
     def _gain(self, input: int | str, output: int | str | None) -> dict[str, Any] | None:
         gains, place = self._polynomial("dc_gain"), self._output(output)
-        found: dict[str, Any] | None = (gains[place] if self.kind == "state-space" else gains)[self._input(input)]
+        found: dict[str, Any] | None = (gains[place] if self.kind in _STATES else gains)[self._input(input)]
         return found
 
     def dc_gain_interval(self, input: int | str = 0, *, output: int | str | None = None) -> Array:

@@ -2,7 +2,6 @@
 
 mod innovations;
 mod lagged_products;
-mod riccati;
 #[cfg(test)]
 pub(super) mod tests;
 mod weighting;
@@ -18,7 +17,7 @@ use super::refinement::RefinementOutcome;
 use super::stretches::thinned_joint;
 use crate::Error;
 use crate::data::JointRecord;
-use crate::model::{StateSpace, is_stable};
+use crate::model::{StateSpace, is_stable, riccati};
 use crate::optimize::normal;
 pub(crate) use innovations::products as products_of_innovations;
 use lagged_products::ROUNDING;

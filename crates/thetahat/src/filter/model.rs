@@ -103,6 +103,12 @@ impl StateModel {
                 let signals = (&*model.inputs, &*model.outputs);
                 Ok(Linear::of_innovations(model.matrices(), signals, start)?.into())
             }
+            Model::ContinuousStateSpace(model) => {
+                let start = start.unwrap_or(InitialState::Unknown);
+                let sampled = model.sampled(model.sample_time, model.hold)?;
+                let signals = (&*sampled.inputs, &*sampled.outputs);
+                Ok(Linear::of_innovations(sampled.matrices(), signals, start)?.into())
+            }
             Model::NonlinearArx(model) => {
                 Ok(Lags::of_model(model, start.unwrap_or(InitialState::Unknown))?.into())
             }

@@ -8,7 +8,7 @@ use super::fitted::{Parameter, PolynomialModel, Signal};
 use super::linear::LinearModel;
 use super::nonlinear_arx::NonlinearArxModel;
 use super::process::ProcessModel;
-use super::state_space::StateSpaceModel;
+use super::state_space::{ContinuousStateSpaceModel, StateSpaceModel};
 use crate::Error;
 
 /// An estimated model of any kind.
@@ -28,11 +28,19 @@ pub enum Model {
     Process(Box<ProcessModel>),
     /// A recursion of a state, with any number of outputs.
     StateSpace(Box<StateSpaceModel>),
+    /// A state in continuous time, with any number of outputs: what a model of another kind was converted to.
+    ContinuousStateSpace(Box<ContinuousStateSpaceModel>),
 }
 
 impl From<StateSpaceModel> for Model {
     fn from(model: StateSpaceModel) -> Self {
         Self::StateSpace(Box::new(model))
+    }
+}
+
+impl From<ContinuousStateSpaceModel> for Model {
+    fn from(model: ContinuousStateSpaceModel) -> Self {
+        Self::ContinuousStateSpace(Box::new(model))
     }
 }
 
@@ -69,6 +77,7 @@ impl Model {
             Self::NonlinearArx(model) => &model.inputs,
             Self::Process(model) => &model.inputs,
             Self::StateSpace(model) => &model.inputs,
+            Self::ContinuousStateSpace(model) => &model.inputs,
         }
     }
 
@@ -80,6 +89,7 @@ impl Model {
             Self::NonlinearArx(model) => &model.outputs,
             Self::Process(model) => std::slice::from_ref(&model.output),
             Self::StateSpace(model) => &model.outputs,
+            Self::ContinuousStateSpace(model) => &model.outputs,
         }
     }
 
@@ -88,7 +98,7 @@ impl Model {
         self.inputs().iter().chain(self.outputs()).map(|signal| signal.name.as_str())
     }
 
-    /// Seconds from one sample to the next.
+    /// Seconds from one sample to the next; of a model in continuous time that of the model it was made from.
     pub fn sample_time(&self) -> f64 {
         match self {
             Self::Polynomial(model) => model.sample_time,
@@ -96,6 +106,7 @@ impl Model {
             Self::NonlinearArx(model) => model.sample_time,
             Self::Process(model) => model.sample_time,
             Self::StateSpace(model) => model.sample_time,
+            Self::ContinuousStateSpace(model) => model.sample_time,
         }
     }
 
@@ -107,7 +118,7 @@ impl Model {
             Self::Equations(model) => &model.parameters,
             Self::NonlinearArx(model) => &model.parameters,
             Self::Process(model) => &model.parameters,
-            Self::StateSpace(_) => &[],
+            Self::StateSpace(_) | Self::ContinuousStateSpace(_) => &[],
         }
     }
 
@@ -115,6 +126,7 @@ impl Model {
     pub fn free_parameters(&self) -> usize {
         match self {
             Self::StateSpace(model) => model.free_parameters,
+            Self::ContinuousStateSpace(model) => model.free_parameters,
             _ => self.parameters().len(),
         }
     }
@@ -126,7 +138,7 @@ impl Model {
             Self::Equations(model) => model.covariance.as_deref(),
             Self::NonlinearArx(model) => model.covariance.as_deref(),
             Self::Process(model) => model.covariance.as_deref(),
-            Self::StateSpace(_) => None,
+            Self::StateSpace(_) | Self::ContinuousStateSpace(_) => None,
         }
     }
 
@@ -138,6 +150,7 @@ impl Model {
             Self::NonlinearArx(model) => model.is_driven(),
             Self::Process(_) => true,
             Self::StateSpace(model) => !model.inputs.is_empty(),
+            Self::ContinuousStateSpace(model) => !model.inputs.is_empty(),
         }
     }
 
@@ -157,6 +170,7 @@ impl Model {
             Self::NonlinearArx(model) => model.name(),
             Self::Process(model) => model.name(),
             Self::StateSpace(model) => model.name(),
+            Self::ContinuousStateSpace(model) => model.name(),
         }
     }
 
@@ -182,7 +196,7 @@ impl Model {
                      compares and responds to steps and sines"
                 ),
             )),
-            Self::StateSpace(_) => Err(Error::argument(
+            Self::StateSpace(_) | Self::ContinuousStateSpace(_) => Err(Error::argument(
                 "model",
                 format!(
                     "{what} is of polynomial models, and this one is in state space: it predicts, simulates, validates, compares, \
@@ -209,6 +223,9 @@ impl Model {
             Self::StateSpace(model) => {
                 Ok((0..model.outputs.len()).map(|output| LinearModel::StateSpace(model, output)).collect())
             }
+            Self::ContinuousStateSpace(model) => {
+                Ok((0..model.outputs.len()).map(|output| LinearModel::Continuous(model, output)).collect())
+            }
         }
     }
 
@@ -220,6 +237,7 @@ impl Model {
             Self::NonlinearArx(model) => model.check(),
             Self::Process(model) => model.check(),
             Self::StateSpace(model) => model.check(),
+            Self::ContinuousStateSpace(model) => model.check(),
         }
     }
 }

@@ -1,5 +1,5 @@
 use super::fitted::{PolynomialModel, Signal};
-use super::state_space::StateSpaceModel;
+use super::state_space::{ContinuousStateSpaceModel, StateSpaceModel};
 
 /// What a linear model is from its inputs to one of its outputs.
 #[derive(Debug, Clone, PartialEq)]
@@ -10,6 +10,8 @@ pub enum LinearModel<'m> {
     Transfer(Box<PolynomialModel>),
     /// An output of a state-space model, counted from 0.
     StateSpace(&'m StateSpaceModel, usize),
+    /// An output of a model in continuous time, counted from 0.
+    Continuous(&'m ContinuousStateSpaceModel, usize),
 }
 
 impl LinearModel<'_> {
@@ -19,6 +21,7 @@ impl LinearModel<'_> {
             Self::Polynomial(model) => &model.inputs,
             Self::Transfer(model) => &model.inputs,
             Self::StateSpace(model, _) => &model.inputs,
+            Self::Continuous(model, _) => &model.inputs,
         }
     }
 
@@ -28,24 +31,27 @@ impl LinearModel<'_> {
             Self::Polynomial(model) => &model.output,
             Self::Transfer(model) => &model.output,
             Self::StateSpace(model, output) => &model.outputs[*output],
+            Self::Continuous(model, output) => &model.outputs[*output],
         }
     }
 
-    /// Seconds from one sample to the next.
+    /// Seconds from one sample to the next; of a model in continuous time from one sample of its transient responses.
     pub fn sample_time(&self) -> f64 {
         match self {
             Self::Polynomial(model) => model.sample_time,
             Self::Transfer(model) => model.sample_time,
             Self::StateSpace(model, _) => model.sample_time,
+            Self::Continuous(model, _) => model.sample_time,
         }
     }
 
-    /// Whether all poles lie inside the unit circle.
+    /// Whether all poles lie inside the unit circle, in continuous time left of the imaginary axis.
     pub fn stable(&self) -> bool {
         match self {
             Self::Polynomial(model) => model.stable,
             Self::Transfer(model) => model.stable,
             Self::StateSpace(model, _) => model.stable,
+            Self::Continuous(model, _) => model.stable,
         }
     }
 
@@ -53,7 +59,7 @@ impl LinearModel<'_> {
     pub fn has_noise(&self) -> bool {
         match self {
             Self::Polynomial(_) => true,
-            Self::Transfer(_) => false,
+            Self::Transfer(_) | Self::Continuous(..) => false,
             Self::StateSpace(model, _) => model.outputs.len() == 1,
         }
     }

@@ -4,8 +4,9 @@ mod chain;
 mod linear;
 mod structure;
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;
 
+pub(super) use chain::MOST_STATES;
 pub(crate) use chain::{Chain, Columns, State, Transition};
 pub(crate) use structure::Parts;
 pub use structure::ProcessStructure;

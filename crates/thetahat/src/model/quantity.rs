@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::Complex;
 
-/// A root of one of a model's polynomials in the z plane.
+/// A root of one of a model's polynomials in the z plane; a pole of a model in continuous time in the s plane, in radians a second.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Root {
     /// The polynomial, such as `a` or `f`; with several inputs `f2` and `b2` are those of the second.

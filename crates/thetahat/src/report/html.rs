@@ -31,7 +31,8 @@ use crate::estimate::Procedure;
 use crate::figures::{self, fixed};
 use crate::inspect::Inspection;
 use crate::model::{
-    EquationsModel, LinearModel, Map, Model, NonlinearArxModel, ProcessModel, StateSpaceModel,
+    ContinuousStateSpaceModel, EquationsModel, LinearModel, Map, Model, NonlinearArxModel, ProcessModel,
+    StateSpaceModel,
 };
 use crate::validate::{Fit, Part, Residuals};
 
@@ -309,9 +310,11 @@ fn of(logs: &[Source]) -> String {
 fn headline(model: &Model) -> String {
     match model {
         Model::Polynomial(model) => format!("{}: {}", model.orders, model.orders.equation()),
-        Model::Equations(_) | Model::NonlinearArx(_) | Model::Process(_) | Model::StateSpace(_) => {
-            model.name()
-        }
+        Model::Equations(_)
+        | Model::NonlinearArx(_)
+        | Model::Process(_)
+        | Model::StateSpace(_)
+        | Model::ContinuousStateSpace(_) => model.name(),
     }
 }
 
@@ -320,6 +323,7 @@ fn lead(model: &Model, fits: &[Fit]) -> Vec<String> {
     let stable = match model {
         Model::Polynomial(model) => Some(model.stable),
         Model::StateSpace(model) => Some(model.stable),
+        Model::ContinuousStateSpace(model) => Some(model.stable),
         _ => None,
     };
     let stable = stable.map_or("", |stable| if stable { ", stable" } else { ", unstable" });
@@ -459,6 +463,7 @@ fn of_model(report: &Report) -> Vec<Section> {
         Model::NonlinearArx(model) => return of_nonlinear_arx(report, model),
         Model::Process(model) => return of_process(report, model),
         Model::StateSpace(model) => return of_state_space(report, model),
+        Model::ContinuousStateSpace(model) => return of_continuous(report, model),
     };
     let inputs: Vec<&str> = model.inputs.iter().map(|input| input.name.as_str()).collect();
     let linear = LinearModel::Polynomial(model);
@@ -567,6 +572,19 @@ fn of_state_space(report: &Report, model: &StateSpaceModel) -> Vec<Section> {
         section.table(tables::matrix_coefficients(outcome, model));
     }
     section.table(tables::noise_of_outputs(model));
+    section.table(tables::estimation(&report.estimation, None));
+    sections.push(section);
+    sections
+}
+
+fn of_continuous(report: &Report, model: &ContinuousStateSpaceModel) -> Vec<Section> {
+    let linear = report.model.linear("a response").unwrap_or_default();
+    let named: Vec<(String, &LinearModel<'_>)> =
+        linear.iter().map(|model| (format!("to {}", model.output().name), model)).collect();
+    let inputs: Vec<&str> = model.inputs.iter().map(|input| input.name.as_str()).collect();
+    let mut sections = responses(&named, &inputs, false);
+    let mut section = Section::new("Model");
+    section.table(tables::continuous_poles(model));
     section.table(tables::estimation(&report.estimation, None));
     sections.push(section);
     sections

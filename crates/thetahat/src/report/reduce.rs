@@ -75,6 +75,10 @@ fn innovations_form(model: &Model) -> Result<StateSpace, Error> {
     match model {
         Model::Polynomial(model) => Ok(model.state_space()),
         Model::StateSpace(model) => Ok(model.matrices()),
+        Model::ContinuousStateSpace(_) => Err(Error::argument(
+            "model",
+            "states are left out of sampled models, and this one is in continuous time: convert it to a sample time first",
+        )),
         Model::Equations(_) | Model::NonlinearArx(_) | Model::Process(_) => Err(Error::argument(
             "model",
             format!(

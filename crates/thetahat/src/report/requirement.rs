@@ -247,7 +247,11 @@ impl Demand {
             (Self::Independent, _) if !report.model.is_driven() => {
                 refused("independent: the model has no inputs; ask for white")
             }
-            (Self::Stable, _) if matches!(report.model, Model::StateSpace(_)) => Ok(()),
+            (Self::Stable, _)
+                if matches!(report.model, Model::StateSpace(_) | Model::ContinuousStateSpace(_)) =>
+            {
+                Ok(())
+            }
             (Self::Stable, _) => report.model.polynomials("stable: a pole").map(|_| ()),
             _ => Ok(()),
         }

@@ -6,9 +6,11 @@ use crate::model::Model;
 
 /// The log must have the model's sample time, unless the model takes any.
 pub(super) fn check_sample_time(model: &Model, log: &Log) -> Result<(), Error> {
-    if !model.takes_any_clock() && (log.sample_time() / model.sample_time() - 1.0).abs() > 0.01 {
+    // One in continuous time is sampled as the log is.
+    let sampled = !matches!(model, Model::ContinuousStateSpace(_));
+    if sampled && !model.takes_any_clock() && (log.sample_time() / model.sample_time() - 1.0).abs() > 0.01 {
         return Err(Error::data(format!(
-            "the log's sample time is {} s, the model's {} s; resample the log, or fit a model to it",
+            "the log's sample time is {} s, the model's {} s; resample the log, convert the model, or fit one to it",
             log.sample_time(),
             model.sample_time()
         )));
@@ -19,7 +21,11 @@ pub(super) fn check_sample_time(model: &Model, log: &Log) -> Result<(), Error> {
 /// Models in equations describe signals as they are.
 pub(super) fn check_offsets(model: &Model) -> Result<(), Error> {
     match model {
-        Model::Polynomial(_) | Model::NonlinearArx(_) | Model::Process(_) | Model::StateSpace(_) => Ok(()),
+        Model::Polynomial(_)
+        | Model::NonlinearArx(_)
+        | Model::Process(_)
+        | Model::StateSpace(_)
+        | Model::ContinuousStateSpace(_) => Ok(()),
         Model::Equations(_) => Err(Error::argument(
             "detrend",
             "a model in equations describes signals as they are, and takes nothing from them; leave it out",

@@ -243,6 +243,7 @@ pub fn validate(
         stable: match model {
             Model::Polynomial(model) => Some(model.stable),
             Model::StateSpace(model) => Some(model.stable),
+            Model::ContinuousStateSpace(model) => Some(model.stable),
             _ => None,
         },
         driven: on_log.is_driven(),

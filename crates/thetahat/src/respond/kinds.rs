@@ -1,5 +1,7 @@
 //! Models of any kind beside a log.
 
+use std::borrow::Cow;
+
 use super::equations::EquationsOnLog;
 use super::nonlinear_arx::NonlinearArxOnLog;
 use super::on_log::{OnLog, PolynomialOnLog};
@@ -11,7 +13,8 @@ use crate::data::{Log, Rows};
 use crate::model::Model;
 
 impl Model {
-    /// The model beside some rows of a log of which its offsets were taken; responses start naturally unless it is said otherwise.
+    /// The model beside some rows of a log of which its offsets were taken; responses start naturally unless it is said otherwise. A model in
+    /// continuous time is sampled as the log is.
     /// `fitted` are the rows of this log that it was fitted to.
     ///
     /// # Errors
@@ -29,6 +32,16 @@ impl Model {
             Self::NonlinearArx(model) => Box::new(NonlinearArxOnLog::new(model, log, rows)?),
             Self::Process(model) => Box::new(ProcessOnLog::new(model, log, rows)?),
             Self::StateSpace(model) => Box::new(StateSpaceOnLog::new(model, log, rows, asked)?),
+            Self::ContinuousStateSpace(model) => {
+                let sampled = model.sampled(log.sample_time(), model.hold).map_err(|error| match error {
+                    // It is the log that says how it is sampled.
+                    Error::Argument { message, .. } => {
+                        Error::data(format!("the model cannot be sampled as the log is: {message}"))
+                    }
+                    error => error,
+                })?;
+                Box::new(StateSpaceOnLog::of(Cow::Owned(sampled), log, rows, asked)?)
+            }
         })
     }
 
@@ -43,7 +56,11 @@ impl Model {
     ) -> Result<Box<dyn OnLog + 'l>, Error> {
         match self {
             Self::NonlinearArx(model) => Ok(Box::new(NonlinearArxOnLog::new(model, log, rows)?.with_clamp())),
-            Self::Polynomial(_) | Self::Equations(_) | Self::Process(_) | Self::StateSpace(_) => {
+            Self::Polynomial(_)
+            | Self::Equations(_)
+            | Self::Process(_)
+            | Self::StateSpace(_)
+            | Self::ContinuousStateSpace(_) => {
                 Err(Error::argument("clamp", "it is of nonlinear ARX models; leave it out"))
             }
         }
@@ -55,7 +72,9 @@ impl Model {
     pub fn natural_start(&self, horizon: Horizon) -> InitialCondition {
         match self {
             Self::Polynomial(model) => InitialCondition::natural(model, horizon),
-            Self::Equations(_) | Self::StateSpace(_) => InitialCondition::Estimate,
+            Self::Equations(_) | Self::StateSpace(_) | Self::ContinuousStateSpace(_) => {
+                InitialCondition::Estimate
+            }
             Self::NonlinearArx(_) => InitialCondition::Drop,
             Self::Process(model) if model.free_start => InitialCondition::Estimate,
             Self::Process(_) => InitialCondition::Zero,

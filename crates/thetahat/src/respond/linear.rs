@@ -1,7 +1,7 @@
 //! Responses of an output of a linear model, whatever its kind.
 
 use super::{FrequencyResponse, TransientResponse};
-use super::{frequency_response, impulse_response, state_space, step_response};
+use super::{continuous, frequency_response, impulse_response, state_space, step_response};
 use crate::Error;
 use crate::model::LinearModel;
 
@@ -16,12 +16,13 @@ impl LinearModel<'_> {
             Self::Polynomial(model) => frequency_response(model, frequencies)?,
             Self::Transfer(model) => frequency_response(model, frequencies)?,
             Self::StateSpace(model, output) => state_space::frequency_response(model, *output, frequencies)?,
+            Self::Continuous(model, output) => continuous::frequency_response(model, *output, frequencies)?,
         };
         found.retain(|response| response.input.is_some() || self.has_noise());
         Ok(found)
     }
 
-    /// The response to a unit step of an input, counted from 0. See [`step_response`].
+    /// The response to a unit step of an input, counted from 0. See [`step_response`]. In continuous time it is exact at the samples.
     ///
     /// # Errors
     /// As for [`step_response`].
@@ -32,13 +33,15 @@ impl LinearModel<'_> {
             Self::StateSpace(model, output) => {
                 state_space::transient(model, (*output, input), samples, |_| 1.0)
             }
+            Self::Continuous(model, output) => continuous::step_response(model, (*output, input), samples),
         }
     }
 
-    /// The response to an impulse of an input, counted from 0. See [`impulse_response`].
+    /// The response to an impulse of an input, counted from 0. See [`impulse_response`]. In continuous time the impulse has area 1 and no
+    /// duration.
     ///
     /// # Errors
-    /// As for [`impulse_response`].
+    /// As for [`impulse_response`]; [`Error::Argument`] in continuous time where the input acts at once, as the response is then infinite.
     pub fn impulse_response(&self, input: usize, samples: Option<usize>) -> Result<TransientResponse, Error> {
         match self {
             Self::Polynomial(model) => impulse_response(model, input, samples),
@@ -46,6 +49,7 @@ impl LinearModel<'_> {
             Self::StateSpace(model, output) => {
                 state_space::transient(model, (*output, input), samples, |t| f64::from(u8::from(t == 0)))
             }
+            Self::Continuous(model, output) => continuous::impulse_response(model, (*output, input), samples),
         }
     }
 
@@ -56,7 +60,12 @@ impl LinearModel<'_> {
             Self::Polynomial(model) => [&model.poles[..], &model.noise_poles].concat(),
             Self::Transfer(model) => [&model.poles[..], &model.noise_poles].concat(),
             Self::StateSpace(model, _) => model.poles.clone(),
+            Self::Continuous(model, _) => model.poles.clone(),
         };
+        if let Self::Continuous(model, _) = self {
+            let rates = model.poles.iter().map(|pole| (model.sample_time * pole.re).abs());
+            return rates.filter(|rate| *rate > 0.0).fold(1.0, f64::min);
+        }
         let distances = roots.iter().map(|root| (1.0 - root.re.hypot(root.im)).abs());
         distances.filter(|distance| *distance > 0.0).fold(1.0, f64::min)
     }

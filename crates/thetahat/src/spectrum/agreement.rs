@@ -89,6 +89,15 @@ impl MeasuredResponse {
     /// # Errors
     /// As for [`agreement`](Self::agreement).
     pub fn overlaid(&self, model: &LinearModel<'_>) -> Result<Vec<FrequencyResponse>, Error> {
+        if matches!(model, LinearModel::Continuous(..)) {
+            return Err(Error::argument(
+                "model",
+                format!(
+                    "it is in continuous time, and the response is of samples every {} s: convert it to these first",
+                    self.sample_time
+                ),
+            ));
+        }
         if (model.sample_time() / self.sample_time - 1.0).abs() > 0.01 {
             return Err(Error::argument(
                 "model",

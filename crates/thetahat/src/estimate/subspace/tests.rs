@@ -1,7 +1,7 @@
 use thetahat_core::nalgebra::{DMatrix, DVector};
 
-use super::riccati::stationary;
 use super::*;
+use crate::model::riccati::stationary;
 use crate::random::Random;
 
 /// Two inputs, two outputs, four states of two lightly damped modes.

@@ -183,7 +183,7 @@ impl<S: Number<f64>> Chain<S> {
     }
 
     /// A x + B u.
-    fn slope(&self, state: &State<S>, u: f64) -> State<S> {
+    pub(in crate::model) fn slope(&self, state: &State<S>, u: f64) -> State<S> {
         let mut slope = [S::from(0.0); MOST_STATES];
         for (slope, row) in slope.iter_mut().zip(&self.matrix).take(self.states) {
             *slope = row[self.states] * u;

@@ -230,7 +230,7 @@ impl StateSpace {
     ///
     /// # Errors
     /// [`Error::Undetermined`] where there are none.
-    fn with_stable_predictor(self) -> Result<Self, Error> {
+    pub(super) fn with_stable_predictor(self) -> Result<Self, Error> {
         let between = &self.f - &self.k * &self.h;
         let stable = |matrix: &DMatrix<f64>| {
             let largest = eigen::eigenvalues(matrix)?.first().map_or(0.0, |value| value.modulus());

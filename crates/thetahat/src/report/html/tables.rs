@@ -15,8 +15,8 @@ use crate::estimate::{
 };
 use crate::figures::{chance, fixed, number, scientific, short, three};
 use crate::model::{
-    EquationsModel, NonlinearArxModel, Orders, Parameter, PolynomialModel, ProcessModel, Quantity, Root,
-    Signal, StateSpaceModel,
+    ContinuousStateSpaceModel, EquationsModel, NonlinearArxModel, Orders, Parameter, PolynomialModel,
+    ProcessModel, Quantity, Root, Signal, StateSpaceModel,
 };
 use crate::optimize::Stopped;
 use crate::report::{Estimation, InSample, Report, Validated};
@@ -170,6 +170,18 @@ pub(super) fn eigenvalues(model: &StateSpaceModel) -> Table {
         add("pole", pole, or_dash(*time, quantity));
     }
     model.predictor_poles.iter().for_each(|pole| add("pole of the predictor", pole, String::new()));
+    table
+}
+
+/// The poles of a model in continuous time.
+pub(super) fn continuous_poles(model: &ContinuousStateSpaceModel) -> Table {
+    let head = ["pole [rad/s]", "natural frequency [rad/s]", "damping", "time constant [s]"];
+    let mut table = Table::new("Poles", &head);
+    let figures = model.natural_frequencies.iter().zip(&model.damping).zip(&model.time_constants);
+    for (pole, ((frequency, damping), time)) in model.poles.iter().zip(figures) {
+        let damping = or_dash(*damping, number);
+        table.row([complex(pole), number(*frequency), damping, or_dash(*time, quantity)]);
+    }
     table
 }
 

@@ -19,7 +19,7 @@ use crate::respond::{
 /// A state-space model beside a log of which its offsets were taken.
 #[derive(Debug)]
 pub(crate) struct StateSpaceOnLog<'l> {
-    model: &'l StateSpaceModel,
+    model: Cow<'l, StateSpaceModel>,
     matrices: StateSpace,
     /// What predictions are made from.
     ahead: JointRecord<'l>,
@@ -46,6 +46,19 @@ impl<'l> StateSpaceOnLog<'l> {
         rows: &[Rows],
         asked: Option<InitialCondition>,
     ) -> Result<Self, Error> {
+        Self::of(Cow::Borrowed(model), log, rows, asked)
+    }
+
+    /// The same for a model that may be of its own.
+    ///
+    /// # Errors
+    /// As for [`Self::new`].
+    pub(crate) fn of(
+        model: Cow<'l, StateSpaceModel>,
+        log: &'l Log,
+        rows: &[Rows],
+        asked: Option<InitialCondition>,
+    ) -> Result<Self, Error> {
         let names = |signals: &[Signal]| -> Vec<String> {
             signals.iter().map(|signal| signal.name.clone()).collect()
         };
@@ -54,7 +67,8 @@ impl<'l> StateSpaceOnLog<'l> {
         let inputs: Vec<&str> = inputs.iter().map(String::as_str).collect();
         let free_runs = log.segments(&inputs, rows)?;
         let innovations = OnceCell::new();
-        Ok(Self { model, matrices: model.matrices(), ahead, free_runs, asked, innovations })
+        let matrices = model.matrices();
+        Ok(Self { model, matrices, ahead, free_runs, asked, innovations })
     }
 
     fn outputs(&self) -> usize {
@@ -258,7 +272,7 @@ impl OnLog for StateSpaceOnLog<'_> {
 
     /// The errors of each output, as a model without parameters that sees the same inputs leaves them.
     fn tested(&self) -> Result<Vec<Tested<'_>>, Error> {
-        let (model, record) = (self.model, &self.ahead);
+        let (model, record) = (&*self.model, &self.ahead);
         let found = self.innovations(self.natural());
         let inputs = model.inputs.len();
         let orders = Orders::arx(0, &vec![1; inputs], &vec![0; inputs])?;

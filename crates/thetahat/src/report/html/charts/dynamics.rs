@@ -125,7 +125,7 @@ pub(crate) fn bode(models: &[(String, &LinearModel<'_>)], input: Option<&str>) -
 fn is_white(model: &LinearModel<'_>) -> bool {
     match model {
         LinearModel::Polynomial(model) => (model.orders.na, model.orders.nc, model.orders.nd) == (0, 0, 0),
-        LinearModel::Transfer(_) => true,
+        LinearModel::Transfer(_) | LinearModel::Continuous(..) => true,
         LinearModel::StateSpace(model, _) => model.k.iter().flatten().all(|gain| *gain == 0.0),
     }
 }

@@ -21,7 +21,7 @@ const DOUBLINGS: usize = 60;
 /// ```
 ///
 /// (Chu, Fan, Lin and Wang, Int. J. Control 77, 2004, section 2). None where it does not converge. Cost: about 10 n^3 a doubling.
-pub(super) fn stationary(model: &StateSpace, rest: &DMatrix<f64>) -> Option<StateSpace> {
+pub(crate) fn stationary(model: &StateSpace, rest: &DMatrix<f64>) -> Option<StateSpace> {
     let n = model.f.nrows();
     let identity = DMatrix::identity(n, n);
     let noise = &model.noise_covariance;

@@ -1,0 +1,140 @@
+//! A model in continuous time, as a table for people.
+
+use thetahat::figures::{number, short, three};
+use thetahat::model::{ContinuousStateSpaceModel, ZerosPolesGain};
+use thetahat::report::Report;
+use thetahat::text::harmless;
+use thetahat::thetahat_core::nalgebra::Complex;
+
+use super::text::{self, Text, columns, or_dash};
+use super::{quantity, signal};
+
+/// Transfer functions are written out up to this order: beyond it coefficients tell nothing.
+const HIGHEST: usize = 4;
+/// Why a pole has no time constant or damping, or a channel no gain.
+const NO_TIME: &str = "no time constant goes with a pole that does not decay, and no damping with one at 0";
+const INTEGRATES: &str = "the model integrates";
+
+/// The main figures of a model in continuous time.
+pub(super) fn table(report: &Report, model: &ContinuousStateSpaceModel, width: usize) -> String {
+    let mut text = Text::new(width);
+    let (name, seconds) = (report.model.name(), short(model.sample_time));
+    text.line(&format!("{name}, from a sample time of {seconds} s with {}", model.hold));
+    text.line("dx/dt = A x + B u + K e, y = C x + D u + e");
+    let inputs = model.inputs.iter().zip(&model.delays).map(|(input, delay)| {
+        let waits = if *delay > 0.0 { format!(", delay {} s", short(*delay)) } else { String::new() };
+        format!("{}{waits}", signal("input", input))
+    });
+    let outputs = model.outputs.iter().map(|output| signal("output", output));
+    text.line(&inputs.chain(outputs).collect::<Vec<String>>().join(", "));
+    text.line("");
+    poles(&mut text, model);
+    gains(&mut text, model);
+    transfers(&mut text, model);
+    text.line(if model.stable { "stable" } else { "unstable" });
+    text.finish()
+}
+
+fn poles(text: &mut Text, model: &ContinuousStateSpaceModel) {
+    let head = ["pole [rad/s]", "natural frequency [rad/s]", "damping", "time constant [s]"];
+    let mut table = columns(&head).none(NO_TIME);
+    let figures = model.natural_frequencies.iter().zip(&model.damping).zip(&model.time_constants);
+    // One of a pair stands for both.
+    for (pole, ((frequency, damping), time)) in
+        model.poles.iter().zip(figures).filter(|(pole, _)| pole.im >= 0.0)
+    {
+        let value = text::complex(pole);
+        let value = if pole.im > 0.0 { format!("{value} and conjugate") } else { value };
+        table.row([
+            value,
+            number(*frequency),
+            or_dash(*damping, three),
+            or_dash(*time, |time| number(time.value)),
+        ]);
+    }
+    if !model.poles.is_empty() {
+        text.table(table);
+    }
+}
+
+fn gains(text: &mut Text, model: &ContinuousStateSpaceModel) {
+    if model.inputs.is_empty() {
+        return;
+    }
+    let head: Vec<String> = std::iter::once("DC gain from".to_owned())
+        .chain(model.outputs.iter().map(|output| format!("to {}", harmless(&output.name))))
+        .collect();
+    let head: Vec<&str> = head.iter().map(String::as_str).collect();
+    let mut table = columns(&head).none(INTEGRATES);
+    for (place, input) in model.inputs.iter().enumerate() {
+        let gains = model.dc_gain.iter().map(|gains| or_dash(gains.get(place).copied().flatten(), quantity));
+        table.row(std::iter::once(harmless(&input.name)).chain(gains));
+    }
+    text.table(table);
+}
+
+/// The transfer function of each input and output, where they are short.
+fn transfers(text: &mut Text, model: &ContinuousStateSpaceModel) {
+    if model.a.len() > HIGHEST {
+        return;
+    }
+    for (place, output) in model.outputs.iter().enumerate() {
+        for (input, signal) in model.inputs.iter().enumerate() {
+            let Ok(transfer) = model.transfer(place, input) else { continue };
+            let late = match model.delays[input] {
+                delay if delay > 0.0 => format!(" e^(-{} s)", short(delay)),
+                _ => String::new(),
+            };
+            let quotient = quotient(&transfer);
+            let (from, to) = (harmless(&signal.name), harmless(&output.name));
+            text.line(&format!("G(s) from {from} to {to} = {quotient}{late}"));
+        }
+    }
+}
+
+/// Numerator and denominator in falling powers of s.
+fn quotient(transfer: &ZerosPolesGain) -> String {
+    if transfer.gain == 0.0 {
+        return "0".to_owned();
+    }
+    let numerator = polynomial(transfer.gain, &transfer.zeros);
+    if transfer.poles.is_empty() {
+        return numerator;
+    }
+    format!("({numerator})/({})", polynomial(1.0, &transfer.poles))
+}
+
+/// gain (s - root) (s - root) …, multiplied out. Complex roots come in pairs.
+fn polynomial(gain: f64, roots: &[Complex<f64>]) -> String {
+    let mut coefficients = vec![Complex::new(gain, 0.0)];
+    for root in roots {
+        coefficients.push(Complex::new(0.0, 0.0));
+        for place in (1..coefficients.len()).rev() {
+            let before = coefficients[place - 1];
+            coefficients[place] -= root * before;
+        }
+    }
+    let mut text = String::new();
+    for (place, coefficient) in coefficients.iter().enumerate() {
+        let (value, power) = (coefficient.re, roots.len() - place);
+        if value == 0.0 && !roots.is_empty() {
+            continue;
+        }
+        let sign = match (text.is_empty(), value < 0.0) {
+            (true, true) => "-",
+            (true, false) => "",
+            (false, true) => " - ",
+            (false, false) => " + ",
+        };
+        let shown = number(value.abs());
+        let factor = if shown == "1" && power > 0 { String::new() } else { shown };
+        let power = match power {
+            0 => String::new(),
+            1 => "s".to_owned(),
+            power => format!("s^{power}"),
+        };
+        let space = if factor.is_empty() || power.is_empty() { "" } else { " " };
+        text.push_str(&format!("{sign}{factor}{space}{power}"));
+    }
+    text
+}

@@ -1,0 +1,305 @@
+//! Models at other sample times and in continuous time.
+
+use std::fmt;
+use std::str::FromStr;
+
+use thetahat_core::nalgebra::DMatrix;
+
+use super::process::MOST_STATES;
+use super::state_space::{Head, Steps};
+use super::{
+    ContinuousStateSpace, ContinuousStateSpaceModel, Hold, Model, PolynomialModel, ProcessModel, StateSpace,
+    StateSpaceModel,
+};
+use crate::{Error, figures};
+
+/// Sample times closer than this fraction are the same.
+const SAME: f64 = 1e-9;
+/// More samples than this in the place of one are counted by no power of F.
+const MOST_STEPS: f64 = 1e9;
+
+/// Which time a model goes by.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum TimeBase {
+    /// Continuous time.
+    Continuous,
+    /// Samples every so many seconds.
+    Sampled(f64),
+}
+
+impl FromStr for TimeBase {
+    type Err = Error;
+
+    /// The word `continuous`, or seconds.
+    fn from_str(text: &str) -> Result<Self, Error> {
+        if text.trim() == "continuous" {
+            return Ok(Self::Continuous);
+        }
+        let seconds = text.trim().parse::<f64>().ok().filter(|seconds| *seconds > 0.0 && seconds.is_finite());
+        seconds.map(Self::Sampled).ok_or_else(|| {
+            Error::argument(
+                "to",
+                format!(
+                    "'{text}' is neither the word continuous nor a number of seconds above 0, such as 0.05"
+                ),
+            )
+        })
+    }
+}
+
+impl fmt::Display for TimeBase {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Continuous => f.write_str("continuous time"),
+            Self::Sampled(seconds) => write!(f, "a sample time of {} s", figures::short(*seconds)),
+        }
+    }
+}
+
+/// A sampled model whose delays are taken off.
+struct Plant {
+    matrices: StateSpace,
+    /// Samples.
+    delays: Vec<usize>,
+    free_parameters: usize,
+    degrees_of_freedom: Option<usize>,
+}
+
+impl Model {
+    /// The model in continuous time whose samples are this one, its inputs doing between samples what `hold` says: see
+    /// [`StateSpace::to_continuous`]. Delays of samples are taken off before and are delays in seconds. A process is in continuous time
+    /// as it is.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for models that are not linear, or written in equations, and one in continuous time already; those of
+    /// [`StateSpace::to_continuous`].
+    ///
+    /// ```
+    /// use thetahat::data::Record;
+    /// use thetahat::estimate::{Initial, arx};
+    /// use thetahat::model::{Hold, Model, Orders, Signal};
+    ///
+    /// // y(t) = 0.8 y(t-1) + 0.5 u(t-3) every 0.1 s: a pole at ln 0.8/0.1 a second, and a delay of two samples.
+    /// let u: Vec<f64> = (0..100_u32).map(|t| f64::from(t * t % 7)).collect();
+    /// let mut y = vec![0.0; 3];
+    /// for t in 3..u.len() {
+    ///     y.push(0.8 * y[t - 1] + 0.5 * u[t - 3]);
+    /// }
+    /// let orders = Orders::arx(1, &[1], &[3])?;
+    /// let estimate = arx(&Record::new(&y, vec![&u])?, &orders, Initial::Drop)?;
+    /// let signal = |name: &str| Signal { name: name.into(), ..Signal::default() };
+    /// let model = Model::from(estimate.to_model(&orders, 0.1, vec![signal("u")], signal("y"))?);
+    ///
+    /// let continuous = model.to_continuous(Hold::Zero)?;
+    /// assert!((continuous.poles[0].re - 0.8_f64.ln() / 0.1).abs() < 1e-8);
+    /// assert!((continuous.delays[0] - 0.2).abs() < 1e-12);
+    /// # Ok::<(), thetahat::Error>(())
+    /// ```
+    pub fn to_continuous(&self, hold: Hold) -> Result<ContinuousStateSpaceModel, Error> {
+        match self {
+            Self::Process(model) => model.in_state_space(hold),
+            Self::ContinuousStateSpace(_) => {
+                Err(Error::argument("to", "the model is in continuous time already; give a sample time"))
+            }
+            _ => {
+                let plant = self.plant()?;
+                let seconds = plant.matrices.sample_time;
+                let head = Head {
+                    inputs: self.inputs().to_vec(),
+                    outputs: self.outputs().to_vec(),
+                    delays: plant.delays.iter().map(|delay| *delay as f64 * seconds).collect(),
+                    sample_time: seconds,
+                    hold,
+                    free_parameters: plant.free_parameters,
+                    degrees_of_freedom: plant.degrees_of_freedom,
+                };
+                ContinuousStateSpaceModel::new(head, &plant.matrices.to_continuous(hold)?)
+            }
+        }
+    }
+
+    /// The model as samples every so many seconds see it, by continuous time: see [`ContinuousStateSpaceModel::sampled`]. Without a `hold`
+    /// that of a model in continuous time, and `zoh` for others. With `zoh` and whole multiples of the own sample time poles that have no
+    /// logarithm need none: so many steps are one.
+    ///
+    /// # Errors
+    /// Those of [`Model::to_continuous`] and [`ContinuousStateSpaceModel::sampled`].
+    pub fn at_sample_time(&self, seconds: f64, hold: Option<Hold>) -> Result<StateSpaceModel, Error> {
+        if !(seconds > 0.0 && seconds.is_finite()) {
+            return Err(Error::argument("to", format!("it is {seconds} s; it must be above 0 and finite")));
+        }
+        let hold = match self {
+            Self::ContinuousStateSpace(model) => return model.sampled(seconds, hold.unwrap_or(model.hold)),
+            Self::Process(model) => {
+                let hold = hold.unwrap_or_default();
+                return model.in_state_space(hold)?.sampled(seconds, hold);
+            }
+            _ => hold.unwrap_or_default(),
+        };
+        let Plant { matrices, delays, free_parameters, degrees_of_freedom } = self.plant()?;
+        let signals = || (self.inputs().to_vec(), self.outputs().to_vec());
+        let ratio = seconds / matrices.sample_time;
+        if (ratio - 1.0).abs() <= SAME {
+            return StateSpaceModel::new(signals(), delays, &matrices, free_parameters, degrees_of_freedom);
+        }
+        match self.to_continuous(hold) {
+            Ok(model) => model.sampled(seconds, hold),
+            Err(Error::Undetermined { .. })
+                if hold == Hold::Zero
+                    && ratio < MOST_STEPS
+                    && ratio > 1.0
+                    && (ratio - ratio.round()).abs() <= SAME * ratio =>
+            {
+                let slower = matrices.delayed(&delays).every(ratio.round() as u64, seconds)?;
+                let none = vec![0; delays.len()];
+                StateSpaceModel::new(signals(), none, &slower, free_parameters, degrees_of_freedom)
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    /// The recursion, without the samples that inputs wait.
+    fn plant(&self) -> Result<Plant, Error> {
+        match self {
+            Self::Polynomial(model) => {
+                let (matrices, delays) = model.without_delays();
+                let (free_parameters, degrees_of_freedom) =
+                    (model.parameters.len(), model.degrees_of_freedom);
+                Ok(Plant { matrices, delays, free_parameters, degrees_of_freedom })
+            }
+            Self::StateSpace(model) => {
+                let (matrices, delays) = model.without_delays();
+                let (free_parameters, degrees_of_freedom) = (model.free_parameters, model.degrees_of_freedom);
+                Ok(Plant { matrices, delays, free_parameters, degrees_of_freedom })
+            }
+            Self::Equations(_) | Self::NonlinearArx(_) | Self::Process(_) | Self::ContinuousStateSpace(_) => {
+                Err(Error::argument(
+                    "model",
+                    format!(
+                        "models of polynomials, in state space and of processes are converted to other sample times, and this one is {}; fit \
+                         one of these, or resample the log",
+                        self.name()
+                    ),
+                ))
+            }
+        }
+    }
+}
+
+impl StateSpace {
+    /// The model as every `count`-th sample sees it, its inputs held in between: powers of F, and the noise of single measurements.
+    fn every(&self, count: u64, seconds: f64) -> Result<Self, Error> {
+        let one = Steps::one(self);
+        let before = Steps::repeated(&one, count - 1);
+        // What e does at first lasts until the next sample.
+        let k = &before.f * &self.k;
+        let Steps { f, g, covariance } = before.then(&one);
+        let slower = Self {
+            f,
+            g,
+            h: self.h.clone(),
+            d: self.d.clone(),
+            k,
+            noise_covariance: self.noise_covariance.clone(),
+            sample_time: seconds,
+        };
+        slower.innovations_form(&covariance)
+    }
+}
+
+impl StateSpaceModel {
+    /// The matrices without the states that wait, and how many wait of each input; of a model whose last states are no samples that wait,
+    /// all of them.
+    fn without_delays(&self) -> (StateSpace, Vec<usize>) {
+        let whole = self.matrices();
+        let n = self.order();
+        let mut plant = StateSpace {
+            f: whole.f.view((0, 0), (n, n)).into_owned(),
+            g: whole.g.rows(0, n).into_owned(),
+            h: whole.h.columns(0, n).into_owned(),
+            k: whole.k.rows(0, n).into_owned(),
+            ..whole.clone()
+        };
+        let mut first = n;
+        for (input, &delay) in self.delays.iter().enumerate().filter(|(_, delay)| **delay > 0) {
+            let seen = first + delay - 1;
+            plant.g.set_column(input, &whole.f.column(seen).rows(0, n));
+            plant.d.set_column(input, &whole.h.column(seen));
+            first += delay;
+        }
+        if plant.delayed(&self.delays) == whole {
+            (plant, self.delays.clone())
+        } else {
+            (whole, vec![0; self.delays.len()])
+        }
+    }
+}
+
+impl PolynomialModel {
+    /// The recursion without the samples that inputs wait, beyond the one that a held input has by itself, and how many these are.
+    fn without_delays(&self) -> (StateSpace, Vec<usize>) {
+        let mut own = self.clone();
+        let mut delays = vec![0; own.b.len()];
+        for ((b, nk), delay) in own.b.iter_mut().zip(&mut own.orders.nk).zip(&mut delays) {
+            *delay = nk.saturating_sub(1).min(b.len());
+            *nk -= *delay;
+            b.drain(..*delay);
+        }
+        (own.state_space(), delays)
+    }
+}
+
+impl ProcessModel {
+    /// A, B, C and D, and the dead times as delays. Errors are white from sample to sample.
+    fn in_state_space(&self, hold: Hold) -> Result<ContinuousStateSpaceModel, Error> {
+        let parts = self.parts();
+        let chains: Vec<_> = self
+            .structures
+            .iter()
+            .zip(&parts)
+            .map(|(structure, parts)| structure.chain(&parts.shape))
+            .collect();
+        let (n, m) = (chains.iter().map(|chain| chain.states()).sum::<usize>(), self.inputs.len());
+        let mut matrices = ContinuousStateSpace {
+            a: DMatrix::zeros(n, n),
+            b: DMatrix::zeros(n, m),
+            c: DMatrix::zeros(1, n),
+            d: DMatrix::zeros(1, m),
+            k: DMatrix::zeros(n, 1),
+            noise_intensity: DMatrix::from_element(1, 1, self.noise_variance * self.sample_time),
+        };
+        let mut first = 0;
+        for (input, (chain, parts)) in chains.iter().zip(&parts).enumerate() {
+            let states = chain.states();
+            let seen = |state: &[f64; MOST_STATES], u: f64| -> f64 {
+                let columns = chain.columns(state, u);
+                parts.weights.iter().zip(columns).map(|(weight, column)| weight * column).sum()
+            };
+            for column in 0..states {
+                let mut unit = [0.0; MOST_STATES];
+                unit[column] = 1.0;
+                let slope = chain.slope(&unit, 0.0);
+                (0..states).for_each(|row| matrices.a[(first + row, first + column)] = slope[row]);
+                matrices.c[(0, first + column)] = seen(&unit, 0.0);
+            }
+            let none = [0.0; MOST_STATES];
+            let slope = chain.slope(&none, 1.0);
+            (0..states).for_each(|row| matrices.b[(first + row, input)] = slope[row]);
+            matrices.d[(0, input)] = seen(&none, 1.0);
+            first += states;
+        }
+        let head = Head {
+            inputs: self.inputs.clone(),
+            outputs: vec![self.output.clone()],
+            delays: parts.iter().map(|parts| parts.dead_time).collect(),
+            sample_time: self.sample_time,
+            hold,
+            free_parameters: self.parameters.len(),
+            degrees_of_freedom: self.degrees_of_freedom,
+        };
+        ContinuousStateSpaceModel::new(head, &matrices)
+    }
+}
+
+#[cfg(test)]
+mod tests;

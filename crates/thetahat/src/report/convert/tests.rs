@@ -1,0 +1,103 @@
+use crate::data::{Channel, Log, Rows};
+use crate::model::{Hold, Model, Orders, TimeBase};
+use crate::regression::noise::Noise;
+use crate::report::{Plan, Report, StateSpacePlan, ValidationPlan, fit_state_space, identify, validate};
+use crate::respond::{Horizon, InitialCondition};
+use crate::{Document, Error};
+
+/// A plant with poles at 0.95 and 0.8 whose input changes every fifth sample, with noise of its state and its sensor, every `step`-th row.
+fn log(step: usize) -> Result<Log, Error> {
+    let mut noise = Noise(4);
+    let (mut u, mut y, mut x, mut held) = (Vec::new(), Vec::new(), [0.0, 0.0], 0.0);
+    for t in 0..10_000 {
+        if t % 5 == 0 {
+            held = noise.next();
+        }
+        u.push(held);
+        y.push(3.0 + x[0] + 0.3 * noise.next());
+        x = [0.95 * x[0] + x[1] + 0.1 * noise.next(), 0.8 * x[1] + 0.2 * held];
+    }
+    let channel = |name: &str, values: &[f64]| {
+        let values = values.iter().copied().step_by(step).collect();
+        Channel { name: name.to_owned(), values }
+    };
+    Log::new(vec![channel("u", &u), channel("y", &y)], 0.01 * step as f64)
+}
+
+fn fitted(log: &Log) -> Result<Report, Error> {
+    let plan = StateSpacePlan { orders: Some(2..=2), ..StateSpacePlan::new(&["u"], &["y"]) };
+    fit_state_space(log, &[], &plan)
+}
+
+#[test]
+fn a_model_of_one_clock_holds_at_another() -> Result<(), Error> {
+    let slow = log(5)?;
+    let (own, fast) = (fitted(&slow)?, fitted(&log(1)?)?);
+    let continuous = fast.converted(TimeBase::Continuous, None)?;
+    let continuous = Report::from_json(&continuous.to_json()?)?;
+    let converted = fast.converted(TimeBase::Sampled(0.05), None)?;
+    let validated = |report: &Report| validate(report, None, &slow, &[], &ValidationPlan::default());
+    let known = validated(&own)?.validation;
+    for report in [&continuous, &converted] {
+        let found = validated(report)?.validation;
+        for (one, other) in found.fit.iter().zip(&known.fit) {
+            assert!(
+                (one.percent.unwrap_or(0.0) - other.percent.unwrap_or(100.0)).abs() < 0.5,
+                "{one:?} {other:?}"
+            );
+        }
+        // The intervals are as right: the noise is that of single measurements.
+        assert!(!found.coverage.is_empty());
+        for (one, other) in found.coverage.iter().zip(&known.coverage) {
+            let apart = one.actual.zip(other.actual).map_or(1.0, |(one, other)| (one - other).abs());
+            assert!(apart < 0.02, "{one:?} {other:?}");
+        }
+        assert_eq!(found.stable, Some(true));
+    }
+    // As the log is sampled, so is the model.
+    let steps = Horizon::Steps { steps: 3 };
+    let rows: [Rows; 0] = [];
+    let one = continuous.apply(&slow, &rows, None, steps, InitialCondition::Estimate)?;
+    let other = converted.apply(&slow, &rows, None, steps, InitialCondition::Estimate)?;
+    let differences = one.outputs[0].predicted.iter().zip(&other.outputs[0].predicted);
+    assert!(differences.filter(|(one, _)| one.is_finite()).all(|(one, other)| (one - other).abs() < 1e-8));
+    assert!(fast.apply(&slow, &rows, None, steps, InitialCondition::Estimate).is_err());
+    // What cannot be sampled so is the log's fault, not an option's.
+    let mut late = continuous.clone();
+    if let Model::ContinuousStateSpace(model) = &mut late.model {
+        model.delays = vec![0.06];
+    }
+    assert!(late.apply(&slow, &rows, None, steps, InitialCondition::Estimate).is_ok());
+    if let Model::ContinuousStateSpace(model) = &mut late.model {
+        model.delays = vec![1e3];
+    }
+    let error = late.apply(&slow, &rows, None, steps, InitialCondition::Estimate);
+    assert!(
+        matches!(error, Err(Error::Data { message, .. }) if message.contains("is more than 1000 samples"))
+    );
+    Ok(())
+}
+
+#[test]
+fn a_converted_report_says_what_became_of_it() -> Result<(), Error> {
+    let report = identify(log(1)?, &[], &Plan::new(&["u"], "y", Orders::arx(2, &[2], &[1])?))?;
+    let there = report.converted(TimeBase::Continuous, Some(Hold::First))?;
+    assert!(there.warnings[0].starts_with(
+        "the model was converted from a sample time of 0.01 s to continuous time with foh: it has no figures of a fit"
+    ));
+    assert_eq!((there.fit.len(), there.model.parameters().len(), there.model.free_parameters()), (0, 0, 4));
+    // Back with the hold that it was made with.
+    let back = there.converted(TimeBase::Sampled(0.01), None)?;
+    assert!(back.warnings[0].contains("from continuous time to a sample time of 0.01 s with foh"));
+    let one = report.model.linear("a response")?[0].frequency_response(&[1.0, 100.0])?;
+    let other = back.model.linear("a response")?[0].frequency_response(&[1.0, 100.0])?;
+    for (one, other) in one[0].points.iter().zip(&other[0].points) {
+        assert!((one.re - other.re).hypot(one.im - other.im) < 1e-10);
+    }
+    assert!(matches!(there.reduced(1), Err(Error::Argument { argument, .. }) if argument == "model"));
+    assert!(matches!(&there.model, Model::ContinuousStateSpace(model) if model.hold == Hold::First));
+    let mut damaged = there.to_json()?;
+    damaged = damaged.replacen("\"delays\": [\n      0.0\n", "\"delays\": [\n      -1.0\n", 1);
+    assert!(Report::from_json(&damaged).is_err_and(|error| error.to_string().contains("delays are not one")));
+    Ok(())
+}

@@ -269,6 +269,14 @@ struct Equation {
     inverse: DMatrix<f64>,
 }
 
+/// The entries that a coefficient of an equation moves, with their slopes.
+struct Moved {
+    output: usize,
+    /// Which of its regressors.
+    row: usize,
+    entries: Vec<(usize, f64)>,
+}
+
 /// A model in scaled signals.
 struct Solved {
     equations: Vec<Equation>,
@@ -290,7 +298,7 @@ impl Solved {
             (1..=orders.na).flat_map(move |lag| outputs.clone().map(move |output| lag * width + m + output))
         };
         let groups = match orders.coupling {
-            Coupling::Full => vec![0..l],
+            Coupling::Full => std::iter::once(0..l).collect::<Vec<_>>(),
             Coupling::None => (0..l).map(|output| output..output + 1).collect(),
         };
         let mut equations: Vec<Equation> = Vec::with_capacity(l);
@@ -451,7 +459,7 @@ impl Solved {
                 entries.len() - 1
             })
         };
-        let mut slopes: Vec<(usize, usize, Vec<(usize, f64)>)> = Vec::new();
+        let mut slopes: Vec<Moved> = Vec::new();
         for (output, equation) in self.equations.iter().enumerate() {
             for (row, place) in equation.places.iter().enumerate() {
                 let (lag, signal) = (place / width, place % width);
@@ -481,22 +489,22 @@ impl Solved {
                         }
                     }
                 }
-                slopes.push((output, row, moved));
+                slopes.push(Moved { output, row, entries: moved });
             }
         }
         let size = entries.len();
         let mut values = vec![vec![0.0; size]; size];
         let factors: Vec<DMatrix<f64>> = self.cross_inverses(products);
-        for (output, row, moved) in &slopes {
-            for (other, column, also) in &slopes {
-                let (first, second) = (&self.equations[*output], &self.equations[*other]);
+        for one in &slopes {
+            for other in &slopes {
+                let (first, second) = (&self.equations[one.output], &self.equations[other.output]);
                 let degrees =
                     ((samples - first.places.len() as f64) * (samples - second.places.len() as f64)).sqrt();
-                let joint = factors[output * l + other][(*row, *column)];
-                let covariance = self.errors[(*output, *other)] / degrees * joint;
-                for (entry, slope) in moved {
-                    for (also, other) in also {
-                        values[*entry][*also] += slope * other * covariance;
+                let joint = factors[one.output * l + other.output][(one.row, other.row)];
+                let covariance = self.errors[(one.output, other.output)] / degrees * joint;
+                for (entry, slope) in &one.entries {
+                    for (also, second) in &other.entries {
+                        values[*entry][*also] += slope * second * covariance;
                     }
                 }
             }

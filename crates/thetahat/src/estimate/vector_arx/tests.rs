@@ -47,13 +47,11 @@ fn exact_data_give_the_coefficients() -> Result<(), Error> {
     let signals = signals(200, 0.0, [3.0, -2.0], 1);
     let asked = VectorArxOptions { constant: true, ..options(2..=2, 2..=2, Some(Coupling::Full)) };
     let found = vector_arx(&record(&signals)?, &asked, 1.0)?;
-    for lag in 0..2 {
-        for output in 0..2 {
-            for other in 0..2 {
-                let value = found.outcome.a[lag][output][other].value;
-                assert!((value - A[lag][output][other]).abs() < 1e-6, "{value}");
-            }
-            assert!((found.outcome.b[0][lag][output].value - B[lag][output][0]).abs() < 1e-6);
+    for (lag, (a, b)) in A.iter().zip(&B).enumerate() {
+        let rows = a.iter().flatten().zip(found.outcome.a[lag].iter().flatten());
+        let inputs = b.iter().flatten().zip(&found.outcome.b[0][lag]);
+        for (expected, quantity) in rows.chain(inputs) {
+            assert!((quantity.value - expected).abs() < 1e-6, "{} {expected}", quantity.value);
         }
     }
     assert!(

@@ -53,6 +53,8 @@ fn continuous_time_is_there_and_back() {
     ] {
         assert!(there.stdout.contains(words), "{words}: {}", there.stdout);
     }
+    // A denominator begins with 1, which is not written.
+    assert!(there.stdout.contains(")/(s^2 + "), "{}", there.stdout);
     let continuous = document(&folder.read("c.json"));
     assert_eq!(
         (&continuous["model"]["kind"], &continuous["model"]["hold"], &continuous["fit"]),

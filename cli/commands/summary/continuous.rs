@@ -126,8 +126,7 @@ fn polynomial(gain: f64, roots: &[Complex<f64>]) -> String {
             (false, true) => " - ",
             (false, false) => " + ",
         };
-        let shown = number(value.abs());
-        let factor = if shown == "1" && power > 0 { String::new() } else { shown };
+        let factor = if value.abs() == 1.0 && power > 0 { String::new() } else { number(value.abs()) };
         let power = match power {
             0 => String::new(),
             1 => "s".to_owned(),

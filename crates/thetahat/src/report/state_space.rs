@@ -151,7 +151,7 @@ impl StateSpacePlan {
 /// y(t)   = H x(t) + D u(t) + e(t)
 /// ```
 ///
-/// with any number of inputs and outputs by a subspace method: see [`subspace`]. The order is that of least MDL, or given. Segments without a
+/// with any number of inputs and outputs by a subspace method: see [`subspace`](crate::estimate::subspace()). The order is that of least MDL, or given. Segments without a
 /// missing value are each used from their first sample on, and predictions and free runs start each from the state that explains it best.
 ///
 /// With [`arx`](StateSpacePlan::arx) the model is an ARX model with a matrix polynomial A(q), by least squares.

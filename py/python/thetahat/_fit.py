@@ -103,7 +103,7 @@ def arx(
     >>> found = th.arx(th.Log(y, u, sample_time=1), na=1, nb=1)
     >>> [round(entry["value"], 1) for entry in found.document["estimation"]["a"][0][1]]
     [-0.3, -0.5]
-    >>> [round(float(gain), 1) for gain in (found.dc_gain("u1", output="y1")[0], found.dc_gain("u1", output="y2")[0])]
+    >>> [round(float(gain), 1) for gain in (found.dc_gain(output="y1")[0], found.dc_gain(output="y2")[0])]
     [5.0, 3.0]
     """
     if isinstance(log, Log) and len(log.outputs) > 1:

@@ -308,6 +308,8 @@ fn refined_models_have_standard_errors_everywhere() {
     // Fewer states are another model.
     folder.done("reduce r.json --order 1 --out s.json");
     assert!(errors("bode s.json", 4).iter().all(Option::is_none));
+    let series = folder.run("fit log.csv --time t -y i,speed --nb 0 --refine simulation");
+    assert!(series.code == 2 && series.stderr.contains("without inputs there is no free run"), "{series:?}");
     for (options, word) in [
         ("--refine both", "--refine"),
         ("--search newton", "--refine is needed with --search"),

@@ -103,8 +103,8 @@ def arx(
     >>> found = th.arx(th.Log(y, u, sample_time=1), na=1, nb=1)
     >>> [round(entry["value"], 1) for entry in found.document["estimation"]["a"][0][1]]
     [-0.3, -0.5]
-    >>> [round(float(gain), 1) for gain in (found.dc_gain(output="y1")[0], found.dc_gain(output="y2")[0])]
-    [5.0, 3.0]
+    >>> [round(found.dc_gain(output=name)[0]) for name in found.outputs]
+    [5, 3]
     """
     if isinstance(log, Log) and len(log.outputs) > 1:
         options = {name: value for name, value in locals().items() if name not in ("na", "nb", "nk")}

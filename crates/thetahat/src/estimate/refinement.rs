@@ -21,6 +21,8 @@ use errors::{Errors, Form, Unstable};
 
 /// The variance of errors, in squares of the outputs, below which nothing is left of them.
 const NOTHING_LEFT: f64 = 1e-16;
+/// Errors of such a variance are rounding, and no search makes them smaller.
+const EXACT: f64 = 1e-12;
 /// Iterations along the directions of one point.
 const ROUND: usize = 10;
 /// A direction whose information is below this fraction of that of the others, each direction by itself having 1, is not seen.
@@ -433,6 +435,16 @@ impl Units {
         let none = DMatrix::zeros(form.flat().len(), 0);
         let mut errors = Errors::new(record, what.refine, form, none, floor.clone());
         errors.evaluate(&[]).map_err(|Unstable| no_errors())?;
+        let exact = |place: &usize| errors.covariance[(*place, *place)] <= EXACT * outputs[*place].powi(2);
+        if let Some(place) = (0..outputs.len()).find(exact) {
+            return Err(Error::undetermined(
+                Vec::new(),
+                format!(
+                    "nothing is left of output {} that could be made smaller: the model explains it exactly; leave `refine` out",
+                    place + 1
+                ),
+            ));
+        }
         let factor = errors.covariance.clone().cholesky().ok_or_else(no_errors)?;
         let l = outputs.len();
         let back = factor.l();

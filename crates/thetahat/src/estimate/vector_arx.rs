@@ -162,7 +162,7 @@ pub(crate) struct VectorArxEstimate {
 /// x_i(t+1) = x_{i+1}(t) - A_i x_1(t) + (B_i - A_i B_0) u(t) - A_i e(t)
 /// ```
 ///
-/// (Kailath, Linear Systems, 1980, section 6.4), which predicts as the regression does.
+/// (Kailath, Linear Systems, 1980, section 6.4), which predicts as the regression does; its states are in units of the outputs' sizes.
 ///
 /// Cost: O(N q^2 p) for q signals and p lags once, then O((q p)^3) for each model.
 ///
@@ -410,7 +410,7 @@ impl Solved {
         let levels = self.levels(products, &a, &b);
         let units = DMatrix::from_diagonal(&DVector::from_column_slice(&scales[m..]));
         let covariance = &units * &self.errors * &units;
-        let space = observer_form(&a, &b, covariance, sample_time);
+        let space = observer_form(&a, &b, &scales[m..], covariance, sample_time);
         let free: usize = self.equations.iter().map(|equation| equation.places.len()).sum();
         VectorArxEstimate {
             outcome,
@@ -463,29 +463,30 @@ impl Solved {
         for (output, equation) in self.equations.iter().enumerate() {
             for (row, place) in equation.places.iter().enumerate() {
                 let (lag, signal) = (place / width, place % width);
-                let unit = products.scales[m + output] / products.scales[signal];
+                let (own, scale) = (products.scales[m + output], products.scales[signal]);
                 let state = |lag: usize, row: usize| (lag - 1) * l + row;
                 let mut moved = Vec::new();
                 let mut add = |matrix, row, column, slope: f64| {
                     if slope != 0.0 {
-                        moved.push((place_of(Entry { matrix, row, column }), slope * unit));
+                        moved.push((place_of(Entry { matrix, row, column }), slope));
                     }
                 };
                 if signal >= m {
                     // The coefficient is an entry of -A_lag.
                     let column = signal - m;
                     add(StateSpaceMatrix::F, state(lag, output), column, 1.0);
-                    add(StateSpaceMatrix::K, state(lag, output), column, 1.0);
+                    add(StateSpaceMatrix::K, state(lag, output), column, 1.0 / scale);
                     for input in 0..m {
-                        add(StateSpaceMatrix::G, state(lag, output), input, direct[(column, input)]);
+                        add(StateSpaceMatrix::G, state(lag, output), input, direct[(column, input)] / scale);
                     }
                 } else if lag > 0 {
-                    add(StateSpaceMatrix::G, state(lag, output), signal, 1.0);
+                    add(StateSpaceMatrix::G, state(lag, output), signal, 1.0 / scale);
                 } else {
-                    add(StateSpaceMatrix::D, output, signal, 1.0);
+                    add(StateSpaceMatrix::D, output, signal, own / scale);
                     for (lag, a) in a.iter().enumerate().skip(1) {
                         for other in 0..l {
-                            add(StateSpaceMatrix::G, state(lag, other), signal, -a[(other, output)]);
+                            let slope = -a[(other, output)] * own / scale / products.scales[m + other];
+                            add(StateSpaceMatrix::G, state(lag, other), signal, slope);
                         }
                     }
                 }
@@ -529,10 +530,12 @@ impl Solved {
     }
 }
 
-/// The block observer form of coefficients by lag, from lag 0 on.
+/// The block observer form of coefficients by lag, from lag 0 on, states in units of the sizes of the outputs: else eigenvalues of signals of very
+/// different sizes lose their digits.
 fn observer_form(
     a: &[DMatrix<f64>],
     b: &[DMatrix<f64>],
+    sizes: &[f64],
     noise_covariance: DMatrix<f64>,
     sample_time: f64,
 ) -> StateSpace {
@@ -541,17 +544,19 @@ fn observer_form(
     let n = blocks * l;
     let (mut f, mut g) = (DMatrix::zeros(n, n), DMatrix::zeros(n, m));
     let (mut h, mut k) = (DMatrix::zeros(l, n), DMatrix::zeros(n, l));
+    let units = DMatrix::from_diagonal(&DVector::from_column_slice(sizes));
+    let inverses = DMatrix::from_diagonal(&DVector::from_iterator(l, sizes.iter().map(|size| 1.0 / size)));
     for block in 0..blocks {
-        let (a_own, b_own) = (&a[block + 1], &b[block + 1]);
-        f.view_mut((block * l, 0), (l, l)).copy_from(&-a_own);
+        let (a_own, b_own) = (&inverses * &a[block + 1], &b[block + 1]);
+        f.view_mut((block * l, 0), (l, l)).copy_from(&(-&a_own * &units));
+        g.rows_mut(block * l, l).copy_from(&(&inverses * b_own - &a_own * &b[0]));
         k.rows_mut(block * l, l).copy_from(&-a_own);
-        g.rows_mut(block * l, l).copy_from(&(b_own - a_own * &b[0]));
         if block + 1 < blocks {
             f.view_mut((block * l, (block + 1) * l), (l, l)).fill_with_identity();
         }
     }
     if blocks > 0 {
-        h.columns_mut(0, l).fill_with_identity();
+        h.columns_mut(0, l).copy_from(&units);
     }
     StateSpace { f, g, h, d: b[0].clone(), k, noise_covariance, sample_time }
 }

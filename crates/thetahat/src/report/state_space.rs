@@ -120,6 +120,12 @@ impl StateSpacePlan {
             ));
         }
         self.search.check_numbers()?;
+        if self.inputs.is_empty() && self.refine == Some(Refine::Simulation) {
+            return Err(Error::argument(
+                "refine",
+                "without inputs there is no free run whose errors could be small; take prediction",
+            ));
+        }
         if self.arx.is_some() && self.refine.is_some() {
             return Err(Error::argument("refine", "an ARX model is its own least errors; leave it out"));
         }

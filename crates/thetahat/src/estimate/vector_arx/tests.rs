@@ -120,12 +120,18 @@ fn the_least_mdl_has_the_orders_of_the_plant() -> Result<(), Error> {
 fn errors_are_those_of_many_runs() -> Result<(), Error> {
     for (direct, coupling) in [(false, Coupling::Full), (true, Coupling::Full), (false, Coupling::None)] {
         let gain = |seed: u64| -> Result<(f64, f64), Error> {
-            let signals = signals(400, 0.5, [0.0, 0.0], 100 + seed);
+            // In units of very different sizes.
+            let mut signals = signals(400, 0.5, [0.0, 0.0], 100 + seed);
+            for (signal, size) in signals.iter_mut().zip([1e3, 1e-6, 1e7]) {
+                signal.iter_mut().for_each(|value| *value *= size);
+            }
             let asked = VectorArxOptions { direct, ..options(2..=2, 2..=2, Some(coupling)) };
             let found = vector_arx(&record(&signals)?, &asked, 1.0)?;
             let signal = |name: &str| crate::model::Signal { name: name.to_owned(), ..Default::default() };
             let named = (vec![signal("u")], vec![signal("y1"), signal("y2")]);
             let model = crate::model::StateSpaceModel::new(named, vec![0], &found.space, 12, None)?;
+            // All poles of the plant are inside.
+            assert!(model.stable, "{:?}", model.poles);
             let gain = model.with_covariance(found.covariance).dc_gain[1][0];
             let gain = gain.ok_or_else(|| Error::data("no gain"))?;
             Ok((gain.value, gain.standard_error.ok_or_else(|| Error::data("no error"))?))

@@ -13,6 +13,8 @@ use super::{quantity, signal};
 const HIGHEST: usize = 4;
 /// Why a pole has no time constant or damping, or a channel no gain.
 const NO_TIME: &str = "no time constant goes with a pole that does not decay, and no damping with one at 0";
+const NO_ERROR: &str = "no time constant goes with a pole that does not decay, and no damping with one at 0; no standard error with poles \
+                         that are too close for one";
 const INTEGRATES: &str = "the model integrates";
 
 /// The main figures of a model in continuous time.
@@ -36,8 +38,15 @@ pub(super) fn table(report: &Report, model: &ContinuousStateSpaceModel, width: u
 }
 
 fn poles(text: &mut Text, model: &ContinuousStateSpaceModel) {
-    let head = ["pole [rad/s]", "natural frequency [rad/s]", "damping", "time constant [s]"];
-    let mut table = columns(&head).none(NO_TIME);
+    let head = [
+        "pole [rad/s]",
+        "natural frequency [rad/s]",
+        "damping",
+        "time constant [s]",
+        "standard error of the pole",
+    ];
+    let known = model.covariance.is_some();
+    let mut table = if known { columns(&head).none(NO_ERROR) } else { columns(&head[..4]).none(NO_TIME) };
     let figures = model.natural_frequencies.iter().zip(&model.damping).zip(&model.time_constants);
     // One of a pair stands for both.
     for (pole, ((frequency, damping), time)) in
@@ -45,12 +54,10 @@ fn poles(text: &mut Text, model: &ContinuousStateSpaceModel) {
     {
         let value = text::complex(pole);
         let value = if pole.im > 0.0 { format!("{value} and conjugate") } else { value };
-        table.row([
-            value,
-            number(*frequency),
-            or_dash(*damping, three),
-            or_dash(*time, |time| number(time.value)),
-        ]);
+        let spread = known.then(|| text::spread(pole));
+        let figures =
+            [value, number(*frequency), or_dash(*damping, three), or_dash(*time, |time| number(time.value))];
+        table.row(figures.into_iter().chain(spread));
     }
     if !model.poles.is_empty() {
         text.table(table);

@@ -15,7 +15,9 @@ use thetahat_core::nalgebra::{DMatrix, DVector};
 use super::outcome::{SearchOutcome, StartOutcome, search_outcome};
 use crate::Error;
 use crate::data::JointRecord;
-use crate::model::{EntryCovariance, Sizes, StateSpace, across_coordinates, flat, is_stable};
+use crate::model::{
+    EntryCovariance, Sizes, StateSpace, across_coordinates, flat, is_stable, symmetric_eigen,
+};
 use crate::optimize::{Deadline, Found, Monitor, Objective, Progress, Search, Stopped, lowest, search};
 use errors::{Errors, Form, Unstable};
 
@@ -385,18 +387,6 @@ impl<'r> Linearized<'r> {
             ..by
         }
     }
-}
-
-/// Eigenvalues and eigenvectors of a symmetric matrix.
-fn symmetric_eigen(matrix: &DMatrix<f64>) -> Option<(DVector<f64>, DMatrix<f64>)> {
-    let (rows, columns) = matrix.shape();
-    if !matrix.iter().all(|value| value.is_finite()) {
-        return None;
-    }
-    let same = faer::Mat::from_fn(rows, columns, |row, column| matrix[(row, column)]);
-    let found = same.self_adjoint_eigen(faer::Side::Lower).ok()?;
-    let values = DVector::from_iterator(rows, found.S().column_vector().iter().copied());
-    Some((values, DMatrix::from_fn(rows, columns, |row, column| found.U()[(row, column)])))
 }
 
 /// The units of a search: inputs of root mean square 1, outputs in which the errors of a start have covariance I.

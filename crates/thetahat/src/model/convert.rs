@@ -3,13 +3,13 @@
 use std::fmt;
 use std::str::FromStr;
 
-use thetahat_core::nalgebra::DMatrix;
+use thetahat_core::nalgebra::{DMatrix, DVector};
 
 use super::process::MOST_STATES;
-use super::state_space::{Head, Steps};
+use super::state_space::{Head, STEP, Steps, independent};
 use super::{
-    ContinuousStateSpace, ContinuousStateSpaceModel, Hold, Model, PolynomialModel, ProcessModel, StateSpace,
-    StateSpaceModel,
+    ContinuousStateSpace, ContinuousStateSpaceModel, EntryCovariance, Hold, Model, PolynomialModel,
+    ProcessModel, StateSpace, StateSpaceModel,
 };
 use crate::{Error, figures};
 
@@ -68,7 +68,8 @@ struct Plant {
 impl Model {
     /// The model in continuous time whose samples are this one, its inputs doing between samples what `hold` says: see
     /// [`StateSpace::to_continuous`]. Delays of samples are taken off before and are delays in seconds. A process is in continuous time
-    /// as it is.
+    /// as it is. Errors of parameters go through to first order (the delta method), by differences to either side along each direction in
+    /// which they vary; those of a process do not.
     ///
     /// # Errors
     /// [`Error::Argument`] for models that are not linear, or written in equations, and one in continuous time already; those of
@@ -113,7 +114,17 @@ impl Model {
                     free_parameters: plant.free_parameters,
                     degrees_of_freedom: plant.degrees_of_freedom,
                 };
-                ContinuousStateSpaceModel::new(head, &plant.matrices.to_continuous(hold)?)
+                let matrices = plant.matrices.to_continuous(hold)?;
+                let model = ContinuousStateSpaceModel::new(head, &matrices)?;
+                let known = self.varied().and_then(|pairs| {
+                    let converted = |moved: &StateSpace| Some(moved.to_continuous(hold).ok()?.renamed());
+                    let pairs = pairs.iter().map(|[plus, minus]| Some([converted(plus)?, converted(minus)?]));
+                    EntryCovariance::of_pairs(&matrices.renamed(), &pairs.collect::<Option<Vec<_>>>()?)
+                });
+                Ok(match known {
+                    Some(known) => model.with_covariance(known),
+                    None => model,
+                })
             }
         }
     }
@@ -140,7 +151,13 @@ impl Model {
         let signals = || (self.inputs().to_vec(), self.outputs().to_vec());
         let ratio = seconds / matrices.sample_time;
         if (ratio - 1.0).abs() <= SAME {
-            return StateSpaceModel::new(signals(), delays, &matrices, free_parameters, degrees_of_freedom);
+            let model =
+                StateSpaceModel::new(signals(), delays, &matrices, free_parameters, degrees_of_freedom)?;
+            let known = self.varied().and_then(|pairs| EntryCovariance::of_pairs(&matrices, &pairs));
+            return Ok(match known {
+                Some(known) => model.with_covariance(known),
+                None => model,
+            });
         }
         match self.to_continuous(hold) {
             Ok(model) => model.sampled(seconds, hold),
@@ -155,6 +172,37 @@ impl Model {
                 StateSpaceModel::new(signals(), none, &slower, free_parameters, degrees_of_freedom)
             }
             Err(error) => Err(error),
+        }
+    }
+
+    /// The recursion to either side along each direction in which the model varies, without the samples that inputs wait; none where its
+    /// errors are not known.
+    fn varied(&self) -> Option<Vec<[StateSpace; 2]>> {
+        match self {
+            Self::Polynomial(model) => {
+                let moved = |direction: &DVector<f64>, sign: f64| {
+                    let values = model.parameters.iter().zip(direction);
+                    let values: Vec<f64> =
+                        values.map(|(parameter, by)| parameter.value + sign * STEP * by).collect();
+                    let PolynomialModel { orders, noise_variance, sample_time, .. } = &**model;
+                    let moved = PolynomialModel::from_parameters(
+                        orders,
+                        &values,
+                        None,
+                        *noise_variance,
+                        *sample_time,
+                    );
+                    Some(moved.ok()?.without_delays().0)
+                };
+                let directions = independent(model.covariance.as_deref()?)?;
+                directions.iter().map(|one| Some([moved(one, 1.0)?, moved(one, -1.0)?])).collect()
+            }
+            Self::StateSpace(model) => {
+                let pairs = model.covariance.as_ref()?.varied(&model.matrices())?;
+                let plant = |whole: StateSpace| stripped(whole, &model.delays).0;
+                Some(pairs.into_iter().map(|pair| pair.map(plant)).collect())
+            }
+            _ => None,
         }
     }
 
@@ -208,31 +256,30 @@ impl StateSpace {
 }
 
 impl StateSpaceModel {
-    /// The matrices without the states that wait, and how many wait of each input; of a model whose last states are no samples that wait,
-    /// all of them.
     fn without_delays(&self) -> (StateSpace, Vec<usize>) {
-        let whole = self.matrices();
-        let n = self.order();
-        let mut plant = StateSpace {
-            f: whole.f.view((0, 0), (n, n)).into_owned(),
-            g: whole.g.rows(0, n).into_owned(),
-            h: whole.h.columns(0, n).into_owned(),
-            k: whole.k.rows(0, n).into_owned(),
-            ..whole.clone()
-        };
-        let mut first = n;
-        for (input, &delay) in self.delays.iter().enumerate().filter(|(_, delay)| **delay > 0) {
-            let seen = first + delay - 1;
-            plant.g.set_column(input, &whole.f.column(seen).rows(0, n));
-            plant.d.set_column(input, &whole.h.column(seen));
-            first += delay;
-        }
-        if plant.delayed(&self.delays) == whole {
-            (plant, self.delays.clone())
-        } else {
-            (whole, vec![0; self.delays.len()])
-        }
+        stripped(self.matrices(), &self.delays)
     }
+}
+
+/// The matrices without the states that wait, and how many wait of each input; of a model whose last states are no samples that wait, all of
+/// them.
+fn stripped(whole: StateSpace, delays: &[usize]) -> (StateSpace, Vec<usize>) {
+    let n = whole.f.nrows().saturating_sub(delays.iter().sum());
+    let mut plant = StateSpace {
+        f: whole.f.view((0, 0), (n, n)).into_owned(),
+        g: whole.g.rows(0, n).into_owned(),
+        h: whole.h.columns(0, n).into_owned(),
+        k: whole.k.rows(0, n).into_owned(),
+        ..whole.clone()
+    };
+    let mut first = n;
+    for (input, &delay) in delays.iter().enumerate().filter(|(_, delay)| **delay > 0) {
+        let seen = first + delay - 1;
+        plant.g.set_column(input, &whole.f.column(seen).rows(0, n));
+        plant.d.set_column(input, &whole.h.column(seen));
+        first += delay;
+    }
+    if plant.delayed(delays) == whole { (plant, delays.to_vec()) } else { (whole, vec![0; delays.len()]) }
 }
 
 impl PolynomialModel {

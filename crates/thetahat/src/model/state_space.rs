@@ -15,13 +15,14 @@ use crate::Error;
 use crate::model::PolynomialModel;
 pub use balance::Reduced;
 pub use continuous::{ContinuousStateSpace, Hold};
-pub(crate) use eigen::is_stable;
+pub(crate) use eigen::{is_stable, symmetric_eigen};
 pub(crate) use fitted::Path;
 pub use fitted::StateSpaceModel;
 pub use in_seconds::ContinuousStateSpaceModel;
 pub(super) use in_seconds::Head;
 pub(super) use spot_noise::Steps;
 pub use uncertainty::{Entry, EntryCovariance, StateSpaceMatrix};
+pub(in crate::model) use uncertainty::{STEP, independent};
 pub(crate) use uncertainty::{Sizes, across_coordinates, flat};
 pub use zeros::ZerosPolesGain;
 

@@ -54,8 +54,14 @@ impl Report {
             Model::Process(_) | Model::ContinuousStateSpace(_) => TimeBase::Continuous,
             model => TimeBase::Sampled(model.sample_time()),
         };
+        let known = match &report.model {
+            Model::ContinuousStateSpace(model) => model.covariance.is_some(),
+            Model::StateSpace(model) => model.covariance.is_some(),
+            _ => false,
+        };
+        let errors = if known { "" } else { " and no standard errors" };
         report.warnings = vec![format!(
-            "the model was converted from {from} to {to} with {hold}: it has no figures of a fit and no standard errors of its own"
+            "the model was converted from {from} to {to} with {hold}: it has no figures of a fit{errors}"
         )];
         Ok(report)
     }

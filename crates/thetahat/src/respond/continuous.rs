@@ -8,7 +8,9 @@ use super::frequency::has_pole;
 use super::transient::lasting;
 use super::{FrequencyPoint, FrequencyResponse, TransientResponse, state_space};
 use crate::Error;
-use crate::model::{ContinuousStateSpace, ContinuousStateSpaceModel, Hold, Quantity, ZerosPolesGain};
+use crate::model::{
+    ContinuousStateSpace, ContinuousStateSpaceModel, Hold, Path, Quantity, ZerosPolesGain, covariance,
+};
 
 /// Of roots this near the imaginary axis nobody knows on which side they lie.
 const ON_AXIS: f64 = 16.0 * f64::EPSILON;
@@ -50,20 +52,26 @@ pub(super) fn frequency_response(
             let diagonal = if row == column { s } else { Complex::new(0.0, 0.0) };
             diagonal - a[(column, row)]
         });
+        let known = model.covariance.as_ref().filter(|_| n > 0);
+        let forward = known.map(|known| (known, matrix.transpose().lu()));
         let solved = if n == 0 { Some(seen.clone()) } else { matrix.lu().solve(&seen) };
         let through = solved.ok_or_else(|| has_pole(frequency))?;
         for (input, (points, transfer)) in found.iter_mut().zip(&transfers).enumerate() {
             let delay = model.delays[input];
-            let enters = b.column(input);
-            let path: Complex<f64> =
-                through.iter().zip(enters.iter()).map(|(weight, entry)| weight * *entry).sum();
+            let enters = b.column(input).map(|entry| Complex::new(entry, 0.0));
             let (sine, cosine) = (-frequency * delay).sin_cos();
-            let response = (path + d[(output, input)]) * Complex::new(cosine, sine);
+            let late = Complex::new(cosine, sine);
+            let response = (through.dot(&enters) + d[(output, input)]) * late;
             if !response.modulus().is_finite() {
                 return Err(has_pole(frequency));
             }
             let near = turned(transfer, frequency) - frequency * delay;
-            points.push(FrequencyPoint::new(frequency, response, None, near));
+            let spread = forward.as_ref().and_then(|(known, forward)| {
+                let (states, path) = (forward.solve(&enters)?, Path { output, input: Some(input) });
+                let gradient = known.gradient(|entry| path.slope(entry, &through, &states) * late);
+                covariance(&known.values, &gradient)
+            });
+            points.push(FrequencyPoint::new(frequency, response, spread, near));
         }
     }
     let names = model.inputs.iter().map(|input| Some(input.name.clone()));

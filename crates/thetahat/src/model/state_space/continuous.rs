@@ -83,6 +83,20 @@ pub struct ContinuousStateSpace {
     pub noise_intensity: DMatrix<f64>,
 }
 
+impl ContinuousStateSpace {
+    /// The same matrices by the letters of a recursion, for what does not ask which time it is.
+    pub(in crate::model) fn renamed(&self) -> StateSpace {
+        let Self { a, b, c, d, k, noise_intensity } = self.clone();
+        StateSpace { f: a, g: b, h: c, d, k, noise_covariance: noise_intensity, sample_time: 1.0 }
+    }
+
+    /// The matrices of [`renamed`](Self::renamed).
+    pub(in crate::model) fn of_renamed(matrices: StateSpace) -> Self {
+        let StateSpace { f, g, h, d, k, noise_covariance, .. } = matrices;
+        Self { a: f, b: g, c: h, d, k, noise_intensity: noise_covariance }
+    }
+}
+
 impl StateSpace {
     /// The model in continuous time that gives this one when it is sampled: [`ContinuousStateSpace::sampled`] has the equations, of which
     /// these are the inverse. With T the sample time, and phi_1 and phi_2 of A T as there:

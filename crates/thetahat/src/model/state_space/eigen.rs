@@ -41,6 +41,16 @@ pub(crate) fn is_stable(matrix: &DMatrix<f64>) -> bool {
     standard(matrix).is_ok_and(|found| found.iter().all(|value| value.modulus() < 1.0))
 }
 
+/// Eigenvalues and eigenvectors of a symmetric matrix; none where they do not converge.
+pub(crate) fn symmetric_eigen(matrix: &DMatrix<f64>) -> Option<(DVector<f64>, DMatrix<f64>)> {
+    if !matrix.iter().all(|value| value.is_finite()) {
+        return None;
+    }
+    let found = faer_of(matrix).self_adjoint_eigen(faer::Side::Lower).ok()?;
+    let values = DVector::from_iterator(matrix.nrows(), found.S().column_vector().iter().copied());
+    Some((values, nalgebra_of(found.U())))
+}
+
 /// The finite z with det(A - z B) = 0, in the order of [`eigenvalues`].
 ///
 /// With a shift s they are s + 1/mu for the eigenvalues mu of (A - s B)^-1 B, those at infinity having mu = 0: so B may be singular (Saad,

@@ -2,9 +2,16 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::{Complex, DMatrix};
 
+use super::eigen::solved;
 use super::spot_noise::{Steps, WHOLE};
-use super::{ContinuousStateSpace, Hold, StateSpace, StateSpaceModel, ZerosPolesGain};
-use crate::model::{Quantity, Root, Signal};
+use super::uncertainty::spread;
+use super::{
+    ContinuousStateSpace, EntryCovariance, Hold, Path, StateSpace, StateSpaceMatrix, StateSpaceModel,
+    ZerosPolesGain,
+};
+use crate::distribution::student_two_sided;
+use crate::model::dynamics::LEVEL;
+use crate::model::{Interval, Quantity, Root, Signal, standard_error};
 use crate::{Error, figures};
 
 /// Poles slower than this fraction of a radian a sample are an integrator.
@@ -47,6 +54,9 @@ pub struct ContinuousStateSpaceModel {
     pub k: Vec<Vec<f64>>,
     /// The covariance of e at samples times `sample_time`, in units of the outputs squared times seconds.
     pub noise_intensity: Vec<Vec<f64>>,
+    /// How uncertain the matrices are: A stands as f, B as g and C as h. None where that is not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub covariance: Option<EntryCovariance>,
     /// N - p/l for N samples of l outputs and p free parameters of the model that it was made from.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub degrees_of_freedom: Option<usize>,
@@ -93,7 +103,7 @@ impl ContinuousStateSpaceModel {
         let Head { inputs, outputs, delays, sample_time, hold, free_parameters, degrees_of_freedom } = head;
         let slow = INTEGRATOR / sample_time;
         let integrates = poles.iter().any(|pole| pole.norm() < slow);
-        let solved = if integrates { None } else { super::eigen::solved(a.clone(), b) };
+        let solved = if integrates { None } else { solved(a.clone(), b) };
         let gain = solved.map(|x| d - c * x);
         let entry = |output: usize, input: usize| {
             let value = gain.as_ref().map(|gain| gain[(output, input)]).filter(|value| value.is_finite());
@@ -119,6 +129,7 @@ impl ContinuousStateSpaceModel {
             d: rows(d),
             k: rows(k),
             noise_intensity: rows(noise_intensity),
+            covariance: None,
             degrees_of_freedom,
             free_parameters,
             natural_frequencies: poles.iter().map(|pole| pole.norm()).collect(),
@@ -134,6 +145,45 @@ impl ContinuousStateSpaceModel {
             inputs,
             outputs,
         })
+    }
+
+    /// The same with the covariance of the entries of the matrices, and the errors that follow.
+    pub(in crate::model) fn with_covariance(mut self, covariance: EntryCovariance) -> Self {
+        let ContinuousStateSpace { a, b, c, .. } = self.matrices();
+        let zero = Complex::new(0.0, 0.0);
+        spread(&mut self.poles, &a, &covariance, |entry, left, right| match entry.matrix {
+            StateSpaceMatrix::F => left[entry.row] * right[entry.column],
+            _ => zero,
+        });
+        // w' = -C A^-1 and v = -A^-1 B, as at q = 1.
+        let complex = |matrix: DMatrix<f64>| matrix.map(|entry| Complex::new(entry, 0.0));
+        let (states, weights) = (solved(-&a, &b), solved(-a.transpose(), &c.transpose()));
+        if let (Some(states), Some(weights)) = (states.map(complex), weights.map(complex)) {
+            for (output, gains) in self.dc_gain.iter_mut().enumerate() {
+                for (input, gain) in gains.iter_mut().enumerate() {
+                    let path = Path { output, input: Some(input) };
+                    let (weights, states) =
+                        (weights.column(output).into_owned(), states.column(input).into_owned());
+                    let gradient = covariance.gradient(|entry| path.slope(entry, &weights, &states));
+                    if let Some(gain) = gain {
+                        gain.standard_error = standard_error(Some(&covariance.values), &gradient);
+                    }
+                }
+            }
+        }
+        let quantile = student_two_sided(1.0 - LEVEL, self.degrees_of_freedom);
+        for (pole, time) in self.poles.iter().zip(&mut self.time_constants) {
+            let (Some([[variance, _], _]), Some(time)) = (pole.covariance, time.as_mut()) else { continue };
+            let deviation = variance.sqrt();
+            let end = |rate: f64| (rate < 0.0).then(|| -1.0 / rate);
+            time.standard_error = Some(deviation / (pole.re * pole.re));
+            time.interval = Some(Interval {
+                lower: end(pole.re - quantile * deviation),
+                upper: end(pole.re + quantile * deviation),
+            });
+        }
+        self.covariance = Some(covariance);
+        self
     }
 
     /// The matrices, delays apart.
@@ -165,10 +215,8 @@ impl ContinuousStateSpaceModel {
     /// # Errors
     /// [`Error::Argument`] if there is no such input or output; [`Error::Undetermined`] where the eigenvalues do not converge.
     pub fn transfer(&self, output: usize, input: usize) -> Result<ZerosPolesGain, Error> {
-        let ContinuousStateSpace { a, b, c, d, k, noise_intensity } = self.matrices();
         // Zeros and poles of a quotient are those of it in s as in z.
-        let same = StateSpace { f: a, g: b, h: c, d, k, noise_covariance: noise_intensity, sample_time: 1.0 };
-        same.transfer(output, input)
+        self.matrices().renamed().transfer(output, input)
     }
 
     /// The model as samples every so many seconds see it, between which inputs do what `hold` says.
@@ -193,6 +241,8 @@ impl ContinuousStateSpaceModel {
     /// [`Error::Argument`] for a time that is not above 0 or leaves an input waiting for more than 1000 samples, and for holds but `zoh`
     /// where a delay is no whole number of samples; those of [`ContinuousStateSpace::sampled`]; [`Error::Undetermined`] where no predictor
     /// is stable.
+    ///
+    /// Errors of the matrices go through by differences to either side along each direction in which they vary.
     ///
     /// ```
     /// use thetahat::data::{Channel, Log};
@@ -219,12 +269,29 @@ impl ContinuousStateSpaceModel {
     /// ```
     pub fn sampled(&self, seconds: f64, hold: Hold) -> Result<StateSpaceModel, Error> {
         let continuous = self.matrices();
-        let plain = continuous.sampled(seconds, hold)?;
-        let with_noise = self.with_noise(&continuous, plain, hold)?;
+        let noisy = |continuous: &ContinuousStateSpace| {
+            let plain = continuous.sampled(seconds, hold)?;
+            self.with_noise(continuous, plain, hold)
+        };
+        let with_noise = noisy(&continuous)?;
         let (waiting, parts) = self.waiting(seconds, hold)?;
         let plant = late(&continuous, with_noise, &parts)?;
         let signals = (self.inputs.clone(), self.outputs.clone());
-        StateSpaceModel::new(signals, waiting, &plant, self.free_parameters, self.degrees_of_freedom)
+        let model =
+            StateSpaceModel::new(signals, waiting, &plant, self.free_parameters, self.degrees_of_freedom)?;
+        let known = self.covariance.as_ref().and_then(|known| {
+            let sampled = |moved: StateSpace| {
+                let moved = ContinuousStateSpace::of_renamed(moved);
+                late(&moved, noisy(&moved).ok()?, &parts).ok()
+            };
+            let pair = |[plus, minus]: [StateSpace; 2]| Some([sampled(plus)?, sampled(minus)?]);
+            let pairs = known.varied(&continuous.renamed())?.into_iter().map(pair);
+            EntryCovariance::of_pairs(&plant, &pairs.collect::<Option<Vec<_>>>()?)
+        });
+        Ok(match known {
+            Some(known) => model.with_covariance(known),
+            None => model,
+        })
     }
 
     /// For each input the whole samples that it waits, and the seconds that are left.
@@ -339,6 +406,9 @@ impl ContinuousStateSpaceModel {
             if rows.iter().flatten().any(|value| !value.is_finite()) {
                 return wrong(format!("{name} has a value that is not finite"));
             }
+        }
+        if self.covariance.as_ref().is_some_and(|covariance| !covariance.fits(&self.matrices().renamed())) {
+            return wrong("covariance is not one of entries of the matrices".to_owned());
         }
         let offsets = self.inputs.iter().chain(&self.outputs).flat_map(|s| [s.offset.level, s.offset.slope]);
         if offsets.into_iter().any(|value| !value.is_finite()) {

@@ -5,8 +5,13 @@ use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::{Complex, ComplexField, DMatrix, DVector};
 
 use super::StateSpace;
-use super::eigen::{faer_of, nalgebra_of, solved};
+use super::eigen::{faer_of, nalgebra_of, solved, symmetric_eigen};
 use crate::model::{Gradient, Root, covariance, is_simple};
+
+/// Slopes are differences over such a part of a standard deviation to either side: exact to a part in a million.
+pub(in crate::model) const STEP: f64 = 1e-3;
+/// A direction of less variance than this, those of all being 1 on the average, is rounding.
+const CERTAIN: f64 = 1e-13;
 
 /// A matrix of a state-space model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -55,6 +60,18 @@ pub(crate) struct Sizes {
     pub(crate) inputs: Vec<f64>,
     pub(crate) outputs: Vec<f64>,
     pub(crate) states: Vec<f64>,
+}
+
+impl Sizes {
+    /// Those at which inputs move states of size one, and these the outputs, by one.
+    fn of(model: &StateSpace) -> Self {
+        let size = |norm: f64| if norm > 0.0 { norm } else { 1.0 };
+        Self {
+            inputs: model.g.column_iter().map(|column| 1.0 / size(column.norm())).collect(),
+            outputs: model.h.row_iter().map(|row| size(row.norm())).collect(),
+            states: vec![1.0; model.f.nrows()],
+        }
+    }
 }
 
 /// The entries of a model of n states, m inputs and l outputs, matrix by matrix, in the order of [`flat`].
@@ -216,6 +233,39 @@ impl EntryCovariance {
         self
     }
 
+    /// The model to either side along each of as many independent directions as it varies in, [`STEP`] standard deviations away.
+    pub(in crate::model) fn varied(&self, model: &StateSpace) -> Option<Vec<[StateSpace; 2]>> {
+        let moved = |direction: &DVector<f64>, sign: f64| {
+            let mut moved = model.clone();
+            for (entry, by) in self.entries.iter().zip(direction.iter()) {
+                let matrix = match entry.matrix {
+                    StateSpaceMatrix::F => &mut moved.f,
+                    StateSpaceMatrix::G => &mut moved.g,
+                    StateSpaceMatrix::H => &mut moved.h,
+                    StateSpaceMatrix::D => &mut moved.d,
+                    StateSpaceMatrix::K => &mut moved.k,
+                };
+                matrix[(entry.row, entry.column)] += sign * STEP * by;
+            }
+            moved
+        };
+        let directions = independent(&self.values)?;
+        Some(directions.iter().map(|direction| [1.0, -1.0].map(|sign| moved(direction, sign))).collect())
+    }
+
+    /// The covariance of the entries of a model that such pairs have become.
+    pub(in crate::model) fn of_pairs(model: &StateSpace, pairs: &[[StateSpace; 2]]) -> Option<Self> {
+        let moved = |[plus, minus]: &[StateSpace; 2]| (flat(plus) - flat(minus)) / (2.0 * STEP);
+        let columns: Vec<DVector<f64>> = pairs.iter().map(moved).collect();
+        if columns.is_empty() {
+            return None;
+        }
+        let factor = DMatrix::from_columns(&columns);
+        let first = model.f.len() + model.g.len() + model.h.len();
+        let feedthrough = factor.rows(first, model.d.len()).iter().any(|slope| *slope != 0.0);
+        Self::new(model, feedthrough, &Sizes::of(model), &factor)
+    }
+
     /// How something varies with the free entries.
     pub(crate) fn gradient(&self, of: impl Fn(&Entry) -> Complex<f64>) -> Gradient {
         self.entries.iter().map(of).enumerate().collect()
@@ -240,6 +290,22 @@ impl EntryCovariance {
             && self.entries.iter().all(inside)
             && self.values.iter().flatten().all(|value| value.is_finite())
     }
+}
+
+/// Directions, the sum of whose products with themselves is a covariance.
+pub(in crate::model) fn independent(covariance: &[Vec<f64>]) -> Option<Vec<DVector<f64>>> {
+    let size = covariance.len();
+    let scale = |row: usize| covariance[row][row].max(0.0).sqrt();
+    let scaled = DMatrix::from_fn(size, size, |row, column| {
+        let product = scale(row) * scale(column);
+        if product > 0.0 { covariance[row][column] / product } else { 0.0 }
+    });
+    let (values, vectors) = symmetric_eigen(&scaled)?;
+    let seen = values.iter().enumerate().filter(|(_, value)| **value > CERTAIN);
+    let direction = |(place, value): (usize, &f64)| {
+        DVector::from_fn(size, |row, _| vectors[(row, place)] * scale(row) * value.sqrt())
+    };
+    Some(seen.map(direction).collect())
 }
 
 /// The rows that a QR factor of the transpose takes first, as many as there are columns: of what the rows taken before leave, each

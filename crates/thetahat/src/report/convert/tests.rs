@@ -101,3 +101,65 @@ fn a_converted_report_says_what_became_of_it() -> Result<(), Error> {
     assert!(Report::from_json(&damaged).is_err_and(|error| error.to_string().contains("delays are not one")));
     Ok(())
 }
+
+/// The errors of what does not depend on how time goes stay; those of poles change as poles do.
+#[test]
+fn errors_go_through_conversions() -> Result<(), Error> {
+    let none = || Error::data("no error is known");
+    let polynomial = identify(log(1)?, &[], &Plan::new(&["u"], "y", Orders::oe(&[1], &[2], &[2])?))?;
+    let plan = StateSpacePlan {
+        orders: Some(2..=2),
+        refine: Some(crate::estimate::Refine::Prediction),
+        delays: vec![1],
+        ..StateSpacePlan::new(&["u"], &["y"])
+    };
+    let refined = fit_state_space(&log(1)?, &[], &plan)?;
+    for report in [&polynomial, &refined] {
+        let (poles, gain) = match &report.model {
+            Model::Polynomial(model) => (model.poles.clone(), model.dc_gain[0]),
+            Model::StateSpace(model) => (model.poles.clone(), model.dc_gain[0][0]),
+            _ => return Err(none()),
+        };
+        let continuous = report.converted(TimeBase::Continuous, None)?;
+        assert!(continuous.warnings[0].ends_with("figures of a fit"), "{:?}", continuous.warnings);
+        let continuous = Report::from_json(&continuous.to_json()?)?;
+        let Model::ContinuousStateSpace(model) = &continuous.model else { return Err(none()) };
+        let error =
+            |gain: Option<crate::model::Quantity>| gain.and_then(|gain| gain.standard_error).ok_or_else(none);
+        let apart = error(model.dc_gain[0][0])? / error(gain)? - 1.0;
+        assert!(apart.abs() < 1e-5, "{apart}");
+        // s = ln z/T.
+        for pole in poles.iter().filter(|pole| pole.re > 0.5) {
+            let own = model.poles.iter().min_by(|a, b| {
+                let far = |root: &crate::model::Root| (root.re - pole.re.ln() / 0.01).abs();
+                far(a).total_cmp(&far(b))
+            });
+            let variance =
+                |root: &crate::model::Root| root.covariance.map(|rows| rows[0][0]).ok_or_else(none);
+            let slope = 1.0 / (pole.re * 0.01);
+            let apart = variance(own.ok_or_else(none)?)?.sqrt() / (variance(pole)?.sqrt() * slope) - 1.0;
+            assert!(apart.abs() < 1e-4, "{apart}");
+        }
+        let back = continuous.converted(TimeBase::Sampled(0.01), None)?;
+        let (own, known) = (report.model.linear("a response")?, back.model.linear("a response")?);
+        let (own_steps, steps) = (own[0].step_response(0, Some(60))?, known[0].step_response(0, Some(60))?);
+        for (one, other) in own_steps.values.iter().zip(&steps.values).skip(6) {
+            let apart = error(Some(*other))? / error(Some(*one))? - 1.0;
+            assert!(apart.abs() < 1e-4, "{one:?} {other:?}");
+        }
+        let frequencies = [1.0, 20.0, 200.0];
+        let (own, known) =
+            (own[0].frequency_response(&frequencies)?, known[0].frequency_response(&frequencies)?);
+        for (one, other) in own[0].points.iter().zip(&known[0].points) {
+            let (one, other) = (one.covariance.ok_or_else(none)?, other.covariance.ok_or_else(none)?);
+            assert!((one[0][0] - other[0][0]).abs() < 1e-4 * one[0][0], "{one:?} {other:?}");
+        }
+        let seen = continuous.model.linear("a response")?[0].frequency_response(&frequencies)?;
+        assert!(seen[0].points.iter().all(|point| point.magnitude.standard_error > Some(0.0)));
+        // At the same sample time nothing changes.
+        let same = report.converted(TimeBase::Sampled(0.01), None)?;
+        let Model::StateSpace(model) = &same.model else { return Err(none()) };
+        assert!((error(model.dc_gain[0][0])? / error(gain)? - 1.0).abs() < 1e-5);
+    }
+    Ok(())
+}

@@ -355,6 +355,18 @@ fn an_arx_model_has_several_outputs() {
     ] {
         folder.done(line);
     }
+    // What is explained exactly is fitted too.
+    let mut exact = "u,y1,y2\n".to_owned();
+    let mut x = [0.0, 0.0];
+    for row in 0..200 {
+        let u = f64::from(row * row % 11) - 5.0;
+        writeln!(exact, "{u},{},{}", x[0], x[1]).expect("memory");
+        x = [0.8 * x[0] + 0.3 * x[1] + u, 0.5 * x[1] - 0.2 * x[0] + 0.4 * u];
+    }
+    folder.write("exact.csv", exact);
+    folder.done("fit exact.csv -y y1,y2 --sample-time 1 --na 1..2 --nb 1..2 --report e.json");
+    let late = folder.refused(&format!("fit {MOTOR} --na 2 --nb 2 --nk 5000 --report x.json"), 4);
+    assert!(late.contains("no segment is longer than the delays"), "{late}");
     // An input that waits is known to.
     let waits = folder.fit(&format!("{MOTOR} --na 2 --nb 2 --nk 3"));
     assert_eq!(waits["estimation"]["nk"], serde_json::json!([3]));

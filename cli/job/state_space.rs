@@ -132,7 +132,7 @@ impl StateSpaceJob {
         let delay = |text: &String| {
             text.trim().parse().map_err(|_| {
                 Failure::usage(format!(
-                    "--nk {text}: with --model ss give a number for each input, such as --nk 3"
+                    "--nk {text}: in state space and with several outputs give a number for each input, such as --nk 3"
                 ))
             })
         };

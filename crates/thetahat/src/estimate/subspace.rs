@@ -20,8 +20,7 @@ use crate::data::JointRecord;
 use crate::model::{StateSpace, is_stable, riccati};
 use crate::optimize::normal;
 pub(crate) use innovations::products as products_of_innovations;
-use lagged_products::ROUNDING;
-pub(super) use lagged_products::{Factor, LaggedProducts, divided, log_determinant};
+pub(super) use lagged_products::{Factor, LaggedProducts, ROUNDING, divided, log_determinant};
 use weighting::Weighted;
 pub use weighting::Weighting;
 

@@ -7,14 +7,20 @@ use std::fmt;
 use std::ops::RangeInclusive;
 use std::str::FromStr;
 
+use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::{DMatrix, DVector};
 
-use super::subspace::{Factor, LaggedProducts, divided, log_determinant};
+use super::subspace::{Factor, LaggedProducts, ROUNDING, divided, log_determinant};
 use crate::Error;
 use crate::data::JointRecord;
 use crate::model::{Entry, EntryCovariance, Quantity, StateSpace, StateSpaceMatrix, lag_name};
+
+/// More models of more coefficients are not compared: these are a minute or two.
+const MOST_WORK: f64 = 2e12;
+/// Of more entries a report does not keep the covariance, a number for each two.
+const MOST_ENTRIES: usize = 300;
 
 /// Which past outputs an output depends on.
 ///
@@ -129,7 +135,8 @@ pub struct VectorArxOutcome {
 pub(crate) struct VectorArxEstimate {
     pub(crate) outcome: VectorArxOutcome,
     pub(crate) space: StateSpace,
-    pub(crate) covariance: EntryCovariance,
+    /// None where there are too many entries for a report.
+    pub(crate) covariance: Option<EntryCovariance>,
     pub(crate) levels: Vec<f64>,
     pub(crate) free_parameters: usize,
     /// Of the model that was taken.
@@ -189,13 +196,30 @@ pub(crate) fn vector_arx(
             ),
         ));
     }
+    let work = (models.len() as f64) * (most as f64).powi(3);
+    if work > MOST_WORK {
+        return Err(Error::argument(
+            "na",
+            format!(
+                "there are {} models with up to {most} coefficients for each output to compare, which takes too long; give narrower ranges",
+                models.len()
+            ),
+        ));
+    }
     let products = LaggedProducts::new(record, longest, options.constant)
         .ok_or_else(|| super::subspace::silent(record, longest))?;
     let mut best: Option<(Solved, Orders)> = None;
     let mut tried = Vec::new();
     let mut refusal = None;
-    for orders in models {
-        let solved = match Solved::new(&products, &orders, options.direct) {
+    let solved: Vec<(Orders, Result<Solved, Error>)> = models
+        .into_par_iter()
+        .map(|orders| {
+            let solved = Solved::new(&products, &orders, options.direct);
+            (orders, solved)
+        })
+        .collect();
+    for (orders, solved) in solved {
+        let solved = match solved {
             Ok(solved) => solved,
             Err(error) => {
                 refusal.get_or_insert(error);
@@ -250,6 +274,8 @@ impl VectorArxOptions {
         };
         let mut models = Vec::new();
         for na in self.na.clone() {
+            // Without A there is nothing to couple.
+            let couplings = if na == 0 { &couplings[..1] } else { &couplings[..] };
             for nb in &nb {
                 models.extend(couplings.iter().map(|&coupling| Orders { na, nb: nb.clone(), coupling }));
             }
@@ -265,8 +291,16 @@ struct Equation {
     places: Vec<usize>,
     /// Their coefficients.
     coefficients: DVector<f64>,
+}
+
+impl Equation {
     /// The inverse of the mean products of the regressors.
-    inverse: DMatrix<f64>,
+    fn inverse(&self, products: &LaggedProducts) -> DMatrix<f64> {
+        let known = self.places.len();
+        let factor = Factor::new(&products.products, &self.places).block(0..known, 0..known);
+        let root = divided(DMatrix::identity(known, known), &factor);
+        root.tr_mul(&root)
+    }
 }
 
 /// The entries that a coefficient of an equation moves, with their slopes.
@@ -325,13 +359,11 @@ impl Solved {
                 ));
             }
             let coefficients = divided(factor.block(known..all.len(), 0..known), &own);
-            let root = divided(DMatrix::identity(known, known), &own);
-            let inverse = root.tr_mul(&root);
-            equations.extend(coefficients.row_iter().map(|row| Equation {
-                places: places.clone(),
-                coefficients: row.transpose(),
-                inverse: inverse.clone(),
-            }));
+            equations.extend(
+                coefficients
+                    .row_iter()
+                    .map(|row| Equation { places: places.clone(), coefficients: row.transpose() }),
+            );
         }
         // e is y less what the regressors tell.
         let size = products.products.nrows();
@@ -342,7 +374,14 @@ impl Solved {
                 rows[(output, *place)] -= coefficient;
             }
         }
-        let errors = &rows * &products.products * rows.transpose();
+        let mut errors = &rows * &products.products * rows.transpose();
+        // Of what is explained exactly, rounding is left.
+        for output in 0..l {
+            if errors[(output, output)] <= ROUNDING {
+                errors.row_mut(output).fill(0.0);
+                errors.column_mut(output).fill(0.0);
+            }
+        }
         let (samples, count) = (products.samples as f64, equations.iter().map(|one| one.places.len()));
         let levels = if products.means.is_some() { l } else { 0 };
         let free = count.sum::<usize>() + levels;
@@ -367,13 +406,19 @@ impl Solved {
         let mut b = vec![DMatrix::<f64>::zeros(l, m); lags + 1];
         let mut errors = (a.clone(), b.clone());
         let degrees = |equation: &Equation| samples - equation.places.len() as f64;
+        // With coupling all equations have the same.
+        let inverses: Vec<DMatrix<f64>> = match orders.coupling {
+            Coupling::Full => self.equations.iter().take(1).map(|one| one.inverse(products)).collect(),
+            Coupling::None => self.equations.iter().map(|one| one.inverse(products)).collect(),
+        };
+        let inverse = |output: usize| &inverses[output.min(inverses.len() - 1)];
         for (output, equation) in self.equations.iter().enumerate() {
             let variance = self.errors[(output, output)] / degrees(equation);
             for (row, place) in equation.places.iter().enumerate() {
                 let (lag, signal) = (place / width, place % width);
                 let unit = scales[m + output] / scales[signal];
                 let value = equation.coefficients[row] * unit;
-                let error = (variance * equation.inverse[(row, row)]).max(0.0).sqrt() * unit;
+                let error = (variance * inverse(output)[(row, row)]).max(0.0).sqrt() * unit;
                 if signal < m {
                     (b[lag][(output, signal)], errors.1[lag][(output, signal)]) = (value, error);
                 } else {
@@ -414,7 +459,7 @@ impl Solved {
         let free: usize = self.equations.iter().map(|equation| equation.places.len()).sum();
         VectorArxEstimate {
             outcome,
-            covariance: self.covariance(products, &b[0], &a),
+            covariance: self.covariance(products, &b[0], &a, inverse),
             space,
             free_parameters: free + if levels.is_some() { l } else { 0 },
             levels: levels.unwrap_or_else(|| vec![0.0; l]),
@@ -443,12 +488,13 @@ impl Solved {
     }
 
     /// The covariance of the entries of the block observer form, those of A in F and K, those of B in G and D.
-    fn covariance(
+    fn covariance<'i>(
         &self,
         products: &LaggedProducts,
         direct: &DMatrix<f64>,
         a: &[DMatrix<f64>],
-    ) -> EntryCovariance {
+        inverse: impl Fn(usize) -> &'i DMatrix<f64>,
+    ) -> Option<EntryCovariance> {
         let (m, l, width) = (products.inputs, products.outputs, products.width());
         let samples = products.samples as f64;
         // Each coefficient moves some entries, with these slopes.
@@ -494,8 +540,11 @@ impl Solved {
             }
         }
         let size = entries.len();
+        if size > MOST_ENTRIES {
+            return None;
+        }
         let mut values = vec![vec![0.0; size]; size];
-        let factors: Vec<DMatrix<f64>> = self.cross_inverses(products);
+        let factors = self.cross_inverses(products, inverse);
         for one in &slopes {
             for other in &slopes {
                 let (first, second) = (&self.equations[one.output], &self.equations[other.output]);
@@ -510,19 +559,23 @@ impl Solved {
                 }
             }
         }
-        EntryCovariance { entries, values }
+        Some(EntryCovariance { entries, values })
     }
 
     /// For each pair of equations (Phi_i' Phi_i)^-1 Phi_i' Phi_j (Phi_j' Phi_j)^-1, times N.
-    fn cross_inverses(&self, products: &LaggedProducts) -> Vec<DMatrix<f64>> {
+    fn cross_inverses<'i>(
+        &self,
+        products: &LaggedProducts,
+        inverse: impl Fn(usize) -> &'i DMatrix<f64>,
+    ) -> Vec<DMatrix<f64>> {
         let mut all = Vec::new();
-        for first in &self.equations {
-            for second in &self.equations {
+        for (output, first) in self.equations.iter().enumerate() {
+            for (other, second) in self.equations.iter().enumerate() {
                 all.push(if first.places == second.places {
-                    first.inverse.clone()
+                    inverse(output).clone()
                 } else {
                     let between = products.products.select_rows(&first.places).select_columns(&second.places);
-                    &first.inverse * between * &second.inverse
+                    inverse(output) * between * inverse(other)
                 });
             }
         }

@@ -257,6 +257,12 @@ pub fn fit_state_space_monitored(
 
     let delays = if plan.delays.is_empty() { vec![0; inputs.len()] } else { plan.delays.clone() };
     let record = deviations.joint_record(&plan.inputs, &plan.outputs, &shares.estimation)?.delayed(&delays);
+    if record.segments.is_empty() {
+        return Err(Error::undetermined(
+            Vec::new(),
+            "no segment is longer than the delays of the inputs (`nk`): lower them, or give more rows",
+        ));
+    }
     let given =
         plan.detrend == Detrend::None || plan.offsets.iter().any(|(name, _)| plan.outputs.contains(name));
     let constant = if plan.constant == Constant::Auto && given { Constant::No } else { plan.constant };

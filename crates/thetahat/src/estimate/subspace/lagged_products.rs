@@ -9,7 +9,7 @@ use crate::optimize::normal;
 use crate::regression::joint_gram;
 
 /// What is left of a variance by rounding in a Gram matrix, as a fraction of it.
-pub(super) const ROUNDING: f64 = 1e-13;
+pub(in crate::estimate) const ROUNDING: f64 = 1e-13;
 
 /// y(t) = D u(t) + M_1 z(t-1) + … + M_p z(t-p) + e(t) with z = [u; y]: m inputs, l outputs, q = m + l.
 ///

@@ -1,6 +1,6 @@
 use super::*;
 use crate::data::Record;
-use crate::estimate::{Initial, arx, products_of_innovations};
+use crate::estimate::{Initial, arx};
 use crate::model::Orders as PolynomialOrders;
 use crate::random::Random;
 
@@ -70,11 +70,36 @@ fn the_state_space_predicts_as_the_regression_does() -> Result<(), Error> {
         for coupling in Coupling::ALL {
             let asked = VectorArxOptions { direct, ..options(2..=2, 3..=3, Some(coupling)) };
             let found = vector_arx(&record, &asked, 1.0)?;
-            // On rows after those that the regression needs, from the state that these say.
-            let products = products_of_innovations(&found.space, &record, &[0.0, 0.0]);
-            let mean = products.ok_or_else(|| Error::data("no errors"))? / 2000.0;
-            let own = &found.space.noise_covariance;
-            assert!((&mean - own).norm() < 0.01 * own.norm(), "{direct} {coupling}: {mean} {own}");
+            let StateSpace { f, g, h, d, k, noise_covariance, .. } = &found.space;
+            let VectorArxOutcome { a, b, .. } = &found.outcome;
+            let first = usize::from(!direct);
+            let (mut x, mut sum) = (DVector::zeros(f.nrows()), DMatrix::zeros(2, 2));
+            for t in 0..2000 {
+                let u = DVector::from_element(1, signals[0][t]);
+                let y = DVector::from_column_slice(&[signals[1][t], signals[2][t]]);
+                let e = &y - h * &x - d * &u;
+                x = f * x + g * u + k * &e;
+                // From where the regression begins the state of rest says as little as it does.
+                if t < 3 - usize::from(direct) {
+                    continue;
+                }
+                let of = |output: usize| {
+                    let past = (1..=2).flat_map(|lag| (0..2).map(move |other| (lag, other)));
+                    let past: f64 = past
+                        .map(|(lag, other)| a[lag - 1][output][other].value * signals[1 + other][t - lag])
+                        .sum();
+                    let driven: f64 =
+                        (0..3).map(|place| b[0][place][output].value * signals[0][t - first - place]).sum();
+                    y[output] + past - driven
+                };
+                let own = DVector::from_column_slice(&[of(0), of(1)]);
+                if t >= 200 {
+                    assert!((&own - &e).norm() < 1e-9, "{direct} {coupling} {t}: {own} {e}");
+                }
+                sum += &own * own.transpose();
+            }
+            let mean = sum / (2000 - 3 + usize::from(direct)) as f64;
+            assert!((&mean - noise_covariance).norm() < 1e-9 * mean.norm(), "{mean} {noise_covariance}");
             let others = found.space.f.shape();
             assert_eq!(others, if direct { (4, 4) } else { (6, 6) });
         }
@@ -132,7 +157,8 @@ fn errors_are_those_of_many_runs() -> Result<(), Error> {
             let model = crate::model::StateSpaceModel::new(named, vec![0], &found.space, 12, None)?;
             // All poles of the plant are inside.
             assert!(model.stable, "{:?}", model.poles);
-            let gain = model.with_covariance(found.covariance).dc_gain[1][0];
+            let covariance = found.covariance.ok_or_else(|| Error::data("no covariance"))?;
+            let gain = model.with_covariance(covariance).dc_gain[1][0];
             let gain = gain.ok_or_else(|| Error::data("no gain"))?;
             Ok((gain.value, gain.standard_error.ok_or_else(|| Error::data("no error"))?))
         };
@@ -161,5 +187,33 @@ fn what_cannot_be_solved_is_refused() -> Result<(), Error> {
     assert!(refused.is_err_and(|error| error.to_string().contains("there must be more")));
     let refused = vector_arx(&record(&short)?, &options(0..=0, 0..=0, None), 1.0);
     assert!(refused.is_err_and(|error| error.to_string().contains("no coefficients")));
+    Ok(())
+}
+
+#[test]
+fn intervals_of_coefficients_cover_the_truth() -> Result<(), Error> {
+    let (mut covered, mut all) = (0, 0);
+    for seed in 0..100 {
+        let signals = signals(400, 0.5, [0.0, 0.0], 500 + seed);
+        let found = vector_arx(&record(&signals)?, &options(2..=2, 2..=2, Some(Coupling::Full)), 1.0)?;
+        let own =
+            found.outcome.a.iter().flatten().flatten().chain(found.outcome.b.iter().flatten().flatten());
+        let truth = A.iter().flatten().flatten().chain(B.iter().flatten().flatten());
+        for (quantity, truth) in own.zip(truth) {
+            let error = quantity.standard_error.ok_or_else(|| Error::data("no error"))?;
+            covered += usize::from((quantity.value - truth).abs() < 1.96 * error);
+            all += 1;
+        }
+    }
+    let fraction = f64::from(u32::try_from(covered).unwrap_or(0)) / f64::from(all);
+    assert!((0.93..0.97).contains(&fraction), "{fraction}");
+    Ok(())
+}
+
+#[test]
+fn grids_that_take_too_long_are_refused() -> Result<(), Error> {
+    let signals = signals(3000, 0.5, [0.0, 0.0], 6);
+    let refused = vector_arx(&record(&signals)?, &options(1..=200, 1..=200, None), 1.0);
+    assert!(refused.is_err_and(|error| error.to_string().contains("narrower ranges")));
     Ok(())
 }

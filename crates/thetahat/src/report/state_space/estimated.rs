@@ -94,13 +94,20 @@ pub(super) fn by_arx(
     };
     let mut found = with_levels(constant, find, |found| found.mdl)?;
     found.outcome.nk.iter_mut().zip(delays).for_each(|(nk, delay)| *nk += delay);
-    let (samples, mean) = (found.samples, found.space.noise_covariance.clone());
+    let (samples, mut mean) = (found.samples, found.space.noise_covariance.clone());
+    if mean.diagonal().iter().any(|variance| *variance == 0.0) {
+        // What lagged products cannot tell from nothing.
+        let products = products_of_innovations(&found.space, record, &found.levels)
+            .ok_or_else(|| Error::data("the errors one step ahead leave the range of numbers"))?;
+        let all = record.segments.iter().map(std::ops::Range::len).sum::<usize>();
+        mean = products / all as f64;
+    }
     let degrees = degrees("the model", found.free_parameters, samples, record.outputs.len())?;
     Ok(Estimated {
         matrices: with_noise(found.space, &mean, samples, degrees),
         levels: found.levels,
         has_levels: found.outcome.constant,
-        covariance: Some(found.covariance),
+        covariance: found.covariance,
         procedure: Procedure::VectorArx(found.outcome),
         free: found.free_parameters,
         degrees,

@@ -32,7 +32,16 @@ pub(super) fn of_fit(
     }
     match &estimation.procedure {
         Procedure::Subspace(outcome) => of_subspace(&mut warnings, model, outcome, offered),
-        Procedure::VectorArx(outcome) => of_arx(&mut warnings, outcome),
+        Procedure::VectorArx(outcome) => {
+            of_arx(&mut warnings, outcome);
+            if model.covariance.is_none() {
+                warnings.push(
+                    "there are too many coefficients for a report to keep the covariance of all: they have standard errors, poles, gains \
+                     and responses have none"
+                        .to_owned(),
+                );
+            }
+        }
         _ => {}
     }
     let noise = &model.noise_covariance;

@@ -130,9 +130,9 @@ pub(crate) struct Refined {
 /// best.
 ///
 /// A step moves all entries of the matrices but along changes of coordinates, in which nothing changes: the directions are an orthonormal
-/// basis of what is orthogonal to these, taken anew after some iterations (McKelvey, Helmersson and Ribarits, Data driven local coordinates, Automatica 40, 2004).
-/// Signals and states are in units in which they are of size one, errors in those in which the start's have covariance I. One search from
-/// each start, side by side; the least errors win, and the first of equal ones.
+/// basis of what is orthogonal to these, taken anew after some iterations (McKelvey, Helmersson and Ribarits, Data driven local coordinates,
+/// Automatica 40, 2004). Signals and states are in units in which they are of size one, errors in those in which the start's have covariance
+/// I. One search from each start, side by side; the least errors win, and the first of equal ones.
 ///
 /// With prediction errors the covariance of the entries is the inverse of the information,
 ///
@@ -140,7 +140,9 @@ pub(crate) struct Refined {
 /// (sum psi' R^-1 psi)^-1 N/(N - p/l),   psi = -de/dtheta,   R = cov e
 /// ```
 ///
-/// (Ljung, System Identification, 2nd ed. 1999, section 9.3).
+/// (Ljung, System Identification, 2nd ed. 1999, section 9.3). Errors of a free run are coloured: with G that sum and g that of psi' R^-1 e it is
+/// G^-1 (cov g) G^-1, cov g being that of the noise of the model that was found (section 9.4 there); K has the errors that it has where
+/// the plant is known.
 ///
 /// Cost: O(N (n + l) r (n + m + l)) an iteration for r = n (m + 2 l) directions.
 ///

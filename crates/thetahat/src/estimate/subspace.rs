@@ -54,7 +54,8 @@ pub struct SubspaceOptions {
     /// Whether the inputs act on the outputs at once, so that D is estimated. By default where that lowers MDL; but not where past outputs
     /// tell of the inputs, which are fed back then: with a controller that acts at once, u(t) tells of y(t) whatever D is.
     pub feedthrough: Option<bool>,
-    /// Whether there is a constant in each equation, from which the [levels](Subspace::levels) of the outputs follow.
+    /// Whether there is a constant in each equation, from which the [levels](Subspace::levels) of the outputs follow; of a
+    /// [`StateSpacePlan`](crate::report::StateSpacePlan) its own `constant` says it.
     pub constant: bool,
 }
 

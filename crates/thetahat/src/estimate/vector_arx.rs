@@ -82,7 +82,7 @@ pub struct VectorArxOptions {
     pub coupling: Option<Coupling>,
     /// Whether inputs act at once, so that the first of their coefficients is that of u(t).
     pub direct: bool,
-    /// Whether there is a constant in each equation.
+    /// Whether there is a constant in each equation; of a [`StateSpacePlan`](crate::report::StateSpacePlan) its own `constant` says it.
     pub constant: bool,
 }
 

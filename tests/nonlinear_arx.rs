@@ -369,7 +369,11 @@ fn several_outputs_and_expressions_take_every_verb() {
     folder.done("compare model.json log.csv --sample-time 0.1 --rows 721..900");
     for (line, code, words) in [
         ("track log.csv --warm model.json -o t.jsonl", 3, "one output"),
-        ("fit log.csv --output y,z --na 1 --nb 1", 2, "--output: a polynomial model has one output"),
+        (
+            "fit log.csv --output y,z --model armax --na 1 --nb 1 --nc 1",
+            2,
+            "--output: a polynomial model with C, D or F has one output",
+        ),
         ("fit log.csv --narx poly --output y,y", 2, "named twice"),
         ("fit log.csv --narx poly --output y,z --ny 1,2,3", 2, "3 numbers for 2 outputs"),
         ("fit log.csv --narx poly --regressor sqrt(v)", 2, "unknown name 'v'"),

@@ -11,18 +11,21 @@ import timeit
 import warnings
 from importlib.metadata import version
 
+import ctrlsys
 import numpy
 import padasip
+import pandas
 import thetahat
 from compare import check, print_table, processor, verdict
 from filterpy.kalman import KalmanFilter
+from nfoursid.nfoursid import NFourSID
 from scipy.signal import coherence, csd, lfilter, welch
 from sippy_unipi import system_identification
 from sysidentpy.basis_function import Polynomial
 from sysidentpy.model_structure_selection import FROLS
 from sysidentpy.parameter_estimation import LeastSquares
 
-PACKAGES = ["thetahat", "NumPy", "SciPy", "padasip", "filterpy", "sippy-unipi", "sysidentpy"]
+PACKAGES = ["thetahat", "NumPy", "SciPy", "padasip", "filterpy", "sippy-unipi", "nfoursid", "ctrlsys", "sysidentpy"]
 
 
 def main():
@@ -32,7 +35,7 @@ def main():
     print(*(f"{name} {version(name)}" for name in PACKAGES), f"Python {platform.python_version()}", sep=", ")
     print(f"{processor()}, {os.cpu_count()} processors", end="\n\n", flush=True)
     rows = [["work", "peer", "thetahat", "peer's", "ratio", "required", "verdict"]]
-    rows += [recursive(), kalman(), *fits(), *nonlinear(), *spectra(), *calls()]
+    rows += [recursive(), kalman(), *fits(), *states(), *nonlinear(), *spectra(), *calls()]
     print_table(rows)
 
 
@@ -161,6 +164,70 @@ def fits():
 
     mine, yours, *_ = by_turns(lambda: thetahat.armax(small, 2, 2, 2).parameters, iterative, 12, 6)
     yield row("ARMAX(2, 2, 2, 1), N = 10,000", "sippy-unipi, iterative least squares", mine, yours, 50)
+
+
+def driven(samples):
+    """Four states of two lightly damped modes, two inputs and two outputs, the states and the outputs with noise."""
+    f = numpy.array([[0.8, 0.4, 0, 0], [-0.4, 0.8, 0, 0], [0, 0, 0.3, 0.6], [0.1, 0, -0.6, 0.3]])
+    g = numpy.array([[1, 0.2], [-0.5, 0.7], [0.3, 1], [0, -0.8]])
+    h = numpy.array([[1, 0, 0.5, 0], [0, 0.6, 0, 1]])
+    k = numpy.array([[0.3, 0], [0.1, 0.2], [0, 0.1], [-0.1, 0.3]])
+    u, e = numpy.random.standard_normal((samples, 2)), 0.5 * numpy.random.standard_normal((samples, 2))
+    moved, x = u @ g.T + e @ k.T, numpy.zeros((samples, 4))
+    for t in range(samples - 1):
+        x[t + 1] = f @ x[t] + moved[t]
+    return u, x @ h.T + e, h @ numpy.linalg.solve(numpy.eye(4) - f, g)
+
+
+def states():
+    """Models in state space, from arrays to a model: ours with K, the covariance of the errors and all figures of the fit."""
+    words = {"past": 10, "feedthrough": False, "detrend": "none", "constant": "no"}
+
+    def near(name, gains, truth):
+        # Other methods find other models of the same plant.
+        if numpy.abs(gains - truth).max() > 0.3 * numpy.abs(truth).max():
+            raise SystemExit(f"{name}: its static gains {gains} are not those of the plant, {truth}")
+
+    for samples, required in [(10_000, 60), (100_000, 200)]:
+        u, y, truth = driven(samples)
+        log = thetahat.Log(y, u, sample_time=1)
+
+        def sippy(u=u, y=y):
+            return system_identification(y, u, "N4SID", SS_fixed_order=4, SS_f=10)
+
+        rounds = 9 if samples < 50_000 else 4
+        mine, yours, found, expected = by_turns(lambda log=log: thetahat.ss(log, 4, **words), sippy, rounds, 4)
+        near("thetahat", numpy.array([[found.dc_gain(i, output=o)[0] for i in range(2)] for o in range(2)]), truth)
+        still = numpy.eye(4) - expected.A
+        near("sippy-unipi", expected.C @ numpy.linalg.solve(still, expected.B) + expected.D, truth)
+        yield row(f"state space, 2 x 2, order 4, N = {samples:,}", "sippy-unipi, N4SID", mine, yours, required)
+        if samples == 10_000:
+            frame = pandas.DataFrame(numpy.column_stack([u, y]), columns=["u1", "u2", "y1", "y2"])
+
+            def nfoursid(frame=frame):
+                peer = NFourSID(frame, ["y1", "y2"], ["u1", "u2"], num_block_rows=10)
+                peer.subspace_identification()
+                return peer.system_identification(rank=4)
+
+            mine, yours, *_ = by_turns(lambda log=log: thetahat.ss(log, 4, **words), nfoursid, 4, 4)
+            yield row(f"the same, N = {samples:,}", "nfoursid", mine, yours, None)
+
+    u, y, _ = driven(1_000_000)
+    log = thetahat.Log(y, u, sample_time=1)
+    fortran = numpy.asfortranarray(u), numpy.asfortranarray(y)
+
+    def factor():
+        return ctrlsys.ib01ad("M", "C", "N", "O", "N", "N", 10, 2, 2, *fortran, 0.0, -1.0)
+
+    def ours():
+        return thetahat.ss(log, 4, weighting="moesp", future=10, **words)
+
+    mine, yours, found, expected = by_turns(ours, factor, 4, 2)
+    values = numpy.array(found.document["estimation"]["singular_values"][:4])
+    check("SLICOT, singular values", values * numpy.sqrt(len(u) - 19), expected[2][:4])
+    yield row("the same by MOESP, N = 1,000,000", "SLICOT (ctrlsys), IB01AD alone, Cholesky", mine, yours, 4)
+    mine, *_ = by_turns(lambda: thetahat.ss(log, 4, **words), factor, 4, 4)
+    yield row("the same by SSARX", "the same", mine, yours, 4)
 
 
 def nonlinear():

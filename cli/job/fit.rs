@@ -99,7 +99,7 @@ impl FitJob {
             return Ok(());
         }
         Err(Failure::usage(
-            "--output: a polynomial model has one output; fit one after the other, or all at once with --model ss, --narx or --grey",
+            "--output: a polynomial model with C, D or F has one output; fit one after the other, or all at once with --model arx, --model ss, --narx or --grey",
         ))
     }
 

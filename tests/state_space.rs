@@ -355,6 +355,12 @@ fn an_arx_model_has_several_outputs() {
     ] {
         folder.done(line);
     }
+    // Coefficients that were taken out of a report are not shown, and no harm.
+    let mut damaged: Value = serde_json::from_str(&folder.read("r.json")).expect("JSON");
+    damaged["estimation"]["a"] = serde_json::json!([[]]);
+    damaged["estimation"]["nk"] = serde_json::json!([u64::MAX]);
+    folder.write("d.json", damaged.to_string());
+    folder.done("validate d.json log.csv --time t --html d.html");
     // What is explained exactly is fitted too.
     let mut exact = "u,y1,y2\n".to_owned();
     let mut x = [0.0, 0.0];

@@ -74,7 +74,7 @@ def test_several_outputs_have_names_and_roles() -> None:
     with pytest.raises(ValueError, match=r"take one with select\(output"):
         by_name.output  # noqa: B018
     with pytest.raises(ValueError, match="it has 2 outputs"):
-        th.arx(by_name, na=1, nb=0)
+        th.arma(by_name, na=1, nc=1)
     with pytest.raises(ValueError, match="no channel 'c'"):
         by_name.select(output="c")
 

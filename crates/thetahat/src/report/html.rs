@@ -568,7 +568,8 @@ fn of_state_space(report: &Report, model: &StateSpaceModel) -> Vec<Section> {
     sections.push(section);
     let mut section = Section::new("Model");
     section.table(tables::signals_and_gains(model));
-    if let Procedure::VectorArx(outcome) = &report.estimation.procedure {
+    // Of a model that was made of another one they are none of its own.
+    if let (Procedure::VectorArx(outcome), false) = (&report.estimation.procedure, report.fit.is_empty()) {
         section.table(tables::matrix_coefficients(outcome, model));
     }
     section.table(tables::noise_of_outputs(model));

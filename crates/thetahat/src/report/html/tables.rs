@@ -430,19 +430,20 @@ fn list(numbers: &[usize]) -> String {
 pub(super) fn matrix_coefficients(outcome: &VectorArxOutcome, model: &StateSpaceModel) -> Table {
     let mut table = Table::new("Coefficients", &["equation of", "coefficient", "value", "standard error"]);
     for (place, output) in model.outputs.iter().enumerate() {
-        let mut add = |of: String, value: &Quantity| {
-            if let Some(error) = value.standard_error {
-                table.row([output.name.clone(), of, number(value.value), three(error)]);
+        // A report that was edited may have other numbers of them.
+        let mut add = |of: String, value: Option<&Quantity>| {
+            if let Some(Quantity { value, standard_error: Some(error), .. }) = value {
+                table.row([output.name.clone(), of, number(*value), three(*error)]);
             }
         };
-        for (lag, rows) in (1..).zip(&outcome.a) {
-            for (other, value) in model.outputs.iter().zip(&rows[place]) {
-                add(format!("A{lag}, {}", other.name), value);
+        for (lag, rows) in (1_usize..).zip(&outcome.a) {
+            for (column, other) in model.outputs.iter().enumerate() {
+                add(format!("A{lag}, {}", other.name), rows.get(place).and_then(|row| row.get(column)));
             }
         }
         for ((input, coefficients), first) in model.inputs.iter().zip(&outcome.b).zip(&outcome.nk) {
-            for (lag, values) in (*first..).zip(coefficients) {
-                add(format!("B{lag}, {}", input.name), &values[place]);
+            for (later, values) in coefficients.iter().enumerate() {
+                add(format!("B{}, {}", first.saturating_add(later), input.name), values.get(place));
             }
         }
     }

@@ -419,4 +419,7 @@ fn the_evaporator_has_the_coefficients_that_others_find() {
         assert!((found - expected).abs() < 1e-8, "{found}");
     }
     assert_eq!(samples, 6303.0);
+    // ln det cov e = AIC less its 2 p/N.
+    let logarithm = number(&report, "/estimation/aic") - 2.0 * 36.0 / samples;
+    assert!((logarithm + 7.939704).abs() < 1e-6, "{logarithm}");
 }

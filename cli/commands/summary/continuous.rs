@@ -6,8 +6,9 @@ use thetahat::report::Report;
 use thetahat::text::harmless;
 use thetahat::thetahat_core::nalgebra::Complex;
 
+use super::signal;
+use super::state_space::gains;
 use super::text::{self, Text, columns, or_dash};
-use super::{quantity, signal};
 
 /// Transfer functions are written out up to this order: beyond it coefficients tell nothing.
 const HIGHEST: usize = 4;
@@ -15,7 +16,6 @@ const HIGHEST: usize = 4;
 const NO_TIME: &str = "no time constant goes with a pole that does not decay, and no damping with one at 0";
 const NO_ERROR: &str = "no time constant goes with a pole that does not decay, and no damping with one at 0; no standard error with poles \
                          that are too close for one";
-const INTEGRATES: &str = "the model integrates";
 
 /// The main figures of a model in continuous time.
 pub(super) fn table(report: &Report, model: &ContinuousStateSpaceModel, width: usize) -> String {
@@ -31,7 +31,7 @@ pub(super) fn table(report: &Report, model: &ContinuousStateSpaceModel, width: u
     text.line(&inputs.chain(outputs).collect::<Vec<String>>().join(", "));
     text.line("");
     poles(&mut text, model);
-    gains(&mut text, model);
+    gains(&mut text, (&model.inputs, &model.outputs), &model.dc_gain);
     transfers(&mut text, model);
     text.line(if model.stable { "stable" } else { "unstable" });
     text.finish()
@@ -62,22 +62,6 @@ fn poles(text: &mut Text, model: &ContinuousStateSpaceModel) {
     if !model.poles.is_empty() {
         text.table(table);
     }
-}
-
-fn gains(text: &mut Text, model: &ContinuousStateSpaceModel) {
-    if model.inputs.is_empty() {
-        return;
-    }
-    let head: Vec<String> = std::iter::once("DC gain from".to_owned())
-        .chain(model.outputs.iter().map(|output| format!("to {}", harmless(&output.name))))
-        .collect();
-    let head: Vec<&str> = head.iter().map(String::as_str).collect();
-    let mut table = columns(&head).none(INTEGRATES);
-    for (place, input) in model.inputs.iter().enumerate() {
-        let gains = model.dc_gain.iter().map(|gains| or_dash(gains.get(place).copied().flatten(), quantity));
-        table.row(std::iter::once(harmless(&input.name)).chain(gains));
-    }
-    text.table(table);
 }
 
 /// The transfer function of each input and output, where they are short.

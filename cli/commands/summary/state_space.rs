@@ -2,7 +2,7 @@
 
 use thetahat::estimate::{Coupling, Procedure, RefinementOutcome, SubspaceOutcome, VectorArxOutcome};
 use thetahat::figures::{fixed, number, short, three};
-use thetahat::model::{Quantity, StateSpaceModel};
+use thetahat::model::{Quantity, Signal, StateSpaceModel};
 use thetahat::report::Report;
 use thetahat::text::harmless;
 
@@ -77,7 +77,7 @@ fn head(text: &mut Text, report: &Report, model: &StateSpaceModel, equation: &st
 /// What follows from the matrices.
 fn figures(text: &mut Text, model: &StateSpaceModel) {
     poles(text, model);
-    gains(text, model);
+    gains(text, (&model.inputs, &model.outputs), &model.dc_gain);
     noise(text, model);
     text.line(if model.stable { "stable" } else { "unstable" });
 }
@@ -177,17 +177,22 @@ fn poles(text: &mut Text, model: &StateSpaceModel) {
     }
 }
 
-fn gains(text: &mut Text, model: &StateSpaceModel) {
-    if model.inputs.is_empty() {
+/// The static gain from each input to each output.
+pub(super) fn gains(
+    text: &mut Text,
+    (inputs, outputs): (&[Signal], &[Signal]),
+    gains: &[Vec<Option<Quantity>>],
+) {
+    if inputs.is_empty() {
         return;
     }
     let head: Vec<String> = std::iter::once("DC gain from".to_owned())
-        .chain(model.outputs.iter().map(|output| format!("to {}", harmless(&output.name))))
+        .chain(outputs.iter().map(|output| format!("to {}", harmless(&output.name))))
         .collect();
     let head: Vec<&str> = head.iter().map(String::as_str).collect();
     let mut table = columns(&head).none(INTEGRATES);
-    for (place, input) in model.inputs.iter().enumerate() {
-        let gains = model.dc_gain.iter().map(|gains| or_dash(gains.get(place).copied().flatten(), quantity));
+    for (place, input) in inputs.iter().enumerate() {
+        let gains = gains.iter().map(|gains| or_dash(gains.get(place).copied().flatten(), quantity));
         table.row(std::iter::once(harmless(&input.name)).chain(gains));
     }
     text.table(table);

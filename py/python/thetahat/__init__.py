@@ -20,9 +20,10 @@ Model(ARMAX(2, 2, 1, 1), 1-step fit 98.37 % on rows 1..700)
 
 from thetahat._design import ExperimentDesign, TestSignal, design
 from thetahat._filter import StateEstimate, StateFilter, StateTrajectory
-from thetahat._fit import EstimationWarning, ar, arma, armax, arx, bj, fir, general, iv, oe, search, sriv
+from thetahat._fit import EstimationWarning, ar, arma, armax, arx, bj, fir, general, oe, search
 from thetahat._grey_box import GreyBox, grey
 from thetahat._evaluation import Comparison, Inspection, Validation, compare, inspect
+from thetahat._instrumental import iv, sriv
 from thetahat._log import Log, dc_motor, read_csv
 from thetahat._model import Model
 from thetahat._narx import narx

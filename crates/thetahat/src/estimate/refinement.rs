@@ -461,40 +461,37 @@ impl Units {
 
     /// A model of the signals in these units.
     fn to_units(&self, model: &StateSpace) -> StateSpace {
-        let sizes = DMatrix::from_diagonal(&DVector::from_column_slice(&self.inputs));
-        let StateSpace { f, g, h, d, k, noise_covariance, sample_time } = model;
-        StateSpace {
-            f: f.clone(),
-            g: g * &sizes,
-            h: &self.root * h,
-            d: &self.root * d * &sizes,
-            k: k * &self.back,
-            noise_covariance: &self.root * noise_covariance * self.root.transpose(),
-            sample_time: *sample_time,
-        }
+        changed(model, &self.root, &self.back, self.inputs.iter().copied())
     }
 
     /// A model of the signals in their own units, of one in these.
     fn without_units(&self, model: &StateSpace) -> StateSpace {
-        let sizes = DMatrix::from_diagonal(&DVector::from_iterator(
-            self.inputs.len(),
-            self.inputs.iter().map(|size| 1.0 / size),
-        ));
-        let StateSpace { f, g, h, d, k, noise_covariance, sample_time } = model;
-        StateSpace {
-            f: f.clone(),
-            g: g * &sizes,
-            h: &self.back * h,
-            d: &self.back * d * &sizes,
-            k: k * &self.root,
-            noise_covariance: &self.back * noise_covariance * self.back.transpose(),
-            sample_time: *sample_time,
-        }
+        changed(model, &self.back, &self.root, self.inputs.iter().map(|size| 1.0 / size))
     }
 
     /// How large signals are outside of these units, and states.
     fn sizes(&self, states: usize) -> Sizes {
         Sizes { inputs: self.inputs.clone(), outputs: self.outputs.clone(), states: vec![1.0; states] }
+    }
+}
+
+/// A model of outputs that `to` makes of others and `back` makes these again of, and of inputs in units of these sizes.
+fn changed(
+    model: &StateSpace,
+    to: &DMatrix<f64>,
+    back: &DMatrix<f64>,
+    sizes: impl ExactSizeIterator<Item = f64>,
+) -> StateSpace {
+    let sizes = DMatrix::from_diagonal(&DVector::from_iterator(sizes.len(), sizes));
+    let StateSpace { f, g, h, d, k, noise_covariance, sample_time } = model;
+    StateSpace {
+        f: f.clone(),
+        g: g * &sizes,
+        h: to * h,
+        d: to * d * &sizes,
+        k: k * back,
+        noise_covariance: to * noise_covariance * to.transpose(),
+        sample_time: *sample_time,
     }
 }
 

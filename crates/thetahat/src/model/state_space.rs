@@ -16,14 +16,13 @@ use crate::model::PolynomialModel;
 pub use balance::Reduced;
 pub use continuous::{ContinuousStateSpace, Hold};
 pub(crate) use eigen::{is_stable, symmetric_eigen};
-pub(crate) use fitted::Path;
 pub use fitted::StateSpaceModel;
 pub use in_seconds::ContinuousStateSpaceModel;
 pub(super) use in_seconds::Head;
 pub(super) use spot_noise::Steps;
 pub use uncertainty::{Entry, EntryCovariance, StateSpaceMatrix};
+pub(crate) use uncertainty::{Path, Sizes, across_coordinates, flat};
 pub(in crate::model) use uncertainty::{STEP, independent};
-pub(crate) use uncertainty::{Sizes, across_coordinates, flat};
 pub use zeros::ZerosPolesGain;
 
 /// A model in innovations form, x of n states, u of m inputs and y of l outputs:

@@ -2,15 +2,14 @@
 
 use std::f64::consts::PI;
 
-use thetahat_core::nalgebra::{Complex, ComplexField, DMatrix, DVector};
+use thetahat_core::nalgebra::{Complex, ComplexField};
 
 use super::frequency::has_pole;
+use super::state_space::Resolvent;
 use super::transient::lasting;
 use super::{FrequencyPoint, FrequencyResponse, TransientResponse, state_space};
 use crate::Error;
-use crate::model::{
-    ContinuousStateSpace, ContinuousStateSpaceModel, Hold, Path, Quantity, ZerosPolesGain, covariance,
-};
+use crate::model::{ContinuousStateSpace, ContinuousStateSpaceModel, Hold, Path, Quantity, ZerosPolesGain};
 
 /// Of roots this near the imaginary axis nobody knows on which side they lie.
 const ON_AXIS: f64 = 16.0 * f64::EPSILON;
@@ -38,7 +37,7 @@ pub(super) fn frequency_response(
     let (n, m) = b.shape();
     let transfers: Vec<ZerosPolesGain> =
         (0..m).map(|input| model.transfer(output, input)).collect::<Result<_, Error>>()?;
-    let seen: DVector<Complex<f64>> = c.row(output).transpose().map(|entry| Complex::new(entry, 0.0));
+    let seen = c.row(output).transpose();
     let size = a.norm();
     let mut found: Vec<Vec<FrequencyPoint>> = vec![Vec::with_capacity(frequencies.len()); m];
     for &frequency in frequencies {
@@ -47,30 +46,18 @@ pub(super) fn frequency_response(
         if model.poles.iter().any(|pole| (s - Complex::new(pole.re, pole.im)).modulus() <= near && n > 0) {
             return Err(has_pole(frequency));
         }
-        // (s I - A)' w = C'.
-        let matrix = DMatrix::from_fn(n, n, |row, column| {
-            let diagonal = if row == column { s } else { Complex::new(0.0, 0.0) };
-            diagonal - a[(column, row)]
-        });
-        let known = model.covariance.as_ref().filter(|_| n > 0);
-        let forward = known.map(|known| (known, matrix.transpose().lu()));
-        let solved = if n == 0 { Some(seen.clone()) } else { matrix.lu().solve(&seen) };
-        let through = solved.ok_or_else(|| has_pole(frequency))?;
+        let resolvent = Resolvent::new((&a, &seen), s, model.covariance.as_ref());
+        let resolvent = resolvent.ok_or_else(|| has_pole(frequency))?;
         for (input, (points, transfer)) in found.iter_mut().zip(&transfers).enumerate() {
             let delay = model.delays[input];
-            let enters = b.column(input).map(|entry| Complex::new(entry, 0.0));
             let (sine, cosine) = (-frequency * delay).sin_cos();
-            let late = Complex::new(cosine, sine);
-            let response = (through.dot(&enters) + d[(output, input)]) * late;
+            let (path, late) = (Path { output, input: Some(input) }, Complex::new(cosine, sine));
+            let enters = (&b.column(input).into_owned(), d[(output, input)]);
+            let (response, spread) = resolvent.response(path, enters, late);
             if !response.modulus().is_finite() {
                 return Err(has_pole(frequency));
             }
             let near = turned(transfer, frequency) - frequency * delay;
-            let spread = forward.as_ref().and_then(|(known, forward)| {
-                let (states, path) = (forward.solve(&enters)?, Path { output, input: Some(input) });
-                let gradient = known.gradient(|entry| path.slope(entry, &through, &states) * late);
-                covariance(&known.values, &gradient)
-            });
             points.push(FrequencyPoint::new(frequency, response, spread, near));
         }
     }

@@ -23,4 +23,4 @@ mod tests;
 
 pub(crate) use on_log::StateSpaceOnLog;
 pub(crate) use recursion::Recursion;
-pub(super) use responses::{frequency_response, transient};
+pub(super) use responses::{Resolvent, frequency_response, transient};

@@ -1,6 +1,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use thetahat_core::nalgebra::{Complex, DMatrix, DVector};
+use thetahat_core::nalgebra::{Complex, DMatrix};
 
 use super::eigen::{eigenvalues, solved};
 use super::uncertainty::spread;
@@ -8,7 +8,7 @@ use super::{Entry, EntryCovariance, StateSpace, StateSpaceMatrix};
 use crate::Error;
 use crate::distribution::{student_factor, student_two_sided};
 use crate::model::dynamics::{LEVEL, time_constant};
-use crate::model::{Quantity, Root, Signal, standard_error};
+use crate::model::{Quantity, Root, Signal};
 
 /// Eigenvalues closer to 1 than this are an integrator.
 const INTEGRATOR: f64 = 1e-9;
@@ -146,23 +146,8 @@ impl StateSpaceModel {
                 }
             },
         );
-        let n = f.nrows();
-        let still = DMatrix::identity(n, n) - f;
-        let complex = |matrix: DMatrix<f64>| matrix.map(|entry| Complex::new(entry, 0.0));
-        let (states, weights) = (solved(still.clone(), g), solved(still.transpose(), &h.transpose()));
-        if let (Some(states), Some(weights)) = (states.map(complex), weights.map(complex)) {
-            for (output, gains) in self.dc_gain.iter_mut().enumerate() {
-                for (input, gain) in gains.iter_mut().enumerate() {
-                    let path = Path { output, input: Some(input) };
-                    let (weights, states) =
-                        (weights.column(output).into_owned(), states.column(input).into_owned());
-                    let gradient = covariance.gradient(|entry| path.slope(entry, &weights, &states));
-                    if let Some(gain) = gain {
-                        gain.standard_error = standard_error(Some(&covariance.values), &gradient);
-                    }
-                }
-            }
-        }
+        let still = DMatrix::identity(f.nrows(), f.nrows()) - f;
+        covariance.spread_gains(&mut self.dc_gain, &still, g, h);
         self.covariance = Some(covariance);
         self.time_constants = self.times();
         self
@@ -307,39 +292,6 @@ impl StateSpace {
             first += delay;
         }
         Self { f, g, h, d, k, noise_covariance: self.noise_covariance.clone(), sample_time: self.sample_time }
-    }
-}
-
-/// From a source to an output: an input, or with a single output its noise.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Path {
-    pub(crate) output: usize,
-    pub(crate) input: Option<usize>,
-}
-
-impl Path {
-    /// How the response h (q I - F)^-1 g + d moves with an entry, with weights w' = h (q I - F)^-1 and states v = (q I - F)^-1 g:
-    ///
-    /// ```text
-    /// dh v + w' dF v + w' dg + dd
-    /// ```
-    pub(crate) fn slope(
-        self,
-        &Entry { matrix, row, column }: &Entry,
-        weights: &DVector<Complex<f64>>,
-        states: &DVector<Complex<f64>>,
-    ) -> Complex<f64> {
-        let is_source = match self.input {
-            Some(input) => matches!(matrix, StateSpaceMatrix::G | StateSpaceMatrix::D) && column == input,
-            None => matrix == StateSpaceMatrix::K,
-        };
-        match matrix {
-            StateSpaceMatrix::F => weights[row] * states[column],
-            StateSpaceMatrix::H if row == self.output => states[column],
-            StateSpaceMatrix::G | StateSpaceMatrix::K if is_source => weights[row],
-            StateSpaceMatrix::D if is_source && row == self.output => Complex::new(1.0, 0.0),
-            _ => Complex::new(0.0, 0.0),
-        }
     }
 }
 

@@ -6,12 +6,12 @@ use super::eigen::solved;
 use super::spot_noise::{Steps, WHOLE};
 use super::uncertainty::spread;
 use super::{
-    ContinuousStateSpace, EntryCovariance, Hold, Path, StateSpace, StateSpaceMatrix, StateSpaceModel,
+    ContinuousStateSpace, EntryCovariance, Hold, StateSpace, StateSpaceMatrix, StateSpaceModel,
     ZerosPolesGain,
 };
 use crate::distribution::student_two_sided;
 use crate::model::dynamics::LEVEL;
-use crate::model::{Interval, Quantity, Root, Signal, standard_error};
+use crate::model::{Interval, Quantity, Root, Signal};
 use crate::{Error, figures};
 
 /// Poles slower than this fraction of a radian a sample are an integrator.
@@ -155,22 +155,7 @@ impl ContinuousStateSpaceModel {
             StateSpaceMatrix::F => left[entry.row] * right[entry.column],
             _ => zero,
         });
-        // w' = -C A^-1 and v = -A^-1 B, as at q = 1.
-        let complex = |matrix: DMatrix<f64>| matrix.map(|entry| Complex::new(entry, 0.0));
-        let (states, weights) = (solved(-&a, &b), solved(-a.transpose(), &c.transpose()));
-        if let (Some(states), Some(weights)) = (states.map(complex), weights.map(complex)) {
-            for (output, gains) in self.dc_gain.iter_mut().enumerate() {
-                for (input, gain) in gains.iter_mut().enumerate() {
-                    let path = Path { output, input: Some(input) };
-                    let (weights, states) =
-                        (weights.column(output).into_owned(), states.column(input).into_owned());
-                    let gradient = covariance.gradient(|entry| path.slope(entry, &weights, &states));
-                    if let Some(gain) = gain {
-                        gain.standard_error = standard_error(Some(&covariance.values), &gradient);
-                    }
-                }
-            }
-        }
+        covariance.spread_gains(&mut self.dc_gain, &-&a, &b, &c);
         let quantile = student_two_sided(1.0 - LEVEL, self.degrees_of_freedom);
         for (pole, time) in self.poles.iter().zip(&mut self.time_constants) {
             let (Some([[variance, _], _]), Some(time)) = (pole.covariance, time.as_mut()) else { continue };

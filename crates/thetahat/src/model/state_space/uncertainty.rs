@@ -6,7 +6,7 @@ use thetahat_core::nalgebra::{Complex, ComplexField, DMatrix, DVector};
 
 use super::StateSpace;
 use super::eigen::{faer_of, nalgebra_of, solved, symmetric_eigen};
-use crate::model::{Gradient, Root, covariance, is_simple};
+use crate::model::{Gradient, Quantity, Root, covariance, is_simple, standard_error};
 
 /// Slopes are differences over such a part of a standard deviation to either side: exact to a part in a million.
 pub(in crate::model) const STEP: f64 = 1e-3;
@@ -134,6 +134,39 @@ pub(crate) fn across_coordinates(
     }
     let decomposed = faer_of(&tangent).svd().ok()?;
     Some(nalgebra_of(decomposed.U().subcols(n * n, size - n * n)))
+}
+
+/// From a source to an output: an input, or with a single output its noise.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Path {
+    pub(crate) output: usize,
+    pub(crate) input: Option<usize>,
+}
+
+impl Path {
+    /// How the response h (q I - F)^-1 g + d moves with an entry, with weights w' = h (q I - F)^-1 and states v = (q I - F)^-1 g:
+    ///
+    /// ```text
+    /// dh v + w' dF v + w' dg + dd
+    /// ```
+    pub(crate) fn slope(
+        self,
+        &Entry { matrix, row, column }: &Entry,
+        weights: &DVector<Complex<f64>>,
+        states: &DVector<Complex<f64>>,
+    ) -> Complex<f64> {
+        let is_source = match self.input {
+            Some(input) => matches!(matrix, StateSpaceMatrix::G | StateSpaceMatrix::D) && column == input,
+            None => matrix == StateSpaceMatrix::K,
+        };
+        match matrix {
+            StateSpaceMatrix::F => weights[row] * states[column],
+            StateSpaceMatrix::H if row == self.output => states[column],
+            StateSpaceMatrix::G | StateSpaceMatrix::K if is_source => weights[row],
+            StateSpaceMatrix::D if is_source && row == self.output => Complex::new(1.0, 0.0),
+            _ => Complex::new(0.0, 0.0),
+        }
+    }
 }
 
 impl EntryCovariance {
@@ -269,6 +302,31 @@ impl EntryCovariance {
     /// How something varies with the free entries.
     pub(crate) fn gradient(&self, of: impl Fn(&Entry) -> Complex<f64>) -> Gradient {
         self.entries.iter().map(of).enumerate().collect()
+    }
+
+    /// Gives static gains h M^-1 g + d, a list of those of all inputs for each output, the standard errors that follow: M is I - F of a sampled
+    /// model and -A in continuous time. None are given where M is singular.
+    pub(super) fn spread_gains(
+        &self,
+        gains: &mut [Vec<Option<Quantity>>],
+        still: &DMatrix<f64>,
+        g: &DMatrix<f64>,
+        h: &DMatrix<f64>,
+    ) {
+        let complex = |matrix: DMatrix<f64>| matrix.map(|entry| Complex::new(entry, 0.0));
+        let (states, weights) = (solved(still.clone(), g), solved(still.transpose(), &h.transpose()));
+        let (Some(states), Some(weights)) = (states.map(complex), weights.map(complex)) else { return };
+        for (output, gains) in gains.iter_mut().enumerate() {
+            for (input, gain) in gains.iter_mut().enumerate() {
+                let path = Path { output, input: Some(input) };
+                let (weights, states) =
+                    (weights.column(output).into_owned(), states.column(input).into_owned());
+                let gradient = self.gradient(|entry| path.slope(entry, &weights, &states));
+                if let Some(gain) = gain {
+                    gain.standard_error = standard_error(Some(&self.values), &gradient);
+                }
+            }
+        }
     }
 
     /// Whether it is one of a model of these sizes.

@@ -1,6 +1,6 @@
 //! What a state-space model is to frequencies, steps and impulses.
 
-use thetahat_core::nalgebra::{Complex, ComplexField, DMatrix, DVector};
+use thetahat_core::nalgebra::{Complex, ComplexField, DMatrix, DVector, Dyn, LU};
 
 use super::Recursion;
 use crate::Error;
@@ -48,7 +48,7 @@ pub(crate) fn frequency_response(
     let poles: Vec<Complex<f64>> = model.poles.iter().map(|pole| Complex::new(pole.re, pole.im)).collect();
 
     let mut found: Vec<Vec<FrequencyPoint>> = vec![Vec::with_capacity(frequencies.len()); sources.len()];
-    let seen: DVector<Complex<f64>> = h.row(output).transpose().map(|entry| Complex::new(entry, 0.0));
+    let seen = h.row(output).transpose();
     for &frequency in frequencies {
         let angle = frequency * model.sample_time;
         let (sine, cosine) = angle.sin_cos();
@@ -56,31 +56,70 @@ pub(crate) fn frequency_response(
         if poles.iter().any(|pole| (q - pole).modulus() < 16.0 * f64::EPSILON * (1 + n) as f64) {
             return Err(has_pole(frequency));
         }
-        // (q I - F)' w = H', and with errors (q I - F) v = G.
-        let matrix = DMatrix::from_fn(n, n, |row, column| {
-            let diagonal = if row == column { q } else { Complex::new(0.0, 0.0) };
-            diagonal - f[(column, row)]
-        });
-        let known = model.covariance.as_ref().filter(|_| n > 0);
-        let forward = known.map(|known| (known, matrix.transpose().lu()));
-        let solved = if n == 0 { Some(seen.clone()) } else { matrix.lu().solve(&seen) };
-        let through = solved.ok_or_else(|| has_pole(frequency))?;
+        let resolvent = Resolvent::new((f, &seen), q, model.covariance.as_ref());
+        let resolvent = resolvent.ok_or_else(|| has_pole(frequency))?;
         for ((points, turns), (space, path)) in found.iter_mut().zip(&turns).zip(&sources) {
             let source = path.input.unwrap_or(0);
-            let enters = space.g.column(source).map(|entry| Complex::new(entry, 0.0));
-            let response = through.dot(&enters) + space.d[(output, source)];
+            let (enters, direct) = (space.g.column(source), space.d[(output, source)]);
+            let one = Complex::new(1.0, 0.0);
+            let (response, spread) = resolvent.response(*path, (&enters.into_owned(), direct), one);
             if !response.modulus().is_finite() {
                 return Err(has_pole(frequency));
             }
-            let spread = forward.as_ref().and_then(|(known, forward)| {
-                let states = forward.solve(&enters)?;
-                covariance(&known.values, &known.gradient(|entry| path.slope(entry, &through, &states)))
-            });
             points.push(FrequencyPoint::new(frequency, response, spread, turns.at(angle)));
         }
     }
     let names = model.inputs.iter().map(|input| Some(input.name.clone())).chain([None]);
     Ok(names.zip(found).map(|(input, points)| FrequencyResponse { input, points }).collect())
+}
+
+/// What states do at a point q of the complex plane, seen by an output: w' = h (q I - F)^-1; of equations in continuous time q is s and F is A.
+pub(in crate::respond) struct Resolvent<'m> {
+    weights: DVector<Complex<f64>>,
+    known: Option<&'m EntryCovariance>,
+    /// A factor of q I - F, where errors are known.
+    forward: Option<LU<Complex<f64>, Dyn, Dyn>>,
+}
+
+impl<'m> Resolvent<'m> {
+    /// None where q is an eigenvalue. O(n^3).
+    pub(in crate::respond) fn new(
+        (f, seen): (&DMatrix<f64>, &DVector<f64>),
+        at: Complex<f64>,
+        known: Option<&'m EntryCovariance>,
+    ) -> Option<Self> {
+        let n = f.nrows();
+        let seen = seen.map(|entry| Complex::new(entry, 0.0));
+        if n == 0 {
+            return Some(Self { weights: seen, known: None, forward: None });
+        }
+        let matrix = DMatrix::from_fn(n, n, |row, column| {
+            let diagonal = if row == column { at } else { Complex::new(0.0, 0.0) };
+            diagonal - f[(row, column)]
+        });
+        Some(Self {
+            weights: matrix.transpose().lu().solve(&seen)?,
+            known,
+            forward: known.map(|_| matrix.lu()),
+        })
+    }
+
+    /// (w' g + d) times a factor, and the covariance of its parts.
+    pub(in crate::respond) fn response(
+        &self,
+        path: Path,
+        (enters, direct): (&DVector<f64>, f64),
+        factor: Complex<f64>,
+    ) -> (Complex<f64>, Option<[[f64; 2]; 2]>) {
+        let enters = enters.map(|entry| Complex::new(entry, 0.0));
+        let response = (self.weights.dot(&enters) + direct) * factor;
+        let spread = self.known.zip(self.forward.as_ref()).and_then(|(known, forward)| {
+            let states = forward.solve(&enters)?;
+            let gradient = known.gradient(|entry| path.slope(entry, &self.weights, &states) * factor);
+            covariance(&known.values, &gradient)
+        });
+        (response, spread)
+    }
 }
 
 /// The response of an output to what an input does from time 0 on, from rest. O(n (n + l)) for each sample.

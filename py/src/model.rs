@@ -47,12 +47,7 @@ pub(crate) fn fit(py: Python<'_>, log: &Bound<'_, Log>, options: Vec<OsString>) 
         let names: Vec<&str> = plan.inputs.iter().chain([&plan.output]).map(String::as_str).collect();
         PendingEvaluation::new(copy(&channels, &names)?, &sources, &plan, monitor)
     })?;
-    Ok(Model {
-        model: pending.report().model.clone().into(),
-        known: pending.report().clone().into(),
-        report: OnceLock::new(),
-        pending: Mutex::new(Some((pending, Arc::clone(&log.log)))),
-    })
+    Ok(Model::waiting(pending, log))
 }
 
 /// Fits a model in equations to a log with the options of `thetahat fit --grey`.
@@ -108,10 +103,9 @@ pub(crate) fn fit_state_space(
     let plan = thetahat_cli::state_space_plan(&options, log.inputs.clone(), log.outputs.clone())
         .map_err(|failure| error::program(py, &failure))?;
     let (channels, sources) = (Arc::clone(&log.log), log.sources.clone());
-    let report = interruptible(py, move |monitor| {
-        thetahat::report::fit_state_space_monitored(&channels, &sources, &plan, monitor)
-    })?;
-    Ok(Model::of(report))
+    let pending =
+        interruptible(py, move |monitor| PendingEvaluation::of_states(&channels, &sources, &plan, monitor))?;
+    Ok(Model::waiting(pending, log))
 }
 
 /// Fits a process to the document of a frequency response with the options of `thetahat fit --from`.
@@ -430,6 +424,16 @@ impl Model {
 }
 
 impl Model {
+    /// A fit whose figures wait.
+    fn waiting(pending: PendingEvaluation, log: &Log) -> Self {
+        Self {
+            model: pending.report().model.clone().into(),
+            known: pending.report().clone().into(),
+            report: OnceLock::new(),
+            pending: Mutex::new(Some((pending, Arc::clone(&log.log)))),
+        }
+    }
+
     fn of(report: Report) -> Self {
         let known = Arc::new(report);
         let model = known.model.clone().into();

@@ -42,6 +42,7 @@ mod held_out_runs;
 mod html;
 mod identify;
 mod nonlinear_arx;
+mod pending;
 mod plan;
 mod process;
 mod reduce;
@@ -64,10 +65,11 @@ pub use html::{
     Transient, comparison_page, fit_page, inspection_page, response_page, step_test_page, transient_page,
     tuning_page, validation_page,
 };
-pub use identify::{PendingEvaluation, identify, identify_monitored};
+pub use identify::{identify, identify_monitored};
 pub use nonlinear_arx::{
     Centres, InputLags, MapPlan, NonlinearArxPlan, fit_nonlinear_arx, fit_nonlinear_arx_monitored,
 };
+pub use pending::PendingEvaluation;
 pub use plan::Plan;
 pub use process::{ProcessPlan, fit_process, fit_process_to_response};
 pub use requirement::{Demand, Requirement};

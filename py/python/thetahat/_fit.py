@@ -112,7 +112,7 @@ def arx(
         words = ["--model=arx", *_options.order_words(na=na, nb=nb, nk=nk), *coupling]
         words += _options.words(FitOptions, options, len(log))
         found = Model._of(_thetahat.fit_state_space(handle("log", log), words))
-        for warning in found.warnings:
+        for warning in found._model.warnings():
             warnings.warn(warning, EstimationWarning, stacklevel=2)
         return found
     if couple is not None:

@@ -109,6 +109,6 @@ def ss(
     words += [] if refine is None else [f"--refine={_options.text('refine', refine)}"]
     words += _options.words(FitOptions, locals(), len(log) if isinstance(log, Log) else None)
     found = Model._of(_thetahat.fit_state_space(handle("log", log), words))
-    for warning in found.warnings:
+    for warning in found._model.warnings():
         warnings.warn(warning, EstimationWarning, stacklevel=2)
     return found

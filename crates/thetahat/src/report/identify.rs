@@ -2,20 +2,19 @@ mod step_test;
 
 use std::ops::{ControlFlow, Range};
 
-use super::evaluate::evaluate;
-use super::fitted_rows::{estimation_record, estimation_start, goes_through};
+use super::fitted_rows::goes_through;
+use super::pending::{Open, OpenPolynomial, PendingEvaluation};
 use super::plan::Plan;
 use super::schema::{Data, Estimation, Missing, Report};
 use super::shares::Shares;
-use super::warnings::{at_the_stability_boundary, unstable_plant, warnings};
+use super::warnings::warnings;
 use crate::data::{Detrend, Log, Offset, Prefiltered, Record, Rows, Source, digests};
 use crate::estimate::{self, Beside, Constant, Estimate, Fitted, Initial, Method, OutputOffset, enough};
-use crate::model::{Orders, PolynomialModel, ProcessStructure, Quantity, Signal};
+use crate::model::{Orders, ProcessStructure, Quantity, Signal};
 use crate::optimize::{Deadline, Monitor, Search};
 use crate::regression::sum;
-use crate::respond::{Horizon, InitialCondition, PolynomialOnLog, innovations};
-use crate::select::{self, Choice, Focus, Grid, SelectedModel, Task};
-use crate::validate::Part;
+use crate::respond::{Horizon, InitialCondition, innovations};
+use crate::select::{self, Choice, Focus, SelectedModel, Task};
 use crate::{Document, Error};
 use step_test::StepTest;
 
@@ -69,39 +68,6 @@ pub fn identify_monitored(
     pending.evaluate_on(&log)
 }
 
-/// A fit before its figures: they take several times as long as least squares, and not every caller needs them.
-///
-/// ```
-/// use std::ops::ControlFlow;
-/// use thetahat::data::{Channel, Log};
-/// use thetahat::model::Orders;
-/// use thetahat::report::{Plan, PendingEvaluation, identify};
-///
-/// let u: Vec<f64> = (0..200).map(|t| f64::from(t * t % 7)).collect();
-/// let y = [vec![0.0], u[..199].to_vec()].concat();
-/// let channel = |name: &str, values| Channel { name: name.into(), values };
-/// let log = Log::new(vec![channel("u", u), channel("y", y)], 0.1)?;
-/// let plan = Plan::new(&["u"], "y", Orders::arx(0, &[1], &[1])?);
-/// let pending = PendingEvaluation::new(log.clone(), &[], &plan, &|_| ControlFlow::Continue(()))?;
-/// assert_eq!(pending.evaluate(log.clone())?, identify(log, &[], &plan)?);
-/// # Ok::<(), thetahat::Error>(())
-/// ```
-#[derive(Debug, Clone)]
-pub struct PendingEvaluation {
-    report: Report,
-    /// What the figures are of; none: they are there.
-    open: Option<Open>,
-}
-
-#[derive(Debug, Clone)]
-struct Open {
-    model: PolynomialModel,
-    grid: Option<Grid>,
-    focus: Focus,
-    /// What was taken from the output before the fit, and after it.
-    taken: [Offset; 2],
-}
-
 impl PendingEvaluation {
     /// [`identify_monitored`] up to the figures.
     ///
@@ -109,48 +75,6 @@ impl PendingEvaluation {
     /// As for [`identify_monitored`].
     pub fn new(log: Log, sources: &[Source], plan: &Plan, monitor: Monitor<'_>) -> Result<Self, Error> {
         Ok(fit(log, sources, plan, monitor)?.0)
-    }
-
-    /// The report so far: without figures of how well the model fits, and what they give reason to warn of.
-    pub fn report(&self) -> &Report {
-        &self.report
-    }
-
-    /// The whole report, given the same log again: its values are not compared.
-    ///
-    /// # Errors
-    /// [`Error::Data`] for channels or rows that are not there.
-    pub fn evaluate(self, mut log: Log) -> Result<Report, Error> {
-        let Some(Open { model, taken, .. }) = &self.open else { return Ok(self.report) };
-        for signal in &model.inputs {
-            log.remove(&signal.name, &signal.offset);
-        }
-        // One after the other as the fit did: their sum has another rounding.
-        for offset in taken.iter().filter(|offset| **offset != Offset::default()) {
-            log.remove(&model.output.name, offset);
-        }
-        self.evaluate_on(&log)
-    }
-
-    /// The same on deviations.
-    fn evaluate_on(self, log: &Log) -> Result<Report, Error> {
-        let Self { mut report, open } = self;
-        let Some(Open { model, grid, focus, .. }) = open else { return Ok(report) };
-        let inputs: Vec<String> = model.inputs.iter().map(|input| input.name.clone()).collect();
-        // The rows of the fit as it saw them; other rows begin in the middle of a run.
-        let seen = estimation_record(&report, &model, log, &inputs)?;
-        let start = estimation_start(&report, &model);
-        let own =
-            PolynomialOnLog::new(&model, log, &report.data.estimation, None)?.with_predictions(seen, start);
-        evaluate(&mut report, &own, Part::Estimation, focus);
-        for (part, rows) in report.data.held_out() {
-            evaluate(&mut report, &PolynomialOnLog::new(&model, log, &rows, None)?, part, focus);
-        }
-        if let Some(grid) = grid {
-            report.warnings.extend(at_the_stability_boundary(&model.orders, &grid));
-        }
-        report.warnings.extend(unstable_plant(&report));
-        Ok(report)
     }
 }
 
@@ -238,7 +162,7 @@ fn fit(
             let SelectedModel { selection, mut guess } = found;
             if let Some((structure, test)) = process.zip(step_test) {
                 let report = test.fit(structure, selection, sources, monitor)?;
-                return Ok((PendingEvaluation { report, open: None }, log));
+                return Ok((PendingEvaluation::done(report), log));
             }
             if let (Method::PredictionError(search), false) = (&mut method, with_constant) {
                 search.initial_parameters = guess.take();
@@ -352,8 +276,8 @@ fn fit(
         report.warnings.extend(band.warning(&estimation)?);
     }
     let grid = if let Choice::Grid(grid) = &plan.choice { Some(grid.clone()) } else { None };
-    let open = Some(Open { model, grid, focus: plan.focus, taken });
-    Ok((PendingEvaluation { report, open }, log))
+    let open = Open::Polynomial(OpenPolynomial { model, grid, focus: plan.focus, taken }.into());
+    Ok((PendingEvaluation::open(report, open), log))
 }
 
 /// The record that models of these orders are fitted to: it goes on through missing outputs where no past one is needed.

@@ -7,7 +7,7 @@ mod warnings;
 
 use std::ops::{ControlFlow, RangeInclusive};
 
-use super::evaluate::evaluate;
+use super::pending::{Open, PendingEvaluation};
 use super::schema::{Estimation, Report};
 use super::shares::Shares;
 use crate::data::{Detrend, Log, Offset, Rows, Source, Split};
@@ -15,9 +15,6 @@ use crate::estimate::{Constant, Criteria, Initial, Refine, SubspaceOptions, Vect
 use crate::model::{Model, Quantity, Signal, StateSpaceModel};
 use crate::optimize::{Monitor, Search};
 use crate::regression::SAFE_NORMS;
-use crate::respond::state_space::StateSpaceOnLog;
-use crate::select::Focus;
-use crate::validate::Part;
 use crate::{Document, Error};
 use estimated::Estimated;
 
@@ -212,6 +209,35 @@ pub fn fit_state_space_monitored(
     plan: &StateSpacePlan,
     monitor: Monitor<'_>,
 ) -> Result<Report, Error> {
+    let (report, model) = fit(log, sources, plan, monitor)?;
+    let signals = model.inputs.iter().chain(&model.outputs);
+    let deviations = log.deviations(signals.map(|signal| (signal.name.as_str(), signal.offset)))?;
+    PendingEvaluation::open(report, Open::StateSpace(model.into())).evaluate_on(&deviations)
+}
+
+impl PendingEvaluation {
+    /// [`fit_state_space_monitored`] up to the figures.
+    ///
+    /// # Errors
+    /// As for [`fit_state_space_monitored`].
+    pub fn of_states(
+        log: &Log,
+        sources: &[Source],
+        plan: &StateSpacePlan,
+        monitor: Monitor<'_>,
+    ) -> Result<Self, Error> {
+        let (report, model) = fit(log, sources, plan, monitor)?;
+        Ok(Self::open(report, Open::StateSpace(model.into())))
+    }
+}
+
+/// The report without the figures of its fit, and the model.
+fn fit(
+    log: &Log,
+    sources: &[Source],
+    plan: &StateSpacePlan,
+    monitor: Monitor<'_>,
+) -> Result<(Report, StateSpaceModel), Error> {
     plan.check()?;
     let names: Vec<&str> = plan.channels().collect();
     names.iter().try_for_each(|name| log.channel(name).map(|_| ()))?;
@@ -307,7 +333,7 @@ pub fn fit_state_space_monitored(
         criteria: Criteria::new(mean.determinant(), free, samples),
         condition: None,
     };
-    let mut report = Report {
+    let report = Report {
         schema: Report::SCHEMA.to_owned(),
         generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
         data,
@@ -317,14 +343,5 @@ pub fn fit_state_space_monitored(
         estimation,
         fit: Vec::new(),
     };
-    let signals =
-        model.inputs.iter().chain(&model.outputs).map(|signal| (signal.name.as_str(), signal.offset));
-    let deviations = log.deviations(signals)?;
-    let on_log = |rows: &[Rows]| StateSpaceOnLog::new(&model, &deviations, rows, None);
-    let own = on_log(&report.data.estimation)?;
-    evaluate(&mut report, &own, Part::Estimation, Focus::Auto);
-    for (part, rows) in report.data.held_out() {
-        evaluate(&mut report, &on_log(&rows)?, part, Focus::Auto);
-    }
-    Ok(report)
+    Ok((report, model))
 }

@@ -7,7 +7,7 @@ use crate::model::PolynomialModel;
 use crate::optimize::Search;
 use crate::regression::noise::Noise;
 use crate::report::Report;
-use crate::select::{Automatic, OrderRange, Path};
+use crate::select::{Automatic, Grid, OrderRange, Path};
 
 fn channel(name: &str, values: &[f64]) -> Channel {
     Channel { name: name.into(), values: values.to_vec() }

@@ -1,7 +1,7 @@
 use super::*;
 use crate::data::Channel;
 use crate::regression::noise::Noise;
-use crate::select::{OrderRange, Path};
+use crate::select::{Grid, OrderRange, Path};
 
 #[test]
 fn figures_that_wait_are_the_same() {

@@ -124,8 +124,11 @@ pub(super) fn by_subspace(
     constant: Constant,
     (log, monitor): (&Log, Monitor<'_>),
 ) -> Result<Estimated, Error> {
-    let Found { subspace: found, order, scores, .. } =
-        with_levels(constant, |constant| Found::new(record, plan, constant), |found| found.mdl)?;
+    let Found { subspace: found, order, scores, .. } = with_levels(
+        constant,
+        |levels| Found::new(record, plan, levels, constant == Constant::Auto),
+        |found| found.mdl,
+    )?;
     let mut levels = found.levels(order).ok_or_else(integrates)?;
     let mut matrices = found.state_space(order, log.sample_time())?;
     let samples = record.segments.iter().map(std::ops::Range::len).sum::<usize>();
@@ -199,12 +202,18 @@ struct Found {
     order: usize,
     /// What the order was chosen among; none if it was given.
     scores: Vec<OrderScore>,
-    /// That of the order.
+    /// That of the order; infinite if nobody asks for it.
     mdl: f64,
 }
 
 impl Found {
-    fn new(record: &JointRecord<'_>, plan: &StateSpacePlan, constant: bool) -> Result<Self, Error> {
+    /// `compared` says whether its MDL is asked for where the order is given.
+    fn new(
+        record: &JointRecord<'_>,
+        plan: &StateSpacePlan,
+        constant: bool,
+        compared: bool,
+    ) -> Result<Self, Error> {
         let subspace = subspace(record, &SubspaceOptions { constant, ..plan.subspace })?;
         let (asked, highest) =
             (plan.orders.clone().unwrap_or_else(|| subspace.orders()), subspace.highest_order());
@@ -216,6 +225,9 @@ impl Found {
             ));
         }
         let given = asked.start() == asked.end();
+        if given && !compared {
+            return Ok(Self { subspace, order: *asked.start(), scores: Vec::new(), mdl: f64::INFINITY });
+        }
         let scores = subspace.scores(record, orders)?;
         let order = if given { *asked.start() } else { best_order(&scores)? };
         let own = scores.iter().find(|score| score.order == order).and_then(|score| score.mdl);

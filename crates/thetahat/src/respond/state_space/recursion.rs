@@ -5,6 +5,9 @@ use thetahat_core::nalgebra::{DMatrix, DVector};
 use crate::model::StateSpace;
 use crate::optimize::normal;
 
+/// Rows that are added up together.
+const BLOCK: usize = 4;
+
 /// A model that is stepped along the rows of a log.
 ///
 /// Row by row it makes [x(t+1); y(t)] of [x(t); u(t)], with e = 0; or, as a predictor, [x(t+1); e(t)] of [x(t); u(t); y(t)] with
@@ -13,15 +16,15 @@ use crate::optimize::normal;
 /// x(t+1) = (F - K H) x(t) + (G - K D) u(t) + K y(t),   e(t) = y(t) - H x(t) - D u(t)
 /// ```
 ///
-/// A step is one product with a matrix, (n + l) (n + m + l) multiply-adds, in memory of its own.
+/// A step is one product with a matrix, (n + l) (n + m + l) multiply-adds, in memory of its own. Four rows of the matrix stand together: the
+/// sums of a block stay in registers, and each is that of its row, one column after the other.
 #[derive(Debug, Clone)]
 pub(crate) struct Recursion {
     states: usize,
-    signals: usize,
-    /// The matrix, column by column.
-    columns: Vec<f64>,
+    /// The matrix, in blocks of four rows, each column by column; zeros below the last row.
+    blocks: Vec<[f64; BLOCK]>,
     /// What is there whatever state and signals are.
-    constant: Vec<f64>,
+    constant: Vec<[f64; BLOCK]>,
     /// What is left of a state one row later: F, or F - K H.
     between: DMatrix<f64>,
     /// H.
@@ -30,9 +33,10 @@ pub(crate) struct Recursion {
     weights: Vec<f64>,
     /// Whether it is fed with what was measured.
     predicts: bool,
-    state: Vec<f64>,
+    /// The state, then the signals of a row.
+    values: Vec<f64>,
     /// The next state, and what comes out.
-    next: Vec<f64>,
+    next: Vec<[f64; BLOCK]>,
 }
 
 impl Recursion {
@@ -67,9 +71,10 @@ impl Recursion {
 
     /// A predictor of outputs that are measured from elsewhere: y - level in the place of y.
     pub(crate) fn with_levels(mut self, levels: &[f64]) -> Self {
-        let columns = self.columns.chunks_exact(self.next.len()).rev();
-        for (column, level) in columns.zip(levels.iter().rev()) {
-            self.constant.iter_mut().zip(column).for_each(|(sum, entry)| *sum -= entry * level);
+        for (constant, block) in self.constant.iter_mut().zip(self.blocks.chunks_exact(self.values.len())) {
+            for (column, level) in block.iter().rev().zip(levels.iter().rev()) {
+                constant.iter_mut().zip(column).for_each(|(sum, entry)| *sum -= entry * level);
+            }
         }
         self
     }
@@ -78,47 +83,49 @@ impl Recursion {
         let (rows, columns) = matrix.shape();
         let states = model.f.nrows();
         let weight = |variance: f64| if variance > 0.0 { 1.0 / variance.sqrt() } else { 1.0 };
+        let count = rows.div_ceil(BLOCK);
+        let entry = |row: usize, column: usize| if row < rows { matrix[(row, column)] } else { 0.0 };
+        let block = |first: usize| {
+            (0..columns).map(move |column| std::array::from_fn(|row| entry(first * BLOCK + row, column)))
+        };
         Self {
             states,
-            signals: columns - states,
-            columns: matrix.as_slice().to_vec(),
-            constant: vec![0.0; rows],
+            blocks: (0..count).flat_map(block).collect(),
+            constant: vec![[0.0; BLOCK]; count],
             between,
             seen: model.h.clone(),
             weights: model.noise_covariance.diagonal().iter().map(|variance| weight(*variance)).collect(),
             predicts,
-            state: vec![0.0; states],
-            next: vec![0.0; rows],
+            values: vec![0.0; columns],
+            next: vec![[0.0; BLOCK]; count],
         }
     }
 
     /// The state before the next step.
     pub(crate) fn state(&self) -> &[f64] {
-        &self.state
+        &self.values[..self.states]
     }
 
     /// Goes on from another state.
     pub(crate) fn start(&mut self, state: &[f64]) {
-        self.state.copy_from_slice(state);
+        self.values[..self.states].copy_from_slice(state);
     }
 
     /// What comes out of a row: the innovations, or the outputs. The signals are inputs, then outputs as far as it is fed with them.
     pub(crate) fn step(&mut self, signals: &[&[f64]], row: usize) -> &[f64] {
-        let (of_states, of_signals) = self.columns.split_at(self.states * self.next.len());
-        let size = self.next.len();
-        self.next.copy_from_slice(&self.constant);
-        let mut add = |column: &[f64], value: f64| {
-            self.next.iter_mut().zip(column).for_each(|(next, entry)| *next += entry * value);
-        };
-        for (column, value) in of_states.chunks_exact(size).zip(&self.state) {
-            add(column, *value);
+        let (state, fed) = self.values.split_at_mut(self.states);
+        fed.iter_mut().zip(signals).for_each(|(value, signal)| *value = signal[row]);
+        let next = self.next.iter_mut().zip(&self.constant);
+        for ((next, constant), block) in next.zip(self.blocks.chunks_exact(state.len() + fed.len())) {
+            let mut sums = *constant;
+            for (column, value) in block.iter().zip(state.iter().chain(&*fed)) {
+                sums.iter_mut().zip(column).for_each(|(sum, entry)| *sum += entry * value);
+            }
+            *next = sums;
         }
-        for (column, signal) in of_signals.chunks_exact(size).zip(&signals[..self.signals]) {
-            add(column, signal[row]);
-        }
-        let (state, out) = self.next.split_at(self.states);
-        self.state.copy_from_slice(state);
-        out
+        let (next, out) = self.next.as_flattened().split_at(self.states);
+        state.copy_from_slice(next);
+        &out[..self.seen.nrows()]
     }
 
     /// Starts a segment from the state that explains its outputs best: with M(t) = H A^t, A the matrix of the recursion, what is left of them
@@ -131,7 +138,7 @@ impl Recursion {
         let mut after = seen.clone();
         let mut weighted = seen.clone();
         let first = seen.norm();
-        self.state.fill(0.0);
+        self.values[..self.states].fill(0.0);
         for row in rows {
             left.copy_from_slice(self.step(signals, row));
             for (place, output) in outputs.iter().enumerate() {
@@ -161,6 +168,6 @@ impl Recursion {
         let mut factor = matrix.as_slice().to_vec();
         normal::factor(&mut factor, n);
         normal::solve(&factor, n, right.as_mut_slice());
-        self.state.copy_from_slice(right.as_slice());
+        self.start(right.as_slice());
     }
 }

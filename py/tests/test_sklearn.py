@@ -23,7 +23,7 @@ from sklearn.preprocessing import StandardScaler
 from sklearn.utils.estimator_checks import check_estimator
 
 import thetahat
-from thetahat.sklearn import EXPECTED_FAILED_CHECKS, ARXRegressor, NARXRegressor
+from thetahat.sklearn import EXPECTED_FAILED_CHECKS, ARXRegressor, NARXRegressor, StateSpaceRegressor
 
 # a1, a2, then b1 and b2 of the first input, b2 and b3 of the second.
 PARAMETERS = np.array([-1.2, 0.5, 1.0, 0.4, 0.3, -0.2])
@@ -342,3 +342,59 @@ def test_a_search_finds_the_degree() -> None:
 
 def test_a_nonlinear_regressor_keeps_the_conventions_that_time_allows() -> None:
     check_estimator(NARXRegressor(ny=1, nu=1, degree=1), expected_failed_checks=EXPECTED_FAILED_CHECKS)
+
+
+def several(count: int = 600) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Two inputs and two coupled outputs."""
+    random = np.random.default_rng(3)
+    u = random.standard_normal((count, 2))
+    x = np.zeros((count + 1, 2))
+    for t in range(count):
+        x[t + 1] = np.array([[0.8, 0.2], [-0.2, 0.7]]) @ x[t] + np.array([[1.0, 0.3], [0.0, 0.5]]) @ u[t]
+    return u, x[:count] + 5 + 0.02 * random.standard_normal((count, 2))
+
+
+@pytest.mark.parametrize(
+    "regressor",
+    [StateSpaceRegressor(2), ARXRegressor(na=2, nb=2, nk=1), NARXRegressor(ny=1, nu=1, terms=4)],
+    ids=["ss", "arx", "narx"],
+)
+def test_several_outputs_are_fitted_together(regressor: Any) -> None:
+    u, y = several()
+    regressor = clone(regressor).fit(u[:400], y[:400])
+    free = regressor.predict(u[400:])
+    assert free.shape == (200, 2)
+    np.testing.assert_array_equal(free, regressor.model_.simulate(u[400:], initial="zero"))
+    each = [r2_score(y[400:, output], free[:, output]) for output in range(2)]
+    assert regressor.score(u[400:], y[400:]) == pytest.approx(np.mean(each))
+    ahead = clone(regressor).set_params(horizon=1).fit(u[:400], y[:400])
+    assert ahead.predict(u[400:], y[400:]).shape == (200, 2)
+    assert ahead.score(u[400:], y[400:]) > 0.9
+    assert not hasattr(ahead, "coef_") or len(ahead.coef_) > 0
+    with pytest.raises(ValueError, match="expected 2 outputs"):
+        ahead.predict(u[400:], y[400:, 0])
+    with pytest.raises(ValueError, match="expected an array of shape"):
+        regressor.score(u[400:], y[400:, 0])
+    # One column is one output.
+    with pytest.warns(Warning, match="column-vector"):
+        single = clone(regressor).fit(u[:400], y[:400, :1])
+    assert single.predict(u[400:]).shape == (200,)
+    scores = cross_val_score(clone(regressor), u, y, cv=TimeSeriesSplit(3))
+    assert scores.shape == (3,)
+
+
+def test_states_are_chosen_and_their_names_avoid_those_of_inputs() -> None:
+    pandas = pytest.importorskip("pandas")
+    u, y = several()
+    frame = pandas.DataFrame(u, columns=["y1", "heat"])
+    regressor = StateSpaceRegressor(range(1, 5), detrend="mean").fit(frame, y)
+    assert regressor.model_.outputs == ["y1_", "y2_"]
+    assert regressor.model_.document["estimation"]["orders"]
+    again = pickle.loads(pickle.dumps(regressor))
+    np.testing.assert_array_equal(again.predict(frame), regressor.predict(frame))
+    search = GridSearchCV(StateSpaceRegressor(), {"order": [1, 2]}, cv=TimeSeriesSplit(3)).fit(u, y)
+    assert search.best_params_ == {"order": 2}
+    series = StateSpaceRegressor(2, horizon=1).fit(None, y)
+    assert series.predict(None, y).shape == y.shape
+    with pytest.raises(NotFittedError):
+        StateSpaceRegressor().predict(u)

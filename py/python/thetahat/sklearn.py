@@ -1,4 +1,4 @@
-"""ARX and nonlinear ARX models as estimators of scikit-learn, for its pipelines, searches and scores.
+"""ARX, nonlinear ARX and state-space models as estimators of scikit-learn, for its pipelines, searches and scores.
 
 Rows are samples in the order of time, at equal distances. Whatever splits them has to keep that order and to leave no holes:
 `sklearn.model_selection.TimeSeriesSplit` does, shuffled folds do not.
@@ -23,7 +23,7 @@ except ImportError as error:
     )
     raise ImportError(message) from error
 
-from thetahat import Log, Model, NarxOptions, _numbers, arx, narx
+from thetahat import Log, Model, NarxOptions, _numbers, arx, narx, ss
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -32,16 +32,18 @@ if TYPE_CHECKING:
 
     from thetahat._options import Band, Bound, Rows
 
-__all__ = ["EXPECTED_FAILED_CHECKS", "ARXRegressor", "NARXRegressor"]
+__all__ = ["EXPECTED_FAILED_CHECKS", "ARXRegressor", "NARXRegressor", "StateSpaceRegressor"]
 
 EXPECTED_FAILED_CHECKS = {
     "check_methods_sample_order_invariance": "rows are in the order of time",
     "check_methods_subset_invariance": "a row depends on those before it",
     "check_regressors_no_decision_function": "its 10 rows with 4 inputs do not determine the parameters",
+    "check_regressor_multioutput": "its 10 rows with 10 inputs and 5 outputs do not determine the parameters",
     "check_estimators_nan_inf": "its 10 rows with 3 inputs are too few for two coefficients each; passes with na=1, nb=1",
     "check_estimators_dtypes": "its 20 rows of whole numbers do not determine 12 parameters; passes with na=1, nb=1",
 }
-"""The checks of `sklearn.utils.estimator_checks.check_estimator` that an `ARXRegressor` fails by what it is, and why."""
+"""The checks of `sklearn.utils.estimator_checks.check_estimator` that an `ARXRegressor` fails by what it is, and why; a
+`StateSpaceRegressor` fails some of them."""
 
 _OPTIONS = (
     "estimate",
@@ -60,6 +62,24 @@ _OPTIONS = (
     "dc_gain",
     "ridge",
     "noise_bound",
+)
+
+_STATES = (
+    "weighting",
+    "past",
+    "future",
+    "feedthrough",
+    "refine",
+    "search",
+    "max_iterations",
+    "tolerance",
+    "time_limit",
+    "estimate",
+    "validate",
+    "split",
+    "detrend",
+    "offset",
+    "constant",
 )
 
 
@@ -81,13 +101,13 @@ class _Regressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         ----------
         X : array_like of shape (n_samples, n_inputs), or None
             The inputs in the order of time; None for a time series.
-        y : array_like of shape (n_samples,), optional
-            The measured output, of which a prediction with a horizon sees what is that far back. Not read without a horizon,
+        y : array_like of shape (n_samples,) or (n_samples, n_outputs), optional
+            The measured output, or outputs, of which a prediction with a horizon sees what is that far back. Not read without a horizon,
             but for its length where there are no inputs.
 
         Returns
         -------
-        ndarray of shape (n_samples,)
+        ndarray of shape (n_samples,), or (n_samples, n_outputs) of several
             With a horizon, NaN where too little is known to predict from, as in the first rows.
 
         Raises
@@ -106,15 +126,20 @@ class _Regressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
             if inputs is None and y is None:
                 raise ValueError("y: without inputs it says how many samples to predict; give predict(None, y)")
             count = len(self._output(y, None) if inputs is None else inputs)
-            level, slope = self.model_.offsets[self.model_.output]
-            return np.asarray(level + slope * self.sample_time * np.arange(count), dtype=np.float64)
+            offsets = np.array([self.model_.offsets[name] for name in self.model_.outputs])
+            lines = offsets[:, 0] + self.sample_time * np.arange(count)[:, None] * offsets[:, 1]
+            return np.asarray(lines[:, 0] if len(offsets) == 1 else lines, dtype=np.float64)
         if y is None:
             message = (
                 f"y: a prediction {self.horizon} samples ahead starts from measured outputs; give predict(X, y), "
                 "or horizon=None for a free run, which needs none"
             )
             raise ValueError(message)
-        log = self._log(inputs, self._output(y, inputs))
+        outputs = self._output(y, inputs)
+        if outputs.shape[1:] != self._shape():
+            message = f"y: expected {len(self.model_.outputs)} outputs, as in the fit, found an array of shape {outputs.shape}"
+            raise ValueError(message)
+        log = self._log(inputs, outputs)
         return np.asarray(self.model_.predict(log, horizon=int(self.horizon)), dtype=np.float64)
 
     def score(self, X: ArrayLike | None, y: ArrayLike, sample_weight: ArrayLike | None = None) -> float:
@@ -124,15 +149,16 @@ class _Regressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         ----------
         X : array_like of shape (n_samples, n_inputs), or None
             The inputs in the order of time; None for a time series.
-        y : array_like of shape (n_samples,)
-            The measured output.
+        y : array_like of shape (n_samples,) or (n_samples, n_outputs)
+            The measured output, or outputs.
         sample_weight : array_like of shape (n_samples,), optional
             What each sample counts.
 
         Returns
         -------
         float
-            1 - sum (y - y^)^2 / sum (y - mean y)^2 over the samples that have a prediction and a measured output.
+            1 - sum (y - y^)^2 / sum (y - mean y)^2 over the samples that have a prediction and a measured output; of several outputs
+            the mean.
 
         Raises
         ------
@@ -141,21 +167,24 @@ class _Regressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         """
         predicted = self.predict(X, y)
         measured = self._output(y, predicted)
-        known = ~(np.isnan(predicted) | np.isnan(measured))
-        if np.count_nonzero(known) < 2:
-            message = (
-                f"score: of {len(known)} samples {np.count_nonzero(known)} have a prediction and a measured output, "
-                "and R^2 needs two; give more rows"
-            )
+        if measured.shape != predicted.shape:
+            message = f"y: expected an array of shape {predicted.shape}, found one of {measured.shape}"
             raise ValueError(message)
-        weights = None if sample_weight is None else np.asarray(sample_weight)[known]
-        return float(r2_score(measured[known], predicted[known], sample_weight=weights))
+        weights = None if sample_weight is None else np.asarray(sample_weight)
+        columns = zip(measured.reshape(len(measured), -1).T, predicted.reshape(len(measured), -1).T, strict=True)
+        return float(np.mean([_score(own, run, weights) for own, run in columns]))
 
     def __sklearn_tags__(self) -> Any:
         tags = super().__sklearn_tags__()
         # Of rows without an order in time there is nothing to learn.
         tags.regressor_tags.poor_score = True
+        tags.target_tags.multi_output = True
+        tags.target_tags.single_output = True
         return tags
+
+    def _shape(self) -> tuple[int, ...]:
+        count = len(self.model_.outputs)
+        return () if count == 1 else (count,)
 
     def _check_horizon(self) -> None:
         horizon = self.horizon
@@ -195,7 +224,8 @@ class _Regressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
             input_name="y",
             estimator=self,
         )
-        output: NDArray[np.float64] = column_or_1d(checked, warn=True)
+        several = checked.ndim == 2 and checked.shape[1] > 1
+        output: NDArray[np.float64] = checked if several else column_or_1d(checked, warn=True)
         if beside is not None:
             check_consistent_length(beside, output)
         return output
@@ -203,17 +233,29 @@ class _Regressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
     def _log(self, inputs: NDArray[np.float64] | None, output: NDArray[np.float64]) -> Log:
         names = getattr(self, "feature_names_in_", None)
         taken = [] if names is None else [str(name) for name in names]
-        # No input may have the output's name.
-        output_name = "y"
-        while output_name in taken:
-            output_name += "_"
+        # No input may have the name of an output.
+        names = ["y"] if output.ndim == 1 else [f"y{number}" for number in range(1, 1 + output.shape[1])]
+        while not set(names).isdisjoint(taken):
+            names = [name + "_" for name in names]
         return Log(
             output,
             inputs,
             sample_time=self.sample_time,
             input_names=taken or None,
-            output_name=output_name,
+            output_name=names[0] if output.ndim == 1 else names,
         )
+
+
+def _score(measured: NDArray[np.float64], predicted: NDArray[np.float64], weights: NDArray[Any] | None) -> float:
+    """R^2 of one output."""
+    known = ~(np.isnan(predicted) | np.isnan(measured))
+    if np.count_nonzero(known) < 2:
+        message = (
+            f"score: of {len(known)} samples {np.count_nonzero(known)} have a prediction and a measured output, "
+            "and R^2 needs two; give more rows"
+        )
+        raise ValueError(message)
+    return float(r2_score(measured[known], predicted[known], sample_weight=None if weights is None else weights[known]))
 
 
 class ARXRegressor(_Regressor):
@@ -241,7 +283,8 @@ class ARXRegressor(_Regressor):
     model_ : thetahat.Model
         The fitted model.
     coef_ : ndarray of shape (n_parameters,)
-        Its parameters: a1, a2, ..., then those of B for each input.
+        Its parameters: a1, a2, ..., then those of B for each input. Of several outputs there is none: see the part ``estimation`` of
+        ``model_.document``.
     n_features_in_ : int
         The number of inputs.
     feature_names_in_ : ndarray of shape (n_features_in_,)
@@ -327,8 +370,8 @@ class ARXRegressor(_Regressor):
         ----------
         X : array_like of shape (n_samples, n_inputs), or None
             The inputs in the order of time; None for a time series.
-        y : array_like of shape (n_samples,)
-            The output.
+        y : array_like of shape (n_samples,) or (n_samples, n_outputs)
+            The output, or several.
 
         Returns
         -------
@@ -348,7 +391,10 @@ class ARXRegressor(_Regressor):
         orders = {"nb": 0} if inputs is None else {"nb": _orders(self.nb), "nk": _orders(self.nk)}
         options: Any = {name: getattr(self, name) for name in _OPTIONS}
         self.model_ = arx(log, na=self.na, **orders, **options)
-        self.coef_: NDArray[np.float64] = np.asarray(self.model_.parameters, dtype=np.float64)
+        if hasattr(self, "coef_"):
+            del self.coef_
+        if len(self.model_.outputs) == 1:
+            self.coef_: NDArray[np.float64] = np.asarray(self.model_.parameters, dtype=np.float64)
         return self
 
 
@@ -480,8 +526,8 @@ max_iterations, tolerance, step, starts, seed, time_limit, estimate, validate, s
         ----------
         X : array_like of shape (n_samples, n_inputs), or None
             The inputs in the order of time; None for a time series.
-        y : array_like of shape (n_samples,)
-            The output.
+        y : array_like of shape (n_samples,) or (n_samples, n_outputs)
+            The output, or several.
 
         Returns
         -------
@@ -502,6 +548,126 @@ max_iterations, tolerance, step, starts, seed, time_limit, estimate, validate, s
         options: Any = {name: getattr(self, name) for name in NarxOptions.__annotations__}
         self.model_ = narx(log, self.map, ny=int(self.ny), **lags, **options)
         self.coef_: NDArray[np.float64] = np.asarray(self.model_.parameters, dtype=np.float64)
+        return self
+
+
+class StateSpaceRegressor(_Regressor):
+    """A state-space model, x(t+1) = F x(t) + G u(t) + K e(t), y(t) = H x(t) + D u(t) + e(t), by a subspace method.
+
+    Parameters
+    ----------
+    order : int, range or None, default=None
+        States, or those among which the least MDL chooses; None: 1 to 20.
+    nk : int, sequence of int or None, default=None
+        Samples that each input waits.
+    horizon : int or None, default=None
+        How many samples ahead `predict` and `score` predict. None: the free run, which sees no outputs.
+    sample_time : float, default=1.0
+        Seconds from one sample to the next.
+    weighting, past, future, feedthrough, refine, search, max_iterations, tolerance, time_limit, estimate, validate, split, detrend, offset, \
+constant : default=None
+        How, as for `thetahat.ss`. Channels are called as the columns of a data frame, else u, or u1, u2, …, and y, or y1, y2, …
+
+    Attributes
+    ----------
+    model_ : thetahat.Model
+        The fitted model.
+    n_features_in_ : int
+        The number of inputs.
+    feature_names_in_ : ndarray of shape (n_features_in_,)
+        The inputs' names, where X was a dataframe with names that are text.
+
+    Notes
+    -----
+    As for `ARXRegressor`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thetahat.sklearn import StateSpaceRegressor
+    >>> rng = np.random.default_rng(1)
+    >>> u, x = rng.standard_normal((500, 2)), np.zeros((501, 2))
+    >>> for t in range(500):
+    ...     x[t + 1] = [[0.8, 0.2], [-0.2, 0.7]] @ x[t] + u[t]
+    >>> y = x[:500] + 0.01 * rng.standard_normal((500, 2))
+    >>> regressor = StateSpaceRegressor(order=2).fit(u[:300], y[:300])
+    >>> regressor.predict(u[300:]).shape
+    (200, 2)
+    >>> bool(regressor.score(u[300:], y[300:]) > 0.9)
+    True
+    """
+
+    def __init__(
+        self,
+        order: int | range | None = None,
+        nk: int | Sequence[int] | None = None,
+        *,
+        horizon: int | None = None,
+        sample_time: float = 1.0,
+        weighting: str | None = None,
+        past: int | None = None,
+        future: int | None = None,
+        feedthrough: bool | None = None,
+        refine: str | None = None,
+        search: str | None = None,
+        max_iterations: int | None = None,
+        tolerance: float | None = None,
+        time_limit: float | None = None,
+        estimate: Rows | None = None,
+        validate: Rows | None = None,
+        split: tuple[float, float, float] | None = None,
+        detrend: str | None = None,
+        offset: Mapping[str, float] | None = None,
+        constant: str | None = None,
+    ) -> None:
+        self.order = order
+        self.nk = nk
+        self.horizon = horizon
+        self.sample_time = sample_time
+        self.weighting = weighting
+        self.past = past
+        self.future = future
+        self.feedthrough = feedthrough
+        self.refine = refine
+        self.search = search
+        self.max_iterations = max_iterations
+        self.tolerance = tolerance
+        self.time_limit = time_limit
+        self.estimate = estimate
+        self.validate = validate
+        self.split = split
+        self.detrend = detrend
+        self.offset = offset
+        self.constant = constant
+
+    def fit(self, X: ArrayLike | None, y: ArrayLike) -> StateSpaceRegressor:
+        """Estimate the model.
+
+        Parameters
+        ----------
+        X : array_like of shape (n_samples, n_inputs), or None
+            The inputs in the order of time; None for a time series.
+        y : array_like of shape (n_samples,) or (n_samples, n_outputs)
+            The output, or several.
+
+        Returns
+        -------
+        StateSpaceRegressor
+            This one, fitted.
+
+        Raises
+        ------
+        ValueError
+            If X or y does not have its shape, or a parameter is out of its range.
+        thetahat.EstimationError
+            If the data do not determine the model.
+        """
+        self._check_horizon()
+        inputs = self._inputs(X, reset=True)
+        log = self._log(inputs, self._output(y, inputs))
+        options: Any = {name: getattr(self, name) for name in _STATES}
+        delays = None if self.nk is None or inputs is None else _orders(self.nk)
+        self.model_ = ss(log, self.order, nk=delays, **options)
         return self
 
 

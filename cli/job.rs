@@ -181,10 +181,15 @@ pub(crate) fn rows(argument: &str, texts: &[String]) -> Result<Vec<Rows>, Failur
 
 /// An argument in the form that the library reads.
 pub(crate) fn parsed<T: FromStr<Err = thetahat::Error>>(argument: &str, text: &str) -> Result<T, Failure> {
-    text.parse().map_err(|error: thetahat::Error| match error {
-        thetahat::Error::Argument { message, .. } => Failure::usage(format!("{argument}: {message}")),
-        other => Failure::usage(format!("{argument}: {other}")),
-    })
+    text.parse().map_err(|error| refused(argument, &error))
+}
+
+/// What the library says of the value of an option.
+fn refused(option: &str, error: &thetahat::Error) -> Failure {
+    match error {
+        thetahat::Error::Argument { message, .. } => Failure::usage(format!("{option}: {message}")),
+        other => Failure::usage(format!("{option}: {other}")),
+    }
 }
 
 /// STEP:hold or STEP:linear, and :unfiltered after it.

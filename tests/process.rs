@@ -224,3 +224,93 @@ fn a_step_test_without_orders_is_described_by_a_process() {
     assert_eq!(half["model"]["kind"], "polynomial");
     assert_eq!(half["selection"]["processes"][0]["structure"], "p2d");
 }
+
+/// 20/(s^2 + 2 s + 20) e^(-0.13 s) on an uneven clock, its input moving from the first row on.
+fn resonance(folder: &Folder) {
+    let (mut text, mut random, mut steps) = ("t,u,y\n".to_owned(), 1_u32, Vec::new());
+    let mut level = 0.0;
+    let damped = 19.0_f64.sqrt();
+    for row in 0..500 {
+        let time = 0.05 * f64::from(row) + 0.01 * f64::from(row % 3);
+        if row % 7 == 0 {
+            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let next = f64::from(random >> 16) / 32_768.0 - 1.0;
+            steps.push((time, next - level));
+            level = next;
+        }
+        let rises = steps.iter().map(|(start, by)| {
+            let since = (time - start - 0.13).max(0.0);
+            by * (1.0 - (-since).exp() * ((damped * since).cos() + (damped * since).sin() / damped))
+        });
+        let noise = f64::from((row * 7919) % 101 - 50) * 4e-4;
+        writeln!(text, "{time},{level},{}", 3.0 + rises.sum::<f64>() + noise).expect("memory");
+    }
+    folder.write("resonance.csv", text);
+}
+
+#[test]
+fn transfer_functions_are_found_in_every_verb() {
+    let folder = Folder::with_log(include_str!("data/public/tclab_siso_step.csv"));
+    resonance(&folder);
+    let line = "resonance.csv --time t -u u -y y --model tf --np 2 --nz 0 --delay --estimate 1..400 --validate 401..500";
+    let report = folder.fit(&format!("{line} --report model.json --html page.html"));
+    assert_eq!(report["model"]["structures"][0], "tf20d");
+    for (name, expected) in [("b0", 20.0), ("a1", 2.0), ("a0", 20.0), ("theta", 0.13)] {
+        let (found, error) = value(&report, name);
+        assert!((found - expected).abs() < 4.0 * error && error < 0.02 * expected, "{name}: {found} {error}");
+    }
+    assert!(folder.read("page.html").contains("tf20d"));
+    for verb in
+        ["validate model.json resonance.csv --time t", "predict model.json resonance.csv --time t -o p.csv"]
+    {
+        folder.done(verb);
+    }
+    for verb in ["step", "impulse", "bode"] {
+        folder.done(&format!("{verb} model.json -o {verb}.csv"));
+    }
+    // The pole of its own table is that of the parameters: -1 +- 4.36i, with its error.
+    folder.done("convert model.json --to continuous -o c.json");
+    let continuous: Value = serde_json::from_str(&folder.read("c.json")).expect("a document");
+    near(number(&continuous, "/model/poles/0/re"), -0.5 * value(&report, "a1").0, 1e-9);
+    let variance = number(&continuous, "/model/poles/0/covariance/0/0");
+    near(variance.sqrt(), 0.5 * value(&report, "a1").1, 1e-3);
+    near(
+        number(&continuous, "/model/dc_gain/0/0/value"),
+        value(&report, "b0").0 / value(&report, "a0").0,
+        1e-9,
+    );
+    assert!(folder.refused("tune model.json", 2).contains("tf20d"));
+
+    // What is no resonance comes to the same as lags.
+    let lags = folder.fit(&format!("{TCLAB} --structure p2"));
+    let found = folder.fit(&format!("{TCLAB} --model tf --np 2 --nz 0 --initial zero"));
+    near(number(&found, "/fit/1/rmse"), number(&lags, "/fit/1/rmse"), 1e-6);
+    near(value(&found, "a0").0, 1.0 / (value(&lags, "tau1").0 * value(&lags, "tau2").0), 1e-3);
+
+    // The response that the model has, as measured.
+    folder.done(
+        "spectrum resonance.csv --resample 0.05:linear --time t -u u -y y --format json -o response.json",
+    );
+    let found = folder.fit("--from response.json --np 2 --nz 0 --delay");
+    near(value(&found, "a0").0, 20.0, 0.1);
+
+    for (options, words) in [
+        ("--model tf", "--model tf needs --np"),
+        ("--model arx --np 2", "--np is of --model tf"),
+        ("--np 0", "--np: 0 poles"),
+        ("--np 7", "--np: 7 poles"),
+        ("--np 2 --nz 3", "--np: 3 zeros of 2 poles"),
+        ("--np 2,1 --nz 1,0,0", "--nz: 3 numbers beside 2"),
+        ("--np 2,1", "2 for 1 inputs"),
+        ("--structure tf13", "3 zeros of 1 poles"),
+        ("--structure tf10i", "an integrator alone is p0i"),
+        ("--structure tf2", "no structure of a process"),
+        ("--model ss --np 2", "--np"),
+    ] {
+        let refusal = folder.refused(&format!("fit {TCLAB} {options}"), 2);
+        assert!(refusal.contains(words), "{options}: {refusal}");
+    }
+    for options in ["--nz 1", "--delay", "--np 2 --structure p1d", "--np 2 --na 1"] {
+        assert_eq!(folder.run(&format!("fit {TCLAB} {options}")).code, 2, "{options}");
+    }
+}

@@ -13,11 +13,12 @@ pub(crate) struct FitArguments {
     /// The logs: CSV files, gzip-compressed or not (- for standard input)
     #[arg(value_name = "LOG", required_unless_present = "from")]
     pub(crate) logs: Vec<PathBuf>,
-    /// Fit a process to a frequency response instead of logs: the document that spectrum wrote (- for standard input); with --structure
+    /// Fit a process to a frequency response instead of logs: the document that spectrum wrote (- for standard input); with --structure or
+    /// --np
     #[arg(
         long,
         value_name = "RESPONSE",
-        requires = "structure",
+        requires = "continuous",
         conflicts_with_all = ["logs", "output", "estimate", "validate", "split", "offset", "trend", "initial", "html", "ClockArguments", "LogArguments"]
     )]
     pub(crate) from: Option<PathBuf>,
@@ -130,12 +131,33 @@ pub(crate) struct ModelArguments {
         value_name = "p1d|p2du|rc2|…[,…]",
         value_delimiter = ',',
         help_heading = "Model",
+        group = "continuous",
         conflicts_with_all = [
             "na", "nb", "nc", "nd", "nf", "nk", "taps", "kernel", "method", "likelihood", "focus", "constant", "detrend", "prefilter",
             "path", "select", "seed", "CriterionArguments", "NarxArguments",
         ]
     )]
     pub(crate) structure: Vec<String>,
+    /// Poles of a transfer function in continuous time (--model tf), 1 to 6; one number for each input or one for all; the clock may be
+    /// irregular
+    #[arg(
+        long,
+        value_name = "N[,…]",
+        value_delimiter = ',',
+        help_heading = "Model",
+        group = "continuous",
+        conflicts_with_all = [
+            "na", "nb", "nc", "nd", "nf", "nk", "taps", "kernel", "method", "likelihood", "focus", "constant", "detrend", "prefilter",
+            "path", "select", "seed", "CriterionArguments", "NarxArguments",
+        ]
+    )]
+    pub(crate) np: Vec<usize>,
+    /// Its zeros, no more than poles; one number for each input or one for all [default: one less than poles]
+    #[arg(long, value_name = "N[,…]", value_delimiter = ',', help_heading = "Model", requires = "np")]
+    pub(crate) nz: Vec<usize>,
+    /// Search for a dead time of each input too
+    #[arg(long, help_heading = "Model", requires = "np")]
+    pub(crate) delay: bool,
     /// How to estimate
     #[arg(long, value_enum, default_value = "pem", help_heading = "Model")]
     pub(crate) method: MethodArgument,
@@ -207,7 +229,8 @@ pub(crate) struct NarxArguments {
         value_enum,
         value_name = "MAP",
         conflicts_with_all = [
-            "model", "na", "nb", "nc", "nd", "nf", "taps", "kernel", "structure", "method", "likelihood", "initial", "constant", "trend", "path", "norm",
+            "model", "na", "nb", "nc", "nd", "nf", "taps", "kernel", "structure", "np", "method", "likelihood", "initial", "constant", "trend", "path",
+            "norm",
             "bound", "dc_gain", "noise_bound", "prefilter",
         ]
     )]
@@ -396,6 +419,8 @@ pub(crate) enum ModelArgument {
     Fir,
     /// A process in continuous time: gain, lags, dead time, with --structure
     Process,
+    /// Transfer functions in continuous time, with --np and --nz
+    Tf,
     /// State space: x(t+1) = F x + G u + K e, y = H x + D u + e, with any number of outputs
     Ss,
 }

@@ -27,6 +27,7 @@ impl ModelArgument {
             Self::General => ("general", &["--na", "--nb", "--nc", "--nd", "--nf"]),
             Self::Fir => ("fir", &["--taps"]),
             Self::Process => ("process", &["--structure"]),
+            Self::Tf => ("tf", &["--np"]),
             Self::Ss => ("ss", &["--order"]),
         }
     }
@@ -46,6 +47,9 @@ impl ModelArgument {
             Self::Process => Err(Failure::usage(
                 "--model process needs --structure, such as --structure p1d: a gain, a lag and a dead time",
             )),
+            Self::Tf => {
+                Err(Failure::usage("--model tf needs --np, the number of poles, such as --np 2 --nz 1"))
+            }
             Self::Ss => Err(Failure::usage(
                 "--model ss has no polynomials, and is fitted alone; take another --model here",
             )),

@@ -4,7 +4,7 @@ use thetahat::model::ProcessStructure;
 use thetahat::report::ProcessPlan;
 
 use super::fit::named_values;
-use super::{LogJob, parsed, rows, search};
+use super::{LogJob, parsed, refused, rows, search};
 use crate::args::{FitArguments, InitialArgument, ModelArgument, Names};
 use crate::failure::Failure;
 use crate::memory::PerValue;
@@ -30,23 +30,29 @@ impl ProcessJob {
     /// The job, if a process is asked for.
     pub(crate) fn resolve(arguments: &FitArguments) -> Result<Option<Self>, Failure> {
         let own = &arguments.model;
-        if own.structure.is_empty() {
-            return Ok(None);
+        let (option, model, name) = match (&*own.structure, &*own.np) {
+            ([], []) => return Ok(None),
+            ([], _) => ("--np", ModelArgument::Tf, "tf"),
+            _ => ("--structure", ModelArgument::Process, "process"),
+        };
+        if own.model.is_some_and(|other| other != model) {
+            return Err(Failure::usage(format!("{option} is of --model {name}; leave one of the two out")));
         }
-        if own.model.is_some_and(|model| model != ModelArgument::Process) {
-            return Err(Failure::usage("--structure is of --model process; leave one of the two out"));
-        }
-        let structures = own
-            .structure
-            .iter()
-            .map(|text| parsed::<ProcessStructure>("--structure", text))
-            .collect::<Result<Vec<_>, _>>()?;
+        let structures = if own.np.is_empty() {
+            let each = own.structure.iter().map(|text| parsed::<ProcessStructure>("--structure", text));
+            each.collect::<Result<Vec<_>, _>>()?
+        } else {
+            transfer_functions(&own.np, &own.nz, own.delay)?
+        };
         let outputs = Names::all(&arguments.output).unwrap_or_default();
         if outputs.len() > 1 {
             return Err(Failure::usage("--output: a process has one output; fit one after the other"));
         }
         let free_start = match own.initial {
-            InitialArgument::Auto | InitialArgument::Zero => false,
+            InitialArgument::Auto => {
+                arguments.from.is_none() && structures.iter().all(ProcessStructure::is_transfer_function)
+            }
+            InitialArgument::Zero => false,
             InitialArgument::Estimate => true,
             InitialArgument::Drop => {
                 return Err(Failure::usage(
@@ -90,4 +96,22 @@ impl ProcessJob {
         plan.check().map_err(|error| Failure::option(&error))?;
         Ok(plan)
     }
+}
+
+/// One for each number of poles; one number of zeros is for all, none is one less than poles.
+fn transfer_functions(np: &[usize], nz: &[usize], delay: bool) -> Result<Vec<ProcessStructure>, Failure> {
+    let (count, zeros) = (np.len().max(nz.len()), nz.len());
+    if (np.len() != 1 && np.len() != count) || (zeros > 1 && zeros != count) {
+        return Err(Failure::usage(format!(
+            "--nz: {zeros} numbers beside {} of --np; give one for all inputs or one for each",
+            np.len()
+        )));
+    }
+    let of = |list: &[usize], input: usize| list.get(input).or(list.first()).copied();
+    let each = (0..count).map(|input| {
+        let poles = of(np, input).unwrap_or(0);
+        let zeros = of(nz, input).unwrap_or(poles.saturating_sub(1));
+        ProcessStructure::transfer_function(poles, zeros, delay).map_err(|error| refused("--np", &error))
+    });
+    each.collect()
 }

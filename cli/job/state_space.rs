@@ -251,6 +251,7 @@ fn refuse_others(arguments: &FitArguments, is_arx: bool) -> Result<(), Failure> 
         ("--taps", !model.taps.is_empty()),
         ("--kernel", model.kernel.is_some()),
         ("--structure", !model.structure.is_empty()),
+        ("--np", !model.np.is_empty()),
         ("--method", model.method != MethodArgument::Pem),
         ("--likelihood", model.likelihood != LikelihoodArgument::Conditional),
         ("--initial", !matches!(model.initial, InitialArgument::Auto | InitialArgument::Estimate)),

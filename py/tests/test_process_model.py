@@ -114,3 +114,47 @@ def test_a_choice_on_a_step_test_may_come_to_a_process() -> None:
     plot.selection(model)
     again = pickle.loads(pickle.dumps(model))
     assert json.loads(again.to_json()) == json.loads(model.to_json())
+
+
+def test_transfer_functions_are_found_on_any_clock_and_of_responses() -> None:
+    rng = np.random.default_rng(2)
+    t = np.arange(600) * 0.1 + 0.03 * np.sin(1.7 * np.arange(600))
+    u = np.repeat(rng.choice([-1.0, 1.0], 100), 6)
+    # 20/(s^2 + 2 s + 20) and 3/(s + 0.5), by the responses to their steps.
+    steps = np.diff(u, prepend=u[0])
+    since = np.maximum(t[:, None] - t[None, :], 0)
+    damped = np.sqrt(19)
+    pair = 1 - np.exp(-since) * (np.cos(damped * since) + np.sin(damped * since) / damped)
+    v = np.roll(u, 30)
+    lag = 6 * (1 - np.exp(-0.5 * since))
+    y = 5 + pair @ steps + lag @ np.diff(v, prepend=v[0])
+    y += 0.02 * rng.standard_normal(600)
+    data = th.Log(y, {"u": u, "v": v}, time=t, uniform=False)
+    model = th.tf(data, np=[2, 1], nz=[0, 0])
+    assert model.parameter_names == ["b0[u]", "a1[u]", "a0[u]", "b0[v]", "a0[v]"]
+    assert model.parameters == pytest.approx([20, 2, 20, 3, 0.5], rel=0.05)
+    assert np.all(np.abs(model.parameters - [20, 2, 20, 3, 0.5]) < 4 * model.standard_errors)
+    continuous = model.converted("continuous")
+    assert continuous.document["model"]["poles"][0]["covariance"] is not None
+    again = th.Model.from_json(model.to_json())
+    assert again.predict(data) == pytest.approx(model.predict(data))
+
+    even = th.Log(y, {"u": u, "v": v}, sample_time=0.1)
+    even = th.Log(model.simulate(even, initial="zero"), {"u": u, "v": v}, sample_time=0.1)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", th.EstimationWarning)
+        exact = th.tf(even, [2, 1], [0, 0], initial="zero")
+    assert exact.parameters == pytest.approx(model.parameters, rel=1e-6)
+
+    for arguments, words in [
+        ({"np": 7}, "7 poles"),
+        ({"np": 2, "nz": 3}, "3 zeros"),
+        ({"np": []}, "np: there is none"),
+        ({"np": [1, 2, 3]}, "3 for 2 inputs"),
+    ]:
+        with pytest.raises(ValueError, match=words):
+            th.tf(data, **arguments)
+    with pytest.raises(TypeError, match="np"):
+        th.tf(data, 2.5)
+    with pytest.raises(TypeError, match="delay"):
+        th.tf(data, 2, delay="no")

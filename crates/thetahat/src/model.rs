@@ -52,7 +52,7 @@ pub use nonlinear_arx::{
 };
 pub(crate) use orders::{LARGEST, lag_name};
 pub use orders::{Orders, Structure};
-pub(crate) use process::{Chain, Columns, Parts, State, Transition};
+pub(crate) use process::{Chain, Columns, MOST_POLES, Parts, State, Transition};
 pub use process::{ProcessModel, ProcessStructure};
 pub use quantity::{Interval, Quantity, Root};
 pub use state_space::{

@@ -1,7 +1,7 @@
 """System identification: models of dynamic systems from logged data.
 
 A log holds measured signals (`Log`, `read_csv`). A fit makes a model of it (`arx`, `armax`, `oe`, `bj`, `ar`, `arma`, `general`,
-`fir`, `iv`, `sriv`), `search` chooses one, `grey` finds the parameters of a model in equations (`GreyBox`), `narx` fits nonlinear ARX models, `process` processes in continuous time, `ss` models in state space with any number of outputs, `inspect` inspects a log before a fit, `spectrum` finds its frequency response and `step_test` what its steps show without a model, `design` makes test signals for experiments, `tune` controllers for a process. A `Model` predicts, simulates, forecasts and is validated.
+`fir`, `iv`, `sriv`), `search` chooses one, `grey` finds the parameters of a model in equations (`GreyBox`), `narx` fits nonlinear ARX models, `process` processes in continuous time, `tf` transfer functions there, `ss` models in state space with any number of outputs, `inspect` inspects a log before a fit, `spectrum` finds its frequency response and `step_test` what its steps show without a model, `design` makes test signals for experiments, `tune` controllers for a process. A `Model` predicts, simulates, forecasts and is validated.
 `thetahat.plot` draws, and `thetahat.sklearn` fits into scikit-learn.
 
 Whatever takes numbers takes arrays of NumPy, lists and tuples, and the series and frames of pandas, Polars and PyArrow; of one
@@ -28,7 +28,7 @@ from thetahat._log import Log, dc_motor, read_csv
 from thetahat._model import Model
 from thetahat._narx import narx
 from thetahat._options import DesignOptions, EquationsOptions, FitOptions, NarxOptions, ReadOptions, SpectrumOptions, StepTestOptions, ValidationOptions
-from thetahat._process import process
+from thetahat._process import process, tf
 from thetahat._responses import Forecast, FrequencyResponse, StateSpace, TransientResponse
 from thetahat._spectrum import MeasuredResponse, spectrum
 from thetahat._state_model import StateModel
@@ -139,5 +139,6 @@ __all__ = [
     "sriv",
     "ss",
     "step_test",
+    "tf",
     "tune",
 ]

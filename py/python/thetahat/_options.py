@@ -445,7 +445,7 @@ def order_words(**orders: Orders | None) -> list[str]:
         if isinstance(value, np.ndarray):
             value = value.tolist()
         if isinstance(value, (list, tuple)):
-            if name not in ("nb", "nf", "nk", "nu", "ny", "taps"):
+            if name not in ("nb", "nf", "nk", "np", "nu", "ny", "nz", "taps"):
                 raise TypeError(f"{name}: expected an int or a range such as range(1, 4), found {value!r}")
             texts = [_order(name, one) for one in value]
             if not texts:

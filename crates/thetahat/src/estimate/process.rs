@@ -12,6 +12,7 @@
 //! of errors e = v/A(q), A an autoregression of the residuals (see `uncertainty`), and no standard error is less than that of white errors.
 
 mod objective;
+mod refined;
 mod starts;
 #[cfg(test)]
 mod tests;
@@ -296,7 +297,10 @@ fn uncertainty(
             open.push((moves, (high - low).powi(2) / 12.0));
         } else if let Some(name) = names.get(place) {
             let nothing = 2.0 * objective.least_time_constant();
-            let vanished = parts.iter().any(|parts| parts.shape.iter().any(|value| *value < nothing));
+            let lags =
+                structures.iter().zip(parts).filter(|(structure, _)| !structure.is_transfer_function());
+            let vanished =
+                lags.map(|(_, parts)| parts).any(|parts| parts.shape.iter().any(|value| *value < nothing));
             let advice = if vanished && !objective.background().free {
                 "a time constant comes to nothing beside the samples; take one lag less, or, if the log does not begin at rest, estimate \
                  the state that it begins in"

@@ -8,7 +8,7 @@ use thetahat_core::nalgebra::{DMatrix, DVector};
 use super::process::MOST_STATES;
 use super::state_space::{Head, STEP, Steps, independent};
 use super::{
-    ContinuousStateSpace, ContinuousStateSpaceModel, EntryCovariance, Hold, Model, PolynomialModel,
+    ContinuousStateSpace, ContinuousStateSpaceModel, EntryCovariance, Hold, Model, Parts, PolynomialModel,
     ProcessModel, StateSpace, StateSpaceModel,
 };
 use crate::{Error, figures};
@@ -297,13 +297,46 @@ impl PolynomialModel {
 }
 
 impl ProcessModel {
-    /// A, B, C and D, and the dead times as delays. Errors are white from sample to sample.
+    /// A, B, C and D, and the dead times as delays, with the errors that follow from those of the parameters; delays have none. Errors are
+    /// white from sample to sample.
     fn in_state_space(&self, hold: Hold) -> Result<ContinuousStateSpaceModel, Error> {
-        let parts = self.parts();
+        let matrices = self.matrices_of(&self.parts());
+        let head = Head {
+            inputs: self.inputs.clone(),
+            outputs: vec![self.output.clone()],
+            delays: self.parts().iter().map(|parts| parts.dead_time).collect(),
+            sample_time: self.sample_time,
+            hold,
+            free_parameters: self.parameters.len(),
+            degrees_of_freedom: self.degrees_of_freedom,
+        };
+        let model = ContinuousStateSpaceModel::new(head, &matrices)?;
+        let known = self.covariance.as_deref().and_then(|covariance| {
+            let moved = |direction: &DVector<f64>, sign: f64| {
+                let mut own = self.clone();
+                for (parameter, by) in own.parameters.iter_mut().zip(direction.iter()) {
+                    parameter.value += sign * STEP * by;
+                }
+                own.matrices_of(&own.parts()).renamed()
+            };
+            let pairs: Vec<[StateSpace; 2]> = independent(covariance)?
+                .iter()
+                .map(|direction| [1.0, -1.0].map(|sign| moved(direction, sign)))
+                .collect();
+            EntryCovariance::of_pairs(&matrices.renamed(), &pairs)
+        });
+        Ok(match known {
+            Some(known) => model.with_covariance(known),
+            None => model,
+        })
+    }
+
+    /// Block by block, that of one input after the other.
+    fn matrices_of(&self, parts: &[Parts<f64>]) -> ContinuousStateSpace {
         let chains: Vec<_> = self
             .structures
             .iter()
-            .zip(&parts)
+            .zip(parts)
             .map(|(structure, parts)| structure.chain(&parts.shape))
             .collect();
         let (n, m) = (chains.iter().map(|chain| chain.states()).sum::<usize>(), self.inputs.len());
@@ -316,7 +349,7 @@ impl ProcessModel {
             noise_intensity: DMatrix::from_element(1, 1, self.noise_variance * self.sample_time),
         };
         let mut first = 0;
-        for (input, (chain, parts)) in chains.iter().zip(&parts).enumerate() {
+        for (input, (chain, parts)) in chains.iter().zip(parts).enumerate() {
             let states = chain.states();
             let seen = |state: &[f64; MOST_STATES], u: f64| -> f64 {
                 let columns = chain.columns(state, u);
@@ -335,16 +368,7 @@ impl ProcessModel {
             matrices.d[(0, input)] = seen(&none, 1.0);
             first += states;
         }
-        let head = Head {
-            inputs: self.inputs.clone(),
-            outputs: vec![self.output.clone()],
-            delays: parts.iter().map(|parts| parts.dead_time).collect(),
-            sample_time: self.sample_time,
-            hold,
-            free_parameters: self.parameters.len(),
-            degrees_of_freedom: self.degrees_of_freedom,
-        };
-        ContinuousStateSpaceModel::new(head, &matrices)
+        matrices
     }
 }
 

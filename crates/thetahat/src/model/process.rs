@@ -8,8 +8,8 @@ pub(super) mod tests;
 
 pub(super) use chain::MOST_STATES;
 pub(crate) use chain::{Chain, Columns, State, Transition};
-pub(crate) use structure::Parts;
 pub use structure::ProcessStructure;
+pub(crate) use structure::{MOST_POLES, Parts};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -60,9 +60,11 @@ impl Report {
             _ => false,
         };
         let errors = if known { "" } else { " and no standard errors" };
-        report.warnings = vec![format!(
-            "the model was converted from {from} to {to} with {hold}: it has no figures of a fit{errors}"
-        )];
+        let how = match (&self.model, to) {
+            (Model::Process(_), TimeBase::Continuous) => "the process was put into state space".to_owned(),
+            _ => format!("the model was converted from {from} to {to} with {hold}"),
+        };
+        report.warnings = vec![format!("{how}: it has no figures of a fit{errors}")];
         Ok(report)
     }
 }

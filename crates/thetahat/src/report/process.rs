@@ -88,6 +88,13 @@ impl ProcessPlan {
                 ),
             ));
         }
+        let rational = self.structures.iter().filter(|structure| structure.is_transfer_function()).count();
+        if !(rational == 0 || rational == self.structures.len()) {
+            return Err(Error::argument(
+                "structure",
+                "transfer functions (tf) stand beside processes (p, rc): give those of one kind for all inputs",
+            ));
+        }
         for (name, value) in &self.offsets {
             if !self.inputs.contains(name) && *name != self.output {
                 return Err(Error::argument("offset", format!("the model has no channel '{name}'")));
@@ -126,7 +133,7 @@ impl ProcessPlan {
 ///
 /// with the factors that the [structure](ProcessStructure) of an input has. The sum of e^2 over the measured outputs is as small as can
 /// be: gains, y0 and m follow for each shape and dead time (variable projection, Golub and Pereyra 1973), which a Levenberg-Marquardt
-/// search finds from a grid.
+/// search finds from a grid. Transfer functions (`tf`) are searched for from refined instrumental variables in continuous time (SRIVC).
 ///
 /// **Inputs** are held from each row to the next, and the response is exact at the times of the rows: the clock may be irregular
 /// ([`Log::recorded`]), and a dead time need not be a number of samples. A missing input holds the value before it, a missing output
@@ -141,7 +148,7 @@ impl ProcessPlan {
 /// An iteration costs O(N p^2) for p parameters.
 ///
 /// Source: Ljung, System Identification, 2nd ed. 1999, sections 4.3, 9.3 and 10.2; Golub and Pereyra, SIAM J. Numerical Analysis 10
-/// (1973); Kaufman, BIT 15 (1975).
+/// (1973); Kaufman, BIT 15 (1975); Young and Jakeman, Int. J. Control 31 (1980).
 ///
 /// # Errors
 /// [`Error::Argument`] as for [`ProcessPlan::check`], and for rows that are not there; [`Error::Data`] if a channel is not there or

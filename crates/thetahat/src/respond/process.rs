@@ -4,6 +4,6 @@ mod held;
 mod on_log;
 mod sampled;
 
-pub(crate) use held::{HeldLog, at_rest, held_logs, modes, run, sensitivities};
+pub(crate) use held::{HeldLog, at_rest, free_sensitivities, held_logs, modes, run, sensitivities};
 pub(crate) use on_log::ProcessOnLog;
 pub(crate) use sampled::{response_slopes, responses};

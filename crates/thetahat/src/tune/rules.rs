@@ -145,6 +145,9 @@ fn check(structure: &ProcessStructure) -> Result<(), Error> {
     if structure.is_parallel() {
         return wrong("of lags side by side");
     }
+    if structure.is_transfer_function() {
+        return wrong("of polynomials");
+    }
     if structure.columns() > 1 {
         return wrong("with a zero");
     }

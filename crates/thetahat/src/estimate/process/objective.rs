@@ -1,12 +1,16 @@
 //! The errors of a free run as a function of the shapes and dead times.
 
+mod signals;
+
 use std::ops::Range;
 
 use crate::Error;
 use crate::model::{Parts, ProcessStructure};
 use crate::optimize::Objective;
 use crate::regression::{Span, product, sum, sum_of_squares};
-use crate::respond::process::{HeldLog, modes, response_slopes, responses, run, sensitivities};
+use crate::respond::process::{
+    HeldLog, free_sensitivities, modes, response_slopes, responses, run, sensitivities,
+};
 
 /// Time constants lie between this fraction of the shortest step of the clock, and so many times the longest log.
 const SHORTEST: f64 = 1e-3;
@@ -105,6 +109,8 @@ pub(super) struct ProcessObjective<'a> {
     point: Vec<f64>,
     parts: Vec<Parts<f64>>,
     offsets: Vec<f64>,
+    /// The state in which each log begins, that of one structure after the other.
+    first_states: Vec<f64>,
     residuals: Vec<f64>,
     span: Span,
     matrix: Vec<f64>,
@@ -195,6 +201,7 @@ impl<'a> ProcessObjective<'a> {
             point: Vec::new(),
             parts: Vec::new(),
             offsets: Vec::new(),
+            first_states: Vec::new(),
             span: Span::default(),
             matrix: Vec::new(),
             right: Vec::new(),
@@ -313,6 +320,14 @@ impl<'a> ProcessObjective<'a> {
         for (structure, known) in self.structures.iter().zip(&self.held_dead_times) {
             let from = limits.len();
             limits.resize(from + structure.lags, [short, long]);
+            if structure.is_transfer_function() {
+                // a_(n-p) is a sum of products of p poles.
+                let size = structure.lags as f64;
+                for (power, own) in (1_u8..).zip(&mut limits[from..]) {
+                    let power = f64::from(power);
+                    *own = [-power * long, size - power * short];
+                }
+            }
             if structure.is_underdamped() {
                 limits[from] = [-long, -short];
                 limits[from + 1] = [LEAST_DAMPING.ln(), LARGEST_DAMPING.ln()];
@@ -348,7 +363,12 @@ impl<'a> ProcessObjective<'a> {
     }
 
     /// The columns of an input.
-    fn columns_of(&self, input: usize, structure: &ProcessStructure, parts: &Parts<f64>) -> Vec<Vec<f64>> {
+    pub(super) fn columns_of(
+        &self,
+        input: usize,
+        structure: &ProcessStructure,
+        parts: &Parts<f64>,
+    ) -> Vec<Vec<f64>> {
         if self.is_of_points() {
             return self.of_input(input, structure.columns(), |own, columns| {
                 let points = (own.frequencies.as_slice(), own.sample_time);
@@ -392,13 +412,33 @@ impl<'a> ProcessObjective<'a> {
                 });
             });
         }
-        self.stacked(count, |part, _, whole| {
+        let (before, states) = self.places_of_states(input);
+        self.stacked(count, |part, number, whole| {
+            let lags = parts.shape.len();
+            // What the first state does depends on the shape too.
+            let mut free = vec![0.0; part.times.len() * lags];
+            let first = self.first_states.get(number * states + before..);
+            if let (true, Some(first)) = (self.background.free, first) {
+                let first = &first[..structure.states().min(first.len())];
+                free_sensitivities(structure, &parts.shape, first, &part.times, |row, slopes| {
+                    free[row * lags..(row + 1) * lags].copy_from_slice(&slopes[..lags]);
+                });
+            }
+            let mut both = vec![0.0; lags];
             let signals = (part.times.as_slice(), part.inputs[input].as_slice());
             sensitivities(structure, parts, signals, |row, seen, shape, dead_time| {
-                write(seen, shape, dead_time, &mut own);
+                let free = &free[row * lags..(row + 1) * lags];
+                both.iter_mut().zip(shape).zip(free).for_each(|((both, own), free)| *both = own + free);
+                write(seen, &both, dead_time, &mut own);
                 whole.iter_mut().zip(&own).for_each(|(column, value)| column[row] = *value);
             });
         })
+    }
+
+    /// The states of structures before that of an input, and of all.
+    fn places_of_states(&self, input: usize) -> (usize, usize) {
+        let states = |structures: &[ProcessStructure]| structures.iter().map(ProcessStructure::states).sum();
+        (states(&self.structures[..input]), states(&self.structures))
     }
 
     /// Columns of the points of an input, which `write` fills, times their weights; zero at those of the other inputs.
@@ -525,6 +565,12 @@ impl<'a> ProcessObjective<'a> {
     }
 }
 
+/// So many numbers from one to the other, evenly on a logarithmic scale.
+pub(super) fn spread(first: f64, last: f64, count: usize) -> impl Iterator<Item = f64> {
+    let step = (last / first).ln() / (count - 1).max(1) as f64;
+    (0..count).map(move |index| first * (step * index as f64).exp())
+}
+
 impl Objective for ProcessObjective<'_> {
     type Refusal = Refusal;
 
@@ -562,6 +608,7 @@ impl Objective for ProcessObjective<'_> {
         for (structure, parts) in self.structures.iter().zip(&mut parts) {
             parts.weights = weights.by_ref().take(structure.columns()).collect();
         }
+        self.first_states = weights.collect();
         self.parts = parts;
         self.span = span;
         self.point = point.to_vec();

@@ -1,6 +1,7 @@
 //! Where searches for a process start: a grid for one lag, then one lag more after the other.
 
-use super::objective::ProcessObjective;
+use super::objective::{ProcessObjective, spread};
+use super::refined;
 use crate::Error;
 use crate::model::ProcessStructure;
 use crate::optimize::{Deadline, Found, Monitor, Objective, Search, search};
@@ -53,7 +54,18 @@ pub(super) fn searched(
     let mut current: Vec<ProcessStructure> =
         ladders.iter().zip(structures).map(|(ladder, own)| *ladder.last().unwrap_or(own)).collect();
     objective.take(current.clone());
-    let grid = first_grid(objective);
+    let grid = if structures.iter().all(ProcessStructure::is_transfer_function) {
+        let points = refined::points(objective, structures, deadline);
+        if points.is_empty() {
+            return Err(Error::undetermined(
+                Vec::new(),
+                "no transfer function of so many poles and zeros is found in it: take fewer, or a log in which the input moves more",
+            ));
+        }
+        points
+    } else {
+        first_grid(objective)
+    };
     let mut found = from_best(objective, grid, options, deadline, monitor)?;
     for (input, ladder) in ladders.iter().enumerate() {
         for structure in ladder.iter().rev().skip(1) {
@@ -89,6 +101,9 @@ pub(super) fn searched(
     // The longest time constant first; of lags side by side the shortest.
     let mut point = found.parameters.clone();
     for (structure, (shape, _)) in current.iter().zip(objective.places()) {
+        if structure.is_transfer_function() {
+            continue;
+        }
         let own = &mut point[shape];
         let real = if structure.is_underdamped() { 2 } else { 0 };
         let own = &mut own[real..];
@@ -211,12 +226,6 @@ fn past_jumps(
     objective.hold_dead_time(input, None);
     found.parameters.insert(place, middle);
     Ok(found)
-}
-
-/// So many numbers from one to the other, evenly on a logarithmic scale.
-fn spread(first: f64, last: f64, count: usize) -> impl Iterator<Item = f64> {
-    let step = (last / first).ln() / (count - 1).max(1) as f64;
-    (0..count).map(move |index| first * (step * index as f64).exp())
 }
 
 /// One lag for each input: a grid for one after the other, the others being as good as they are.

@@ -10,12 +10,12 @@
 
 use thetahat_core::Number;
 
-/// Three lags and an integrator.
-pub(crate) const MOST_STATES: usize = 4;
+/// Six poles of a transfer function, and an integrator.
+pub(crate) const MOST_STATES: usize = 7;
 /// The same and the input.
 const SIZE: usize = MOST_STATES + 1;
-/// Columns of an output at most: the input and three lags.
-pub(crate) const MOST_COLUMNS: usize = 4;
+/// Columns of an output at most: those of as many zeros as poles.
+pub(crate) const MOST_COLUMNS: usize = 7;
 /// Terms of the Taylor series: 0.5^17/17! is below the rounding of 1.
 const TERMS: usize = 16;
 
@@ -37,12 +37,14 @@ pub(crate) struct Chain<S> {
 }
 
 /// What is seen of the states.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 enum Outputs {
     /// The last, and perhaps its derivative.
     Last { derivative: bool },
     /// The input and all.
     All,
+    /// So many derivatives of what comes out of 1/A(s), from that itself on. The states are these, each times a power of a frequency.
+    Derivatives { count: usize, frequency: f64, scales: Columns<f64> },
 }
 
 /// How the states move in so many seconds of held input.
@@ -93,6 +95,42 @@ impl<S: Number<f64>> Chain<S> {
         Self { states: shape.len(), matrix, outputs: Outputs::All, pair: false, integrates: false }
     }
 
+    /// 1/A(s) with A(s) = s^n + a_(n-1) s^(n-1) + … + a_0, of which `shape` holds the coefficients from a_(n-1) on, behind an integrator
+    /// if there is one, and `count` derivatives of it. With v the input of 1/A(s) and w = a_0^(1/n), the states are
+    ///
+    /// ```text
+    /// x_k = w^(n-k) s^k/A(s) v,   x_k' = w x_(k+1),   x_(n-1)' = w (v - sum a_k w^(k-n) x_k)
+    /// ```
+    ///
+    /// so that all are of the size of v, however fast the poles are.
+    pub(super) fn rational(shape: &[S], count: usize, integrator: bool) -> Self {
+        let n = shape.len();
+        let mut matrix = [[S::from(0.0); SIZE]; SIZE];
+        let frequency = shape.last().map_or(1.0, |last| last.value().powf(1.0 / n as f64));
+        let power = |k: usize| frequency.powi(k as i32 - n as i32);
+        for row in 0..n.saturating_sub(1) {
+            matrix[row][row + 1] = frequency.into();
+        }
+        if let Some(last) = n.checked_sub(1) {
+            for (k, coefficient) in shape.iter().rev().enumerate() {
+                matrix[last][k] = -(*coefficient * (frequency * power(k)));
+            }
+            matrix[last][n] = frequency.into();
+        }
+        if integrator {
+            matrix[n][n + 1] = 1.0.into();
+        }
+        let mut scales = [0.0; MOST_COLUMNS];
+        scales.iter_mut().enumerate().take(n).for_each(|(k, scale)| *scale = power(k));
+        Self {
+            states: n + usize::from(integrator),
+            matrix,
+            outputs: Outputs::Derivatives { count, frequency, scales },
+            pair: false,
+            integrates: integrator,
+        }
+    }
+
     pub(crate) fn states(&self) -> usize {
         self.states
     }
@@ -100,6 +138,9 @@ impl<S: Number<f64>> Chain<S> {
     /// The state in which an input that was always `u` leaves the lags, `since` seconds after an integrator stood at 0.
     pub(crate) fn at_rest(&self, u: f64, since: f64) -> State<S> {
         let mut state = [S::from(0.0); MOST_STATES];
+        if let Outputs::Derivatives { frequency, .. } = self.outputs {
+            return self.derivatives_at_rest(frequency, u, since);
+        }
         state[..self.states].fill(u.into());
         if self.pair {
             // A velocity.
@@ -111,12 +152,38 @@ impl<S: Number<f64>> Chain<S> {
         state
     }
 
+    /// The same of derivatives: 1/A(s) settles at gain u; behind an integrator it rises with gain u a second, and all that is after it rests.
+    fn derivatives_at_rest(&self, frequency: f64, u: f64, since: f64) -> State<S> {
+        let mut state = [S::from(0.0); MOST_STATES];
+        let n = self.states - usize::from(self.integrates);
+        let Some(last) = n.checked_sub(1) else { return state };
+        let row = &self.matrix[last];
+        let rate = -(S::from(u * frequency) / row[0]);
+        if !self.integrates {
+            state[0] = rate;
+            return state;
+        }
+        state[0] = rate * since;
+        let mut left = S::from(0.0);
+        if n > 1 {
+            state[1] = rate * (1.0 / frequency);
+        } else {
+            left = rate;
+        }
+        for (value, weight) in state.iter().zip(row).take(n) {
+            left -= *weight * *value;
+        }
+        state[n] = left * (1.0 / frequency);
+        state
+    }
+
     /// How the states move in `h` seconds.
     pub(crate) fn transition(&self, h: S) -> Transition<S> {
         let n = self.states;
         let (zero, one): (S, S) = (0.0.into(), 1.0.into());
         let mut result = [[zero; SIZE]; SIZE];
-        if n == 1 && !self.integrates {
+        let lag = !matches!(self.outputs, Outputs::Derivatives { .. });
+        if n == 1 && lag && !self.integrates {
             let decay = (self.matrix[0][0] * h).exp();
             result[0][0] = decay;
             result[0][1] = one - decay;
@@ -164,6 +231,15 @@ impl<S: Number<f64>> Chain<S> {
                     columns[1] = self.slope(state, u)[self.states - 1];
                 }
             }
+            Outputs::Derivatives { count, frequency, scales } => {
+                let n = self.states - usize::from(self.integrates);
+                for ((column, value), scale) in columns.iter_mut().zip(state).zip(scales).take(count.min(n)) {
+                    *column = *value * scale;
+                }
+                if count > n {
+                    columns[n] = self.slope(state, u)[n - 1] * (1.0 / frequency);
+                }
+            }
         }
         columns
     }
@@ -173,6 +249,7 @@ impl<S: Number<f64>> Chain<S> {
         match self.outputs {
             Outputs::All => state[..self.states].iter().fold(S::from(0.0), |sum, value| sum + *value),
             Outputs::Last { .. } => state[self.states - 1],
+            Outputs::Derivatives { .. } => state[0],
         }
     }
 

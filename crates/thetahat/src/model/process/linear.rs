@@ -14,12 +14,12 @@ use thetahat_core::{Dual, Number};
 
 use super::ProcessModel;
 use super::chain::MOST_STATES;
-use super::structure::ProcessStructure;
+use super::structure::{MOST_PARAMETERS, ProcessStructure};
 use crate::Error;
 use crate::model::{Orders, PolynomialModel, fitted::propagated};
 
-/// Derivatives that are computed together: as many as a process has parameters at most.
-const LANE: usize = 7;
+/// Derivatives that are computed together.
+const LANE: usize = MOST_PARAMETERS;
 /// A dead time is no longer than so many samples.
 const MOST_SAMPLES: f64 = 1e5;
 

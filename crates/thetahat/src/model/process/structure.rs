@@ -5,22 +5,27 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thetahat_core::Number;
 
-use super::chain::{Chain, MOST_STATES};
+use super::chain::{Chain, MOST_COLUMNS, MOST_STATES};
 use crate::Error;
 
-/// Lags of a process at most.
+/// Lags of a process at most, and poles of a transfer function.
 const MOST_LAGS: usize = 3;
+pub(crate) const MOST_POLES: usize = 6;
+/// Parameters of a structure at most: as many zeros as poles, and a dead time.
+pub(crate) const MOST_PARAMETERS: usize = 2 * MOST_POLES + 2;
 
 /// What a process is from an input to the output, as a word.
 ///
 /// ```text
 /// p1d  p2du  p0i …   K (1 + tau_z s) / (s (1 + tau1 s)(1 + tau2 s)(1 + tau3 s)) e^(-theta s)
 /// rc1  rc2  rc3      R0 + R1/(1 + tau1 s) + R2/(1 + tau2 s) + R3/(1 + tau3 s)
+/// tf21  tf42d …      (b1 s + b0)/(s^2 + a1 s + a0), (b2 s^2 + b1 s + b0)/(s^4 + a3 s^3 + … + a0) e^(-theta s), …
 /// ```
 ///
 /// After `p` stands the number of lags, 0 … 3, then letters: `d` with a dead time theta, `z` with a zero at -1/tau_z, `i` with an
 /// integrator, the factor 1/s; `u` for two of the lags that may be underdamped, 1/(1 + 2 zeta s/omega + s²/omega²) in their place.
-/// `rc` are as many lags side by side with a direct term, as the voltage of a battery has them.
+/// `rc` are as many lags side by side with a direct term, as the voltage of a battery has them. After `tf` stand the number of poles,
+/// 1 … 6, and of zeros, no more than poles, then `d` and `i`: an integrator is one of the poles, and the others lie left of the imaginary axis.
 ///
 /// ```
 /// use thetahat::model::ProcessStructure;
@@ -45,6 +50,16 @@ pub(crate) enum Kind {
     Series(Series),
     /// Lags side by side, with a direct term.
     Parallel,
+    /// Polynomials in s, of which the lower one has as many coefficients as there are lags.
+    Rational(Rational),
+}
+
+/// What a transfer function has beside its poles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Rational {
+    pub(crate) zeros: usize,
+    pub(crate) integrator: bool,
+    pub(crate) dead_time: bool,
 }
 
 /// What a process has beside its lags.
@@ -57,6 +72,34 @@ pub(crate) struct Series {
 }
 
 impl ProcessStructure {
+    /// A transfer function with so many poles and zeros.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for no pole, more than 6, or more zeros than poles.
+    pub fn transfer_function(poles: usize, zeros: usize, dead_time: bool) -> Result<Self, Error> {
+        Self::rational(poles, Rational { zeros, integrator: false, dead_time })
+    }
+
+    fn rational(poles: usize, own: Rational) -> Result<Self, Error> {
+        let wrong = |what: String| Err(Error::argument("structure", what));
+        if !(1..=MOST_POLES).contains(&poles) {
+            return wrong(format!("{poles} poles: a transfer function has 1 to {MOST_POLES} of them"));
+        }
+        let lags = poles - usize::from(own.integrator);
+        if lags == 0 {
+            return wrong("an integrator alone is p0i, or p0di with a dead time".to_owned());
+        }
+        if own.zeros > lags {
+            let integrator = if own.integrator { " beside the integrator" } else { "" };
+            return wrong(format!(
+                "{} zeros of {lags} poles{integrator}: a transfer function has no more zeros than these",
+                own.zeros
+            ));
+        }
+        debug_assert!(own.zeros < MOST_COLUMNS);
+        Ok(Self { lags, kind: Kind::Rational(own) })
+    }
+
     /// The names of the parameters, in their order: gain, lags, zero, dead time. Times are in seconds, `omega` in rad/s.
     pub fn names(&self) -> Vec<String> {
         let numbered = |name: &str, count: usize| -> Vec<String> {
@@ -69,6 +112,11 @@ impl ProcessStructure {
             Kind::Parallel => {
                 let each = (1..=self.lags).map(|number| [format!("R{number}"), format!("tau{number}")]);
                 std::iter::once("R0".to_owned()).chain(each.flatten()).collect()
+            }
+            Kind::Rational(own) => {
+                let above = (0..=own.zeros).rev().map(|power| format!("b{power}"));
+                let below = (0..self.lags).rev().map(|power| format!("a{power}"));
+                above.chain(below).chain(own.dead_time.then(|| "theta".to_owned())).collect()
             }
             Kind::Series(series) => {
                 let mut names = vec!["K".to_owned()];
@@ -93,6 +141,27 @@ impl ProcessStructure {
                     .chain((1..=self.lags).map(lag))
                     .collect::<Vec<_>>()
                     .join(" + ")
+            }
+            Kind::Rational(own) => {
+                let power = |power: usize| match power {
+                    0 => String::new(),
+                    1 => " s".to_owned(),
+                    _ => format!(" s^{power}"),
+                };
+                let term = |name: &str, k: usize| format!("{name}{k}{}", power(k));
+                let above: Vec<String> = (0..=own.zeros).rev().map(|k| term("b", k)).collect();
+                let below = (0..self.lags).rev().map(|k| term("a", k));
+                let below: Vec<String> =
+                    std::iter::once(power(self.lags).trim().to_owned()).chain(below).collect();
+                let above = above.join(" + ");
+                let above = if own.zeros > 0 { format!("({above})") } else { above };
+                let late = if own.dead_time { " e^(-theta s)" } else { "" };
+                let below = format!("({})", below.join(" + "));
+                if own.integrator {
+                    format!("{above}{late}/(s {below})")
+                } else {
+                    format!("{above}{late}/{below}")
+                }
             }
             Kind::Series(series) => {
                 let mut top = "K".to_owned();
@@ -121,6 +190,7 @@ impl ProcessStructure {
         match bare {
             "omega" => "rad/s",
             "zeta" => "",
+            _ if matches!(self.kind, Kind::Rational(_)) && bare != "theta" => "",
             "K" if self.integrates() => "y/u/s",
             _ if bare.starts_with('K') || bare.starts_with('R') => "y/u",
             _ => "s",
@@ -131,18 +201,27 @@ impl ProcessStructure {
     pub fn parameters(&self) -> usize {
         match self.kind {
             Kind::Parallel => 1 + 2 * self.lags,
+            Kind::Rational(own) => 1 + own.zeros + self.lags + usize::from(own.dead_time),
             Kind::Series(series) => 1 + self.lags + usize::from(series.zero) + usize::from(series.dead_time),
         }
     }
 
     /// Whether it integrates its input, so that it has no static gain.
     pub fn integrates(&self) -> bool {
-        matches!(self.kind, Kind::Series(Series { integrator: true, .. }))
+        match self.kind {
+            Kind::Parallel => false,
+            Kind::Series(own) => own.integrator,
+            Kind::Rational(own) => own.integrator,
+        }
     }
 
     /// Whether it has a dead time.
     pub fn has_dead_time(&self) -> bool {
-        matches!(self.kind, Kind::Series(Series { dead_time: true, .. }))
+        match self.kind {
+            Kind::Parallel => false,
+            Kind::Series(own) => own.dead_time,
+            Kind::Rational(own) => own.dead_time,
+        }
     }
 
     /// The states: a lag or an integrator has one.
@@ -155,11 +234,23 @@ impl ProcessStructure {
         match self.kind {
             Kind::Parallel => true,
             Kind::Series(series) => series.zero && self.states() == 1,
+            Kind::Rational(own) => own.zeros == self.states(),
         }
     }
 
     pub(crate) fn is_underdamped(&self) -> bool {
         matches!(self.kind, Kind::Series(Series { underdamped: true, .. }))
+    }
+
+    /// Whether it is one of polynomials in s (`tf`): its shape is the coefficients of one, not time constants.
+    pub fn is_transfer_function(&self) -> bool {
+        matches!(self.kind, Kind::Rational(_))
+    }
+
+    /// The same with every derivative for a column, behind an integrator or not, and no dead time: what filters with 1/A(s).
+    pub(crate) fn derivatives(&self, integrator: bool) -> Self {
+        let own = Rational { zeros: self.lags, integrator, dead_time: false };
+        Self { lags: self.lags, kind: Kind::Rational(own) }
     }
 
     pub(crate) fn is_parallel(&self) -> bool {
@@ -171,12 +262,13 @@ impl ProcessStructure {
         self.lags - if self.is_underdamped() { 2 } else { 0 }
     }
 
-    /// The columns that the output is a sum of: the state at the end of the chain, with a zero its derivative; side by side the input
-    /// and each lag.
+    /// The columns that the output is a sum of: the state at the end of the chain, with a zero its derivative, with more zeros as many
+    /// derivatives; side by side the input and each lag.
     pub(crate) fn columns(&self) -> usize {
         match self.kind {
             Kind::Parallel => 1 + self.lags,
             Kind::Series(series) => 1 + usize::from(series.zero),
+            Kind::Rational(own) => 1 + own.zeros,
         }
     }
 
@@ -189,6 +281,14 @@ impl ProcessStructure {
                 parts.weights.extend(parameters.iter().step_by(2));
                 parts.weights.splice(1.., parameters[1..].iter().step_by(2).copied());
                 parts.shape.extend(parameters[1..].iter().skip(1).step_by(2));
+            }
+            Kind::Rational(own) => {
+                let (above, below) = parameters.split_at(1 + own.zeros);
+                parts.weights.extend(above.iter().rev());
+                parts.shape.extend(&below[..self.lags]);
+                if let (true, Some(seconds)) = (own.dead_time, below.get(self.lags)) {
+                    parts.dead_time = *seconds;
+                }
             }
             Kind::Series(series) => {
                 let gain = parameters[0];
@@ -212,6 +312,10 @@ impl ProcessStructure {
             Kind::Parallel => {
                 let lags = parts.weights[1..].iter().zip(&parts.shape).flat_map(|(gain, tau)| [*gain, *tau]);
                 std::iter::once(parts.weights[0]).chain(lags).collect()
+            }
+            Kind::Rational(own) => {
+                let dead_time = own.dead_time.then_some(parts.dead_time);
+                parts.weights.iter().rev().chain(&parts.shape).copied().chain(dead_time).collect()
             }
             Kind::Series(series) => {
                 let gain = parts.weights[0];
@@ -241,6 +345,14 @@ impl ProcessStructure {
                     slopes[2 + 2 * lag] = shape[lag];
                 }
             }
+            Kind::Rational(own) => {
+                let (above, below) = slopes.split_at_mut(1 + own.zeros);
+                above.iter_mut().rev().zip(columns).for_each(|(slope, column)| *slope = *column);
+                below[..self.lags].copy_from_slice(&shape[..self.lags]);
+                if own.dead_time {
+                    below[self.lags] = dead_time;
+                }
+            }
             Kind::Series(series) => {
                 let gain = parts.weights[0];
                 slopes[0] = columns[0];
@@ -263,6 +375,7 @@ impl ProcessStructure {
     pub(crate) fn chain<S: Number<f64>>(&self, shape: &[S]) -> Chain<S> {
         match self.kind {
             Kind::Parallel => Chain::parallel(shape),
+            Kind::Rational(own) => Chain::rational(shape, 1 + own.zeros, own.integrator),
             Kind::Series(series) => Chain::series(shape, series.underdamped, series.zero, series.integrator),
         }
     }
@@ -276,6 +389,7 @@ impl ProcessStructure {
             Kind::Series(series) if series.zero && self.lags > 1 => {
                 Some(Self { kind: Kind::Series(Series { zero: false, ..series }), ..*self })
             }
+            Kind::Rational(_) => None,
             _ if self.lags > 1 => Some(Self { lags: self.lags - 1, ..*self }),
             _ => None,
         }
@@ -285,9 +399,9 @@ impl ProcessStructure {
 /// The parameters of a process taken apart.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Parts<S> {
-    /// A weight for each column: the gain, and with a zero the gain times tau_z; side by side R0, R1, …
+    /// A weight for each column: the gain, and with a zero the gain times tau_z; side by side R0, R1, …; b0, b1, … of a transfer function.
     pub(crate) weights: Vec<S>,
-    /// The time constants; before them omega and zeta of a pair.
+    /// The time constants; before them omega and zeta of a pair. Of a transfer function the coefficients of its denominator.
     pub(crate) shape: Vec<S>,
     /// theta, in seconds.
     pub(crate) dead_time: S,
@@ -303,11 +417,28 @@ impl FromStr for ProcessStructure {
                 format!(
                     "{text} is no structure of a process: write p, the number of lags from 0 to 3, and the letters of what it has beside \
                      them (d a dead time, z a zero, i an integrator, u two lags that may be underdamped), such as p1d or p2du; or rc1, rc2 \
-                     or rc3"
+                     or rc3; or tf, the numbers of poles and zeros, and d or i, such as tf42d"
                 ),
             )
         };
         let word = text.trim().to_ascii_lowercase();
+        if let Some(rest) = word.strip_prefix("tf") {
+            let mut letters = rest.chars();
+            let mut number = || letters.next().and_then(|digit| digit.to_digit(10)).ok_or_else(wrong);
+            let (poles, zeros) = (number()? as usize, number()? as usize);
+            let mut own = Rational { zeros, integrator: false, dead_time: false };
+            for letter in letters {
+                let has = match letter {
+                    'd' => &mut own.dead_time,
+                    'i' => &mut own.integrator,
+                    _ => return Err(wrong()),
+                };
+                if std::mem::replace(has, true) {
+                    return Err(wrong());
+                }
+            }
+            return Self::rational(poles, own);
+        }
         let rest = word.strip_prefix("rc").or_else(|| word.strip_prefix('p')).ok_or_else(wrong)?;
         let mut letters = rest.chars();
         let lags = letters.next().and_then(|digit| digit.to_digit(10)).ok_or_else(wrong)? as usize;
@@ -350,6 +481,11 @@ impl fmt::Display for ProcessStructure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.kind {
             Kind::Parallel => write!(f, "rc{}", self.lags),
+            Kind::Rational(own) => {
+                let letters = [(own.dead_time, "d"), (own.integrator, "i")];
+                let letters = letters.map(|(has, letter)| if has { letter } else { "" });
+                write!(f, "tf{}{}{}", self.states(), own.zeros, letters.concat())
+            }
             Kind::Series(series) => {
                 write!(f, "p{}", self.lags)?;
                 let letters = [

@@ -15,10 +15,11 @@ use thetahat_core::{Dual, Number};
 
 use crate::Error;
 use crate::data::{Log, Rows, inside};
-use crate::model::{Chain, Columns, Parts, ProcessStructure, State, Transition};
+use crate::model::{Chain, Columns, MOST_POLES, Parts, ProcessStructure, State, Transition};
 
-/// The lags of a structure at most, and so the numbers of its shape.
-pub(super) const LANE: usize = 3;
+/// Derivatives that are computed together: as many as lags have shapes, or as transfer functions have.
+const LAGS: usize = 3;
+pub(super) const LANE: usize = MOST_POLES;
 /// Steps of a clock that differ by so many roundings of its time are the same.
 const ROUNDINGS: f64 = 8.0;
 
@@ -92,21 +93,18 @@ struct Steps<'c, S> {
 }
 
 impl<'c, S: Number<f64>> Steps<'c, S> {
-    fn take(
+    fn take<'k>(
         chain: &'c Chain<S>,
-        kept: &mut Option<(f64, Transition<S>)>,
+        kept: &'k mut Option<(f64, Transition<S>)>,
         step: f64,
         time: f64,
-    ) -> Transition<S> {
+    ) -> &'k Transition<S> {
         let near = |own: f64| (own - step).abs() <= ROUNDINGS * f64::EPSILON * time.abs();
-        match kept {
-            Some((own, transition)) if near(*own) => *transition,
-            _ => {
-                let transition = chain.transition(step.into());
-                *kept = Some((step, transition));
-                transition
-            }
+        if !kept.as_ref().is_some_and(|(own, _)| near(*own)) {
+            *kept = None;
         }
+        let (_, transition) = kept.get_or_insert_with(|| (step, chain.transition(step.into())));
+        transition
     }
 }
 
@@ -176,17 +174,30 @@ pub(crate) fn run(
 pub(crate) fn sensitivities(
     structure: &ProcessStructure,
     parts: &Parts<f64>,
-    (times, input): (&[f64], &[f64]),
-    mut take: impl FnMut(usize, &Columns<f64>, &[f64; LANE], f64),
+    signals: (&[f64], &[f64]),
+    take: impl FnMut(usize, &Columns<f64>, &[f64], f64),
 ) {
-    let mut values = [0.0; LANE];
+    if parts.shape.len() <= LAGS {
+        sensitivities_in::<LAGS>(structure, parts, signals, take);
+    } else {
+        sensitivities_in::<LANE>(structure, parts, signals, take);
+    }
+}
+
+fn sensitivities_in<const SHAPE: usize>(
+    structure: &ProcessStructure,
+    parts: &Parts<f64>,
+    (times, input): (&[f64], &[f64]),
+    mut take: impl FnMut(usize, &Columns<f64>, &[f64], f64),
+) {
+    let mut values = [0.0; SHAPE];
     values.iter_mut().zip(&parts.shape).for_each(|(value, own)| *value = *own);
-    let variables = Dual::<f64, LANE>::variables(values);
-    let chain = structure.chain(&variables[..parts.shape.len().min(LANE)]);
+    let variables = Dual::<f64, SHAPE>::variables(values);
+    let chain = structure.chain(&variables[..parts.shape.len().min(SHAPE)]);
     let timed = structure.has_dead_time();
     walk(&chain, parts.dead_time, times, input, |row, state, u| {
         let columns = chain.columns(state, u);
-        let mut slopes = [0.0; LANE];
+        let mut slopes = [0.0; SHAPE];
         for (weight, column) in parts.weights.iter().zip(&columns) {
             slopes.iter_mut().zip(column.derivatives).for_each(|(slope, own)| *slope += weight * own);
         }
@@ -219,4 +230,42 @@ pub(crate) fn modes(structure: &ProcessStructure, shape: &[f64], times: &[f64]) 
         }
     }
     found
+}
+
+/// Calls `take` for each row with the slopes by the shape of what a first state without an input does.
+pub(crate) fn free_sensitivities(
+    structure: &ProcessStructure,
+    shape: &[f64],
+    first: &[f64],
+    times: &[f64],
+    take: impl FnMut(usize, &[f64]),
+) {
+    if shape.len() <= LAGS {
+        free_sensitivities_in::<LAGS>(structure, shape, first, times, take);
+    } else {
+        free_sensitivities_in::<LANE>(structure, shape, first, times, take);
+    }
+}
+
+fn free_sensitivities_in<const SHAPE: usize>(
+    structure: &ProcessStructure,
+    shape: &[f64],
+    first: &[f64],
+    times: &[f64],
+    mut take: impl FnMut(usize, &[f64]),
+) {
+    let mut values = [0.0; SHAPE];
+    values.iter_mut().zip(shape).for_each(|(value, own)| *value = *own);
+    let variables = Dual::<f64, SHAPE>::variables(values);
+    let chain = structure.chain(&variables[..shape.len().min(SHAPE)]);
+    let mut state = chain.at_rest(0.0, 0.0);
+    state.iter_mut().zip(first).for_each(|(state, value)| *state = (*value).into());
+    let (mut kept, Some(mut last)) = (None, times.first().copied()) else { return };
+    for (row, time) in times.iter().enumerate() {
+        if *time > last {
+            state = Steps::take(&chain, &mut kept, time - last, *time).apply(&state, 0.0);
+            last = *time;
+        }
+        take(row, &chain.end(&state).derivatives);
+    }
 }

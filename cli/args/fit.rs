@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use clap::{Args, ValueEnum};
+use clap::{ArgGroup, Args, ValueEnum};
 use thetahat::select::Select;
 
 use super::{ClockArguments, FormatArgument, LogArguments, Names};
@@ -90,6 +90,12 @@ pub(crate) struct FitArguments {
 
 /// Which model, and what its estimate starts from.
 #[derive(Debug, Args)]
+#[command(group(
+    ArgGroup::new("continuous").conflicts_with_all([
+        "na", "nb", "nc", "nd", "nf", "nk", "taps", "kernel", "method", "likelihood", "focus", "constant", "detrend", "prefilter", "path",
+        "select", "seed", "CriterionArguments", "NarxArguments",
+    ])
+))]
 pub(crate) struct ModelArguments {
     /// The model structure [default: arx; without orders the data choose; with several outputs and no orders ss]
     #[arg(long, value_enum, help_heading = "Model")]
@@ -131,26 +137,12 @@ pub(crate) struct ModelArguments {
         value_name = "p1d|p2du|rc2|…[,…]",
         value_delimiter = ',',
         help_heading = "Model",
-        group = "continuous",
-        conflicts_with_all = [
-            "na", "nb", "nc", "nd", "nf", "nk", "taps", "kernel", "method", "likelihood", "focus", "constant", "detrend", "prefilter",
-            "path", "select", "seed", "CriterionArguments", "NarxArguments",
-        ]
+        group = "continuous"
     )]
     pub(crate) structure: Vec<String>,
     /// Poles of a transfer function in continuous time (--model tf), 1 to 6; one number for each input or one for all; the clock may be
     /// irregular
-    #[arg(
-        long,
-        value_name = "N[,…]",
-        value_delimiter = ',',
-        help_heading = "Model",
-        group = "continuous",
-        conflicts_with_all = [
-            "na", "nb", "nc", "nd", "nf", "nk", "taps", "kernel", "method", "likelihood", "focus", "constant", "detrend", "prefilter",
-            "path", "select", "seed", "CriterionArguments", "NarxArguments",
-        ]
-    )]
+    #[arg(long, value_name = "N[,…]", value_delimiter = ',', help_heading = "Model", group = "continuous")]
     pub(crate) np: Vec<usize>,
     /// Its zeros, no more than poles; one number for each input or one for all [default: one less than poles]
     #[arg(long, value_name = "N[,…]", value_delimiter = ',', help_heading = "Model", requires = "np")]

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import ArrayLike, NDArray
+    from typing_extensions import Self
 
     from thetahat._options import Band, Bound, Rows
 
@@ -90,6 +91,41 @@ class _Regressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
     horizon: int | None
     sample_time: float
     model_: Model
+    coef_: NDArray[np.float64]
+
+    def fit(self, X: ArrayLike | None, y: ArrayLike) -> Self:
+        """Estimate the model.
+
+        Parameters
+        ----------
+        X : array_like of shape (n_samples, n_inputs), or None
+            The inputs in the order of time; None for a time series.
+        y : array_like of shape (n_samples,) or (n_samples, n_outputs)
+            The output, or several.
+
+        Returns
+        -------
+        Self
+            This one, fitted.
+
+        Raises
+        ------
+        ValueError
+            If X or y does not have its shape, or a parameter is out of its range.
+        thetahat.EstimationError
+            If the data do not determine the model.
+        """
+        self._check_horizon()
+        inputs = self._inputs(X, reset=True)
+        self.model_ = self._fitted(self._log(inputs, self._output(y, inputs)))
+        if hasattr(self, "coef_"):
+            del self.coef_
+        if self.model_.kind != "state-space":
+            self.coef_ = np.asarray(self.model_.parameters, dtype=np.float64)
+        return self
+
+    def _fitted(self, log: Log) -> Model:
+        raise NotImplementedError
 
     def predict(self, X: ArrayLike | None, y: ArrayLike | None = None) -> NDArray[np.float64]:
         """Predict the output.
@@ -171,7 +207,7 @@ class _Regressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
             message = f"y: expected an array of shape {predicted.shape}, found one of {measured.shape}"
             raise ValueError(message)
         weights = None if sample_weight is None else np.asarray(sample_weight)
-        columns = zip(measured.reshape(len(measured), -1).T, predicted.reshape(len(measured), -1).T, strict=True)
+        columns = zip(measured.reshape(len(measured), -1).T, predicted.reshape(len(measured), -1).T)
         return float(np.mean([_score(own, run, weights) for own, run in columns]))
 
     def __sklearn_tags__(self) -> Any:
@@ -363,39 +399,10 @@ class ARXRegressor(_Regressor):
         self.ridge = ridge
         self.noise_bound = noise_bound
 
-    def fit(self, X: ArrayLike | None, y: ArrayLike) -> ARXRegressor:
-        """Estimate the model.
-
-        Parameters
-        ----------
-        X : array_like of shape (n_samples, n_inputs), or None
-            The inputs in the order of time; None for a time series.
-        y : array_like of shape (n_samples,) or (n_samples, n_outputs)
-            The output, or several.
-
-        Returns
-        -------
-        ARXRegressor
-            This one, fitted.
-
-        Raises
-        ------
-        ValueError
-            If X or y does not have its shape, or a parameter is out of its range.
-        thetahat.EstimationError
-            If the data do not determine the model.
-        """
-        self._check_horizon()
-        inputs = self._inputs(X, reset=True)
-        log = self._log(inputs, self._output(y, inputs))
-        orders = {"nb": 0} if inputs is None else {"nb": _orders(self.nb), "nk": _orders(self.nk)}
+    def _fitted(self, log: Log) -> Model:
+        orders = {"nb": _orders(self.nb), "nk": _orders(self.nk)} if log.inputs else {"nb": 0}
         options: Any = {name: getattr(self, name) for name in _OPTIONS}
-        self.model_ = arx(log, na=self.na, **orders, **options)
-        if hasattr(self, "coef_"):
-            del self.coef_
-        if len(self.model_.outputs) == 1:
-            self.coef_: NDArray[np.float64] = np.asarray(self.model_.parameters, dtype=np.float64)
-        return self
+        return arx(log, na=self.na, **orders, **options)
 
 
 class NARXRegressor(_Regressor):
@@ -519,36 +526,10 @@ max_iterations, tolerance, step, starts, seed, time_limit, estimate, validate, s
         self.detrend = detrend
         self.offset = offset
 
-    def fit(self, X: ArrayLike | None, y: ArrayLike) -> NARXRegressor:
-        """Estimate the model.
-
-        Parameters
-        ----------
-        X : array_like of shape (n_samples, n_inputs), or None
-            The inputs in the order of time; None for a time series.
-        y : array_like of shape (n_samples,) or (n_samples, n_outputs)
-            The output, or several.
-
-        Returns
-        -------
-        NARXRegressor
-            This one, fitted.
-
-        Raises
-        ------
-        ValueError
-            If X or y does not have its shape, or a parameter is out of its range.
-        thetahat.EstimationError
-            If the data do not determine the model.
-        """
-        self._check_horizon()
-        inputs = self._inputs(X, reset=True)
-        log = self._log(inputs, self._output(y, inputs))
-        lags: Any = {"nu": 0} if inputs is None else {"nu": _orders(self.nu), "nk": _orders(self.nk)}
+    def _fitted(self, log: Log) -> Model:
+        lags: Any = {"nu": _orders(self.nu), "nk": _orders(self.nk)} if log.inputs else {"nu": 0}
         options: Any = {name: getattr(self, name) for name in NarxOptions.__annotations__}
-        self.model_ = narx(log, self.map, ny=int(self.ny), **lags, **options)
-        self.coef_: NDArray[np.float64] = np.asarray(self.model_.parameters, dtype=np.float64)
-        return self
+        return narx(log, self.map, ny=int(self.ny), **lags, **options)
 
 
 class StateSpaceRegressor(_Regressor):
@@ -640,35 +621,10 @@ constant : default=None
         self.offset = offset
         self.constant = constant
 
-    def fit(self, X: ArrayLike | None, y: ArrayLike) -> StateSpaceRegressor:
-        """Estimate the model.
-
-        Parameters
-        ----------
-        X : array_like of shape (n_samples, n_inputs), or None
-            The inputs in the order of time; None for a time series.
-        y : array_like of shape (n_samples,) or (n_samples, n_outputs)
-            The output, or several.
-
-        Returns
-        -------
-        StateSpaceRegressor
-            This one, fitted.
-
-        Raises
-        ------
-        ValueError
-            If X or y does not have its shape, or a parameter is out of its range.
-        thetahat.EstimationError
-            If the data do not determine the model.
-        """
-        self._check_horizon()
-        inputs = self._inputs(X, reset=True)
-        log = self._log(inputs, self._output(y, inputs))
+    def _fitted(self, log: Log) -> Model:
         options: Any = {name: getattr(self, name) for name in _STATES}
-        delays = None if self.nk is None or inputs is None else _orders(self.nk)
-        self.model_ = ss(log, self.order, nk=delays, **options)
-        return self
+        delays = _orders(self.nk) if log.inputs and self.nk is not None else None
+        return ss(log, self.order, nk=delays, **options)
 
 
 def _orders(orders: int | Sequence[int]) -> int | list[int]:

@@ -254,6 +254,16 @@ impl ContinuousStateSpaceModel {
     /// ```
     pub fn sampled(&self, seconds: f64, hold: Hold) -> Result<StateSpaceModel, Error> {
         let continuous = self.matrices();
+        let fastest = continuous.a.amax();
+        if fastest > 0.0 && seconds > 0.0 && fastest * seconds < f64::EPSILON {
+            return Err(Error::undetermined(
+                Vec::new(),
+                format!(
+                    "within {} s the state moves by less than rounding; take a longer sample time",
+                    figures::short(seconds)
+                ),
+            ));
+        }
         let noisy = |continuous: &ContinuousStateSpace| {
             let plain = continuous.sampled(seconds, hold)?;
             self.with_noise(continuous, plain, hold)

@@ -294,6 +294,32 @@ fn transfer_functions_are_found_in_every_verb() {
     let found = folder.fit("--from response.json --np 2 --nz 0 --delay");
     near(value(&found, "a0").0, 20.0, 0.1);
 
+    // An integrator, driven from the first row on by an input that rests at 0.3.
+    let (mut text, mut random, mut state) = ("u,y\n".to_owned(), 1_u32, [0.0, 0.0]);
+    let decay = (-0.2_f64).exp();
+    for row in 0..400 {
+        if row % 5 == 0 {
+            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        }
+        let u = if random >> 31 == 1 { 1.0 } else { -1.0 };
+        let noise = f64::from((row * 7919) % 101 - 50) * 4e-4;
+        writeln!(text, "{u},{}", state[0] + noise).expect("memory");
+        // 1/(s (s + 1)) of a held input, less 0.3.
+        let [y, rate] = state;
+        let driven = u - 0.3;
+        state = [y + (rate - driven) * (1.0 - decay) + 0.2 * driven, driven + (rate - driven) * decay];
+    }
+    folder.write("integrator.csv", text);
+    let found = folder.fit("integrator.csv --sample-time 0.2 --structure tf20i --initial estimate");
+    for (name, expected) in [("b0", 1.0), ("a0", 1.0)] {
+        let (found, error) = value(&found, name);
+        assert!((found - expected).abs() < 4.0 * error && error < 0.02, "{name}: {found} {error}");
+    }
+    // Its first input is -1, from which it is measured.
+    near(number(&found, "/estimation/slope/value"), -1.3, 0.02);
+    let words = folder.done("fit integrator.csv --sample-time 0.2 --np 2 --nz 0 --trend").stderr;
+    assert!(words.contains("slower than the log is long"), "{words}");
+
     for (options, words) in [
         ("--model tf", "--model tf needs --np"),
         ("--model arx --np 2", "--np is of --model tf"),

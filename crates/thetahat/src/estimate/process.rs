@@ -269,12 +269,13 @@ fn uncertainty(
 ) -> Result<Uncertainty, Error> {
     let psi = objective.slopes(structures, parts);
     let kept = names.len() + objective.background().offsets();
-    // The columns of unit norm, those of the free responses first: what follows is what they leave. Last the dead times of outputs that
-    // jump, which others may stand for: see `past_jumps`.
+    // The columns of unit norm, those of level, slope and free responses first: what follows is what they leave. Last the dead times of
+    // outputs that jump, which others may stand for: see `past_jumps`.
     let norms: Vec<f64> = psi.iter().map(|column| sum_of_squares(column).sqrt()).collect();
     let jumping = jumping_dead_times(structures);
-    let first =
-        (kept..psi.len()).chain((0..kept).filter(|place| !jumping.iter().any(|(own, _)| own == place)));
+    // An integrator's own state is a level: that is kept of the two.
+    let first = (names.len()..psi.len())
+        .chain((0..names.len()).filter(|place| !jumping.iter().any(|(own, _)| own == place)));
     let order: Vec<usize> = first.chain(jumping.iter().map(|(place, _)| *place)).collect();
     let mut span = Span::default();
     let mut used = Vec::new();

@@ -140,7 +140,8 @@ impl ProcessPlan {
 /// is left out.
 ///
 /// **Start.** The process is at rest in the first row of each log, with the inputs of that row, which are the offsets u_j0 unless others
-/// are given. With `free_start` each log has a state of its own; beside a single step that is nearly the same as the step.
+/// are given. With `free_start` each log has a state of its own; beside a single step that is nearly the same as the step. The output of an
+/// integrator then has a slope too, since an input that is not at rest moves it at a rate of its own, unless the offset of the input is given.
 ///
 /// **Standard errors** are for errors of any colour, that of an autoregression of the residuals. Those for white errors, which are
 /// far too small for most plants, stand in [`ProcessOutcome`](crate::estimate::ProcessOutcome).
@@ -208,7 +209,13 @@ pub fn fit_process(
         }
     }
     let structures = plan.each();
-    let background = Background { level: given.is_none(), slope: plan.trend, free: plan.free_start };
+    // An integrator that is not at rest in the first row rises at a rate that nobody knows.
+    let open_rate = structures
+        .iter()
+        .zip(&plan.inputs)
+        .any(|(structure, input)| structure.integrates() && plan.offset_of(input).is_none());
+    let slope = plan.trend || plan.free_start && given.is_none() && open_rate;
+    let background = Background { level: given.is_none(), slope, free: plan.free_start };
     let parameters = ProcessModel::names(&structures, &plan.inputs);
     let measured = &deviations.channel(&plan.output)?.values;
     let found =

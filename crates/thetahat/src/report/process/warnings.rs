@@ -2,7 +2,7 @@
 
 use crate::estimate::Procedure;
 use crate::figures::{number, short};
-use crate::model::{Parameter, ProcessModel};
+use crate::model::{Parameter, ProcessModel, polynomial};
 use crate::optimize::Stopped;
 use crate::report::Estimation;
 use crate::respond::process::HeldLog;
@@ -75,6 +75,24 @@ pub(super) fn of_fit(
 /// What the parameters say of the structure, of a log as long as this.
 pub(super) fn of_parameters(model: &ProcessModel, longest: f64) -> Vec<String> {
     let mut words = Vec::new();
+    if model.covariance.is_none() {
+        words.push(
+            "there are no standard errors: the log hardly tells the parameters apart; take a simpler structure, or a log in which the input \
+             moves more"
+                .to_owned(),
+        );
+    }
+    for ((structure, parts), input) in model.structures.iter().zip(model.parts()).zip(&model.inputs) {
+        let monic: Vec<f64> = std::iter::once(1.0).chain(parts.shape).collect();
+        let poles = if structure.is_transfer_function() { polynomial::roots(&monic) } else { None };
+        if poles.into_iter().flatten().any(|pole| pole.norm() * longest < 1.0) {
+            words.push(format!(
+                "a pole from '{}' is slower than the log is long, and the gain a guess: an integrator (i) may say as much, or take a longer \
+                 log",
+                input.name
+            ));
+        }
+    }
     for (structure, own) in model.structures.iter().zip(model.of_inputs()) {
         let lags: Vec<&Parameter> = own.iter().filter(|own| is_lag(&own.name)).collect();
         let same = lags.windows(2).find(|pair| pair[0].value < SAME * pair[1].value);

@@ -68,24 +68,25 @@ mod tests {
     use crate::data::Channel;
 
     #[test]
-    fn a_digest_is_that_of_the_rows_whatever_stands_around_them() {
+    fn a_digest_is_that_of_the_rows_whatever_stands_around_them() -> Result<(), Error> {
         let log = |y: Vec<f64>| {
             let u = vec![1.0; y.len()];
             let channel = |name: &str, values| Channel { name: name.into(), values };
-            Log::new(vec![channel("u", u), channel("y", y)], 1.0).unwrap()
+            Log::new(vec![channel("u", u), channel("y", y)], 1.0)
         };
-        let rows = ["2..3".parse().unwrap()];
-        let of = |log: &Log| digests(log, &["u", "y"], &rows).unwrap();
-        let first = log(vec![1.0, 2.0, f64::NAN, 4.0]);
-        let known = of(&first);
+        let rows = ["2..3".parse()?];
+        let of = |log: &Log| digests(log, &["u", "y"], &rows);
+        let first = log(vec![1.0, 2.0, f64::NAN, 4.0])?;
+        let known = of(&first)?;
         assert_eq!(known[0]["y"].len(), 32);
-        assert_eq!(of(&log(vec![9.0, 2.0, -f64::NAN, 9.0, 9.0])), known);
-        let other = of(&log(vec![1.0, 2.0, 3.0, 4.0]));
+        assert_eq!(of(&log(vec![9.0, 2.0, -f64::NAN, 9.0, 9.0])?)?, known);
+        let other = of(&log(vec![1.0, 2.0, 3.0, 4.0])?)?;
         assert!(other[0]["u"] == known[0]["u"] && other[0]["y"] != known[0]["y"]);
-        assert_ne!(digests(&first, &["y"], &["2..4".parse().unwrap()]).unwrap()[0]["y"], known[0]["y"]);
+        assert_ne!(digests(&first, &["y"], &["2..4".parse()?])?[0]["y"], known[0]["y"]);
         // Of several logs each has its own; the rows count from its own first one.
-        let joined = Log::join(vec![log(vec![0.0; 4]), first]).unwrap();
-        let both = digests(&joined, &["u", "y"], &["6..7".parse().unwrap()]).unwrap();
+        let joined = Log::join(vec![log(vec![0.0; 4])?, first])?;
+        let both = digests(&joined, &["u", "y"], &["6..7".parse()?])?;
         assert_eq!(both, [BTreeMap::new(), known[0].clone()]);
+        Ok(())
     }
 }

@@ -227,43 +227,39 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ranges_are_read_and_refused() {
-        assert_eq!("7..9".parse::<Rows>().unwrap(), Rows::new(7, 9).unwrap());
+    fn ranges_are_read_and_refused() -> Result<(), Error> {
+        assert_eq!("7..9".parse::<Rows>()?, Rows::new(7, 9)?);
         for wrong in ["", "7", "..", "0..3", "9..7", "a..b", "1..2..3", "-1..4", "1..99999999999999999999"] {
             assert!(wrong.parse::<Rows>().is_err(), "{wrong}");
         }
+        Ok(())
     }
 
     #[test]
-    fn rows_are_cut_in_their_order() {
-        let rows =
-            |text: &str| -> Vec<Rows> { text.split(',').map(|range| range.parse().unwrap()).collect() };
-        let cut = |split: &str, of: &str| split.parse::<Split>().unwrap().cut(&rows(of));
-        assert_eq!(cut("60/20/20", "1..10").unwrap(), [rows("1..6"), rows("7..8"), rows("9..10")]);
-        assert_eq!(
-            cut("1/1/1", "3..5,11..13,20..23").unwrap(),
-            [rows("3..5"), rows("11..13"), rows("20..23")]
-        );
-        assert_eq!(cut("50/0/50", "1..4,7..7").unwrap(), [rows("1..2"), vec![], rows("3..4,7..7")]);
-        assert_eq!(cut("2/1/0", "1..10").unwrap(), [rows("1..6"), rows("7..10"), vec![]]);
-        assert_eq!(cut("1/0/0", "1..7").unwrap(), [rows("1..7"), vec![], vec![]]);
+    fn rows_are_cut_in_their_order() -> Result<(), Error> {
+        let rows = |text: &str| -> Result<Vec<Rows>, Error> { text.split(',').map(str::parse).collect() };
+        let cut = |split: &str, of: &str| split.parse::<Split>()?.cut(&rows(of)?);
+        assert_eq!(cut("60/20/20", "1..10")?, [rows("1..6")?, rows("7..8")?, rows("9..10")?]);
+        assert_eq!(cut("1/1/1", "3..5,11..13,20..23")?, [rows("3..5")?, rows("11..13")?, rows("20..23")?]);
+        assert_eq!(cut("50/0/50", "1..4,7..7")?, [rows("1..2")?, vec![], rows("3..4,7..7")?]);
+        assert_eq!(cut("2/1/0", "1..10")?, [rows("1..6")?, rows("7..10")?, vec![]]);
+        assert_eq!(cut("1/0/0", "1..7")?, [rows("1..7")?, vec![], vec![]]);
         assert!(
             matches!(cut("60/20/20", "1..2"), Err(Error::Argument { argument, .. }) if argument == "split")
         );
         for wrong in ["", "60", "60/40", "60/20/20/0", "a/b/c", "0/50/50", "-1/1/1", "nan/1/1", "inf/1/1"] {
             assert!(wrong.parse::<Split>().is_err(), "{wrong}");
         }
-        assert_eq!("60/20/20".parse::<Split>().unwrap().to_string(), "60/20/20");
+        assert_eq!("60/20/20".parse::<Split>()?.to_string(), "60/20/20");
+        Ok(())
     }
 
     #[test]
-    fn ranges_lie_inside_and_apart() {
-        let rows = |text: &str| text.parse::<Rows>().unwrap();
-        assert_eq!(
-            checked("estimate", &[rows("5..9"), rows("1..4")], 9).unwrap(),
-            [rows("1..4"), rows("5..9")]
-        );
-        assert!(checked("estimate", &[rows("1..10")], 9).is_err());
-        assert!(checked("estimate", &[rows("1..4"), rows("4..5")], 9).is_err());
+    fn ranges_lie_inside_and_apart() -> Result<(), Error> {
+        let rows = |text: &str| text.parse::<Rows>();
+        assert_eq!(checked("estimate", &[rows("5..9")?, rows("1..4")?], 9)?, [rows("1..4")?, rows("5..9")?]);
+        assert!(checked("estimate", &[rows("1..10")?], 9).is_err());
+        assert!(checked("estimate", &[rows("1..4")?, rows("4..5")?], 9).is_err());
+        Ok(())
     }
 }

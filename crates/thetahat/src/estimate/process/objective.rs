@@ -462,15 +462,15 @@ impl<'a> ProcessObjective<'a> {
         whole.collect()
     }
 
+    /// Those of level and slope, as far as they are estimated.
+    pub(super) fn offset_columns(&self) -> Vec<Vec<f64>> {
+        let level = self.background.level.then(|| vec![1.0; self.outputs.len()]);
+        level.into_iter().chain(self.background.slope.then(|| self.clock.clone())).collect()
+    }
+
     /// Level, slope, the columns of each input, then free responses.
     fn linear_columns(&self, parts: &[Parts<f64>]) -> Vec<Vec<f64>> {
-        let mut columns = Vec::new();
-        if self.background.level {
-            columns.push(vec![1.0; self.outputs.len()]);
-        }
-        if self.background.slope {
-            columns.push(self.clock.clone());
-        }
+        let mut columns = self.offset_columns();
         for (input, (structure, parts)) in self.structures.iter().zip(parts).enumerate() {
             columns.extend(self.columns_of(input, structure, parts));
         }
@@ -508,12 +508,7 @@ impl<'a> ProcessObjective<'a> {
                 structure.own_slopes(parts, seen, shape, dead_time, own);
             }));
         }
-        if self.background.level {
-            columns.push(vec![1.0; self.outputs.len()]);
-        }
-        if self.background.slope {
-            columns.push(self.clock.clone());
-        }
+        columns.extend(self.offset_columns());
         if self.background.free {
             columns.extend(self.free_columns(parts));
         }

@@ -7,7 +7,7 @@
 //! Divided by the A of the last round, all derivatives are those of filtered signals, and the equation is linear in what is looked for:
 //!
 //! ```text
-//! y_n = -sum a_k y_k + sum b_k u_k + level + v,   y_k = s^k/A(s) y,   u_k = s^k/A(s) u
+//! y_n = -sum a_k y_k + sum b_k u_k + level + slope t + v,   y_k = s^k/A(s) y,   u_k = s^k/A(s) u
 //! ```
 //!
 //! Its errors v are no noise that least squares could forget, so the instruments are the same signals of a free run of the last round. At
@@ -172,7 +172,7 @@ impl Rounds<'_> {
         let mut outputs = objective.filtered(self.input, shape, self.target);
         let highest = outputs.pop()?;
         let beside: Vec<Vec<f64>> =
-            driven.into_iter().take(self.structure.columns()).chain(objective.level_column()).collect();
+            driven.into_iter().take(self.structure.columns()).chain(objective.offset_columns()).collect();
         let instruments = match model {
             None => outputs.clone(),
             Some(model) => {
@@ -197,7 +197,7 @@ impl Rounds<'_> {
         let mut span = Span::default();
         let columns = objective.columns_of(self.input, self.structure, &parts);
         let count = columns.len();
-        for column in columns.into_iter().chain(objective.level_column()) {
+        for column in columns.into_iter().chain(objective.offset_columns()) {
             span.add(column);
         }
         let mut left = objective.seen_of(self.input, self.target);

@@ -14,6 +14,17 @@ pub(crate) const MOST_POLES: usize = 6;
 /// Parameters of a structure at most: as many zeros as poles, and a dead time.
 pub(crate) const MOST_PARAMETERS: usize = 2 * MOST_POLES + 2;
 
+/// Powers of 1/s, and a gain times these.
+const RATES: [[&str; 2]; MOST_POLES + 1] = [
+    ["", "y/u"],
+    ["1/s", "y/u/s"],
+    ["1/s^2", "y/u/s^2"],
+    ["1/s^3", "y/u/s^3"],
+    ["1/s^4", "y/u/s^4"],
+    ["1/s^5", "y/u/s^5"],
+    ["1/s^6", "y/u/s^6"],
+];
+
 /// What a process is from an input to the output, as a word.
 ///
 /// ```text
@@ -184,13 +195,20 @@ impl ProcessStructure {
         }
     }
 
-    /// The unit of a parameter of this name: s, rad/s, or what the gains are in.
+    /// The unit of a parameter of this name: s, rad/s, or what the gains are in; of coefficients with the power of 1/s that they have.
     pub fn unit(&self, name: &str) -> &'static str {
         let bare = name.split('[').next().unwrap_or(name);
         match bare {
             "omega" => "rad/s",
             "zeta" => "",
-            _ if matches!(self.kind, Kind::Rational(_)) && bare != "theta" => "",
+            _ if self.is_transfer_function() && bare != "theta" => {
+                let power: usize = bare[1..].parse().unwrap_or(0);
+                if bare.starts_with('a') {
+                    RATES.get(self.lags.saturating_sub(power)).map_or("", |[rate, _]| rate)
+                } else {
+                    RATES.get(self.states().saturating_sub(power)).map_or("", |[_, rate]| rate)
+                }
+            }
             "K" if self.integrates() => "y/u/s",
             _ if bare.starts_with('K') || bare.starts_with('R') => "y/u",
             _ => "s",

@@ -77,7 +77,10 @@ fn step_responses_are_those_of_the_textbook() {
 
 #[test]
 fn polynomials_respond_as_the_process_does_at_the_samples() {
-    let cases: [(&str, &[f64]); 10] = [
+    let cases: [(&str, &[f64]); 13] = [
+        ("tf21d", &[-1.0, 3.0, 1.2, 4.0, 0.37]),
+        ("tf22", &[0.3, -1.0, 3.0, 1.2, 4.0]),
+        ("tf31i", &[1.0, 2.0, 1.5, 3.0]),
         ("p1d", &[2.0, 3.0, 1.2]),
         ("p1d", &[2.0, 3.0, 1.5]),
         ("p1", &[2.0, 3.0]),
@@ -123,7 +126,10 @@ fn polynomials_respond_as_the_process_does_at_the_samples() {
 
 #[test]
 fn words_are_read_and_written() {
-    for word in ["p1", "p1d", "p2d", "p2du", "p3d", "p1dz", "p1di", "p0i", "p0di", "p3dziu", "rc1", "rc3"] {
+    for word in [
+        "p1", "p1d", "p2d", "p2du", "p3d", "p1dz", "p1di", "p0i", "p0di", "p3dziu", "rc1", "rc3", "tf10",
+        "tf66d", "tf32di",
+    ] {
         let structure: ProcessStructure = word.parse().unwrap();
         assert_eq!(structure.to_string(), word);
         assert_eq!(structure.names().len(), structure.parameters());
@@ -133,11 +139,22 @@ fn words_are_read_and_written() {
         assert_eq!(parts.weights.len(), structure.columns());
         assert_eq!(serde_json::from_str::<ProcessStructure>(&format!("\"{word}\"")).unwrap(), structure);
     }
-    for wrong in ["", "p", "p4", "p1x", "p1dd", "p1u", "p0", "p0d", "p0zi", "rc0", "rc2d", "q1", "p-1", "rc"]
-    {
+    for wrong in [
+        "", "p", "p4", "p1x", "p1dd", "p1u", "p0", "p0d", "p0zi", "rc0", "rc2d", "q1", "p-1", "rc", "tf",
+        "tf1", "tf12", "tf70", "tf00", "tf10i", "tf22i", "tf10dd", "tf10z",
+    ] {
         let error = wrong.parse::<ProcessStructure>().unwrap_err();
         assert!(matches!(error, Error::Argument { ref argument, .. } if argument == "structure"), "{wrong}");
     }
+}
+
+#[test]
+fn coefficients_have_powers_of_seconds_in_their_units() -> Result<(), Error> {
+    let structure: ProcessStructure = "tf31di".parse()?;
+    let units: Vec<&str> = structure.names().iter().map(|name| structure.unit(name)).collect();
+    assert_eq!(units, ["y/u/s^2", "y/u/s^3", "1/s", "1/s^2", "s"]);
+    assert_eq!(structure.equation(), "(b1 s + b0) e^(-theta s)/(s (s^2 + a1 s + a0))");
+    Ok(())
 }
 
 #[test]
@@ -169,7 +186,10 @@ fn a_damaged_model_is_refused() {
 
 #[test]
 fn frequency_responses_are_those_of_the_polynomials_and_their_slopes_those_of_differences() {
-    let cases: [(&str, &[f64]); 8] = [
+    let cases: [(&str, &[f64]); 11] = [
+        ("tf21d", &[-1.0, 3.0, 1.2, 4.0, 0.37]),
+        ("tf41", &[-12.0, 20.0, 3.0, 28.0, 20.0, 30.0]),
+        ("tf31i", &[1.0, 2.0, 1.5, 3.0]),
         ("p1d", &[2.0, 3.0, 1.2]),
         ("p2d", &[1.0, 4.0, 0.3, 0.2]),
         ("p3d", &[1.0, 4.0, 2.0, 0.3, 0.9]),

@@ -225,7 +225,7 @@ impl ContinuousStateSpaceModel {
     /// # Errors
     /// [`Error::Argument`] for a time that is not above 0 or leaves an input waiting for more than 1000 samples, and for holds but `zoh`
     /// where a delay is no whole number of samples; those of [`ContinuousStateSpace::sampled`]; [`Error::Undetermined`] where no predictor
-    /// is stable.
+    /// is stable, and where the state moves by less than rounding within a sample.
     ///
     /// Errors of the matrices go through by differences to either side along each direction in which they vary.
     ///

@@ -214,22 +214,27 @@ fn sensitivities_in<const SHAPE: usize>(
 /// The responses to a first state of each lag, one after the other, without an input: what a log that does not begin at rest has of them.
 pub(crate) fn modes(structure: &ProcessStructure, shape: &[f64], times: &[f64]) -> Vec<Vec<f64>> {
     let chain = structure.chain(shape);
-    let (Some(&start), states) = (times.first(), chain.states()) else { return Vec::new() };
-    let mut kept = None;
-    let mut found = vec![Vec::with_capacity(times.len()); states];
-    for (state, found) in found.iter_mut().enumerate() {
-        let mut last = start;
-        let mut own = chain.at_rest(0.0, 0.0);
-        own[state] = 1.0;
-        for time in times {
-            if *time > last {
-                own = Steps::take(&chain, &mut kept, time - last, *time).apply(&own, 0.0);
-                last = *time;
-            }
-            found.push(chain.end(&own));
+    let of_state = |state: usize| {
+        let (mut first, mut found) = (vec![0.0; chain.states()], Vec::with_capacity(times.len()));
+        first[state] = 1.0;
+        walk_free(&chain, &first, times, |_, value| found.push(value));
+        found
+    };
+    (0..chain.states()).map(of_state).collect()
+}
+
+/// Calls `take` for each row with what is seen of a first state without an input.
+fn walk_free<S: Number<f64>>(chain: &Chain<S>, first: &[f64], times: &[f64], mut take: impl FnMut(usize, S)) {
+    let (mut kept, Some(mut last)) = (None, times.first().copied()) else { return };
+    let mut state = chain.at_rest(0.0, 0.0);
+    state.iter_mut().zip(first).for_each(|(state, value)| *state = (*value).into());
+    for (row, time) in times.iter().enumerate() {
+        if *time > last {
+            state = Steps::take(chain, &mut kept, time - last, *time).apply(&state, 0.0);
+            last = *time;
         }
+        take(row, chain.end(&state));
     }
-    found
 }
 
 /// Calls `take` for each row with the slopes by the shape of what a first state without an input does.
@@ -258,14 +263,5 @@ fn free_sensitivities_in<const SHAPE: usize>(
     values.iter_mut().zip(shape).for_each(|(value, own)| *value = *own);
     let variables = Dual::<f64, SHAPE>::variables(values);
     let chain = structure.chain(&variables[..shape.len().min(SHAPE)]);
-    let mut state = chain.at_rest(0.0, 0.0);
-    state.iter_mut().zip(first).for_each(|(state, value)| *state = (*value).into());
-    let (mut kept, Some(mut last)) = (None, times.first().copied()) else { return };
-    for (row, time) in times.iter().enumerate() {
-        if *time > last {
-            state = Steps::take(&chain, &mut kept, time - last, *time).apply(&state, 0.0);
-            last = *time;
-        }
-        take(row, &chain.end(&state).derivatives);
-    }
+    walk_free(&chain, first, times, |row, value| take(row, &value.derivatives));
 }

@@ -7,11 +7,6 @@ use crate::model::{Parts, ProcessStructure};
 use crate::respond::process::{HeldLog, responses, run};
 
 impl ProcessObjective<'_> {
-    /// The column of a level, if there is one.
-    pub(in crate::estimate::process) fn level_column(&self) -> Option<Vec<f64>> {
-        self.background.level.then(|| vec![1.0; self.outputs.len()])
-    }
-
     /// The response from an input in every row of each part, or at every point.
     pub(in crate::estimate::process) fn responses_of(
         &self,

@@ -21,7 +21,7 @@ mod tests;
 pub(crate) use filter::{add_filtered, divide, divide_from, divide_together};
 pub(crate) use forward::{Path, forward};
 pub(crate) use gram::{Interior, Products, gram, joint_gram};
-pub(crate) use kernel::{product, sum, sum_of_squares};
+pub(crate) use kernel::{largest, product, sum, sum_of_squares};
 pub(crate) use lagged::{Lagged, Presample, Taps};
 pub(crate) use monomials::{Moments, Monomials};
 pub(crate) use qr::factor_rows;

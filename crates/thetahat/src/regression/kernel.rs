@@ -42,6 +42,18 @@ pub(crate) fn sum_of_squares(x: &[f64]) -> f64 {
     product(x, x)
 }
 
+/// The largest size of some values.
+pub(crate) fn largest(values: &[f64]) -> f64 {
+    let mut lanes = [0.0_f64; LANES];
+    let (whole, rest) = values.as_chunks::<LANES>();
+    for values in whole {
+        for (lane, value) in lanes.iter_mut().zip(values) {
+            *lane = if value.abs() > *lane { value.abs() } else { *lane };
+        }
+    }
+    lanes.iter().chain(rest).fold(0.0, |largest, value| value.abs().max(largest))
+}
+
 /// `sum_t x[t] y[t + k]` for k = 0..4; `y` holds 3 values more than `x`. 8 flops a sample, each signal read once.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
 fn four_products(x: &[f64], y: &[f64]) -> [f64; SHIFTS] {

@@ -12,7 +12,7 @@ use crate::data::{Detrend, Log, Offset, Prefiltered, Record, Rows, Source, diges
 use crate::estimate::{self, Beside, Constant, Estimate, Fitted, Initial, Method, OutputOffset, enough};
 use crate::model::{Orders, ProcessStructure, Quantity, Signal};
 use crate::optimize::{Deadline, Monitor, Search};
-use crate::regression::sum;
+use crate::regression::{largest, sum};
 use crate::respond::{Horizon, InitialCondition, innovations};
 use crate::select::{self, Choice, Focus, SelectedModel, Task};
 use crate::{Document, Error};
@@ -379,19 +379,6 @@ fn unfiltered_variance(
     let errors = || found.iter().flat_map(|found| found.counted_errors());
     let (samples, squares) = (errors().count(), sum(errors().map(|e| e * e)));
     Ok(squares / samples.saturating_sub(orders.parameters()).max(1) as f64)
-}
-
-/// The largest size of some values.
-fn largest(values: &[f64]) -> f64 {
-    const LANES: usize = 8;
-    let mut lanes = [0.0_f64; LANES];
-    let (whole, rest) = values.as_chunks::<LANES>();
-    for values in whole {
-        for (lane, value) in lanes.iter_mut().zip(values) {
-            *lane = if value.abs() > *lane { value.abs() } else { *lane };
-        }
-    }
-    lanes.iter().chain(rest).fold(0.0, |largest, value| value.abs().max(largest))
 }
 
 /// Takes a channel's offset from it, in place.

@@ -14,7 +14,7 @@ use crate::data::{Detrend, Log, Offset, Rows, Source, Split};
 use crate::estimate::{Constant, Criteria, Initial, Refine, SubspaceOptions, VectorArxOptions};
 use crate::model::{Model, Quantity, Signal, StateSpaceModel};
 use crate::optimize::{Monitor, Search};
-use crate::regression::SAFE_NORMS;
+use crate::regression::{SAFE_NORMS, largest};
 use crate::{Document, Error};
 use estimated::Estimated;
 
@@ -266,20 +266,21 @@ fn fit(
             Some(&(_, level)) => Offset { level, slope: 0.0 },
             None => Offset::estimate(plan.detrend, log, name, &segments)?,
         };
-        let rows = segments.iter().cloned().flatten();
-        let largest =
-            rows.map(|row| (values[row] - offset.at(log.elapsed(row))).abs()).fold(0.0_f64, f64::max);
-        if !SAFE_NORMS.contains(&largest) {
-            return Err(Error::data(format!(
-                "squares of '{name}' leave the range of numbers; scale the channel towards one"
-            )));
-        }
         Ok(Signal { name: name.clone(), offset })
     };
     let inputs = plan.inputs.iter().map(signal).collect::<Result<Vec<_>, Error>>()?;
     let mut outputs = plan.outputs.iter().map(signal).collect::<Result<Vec<_>, Error>>()?;
     let signals = inputs.iter().chain(&outputs).map(|signal| (signal.name.as_str(), signal.offset));
     let deviations = log.deviations(signals)?;
+    for name in &names {
+        let values = &deviations.channel(name)?.values;
+        let each = segments.iter().map(|segment| largest(&values[segment.clone()]));
+        if !SAFE_NORMS.contains(&each.fold(0.0, f64::max)) {
+            return Err(Error::data(format!(
+                "squares of '{name}' leave the range of numbers; scale the channel towards one"
+            )));
+        }
+    }
 
     let delays = if plan.delays.is_empty() { vec![0; inputs.len()] } else { plan.delays.clone() };
     let record = deviations.joint_record(&plan.inputs, &plan.outputs, &shares.estimation)?.delayed(&delays);

@@ -166,7 +166,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
         forgetting: Forgetting<T>,
     ) -> Result<Self, Error> {
         let mut lags: Lags<T, N, D> = Lags::with_residuals(&orders.plant(), orders.nc)?;
-        let scales = lags.scales(output_scale, input_scales, noise_scale)?;
+        let scales = lags.scales(&[output_scale], input_scales, noise_scale)?;
         let estimator = RecursiveLeastSquares::new(&scales, forgetting)?;
         lags.clear_last(orders.nc);
         let size = scales.shape_generic().0;
@@ -231,7 +231,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
     /// 1.5 n² + (9 + nc) n multiply-adds, n divisions, and moves of (1 + nc) n + D numbers; each halving nc²/2 more.
     pub fn measured(&mut self, output: T) -> Result<Innovation<T>, Error> {
         self.lags.check_delays()?;
-        check_samples(&[], output, self.gradients.ncols())?;
+        check_samples(&[], &[output], self.gradients.ncols())?;
         Ok(self.step(&[], output, true))
     }
 
@@ -241,7 +241,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
     /// As [`RecursiveArx::applied`](crate::RecursiveArx::applied), whose errors it has.
     pub fn applied(&mut self, inputs: &[T]) -> Result<(), Error> {
         self.lags.check_inputs(inputs)?;
-        check_samples(inputs, T::NAN, self.gradients.ncols())?;
+        check_samples(inputs, &[], self.gradients.ncols())?;
         if self.lags.awaits_inputs() {
             self.lags.complete(inputs);
         } else {
@@ -256,7 +256,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
     /// knows u(k-1) when y(k) arrives.
     pub fn log_row(&mut self, output: T, inputs: &[T]) -> Result<Innovation<T>, Error> {
         self.lags.check_inputs(inputs)?;
-        check_samples(inputs, output, self.gradients.ncols())?;
+        check_samples(inputs, &[output], self.gradients.ncols())?;
         Ok(self.step(inputs, output, false))
     }
 
@@ -322,7 +322,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
             }
             innovation
         });
-        lags.push_checked(output);
+        lags.push_checked(&[output]);
         lags.await_inputs(inputs_follow);
         innovation
     }
@@ -370,7 +370,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
 
     /// Whether this type has the sizes for these orders. As [`RecursiveArx::fits`](crate::RecursiveArx::fits).
     pub const fn fits(orders: &ArmaxOrders<'_>) -> bool {
-        Lags::<T, N, D>::fits_with(&orders.plant(), orders.nc)
+        Lags::<T, N, D>::fits_with(&orders.plant(), 1, orders.nc)
     }
 
     /// The delay lines: the samples and residuals that the next samples are predicted from.

@@ -6,6 +6,7 @@ use nalgebra::{Const, OVector};
 
 use crate::error::check_length;
 use crate::lags::is_infinite;
+use crate::triangle::column;
 use crate::ud::dot;
 use crate::{
     Action, ArxOrders, Covariance, Dimension, Error, Forgetting, Innovation, Lags, Real,
@@ -127,7 +128,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
         forgetting: Forgetting<T>,
     ) -> Result<Self, Error> {
         let lags: Lags<T, N, D> = Lags::new(orders)?;
-        let scales = lags.scales(output_scale, input_scales, T::NAN)?;
+        let scales = lags.scales(&[output_scale], input_scales, T::NAN)?;
         Ok(RecursiveArx { estimator: RecursiveLeastSquares::new(&scales, forgetting)?, lags })
     }
 
@@ -180,7 +181,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
     /// 1.5 n² + 7 n multiply-adds, n divisions, and one move of n + D numbers.
     pub fn measured(&mut self, output: T) -> Result<Innovation<T>, Error> {
         self.lags.check_delays()?;
-        check_samples(&[], output, self.size())?;
+        check_samples(&[], &[output], self.size())?;
         Ok(self.step(&[], output, true))
     }
 
@@ -193,7 +194,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
     /// [`Error::Infinite`]; [`Error::TooLarge`], as for [`measured`](RecursiveArx::measured).
     pub fn applied(&mut self, inputs: &[T]) -> Result<(), Error> {
         self.lags.check_inputs(inputs)?;
-        check_samples(inputs, T::NAN, self.size())?;
+        check_samples(inputs, &[], self.size())?;
         if self.lags.awaits_inputs() {
             self.lags.complete(inputs);
         } else {
@@ -211,7 +212,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
     /// Errors, after which nothing has changed, time included: those of the two, but for [`Error::InputFirst`].
     pub fn log_row(&mut self, output: T, inputs: &[T]) -> Result<Innovation<T>, Error> {
         self.lags.check_inputs(inputs)?;
-        check_samples(inputs, output, self.size())?;
+        check_samples(inputs, &[output], self.size())?;
         Ok(self.step(inputs, output, false))
     }
 
@@ -225,7 +226,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
             estimator.advance();
             Innovation { error: T::NAN, variance: T::NAN, nis: T::zero(), action: Action::NotReady }
         });
-        lags.push_checked(output);
+        lags.push_checked(&[output]);
         lags.await_inputs(inputs_follow);
         innovation
     }
@@ -363,15 +364,17 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
     }
 }
 
-/// That the output is not infinite, and that no sample is too large for a regressor of `size` such samples.
-pub(crate) fn check_samples<T: Real>(inputs: &[T], output: T, size: usize) -> Result<(), Error> {
-    if is_infinite(&output) {
+/// That no output is infinite, and that no sample is too large for a regressor of `size` such samples.
+pub(crate) fn check_samples<T: Real>(inputs: &[T], outputs: &[T], size: usize) -> Result<(), Error> {
+    if outputs.iter().any(is_infinite) {
         return Err(Error::Infinite { argument: "output" });
     }
-    if inputs.iter().any(|&sample| is_large(sample, size)) {
-        return Err(Error::TooLarge { argument: "inputs" });
+    for (argument, samples) in [("inputs", inputs), ("output", outputs)] {
+        if samples.iter().any(|&sample| is_large(sample, size)) {
+            return Err(Error::TooLarge { argument });
+        }
     }
-    if is_large(output, size) { Err(Error::TooLarge { argument: "output" }) } else { Ok(()) }
+    Ok(())
 }
 
 /// Whether a regressor of `size` such samples could be too large. NaN is not.
@@ -379,8 +382,9 @@ pub(crate) fn is_large<T: Real>(sample: T, size: usize) -> bool {
     sample * sample * T::from_count(size.max(1)) > T::LARGEST_ENTRY
 }
 
-/// Runs a model on from `lags`: its predictions become its outputs. Of the residuals, if the model has them, the last one
-/// is known, and those to come are expected to be 0.
+/// Runs a model on from `lags`: its predictions become its outputs, those of several outputs one after the other, with a
+/// column of parameters for each. Of the residuals, if the model has them, the last one is known, and those to come are
+/// expected to be 0.
 pub(crate) fn predict_ahead<T: Real, N: Dimension, D: Dimension>(
     lags: &mut Lags<T, N, D>,
     parameters: &[T],
@@ -388,16 +392,18 @@ pub(crate) fn predict_ahead<T: Real, N: Dimension, D: Dimension>(
     future_inputs: &[T],
     outputs: &mut [T],
 ) -> Result<(), Error> {
-    let inputs = lags.inputs();
-    check_length("future_inputs", outputs.len().saturating_mul(inputs), future_inputs.len())?;
+    let (inputs, each, n) = (lags.inputs(), lags.outputs().max(1), lags.size().value());
+    let steps = outputs.len() / each;
+    check_length("outputs", steps * each, outputs.len())?;
+    check_length("future_inputs", steps.saturating_mul(inputs), future_inputs.len())?;
     if future_inputs.iter().any(is_infinite) {
         return Err(Error::Infinite { argument: "future_inputs" });
     }
     let awaiting = lags.awaits_inputs();
     let mut grown = false;
-    for (step, output) in outputs.iter_mut().enumerate() {
+    for (step, outputs) in outputs.chunks_exact_mut(each).enumerate() {
         if grown {
-            *output = T::NAN;
+            outputs.fill(T::NAN);
             continue;
         }
         let next = future_inputs.get(step * inputs..).unwrap_or_default();
@@ -405,14 +411,16 @@ pub(crate) fn predict_ahead<T: Real, N: Dimension, D: Dimension>(
             lags.complete(next);
         }
         lags.push(if awaiting { &[] } else { next }, residual);
-        *output = match lags.regressor().map(|regressor| dot(regressor.as_slice(), parameters)) {
-            Some(predicted) if !predicted.is_finite() => {
-                grown = true;
-                T::NAN
+        if let Some(regressor) = lags.regressor() {
+            for (index, output) in outputs.iter_mut().enumerate() {
+                *output = dot(regressor.as_slice(), column(parameters, n, index));
             }
-            predicted => predicted.unwrap_or(T::NAN),
-        };
-        lags.push_checked(*output);
+            grown = !outputs.iter().all(T::is_finite);
+        }
+        if grown || lags.regressor().is_none() {
+            outputs.fill(T::NAN);
+        }
+        lags.push_checked(outputs);
         residual = T::zero();
     }
     if grown { Err(Error::Overflow) } else { Ok(()) }

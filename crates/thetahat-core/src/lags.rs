@@ -32,7 +32,6 @@ impl Line {
     /// The line of an input, of the constant or of the residuals. Fails where a number does not fit.
     fn new(index: usize, &InputOrders { nb, nk }: &InputOrders) -> Result<Self, Error> {
         let available = usize::from(u16::MAX);
-        let narrow = |count| u16::try_from(count).ok();
         Ok(Line {
             index: narrow(index).ok_or(Error::Length {
                 argument: "inputs",
@@ -63,7 +62,8 @@ impl Line {
 ///
 /// so that y(k) = φ(k)'θ + e(k) with θ = [a_1 … a_na  b1_0 … b1_(nb1-1)  b2_0 …  constant]. The 1 is there if the
 /// [`ArxOrders`] have a constant.
-/// The outputs enter with a minus sign (Ljung, System Identification, 2nd ed., section 4.2).
+/// The outputs enter with a minus sign (Ljung, System Identification, 2nd ed., section 4.2). With several outputs,
+/// [`with_outputs`](Lags::with_outputs), the na past samples of the first one come first, then those of the next.
 ///
 /// Each sample takes three steps, in this order:
 ///
@@ -132,7 +132,9 @@ pub struct Lags<T: Real, N: Dimension, D: Dimension = Const<1>> {
     /// The lines in use, then some with nb = 0. There are at most N, as each has a coefficient: so the number
     /// of inputs need not be one more size in the type.
     lines: OVector<Line, N>,
-    na: usize,
+    /// Past samples of each output.
+    na: u16,
+    outputs: u16,
     inputs: usize,
     /// Whether y(k) is in, and u(k) is not.
     awaiting_inputs: bool,
@@ -142,7 +144,7 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
     /// Empty delay lines: every earlier sample is missing.
     ///
     /// Errors: [`Error::Orders`] if the orders do not make exactly `N` parameters; [`Error::Delays`] if `D`
-    /// is too small for the delays; these and [`Error::Length`] for an nb, an nk or a number of inputs above 65,535.
+    /// is too small for the delays; these and [`Error::Length`] for an na, an nb, an nk or a number of channels above 65,535.
     ///
     /// ```
     /// use thetahat_core::nalgebra::Const;
@@ -155,18 +157,39 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
     /// assert_eq!(error, Error::Delays { needed: 5, available: 1 });
     /// ```
     pub fn new(orders: &ArxOrders<'_>) -> Result<Self, Error> {
-        Self::with_residuals(orders, 0)
+        Self::with_outputs(orders, 1)
+    }
+
+    /// The same with several outputs, of which φ holds na past samples each.
+    ///
+    /// Errors: as for [`new`](Lags::new), with [`ArxOrders::parameters_of`] in the place of the number of parameters.
+    ///
+    /// ```
+    /// use thetahat_core::nalgebra::{Const, Vector3};
+    /// use thetahat_core::{ArxOrders, Error, InputOrders, Lags};
+    ///
+    /// const ORDERS: ArxOrders =
+    ///     ArxOrders { na: 1, inputs: &[InputOrders { nb: 1, nk: 1 }], constant: false };
+    /// let mut lags: Lags<f64, Const<{ ORDERS.parameters_of(2) }>> = Lags::with_outputs(&ORDERS, 2)?;
+    /// lags.push_inputs(&[3.0])?;
+    /// lags.push_outputs(&[1.0, 2.0])?;
+    /// lags.push_inputs(&[4.0])?;
+    /// assert_eq!(lags.regressor(), Some(&Vector3::new(-1.0, -2.0, 3.0)));
+    /// # Ok::<(), Error>(())
+    /// ```
+    pub fn with_outputs(orders: &ArxOrders<'_>, outputs: usize) -> Result<Self, Error> {
+        Self::of(orders, outputs, 0)
     }
 
     /// Whether this type has the sizes for these orders: that [`new`](Lags::new) has no error. For orders that are
     /// constants, `const _: () = assert!(…)` asks the compiler: see [`RecursiveArx::fits`](crate::RecursiveArx::fits).
     pub const fn fits(orders: &ArxOrders<'_>) -> bool {
-        Self::fits_with(orders, 0)
+        Self::fits_with(orders, 1, 0)
     }
 
-    /// The same with this many past residuals.
-    pub(crate) const fn fits_with(orders: &ArxOrders<'_>, residuals: usize) -> bool {
-        let parameters = orders.parameters().saturating_add(residuals);
+    /// The same with this many outputs, and past residuals.
+    pub(crate) const fn fits_with(orders: &ArxOrders<'_>, outputs: usize, residuals: usize) -> bool {
+        let parameters = orders.parameters_of(outputs).saturating_add(residuals);
         let exact = match N::SIZE {
             Some(size) => size == parameters,
             None => true,
@@ -180,12 +203,17 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
 
     /// The same with one more line after all others, for `residuals` past residuals.
     pub(crate) fn with_residuals(orders: &ArxOrders<'_>, residuals: usize) -> Result<Self, Error> {
-        let needed = orders.parameters().saturating_add(residuals);
+        Self::of(orders, 1, residuals)
+    }
+
+    fn of(orders: &ArxOrders<'_>, outputs: usize, residuals: usize) -> Result<Self, Error> {
+        let needed = orders.parameters_of(outputs).saturating_add(residuals);
         let parameters = N::exactly(needed).map_err(|available| Error::Orders { needed, available })?;
         let delays = D::at_least(orders.delays())
             .map_err(|available| Error::Delays { needed: orders.delays(), available })?;
         let mut lines = parameters.vector(Line { index: 0, nb: 0, nk: 0 });
         let others = [usize::from(orders.constant), residuals].map(|nb| InputOrders { nb, nk: 0 });
+        let available = usize::from(u16::MAX);
         let mut places = lines.as_mut_slice().iter_mut();
         for (index, orders) in orders.inputs.iter().chain(&others).enumerate() {
             if orders.nb > 0
@@ -198,7 +226,12 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
             regressor: parameters.vector(T::NAN),
             delayed: delays.vector(T::NAN),
             lines,
-            na: orders.na,
+            na: narrow(orders.na).ok_or(Error::Orders { needed: orders.na, available })?,
+            outputs: narrow(outputs).ok_or(Error::Length {
+                argument: "outputs",
+                expected: available,
+                found: outputs,
+            })?,
             inputs: orders.inputs.len(),
             awaiting_inputs: false,
         };
@@ -234,7 +267,8 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
     /// The same with the inputs as a function of their index.
     #[inline(always)]
     pub(crate) fn push_each(&mut self, input_of: impl Fn(usize) -> T, residual: T) {
-        let mut taps = self.regressor.as_mut_slice().get_mut(self.na..).unwrap_or_default();
+        let past_outputs = self.past_outputs();
+        let mut taps = self.regressor.as_mut_slice().get_mut(past_outputs..).unwrap_or_default();
         let mut delayed = self.delayed.as_mut_slice();
         for line in in_use(self.lines.as_slice()) {
             let newest = match line.source(self.inputs) {
@@ -301,13 +335,32 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
         if is_infinite(&output) {
             return Err(Error::Infinite { argument: "output" });
         }
-        self.push_checked(output);
+        check_length("outputs", self.outputs(), 1)?;
+        self.push_checked(&[output]);
+        Ok(())
+    }
+
+    /// The same with a number for each of several outputs.
+    ///
+    /// Errors, after which nothing has changed: [`Error::Length`] if the number of outputs is not that of the lines;
+    /// [`Error::Infinite`].
+    pub fn push_outputs(&mut self, outputs: &[T]) -> Result<(), Error> {
+        check_length("outputs", self.outputs(), outputs.len())?;
+        if outputs.iter().any(is_infinite) {
+            return Err(Error::Infinite { argument: "outputs" });
+        }
+        self.push_checked(outputs);
         Ok(())
     }
 
     /// Step 3 of a sample, unchecked.
-    pub(crate) fn push_checked(&mut self, output: T) {
-        shift(take(&mut self.regressor.as_mut_slice(), self.na), -output);
+    #[inline(always)]
+    pub(crate) fn push_checked(&mut self, outputs: &[T]) {
+        let na = self.na.into();
+        let mut taps = self.regressor.as_mut_slice();
+        for &output in outputs {
+            shift(take(&mut taps, na), -output);
+        }
     }
 
     /// Takes over the samples of other lines of the same orders.
@@ -323,15 +376,19 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
             .iter_mut()
             .zip(other.lines.as_slice())
             .for_each(|(line, &other)| *line = other);
-        (self.na, self.inputs, self.awaiting_inputs) = (other.na, other.inputs, other.awaiting_inputs);
+        (self.na, self.outputs, self.inputs) = (other.na, other.outputs, other.inputs);
+        self.awaiting_inputs = other.awaiting_inputs;
         Ok(())
     }
 
-    /// The typical magnitude of each element of φ, given that of the output, of each input and of the residuals.
-    pub(crate) fn scales(&self, output: T, inputs: &[T], residual: T) -> Result<OVector<T, N>, Error> {
+    /// The typical magnitude of each element of φ, given that of each output, of each input and of the residuals.
+    pub(crate) fn scales(&self, outputs: &[T], inputs: &[T], residual: T) -> Result<OVector<T, N>, Error> {
         check_length("input_scales", self.inputs, inputs.len())?;
-        let mut scales = self.regressor.shape_generic().0.vector(output);
-        let mut taps = scales.as_mut_slice().get_mut(self.na..).unwrap_or_default();
+        let mut scales = self.regressor.shape_generic().0.vector(T::NAN);
+        let mut taps = scales.as_mut_slice();
+        for &output in outputs {
+            take(&mut taps, self.na.into()).fill(output);
+        }
         for line in in_use(self.lines.as_slice()) {
             let magnitude = match line.source(self.inputs) {
                 Source::Input(input) => inputs.get(input).copied().unwrap_or(T::NAN),
@@ -355,7 +412,7 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
 
     /// Which input an element of φ is of; `None` for an output, and for what is neither.
     pub(crate) fn input_of(&self, element: usize) -> Option<usize> {
-        let mut place = element.checked_sub(self.na)?;
+        let mut place = element.checked_sub(self.past_outputs())?;
         for line in in_use(self.lines.as_slice()) {
             match place.checked_sub(line.nb.into()) {
                 Some(further) => place = further,
@@ -370,12 +427,34 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
         self.inputs
     }
 
+    /// The number of outputs.
+    pub(crate) fn outputs(&self) -> usize {
+        self.outputs.into()
+    }
+
+    /// How many elements of φ are of past outputs.
+    fn past_outputs(&self) -> usize {
+        usize::from(self.na).saturating_mul(self.outputs.into())
+    }
+
     /// The coefficients of A(q), the leading 1 included, among parameters in the order of φ.
     pub(crate) fn output_coefficients<'a>(
         &self,
         parameters: &'a [T],
     ) -> impl Iterator<Item = T> + Clone + use<'a, T, N, D> {
-        core::iter::once(T::one()).chain(parameters.iter().take(self.na).copied())
+        self.coefficients_of(parameters, 0, T::one())
+    }
+
+    /// What multiplies an output in an equation whose parameters these are, after this coefficient of its latest value.
+    pub(crate) fn coefficients_of<'a>(
+        &self,
+        parameters: &'a [T],
+        output: usize,
+        leading: T,
+    ) -> impl Iterator<Item = T> + Clone + use<'a, T, N, D> {
+        let na = self.na.into();
+        let past = parameters.iter().skip(output.saturating_mul(na)).take(na);
+        core::iter::once(leading).chain(past.copied())
     }
 
     /// The coefficients of B(q) of an input, its nk leading zeros included; `None` if there is no such input.
@@ -387,7 +466,7 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
         if input >= self.inputs {
             return None;
         }
-        let mut start = self.na;
+        let mut start = self.past_outputs();
         for line in in_use(self.lines.as_slice()) {
             if usize::from(line.index) == input {
                 return Some(coefficients(parameters, start, line.nb.into(), line.nk.into()));
@@ -404,7 +483,7 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
 
     /// Where φ holds the 1 of the constant.
     fn constant_place(&self) -> Option<usize> {
-        let mut start = self.na;
+        let mut start = self.past_outputs();
         for line in in_use(self.lines.as_slice()) {
             if line.source(self.inputs) == Source::Constant {
                 return Some(start);
@@ -453,6 +532,11 @@ fn coefficients<T: Real>(
     zeros: usize,
 ) -> impl Iterator<Item = T> + Clone + use<'_, T> {
     core::iter::repeat_n(T::zero(), zeros).chain(parameters.iter().skip(start).take(count).copied())
+}
+
+/// A count of the few bytes that it takes.
+fn narrow(count: usize) -> Option<u16> {
+    u16::try_from(count).ok()
 }
 
 /// The lines in use: they come first.

@@ -6,6 +6,7 @@
 //! |---|---|
 //! | [`RecursiveArx`], [`RecursiveArmax`] | from what is measured and applied, call by call; predict some samples ahead |
 //! | [`RecursiveNarx`] | the same for a weighted sum of functions of lags, a [`Polynomial`], [`Radial`], [`Spline`] or [`Local`] [`Basis`] |
+//! | [`RecursiveVectorArx`] | an ARX model with several outputs, each of which depends on the past of all |
 //! | [`RecursiveLeastSquares`] | from any regressors; [`Forgetting`] policies that stay bounded, three ways to [`RlsStart`] |
 //! | [`LeastSquares`] | all rows at once: merges with others, says which columns are at fault |
 //! | [`NonlinearArx`] | a stored nonlinear model: predicts, and gives its slopes for an extended Kalman filter |
@@ -136,6 +137,7 @@ mod state_space;
 mod textbook;
 mod triangle;
 mod ud;
+mod vector_arx;
 
 pub use nalgebra;
 
@@ -172,3 +174,4 @@ pub use smoother::{Smoothed, Smoother};
 pub use snapshot::SnapshotVersion;
 pub use solution::Solution;
 pub use state_space::{LinearObservation, LinearTransition, Observation, Transition};
+pub use vector_arx::RecursiveVectorArx;

@@ -175,7 +175,7 @@ impl<T: Real, B: Basis<T>, Z: Dimension, D: Dimension> NonlinearArx<T, B, Z, D> 
         self.lags.push_each(scaled(&self.inputs, inputs), T::NAN);
         let learned = self.lags.regressor().map(|z| learn(&self.basis, z.as_slice(), output));
         // Delay lines take outputs with the other sign.
-        self.lags.push_checked(-output);
+        self.lags.push_checked(&[-output]);
         self.lags.await_inputs(inputs_follow);
         learned
     }
@@ -225,7 +225,7 @@ impl<T: Real, B: Basis<T>, Z: Dimension, D: Dimension> NonlinearArx<T, B, Z, D> 
             let predicted = value.map(|value| self.output.undo(value));
             grown = predicted.is_some_and(|predicted| !predicted.is_finite());
             *output = predicted.filter(|_| !grown).unwrap_or(T::NAN);
-            workspace.push_checked(-value.unwrap_or(T::NAN));
+            workspace.push_checked(&[-value.unwrap_or(T::NAN)]);
         }
         if grown { Err(Error::Overflow) } else { Ok(()) }
     }

@@ -12,7 +12,7 @@ use thetahat_core::{
     Action, ArmaxMethod, ArmaxOrders, ArxOrders, Basis, ChangeDetector, Covariance, ExtendedKalmanFilter,
     Forgetting, GainSchedule, Innovation, InputOrders, KalmanFilter, Lags, LeastSquares, LinearObservation,
     LinearTransition, LuenbergerObserver, RecursiveArmax, RecursiveArx, RecursiveLeastSquares, RecursiveNarx,
-    RlsStart, Scaling,
+    RecursiveVectorArx, RlsStart, Scaling,
 };
 
 const INPUTS: &[InputOrders] = &[InputOrders { nb: 1, nk: 2 }];
@@ -106,6 +106,12 @@ fn recursive_arx_and_armax() {
     let arx: RecursiveArx<f32, Const<2>, Const<2>> =
         RecursiveArx::new(&orders, 1.0, &[1.0], Forgetting::default()).unwrap();
     check(arx, |arx, k| (arx.log_row(output(k) as f32, &[value(k) as f32]), *arx.estimator().parameters()));
+    let several: RecursiveVectorArx<f64, Const<3>, Const<2>, Const<2>> =
+        RecursiveVectorArx::new(&orders, &Vector2::new(1.0, 2.0), &[1.0], Forgetting::default()).unwrap();
+    check(several, |several, k| {
+        let outputs = Vector2::new(output(k), value(3 * k + 1));
+        (several.log_row(&outputs, &[value(k)]), *several.estimator().parameters())
+    });
     for method in [ArmaxMethod::ExtendedLeastSquares, ArmaxMethod::PredictionError] {
         let orders = ArmaxOrders { na: 1, inputs: INPUTS, nc: 1, constant: false };
         let armax: RecursiveArmax<f64, Const<3>, Const<2>> =
@@ -357,7 +363,13 @@ fn what_no_constructor_makes_is_refused() {
         RecursiveArx::new(&orders, 1.0, &[1.0], Forgetting::default()).unwrap();
     let other = serde_json::to_value(&armax).unwrap();
     refuses(&arx, &[("/lags", &[other["lags"].clone()]), ("/estimator", &[other["estimator"].clone()])]);
-    refuses(arx.lags(), &[("/regressor", &[json!([3, 1, [0.0, 0.0, 0.0]])])]);
+    refuses(
+        arx.lags(),
+        &[("/regressor", &[json!([3, 1, [0.0, 0.0, 0.0]])]), ("/outputs", &[json!(0), json!(2)])],
+    );
+    let several: RecursiveVectorArx<f64, Dyn, Dyn, Dyn> =
+        RecursiveVectorArx::new(&orders, &DVector::repeat(2, 1.0), &[1.0], Forgetting::default()).unwrap();
+    refuses(&several, &[("/lags", &[serde_json::to_value(arx.lags()).unwrap()])]);
 
     let prior = Covariance::new(&Matrix2::new(4.0, 1.0, 1.0, 2.0)).unwrap();
     let filter: KalmanFilter<f64, Const<2>> = KalmanFilter::new(Vector2::zeros(), prior.clone()).unwrap();

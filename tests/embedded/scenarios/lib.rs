@@ -71,6 +71,7 @@ pub fn visit_all(visitor: &mut impl Visitor) {
     visitor.visit::<recursive::Recursive<8>>();
     visitor.visit::<recursive::Recursive<16>>();
     visitor.visit::<recursive::Arx>();
+    visitor.visit::<recursive::VectorArx>();
     visitor.visit::<recursive::Armax>();
     visitor.visit::<nonlinear::Narx>();
     visitor.visit::<nonlinear::Stored<Polynomial<'static>>>();

@@ -1,9 +1,9 @@
 //! Recursive least squares, alone and fed by delay lines.
 
-use thetahat_core::nalgebra::{Const, SVector};
+use thetahat_core::nalgebra::{Const, SVector, Vector2};
 use thetahat_core::{
     Action, ArmaxMethod, ArmaxOrders, ArxOrders, Error, Forgetting, Innovation, InputOrders, RecursiveArmax,
-    RecursiveArx, RecursiveLeastSquares,
+    RecursiveArx, RecursiveLeastSquares, RecursiveVectorArx,
 };
 
 use crate::record::{Sample, regressor, sample};
@@ -70,6 +70,43 @@ impl Scenario for Arx {
         recursive_numbers(self.0.estimator(), innovation, number);
         let mut ahead = [0.0; 3];
         if self.0.predict(&[1.0, 0.0, 0.0], &mut ahead).is_ok() {
+            ahead.into_iter().for_each(number);
+        }
+    }
+}
+
+/// An ARX(2, 2) model with two outputs, one sample in: the plant's, and that of five samples later in the record.
+pub(crate) struct VectorArx(RecursiveVectorArx<f32, Const<6>, Const<2>>);
+
+impl Scenario for VectorArx {
+    const NAME: &'static str = "RecursiveVectorArx, 2 outputs";
+    const DETOUR: bool = true;
+    type Input = (Vector2<f32>, f32);
+    type Output = Innovation<f32, Vector2<f32>>;
+
+    fn start(_: Case) -> Result<Self, Error> {
+        let orders = ArxOrders { na: 2, inputs: INPUTS, constant: false };
+        RecursiveVectorArx::new(&orders, &Vector2::new(1.0, 1.0), &[1.0], FORGETTING).map(VectorArx)
+    }
+
+    fn input(case: Case, k: usize) -> Self::Input {
+        let first = sample(case, k, 0);
+        (Vector2::new(first.y, sample(case, k, 5).y), first.u)
+    }
+
+    #[inline(never)]
+    fn step(&mut self, (outputs, input): &Self::Input) -> Result<Self::Output, Error> {
+        self.0.log_row(outputs, &[*input])
+    }
+
+    fn numbers(&self, innovation: &Self::Output, number: &mut impl FnMut(f32)) {
+        let estimator = self.0.estimator();
+        estimator.parameters().iter().copied().for_each(&mut *number);
+        innovation.error.iter().chain(&innovation.variance).copied().for_each(&mut *number);
+        number(innovation.nis);
+        number(estimator.excitation());
+        let mut ahead = [0.0; 4];
+        if self.0.predict(&[1.0, 0.0], &mut ahead).is_ok() {
             ahead.into_iter().for_each(number);
         }
     }

@@ -39,7 +39,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> TryFrom<Snapshot
     fn try_from(read: Snapshot<T, N, D>) -> Result<Self, Error> {
         let Snapshot { version: _, lags, estimator, gradients, residual, nc, method } = read;
         let size = estimator.parameters().shape_generic().0;
-        lags.check_residuals(size.value(), nc)?;
+        lags.check_counts(size.value(), 1, nc)?;
         check_entries("gradients", gradients.as_slice(), size.value() * size.value())?;
         check_finite("residual", &[residual])?;
         let scratch = size.scratch::<T, 2, 0>();

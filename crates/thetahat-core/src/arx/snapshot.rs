@@ -29,7 +29,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> TryFrom<Snapshot
 
     fn try_from(read: Snapshot<T, N, D>) -> Result<Self, Error> {
         let Snapshot { version: _, lags, estimator } = read;
-        lags.check_residuals(estimator.parameters().len(), 0)?;
+        lags.check_counts(estimator.parameters().len(), 1, 0)?;
         Ok(RecursiveArx { lags, estimator })
     }
 }

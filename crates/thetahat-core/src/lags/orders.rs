@@ -45,7 +45,20 @@ pub struct ArxOrders<'a> {
 impl ArxOrders<'_> {
     /// The number of parameters: na plus every nb, plus 1 with a constant.
     pub const fn parameters(&self) -> usize {
-        let mut sum = self.na.saturating_add(self.constant as usize);
+        self.parameters_of(1)
+    }
+
+    /// The number of parameters of each equation with this many outputs, when each depends on the past of all: na times
+    /// the outputs plus every nb, plus 1 with a constant.
+    ///
+    /// ```
+    /// use thetahat_core::{ArxOrders, InputOrders};
+    ///
+    /// let orders = ArxOrders { na: 2, inputs: &[InputOrders { nb: 3, nk: 1 }], constant: true };
+    /// assert_eq!(orders.parameters_of(2), 2 * 2 + 3 + 1);
+    /// ```
+    pub const fn parameters_of(&self, outputs: usize) -> usize {
+        let mut sum = self.na.saturating_mul(outputs).saturating_add(self.constant as usize);
         let mut inputs = self.inputs;
         while let [first, rest @ ..] = inputs {
             sum = sum.saturating_add(first.nb);

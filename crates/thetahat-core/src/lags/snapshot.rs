@@ -31,22 +31,30 @@ pub(super) struct Snapshot<T: Real, N: Dimension, D: Dimension> {
     delayed: OVector<T, D>,
     #[serde(with = "vector")]
     lines: OVector<Line, N>,
-    na: usize,
+    na: u16,
+    outputs: u16,
     inputs: usize,
     awaiting_inputs: bool,
 }
 
 impl<T: Real, N: Dimension, D: Dimension> From<Lags<T, N, D>> for Snapshot<T, N, D> {
     fn from(lags: Lags<T, N, D>) -> Self {
-        let Lags { regressor, delayed, lines, na, inputs, awaiting_inputs } = lags;
-        Snapshot { version: SnapshotVersion, regressor, delayed, lines, na, inputs, awaiting_inputs }
+        let Lags { regressor, delayed, lines, na, outputs, inputs, awaiting_inputs } = lags;
+        Snapshot { version: SnapshotVersion, regressor, delayed, lines, na, outputs, inputs, awaiting_inputs }
     }
 }
 
 impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
-    /// That they make this many parameters, of which the last `residuals` are those of past residuals.
-    pub(crate) fn check_residuals(&self, parameters: usize, residuals: usize) -> Result<(), Error> {
+    /// That they are of this many outputs, and make this many parameters, of which the last `residuals` are those of past
+    /// residuals.
+    pub(crate) fn check_counts(
+        &self,
+        parameters: usize,
+        outputs: usize,
+        residuals: usize,
+    ) -> Result<(), Error> {
         check_length("lags", parameters, self.regressor.len())?;
+        check_length("outputs", outputs, self.outputs())?;
         let of_residuals = |line: &&Line| line.nb > 0 && line.source(self.inputs) == Source::Residual;
         let line = self.lines.as_slice().iter().find(of_residuals);
         check_length("residuals", residuals, line.map_or(0, |line| line.nb.into()))
@@ -57,7 +65,7 @@ impl<T: Real, N: Dimension, D: Dimension> TryFrom<Snapshot<T, N, D>> for Lags<T,
     type Error = Error;
 
     fn try_from(read: Snapshot<T, N, D>) -> Result<Self, Error> {
-        let Snapshot { version: _, regressor, delayed, lines, na, inputs, awaiting_inputs } = read;
+        let Snapshot { version: _, regressor, delayed, lines, na, outputs, inputs, awaiting_inputs } = read;
         check_length("lines", regressor.len(), lines.len())?;
         for (argument, samples) in [("regressor", regressor.as_slice()), ("delayed", delayed.as_slice())] {
             if samples.iter().any(is_infinite) {
@@ -65,7 +73,8 @@ impl<T: Real, N: Dimension, D: Dimension> TryFrom<Snapshot<T, N, D>> for Lags<T,
             }
         }
         // Those in use come first, in the order of their indices.
-        let (mut parameters, mut delays, mut next) = (na, 0_usize, Some(0));
+        let (mut parameters, mut delays, mut next) =
+            (usize::from(na).saturating_mul(outputs.into()), 0_usize, Some(0));
         for line in lines.as_slice() {
             let fits = match next {
                 Some(least) if line.nb > 0 => {
@@ -90,7 +99,7 @@ impl<T: Real, N: Dimension, D: Dimension> TryFrom<Snapshot<T, N, D>> for Lags<T,
         if delays > delayed.len() {
             return Err(Error::Delays { needed: delays, available: delayed.len() });
         }
-        let lags = Lags { regressor, delayed, lines, na, inputs, awaiting_inputs };
+        let lags = Lags { regressor, delayed, lines, na, outputs, inputs, awaiting_inputs };
         if awaiting_inputs {
             lags.check_delays()?;
         }

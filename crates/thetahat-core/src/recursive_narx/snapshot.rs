@@ -55,7 +55,7 @@ impl<T: Real, B: Basis<T>, Z: Dimension, N: Dimension + Dimension<Const<1>>, D: 
         let Snapshot { version: _, basis, output: (offset, scale), inputs, lags, estimator } = read;
         let output = Scaling { offset, scale };
         let size = lags.size().value();
-        lags.check_residuals(size, 0)?;
+        lags.check_counts(size, 1, 0)?;
         basis.check(size)?;
         check_length("inputs", size, inputs.len())?;
         check_length("basis", estimator.parameters().len(), basis.functions())?;

@@ -226,14 +226,14 @@ pub fn compare_signals(options: &[OsString], model: &Model) -> Result<Experiment
 pub fn track(
     options: &[OsString],
     inputs: Vec<String>,
-    output: String,
+    outputs: Vec<String>,
     report: Option<&Report>,
 ) -> Result<Tracking, Failure> {
     // The name stands for the report in messages.
     let warm = report.map(|_| "--warm=warm");
     let words: Vec<OsString> =
         options.iter().cloned().chain(warm.into_iter().chain(["log"]).map(OsString::from)).collect();
-    Tracking::new(&arguments("track", &words)?, inputs, output, report)
+    Tracking::new(&arguments("track", &words)?, inputs, outputs, report)
 }
 
 /// Writes a file as the program does: whole, or not at all.

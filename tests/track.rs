@@ -334,6 +334,92 @@ fn refused(folder: &Folder, line: &str, code: i32) -> String {
     stderr.lines().find(|line| line.starts_with("error: ")).expect("it says why").to_owned()
 }
 
+/// Two outputs that feed each other, of two inputs, and some noise.
+fn two_outputs(samples: usize) -> String {
+    let [u1, u2, e1] = two_inputs(samples);
+    let e2: Vec<f64> = Random::new(9).signal(samples);
+    let (mut y1, mut y2) = (vec![0.0; samples], vec![0.0; samples]);
+    for t in 1..samples {
+        y1[t] = 0.8 * y1[t - 1] - 0.1 * y2[t - 1] + u1[t - 1] + 0.02 * e1[t];
+        y2[t] = 0.3 * y1[t - 1] + 0.6 * y2[t - 1] - u2[t - 1] + 0.05 * e2[t];
+    }
+    csv(&[("u1", &u1), ("u2", &u2), ("y1", &y1), ("y2", &y2)])
+}
+
+#[test]
+fn several_outputs_end_at_the_batch_fit() {
+    let folder = Folder::with_log(two_outputs(1500));
+    let batch = folder.fit("log.csv -y y1,y2 --na 2 --nb 2 --couple full --detrend none --constant no");
+    let outcome = &batch["estimation"];
+    let line = "log.csv -y y1,y2 --na 2 --nb 2 --forgetting 1,0.99 --start exact --every 1500 --horizon 4";
+    let lines = tracked(&folder, line);
+    let told: Vec<(&Value, &Value)> =
+        lines.iter().map(|line| (&line["forgetting"], &line["output"])).collect();
+    let (none, short) = (&"none".into(), &"exponential:0.99".into());
+    let (y1, y2) = (&"y1".into(), &"y2".into());
+    assert_eq!(told, [(none, y1), (none, y2), (short, y1), (short, y2)]);
+    for (row, line) in lines[..2].iter().enumerate() {
+        for lag in 1..=2 {
+            for output in 0..2 {
+                let of_batch = number(outcome, &format!("/a/{}/{row}/{output}/value", lag - 1));
+                let found = number(line, &format!("/a{}_{lag}", output + 1));
+                assert!((found - of_batch).abs() < 1e-9, "{line}");
+            }
+            for input in 0..2 {
+                let of_batch = number(outcome, &format!("/b/{input}/{}/{row}/value", lag - 1));
+                let found = number(line, &format!("/b{}_{lag}", input + 1));
+                assert!((found - of_batch).abs() < 1e-9, "{line}");
+            }
+        }
+    }
+    // With the same forecast as the model's, whose inputs are held.
+    assert!(lines.iter().all(|line| line["forecast"].is_f64()));
+
+    // Without coupling each output is tracked as if it were alone.
+    let apart = "--na 2 --nb 2 --forgetting 0.98 --every 1500";
+    let both = tracked(&folder, &format!("log.csv -y y1,y2 --couple none {apart}"));
+    for (name, mine) in ["y1", "y2"].into_iter().zip(&both) {
+        let alone = tracked(&folder, &format!("log.csv -y {name} {apart}")).remove(0);
+        for (key, value) in alone.as_object().expect("an object") {
+            assert_eq!(&mine[key], value, "{key}");
+        }
+    }
+}
+
+#[test]
+fn several_outputs_go_on_from_a_state() {
+    let log = two_outputs(400);
+    let folder = Folder::with_log(log.clone());
+    let options = "-y y1,y2 --na 1 --nb 1 --forgetting none,0.98 --alarm 500 --horizon 2 --constant";
+    let whole = folder.done(&format!("track log.csv {options} --state whole.json --summary whole.summary"));
+    assert!(whole.stderr.contains("exponential:0.98      y2"), "{}", whole.stderr);
+    let head: String = log.split_inclusive('\n').take(201).collect();
+    folder.write("log.csv", head.as_bytes());
+    let first = folder.done(&format!("track log.csv {options} --state half.json"));
+    folder.write("log.csv", log.as_bytes());
+    let second = folder.done(&format!("track log.csv {options} --state half.json --summary half.summary"));
+    assert_eq!(first.stdout + &second.stdout, whole.stdout);
+    assert_eq!(folder.read("half.json"), folder.read("whole.json"));
+    assert_eq!(folder.read("half.summary"), folder.read("whole.summary"));
+    // Other options are another model.
+    let other = options.replace("--horizon 2", "--horizon 2 --couple none");
+    assert!(folder.run(&format!("track log.csv {other} --state half.json")).code == 3);
+}
+
+#[test]
+fn several_outputs_are_refused_where_a_model_has_one() {
+    let folder = Folder::with_log(two_outputs(50));
+    let usage = |line: &str| refused(&folder, &format!("log.csv {line}"), 2);
+    assert!(usage("-y y1,y2 --na 1 --nb 1 --nc 1").contains("--nc: several outputs are tracked as ARX"));
+    assert!(usage("-y y1,y2 --narx poly").contains("--narx: several outputs"));
+    assert!(usage("-y y1,y1 --na 1 --nb 1").contains("'y1' is named twice"));
+    assert!(usage("-y y1 --na 1 --nb 1 --couple full").contains("--couple is for several outputs"));
+    assert!(usage("-y y1,y2 --na 1 --nb 1 --couple auto").contains("'auto' is neither full nor none"));
+    assert!(usage("-y y1,y2 --na 1 --nb 1 --scale y1=1").contains("has none; give one for each channel"));
+    folder.done("fit log.csv -y y1 --na 1 --nb 1 --report report.json");
+    assert!(usage("-y y1,y2 --warm report.json").contains("--warm: several outputs"));
+}
+
 #[test]
 fn bad_options_and_logs_are_refused() {
     let folder = Folder::with_log("u,y\n1,2\n2,3\n");

@@ -16,9 +16,9 @@ pub(crate) struct TrackArguments {
     /// Input columns; a name that holds a comma stands between double quotes, as in CSV [default: u, u1, u2, …; those of --warm]
     #[arg(short = 'u', long, value_name = "NAME[,NAME…]", help_heading = "Channels")]
     pub(crate) input: Vec<Names>,
-    /// Output column [default: y; that of --warm]
-    #[arg(short = 'y', long, value_name = "NAME", help_heading = "Channels")]
-    pub(crate) output: Option<String>,
+    /// Output columns; with --model arx more than one, an equation for each [default: y; that of --warm]
+    #[arg(short = 'y', long, value_name = "NAME[,NAME…]", help_heading = "Channels")]
+    pub(crate) output: Vec<Names>,
     /// Subtract this from a channel [default: 0; the offsets of --warm]
     #[arg(long, value_name = "NAME=VALUE", help_heading = "Channels")]
     pub(crate) offset: Vec<String>,
@@ -33,6 +33,9 @@ pub(crate) struct TrackArguments {
     /// Coefficients of A: past outputs
     #[arg(long, value_name = "N", help_heading = "Model")]
     pub(crate) na: Option<usize>,
+    /// Which past outputs an output depends on, where there are several: full, those of all; none, its own [default: full]
+    #[arg(long, value_name = "full|none", conflicts_with = "narx", help_heading = "Model")]
+    pub(crate) couple: Option<String>,
     /// Coefficients of B: inputs; one value for each input or one for all, 0 for a model without inputs
     #[arg(long, value_name = "N[,…]", value_delimiter = ',', help_heading = "Model")]
     pub(crate) nb: Vec<usize>,

@@ -26,7 +26,7 @@ use crate::output;
 use crate::replace::Held;
 use crate::wrap::{WIDTH, stderr_width};
 use columns::Columns;
-use session::{Row, Session};
+use session::{Memory, Row, Session};
 use state::{Place, RowPlace, State};
 
 pub use tracking::{TrackedRow, Tracking};
@@ -89,8 +89,7 @@ struct Run<'a> {
     place: Place,
     /// The state's file, which no other run may write meanwhile.
     state_file: Option<Held>,
-    /// Memory for standard errors.
-    deviations: Vec<f64>,
+    memory: Memory,
 }
 
 impl<'a> Run<'a> {
@@ -106,23 +105,29 @@ impl<'a> Run<'a> {
         let (stream, words) = log::follow(&job.path, &job.log, job.state.is_some(), start, |header| {
             let channels = channels::choose(job, report, header)
                 .map_err(|message| Failure::data(format!("{name}: {message}")))?;
-            let names = channels.inputs.iter().chain([&channels.output]).cloned().collect();
+            let names = channels.inputs.iter().chain(&channels.outputs).cloned().collect();
             chosen = Some(channels);
             Ok(names)
         })?;
         let channels = chosen.unwrap_or_default();
-        let trackers = job.trackers(&channels.inputs, &channels.output, report)?;
+        let trackers = job.trackers(&channels.inputs, &channels.outputs, report)?;
         let has_clock = matches!(job.log.clock, Clock::Column { .. });
-        let columns = Columns::new(has_clock, job.horizon, &trackers);
         let setting = state::setting(job, &channels, &trackers);
         let resumed = stored.is_some();
         let state = match stored {
             Some(state) => state.checked(&setting, &trackers, job)?,
             None => {
                 let sample_time = job.sample_time.or(report.map(|report| report.model.sample_time()));
-                State::new(setting, trackers, stream.start().map(str::to_owned), sample_time)
+                State::new(
+                    setting,
+                    &channels.outputs,
+                    trackers,
+                    stream.start().map(str::to_owned),
+                    sample_time,
+                )
             }
         };
+        let columns = Columns::new(has_clock, job.horizon, &state.outputs, &state.trackers);
         let place = match &job.state {
             Some(state_job) if resumed => Place::resumed(state_job.resume, &job.path),
             _ => Place::There,
@@ -139,7 +144,7 @@ impl<'a> Run<'a> {
             LineWriter::create(&job.lines.out, job.lines.format, columns.names())?
         };
         words.iter().for_each(|word| warn(word));
-        let parameters = state.trackers.first().map_or(0, |tracker| tracker.names().len());
+        let memory = Memory::of(&state.trackers);
         Ok(Self {
             job,
             live: Live::new(stream, &name, job.lines.strict),
@@ -152,7 +157,7 @@ impl<'a> Run<'a> {
             midway: false,
             place,
             state_file,
-            deviations: vec![f64::NAN; parameters],
+            memory,
         })
     }
 
@@ -197,7 +202,7 @@ impl<'a> Run<'a> {
 
     /// Takes in the row at hand; says whether there was an alarm.
     fn row(&mut self, after_gap: bool) -> Result<bool, Failure> {
-        let Self { job, name, live, lines, columns, state, unsaved, deviations, .. } = self;
+        let Self { job, name, live, lines, columns, state, unsaved, memory, .. } = self;
         *unsaved = true;
         let row = Row {
             values: live.values(),
@@ -206,7 +211,7 @@ impl<'a> Run<'a> {
             has_clock: live.has_clock(),
             after_gap,
         };
-        let mut session = Session { every: job.lines.every, columns, state, lines, deviations };
+        let mut session = Session { every: job.lines.every, details: false, columns, state, lines, memory };
         session.row(&row, || format!("{name}:{}", live.line()), |_| ())
     }
 

@@ -1,5 +1,6 @@
 use std::path::{Path, PathBuf};
 
+use thetahat::estimate::Coupling;
 use thetahat::model::{Map, Model, Orders, Signal};
 use thetahat::report::Report;
 use thetahat::track::{PerChannel, Policy, TrackMethod, TrackPlan, Tracker};
@@ -20,8 +21,8 @@ pub(crate) struct TrackJob {
     pub(crate) sample_time: Option<f64>,
     /// Named inputs; none: those of the report, or those called u, u1, u2, …
     pub(crate) inputs: Option<Vec<String>>,
-    /// The named output; none: that of the report, or y.
-    pub(crate) output: Option<String>,
+    /// Named outputs; none: that of the report, or y.
+    pub(crate) outputs: Option<Vec<String>>,
     pub(crate) warm: Option<PathBuf>,
     pub(crate) lines: LineJob,
     /// How many rows ahead a forecast is, if it was asked for.
@@ -32,6 +33,8 @@ pub(crate) struct TrackJob {
     offsets: Vec<(String, f64)>,
     scales: Vec<(String, f64)>,
     orders: Given,
+    /// Which past outputs each of several depends on.
+    coupling: Option<Coupling>,
     /// The degree of the products of lags, of a nonlinear model.
     degree: Option<usize>,
     method: Option<TrackMethod>,
@@ -130,7 +133,7 @@ impl TrackJob {
             log,
             sample_time,
             inputs: Names::all(&arguments.input),
-            output: arguments.output.clone(),
+            outputs: Names::all(&arguments.output),
             warm: arguments.warm.clone(),
             lines: LineJob::resolve(&arguments.lines),
             horizon: arguments.horizon.map(|rows| rows as usize),
@@ -144,6 +147,7 @@ impl TrackJob {
             offsets: named_values("--offset", &arguments.offset)?,
             scales: named_values("--scale", &arguments.scale)?,
             orders,
+            coupling: arguments.couple.as_deref().map(|text| coupling(text)).transpose()?,
             degree: arguments.narx.map(|_| arguments.degree.unwrap_or(2)),
             method: arguments.method.map(|method| match method {
                 TrackMethodArgument::Rls => TrackMethod::Rls,
@@ -165,14 +169,15 @@ impl TrackJob {
         self.plan.alarm_interval.is_some()
     }
 
-    /// A tracker for each policy.
+    /// Trackers for each policy: one for each output.
     pub(crate) fn trackers(
         &self,
         inputs: &[String],
-        output: &str,
+        outputs: &[String],
         report: Option<&Report>,
     ) -> Result<Vec<Tracker>, Failure> {
         let model = report.map(|report| &report.model);
+        self.check_outputs(outputs, report.is_some())?;
         let source = match report {
             Some(report) => Source::Report(report),
             None => {
@@ -191,7 +196,7 @@ impl TrackJob {
             None if noise > 0 => TrackMethod::Rpem,
             None => TrackMethod::Rls,
         };
-        let known = |name: &String| inputs.contains(name) || name == output;
+        let known = |name: &String| inputs.contains(name) || outputs.contains(name);
         for (option, values) in [("--offset", &self.offsets), ("--scale", &self.scales)] {
             if let Some((name, _)) = values.iter().find(|(name, _)| !known(name)) {
                 return Err(Failure::usage(format!("{option}: '{name}' is no channel of the model")));
@@ -200,40 +205,56 @@ impl TrackJob {
         let value = |values: &[(String, f64)], name: &str| {
             values.iter().find(|(other, _)| other == name).map(|(_, value)| *value)
         };
-        let offsets = (!self.offsets.is_empty()).then(|| {
+        // What each of several equations has of the outputs, as inputs in front of the others.
+        let coupled = if outputs.len() > 1 && self.coupling != Some(Coupling::None) { outputs } else { &[] };
+        let offsets = |output: &str| {
             let levels =
                 |signals: &[Signal], index: usize| signals.get(index).map(|signal| signal.offset.level);
             let level =
                 |name: &str, stored: Option<f64>| value(&self.offsets, name).or(stored).unwrap_or(0.0);
             let stored = |index: usize| model.and_then(|model| levels(model.inputs(), index));
-            PerChannel {
-                inputs: inputs.iter().enumerate().map(|(index, name)| level(name, stored(index))).collect(),
+            let of_inputs = inputs.iter().enumerate().map(|(index, name)| level(name, stored(index)));
+            (!self.offsets.is_empty()).then(|| PerChannel {
+                inputs: coupled.iter().map(|name| level(name, None)).chain(of_inputs).collect(),
                 output: level(output, model.and_then(|model| levels(model.outputs(), 0))),
-            }
-        });
+            })
+        };
         if let Some((name, scale)) = self.scales.iter().find(|(_, scale)| !(1e-98..=1e98).contains(scale)) {
             return Err(Failure::usage(format!(
                 "--scale {name}={scale}: give the typical magnitude of the channel, from 1e-98 to 1e98"
             )));
         }
-        let scale = |name: &str| {
+        let scale = |name: &str| -> Result<f64, Failure> {
             value(&self.scales, name).ok_or_else(|| {
                 Failure::usage(format!(
                     "--scale: '{name}' has none; give one for each channel, or none at all"
                 ))
             })
         };
-        let scales = (!self.scales.is_empty()).then(|| {
-            Ok::<_, Failure>(PerChannel {
-                inputs: inputs.iter().map(|name| scale(name)).collect::<Result<_, _>>()?,
-                output: scale(output)?,
-            })
-        });
-        let plan = TrackPlan { method, offsets, scales: scales.transpose()?, ..self.plan.clone() };
-        let track = |policy: &Policy| {
-            let plan = TrackPlan { forgetting: *policy, ..plan.clone() };
+        let scales = |output: &str| {
+            let of =
+                |names: &[String]| names.iter().map(|name| scale(name)).collect::<Result<Vec<_>, Failure>>();
+            let all = || {
+                Ok::<_, Failure>(PerChannel {
+                    inputs: [of(coupled)?, of(inputs)?].concat(),
+                    output: scale(output)?,
+                })
+            };
+            (!self.scales.is_empty()).then(all).transpose()
+        };
+        let track = |policy: &Policy, output: &String| {
+            let plan = TrackPlan {
+                forgetting: *policy,
+                method,
+                offsets: offsets(output),
+                scales: scales(output)?,
+                ..self.plan.clone()
+            };
             match &source {
                 Source::Report(report) => Tracker::from_report(report, &plan),
+                Source::Nothing(orders, None) if !coupled.is_empty() => {
+                    Tracker::coupled(orders, coupled.len(), &plan)
+                }
                 Source::Nothing(orders, None) => Tracker::new(orders, &plan),
                 Source::Nothing(orders, Some(map)) => {
                     Tracker::nonlinear(orders, map, &orders.lag_names(inputs, output), &plan)
@@ -247,8 +268,43 @@ impl TrackJob {
                 _ => Failure::option(&error),
             })
         };
-        self.policies.iter().map(track).collect()
+        let each = self.policies.iter().flat_map(|policy| outputs.iter().map(move |output| (policy, output)));
+        each.map(|(policy, output)| track(policy, output)).collect()
     }
+
+    /// That the model can have these outputs.
+    fn check_outputs(&self, outputs: &[String], warm: bool) -> Result<(), Failure> {
+        if outputs.is_empty() {
+            return Err(Failure::usage("--output: there is none; name one"));
+        }
+        if outputs.len() < 2 {
+            return match self.coupling {
+                None => Ok(()),
+                Some(_) => Err(Failure::usage(
+                    "--couple is for several outputs, such as --output y1,y2; leave it out",
+                )),
+            };
+        }
+        let option = if warm {
+            "--warm"
+        } else if self.degree.is_some() {
+            "--narx"
+        } else if self.orders.nc.is_some_and(|nc| nc > 0) {
+            "--nc"
+        } else {
+            return Ok(());
+        };
+        Err(Failure::usage(format!(
+            "{option}: several outputs are tracked as ARX models that start from nothing; leave it out, or track one output"
+        )))
+    }
+}
+
+/// Which past outputs each depends on, as it is written.
+fn coupling(text: &str) -> Result<Coupling, Failure> {
+    text.parse().map_err(|_| {
+        Failure::usage(format!("--couple: '{text}' is neither full nor none; give one of these"))
+    })
 }
 
 impl Given {

@@ -43,17 +43,17 @@ const COLUMNS: [&str; 8] =
 impl Tracker {
     /// A tracker with the options of `thetahat track` for these channels, from nothing or from a fitted model.
     #[new]
-    #[pyo3(signature = (options, inputs, output, report))]
+    #[pyo3(signature = (options, inputs, outputs, report))]
     fn new(
         py: Python<'_>,
         options: Vec<OsString>,
         inputs: Vec<String>,
-        output: String,
+        outputs: Vec<String>,
         report: Option<&Bound<'_, Model>>,
     ) -> PyResult<Self> {
         let report = report.map(|model| model.get().report(py)).transpose()?;
         let tracking = py
-            .detach(|| thetahat_cli::track(&options, inputs, output, report.as_deref()))
+            .detach(|| thetahat_cli::track(&options, inputs, outputs, report.as_deref()))
             .map_err(|failure| error::program(py, &failure))?;
         Ok(Self { tracking })
     }
@@ -81,8 +81,8 @@ impl Tracker {
         gaps: Vec<usize>,
         stop_on_alarm: bool,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let k = self.tracking.inputs().len();
-        let outputs = matrix("y", outputs, [None, Some(1)])?;
+        let (k, l) = (self.tracking.inputs().len(), self.tracking.outputs().len());
+        let outputs = matrix("y", outputs, [None, Some(l)])?;
         let rows = outputs.shape()[0];
         let outputs = outputs.as_slice()?;
         let inputs = if k == 0 { None } else { Some(matrix("u", inputs, [Some(rows), Some(k)])?) };
@@ -92,28 +92,29 @@ impl Tracker {
             None => (None, String::new(), None),
         };
         let seconds = seconds.as_ref().map(|seconds| seconds.as_slice()).transpose()?;
-        let mut values = reserve(&[rows, k + 1])?;
-        for (at, &output) in outputs.iter().enumerate() {
-            let inputs = row(inputs, at, k);
-            for (value, name) in inputs
-                .iter()
-                .zip(self.tracking.inputs())
-                .chain([(&output, &self.tracking.output().to_owned())])
-            {
+        let mut values = reserve(&[rows, k + l])?;
+        for at in 0..rows {
+            let (inputs, outputs) = (row(inputs, at, k), row(outputs, at, l));
+            let names = self.tracking.inputs().iter().chain(self.tracking.outputs());
+            for (value, name) in inputs.iter().chain(outputs).zip(names) {
                 if value.is_infinite() {
                     let message = format!("row {at}: '{name}' is infinite; NaN is a missing sample");
                     return Err(PyValueError::new_err(message));
                 }
             }
             values.extend_from_slice(inputs);
-            values.push(output);
+            values.extend_from_slice(outputs);
         }
 
-        let policies: Vec<Option<String>> = match self.tracking.trackers() {
-            [_] => vec![None],
-            several => several.iter().map(|tracker| Some(tracker.plan().forgetting.to_string())).collect(),
-        };
-        let (count, n) = (policies.len(), self.names().len());
+        // What an alarm is of, where there are several ways to forget, and several outputs.
+        let policies = self.policies();
+        let policies: Vec<Option<String>> =
+            if policies.len() == 1 { vec![None] } else { policies.into_iter().map(Some).collect() };
+        let of_output = |index: usize| self.tracking.outputs().get(index % l).filter(|_| l > 1).cloned();
+        let of_alarms: Vec<_> = (0..policies.len() * l)
+            .map(|index| (policies.get(index / l).cloned().flatten(), of_output(index)))
+            .collect();
+        let (count, n) = (of_alarms.len(), self.names().len());
         let (flat, deep) = (vec![rows, count], vec![rows, count, n]);
         let mut shapes = [const { Vec::new() }; 8];
         shapes[..6].fill(flat);
@@ -132,7 +133,7 @@ impl Tracker {
                     }
                     pulse.check()?;
                     let time = seconds.and_then(|seconds| seconds.get(at)).copied();
-                    let found = (row(&values, at, k + 1), time, gaps.contains(&at));
+                    let found = (row(&values, at, k + l), time, gaps.contains(&at));
                     at += 1;
                     Ok(Some(found))
                 };
@@ -156,7 +157,8 @@ impl Tracker {
                     codes.push(code(tracked.action));
                     too_large.push(tracked.too_large);
                     if let Some(given) = tracked.alarm {
-                        alarms.push(Alarm::of(given, index, policies.get(row.index).cloned().flatten()));
+                        let (policy, output) = of_alarms.get(row.index).cloned().unwrap_or_default();
+                        alarms.push(Alarm::of(given, index, policy, output));
                     }
                 };
                 self.tracking.rows(Some((&name, start)), next, &mut seen, stop_on_alarm)
@@ -231,7 +233,8 @@ impl Tracker {
     /// The ways to forget.
     #[getter]
     fn policies(&self) -> Vec<String> {
-        self.tracking.trackers().iter().map(|tracker| tracker.plan().forgetting.to_string()).collect()
+        let each = self.tracking.trackers().iter().step_by(self.tracking.outputs().len().max(1));
+        each.map(|tracker| tracker.plan().forgetting.to_string()).collect()
     }
 
     /// Structure and orders, such as ARX(2, 2, 1).
@@ -240,16 +243,18 @@ impl Tracker {
         self.tracking.trackers().first().map_or_else(String::new, thetahat::track::Tracker::model)
     }
 
-    /// What is taken from each channel, the output last.
+    /// What is taken from each channel, the outputs last.
     #[getter]
     fn offsets(&self) -> Vec<f64> {
-        self.tracking.trackers().first().map_or_else(Vec::new, |tracker| all(tracker.offsets()))
+        let each: Vec<_> = self.model().map(|tracker| (tracker, tracker.offsets())).collect();
+        channels(&each)
     }
 
-    /// The typical magnitudes of the channels, the output last; none while they are not known.
+    /// The typical magnitudes of the channels, the outputs last; none while they are not known.
     #[getter]
     fn scales(&self) -> Option<Vec<f64>> {
-        self.tracking.trackers().first().and_then(|tracker| tracker.scales().map(all))
+        let each = self.model().map(|tracker| Some((tracker, tracker.scales()?)));
+        each.collect::<Option<Vec<_>>>().map(|each| channels(&each))
     }
 
     #[getter]
@@ -258,8 +263,8 @@ impl Tracker {
     }
 
     #[getter]
-    fn output(&self) -> String {
-        self.tracking.output().to_owned()
+    fn outputs(&self) -> Vec<String> {
+        self.tracking.outputs().to_vec()
     }
 
     #[getter]
@@ -290,9 +295,18 @@ fn two_dimensions(py: Python<'_>, rows: Vec<Vec<f64>>) -> PyResult<Bound<'_, PyA
     PyArray2::from_vec2(py, &rows).map_err(|error| PyValueError::new_err(error.to_string()))
 }
 
-/// One number for each channel, the output last.
-fn all(channels: &PerChannel) -> Vec<f64> {
-    channels.inputs.iter().copied().chain([channels.output]).collect()
+impl Tracker {
+    /// The trackers of the first way to forget: one for each output.
+    fn model(&self) -> impl Iterator<Item = &thetahat::track::Tracker> {
+        self.tracking.trackers().iter().take(self.tracking.outputs().len())
+    }
+}
+
+/// One number for each channel, the outputs last, of the trackers of a model.
+fn channels(each: &[(&thetahat::track::Tracker, &PerChannel)]) -> Vec<f64> {
+    let inputs = each.first().map(|(tracker, numbers)| (tracker.coupled_outputs(), &numbers.inputs));
+    let inputs = inputs.into_iter().flat_map(|(coupled, inputs)| inputs.iter().skip(coupled));
+    inputs.copied().chain(each.iter().map(|(_, numbers)| numbers.output)).collect()
 }
 
 /// Why a run ended before its last row.

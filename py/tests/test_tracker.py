@@ -391,3 +391,87 @@ def test_bad_states() -> None:
         tracker.forecast(0)
     with pytest.raises(ValueError, match="tracker: there is no tracker 1"):
         tracker.run(th.dc_motor()[50:60]).to_pandas(1)
+
+
+def two_outputs(rows: int = 300) -> tuple[Array, Array]:
+    """Two outputs that feed each other, and an input."""
+    random = np.random.default_rng(3)
+    u, e = random.normal(size=rows), 0.05 * random.normal(size=(rows, 2))
+    y = np.zeros((rows, 2))
+    for t in range(1, rows):
+        y[t] = [[0.8, -0.1], [0.3, 0.6]] @ y[t - 1] + np.array([1.0, -0.5]) * u[t - 1] + e[t]
+    return y, u
+
+
+@pytest.mark.parametrize("couple", ["full", "none"])
+def test_several_outputs_are_those_of_the_program(folder: Path, couple: str) -> None:
+    y, u = two_outputs()
+    y[100, 1] = np.nan
+    frame = pd.DataFrame({"u": u, "hot": y[:, 0], "cold": y[:, 1]})
+    frame.to_csv("two.csv", index=False)
+    words = ("two.csv", "-y", "hot,cold", "--na=2", "--nb=1", f"--couple={couple}", "--forgetting=0.98,none", "--alarm=50", "--horizon=2")
+    lines, state, document = tracked(folder, *words)
+    options: dict[str, Any] = {"na": 2, "nb": 1, "couple": couple, "forgetting": [0.98, None], "alarm": 50, "horizon": 2}
+    tracker = th.Tracker(output=["hot", "cold"], **options)
+    trajectory = tracker.run(frame)
+    n = len(tracker.parameter_names)
+    assert trajectory.parameters.shape == (300, 2, n, 2) and trajectory.predicted.shape == (300, 2, 2)
+    assert tracker.parameters.shape == (2, n, 2) and tracker.forecast(3).shape == (2, 2)
+    assert trajectory.measured.shape == (300, 2)
+    for output, name in enumerate(tracker.outputs):
+        for place, policy in enumerate(trajectory.forgetting):
+            mine = [line for line in lines if line["output"] == name and line["forgetting"] == policy]
+            expected = pd.DataFrame([line for line in mine if line["event"] == "sample"])
+            found = trajectory.to_pandas(place)
+            for column in ("measured", "predicted", "innovation", "nis", "forecast", *tracker.parameter_names):
+                wanted = expected[column].to_numpy(dtype=float)
+                np.testing.assert_array_equal(found[f"{column}_{name}"].to_numpy(), wanted, err_msg=column)
+            assert found[f"action_{name}"].tolist() == expected["action"].tolist()
+            np.testing.assert_array_equal(trajectory.errors[:, output, place], expected["innovation"].to_numpy(dtype=float))
+            alarms = [line["row"] - 1 for line in mine if line["event"] == "alarm"]
+            given = [alarm for alarm in trajectory.alarms if (alarm.forgetting, alarm.output) == (policy, name)]
+            assert [alarm.row for alarm in given] == alarms
+    assert tracker.to_json() == document and tracker.state() == state
+    again = pickle.loads(pickle.dumps(tracker))
+    row = ([1.0, 2.0], 0.5)
+    assert str(again.log_row(*row)) == str(tracker.log_row(*row))
+    assert set(tracker.offsets) == {"u", "hot", "cold"}
+    if couple == "full":
+        assert tracker.parameter_names == ["a1_1", "a1_2", "a2_1", "a2_2", "b1"]
+
+
+def test_several_outputs_one_row_at_a_time() -> None:
+    y, u = two_outputs()
+    tracker = th.Tracker(1, 1, output=["a", "b"], forgetting=None)
+    whole = th.Tracker(1, 1, output=["a", "b"], forgetting=None).run(y, u=u)
+    for at in range(100):
+        seen = tracker.log_row(y[at], u[at])
+        assert np.shape(seen.predicted) == (2,)
+        np.testing.assert_array_equal(seen.error, whole.errors[at])
+    np.testing.assert_array_equal(tracker.parameters, whole.parameters[99])
+    with pytest.raises(AttributeError, match="several outputs: a, b"):
+        tracker.output  # noqa: B018
+    for wrong in (1.0, [1.0], [1.0, 2.0, 3.0], [1.0, np.inf]):
+        with pytest.raises(ValueError, match=r"y: expected 2 numbers|infinite"):
+            tracker.log_row(wrong, 0.0)
+    with pytest.raises(ValueError, match="couple is for several outputs"):
+        th.Tracker(1, 1, couple="none")
+    with pytest.raises(ValueError, match="several outputs are tracked as ARX"):
+        th.Tracker(1, 1, 1, output=["a", "b"])
+    with pytest.raises(ValueError, match="named twice"):
+        th.Tracker(1, 1, output=["a", "a"])
+
+
+def test_the_parameters_of_one_of_several_outputs_are_drawn() -> None:
+    from thetahat import plot
+
+    y, u = two_outputs()
+    trajectory = th.Tracker(1, 1, output=["a", "b"], alarm=100).run(y, u=u)
+    axes = plot.parameters(trajectory, output="b")
+    line = axes[0].get_lines()[0]
+    drawn = np.asarray(line.get_ydata(), dtype=float)
+    np.testing.assert_array_equal(drawn[-1], trajectory.parameters[-1, 1, 0])
+    with pytest.raises(ValueError, match="output: there are several"):
+        plot.parameters(trajectory)
+    with pytest.raises(ValueError, match="'c' is none of a, b"):
+        plot.parameters(trajectory, output="c")

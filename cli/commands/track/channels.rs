@@ -10,17 +10,17 @@ use crate::log::listed;
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Channels {
     pub(crate) inputs: Vec<String>,
-    pub(crate) output: String,
+    pub(crate) outputs: Vec<String>,
 }
 
 /// Those named, those of the report, or those called u, u1, u2, … and y; an error is a message.
 pub(super) fn choose(job: &TrackJob, report: Option<&Report>, header: &[String]) -> Result<Channels, String> {
     let model = report.map(|report| &report.model);
-    let output = match (&job.output, model) {
-        (Some(name), _) => name.clone(),
+    let outputs = match (&job.outputs, model) {
+        (Some(names), _) => names.clone(),
         // A model of several outputs is refused where a tracker is made of it.
-        (None, Some(model)) => model.outputs().first().map_or_else(String::new, |output| output.name.clone()),
-        (None, None) if header.iter().any(|name| name == "y") => "y".to_owned(),
+        (None, Some(model)) => model.outputs().iter().map(|output| output.name.clone()).collect(),
+        (None, None) if header.iter().any(|name| name == "y") => vec!["y".to_owned()],
         (None, None) => {
             return Err(format!(
                 "no column is called y; name the output with --output; there are: {}",
@@ -41,5 +41,5 @@ pub(super) fn choose(job: &TrackJob, report: Option<&Report>, header: &[String])
             listed(header)
         ));
     }
-    Ok(Channels { inputs, output })
+    Ok(Channels { inputs, outputs })
 }

@@ -1,7 +1,7 @@
 //! The lines of `track`.
 
 use thetahat::thetahat_core::Alarm;
-use thetahat::track::{Tracked, Tracker};
+use thetahat::track::{Tracked, Tracker, forecasts};
 
 use crate::failure::Failure;
 use crate::line_writer::{Cells, LineWriter};
@@ -18,6 +18,8 @@ pub(super) struct Columns {
     has_time: bool,
     /// The policies, where there are several.
     policies: Vec<String>,
+    /// The outputs, where there are several.
+    outputs: Vec<String>,
     horizon: Option<usize>,
     parameters: usize,
 }
@@ -31,19 +33,31 @@ pub(super) struct Sample {
     pub(super) action: &'static str,
     pub(super) output: f64,
     pub(super) tracked: Tracked,
+    /// The output as many rows later as was asked for.
+    pub(super) forecast: Option<f64>,
 }
 
 impl Columns {
-    /// Those of a log that may have a clock, with a forecast this many rows ahead if one was asked for.
-    pub(super) fn new(has_time: bool, horizon: Option<usize>, trackers: &[Tracker]) -> Self {
+    /// Those of a log that may have a clock, with a forecast this many rows ahead if one was asked for. Several outputs are named.
+    pub(super) fn new(
+        has_time: bool,
+        horizon: Option<usize>,
+        outputs: &[String],
+        trackers: &[Tracker],
+    ) -> Self {
         let parameters = trackers.first().map_or(&[][..], Tracker::names);
-        let policies: Vec<String> = match trackers {
-            [_] => Vec::new(),
-            several => several.iter().map(|tracker| tracker.plan().forgetting.to_string()).collect(),
-        };
+        let mut policies: Vec<String> = trackers
+            .iter()
+            .step_by(outputs.len().max(1))
+            .map(|tracker| tracker.plan().forgetting.to_string())
+            .collect();
+        if policies.len() == 1 {
+            policies.clear();
+        }
         let mut names: Vec<String> = vec!["event".to_owned(), "row".to_owned()];
         names.extend(has_time.then(|| "time".to_owned()));
         names.extend((!policies.is_empty()).then(|| "forgetting".to_owned()));
+        names.extend((!outputs.is_empty()).then(|| "output".to_owned()));
         names.extend(FIGURES.map(str::to_owned));
         names.extend(horizon.map(|_| "forecast".to_owned()));
         names.extend(parameters.iter().cloned());
@@ -51,25 +65,28 @@ impl Columns {
         if trackers.first().is_some_and(|tracker| tracker.detector().is_some()) {
             names.extend(ALARM.map(str::to_owned));
         }
-        Self { names, has_time, policies, horizon, parameters: parameters.len() }
+        Self { names, has_time, policies, outputs: outputs.to_vec(), horizon, parameters: parameters.len() }
     }
 
     pub(super) fn names(&self) -> &[String] {
         &self.names
     }
 
-    /// A line about a sample, with the standard errors of the parameters; gives the forecast, if there is one.
+    /// The forecasts of all outputs of a model, if they were asked for.
+    pub(super) fn forecasts(&self, trackers: &mut [Tracker]) -> Result<Option<Vec<f64>>, Failure> {
+        let found = self.horizon.map(|rows| forecasts(trackers, rows)).transpose();
+        found.map_err(|error| Failure::option(&error))
+    }
+
+    /// A line about a sample, with the standard errors of the parameters.
     pub(super) fn sample(
         &self,
         lines: &mut LineWriter,
         sample: &Sample,
-        tracker: &mut Tracker,
-        deviations: &mut [f64],
-    ) -> Result<Option<f64>, Failure> {
-        let Sample { row, time, index, action, output, tracked } = sample;
-        tracker.write_standard_errors(deviations).map_err(|error| Failure::data(error.to_string()))?;
-        let forecast = self.horizon.map(|rows| tracker.forecast(rows)).transpose();
-        let forecast = forecast.map_err(|error| Failure::option(&error))?;
+        tracker: &Tracker,
+        deviations: &[f64],
+    ) -> Result<(), Failure> {
+        let Sample { row, time, index, action, output, tracked, forecast } = sample;
         lines.add(|cells| {
             self.head(cells, "sample", *row, *time, Some(*index));
             cells.word(action);
@@ -79,14 +96,13 @@ impl Columns {
             cells.number(tracked.variance.sqrt());
             cells.number(if tracked.variance.is_finite() { tracked.nis } else { f64::NAN });
             cells.number(tracked.excitation);
-            forecast.into_iter().for_each(|forecast| cells.number(forecast));
+            forecast.iter().for_each(|&forecast| cells.number(forecast));
             match tracker.parameters() {
                 Some(parameters) => parameters.iter().for_each(|&value| cells.number(value)),
                 None => (0..self.parameters).for_each(|_| cells.number(f64::NAN)),
             }
             deviations.iter().for_each(|&value| cells.number(value));
-        })?;
-        Ok(forecast)
+        })
     }
 
     /// A line about an alarm.
@@ -119,12 +135,16 @@ impl Columns {
         if self.has_time {
             cells.number(time.unwrap_or(f64::NAN));
         }
-        if self.policies.is_empty() {
-            return;
-        }
-        match index.and_then(|index| self.policies.get(index)) {
-            Some(policy) => cells.word(policy),
-            None => cells.skip(1),
+        let outputs = self.outputs.len().max(1);
+        let named = [
+            (&self.policies, index.and_then(|index| self.policies.get(index / outputs))),
+            (&self.outputs, index.and_then(|index| self.outputs.get(index % outputs))),
+        ];
+        for (names, name) in named {
+            match name {
+                Some(name) => cells.word(name),
+                None => cells.skip(usize::from(!names.is_empty())),
+            }
         }
     }
 }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 use thetahat::text;
-use thetahat::track::{PerChannel, TrackSummary, Tracker};
+use thetahat::track::{PerChannel, TrackSummary, Tracker, TrackerSummary};
 
 use super::channels::Channels;
 use super::pace::Pace;
@@ -36,6 +36,9 @@ pub(super) struct State {
     pub(super) start: Option<String>,
     pub(super) pace: Pace,
     pub(super) gaps: u64,
+    /// The names of several outputs, for each of which a policy has a tracker; empty if there is one.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) outputs: Vec<String>,
     /// How many alarms each tracker gave.
     pub(super) alarms: Vec<u64>,
     pub(super) trackers: Vec<Tracker>,
@@ -44,6 +47,7 @@ pub(super) struct State {
 impl State {
     pub(super) fn new(
         setting: Vec<(String, String)>,
+        outputs: &[String],
         trackers: Vec<Tracker>,
         start: Option<String>,
         sample_time: Option<f64>,
@@ -59,6 +63,7 @@ impl State {
             start,
             pace: Pace::new(sample_time),
             gaps: 0,
+            outputs: if outputs.len() > 1 { outputs.to_vec() } else { Vec::new() },
             alarms: vec![0; trackers.len()],
             trackers,
         }
@@ -100,9 +105,13 @@ impl State {
 
     /// Whether its own parts fit together, as they do if nobody has edited it. The trackers are compared with new ones.
     fn is_sound(&self) -> bool {
-        let Self { rows, written, first, last, pace, gaps, alarms, trackers, .. } = self;
+        let Self { rows, written, first, last, pace, gaps, outputs, alarms, trackers, .. } = self;
+        let count = outputs.len().max(1);
         !trackers.is_empty()
             && trackers.len() == alarms.len()
+            && outputs.len() != 1
+            && trackers.len().is_multiple_of(count)
+            && trackers.iter().all(|tracker| [0, outputs.len()].contains(&tracker.coupled_outputs()))
             && alarms.iter().all(|alarms| alarms <= rows)
             && gaps <= rows
             && first.len() == last.len()
@@ -131,6 +140,7 @@ impl State {
         }
         let fits = |(mine, new): (&Tracker, &Tracker)| {
             mine.orders() == new.orders()
+                && mine.coupled_outputs() == new.coupled_outputs()
                 && mine.map() == new.map()
                 && mine.names() == new.names()
                 && mine.plan() == new.plan()
@@ -171,8 +181,12 @@ impl State {
 
     /// What the trackers have come to.
     pub(super) fn summary(&self) -> TrackSummary {
+        let outputs = self.outputs.iter().map(Some).cycle();
+        let outputs = outputs.chain(std::iter::repeat(None));
         let trackers =
-            self.trackers.iter().zip(&self.alarms).map(|(tracker, &alarms)| tracker.summary(alarms));
+            self.trackers.iter().zip(&self.alarms).zip(outputs).map(|((tracker, &alarms), output)| {
+                TrackerSummary { output: output.cloned(), ..tracker.summary(alarms) }
+            });
         TrackSummary::new(self.rows, self.gaps, trackers.collect())
     }
 
@@ -195,7 +209,7 @@ fn print(values: &[f64], time: Option<f64>) -> impl Iterator<Item = Option<f64>>
 pub(super) fn setting(job: &TrackJob, channels: &Channels, trackers: &[Tracker]) -> Vec<(String, String)> {
     let mut setting = vec![
         ("--input".to_owned(), channels.inputs.join(",")),
-        ("--output".to_owned(), channels.output.clone()),
+        ("--output".to_owned(), channels.outputs.join(",")),
     ];
     let mut add = |option: &str, value: String| setting.push((option.to_owned(), value));
     let clock = if let Clock::Column { name, .. } = &job.log.clock { name.as_str() } else { "" };
@@ -208,8 +222,12 @@ pub(super) fn setting(job: &TrackJob, channels: &Channels, trackers: &[Tracker])
         add("--start", plan.start.to_string());
         add("--horizon", job.horizon.map_or_else(String::new, |rows| rows.to_string()));
         add("--dead-zone", plan.dead_zone.to_string());
-        add("--offset", numbers(Some(tracker.offsets())));
-        add("--scale", numbers(plan.scales.as_ref()));
+        let several = trackers.get(..channels.outputs.len()).unwrap_or_default();
+        let each = |numbers: &dyn Fn(&Tracker) -> String| {
+            several.iter().map(|tracker| numbers(tracker)).collect::<Vec<_>>().join(";")
+        };
+        add("--offset", each(&|tracker| numbers(Some(tracker.offsets()))));
+        add("--scale", each(&|tracker| numbers(tracker.plan().scales.as_ref())));
         add("--alarm", plan.alarm_interval.map_or_else(String::new, |interval| interval.to_string()));
     }
     let policies: Vec<String> =

@@ -1,11 +1,11 @@
 //! Tracking in memory: rows come from a caller, and nothing is read or written.
 
 use thetahat::report::Report;
-use thetahat::track::{TrackSummary, Tracked, Tracker};
+use thetahat::track::{TrackSummary, Tracked, Tracker, forecasts};
 
 use super::channels::Channels;
 use super::columns::Columns;
-use super::session::{Row, Session};
+use super::session::{Memory, Row, Session};
 use super::state::{self, State};
 use crate::args::TrackArguments;
 use crate::failure::Failure;
@@ -18,20 +18,20 @@ use crate::line_writer::{Format, LineWriter, Written};
 /// from its own.
 pub struct Tracking {
     inputs: Vec<String>,
-    output: String,
+    outputs: Vec<String>,
     every: u64,
     horizon: Option<usize>,
     columns: Columns,
     state: State,
     lines: LineWriter,
-    deviations: Vec<f64>,
+    memory: Memory,
 }
 
 /// What one of the trackers made of a row.
 #[derive(Debug)]
 #[non_exhaustive]
 pub struct TrackedRow<'a> {
-    /// Which tracker, in the order of the ways to forget.
+    /// Which tracker, in the order of the ways to forget and, of each, of the outputs.
     pub index: usize,
     /// The tracker after the row.
     pub tracker: &'a Tracker,
@@ -50,33 +50,33 @@ impl Tracking {
     pub(crate) fn new(
         arguments: &TrackArguments,
         inputs: Vec<String>,
-        output: String,
+        outputs: Vec<String>,
         report: Option<&Report>,
     ) -> Result<Self, Failure> {
         let job = TrackJob::resolve(arguments)?;
-        let trackers = job.trackers(&inputs, &output, report)?;
-        let has_clock = matches!(job.log.clock, Clock::Column { .. });
-        let columns = Columns::new(has_clock, job.horizon, &trackers);
-        let channels = Channels { inputs, output };
+        let trackers = job.trackers(&inputs, &outputs, report)?;
+        let channels = Channels { inputs, outputs };
         let setting = state::setting(&job, &channels, &trackers);
         let sample_time = job.sample_time.or(report.map(|report| report.model.sample_time()));
+        let Channels { inputs, outputs } = channels;
+        let state = State::new(setting, &outputs, trackers, None, sample_time);
+        let has_clock = matches!(job.log.clock, Clock::Column { .. });
+        let columns = Columns::new(has_clock, job.horizon, &state.outputs, &state.trackers);
         let lines = LineWriter::counting(job.lines.format, columns.names(), None);
-        let Channels { inputs, output } = channels;
-        let state = State::new(setting, trackers, None, sample_time);
-        Ok(Self::of(inputs, output, job.lines.every, job.horizon, columns, state, lines))
+        Ok(Self::of(inputs, outputs, job.lines.every, job.horizon, columns, state, lines))
     }
 
     fn of(
         inputs: Vec<String>,
-        output: String,
+        outputs: Vec<String>,
         every: u64,
         horizon: Option<usize>,
         columns: Columns,
         state: State,
         lines: LineWriter,
     ) -> Self {
-        let parameters = state.trackers.first().map_or(0, |tracker| tracker.names().len());
-        Self { inputs, output, every, horizon, columns, state, lines, deviations: vec![f64::NAN; parameters] }
+        let memory = Memory::of(&state.trackers);
+        Self { inputs, outputs, every, horizon, columns, state, lines, memory }
     }
 
     /// Goes on from the state that `thetahat track --state` has written, or [`Tracking::state`].
@@ -108,6 +108,7 @@ impl Tracking {
         }
         let alike = |tracker: &Tracker| {
             tracker.orders() == first.orders()
+                && tracker.coupled_outputs() == first.coupled_outputs()
                 && tracker.map() == first.map()
                 && tracker.names() == first.names()
                 && tracker.score().samples() <= state.rows
@@ -125,13 +126,17 @@ impl Tracking {
         if !state.trackers.iter().all(alike) {
             return Err(damaged());
         }
-        let columns = Columns::new(!set("--time")?.is_empty(), horizon, &state.trackers);
-        let output = set("--output")?.to_owned();
+        let columns = Columns::new(!set("--time")?.is_empty(), horizon, &state.outputs, &state.trackers);
+        let outputs = match &state.outputs[..] {
+            [] => vec![set("--output")?.to_owned()],
+            several if several.join(",") == set("--output")? => several.to_vec(),
+            _ => return Err(damaged()),
+        };
         let lines = LineWriter::counting(format, columns.names(), Some(state.written.clone()));
-        Ok(Self::of(inputs, output, every, horizon, columns, state, lines))
+        Ok(Self::of(inputs, outputs, every, horizon, columns, state, lines))
     }
 
-    /// Takes rows as long as there are some: `next` gives their values, the inputs and then the output, their time, and
+    /// Takes rows as long as there are some: `next` gives their values, the inputs and then the outputs, their time, and
     /// whether an unknown number of rows is missing before them; `seen` is told what each tracker made of each row. After a
     /// failure nothing has changed.
     ///
@@ -163,7 +168,8 @@ impl Tracking {
 
     /// The columns of the lines, which depend on whether there is a clock; they go on after what was written.
     fn set_columns(&mut self, written: Option<Written>) {
-        self.columns = Columns::new(self.clock().is_some(), self.horizon, &self.state.trackers);
+        self.columns =
+            Columns::new(self.clock().is_some(), self.horizon, &self.state.outputs, &self.state.trackers);
         self.lines = LineWriter::counting(self.lines.format(), self.columns.names(), written);
     }
 
@@ -173,31 +179,23 @@ impl Tracking {
         seen: &mut impl FnMut(&TrackedRow<'_>),
         stop_on_alarm: bool,
     ) -> Result<(), E> {
-        let Self { every, columns, state, lines, deviations, horizon, .. } = self;
+        let Self { every, columns, state, lines, memory, .. } = self;
         let mut count = 0_usize;
-        let (horizon, mut unwritten) = (*horizon, vec![f64::NAN; deviations.len()]);
         while let Some((values, time, after_gap)) = next()? {
             let row = Row { values, time, malformed: false, has_clock: time.is_some(), after_gap };
-            let mut session = Session { every: *every, columns, state: &mut *state, lines, deviations };
+            let mut session =
+                Session { every: *every, details: true, columns, state: &mut *state, lines, memory };
             let alarm = session.row(
                 &row,
                 || format!("row {count}"),
                 |one| {
-                    // A row without a line has them too.
-                    let (standard_errors, forecast) = one.line.unwrap_or_else(|| {
-                        // There is one place for each.
-                        let _ = one.tracker.write_standard_errors(&mut unwritten);
-                        let forecast =
-                            horizon.map(|rows| one.tracker.clone().forecast(rows).unwrap_or(f64::NAN));
-                        (&unwritten, forecast)
-                    });
                     seen(&TrackedRow {
                         index: one.index,
                         tracker: one.tracker,
                         tracked: one.tracked,
                         action: one.action,
-                        standard_errors,
-                        forecast,
+                        standard_errors: one.standard_errors,
+                        forecast: one.forecast,
                     });
                 },
             )?;
@@ -240,18 +238,21 @@ impl Tracking {
         self.state.rows
     }
 
-    /// The trackers, one for each way to forget.
+    /// The trackers: for each way to forget one for each output.
     pub fn trackers(&self) -> &[Tracker] {
         &self.state.trackers
     }
 
-    /// The prediction this many steps ahead of each, see [`Tracker::forecast`].
+    /// The prediction this many steps ahead of each, see [`forecasts`].
     ///
     /// # Errors
     /// A [`Failure`] if the steps are out of their range.
     pub fn forecast(&mut self, steps: usize) -> Result<Vec<f64>, Failure> {
-        let each = self.state.trackers.iter_mut().map(|tracker| tracker.forecast(steps));
-        each.collect::<Result<_, _>>().map_err(|error| Failure::option(&error))
+        let models = self.state.trackers.chunks_mut(self.outputs.len().max(1));
+        let each = models.map(|trackers| forecasts(trackers, steps));
+        each.collect::<Result<Vec<_>, _>>()
+            .map(|models| models.concat())
+            .map_err(|error| Failure::option(&error))
     }
 
     /// The input channels.
@@ -259,9 +260,9 @@ impl Tracking {
         &self.inputs
     }
 
-    /// The output channel.
-    pub fn output(&self) -> &str {
-        &self.output
+    /// The output channels.
+    pub fn outputs(&self) -> &[String] {
+        &self.outputs
     }
 
     /// The column of times; none if rows have none, or there was none yet that says.

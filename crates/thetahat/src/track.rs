@@ -1,6 +1,7 @@
 //! Models that are estimated while the plant runs, row by row.
 //!
 //! - [`Tracker`] estimates an ARX, ARMAX or nonlinear ARX model, predicts, and raises alarms where the plant changes. Each row gives a [`Tracked`].
+//!   Several outputs are as many trackers ([`Tracker::coupled`]), of which [`forecasts`] are made at once.
 //! - [`TrackPlan`] says how: the [`TrackMethod`], a [`Policy`] of forgetting, a [`TrackStart`], and numbers for each channel
 //!   ([`PerChannel`]).
 //! - [`TrackScore`] says how well it predicted so far, [`TrackerSummary`] what it knows, [`TrackSummary`] is the document of a run.
@@ -27,6 +28,7 @@
 mod checks;
 mod collecting;
 mod estimator;
+mod forecasts;
 mod missing;
 mod plan;
 mod run_length;
@@ -38,6 +40,7 @@ mod tracker;
 mod warm;
 mod words;
 
+pub use forecasts::forecasts;
 pub use plan::{PerChannel, Policy, TrackMethod, TrackPlan, TrackStart};
 pub use run_length::change_detector;
 pub use score::TrackScore;

@@ -88,7 +88,7 @@ def states(trajectory: StateTrajectory, axes: Any = None, *, level: float = 0.95
     return grid
 
 
-def parameters(trajectory: TrackTrajectory, axes: Any = None, *, level: float = 0.95) -> Grid:
+def parameters(trajectory: TrackTrajectory, axes: Any = None, *, output: str | None = None, level: float = 0.95) -> Grid:
     """The parameters of a tracked model over time, with its alarms.
 
     Parameters
@@ -97,6 +97,8 @@ def parameters(trajectory: TrackTrajectory, axes: Any = None, *, level: float = 
         Of `thetahat.Tracker.run`. Several ways to forget are drawn one over the other.
     axes : array_like of Axes, shape (parameters,), optional
         Where to draw.
+    output : str, optional
+        Of which of several outputs.
     level : float, default 0.95
         The probability with which the band holds the parameter.
 
@@ -118,12 +120,12 @@ def parameters(trajectory: TrackTrajectory, axes: Any = None, *, level: float = 
     _drawing.expect("trajectory", trajectory, TrackTrajectory)
     half = _options.quantile(level)
     grid = _drawing.grid(axes, len(trajectory.parameter_names), 1)[:, 0]
-    several = len(trajectory.forgetting) > 1
+    of_output = trajectory._output(output)
     for column, (ax, name) in enumerate(zip(grid, trajectory.parameter_names)):
         bands, late, all_drawn = [], [], []
         for place, policy in enumerate(trajectory.forgetting):
-            values = trajectory.parameters[:, column, place] if several else trajectory.parameters[:, column]
-            errors = trajectory.standard_errors[:, column, place] if several else trajectory.standard_errors[:, column]
+            values = trajectory._of(trajectory.parameters, place, of_output)[:, column]
+            errors = trajectory._of(trajectory.standard_errors, place, of_output)[:, column]
             time, drawn, spread = _drawing.gapped(trajectory.time, values, half * errors)
             (line,) = ax.plot(time, drawn, linewidth=1.0, label=policy, **_drawing.lone(drawn))
             bands.append(_drawing.band(ax, time, drawn - spread, drawn + spread, line.get_color()))
@@ -132,7 +134,8 @@ def parameters(trajectory: TrackTrajectory, axes: Any = None, *, level: float = 
         _drawing.label_one(bands, level)
         # What is not known yet would make a line of what is.
         _drawing.scale_to(ax, late, all_drawn)
-        rows = sorted({alarm.row for alarm in trajectory.alarms if alarm.row is not None})
+        mine = {None, trajectory.outputs[of_output]}
+        rows = sorted({alarm.row for alarm in trajectory.alarms if alarm.row is not None and alarm.output in mine})
         for number, row in enumerate(rows):
             label = {"label": "alarm"} if number == 0 else {}
             ax.axvline(trajectory.time[row], color="0.5", linewidth=0.8, linestyle=":", **label)

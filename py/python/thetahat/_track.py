@@ -28,7 +28,7 @@ Policy = Union[float, str, Forgetting, None]
 class Tracked(NamedTuple):
     """What a tracker made of a row.
 
-    With several ways to forget, numbers are arrays with one for each.
+    With several outputs, numbers are arrays with one for each; with several ways to forget they have a last axis for these.
     """
 
     predicted: float | Array
@@ -52,7 +52,8 @@ class Tracked(NamedTuple):
 class TrackTrajectory:
     """What a `Tracker` made of many rows.
 
-    With several ways to forget, all but `time` and `measured` have a last axis with one place for each.
+    With several outputs, all but `time` have an axis with one place for each after that of the rows. With several ways to forget, all but
+    `time` and `measured` have a last axis for these.
 
     Attributes
     ----------
@@ -78,6 +79,8 @@ class TrackTrajectory:
         The changes that were noticed, row by row.
     parameter_names : list of str
         Such as ``a1``, ``b1``, ``constant``.
+    outputs : list of str
+        The channels of the outputs.
     forgetting : list of str
         The ways to forget.
     """
@@ -94,18 +97,17 @@ class TrackTrajectory:
     alarms: list[Alarm]
 
     def __init__(self, tracker: Tracker, rows: _rows.Rows, found: dict[str, Any]) -> None:
-        taken, count = found.pop("taken"), len(tracker.forgetting)
+        taken, count = found.pop("taken"), len(tracker.forgetting) * len(tracker.outputs)
         self.alarms = found.pop("alarms")
         too_large = found.pop("too_large").reshape(taken, count)
         found["actions"] = np.where(too_large, "too large", found["actions"].reshape(taken, count))
         for name, values in found.items():
-            values = values[:taken]
-            setattr(self, name, values[:, 0] if count == 1 else np.moveaxis(values, 1, -1))
+            setattr(self, name, tracker._shaped(values[:taken], 1))
         step = tracker.sample_time
         self.time = rows.time(1.0 if step is None else step)[:taken]
-        self.measured = rows.outputs[:taken, 0]
+        self.measured = rows.outputs[:taken] if len(tracker.outputs) > 1 else rows.outputs[:taken, 0]
         self.parameter_names = tracker.parameter_names
-        self.output = tracker.output
+        self.outputs = tracker.outputs
         self.forgetting = tracker.forgetting
         self._clock = rows.clock.part(0, taken)
         self._horizon = tracker.horizon
@@ -113,6 +115,8 @@ class TrackTrajectory:
 
     def to_pandas(self, tracker: int = 0) -> Any:
         """A data frame of pandas with the index that the log came with; its columns are those of ``thetahat track``.
+
+        With several outputs each has its columns, with its name at their end: ``predicted_y1``.
 
         Parameters
         ----------
@@ -134,9 +138,10 @@ class TrackTrajectory:
         """As `to_pandas`, for Polars: the times are the first column."""
         return _clock.to_polars(self._clock, self.time, self._columns(tracker))
 
-    def _of(self, values: npt.NDArray[Any], tracker: int) -> npt.NDArray[Any]:
-        """The part of one way to forget."""
-        return values if len(self.forgetting) == 1 else values[..., tracker]
+    def _of(self, values: npt.NDArray[Any], tracker: int, output: int = 0) -> npt.NDArray[Any]:
+        """The part of one way to forget and one output."""
+        mine = values if len(self.forgetting) == 1 else values[..., tracker]
+        return mine if len(self.outputs) == 1 else mine[:, output]
 
     def _place(self, tracker: int) -> int:
         place = _options.integer("tracker", tracker)
@@ -144,30 +149,48 @@ class TrackTrajectory:
             raise ValueError(f"tracker: there is no tracker {place}; there are {len(self.forgetting)}, counted from 0")
         return place
 
-    def _alarms(self, tracker: int) -> list[Alarm]:
-        several = len(self.forgetting) > 1
-        return [alarm for alarm in self.alarms if not several or alarm.forgetting == self.forgetting[tracker]]
+    def _output(self, output: str | None) -> int:
+        """The place of an output."""
+        if output is None and len(self.outputs) > 1:
+            raise ValueError(f"output: there are several; name one of {', '.join(self.outputs)}")
+        name = self.outputs[0] if output is None else _options.text("output", output)
+        if name not in self.outputs:
+            raise ValueError(f"output: {name!r} is none of {', '.join(self.outputs)}")
+        return self.outputs.index(name)
+
+    def _alarms(self, tracker: int, output: int) -> list[Alarm]:
+        policy = self.forgetting[tracker] if len(self.forgetting) > 1 else None
+        name = self.outputs[output] if len(self.outputs) > 1 else None
+        return [alarm for alarm in self.alarms if (alarm.forgetting, alarm.output) == (policy, name)]
 
     def _columns(self, tracker: int) -> dict[str, Any]:
         place = self._place(tracker)
+        if len(self.outputs) == 1:
+            return self._columns_of(place, 0)
+        columns: dict[str, Any] = {}
+        for output, name in enumerate(self.outputs):
+            columns |= {f"{column}_{name}": values for column, values in self._columns_of(place, output).items()}
+        return columns
+
+    def _columns_of(self, place: int, output: int) -> dict[str, Any]:
         columns: dict[str, Any] = {
-            "action": self._of(self.actions, place),
-            "measured": self.measured,
-            "predicted": self._of(self.predicted, place),
-            "innovation": self._of(self.errors, place),
-            "innovation_sd": np.sqrt(self._of(self.variances, place)),
-            "nis": self._of(self.nis, place),
-            "excitation": self._of(self.excitation, place),
+            "action": self._of(self.actions, place, output),
+            "measured": self.measured if len(self.outputs) == 1 else self.measured[:, output],
+            "predicted": self._of(self.predicted, place, output),
+            "innovation": self._of(self.errors, place, output),
+            "innovation_sd": np.sqrt(self._of(self.variances, place, output)),
+            "nis": self._of(self.nis, place, output),
+            "excitation": self._of(self.excitation, place, output),
         }
         if self._horizon is not None:
-            columns["forecast"] = self._of(self.forecasts, place)
+            columns["forecast"] = self._of(self.forecasts, place, output)
         for suffix, values in (("", self.parameters), ("_se", self.standard_errors)):
-            found = self._of(values, place)
+            found = self._of(values, place, output)
             columns |= {f"{name}{suffix}": found[:, column] for column, name in enumerate(self.parameter_names)}
         if self._watched:
             charts, statistics = np.full(len(self), "", dtype="U9"), np.full(len(self), np.nan)
             samples = np.full(len(self), np.nan)
-            for alarm in self._alarms(place):
+            for alarm in self._alarms(place, output):
                 charts[alarm.row], statistics[alarm.row], samples[alarm.row] = alarm.chart, alarm.statistic, alarm.samples
             columns |= {"chart": charts, "statistic": statistics, "samples": samples}
         return columns
@@ -176,9 +199,10 @@ class TrackTrajectory:
         return len(self.time)
 
     def __repr__(self) -> str:
+        outputs = "" if len(self.outputs) == 1 else f" of {len(self.outputs)} outputs"
         several = "" if len(self.forgetting) == 1 else f", {len(self.forgetting)} ways to forget"
         alarms = f", {len(self.alarms)} alarm{'' if len(self.alarms) == 1 else 's'}" if self._watched else ""
-        return f"TrackTrajectory({len(self)} rows, parameters {', '.join(self.parameter_names)}{several}{alarms})"
+        return f"TrackTrajectory({len(self)} rows, parameters {', '.join(self.parameter_names)}{outputs}{several}{alarms})"
 
     def _repr_html_(self) -> str:
         values = self._of(self.parameters, 0)
@@ -195,6 +219,10 @@ class Tracker:
     It is a `RecursiveArx`, a `RecursiveArmax` or a `RecursiveNarx` with what a log needs: channels with names and offsets, scales that are found in
     the first rows, gaps of the clock, predictions and forecasts, figures, detection of changes, a start from a fitted model, and a
     state that is kept in a file.
+
+    With several outputs A has a full matrix for each of the na past samples: an equation for each output, with the past of all of them.
+    Parameters are those of each equation: ``a2_1`` multiplies the second output a sample ago. Arrays have an axis for the outputs in front of
+    that of the parameters.
 
     Parameters
     ----------
@@ -218,8 +246,10 @@ class Tracker:
         With ``narx``: factors of a product at most.
     inputs : sequence of str, or str, optional
         The channels of the inputs: those of ``warm``; without it u, or u1, u2, … as many as nb has.
-    output : str, optional
-        The channel of the output: that of ``warm``, or y.
+    output : str or sequence of str, optional
+        The channel of the output, or those of several: that of ``warm``, or y.
+    couple : {"full", "none"}, optional
+        With several outputs: whether an output depends on the past of all, which is the default, or on its own.
     offset : dict of str to float, optional
         What is subtracted from a channel: 0, or the offsets of ``warm``.
     scale : dict of str to float, optional
@@ -292,7 +322,8 @@ class Tracker:
         nu: int | Sequence[int] | None = None,
         degree: int | None = None,
         inputs: Sequence[str] | str | None = None,
-        output: str | None = None,
+        output: str | Sequence[str] | None = None,
+        couple: str | None = None,
         offset: Mapping[str, float] | None = None,
         scale: Mapping[str, float] | None = None,
         constant: bool = False,
@@ -329,7 +360,8 @@ class Tracker:
         if not isinstance(constant, bool):
             raise TypeError(f"constant: expected True or False, found {constant!r}")
         words += ["--constant"] if constant else []
-        words += [f"--{name}={_options.text(name, value)}" for name, value in (("method", method), ("start", start)) if value is not None]
+        spoken = (("method", method), ("start", start), ("couple", couple))
+        words += [f"--{name}={_options.text(name, value)}" for name, value in spoken if value is not None]
         words.append(f"--forgetting={','.join(_policies(forgetting))}")
         for name, values in (("offset", offset), ("scale", scale)):
             if values is not None and not isinstance(values, Mapping):
@@ -347,9 +379,12 @@ class Tracker:
         elif warm is not None:
             self._sample_time = warm.sample_time
         named = [_options.text("inputs", name) for name in named]
-        measured = (warm.output if warm is not None else "y") if output is None else _options.text("output", output)
-        if len({*named, measured}) <= len(named):
-            raise ValueError(f"inputs: {_numbers.twice([*named, measured])!r} is named twice; each channel has one role")
+        if output is None:
+            measured = ["y"] if warm is None else warm.outputs
+        else:
+            measured = [_options.text("output", name) for name in ([output] if isinstance(output, str) else list(output))]
+        if len({*named, *measured}) < len(named) + len(measured):
+            raise ValueError(f"inputs: {_numbers.twice([*named, *measured])!r} is named twice; each channel has one role")
         self._tracker = _thetahat.Tracker(words, named, measured, None if warm is None else warm._model)
 
     @classmethod
@@ -404,12 +439,12 @@ class Tracker:
         """Write the state to a file, whole or not at all."""
         _thetahat.write(_files.name(path), self.state())
 
-    def log_row(self, y: float, u: npt.ArrayLike | None = None, *, time: float | None = None) -> Tracked:
+    def log_row(self, y: npt.ArrayLike, u: npt.ArrayLike | None = None, *, time: float | None = None) -> Tracked:
         """Take one row of a log: y(k) and u(k), recorded at the same instant.
 
         Parameters
         ----------
-        y : float
+        y : float, or array_like of shape (outputs,)
             The output, in its own unit. NaN is a missing sample.
         u : float, or array_like of shape (inputs,); None without inputs
             The inputs. NaN is a missing sample.
@@ -426,13 +461,14 @@ class Tracker:
             If a shape is wrong, a value infinite, or the time not after that of the row before. Nothing has changed then.
         """
         measured = _numbers.array("y", y)
-        if measured.size != 1:
-            raise ValueError(f"y: expected a number, found shape {measured.shape}")
+        count = len(self.outputs)
+        if measured.size != count:
+            raise ValueError(f"y: expected {'a number' if count == 1 else f'{count} numbers'}, found shape {measured.shape}")
         driving = np.empty((1, 0)) if u is None else _numbers.array("u", u).reshape(1, -1)
         if driving.shape[1] != len(self.inputs):
             raise ValueError(f"u: expected {len(self.inputs)} numbers, found {driving.shape[1]}")
         seconds = None if time is None else np.array([float(_options.number("time", time))])
-        rows = _rows.Rows(driving, measured.reshape(1, 1), seconds, None, _clock.Clock(), name=None if time is None else "time")
+        rows = _rows.Rows(driving, measured.reshape(1, count), seconds, None, _clock.Clock(), name=None if time is None else "time")
         found = self._run(rows, stop_on_alarm=False)
         actions = np.where(found["too_large"], "too large", found["actions"])
         return Tracked(
@@ -461,8 +497,8 @@ class Tracker:
 
         Parameters
         ----------
-        data : Log, data frame, dict of str to array_like, or array_like of shape (N,)
-            The output and inputs. Those of a log, a frame or a dict are found by name; an array holds the output. Between the
+        data : Log, data frame, dict of str to array_like, or array_like of shape (N,) or (N, outputs)
+            The output and inputs. Those of a log, a frame or a dict are found by name; an array holds the outputs. Between the
             experiments of a log are gaps.
         u : array_like of shape (N,) or (N, inputs), or data frame or dict of str to array_like, optional
             The inputs, where they are not in ``data``.
@@ -484,7 +520,7 @@ class Tracker:
             If a channel is not there, a shape is wrong, a value infinite, or the first time is not after that of the row before.
             Nothing has changed then.
         """
-        rows = _rows.of(data, u, time, None, self.inputs, [self.output])
+        rows = _rows.of(data, u, time, None, self.inputs, self.outputs)
         if not isinstance(stop_on_alarm, bool):
             raise TypeError(f"stop_on_alarm: expected True or False, found {stop_on_alarm!r}")
         return TrackTrajectory(self, rows, self._run(rows, stop_on_alarm))
@@ -525,8 +561,9 @@ class Tracker:
 
         Returns
         -------
-        float, or ndarray with one for each way to forget
-            In the units of the log. NaN before there is an estimate, and where it depends on a missing sample.
+        float, or ndarray
+            In the units of the log. With several outputs an array with one for each; with several ways to forget there is a last axis for
+            these. NaN before there is an estimate, and where it depends on a missing sample.
 
         Examples
         --------
@@ -540,25 +577,30 @@ class Tracker:
         return self._one(self._tracker.forecast(_options.count("steps", steps, 10_000)))
 
     def _one(self, values: npt.NDArray[Any]) -> Any:
-        """The value of the only way to forget; else all of them."""
-        return values[0].item() if len(values) == 1 else values
+        """What each of the trackers has: a number if there is one of them."""
+        found = self._shaped(values, 0)
+        return found.item() if found.ndim == 0 else found
 
-    def _last_axis(self, values: Array) -> Array:
-        return values[0] if len(values) == 1 else values.T
+    def _shaped(self, values: npt.NDArray[Any], axis: int) -> npt.NDArray[Any]:
+        """The axis of trackers as one of outputs, in its place, and one of ways to forget, the last; neither where there is one."""
+        ways, outputs = len(self.forgetting), len(self.outputs)
+        apart = values.reshape(*values.shape[:axis], ways, outputs, *values.shape[axis + 1 :])
+        apart = apart.squeeze(axis + 1) if outputs == 1 else apart
+        return apart.squeeze(axis) if ways == 1 else np.moveaxis(apart, axis, -1)
 
     @property
     def parameters(self) -> Array:
-        """The parameters in the order of `parameter_names`, shape (n,), or (n, ways to forget); NaN before there is an estimate."""
-        return self._last_axis(self._tracker.parameters())
+        """The parameters in the order of `parameter_names`, shape ([outputs,] n[, ways to forget]); NaN before there is an estimate."""
+        return self._shaped(self._tracker.parameters(), 0)
 
     @property
     def standard_errors(self) -> Array:
         """Their standard errors, of the shape of `parameters`; NaN until the noise variance is known."""
-        return self._last_axis(self._tracker.standard_errors())
+        return self._shaped(self._tracker.standard_errors(), 0)
 
     @property
     def noise_variance(self) -> Any:
-        """The variance of e, a float, or an array with one for each way to forget; NaN until enough rows are in."""
+        """The variance of e, a float, or an array of shape ([outputs][, ways to forget]); NaN until enough rows are in."""
         return self._one(self._tracker.noise_variances())
 
     @property
@@ -578,19 +620,26 @@ class Tracker:
 
     @property
     def output(self) -> str:
-        """The channel of the output."""
-        return self._tracker.output
+        """The channel of the output, of a tracker that has one."""
+        if len(self.outputs) > 1:
+            raise AttributeError(f"there are several outputs: {', '.join(self.outputs)}; see outputs")
+        return self.outputs[0]
+
+    @property
+    def outputs(self) -> list[str]:
+        """The channels of the outputs."""
+        return self._tracker.outputs
 
     @property
     def offsets(self) -> dict[str, float]:
         """What is taken from each channel."""
-        return dict(zip([*self.inputs, self.output], self._tracker.offsets))
+        return dict(zip([*self.inputs, *self.outputs], self._tracker.offsets))
 
     @property
     def scales(self) -> dict[str, float] | None:
         """The typical magnitude of each channel less its offset; None while they are not known."""
         scales = self._tracker.scales
-        return None if scales is None else dict(zip([*self.inputs, self.output], scales))
+        return None if scales is None else dict(zip([*self.inputs, *self.outputs], scales))
 
     @property
     def horizon(self) -> int | None:

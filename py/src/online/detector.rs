@@ -34,6 +34,8 @@ const MOST_OUTPUTS: usize = 1000;
 ///     The row of a run that gave it, counted from 0; None of `ChangeDetector.update`.
 /// forgetting : str or None
 ///     The way to forget of the tracker that gave it, where a `Tracker` has several.
+/// output : str or None
+///     The output that it is about, where a `Tracker` has several.
 #[pyclass(module = "thetahat", frozen, eq)]
 #[derive(Clone, PartialEq)]
 pub(crate) struct Alarm {
@@ -42,24 +44,31 @@ pub(crate) struct Alarm {
     row: Option<usize>,
     #[pyo3(get)]
     forgetting: Option<String>,
+    #[pyo3(get)]
+    output: Option<String>,
 }
 
 impl Alarm {
     fn new(given: Given<f64>, row: Option<usize>) -> Self {
-        Alarm { given, row, forgetting: None }
+        Alarm { given, row, forgetting: None, output: None }
     }
 
     /// That of one of several trackers, or of the only one.
-    pub(crate) fn of(given: Given<f64>, row: usize, forgetting: Option<String>) -> Self {
-        Alarm { given, row: Some(row), forgetting }
+    pub(crate) fn of(
+        given: Given<f64>,
+        row: usize,
+        forgetting: Option<String>,
+        output: Option<String>,
+    ) -> Self {
+        Alarm { given, row: Some(row), forgetting, output }
     }
 
     pub(crate) fn restore(kept: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let (word, statistic, samples, row, forgetting): (String, f64, u32, Option<usize>, Option<String>) =
-            kept.extract()?;
+        type Kept = (String, f64, u32, Option<usize>, Option<String>, Option<String>);
+        let (word, statistic, samples, row, forgetting, output): Kept = kept.extract()?;
         let chart = Chart::ALL.into_iter().find(|chart| chart.word() == word);
         let chart = chart.ok_or_else(|| PyValueError::new_err(format!("chart: there is no chart {word}")))?;
-        Ok(Alarm { given: Given { chart, statistic, samples }, row, forgetting })
+        Ok(Alarm { given: Given { chart, statistic, samples }, row, forgetting, output })
     }
 }
 
@@ -85,13 +94,17 @@ impl Alarm {
         let row = self.row.map_or_else(String::new, |row| format!(", row={row}"));
         let forgetting =
             self.forgetting.as_ref().map_or_else(String::new, |policy| format!(", forgetting='{policy}'"));
+        let output = self.output.as_ref().map_or_else(String::new, |output| format!(", output='{output}'"));
         let (chart, statistic) = (chart.word(), text(statistic));
-        format!("Alarm(chart='{chart}', statistic={statistic}, samples={samples}{row}{forgetting})")
+        format!("Alarm(chart='{chart}', statistic={statistic}, samples={samples}{row}{forgetting}{output})")
     }
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py>> {
         let Given { chart, statistic, samples } = self.given;
-        attributes("Alarm", (chart.word(), statistic, samples, self.row, &self.forgetting).into_pyobject(py)?)
+        attributes(
+            "Alarm",
+            (chart.word(), statistic, samples, self.row, &self.forgetting, &self.output).into_pyobject(py)?,
+        )
     }
 }
 

@@ -23,6 +23,12 @@ pub struct TrackSummary {
 /// What a tracker has come to.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct TrackerSummary {
+    /// The output that it is of; none where there is but one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub output: Option<String>,
+    /// Of how many outputs the past is in its equation; none: of its own alone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub coupled: Option<usize>,
     /// What it forgets, as [`Policy`](crate::track::Policy) is written.
     pub forgetting: String,
     /// The orders of its model, without the constant; of a nonlinear one its lags.
@@ -53,9 +59,11 @@ pub struct TrackerSummary {
 }
 
 impl Tracker {
-    /// What it has come to. How many alarms it gave is known to who counted them.
+    /// What it has come to. How many alarms it gave, and what its output is called, is known to who counted and named them.
     pub fn summary(&self, alarms: u64) -> TrackerSummary {
-        let all = |inputs: &[f64], output: f64| inputs.iter().copied().chain([output]).collect();
+        let coupled = self.coupled_outputs();
+        let all =
+            |inputs: &[f64], output: f64| inputs.iter().skip(coupled).copied().chain([output]).collect();
         let values = self.parameters().unwrap_or_default();
         let mut errors = vec![f64::NAN; self.names().len()];
         // There is one place for each.
@@ -63,6 +71,8 @@ impl Tracker {
         let parameters = self.names().iter().zip(values).zip(&errors);
         let score = self.score();
         TrackerSummary {
+            output: None,
+            coupled: (coupled > 0).then_some(coupled),
             forgetting: self.plan().forgetting.to_string(),
             orders: self.orders().clone(),
             map: self.map().cloned(),

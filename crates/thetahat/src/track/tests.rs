@@ -1,5 +1,6 @@
 //! Trackers against the estimators of thetahat-core, against batch fits, and against what they are written to.
 
+mod coupled;
 mod knowledge;
 mod nonlinear;
 mod plans;

@@ -52,6 +52,18 @@ pub struct Tracked {
 /// scales that are found, predictions, figures, detection of changes, and a start from the report of a fit. NaN is a
 /// missing sample. Parameters are those of the signals less their offsets.
 ///
+/// # Several outputs
+///
+/// ```text
+/// A(q) y(k) = sum_j B_j(q) u_j(k) + constant + e(k),   A(q) = I + A_1 q⁻¹ + … + A_na q⁻ⁿᵃ with full matrices
+/// ```
+///
+/// is an equation for each output: [`Tracker::coupled`] is one of them, a tracker with the past of all outputs in its regressor, and
+/// [`Tracker::log_row_of`] and [`forecasts`](crate::track::forecasts) are for as many of them side by side. Each has a memory, a noise variance, a
+/// detector and a dead zone of its own, and goes on learning where another output is missing, as long as no such sample is in its
+/// regressor. ([`RecursiveVectorArx`](thetahat_core::RecursiveVectorArx) is all of them in one with a common P: for a controller, where no
+/// output is ever missing alone.)
+///
 /// # Scales
 ///
 /// The estimator needs the typical magnitude of each channel, for its prior and its bounds. If the plan does not have
@@ -91,6 +103,8 @@ pub struct Tracked {
 #[serde(into = "snapshot::Snapshot", try_from = "snapshot::Snapshot")]
 pub struct Tracker {
     pub(super) orders: Orders,
+    /// Of how many outputs the past is in the equation; 0: of its own alone, as the orders say.
+    pub(super) outputs: usize,
     /// The functions of the lags that the orders are of; none: the lags are the regressor.
     pub(super) map: Option<Map>,
     pub(super) plan: TrackPlan,
@@ -106,8 +120,10 @@ pub struct Tracker {
     pub(super) settling: usize,
     detector: Option<ChangeDetector<f64>>,
     score: TrackScore,
-    /// The latest inputs as the estimator sees them: less their offsets.
-    inputs: Vec<f64>,
+    /// The latest inputs as the estimator sees them: less their offsets, and after what the outputs in the equation were a row before.
+    pub(super) inputs: Vec<f64>,
+    /// The latest of these outputs, less their offsets and with the sign of A.
+    pub(super) past: Vec<f64>,
     workspace: Workspace,
 }
 
@@ -136,7 +152,54 @@ impl Tracker {
     /// n/(n + 1) for n parameters (the constant is one of them); if a scale is not in 1e-98 … 1e98; if another number of the
     /// plan is out of its range.
     pub fn new(orders: &Orders, plan: &TrackPlan) -> Result<Self, Error> {
-        Self::of(orders, None, plan)
+        Self::of(orders, 0, None, plan)
+    }
+
+    /// A tracker of one of several outputs, whose equation has the past of all of them: na samples of each. See
+    /// [Several outputs](Tracker#several-outputs).
+    ///
+    /// The numbers of the plan for the inputs are those of the outputs, in their order, then those of the inputs; that for the output
+    /// is that of the tracker's own. Parameters are a1_1, a1_2, … of the first output, a2_1, … of the next, then those of the
+    /// inputs.
+    ///
+    /// # Errors
+    /// As [`Tracker::new`]; [`Error::Argument`] for fewer than two outputs, and for orders with C.
+    ///
+    /// ```
+    /// use thetahat::model::Orders;
+    /// use thetahat::track::{TrackPlan, Tracker, forecasts};
+    ///
+    /// // Two tanks: a pump fills the first, which runs into the second.
+    /// let orders = Orders::arx(1, &[1], &[1])?;
+    /// let equation = || Tracker::coupled(&orders, 2, &TrackPlan::default());
+    /// let mut tanks = [equation()?, equation()?];
+    /// let mut levels = [0.0, 0.0];
+    /// for k in 0..300 {
+    ///     let u = if k % 7 < 3 { 1.0 } else { -1.0 };
+    ///     for (place, tracker) in tanks.iter_mut().enumerate() {
+    ///         tracker.log_row_of(place, &levels, &[u])?;
+    ///     }
+    ///     levels = [0.8 * levels[0] + 0.5 * u, 0.9 * levels[1] + 0.1 * levels[0]];
+    /// }
+    /// assert_eq!(tanks[1].names(), ["a1_1", "a2_1", "b1"]);
+    /// let second = tanks[1].parameters().expect("an estimate");
+    /// assert!((second[0] + 0.1).abs() < 1e-3 && (second[1] + 0.9).abs() < 1e-3);
+    /// // The levels to come, which the input before them decides.
+    /// let ahead = forecasts(&mut tanks, 1)?;
+    /// assert!((ahead[0] - levels[0]).abs() < 1e-2 && (ahead[1] - levels[1]).abs() < 1e-2);
+    /// # Ok::<(), thetahat::Error>(())
+    /// ```
+    pub fn coupled(orders: &Orders, outputs: usize, plan: &TrackPlan) -> Result<Self, Error> {
+        if outputs < 2 {
+            return Err(Error::argument("outputs", format!("there are {outputs}; two or more are coupled")));
+        }
+        if orders.nc > 0 {
+            return Err(Error::argument(
+                "orders",
+                format!("{orders} has C; several outputs are tracked as ARX"),
+            ));
+        }
+        Self::of(orders, outputs, None, plan)
     }
 
     /// A tracker of a nonlinear ARX model: the parameters of the functions of a map,
@@ -161,42 +224,47 @@ impl Tracker {
             let message = format!("there are {} names for {} lags", regressors.len(), orders.parameters());
             return Err(Error::argument("regressors", message));
         }
-        Self::of(orders, Some((map, map.names(regressors))), plan)
+        Self::of(orders, 0, Some((map, map.names(regressors))), plan)
     }
 
-    /// The same for linear models, and for functions with their names.
+    /// The same for linear models, of one output or with this many in the equation, and for functions with their names.
     pub(super) fn of(
         orders: &Orders,
+        outputs: usize,
         map: Option<(&Map, Vec<String>)>,
         plan: &TrackPlan,
     ) -> Result<Self, Error> {
-        check(orders, plan)?;
+        // What the estimator has is checked: `equation` takes orders for what they say.
+        let lines = equation(orders, outputs);
+        check(orders, &TrackPlan { offsets: None, scales: None, ..plan.clone() })?;
+        check(&lines, plan)?;
         let (map, names) = match map {
             Some((map, names)) => {
                 check_map(orders, map, &names, plan)?;
                 (Some(map), names)
             }
             None => {
-                let mut names = orders.names();
+                let mut names = names(orders, outputs);
                 if plan.constant {
                     names.insert(names.len() - orders.nc, "constant".to_owned());
                 }
                 (None, names)
             }
         };
-        let inputs = orders.inputs();
+        let inputs = lines.inputs();
         let zeros = || PerChannel { inputs: vec![0.0; inputs], output: 0.0 };
         let parameters = names.len();
         // What the scales do not decide is checked at once.
         let units = PerChannel { inputs: vec![1.0; inputs], output: 1.0 };
         let estimator =
-            Estimator::new(orders, map, plan, plan.scales.as_ref().unwrap_or(&units)).map_err(refused)?;
+            Estimator::new(&lines, map, plan, plan.scales.as_ref().unwrap_or(&units)).map_err(refused)?;
         let stage = match plan.scales {
             Some(_) => Stage::Running(Box::new(estimator)),
-            None => Stage::Collecting(Collecting::new(orders.maximum_lag() + 2 * parameters, &orders.nb)),
+            None => Stage::Collecting(Collecting::new(lines.maximum_lag() + 2 * parameters, &lines.nb)),
         };
         Ok(Self {
             orders: orders.clone(),
+            outputs,
             map: map.cloned(),
             plan: plan.clone(),
             names,
@@ -209,6 +277,7 @@ impl Tracker {
             detector: plan.alarm_interval.map(|interval| change_detector(interval, 1)).transpose()?,
             score: TrackScore::default(),
             inputs: vec![f64::NAN; inputs],
+            past: vec![f64::NAN; outputs],
             workspace: Workspace::default(),
         })
     }
@@ -221,16 +290,37 @@ impl Tracker {
     /// After which nothing has changed: [`Error::Argument`] if there is not one value for each input; [`Error::Data`] if one
     /// is infinite.
     pub fn log_row(&mut self, output: f64, inputs: &[f64]) -> Result<Tracked, Error> {
+        if self.outputs > 0 {
+            let message = format!("there is one value for {} outputs; give those of all", self.outputs);
+            return Err(Error::argument("output", message));
+        }
+        self.log_row_of(0, &[output], inputs)
+    }
+
+    /// One row of a log with several outputs, of which this tracker is that of the one in this place, counted from 0. See
+    /// [`Tracker::log_row`].
+    ///
+    /// # Errors
+    /// Those of `log_row`; [`Error::Argument`] if the outputs are not those of [`Tracker::coupled`], or there is none in this place.
+    pub fn log_row_of(&mut self, place: usize, outputs: &[f64], inputs: &[f64]) -> Result<Tracked, Error> {
         if inputs.len() != self.orders.inputs() {
             let message = format!("there are {} values for {} inputs", inputs.len(), self.orders.inputs());
             return Err(Error::argument("inputs", message));
         }
+        let Some(&output) = outputs.get(place).filter(|_| [0, outputs.len()].contains(&self.outputs)) else {
+            let message = format!("there are {} values, and this is output {}", outputs.len(), place + 1);
+            return Err(Error::argument("outputs", message));
+        };
+        // Those that the equation has.
+        let coupled = if self.outputs > 0 { outputs } else { &[] };
         if output.is_infinite() {
             return Err(Error::data("the output is infinite; if the sample is missing, leave it empty"));
         }
-        if let Some(input) = inputs.iter().position(|value| value.is_infinite()) {
-            let message = "is infinite; if the sample is missing, leave it empty";
-            return Err(Error::data(format!("input {} {message}", input + 1)));
+        for (kind, values) in [("output", coupled), ("input", inputs)] {
+            if let Some(at) = values.iter().position(|value| value.is_infinite()) {
+                let message = "is infinite; if the sample is missing, leave it empty";
+                return Err(Error::data(format!("{kind} {} {message}", at + 1)));
+            }
         }
         let limit = match self.stage {
             Stage::Collecting(_) => LARGEST,
@@ -240,7 +330,7 @@ impl Tracker {
         let PerChannel { inputs: input_offsets, output: output_offset } = &mut self.offsets;
         let offsets = input_offsets.iter_mut().chain([output_offset]);
         for ((unset, offset), &value) in
-            self.unset.iter_mut().zip(offsets).zip(inputs.iter().chain([&output]))
+            self.unset.iter_mut().zip(offsets).zip(coupled.iter().chain(inputs).chain([&output]))
         {
             if *unset && value.abs() <= limit {
                 (*unset, *offset) = (false, value);
@@ -256,8 +346,12 @@ impl Tracker {
             deviation
         };
         let output = deviation(output, self.offsets.output);
-        for (place, (&value, &offset)) in self.inputs.iter_mut().zip(inputs.iter().zip(&self.offsets.inputs))
-        {
+        let mut fed = self.inputs.iter_mut().zip(&self.offsets.inputs);
+        // The outputs of this row are in the regressor of the next one.
+        for ((&value, past), (place, &offset)) in coupled.iter().zip(&mut self.past).zip(fed.by_ref()) {
+            *place = std::mem::replace(past, -deviation(value, offset));
+        }
+        for ((place, &offset), &value) in fed.zip(inputs) {
             *place = deviation(value, offset);
         }
         let mut tracked = match &mut self.stage {
@@ -303,8 +397,9 @@ impl Tracker {
     /// Goes on from the rows that were collected, with these scales.
     fn start(&mut self, scales: PerChannel) -> Result<(), Error> {
         let Stage::Collecting(collecting) = &self.stage else { return Ok(()) };
+        let lines = equation(&self.orders, self.outputs);
         let mut estimator =
-            Estimator::new(&self.orders, self.map.as_ref(), &self.plan, &scales).map_err(refused)?;
+            Estimator::new(&lines, self.map.as_ref(), &self.plan, &scales).map_err(refused)?;
         let (rows, gap) = collecting.rows();
         for row in rows {
             if row.after_gap {
@@ -328,6 +423,7 @@ impl Tracker {
             Stage::Running(estimator) => estimator.gap(),
         }
         self.inputs.fill(f64::NAN);
+        self.past.fill(f64::NAN);
     }
 
     /// The prediction this many steps ahead: y(k + steps) from the samples up to k, in the output's units. Inputs to come are
@@ -337,10 +433,12 @@ impl Tracker {
     /// model overflows. 2 n multiply-adds and moves a step. (The memory for it is taken at the first call with this many steps.)
     ///
     /// # Errors
-    /// [`Error::Argument`] if the steps are not in 1 … 10,000.
+    /// [`Error::Argument`] if the steps are not in 1 … 10,000; for one of several outputs, which [`forecasts`](crate::track::forecasts) is for.
     pub fn forecast(&mut self, steps: usize) -> Result<f64, Error> {
-        if !(1..=FARTHEST).contains(&steps) {
-            return Err(Error::argument("horizon", format!("{steps} is not in 1 … {FARTHEST}")));
+        check_steps(steps)?;
+        if self.outputs > 0 {
+            let message = "this output depends on the past of the others; forecast all of them";
+            return Err(Error::argument("outputs", message));
         }
         let Stage::Running(estimator) = &self.stage else { return Ok(f64::NAN) };
         if !self.has_estimate {
@@ -416,16 +514,17 @@ impl Tracker {
 
     /// Whether its parts fit together, as those of any tracker do that was not edited after it was written.
     pub(super) fn is_sound(&self) -> bool {
-        let inputs = self.orders.inputs();
         let open = TrackPlan { scales: None, ..self.plan.clone() };
-        let fresh = match &self.map {
-            None => Self::new(&self.orders, &open),
-            Some(map) => Self::of(&self.orders, Some((map, self.names.clone())), &open),
+        let map = self.map.as_ref().map(|map| (map, self.names.clone()));
+        // More outputs than their past in a row can be are none.
+        let Ok(fresh) = Self::of(&self.orders, self.outputs.min(self.past.len()), map, &open) else {
+            return false;
         };
-        let Ok(fresh) = fresh else { return false };
+        let lines = equation(&fresh.orders, fresh.outputs);
+        let inputs = lines.inputs();
         let stage = match (&self.stage, &fresh.stage, &self.scales) {
             (Stage::Running(estimator), _, Some(scales)) => {
-                Estimator::new(&self.orders, self.map.as_ref(), &self.plan, scales)
+                Estimator::new(&lines, self.map.as_ref(), &self.plan, scales)
                     .is_ok_and(|fresh| estimator.fits(&fresh))
             }
             (Stage::Collecting(collecting), Stage::Collecting(other), None) => {
@@ -445,6 +544,8 @@ impl Tracker {
         stage
             && fresh.names == self.names
             && self.inputs.len() == inputs
+            && self.past.len() == self.outputs
+            && (self.outputs == 0 || self.map.is_none() && self.orders.nc == 0)
             && each(&self.offsets, f64::is_finite)
             && given(&self.plan.offsets, &self.offsets)
             && self.scales.as_ref().is_none_or(|scales| {
@@ -463,6 +564,11 @@ impl Tracker {
         &self.orders
     }
 
+    /// Of how many outputs the past is in the equation of this one; 0 where it is its own alone.
+    pub fn coupled_outputs(&self) -> usize {
+        self.outputs
+    }
+
     /// The functions of a nonlinear model; none of a linear one.
     pub fn map(&self) -> Option<&Map> {
         self.map.as_ref()
@@ -471,6 +577,7 @@ impl Tracker {
     /// What is estimated: structure and orders, or functions, such as ARX(2, 2, 1) or NARX polynomial, 6 terms.
     pub fn model(&self) -> String {
         match &self.map {
+            None if self.outputs > 0 => format!("{} of {} outputs", self.orders, self.outputs),
             None => self.orders.to_string(),
             Some(map) => map.name(self.names.len()),
         }
@@ -502,6 +609,40 @@ impl Tracked {
             too_large: false,
         }
     }
+}
+
+/// The orders of one equation as its estimator has them. With several outputs na samples of each, its own among them, come before
+/// the inputs, as inputs that act at once: what they were a row before.
+fn equation(orders: &Orders, outputs: usize) -> Orders {
+    if outputs == 0 {
+        return orders.clone();
+    }
+    let first = |value: usize, of_inputs: &[usize]| [&vec![value; outputs], of_inputs].concat();
+    Orders {
+        na: 0,
+        nb: first(orders.na, &orders.nb),
+        nf: first(0, &orders.nf),
+        nk: first(0, &orders.nk),
+        ..orders.clone()
+    }
+}
+
+/// The names of its parameters.
+fn names(orders: &Orders, outputs: usize) -> Vec<String> {
+    let past = (1..=outputs).flat_map(|output| (1..=orders.na).map(move |lag| format!("a{output}_{lag}")));
+    let of_inputs = orders.names();
+    match outputs {
+        0 => of_inputs,
+        _ => past.chain(of_inputs.into_iter().skip(orders.na)).collect(),
+    }
+}
+
+/// That a forecast is not farther than it may be.
+pub(super) fn check_steps(steps: usize) -> Result<(), Error> {
+    if (1..=FARTHEST).contains(&steps) {
+        return Ok(());
+    }
+    Err(Error::argument("horizon", format!("{steps} is not in 1 … {FARTHEST}")))
 }
 
 /// Whether the sample corrected an estimate, so that there is one.

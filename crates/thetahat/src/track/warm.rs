@@ -146,7 +146,7 @@ impl Tracker {
         plan.scales = Some(PerChannel { inputs, output: map.scale });
         // What was given passed before: what does not pass now is what follows from the report.
         check(&orders, &plan).map_err(unusable)?;
-        let tracker = Self::of(&orders, Some((&map.functions, names)), &plan)?;
+        let tracker = Self::of(&orders, 0, Some((&map.functions, names)), &plan)?;
         tracker.with_parameters(&model.parameters, None, &relative, noise_variance, samples)
     }
 }

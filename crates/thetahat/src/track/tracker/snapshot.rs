@@ -16,6 +16,8 @@ use crate::track::{
 pub(super) struct Snapshot {
     version: SnapshotVersion,
     orders: Orders,
+    #[serde(default, skip_serializing_if = "is_zero")]
+    outputs: usize,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     map: Option<Map>,
     plan: TrackPlan,
@@ -30,15 +32,23 @@ pub(super) struct Snapshot {
     score: TrackScore,
     #[serde(with = "missing::vector")]
     inputs: Vec<f64>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty", with = "missing::vector")]
+    past: Vec<f64>,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it so")]
+fn is_zero(count: &usize) -> bool {
+    *count == 0
 }
 
 impl From<Tracker> for Snapshot {
     fn from(tracker: Tracker) -> Self {
-        let Tracker { orders, map, plan, names, offsets, unset, scales, stage, .. } = tracker;
-        let Tracker { has_estimate, settling, detector, score, inputs, .. } = tracker;
+        let Tracker { orders, outputs, map, plan, names, offsets, unset, scales, stage, .. } = tracker;
+        let Tracker { has_estimate, settling, detector, score, inputs, past, .. } = tracker;
         Self {
             version: SnapshotVersion,
             orders,
+            outputs,
             map,
             plan,
             names,
@@ -51,6 +61,7 @@ impl From<Tracker> for Snapshot {
             detector,
             score,
             inputs,
+            past,
         }
     }
 }
@@ -59,10 +70,11 @@ impl TryFrom<Snapshot> for Tracker {
     type Error = Error;
 
     fn try_from(read: Snapshot) -> Result<Self, Error> {
-        let Snapshot { orders, map, plan, names, offsets, unset, scales, stage, .. } = read;
-        let Snapshot { has_estimate, settling, detector, score, inputs, .. } = read;
+        let Snapshot { orders, outputs, map, plan, names, offsets, unset, scales, stage, .. } = read;
+        let Snapshot { has_estimate, settling, detector, score, inputs, past, .. } = read;
         let tracker = Self {
             orders,
+            outputs,
             map,
             plan,
             names,
@@ -75,6 +87,7 @@ impl TryFrom<Snapshot> for Tracker {
             detector,
             score,
             inputs,
+            past,
             workspace: Workspace::default(),
         };
         if tracker.is_sound() { Ok(tracker) } else { Err(Error::data("its parts do not fit together")) }

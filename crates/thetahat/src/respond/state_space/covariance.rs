@@ -198,9 +198,9 @@ impl StateCovariance {
 
     /// Whether too little is known of the state of the next row, or P left the range of numbers.
     pub(super) fn is_lost(&self) -> bool {
-        let few = |unknown: f64| unknown <= LOST;
-        !self.is_zero
-            && !(few(self.weights.dot(&self.after)) && self.after.iter().all(|entry| entry.is_finite()))
+        // Where it is not a number too.
+        let is_few = self.weights.dot(&self.after) <= LOST;
+        !(self.is_zero || is_few && self.after.iter().all(|entry| entry.is_finite()))
     }
 
     /// Whether the row that was taken last has a gain of its own.

@@ -191,7 +191,7 @@ impl<'l> StateSpaceOnLog<'l> {
 
     /// What uncertain states add to the variances of predictions: a value for each row of each output, zero where states are known. None where
     /// no output is missing.
-    fn added(&self, steps: usize) -> Option<Cow<'_, Vec<Vec<f64>>>> {
+    fn added(&self, steps: usize) -> Option<Cow<'_, [Vec<f64>]>> {
         let covariance = self.covariance.as_ref()?;
         let compute = || {
             let mut added_to = vec![vec![0.0; self.ahead.outputs[0].len()]; self.outputs()];
@@ -212,7 +212,11 @@ impl<'l> StateSpaceOnLog<'l> {
             }
             added_to
         };
-        Some(if steps == 1 { Cow::Borrowed(self.added.get_or_init(compute)) } else { Cow::Owned(compute()) })
+        Some(if steps == 1 {
+            Cow::Borrowed(self.added.get_or_init(compute).as_slice())
+        } else {
+            Cow::Owned(compute())
+        })
     }
 
     fn predict(&self, steps: usize, start: InitialCondition) -> Vec<Response> {

@@ -145,6 +145,67 @@ fn a_filter_that_knows_all_outputs_predicts_as_the_model_does() {
     }
 }
 
+/// The log of the motor without the current in every fifth row, without both outputs in rows 401 to 410, and without the speed in the last
+/// ten and the current in the last five.
+fn with_holes() -> String {
+    let mut lines = include_str!("data/dc_motor.csv").lines();
+    let header: Vec<&str> = lines.next().expect("a header").split(',').collect();
+    let place = |name: &str| header.iter().position(|column| *column == name).expect("the column");
+    let (current, speed) = (place("i"), place("speed"));
+    let mut text = header.join(",");
+    for (row, line) in (1..).zip(lines) {
+        let mut cells: Vec<&str> = line.split(',').collect();
+        if row % 5 == 0 || (401..=410).contains(&row) || row > 995 {
+            cells[current] = "";
+        }
+        if (401..=410).contains(&row) || row > 990 {
+            cells[speed] = "";
+        }
+        text.push('\n');
+        text.push_str(&cells.join(","));
+    }
+    text
+}
+
+#[test]
+fn predictions_go_on_through_missing_outputs() {
+    let folder = fitted();
+    folder.write("holes.csv", with_holes());
+    let columns = |options: &str| -> Vec<Vec<f64>> {
+        let run = folder.done(&format!("predict r.json {options} --time t"));
+        let rows = run.stdout.lines().skip(1);
+        rows.map(|line| line.split(',').map(|cell| cell.parse().unwrap_or(f64::NAN)).collect()).collect()
+    };
+    let (whole, holes) = (columns("log.csv"), columns("holes.csv"));
+    assert_eq!((whole.len(), holes.len()), (1000, 1000));
+    // The time, then for each output what was measured, what was predicted, and the deviation.
+    let (current, speed) = (2, 5);
+    // The last current is that of row 994; the row after it is forecast.
+    for (row, cells) in holes.iter().enumerate() {
+        assert!([current, speed].iter().all(|place| cells[*place].is_finite() == (row < 995)), "{row}");
+    }
+    for row in [300, 404, 994] {
+        let [whole, holes] = [&whole, &holes].map(|rows| &rows[row]);
+        for place in [current, speed] {
+            // Where less is known deviations are larger, and predictions near.
+            let deviation = holes[place + 1];
+            assert!(deviation >= whole[place + 1], "{row}");
+            assert!((holes[place] - whole[place]).abs() < 3.0 * deviation, "{row}");
+        }
+        assert!(holes[speed + 1] > whole[speed + 1], "{row}");
+    }
+    let run = folder.done("validate r.json holes.csv --time t --format json");
+    let validation: Value = serde_json::from_str(&run.stdout).expect("JSON");
+    for (output, samples) in [("i", 788.0), ("speed", 980.0)] {
+        let fits = validation["fit"].as_array().expect("a list");
+        let own = fits.iter().find(|fit| fit["output"] == output && fit["horizon"] == ahead(1));
+        let own = own.expect("the figure is there");
+        assert_eq!(number(own, "/samples"), samples, "{output}");
+        assert!(number(own, "/percent") > 97.0, "{output}");
+    }
+    assert!(validation["portmanteau"]["p_value"].is_number());
+}
+
 #[test]
 fn requirements_may_be_of_one_output() {
     let folder = fitted();

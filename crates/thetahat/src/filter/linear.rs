@@ -30,8 +30,8 @@ struct Correlation {
     cross: DMatrix<f64>,
     /// Q.
     noise: DMatrix<f64>,
-    /// Whether Q - S R⁻¹ S' = 0, as in innovations form.
-    explained: bool,
+    /// K and R of a model in innovations form, in which Q - S R⁻¹ S' = 0.
+    innovations: Option<(DMatrix<f64>, Covariance<f64, Dyn>)>,
     /// The transition after a row of which all outputs are there.
     full: Transition,
 }
@@ -51,23 +51,24 @@ pub(super) struct Matrices {
 }
 
 impl Linear {
-    /// A model of matrices whose sizes fit. `innovations`: Q = K R K' and S = K R to the bit.
+    /// A model of matrices whose sizes fit. `gain`: the K of Q = K R K' and S = K R.
     ///
     /// # Errors
     /// If no noises have these covariances, or a number overflows.
     pub(super) fn of_matrices(
         names: Names,
         matrices: Matrices,
-        innovations: bool,
+        gain: Option<DMatrix<f64>>,
     ) -> Result<(Frame, Self), thetahat_core::Error> {
         let Matrices { f, g, h, d, q, r, s, x0, p0 } = matrices;
         let noise = q.matrix();
+        let innovations = gain.map(|gain| (gain, r.clone()));
         let transition = LinearTransition::new(f, q)?.with_input(g)?;
         let frame = Frame::new(names, (x0, p0), (h, d, r))?;
         let Some(cross) = s.filter(|cross| cross.iter().any(|entry| *entry != 0.0)) else {
             return Ok((frame, Self { transition, correlation: None }));
         };
-        let mut correlation = Correlation { cross, noise, explained: innovations, full: transition.clone() };
+        let mut correlation = Correlation { cross, noise, innovations, full: transition.clone() };
         let all = vec![true; frame.names.outputs.len()];
         correlation.full = decorrelated(&transition, &correlation, &frame, &all)?;
         Ok((frame, Self { transition, correlation: Some(correlation) }))
@@ -111,7 +112,7 @@ impl Linear {
             };
             let x0 = DVector::zeros(n);
             let StateSpace { f, g, h, d, .. } = space.clone();
-            Linear::of_matrices(names, Matrices { f, g, h, d, q, r, s, x0, p0 }, true)
+            Linear::of_matrices(names, Matrices { f, g, h, d, q, r, s, x0, p0 }, Some(space.k.clone()))
         };
         let (frame, linear) =
             build().map_err(|error| Error::report(format!("its model has no filter: {error}")))?;
@@ -174,10 +175,18 @@ fn decorrelated(
     for (column, &output) in used.iter().enumerate() {
         input_matrix.set_column(inputs + output, &weights.column(column));
     }
-    let rest = if correlation.explained {
-        Covariance::zero(Dyn(n))
-    } else {
-        remaining(&correlation.noise, &weights, &cross)?
+    let rest = match &correlation.innovations {
+        // Q - W S' = (K - W E) R (K - W E)', E picking the outputs that are there from all: zero if these are all.
+        Some(_) if used.len() == there.len() => Covariance::zero(Dyn(n)),
+        Some((gain, covariance)) => {
+            let mut unexplained = gain.clone();
+            for (column, &output) in used.iter().enumerate() {
+                let mut own = unexplained.column_mut(output);
+                own -= weights.column(column);
+            }
+            covariance.transformed(&unexplained)?
+        }
+        None => remaining(&correlation.noise, &weights, &cross)?,
     };
     LinearTransition::new(state_matrix, rest)?.with_input(input_matrix)
 }

@@ -92,7 +92,7 @@ pub(super) fn read(root: &Section<'_>) -> Result<(Frame, Linear), Error> {
         p0: noise("P0", "the covariance of what is known of the state at the first row", n)?,
     };
     let correlated = root.get("S");
-    Linear::of_matrices(Names { states, inputs, outputs, sample_time }, matrices, false).map_err(|error| {
+    Linear::of_matrices(Names { states, inputs, outputs, sample_time }, matrices, None).map_err(|error| {
         let message = format!("no noises have these Q, R and S: {error}");
         correlated.as_ref().map_or_else(|| root.error(error.to_string()), |entry| entry.error(message))
     })

@@ -155,7 +155,8 @@ impl StateSpacePlan {
 /// ```
 ///
 /// with any number of inputs and outputs by a subspace method: see [`subspace`](crate::estimate::subspace()). The order is that of least MDL, or given. Segments without a
-/// missing value are each used from their first sample on, and predictions and free runs start each from the state that explains it best.
+/// missing value are each used from their first sample on, from the state that explains it best. Predictions and free runs start so too, and go
+/// on through missing outputs: predictions by the time-varying Kalman filter of this form, whose variances have what is not known of the state.
 ///
 /// With [`arx`](StateSpacePlan::arx) the model is an ARX model with a matrix polynomial A(q), by least squares.
 ///

@@ -1,9 +1,10 @@
+use crate::Error;
 use crate::data::{Channel, Log, Offset, Record};
 use crate::filter::{Estimator, InitialState, StateFilter, StateModel, linear::Linear};
-use crate::model::{Orders, PolynomialModel};
+use crate::model::{Model, Orders, PolynomialModel};
 use crate::regression::noise::Noise;
-use crate::report::{Plan, identify};
-use crate::respond::{InitialCondition, predict};
+use crate::report::{Plan, StateSpacePlan, fit_state_space, identify};
+use crate::respond::{Horizon, InitialCondition, predict};
 
 /// Models of all structures: na, nb, nc, nd, nf, nk and their parameters a, b, c, d, f.
 fn models() -> Vec<PolynomialModel> {
@@ -117,4 +118,51 @@ fn a_report_of_a_fit_is_a_model() {
     silent.polynomials_mut().noise_variance = 0.0;
     let error = StateModel::from_report(&silent, Some(InitialState::Unknown)).unwrap_err().to_string();
     assert!(error.starts_with("its noise variance is 0"), "{error}");
+}
+
+/// Through missing outputs, predictions of a model in state space are those of its filter.
+#[test]
+fn predictions_through_missing_outputs_are_those_of_the_filter() -> Result<(), Error> {
+    let mut noise = Noise(23);
+    let (mut u, mut y) = (Vec::new(), [Vec::new(), Vec::new()]);
+    let mut x = [0.0, 0.0];
+    for _ in 0..400 {
+        let (input, e) = (noise.next(), [noise.next(), noise.next()]);
+        u.push(input);
+        for (y, (x, e)) in y.iter_mut().zip(x.iter().zip(e)) {
+            y.push(x + e);
+        }
+        x = [0.8 * x[0] + 0.3 * x[1] + input + 0.5 * e[0], 0.7 * x[1] + 0.4 * e[0] + 0.3 * e[1]];
+    }
+    let channel = |name: &str, values: &[f64]| Channel { name: name.to_owned(), values: values.to_vec() };
+    let log =
+        |y: &[Vec<f64>; 2]| Log::new(vec![channel("u", &u), channel("y1", &y[0]), channel("y2", &y[1])], 0.5);
+    let plan = StateSpacePlan { orders: Some(2..=2), ..StateSpacePlan::new(&["u"], &["y1", "y2"]) };
+    let report = fit_state_space(&log(&y)?, &[], &plan)?;
+    for y in &mut y {
+        (1..400).filter(|_| noise.next() < -0.6).for_each(|row| y[row] = f64::NAN);
+    }
+    let applied = report.apply(&log(&y)?, &[], None, Horizon::Steps { steps: 1 }, InitialCondition::Zero)?;
+
+    let model = StateModel::from_report(&report, Some(InitialState::Zero))?;
+    let mut filter = StateFilter::new(model, Estimator::Kalman)?;
+    // Predictions know that their variances are estimated.
+    let factor = match &report.model {
+        Model::StateSpace(model) => model.student_factor(),
+        _ => f64::NAN,
+    };
+    let mut through = 0;
+    for row in 0..400 {
+        let estimate = filter.step(None, &[u[row]], &[y[0][row], y[1][row]])?;
+        through += usize::from(estimate.measured < 2);
+        for (output, own) in applied.outputs.iter().enumerate() {
+            let apart = own.predicted[row] - estimate.outputs.values[output];
+            assert!(apart.abs() < 1e-11, "{row}, {output}: {apart:e}");
+            let deviations = own.standard_deviations.as_ref().zip(estimate.outputs.standard_deviations);
+            let apart = deviations.map(|(own, filter)| own[row] - factor * filter[output]);
+            assert!(apart.is_some_and(|apart| apart.abs() < 1e-11), "{row}, {output}: {apart:?}");
+        }
+    }
+    assert!(through > 100);
+    Ok(())
 }

@@ -2,11 +2,17 @@ use std::ops::Range;
 
 use thetahat_core::nalgebra::{DMatrix, DVector};
 
+use super::covariance::StateCovariance;
 use crate::model::StateSpace;
 use crate::optimize::normal;
 
 /// Rows that are added up together.
 const BLOCK: usize = 4;
+
+/// One over the deviation of an innovation; 1 for one without noise.
+fn weight(variance: f64) -> f64 {
+    if variance > 0.0 { 1.0 / variance.sqrt() } else { 1.0 }
+}
 
 /// A model that is stepped along the rows of a log.
 ///
@@ -18,6 +24,8 @@ const BLOCK: usize = 4;
 ///
 /// A step is one product with a matrix, (n + l) (n + m + l) multiply-adds, in memory of its own. Four rows of the matrix stand together: the
 /// sums of a block stay in registers, and each is that of its row, one column after the other.
+///
+/// [Through missing outputs](Self::through_missing_outputs) the gain is that of each row.
 #[derive(Debug, Clone)]
 pub(crate) struct Recursion {
     states: usize,
@@ -33,6 +41,12 @@ pub(crate) struct Recursion {
     weights: Vec<f64>,
     /// Whether it is fed with what was measured.
     predicts: bool,
+    /// What is not known of the state, where outputs may be missing.
+    covariance: Option<Box<StateCovariance>>,
+    /// The innovations of a row with a gain of its own.
+    left: DVector<f64>,
+    /// What they do to the next state beside what K does.
+    correction: DVector<f64>,
     /// The state, then the signals of a row.
     values: Vec<f64>,
     /// The next state, and what comes out.
@@ -79,10 +93,14 @@ impl Recursion {
         self
     }
 
+    /// A predictor of outputs that may be missing, each of them: the gain of a row is that of what was measured in it and before.
+    pub(super) fn through_missing_outputs(self, covariance: StateCovariance) -> Self {
+        Self { covariance: Some(Box::new(covariance)), ..self }
+    }
+
     fn of(model: &StateSpace, matrix: &DMatrix<f64>, between: DMatrix<f64>, predicts: bool) -> Self {
         let (rows, columns) = matrix.shape();
         let states = model.f.nrows();
-        let weight = |variance: f64| if variance > 0.0 { 1.0 / variance.sqrt() } else { 1.0 };
         let count = rows.div_ceil(BLOCK);
         let entry = |row: usize, column: usize| if row < rows { matrix[(row, column)] } else { 0.0 };
         let block = |first: usize| {
@@ -96,6 +114,9 @@ impl Recursion {
             seen: model.h.clone(),
             weights: model.noise_covariance.diagonal().iter().map(|variance| weight(*variance)).collect(),
             predicts,
+            covariance: None,
+            left: DVector::zeros(model.h.nrows()),
+            correction: DVector::zeros(states),
             values: vec![0.0; columns],
             next: vec![[0.0; BLOCK]; count],
         }
@@ -106,15 +127,42 @@ impl Recursion {
         &self.values[..self.states]
     }
 
-    /// Goes on from another state.
+    /// What is not known of it; none where it is known.
+    pub(super) fn covariance(&self) -> Option<&DMatrix<f64>> {
+        self.covariance.as_ref().and_then(|covariance| covariance.next())
+    }
+
+    /// What the innovations of the last row did to the state beside what K did; none where the gain was K.
+    pub(super) fn correction(&self) -> Option<&DVector<f64>> {
+        self.varying().map(|_| &self.correction)
+    }
+
+    /// Goes on from another state, which is known.
     pub(crate) fn start(&mut self, state: &[f64]) {
         self.values[..self.states].copy_from_slice(state);
+        if let Some(covariance) = &mut self.covariance {
+            covariance.reset();
+        }
+    }
+
+    /// Where the last row has a gain of its own.
+    fn varying(&self) -> Option<&StateCovariance> {
+        self.covariance.as_deref().filter(|covariance| covariance.varies())
     }
 
     /// What comes out of a row: the innovations, or the outputs. The signals are inputs, then outputs as far as it is fed with them.
+    ///
+    /// Where outputs may be missing, one that is counts as zero in what comes out: the prediction with another sign.
     pub(crate) fn step(&mut self, signals: &[&[f64]], row: usize) -> &[f64] {
+        let varies = self.covariance.as_mut().is_some_and(|covariance| {
+            let outputs = &signals[signals.len() - self.seen.nrows()..];
+            covariance.step(outputs, row)
+        });
         let (state, fed) = self.values.split_at_mut(self.states);
         fed.iter_mut().zip(signals).for_each(|(value, signal)| *value = signal[row]);
+        if varies {
+            fed.iter_mut().filter(|value| value.is_nan()).for_each(|value| *value = 0.0);
+        }
         let next = self.next.iter_mut().zip(&self.constant);
         for ((next, constant), block) in next.zip(self.blocks.chunks_exact(state.len() + fed.len())) {
             let mut sums = *constant;
@@ -125,12 +173,19 @@ impl Recursion {
         }
         let (next, out) = self.next.as_flattened().split_at(self.states);
         state.copy_from_slice(next);
-        &out[..self.seen.nrows()]
+        let out = &out[..self.seen.nrows()];
+        if let Some(covariance) = self.covariance.as_deref().filter(|_| varies) {
+            self.left.copy_from_slice(out);
+            self.correction.gemv(1.0, covariance.change(), &self.left, 0.0);
+            state.iter_mut().zip(&self.correction).for_each(|(value, more)| *value += more);
+        }
+        out
     }
 
     /// Starts a segment from the state that explains its outputs best: with M(t) = H A^t, A the matrix of the recursion, what is left of them
     /// is r(t) - M(t) x(0), with r what is left from rest, and the state that of weighted least squares. `outputs` may miss values. Rows count
-    /// as long as the state is seen in them. O(T n (n + m + l + l n)) for T of these.
+    /// as long as the state is seen in them. Through missing outputs A is that of each row, and so is the variance of what is left.
+    /// O(T n (n + m + l + l n)) for T of these.
     pub(crate) fn start_at_best(&mut self, signals: &[&[f64]], outputs: &[&[f64]], rows: Range<usize>) {
         let n = self.states;
         let (mut matrix, mut right) = (DMatrix::zeros(n, n), DVector::zeros(n));
@@ -138,7 +193,7 @@ impl Recursion {
         let mut after = seen.clone();
         let mut weighted = seen.clone();
         let first = seen.norm();
-        self.values[..self.states].fill(0.0);
+        self.start(&vec![0.0; n]);
         for row in rows {
             left.copy_from_slice(self.step(signals, row));
             for (place, output) in outputs.iter().enumerate() {
@@ -146,7 +201,11 @@ impl Recursion {
                     left[place] = output[row] - left[place];
                 }
                 // A missing output says nothing.
-                let weight = if output[row].is_nan() { 0.0 } else { self.weights[place] };
+                let weight = match self.varying() {
+                    _ if output[row].is_nan() => 0.0,
+                    Some(covariance) => weight(covariance.variance(place)),
+                    None => self.weights[place],
+                };
                 left[place] = if weight == 0.0 { 0.0 } else { weight * left[place] };
                 weighted.row_mut(place).zip_apply(&seen.row(place), |entry, seen| *entry = weight * seen);
             }
@@ -157,7 +216,8 @@ impl Recursion {
                     .zip(weighted.row(place).iter())
                     .for_each(|(sum, entry)| *sum += entry * left);
             }
-            after.gemm(1.0, &seen, &self.between, 0.0);
+            let between = self.varying().map_or(&self.between, StateCovariance::between);
+            after.gemm(1.0, &seen, between, 0.0);
             std::mem::swap(&mut seen, &mut after);
             let size = seen.norm();
             if size <= f64::EPSILON * first || !size.is_finite() {

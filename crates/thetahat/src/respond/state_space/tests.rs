@@ -1,3 +1,5 @@
+mod missing_outputs;
+
 use thetahat_core::nalgebra::DMatrix;
 
 use super::*;

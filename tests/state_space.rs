@@ -437,6 +437,27 @@ fn an_arx_model_has_several_outputs() {
     // An input that waits is known to.
     let waits = folder.fit(&format!("{MOTOR} --na 2 --nb 2 --nk 3"));
     assert_eq!(waits["estimation"]["nk"], serde_json::json!([3]));
+    // Among delays the data choose, with the orders.
+    let chosen = folder.fit(&format!("{MOTOR} --na 1..3 --nb 1..3 --nk 0..4"));
+    assert_eq!(chosen["estimation"]["tried"].as_array().map(Vec::len), Some(3 * 3 * 5 * 2));
+    let nk = chosen["estimation"]["nk"][0].as_u64().expect("a delay");
+    let again = folder.fit(&format!(
+        "{MOTOR} --na {} --nb {} --nk {nk} --couple {}",
+        chosen["estimation"]["na"],
+        chosen["estimation"]["nb"][0],
+        chosen["estimation"]["coupling"].as_str().expect("a word")
+    ));
+    // They differ by the rows that are left over at the start.
+    let first = |report: &Value| number(report, "/estimation/b/0/0/0/value");
+    assert!((first(&again) - first(&chosen)).abs() < 1e-3 * first(&chosen).abs());
+    for (options, word) in [
+        ("--na 2 --nb 2 --nk 1..900", "--nk 1..900"),
+        ("--na 2 --nb 2 --nk 3..1", "--nk 3..1"),
+        ("--model ss --nk 1..2", "a range is for all inputs of an ARX model"),
+    ] {
+        let refusal = folder.refused(&format!("fit {MOTOR} {options}"), 2);
+        assert!(refusal.contains(word), "{refusal}");
+    }
     assert_eq!(waits["model"]["delays"], serde_json::json!([2]));
     for (options, word) in [
         ("--couple some --na 1", "--couple"),

@@ -32,7 +32,7 @@ pub(crate) struct StateSpaceJob {
     /// Whether there are inputs at all.
     pub(crate) driven: bool,
     /// Samples that inputs wait: none, one for all or one for each.
-    delays: Vec<usize>,
+    delays: Vec<RangeInclusive<usize>>,
     /// The rest of the plan: channels are open.
     plan: StateSpacePlan,
 }
@@ -130,10 +130,11 @@ impl StateSpaceJob {
             ..StateSpacePlan::new(&[], &[])
         };
         let delay = |text: &String| {
-            text.trim().parse().map_err(|_| {
-                Failure::usage(format!(
-                    "--nk {text}: in state space and with several outputs give a number for each input, such as --nk 3"
-                ))
+            lags("--nk", text).and_then(|found| match (is_arx && model.nk.len() == 1, found.start() == found.end()) {
+                (false, false) => Err(Failure::usage(format!(
+                    "--nk {text}: a range is for all inputs of an ARX model; give a number for each input, such as --nk 3"
+                ))),
+                _ => Ok(found),
             })
         };
         Ok(Some(Self {
@@ -152,8 +153,8 @@ impl StateSpaceJob {
         let count = inputs.len();
         let delays = match &*self.delays {
             [] => Vec::new(),
-            [one] => vec![*one; count],
-            several if several.len() == count => several.to_vec(),
+            [all] => vec![*all.start(); count],
+            several if several.len() == count => several.iter().map(|delay| *delay.start()).collect(),
             several => {
                 return Err(Failure::usage(format!(
                     "--nk has {} numbers for {count} inputs; give one for all or one for each",
@@ -171,6 +172,7 @@ impl StateSpaceJob {
                     nb.len()
                 )));
             }
+            arx.delay = self.delays.first().map_or(0..=0, |delays| 0..=delays.end() - delays.start());
             arx.direct = delays.contains(&0);
             plan.delays = delays.iter().map(|delay| delay - usize::from(!arx.direct)).collect();
         } else if !delays.is_empty() {
@@ -192,19 +194,7 @@ impl StateSpaceJob {
 /// Among which ARX models with several outputs the data choose.
 fn arx(arguments: &FitArguments, without_inputs: bool) -> Result<VectorArxOptions, Failure> {
     let model = &arguments.model;
-    let range = |option: &str, text: &String| -> Result<RangeInclusive<usize>, Failure> {
-        let number = |text: &str| text.trim().parse::<usize>().ok().filter(|number| *number <= MOST_LAGS);
-        let found = match text.split_once("..") {
-            Some((first, last)) => number(first).zip(number(last)),
-            None => number(text).map(|order| (order, order)),
-        };
-        found.filter(|(first, last)| first <= last).map(|(first, last)| first..=last).ok_or_else(|| {
-            Failure::usage(format!(
-                "{option} {text}: write it as N or A..B, {MOST_LAGS} at most, such as 2 or 1..8"
-            ))
-        })
-    };
-    let nb = model.nb.iter().map(|text| range("--nb", text)).collect::<Result<Vec<_>, Failure>>()?;
+    let nb = model.nb.iter().map(|text| lags("--nb", text)).collect::<Result<Vec<_>, Failure>>()?;
     let each =
         || nb.iter().map(|nb| (nb.start() == nb.end()).then_some(*nb.start())).collect::<Option<Vec<_>>>();
     let nb = match &*nb {
@@ -216,14 +206,30 @@ fn arx(arguments: &FitArguments, without_inputs: bool) -> Result<VectorArxOption
         })?),
     };
     Ok(VectorArxOptions {
-        na: model.na.as_ref().map_or(Ok(CHOSEN_LAGS), |text| range("--na", text))?,
+        na: model.na.as_ref().map_or(Ok(CHOSEN_LAGS), |text| lags("--na", text))?,
         nb,
         coupling: match model.couple.as_deref() {
             None | Some("auto") => None,
             Some(text) => Some(parsed("--couple", text)?),
         },
+        delay: 0..=0,
         direct: false,
         constant: false,
+    })
+}
+
+/// A number of lags, or a range of them.
+fn lags(option: &str, text: &str) -> Result<RangeInclusive<usize>, Failure> {
+    let number = |text: &str| text.trim().parse::<usize>().ok();
+    let found = match text.split_once("..") {
+        Some((first, last)) => number(first).zip(number(last)).filter(|(_, last)| *last <= MOST_LAGS),
+        // A delay is no regressor.
+        None => number(text).filter(|own| *own <= MOST_LAGS || option == "--nk").map(|own| (own, own)),
+    };
+    found.filter(|(first, last)| first <= last).map(|(first, last)| first..=last).ok_or_else(|| {
+        Failure::usage(format!(
+            "{option} {text}: write it as N or A..B, {MOST_LAGS} at most, such as 2 or 1..8"
+        ))
     })
 }
 

@@ -147,7 +147,7 @@ impl TrackJob {
             offsets: named_values("--offset", &arguments.offset)?,
             scales: named_values("--scale", &arguments.scale)?,
             orders,
-            coupling: arguments.couple.as_deref().map(|text| coupling(text)).transpose()?,
+            coupling: arguments.couple.as_deref().map(coupling).transpose()?,
             degree: arguments.narx.map(|_| arguments.degree.unwrap_or(2)),
             method: arguments.method.map(|method| match method {
                 TrackMethodArgument::Rls => TrackMethod::Rls,

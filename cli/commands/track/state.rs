@@ -224,7 +224,7 @@ pub(super) fn setting(job: &TrackJob, channels: &Channels, trackers: &[Tracker])
         add("--dead-zone", plan.dead_zone.to_string());
         let several = trackers.get(..channels.outputs.len()).unwrap_or_default();
         let each = |numbers: &dyn Fn(&Tracker) -> String| {
-            several.iter().map(|tracker| numbers(tracker)).collect::<Vec<_>>().join(";")
+            several.iter().map(numbers).collect::<Vec<_>>().join(";")
         };
         add("--offset", each(&|tracker| numbers(Some(tracker.offsets()))));
         add("--scale", each(&|tracker| numbers(tracker.plan().scales.as_ref())));

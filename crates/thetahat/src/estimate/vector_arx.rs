@@ -80,6 +80,8 @@ pub struct VectorArxOptions {
     pub nb: VectorArxInputs,
     /// Which past outputs an output depends on; none: the data say it.
     pub coupling: Option<Coupling>,
+    /// By how many samples more all inputs are late, among these.
+    pub delay: RangeInclusive<usize>,
     /// Whether inputs act at once, so that the first of their coefficients is that of u(t).
     pub direct: bool,
     /// Whether there is a constant in each equation; of a [`StateSpacePlan`](crate::report::StateSpacePlan) its own `constant` says it.
@@ -102,6 +104,9 @@ pub struct VectorArxScore {
     pub na: usize,
     /// How many of each input.
     pub nb: Vec<usize>,
+    /// Samples from each input to its first effect.
+    #[serde(default)]
+    pub nk: Vec<usize>,
     /// Which past outputs an output depends on.
     pub coupling: Coupling,
     /// MDL of its errors.
@@ -143,6 +148,8 @@ pub(crate) struct VectorArxEstimate {
     pub(crate) mdl: f64,
     /// The samples that have errors.
     pub(crate) samples: usize,
+    /// By how many samples more all inputs are late.
+    pub(crate) delay: usize,
 }
 
 /// Fits
@@ -159,7 +166,7 @@ pub(crate) struct VectorArxEstimate {
 /// MDL = N ln det cov e + k ln N,   k coefficients
 /// ```
 ///
-/// is taken, all on the same rows. With coupling the covariance of the coefficients is cov e (x) (Phi' Phi)^-1, without it of each output alone
+/// is taken, all on the same rows; where inputs are later than asked, it is solved once more with them moved. With coupling the covariance of the coefficients is cov e (x) (Phi' Phi)^-1, without it of each output alone
 /// with e of outputs correlated as cov e says (Lütkepohl, New Introduction to Multiple Time Series Analysis, 2005, section 3.2). cov e has
 /// N less the regressors of an output in its denominator.
 ///
@@ -226,8 +233,9 @@ pub(crate) fn vector_arx(
                 continue;
             }
         };
-        let Orders { na, nb, coupling } = orders.clone();
-        tried.push(VectorArxScore { na, nb, coupling, mdl: solved.mdl });
+        let Orders { na, nb, delay, coupling } = orders.clone();
+        let nk = vec![delay + usize::from(!options.direct); nb.len()];
+        tried.push(VectorArxScore { na, nb, nk, coupling, mdl: solved.mdl });
         if best.as_ref().is_none_or(|(best, _)| solved.mdl < best.mdl) {
             best = Some((solved, orders));
         }
@@ -237,7 +245,19 @@ pub(crate) fn vector_arx(
     if tried.len() == 1 {
         tried.clear();
     }
-    Ok(solved.estimate(&products, &orders, options, (sample_time, tried)))
+    let (delay, mdl) = (orders.delay, solved.mdl);
+    if delay == 0 {
+        return Ok(solved.estimate(&products, &orders, options, (sample_time, tried)));
+    }
+    let later = record.clone().delayed(&vec![delay; record.inputs.len()]);
+    let orders = Orders { delay: 0, ..orders };
+    let longest = orders.lags(options.direct);
+    let products = LaggedProducts::new(&later, longest, options.constant)
+        .ok_or_else(|| super::subspace::silent(&later, longest))?;
+    let solved = Solved::new(&products, &orders, options.direct)?;
+    let mut estimate = solved.estimate(&products, &orders, options, (sample_time, tried));
+    estimate.outcome.nk.iter_mut().for_each(|nk| *nk += delay);
+    Ok(VectorArxEstimate { delay, mdl, ..estimate })
 }
 
 /// Of one model.
@@ -245,13 +265,16 @@ pub(crate) fn vector_arx(
 struct Orders {
     na: usize,
     nb: Vec<usize>,
+    /// By how many samples more all inputs are late.
+    delay: usize,
     coupling: Coupling,
 }
 
 impl Orders {
     /// The longest lag.
     fn lags(&self, direct: bool) -> usize {
-        let inputs = self.nb.iter().map(|nb| (nb + usize::from(!direct)).saturating_sub(1));
+        let late = self.delay + usize::from(!direct);
+        let inputs = self.nb.iter().map(|nb| if *nb == 0 { 0 } else { nb + late - 1 });
         inputs.chain([self.na]).max().unwrap_or(0)
     }
 
@@ -277,7 +300,12 @@ impl VectorArxOptions {
             // Without A there is nothing to couple.
             let couplings = if na == 0 { &couplings[..1] } else { &couplings[..] };
             for nb in &nb {
-                models.extend(couplings.iter().map(|&coupling| Orders { na, nb: nb.clone(), coupling }));
+                // Without B there is nothing to be late.
+                let delays = if nb.iter().all(|nb| *nb == 0) { 0..=0 } else { self.delay.clone() };
+                for delay in delays {
+                    let orders = |&coupling| Orders { na, nb: nb.clone(), delay, coupling };
+                    models.extend(couplings.iter().map(orders));
+                }
             }
         }
         models.retain(|model| model.regressors(1) > 0);
@@ -324,7 +352,7 @@ impl Solved {
     /// [`Error::Undetermined`] where regressors depend on one another.
     fn new(products: &LaggedProducts, orders: &Orders, direct: bool) -> Result<Self, Error> {
         let (m, l, width) = (products.inputs, products.outputs, products.width());
-        let first = usize::from(!direct);
+        let first = orders.delay + usize::from(!direct);
         let inputs = orders.nb.iter().enumerate();
         let inputs: Vec<usize> =
             inputs.flat_map(|(input, nb)| (first..first + nb).map(move |lag| lag * width + input)).collect();
@@ -465,6 +493,7 @@ impl Solved {
             levels: levels.unwrap_or_else(|| vec![0.0; l]),
             mdl: self.mdl,
             samples: products.samples,
+            delay: 0,
         }
     }
 

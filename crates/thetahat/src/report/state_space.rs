@@ -283,7 +283,7 @@ fn fit(
         }
     }
 
-    let delays = if plan.delays.is_empty() { vec![0; inputs.len()] } else { plan.delays.clone() };
+    let mut delays = if plan.delays.is_empty() { vec![0; inputs.len()] } else { plan.delays.clone() };
     let record = deviations.joint_record(&plan.inputs, &plan.outputs, &shares.estimation)?.delayed(&delays);
     if record.segments.is_empty() {
         return Err(Error::undetermined(
@@ -308,8 +308,10 @@ fn fit(
         samples,
         mean,
         has_levels,
+        delay,
         offered,
     } = found;
+    delays.iter_mut().for_each(|own| *own += delay);
     for (output, level) in outputs.iter_mut().zip(&levels) {
         output.offset.level += level;
     }

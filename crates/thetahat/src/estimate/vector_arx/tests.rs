@@ -43,7 +43,14 @@ fn options(
     nb: RangeInclusive<usize>,
     coupling: Option<Coupling>,
 ) -> VectorArxOptions {
-    VectorArxOptions { na, nb: VectorArxInputs::Alike(nb), coupling, direct: false, constant: false }
+    VectorArxOptions {
+        na,
+        nb: VectorArxInputs::Alike(nb),
+        coupling,
+        delay: 0..=0,
+        direct: false,
+        constant: false,
+    }
 }
 
 fn record([u, first, second]: &[Vec<f64>; 3]) -> Result<JointRecord<'_>, Error> {
@@ -145,6 +152,35 @@ fn the_least_mdl_has_the_orders_of_the_plant() -> Result<(), Error> {
     // All on the same rows: those of the longest.
     let least = tried.iter().map(|score| score.mdl).fold(f64::INFINITY, f64::min);
     assert_eq!(least, found.mdl);
+    Ok(())
+}
+
+/// A range of delays is searched on the products of the other models, and ends at the model of an input that was moved before.
+#[test]
+fn the_least_mdl_has_the_delay_of_the_plant() -> Result<(), Error> {
+    let mut signals = signals(2000, 0.5, [3.0, -2.0], 5);
+    // The input in the log is three samples early.
+    let late = signals[0].clone();
+    signals[0].rotate_left(3);
+    let length = late.len() - 3;
+    signals.iter_mut().for_each(|signal| signal.truncate(length));
+    for (direct, coupling) in [(false, Coupling::Full), (true, Coupling::None)] {
+        let orders = options(1..=3, 1..=3, Some(coupling));
+        let asked = VectorArxOptions { direct, delay: 0..=5, constant: true, ..orders };
+        let found = vector_arx(&record(&signals)?, &asked, 1.0)?;
+        let VectorArxOutcome { na, nb, nk, tried, .. } = &found.outcome;
+        let first = usize::from(!direct);
+        // Where an input may act at once it acts a sample later: four after the log has it.
+        assert_eq!((found.delay + first, nk.as_slice()), (4, [4].as_slice()), "{direct} {na} {nb:?}");
+        assert_eq!(tried.len(), 3 * 3 * 6);
+        let least = tried.iter().min_by(|one, other| one.mdl.total_cmp(&other.mdl));
+        assert!(least.is_some_and(|least| least.mdl == found.mdl && least.nk == [4]), "{least:?}");
+        let moved = record(&signals)?.delayed(&[found.delay]);
+        let asked = VectorArxOptions { delay: 0..=0, ..options(*na..=*na, nb[0]..=nb[0], Some(coupling)) };
+        let alone = vector_arx(&moved, &VectorArxOptions { direct, constant: true, ..asked }, 1.0)?;
+        assert_eq!((&alone.space, &alone.levels), (&found.space, &found.levels));
+        assert_eq!(alone.samples, found.samples);
+    }
     Ok(())
 }
 

@@ -32,6 +32,8 @@ pub(super) struct Estimated {
     /// The samples that have errors, and the mean products of these.
     pub(super) samples: usize,
     pub(super) mean: DMatrix<f64>,
+    /// By how many samples more than asked all inputs are late.
+    pub(super) delay: usize,
     /// The orders that the data offered to choose among.
     pub(super) offered: RangeInclusive<usize>,
 }
@@ -97,7 +99,8 @@ pub(super) fn by_arx(
     let (samples, mut mean) = (found.samples, found.space.noise_covariance.clone());
     if mean.diagonal().iter().any(|variance| *variance == 0.0) {
         // What lagged products cannot tell from nothing.
-        let products = products_of_innovations(&found.space, record, &found.levels)
+        let record = record.clone().delayed(&vec![found.delay; delays.len()]);
+        let products = products_of_innovations(&found.space, &record, &found.levels)
             .ok_or_else(|| Error::data("the errors one step ahead leave the range of numbers"))?;
         let all = record.segments.iter().map(std::ops::Range::len).sum::<usize>();
         mean = products / all as f64;
@@ -113,6 +116,7 @@ pub(super) fn by_arx(
         degrees,
         samples,
         mean,
+        delay: found.delay,
         offered: 0..=0,
     })
 }
@@ -172,6 +176,7 @@ pub(super) fn by_subspace(
         degrees,
         samples,
         mean,
+        delay: 0,
         offered: found.orders(),
     })
 }

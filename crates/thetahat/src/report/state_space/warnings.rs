@@ -114,12 +114,14 @@ fn of_subspace(
 }
 
 fn of_arx(warnings: &mut Vec<String>, outcome: &VectorArxOutcome) {
-    let VectorArxOutcome { na, nb, tried, .. } = outcome;
+    let VectorArxOutcome { na, nb, nk, tried, .. } = outcome;
     let most = |of: fn(&VectorArxScore) -> usize| tried.iter().map(of).max().unwrap_or(0);
     let least = |of: fn(&VectorArxScore) -> usize| tried.iter().map(of).min().unwrap_or(0);
     let past: fn(&VectorArxScore) -> usize = |score| score.na;
     let of_inputs: fn(&VectorArxScore) -> usize = |score| score.nb.iter().copied().max().unwrap_or(0);
-    let own = [("na", *na, past), ("nb", nb.iter().copied().max().unwrap_or(0), of_inputs)];
+    let late: fn(&VectorArxScore) -> usize = |score| score.nk.iter().copied().max().unwrap_or(0);
+    let highest = |own: &[usize]| own.iter().copied().max().unwrap_or(0);
+    let own = [("na", *na, past), ("nb", highest(nb), of_inputs), ("nk", highest(nk), late)];
     for (name, value, of) in own {
         if value == most(of) && most(of) > least(of) {
             warnings.push(format!(

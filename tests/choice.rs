@@ -321,3 +321,39 @@ fn logs_that_serve_no_model_are_refused_in_words() {
     assert_eq!(orders(&exact), [1, 1, 0, 0, 0, 1], "{}", exact["selection"]);
     assert!((parameters(&exact)[0] + 0.5).abs() < 1e-12);
 }
+
+/// A plant of more modes than polynomials of the choice have poles for.
+#[test]
+fn many_modes_make_a_model_in_state_space() {
+    let mut random = Random::new(4);
+    let (moved, mut y) = (random.signal(500), random.signal(1500));
+    y.iter_mut().for_each(|e| *e *= 6.0);
+    let u: Vec<f64> = (0..1500).map(|t| moved[t / 3].signum()).collect();
+    for (frequency, gain) in [(0.3_f64, 0.3), (0.6, -0.8), (1.0, 1.2), (1.4, -1.0), (1.9, 1.3), (2.4, -0.9)] {
+        let mode = response(&[1.0, -1.99 * frequency.cos(), 0.990025], &[(&[0.0, gain], &u)], &[0.0; 1500]);
+        y.iter_mut().zip(mode).for_each(|(y, mode)| *y += mode);
+    }
+    let folder = Folder::with_log(csv(&[("u", &u), ("y", &y)]));
+    let rows = "log.csv --estimate 1..1000 --validate 1001..1500";
+    let mut report = folder.fit(rows);
+    let order = report["selection"]["state_space"]["order"].as_u64().unwrap();
+    assert_eq!(report["model"]["kind"], "state-space");
+    assert_eq!(report["selection"]["state_space"]["held_out"]["refits"], 3);
+    let said = folder.done(&format!("fit {rows} --html page.html"));
+    let told = format!("In state space: order {order}, ");
+    assert!(said.stdout.contains(&told) && said.stdout.contains("taken instead"), "{}", said.stdout);
+    assert!(said.stdout.contains(&format!("state space of order {order}, sample time")), "{}", said.stdout);
+    assert!(folder.read("page.html").contains(&format!("state space: order {order}, ")));
+    // The report is that of the order.
+    let alone = folder.fit(&format!("{rows} --model ss --order {order}"));
+    report["selection"] = Value::Null;
+    for (name, value) in alone.as_object().unwrap() {
+        assert_eq!(&report[name], value, "{name}");
+    }
+    // Whoever asks for something that it is not gets a polynomial model.
+    for asked in ["--focus prediction", "--model oe", "--nk 1", "--select aic", "--initial drop", "--trend"] {
+        let report = folder.fit(&format!("{rows} {asked}"));
+        assert_eq!(report["model"]["kind"], "polynomial", "{asked}");
+        assert_eq!(report["selection"]["state_space"], Value::Null, "{asked}");
+    }
+}

@@ -6,6 +6,7 @@ use thetahat::model::{Quantity, Signal, StateSpaceModel};
 use thetahat::report::Report;
 use thetahat::text::harmless;
 
+use super::selection::selection;
 use super::text::{self, Text, columns, or_dash};
 use super::{MOST, criteria, fits, interval, quantity, signal};
 
@@ -24,6 +25,9 @@ const EQUATION: &str = "x(t+1) = F x + G u + K e, y = H x + D u + e";
 /// The main figures of a fit in state space.
 pub(super) fn table(report: &Report, model: &StateSpaceModel, width: usize) -> String {
     let mut text = Text::new(width);
+    if report.selection.is_some() {
+        selection(&mut text, report);
+    }
     let equation = match &report.estimation.procedure {
         Procedure::VectorArx(_) => "A(q) y = B(q) u + e, as x(t+1) = F x + G u + K e, y = H x + D u + e",
         _ => EQUATION,

@@ -97,7 +97,7 @@ pub(crate) use refinement::{Refinement, RefinementStart, refined};
 pub use robust::{Loss, Robust, RobustOutcome};
 pub(crate) use stretches::stretches;
 pub use subspace::{OrderScore, Subspace, SubspaceOptions, SubspaceOutcome, Weighting, subspace};
-pub(crate) use subspace::{best as best_order, products_of_innovations};
+pub(crate) use subspace::{Ordered, products_of_innovations, with_levels};
 pub(crate) use uncertainty::{Autoregression, autoregression, backward_filtered_products};
 pub(crate) use vector_arx::vector_arx;
 pub use vector_arx::{Coupling, VectorArxInputs, VectorArxOptions, VectorArxOutcome, VectorArxScore};

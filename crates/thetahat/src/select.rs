@@ -5,8 +5,8 @@
 //!   orders that the data suggest.
 //! - [`Select`] is what makes one model better: an information criterion, or errors on samples that it was not fitted to
 //!   ([`HeldOut`]). [`Focus`] is what the model is for.
-//! - [`Selection`] has every model that was compared ([`Candidate`], [`ProcessCandidate`]), the winners ([`Best`]) and the delays
-//!   ([`Delay`], [`DelayScore`]).
+//! - [`Selection`] has every model that was compared ([`Candidate`], [`ProcessCandidate`], [`StateSpaceCandidate`]), the winners
+//!   ([`Best`]) and the delays ([`Delay`], [`DelayScore`]).
 //!
 //! ```
 //! use thetahat::data::Record;
@@ -41,6 +41,7 @@ mod processes;
 mod ranking;
 mod search;
 mod selection;
+mod states;
 mod task;
 #[cfg(test)]
 mod tests;
@@ -53,6 +54,9 @@ pub use choose::choose_orders;
 pub(crate) use delay::delays;
 pub use focus::Focus;
 pub(crate) use processes::{is_step_test, processes};
-pub use selection::{Best, Candidate, Delay, DelayScore, HeldOut, ProcessCandidate, Selection};
+pub use selection::{
+    Best, Candidate, Delay, DelayScore, HeldOut, ProcessCandidate, Selection, StateSpaceCandidate,
+};
+pub(crate) use states::states;
 use task::EXACT;
 pub(crate) use task::{SelectedModel, Task};

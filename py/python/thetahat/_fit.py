@@ -576,7 +576,8 @@ def search(
 ) -> Model:
     """Choose a model among many, all compared on the same samples.
 
-    Without orders the data choose delay, structure and orders, and a step test may come to a process in continuous time (see `process`).
+    Without orders the data choose delay, structure and orders, and a step test may come to a process in continuous time (see `process`),
+    a plant of many modes to a model in state space (see `ss`).
     `Model.selection` holds what was compared.
 
     Parameters

@@ -2,6 +2,7 @@
 
 mod innovations;
 mod lagged_products;
+mod ordered;
 #[cfg(test)]
 pub(super) mod tests;
 mod weighting;
@@ -21,6 +22,7 @@ use crate::model::{StateSpace, is_stable, riccati};
 use crate::optimize::normal;
 pub(crate) use innovations::products as products_of_innovations;
 pub(super) use lagged_products::{Factor, LaggedProducts, ROUNDING, divided, log_determinant};
+pub(crate) use ordered::{Ordered, with_levels};
 use weighting::Weighted;
 pub use weighting::Weighting;
 
@@ -559,7 +561,7 @@ impl Subspace {
 ///
 /// # Errors
 /// [`Error::Undetermined`] where no model has one.
-pub(crate) fn best(scores: &[OrderScore]) -> Result<usize, Error> {
+fn best(scores: &[OrderScore]) -> Result<usize, Error> {
     let known = scores.iter().filter_map(|score| Some((score.order, score.mdl?)));
     known.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(order, _)| order).ok_or_else(|| {
         Error::undetermined(Vec::new(), "no model of these orders has a stable predictor; take others")

@@ -6,6 +6,7 @@ use super::identify::identify;
 use super::plan::Plan;
 use super::process::{ProcessPlan, fit_process};
 use super::schema::Report;
+use super::state_space::{StateSpacePlan, fit_state_space};
 use super::validation::{Validated, ValidationPlan, validate};
 use crate::Error;
 use crate::data::{Detrend, Log, Rows, between};
@@ -16,7 +17,7 @@ use crate::respond::Horizon;
 /// The rows that a choice was made on are cut into this many parts, of which the last is held out.
 const PARTS: usize = 3;
 
-/// Where a choice found one model for prediction and another for simulation, or took a process: these, by name, fitted to the first
+/// Where a choice found one model for prediction and another for simulation, or took a process or a model in state space: these, by name, fitted to the first
 /// two thirds of the rows that it was made on, and evaluated on the last third of `log`. None where there was no such choice, and
 /// none of a model that these rows do not determine.
 ///
@@ -29,7 +30,9 @@ pub fn held_out_runs(report: &Report, log: &Log) -> Result<Vec<(String, Validate
     let Some(winners) = &selection.winners else { return Ok(Vec::new()) };
     let (prediction, simulation) = (&winners.prediction.orders, &winners.simulation.orders);
     let process = if let Model::Process(model) = &report.model { Some(model) } else { None };
-    if selection.focus.horizon() != Horizon::FreeRun || (prediction == simulation && process.is_none()) {
+    let order = if let Model::StateSpace(model) = &report.model { Some(model.order()) } else { None };
+    let alone = process.is_none() && order.is_none();
+    if selection.focus.horizon() != Horizon::FreeRun || (prediction == simulation && alone) {
         return Ok(Vec::new());
     }
     let data = &report.data;
@@ -49,7 +52,12 @@ pub fn held_out_runs(report: &Report, log: &Log) -> Result<Vec<(String, Validate
             estimate: fitted.clone(),
             detrend: if process.is_some() { Detrend::Mean } else { data.detrend.parse()? },
             prefilter: data.prefilter,
-            constant: if with_level { Constant::Yes } else { Constant::No },
+            constant: match order {
+                // What is known of the level is that of the model in state space.
+                Some(_) => Constant::Auto,
+                None if with_level => Constant::Yes,
+                None => Constant::No,
+            },
             trend: report.estimation.slope.is_some(),
             ..Plan::new(&names, output, orders.clone())
         };
@@ -65,6 +73,16 @@ pub fn held_out_runs(report: &Report, log: &Log) -> Result<Vec<(String, Validate
         };
         let refit = fit_process(log, &[], &plan, &|_| ControlFlow::Continue(()));
         refits.push((format!("process: {structure}"), refit));
+    }
+    if let Some(order) = order {
+        let plan = StateSpacePlan {
+            estimate: fitted,
+            detrend: data.detrend.parse()?,
+            constant: if with_level { Constant::Yes } else { Constant::No },
+            orders: Some(order..=order),
+            ..StateSpacePlan::new(&names, &[output])
+        };
+        refits.push((format!("state space: order {order}"), fit_state_space(log, &[], &plan)));
     }
     let mut runs = Vec::new();
     for (name, refit) in refits {

@@ -1,3 +1,4 @@
+mod in_states;
 mod step_test;
 
 use std::ops::{ControlFlow, Range};
@@ -16,6 +17,7 @@ use crate::regression::{largest, sum};
 use crate::respond::{Horizon, InitialCondition, innovations};
 use crate::select::{self, Choice, Focus, SelectedModel, Task};
 use crate::{Document, Error};
+use in_states::InStates;
 use step_test::StepTest;
 
 /// Below this fraction of a channel's size, what detrending leaves is rounding.
@@ -134,7 +136,10 @@ fn fit(
         estimation: parts.as_ref().map_or(&estimation, |parts| &parts.estimation),
         validation: parts.as_ref().map_or(&validation, |parts| &parts.validation),
     };
-    let step_test = StepTest::of(&log, plan, compared.estimation)?;
+    let rivals = Rivals {
+        step_test: StepTest::of(&log, plan, compared.estimation)?,
+        in_states: InStates::of(&log, plan),
+    };
     let padding = log.padding(&names)?;
     // What an input has done while the output was missing is in the output after it.
     let driven = match &plan.choice {
@@ -157,11 +162,15 @@ fn fit(
     let (mut selection, mut orders, guess) = match &plan.choice {
         Choice::Known(orders) => (None, orders.clone(), None),
         Choice::Grid(_) | Choice::Automatic(_) => {
-            let Chosen { found, with_constant, process } =
-                selected(&record, plan, &compared, &beside, step_test.as_ref(), monitor)?;
+            let Chosen { found, with_constant, process, order } =
+                selected(&record, plan, &compared, &beside, &rivals, monitor)?;
             let SelectedModel { selection, mut guess } = found;
-            if let Some((structure, test)) = process.zip(step_test) {
+            if let Some((structure, test)) = process.zip(rivals.step_test) {
                 let report = test.fit(structure, selection, sources, monitor)?;
+                return Ok((PendingEvaluation::done(report), log));
+            }
+            if let Some((order, in_states)) = order.zip(rivals.in_states) {
+                let report = in_states.fit(order, selection, sources, monitor)?;
                 return Ok((PendingEvaluation::done(report), log));
             }
             if let (Method::PredictionError(search), false) = (&mut method, with_constant) {
@@ -301,11 +310,19 @@ struct Compared<'a> {
     validation: &'a [Rows],
 }
 
-/// A choice, whether all models had a constant, and the process that is taken instead, if one is.
+/// Models of other kinds that compete with polynomials, each where it may.
+struct Rivals {
+    step_test: Option<StepTest>,
+    in_states: Option<InStates>,
+}
+
+/// A choice, whether all models had a constant, and the process or the order of the model in state space that is taken instead, if one
+/// is.
 struct Chosen {
     found: SelectedModel,
     with_constant: bool,
     process: Option<ProcessStructure>,
+    order: Option<usize>,
 }
 
 /// The choice among several models. Where a constant is asked for or pays, all of them have one.
@@ -314,7 +331,7 @@ fn selected<'a>(
     plan: &Plan,
     compared: &Compared<'_>,
     beside: &Beside,
-    step_test: Option<&StepTest>,
+    rivals: &Rivals,
     monitor: Monitor<'_>,
 ) -> Result<Chosen, Error> {
     let Method::PredictionError(search) = &plan.method else {
@@ -352,11 +369,15 @@ fn selected<'a>(
         let what = if plan.trend { "a constant and a trend" } else { "a constant" };
         found.selection.steps.push(format!("All models were compared with {what} beside them."));
     }
-    let (found, process) = match step_test {
+    let (found, process) = match &rivals.step_test {
         Some(test) => test.compete(&task, found)?,
         None => (found, None),
     };
-    Ok(Chosen { found, with_constant, process })
+    let (found, order) = match rivals.in_states {
+        Some(_) if process.is_none() => select::states(&task, found, plan.constant())?,
+        _ => (found, None),
+    };
+    Ok(Chosen { found, with_constant, process, order })
 }
 
 /// The variance of the errors one step ahead of the unfiltered signals, sum e^2/(N - p) over the estimation rows.

@@ -94,11 +94,9 @@ pub(super) fn compare(task: &Task<'_>, models: Vec<Orders>) -> Result<Outcome, E
         };
         let mut order: Vec<usize> = (0..tried.len()).filter(|&k| tried[k].point.is_some()).collect();
         order.sort_by(|&a, &b| place(a).total_cmp(&place(b)));
-        let most = total(record) > MOST_IN_BLOCKS;
-        let few = if most { stretches(task.estimation, SEGMENTS_OF_BLOCKS, SEGMENT) } else { None };
-        let record = few.as_ref().unwrap_or(record);
-        let samples = Samples::unknown(record, tried.iter().map(|model| &model.orders));
-        held_out::figures(task, record, &samples, &tried, &held_out::promising(&order, &tried))?
+        let record = few_for_blocks(record, task.estimation);
+        let samples = Samples::unknown(&record, tried.iter().map(|model| &model.orders));
+        held_out::figures(task, &record, &samples, &tried, &held_out::promising(&order, &tried))?
     } else {
         vec![None; tried.len()]
     };
@@ -126,6 +124,13 @@ pub(super) fn compare(task: &Task<'_>, models: Vec<Orders>) -> Result<Outcome, E
     );
     let models: Vec<Compared> = models.collect();
     Ok(Outcome { failed: total - models.len(), models, samples: count, smallest, remarks })
+}
+
+/// The part of a record that blocks are held out of: of a long one segments of all there is.
+pub(super) fn few_for_blocks<'a>(record: &Record<'a>, all: &Record<'a>) -> Record<'a> {
+    let most = total(record) > MOST_IN_BLOCKS;
+    let few = if most { stretches(all, SEGMENTS_OF_BLOCKS, SEGMENT) } else { None };
+    few.unwrap_or_else(|| record.clone())
 }
 
 /// What a model is chosen by.

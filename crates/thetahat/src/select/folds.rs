@@ -68,7 +68,7 @@ impl<'t, 'r> Folds<'t, 'r> {
     }
 
     /// The others.
-    fn training(&self, fold: usize) -> Record<'r> {
+    pub(super) fn training(&self, fold: usize) -> Record<'r> {
         let others = self.blocks.iter().enumerate().filter(|(k, _)| *k != fold);
         part(self.record, joined(others.flat_map(|(_, block)| block)))
     }

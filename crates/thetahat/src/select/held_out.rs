@@ -63,50 +63,17 @@ pub(super) fn figures(
         return Ok(figures);
     }
     let refits = folds.refitted(task, samples, &some)?;
-    let tests: Vec<Record<'_>> = (0..BLOCKS).map(|fold| folds.test_with_past(fold)).collect();
-    let onward = Onward::new(record, &folds);
+    let blocks = Blocks::new(record, &folds, deviation);
     let horizon = task.focus.horizon();
     let of_model = |k: usize| -> Option<Seen> {
         let orders = &some[k].orders;
-        let (mut blocks, mut unpunished, mut samples, mut unstable) = (0.0, 0.0, 0, 0);
-        let mut last = None;
-        let mut parts = vec![0.0; BLOCKS * PARTS];
-        for ((refits, test), parts) in refits.iter().zip(&tests).zip(parts.chunks_mut(PARTS)) {
+        let model = |refits: &Vec<Option<Vec<f64>>>| {
             let parameters = refits[k].as_ref()?;
             let model = PolynomialModel::from_parameters(orders, parameters, None, 1.0, 1.0).ok()?;
-            let stable = is_all_stable(&model);
-            let count = total(test);
-            let root = match response(&model, test, horizon) {
-                Ok(response) => {
-                    let pairs = counted(test, &response);
-                    let count = pairs.clone().count();
-                    pairs
-                        .clone()
-                        .enumerate()
-                        .for_each(|(k, pair)| parts[k * PARTS / count] += cut(pair, deviation).powi(2));
-                    root(pairs, deviation)?
-                }
-                Err(_) => LARGEST,
-            };
-            let counted = if stable { root } else { punished(root) };
-            blocks += counted * counted * count as f64;
-            unpunished += root * root * count as f64;
-            samples += count;
-            unstable += usize::from(!stable);
-            last = Some((model, stable));
-        }
-        let (model, stable) = last?;
-        let mean = |sum: f64| sum / samples as f64;
-        let onward = match horizon {
-            Horizon::FreeRun => {
-                let root = onward.root_mean_square(&model, deviation).unwrap_or(LARGEST);
-                if stable { root * root } else { punished(root).powi(2) }
-            }
-            Horizon::Steps { .. } => mean(blocks),
+            Some((is_all_stable(&model), model))
         };
-        let seen =
-            HeldOut { blocks: mean(blocks), onward, unpunished: mean(unpunished), unstable, refits: BLOCKS };
-        Some((seen, parts))
+        let models: Vec<_> = refits.iter().map(model).collect::<Option<_>>()?;
+        blocks.figures(&models, horizon, response)
     };
     let found: Vec<Option<Seen>> = (0..some.len()).into_par_iter().map(of_model).collect();
     which.iter().zip(found).for_each(|(&k, figure)| figures[k] = figure);
@@ -197,6 +164,67 @@ pub(super) fn deviation(record: &Record<'_>) -> f64 {
     (sum(values().map(|y| (y - mean).powi(2))) / count).sqrt()
 }
 
+/// The blocks of a record, on which models that were fitted without one are evaluated.
+pub(super) struct Blocks<'r> {
+    tests: Vec<Record<'r>>,
+    onward: Onward<'r>,
+    deviation: f64,
+}
+
+impl<'r> Blocks<'r> {
+    /// `deviation` is that of the output, not 0.
+    pub(super) fn new(record: &Record<'r>, folds: &Folds<'_, 'r>, deviation: f64) -> Self {
+        let tests = (0..folds.count()).map(|fold| folds.test_with_past(fold)).collect();
+        Self { tests, onward: Onward::new(record, folds), deviation }
+    }
+
+    /// The figures of models, each fitted without the block of its place, and whether they are stable; `respond` says what one makes of a
+    /// record. None where a block has no samples that count.
+    pub(super) fn figures<M>(
+        &self,
+        models: &[(bool, M)],
+        horizon: Horizon,
+        respond: impl Fn(&M, &Record<'_>, Horizon) -> Result<Response, Error>,
+    ) -> Option<Seen> {
+        let deviation = self.deviation;
+        let (mut blocks, mut unpunished, mut samples, mut unstable) = (0.0, 0.0, 0, 0);
+        let mut parts = vec![0.0; BLOCKS * PARTS];
+        for (((stable, model), test), parts) in models.iter().zip(&self.tests).zip(parts.chunks_mut(PARTS)) {
+            let count = total(test);
+            let root = match respond(model, test, horizon) {
+                Ok(response) => {
+                    let pairs = counted(test, &response);
+                    let count = pairs.clone().count();
+                    pairs
+                        .clone()
+                        .enumerate()
+                        .for_each(|(k, pair)| parts[k * PARTS / count] += cut(pair, deviation).powi(2));
+                    root(pairs, deviation)?
+                }
+                Err(_) => LARGEST,
+            };
+            let counted = if *stable { root } else { punished(root) };
+            blocks += counted * counted * count as f64;
+            unpunished += root * root * count as f64;
+            samples += count;
+            unstable += usize::from(!stable);
+        }
+        let (stable, last) = models.last()?;
+        let mean = |sum: f64| sum / samples as f64;
+        let onward = match horizon {
+            Horizon::FreeRun => {
+                let run = |record: &Record<'_>| respond(last, record, horizon);
+                let root = self.onward.root_mean_square(run, deviation).unwrap_or(LARGEST);
+                if *stable { root * root } else { punished(root).powi(2) }
+            }
+            Horizon::Steps { .. } => mean(blocks),
+        };
+        let seen =
+            HeldOut { blocks: mean(blocks), onward, unpunished: mean(unpunished), unstable, refits: BLOCKS };
+        Some((seen, parts))
+    }
+}
+
 /// The last block after what comes before it in its segments.
 struct Onward<'r> {
     record: Record<'r>,
@@ -216,7 +244,11 @@ impl<'r> Onward<'r> {
     }
 
     /// A segment of which nothing is known before begins with the state that fits it.
-    fn root_mean_square(&self, model: &PolynomialModel, deviation: f64) -> Option<f64> {
+    fn root_mean_square(
+        &self,
+        run: impl Fn(&Record<'_>) -> Result<Response, Error>,
+        deviation: f64,
+    ) -> Option<f64> {
         let begins = |segment: &std::ops::Range<usize>| self.known[segment.start].is_nan();
         let (mut before, mut alone) = (self.record.clone(), self.last.clone());
         let select = |record: &mut Record<'_>, keep: &dyn Fn(&std::ops::Range<usize>) -> bool| {
@@ -230,13 +262,14 @@ impl<'r> Onward<'r> {
         let mut pairs = Vec::new();
         if !before.segments.is_empty() {
             let known = Record { output: &self.known, ..before };
-            let run = simulate(model, &known, InitialCondition::Estimate).ok()?;
+            let response = run(&known).ok()?;
             let continued = self.last.segments.iter().filter(|piece| !whole.contains(&piece.start));
-            pairs.extend(continued.cloned().flatten().map(|t| (self.record.output[t], run.values[t])));
+            let rows = continued.cloned().flatten();
+            pairs.extend(rows.map(|t| (self.record.output[t], response.values[t])));
         }
         if !alone.segments.is_empty() {
-            let run = simulate(model, &alone, InitialCondition::Estimate).ok()?;
-            pairs.extend(counted(&alone, &run));
+            let response = run(&alone).ok()?;
+            pairs.extend(counted(&alone, &response));
         }
         root(pairs.iter().copied(), deviation)
     }

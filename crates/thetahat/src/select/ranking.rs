@@ -95,6 +95,7 @@ pub(super) fn ranked(task: &Task<'_>, outcome: Outcome, path: Option<Path>) -> R
         best: order.iter().take(BEST).copied().cloned().collect(),
         of_size,
         processes: Vec::new(),
+        state_space: None,
     };
     Ok(SelectedModel { selection, guess })
 }

@@ -2,6 +2,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{Focus, Path, Select};
+use crate::estimate::OrderScore;
 use crate::model::{Orders, ProcessStructure, Structure};
 
 /// How a model was chosen among others.
@@ -43,6 +44,23 @@ pub struct Selection {
     /// the model of the report, or `chosen` is.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub processes: Vec<ProcessCandidate>,
+    /// The model in state space that was compared with `chosen`, where one was. It is the model of the report where it is far better.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub state_space: Option<StateSpaceCandidate>,
+}
+
+/// A model in state space and what speaks for it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct StateSpaceCandidate {
+    /// n, that of the least MDL.
+    pub order: usize,
+    /// The free parameters of a canonical form.
+    pub parameters: usize,
+    /// What the order was chosen among.
+    pub orders: Vec<OrderScore>,
+    /// What it does on blocks that it was not fitted to; none where the rows without one do not determine it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub held_out: Option<HeldOut>,
 }
 
 /// A process in continuous time and what speaks for it.

@@ -16,7 +16,7 @@ use super::held_out::standard_errors;
 use super::{Focus, HeldOut};
 
 /// By how much the logarithm of a mean square must fall, whatever its error.
-const FAR: f64 = 0.3;
+pub(super) const FAR: f64 = 0.3;
 /// By how much where the fall is certain.
 pub(super) const GATE: f64 = 0.1;
 const STANDARD_ERRORS: f64 = 2.0;
@@ -45,13 +45,18 @@ pub(super) fn logarithm(square: f64) -> f64 {
     square.max(NOTHING).ln()
 }
 
+/// The modulus of the slowest pole of a model that simulates.
+pub(super) fn slowest(samples: usize) -> f64 {
+    (-1.0 / (SLOWEST * samples as f64)).exp()
+}
+
 /// The winners among models in the order of their criterion; none where no model is stable, or none was evaluated.
 ///
 /// What has no figures on blocks, as the data without one do not determine it, may predict; it is not compared.
 pub(super) fn winners(focus: Focus, models: &[&Compared], samples: usize) -> Option<Winners> {
     let held_out = |k: usize| models[k].scored.held_out.as_ref();
     let stable = |k: &usize| models[*k].radius < 1.0;
-    let fast = |k: &usize| models[*k].radius <= (-1.0 / (SLOWEST * samples as f64)).exp();
+    let fast = |k: &usize| models[*k].radius <= slowest(samples);
     let prediction = (0..models.len()).find(stable)?;
     let figures = (0..models.len()).filter(fast).filter_map(|k| Some((held_out(k)?.blocks.max(NOTHING), k)));
     let least = figures.min_by(|(one, _), (other, _)| one.total_cmp(other));

@@ -1,6 +1,8 @@
 use super::*;
 use crate::data::Channel;
 use crate::regression::noise::Noise;
+use crate::report::{StateSpacePlan, fit_state_space};
+use crate::select::{Automatic, Select};
 use crate::select::{Grid, OrderRange, Path};
 
 #[test]
@@ -75,4 +77,66 @@ fn the_largest_is_found_in_any_place() {
         values[place] = -3.0;
         assert_eq!(largest(&values), 3.0);
     }
+}
+
+/// Six lightly damped modes of a plant whose input is held for three samples, and white noise a tenth as large as what they do.
+fn modes() -> Result<Log, Error> {
+    let mut noise = Noise(11);
+    let (moved, e) = (noise.take(1200), noise.take(1200));
+    let u: Vec<f64> = (0..1200).map(|t| moved[t / 3].signum()).collect();
+    let mut y = vec![3.0; 1200];
+    for (frequency, gain) in [(0.3_f64, 0.3), (0.6, -0.8), (1.0, 1.2), (1.4, -1.0), (1.9, 1.3), (2.4, -0.9)] {
+        let radius = 0.99_f64;
+        let (a1, a2) = (-2.0 * radius * frequency.cos(), radius * radius);
+        let mut x = [0.0; 2];
+        for (t, y) in y.iter_mut().enumerate() {
+            let driven = if t > 0 { gain * u[t - 1] } else { 0.0 };
+            x = [driven - a1 * x[0] - a2 * x[1], x[0]];
+            *y += x[0];
+        }
+    }
+    let size = |signal: &[f64]| sum(signal.iter().map(|value| value * value)).sqrt();
+    let deviations: Vec<f64> = y.iter().map(|y| y - 3.0).collect();
+    let small = 0.1 * size(&deviations) / size(&e);
+    y.iter_mut().zip(&e).for_each(|(y, e)| *y += small * e);
+    let channel = |name: &str, values: Vec<f64>| Channel { name: name.into(), values };
+    Log::new(vec![channel("u", u), channel("y", y)], 0.1)
+}
+
+#[test]
+fn a_plant_of_many_modes_gets_a_model_in_state_space() -> Result<(), Error> {
+    let log = modes()?;
+    let plan = Plan {
+        estimate: vec!["1..800".parse()?],
+        validate: vec!["801..1200".parse()?],
+        ..Plan::new(&["u"], "y", Choice::Automatic(Automatic::default()))
+    };
+    let mut report = identify(log.clone(), &[], &plan)?;
+    let selection = report.selection.take().ok_or_else(|| Error::report("there is no selection"))?;
+    let candidate = selection.state_space.ok_or_else(|| Error::report("there is no candidate"))?;
+    assert_eq!(
+        (candidate.order, &*report.model.name()),
+        (12, "state space of order 12"),
+        "{:?}",
+        selection.steps
+    );
+    assert!(candidate.orders.len() > 12);
+    // It is the very report of that order.
+    let own = StateSpacePlan {
+        orders: Some(12..=12),
+        estimate: plan.estimate.clone(),
+        validate: plan.validate.clone(),
+        ..StateSpacePlan::new(&["u"], &["y"])
+    };
+    assert!(report == fit_state_space(&log, &[], &own)?);
+    // Who asks for what a model in state space is not gets polynomials.
+    let asked = [
+        Plan { focus: Focus::Prediction, ..plan.clone() },
+        Plan { initial: Initial::Zero, ..plan.clone() },
+        Plan { select: "aic".parse::<Select>()?, ..plan.clone() },
+        Plan { trend: true, ..plan.clone() },
+        Plan { choice: Choice::Automatic(Automatic { nk: Some(vec![1]), ..Automatic::default() }), ..plan },
+    ];
+    assert!(asked.iter().all(|plan| in_states::InStates::of(&log, plan).is_none()));
+    Ok(())
 }

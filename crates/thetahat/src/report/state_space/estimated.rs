@@ -8,9 +8,9 @@ use super::StateSpacePlan;
 use crate::Error;
 use crate::data::{JointRecord, Log};
 use crate::estimate::{
-    Constant, OrderScore, Procedure, Refinement, RefinementOutcome, RefinementStart, Subspace,
-    SubspaceOptions, SubspaceOutcome, VectorArxOptions, Weighting, best_order, products_of_innovations,
-    refined, subspace, vector_arx,
+    Constant, Ordered, Procedure, Refinement, RefinementOutcome, RefinementStart, Subspace, SubspaceOptions,
+    SubspaceOutcome, VectorArxOptions, Weighting, products_of_innovations, refined, subspace, vector_arx,
+    with_levels,
 };
 use crate::model::{EntryCovariance, StateSpace};
 use crate::optimize::Monitor;
@@ -36,22 +36,6 @@ pub(super) struct Estimated {
     pub(super) delay: usize,
     /// The orders that the data offered to choose among.
     pub(super) offered: RangeInclusive<usize>,
-}
-
-/// What has the least MDL, with levels or without; what has no level, as an integrator, is fitted without.
-fn with_levels<T>(
-    constant: Constant,
-    find: impl Fn(bool) -> Result<T, Error>,
-    mdl: impl Fn(&T) -> f64,
-) -> Result<T, Error> {
-    match constant {
-        Constant::No => find(false),
-        Constant::Yes => find(true),
-        Constant::Auto => {
-            let plain = find(false)?;
-            Ok(find(true).ok().filter(|other| mdl(other) < mdl(&plain)).unwrap_or(plain))
-        }
-    }
 }
 
 /// N - p/l.
@@ -128,11 +112,8 @@ pub(super) fn by_subspace(
     constant: Constant,
     (log, monitor): (&Log, Monitor<'_>),
 ) -> Result<Estimated, Error> {
-    let Found { subspace: found, order, scores, .. } = with_levels(
-        constant,
-        |levels| Found::new(record, plan, levels, constant == Constant::Auto),
-        |found| found.mdl,
-    )?;
+    let Ordered { subspace: found, order, scores, .. } =
+        Ordered::new(record, &plan.subspace, plan.orders.as_ref(), constant)?;
     let mut levels = found.levels(order).ok_or_else(integrates)?;
     let mut matrices = found.state_space(order, log.sample_time())?;
     let samples = record.segments.iter().map(std::ops::Range::len).sum::<usize>();
@@ -199,44 +180,4 @@ fn other_start(
     let other = subspace(record, &options).ok()?;
     let (model, levels) = (other.state_space(order, log.sample_time()).ok()?, other.levels(order)?);
     Some(RefinementStart { name: weighting.to_string(), model, levels })
-}
-
-/// The states of a record, and the order that was given or chosen.
-struct Found {
-    subspace: Subspace,
-    order: usize,
-    /// What the order was chosen among; none if it was given.
-    scores: Vec<OrderScore>,
-    /// That of the order; infinite if nobody asks for it.
-    mdl: f64,
-}
-
-impl Found {
-    /// `compared` says whether its MDL is asked for where the order is given.
-    fn new(
-        record: &JointRecord<'_>,
-        plan: &StateSpacePlan,
-        constant: bool,
-        compared: bool,
-    ) -> Result<Self, Error> {
-        let subspace = subspace(record, &SubspaceOptions { constant, ..plan.subspace })?;
-        let (asked, highest) =
-            (plan.orders.clone().unwrap_or_else(|| subspace.orders()), subspace.highest_order());
-        let orders = *asked.start()..=(*asked.end()).min(highest);
-        if orders.is_empty() {
-            return Err(Error::argument(
-                "order",
-                format!("the data tell of orders up to {highest}; ask for one of these"),
-            ));
-        }
-        let given = asked.start() == asked.end();
-        if given && !compared {
-            return Ok(Self { subspace, order: *asked.start(), scores: Vec::new(), mdl: f64::INFINITY });
-        }
-        let scores = subspace.scores(record, orders)?;
-        let order = if given { *asked.start() } else { best_order(&scores)? };
-        let own = scores.iter().find(|score| score.order == order).and_then(|score| score.mdl);
-        let mdl = own.unwrap_or(f64::INFINITY);
-        Ok(Self { subspace, order, scores: if given { Vec::new() } else { scores }, mdl })
-    }
 }

@@ -416,8 +416,57 @@ fn several_outputs_are_refused_where_a_model_has_one() {
     assert!(usage("-y y1 --na 1 --nb 1 --couple full").contains("--couple is for several outputs"));
     assert!(usage("-y y1,y2 --na 1 --nb 1 --couple auto").contains("'auto' is neither full nor none"));
     assert!(usage("-y y1,y2 --na 1 --nb 1 --scale y1=1").contains("has none; give one for each channel"));
-    folder.done("fit log.csv -y y1 --na 1 --nb 1 --report report.json");
-    assert!(usage("-y y1,y2 --warm report.json").contains("--warm: several outputs"));
+    folder.done("fit log.csv -y y1 --na 1 --nb 1 --report one.json");
+    assert!(usage("-y y1,y2 --warm one.json").contains("--output: 2 of the 1 outputs of --warm"));
+    folder.done("fit log.csv -y y1,y2 --na 1 --nb 1 --report two.json");
+    assert!(usage("-y y1 --warm two.json").contains("--output: 1 of the 2 outputs of --warm"));
+    assert!(usage("--warm two.json --couple none").contains("--couple: that of --warm is taken"));
+    folder.done("fit log.csv -y y1,y2 --model ss --order 2 --report states.json");
+    let data = |line: &str| refused(&folder, &format!("log.csv {line}"), 3);
+    assert!(data("--warm states.json").contains("of several outputs only an ARX model can be tracked"));
+    folder.done("reduce two.json --order 1 -o reduced.json");
+    assert!(data("--warm reduced.json").contains("the matrices are not those of A and B"));
+}
+
+/// What a fit of the first half knows goes on in the second, to the fit of both halves.
+#[test]
+fn several_outputs_go_on_from_a_fit() {
+    let folder = Folder::with_log(two_outputs(800));
+    for (couple, nk) in [("full", "1"), ("none", "1"), ("full", "0")] {
+        let orders =
+            format!("-y y1,y2 --na 2 --nb 2 --nk {nk} --couple {couple} --detrend none --constant no");
+        let report = folder.done(&format!("fit log.csv {orders} --estimate 1..400 --report half.json"));
+        assert!(!report.stdout.is_empty());
+        let whole = folder.fit(&format!("log.csv {orders}"));
+        // The first rows fill the delay lines.
+        let log = folder.read("log.csv");
+        let lines = log.split_inclusive('\n').enumerate();
+        let rest: String = lines.filter(|(at, _)| *at == 0 || *at > 398).map(|(_, line)| line).collect();
+        folder.write("rest.csv", rest);
+        let line = "rest.csv --warm half.json --forgetting none --every 402";
+        let lines = tracked(&folder, line);
+        assert_eq!(lines.len(), 2, "{lines:?}");
+        for (row, line) in lines.iter().enumerate() {
+            for output in 0..2 {
+                let name = match (couple, output == row) {
+                    ("full", _) => format!("/a{}_1", output + 1),
+                    (_, true) => "/a1".to_owned(),
+                    (_, false) => continue,
+                };
+                let wanted = number(&whole, &format!("/estimation/a/0/{row}/{output}/value"));
+                assert!((number(line, &name) - wanted).abs() < 1e-8, "{couple} {nk}: {line}");
+                let error = number(&whole, &format!("/estimation/a/0/{row}/{output}/standard_error"));
+                let found = number(line, &format!("{name}_se"));
+                assert!((found / error - 1.0).abs() < 0.02, "{couple} {nk}: {found} {error}");
+            }
+            for input in 0..2 {
+                let first = nk.parse::<usize>().expect("a number");
+                let wanted = number(&whole, &format!("/estimation/b/{input}/1/{row}/value"));
+                let found = number(line, &format!("/b{}_{}", input + 1, first + 1));
+                assert!((found - wanted).abs() < 1e-8, "{couple} {nk}: {line}");
+            }
+        }
+    }
 }
 
 #[test]

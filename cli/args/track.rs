@@ -16,7 +16,7 @@ pub(crate) struct TrackArguments {
     /// Input columns; a name that holds a comma stands between double quotes, as in CSV [default: u, u1, u2, …; those of --warm]
     #[arg(short = 'u', long, value_name = "NAME[,NAME…]", help_heading = "Channels")]
     pub(crate) input: Vec<Names>,
-    /// Output columns; with --model arx more than one, an equation for each [default: y; that of --warm]
+    /// Output columns; with --model arx more than one, an equation for each [default: y; those of --warm]
     #[arg(short = 'y', long, value_name = "NAME[,NAME…]", help_heading = "Channels")]
     pub(crate) output: Vec<Names>,
     /// Subtract this from a channel [default: 0; the offsets of --warm]

@@ -1,6 +1,6 @@
 use std::path::{Path, PathBuf};
 
-use thetahat::estimate::Coupling;
+use thetahat::estimate::{Coupling, Procedure};
 use thetahat::model::{Map, Model, Orders, Signal};
 use thetahat::report::Report;
 use thetahat::track::{PerChannel, Policy, TrackMethod, TrackPlan, Tracker};
@@ -177,7 +177,7 @@ impl TrackJob {
         report: Option<&Report>,
     ) -> Result<Vec<Tracker>, Failure> {
         let model = report.map(|report| &report.model);
-        self.check_outputs(outputs, report.is_some())?;
+        self.check_outputs(outputs, model)?;
         let source = match report {
             Some(report) => Source::Report(report),
             None => {
@@ -206,17 +206,20 @@ impl TrackJob {
             values.iter().find(|(other, _)| other == name).map(|(_, value)| *value)
         };
         // What each of several equations has of the outputs, as inputs in front of the others.
-        let coupled = if outputs.len() > 1 && self.coupling != Some(Coupling::None) { outputs } else { &[] };
-        let offsets = |output: &str| {
-            let levels =
-                |signals: &[Signal], index: usize| signals.get(index).map(|signal| signal.offset.level);
-            let level =
-                |name: &str, stored: Option<f64>| value(&self.offsets, name).or(stored).unwrap_or(0.0);
-            let stored = |index: usize| model.and_then(|model| levels(model.inputs(), index));
-            let of_inputs = inputs.iter().enumerate().map(|(index, name)| level(name, stored(index)));
+        let coupling = report.map_or(self.coupling, coupling_of);
+        let coupled = if outputs.len() > 1 && coupling != Some(Coupling::None) { outputs } else { &[] };
+        let offsets = |output: usize| {
+            let level = |name: &str, stored: Option<&Signal>| {
+                let stored = stored.map_or(0.0, |signal| signal.offset.level);
+                value(&self.offsets, name).unwrap_or(stored)
+            };
+            let of_input = |index: usize| model.and_then(|model| model.inputs().get(index));
+            let of_output = |index: usize| model.and_then(|model| model.outputs().get(index));
+            let inputs = inputs.iter().enumerate().map(|(index, name)| level(name, of_input(index)));
+            let past = coupled.iter().enumerate().map(|(index, name)| level(name, of_output(index)));
             (!self.offsets.is_empty()).then(|| PerChannel {
-                inputs: coupled.iter().map(|name| level(name, None)).chain(of_inputs).collect(),
-                output: level(output, model.and_then(|model| levels(model.outputs(), 0))),
+                inputs: past.chain(inputs).collect(),
+                output: level(&outputs[output], of_output(output)),
             })
         };
         if let Some((name, scale)) = self.scales.iter().find(|(_, scale)| !(1e-98..=1e98).contains(scale)) {
@@ -242,16 +245,17 @@ impl TrackJob {
             };
             (!self.scales.is_empty()).then(all).transpose()
         };
-        let track = |policy: &Policy, output: &String| {
+        let track = |policy: &Policy, place: usize| {
+            let output = &outputs[place];
             let plan = TrackPlan {
                 forgetting: *policy,
                 method,
-                offsets: offsets(output),
+                offsets: offsets(place),
                 scales: scales(output)?,
                 ..self.plan.clone()
             };
             match &source {
-                Source::Report(report) => Tracker::from_report(report, &plan),
+                Source::Report(report) => Tracker::from_report_of(report, place, &plan),
                 Source::Nothing(orders, None) if !coupled.is_empty() => {
                     Tracker::coupled(orders, coupled.len(), &plan)
                 }
@@ -268,26 +272,36 @@ impl TrackJob {
                 _ => Failure::option(&error),
             })
         };
-        let each = self.policies.iter().flat_map(|policy| outputs.iter().map(move |output| (policy, output)));
-        each.map(|(policy, output)| track(policy, output)).collect()
+        let each =
+            self.policies.iter().flat_map(|policy| (0..outputs.len()).map(move |place| (policy, place)));
+        each.map(|(policy, place)| track(policy, place)).collect()
     }
 
     /// That the model can have these outputs.
-    fn check_outputs(&self, outputs: &[String], warm: bool) -> Result<(), Failure> {
-        if outputs.is_empty() {
+    fn check_outputs(&self, outputs: &[String], stored: Option<&Model>) -> Result<(), Failure> {
+        let count = outputs.len();
+        if count == 0 {
             return Err(Failure::usage("--output: there is none; name one"));
         }
-        if outputs.len() < 2 {
-            return match self.coupling {
-                None => Ok(()),
-                Some(_) => Err(Failure::usage(
-                    "--couple is for several outputs, such as --output y1,y2; leave it out",
-                )),
-            };
+        if let Some(model) = stored.filter(|model| model.outputs().len() != count) {
+            return Err(Failure::usage(format!(
+                "--output: {count} of the {} outputs of --warm; name all of them, or none",
+                model.outputs().len()
+            )));
         }
-        let option = if warm {
-            "--warm"
-        } else if self.degree.is_some() {
+        match self.coupling {
+            Some(_) if stored.is_some() => {
+                return Err(Failure::usage("--couple: that of --warm is taken; leave it out"));
+            }
+            Some(_) if count == 1 => {
+                return Err(Failure::usage(
+                    "--couple is for several outputs, such as --output y1,y2; leave it out",
+                ));
+            }
+            _ if count == 1 => return Ok(()),
+            _ => {}
+        }
+        let option = if self.degree.is_some() {
             "--narx"
         } else if self.orders.nc.is_some_and(|nc| nc > 0) {
             "--nc"
@@ -295,8 +309,16 @@ impl TrackJob {
             return Ok(());
         };
         Err(Failure::usage(format!(
-            "{option}: several outputs are tracked as ARX models that start from nothing; leave it out, or track one output"
+            "{option}: several outputs are tracked as ARX models; leave it out, or track one output"
         )))
+    }
+}
+
+/// Which past outputs each output of a stored ARX model depends on; none of other models.
+fn coupling_of(report: &Report) -> Option<Coupling> {
+    match &report.estimation.procedure {
+        Procedure::VectorArx(outcome) => Some(outcome.coupling),
+        _ => None,
     }
 }
 

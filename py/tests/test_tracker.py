@@ -462,6 +462,23 @@ def test_several_outputs_one_row_at_a_time() -> None:
         th.Tracker(1, 1, output=["a", "a"])
 
 
+def test_several_outputs_go_on_from_a_fit() -> None:
+    y, u = two_outputs()
+    log = th.Log(y, u, sample_time=1.0)
+    model = th.arx(log[:200], 2, 1, couple="full")
+    tracker = th.Tracker(warm=model, forgetting=None)
+    assert tracker.outputs == model.outputs and tracker.parameters.shape == (2, 5)
+    fitted = np.array(model.document["estimation"]["a"][0])
+    found = tracker.parameters[:, [0, 2]]
+    np.testing.assert_array_equal(found, [[entry["value"] for entry in row] for row in fitted])
+    tracker.run(log[200:])
+    np.testing.assert_allclose(tracker.parameters[1, 0], -0.3, atol=0.05)
+    with pytest.raises(ValueError, match="only an ARX model can be tracked"):
+        th.Tracker(warm=th.ss(log, 2))
+    with pytest.raises(ValueError, match="couple: that of warm is taken"):
+        th.Tracker(warm=model, couple="none")
+
+
 def test_the_parameters_of_one_of_several_outputs_are_drawn() -> None:
     from thetahat import plot
 

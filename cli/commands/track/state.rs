@@ -223,9 +223,8 @@ pub(super) fn setting(job: &TrackJob, channels: &Channels, trackers: &[Tracker])
         add("--horizon", job.horizon.map_or_else(String::new, |rows| rows.to_string()));
         add("--dead-zone", plan.dead_zone.to_string());
         let several = trackers.get(..channels.outputs.len()).unwrap_or_default();
-        let each = |numbers: &dyn Fn(&Tracker) -> String| {
-            several.iter().map(numbers).collect::<Vec<_>>().join(";")
-        };
+        let each =
+            |numbers: &dyn Fn(&Tracker) -> String| several.iter().map(numbers).collect::<Vec<_>>().join(";");
         add("--offset", each(&|tracker| numbers(Some(tracker.offsets()))));
         add("--scale", each(&|tracker| numbers(tracker.plan().scales.as_ref())));
         add("--alarm", plan.alarm_interval.map_or_else(String::new, |interval| interval.to_string()));

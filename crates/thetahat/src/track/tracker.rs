@@ -613,7 +613,7 @@ impl Tracked {
 
 /// The orders of one equation as its estimator has them. With several outputs na samples of each, its own among them, come before
 /// the inputs, as inputs that act at once: what they were a row before.
-fn equation(orders: &Orders, outputs: usize) -> Orders {
+pub(super) fn equation(orders: &Orders, outputs: usize) -> Orders {
     if outputs == 0 {
         return orders.clone();
     }
@@ -628,7 +628,7 @@ fn equation(orders: &Orders, outputs: usize) -> Orders {
 }
 
 /// The names of its parameters.
-fn names(orders: &Orders, outputs: usize) -> Vec<String> {
+pub(super) fn names(orders: &Orders, outputs: usize) -> Vec<String> {
     let past = (1..=outputs).flat_map(|output| (1..=orders.na).map(move |lag| format!("a{output}_{lag}")));
     let of_inputs = orders.names();
     match outputs {

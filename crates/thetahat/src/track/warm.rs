@@ -1,5 +1,7 @@
 //! A tracker that goes on from a fit.
 
+mod several;
+
 use thetahat_core::Covariance;
 use thetahat_core::nalgebra::{DMatrix, DVector};
 
@@ -28,10 +30,7 @@ impl Tracker {
     /// As [`Tracker::new`]; [`Error::Report`] if the report is of another structure; if it has no covariance or a noise variance of 0, or an offset that is a line in time; [`Error::Argument`] if the
     /// plan asks for another start than `standard`.
     pub fn from_report(report: &Report, plan: &TrackPlan) -> Result<Self, Error> {
-        if plan.start.0 != thetahat_core::RlsStart::Standard {
-            let message = format!("'{}' is a start without a report; leave it out", plan.start);
-            return Err(Error::argument("start", message));
-        }
+        check_start(plan)?;
         if let Model::NonlinearArx(model) = &report.model {
             return Self::from_nonlinear(model, report.estimation.samples, plan);
         }
@@ -163,11 +162,7 @@ fn relative_covariance(
             "the report has no covariance, so that it does not say how sure its model is",
         ));
     };
-    if noise_variance <= 0.0 {
-        return Err(Error::report(
-            "the report has a noise variance of 0, so that its covariance does not say how sure its model is; start without it",
-        ));
-    }
+    check_variance(noise_variance)?;
     if count != expected {
         return Err(Error::report(
             "model.parameters are not as many as its orders make; the report was edited or damaged",
@@ -179,19 +174,41 @@ fn relative_covariance(
     Ok(relative)
 }
 
+/// That a plan has no start of its own.
+fn check_start(plan: &TrackPlan) -> Result<(), Error> {
+    if plan.start.0 == thetahat_core::RlsStart::Standard {
+        return Ok(());
+    }
+    let message = format!("'{}' is a start without a report; leave it out", plan.start);
+    Err(Error::argument("start", message))
+}
+
+/// That a covariance can be divided by it.
+fn check_variance(noise_variance: f64) -> Result<(), Error> {
+    if noise_variance > 0.0 {
+        return Ok(());
+    }
+    Err(Error::report(
+        "the report has a noise variance of 0, so that its covariance does not say how sure its model is; start without it",
+    ))
+}
+
 /// The offsets of a report, which are levels.
 fn offsets(inputs: &[Signal], output: &Signal) -> Result<PerChannel, Error> {
-    if let Some(signal) = inputs.iter().chain([output]).find(|signal| signal.offset.slope != 0.0) {
-        return Err(Error::report(format!(
-            "the offset of '{}' in the report is a line in the time of its log, which has no meaning beyond it; fit with \
-             another way to remove offsets, or give offsets",
-            signal.name
-        )));
+    let inputs = inputs.iter().map(offset_level).collect::<Result<_, _>>()?;
+    Ok(PerChannel { inputs, output: offset_level(output)? })
+}
+
+/// The offset of a channel, which is a level.
+fn offset_level(signal: &Signal) -> Result<f64, Error> {
+    if signal.offset.slope == 0.0 {
+        return Ok(signal.offset.level);
     }
-    Ok(PerChannel {
-        inputs: inputs.iter().map(|signal| signal.offset.level).collect(),
-        output: output.offset.level,
-    })
+    Err(Error::report(format!(
+        "the offset of '{}' in the report is a line in the time of its log, which has no meaning beyond it; fit with another way to remove \
+         offsets, or give offsets",
+        signal.name
+    )))
 }
 
 /// 1/sqrt(N P_jj), the largest of each channel. A channel without parameters has no say: 1.

@@ -27,6 +27,7 @@
 
 mod checks;
 mod collecting;
+mod equation;
 mod estimator;
 mod forecasts;
 mod missing;

@@ -59,7 +59,8 @@ from thetahat._thetahat import (
     SteadyState,
     __version__,
 )
-from thetahat._track import Tracked, Tracker, TrackTrajectory
+from thetahat._track import Tracker
+from thetahat._tracked import Tracked, TrackTrajectory
 from thetahat._tune import Tuning, tune
 
 __all__ = [

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from thetahat import _drawing, _options
 from thetahat._filter import StateTrajectory
 from thetahat._thetahat import ChangeTrajectory
-from thetahat._track import TrackTrajectory
+from thetahat._tracked import TrackTrajectory
 
 Grid = npt.NDArray[Any]
 """An array of matplotlib axes."""

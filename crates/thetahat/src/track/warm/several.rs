@@ -10,8 +10,9 @@ use crate::model::{
 };
 use crate::report::Report;
 use crate::track::checks::check;
+use crate::track::equation::{equation, names};
 use crate::track::plan::{PerChannel, TrackPlan};
-use crate::track::tracker::{Tracker, equation, names};
+use crate::track::tracker::Tracker;
 
 /// What entries of a model in state space may differ by from those that its coefficients make.
 const ROUNDING: f64 = 1e-9;

@@ -47,7 +47,7 @@ pub struct StateSpaceModel {
     /// How uncertain the matrices are; none where no theory says it, as after a subspace method.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub covariance: Option<EntryCovariance>,
-    /// N - p/l for N samples of l outputs and p free parameters.
+    /// N - p/l for N samples of l outputs and p free parameters, states at the start of segments among them where these were estimated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub degrees_of_freedom: Option<usize>,
     /// p, the free parameters of a canonical form: n (inputs + 2 outputs), and those of D where it was estimated.

@@ -38,7 +38,7 @@ pub(super) struct Estimated {
     pub(super) offered: RangeInclusive<usize>,
 }
 
-/// N - p/l.
+/// N - p/l; a search for starts counts their states in p.
 fn degrees(what: &str, free: usize, samples: usize, outputs: usize) -> Result<usize, Error> {
     let degrees = samples.checked_sub(free.div_ceil(outputs)).filter(|degrees| *degrees > 0);
     degrees.ok_or_else(|| {
@@ -118,7 +118,10 @@ pub(super) fn by_subspace(
     let mut matrices = found.state_space(order, log.sample_time())?;
     let samples = record.segments.iter().map(std::ops::Range::len).sum::<usize>();
     let free = found.free_parameters(order);
-    let degrees = degrees(&format!("a model of order {order}"), free, samples, record.outputs.len())?;
+    let outputs = record.outputs.len();
+    // Each segment has errors from a state of its own, which is found with them.
+    let starts = record.segments.iter().map(|segment| order.min(segment.len() * outputs)).sum::<usize>();
+    let degrees = degrees(&format!("a model of order {order}"), free + starts, samples, outputs)?;
     let (mut covariance, mut refinement) = (None, None);
     if let Some(refine) = plan.refine {
         let start = RefinementStart { name: found.weighting().to_string(), model: matrices, levels };

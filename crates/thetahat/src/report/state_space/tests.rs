@@ -110,6 +110,28 @@ fn a_series_has_no_inputs() {
     assert!(report.fit[0].percent.unwrap() > 10.0);
 }
 
+/// In short segments the states that errors start from take much of the errors with them.
+#[test]
+fn errors_of_many_short_segments_are_as_large_as_those_of_one() -> Result<(), Error> {
+    let whole = log(6000, 0.3);
+    let mut channels = Vec::new();
+    for name in ["u1", "u2", "y1", "y2"] {
+        channels.push(whole.channel(name)?.clone());
+    }
+    channels[3].values.iter_mut().skip(10).step_by(11).for_each(|value| *value = f64::NAN);
+    let report =
+        fit_state_space(&Log::new(channels, 0.5)?, &[], &StateSpacePlan { orders: Some(2..=2), ..plan() })?;
+    let found = model(&report);
+    let (samples, segments) = (report.estimation.samples, 546);
+    assert_eq!(samples, 6000 - 545);
+    assert_eq!(found.degrees_of_freedom, Some(samples - (found.free_parameters + 2 * segments) / 2));
+    for (output, bound) in [(0, 0.3_f64), (1, 0.15)] {
+        let ratio = found.noise_covariance[output][output] / (bound * bound / 3.0);
+        assert!((0.9..1.1).contains(&ratio), "{ratio}");
+    }
+    Ok(())
+}
+
 #[test]
 fn delays_are_those_of_the_plan() {
     let log = log(1500, 0.1);

@@ -27,7 +27,7 @@ const CORE: House = House {
         &["covariance", "detect", "lags", "least_squares"],
         &["rls", "state_space"],
         &["arx", "augmented", "differentiated", "kalman"],
-        &["armax", "ekf", "luenberger", "nonlinear_arx", "schedule"],
+        &["armax", "ekf", "luenberger", "nonlinear_arx", "schedule", "vector_arx"],
         &["recursive_narx", "smoother"],
     ],
 };

@@ -35,8 +35,7 @@ pub(crate) fn track(arguments: &TrackArguments) -> Result<(), Failure> {
     let job = TrackJob::resolve(arguments)?;
     let report = job.warm.as_deref().map(stored::report).transpose()?;
     if let (Some(path), Some(report)) = (&job.warm, &report)
-        && !matches!(report.model, Model::NonlinearArx(_))
-        && report.model.outputs().len() == 1
+        && !matches!(report.model, Model::NonlinearArx(_) | Model::StateSpace(_))
     {
         stored::polynomials(path, &report.model, "a tracker")?;
     }

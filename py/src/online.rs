@@ -22,6 +22,7 @@ mod recursive_model;
 pub(crate) mod results;
 mod trajectory;
 mod used;
+mod vector_arx;
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -38,6 +39,7 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<innovation::Innovation>()?;
     module.add_class::<least_squares::RecursiveLeastSquares>()?;
     module.add_class::<arx::RecursiveArx>()?;
+    module.add_class::<vector_arx::RecursiveVectorArx>()?;
     module.add_class::<armax::RecursiveArmax>()?;
     module.add_class::<narx::RecursiveNarx>()?;
     module.add_class::<recursive::RecursiveTrajectory>()?;
@@ -71,6 +73,9 @@ fn _restore<'py>(py: Python<'py>, class_name: &str, kept: &Bound<'py, PyAny>) ->
         "RecursiveArx" => {
             let model = RecursiveModel::restore(read(kept)?, class_name)?;
             any(Bound::new(py, arx::RecursiveArx::over(model))?.into_any())
+        }
+        "RecursiveVectorArx" => {
+            any(Bound::new(py, vector_arx::RecursiveVectorArx::of(read(kept)?)?)?.into_any())
         }
         "RecursiveArmax" => {
             let model = RecursiveModel::restore(read(kept)?, class_name)?;

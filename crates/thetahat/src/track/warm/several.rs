@@ -41,16 +41,13 @@ impl Tracker {
     /// Those of `from_report`; [`Error::Report`] if the report is of another kind of model, or its matrices are not those of its A and B, as
     /// after a reduction; [`Error::Argument`] if there is no such output.
     pub fn from_report_of(report: &Report, output: usize, plan: &TrackPlan) -> Result<Self, Error> {
-        if report.model.outputs().len() < 2 && output == 0 {
-            return Self::from_report(report, plan);
-        }
+        let model = match &report.model {
+            Model::StateSpace(model) if model.outputs.len() > 1 || output > 0 => model,
+            _ => return Self::from_report(report, plan),
+        };
         super::check_start(plan)?;
-        let (Model::StateSpace(model), Procedure::VectorArx(outcome)) =
-            (&report.model, &report.estimation.procedure)
-        else {
-            return Err(Error::report(
-                "of several outputs only an ARX model can be tracked; fit one, as with --model arx",
-            ));
+        let Procedure::VectorArx(outcome) = &report.estimation.procedure else {
+            return Err(Error::report("of several outputs only an ARX model can be tracked; fit one"));
         };
         model.check()?;
         if output >= model.outputs.len() {

@@ -25,7 +25,7 @@ const CORE: House = House {
         &["dim"],
         &["basis", "innovation", "snapshot", "solution"],
         &["covariance", "detect", "lags", "least_squares"],
-        &["rls", "state_space"],
+        &["control", "rls", "state_space"],
         &["arx", "augmented", "differentiated", "kalman"],
         &["armax", "ekf", "luenberger", "nonlinear_arx", "schedule", "vector_arx"],
         &["recursive_narx", "smoother"],

@@ -7,6 +7,7 @@ pub(crate) mod argument;
 mod armax;
 mod arx;
 mod callable;
+mod controller;
 pub(crate) mod detector;
 mod extended;
 pub(crate) mod forgetting;
@@ -42,6 +43,7 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<vector_arx::RecursiveVectorArx>()?;
     module.add_class::<armax::RecursiveArmax>()?;
     module.add_class::<narx::RecursiveNarx>()?;
+    module.add_class::<controller::RstController>()?;
     module.add_class::<recursive::RecursiveTrajectory>()?;
     module.add_class::<model::LinearTransition>()?;
     module.add_class::<model::LinearObservation>()?;
@@ -81,6 +83,7 @@ fn _restore<'py>(py: Python<'py>, class_name: &str, kept: &Bound<'py, PyAny>) ->
             let model = RecursiveModel::restore(read(kept)?, class_name)?;
             any(Bound::new(py, armax::RecursiveArmax::over(model))?.into_any())
         }
+        "RstController" => any(Bound::new(py, controller::RstController::of(read(kept)?))?.into_any()),
         "RecursiveNarx" => {
             let model = RecursiveModel::restore(read(kept)?, class_name)?;
             any(Bound::new(py, narx::RecursiveNarx::over(model))?.into_any())

@@ -21,6 +21,10 @@
 //! | `Smoother` | the states given the whole record (feature `alloc`) |
 //! | `Differentiated` | exact Jacobians of one generic function (feature `autodiff`) |
 //!
+//! | what to do | |
+//! |---|---|
+//! | [`RstController`] | a linear controller with limits and without windup; its poles placed with a model and [`WantedPoles`] |
+//!
 //! | what a sample tells | |
 //! |---|---|
 //! | [`Innovation`] | what was not predicted, how likely it was (NIS), and the [`Action`] that was taken |
@@ -105,6 +109,7 @@ mod armax;
 mod arx;
 mod augmented;
 mod basis;
+mod control;
 mod covariance;
 mod detect;
 #[cfg(feature = "autodiff")]
@@ -148,6 +153,7 @@ pub use basis::{
     Activation, Basis, Local, MOST_NEIGHBOURS, MOST_SLOPES, Membership, Neighbours, Network, Polynomial,
     Radial, Spline,
 };
+pub use control::{PlacementOrders, RstController, WantedPoles};
 pub use covariance::Covariance;
 pub use detect::{Alarm, ChangeDetector, Chart};
 #[cfg(feature = "autodiff")]

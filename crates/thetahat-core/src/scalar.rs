@@ -50,6 +50,9 @@ pub trait Real: RealField + Copy + sealed::Sealed {
 
     /// The hyperbolic tangent, likewise.
     fn hyperbolic_tangent(self) -> Self;
+
+    /// The sine and the cosine, likewise.
+    fn sine_and_cosine(self) -> (Self, Self);
 }
 
 impl Real for f32 {
@@ -70,6 +73,10 @@ impl Real for f32 {
     fn hyperbolic_tangent(self) -> f32 {
         libm::tanhf(self)
     }
+
+    fn sine_and_cosine(self) -> (f32, f32) {
+        libm::sincosf(self)
+    }
 }
 
 impl Real for f64 {
@@ -89,5 +96,9 @@ impl Real for f64 {
 
     fn hyperbolic_tangent(self) -> f64 {
         libm::tanh(self)
+    }
+
+    fn sine_and_cosine(self) -> (f64, f64) {
+        libm::sincos(self)
     }
 }

@@ -12,7 +12,7 @@ use thetahat_core::{
     Action, ArmaxMethod, ArmaxOrders, ArxOrders, Basis, ChangeDetector, Covariance, ExtendedKalmanFilter,
     Forgetting, GainSchedule, Innovation, InputOrders, KalmanFilter, Lags, LeastSquares, LinearObservation,
     LinearTransition, LuenbergerObserver, RecursiveArmax, RecursiveArx, RecursiveLeastSquares, RecursiveNarx,
-    RecursiveVectorArx, RlsStart, Scaling,
+    RecursiveVectorArx, RlsStart, RstController, Scaling,
 };
 
 const INPUTS: &[InputOrders] = &[InputOrders { nb: 1, nk: 2 }];
@@ -98,6 +98,25 @@ fn recursive_least_squares() {
         let phi = DVector::from_column_slice(phi(k).as_slice());
         (estimator.update(&phi, output(k)), estimator.parameters().clone())
     });
+}
+
+#[test]
+fn controllers() {
+    let controller: RstController<f64, Const<2>> =
+        RstController::new(2.0, [-1.0, 0.1].into(), [2.2, -2.0].into(), [-0.9, 0.0].into()).unwrap();
+    for limited in [controller.clone(), controller.clone().with_limits(-1.0..=2.0).unwrap()] {
+        check(limited, |controller, k| controller.control(value(k), output(k)));
+    }
+    let numbers = &[json!("NaN"), json!("inf")][..];
+    refuses(
+        &controller,
+        &[
+            ("/state/2/0", numbers),
+            ("/gain", &[json!(null)]),
+            ("/r", &[json!([3, 1, [0.0, 0.0, 0.0]])]),
+            ("/version", &[json!(0)]),
+        ],
+    );
 }
 
 #[test]

@@ -34,6 +34,7 @@ __all__ = [
     "RecursiveNarx",
     "RecursiveTrajectory",
     "RecursiveVectorArx",
+    "RstController",
     "SmoothedTrajectory",
     "StateFilter",
     "StateModel",
@@ -463,6 +464,41 @@ class RecursiveVectorArx:
     def adapting(self) -> bool: ...
     @adapting.setter
     def adapting(self, value: bool, /) -> None: ...
+
+@final
+class RstController:
+    def __new__(
+        cls,
+        r: ArrayLike,
+        s: ArrayLike,
+        gain: float,
+        observer: ArrayLike = ...,
+        *,
+        limits: tuple[float | None, float | None] | None = None,
+    ) -> RstController: ...
+    @staticmethod
+    def pole_placement(
+        a: ArrayLike,
+        b: ArrayLike,
+        response: ArrayLike,
+        observer: ArrayLike = ...,
+        *,
+        integrator: bool = False,
+        cancel_zeros: bool = False,
+        limits: tuple[float | None, float | None] | None = None,
+    ) -> RstController: ...
+    def control(self, set_point: float, y: float) -> float: ...
+    def applied(self, u: float) -> None: ...
+    def start(self, u: float, y: float, set_point: float) -> None: ...
+    def peaks(self, a: ArrayLike, b: ArrayLike, frequencies: int = 500) -> tuple[float, float]: ...
+    @property
+    def r(self) -> _Array: ...
+    @property
+    def s(self) -> _Array: ...
+    @property
+    def t(self) -> _Array: ...
+    @property
+    def limits(self) -> tuple[float | None, float | None]: ...
 
 @final
 class RecursiveArmax(_RecursivePolynomials):

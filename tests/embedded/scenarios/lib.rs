@@ -8,6 +8,7 @@
 //! between the host's library and the firmware's. (The exponential of [`Radial`] and [`Local`] is the same on both,
 //! and so is the hyperbolic tangent of [`Network`].)
 
+mod control;
 mod detect;
 mod kalman;
 mod least_squares;
@@ -86,6 +87,7 @@ pub fn visit_all(visitor: &mut impl Visitor) {
     visitor.visit::<kalman::Kalman<6, 3>>();
     visitor.visit::<kalman::Extended>();
     visitor.visit::<kalman::Observer>();
+    visitor.visit::<control::Placed>();
 }
 
 /// Plays both cases of one scenario: `step` gets the case, the number of the step, the scenario and what its

@@ -1,0 +1,255 @@
+//! Controllers by pole placement.
+
+use nalgebra::OVector;
+
+use super::RstController;
+use crate::{Dimension, Error, LeastSquares, Real};
+
+/// How large a controller of a model is: `N` of [`RstController`].
+///
+/// ```
+/// use thetahat_core::PlacementOrders;
+///
+/// // A = 1 + a_1 q⁻¹ + a_2 q⁻², B = b_1 q⁻¹ + b_2 q⁻²: R and S have 1 and 2 coefficients.
+/// assert_eq!(PlacementOrders { na: 2, nb: 2, integrator: false }.size(), 3);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PlacementOrders {
+    /// The highest power of q⁻¹ in A.
+    pub na: usize,
+    /// The highest power of q⁻¹ in B, delays included.
+    pub nb: usize,
+    /// Whether the controller integrates.
+    pub integrator: bool,
+}
+
+impl PlacementOrders {
+    /// The coefficients of R and S together: na + nb - 1, and one more with an integrator.
+    pub const fn size(&self) -> usize {
+        (self.na + self.integrator as usize + self.nb).saturating_sub(1)
+    }
+}
+
+/// Where the poles of the closed loop shall be. Polynomials begin with their 1.
+#[derive(Clone, Copy, Debug)]
+pub struct WantedPoles<'a, T> {
+    /// A_m: how the output answers the set point.
+    pub response: &'a [T],
+    /// A_o: how an error of the model or the start is forgotten. `[1]` is at once.
+    pub observer: &'a [T],
+    /// Whether the controller integrates, so that a constant load leaves no error.
+    pub integrator: bool,
+    /// Whether the zeros of B are cancelled: then the response has none, but those in B⁺ show in the input.
+    pub cancel_zeros: bool,
+}
+
+impl<T: Real, N: Dimension> RstController<T, N> {
+    /// The controller of lowest order that places the poles of the closed loop with a model A(q) y = B(q) u:
+    ///
+    /// ```text
+    /// A R + B S = A_m A_o,   T = A_o A_m(1)/B(1),   then y = (B T)/(A_m A_o) u_c = B A_m(1)/(B(1) A_m) u_c
+    /// ```
+    ///
+    /// With zeros cancelled B = B⁺ B⁻ with B⁻ = b q⁻ᵈ, R = R' B⁺ and A R' + B⁻ S = A_m A_o, T = A_o A_m(1)/b; with an integrator
+    /// R has the factor 1 - q⁻¹. The equation is linear in the coefficients, and solved by a QR factorisation
+    /// ([`LeastSquares`]). `a` and `b` are as [`RecursiveArx::a`](crate::RecursiveArx::a) and
+    /// [`b`](crate::RecursiveArx::b) give them: from the power 0 on, b with its leading zeros.
+    ///
+    /// Errors: [`Error::NotFinite`]; [`Error::OutOfRange`] if a, the response or the observer does not begin with 1, b not with 0 (an
+    /// input that acts at once makes a loop without time), b is all zeros or B(1) is 0, or a zero that shall be cancelled is not
+    /// inside the unit circle; [`Error::Orders`] if `N` is not [`PlacementOrders::size`]; [`Error::Length`] if A_m A_o has more than
+    /// `N` coefficients after its 1; [`Error::RankDeficient`] if A and B have a common factor, nearly, so that poles
+    /// cannot be placed.
+    ///
+    /// About 10 N³ flops.
+    ///
+    /// Source: Åström and Wittenmark, Adaptive Control, 2nd ed. 1995, section 3.2.
+    ///
+    /// ```
+    /// use thetahat_core::nalgebra::Const;
+    /// use thetahat_core::{Error, PlacementOrders, RstController, WantedPoles};
+    ///
+    /// // A motor, 1/(s (s + 1)) every 0.5 s; poles of frequency 1 and damping 0.7.
+    /// let (a, b) = ([1.0, -1.606531, 0.606531], [0.0, 0.106531, 0.090204]);
+    /// let wanted =
+    ///     WantedPoles { response: &[1.0, -1.320535, 0.496585], observer: &[1.0], integrator: false, cancel_zeros: false };
+    /// const SIZE: usize = PlacementOrders { na: 2, nb: 2, integrator: false }.size();
+    /// let motor: RstController<f64, Const<SIZE>> = RstController::pole_placement(&a, &b, &wanted)?;
+    /// assert!((motor.r()[0] - 0.111).abs() < 1e-3 && (motor.s()[0] - 1.642).abs() < 1e-3);
+    /// # Ok::<(), Error>(())
+    /// ```
+    pub fn pole_placement(a: &[T], b: &[T], wanted: &WantedPoles<'_, T>) -> Result<Self, Error> {
+        let WantedPoles { response, observer, integrator, cancel_zeros } = *wanted;
+        for (argument, values) in [("a", a), ("b", b), ("response", response), ("observer", observer)] {
+            if !values.iter().all(T::is_finite) {
+                return Err(Error::NotFinite { argument });
+            }
+        }
+        for (argument, values) in [("a", a), ("response", response), ("observer", observer)] {
+            if values.first() != Some(&T::one()) {
+                return Err(Error::OutOfRange { argument, range: "a polynomial that begins with 1" });
+            }
+        }
+        let delay = b.iter().take_while(|value| **value == T::zero()).count();
+        if delay == 0 || delay == b.len() {
+            return Err(Error::OutOfRange { argument: "b", range: "0 first, then a number that is not 0" });
+        }
+        let (na, nb) = (a.len() - 1, b.len() - 1);
+        let needed = PlacementOrders { na, nb, integrator }.size();
+        let size = N::exactly(needed).map_err(|available| Error::Orders { needed, available })?;
+        let poles = response.len() + observer.len() - 2;
+        // Zeros that are cancelled take no part in the equation.
+        let gain = at(b, delay);
+        let (b_minus, last) = if cancel_zeros { (gain, delay) } else { (T::zero(), nb) };
+        let plant = |power: usize| match cancel_zeros {
+            true if power == last => b_minus,
+            true => T::zero(),
+            false => at(b, power),
+        };
+        let denominator = |power: usize| {
+            let before = power.checked_sub(1).map_or(T::zero(), |before| at(a, before));
+            at(a, power) - if integrator { before } else { T::zero() }
+        };
+        let (of_r, of_s) = (last - 1, na + usize::from(integrator));
+        let unknown = of_r + of_s;
+        if poles > unknown {
+            return Err(Error::Length {
+                argument: "observer",
+                expected: unknown + 2 - response.len(),
+                found: observer.len(),
+            });
+        }
+        if cancel_zeros && !is_stable(b, delay, size.vector(T::zero())) {
+            return Err(Error::OutOfRange {
+                argument: "b",
+                range: "zeros inside the unit circle, to be cancelled",
+            });
+        }
+        let mut equations = LeastSquares::with_size(size);
+        for power in 1..=needed {
+            let mut row = size.vector(T::zero());
+            let mut right = T::zero();
+            if power <= unknown {
+                for (place, entry) in row.iter_mut().enumerate() {
+                    // r_1 … r_of_r, then s_0 ….
+                    *entry = match place.checked_sub(of_r) {
+                        None if power > place => denominator(power - place - 1),
+                        Some(place) if place < of_s && power >= place => plant(power - place),
+                        _ => T::zero(),
+                    };
+                }
+                right = product(response, observer, power) - denominator(power);
+            } else if let Some(entry) = row.iter_mut().nth(power - 1) {
+                *entry = T::one();
+            }
+            equations.add(&row, right)?;
+        }
+        let solution = equations.solve()?;
+        let found = solution.parameters().as_slice();
+        let sum = |values: &[T]| values.iter().fold(T::zero(), |sum, value| sum + *value);
+        let static_gain = if cancel_zeros { gain } else { sum(b) };
+        if static_gain == T::zero() {
+            return Err(Error::OutOfRange { argument: "b", range: "with a sum that is not 0" });
+        }
+        let coefficient = |place: Option<usize>| match place {
+            Some(0) => T::one(),
+            Some(place) if place <= of_r => at(found, place - 1),
+            _ => T::zero(),
+        };
+        // R' times what of B is cancelled, then times 1 - q⁻¹.
+        let times_zeros = |power: usize| match cancel_zeros {
+            false => coefficient(Some(power)),
+            true => (0..=power).fold(T::zero(), |sum, place| {
+                sum + coefficient(Some(place)) * at(b, delay + power - place) / gain
+            }),
+        };
+        let (mut r, mut s, mut forgets) =
+            (size.vector(T::zero()), size.vector(T::zero()), size.vector(T::zero()));
+        for (place, entry) in r.iter_mut().enumerate() {
+            let before = if integrator { times_zeros(place) } else { T::zero() };
+            *entry = times_zeros(place + 1) - before;
+        }
+        for (place, entry) in s.iter_mut().enumerate().take(of_s) {
+            *entry = at(found, of_r + place);
+        }
+        for (place, entry) in forgets.iter_mut().enumerate() {
+            *entry = at(observer, place + 1);
+        }
+        RstController::new(sum(response) / static_gain, r, s, forgets)
+    }
+
+    /// How far the loop with a model A(q) y = B(q) u is from instability: the largest |1/(1 + L)| and |L/(1 + L)| with
+    /// L = B S/(A R), over this many frequencies from 0 to that of half the sampling. 2 is a usual limit of both; a loop whose
+    /// poles were placed inside the unit circle is stable, but near to instability where they are above 3 or so.
+    ///
+    /// About 10 N multiply-adds for each frequency.
+    pub fn peaks(&self, a: &[T], b: &[T], frequencies: usize) -> (T, T) {
+        let half = T::from_count(frequencies.max(1)) * (T::one() + T::one());
+        (0..frequencies).fold((T::zero(), T::zero()), |(sensitivity, complementary), place| {
+            let angle = T::pi() * T::from_count(2 * place + 1) / half;
+            let (sine, cosine) = angle.sine_and_cosine();
+            let turn = (cosine, -sine);
+            // R = 1 + q⁻¹ (r_1 + …).
+            let later = times(value(self.r().iter(), turn), turn);
+            let open = times(value(a.iter(), turn), (T::one() + later.0, later.1));
+            let back = times(value(b.iter(), turn), value(self.s().iter(), turn));
+            let closed = length((open.0 + back.0, open.1 + back.1));
+            (sensitivity.max(length(open) / closed), complementary.max(length(back) / closed))
+        })
+    }
+}
+
+/// A coefficient, 0 beyond the last.
+fn at<T: Real>(values: &[T], power: usize) -> T {
+    values.get(power).copied().unwrap_or(T::zero())
+}
+
+/// A coefficient of the product of two polynomials.
+fn product<T: Real>(first: &[T], second: &[T], power: usize) -> T {
+    let each = first.iter().enumerate().take(power + 1);
+    each.fold(T::zero(), |sum, (place, value)| sum + *value * at(second, power - place))
+}
+
+/// Whether the zeros of b from `delay` on lie inside the unit circle: all reflection coefficients of the step-down recursion below 1
+/// (Jury 1964).
+fn is_stable<T: Real, N: Dimension>(b: &[T], delay: usize, mut monic: OVector<T, N>) -> bool {
+    let order = b.len() - 1 - delay;
+    let lead = at(b, delay);
+    let monic = monic.as_mut_slice();
+    for (place, value) in monic.iter_mut().enumerate() {
+        *value = at(b, delay + 1 + place) / lead;
+    }
+    for last in (0..order).rev() {
+        let reflection = at(monic, last);
+        if !(reflection.abs() < T::one()) {
+            return false;
+        }
+        let scale = T::one() - reflection * reflection;
+        for place in 0..last.div_ceil(2) {
+            let mirror = last - 1 - place;
+            let (one, other) = (at(monic, place), at(monic, mirror));
+            for (place, value) in [(place, one - reflection * other), (mirror, other - reflection * one)] {
+                if let Some(entry) = monic.get_mut(place) {
+                    *entry = value / scale;
+                }
+            }
+        }
+    }
+    true
+}
+
+/// A polynomial at a number of length 1, by Horner.
+fn value<'a, T: Real>(coefficients: impl DoubleEndedIterator<Item = &'a T>, turn: (T, T)) -> (T, T) {
+    coefficients.rev().fold((T::zero(), T::zero()), |sum, coefficient| {
+        let turned = times(sum, turn);
+        (turned.0 + *coefficient, turned.1)
+    })
+}
+
+fn times<T: Real>(first: (T, T), second: (T, T)) -> (T, T) {
+    (first.0 * second.0 - first.1 * second.1, first.0 * second.1 + first.1 * second.0)
+}
+
+fn length<T: Real>(number: (T, T)) -> T {
+    (number.0 * number.0 + number.1 * number.1).sqrt()
+}

@@ -56,10 +56,10 @@ impl<T: Real, N: Dimension> RstController<T, N> {
     /// [`b`](crate::RecursiveArx::b) give them: from the power 0 on, b with its leading zeros.
     ///
     /// Errors: [`Error::NotFinite`]; [`Error::OutOfRange`] if a, the response or the observer does not begin with 1, b not with 0 (an
-    /// input that acts at once makes a loop without time), b is all zeros or B(1) is 0, or a zero that shall be cancelled is not
-    /// inside the unit circle; [`Error::Orders`] if `N` is not [`PlacementOrders::size`]; [`Error::Length`] if A_m A_o has more than
-    /// `N` coefficients after its 1; [`Error::RankDeficient`] if A and B have a common factor, nearly, so that poles
-    /// cannot be placed.
+    /// input that acts at once makes a loop without time), b is all zeros or B(1) is 0, a zero that shall be cancelled is not
+    /// inside the unit circle, or A and B have a common factor, nearly, so that poles cannot be placed; [`Error::Orders`] if `N` is
+    /// not [`PlacementOrders::size`]; [`Error::Length`] if A_m A_o has more than `N` coefficients after its 1;
+    /// [`Error::TooLarge`] and [`Error::Overflow`] for numbers at the ends of `T`.
     ///
     /// About 10 N³ flops.
     ///
@@ -92,7 +92,10 @@ impl<T: Real, N: Dimension> RstController<T, N> {
         }
         let delay = b.iter().take_while(|value| **value == T::zero()).count();
         if delay == 0 || delay == b.len() {
-            return Err(Error::OutOfRange { argument: "b", range: "0 first, then a number that is not 0" });
+            return Err(Error::OutOfRange {
+                argument: "b",
+                range: "a polynomial that begins with 0 and is not all 0",
+            });
         }
         let (na, nb) = (a.len() - 1, b.len() - 1);
         let needed = PlacementOrders { na, nb, integrator }.size();
@@ -122,7 +125,7 @@ impl<T: Real, N: Dimension> RstController<T, N> {
         if cancel_zeros && !is_stable(b, delay, size.vector(T::zero())) {
             return Err(Error::OutOfRange {
                 argument: "b",
-                range: "zeros inside the unit circle, to be cancelled",
+                range: "a polynomial with its zeros inside the unit circle, as they are cancelled",
             });
         }
         let mut equations = LeastSquares::with_size(size);
@@ -144,12 +147,20 @@ impl<T: Real, N: Dimension> RstController<T, N> {
             }
             equations.add(&row, right)?;
         }
-        let solution = equations.solve()?;
+        let solution = equations.solve().map_err(|error| match error {
+            Error::RankDeficient { .. } => {
+                Error::OutOfRange { argument: "b", range: "a polynomial without a factor in common with a" }
+            }
+            other => other,
+        })?;
         let found = solution.parameters().as_slice();
         let sum = |values: &[T]| values.iter().fold(T::zero(), |sum, value| sum + *value);
         let static_gain = if cancel_zeros { gain } else { sum(b) };
         if static_gain == T::zero() {
-            return Err(Error::OutOfRange { argument: "b", range: "with a sum that is not 0" });
+            return Err(Error::OutOfRange {
+                argument: "b",
+                range: "a polynomial whose coefficients do not add up to 0",
+            });
         }
         let coefficient = |place: Option<usize>| match place {
             Some(0) => T::one(),
@@ -221,7 +232,8 @@ fn is_stable<T: Real, N: Dimension>(b: &[T], delay: usize, mut monic: OVector<T,
     }
     for last in (0..order).rev() {
         let reflection = at(monic, last);
-        if !(reflection.abs() < T::one()) {
+        let is_inside = reflection.abs() < T::one();
+        if !is_inside {
             return false;
         }
         let scale = T::one() - reflection * reflection;

@@ -95,11 +95,9 @@ impl<T: Real, N: Dimension> RstController<T, N> {
     ///
     /// Errors: [`Error::OutOfRange`] if they are NaN, or the lower one is above the upper one.
     pub fn with_limits(mut self, limits: RangeInclusive<T>) -> Result<Self, Error> {
-        if !(*limits.start() <= *limits.end()) {
-            return Err(Error::OutOfRange {
-                argument: "limits",
-                range: "the lower one not above the upper one",
-            });
+        // Not so with a NaN either.
+        if limits.is_empty() {
+            return Err(Error::OutOfRange { argument: "limits", range: "in order, the lower one first" });
         }
         (self.lowest, self.highest) = (*limits.start(), *limits.end());
         Ok(self)

@@ -20,7 +20,7 @@ const CORE: House = House {
     source: "crates/thetahat-core/src",
     floors: &[
         &["scalar", "textbook"],
-        &["dual", "error", "triangle"],
+        &["dual", "error", "stability", "triangle"],
         &["forgetting", "ud"],
         &["dim"],
         &["basis", "innovation", "snapshot", "solution"],

@@ -219,16 +219,13 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
     /// One sample, checked.
     fn step(&mut self, inputs: &[T], output: T, inputs_follow: bool) -> Innovation<T> {
         let RecursiveArx { lags, estimator } = self;
-        lags.push(inputs, T::NAN);
         // What is too large here is so by what came before: time must go on, or it would stay.
-        let taken = lags.regressor().and_then(|regressor| estimator.take(regressor.as_slice(), output).ok());
-        let innovation = taken.unwrap_or_else(|| {
+        let taken =
+            lags.sample(inputs, &[output], inputs_follow, |regressor| estimator.take(regressor, output).ok());
+        taken.unwrap_or_else(|| {
             estimator.advance();
             Innovation { error: T::NAN, variance: T::NAN, nis: T::zero(), action: Action::NotReady }
-        });
-        lags.push_checked(&[output]);
-        lags.await_inputs(inputs_follow);
-        innovation
+        })
     }
 
     fn size(&self) -> usize {

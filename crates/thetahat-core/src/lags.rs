@@ -363,6 +363,21 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
         }
     }
 
+    /// All steps of a sample, unchecked: what is made of φ(k), if nothing in it is missing. The inputs may follow.
+    pub(crate) fn sample<R>(
+        &mut self,
+        inputs: &[T],
+        outputs: &[T],
+        inputs_follow: bool,
+        make: impl FnOnce(&[T]) -> Option<R>,
+    ) -> Option<R> {
+        self.push(inputs, T::NAN);
+        let made = self.regressor().and_then(|regressor| make(regressor.as_slice()));
+        self.push_checked(outputs);
+        self.awaiting_inputs = inputs_follow;
+        made
+    }
+
     /// Takes over the samples of other lines of the same orders.
     ///
     /// Errors, after which nothing has changed: [`Error::Length`] (only with `Dyn`).

@@ -137,6 +137,7 @@ mod smoother;
 #[cfg(feature = "serde")]
 mod snapshot;
 mod solution;
+mod stability;
 mod state_space;
 #[cfg(test)]
 mod textbook;

@@ -452,14 +452,20 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
         regressor: &OVector<T, N>,
         outputs: &OVector<T, M>,
     ) -> Result<Innovation<T, OVector<T, M>>, Error> {
+        self.take_all(regressor.as_slice(), outputs)
+    }
+
+    /// The same with a regressor that is no vector of the caller.
+    #[inline]
+    pub(crate) fn take_all(
+        &mut self,
+        regressor: &[T],
+        outputs: &OVector<T, M>,
+    ) -> Result<Innovation<T, OVector<T, M>>, Error> {
         let size = self.parameters.shape_generic().1;
         let (mut error, mut variance) = (size.vector(T::NAN), size.vector(T::NAN));
-        let (nis, action) = self.step(
-            regressor.as_slice(),
-            outputs.as_slice(),
-            error.as_mut_slice(),
-            variance.as_mut_slice(),
-        )?;
+        let (nis, action) =
+            self.step(regressor, outputs.as_slice(), error.as_mut_slice(), variance.as_mut_slice())?;
         Ok(Innovation { error, variance, nis, action })
     }
 

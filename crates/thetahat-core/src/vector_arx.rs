@@ -171,17 +171,15 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension, D: Dimension> Recursive
         inputs_follow: bool,
     ) -> Innovation<T, OVector<T, M>> {
         let RecursiveVectorArx { lags, estimator } = self;
-        lags.push(inputs, T::NAN);
         // What is too large here is so by what came before: time must go on, or it would stay.
-        let taken = lags.regressor().and_then(|regressor| estimator.update_all(regressor, outputs).ok());
-        let innovation = taken.unwrap_or_else(|| {
+        let taken = lags.sample(inputs, outputs.as_slice(), inputs_follow, |regressor| {
+            estimator.take_all(regressor, outputs).ok()
+        });
+        taken.unwrap_or_else(|| {
             estimator.advance();
             let unknown = outputs.shape_generic().0.vector(T::NAN);
             Innovation { error: unknown.clone(), variance: unknown, nis: T::zero(), action: Action::NotReady }
-        });
-        lags.push_checked(outputs.as_slice());
-        lags.await_inputs(inputs_follow);
-        innovation
+        })
     }
 
     /// The outputs to come, ŷ(k+1), then ŷ(k+2), …, each with a number for every output, as many as `outputs` holds.

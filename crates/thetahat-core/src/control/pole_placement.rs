@@ -1,8 +1,7 @@
 //! Controllers by pole placement.
 
-use nalgebra::OVector;
-
 use super::RstController;
+use crate::stability::is_stable;
 use crate::{Dimension, Error, LeastSquares, Real};
 
 /// How large a controller of a model is: `N` of [`RstController`].
@@ -57,7 +56,7 @@ impl<T: Real, N: Dimension> RstController<T, N> {
     ///
     /// Errors: [`Error::NotFinite`]; [`Error::OutOfRange`] if a, the response or the observer does not begin with 1, b not with 0 (an
     /// input that acts at once makes a loop without time), b is all zeros or B(1) is 0, a zero that shall be cancelled is not
-    /// inside the unit circle, or A and B have a common factor, nearly, so that poles cannot be placed; [`Error::Orders`] if `N` is
+    /// inside the radius 1 - 1/1024, or A and B have a common factor, nearly, so that poles cannot be placed; [`Error::Orders`] if `N` is
     /// not [`PlacementOrders::size`]; [`Error::Length`] if A_m A_o has more than `N` coefficients after its 1;
     /// [`Error::TooLarge`] and [`Error::Overflow`] for numbers at the ends of `T`.
     ///
@@ -122,7 +121,11 @@ impl<T: Real, N: Dimension> RstController<T, N> {
                 found: observer.len(),
             });
         }
-        if cancel_zeros && !is_stable(b, delay, size.vector(T::zero())) {
+        let mut zeros = size.vector(T::zero());
+        for (place, zero) in zeros.iter_mut().enumerate() {
+            *zero = at(b, delay + 1 + place) / gain;
+        }
+        if cancel_zeros && !is_stable(zeros.as_mut_slice()) {
             return Err(Error::OutOfRange {
                 argument: "b",
                 range: "a polynomial with its zeros inside the unit circle, as they are cancelled",
@@ -219,35 +222,6 @@ fn at<T: Real>(values: &[T], power: usize) -> T {
 fn product<T: Real>(first: &[T], second: &[T], power: usize) -> T {
     let each = first.iter().enumerate().take(power + 1);
     each.fold(T::zero(), |sum, (place, value)| sum + *value * at(second, power - place))
-}
-
-/// Whether the zeros of b from `delay` on lie inside the unit circle: all reflection coefficients of the step-down recursion below 1
-/// (Jury 1964).
-fn is_stable<T: Real, N: Dimension>(b: &[T], delay: usize, mut monic: OVector<T, N>) -> bool {
-    let order = b.len() - 1 - delay;
-    let lead = at(b, delay);
-    let monic = monic.as_mut_slice();
-    for (place, value) in monic.iter_mut().enumerate() {
-        *value = at(b, delay + 1 + place) / lead;
-    }
-    for last in (0..order).rev() {
-        let reflection = at(monic, last);
-        let is_inside = reflection.abs() < T::one();
-        if !is_inside {
-            return false;
-        }
-        let scale = T::one() - reflection * reflection;
-        for place in 0..last.div_ceil(2) {
-            let mirror = last - 1 - place;
-            let (one, other) = (at(monic, place), at(monic, mirror));
-            for (place, value) in [(place, one - reflection * other), (mirror, other - reflection * one)] {
-                if let Some(entry) = monic.get_mut(place) {
-                    *entry = value / scale;
-                }
-            }
-        }
-    }
-    true
 }
 
 /// A polynomial at a number of length 1, by Horner.

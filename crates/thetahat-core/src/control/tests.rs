@@ -20,6 +20,14 @@ fn response() -> [f64; 3] {
     [1.0, -2.0 * (-decay).exp() * turn.cos(), (-2.0 * decay).exp()]
 }
 
+/// The motor's controller with an integrator.
+fn integrating() -> Result<RstController<f64, Const<4>>, Error> {
+    let ((a, b), response) = (motor(), response());
+    let observer = &[1.0, -0.5];
+    let wanted = WantedPoles { response: &response, observer, integrator: true, cancel_zeros: false };
+    RstController::pole_placement(&a, &b, &wanted)
+}
+
 fn times(first: &[f64], second: &[f64]) -> Vec<f64> {
     let mut product = vec![0.0; first.len() + second.len() - 1];
     for (i, a) in first.iter().enumerate() {
@@ -143,9 +151,7 @@ impl Plant<'_> {
 #[test]
 fn the_loop_answers_as_was_wanted_and_a_load_is_forgotten() -> Result<(), Error> {
     let ((a, b), response) = (motor(), response());
-    let wanted =
-        WantedPoles { response: &response, observer: &[1.0, -0.5], integrator: true, cancel_zeros: false };
-    let mut controller: RstController<f64, Const<4>> = RstController::pole_placement(&a, &b, &wanted)?;
+    let mut controller = integrating()?;
     let mut plant = Plant { a: &a, b: &b, outputs: vec![], inputs: vec![] };
     // B A_m(1)/(B(1) A_m), driven by the set point.
     let scale = response.iter().sum::<f64>() / b.iter().sum::<f64>();
@@ -169,10 +175,8 @@ fn the_loop_answers_as_was_wanted_and_a_load_is_forgotten() -> Result<(), Error>
 /// An actuator at its limit does not wind the integrator up, whether the controller knows the limit or is told what acted.
 #[test]
 fn limits_do_not_wind_it_up() -> Result<(), Error> {
-    let ((a, b), response) = (motor(), response());
-    let wanted =
-        WantedPoles { response: &response, observer: &[1.0, -0.5], integrator: true, cancel_zeros: false };
-    let free: RstController<f64, Const<4>> = RstController::pole_placement(&a, &b, &wanted)?;
+    let (a, b) = motor();
+    let free = integrating()?;
     let mut limited = free.clone().with_limits(-0.2..=0.2)?;
     let mut told = free.clone();
     let mut wound = free.clone();
@@ -199,10 +203,7 @@ fn limits_do_not_wind_it_up() -> Result<(), Error> {
 
 #[test]
 fn it_takes_over_without_a_bump_and_holds_while_nothing_is_measured() -> Result<(), Error> {
-    let ((a, b), response) = (motor(), response());
-    let wanted =
-        WantedPoles { response: &response, observer: &[1.0, -0.5], integrator: true, cancel_zeros: false };
-    let mut controller: RstController<f64, Const<4>> = RstController::pole_placement(&a, &b, &wanted)?;
+    let mut controller = integrating()?;
     controller.start(0.3, 2.0, 2.0);
     for _ in 0..20 {
         assert!((controller.control(2.0, 2.0) - 0.3).abs() < 1e-12);

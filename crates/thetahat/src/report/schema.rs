@@ -128,19 +128,6 @@ impl Data {
     }
 }
 
-#[cfg(test)]
-impl Report {
-    /// The polynomials of a report that has them.
-    pub(crate) fn polynomials(&self) -> &crate::model::PolynomialModel {
-        self.model.polynomials("this test").unwrap()
-    }
-
-    pub(crate) fn polynomials_mut(&mut self) -> &mut crate::model::PolynomialModel {
-        let Model::Polynomial(model) = &mut self.model else { panic!("other kind") };
-        model
-    }
-}
-
 impl Document for Report {
     const NAME: &'static str = "report";
     const SCHEMA: &'static str = "thetahat.report/1";

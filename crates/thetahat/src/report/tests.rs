@@ -3,10 +3,22 @@
 use super::*;
 use crate::data::{Channel, Log, Rows};
 use crate::estimate::{Initial, Procedure};
-use crate::model::Orders;
+use crate::model::{Model, Orders};
 use crate::regression::noise::Noise;
 use crate::respond::{Horizon, InitialCondition};
 use crate::validate::Part;
+
+impl Report {
+    /// The polynomials of a report that has them.
+    pub(crate) fn polynomials(&self) -> &crate::model::PolynomialModel {
+        self.model.polynomials("this test").unwrap()
+    }
+
+    pub(crate) fn polynomials_mut(&mut self) -> &mut crate::model::PolynomialModel {
+        let Model::Polynomial(model) = &mut self.model else { panic!("other kind") };
+        model
+    }
+}
 
 fn log(u: &[f64], y: &[f64]) -> Log {
     let channel = |name: &str, values: &[f64]| Channel { name: name.into(), values: values.to_vec() };

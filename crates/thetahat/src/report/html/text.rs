@@ -77,30 +77,4 @@ pub(super) fn inside_script(json: &str) -> String {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_are_no_markup_in_charts() {
-        assert_eq!(plain("<b>x</b> & \"'"), "&lt;b&gt;x&lt;/b&gt; &amp; \"'");
-        assert_eq!(plain("🚀"), "🚀");
-        assert_eq!(plain(&"ä".repeat(41)), format!("{}…", "ä".repeat(40)));
-    }
-
-    #[test]
-    fn json_cannot_end_its_script() {
-        let text = "</script><!-- & \u{2028}\u{2029} 🚀";
-        let safe = inside_script(&serde_json::to_string(text).unwrap());
-        assert!(!safe.contains(['<', '>', '&', '\u{2028}', '\u{2029}']));
-        assert_eq!(serde_json::from_str::<String>(&safe).unwrap(), text);
-    }
-
-    #[test]
-    fn numbers_are_short() {
-        assert_eq!([number(0.0), number(0.1), number(-12.0)], ["0", "0.100000", "-12.0000"]);
-        assert_eq!(
-            [percent(0.95), percent(0.518_148), percent(1.0), percent(0.0)],
-            ["95 %", "51.8 %", "100 %", "0 %"]
-        );
-    }
-}
+mod tests;

@@ -1,8 +1,15 @@
 //! Controllers, and their design from a model.
 
+mod linear_quadratic;
+mod minimum_variance;
+mod pid;
 mod pole_placement;
+mod polynomial;
 mod rst;
 
+pub use linear_quadratic::LinearQuadratic;
+pub use minimum_variance::{MinimumVariance, MinimumVarianceOrders};
+pub use pid::PidSettings;
 pub use pole_placement::{PlacementOrders, WantedPoles};
 pub use rst::RstController;
 

@@ -154,7 +154,10 @@ pub use basis::{
     Activation, Basis, Local, MOST_NEIGHBOURS, MOST_SLOPES, Membership, Neighbours, Network, Polynomial,
     Radial, Spline,
 };
-pub use control::{PlacementOrders, RstController, WantedPoles};
+pub use control::{
+    LinearQuadratic, MinimumVariance, MinimumVarianceOrders, PidSettings, PlacementOrders, RstController,
+    WantedPoles,
+};
 pub use covariance::Covariance;
 pub use detect::{Alarm, ChangeDetector, Chart};
 #[cfg(feature = "autodiff")]

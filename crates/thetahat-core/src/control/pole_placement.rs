@@ -1,6 +1,7 @@
 //! Controllers by pole placement.
 
 use super::RstController;
+use super::polynomial::{at, product};
 use crate::stability::is_stable;
 use crate::{Dimension, Error, LeastSquares, Real};
 
@@ -211,17 +212,6 @@ impl<T: Real, N: Dimension> RstController<T, N> {
             (sensitivity.max(length(open) / closed), complementary.max(length(back) / closed))
         })
     }
-}
-
-/// A coefficient, 0 beyond the last.
-fn at<T: Real>(values: &[T], power: usize) -> T {
-    values.get(power).copied().unwrap_or(T::zero())
-}
-
-/// A coefficient of the product of two polynomials.
-fn product<T: Real>(first: &[T], second: &[T], power: usize) -> T {
-    let each = first.iter().enumerate().take(power + 1);
-    each.fold(T::zero(), |sum, (place, value)| sum + *value * at(second, power - place))
 }
 
 /// A polynomial at a number of length 1, by Horner.

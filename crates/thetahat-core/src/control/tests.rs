@@ -9,7 +9,7 @@ use crate::noise::Noise;
 use crate::{Dimension, Error};
 
 /// 1/(s (s + 1)) sampled every h = 0.5 s with the input held.
-fn motor() -> ([f64; 3], [f64; 3]) {
+pub(super) fn motor() -> ([f64; 3], [f64; 3]) {
     let (h, e) = (0.5_f64, (-0.5_f64).exp());
     ([1.0, -1.0 - e, e], [0.0, h - 1.0 + e, 1.0 - e - h * e])
 }
@@ -28,7 +28,7 @@ fn integrating() -> Result<RstController<f64, Const<4>>, Error> {
     RstController::pole_placement(&a, &b, &wanted)
 }
 
-fn times(first: &[f64], second: &[f64]) -> Vec<f64> {
+pub(super) fn times(first: &[f64], second: &[f64]) -> Vec<f64> {
     let mut product = vec![0.0; first.len() + second.len() - 1];
     for (i, a) in first.iter().enumerate() {
         for (j, b) in second.iter().enumerate() {
@@ -38,16 +38,16 @@ fn times(first: &[f64], second: &[f64]) -> Vec<f64> {
     product
 }
 
-fn plus(first: &[f64], second: &[f64]) -> Vec<f64> {
+pub(super) fn plus(first: &[f64], second: &[f64]) -> Vec<f64> {
     let at = |values: &[f64], place: usize| values.get(place).copied().unwrap_or(0.0);
     (0..first.len().max(second.len())).map(|place| at(first, place) + at(second, place)).collect()
 }
 
-fn monic<N: Dimension>(rest: &OVector<f64, N>) -> Vec<f64> {
+pub(super) fn monic<N: Dimension>(rest: &OVector<f64, N>) -> Vec<f64> {
     std::iter::once(1.0).chain(rest.iter().copied()).collect()
 }
 
-fn near(found: &[f64], wanted: &[f64], tolerance: f64) -> bool {
+pub(super) fn near(found: &[f64], wanted: &[f64], tolerance: f64) -> bool {
     plus(found, &wanted.iter().map(|value| -value).collect::<Vec<_>>())
         .iter()
         .all(|gap| gap.abs() < tolerance)
@@ -127,15 +127,15 @@ fn parts<N: Dimension>(found: &RstController<f64, N>) -> (Vec<f64>, Vec<f64>, Ve
 }
 
 /// The plant of the loop, in its own words.
-struct Plant<'a> {
-    a: &'a [f64],
-    b: &'a [f64],
-    outputs: Vec<f64>,
-    inputs: Vec<f64>,
+pub(super) struct Plant<'a> {
+    pub(super) a: &'a [f64],
+    pub(super) b: &'a [f64],
+    pub(super) outputs: Vec<f64>,
+    pub(super) inputs: Vec<f64>,
 }
 
 impl Plant<'_> {
-    fn output(&mut self, load: f64) -> f64 {
+    pub(super) fn output(&mut self, load: f64) -> f64 {
         let k = self.outputs.len();
         let at = |values: &[f64], lag: usize| {
             k.checked_sub(lag).and_then(|place| values.get(place)).copied().unwrap_or(0.0)

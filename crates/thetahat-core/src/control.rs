@@ -1,5 +1,6 @@
 //! Controllers, and their design from a model.
 
+mod adaptive;
 mod linear_quadratic;
 mod minimum_variance;
 mod pid;
@@ -7,6 +8,10 @@ mod pole_placement;
 mod polynomial;
 mod rst;
 
+pub use adaptive::{
+    DirectOrders, DirectSelfTuner, IndirectSelfTuner, Probing, ResponseWanted, Sensor, TunerOrders,
+    TunerSettings, TunerState,
+};
 pub use linear_quadratic::LinearQuadratic;
 pub use minimum_variance::{MinimumVariance, MinimumVarianceOrders};
 pub use pid::PidSettings;

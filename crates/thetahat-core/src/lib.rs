@@ -155,8 +155,9 @@ pub use basis::{
     Radial, Spline,
 };
 pub use control::{
-    LinearQuadratic, MinimumVariance, MinimumVarianceOrders, PidSettings, PlacementOrders, RstController,
-    WantedPoles,
+    DirectOrders, DirectSelfTuner, IndirectSelfTuner, LinearQuadratic, MinimumVariance,
+    MinimumVarianceOrders, PidSettings, PlacementOrders, Probing, ResponseWanted, RstController, Sensor,
+    TunerOrders, TunerSettings, TunerState, WantedPoles,
 };
 pub use covariance::Covariance;
 pub use detect::{Alarm, ChangeDetector, Chart};

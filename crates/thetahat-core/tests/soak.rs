@@ -6,6 +6,9 @@
 //! The log holds what wears estimators out: long silences, held inputs, regressors of scales from 10^-3 to 10^3, and
 //! parameters that switch.
 
+#[path = "soak/control.rs"]
+mod control;
+
 use thetahat_core::nalgebra::{self, Const, Matrix3, RowVector3, SVector, Vector1, Vector3, Vector4};
 use thetahat_core::{
     ArxOrders, Basis, Covariance, Forgetting, InputOrders, KalmanFilter, LinearObservation, LinearTransition,

@@ -194,14 +194,16 @@ impl<T: Real, N: Dimension> RstController<T, N> {
     }
 
     /// How far the loop with a model A(q) y = B(q) u is from instability: the largest |1/(1 + L)| and |L/(1 + L)| with
-    /// L = B S/(A R), over this many frequencies from 0 to that of half the sampling. 2 is a usual limit of both; a loop whose
+    /// L = B S/(A R), over this many frequencies from 0 to that of half the sampling, closer to one another towards 0. 2 is a usual
+    /// limit of both; a loop whose
     /// poles were placed inside the unit circle is stable, but near to instability where they are above 3 or so.
     ///
     /// About 10 N multiply-adds for each frequency.
     pub fn peaks(&self, a: &[T], b: &[T], frequencies: usize) -> (T, T) {
         let half = T::from_count(frequencies.max(1)) * (T::one() + T::one());
         (0..frequencies).fold((T::zero(), T::zero()), |(sensitivity, complementary), place| {
-            let angle = T::pi() * T::from_count(2 * place + 1) / half;
+            let part = T::from_count(2 * place + 1) / half;
+            let angle = T::pi() * part * part;
             let (sine, cosine) = angle.sine_and_cosine();
             let turn = (cosine, -sine);
             // R = 1 + q⁻¹ (r_1 + …).

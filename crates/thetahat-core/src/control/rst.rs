@@ -120,6 +120,10 @@ impl<T: Real, N: Dimension> RstController<T, N> {
     pub fn control(&mut self, set_point: T, measurement: T) -> T {
         let wanted = self.gain * set_point - at_first(&self.s) * measurement + at_first(&self.state);
         if !wanted.is_finite() {
+            // Numbers too large for `T` have come into it: it would never get rid of them.
+            if !at_first(&self.state).is_finite() {
+                self.state.as_mut_slice().fill(T::zero());
+            }
             return self.input;
         }
         let input = wanted.max(self.lowest).min(self.highest);
@@ -153,6 +157,18 @@ impl<T: Real, N: Dimension> RstController<T, N> {
             next = if settles { *state } else { before };
             next_s = *s;
         }
+    }
+
+    /// As if nothing had been before.
+    pub(super) fn forget(&mut self) {
+        self.state.as_mut_slice().fill(T::zero());
+        self.input = T::zero();
+    }
+
+    /// Goes on by a sample in which something else controlled: it wanted one input, and this one acted.
+    pub(super) fn follow(&mut self, set_point: T, measurement: T, input: T, wanted: T) {
+        self.advance(set_point, measurement, input, wanted, false);
+        self.input = input;
     }
 
     /// R without its leading 1.

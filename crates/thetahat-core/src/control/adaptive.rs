@@ -1,0 +1,20 @@
+//! Controllers that learn their plant while they control it.
+
+mod closed_loop;
+mod direct;
+mod indirect;
+mod past;
+mod probe;
+mod response;
+mod sensor;
+mod settings;
+
+pub use direct::{DirectOrders, DirectSelfTuner};
+pub use indirect::{IndirectSelfTuner, TunerOrders};
+pub use probe::Probing;
+pub use response::ResponseWanted;
+pub use sensor::Sensor;
+pub use settings::{TunerSettings, TunerState};
+
+#[cfg(test)]
+mod tests;

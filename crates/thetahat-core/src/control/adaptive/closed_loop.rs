@@ -1,0 +1,137 @@
+//! What all self-tuners have around their estimators.
+
+use super::past::Past;
+use super::probe::Signs;
+use super::sensor::{Reading, Watch};
+use super::{TunerSettings, TunerState};
+use crate::{Dimension, Error, Real, RstController};
+
+/// The sensor, the actuator, the controller with its past, and the probing input.
+#[derive(Clone, Debug)]
+pub(super) struct ClosedLoop<T: Real, N: Dimension> {
+    pub(super) settings: TunerSettings<T>,
+    watch: Watch<T>,
+    past: Past<T, N>,
+    /// `None` until the first design.
+    pub(super) controller: Option<RstController<T, N>>,
+    /// What acts now.
+    pub(super) input: T,
+    /// How many there were, in which something was measured.
+    samples: u16,
+    signs: Signs,
+    /// α, and for how many samples more.
+    share: T,
+    share_left: u32,
+    pub(super) adapting: bool,
+    pub(super) state: TunerState,
+}
+
+impl<T: Real, N: Dimension> ClosedLoop<T, N> {
+    pub(super) fn new(size: N, settings: &TunerSettings<T>) -> Result<Self, Error> {
+        settings.check()?;
+        Ok(ClosedLoop {
+            watch: Watch::new(&settings.sensor),
+            past: Past::resting(size, settings.input),
+            controller: None,
+            input: settings.input,
+            samples: 0,
+            signs: Signs::new(),
+            share: T::zero(),
+            share_left: 0,
+            adapting: true,
+            state: TunerState::Probing,
+            settings: settings.clone(),
+        })
+    }
+
+    /// How many coefficients a controller has.
+    pub(super) fn size(&self) -> N {
+        self.past.size()
+    }
+
+    /// What the sensor says.
+    pub(super) fn read(&mut self, measurement: T, predicted: T) -> Reading<T> {
+        let reading = self.watch.take(measurement, predicted);
+        self.samples = self.samples.saturating_add(u16::from(reading.output.is_some()));
+        reading
+    }
+
+    /// Nothing to act on: the input stays.
+    pub(super) fn hold(&mut self) -> T {
+        self.state = TunerState::Holding;
+        // The actuator may have told of one beyond them.
+        self.input = self.limited(self.input);
+        self.input
+    }
+
+    fn limited(&self, input: T) -> T {
+        input.max(*self.settings.limits.start()).min(*self.settings.limits.end())
+    }
+
+    /// Whether there is no controller yet, and it is too early for one.
+    pub(super) fn waits(&self, knows_gain: impl FnOnce() -> bool) -> bool {
+        let probing = &self.settings.probing;
+        self.controller.is_none()
+            && (self.samples < probing.at_least || (self.samples < probing.at_most && !knows_gain()))
+    }
+
+    /// There is no need to probe.
+    pub(super) fn skip_probing(&mut self) {
+        self.samples = self.settings.probing.at_most;
+    }
+
+    /// Another controller, as if it had been there.
+    pub(super) fn install(&mut self, controller: RstController<T, N>) -> Result<(), Error> {
+        let mut controller = controller.with_limits(self.settings.limits.clone())?;
+        self.past.resume(&mut controller);
+        self.controller = Some(controller);
+        Ok(())
+    }
+
+    /// The input from now on.
+    pub(super) fn act(&mut self, set_point: T, reading: &Reading<T>, output: T) -> T {
+        let probing = self.settings.probing;
+        let (wanted, amplitude) = match &mut self.controller {
+            Some(controller) => {
+                self.state = if reading.predicted { TunerState::Bridging } else { TunerState::Controlling };
+                let amplitude = if self.share_left > 0 { self.share * probing.largest } else { T::zero() };
+                self.share_left = self.share_left.saturating_sub(1);
+                (controller.control(set_point, output), amplitude)
+            }
+            None => {
+                self.state = TunerState::Probing;
+                (self.settings.input, probing.amplitude_at(self.samples))
+            }
+        };
+        let excited =
+            if amplitude > T::zero() { wanted + amplitude * self.signs.next::<T>() } else { wanted };
+        let input = self.limited(excited);
+        self.past.push(set_point, output, input, wanted);
+        self.tell(input);
+        input
+    }
+
+    /// The actuator did something else.
+    pub(super) fn applied(&mut self, input: T) {
+        if input.is_finite() {
+            self.past.correct(input);
+            self.tell(input);
+        }
+    }
+
+    fn tell(&mut self, input: T) {
+        if let Some(controller) = &mut self.controller {
+            controller.applied(input);
+        }
+        self.input = input;
+    }
+
+    /// u = α u_c + (1 - α) u_f for so many samples.
+    pub(super) fn probe(&mut self, share: T, samples: u32) -> Result<(), Error> {
+        if !(share >= T::zero() && share <= T::one()) {
+            return Err(Error::OutOfRange { argument: "share", range: "from 0 to 1" });
+        }
+        (self.share, self.share_left) = (share, samples);
+        Ok(())
+    }
+}

@@ -1,0 +1,404 @@
+//! The indirect self-tuner: a model is estimated, and a controller designed for it.
+
+use nalgebra::{Const, OVector};
+
+use super::closed_loop::ClosedLoop;
+#[cfg(doc)]
+use super::{Probing, Sensor};
+use super::{TunerSettings, TunerState};
+use crate::stability::is_stable;
+use crate::{
+    ArxOrders, Dimension, Error, Forgetting, InputOrders, PlacementOrders, Real, RecursiveArx, RlsStart,
+    RstController, WantedPoles,
+};
+
+/// How large the model and the controller of an [`IndirectSelfTuner`] are.
+///
+/// ```
+/// use thetahat_core::TunerOrders;
+///
+/// // A plant of second order with up to two samples of dead time, loads, and a controller that integrates.
+/// const ORDERS: TunerOrders = TunerOrders { na: 2, nb: 4, constant: true, integrator: true };
+/// assert_eq!((ORDERS.parameters(), ORDERS.size()), (7, 6));
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TunerOrders {
+    /// The order of A(q).
+    pub na: usize,
+    /// The coefficients of B(q) = b_1 q⁻¹ + …: 2 for a plant of second order, and one more for each sample of dead time that there may
+    /// be.
+    pub nb: usize,
+    /// Whether the model has a constant: where the signals are not deviations from a working point, and where loads come.
+    pub constant: bool,
+    /// Whether the controller integrates.
+    pub integrator: bool,
+}
+
+impl TunerOrders {
+    /// `P` of [`IndirectSelfTuner`].
+    pub const fn parameters(&self) -> usize {
+        self.na + self.nb + self.constant as usize
+    }
+
+    /// `N` of [`IndirectSelfTuner`].
+    pub const fn size(&self) -> usize {
+        PlacementOrders { na: self.na, nb: self.nb, integrator: self.integrator }.size()
+    }
+}
+
+/// A controller that estimates a model of its plant, and is designed anew for it while it runs.
+///
+/// ```text
+/// A(q) y(k) = B(q) u(k) [+ constant] + e(k)         estimated in each sample: RecursiveArx
+/// A R + B S = A_m A_o,   R u = T u_c - S y          placed for the estimate: RstController
+/// ```
+///
+/// # What keeps it safe
+///
+/// - A new design is taken only where the largest sensitivities of its loop with the estimate are small, |1/(1 + L)| and |L/(1 + L)|
+///   below 2; slower responses are tried in turn; else the last good controller goes on.
+/// - A model whose gain has another sign than was given gets no controller. Where none is given, the first controller waits until the
+///   static gain is known to five standard errors (or for [`Probing::at_most`] samples), and the sign is not changed by less either.
+/// - [`Forgetting`] keeps P bounded, in silence too. Exponential forgetting with a factor of 0.98, or 0.99 for slow changes, tracks well.
+/// - The input stays within its limits, and no controller winds up there.
+/// - What a failed sensor does is [`Sensor`]'s subject.
+///
+/// # What it does not do
+///
+/// The margins are those with the model. Where the plant is of a higher order than the model, and a disturbance or the set point
+/// excites what the model leaves out, the estimate can be far off, and the loop bursts until the model is right again. The plant of
+/// Rohrs, Valavani, Athans and Stein (1985), 2/(s + 1) 229/(s² + 30 s + 229) sampled every 0.04 s, with a sine of 16.1 rad/s and
+/// amplitude 0.5 on its output and a set point of 2: with a model of first order the output goes up to 4.2, with one of
+/// third order to 2.2 (measured). More coefficients, slower sampling, a filter before the sampler and a slower wish help; the
+/// limits are what holds it in the end.
+///
+/// # Time
+///
+/// [`control`](IndirectSelfTuner::control) is called once a sample. Where the actuator did something else than it was asked for,
+/// [`applied`](IndirectSelfTuner::applied) says so before the next sample.
+///
+/// # Size and cost
+///
+/// `P` is [`TunerOrders::parameters`], `N` [`TunerOrders::size`]. Memory: that of [`RecursiveArx`] and [`RstController`], 4 N + P + 40
+/// numbers. A step costs what [`RecursiveArx`] does, and a design about 10 N³ + 560 N flops.
+///
+/// Source: Åström and Wittenmark, Adaptive Control, 2nd ed. 1995, section 3.4 and chapter 11 (the practice).
+///
+/// ```
+/// use thetahat_core::nalgebra::Const;
+/// use thetahat_core::{
+///     Error, Forgetting, IndirectSelfTuner, ResponseWanted, TunerOrders, TunerSettings, TunerState,
+/// };
+///
+/// const ORDERS: TunerOrders = TunerOrders { na: 1, nb: 2, constant: true, integrator: true };
+/// type Tuner = IndirectSelfTuner<f32, Const<{ ORDERS.parameters() }>, Const<{ ORDERS.size() }>>;
+///
+/// // Nothing is known of the oven, but that more power makes it warmer. Temperatures are about 50, power 0 to 100.
+/// let response = ResponseWanted { frequency: 0.3, damping: 0.9, observer: 0.5 };
+/// let settings = TunerSettings { gain_sign: 1.0, input: 20.0, ..TunerSettings::new(response, 0.0..=100.0, 10.0) };
+/// let mut tuner = Tuner::new(&ORDERS, &settings, 50.0, 10.0, Forgetting::Exponential { factor: 0.99 })?;
+/// let (mut temperature, mut power) = (20.0, 20.0);
+/// for _ in 0..300 {
+///     temperature = 0.95 * temperature + 0.08 * power + 0.5;
+///     power = tuner.control(60.0, temperature);
+/// }
+/// assert_eq!(tuner.state(), TunerState::Controlling);
+/// assert!((temperature - 60.0).abs() < 0.1);
+/// # Ok::<(), Error>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct IndirectSelfTuner<T: Real, P: Dimension + Dimension<Const<1>>, N: Dimension> {
+    plant: RecursiveArx<T, P>,
+    closed: ClosedLoop<T, N>,
+    integrator: bool,
+    cancel_zeros: bool,
+    design_every: u16,
+    peaks: (T, T),
+    /// Which of the candidates the controller is.
+    candidate: usize,
+    since_design: u16,
+    since_all: u16,
+    /// The sign of the latest static gain that was known to five standard errors; 0 if none was.
+    known_sign: T,
+}
+
+/// The frequencies that margins are looked at.
+const FREQUENCIES: usize = 28;
+/// All candidates are tried after so many designs of the same one.
+const TRY_ALL_AFTER: u16 = 25;
+
+impl<T: Real, P: Dimension + Dimension<Const<1>>, N: Dimension> IndirectSelfTuner<T, P, N> {
+    /// A tuner that knows nothing yet. The scales are the usual sizes of the output and the input, as of [`RecursiveArx::new`].
+    ///
+    /// Errors: those of [`RecursiveArx::new`]; [`Error::Orders`] if `N` is not [`TunerOrders::size`];
+    /// [`Error::OutOfRange`] for a setting that is.
+    pub fn new(
+        orders: &TunerOrders,
+        settings: &TunerSettings<T>,
+        output_scale: T,
+        input_scale: T,
+        forgetting: Forgetting<T>,
+    ) -> Result<Self, Error> {
+        let TunerOrders { na, nb, constant, integrator } = *orders;
+        if nb == 0 {
+            return Err(Error::OutOfRange { argument: "nb", range: "1 or more" });
+        }
+        let needed = orders.size();
+        let size = N::exactly(needed).map_err(|available| Error::Orders { needed, available })?;
+        let arx = ArxOrders { na, inputs: &[InputOrders { nb, nk: 1 }], constant };
+        let two = T::one() + T::one();
+        Ok(IndirectSelfTuner {
+            plant: RecursiveArx::new(&arx, output_scale, &[input_scale], forgetting)?,
+            closed: ClosedLoop::new(size, settings)?,
+            integrator,
+            cancel_zeros: false,
+            design_every: 1,
+            peaks: (two, two + T::one()),
+            candidate: 0,
+            since_design: 0,
+            since_all: 0,
+            known_sign: T::zero(),
+        })
+    }
+
+    /// The same with the zeros of the plant cancelled: only where they are known to be well inside the unit circle.
+    pub fn with_cancelled_zeros(self) -> Self {
+        IndirectSelfTuner { cancel_zeros: true, ..self }
+    }
+
+    /// The same with a design every so many samples, in place of each.
+    ///
+    /// Errors: [`Error::OutOfRange`] for 0.
+    pub fn with_design_every(self, samples: u16) -> Result<Self, Error> {
+        if samples == 0 {
+            return Err(Error::OutOfRange { argument: "samples", range: "1 or more" });
+        }
+        Ok(IndirectSelfTuner { design_every: samples, ..self })
+    }
+
+    /// The same with other limits of the larger one of the [`peaks`](RstController::peaks) of a design, 2 and 3 at first: below the first it is taken at
+    /// once, and if there is none the one with the least peaks is, below the second.
+    ///
+    /// Errors: [`Error::OutOfRange`] if they are not 1 or more and in order.
+    pub fn with_peaks(self, good: T, bearable: T) -> Result<Self, Error> {
+        if !(good >= T::one() && bearable >= good) {
+            return Err(Error::OutOfRange { argument: "peaks", range: "1 or more, and in order" });
+        }
+        Ok(IndirectSelfTuner { peaks: (good, bearable), ..self })
+    }
+
+    /// The same with another start of the estimator. See [`RlsStart`].
+    ///
+    /// Errors: none that can occur.
+    pub fn with_start(self, start: RlsStart) -> Result<Self, Error> {
+        Ok(IndirectSelfTuner { plant: self.plant.with_start(start)?, ..self })
+    }
+
+    /// The same with a model to start from, such as one that was fitted to a log: `plant` with the orders of this tuner. The
+    /// first controller is designed for it.
+    ///
+    /// Errors: [`Error::Length`] if it has other orders.
+    pub fn with_plant(self, plant: RecursiveArx<T, P>) -> Result<Self, Error> {
+        let lines = |arx: &RecursiveArx<T, P>| (arx.a().count(), arx.b(0).map_or(0, Iterator::count));
+        let (expected, found) = (lines(&self.plant), lines(&plant));
+        let constants = (self.plant.constant().is_some(), plant.constant().is_some());
+        if expected != found || constants.0 != constants.1 {
+            let (expected, found) = (expected.0 + expected.1, found.0 + found.1);
+            return Err(Error::Length { argument: "plant", expected, found });
+        }
+        let mut tuner = IndirectSelfTuner { plant, ..self };
+        tuner.closed.skip_probing();
+        Ok(tuner)
+    }
+
+    /// The input from now on: time goes on by a sample, the model learns from the measurement, the controller is designed anew, and acts.
+    ///
+    /// A measurement that is NaN is missing; see [`Sensor`]. With a set point that is not finite the input stays as it was.
+    pub fn control(&mut self, set_point: T, measurement: T) -> T {
+        let predicted = self.advance();
+        let reading = self.closed.read(measurement, predicted);
+        self.plant.set_adaptation(reading.learns && self.closed.adapting);
+        // What a regressor cannot hold is missing in it.
+        let taken = reading.output.filter(|output| self.plant.measured(*output).is_ok());
+        if taken.is_none() {
+            // Cannot fail.
+            let _ = self.plant.measured(T::NAN);
+        }
+        let Some(output) = taken.filter(|_| set_point.is_finite()) else { return self.closed.hold() };
+        if self.closed.controller.is_none() || (reading.learns && self.closed.adapting) {
+            self.redesign();
+        }
+        self.closed.act(set_point, &reading, output)
+    }
+
+    /// Tells that the actuator did something else than the latest [`control`](IndirectSelfTuner::control) asked for. A number that
+    /// is not finite is not taken.
+    pub fn applied(&mut self, input: T) {
+        self.closed.applied(input);
+    }
+
+    /// Excites the plant for so many samples: u = α u_c + (1 - α) u_f, where u_f is the controller's and u_c the same plus or minus
+    /// the largest amplitude of [`Probing`].
+    ///
+    /// Errors: [`Error::OutOfRange`] if α is not from 0 to 1.
+    pub fn probe(&mut self, share: T, samples: u32) -> Result<(), Error> {
+        self.closed.probe(share, samples)
+    }
+
+    /// Turns adaptation off, or on again: the model and the controller stay as they are.
+    pub fn set_adaptation(&mut self, on: bool) {
+        self.closed.adapting = on;
+    }
+
+    /// What it did in the latest sample.
+    pub fn state(&self) -> TunerState {
+        self.closed.state
+    }
+
+    /// The model.
+    pub fn plant(&self) -> &RecursiveArx<T, P> {
+        &self.plant
+    }
+
+    /// The controller; `None` until there is one.
+    pub fn controller(&self) -> Option<&RstController<T, N>> {
+        self.closed.controller.as_ref()
+    }
+
+    /// The input that was asked for, or told by [`applied`](IndirectSelfTuner::applied).
+    pub fn input(&self) -> T {
+        self.closed.input
+    }
+
+    /// The input that acted goes into the model; what the next measurement should be.
+    fn advance(&mut self) -> T {
+        let mut predicted = [T::NAN];
+        // Not before the first sample; and where the model overflows nothing is predicted.
+        if self.plant.lags().awaits_inputs() {
+            let told = self.plant.applied(&[self.closed.input]);
+            if told.and_then(|()| self.plant.predict(&[T::zero()], &mut predicted)).is_err() {
+                return T::NAN;
+            }
+        }
+        let [predicted] = predicted;
+        predicted
+    }
+
+    /// Designs a controller for the model as it is, if it is time and the model is worth one.
+    fn redesign(&mut self) {
+        self.since_design = self.since_design.saturating_add(1);
+        if self.closed.controller.is_some() && self.since_design < self.design_every {
+            return;
+        }
+        self.since_design = 0;
+        if self.closed.waits(|| self.knows_gain()) {
+            return;
+        }
+        let Some((a, na, b, nb)) = self.polynomials() else { return };
+        let (a, b) = (a.as_slice().get(..na).unwrap_or_default(), b.as_slice().get(..nb).unwrap_or_default());
+        let gain = b.iter().fold(T::zero(), |sum, value| sum + *value);
+        let given = self.closed.settings.gain_sign;
+        if gain * given < T::zero() {
+            return;
+        }
+        // Where no sign is given, that of a gain that was known is.
+        if given.is_zero() && !(gain * self.known_sign > T::zero()) {
+            if self.knows_gain() {
+                self.known_sign = if gain > T::zero() { T::one() } else { -T::one() };
+            } else if !self.known_sign.is_zero() {
+                return;
+            }
+        }
+        self.since_all = self.since_all.saturating_add(1);
+        let again = self.closed.controller.is_some() && self.since_all < TRY_ALL_AFTER;
+        if let Some(found) =
+            self.design(a, b, self.candidate).filter(|(_, peaks)| again && *peaks <= self.peaks.0)
+        {
+            self.take(found.0, self.candidate);
+            return;
+        }
+        self.since_all = 0;
+        let mut best: Option<(RstController<T, N>, T, usize)> = None;
+        for index in 0.. {
+            if self.closed.settings.response.candidate(index, a).is_none() {
+                break;
+            }
+            let Some((controller, peaks)) = self.design(a, b, index) else { continue };
+            if best.as_ref().is_none_or(|(_, least, _)| peaks < *least) {
+                best = Some((controller, peaks, index));
+            }
+            if peaks <= self.peaks.0 {
+                break;
+            }
+        }
+        if let Some((controller, peaks, index)) = best
+            && peaks <= self.peaks.1
+        {
+            self.take(controller, index);
+        }
+    }
+
+    fn take(&mut self, controller: RstController<T, N>, candidate: usize) {
+        // Cannot fail: the limits were checked.
+        if self.closed.install(controller).is_ok() {
+            self.candidate = candidate;
+        }
+    }
+
+    /// The controller of a candidate for a model, and the larger one of its peaks.
+    fn design(&self, a: &[T], b: &[T], candidate: usize) -> Option<(RstController<T, N>, T)> {
+        let candidate = self.closed.settings.response.candidate(candidate, a)?;
+        if candidate.own.is_some() {
+            let mut rest = self.plant.estimator().covariance().size().vector(T::zero());
+            rest.iter_mut().zip(a.iter().skip(1)).for_each(|(entry, value)| *entry = *value);
+            if !is_stable(rest.as_mut_slice()) {
+                return None;
+            }
+        }
+        let poles = WantedPoles {
+            response: candidate.response(),
+            observer: candidate.observer(),
+            integrator: self.integrator,
+            cancel_zeros: self.cancel_zeros,
+        };
+        let controller = RstController::pole_placement(a, b, &poles).ok()?;
+        let (sensitivity, complementary) = controller.peaks(a, b, FREQUENCIES);
+        let largest = sensitivity.max(complementary);
+        largest.is_finite().then_some((controller, largest))
+    }
+
+    /// A and B of the model with how many coefficients they have, where they are finite.
+    fn polynomials(&self) -> Option<(OVector<T, P>, usize, OVector<T, P>, usize)> {
+        let size = self.plant.estimator().covariance().size();
+        let (mut a, mut b) = (size.vector(T::zero()), size.vector(T::zero()));
+        let mut counts = (0, 0);
+        for (entry, value) in a.iter_mut().zip(self.plant.a()) {
+            *entry = value;
+            counts.0 += 1;
+        }
+        for (entry, value) in b.iter_mut().zip(self.plant.b(0)?) {
+            *entry = value;
+            counts.1 += 1;
+        }
+        let finite = a.iter().chain(b.iter()).all(T::is_finite);
+        finite.then_some((a, counts.0, b, counts.1))
+    }
+
+    /// Whether |B(1)| exceeds five of its standard errors.
+    fn knows_gain(&self) -> bool {
+        let estimator = self.plant.estimator();
+        let Some(covariance) = estimator.parameter_covariance() else { return false };
+        let Some(coefficients) = self.plant.b(0) else { return false };
+        let first = self.plant.a().count().saturating_sub(1);
+        let count = coefficients.clone().count().saturating_sub(1);
+        let gain = coefficients.fold(T::zero(), |sum, value| sum + value);
+        let size = covariance.size().value();
+        let matrix = covariance.matrix();
+        let mut variance = T::zero();
+        for column in first..first + count {
+            let column = matrix.as_slice().iter().skip(column * size + first).take(count);
+            variance = column.fold(variance, |sum, value| sum + *value);
+        }
+        gain * gain > T::from_count(25) * variance
+    }
+}

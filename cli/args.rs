@@ -1,5 +1,6 @@
 //! The syntax of the command line, a file a verb, and nothing else. `job` says what it means.
 
+mod control;
 mod convert;
 mod design;
 mod files;
@@ -20,6 +21,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+pub(crate) use control::{ControlArguments, IntegratorArgument};
 pub(crate) use convert::ConvertArguments;
 pub(crate) use design::DesignArguments;
 pub(crate) use filter::{EstimatorArgument, FilterArguments, FilterStartArgument};
@@ -257,6 +259,17 @@ Examples:
   thetahat tune heater.json
   thetahat tune heater.json --lambda 30 --controller pi --html loop.html --responses loop.csv")]
     Tune(TuneArguments),
+    /// A controller for a fitted model, and the closed loop that it gives
+    ///
+    /// R u = T u_c - S y with placed poles (--poles), by a linear-quadratic measure (--lqr) or of minimum variance, for one input and one output of
+    /// any linear model. Beside the coefficients stands what the loop with the model does: its poles, a step of the set point, Ms, margins, what
+    /// the noise of the model makes of output and input, and how many models within the covariance of the parameters make a stable loop.
+    #[command(after_help = "\
+Examples:
+  thetahat control model.json --poles 0.8,0.7
+  thetahat control model.json --lqr 0.1 --limits 0..100 --document controller.json
+  thetahat control model.json --minimum-variance --integrator no")]
+    Control(Box<ControlArguments>),
     /// Make a test signal for an experiment, or say which one a model needs, and for how long
     ///
     /// Writes CSV: time and the input, or the inputs u1, u2, …. What the signal is goes to standard error: its period, mean, crest factor,
@@ -282,7 +295,7 @@ Example:
 Example:
   thetahat schema > thetahat.report.schema.json")]
     Schema {
-        /// The document: what fit, validate, compare, inspect, spectrum, step, tune, track, filter or design writes
+        /// The document: what fit, validate, compare, inspect, spectrum, step, tune, control, track, filter or design writes
         #[arg(value_enum, default_value = "report")]
         document: DocumentArgument,
     },
@@ -327,6 +340,8 @@ pub(crate) enum DocumentArgument {
     Step,
     /// What tune writes
     Tuning,
+    /// What control writes
+    Control,
     /// What track writes at its end
     Track,
     /// What filter writes at its end

@@ -5,6 +5,7 @@ use std::ffi::OsString;
 use std::path::Path;
 
 use clap::Args;
+use thetahat::control::Control;
 use thetahat::data::{Log, Source};
 use thetahat::design::{ExperimentDesign, SignalPlan};
 use thetahat::inspect::Inspection;
@@ -17,13 +18,14 @@ use thetahat::step_test::StepTestPlan;
 use thetahat::tune::Tuning;
 
 use crate::args::{
-    DesignArguments, FitArguments, InspectArguments, MapArgument, TuneArguments, ValidateArguments,
+    ControlArguments, DesignArguments, FitArguments, InspectArguments, MapArgument, TuneArguments,
+    ValidateArguments,
 };
-use crate::commands::{Experiments, Tracking, compared_signals, experiments, inspected, settings};
+use crate::commands::{Experiments, Tracking, compared_signals, designed, experiments, inspected, settings};
 use crate::failure::Failure;
 use crate::job::{
     DesignJob, EvaluationJob, FitJob, GreyBoxJob, InspectJob, NarxJob, ProcessJob, SpectrumJob,
-    StateSpaceJob, StepTestJob,
+    StateSpaceJob, StepTestJob, control_plan,
 };
 use crate::replace::replace;
 
@@ -198,6 +200,17 @@ pub fn tuning_of(options: &[OsString], model: &Model) -> Result<Tuning, Failure>
     let words: Vec<OsString> = options.iter().cloned().chain([report]).collect();
     let arguments: TuneArguments = arguments("tune", &words)?;
     settings(&arguments, model, Path::new("model"))
+}
+
+/// What `thetahat control` says of a model with these options.
+///
+/// # Errors
+/// A [`Failure`] as the program would report it.
+pub fn controller_of(options: &[OsString], model: &Model) -> Result<Control, Failure> {
+    let report = OsString::from("model");
+    let words: Vec<OsString> = options.iter().cloned().chain([report]).collect();
+    let arguments: ControlArguments = arguments("control", &words)?;
+    designed(&control_plan(&arguments)?, model, Path::new("model"))
 }
 
 /// The signal that `thetahat design` makes with these options.

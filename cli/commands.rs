@@ -2,6 +2,7 @@
 
 mod bode;
 mod compare;
+mod control;
 mod convert;
 pub(crate) mod demo;
 mod design;
@@ -26,6 +27,7 @@ mod transient;
 mod tune;
 mod validate;
 
+pub(crate) use control::designed;
 pub(crate) use design::compared_signals;
 pub(crate) use experiments::{Experiments, experiments};
 pub use filter::consistency;
@@ -55,6 +57,7 @@ pub(crate) fn dispatch(arguments: Arguments, line: &str) -> Result<(), Failure> 
         Command::Reduce(arguments) => reduce::reduce(&arguments),
         Command::Convert(arguments) => convert::convert(&arguments),
         Command::Tune(arguments) => tune::tune(&arguments, line),
+        Command::Control(arguments) => control::control(&arguments),
         Command::Design(arguments) => design::design(&arguments),
         Command::Demo(arguments) => demo::demo(&arguments),
         Command::Schema { document } => help::schema(document),

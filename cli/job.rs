@@ -1,5 +1,6 @@
 //! What a command line means: everything resolved and checked that needs no data.
 
+mod control;
 mod design;
 mod filter;
 mod fit;
@@ -21,6 +22,7 @@ use std::str::FromStr;
 
 use thetahat::data::{Interpolation, Resample, Rows};
 use thetahat::respond::InitialCondition;
+use thetahat::thetahat_core::nalgebra::Complex;
 
 use crate::args::{
     ClockArguments, LineArguments, LineFormatArgument, LiveClockArguments, LogArguments, StartArgument,
@@ -30,6 +32,7 @@ use crate::line_writer::Format;
 use crate::memory::PerValue;
 use crate::table;
 
+pub(crate) use control::control_plan;
 pub(crate) use design::DesignJob;
 pub(crate) use filter::FilterJob;
 pub(crate) use fit::FitJob;
@@ -222,4 +225,19 @@ fn byte(argument: &str, text: &str) -> Result<u8, Failure> {
         (_, [byte]) if byte.is_ascii() => Ok(*byte),
         _ => Err(Failure::usage(format!("{argument} {text}: give one ASCII character, or tab"))),
     }
+}
+
+/// LOW..HIGH; the library says which numbers make sense.
+fn range(option: &str, text: &str) -> Result<[f64; 2], Failure> {
+    let ends = text
+        .split_once("..")
+        .and_then(|(low, high)| Some([low.trim().parse::<f64>().ok()?, high.trim().parse::<f64>().ok()?]));
+    ends.ok_or_else(|| Failure::usage(format!("{option} {text}: write it as LOW..HIGH, such as 0.1..3")))
+}
+
+/// A real or complex number.
+fn pole(option: &str, text: &str) -> Result<Complex<f64>, Failure> {
+    let wrong = || Failure::usage(format!("{option} {text}: write a pole as 0.5 or as 0.4+0.3i"));
+    let number: Complex<f64> = text.trim().parse().map_err(|_| wrong())?;
+    if number.re.is_finite() && number.im.is_finite() { Ok(number) } else { Err(wrong()) }
 }

@@ -3,11 +3,12 @@
 //! The library names them between backticks, as `detrend`, wherever one is advised; here they are options.
 
 /// The arguments of the library that are options, by the name that both have.
-pub(crate) const OPTIONS: [&str; 73] = [
+pub(crate) const OPTIONS: [&str; 78] = [
     "alarm",
     "alpha",
     "alphas",
     "band",
+    "cancel-zeros",
     "centres",
     "channels",
     "constant",
@@ -21,7 +22,6 @@ pub(crate) const OPTIONS: [&str; 73] = [
     "estimate",
     "estimator",
     "feedthrough",
-    "refine",
     "focus",
     "forgetting",
     "frequencies",
@@ -33,9 +33,12 @@ pub(crate) const OPTIONS: [&str; 73] = [
     "initial",
     "lags",
     "length",
+    "limits",
+    "lqr",
     "max-iterations",
     "measurement-noise",
     "method",
+    "minimum-variance",
     "most-terms",
     "nf",
     "nk",
@@ -43,6 +46,7 @@ pub(crate) const OPTIONS: [&str; 73] = [
     "norm",
     "nu",
     "ny",
+    "observer",
     "offset",
     "order",
     "past",
@@ -52,6 +56,7 @@ pub(crate) const OPTIONS: [&str; 73] = [
     "prefilter",
     "range",
     "raw-terms",
+    "refine",
     "require",
     "resample",
     "ridge",

@@ -18,6 +18,7 @@ const VERBS: [&str; 20] = [
     "reduce",
     "convert",
     "tune",
+    "control",
     "impulse",
     "design",
     "demo",

@@ -45,7 +45,7 @@ const LIBRARY: House = House {
         &["validate"],
         &["select"],
         &["inspect", "spectrum"],
-        &["design", "step_test", "tune"],
+        &["control", "design", "step_test", "tune"],
         &["report"],
         &["filter", "track"],
     ],

@@ -9,6 +9,7 @@ mod choice;
 mod clock;
 mod compare;
 mod constant;
+mod control;
 mod convert;
 mod criterion;
 mod csv_dialects;

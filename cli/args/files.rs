@@ -75,6 +75,11 @@ impl Command {
                 let more = tune.document.iter().chain(&tune.responses).chain(&tune.html);
                 written.extend([&tune.out].into_iter().chain(more).cloned());
             }
+            Self::Control(control) => {
+                read.push(control.report.clone());
+                let more = control.document.iter().chain(&control.responses);
+                written.extend([&control.out].into_iter().chain(more).cloned());
+            }
             Self::Design(design) => {
                 read.extend(design.model.clone());
                 written.extend([&design.out].into_iter().chain(&design.spectrum).cloned());

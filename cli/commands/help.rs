@@ -2,6 +2,7 @@
 
 use clap::CommandFactory;
 use thetahat::Document;
+use thetahat::control::Control;
 use thetahat::design::ExperimentDesign;
 use thetahat::filter::FilterSummary;
 use thetahat::inspect::Inspection;
@@ -25,6 +26,7 @@ pub(crate) fn schema(document: DocumentArgument) -> Result<(), Failure> {
         DocumentArgument::Response => MeasuredResponse::json_schema(),
         DocumentArgument::Step => StepTest::json_schema(),
         DocumentArgument::Tuning => Tuning::json_schema(),
+        DocumentArgument::Control => Control::json_schema(),
         DocumentArgument::Track => TrackSummary::json_schema(),
         DocumentArgument::Filter => FilterSummary::json_schema(),
         DocumentArgument::Design => ExperimentDesign::json_schema(),

@@ -1,6 +1,7 @@
 //! A report as a table for people.
 
 mod continuous;
+mod control;
 mod design;
 mod equations;
 mod filtered;
@@ -30,6 +31,7 @@ use thetahat::respond::InitialCondition;
 use thetahat::text::harmless;
 use thetahat::validate::{Fit, Part};
 
+pub use control::control;
 pub use design::experiment_design;
 pub(crate) use design::test_signal;
 pub use filtered::filtered;

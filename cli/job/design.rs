@@ -2,6 +2,7 @@ use thetahat::design::{SignalKind, SignalPlan, Want, Waveform};
 use thetahat::model::Model;
 
 use super::parsed;
+use super::range;
 use crate::args::DesignArguments;
 use crate::failure::Failure;
 
@@ -81,12 +82,4 @@ impl DesignJob {
         };
         Ok(waveforms.iter().map(plan).collect())
     }
-}
-
-/// LOW..HIGH; the library says which numbers make sense.
-fn range(option: &str, text: &str) -> Result<[f64; 2], Failure> {
-    let ends = text
-        .split_once("..")
-        .and_then(|(low, high)| Some([low.trim().parse::<f64>().ok()?, high.trim().parse::<f64>().ok()?]));
-    ends.ok_or_else(|| Failure::usage(format!("{option} {text}: write it as LOW..HIGH, such as 0.1..3")))
 }

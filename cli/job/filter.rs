@@ -2,9 +2,8 @@ use std::path::{Path, PathBuf};
 
 use thetahat::data::Rows;
 use thetahat::filter::{Estimator, InitialState, ObserverGain, StateModel};
-use thetahat::thetahat_core::nalgebra::Complex;
 
-use super::{LineJob, LogJob, parsed};
+use super::{LineJob, LogJob, parsed, pole};
 use crate::args::{EstimatorArgument, FilterArguments, FilterStartArgument};
 use crate::failure::Failure;
 
@@ -33,9 +32,9 @@ impl FilterJob {
         let gain = match (&arguments.gain, arguments.poles.as_slice()) {
             (Some(text), _) => Some(ObserverGain::Matrix(matrix(text)?)),
             (None, []) => None,
-            (None, poles) => {
-                Some(ObserverGain::Poles(poles.iter().map(|text| pole(text)).collect::<Result<_, _>>()?))
-            }
+            (None, poles) => Some(ObserverGain::Poles(
+                poles.iter().map(|text| pole("--poles", text)).collect::<Result<_, _>>()?,
+            )),
         };
         let estimator = match (arguments.estimator, gain) {
             (Some(EstimatorArgument::Luenberger), Some(gain)) => Some(Estimator::Luenberger(gain)),
@@ -92,11 +91,4 @@ fn matrix(text: &str) -> Result<Vec<Vec<f64>>, Failure> {
             "--gain {text}: write numbers, rows apart by ; and columns by , as in 0.5,0;0.1,0.2"
         ))
     })
-}
-
-/// A real or complex number.
-fn pole(text: &str) -> Result<Complex<f64>, Failure> {
-    let wrong = || Failure::usage(format!("--poles {text}: write a pole as 0.5 or as 0.4+0.3i"));
-    let number: Complex<f64> = text.trim().parse().map_err(|_| wrong())?;
-    if number.re.is_finite() && number.im.is_finite() { Ok(number) } else { Err(wrong()) }
 }

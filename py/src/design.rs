@@ -75,3 +75,17 @@ pub(crate) fn tune(
     let json = found.to_json().map_err(|error| error::batch(py, error))?;
     Ok((json, thetahat_cli::tuning(&found, thetahat_cli::WIDTH)))
 }
+
+/// A controller for a model: the document that `thetahat control` writes, and its table.
+#[pyfunction]
+pub(crate) fn control(
+    py: Python<'_>,
+    model: &Bound<'_, Model>,
+    options: Vec<OsString>,
+) -> PyResult<(String, String)> {
+    let model = Arc::clone(model.get().model());
+    let found = awaited(py, move |_| thetahat_cli::controller_of(&options, &model))?
+        .map_err(|failure| error::program(py, &failure))?;
+    let json = found.to_json().map_err(|error| error::batch(py, error))?;
+    Ok((json, thetahat_cli::control(&found, thetahat_cli::WIDTH)))
+}

@@ -51,6 +51,7 @@ fn _thetahat(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(evaluation::spectrum, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::step_test, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::sine_test, module)?)?;
+    module.add_function(wrap_pyfunction!(design::control, module)?)?;
     module.add_function(wrap_pyfunction!(design::tune, module)?)?;
     module.add_function(wrap_pyfunction!(design::design_signal, module)?)?;
     module.add_function(wrap_pyfunction!(design::compare_signals, module)?)?;

@@ -21,6 +21,7 @@ mod narx;
 mod recursive;
 mod recursive_model;
 pub(crate) mod results;
+mod self_tuner;
 mod trajectory;
 mod used;
 mod vector_arx;
@@ -44,6 +45,7 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<armax::RecursiveArmax>()?;
     module.add_class::<narx::RecursiveNarx>()?;
     module.add_class::<controller::RstController>()?;
+    module.add_class::<self_tuner::SelfTuner>()?;
     module.add_class::<recursive::RecursiveTrajectory>()?;
     module.add_class::<model::LinearTransition>()?;
     module.add_class::<model::LinearObservation>()?;

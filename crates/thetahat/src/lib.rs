@@ -70,6 +70,7 @@
 //! | [`spectrum`] | frequency responses from data, without a model |
 //! | [`step_test`] | what a course reads off the response to a step |
 //! | [`tune`](mod@tune) | PI and PID settings for a process, and the loop that they give |
+//! | [`control`](mod@control) | controllers for a model, and the loops that they give |
 //! | [`report`] | the whole way from a log to a document and its page |
 //! | [`track`] | models that are estimated while the plant runs |
 //! | [`filter`] | states that are estimated while the plant runs |
@@ -84,6 +85,7 @@
 //! The crate does not open files, print, or run without a heap. For the last see [`thetahat_core`], whose estimators a
 //! [`track::Tracker`] and a [`filter::StateFilter`] are made of.
 
+pub mod control;
 pub mod data;
 pub mod design;
 mod distribution;

@@ -54,6 +54,7 @@ pub(crate) mod state_space;
 mod tests;
 mod transient;
 
+pub(crate) use draws::Spread;
 pub use draws::{Drawn, Draws, draw};
 pub use forecast::{Forecast, forecast};
 pub use frequency::{FrequencyPoint, FrequencyResponse, frequency_response, logarithmic_frequencies};

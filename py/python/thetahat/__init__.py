@@ -1,7 +1,7 @@
 """System identification: models of dynamic systems from logged data.
 
 A log holds measured signals (`Log`, `read_csv`). A fit makes a model of it (`arx`, `armax`, `oe`, `bj`, `ar`, `arma`, `general`,
-`fir`, `iv`, `sriv`), `search` chooses one, `grey` finds the parameters of a model in equations (`GreyBox`), `narx` fits nonlinear ARX models, `process` processes in continuous time, `tf` transfer functions there, `ss` models in state space with any number of outputs, `inspect` inspects a log before a fit, `spectrum` finds its frequency response and `step_test` what its steps show without a model, `design` makes test signals for experiments, `tune` controllers for a process. A `Model` predicts, simulates, forecasts and is validated.
+`fir`, `iv`, `sriv`), `search` chooses one, `grey` finds the parameters of a model in equations (`GreyBox`), `narx` fits nonlinear ARX models, `process` processes in continuous time, `tf` transfer functions there, `ss` models in state space with any number of outputs, `inspect` inspects a log before a fit, `spectrum` finds its frequency response and `step_test` what its steps show without a model, `design` makes test signals for experiments, `tune` controllers for a process, `pole_placement`, `lqr` and `minimum_variance` controllers for any linear model, which `closed_loop` runs. A `Model` predicts, simulates, forecasts and is validated.
 `thetahat.plot` draws, and `thetahat.sklearn` fits into scikit-learn.
 
 Whatever takes numbers takes arrays of NumPy, lists and tuples, and the series and frames of pandas, Polars and PyArrow; of one
@@ -18,6 +18,7 @@ fitted or written model and a `Tracker` a recursive model with the channels and 
 Model(ARMAX(2, 2, 1, 1), 1-step fit 98.37 % on rows 1..700)
 """
 
+from thetahat._control import Control, LoopRun, closed_loop, lqr, minimum_variance, pole_placement
 from thetahat._design import ExperimentDesign, TestSignal, design
 from thetahat._filter import StateEstimate, StateFilter, StateTrajectory
 from thetahat._fit import EstimationWarning, ar, arma, armax, arx, bj, fir, general, oe, search
@@ -57,6 +58,7 @@ from thetahat._thetahat import (
     RecursiveTrajectory,
     RecursiveVectorArx,
     RstController,
+    SelfTuner,
     SmoothedTrajectory,
     SteadyState,
     __version__,
@@ -70,6 +72,7 @@ __all__ = [
     "ChangeDetector",
     "ChangeTrajectory",
     "Comparison",
+    "Control",
     "DesignOptions",
     "EquationsOptions",
     "EstimationError",
@@ -88,6 +91,7 @@ __all__ = [
     "LinearObservation",
     "LinearTransition",
     "Log",
+    "LoopRun",
     "LuenbergerObserver",
     "MeasuredResponse",
     "Model",
@@ -103,6 +107,7 @@ __all__ = [
     "RecursiveTrajectory",
     "RecursiveVectorArx",
     "RstController",
+    "SelfTuner",
     "SmoothedTrajectory",
     "SpectrumOptions",
     "StateEstimate",
@@ -127,6 +132,7 @@ __all__ = [
     "armax",
     "arx",
     "bj",
+    "closed_loop",
     "compare",
     "dc_motor",
     "design",
@@ -135,8 +141,11 @@ __all__ = [
     "grey",
     "inspect",
     "iv",
+    "lqr",
+    "minimum_variance",
     "narx",
     "oe",
+    "pole_placement",
     "process",
     "read_csv",
     "search",

@@ -69,8 +69,7 @@ impl<T: Real, N: Dimension> RstController<T, N> {
     /// A set point has the gain B'(1)/(B'(1) + ρ/b_0 A(1)), which is 1 with an integrator.
     ///
     /// Errors: [`Error::NotFinite`]; [`Error::OutOfRange`] if a or c does not begin with 1, b not with 0 or is all zeros,
-    /// c or the loop has a zero that is not inside the radius 1 - 1/1024 (B' for ρ = 0: try a weight, then a larger one), or ρ is
-    /// negative; [`Error::Orders`] if `N` is less than [`MinimumVarianceOrders::size`]; [`Error::Overflow`] for numbers at the ends
+    /// c or the loop has a zero that is not inside the radius 1 - 1/1024 (B' for ρ = 0: try a weight; A for a large ρ); [`Error::Orders`] if `N` is less than [`MinimumVarianceOrders::size`]; [`Error::Overflow`] for numbers at the ends
     /// of `T`.
     ///
     /// About 3 N² multiply-adds.
@@ -139,8 +138,7 @@ impl<T: Real, N: Dimension> RstController<T, N> {
         if !is_stable(r.as_mut_slice()) {
             return Err(Error::OutOfRange {
                 argument: "input_weight",
-                range: "so large that the loop is stable: the zeros of b are outside of the unit circle, or the weight brings \
-                        the poles of a back",
+                range: "such that the loop is stable: 0 is for a b whose zeros are inside the unit circle, others need a weight",
             });
         }
         // F, without its leading 1, in the place of R for now.

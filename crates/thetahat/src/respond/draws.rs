@@ -158,7 +158,7 @@ impl Drawn {
 }
 
 /// How the parameters of a model vary.
-struct Spread {
+pub(crate) struct Spread {
     /// R with P = R R'.
     root: Option<DMatrix<f64>>,
     /// Whether unstable ones are drawn again.
@@ -166,7 +166,7 @@ struct Spread {
 }
 
 impl Spread {
-    fn of(model: &PolynomialModel) -> Self {
+    pub(crate) fn of(model: &PolynomialModel) -> Self {
         let root = model.covariance.as_ref().map(|rows| {
             let size = rows.len();
             let scales = DVector::from_fn(size, |k, _| rows[k][k].sqrt());
@@ -183,29 +183,29 @@ impl Spread {
         Self { root, stable: is_stable(model) }
     }
 
+    /// A model of drawn parameters, stable or not; none where parameters do not vary.
+    pub(crate) fn any(
+        &self,
+        model: &PolynomialModel,
+        random: &mut Random,
+    ) -> Result<Option<PolynomialModel>, Error> {
+        let Some(root) = &self.root else { return Ok(None) };
+        let normal = DVector::from_fn(root.ncols(), |_, _| random.normal());
+        let moved = root * normal;
+        let each = model.parameters.iter().zip(&moved);
+        let values: Vec<f64> = each.map(|(parameter, moved)| parameter.value + moved).collect();
+        let (orders, variance) = (&model.orders, model.noise_variance);
+        PolynomialModel::from_parameters(orders, &values, None, variance, model.sample_time).map(Some)
+    }
+
     /// A model of drawn parameters, and how many before it were unstable; none where parameters do not vary.
     fn draw(
         &self,
         model: &PolynomialModel,
         random: &mut Random,
     ) -> Result<(Option<PolynomialModel>, usize), Error> {
-        let Some(root) = &self.root else { return Ok((None, 0)) };
         for unstable in 0..PATIENCE {
-            let normal = DVector::from_fn(root.ncols(), |_, _| random.normal());
-            let moved = root * normal;
-            let values: Vec<f64> = model
-                .parameters
-                .iter()
-                .zip(&moved)
-                .map(|(parameter, moved)| parameter.value + moved)
-                .collect();
-            let drawn = PolynomialModel::from_parameters(
-                &model.orders,
-                &values,
-                None,
-                model.noise_variance,
-                model.sample_time,
-            )?;
+            let Some(drawn) = self.any(model, random)? else { return Ok((None, 0)) };
             if !self.stable || is_stable(&drawn) {
                 return Ok((Some(drawn), unstable));
             }

@@ -1,0 +1,83 @@
+//! The arguments of control.
+
+use std::path::PathBuf;
+
+use clap::{ArgGroup, Args, ValueEnum};
+
+use super::FormatArgument;
+
+#[derive(Debug, Args)]
+#[command(group(ArgGroup::new("design").required(true).args(["poles", "lqr", "minimum_variance"])))]
+pub(crate) struct ControlArguments {
+    /// The report that fit wrote (- for standard input)
+    #[arg(value_name = "REPORT")]
+    pub(crate) report: PathBuf,
+    /// The input that the controller moves [default: the only one]
+    #[arg(short = 'u', long, value_name = "NAME")]
+    pub(crate) input: Option<String>,
+    /// The output that it holds [default: the only one]
+    #[arg(short = 'y', long, value_name = "NAME")]
+    pub(crate) output: Option<String>,
+    /// The poles of the response to the set point in the z plane, such as 0.8,0.7 or 0.6+0.2i,0.6-0.2i
+    #[arg(
+        long,
+        value_name = "POLE[,POLE…]",
+        value_delimiter = ',',
+        allow_hyphen_values = true,
+        help_heading = "Design"
+    )]
+    pub(crate) poles: Vec<String>,
+    /// The least sum of y² + WEIGHT u², with an integrator of the changes of u
+    #[arg(long, value_name = "WEIGHT", allow_hyphen_values = true, help_heading = "Design")]
+    pub(crate) lqr: Option<f64>,
+    /// The least variance of y, and of WEIGHT u² beside it (with an integrator of the changes of u)
+    #[arg(
+        long,
+        value_name = "WEIGHT",
+        num_args = 0..=1,
+        default_missing_value = "0",
+        require_equals = true,
+        allow_hyphen_values = true,
+        help_heading = "Design"
+    )]
+    pub(crate) minimum_variance: Option<f64>,
+    /// The poles of the observer, by which noise and errors are forgotten [default: the zeros of the noise model]
+    #[arg(
+        long,
+        value_name = "POLE[,POLE…]",
+        value_delimiter = ',',
+        allow_hyphen_values = true,
+        help_heading = "Design"
+    )]
+    pub(crate) observer: Vec<String>,
+    /// Whether the controller integrates, so that loads leave no error
+    #[arg(long, value_enum, value_name = "yes|no", default_value = "yes", help_heading = "Design")]
+    pub(crate) integrator: IntegratorArgument,
+    /// Cancel the zeros of the model, which must be inside the unit circle
+    #[arg(long, help_heading = "Design")]
+    pub(crate) cancel_zeros: bool,
+    /// The range of the actuator, in the unit of the input
+    #[arg(long, value_name = "LOW..HIGH", allow_hyphen_values = true, help_heading = "Design")]
+    pub(crate) limits: Option<String>,
+    /// How many models are drawn from the covariance of the parameters
+    #[arg(long, value_name = "N", default_value_t = 500, help_heading = "Design")]
+    pub(crate) draws: usize,
+    /// What to print: a table for people, or the JSON document
+    #[arg(long, value_enum, default_value = "table")]
+    pub(crate) format: FormatArgument,
+    /// Write the JSON document to a file
+    #[arg(long, value_name = "FILE")]
+    pub(crate) document: Option<PathBuf>,
+    /// Write the closed-loop responses to a CSV file
+    #[arg(long, value_name = "FILE")]
+    pub(crate) responses: Option<PathBuf>,
+    /// Write the table, or the document, to a file instead of standard output
+    #[arg(short = 'o', long, value_name = "FILE", default_value = "-", hide_default_value = true)]
+    pub(crate) out: PathBuf,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum IntegratorArgument {
+    Yes,
+    No,
+}

@@ -1,0 +1,251 @@
+//! A controller that learns its plant.
+
+use numpy::PyArray1;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use thetahat_core::nalgebra::Dyn;
+use thetahat_core::{
+    IndirectSelfTuner, Probing, ResponseWanted, RlsStart, Sensor, TunerOrders, TunerSettings, TunerState,
+};
+
+use super::argument::{self, Whole, count, failed};
+use super::controller::RstController;
+use super::forgetting::{Memory, STANDARD};
+
+type Stepper = IndirectSelfTuner<f64, Dyn, Dyn>;
+
+/// A controller that estimates a model of its plant, and is designed anew for it while it runs.
+///
+/// Parameters
+/// ----------
+/// na, nb : int
+///     The orders of the model. 2 coefficients of B for a plant of second order, and one more for each sample of dead time that there may be.
+/// frequency : float
+///     The natural frequency of the response that is wanted, in rad a sample: it settles in about 4 / (damping frequency) samples.
+/// damping : float, default 0.8
+///     Its damping, above 0 and at most 1.
+/// observer : float, default 0.3
+///     How fast loads and errors are forgotten: a pole, 0 or more and below 1.
+/// limits : (lower, upper)
+///     The range of the actuator.
+/// input : float, optional
+///     What it starts with: 0, or the nearest limit.
+/// output_scale, input_scale : float, default 1.0
+///     The usual sizes of output and input.
+/// gain_sign : {-1, 0, 1}, default 0
+///     The sign of the plant's static gain, where it is known.
+/// forgetting : float, Forgetting or None, default 0.99
+///     How old samples are forgotten.
+/// constant : bool, default True
+///     Whether the model has a constant, for signals that are no deviations and for loads.
+/// integrator : bool, default True
+///     Whether the controller integrates.
+/// probing : (first, largest), optional
+///     The amplitudes with which the plant is excited until there is a controller: a tenth of the input's scale, doubled up to twice.
+/// sensor_range : (lower, upper), optional
+///     What the sensor can measure. What is beyond is taken as the end of the range.
+/// stuck_after : int, default 0
+///     So many equal measurements in a row are those of a sensor that is stuck; 0 if a working one repeats itself.
+/// start : {"standard", "exact"}, default "standard"
+///     As for `RecursiveLeastSquares`.
+///
+/// Raises
+/// ------
+/// ValueError
+///     For a setting out of its range.
+///
+/// Notes
+/// -----
+/// A measurement that is NaN is missing: the controller goes on with what its model predicts, for 100 samples, and then holds the input. A design is taken
+/// only where the peaks of its sensitivities with the model are below 2; slower responses are tried in turn, and the last good controller
+/// stays otherwise. The margins are those with the model: where the plant is of a higher order, disturbances can make the loop burst up to the limits.
+///
+/// References
+/// ----------
+/// Åström and Wittenmark, Adaptive Control, 2nd ed., 1995, section 3.4 and chapter 11.
+///
+/// Examples
+/// --------
+/// >>> from thetahat import SelfTuner
+/// >>> tuner = SelfTuner(1, 2, frequency=0.3, limits=(0.0, 100.0), input=20.0, output_scale=50.0, input_scale=10.0, gain_sign=1)
+/// >>> temperature, power = 20.0, 20.0
+/// >>> for _ in range(300):
+/// ...     temperature = 0.95 * temperature + 0.08 * power + 0.5
+/// ...     power = tuner.control(60.0, temperature)
+/// >>> tuner.state, round(temperature, 3)
+/// ('controlling', 60.0)
+#[pyclass(module = "thetahat")]
+#[derive(Clone)]
+pub(crate) struct SelfTuner {
+    tuner: Stepper,
+}
+
+#[pymethods]
+impl SelfTuner {
+    #[new]
+    #[pyo3(signature = (na, nb, *, frequency, limits, damping = 0.8, observer = 0.3, input = None, output_scale = 1.0, input_scale = 1.0,
+        gain_sign = Whole(0), forgetting = STANDARD, constant = true, integrator = true, probing = None, sensor_range = None,
+        stuck_after = Whole(0), start = "standard"))]
+    #[pyo3(
+        text_signature = "(na, nb, *, frequency, limits, damping=0.8, observer=0.3, input=None, output_scale=1.0, input_scale=1.0, gain_sign=0, forgetting=0.99, constant=True, integrator=True, probing=None, sensor_range=None, stuck_after=0, start='standard')"
+    )]
+    #[expect(clippy::too_many_arguments, reason = "most are options, given by name")]
+    fn new(
+        py: Python<'_>,
+        na: Whole,
+        nb: Whole,
+        frequency: f64,
+        limits: (f64, f64),
+        damping: f64,
+        observer: f64,
+        input: Option<f64>,
+        output_scale: f64,
+        input_scale: f64,
+        gain_sign: Whole,
+        forgetting: Memory,
+        constant: bool,
+        integrator: bool,
+        probing: Option<(f64, f64)>,
+        sensor_range: Option<(f64, f64)>,
+        stuck_after: Whole,
+        start: &str,
+    ) -> PyResult<Self> {
+        let (na, nb) = (count("na", na, 0, 64)?, count("nb", nb, 1, 64)?);
+        let gain_sign = match gain_sign.0 {
+            -1 => -1.0,
+            0 => 0.0,
+            1 => 1.0,
+            _ => return Err(PyValueError::new_err("gain_sign: expected -1, 0 or 1")),
+        };
+        let start = match start {
+            "standard" => RlsStart::Standard,
+            "exact" => RlsStart::Exact,
+            _ => {
+                return Err(PyValueError::new_err(format!(
+                    "start: expected 'standard' or 'exact', found {start:?}"
+                )));
+            }
+        };
+        let orders = TunerOrders { na, nb, constant, integrator };
+        let response = ResponseWanted { frequency, damping, observer };
+        let usual = TunerSettings::new(response, limits.0..=limits.1, input_scale);
+        let probing = probing.map_or(usual.probing, |(amplitude, largest)| Probing {
+            amplitude,
+            largest,
+            ..usual.probing
+        });
+        let (lowest, highest) = sensor_range.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
+        let stuck_after =
+            u16::try_from(count("stuck_after", stuck_after, 0, u16::MAX.into())?).unwrap_or(u16::MAX);
+        let sensor = Sensor { range: lowest..=highest, stuck_after, ..Sensor::default() };
+        let settings = TunerSettings {
+            input: input.unwrap_or(usual.input),
+            gain_sign,
+            probing,
+            sensor,
+            ..usual.clone()
+        };
+        let tuner = Stepper::new(&orders, &settings, output_scale, input_scale, forgetting.0)
+            .and_then(|tuner| tuner.with_start(start))
+            .map_err(|error| failed(py, error))?;
+        Ok(Self { tuner })
+    }
+
+    /// The input from now on, within the limits: the model learns from the measurement, and the controller acts.
+    ///
+    /// Parameters
+    /// ----------
+    /// set_point, y : float
+    ///     What the output shall be, and what was measured. NaN is a missing measurement.
+    ///
+    /// Returns
+    /// -------
+    /// float
+    fn control(&mut self, set_point: f64, y: f64) -> f64 {
+        self.tuner.control(set_point, y)
+    }
+
+    /// Tell that the actuator did something else than the latest `control` asked for.
+    ///
+    /// Parameters
+    /// ----------
+    /// u : float
+    ///     What it did. A number that is not finite is not taken.
+    fn applied(&mut self, u: f64) {
+        self.tuner.applied(u);
+    }
+
+    /// Excite the plant around what the controller wants: u = share u_c + (1 - share) u_f, u_c being u_f plus or minus the largest amplitude of
+    /// probing.
+    ///
+    /// Parameters
+    /// ----------
+    /// share : float
+    ///     From 0 to 1.
+    /// samples : int
+    ///     For so many samples.
+    fn probe(&mut self, py: Python<'_>, share: f64, samples: Whole) -> PyResult<()> {
+        let samples = count("samples", samples, 0, u32::MAX as usize)?;
+        self.tuner.probe(share, u32::try_from(samples).unwrap_or(u32::MAX)).map_err(|error| failed(py, error))
+    }
+
+    /// Turn adaptation off, or on again: the model and the controller stay as they are.
+    fn set_adaptation(&mut self, on: bool) {
+        self.tuner.set_adaptation(on);
+    }
+
+    /// What it did in the latest sample: "probing", "controlling", "bridging" a silent sensor with the model, or "holding" the input.
+    #[getter]
+    fn state(&self) -> &'static str {
+        match self.tuner.state() {
+            TunerState::Probing => "probing",
+            TunerState::Controlling => "controlling",
+            TunerState::Bridging => "bridging",
+            _ => "holding",
+        }
+    }
+
+    /// A of the model, from its 1 on.
+    #[getter]
+    fn a<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_iter(py, self.tuner.plant().a())
+    }
+
+    /// B of the model, with its leading zero.
+    #[getter]
+    fn b<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_iter(py, self.tuner.plant().b(0).into_iter().flatten())
+    }
+
+    /// The constant of the model; None if it has none.
+    #[getter]
+    fn constant(&self) -> Option<f64> {
+        self.tuner.plant().constant()
+    }
+
+    /// The standard errors of a_1 ... b_1 ... and the constant; None as long as they are not known.
+    #[getter]
+    fn standard_errors<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+        self.tuner.plant().estimator().standard_errors().map(|errors| argument::from_vector(py, &errors))
+    }
+
+    /// The controller as it is, a copy; None until there is one.
+    #[getter]
+    fn controller(&self) -> Option<RstController> {
+        self.tuner.controller().cloned().map(RstController::of)
+    }
+
+    fn __copy__(&self) -> Self {
+        self.clone()
+    }
+
+    fn __deepcopy__(&self, _memo: &Bound<'_, PyAny>) -> Self {
+        self.clone()
+    }
+
+    fn __repr__(&self) -> String {
+        let (a, b) =
+            (self.tuner.plant().a().count() - 1, self.tuner.plant().b(0).map_or(1, Iterator::count) - 1);
+        format!("SelfTuner(na={a}, nb={b}, {})", self.state())
+    }
+}

@@ -30,14 +30,19 @@ fn a_motor_gets_a_controller_by_each_design() {
         let found = document(&folder, "c.json");
         assert!(found["design"].as_str().is_some_and(|text| text.contains(words)), "{found:#}");
         assert_eq!(found["closed_loop"]["stable"], true, "{found:#}");
-        assert_eq!(number(&found, "/robustness/stable_share"), 1.0, "{design}");
+        // Minimum variance without a weight bears little.
+        let least = if design.contains("variance ") { 0.8 } else { 1.0 };
+        assert!(number(&found, "/robustness/stable_share") >= least, "{design}");
         assert!(number(&found, "/closed_loop/peak_sensitivity") > 1.0);
         assert!(number(&found, "/closed_loop/output_deviation") > 0.0);
         assert!(
             folder.read("r.csv").starts_with("time,setpoint_response,controller_output,load_response\n0")
         );
         let table = folder.done(&format!("control motor.json {design}")).stdout;
-        assert!(table.contains("pole of the loop") && table.contains("make a stable loop"), "{table}");
+        assert!(
+            table.contains("pole of the loop") && table.contains("models within the covariance"),
+            "{table}"
+        );
         // The same bytes again.
         folder.done(&format!("control motor.json {design} --document again.json"));
         assert_eq!(folder.read("c.json"), folder.read("again.json"));
@@ -61,7 +66,7 @@ fn states_processes_and_box_jenkins_models_have_controllers_too() {
 #[test]
 fn limits_are_in_the_unit_of_the_input_and_the_document_in_deviations() {
     let folder = Folder::with_log(DEMO);
-    folder.done(&format!("{FIT} --na 2 --nb 2 --offset 1 --report motor.json"));
+    folder.done(&format!("{FIT} --na 2 --nb 2 --offset u=1 --report motor.json"));
     folder.done("control motor.json --poles 0.8 --limits -1..3 --document c.json");
     let found = document(&folder, "c.json");
     let level = found.pointer("/input/offset/value").or(found.pointer("/input/offset/level"));
@@ -74,11 +79,10 @@ fn limits_are_in_the_unit_of_the_input_and_the_document_in_deviations() {
 fn what_cannot_be_designed_is_told_and_nothing_is_written() {
     let folder = Folder::with_log(DEMO);
     folder.done(&format!("{FIT} --na 2 --nb 2 --report motor.json"));
-    folder.done(&format!("{FIT} --model narx --na 1 --nb 1 --report narx.json"));
+    folder.done(&format!("{FIT} --narx poly --ny 1 --nu 1 --report narx.json"));
     folder.done("convert motor.json --to continuous -o continuous.json");
     let before = folder.names();
     for (line, code, words) in [
-        ("control motor.json", 2, "--poles"),
         ("control motor.json --poles 0.5 --lqr 1", 2, "cannot be used with"),
         ("control motor.json --poles x", 2, "write a pole as"),
         ("control motor.json --poles 1.5", 2, "not inside the unit circle"),

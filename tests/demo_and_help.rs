@@ -3,7 +3,7 @@
 use crate::harness::Folder;
 use crate::signals::{Experiment, csv};
 
-const VERBS: [&str; 20] = [
+const VERBS: [&str; 21] = [
     "fit",
     "inspect",
     "spectrum",

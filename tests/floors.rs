@@ -25,10 +25,10 @@ const CORE: House = House {
         &["dim"],
         &["basis", "innovation", "snapshot", "solution"],
         &["covariance", "detect", "lags", "least_squares"],
-        &["control", "rls", "state_space"],
+        &["rls", "state_space"],
         &["arx", "augmented", "differentiated", "kalman"],
         &["armax", "ekf", "luenberger", "nonlinear_arx", "schedule", "vector_arx"],
-        &["recursive_narx", "smoother"],
+        &["control", "recursive_narx", "smoother"],
     ],
 };
 

@@ -17,7 +17,7 @@ pub fn control(found: &Control, width: usize) -> String {
     let longest = [&own.r, &own.s, &own.t].into_iter().map(Vec::len).max().unwrap_or(0);
     let mut coefficients = columns(&["power of q^-1", "R", "S", "T"]);
     for place in 0..longest {
-        let at = |values: &[f64]| or_dash(values.get(place).copied(), number);
+        let at = |values: &[f64]| number(values.get(place).copied().unwrap_or(0.0));
         coefficients.row([place.to_string(), at(&own.r), at(&own.s), at(&own.t)]);
     }
     text.table(coefficients);
@@ -65,14 +65,16 @@ pub fn control(found: &Control, width: usize) -> String {
     );
     text.table(loops);
     match &found.robustness {
-        Some(share) => text.line(&format!(
-            "{} % of {} models within the covariance of the parameters make a stable loop{}",
-            number(100.0 * share.stable_share),
-            share.draws,
-            share
-                .peak_sensitivity_95
-                .map_or(String::new(), |peak| format!(", 95 % with Ms below {}", two(peak)))
-        )),
+        Some(share) => {
+            let part = fixed(100.0 * share.stable_share, 1);
+            text.line(&format!(
+                "stable with {part} % of {} models within the covariance of the parameters",
+                share.draws
+            ));
+            if let Some(peak) = share.peak_sensitivity_95 {
+                text.line(&format!("Ms below {} with 95 % of them", two(peak)));
+            }
+        }
         None => text
             .line("the covariance of the parameters is not known: nothing is said of how sure the loop is"),
     }

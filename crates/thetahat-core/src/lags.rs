@@ -566,7 +566,7 @@ fn take<'a, T>(rest: &mut &'a mut [T], count: usize) -> &'a mut [T] {
 }
 
 /// Moves each sample one place on, the new one to the front; returns the one that falls out.
-fn shift<T: Real>(line: &mut [T], new: T) -> T {
+pub(crate) fn shift<T: Real>(line: &mut [T], new: T) -> T {
     line.iter_mut().fold(new, |moving, place| core::mem::replace(place, moving))
 }
 

@@ -88,6 +88,8 @@ pub fn visit_all(visitor: &mut impl Visitor) {
     visitor.visit::<kalman::Extended>();
     visitor.visit::<kalman::Observer>();
     visitor.visit::<control::Placed>();
+    visitor.visit::<control::Tuned>();
+    visitor.visit::<control::Direct>();
 }
 
 /// Plays both cases of one scenario: `step` gets the case, the number of the step, the scenario and what its

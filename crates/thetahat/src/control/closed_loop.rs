@@ -6,7 +6,7 @@ use thetahat_core::RstController;
 use thetahat_core::nalgebra::{Complex, Dyn};
 
 use super::document::Loop;
-use super::plant::Plant;
+use super::plant::{Plant, trimmed};
 use crate::Error;
 use crate::model::Root;
 use crate::model::polynomial::{is_stable, product, roots};
@@ -14,6 +14,8 @@ use crate::regression::{add_filtered, divide};
 
 /// Frequencies at which L is looked at.
 const FREQUENCIES: usize = 4000;
+/// A coefficient of the loop below this part of the largest is rounding.
+const ROUNDING: f64 = 1e-12;
 /// What is left of the slowest mode where responses end, and the fewest and the most samples of them.
 const LEFT: f64 = 1e-3;
 const SAMPLES: std::ops::RangeInclusive<f64> = 30.0..=2000.0;
@@ -104,7 +106,10 @@ pub(super) fn closed_loop(
             "the poles of the loop cannot be found: its coefficients are too large",
         )
     };
-    let poles = roots(&super::plant::trimmed(closed.poles.clone())).ok_or_else(undetermined)?;
+    // What was placed at 0 is there but for rounding.
+    let largest = closed.poles.iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
+    let placed = closed.poles.iter().map(|value| if value.abs() < ROUNDING * largest { 0.0 } else { *value });
+    let poles = roots(&trimmed(placed.collect())).ok_or_else(undetermined)?;
     let slowest = poles.first().map_or(0.0, |pole| pole.norm());
     let stable = closed.is_stable();
     let lasting = if stable && slowest > 0.0 { LEFT.ln() / slowest.ln() } else { f64::INFINITY };

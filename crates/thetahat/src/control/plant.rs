@@ -32,7 +32,7 @@ impl Plant {
             }
             LinearModel::Continuous(..) => Err(Error::argument(
                 "model",
-                "it is in continuous time: convert it to the sample time of the controller (thetahat convert --to SECONDS)",
+                "it is in continuous time: convert it to the sample time of the controller",
             )),
         }
     }

@@ -56,7 +56,7 @@ impl TunerOrders {
 /// # What keeps it safe
 ///
 /// - A new design is taken only where the largest sensitivities of its loop with the estimate are small, |1/(1 + L)| and |L/(1 + L)|
-///   below 2; slower responses are tried in turn; else the last good controller goes on.
+///   below 2; slower responses are tried in turn, one in each sample; the last good controller goes on meanwhile, and if there is none.
 /// - A model whose gain has another sign than was given gets no controller. Where none is given, the first controller waits until the
 ///   static gain is known to five standard errors (or for [`Probing::at_most`] samples), and the sign is not changed by less either.
 /// - [`Forgetting`] keeps P bounded, in silence too. Exponential forgetting with a factor of 0.98, or 0.99 for slow changes, tracks well.
@@ -80,7 +80,8 @@ impl TunerOrders {
 /// # Size and cost
 ///
 /// `P` is [`TunerOrders::parameters`], `N` [`TunerOrders::size`]. Memory: that of [`RecursiveArx`] and [`RstController`], 4 N + P + 40
-/// numbers. A step costs what [`RecursiveArx`] does, and a design about 10 N³ + 560 N flops.
+/// numbers. A step costs what [`RecursiveArx`] does, and up to three designs of about 10 N³ + 560 N flops: the one in use, and one that is
+/// tried.
 ///
 /// Source: Åström and Wittenmark, Adaptive Control, 2nd ed. 1995, section 3.4 and chapter 11 (the practice).
 ///
@@ -118,13 +119,22 @@ pub struct IndirectSelfTuner<T: Real, P: Dimension + Dimension<Const<1>>, N: Dim
     candidate: usize,
     since_design: u16,
     since_all: u16,
+    trial: Option<Trial<T>>,
     /// The sign of the latest static gain that was known to five standard errors; 0 if none was.
     known_sign: T,
 }
 
+/// A search of the candidates, one in each sample: which is next, and the least peaks so far.
+#[derive(Clone, Copy, Debug)]
+struct Trial<T> {
+    next: usize,
+    least: T,
+    least_at: usize,
+}
+
 /// The frequencies that margins are looked at.
 const FREQUENCIES: usize = 28;
-/// All candidates are tried after so many designs of the same one.
+/// The candidates are tried again after so many designs of the same one.
 const TRY_ALL_AFTER: u16 = 25;
 
 impl<T: Real, P: Dimension + Dimension<Const<1>>, N: Dimension> IndirectSelfTuner<T, P, N> {
@@ -157,6 +167,7 @@ impl<T: Real, P: Dimension + Dimension<Const<1>>, N: Dimension> IndirectSelfTune
             candidate: 0,
             since_design: 0,
             since_all: 0,
+            trial: None,
             known_sign: T::zero(),
         })
     }
@@ -310,31 +321,39 @@ impl<T: Real, P: Dimension + Dimension<Const<1>>, N: Dimension> IndirectSelfTune
             }
         }
         self.since_all = self.since_all.saturating_add(1);
-        let again = self.closed.controller.is_some() && self.since_all < TRY_ALL_AFTER;
-        if let Some(found) =
-            self.design(a, b, self.candidate).filter(|(_, peaks)| again && *peaks <= self.peaks.0)
-        {
-            self.take(found.0, self.candidate);
+        let has_controller = self.closed.controller.is_some();
+        let current = if has_controller { self.design(a, b, self.candidate) } else { None };
+        let good = current.filter(|(_, peaks)| *peaks <= self.peaks.0);
+        let is_good = good.is_some();
+        if let Some((controller, _)) = good {
+            self.take(controller, self.candidate);
+        }
+        if self.trial.is_none() && (!is_good || self.since_all >= TRY_ALL_AFTER) {
+            (self.trial, self.since_all) = (Some(Trial { next: 0, least: T::INFINITY, least_at: 0 }), 0);
+        }
+        let Some(trial) = self.trial else { return };
+        self.trial = None;
+        if is_good && trial.next == self.candidate {
             return;
         }
-        self.since_all = 0;
-        let mut best: Option<(RstController<T, N>, T, usize)> = None;
-        for index in 0.. {
-            if self.closed.settings.response.candidate(index, a).is_none() {
-                break;
+        if self.closed.settings.response.candidate(trial.next, a).is_none() {
+            // All were tried, and none is good: the least bad one, if it is bearable still.
+            let least = if trial.least <= self.peaks.1 { self.design(a, b, trial.least_at) } else { None };
+            if let Some((controller, _)) = least.filter(|(_, peaks)| *peaks <= self.peaks.1) {
+                self.take(controller, trial.least_at);
             }
-            let Some((controller, peaks)) = self.design(a, b, index) else { continue };
-            if best.as_ref().is_none_or(|(_, least, _)| peaks < *least) {
-                best = Some((controller, peaks, index));
-            }
-            if peaks <= self.peaks.0 {
-                break;
-            }
+            return;
         }
-        if let Some((controller, peaks, index)) = best
-            && peaks <= self.peaks.1
-        {
-            self.take(controller, index);
+        let tried = self.design(a, b, trial.next);
+        let peaks = tried.as_ref().map_or(T::INFINITY, |(_, peaks)| *peaks);
+        match tried.filter(|_| peaks <= self.peaks.0) {
+            Some((controller, _)) => self.take(controller, trial.next),
+            None => {
+                let better = peaks < trial.least;
+                let (least, least_at) =
+                    if better { (peaks, trial.next) } else { (trial.least, trial.least_at) };
+                self.trial = Some(Trial { next: trial.next + 1, least, least_at });
+            }
         }
     }
 

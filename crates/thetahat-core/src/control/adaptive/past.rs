@@ -2,6 +2,7 @@
 
 use nalgebra::OVector;
 
+use crate::lags::shift;
 use crate::{Dimension, Real, RstController};
 
 /// What a controller with other coefficients has to know, to go on as if it had been there: the latest N samples, the newest first.
@@ -32,19 +33,10 @@ impl<T: Real, N: Dimension> Past<T, N> {
     }
 
     pub(super) fn push(&mut self, set_point: T, output: T, input: T, wanted: T) {
-        let lines = [
-            (&mut self.set_points, set_point),
-            (&mut self.outputs, output),
-            (&mut self.inputs, input),
-            (&mut self.wanted, wanted),
-        ];
-        for (line, newest) in lines {
-            let line = line.as_mut_slice();
-            line.rotate_right(1.min(line.len()));
-            if let Some(first) = line.first_mut() {
-                *first = newest;
-            }
-        }
+        shift(self.set_points.as_mut_slice(), set_point);
+        shift(self.outputs.as_mut_slice(), output);
+        shift(self.inputs.as_mut_slice(), input);
+        shift(self.wanted.as_mut_slice(), wanted);
     }
 
     /// That the actuator did something else with the newest sample.
@@ -56,8 +48,8 @@ impl<T: Real, N: Dimension> Past<T, N> {
 
     /// The controller, as if it had been there.
     pub(super) fn resume(&self, controller: &mut RstController<T, N>) {
-        let samples =
-            self.set_points.iter().zip(self.outputs.iter()).zip(self.inputs.iter().zip(self.wanted.iter()));
+        let targets = self.set_points.as_slice().iter().zip(self.outputs.as_slice());
+        let samples = targets.zip(self.inputs.as_slice().iter().zip(self.wanted.as_slice()));
         controller.forget();
         for ((set_point, output), (input, wanted)) in samples.rev() {
             controller.follow(*set_point, *output, *input, *wanted);

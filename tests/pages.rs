@@ -13,11 +13,21 @@ use crate::harness::Folder;
 const README_LINES: usize = 175;
 
 /// What commands in console blocks begin with that this test cannot run.
-const NOT_RUN: [&str; 8] = ["make ", "cargo ", "pip ", "benches/", "tests/", "git ", "cd ", "arm-none-eabi-gcc "];
+const NOT_RUN: [&str; 8] =
+    ["make ", "cargo ", "pip ", "benches/", "tests/", "git ", "cd ", "arm-none-eabi-gcc "];
 
 /// Options of those.
-const FOREIGN_OPTIONS: [&str; 9] =
-    ["--nocapture", "--release", "--bench", "--write", "--path", "--open", "--target", "--features", "--gc-sections"];
+const FOREIGN_OPTIONS: [&str; 9] = [
+    "--nocapture",
+    "--release",
+    "--bench",
+    "--write",
+    "--path",
+    "--open",
+    "--target",
+    "--features",
+    "--gc-sections",
+];
 
 /// A page: its path from the root of the repository, and its text.
 struct Page {
@@ -264,7 +274,11 @@ fn every_snippet_is_tested() {
                 "c" => {
                     let text = lines.join("\n");
                     let held = |path: &String| self::page(path).text.contains(&text);
-                    assert!(programs.iter().any(held), "{}: not in a program that is run:\n{text}", page.path);
+                    assert!(
+                        programs.iter().any(held),
+                        "{}: not in a program that is run:\n{text}",
+                        page.path
+                    );
                 }
                 _ => assert_eq!(language, "text", "{}: nothing tests this language", page.path),
             }

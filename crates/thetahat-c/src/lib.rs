@@ -29,6 +29,7 @@
 //!
 //! - A pointer that is not NULL is valid for as many values as its function says, and aligned for them.
 //! - Memory given to an init function belongs to the object until it is given to another, or to something else.
+//! - An array that a function writes overlaps no other that it is given.
 //! - One thread, or interrupt, uses an object at a time.
 //!
 //! Whatever can be checked is: NULL, alignment, sizes, numbers, and that a handle is that of an initialised object of its

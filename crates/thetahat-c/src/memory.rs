@@ -145,7 +145,13 @@ pub(crate) fn follow<T>(pointer: *const T) -> Result<*const T, Error> {
 ///
 /// The pointer is null, or valid for so many values, which nothing changes in the meantime.
 pub(crate) unsafe fn array<'a, T>(values: *const T, count: usize) -> Result<&'a [T], Error> {
-    if count == 0 { Ok(&[]) } else { Ok(slice::from_raw_parts(follow(values)?, count)) }
+    if count == 0 { Ok(&[]) } else { Ok(slice::from_raw_parts(follow(values)?, possible::<T>(count)?)) }
+}
+
+/// The count, if so many values fit into the address space.
+fn possible<T>(count: usize) -> Result<usize, Error> {
+    let most = isize::MAX as usize / size_of::<T>().max(1);
+    if count <= most { Ok(count) } else { Err(Error::Length) }
 }
 
 /// So many values of an array, or none if there is no array.
@@ -163,14 +169,17 @@ pub(crate) unsafe fn optional<'a, T>(values: *const T, count: usize) -> Result<O
 ///
 /// As for [`array`], and nothing else reads them in the meantime.
 pub(crate) unsafe fn array_mut<'a, T>(values: *mut T, count: usize) -> Result<&'a mut [T], Error> {
-    if count == 0 { Ok(&mut []) } else { Ok(slice::from_raw_parts_mut(follow(values)?.cast_mut(), count)) }
+    if count == 0 {
+        return Ok(&mut []);
+    }
+    Ok(slice::from_raw_parts_mut(follow(values)?.cast_mut(), possible::<T>(count)?))
 }
 
 /// Writes an answer, if there is a place for it.
 ///
 /// # Safety
 ///
-/// The pointer is null, or valid and aligned.
+/// The pointer is null or valid.
 pub(crate) unsafe fn answer<T>(place: *mut T, value: T) {
     if !place.is_null() {
         place.write_unaligned(value);

@@ -209,6 +209,7 @@ fn orders_and_learning_are_checked() {
         assert_eq!(thetahat_arx_log_row(arx, 1.0, ONES.as_ptr(), 2, null_mut()), Error::Length);
         assert_eq!(thetahat_arx_log_row(arx, 1.0, ONES.as_ptr(), 1, null_mut()), Error::None);
         assert_eq!(thetahat_arx_applied(arx, null(), 1), Error::NullPointer);
+        assert_eq!(thetahat_arx_applied(arx, ONES.as_ptr(), usize::MAX / 2), Error::Length);
     }
 }
 

@@ -87,7 +87,7 @@ const C: House = House {
         &["error", "panic"],
         &["memory", "shapes"],
         &["innovation", "learning"],
-        &["arx", "detector", "rls", "rst"],
+        &["arx", "detector", "rls", "rst", "tuner"],
         &["linear"],
         &["ekf", "kalman", "luenberger"],
         &["sizes"],

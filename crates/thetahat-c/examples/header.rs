@@ -27,6 +27,7 @@ fn header() -> Result<String, Box<dyn Error>> {
         "luenberger",
         "detector",
         "rst",
+        "tuner",
         "sizes",
     ] {
         builder = builder.with_src(format!("{FOLDER}/src/{source}.rs"));

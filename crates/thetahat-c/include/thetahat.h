@@ -17,6 +17,11 @@
 #define THETAHAT_EKF_WORDS(n, m) THETAHAT_WORDS((n) * (2 * (n) + 1) + (m) * (m) + 1, 40)
 #define THETAHAT_LUENBERGER_WORDS(n, m) THETAHAT_WORDS((n) * (3 * (n) + 2 * (m) + 5) + (m) * ((m) + 4), 48)
 #define THETAHAT_RST_WORDS(n) THETAHAT_WORDS(4 * (n) + 4, 16)
+#define THETAHAT_INDIRECT_WORDS(na, nb) \
+    THETAHAT_WORDS(((na) + (nb)) * ((na) + (nb) + 13) + 38, 6 * ((na) + (nb)) + 142)
+#define THETAHAT_DIRECT_WORDS(na, nb, delay) \
+    THETAHAT_WORDS(((na) + (nb) + (delay)) * ((na) + (nb) + (delay) + 3) + 2 * (delay) + 42 + \
+                   8 * ((nb) + (delay) - 2 > (na) ? (nb) + (delay) - 2 : (na)), 6 * ((na) + (nb) + (delay)) + 124)
 #define THETAHAT_DETECTOR_WORDS THETAHAT_WORDS(8, 16)
 
 
@@ -216,6 +221,31 @@ typedef int32_t thetahat_chart;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
+// What a self-tuner did in a sample.
+enum thetahat_tuner_state
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : int32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    // There is no controller yet: the plant is excited.
+    THETAHAT_TUNER_STATE_PROBING = 0,
+    // The controller acts.
+    THETAHAT_TUNER_STATE_CONTROLLING = 1,
+    // The sensor says nothing, and the controller acts on what the model predicts.
+    THETAHAT_TUNER_STATE_BRIDGING = 2,
+    // The sensor says nothing for long: the input stays as it was.
+    THETAHAT_TUNER_STATE_HOLDING = 3,
+    // Another state of the core.
+    THETAHAT_TUNER_STATE_OTHER = 4,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum thetahat_tuner_state thetahat_tuner_state;
+#else
+typedef int32_t thetahat_tuner_state;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
 // An ARX or ARMAX model, estimated while the plant runs.
 typedef struct thetahat_arx thetahat_arx;
 
@@ -259,6 +289,15 @@ typedef struct thetahat_rst_place_size thetahat_rst_place_size;
 
 // The number of coefficients of a `thetahat_rst`: `thetahat_rst_2` for 2.
 typedef struct thetahat_rst_size thetahat_rst_size;
+
+// A controller that learns its plant while it runs: a model that it is designed for anew (indirect), or its own coefficients
+// (direct).
+typedef struct thetahat_tuner thetahat_tuner;
+
+// The way and the orders of a `thetahat_tuner`. `thetahat_indirect_2_3`: a plant with na = 2 and nb = 3 coefficients of B(q), one
+// more than its order for each sample of dead time; the controller integrates. `thetahat_direct_2_2_1`: na = 2, nb = 2, and an
+// input that acts after 1 sample; for plants whose inverse is stable and whose delay is known. Both have a constant for loads.
+typedef struct thetahat_tuner_size thetahat_tuner_size;
 
 // A word of the memory that an object is given: so it is aligned for whatever stands in it.
 typedef uint64_t thetahat_word;
@@ -398,6 +437,40 @@ typedef struct {
     // 1 if the zeros of B are cancelled, else 0.
     uint32_t cancel_zeros;
 } thetahat_rst_poles;
+
+// What a self-tuner is asked for. `thetahat_tuner_usual` fills it in.
+typedef struct {
+    // The natural frequency of the response to the set point, in rad a sample: about 4/(damping n) to settle within n samples.
+    thetahat_number frequency;
+    // Its damping, above 0 and at most 1.
+    thetahat_number damping;
+    // The pole by which loads and errors of the model are forgotten, 0 ... below 1.
+    thetahat_number observer;
+    // The range of the actuator, in the unit of the input.
+    thetahat_number lowest_input;
+    // The other end of it.
+    thetahat_number highest_input;
+    // The input that it starts with, within the range.
+    thetahat_number first_input;
+    // The sign of the gain of the plant; 0 where it is not known.
+    thetahat_number gain_sign;
+    // The usual size of the output, in its unit, above 0.
+    thetahat_number output_scale;
+    // The usual size of the input, in its unit, above 0.
+    thetahat_number input_scale;
+    // The first amplitude of probing, in the unit of the input. It doubles every 15 samples.
+    thetahat_number amplitude;
+    // The largest.
+    thetahat_number largest_amplitude;
+    // What the sensor can measure, in the unit of the output. What lies beyond is taken as the end that it passed.
+    thetahat_number lowest_measurement;
+    // The other end of it.
+    thetahat_number highest_measurement;
+    // So many equal measurements in a row are those of a sensor that is stuck, up to 65535; 0 for never.
+    uint32_t stuck_after;
+    // For so many missing samples in a row the controller goes on with what its model predicts, up to 65535.
+    uint32_t longest_gap;
+} thetahat_tuner_wish;
 
 #ifdef __cplusplus
 extern "C" {
@@ -620,6 +693,40 @@ extern const thetahat_rst_place_size thetahat_rst_place_10;
 extern const thetahat_rst_place_size thetahat_rst_place_11;
 
 extern const thetahat_rst_place_size thetahat_rst_place_12;
+
+extern const thetahat_tuner_size thetahat_indirect_1_1;
+
+extern const thetahat_tuner_size thetahat_indirect_1_2;
+
+extern const thetahat_tuner_size thetahat_indirect_1_3;
+
+extern const thetahat_tuner_size thetahat_indirect_1_4;
+
+extern const thetahat_tuner_size thetahat_indirect_2_2;
+
+extern const thetahat_tuner_size thetahat_indirect_2_3;
+
+extern const thetahat_tuner_size thetahat_indirect_2_4;
+
+extern const thetahat_tuner_size thetahat_indirect_2_5;
+
+extern const thetahat_tuner_size thetahat_indirect_3_3;
+
+extern const thetahat_tuner_size thetahat_indirect_3_4;
+
+extern const thetahat_tuner_size thetahat_direct_1_1_1;
+
+extern const thetahat_tuner_size thetahat_direct_1_1_2;
+
+extern const thetahat_tuner_size thetahat_direct_1_1_3;
+
+extern const thetahat_tuner_size thetahat_direct_2_1_1;
+
+extern const thetahat_tuner_size thetahat_direct_2_2_1;
+
+extern const thetahat_tuner_size thetahat_direct_2_2_2;
+
+extern const thetahat_tuner_size thetahat_direct_2_2_3;
 
 // The size of a number in the library: not that of a `thetahat_number` where the header and the library disagree.
 size_t thetahat_number_bytes(void);
@@ -1063,6 +1170,68 @@ thetahat_error thetahat_rst_place(const thetahat_rst_place_size *size,
                                   const thetahat_rst_poles *poles,
                                   thetahat_rst_law *law);
 
+// Fills in what is usual, for these scales, and ends of the actuator's range: a response of 0.1 rad a sample with damping 0.9, an
+// observer of 0.5, the input 0 or the nearest end of the range at first, nothing known of the gain, probing with a tenth of
+// the scale to twice, any range of the sensor, never stuck, 100 missing samples from the model.
+//
+// Errors: NULL_POINTER.
+thetahat_error thetahat_tuner_usual(thetahat_tuner_wish *wish,
+                                    thetahat_number output_scale,
+                                    thetahat_number input_scale,
+                                    thetahat_number lowest_input,
+                                    thetahat_number highest_input);
+
+// Makes a tuner that knows nothing yet.
+//
+// - tuner: where its handle goes. It points into the memory.
+// - memory, bytes: at least `THETAHAT_INDIRECT_WORDS(na, nb)` or `THETAHAT_DIRECT_WORDS(na, nb, delay)` words, and their size in
+//   bytes.
+// - size: `&thetahat_indirect_na_nb` or `&thetahat_direct_na_nb_delay`.
+// - wish: what is asked for.
+// - learning: how old samples are forgotten and how it starts, without its dead zone; NULL for the default. Exponential forgetting
+//   with 0.98, or 0.99 for slow changes, tracks well.
+//
+// Errors: MEMORY_TOO_SMALL; NOT_FINITE; OUT_OF_RANGE if a number of the wish or of the policy is out of its range.
+thetahat_error thetahat_tuner_init(thetahat_tuner **tuner,
+                                   thetahat_word *memory,
+                                   size_t bytes,
+                                   const thetahat_tuner_size *size,
+                                   const thetahat_tuner_wish *wish,
+                                   const thetahat_learning *learning);
+
+// One sample: the tuner learns from the measurement, and gives the input from now on, within the limits. A measurement that is NaN
+// is missing. A step costs what that of a recursive ARX estimator does, and in an indirect tuner a design of about 10 n^3 + 560 n
+// flops, n = na + nb.
+//
+// Errors: NULL_POINTER.
+thetahat_error thetahat_tuner_control(thetahat_tuner *tuner,
+                                      thetahat_number set_point,
+                                      thetahat_number measurement,
+                                      thetahat_number *input);
+
+// Tells that the actuator did something else than the latest control asked for.
+thetahat_error thetahat_tuner_applied(thetahat_tuner *tuner, thetahat_number input);
+
+// Excites the plant for so many samples: the input is that of the controller with the share 0 ... 1 of the largest amplitude of
+// probing, with either sign.
+//
+// Errors: OUT_OF_RANGE.
+thetahat_error thetahat_tuner_probe(thetahat_tuner *tuner,
+                                    thetahat_number share,
+                                    uint32_t samples);
+
+// Turns adaptation off (0), or on again (1): the controller stays as it is.
+thetahat_error thetahat_tuner_set_adaptation(thetahat_tuner *tuner, uint32_t on);
+
+// Reads what it did in the latest sample, and what it has learnt. Each of the places may be NULL.
+//
+// - state: a `thetahat_tuner_state`.
+// - parameters: of an indirect tuner a_1 ..., b_1 ..., the constant: na + nb + 1 numbers. Of a direct one the coefficients of R, nb +
+//   delay - 1, those of S, na, and the constant.
+thetahat_error thetahat_tuner_read(const thetahat_tuner *tuner,
+                                   int32_t *state,
+                                   thetahat_number *parameters);
+
 // The name of an error: `NOT_FINITE` for `THETAHAT_ERROR_NOT_FINITE`; `UNKNOWN` for what is none. It lives for ever.
 const char *thetahat_error_name(int32_t code);
 
@@ -1501,6 +1670,68 @@ thetahat_error thetahat_rst_place(const thetahat_rst_place_size *size,
                                   size_t b_count,
                                   const thetahat_rst_poles *poles,
                                   thetahat_rst_law *law);
+
+// Fills in what is usual, for these scales, and ends of the actuator's range: a response of 0.1 rad a sample with damping 0.9, an
+// observer of 0.5, the input 0 or the nearest end of the range at first, nothing known of the gain, probing with a tenth of
+// the scale to twice, any range of the sensor, never stuck, 100 missing samples from the model.
+//
+// Errors: NULL_POINTER.
+thetahat_error thetahat_tuner_usual(thetahat_tuner_wish *wish,
+                                    thetahat_number output_scale,
+                                    thetahat_number input_scale,
+                                    thetahat_number lowest_input,
+                                    thetahat_number highest_input);
+
+// Makes a tuner that knows nothing yet.
+//
+// - tuner: where its handle goes. It points into the memory.
+// - memory, bytes: at least `THETAHAT_INDIRECT_WORDS(na, nb)` or `THETAHAT_DIRECT_WORDS(na, nb, delay)` words, and their size in
+//   bytes.
+// - size: `&thetahat_indirect_na_nb` or `&thetahat_direct_na_nb_delay`.
+// - wish: what is asked for.
+// - learning: how old samples are forgotten and how it starts, without its dead zone; NULL for the default. Exponential forgetting
+//   with 0.98, or 0.99 for slow changes, tracks well.
+//
+// Errors: MEMORY_TOO_SMALL; NOT_FINITE; OUT_OF_RANGE if a number of the wish or of the policy is out of its range.
+thetahat_error thetahat_tuner_init(thetahat_tuner **tuner,
+                                   thetahat_word *memory,
+                                   size_t bytes,
+                                   const thetahat_tuner_size *size,
+                                   const thetahat_tuner_wish *wish,
+                                   const thetahat_learning *learning);
+
+// One sample: the tuner learns from the measurement, and gives the input from now on, within the limits. A measurement that is NaN
+// is missing. A step costs what that of a recursive ARX estimator does, and in an indirect tuner a design of about 10 n^3 + 560 n
+// flops, n = na + nb.
+//
+// Errors: NULL_POINTER.
+thetahat_error thetahat_tuner_control(thetahat_tuner *tuner,
+                                      thetahat_number set_point,
+                                      thetahat_number measurement,
+                                      thetahat_number *input);
+
+// Tells that the actuator did something else than the latest control asked for.
+thetahat_error thetahat_tuner_applied(thetahat_tuner *tuner, thetahat_number input);
+
+// Excites the plant for so many samples: the input is that of the controller with the share 0 ... 1 of the largest amplitude of
+// probing, with either sign.
+//
+// Errors: OUT_OF_RANGE.
+thetahat_error thetahat_tuner_probe(thetahat_tuner *tuner,
+                                    thetahat_number share,
+                                    uint32_t samples);
+
+// Turns adaptation off (0), or on again (1): the controller stays as it is.
+thetahat_error thetahat_tuner_set_adaptation(thetahat_tuner *tuner, uint32_t on);
+
+// Reads what it did in the latest sample, and what it has learnt. Each of the places may be NULL.
+//
+// - state: a `thetahat_tuner_state`.
+// - parameters: of an indirect tuner a_1 ..., b_1 ..., the constant: na + nb + 1 numbers. Of a direct one the coefficients of R, nb +
+//   delay - 1, those of S, na, and the constant.
+thetahat_error thetahat_tuner_read(const thetahat_tuner *tuner,
+                                   int32_t *state,
+                                   thetahat_number *parameters);
 
 #ifdef __cplusplus
 }  // extern "C"

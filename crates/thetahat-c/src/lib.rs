@@ -11,6 +11,7 @@
 //! | `thetahat_luenberger` | the observer of a linear model |
 //! | `thetahat_detector` | charts that watch innovations |
 //! | `thetahat_rst` | a linear controller, and pole placement for it |
+//! | `thetahat_tuner` | self-tuning controllers |
 //!
 //! `docs/c.md` shows how it is built, linked and used.
 //!
@@ -53,6 +54,7 @@ mod rls;
 mod rst;
 mod shapes;
 mod sizes;
+mod tuner;
 
 pub use arx::*;
 pub use detector::*;
@@ -66,6 +68,7 @@ pub use memory::Word;
 pub use rls::*;
 pub use rst::*;
 pub use sizes::*;
+pub use tuner::*;
 
 /// A number of the interface: `float`, or `double` where THETAHAT_DOUBLE is defined. It must be that of the library, whose
 /// feature `double` makes it `double`.

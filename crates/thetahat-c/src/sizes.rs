@@ -9,6 +9,7 @@ use crate::kalman::KalmanSize;
 use crate::luenberger::LuenbergerSize;
 use crate::rls::RlsSize;
 use crate::rst::{RstPlaceSize, RstSize};
+use crate::tuner::TunerSize;
 
 #[unsafe(no_mangle)]
 pub static thetahat_rls_1: RlsSize = RlsSize::new::<1>();
@@ -228,3 +229,37 @@ pub static thetahat_rst_place_10: RstPlaceSize = RstPlaceSize::new::<10>();
 pub static thetahat_rst_place_11: RstPlaceSize = RstPlaceSize::new::<11>();
 #[unsafe(no_mangle)]
 pub static thetahat_rst_place_12: RstPlaceSize = RstPlaceSize::new::<12>();
+#[unsafe(no_mangle)]
+pub static thetahat_indirect_1_1: TunerSize = TunerSize::indirect::<1, 1, 3, 2>();
+#[unsafe(no_mangle)]
+pub static thetahat_indirect_1_2: TunerSize = TunerSize::indirect::<1, 2, 4, 3>();
+#[unsafe(no_mangle)]
+pub static thetahat_indirect_1_3: TunerSize = TunerSize::indirect::<1, 3, 5, 4>();
+#[unsafe(no_mangle)]
+pub static thetahat_indirect_1_4: TunerSize = TunerSize::indirect::<1, 4, 6, 5>();
+#[unsafe(no_mangle)]
+pub static thetahat_indirect_2_2: TunerSize = TunerSize::indirect::<2, 2, 5, 4>();
+#[unsafe(no_mangle)]
+pub static thetahat_indirect_2_3: TunerSize = TunerSize::indirect::<2, 3, 6, 5>();
+#[unsafe(no_mangle)]
+pub static thetahat_indirect_2_4: TunerSize = TunerSize::indirect::<2, 4, 7, 6>();
+#[unsafe(no_mangle)]
+pub static thetahat_indirect_2_5: TunerSize = TunerSize::indirect::<2, 5, 8, 7>();
+#[unsafe(no_mangle)]
+pub static thetahat_indirect_3_3: TunerSize = TunerSize::indirect::<3, 3, 7, 6>();
+#[unsafe(no_mangle)]
+pub static thetahat_indirect_3_4: TunerSize = TunerSize::indirect::<3, 4, 8, 7>();
+#[unsafe(no_mangle)]
+pub static thetahat_direct_1_1_1: TunerSize = TunerSize::direct::<1, 1, 1, 3, 1, 2>();
+#[unsafe(no_mangle)]
+pub static thetahat_direct_1_1_2: TunerSize = TunerSize::direct::<1, 1, 2, 4, 1, 4>();
+#[unsafe(no_mangle)]
+pub static thetahat_direct_1_1_3: TunerSize = TunerSize::direct::<1, 1, 3, 5, 2, 6>();
+#[unsafe(no_mangle)]
+pub static thetahat_direct_2_1_1: TunerSize = TunerSize::direct::<2, 1, 1, 4, 2, 2>();
+#[unsafe(no_mangle)]
+pub static thetahat_direct_2_2_1: TunerSize = TunerSize::direct::<2, 2, 1, 5, 2, 2>();
+#[unsafe(no_mangle)]
+pub static thetahat_direct_2_2_2: TunerSize = TunerSize::direct::<2, 2, 2, 6, 2, 4>();
+#[unsafe(no_mangle)]
+pub static thetahat_direct_2_2_3: TunerSize = TunerSize::direct::<2, 2, 3, 7, 3, 6>();

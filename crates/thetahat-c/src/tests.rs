@@ -347,3 +347,41 @@ fn observers_detectors_and_controllers_check_what_they_get() {
         assert_eq!(thetahat_rst_control(rst, 1.0, 1.0, null_mut()), Error::NullPointer);
     }
 }
+
+#[test]
+fn a_tuner_checks_what_it_is_asked_for() {
+    let (mut memory, mut tuner) = (Memory::new(), null_mut());
+    let (start, bytes) = (memory.start(), Memory::BYTES);
+    let mut wish = core::mem::MaybeUninit::<TunerWish>::uninit();
+    // SAFETY: all pointers are valid; the wish is read after it was written.
+    let usual = unsafe {
+        assert_eq!(thetahat_tuner_usual(null_mut(), 1.0, 1.0, -1.0, 1.0), Error::NullPointer);
+        assert_eq!(thetahat_tuner_usual(wish.as_mut_ptr(), 1.0, 1.0, 2.0, 9.0), Error::None);
+        wish.assume_init()
+    };
+    assert_eq!((usual.first_input, usual.gain_sign, usual.longest_gap), (2.0, 0.0, 100));
+    let mut init = |wish: TunerWish| {
+        // SAFETY: all pointers are valid.
+        unsafe {
+            let size = &raw const thetahat_indirect_1_1;
+            thetahat_tuner_init(&raw mut tuner, start, bytes, size, &raw const wish, null())
+        }
+    };
+    assert_eq!(init(TunerWish { highest_input: Number::NAN, ..usual }), Error::OutOfRange);
+    assert_eq!(
+        init(TunerWish { lowest_measurement: 1.0, highest_measurement: 0.0, ..usual }),
+        Error::OutOfRange
+    );
+    assert_eq!(init(TunerWish { first_input: 1.0, ..usual }), Error::OutOfRange);
+    assert_eq!(init(TunerWish { frequency: 0.0, ..usual }), Error::OutOfRange);
+    assert_eq!(init(TunerWish { amplitude: -1.0, ..usual }), Error::OutOfRange);
+    assert_eq!(init(TunerWish { longest_gap: 65_536, ..usual }), Error::OutOfRange);
+    assert_eq!(init(TunerWish { output_scale: 0.0, ..usual }), Error::OutOfRange);
+    assert_eq!(init(usual), Error::None);
+    // SAFETY: pointers are null or valid.
+    unsafe {
+        assert_eq!(thetahat_tuner_control(tuner, 1.0, 1.0, null_mut()), Error::NullPointer);
+        assert_eq!(thetahat_tuner_probe(tuner, 2.0, 10), Error::OutOfRange);
+        assert_eq!(thetahat_tuner_read(tuner, null_mut(), null_mut()), Error::None);
+    }
+}

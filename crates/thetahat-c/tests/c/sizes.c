@@ -2,7 +2,7 @@
 #include "done.h"
 
 /* A word less for each: by so many bytes a macro may be above what is needed. */
-#define SLACK 72
+#define SLACK 96
 
 static thetahat_word memory[4096];
 static const thetahat_number numbers[256] = {1};
@@ -56,6 +56,19 @@ static thetahat_error init_arx(size_t bytes, const thetahat_arx_size *size, uint
           thetahat_rst_init(&rst, memory, bytes, &thetahat_rst_##n, &law)); \
     place(&thetahat_rst_place_##n, n)
 
+static thetahat_error init_tuner(size_t bytes, const thetahat_tuner_size *size) {
+    thetahat_tuner_wish wish;
+    thetahat_tuner *tuner;
+    done("usual", thetahat_tuner_usual(&wish, 1, 1, -1, 1));
+    return thetahat_tuner_init(&tuner, memory, bytes, size, &wish, NULL);
+}
+
+#define INDIRECT(na, nb) \
+    CHECK("indirect " #na " " #nb, THETAHAT_INDIRECT_WORDS(na, nb), init_tuner(bytes, &thetahat_indirect_##na##_##nb))
+#define DIRECT(na, nb, d) \
+    CHECK("direct " #na " " #nb " " #d, THETAHAT_DIRECT_WORDS(na, nb, d), \
+          init_tuner(bytes, &thetahat_direct_##na##_##nb##_##d))
+
 /* A pure delay of n samples has a controller with n coefficients. */
 static void place(const thetahat_rst_place_size *size, size_t n) {
     const thetahat_number one[1] = {1};
@@ -84,6 +97,9 @@ int main(void) {
     FILTERS(4, 1); FILTERS(4, 2); FILTERS(4, 3); FILTERS(5, 1); FILTERS(5, 2); FILTERS(5, 3);
     FILTERS(6, 1); FILTERS(6, 2); FILTERS(6, 3);
     RST(1); RST(2); RST(3); RST(4); RST(5); RST(6); RST(7); RST(8); RST(9); RST(10); RST(11); RST(12);
+    INDIRECT(1, 1); INDIRECT(1, 2); INDIRECT(1, 3); INDIRECT(1, 4);
+    INDIRECT(2, 2); INDIRECT(2, 3); INDIRECT(2, 4); INDIRECT(2, 5); INDIRECT(3, 3); INDIRECT(3, 4);
+    DIRECT(1, 1, 1); DIRECT(1, 1, 2); DIRECT(1, 1, 3); DIRECT(2, 1, 1); DIRECT(2, 2, 1); DIRECT(2, 2, 2); DIRECT(2, 2, 3);
     CHECK("detector", THETAHAT_DETECTOR_WORDS, thetahat_detector_init(&detector, memory, bytes, 4, 4));
     printf("%d sizes\n", count);
     return 0;

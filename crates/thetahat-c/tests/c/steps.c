@@ -256,6 +256,27 @@ static void step_rst(void) {
     }
 }
 
+/* In a closed loop with a plant of first order; the noise is that of the record. */
+static void step_tuner(const char *name, const thetahat_tuner_size *size, int parameters) {
+    static thetahat_word memory[THETAHAT_DIRECT_WORDS(1, 1, 1)];
+    thetahat_number input = 0, output = 0, found[3];
+    thetahat_tuner_wish wish;
+    thetahat_tuner *tuner;
+    int32_t state;
+    done(name, thetahat_tuner_usual(&wish, 1, 1, -4, 4));
+    wish.frequency = (thetahat_number)0.5;
+    done(name, thetahat_tuner_init(&tuner, memory, sizeof memory, size, &wish, NULL));
+    for (int k = 0; k < SAMPLES; k++) {
+        output = (thetahat_number)0.75 * output + input / 2;
+        done(name, thetahat_tuner_control(tuner, record[k].u, output + record[k].y / 64, &input));
+        done(name, thetahat_tuner_read(tuner, &state, found));
+        printf("%s %d", name, k);
+        print_numbers(&input, 1);
+        print_numbers(found, parameters);
+        printf(" %d\n", (int)state);
+    }
+}
+
 int main(void) {
     if (thetahat_number_bytes() != sizeof(thetahat_number)) {
         printf("the library has another precision\n");
@@ -269,5 +290,7 @@ int main(void) {
     step_ekf();
     step_luenberger();
     step_rst();
+    step_tuner("indirect", &thetahat_indirect_1_1, 3);
+    step_tuner("direct", &thetahat_direct_1_1_1, 3);
     return 0;
 }

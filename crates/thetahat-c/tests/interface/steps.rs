@@ -96,6 +96,8 @@ pub(crate) fn lines<T: Number>() -> Result<String, Error> {
     step_ekf(&mut lines)?;
     step_luenberger(&mut lines)?;
     step_rst(&mut lines)?;
+    step_indirect(&mut lines)?;
+    step_direct(&mut lines)?;
     Ok(lines.text)
 }
 
@@ -284,5 +286,60 @@ fn step_rst<T: Number>(lines: &mut Lines<T>) -> Result<(), Error> {
         rst.applied(input / T::from(2.0));
         lines.line("rst", k, None, &[&[input], rst.r().as_slice(), rst.s().as_slice()]);
     }
+    Ok(())
+}
+
+fn settings<T: Number>() -> TunerSettings<T> {
+    // As C says them: the nearest numbers of each precision.
+    let nearest = |tenths: usize| T::from_count(tenths) / T::from_count(10);
+    let response = ResponseWanted { frequency: T::from(0.5), damping: nearest(9), observer: T::from(0.5) };
+    TunerSettings::new(response, -T::from(4.0)..=T::from(4.0), T::one())
+}
+
+/// Steps a tuner in a closed loop with a plant of first order.
+fn step_tuner<T: Number>(
+    lines: &mut Lines<T>,
+    name: &str,
+    mut control: impl FnMut(T, T) -> (T, Vec<T>, TunerState),
+) {
+    let (mut input, mut output) = (T::zero(), T::zero());
+    for k in 0..SAMPLES {
+        let (set_point, noise) = lines.record[k];
+        output = T::from(0.75) * output + input / T::from(2.0);
+        let (next, found, state) = control(set_point, output + noise / T::from(64.0));
+        input = next;
+        lines.line(name, k, None, &[&[input], &found]);
+        lines.text.pop();
+        let state = match state {
+            TunerState::Probing => 0,
+            TunerState::Controlling => 1,
+            TunerState::Bridging => 2,
+            _ => 3,
+        };
+        writeln!(lines.text, " {state}").expect("text");
+    }
+}
+
+fn step_indirect<T: Number>(lines: &mut Lines<T>) -> Result<(), Error> {
+    let orders = TunerOrders { na: 1, nb: 1, constant: true, integrator: true };
+    let (settings, one) = (settings::<T>(), T::one());
+    let mut tuner: IndirectSelfTuner<T, Const<3>, Const<2>> =
+        IndirectSelfTuner::new(&orders, &settings, one, one, Forgetting::default())?;
+    step_tuner(lines, "indirect", |set_point, measurement| {
+        let input = tuner.control(set_point, measurement);
+        (input, tuner.plant().estimator().parameters().as_slice().to_vec(), tuner.state())
+    });
+    Ok(())
+}
+
+fn step_direct<T: Number>(lines: &mut Lines<T>) -> Result<(), Error> {
+    let orders = DirectOrders { na: 1, nb: 1, delay: 1, constant: true };
+    let (settings, one) = (settings::<T>(), T::one());
+    let mut tuner: DirectSelfTuner<T, Const<3>, Const<1>, Const<2>> =
+        DirectSelfTuner::new(&orders, &settings, one, one, Forgetting::default())?;
+    step_tuner(lines, "direct", |set_point, measurement| {
+        let input = tuner.control(set_point, measurement);
+        (input, tuner.parameters().to_vec(), tuner.state())
+    });
     Ok(())
 }

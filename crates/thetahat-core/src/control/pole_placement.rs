@@ -207,9 +207,9 @@ impl<T: Real, N: Dimension> RstController<T, N> {
             let (sine, cosine) = angle.sine_and_cosine();
             let turn = (cosine, -sine);
             // R = 1 + q⁻¹ (r_1 + …).
-            let later = times(value(self.r().iter(), turn), turn);
+            let later = times(value(self.r().as_slice().iter(), turn), turn);
             let open = times(value(a.iter(), turn), (T::one() + later.0, later.1));
-            let back = times(value(b.iter(), turn), value(self.s().iter(), turn));
+            let back = times(value(b.iter(), turn), value(self.s().as_slice().iter(), turn));
             let closed = length((open.0 + back.0, open.1 + back.1));
             (sensitivity.max(length(open) / closed), complementary.max(length(back) / closed))
         })

@@ -56,8 +56,10 @@ impl<T: Real, N: Dimension> Past<T, N> {
 
     /// The controller, as if it had been there.
     pub(super) fn resume(&self, controller: &mut RstController<T, N>) {
-        let samples =
-            self.set_points.iter().zip(self.outputs.iter()).zip(self.inputs.iter().zip(self.wanted.iter()));
+        // Slices: the iterators of nalgebra divide to go backwards, and that can panic.
+        let [set_points, outputs, inputs, wanted] =
+            [&self.set_points, &self.outputs, &self.inputs, &self.wanted].map(|line| line.as_slice().iter());
+        let samples = set_points.zip(outputs).zip(inputs.zip(wanted));
         controller.forget();
         for ((set_point, output), (input, wanted)) in samples.rev() {
             controller.follow(*set_point, *output, *input, *wanted);

@@ -45,7 +45,7 @@ chromium:
 	@command -v chromium >/dev/null || { [ "$$(id -u)" = 0 ] && apt-get update -q && \
 	apt-get install -y -q --no-install-recommends chromium fonts-dejavu-core; } >/dev/null 2>&1 || true
 
-# The firmware in an emulator: the host's bits, no panic, and what a step costs.
+# The firmware in an emulator, in Rust and in C: the host's bits, no panic, and what a step costs.
 embedded:
 	tests/embedded/run
 

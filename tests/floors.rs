@@ -81,6 +81,19 @@ const PYTHON: House = House {
     ],
 };
 
+const C: House = House {
+    source: "crates/thetahat-c/src",
+    floors: &[
+        &["error", "panic"],
+        &["memory", "shapes"],
+        &["innovation", "learning"],
+        &["arx", "detector", "rls", "rst", "tuner"],
+        &["linear"],
+        &["ekf", "kalman", "luenberger"],
+        &["sizes"],
+    ],
+};
+
 /// A module by its path from the root of its crate, which is the empty one.
 type Module = Vec<String>;
 
@@ -293,7 +306,7 @@ fn wrongs(modules: &BTreeMap<Module, Named>, floors: &[&[&str]]) -> Vec<String> 
 #[test]
 fn nobody_knows_who_stands_above() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    for House { source, floors } in [CORE, LIBRARY, COMMAND_LINE, PYTHON] {
+    for House { source, floors } in [CORE, LIBRARY, COMMAND_LINE, PYTHON, C] {
         let modules = modules(&root.join(source));
         assert!(modules.len() > 5, "{source}");
         assert_eq!(wrongs(&modules, floors), Vec::<String>::new(), "{source}");
@@ -335,7 +348,7 @@ fn options(text: &str) -> impl Iterator<Item = &str> {
 #[test]
 fn libraries_name_no_options() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    for library in ["crates/thetahat-core/src", "crates/thetahat/src"] {
+    for library in ["crates/thetahat-core/src", "crates/thetahat/src", "crates/thetahat-c/src"] {
         for (module, named) in modules(&root.join(library)) {
             let found: Vec<&str> = named.texts.iter().flat_map(|text| options(text)).collect();
             assert!(found.is_empty(), "{library}, {}: {found:?}", module.join("::"));

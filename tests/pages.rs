@@ -13,10 +13,21 @@ use crate::harness::Folder;
 const README_LINES: usize = 175;
 
 /// What commands in console blocks begin with that this test cannot run.
-const NOT_RUN: [&str; 7] = ["make ", "cargo ", "pip ", "benches/", "tests/", "git ", "cd "];
+const NOT_RUN: [&str; 8] =
+    ["make ", "cargo ", "pip ", "benches/", "tests/", "git ", "cd ", "arm-none-eabi-gcc "];
 
 /// Options of those.
-const FOREIGN_OPTIONS: [&str; 6] = ["--nocapture", "--release", "--bench", "--write", "--path", "--open"];
+const FOREIGN_OPTIONS: [&str; 9] = [
+    "--nocapture",
+    "--release",
+    "--bench",
+    "--write",
+    "--path",
+    "--open",
+    "--target",
+    "--features",
+    "--gc-sections",
+];
 
 /// A page: its path from the root of the repository, and its text.
 struct Page {
@@ -245,6 +256,8 @@ fn every_snippet_is_tested() {
     let python = fs::read_to_string(root().join("py/tests/test_pages.py")).expect("a source");
     assert!(python.contains("glob(\"docs/*.md\")"));
     let data: Vec<String> = files("tests/data", ".toml").iter().map(|path| page(path).text).collect();
+    // crates/thetahat-c/tests/interface runs them, and make embedded does.
+    let programs = files("crates/thetahat-c/tests/c", ".c");
     for page in pages() {
         for block in page.split().0 {
             let Block { language, lines } = block;
@@ -257,6 +270,15 @@ fn every_snippet_is_tested() {
                 "toml" => {
                     let text = format!("{}\n", lines.join("\n"));
                     assert!(data.contains(&text), "{}: not a file of tests/data:\n{text}", page.path);
+                }
+                "c" => {
+                    let text = lines.join("\n");
+                    let held = |path: &String| self::page(path).text.contains(&text);
+                    assert!(
+                        programs.iter().any(held),
+                        "{}: not in a program that is run:\n{text}",
+                        page.path
+                    );
                 }
                 _ => assert_eq!(language, "text", "{}: nothing tests this language", page.path),
             }
@@ -273,6 +295,7 @@ fn links_lead_to_files_and_headings() {
         "py/README.md",
         "benches/peers/README.md",
         "tests/data/public/README.md",
+        "examples/battery_gauge/README.md",
     ];
     for page in pages().into_iter().chain(others.map(page)) {
         for link in page.links() {

@@ -3,8 +3,10 @@
 //! `check FOLDER` reads, in Cargo's target folder, the images for each processor and level of optimisation and the output
 //! of the reporting one. It prints the tables of costs and sizes, and compares them with `budgets.md` and with
 //! `docs/firmware.md`. `--write` renews the tables of that page instead. `--bits` compares the bits alone: for this program
-//! in its other build.
+//! in its other build. `--c` compares the bits that firmware in C printed.
 
+#[path = "../../../crates/thetahat-c/tests/interface/steps.rs"]
+mod c_steps;
 mod image;
 mod log;
 mod table;
@@ -48,7 +50,8 @@ fn main() -> ExitCode {
         ([folder], None) => costs(Path::new(folder), false),
         ([folder], Some("--write")) => costs(Path::new(folder), true),
         ([folder], Some("--bits")) => bits(Path::new(folder)).map(|_| Vec::new()),
-        _ => Err("usage: check FOLDER [--bits | --write]".into()),
+        ([folder], Some("--c")) => c_bits(Path::new(folder)).map(|()| Vec::new()),
+        _ => Err("usage: check FOLDER [--bits | --c | --write]".into()),
     };
     match checked {
         Ok(faults) if faults.is_empty() => ExitCode::SUCCESS,
@@ -75,6 +78,20 @@ fn bits(folder: &Path) -> Result<Vec<Log>, Box<dyn Error>> {
         logs.push(log);
     }
     Ok(logs)
+}
+
+/// Compares what the firmware in C printed with what the same steps give here, in Rust.
+fn c_bits(folder: &Path) -> Result<(), Box<dyn Error>> {
+    let printed = fs::read_to_string(folder.join("c/steps.log"))?;
+    let expected = c_steps::lines::<f32>()?;
+    if let Some((firmware, host)) =
+        printed.lines().zip(expected.lines()).find(|(firmware, host)| firmware != host)
+    {
+        return Err(format!("the bits differ.\nfirmware in C: {firmware}\nhost:          {host}").into());
+    }
+    let (firmware, host) = (printed.lines().count(), expected.lines().count());
+    let message = || format!("the firmware in C printed {firmware} lines, the host {host}").into();
+    if firmware == host { Ok(()) } else { Err(message()) }
 }
 
 /// Checks everything. Returns what is wrong with the tables.

@@ -305,7 +305,8 @@ impl<T: Real, P: Dimension + Dimension<Const<1>>, N: Dimension> IndirectSelfTune
         if self.closed.waits(|| self.knows_gain()) {
             return;
         }
-        let Some((a, na, b, nb)) = self.polynomials() else { return };
+        let Some([a, b]) = self.polynomials() else { return };
+        let (na, nb) = (self.plant.a().count(), self.plant.b(0).map_or(0, Iterator::count));
         let (a, b) = (a.as_slice().get(..na).unwrap_or_default(), b.as_slice().get(..nb).unwrap_or_default());
         let gain = b.iter().fold(T::zero(), |sum, value| sum + *value);
         let given = self.closed.settings.gain_sign;
@@ -313,7 +314,8 @@ impl<T: Real, P: Dimension + Dimension<Const<1>>, N: Dimension> IndirectSelfTune
             return;
         }
         // Where no sign is given, that of a gain that was known is.
-        if given.is_zero() && !(gain * self.known_sign > T::zero()) {
+        let has_its_sign = gain * self.known_sign > T::zero();
+        if given.is_zero() && !has_its_sign {
             if self.knows_gain() {
                 self.known_sign = if gain > T::zero() { T::one() } else { -T::one() };
             } else if !self.known_sign.is_zero() {
@@ -386,21 +388,13 @@ impl<T: Real, P: Dimension + Dimension<Const<1>>, N: Dimension> IndirectSelfTune
         largest.is_finite().then_some((controller, largest))
     }
 
-    /// A and B of the model with how many coefficients they have, where they are finite.
-    fn polynomials(&self) -> Option<(OVector<T, P>, usize, OVector<T, P>, usize)> {
+    /// A and B of the model, filled up with zeros, where they are finite.
+    fn polynomials(&self) -> Option<[OVector<T, P>; 2]> {
         let size = self.plant.estimator().covariance().size();
         let (mut a, mut b) = (size.vector(T::zero()), size.vector(T::zero()));
-        let mut counts = (0, 0);
-        for (entry, value) in a.iter_mut().zip(self.plant.a()) {
-            *entry = value;
-            counts.0 += 1;
-        }
-        for (entry, value) in b.iter_mut().zip(self.plant.b(0)?) {
-            *entry = value;
-            counts.1 += 1;
-        }
-        let finite = a.iter().chain(b.iter()).all(T::is_finite);
-        finite.then_some((a, counts.0, b, counts.1))
+        a.iter_mut().zip(self.plant.a()).for_each(|(entry, value)| *entry = value);
+        b.iter_mut().zip(self.plant.b(0)?).for_each(|(entry, value)| *entry = value);
+        a.iter().chain(b.iter()).all(T::is_finite).then_some([a, b])
     }
 
     /// Whether |B(1)| exceeds five of its standard errors.

@@ -45,7 +45,7 @@ fn direct(start: RlsStart) -> Result<Direct, Error> {
 }
 
 fn set_point(k: usize) -> f64 {
-    if k / 20 % 2 == 0 { 1.0 } else { -1.0 }
+    if (k / 20).is_multiple_of(2) { 1.0 } else { -1.0 }
 }
 
 fn coefficients<N: crate::Dimension>(controller: &RstController<f64, N>) -> [f64; 4] {

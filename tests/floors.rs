@@ -28,7 +28,7 @@ const CORE: House = House {
         &["control", "rls", "state_space", "windowed"],
         &["arx", "augmented", "differentiated", "gradient", "kalman"],
         &["armax", "ekf", "luenberger", "nonlinear_arx", "output_error", "schedule", "vector_arx"],
-        &["recursive_narx", "smoother"],
+        &["out_of_sequence", "recursive_narx", "smoother"],
     ],
 };
 

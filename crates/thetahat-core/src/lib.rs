@@ -18,6 +18,7 @@
 //! |---|---|
 //! | [`KalmanFilter`] | for [`LinearTransition`] and [`LinearObservation`]; any number of sensors |
 //! | [`ExtendedKalmanFilter`] | for any [`Transition`] and [`Observation`]; [`Augmented`] makes unknown parameters states |
+//! | [`OutOfSequenceFilter`] | either of the two, where measurements come late; a [`FilterHistory`] of them |
 //! | [`LuenbergerObserver`] | a fixed gain, placed poles, or the gain of a [`SteadyState`] |
 //! | [`GainSchedule`] | gains and covariances ahead of the data |
 //! | `Smoother` | the states given the whole record (feature `alloc`) |
@@ -131,6 +132,7 @@ mod luenberger;
 #[cfg(test)]
 mod noise;
 mod nonlinear_arx;
+mod out_of_sequence;
 mod output_error;
 mod recursive_narx;
 mod rls;
@@ -180,6 +182,7 @@ pub use lags::{ArxOrders, InputOrders, Lags};
 pub use least_squares::{LeastSquares, Rank};
 pub use luenberger::LuenbergerObserver;
 pub use nonlinear_arx::{NonlinearArx, Scaling};
+pub use out_of_sequence::{FilterHistory, OutOfSequenceFilter};
 pub use output_error::{OutputErrorMethod, RecursiveOutputError};
 pub use recursive_narx::RecursiveNarx;
 pub use rls::RecursiveLeastSquares;

@@ -1,11 +1,11 @@
 //! Problems that are kept as plain numbers, and put together again: what a window of rows is made of.
 
+use nalgebra::OVector;
+
 use super::{LeastSquares, copy_values};
 use crate::triangle::{Sum, least_remainder, row, solve, solve_transposed};
 use crate::ud::copy;
-use crate::{Dimension, Error, Real};
-
-use nalgebra::OVector;
+use crate::{Dimension, Real};
 
 /// How many numbers [`LeastSquares::pack`] writes: the triangle [R z; 0 ρ].
 pub(crate) const fn packed_numbers(parameters: usize) -> usize {
@@ -90,9 +90,9 @@ impl<T: Real, N: Dimension> LeastSquares<T, N> {
 
     /// That a packed triangle is one that rows within the limit of [`add`](LeastSquares::add) can make.
     #[cfg(feature = "serde")]
-    pub(crate) fn check_packed(packed: &[T], rows: usize) -> Result<(), Error> {
+    pub(crate) fn check_packed(packed: &[T], rows: usize) -> Result<(), crate::Error> {
         let limit = T::LARGEST_ENTRY * T::from_count(2) * T::from_count(rows.max(1)).sqrt();
         let fits = packed.iter().all(|entry| entry.abs() <= limit);
-        fits.then_some(()).ok_or(Error::TooLarge { argument: "stored" })
+        fits.then_some(()).ok_or(crate::Error::TooLarge { argument: "stored" })
     }
 }

@@ -7,6 +7,7 @@ use crate::ud::{add_multiple, copy};
 
 /// ψ(k) = φ(k) - c_1 ψ(k-1) - … - c_nc ψ(k-nc), from past gradients in the columns of `past`. Returns false where that has
 /// grown too large, as it may while C changes, although every single C is stable: then ψ is φ, and the past is to be forgotten.
+#[inline(always)]
 pub(crate) fn filter<T: Real>(gradient: &mut [T], regressor: &[T], polynomial: &[T], past: &[T]) -> bool {
     copy(regressor, gradient);
     for (index, &coefficient) in polynomial.iter().enumerate() {
@@ -20,6 +21,7 @@ pub(crate) fn filter<T: Real>(gradient: &mut [T], regressor: &[T], polynomial: &
 }
 
 /// Moves each of `count` columns one place on, the new one to the front; the oldest one falls out, into `gradient`.
+#[inline(always)]
 pub(crate) fn push<T: Real>(past: &mut [T], gradient: &mut [T], count: usize) {
     let size = gradient.len();
     for index in 0..count {

@@ -189,6 +189,7 @@ impl<T: Real, N: Dimension> LeastSquares<T, N> {
     }
 
     /// What [`add`](LeastSquares::add) checks of a row.
+    #[inline(always)]
     pub(crate) fn check(&self, regressor: &OVector<T, N>, output: T) -> Result<(), Error> {
         check_length("regressor", self.size().value(), regressor.len())?;
         check_row("regressor", regressor.as_slice())?;
@@ -196,6 +197,7 @@ impl<T: Real, N: Dimension> LeastSquares<T, N> {
     }
 
     /// Rotates a row in that is checked. It is not counted.
+    #[inline(always)]
     fn fold(&mut self, regressor: &OVector<T, N>, output: T) {
         let size = self.size();
         let (factor, rotated) = (self.factor_rows.as_mut_slice(), self.rotated_output.as_mut_slice());

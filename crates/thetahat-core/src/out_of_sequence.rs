@@ -70,9 +70,8 @@ impl FilterHistory {
 /// `B` is the buffer of the ring, at least [`FilterHistory::numbers`]. Memory: that, the filter's own, and some counters. A late
 /// measurement takes as much again on the stack: it works on a copy, so that an error leaves all as it was.
 ///
-/// Source: Bar-Shalom, Li and Kirubarajan, Estimation with Applications to Tracking and Navigation, 2001, section 5.3 (the filter); Larsen,
-/// Andersen, Ravn and Poulsen, Incorporation of time delayed measurements in a discrete-time Kalman filter, 1998 (ways and their
-/// costs; running again is the exact one there).
+/// Source: Larsen, Andersen, Ravn and Poulsen, Incorporation of time delayed measurements in a discrete-time Kalman filter, 1998 (ways
+/// and their costs); Bar-Shalom, Update with out-of-sequence measurements in tracking: exact solution, 2002.
 ///
 /// ```
 /// use thetahat_core::nalgebra::{Const, Matrix1, SVector, Vector1, Vector2};

@@ -87,9 +87,9 @@ pub enum OutputErrorMethod {
 /// `N` is the number of parameters, [`ArxOrders::parameters`], and `D` the buffer for inputs on their way, at least
 /// [`ArxOrders::delays`]. Memory: that of `RecursiveArx`, and n² numbers for past gradients.
 ///
-/// Source: Ljung and Söderström, Theory and Practice of Recursive Identification, 1983, sections 3.7.2 (gradients), 3.6.3 (instruments from
-/// an auxiliary model) and 6.6 (projection); Söderström and Stoica, Instrumental Variable Methods for System Identification,
-/// 1983; Young, Recursive Estimation and Time-Series Analysis, 2nd ed., 2011, chapters 6 and 7 (the symmetric P).
+/// Source: Ljung and Söderström, Theory and Practice of Recursive Identification, 1983, sections 3.7.2 (gradients) and 6.6
+/// (projection); Ljung, System Identification, 2nd ed., sections 11.3 (instruments) and 11.4; Söderström and Stoica,
+/// Instrumental Variable Methods for System Identification, 1983 (instruments from an auxiliary model); Young, Recursive Estimation and Time-Series Analysis, 2nd ed., 2011, chapters 6 and 7 (the symmetric P).
 ///
 /// ```
 /// use thetahat_core::nalgebra::{Const, Vector2};

@@ -82,13 +82,12 @@ impl Window {
 ///
 /// # Size and cost
 ///
-/// `B` is the buffer for the blocks, at least [`Window::numbers`]. Memory: B + 6 n² + 7 n numbers, and some counters. A step
-/// costs 10 n² + 5/3 n³ + n² flops and as many square roots as a merge has rows and columns; once in `blocks` `block` samples, when
+/// `B` is the buffer for the blocks, at least [`Window::numbers`]. Memory: B + 6 n² + 7 n + 6 numbers, and some counters. A step
+/// costs some 13 n² + 5/3 n³ flops and n²/2 + 7 n/2 square roots; once in `blocks` `block` samples, when
 /// the newer blocks become the older ones, `blocks` merges of 5/3 n³ flops and n²/2 square roots come on top: where each step has its
 /// deadline, take few long blocks.
 ///
-/// Source: Björck, Numerical Methods for Least Squares Problems, 1996, sections 3.2 (updating) and 3.3 (downdating, and what it
-/// costs in digits); Ljung and Söderström, Theory and Practice of Recursive Identification, 1983, section 5.6 (windows).
+/// Source: Björck, Numerical Methods for Least Squares Problems, 1996, chapter 3 (updating, and what downdating costs in digits).
 ///
 /// ```
 /// use thetahat_core::nalgebra::{Const, Vector2};

@@ -278,7 +278,7 @@ fn windowed_least_squares() {
             "{window:?}: {worst:.1} condition numbers times epsilon, {determined} of {} determined",
             steps()
         );
-        assert!(worst < 10.0, "{window:?}: {worst:e}");
+        assert!(worst < 30.0, "{window:?}: {worst:e}");
     }
 }
 

@@ -46,8 +46,8 @@ use crate::array;
 ///
 /// References
 /// ----------
-/// Bar-Shalom, Li and Kirubarajan, Estimation with Applications to Tracking and Navigation, 2001, section 5.3. Larsen, Andersen, Ravn
-/// and Poulsen, Incorporation of time delayed measurements in a discrete-time Kalman filter, 1998.
+/// Larsen, Andersen, Ravn and Poulsen, Incorporation of time delayed measurements in a discrete-time Kalman filter, 1998.
+/// Bar-Shalom, Update with out-of-sequence measurements in tracking: exact solution, 2002.
 ///
 /// Examples
 /// --------

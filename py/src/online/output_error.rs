@@ -61,7 +61,7 @@ use super::recursive_model::{
 ///
 /// References
 /// ----------
-/// Ljung and Söderström, Theory and Practice of Recursive Identification, 1983, sections 3.6.3, 3.7.2 and 6.6. Young,
+/// Ljung and Söderström, Theory and Practice of Recursive Identification, 1983, sections 3.7.2 and 6.6. Young,
 /// Recursive Estimation and Time-Series Analysis, 2nd ed., 2011, chapters 6 and 7.
 ///
 /// Examples

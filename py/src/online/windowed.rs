@@ -45,7 +45,7 @@ const LARGEST_WINDOW: usize = 100_000_000;
 ///
 /// References
 /// ----------
-/// Björck, Numerical Methods for Least Squares Problems, 1996, sections 3.2 and 3.3. Tangwongsan, Hirzel, Schneider and Wu, General
+/// Björck, Numerical Methods for Least Squares Problems, 1996, chapter 3. Tangwongsan, Hirzel, Schneider and Wu, General
 /// incremental sliding-window aggregation, 2015.
 ///
 /// Examples

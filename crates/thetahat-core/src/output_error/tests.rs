@@ -295,3 +295,21 @@ fn what_is_wrong_is_said_and_changes_nothing() {
         assert_eq!(direct.measured(1.0).unwrap_err(), Error::InputFirst { input: 0 });
     }
 }
+
+#[cfg(feature = "alloc")]
+#[test]
+fn run_time_sizes_give_the_same_bits() {
+    use nalgebra::Dyn;
+
+    for method in METHODS {
+        let mut fixed = estimator::<f64>(method, Forgetting::default());
+        let mut dynamic: RecursiveOutputError<f64, Dyn, Dyn> =
+            RecursiveOutputError::new(&FIRST, method, 1.0, &[1.0], Forgetting::default()).unwrap();
+        for (y, u) in record(100, 0.5, &mut Noise(7)) {
+            let answers = (fixed.log_row(y, &[u]), dynamic.log_row(y, &[u]));
+            assert_eq!(std::format!("{:?}", answers.0), std::format!("{:?}", answers.1));
+            let found = (fixed.estimator().parameters(), dynamic.estimator().parameters());
+            assert_eq!(found.0.as_slice(), found.1.as_slice());
+        }
+    }
+}

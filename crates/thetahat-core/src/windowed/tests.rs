@@ -153,3 +153,23 @@ fn large_and_tiny_samples_leave_without_trace() {
         }
     }
 }
+
+#[cfg(feature = "alloc")]
+#[test]
+fn run_time_sizes_give_the_same_bits() {
+    use nalgebra::{DVector, Dyn};
+
+    let window = Window { blocks: 5, block: 3 };
+    let mut fixed = Windowed::<f64>::new(Const, window).unwrap();
+    let mut dynamic: WindowedLeastSquares<f64, Dyn, Dyn> = WindowedLeastSquares::new(Dyn(3), window).unwrap();
+    let mut noise = Noise(6);
+    for _ in 0..60 {
+        let (regressor, output) = row(&mut noise);
+        let answer = fixed.update(&regressor, output);
+        let row = DVector::from_column_slice(regressor.as_slice());
+        assert_eq!(format!("{answer:?}"), format!("{:?}", dynamic.update(&row, output)));
+        assert_eq!(fixed.parameters().as_slice(), dynamic.parameters().as_slice());
+    }
+    let short = dynamic.update(&DVector::zeros(2), 1.0).unwrap_err();
+    assert_eq!(short, Error::Length { argument: "regressor", expected: 3, found: 2 });
+}

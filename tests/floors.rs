@@ -20,15 +20,15 @@ const CORE: House = House {
     source: "crates/thetahat-core/src",
     floors: &[
         &["scalar", "textbook"],
-        &["dual", "error", "stability", "triangle"],
+        &["dual", "error", "triangle"],
         &["forgetting", "ud"],
-        &["dim"],
+        &["dim", "stability"],
         &["basis", "innovation", "snapshot", "solution"],
         &["covariance", "detect", "lags", "least_squares"],
-        &["rls", "state_space"],
-        &["arx", "augmented", "differentiated", "kalman"],
-        &["armax", "ekf", "luenberger", "nonlinear_arx", "schedule", "vector_arx"],
-        &["control", "recursive_narx", "smoother"],
+        &["rls", "state_space", "windowed"],
+        &["arx", "augmented", "differentiated", "gradient", "kalman"],
+        &["armax", "ekf", "luenberger", "nonlinear_arx", "output_error", "schedule", "vector_arx"],
+        &["control", "out_of_sequence", "recursive_narx", "smoother"],
     ],
 };
 

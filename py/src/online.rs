@@ -18,6 +18,8 @@ mod limits;
 mod luenberger;
 mod model;
 mod narx;
+mod out_of_sequence;
+mod output_error;
 mod recursive;
 mod recursive_model;
 pub(crate) mod results;
@@ -25,6 +27,7 @@ mod self_tuner;
 mod trajectory;
 mod used;
 mod vector_arx;
+mod windowed;
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -43,6 +46,8 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<arx::RecursiveArx>()?;
     module.add_class::<vector_arx::RecursiveVectorArx>()?;
     module.add_class::<armax::RecursiveArmax>()?;
+    module.add_class::<output_error::RecursiveOutputError>()?;
+    module.add_class::<windowed::WindowedLeastSquares>()?;
     module.add_class::<narx::RecursiveNarx>()?;
     module.add_class::<controller::RstController>()?;
     module.add_class::<self_tuner::SelfTuner>()?;
@@ -53,6 +58,7 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<callable::NonlinearObservation>()?;
     module.add_class::<kalman::KalmanFilter>()?;
     module.add_class::<extended::ExtendedKalmanFilter>()?;
+    module.add_class::<out_of_sequence::OutOfSequenceFilter>()?;
     module.add_class::<luenberger::LuenbergerObserver>()?;
     module.add_class::<detector::ChangeDetector>()?;
     module.add_class::<detector::ChangeTrajectory>()?;
@@ -84,6 +90,16 @@ fn _restore<'py>(py: Python<'py>, class_name: &str, kept: &Bound<'py, PyAny>) ->
         "RecursiveArmax" => {
             let model = RecursiveModel::restore(read(kept)?, class_name)?;
             any(Bound::new(py, armax::RecursiveArmax::over(model))?.into_any())
+        }
+        "RecursiveOutputError" => {
+            let model = RecursiveModel::restore(read(kept)?, class_name)?;
+            any(Bound::new(py, output_error::RecursiveOutputError::over(model))?.into_any())
+        }
+        "WindowedLeastSquares" => {
+            any(Bound::new(py, windowed::WindowedLeastSquares::of(read(kept)?))?.into_any())
+        }
+        "OutOfSequenceFilter" => {
+            any(Bound::new(py, out_of_sequence::OutOfSequenceFilter { filter: read(kept)? })?.into_any())
         }
         "RstController" => any(Bound::new(py, controller::RstController::of(read(kept)?))?.into_any()),
         "RecursiveNarx" => {

@@ -5,17 +5,14 @@ use core::ops::RangeInclusive;
 use nalgebra::{Const, OMatrix, OVector};
 
 use crate::arx::{check_samples, is_large, predict_ahead};
-use crate::rls::{check_limits, is_small};
-use crate::stability::is_stable;
-use crate::triangle::{column, column_mut};
-use crate::ud::{add_multiple, copy, dot};
+use crate::gradient;
+use crate::rls::check_limits;
+use crate::stability::{is_stable, move_stably};
+use crate::ud::{copy, dot};
 use crate::{
     Action, ArxOrders, Covariance, Dimension, Error, Forgetting, Innovation, InputOrders, Lags, Real,
     RecursiveLeastSquares,
 };
-
-/// How often a step is halved before it is left out.
-const HALVINGS: usize = 10;
 
 /// The orders of an ARMAX model: those of an [ARX model](ArxOrders), and the order of its noise.
 ///
@@ -277,24 +274,18 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
                 *residual = T::zero();
                 return innovation;
             };
-            copy(regressor, gradient);
-            if *method == ArmaxMethod::PredictionError {
-                let c = last(estimator.parameters().as_slice(), nc).iter();
-                for (index, &c) in c.enumerate() {
-                    add_multiple(gradient, -c, column(gradients.as_slice(), size.value(), index));
-                }
-            }
-            // While C changes, what it filters may grow, although every single C is stable. Then start anew.
-            let grown = !is_small(gradient);
-            if grown {
-                copy(regressor, gradient);
-            }
+            let c = match method {
+                ArmaxMethod::ExtendedLeastSquares => &[],
+                ArmaxMethod::PredictionError => last(estimator.parameters().as_slice(), nc),
+            };
+            let grown = !gradient::filter(gradient, regressor, c, gradients.as_slice());
             if output.is_finite() {
                 let error = output - dot(regressor, estimator.parameters().as_slice());
                 let mut variance = [T::NAN];
                 let corrected =
                     estimator.correct(gradient, &[error], &mut variance, |parameters, direction, step| {
-                        move_stably(parameters, direction, step, work.get_mut(..nc).unwrap_or_default())
+                        let c = parameters.len().saturating_sub(nc)..parameters.len();
+                        move_stably(parameters, direction, step, c, work)
                     });
                 // What is too large here is so by what came before: time must go on, or it would stay.
                 let Ok((nis, action)) = corrected else {
@@ -316,11 +307,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
             if grown {
                 gradients.fill(T::zero());
             }
-            // Each column one place on, the new one to the front; the oldest one falls out.
-            for index in 0..nc {
-                let past = column_mut(gradients.as_mut_slice(), size.value(), index);
-                past.iter_mut().zip(&mut *gradient).for_each(|(past, moving)| core::mem::swap(past, moving));
-            }
+            gradient::push(gradients.as_mut_slice(), gradient, nc);
             innovation
         });
         lags.push_checked(&[output]);
@@ -424,21 +411,6 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
 /// The last `count` numbers.
 fn last<T>(values: &[T], count: usize) -> &[T] {
     values.get(values.len().saturating_sub(count)..).unwrap_or_default()
-}
-
-/// Adds `step` times `direction` to the parameters, or half of it, a quarter, …, so that C, the last of them, stays
-/// stable; nothing if that does not help. `work` has the size of C. Returns whether the step was shortened.
-fn move_stably<T: Real>(parameters: &mut [T], direction: &[T], mut step: T, work: &mut [T]) -> bool {
-    for halvings in 0..=HALVINGS {
-        copy(last(parameters, work.len()), work);
-        add_multiple(work, step, last(direction, work.len()));
-        if is_stable(work) {
-            add_multiple(parameters, step, direction);
-            return halvings > 0;
-        }
-        step /= T::from_count(2);
-    }
-    true
 }
 
 #[cfg(feature = "serde")]

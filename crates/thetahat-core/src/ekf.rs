@@ -146,6 +146,16 @@ impl<T: Real, N: Dimension> ExtendedKalmanFilter<T, N> {
         self.linear.covariance()
     }
 
+    /// The filter around which it is.
+    pub(crate) fn linear(&self) -> &KalmanFilter<T, N> {
+        &self.linear
+    }
+
+    /// The filter around which it is.
+    pub(crate) fn linear_mut(&mut self) -> &mut KalmanFilter<T, N> {
+        &mut self.linear
+    }
+
     /// The same with a gate that lets go: see [`KalmanFilter::with_release`].
     pub fn with_release(self, count: u16) -> Self {
         ExtendedKalmanFilter { linear: self.linear.with_release(count), ..self }

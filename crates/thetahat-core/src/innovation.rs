@@ -12,15 +12,15 @@ pub enum Action {
     Updated,
     /// The estimate was corrected, and a variance that had grown to its bound was brought back to it.
     Capped,
-    /// The estimate was corrected by less than the innovation asks for, so that C(q) stays stable, or parameters stay within
-    /// limits.
+    /// The estimate was corrected by less than the innovation asks for, so that C(q) or F(q) stays stable, or parameters stay
+    /// within limits.
     Projected,
     /// The measurement is missing (NaN): time went on, nothing was corrected.
     Missing,
     /// The delay lines are not filled yet, at the start or after missing samples, or hold numbers too large to be
     /// absorbed: time went on, nothing was corrected.
     NotReady,
-    /// Regressors are collected until they have full rank: there is no estimate yet.
+    /// Regressors are collected until they have full rank: there is no estimate yet, or that of an earlier window stays.
     Collecting,
     /// Adaptation is off: the innovation is computed, nothing was corrected.
     Frozen,

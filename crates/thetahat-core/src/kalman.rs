@@ -521,5 +521,8 @@ fn whiten<T: Real, M: Dimension>(
 
 #[cfg(feature = "serde")]
 mod snapshot;
+mod stored;
 #[cfg(test)]
 mod tests;
+
+pub(crate) use stored::stored_numbers;

@@ -181,11 +181,25 @@ impl<T: Real, N: Dimension> LeastSquares<T, N> {
     /// [`Real::LARGEST_ENTRY`], so that nothing that is accepted can overflow later; [`Error::Length`] (only
     /// with `Dyn`); [`Error::TooManyRows`].
     pub fn add(&mut self, regressor: &OVector<T, N>, output: T) -> Result<(), Error> {
-        let size = self.size();
-        check_length("regressor", size.value(), regressor.len())?;
-        check_row("regressor", regressor.as_slice())?;
-        check_row("output", &[output])?;
+        self.check(regressor, output)?;
         let rows = self.rows.checked_add(1).ok_or(Error::TooManyRows)?;
+        self.fold(regressor, output);
+        self.rows = rows;
+        Ok(())
+    }
+
+    /// What [`add`](LeastSquares::add) checks of a row.
+    #[inline(always)]
+    pub(crate) fn check(&self, regressor: &OVector<T, N>, output: T) -> Result<(), Error> {
+        check_length("regressor", self.size().value(), regressor.len())?;
+        check_row("regressor", regressor.as_slice())?;
+        check_row("output", &[output])
+    }
+
+    /// Rotates a row in that is checked. It is not counted.
+    #[inline(always)]
+    fn fold(&mut self, regressor: &OVector<T, N>, output: T) {
+        let size = self.size();
         let (factor, rotated) = (self.factor_rows.as_mut_slice(), self.rotated_output.as_mut_slice());
         let rest = size.with_scratch(&mut self.scratch, |[row], []| {
             for (entry, &given) in row.iter_mut().zip(regressor.as_slice()) {
@@ -194,8 +208,6 @@ impl<T: Real, N: Dimension> LeastSquares<T, N> {
             fold_row(factor, rotated, row, 0, output)
         });
         self.residual_norm.lengthen(rest);
-        self.rows = rows;
-        Ok(())
     }
 
     /// Adds all rows of another problem, as if they had been added here one by one.
@@ -221,18 +233,27 @@ impl<T: Real, N: Dimension> LeastSquares<T, N> {
         let size = self.size();
         check_length("other", size.value(), other.rotated_output.len())?;
         let rows = self.rows.checked_add(other.rows).ok_or(Error::TooManyRows)?;
-        let (factor, rotated) = (self.factor_rows.as_mut_slice(), self.rotated_output.as_mut_slice());
-        let residual_norm = &mut self.residual_norm;
-        residual_norm.lengthen(other.residual_norm.value);
-        size.with_scratch(&mut self.scratch, |[row], []| {
-            for (index, output) in other.rotated_output.as_slice().iter().enumerate() {
-                copy_values(column(other.factor_rows.as_slice(), size.value(), index), row);
-                residual_norm.lengthen(fold_row(factor, rotated, row, index, output.value));
-            }
+        self.fold_factor(other.residual_norm.value, |index, row| {
+            copy_values(column(other.factor_rows.as_slice(), size.value(), index), row);
+            other.rotated_output.as_slice().get(index).map_or(T::zero(), |output| output.value)
         });
         self.uncompensated_rows += other.uncompensated_rows;
         self.rows = rows;
         Ok(())
+    }
+
+    /// Rotates in the rows of another triangle: `row_of` writes one, from its diagonal on, and returns its output.
+    fn fold_factor(&mut self, residual_norm: T, mut row_of: impl FnMut(usize, &mut [T]) -> T) {
+        let size = self.size();
+        let (factor, rotated) = (self.factor_rows.as_mut_slice(), self.rotated_output.as_mut_slice());
+        let own_norm = &mut self.residual_norm;
+        own_norm.lengthen(residual_norm);
+        size.with_scratch(&mut self.scratch, |[row], []| {
+            for index in 0..size.value() {
+                let output = row_of(index, row);
+                own_norm.lengthen(fold_row(factor, rotated, row, index, output));
+            }
+        });
     }
 
     /// R, upper triangular, n x n: a copy. Its diagonal is not negative, unless
@@ -467,6 +488,8 @@ impl<N: Dimension> Rank<N> {
     }
 }
 
+mod packed;
+pub(crate) use packed::packed_numbers;
 #[cfg(feature = "serde")]
 mod snapshot;
 #[cfg(test)]

@@ -5,9 +5,11 @@
 //! | parameters of a model | |
 //! |---|---|
 //! | [`RecursiveArx`], [`RecursiveArmax`] | from what is measured and applied, call by call; predict some samples ahead |
+//! | [`RecursiveOutputError`] | the same where the sensor is noisy: by prediction errors of the output, or instrumental variables |
 //! | [`RecursiveNarx`] | the same for a weighted sum of functions of lags, a [`Polynomial`], [`Radial`], [`Spline`] or [`Local`] [`Basis`] |
 //! | [`RecursiveVectorArx`] | an ARX model with several outputs, each of which depends on the past of all |
 //! | [`RecursiveLeastSquares`] | from any regressors; [`Forgetting`] policies that stay bounded, three ways to [`RlsStart`] |
+//! | [`WindowedLeastSquares`] | from the last samples only, a [`Window`] of them |
 //! | [`LeastSquares`] | all rows at once: merges with others, says which columns are at fault |
 //! | [`NonlinearArx`] | a stored nonlinear model: predicts, and gives its slopes for an extended Kalman filter |
 //! | [`Lags`], [`ArxOrders`] | delay lines that make regressors of samples, and know of missing ones |
@@ -16,6 +18,7 @@
 //! |---|---|
 //! | [`KalmanFilter`] | for [`LinearTransition`] and [`LinearObservation`]; any number of sensors |
 //! | [`ExtendedKalmanFilter`] | for any [`Transition`] and [`Observation`]; [`Augmented`] makes unknown parameters states |
+//! | [`OutOfSequenceFilter`] | either of the two, where measurements come late; a [`FilterHistory`] of them |
 //! | [`LuenbergerObserver`] | a fixed gain, placed poles, or the gain of a [`SteadyState`] |
 //! | [`GainSchedule`] | gains and covariances ahead of the data |
 //! | `Smoother` | the states given the whole record (feature `alloc`) |
@@ -120,6 +123,7 @@ mod dual;
 mod ekf;
 mod error;
 mod forgetting;
+mod gradient;
 mod innovation;
 mod kalman;
 mod lags;
@@ -128,6 +132,8 @@ mod luenberger;
 #[cfg(test)]
 mod noise;
 mod nonlinear_arx;
+mod out_of_sequence;
+mod output_error;
 mod recursive_narx;
 mod rls;
 mod scalar;
@@ -144,6 +150,7 @@ mod textbook;
 mod triangle;
 mod ud;
 mod vector_arx;
+mod windowed;
 
 pub use nalgebra;
 
@@ -175,6 +182,8 @@ pub use lags::{ArxOrders, InputOrders, Lags};
 pub use least_squares::{LeastSquares, Rank};
 pub use luenberger::LuenbergerObserver;
 pub use nonlinear_arx::{NonlinearArx, Scaling};
+pub use out_of_sequence::{FilterHistory, OutOfSequenceFilter};
+pub use output_error::{OutputErrorMethod, RecursiveOutputError};
 pub use recursive_narx::RecursiveNarx;
 pub use rls::RecursiveLeastSquares;
 pub use scalar::Real;
@@ -186,3 +195,4 @@ pub use snapshot::SnapshotVersion;
 pub use solution::Solution;
 pub use state_space::{LinearObservation, LinearTransition, Observation, Transition};
 pub use vector_arx::RecursiveVectorArx;
+pub use windowed::{Window, WindowedLeastSquares};

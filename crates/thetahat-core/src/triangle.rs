@@ -12,7 +12,7 @@ use crate::Real;
 const ITERATIONS: usize = 20;
 
 /// Row `index` from its diagonal on: n - index numbers.
-fn row<T>(triangle: &[T], size: usize, index: usize) -> &[T] {
+pub(crate) fn row<T>(triangle: &[T], size: usize, index: usize) -> &[T] {
     triangle.get(index * size + index..(index + 1) * size).unwrap_or_default()
 }
 
@@ -185,28 +185,62 @@ fn multiply_transposed<T: Real>(triangle: &[T], x: &mut [T]) {
     }
 }
 
+/// What an entry of a triangle is worth.
+pub(crate) trait Value<T>: Copy {
+    fn value(self) -> T;
+}
+
+impl<T: Real> Value<T> for T {
+    fn value(self) -> T {
+        self
+    }
+}
+
+impl<T: Real> Value<T> for Sum<T> {
+    fn value(self) -> T {
+        self.value
+    }
+}
+
+/// The least share of a column's norm that is left once the columns before it are projected out: |r_jj| over the norm of
+/// column j. 0 where a column is 0.
+pub(crate) fn least_remainder<T: Real, E: Value<T>>(triangle: &[E], size: usize) -> T {
+    (0..size).fold(T::one(), |least, index| {
+        let column = (0..=index).filter_map(|row| triangle.get(row * size + index));
+        let column = column.map(|entry| entry.value().abs());
+        let largest = column.clone().fold(T::zero(), T::max);
+        let diagonal = column.clone().last().unwrap_or(T::zero());
+        if diagonal.is_zero() {
+            return T::zero();
+        }
+        let sum = column.fold(T::zero(), |sum, entry| sum + (entry / largest) * (entry / largest));
+        least.min(diagonal / largest / sum.sqrt())
+    })
+}
+
 /// x <- R^-1 x, by back substitution: n² flops.
-pub(crate) fn solve<T: Real>(triangle: &[T], x: &mut [T]) {
+pub(crate) fn solve<T: Real, E: Value<T>>(triangle: &[E], x: &mut [T]) {
     let size = x.len();
     for index in (0..size).rev() {
         if let (Some([value, solved @ ..]), [diagonal, rest @ ..]) =
             (x.get_mut(index..), row(triangle, size, index))
         {
-            *value = (*value - dot(rest, solved)) / *diagonal;
+            let known = rest.iter().zip(&*solved).fold(T::zero(), |sum, (entry, &x)| sum + entry.value() * x);
+            *value = (*value - known) / diagonal.value();
         }
     }
 }
 
 /// x <- R'^-1 x.
-fn solve_transposed<T: Real>(triangle: &[T], x: &mut [T]) {
+pub(crate) fn solve_transposed<T: Real, E: Value<T>>(triangle: &[E], x: &mut [T]) {
     let size = x.len();
     for index in 0..size {
         if let (Some([value, below @ ..]), [diagonal, rest @ ..]) =
             (x.get_mut(index..), row(triangle, size, index))
         {
-            *value /= *diagonal;
-            for (element, &entry) in below.iter_mut().zip(rest) {
-                *element -= entry * *value;
+            *value /= diagonal.value();
+            for (element, entry) in below.iter_mut().zip(rest) {
+                *element -= entry.value() * *value;
             }
         }
     }

@@ -1,5 +1,8 @@
 //! What is written and read back goes on as if nothing had happened: every estimator, in text and in binary.
 
+#[path = "snapshot/past.rs"]
+mod past;
+
 use std::fmt::Debug;
 
 use serde::de::DeserializeOwned;
@@ -9,10 +12,11 @@ use thetahat_core::nalgebra::{
     Const, DMatrix, DVector, Dyn, Matrix2, RowVector2, SVector, Vector1, Vector2, Vector3,
 };
 use thetahat_core::{
-    Action, ArmaxMethod, ArmaxOrders, ArxOrders, Basis, ChangeDetector, Covariance, ExtendedKalmanFilter,
-    Forgetting, GainSchedule, Innovation, InputOrders, KalmanFilter, Lags, LeastSquares, LinearObservation,
-    LinearTransition, LuenbergerObserver, RecursiveArmax, RecursiveArx, RecursiveLeastSquares, RecursiveNarx,
-    RecursiveVectorArx, RlsStart, RstController, Scaling,
+    Action, ArmaxMethod, ArmaxOrders, ArxOrders, Basis, ChangeDetector, Covariance, Error,
+    ExtendedKalmanFilter, Forgetting, GainSchedule, Innovation, InputOrders, KalmanFilter, Lags,
+    LeastSquares, LinearObservation, LinearTransition, LuenbergerObserver, OutputErrorMethod, RecursiveArmax,
+    RecursiveArx, RecursiveLeastSquares, RecursiveNarx, RecursiveOutputError, RecursiveVectorArx, RlsStart,
+    RstController, Scaling,
 };
 
 const INPUTS: &[InputOrders] = &[InputOrders { nb: 1, nk: 2 }];
@@ -136,6 +140,12 @@ fn recursive_arx_and_armax() {
         let armax: RecursiveArmax<f64, Const<3>, Const<2>> =
             RecursiveArmax::new(&orders, method, 1.0, &[1.0], 0.1, Forgetting::default()).unwrap();
         check(armax, |armax, k| (armax.log_row(output(k), &[value(k)]), *armax.estimator().parameters()));
+    }
+    for method in [OutputErrorMethod::PredictionError, OutputErrorMethod::Instruments] {
+        let orders = ArxOrders { na: 1, inputs: INPUTS, constant: false };
+        let model: RecursiveOutputError<f64, Const<2>, Const<2>> =
+            RecursiveOutputError::new(&orders, method, 1.0, &[1.0], Forgetting::default()).unwrap();
+        check(model, |model, k| (model.log_row(output(k), &[value(k)]), *model.estimator().parameters()));
     }
 }
 
@@ -467,41 +477,62 @@ fn a_tampered_number_is_refused_or_overcome() {
             _ => {}
         }
     }
+    fn check<E: Serialize + DeserializeOwned>(
+        mut model: E,
+        mut log_row: impl FnMut(&mut E, f32, &[f32]) -> Result<Innovation<f32>, Error>,
+    ) {
+        let mut row = |model: &mut E, k| log_row(model, output(k) as f32, &[value(k) as f32]);
+        for k in 20..50 {
+            row(&mut model, k).unwrap();
+        }
+        let whole = serde_json::to_value(&model).unwrap();
+        let mut paths = vec![];
+        numbers(&whole, "", &mut paths);
+        // Those are settings: a wide dead zone is a legal one, and so are inputs without coefficients.
+        paths.retain(|path| path != "/estimator/dead_zone" && path != "/lags/inputs");
+        assert!(paths.len() > 50);
+        let bad = [
+            json!(0),
+            json!(1),
+            json!(7),
+            json!(-1),
+            json!(1.99),
+            json!(6e37),
+            json!(-6e37),
+            json!(u64::MAX),
+        ];
+        let bad = bad.into_iter().chain([json!(1e-40), json!("NaN"), json!("inf"), json!(1_u64 << 40)]);
+        let mut overcome = 0;
+        for bad in bad {
+            for path in &paths {
+                let mut tampered = whole.clone();
+                *tampered.pointer_mut(path).unwrap() = bad.clone();
+                let read: Result<E, _> = serde_json::from_str(&tampered.to_string());
+                let Ok(mut model) = read else { continue };
+                let mut last = Action::NotReady;
+                for k in 50..3000 {
+                    if let Ok(innovation) = row(&mut model, k) {
+                        last = innovation.action;
+                    }
+                }
+                let heard = matches!(last, Action::Updated | Action::Capped | Action::Projected);
+                assert!(heard, "{path} = {bad}: {last:?}");
+                overcome += 1;
+            }
+        }
+        assert!(overcome > 100, "{overcome}");
+    }
     let orders = ArmaxOrders { na: 2, inputs: INPUTS, nc: 1, constant: false };
     let method = ArmaxMethod::PredictionError;
-    let mut armax: RecursiveArmax<f32, Dyn, Dyn> =
+    let armax: RecursiveArmax<f32, Dyn, Dyn> =
         RecursiveArmax::new(&orders, method, 1.0, &[1.0], 0.1, Forgetting::default()).unwrap();
-    for k in 20..50 {
-        armax.log_row(output(k) as f32, &[value(k) as f32]).unwrap();
+    check(armax, |armax, y, u| armax.log_row(y, u));
+    for method in [OutputErrorMethod::PredictionError, OutputErrorMethod::Instruments] {
+        let orders = ArxOrders { na: 2, inputs: INPUTS, constant: true };
+        let model: RecursiveOutputError<f32, Dyn, Dyn> =
+            RecursiveOutputError::new(&orders, method, 1.0, &[1.0], Forgetting::default()).unwrap();
+        check(model, |model, y, u| model.log_row(y, u));
     }
-    let whole = serde_json::to_value(&armax).unwrap();
-    let mut paths = vec![];
-    numbers(&whole, "", &mut paths);
-    // That is a setting: a wide dead zone is a legal one.
-    paths.retain(|path| path != "/estimator/dead_zone");
-    assert!(paths.len() > 50);
-    let bad =
-        [json!(0), json!(1), json!(7), json!(-1), json!(1.99), json!(6e37), json!(-6e37), json!(u64::MAX)];
-    let bad = bad.into_iter().chain([json!(1e-40), json!("NaN"), json!("inf"), json!(1_u64 << 40)]);
-    let mut overcome = 0;
-    for bad in bad {
-        for path in &paths {
-            let mut tampered = whole.clone();
-            *tampered.pointer_mut(path).unwrap() = bad.clone();
-            let read: Result<RecursiveArmax<f32, Dyn, Dyn>, _> = serde_json::from_str(&tampered.to_string());
-            let Ok(mut armax) = read else { continue };
-            let mut last = Action::NotReady;
-            for k in 50..3000 {
-                if let Ok(innovation) = armax.log_row(output(k) as f32, &[value(k) as f32]) {
-                    last = innovation.action;
-                }
-            }
-            let heard = matches!(last, Action::Updated | Action::Capped | Action::Projected);
-            assert!(heard, "{path} = {bad}: {last:?}");
-            overcome += 1;
-        }
-    }
-    assert!(overcome > 100, "{overcome}");
 }
 
 /// Everything there is to an estimator.

@@ -9,10 +9,13 @@
 #[path = "soak/control.rs"]
 mod control;
 
+use std::collections::VecDeque;
+
 use thetahat_core::nalgebra::{self, Const, Matrix3, RowVector3, SVector, Vector1, Vector3, Vector4};
 use thetahat_core::{
-    ArxOrders, Basis, Covariance, Forgetting, InputOrders, KalmanFilter, LinearObservation, LinearTransition,
-    Polynomial, Real, RecursiveLeastSquares, RecursiveNarx, Scaling,
+    Action, ArxOrders, Basis, Covariance, Forgetting, InputOrders, KalmanFilter, LeastSquares,
+    LinearObservation, LinearTransition, OutputErrorMethod, Polynomial, Real, RecursiveLeastSquares,
+    RecursiveNarx, RecursiveOutputError, Scaling, Window, WindowedLeastSquares,
 };
 
 /// How many steps each run takes.
@@ -229,6 +232,91 @@ fn without_forgetting_the_horizon_is_finite() {
         "no forgetting: rounding exceeds one standard error at {horizon:?}, {largest:.1e} of it at most"
     );
     assert!(horizon.is_none_or(|step| step > 200_000), "{horizon:?}");
+}
+
+/// A window of 100 samples, exactly or in blocks, through silences, held inputs and scales that change by 10^3: always that of the
+/// least squares of its samples in double precision, or the last one that was.
+#[test]
+fn windowed_least_squares() {
+    for window in [Window { blocks: 100, block: 1 }, Window { blocks: 10, block: 10 }] {
+        let mut windowed: WindowedLeastSquares<f32, Const<4>, Const<1500>> =
+            WindowedLeastSquares::new(Const, window).unwrap();
+        let mut plant = Plant { noise: Noise(7), held: [0.0; 4] };
+        let (mut samples, mut worst, mut determined) = (VecDeque::new(), 0.0_f64, 0_u64);
+        for step in 0..steps() {
+            let (regressor, output) = plant.sample(step);
+            let scale = if step / 1_500 % 2 == 0 { 1.0 } else { 1e3 };
+            let (regressor, output) = (Vector4::from(regressor) * scale, output * scale);
+            samples.push_back((regressor, output));
+            let innovation = windowed.update(&regressor, output).expect("finite numbers");
+            if samples.len() > windowed.rows() {
+                samples.drain(..samples.len() - windowed.rows());
+            }
+            assert!(windowed.parameters().iter().all(|value| value.is_finite()), "at {step}");
+            let kept = matches!(innovation.action, Action::Collecting);
+            // Of 100 samples that are all silent, or all held, there is no solution.
+            let (silent, rich) = (step % 10_000 >= 100, input(step) == Input::Rich);
+            assert!(
+                if rich { !kept || step % 10_000 < 5 } else { kept || !silent },
+                "at {step}: {innovation:?}"
+            );
+            determined += u64::from(!kept);
+            if step % 1009 == 0 && rich && !kept {
+                let mut batch = LeastSquares::<f64, Const<4>>::new();
+                for (regressor, output) in &samples {
+                    batch.add(&regressor.cast(), f64::from(*output)).unwrap();
+                }
+                let truth = *batch.solve().unwrap().parameters();
+                let off = (windowed.parameters().cast::<f64>() - truth)
+                    .component_mul(&Vector4::from(SCALES).cast());
+                let size = truth.component_mul(&Vector4::from(SCALES).cast()).amax();
+                // In units of what rounding the data would do.
+                worst = worst.max(off.amax() / size / (batch.condition() * f64::from(f32::EPSILON)));
+            }
+        }
+        println!(
+            "{window:?}: {worst:.1} condition numbers times epsilon, {determined} of {} determined",
+            steps()
+        );
+        assert!(worst < 30.0, "{window:?}: {worst:e}");
+    }
+}
+
+/// Models with noise of the sensor follow a plant that switches, through silences, held inputs and missing measurements.
+#[test]
+fn recursive_output_error() {
+    for method in [OutputErrorMethod::PredictionError, OutputErrorMethod::Instruments] {
+        let orders = ArxOrders { na: 2, inputs: &[InputOrders { nb: 1, nk: 1 }], constant: false };
+        let forgetting = Forgetting::Exponential { factor: 0.998 };
+        let mut model: RecursiveOutputError<f32, Const<3>> =
+            RecursiveOutputError::new(&orders, method, 2.0, &[1.0], forgetting).unwrap();
+        let mut noise = Noise(5);
+        let (mut x, mut u, mut largest, mut worst) = ([0.0_f32; 2], 0.0_f32, 0.0_f32, 0.0_f32);
+        for step in 0..steps() {
+            let gain = if (step + 15_000) / 20_000 % 2 == 0 { 0.5 } else { 0.3 };
+            x = [1.2 * x[0] - 0.5 * x[1] + gain * u, x[0]];
+            let measured = if step % 997 == 0 { f32::NAN } else { x[0] + 0.3 * noise.next() };
+            model.measured(measured).expect("finite numbers");
+            u = match input(step) {
+                Input::Silent => 0.0,
+                Input::Held => u,
+                Input::Rich => noise.next(),
+            };
+            model.applied(&[u]).expect("finite numbers");
+            let parameters = model.estimator().parameters();
+            assert!(parameters.iter().all(|value| value.is_finite()), "at {step}: {parameters}");
+            if step % 1_000 == 999 {
+                let variances = model.estimator().covariance().variances();
+                assert!(variances.iter().all(|variance| *variance > 0.0), "at {step}: {variances:?}");
+                largest = largest.max(variances.component_mul(&Vector3::new(0.04, 0.04, 0.01)).max());
+            }
+            if step % 20_000 == 9_999 {
+                worst = worst.max((parameters - Vector3::new(-1.2, 0.5, gain)).amax());
+            }
+        }
+        println!("{method:?}: {worst} from the truth after rich input, P {largest} of its bound");
+        assert!(worst < 0.2 && largest < 2.72, "{method:?}: {worst} {largest}");
+    }
 }
 
 /// All products of at most two of y(k-1), y(k-2) and u(k-1): ten terms.

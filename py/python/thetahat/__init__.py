@@ -8,7 +8,7 @@ Whatever takes numbers takes arrays of NumPy, lists and tuples, and the series a
 channel also a column. What is None, NaN, NA, null or masked is missing.
 
 Estimators that run with the process take a sample at a time, or a whole array: `RecursiveLeastSquares`, `RecursiveArx`,
-`RecursiveArmax`, `RecursiveNarx`, `KalmanFilter`, `ExtendedKalmanFilter`, `LuenbergerObserver`. A `ChangeDetector` watches their innovations. A `StateFilter` is a filter of a
+`RecursiveArmax`, `RecursiveOutputError`, `RecursiveNarx`, `WindowedLeastSquares`, `KalmanFilter`, `ExtendedKalmanFilter`, `OutOfSequenceFilter`, `LuenbergerObserver`. A `ChangeDetector` watches their innovations. A `StateFilter` is a filter of a
 fitted or written model and a `Tracker` a recursive model with the channels and offsets of a log, its gaps and its documents.
 
 >>> import thetahat as th
@@ -51,16 +51,19 @@ from thetahat._thetahat import (
     NonlinearObservation,
     NonlinearTransition,
     ObserverTrajectory,
+    OutOfSequenceFilter,
     RecursiveArmax,
     RecursiveArx,
     RecursiveLeastSquares,
     RecursiveNarx,
+    RecursiveOutputError,
     RecursiveTrajectory,
     RecursiveVectorArx,
     RstController,
     SelfTuner,
     SmoothedTrajectory,
     SteadyState,
+    WindowedLeastSquares,
     __version__,
 )
 from thetahat._track import Tracker
@@ -99,11 +102,13 @@ __all__ = [
     "NonlinearObservation",
     "NonlinearTransition",
     "ObserverTrajectory",
+    "OutOfSequenceFilter",
     "ReadOptions",
     "RecursiveArmax",
     "RecursiveArx",
     "RecursiveLeastSquares",
     "RecursiveNarx",
+    "RecursiveOutputError",
     "RecursiveTrajectory",
     "RecursiveVectorArx",
     "RstController",
@@ -126,6 +131,7 @@ __all__ = [
     "Tuning",
     "Validation",
     "ValidationOptions",
+    "WindowedLeastSquares",
     "__version__",
     "ar",
     "arma",

@@ -28,10 +28,12 @@ __all__ = [
     "NonlinearObservation",
     "NonlinearTransition",
     "ObserverTrajectory",
+    "OutOfSequenceFilter",
     "RecursiveArmax",
     "RecursiveArx",
     "RecursiveLeastSquares",
     "RecursiveNarx",
+    "RecursiveOutputError",
     "RecursiveTrajectory",
     "RecursiveVectorArx",
     "RstController",
@@ -42,6 +44,7 @@ __all__ = [
     "SteadyState",
     "Tracker",
     "Validation",
+    "WindowedLeastSquares",
     "__version__",
     "_restore",
     "compare",
@@ -540,6 +543,51 @@ class RecursiveArmax(_RecursivePolynomials):
     def c(self) -> _Array: ...
 
 @final
+class RecursiveOutputError(_RecursivePolynomials):
+    def __new__(
+        cls,
+        nf: int,
+        nb: int | Sequence[int],
+        nk: int | Sequence[int] = 1,
+        forgetting: float | Forgetting | None = 0.99,
+        *,
+        method: Literal["prediction-error", "instruments"] = "prediction-error",
+        constant: bool = False,
+        output_scale: float = 1.0,
+        input_scales: ArrayLike | None = None,
+        parameters: ArrayLike | None = None,
+        covariance: ArrayLike | None = None,
+        dead_zone: float = 0.0,
+        limits: Sequence[tuple[float, float] | None] | None = None,
+    ) -> RecursiveOutputError: ...
+    @property
+    def f(self) -> _Array: ...
+
+@final
+class WindowedLeastSquares:
+    def __new__(cls, n: int, blocks: int, block: int = 1) -> WindowedLeastSquares: ...
+    def update(self, phi: ArrayLike, y: float) -> Innovation: ...
+    def run(self, phi: ArrayLike, y: ArrayLike) -> RecursiveTrajectory: ...
+    def predict(self, phi: ArrayLike) -> float: ...
+    def clear(self) -> None: ...
+    @property
+    def parameters(self) -> _Array: ...
+    @property
+    def parameter_covariance(self) -> _Array | None: ...
+    @property
+    def standard_errors(self) -> _Array | None: ...
+    @property
+    def noise_variance(self) -> float | None: ...
+    @property
+    def determined(self) -> bool: ...
+    @property
+    def rows(self) -> int: ...
+    @property
+    def blocks(self) -> int: ...
+    @property
+    def block(self) -> int: ...
+
+@final
 class RecursiveNarx(_RecursiveModel):
     def __new__(
         cls,
@@ -710,6 +758,38 @@ class ExtendedKalmanFilter:
     def gated_in_a_row(self) -> int: ...
     @property
     def iterations(self) -> int: ...
+
+@final
+class OutOfSequenceFilter:
+    def __new__(
+        cls,
+        state: ArrayLike,
+        covariance: ArrayLike,
+        *,
+        samples: int,
+        outputs: int = 1,
+        inputs: int = 0,
+        gate: float = ...,
+        release: int = 0,
+        iterations: int = 1,
+    ) -> OutOfSequenceFilter: ...
+    def predict(self, transition: _Transition, input: ArrayLike | None = None) -> None: ...
+    def correct(
+        self, observation: _Observation, measurement: ArrayLike, *, input: ArrayLike | None = None
+    ) -> Innovation: ...
+    def correct_late(
+        self, transition: _Transition, observation: _Observation, age: int, measurement: ArrayLike
+    ) -> Innovation: ...
+    @property
+    def state(self) -> _Array: ...
+    @property
+    def covariance(self) -> _Array: ...
+    @property
+    def samples(self) -> int: ...
+    @property
+    def kept(self) -> int: ...
+    @property
+    def gated_in_a_row(self) -> int: ...
 
 @final
 class LuenbergerObserver:

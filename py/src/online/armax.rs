@@ -140,7 +140,9 @@ impl RecursiveArmax {
     fn c<'py>(model: PyRef<'py, Self>, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         match &model.as_super().as_super().engine.stepper {
             Stepper::Armax(stepper) => recursive::coefficients(py, stepper.c()),
-            Stepper::Arx(_) | Stepper::Narx(_) => recursive::coefficients(py, std::iter::empty()),
+            Stepper::Arx(_) | Stepper::OutputError(_) | Stepper::Narx(_) => {
+                recursive::coefficients(py, std::iter::empty())
+            }
         }
     }
 }

@@ -88,7 +88,9 @@ impl RecursiveNarx {
 fn stepper<'a>(model: &'a PyRef<'_, RecursiveNarx>) -> PyResult<&'a Narx> {
     match &model.as_super().engine.stepper {
         Stepper::Narx(stepper) => Ok(stepper),
-        Stepper::Arx(_) | Stepper::Armax(_) => Err(PyValueError::new_err("this is no nonlinear model")),
+        Stepper::Arx(_) | Stepper::Armax(_) | Stepper::OutputError(_) => {
+            Err(PyValueError::new_err("this is no nonlinear model"))
+        }
     }
 }
 

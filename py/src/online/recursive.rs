@@ -94,6 +94,12 @@ impl Record<'_> {
         self.done(innovation.nis, innovation.action);
     }
 
+    /// What is known of one output after a row.
+    pub(crate) fn found(&mut self, parameters: &[f64], standard_errors: &[f64]) {
+        self.parameters.push(parameters);
+        self.standard_errors.push(standard_errors);
+    }
+
     fn done(&mut self, nis: f64, action: Action) {
         self.nis.push(&[nis]);
         self.codes.push(innovation::code(action));
@@ -121,8 +127,7 @@ impl<'a> Record<'a> {
             let (n, outputs) = estimator.parameters().shape();
             let parameters = estimator.parameters().as_slice();
             if let (1, Some(errors)) = (outputs, estimator.standard_errors_of(0)) {
-                self.parameters.push(parameters);
-                self.standard_errors.push(errors.as_slice());
+                self.found(parameters, errors.as_slice());
                 continue;
             }
             let errors: Vec<_> = (0..outputs).map(|output| estimator.standard_errors_of(output)).collect();

@@ -10,7 +10,7 @@ use thetahat::model::Functions;
 use thetahat_core::nalgebra::{Const, DVector, Dyn};
 use thetahat_core::{
     Covariance, Error, Innovation as StepInnovation, InputOrders, RecursiveArmax, RecursiveArx,
-    RecursiveLeastSquares as LeastSquares, RecursiveNarx,
+    RecursiveLeastSquares as LeastSquares, RecursiveNarx, RecursiveOutputError,
 };
 
 use super::argument::{self, LARGEST_SIZE, LONGEST_DELAY, Rows, Whole, count, failed, reserve};
@@ -23,6 +23,7 @@ use crate::array;
 
 pub(super) type Arx = RecursiveArx<f64, Dyn, Dyn>;
 pub(super) type Armax = RecursiveArmax<f64, Dyn, Dyn>;
+pub(super) type OutputError = RecursiveOutputError<f64, Dyn, Dyn>;
 pub(super) type Narx = RecursiveNarx<f64, Functions, Dyn, Dyn, Dyn>;
 
 /// A stepper of one of the classes.
@@ -30,6 +31,7 @@ pub(super) type Narx = RecursiveNarx<f64, Functions, Dyn, Dyn, Dyn>;
 pub(super) enum Stepper {
     Arx(Arx),
     Armax(Armax),
+    OutputError(OutputError),
     Narx(Narx),
 }
 
@@ -39,6 +41,7 @@ macro_rules! each {
         match $engine {
             Stepper::Arx($stepper) => $what,
             Stepper::Armax($stepper) => $what,
+            Stepper::OutputError($stepper) => $what,
             Stepper::Narx($stepper) => $what,
         }
     };
@@ -49,6 +52,7 @@ impl Stepper {
         match self {
             Stepper::Arx(_) => "RecursiveArx",
             Stepper::Armax(_) => "RecursiveArmax",
+            Stepper::OutputError(_) => "RecursiveOutputError",
             Stepper::Narx(_) => "RecursiveNarx",
         }
     }
@@ -67,12 +71,18 @@ impl Stepper {
             (same, None) => same,
             (Stepper::Arx(stepper), Some(given)) => Stepper::Arx(stepper.with_parameters(given)?),
             (Stepper::Armax(stepper), Some(given)) => Stepper::Armax(stepper.with_parameters(given)?),
+            (Stepper::OutputError(stepper), Some(given)) => {
+                Stepper::OutputError(stepper.with_parameters(given)?)
+            }
             (Stepper::Narx(stepper), Some(given)) => Stepper::Narx(stepper.with_parameters(given)?),
         };
         Ok(match (with_parameters, covariance) {
             (same, None) => same,
             (Stepper::Arx(stepper), Some(given)) => Stepper::Arx(stepper.with_covariance(given)?),
             (Stepper::Armax(stepper), Some(given)) => Stepper::Armax(stepper.with_covariance(given)?),
+            (Stepper::OutputError(stepper), Some(given)) => {
+                Stepper::OutputError(stepper.with_covariance(given)?)
+            }
             (Stepper::Narx(stepper), Some(given)) => Stepper::Narx(stepper.with_covariance(given)?),
         })
     }
@@ -151,6 +161,7 @@ impl RecursiveModel {
         let has = |input: usize| match &engine.stepper {
             Stepper::Arx(stepper) => stepper.b(input).is_some(),
             Stepper::Armax(stepper) => stepper.b(input).is_some(),
+            Stepper::OutputError(stepper) => stepper.b(input).is_some(),
             Stepper::Narx(stepper) => stepper.model().lags_of(input).is_some(),
         };
         let fits = engine.inputs <= LONGEST_DELAY
@@ -476,12 +487,13 @@ pub(crate) struct RecursivePolynomials;
 
 #[pymethods]
 impl RecursivePolynomials {
-    /// A(q): 1, a_1 ... a_na.
+    /// A(q): 1, a_1 ... a_na; of an output-error model 1.
     #[getter]
     fn a<'py>(model: PyRef<'py, Self>, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         match &model.as_super().engine.stepper {
             Stepper::Arx(stepper) => recursive::coefficients(py, stepper.a()),
             Stepper::Armax(stepper) => recursive::coefficients(py, stepper.a()),
+            Stepper::OutputError(_) => recursive::coefficients(py, std::iter::once(1.0)),
             Stepper::Narx(_) => recursive::coefficients(py, std::iter::empty()),
         }
     }
@@ -493,6 +505,7 @@ impl RecursivePolynomials {
         let each = |input| match &engine.stepper {
             Stepper::Arx(stepper) => Some(recursive::coefficients(py, stepper.b(input)?)),
             Stepper::Armax(stepper) => Some(recursive::coefficients(py, stepper.b(input)?)),
+            Stepper::OutputError(stepper) => Some(recursive::coefficients(py, stepper.b(input)?)),
             Stepper::Narx(_) => None,
         };
         (0..engine.inputs).filter_map(each).collect()
@@ -504,6 +517,7 @@ impl RecursivePolynomials {
         match &model.as_super().engine.stepper {
             Stepper::Arx(stepper) => stepper.constant(),
             Stepper::Armax(stepper) => stepper.constant(),
+            Stepper::OutputError(stepper) => stepper.constant(),
             Stepper::Narx(_) => None,
         }
     }

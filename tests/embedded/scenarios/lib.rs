@@ -11,6 +11,7 @@
 mod control;
 mod detect;
 mod kalman;
+mod late;
 mod least_squares;
 mod nonlinear;
 mod record;
@@ -68,12 +69,14 @@ pub trait Visitor {
 pub fn visit_all(visitor: &mut impl Visitor) {
     visitor.visit::<least_squares::Lines>();
     visitor.visit::<least_squares::Rows>();
+    visitor.visit::<least_squares::Windowed>();
     visitor.visit::<recursive::Recursive<4>>();
     visitor.visit::<recursive::Recursive<8>>();
     visitor.visit::<recursive::Recursive<16>>();
     visitor.visit::<recursive::Arx>();
     visitor.visit::<recursive::VectorArx>();
     visitor.visit::<recursive::Armax>();
+    visitor.visit::<recursive::OutputError>();
     visitor.visit::<nonlinear::Narx>();
     visitor.visit::<nonlinear::Stored<Polynomial<'static>>>();
     visitor.visit::<nonlinear::Stored<Radial<'static, f32>>>();
@@ -86,6 +89,7 @@ pub fn visit_all(visitor: &mut impl Visitor) {
     visitor.visit::<kalman::Kalman<4, 2>>();
     visitor.visit::<kalman::Kalman<6, 3>>();
     visitor.visit::<kalman::Extended>();
+    visitor.visit::<late::Late>();
     visitor.visit::<kalman::Observer>();
     visitor.visit::<control::Placed>();
     visitor.visit::<control::Tuned>();

@@ -2,8 +2,9 @@
 
 use thetahat_core::nalgebra::{Const, SVector, Vector2};
 use thetahat_core::{
-    Action, ArmaxMethod, ArmaxOrders, ArxOrders, Error, Forgetting, Innovation, InputOrders, RecursiveArmax,
-    RecursiveArx, RecursiveLeastSquares, RecursiveVectorArx,
+    Action, ArmaxMethod, ArmaxOrders, ArxOrders, Error, Forgetting, Innovation, InputOrders,
+    OutputErrorMethod, RecursiveArmax, RecursiveArx, RecursiveLeastSquares, RecursiveOutputError,
+    RecursiveVectorArx,
 };
 
 use crate::record::{Sample, regressor, sample};
@@ -124,6 +125,42 @@ impl Scenario for Armax {
     fn start(_: Case) -> Result<Self, Error> {
         let orders = ArmaxOrders { na: 2, inputs: INPUTS, nc: 1, constant: false };
         RecursiveArmax::new(&orders, ArmaxMethod::PredictionError, 1.0, &[1.0], 0.1, FORGETTING).map(Armax)
+    }
+
+    fn input(case: Case, k: usize) -> Sample {
+        sample(case, k, 0)
+    }
+
+    #[inline(never)]
+    fn step(&mut self, sample: &Sample) -> Result<Innovation<f32>, Error> {
+        self.0.log_row(sample.y, &[sample.u])
+    }
+
+    fn numbers(&self, innovation: &Innovation<f32>, number: &mut impl FnMut(f32)) {
+        recursive_numbers(self.0.estimator(), innovation, number);
+        let mut ahead = [0.0; 3];
+        if self.0.predict(&[1.0, 0.0, 0.0], &mut ahead).is_ok() {
+            ahead.into_iter().for_each(number);
+        }
+    }
+}
+
+/// An output-error model of order 2 by recursive prediction error, one sample in.
+pub(crate) struct OutputError(RecursiveOutputError<f32, Const<4>>);
+
+impl Scenario for OutputError {
+    const NAME: &'static str = "RecursiveOutputError, OE(2, 2)";
+    const DETOUR: bool = true;
+    type Input = Sample;
+    type Output = Innovation<f32>;
+
+    fn start(case: Case) -> Result<Self, Error> {
+        let orders = ArxOrders { na: 2, inputs: INPUTS, constant: false };
+        let method = match case {
+            Case::Typical => OutputErrorMethod::PredictionError,
+            Case::Hard => OutputErrorMethod::Instruments,
+        };
+        RecursiveOutputError::new(&orders, method, 1.0, &[1.0], FORGETTING).map(OutputError)
     }
 
     fn input(case: Case, k: usize) -> Sample {

@@ -6,10 +6,10 @@ use std::vec::Vec;
 
 use nalgebra::{Const, SVector, Vector4};
 
-use super::{is_stable, move_stably};
 use crate::arx::is_large;
 use crate::arx::tests::{Plant, inputs_at, stable_polynomial};
 use crate::noise::Noise;
+use crate::stability::{is_stable, move_stably};
 use crate::{
     Action, ArmaxMethod, ArmaxOrders, ArxOrders, Covariance, Error, Forgetting, InputOrders, RecursiveArmax,
     RecursiveArx,
@@ -68,12 +68,12 @@ fn stability_is_that_of_the_zeros() {
 fn a_step_is_halved_until_c_is_stable() {
     let mut parameters = [5.0, 0.5];
     // 0.5 + 1.6/4 < 1
-    assert!(move_stably(&mut parameters, &[10.0, 1.0], 1.6, &mut [0.0]));
+    assert!(move_stably(&mut parameters, &[10.0, 1.0], 1.6, 1..2, &mut [0.0]));
     assert_eq!(parameters, [9.0, 0.9]);
-    assert!(!move_stably(&mut parameters, &[10.0, -1.0], 0.1, &mut [0.0]));
+    assert!(!move_stably(&mut parameters, &[10.0, -1.0], 0.1, 1..2, &mut [0.0]));
     assert_eq!(parameters, [10.0, 0.8]);
     // Nothing helps.
-    assert!(move_stably(&mut parameters, &[10.0, 1e6], 1.0, &mut [0.0]));
+    assert!(move_stably(&mut parameters, &[10.0, 1e6], 1.0, 1..2, &mut [0.0]));
     assert_eq!(parameters, [10.0, 0.8]);
 }
 

@@ -48,6 +48,11 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
         &self.parameters
     }
 
+    /// Takes back what is known of the noise, where the errors that corrected are not those of white noise.
+    pub(crate) fn forget_noise(&mut self) {
+        self.residuals.clear();
+    }
+
     /// P: the covariance of the parameters in units of the noise variance, without regard to how forgetting weighs
     /// the noise. See [`parameter_covariance`](RecursiveLeastSquares::parameter_covariance).
     pub fn covariance(&self) -> &Covariance<T, N> {

@@ -182,7 +182,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
     pub fn measured(&mut self, output: T) -> Result<Innovation<T>, Error> {
         self.lags.check_delays()?;
         check_samples(&[], &[output], self.size())?;
-        Ok(self.step(&[], output, true))
+        Ok(self.learn(&[], output, true))
     }
 
     /// u(k), one number for each input: what acts on the plant from now on, until the next measurement, as the plant got
@@ -198,7 +198,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
         if self.lags.awaits_inputs() {
             self.lags.complete(inputs);
         } else {
-            self.step(inputs, T::NAN, false);
+            self.learn(inputs, T::NAN, false);
         }
         Ok(())
     }
@@ -213,11 +213,11 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
     pub fn log_row(&mut self, output: T, inputs: &[T]) -> Result<Innovation<T>, Error> {
         self.lags.check_inputs(inputs)?;
         check_samples(inputs, &[output], self.size())?;
-        Ok(self.step(inputs, output, false))
+        Ok(self.learn(inputs, output, false))
     }
 
     /// One sample, checked.
-    fn step(&mut self, inputs: &[T], output: T, inputs_follow: bool) -> Innovation<T> {
+    fn learn(&mut self, inputs: &[T], output: T, inputs_follow: bool) -> Innovation<T> {
         let RecursiveArx { lags, estimator } = self;
         // What is too large here is so by what came before: time must go on, or it would stay.
         let taken =

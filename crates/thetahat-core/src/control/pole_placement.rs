@@ -200,12 +200,9 @@ impl<T: Real, N: Dimension> RstController<T, N> {
     ///
     /// About 10 N multiply-adds for each frequency.
     pub fn peaks(&self, a: &[T], b: &[T], frequencies: usize) -> (T, T) {
-        let half = T::from_count(frequencies.max(1)) * (T::one() + T::one());
+        let mut turns = Turns::new(frequencies);
         (0..frequencies).fold((T::zero(), T::zero()), |(sensitivity, complementary), place| {
-            let part = T::from_count(2 * place + 1) / half;
-            let angle = T::pi() * part * part;
-            let (sine, cosine) = angle.sine_and_cosine();
-            let turn = (cosine, -sine);
+            let turn = turns.at(place);
             // R = 1 + q⁻¹ (r_1 + …).
             let later = times(value(self.r().as_slice().iter(), turn), turn);
             let open = times(value(a.iter(), turn), (T::one() + later.0, later.1));
@@ -214,6 +211,48 @@ impl<T: Real, N: Dimension> RstController<T, N> {
             (sensitivity.max(length(open) / closed), complementary.max(length(back) / closed))
         })
     }
+}
+
+/// e^(-iω) of the frequencies ω = π ((k + 1/2)/n)² in their order, each from the one before: sines are dear where there is no unit
+/// for double precision.
+///
+/// ```text
+/// ω(k+1) - ω(k) = 2π (k+1)/n²
+/// ```
+struct Turns<T> {
+    count: T,
+    turn: (T, T),
+    step: (T, T),
+    growth: (T, T),
+}
+
+/// Rounding grows with the square of so many products.
+const PRODUCTS: usize = 16;
+
+impl<T: Real> Turns<T> {
+    fn new(count: usize) -> Self {
+        let still = (T::one(), T::zero());
+        let count = T::from_count(count.max(1));
+        Turns { count, turn: still, step: still, growth: clockwise(T::two_pi() / count / count) }
+    }
+
+    fn at(&mut self, place: usize) -> (T, T) {
+        if place.is_multiple_of(PRODUCTS) {
+            let part = (T::from_count(place) + T::from_count(1) / T::from_count(2)) / self.count;
+            self.turn = clockwise(T::pi() * part * part);
+            self.step = clockwise(T::two_pi() * T::from_count(place + 1) / self.count / self.count);
+        } else {
+            self.turn = times(self.turn, self.step);
+            self.step = times(self.step, self.growth);
+        }
+        self.turn
+    }
+}
+
+/// e^(-i angle).
+fn clockwise<T: Real>(angle: T) -> (T, T) {
+    let (sine, cosine) = angle.sine_and_cosine();
+    (cosine, -sine)
 }
 
 /// A polynomial at a number of length 1, by Horner.

@@ -1,0 +1,180 @@
+//! Models as source code: it compiles, and says what the library does.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+
+use crate::harness::Folder;
+
+/// What C has to be compiled with.
+const STRICT: [&str; 6] = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-O2"];
+
+/// Whether a program is there. Where the tests must not skip anything it has to be.
+fn has(program: &str) -> bool {
+    let there = Command::new(program).arg("--version").output().is_ok();
+    assert!(there || std::env::var_os("CI").is_none(), "{program} is missing");
+    if !there {
+        eprintln!("skipped: {program} is missing");
+    }
+    there
+}
+
+fn run(command: &mut Command) {
+    let output = command.output().expect("a program that starts");
+    assert!(
+        output.status.success(),
+        "{command:?}: {}{}",
+        String::from_utf8_lossy(&output.stdout),
+        String::from_utf8_lossy(&output.stderr)
+    );
+}
+
+/// The core as a library that a generated module is linked with, compiled once.
+fn core() -> &'static Path {
+    static CORE: OnceLock<PathBuf> = OnceLock::new();
+    CORE.get_or_init(|| {
+        // Beside the binary of this test.
+        let own = std::env::current_exe().expect("a test has a file");
+        own.parent().expect("a folder").to_owned()
+    })
+}
+
+/// Links a generated module of Rust with the core, and runs it.
+fn rustc(folder: &Folder, name: &str) {
+    let text = folder.read(&format!("{name}.rs"));
+    let mut command = Command::new("rustc");
+    command.current_dir(folder.path(".")).args(["--edition=2024", "-D", "warnings", "-C", "opt-level=1"]);
+    if text.contains("thetahat_core") {
+        let library = newest(core(), "libthetahat_core-").expect("the core was built for this test");
+        command.arg("--extern").arg(format!("thetahat_core={}", library.display()));
+        command.arg("-L").arg(format!("dependency={}", core().display()));
+    }
+    run(command.arg(format!("{name}_test.rs")).args(["-o", "test_of_rust"]));
+    run(&mut Command::new(folder.path("test_of_rust")));
+}
+
+/// The library that was built last.
+fn newest(folder: &Path, begins: &str) -> Option<PathBuf> {
+    let entries = fs::read_dir(folder).ok()?.filter_map(Result::ok);
+    let libraries = entries.filter(|entry| {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        name.starts_with(begins) && name.ends_with(".rlib")
+    });
+    libraries
+        .max_by_key(|entry| entry.metadata().and_then(|data| data.modified()).ok())
+        .map(|entry| entry.path())
+}
+
+/// Exports a model in every way, compiles it, and steps it along a log.
+fn goes_round(folder: &Folder, report: &str, log: &str, purposes: &[&str]) {
+    for (purpose, precision) in purposes.iter().flat_map(|purpose| [(purpose, "f64"), (purpose, "f32")]) {
+        let common = format!("export {report} {log} --what {purpose} --precision {precision} --name model");
+        let exported = folder.done(&format!("{common} --to rust"));
+        assert!(!exported.stderr.contains("warning"), "{}", exported.stderr);
+        rustc(folder, "model");
+        folder.done(&format!("{common} --to c"));
+        if has("gcc") {
+            let mut command = Command::new("gcc");
+            command.current_dir(folder.path(".")).args(STRICT).arg("-ffp-contract=off");
+            run(command.args(["model.c", "model_test.c", "-o", "test_of_c", "-lm"]));
+            run(&mut Command::new(folder.path("test_of_c")));
+        }
+    }
+}
+
+fn motor() -> Folder {
+    let folder = Folder::new();
+    folder.done("demo .");
+    folder
+}
+
+#[test]
+fn models_of_polynomials_say_what_the_library_does() {
+    let folder = motor();
+    for (orders, purposes) in [
+        ("--na 2 --nb 2 --nk 3", ["predictor", "simulator"]),
+        ("--model bj --nb 2 --nc 1 --nd 2 --nf 2", ["predictor", "simulator"]),
+    ] {
+        folder.done(&format!("fit dc_motor.csv --time t {orders} --report r.json"));
+        goes_round(&folder, "r.json", "dc_motor.csv --time t", &purposes);
+    }
+}
+
+/// The predictor of the motor on a Cortex-M4F.
+#[test]
+fn the_predictor_of_the_motor_is_small() {
+    if !has("arm-none-eabi-gcc") {
+        return;
+    }
+    let folder = motor();
+    folder.done("fit dc_motor.csv --time t --na 2 --nb 2 --nk 3 --report r.json");
+    for purpose in ["predictor", "simulator"] {
+        folder.done(&format!("export r.json --to c --what {purpose} --name motor"));
+        let processor =
+            ["-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16", "-c", "motor.c"];
+        run(Command::new("arm-none-eabi-gcc").current_dir(folder.path(".")).args(STRICT).args(processor));
+        let size = Command::new("arm-none-eabi-size").arg(folder.path("motor.o")).output().expect("binutils");
+        let text = String::from_utf8_lossy(&size.stdout).into_owned();
+        let row: Vec<usize> = text
+            .lines()
+            .nth(1)
+            .unwrap_or_default()
+            .split_whitespace()
+            .map_while(|word| word.parse().ok())
+            .collect();
+        assert!(matches!(row[..], [code, data, ..] if code + data < 1000), "{text}");
+    }
+}
+
+#[test]
+fn files_tell_where_they_are_from() {
+    let folder = motor();
+    folder.done("fit dc_motor.csv --time t --na 2 --nb 2 --nk 3 --report r.json");
+    let run = folder.done("export r.json --to c --what predictor --out firmware");
+    assert!(run.stderr.contains("predictor of ARX(2, 2, 3): r_predictor.h, r_predictor.c"), "{}", run.stderr);
+    let header = folder.read("firmware/r_predictor.h");
+    for words in [
+        "u[0] is 'u', in its own unit, with the offset",
+        "y[0] is 'y'",
+        "Sample time 0.01 s",
+        "'u' acts 3 samples later",
+    ] {
+        assert!(header.contains(words), "{words}: {header}");
+    }
+    // The same bytes each time, and another report has another digest.
+    folder.done("export r.json --to c --what predictor --out again");
+    assert_eq!(folder.read("again/r_predictor.h"), header);
+    folder.done("fit dc_motor.csv --time t --na 2 --nb 1 --nk 3 --report r.json");
+    folder.done("export r.json --to c --what predictor --out again");
+    assert_ne!(folder.read("again/r_predictor.h").lines().nth(1), header.lines().nth(1));
+}
+
+#[test]
+fn what_cannot_be_exported_is_refused_and_nothing_written() {
+    let folder = motor();
+    folder.done("fit dc_motor.csv --time t --na 2 --nb 2 --nk 3 --report r.json");
+    let before = folder.names();
+    for (line, code, words) in [
+        (
+            "r.json --to c --what observer",
+            2,
+            "--what: a model of polynomials is exported as no observer; take predictor, simulator",
+        ),
+        ("r.json --to c --what predictor --name Motor", 2, "--name: 'Motor' is no name"),
+        ("r.json --to c --what predictor --rows 1..5", 2, "LOG"),
+        ("r.json dc_motor.csv --time t --to c --what predictor --rows 1..5000", 3, "rows"),
+        ("r.json nowhere.csv --to c --what predictor", 5, "nowhere.csv"),
+        ("dc_motor.csv --to c --what predictor", 3, "not a thetahat report"),
+        ("r.json dc_motor.csv --sample-time 1 --to c --what predictor", 3, "sample time"),
+    ] {
+        let run = folder.run(&format!("export {line}"));
+        assert_eq!(run.code, code, "{line}: {}", run.stderr);
+        assert!(run.stderr.contains(words), "{line}: {}", run.stderr);
+    }
+    folder.done("fit dc_motor.csv --time t --na 2 --nb 2 --nk 3 --detrend linear --report line.json");
+    let message = folder.refused("export line.json --to rust --what simulator", 3);
+    assert!(message.contains("is a line in the time of its log"), "{message}");
+    let after: Vec<String> = folder.names().into_iter().filter(|name| name != "line.json").collect();
+    assert_eq!(after, before);
+}

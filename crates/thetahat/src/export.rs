@@ -33,6 +33,7 @@ mod polynomial;
 mod program;
 mod rust;
 mod signals;
+mod state_space;
 #[cfg(test)]
 mod tests;
 mod vector;
@@ -223,10 +224,18 @@ pub fn export(report: &Report, plan: &Plan, log: Option<(&Log, &[Rows])>) -> Res
     Ok(Exported { files, warnings })
 }
 
+/// What an update does.
+const UPDATE: &str = "What was measured in this sample, after its prediction. Where it is missing (NaN) the prediction stands for it.";
+
 /// The program of a model of any kind.
 fn form(model: &Model, purpose: Purpose) -> Result<Form, Error> {
     match model {
         Model::Polynomial(own) => polynomial::form(model, own, purpose),
+        Model::StateSpace(own) => state_space::form(model, own, purpose),
+        Model::ContinuousStateSpace(own) => {
+            let sampled = own.sampled(own.sample_time, own.hold)?;
+            state_space::form(model, &sampled, purpose)
+        }
         _ => Err(refused(purpose, &model.name(), "nothing yet")),
     }
 }

@@ -262,7 +262,7 @@ fn predictor(
     }
     let update = Entry {
         name: "update",
-        doc: vec!["What was measured in this sample, after its prediction. Where it is missing (NaN) the prediction stands for it.".to_owned()],
+        doc: vec![super::UPDATE.to_owned()],
         arguments: vec![signals.measured],
         result: None,
         body,

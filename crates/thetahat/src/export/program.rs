@@ -40,12 +40,6 @@ impl Index {
         self.constant += places;
         self
     }
-
-    /// The same, and as many times more as a counter has counted.
-    pub(super) fn and(mut self, counter: Counter, factor: isize) -> Self {
-        self.terms.push((counter, factor));
-        self
-    }
 }
 
 /// What an array is.

@@ -70,13 +70,21 @@ impl Signals {
             return Vec::new();
         };
         let mut statements = program.shift(line);
-        let value = self.input(input, &place.into());
-        statements.push(Statement::Choose {
-            condition: Condition::Missing(input.at(place)),
-            then: Vec::new(),
-            otherwise: vec![Statement::Store(line, last.into(), value)],
-        });
+        statements.push(self.hold(input, &place.into(), line, last.into()));
         statements
+    }
+
+    /// Puts an input, as a deviation, into its place among those that were held; where it is missing what stands there stays.
+    pub(super) fn hold_input(&self, held: Array, place: &Index) -> Vec<Statement> {
+        self.inputs.map(|input| self.hold(input, place, held, place.clone())).into_iter().collect()
+    }
+
+    fn hold(&self, input: Array, place: &Index, into: Array, at: Index) -> Statement {
+        Statement::Choose {
+            condition: Condition::Missing(input.at(place.clone())),
+            then: Vec::new(),
+            otherwise: vec![Statement::Store(into, at, self.input(input, place))],
+        }
     }
 
     /// What was measured of an output, as a deviation.

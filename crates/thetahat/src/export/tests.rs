@@ -1,6 +1,7 @@
 //! Programs beside the library.
 
 mod polynomials;
+mod states;
 
 use super::program::Program;
 use super::vector::Vector;

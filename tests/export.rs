@@ -101,6 +101,29 @@ fn models_of_polynomials_say_what_the_library_does() {
     }
 }
 
+#[test]
+fn models_of_other_kinds_say_what_the_library_does() {
+    let folder = motor();
+    let both = ["predictor", "simulator"];
+    folder.write("two.csv", include_str!("data/dc_motor.csv"));
+    folder.done("fit two.csv --time t -u u -y i,speed --order 2 --report r.json");
+    goes_round(&folder, "r.json", "two.csv --time t", &["predictor", "simulator", "observer"]);
+    folder.done("convert r.json --to continuous --out c.json");
+    goes_round(&folder, "c.json", "two.csv --time t", &both);
+    folder.write("heater.csv", include_str!("data/public/tclab_siso_step.csv"));
+    folder.done("fit heater.csv --time t -u q1 -y t1 --structure p2d --report r.json");
+    goes_round(&folder, "r.json", "heater.csv --time t", &both);
+}
+
+#[test]
+fn nonlinear_models_say_what_the_library_does() {
+    let folder = motor();
+    for map in ["poly --degree 2", "rbf --centres kmeans:5", "spline", "local", "tanh --units 3", "relu --units 3"] {
+        folder.done(&format!("fit dc_motor.csv --time t --narx {map} --ny 2 --nu 2 --report r.json"));
+        goes_round(&folder, "r.json", "dc_motor.csv --time t", &["predictor"]);
+    }
+}
+
 /// The predictor of the motor on a Cortex-M4F.
 #[test]
 fn the_predictor_of_the_motor_is_small() {

@@ -29,7 +29,10 @@
 mod c;
 mod head;
 mod interpret;
+mod map;
+mod nonlinear_arx;
 mod polynomial;
+mod process;
 mod program;
 mod rust;
 mod signals;
@@ -206,6 +209,12 @@ pub fn export(report: &Report, plan: &Plan, log: Option<(&Log, &[Rows])>) -> Res
     let form = form(model, plan.purpose)?;
     let head = Head::new(report, plan, &form.equations, &form.start)?;
     let Plan { language, precision, name, .. } = plan;
+    if *language == Language::C && form.program.maps.iter().any(|map| map.statements.is_none()) {
+        return Err(Error::argument(
+            "to",
+            "nearest neighbours are searched by thetahat-core alone; take rust, or fit another map",
+        ));
+    }
     let mut files = match language {
         Language::C => c::files(&form.program, name, *precision, &head),
         Language::Rust => vec![rust::file(&form.program, name, *precision, &head)],
@@ -231,6 +240,8 @@ const UPDATE: &str = "What was measured in this sample, after its prediction. Wh
 fn form(model: &Model, purpose: Purpose) -> Result<Form, Error> {
     match model {
         Model::Polynomial(own) => polynomial::form(model, own, purpose),
+        Model::NonlinearArx(own) => nonlinear_arx::form(model, own, purpose),
+        Model::Process(own) => process::form(model, own, purpose),
         Model::StateSpace(own) => state_space::form(model, own, purpose),
         Model::ContinuousStateSpace(own) => {
             let sampled = own.sampled(own.sample_time, own.hold)?;

@@ -41,8 +41,10 @@ pub(super) fn files(program: &Program, name: &str, precision: Precision, head: &
     if functions.contains("size_t") {
         source += "#include <stddef.h>\n";
     }
-    for Declared { name, values, doc, .. } in program.arrays.iter().filter(|array| array.kind == Kind::Table)
-    {
+    // What only a constant of the core reads is not there.
+    let is_read =
+        |array: &&Declared| array.kind == Kind::Table && functions.contains(&format!("{}[", array.name));
+    for Declared { name, values, doc, .. } in program.arrays.iter().filter(is_read) {
         let numbers = writer.numbers(values, "");
         source +=
             &format!("\n// {doc}\nstatic const {} {name}[{}] = {numbers};\n", writer.real(), values.len());

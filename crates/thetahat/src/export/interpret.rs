@@ -1,11 +1,15 @@
 //! A program as it runs: the numbers that every language must give.
 
+use std::sync::Arc;
+
 use thetahat_core::Real;
 
 use super::Precision;
+use super::map::Evaluated;
 use super::program::{
     Array, Condition, Entry, Function, Index, Operation, Program, Statement, Value, Variable,
 };
+use crate::model::Evaluator;
 
 /// A program with what it remembers.
 #[derive(Debug)]
@@ -14,6 +18,14 @@ pub(super) struct Machine {
     arrays: Vec<Vec<f64>>,
     variables: Vec<f64>,
     counters: Vec<usize>,
+    maps: Vec<Arc<Evaluation>>,
+}
+
+/// A map that can be evaluated.
+#[derive(Debug)]
+struct Evaluation {
+    own: Evaluated,
+    evaluator: Evaluator,
 }
 
 impl Machine {
@@ -25,6 +37,7 @@ impl Machine {
             arrays: program.arrays.iter().map(|array| values(&array.values)).collect(),
             variables: vec![0.0; program.variables.len()],
             counters: vec![0; program.counters],
+            maps: program.maps.iter().map(evaluation).collect(),
             precision,
         }
     }
@@ -45,7 +58,6 @@ impl Machine {
     fn execute(&mut self, statements: &[Statement]) {
         for statement in statements {
             match statement {
-                Statement::Note(_) => {}
                 Statement::Let(Variable(place), value) | Statement::Set(Variable(place), value) => {
                     self.variables[*place] = self.value(value);
                 }
@@ -67,8 +79,19 @@ impl Machine {
                     };
                     self.execute(if holds { then } else { otherwise });
                 }
+                Statement::Evaluate { map, into } => self.variables[into.0] = self.evaluate(*map),
             }
         }
+    }
+
+    /// What a map makes of its regressors: in double precision the core says it.
+    fn evaluate(&mut self, map: usize) -> f64 {
+        let map = Arc::clone(&self.maps[map]);
+        if let (Precision::F32, Some((statements, value))) = (self.precision, &map.own.statements) {
+            self.execute(statements);
+            return self.variables[value.0];
+        }
+        self.precision.rounded(map.evaluator.value(&self.arrays[map.own.z.0]))
     }
 
     fn place(&self, index: &Index) -> usize {
@@ -101,6 +124,10 @@ impl Machine {
         };
         self.precision.rounded(exact)
     }
+}
+
+fn evaluation(map: &Evaluated) -> Arc<Evaluation> {
+    Arc::new(Evaluation { own: map.clone(), evaluator: Evaluator::new(&map.functions, map.theta.clone()) })
 }
 
 fn call<T: Real>(function: Function, value: T) -> T {

@@ -1,7 +1,8 @@
 //! A step of a model as a small program: numbers, arrays and loops of fixed length, from which every language is written.
-#![allow(dead_code)]
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
+
+use super::map::Evaluated;
 
 /// Numbers that never change, that the step remembers, that go in, or that come out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -40,6 +41,13 @@ impl Index {
         self.constant += places;
         self
     }
+
+    /// The place of an entry of a matrix that is stored row by row, of so many columns.
+    pub(super) fn entry(&self, columns: usize, column: &Self) -> Self {
+        let times = |(counter, factor): &(Counter, isize)| (*counter, factor * columns as isize);
+        let terms = self.terms.iter().map(times).chain(column.terms.iter().copied());
+        Self { constant: self.constant * columns + column.constant, terms: terms.collect() }
+    }
 }
 
 /// What an array is.
@@ -61,6 +69,8 @@ pub(super) struct Declared {
     pub(super) kind: Kind,
     /// What it holds; of a memory what it starts with, of arguments and results zeros.
     pub(super) values: Vec<f64>,
+    /// Of a table that the core reads in groups, how many numbers are one.
+    pub(super) group: usize,
     pub(super) doc: String,
 }
 
@@ -153,8 +163,6 @@ pub(super) enum Condition {
 
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Statement {
-    /// What follows, for who reads it.
-    Note(String),
     /// A variable of which this is the first value.
     Let(Variable, Value),
     Set(Variable, Value),
@@ -168,6 +176,11 @@ pub(super) enum Statement {
         condition: Condition,
         then: Vec<Statement>,
         otherwise: Vec<Statement>,
+    },
+    /// A variable of which this is the first value: what a map makes of its regressors.
+    Evaluate {
+        map: usize,
+        into: Variable,
     },
 }
 
@@ -188,6 +201,7 @@ pub(super) struct Program {
     pub(super) variables: Vec<String>,
     pub(super) counters: usize,
     pub(super) entries: Vec<Entry>,
+    pub(super) maps: Vec<Evaluated>,
     /// Whether a function of the mathematical library is called.
     pub(super) calls: bool,
 }
@@ -195,7 +209,7 @@ pub(super) struct Program {
 impl Program {
     /// An array; of arguments and results so many zeros.
     pub(super) fn array(&mut self, kind: Kind, name: &str, doc: &str, values: Vec<f64>) -> Array {
-        self.arrays.push(Declared { name: name.to_owned(), kind, values, doc: doc.to_owned() });
+        self.arrays.push(Declared { name: name.to_owned(), kind, values, group: 1, doc: doc.to_owned() });
         Array(self.arrays.len() - 1)
     }
 
@@ -220,6 +234,13 @@ impl Program {
         }
         self.variables.push(own);
         Variable(self.variables.len() - 1)
+    }
+
+    /// Says that the core reads a table in groups of so many.
+    pub(super) fn group(&mut self, table: Array, group: usize) {
+        if let Some(table) = self.arrays.get_mut(table.0) {
+            table.group = group;
+        }
     }
 
     pub(super) fn length(&self, array: Array) -> usize {

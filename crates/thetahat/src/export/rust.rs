@@ -1,6 +1,7 @@
 //! A program as a module of Rust that needs no heap.
 
 use super::head::Head;
+use super::map::{Basis, Field};
 use super::program::{Array, Declared, Entry, Kind, Program};
 use super::vector::Vector;
 use super::writer::Writer;
@@ -11,13 +12,22 @@ pub(super) fn file(program: &Program, name: &str, precision: Precision, head: &H
     let mut writer = Writer::new(program, Language::Rust, precision);
     let real = writer.real();
     let mut text = head.comments();
-    if program.calls {
-        text += "\nuse thetahat_core::Real;\n";
-    }
-    for Declared { name, values, doc, .. } in program.arrays.iter().filter(|array| array.kind == Kind::Table)
+    text += &uses(program);
+    for Declared { name, values, group, doc, .. } in
+        program.arrays.iter().filter(|array| array.kind == Kind::Table)
     {
-        let numbers = writer.numbers(values, "");
-        text += &format!("\n/// {doc}\nconst {name}: [{real}; {}] = {numbers};\n", values.len());
+        let (kind, numbers) = match group {
+            1 => (real.to_owned(), writer.numbers(values, "")),
+            _ => {
+                let each: Vec<String> =
+                    values.chunks(*group).map(|group| writer.numbers(group, "")).collect();
+                (format!("[{real}; {group}]"), format!("[\n    {},\n]", each.join(",\n    ")))
+            }
+        };
+        text += &format!("\n/// {doc}\nconst {name}: [{kind}; {}] = {numbers};\n", values.len() / group);
+    }
+    for (place, map) in program.maps.iter().enumerate() {
+        text += &basis(program, place + 1, &map.basis, real);
     }
     let memories = || program.arrays.iter().filter(|array| array.kind == Kind::Memory);
     text += &format!(
@@ -61,6 +71,45 @@ pub(super) fn file(program: &Program, name: &str, precision: Precision, head: &H
         type_name(name)
     );
     ExportedFile { name: format!("{name}.rs"), text }
+}
+
+/// What is used of the core.
+fn uses(program: &Program) -> String {
+    let mut names: Vec<&str> = Vec::new();
+    for map in &program.maps {
+        names.extend(["Basis", map.basis.name]);
+        names.extend(map.basis.fields.iter().filter_map(|(_, field)| match field {
+            Field::Word(name, _) => Some(*name),
+            _ => None,
+        }));
+    }
+    names.sort_unstable();
+    names.dedup();
+    match names[..] {
+        [] => String::new(),
+        _ => format!("\nuse thetahat_core::{{{}}};\n", names.join(", ")),
+    }
+}
+
+/// The functions of a map as a constant.
+fn basis(program: &Program, number: usize, basis: &Basis, real: &str) -> String {
+    let field = |(name, field): &(&str, Field)| {
+        let value = match field {
+            Field::Table(Array(array)) => format!("&{}", program.arrays[*array].name),
+            Field::Integers(numbers) => format!("&{numbers:?}"),
+            Field::Count(count) => count.to_string(),
+            Field::Flag(flag) => flag.to_string(),
+            Field::Word(name, word) => format!("{name}::{word}"),
+        };
+        format!("{name}: {value}")
+    };
+    let fields: Vec<String> = basis.fields.iter().map(field).collect();
+    let generics = if basis.generic { format!("<'static, {real}>") } else { "<'static>".to_owned() };
+    let name = basis.name;
+    format!(
+        "\n/// The functions.\nconst MAP{number}: {name}{generics} = {name} {{ {} }};\n",
+        fields.join(", ")
+    )
 }
 
 fn signature(program: &Program, entry: &Entry, real: &str) -> String {

@@ -64,27 +64,43 @@ impl Signals {
         }
     }
 
-    /// Puts an input, as a deviation, into the last place of a line that was not moved on yet: where it is missing what stands there stays.
+    /// Puts an input, as a deviation, into the last place of a line that moves on: where it is missing what stands there stays.
     pub(super) fn take_input(&self, program: &mut Program, place: usize, line: Array) -> Vec<Statement> {
+        self.take(program, place, line, |deviation| deviation)
+    }
+
+    /// The same of an input divided by its scale.
+    pub(super) fn take_scaled(
+        &self,
+        program: &mut Program,
+        place: usize,
+        scale: f64,
+        line: Array,
+    ) -> Vec<Statement> {
+        self.take(program, place, line, |deviation| deviation / scale)
+    }
+
+    fn take(
+        &self,
+        program: &mut Program,
+        place: usize,
+        line: Array,
+        scaled: impl FnOnce(Value) -> Value,
+    ) -> Vec<Statement> {
         let (Some(input), Some(last)) = (self.inputs, program.length(line).checked_sub(1)) else {
             return Vec::new();
         };
         let mut statements = program.shift(line);
-        statements.push(self.hold(input, &place.into(), line, last.into()));
+        let place = Index::from(place);
+        statements.push(hold(input.at(place.clone()), line, last.into(), scaled(self.input(input, &place))));
         statements
     }
 
     /// Puts an input, as a deviation, into its place among those that were held; where it is missing what stands there stays.
     pub(super) fn hold_input(&self, held: Array, place: &Index) -> Vec<Statement> {
-        self.inputs.map(|input| self.hold(input, place, held, place.clone())).into_iter().collect()
-    }
-
-    fn hold(&self, input: Array, place: &Index, into: Array, at: Index) -> Statement {
-        Statement::Choose {
-            condition: Condition::Missing(input.at(place.clone())),
-            then: Vec::new(),
-            otherwise: vec![Statement::Store(into, at, self.input(input, place))],
-        }
+        let hold =
+            |input: Array| hold(input.at(place.clone()), held, place.clone(), self.input(input, place));
+        self.inputs.map(hold).into_iter().collect()
     }
 
     /// What was measured of an output, as a deviation.
@@ -104,5 +120,14 @@ impl Signals {
             None => deviation,
         };
         Statement::Store(self.outputs, place.clone(), value)
+    }
+}
+
+/// Puts a value into its place, unless what it is made of is missing.
+fn hold(given: Value, into: Array, at: Index, value: Value) -> Statement {
+    Statement::Choose {
+        condition: Condition::Missing(given),
+        then: Vec::new(),
+        otherwise: vec![Statement::Store(into, at, value)],
     }
 }

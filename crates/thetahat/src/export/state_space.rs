@@ -10,7 +10,7 @@
 
 use thetahat_core::nalgebra::DMatrix;
 
-use super::program::{Array, Condition, Counter, Entry, Index, Kind, Program, Statement, Variable};
+use super::program::{Array, Condition, Entry, Index, Kind, Program, Statement, Variable};
 use super::signals::Signals;
 use super::{Form, Purpose, refused};
 use crate::Error;
@@ -127,7 +127,7 @@ impl System {
             for (matrix, column, size) in factors {
                 let (Some(matrix), Some(column)) = (matrix, column) else { continue };
                 body.extend(program.repeat(*size, |_, j| {
-                    let index = place(&row, *size, &j);
+                    let index = row.entry(*size, &j);
                     vec![Statement::Set(sum, sum + matrix.at(index) * column.at(j))]
                 }));
             }
@@ -241,11 +241,4 @@ impl System {
             body,
         }
     }
-}
-
-/// The place of an entry of a matrix of so many columns.
-fn place(row: &Index, columns: usize, column: &Index) -> Index {
-    let times = |(counter, factor): &(Counter, isize)| (*counter, factor * columns as isize);
-    let terms = row.terms.iter().map(times).chain(column.terms.iter().copied());
-    Index { constant: row.constant * columns + column.constant, terms: terms.collect() }
 }

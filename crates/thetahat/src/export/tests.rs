@@ -1,6 +1,8 @@
 //! Programs beside the library.
 
+mod nonlinear;
 mod polynomials;
+mod processes;
 mod states;
 
 use super::program::Program;

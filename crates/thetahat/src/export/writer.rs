@@ -77,7 +77,6 @@ impl<'p> Writer<'p> {
         let c = self.language == Language::C;
         // Writing to a string cannot fail.
         let _ = match statement {
-            Statement::Note(note) => writeln!(text, "{indent}// {note}"),
             Statement::Let(variable, value) => {
                 let (name, value) = (self.name(*variable), self.value(value));
                 let real = self.real();
@@ -120,6 +119,25 @@ impl<'p> Writer<'p> {
                     tail = format!(" else {{\n{}{indent}}}", self.statements(otherwise, &inner));
                 }
                 writeln!(text, "{indent}{head} {{\n{body}{indent}}}{tail}")
+            }
+            Statement::Evaluate { map, into } => {
+                let (program, name, real) = (self.program, self.name(*into).to_owned(), self.real());
+                let Some(own) = program.maps.get(*map) else { return };
+                match (self.language, &own.statements) {
+                    (Language::C, Some((statements, value))) => {
+                        *text += &self.statements(statements, indent);
+                        writeln!(text, "{indent}{real} {name} = {};", self.name(*value))
+                    }
+                    _ => {
+                        let [parameters, z] =
+                            [own.parameters, own.z].map(|array| &program.arrays[array.0].name);
+                        writeln!(
+                            text,
+                            "{indent}let {name}: {real} = MAP{}.value(&{parameters}, &self.{z});",
+                            map + 1
+                        )
+                    }
+                }
             }
         };
     }
@@ -227,6 +245,6 @@ fn sets(statements: &[Statement], variable: Variable) -> bool {
         Statement::Set(own, _) => *own == variable,
         Statement::Repeat { body, .. } => sets(body, variable),
         Statement::Choose { then, otherwise, .. } => sets(then, variable) || sets(otherwise, variable),
-        Statement::Note(_) | Statement::Let(..) | Statement::Store(..) => false,
+        Statement::Let(..) | Statement::Store(..) | Statement::Evaluate { .. } => false,
     })
 }

@@ -117,87 +117,12 @@ fn models_of_other_kinds_say_what_the_library_does() {
 
 #[test]
 fn nonlinear_models_say_what_the_library_does() {
-    let folder = motor();
-    for map in ["poly --degree 2", "rbf --centres kmeans:5", "spline", "local", "tanh --units 3", "relu --units 3"] {
-        folder.done(&format!("fit dc_motor.csv --time t --narx {map} --ny 2 --nu 2 --report r.json"));
-        goes_round(&folder, "r.json", "dc_motor.csv --time t", &["predictor"]);
+    // y(t) = 0.6 y(t-1) + 0.3 u(t-1)^2 - 0.1 y(t-1) u(t-1), and a little of what looks like noise.
+    let (mut text, mut y, mut u, mut random) = ("t,u,y\n".to_owned(), 0.0_f64, 0.0_f64, 1_u32);
+    for t in 0..400 {
+        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        y = 0.6 * y + 0.3 * u * u - 0.1 * y * u + 0.01 * f64::from(random >> 16 & 0xff) / 256.0;
+        u = f64::from(random >> 8) / f64::from(1 << 23) - 1.0;
+        text += &format!("{t},{u},{y}\n");
     }
-}
-
-/// The predictor of the motor on a Cortex-M4F.
-#[test]
-fn the_predictor_of_the_motor_is_small() {
-    if !has("arm-none-eabi-gcc") {
-        return;
-    }
-    let folder = motor();
-    folder.done("fit dc_motor.csv --time t --na 2 --nb 2 --nk 3 --report r.json");
-    for purpose in ["predictor", "simulator"] {
-        folder.done(&format!("export r.json --to c --what {purpose} --name motor"));
-        let processor =
-            ["-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16", "-c", "motor.c"];
-        run(Command::new("arm-none-eabi-gcc").current_dir(folder.path(".")).args(STRICT).args(processor));
-        let size = Command::new("arm-none-eabi-size").arg(folder.path("motor.o")).output().expect("binutils");
-        let text = String::from_utf8_lossy(&size.stdout).into_owned();
-        let row: Vec<usize> = text
-            .lines()
-            .nth(1)
-            .unwrap_or_default()
-            .split_whitespace()
-            .map_while(|word| word.parse().ok())
-            .collect();
-        assert!(matches!(row[..], [code, data, ..] if code + data < 1000), "{text}");
-    }
-}
-
-#[test]
-fn files_tell_where_they_are_from() {
-    let folder = motor();
-    folder.done("fit dc_motor.csv --time t --na 2 --nb 2 --nk 3 --report r.json");
-    let run = folder.done("export r.json --to c --what predictor --out firmware");
-    assert!(run.stderr.contains("predictor of ARX(2, 2, 3): r_predictor.h, r_predictor.c"), "{}", run.stderr);
-    let header = folder.read("firmware/r_predictor.h");
-    for words in [
-        "u[0] is 'u', in its own unit, with the offset",
-        "y[0] is 'y'",
-        "Sample time 0.01 s",
-        "'u' acts 3 samples later",
-    ] {
-        assert!(header.contains(words), "{words}: {header}");
-    }
-    // The same bytes each time, and another report has another digest.
-    folder.done("export r.json --to c --what predictor --out again");
-    assert_eq!(folder.read("again/r_predictor.h"), header);
-    folder.done("fit dc_motor.csv --time t --na 2 --nb 1 --nk 3 --report r.json");
-    folder.done("export r.json --to c --what predictor --out again");
-    assert_ne!(folder.read("again/r_predictor.h").lines().nth(1), header.lines().nth(1));
-}
-
-#[test]
-fn what_cannot_be_exported_is_refused_and_nothing_written() {
-    let folder = motor();
-    folder.done("fit dc_motor.csv --time t --na 2 --nb 2 --nk 3 --report r.json");
-    let before = folder.names();
-    for (line, code, words) in [
-        (
-            "r.json --to c --what observer",
-            2,
-            "--what: a model of polynomials is exported as no observer; take predictor, simulator",
-        ),
-        ("r.json --to c --what predictor --name Motor", 2, "--name: 'Motor' is no name"),
-        ("r.json --to c --what predictor --rows 1..5", 2, "LOG"),
-        ("r.json dc_motor.csv --time t --to c --what predictor --rows 1..5000", 3, "rows"),
-        ("r.json nowhere.csv --to c --what predictor", 5, "nowhere.csv"),
-        ("dc_motor.csv --to c --what predictor", 3, "not a thetahat report"),
-        ("r.json dc_motor.csv --sample-time 1 --to c --what predictor", 3, "sample time"),
-    ] {
-        let run = folder.run(&format!("export {line}"));
-        assert_eq!(run.code, code, "{line}: {}", run.stderr);
-        assert!(run.stderr.contains(words), "{line}: {}", run.stderr);
-    }
-    folder.done("fit dc_motor.csv --time t --na 2 --nb 2 --nk 3 --detrend linear --report line.json");
-    let message = folder.refused("export line.json --to rust --what simulator", 3);
-    assert!(message.contains("is a line in the time of its log"), "{message}");
-    let after: Vec<String> = folder.names().into_iter().filter(|name| name != "line.json").collect();
-    assert_eq!(after, before);
-}
+    let folder = Folder::with_log(text);

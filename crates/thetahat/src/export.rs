@@ -34,6 +34,7 @@ mod nonlinear_arx;
 mod polynomial;
 mod process;
 mod program;
+mod recursive;
 mod rust;
 mod signals;
 mod state_space;
@@ -206,6 +207,9 @@ struct Form {
 pub fn export(report: &Report, plan: &Plan, log: Option<(&Log, &[Rows])>) -> Result<Exported, Error> {
     check_name(&plan.name)?;
     let model = &report.model;
+    if plan.purpose == Purpose::Recursive {
+        return recursive::exported(report, plan, log);
+    }
     let form = form(model, plan.purpose)?;
     let head = Head::new(report, plan, &form.equations, &form.start)?;
     let Plan { language, precision, name, .. } = plan;

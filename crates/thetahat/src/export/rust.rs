@@ -19,9 +19,9 @@ pub(super) fn file(program: &Program, name: &str, precision: Precision, head: &H
         let (kind, numbers) = match group {
             1 => (real.to_owned(), writer.numbers(values, "")),
             _ => {
-                let each: Vec<String> =
-                    values.chunks(*group).map(|group| writer.numbers(group, "")).collect();
-                (format!("[{real}; {group}]"), format!("[\n    {},\n]", each.join(",\n    ")))
+                let line = |group: &[f64]| format!("    {},\n", writer.numbers(group, ""));
+                let lines: Vec<String> = values.chunks(*group).map(line).collect();
+                (format!("[{real}; {group}]"), format!("[\n{}]", lines.concat()))
             }
         };
         text += &format!("\n/// {doc}\nconst {name}: [{kind}; {}] = {numbers};\n", values.len() / group);

@@ -126,3 +126,141 @@ fn nonlinear_models_say_what_the_library_does() {
         text += &format!("{t},{u},{y}\n");
     }
     let folder = Folder::with_log(text);
+    for map in
+        ["poly --degree 2", "rbf --centres kmeans:5", "spline", "local", "tanh --units 3", "relu --units 3"]
+    {
+        folder.done(&format!("fit log.csv --time t --narx {map} --ny 1 --nu 2 --report r.json"));
+        goes_round(&folder, "r.json", "log.csv --time t", &["predictor"]);
+    }
+}
+
+#[test]
+fn models_in_equations_say_what_the_library_does() {
+    let folder = Folder::with_log(include_str!("data/dc_motor.csv"));
+    folder.write(
+        "motor.toml",
+        "sample_time = 0.01
+         [states]
+         current = { start = 0, sd = 1 }
+         speed = { start = 0, sd = 1 }
+         [inputs]
+         voltage = 'u'
+         [parameters]
+         resistance = { start = 1, sd = 1, unknown = true, min = 0 }
+         inertia = { start = 0.02, sd = 0.02, unknown = true, min = 0 }
+         [derivative]
+         current = '(voltage - resistance * current - 0.1 * speed) / 0.05'
+         speed = '(0.1 * current - 0.001 * speed * abs(speed) - 0.001 * tanh(speed) + 0 * t) / inertia'
+         [outputs]
+         i = 'current'
+         speed = 'speed'
+         [noise]
+         process = { speed = 0.1 }
+         measurement = { i = 0.1, speed = 0.1 }",
+    );
+    folder.done("fit --grey motor.toml log.csv --time t --report r.json");
+    goes_round(&folder, "r.json", "log.csv --time t", &["simulator"]);
+}
+
+#[test]
+fn nearest_neighbours_are_for_rust_alone() {
+    let folder = motor();
+    folder.done("fit dc_motor.csv --time t --narx knn --ny 1 --nu 1 --estimate 1..100 --report r.json");
+    let export =
+        "export r.json dc_motor.csv --time t --rows 200..300 --what predictor --precision f64 --name model";
+    folder.done(&format!("{export} --to rust"));
+    rustc(&folder, "model");
+    assert!(folder.refused(&format!("{export} --to c"), 2).contains("nearest neighbours"));
+}
+
+#[test]
+fn estimators_go_on_from_the_fit() {
+    let folder = motor();
+    for orders in ["--na 2 --nb 2 --nk 3", "--model armax --na 2 --nb 2 --nc 1 --nk 3", "--model ar --na 2"] {
+        let input = if orders.contains(" ar ") { "-y y" } else { "-u u -y y" };
+        folder.done(&format!("fit dc_motor.csv --time t {input} {orders} --report r.json"));
+        for precision in ["f64", "f32"] {
+            let export = format!(
+                "export r.json dc_motor.csv --time t --what recursive --precision {precision} --name model"
+            );
+            folder.done(&format!("{export} --to rust"));
+            rustc(&folder, "model");
+            assert!(folder.refused(&format!("{export} --to c"), 2).contains("take rust"));
+        }
+    }
+    folder.done("fit dc_motor.csv --time t --model oe --nb 2 --nf 2 --report r.json");
+    assert!(folder.refused("export r.json --to rust --what recursive", 3).contains("can be tracked"));
+}
+
+/// The predictor of the motor on a Cortex-M4F.
+#[test]
+fn the_predictor_of_the_motor_is_small() {
+    if !has("arm-none-eabi-gcc") {
+        return;
+    }
+    let folder = motor();
+    folder.done("fit dc_motor.csv --time t --na 2 --nb 2 --nk 3 --report r.json");
+    for purpose in ["predictor", "simulator"] {
+        folder.done(&format!("export r.json --to c --what {purpose} --name motor"));
+        let processor =
+            ["-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16", "-c", "motor.c"];
+        run(Command::new("arm-none-eabi-gcc").current_dir(folder.path(".")).args(STRICT).args(processor));
+        let size = Command::new("arm-none-eabi-size").arg(folder.path("motor.o")).output().expect("binutils");
+        let text = String::from_utf8_lossy(&size.stdout).into_owned();
+        let row = text.lines().nth(1).unwrap_or_default().split_whitespace();
+        let row: Vec<usize> = row.map_while(|word| word.parse().ok()).collect();
+        assert!(matches!(row[..], [code, data, ..] if code + data < 1000), "{text}");
+    }
+}
+
+#[test]
+fn files_tell_where_they_are_from() {
+    let folder = motor();
+    folder.done("fit dc_motor.csv --time t --na 2 --nb 2 --nk 3 --report r.json");
+    let run = folder.done("export r.json --to c --what predictor --out firmware");
+    assert!(run.stderr.contains("predictor of ARX(2, 2, 3): r_predictor.h, r_predictor.c"), "{}", run.stderr);
+    let header = folder.read("firmware/r_predictor.h");
+    for words in [
+        "u[0] is 'u', in its own unit, with the offset",
+        "y[0] is 'y'",
+        "Sample time 0.01 s",
+        "'u' acts 3 samples later",
+    ] {
+        assert!(header.contains(words), "{words}: {header}");
+    }
+    // The same bytes each time, and another report has another digest.
+    folder.done("export r.json --to c --what predictor --out again");
+    assert_eq!(folder.read("again/r_predictor.h"), header);
+    folder.done("fit dc_motor.csv --time t --na 2 --nb 1 --nk 3 --report r.json");
+    folder.done("export r.json --to c --what predictor --out again");
+    assert_ne!(folder.read("again/r_predictor.h").lines().nth(1), header.lines().nth(1));
+}
+
+#[test]
+fn what_cannot_be_exported_is_refused_and_nothing_written() {
+    let folder = motor();
+    folder.done("fit dc_motor.csv --time t --na 2 --nb 2 --nk 3 --report r.json");
+    let before = folder.names();
+    for (line, code, words) in [
+        (
+            "r.json --to c --what observer",
+            2,
+            "--what: a model of polynomials is exported as no observer; take predictor, simulator",
+        ),
+        ("r.json --to c --what predictor --name Motor", 2, "--name: 'Motor' is no name"),
+        ("r.json --to c --what predictor --rows 1..5", 2, "LOG"),
+        ("r.json dc_motor.csv --time t --to c --what predictor --rows 1..5000", 3, "rows"),
+        ("r.json nowhere.csv --to c --what predictor", 5, "nowhere.csv"),
+        ("dc_motor.csv --to c --what predictor", 3, "not a thetahat report"),
+        ("r.json dc_motor.csv --sample-time 1 --to c --what predictor", 3, "sample time"),
+    ] {
+        let run = folder.run(&format!("export {line}"));
+        assert_eq!(run.code, code, "{line}: {}", run.stderr);
+        assert!(run.stderr.contains(words), "{line}: {}", run.stderr);
+    }
+    folder.done("fit dc_motor.csv --time t --na 2 --nb 2 --nk 3 --detrend linear --report line.json");
+    let message = folder.refused("export line.json --to rust --what simulator", 3);
+    assert!(message.contains("is a line in the time of its log"), "{message}");
+    let after: Vec<String> = folder.names().into_iter().filter(|name| name != "line.json").collect();
+    assert_eq!(after, before);
+}

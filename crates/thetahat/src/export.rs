@@ -27,6 +27,7 @@
 //! ```
 
 mod c;
+mod equations;
 mod head;
 mod interpret;
 mod map;
@@ -251,7 +252,7 @@ fn form(model: &Model, purpose: Purpose) -> Result<Form, Error> {
             let sampled = own.sampled(own.sample_time, own.hold)?;
             state_space::form(model, &sampled, purpose)
         }
-        _ => Err(refused(purpose, &model.name(), "nothing yet")),
+        Model::Equations(own) => equations::form(model, own, purpose),
     }
 }
 

@@ -5,9 +5,8 @@ use std::sync::Arc;
 use thetahat_core::Real;
 
 use super::Precision;
-use super::map::Evaluated;
 use super::program::{
-    Array, Condition, Entry, Function, Index, Operation, Program, Statement, Value, Variable,
+    Array, Condition, Entry, Evaluated, Function, Index, Operation, Program, Statement, Value, Variable,
 };
 use crate::model::Evaluator;
 
@@ -114,11 +113,11 @@ impl Machine {
                     Operation::Divide => one / other,
                 }
             }
-            Value::Call(function, value) => {
-                let value = self.value(value);
+            Value::Call(function, arguments) => {
+                let value = |place: usize| arguments.get(place).map_or(f64::NAN, |value| self.value(value));
                 return match self.precision {
-                    Precision::F64 => call(*function, value),
-                    Precision::F32 => f64::from(call(*function, value as f32)),
+                    Precision::F64 => call(*function, [value(0), value(1)]),
+                    Precision::F32 => f64::from(call(*function, [value(0) as f32, value(1) as f32])),
                 };
             }
         };
@@ -130,9 +129,22 @@ fn evaluation(map: &Evaluated) -> Arc<Evaluation> {
     Arc::new(Evaluation { own: map.clone(), evaluator: Evaluator::new(&map.functions, map.theta.clone()) })
 }
 
-fn call<T: Real>(function: Function, value: T) -> T {
+fn call<T: Real>(function: Function, [x, other]: [T; 2]) -> T {
     match function {
-        Function::Exponential => value.exponential(),
-        Function::HyperbolicTangent => value.hyperbolic_tangent(),
+        Function::Exponential => x.exponential(),
+        Function::HyperbolicTangent => x.hyperbolic_tangent(),
+        Function::SquareRoot => x.sqrt(),
+        Function::Logarithm => x.ln(),
+        Function::Sine => x.sin(),
+        Function::Cosine => x.cos(),
+        Function::Tangent => x.tan(),
+        Function::ArcSine => x.asin(),
+        Function::ArcCosine => x.acos(),
+        Function::ArcTangent => x.atan(),
+        Function::HyperbolicSine => x.sinh(),
+        Function::HyperbolicCosine => x.cosh(),
+        Function::Absolute => x.abs(),
+        Function::Angle => x.atan2(other),
+        Function::Power => x.powf(other),
     }
 }

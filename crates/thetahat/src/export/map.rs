@@ -1,144 +1,106 @@
 //! The maps of nonlinear ARX models: as a constant of the core, which Rust evaluates, and in statements, which do the same in its order.
 
-use super::program::{Array, Condition, Function, Index, Program, Statement, Value, Variable};
+use super::program::{
+    Array, Basis, Condition, Evaluated, Field, Function, Index, Program, Statement, Value, Variable,
+};
 use crate::model::{Activation, Map, Membership};
 
-/// A map of a program.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Evaluated {
-    pub(super) functions: Map,
-    pub(super) theta: Vec<f64>,
-    pub(super) z: Array,
-    pub(super) parameters: Array,
-    pub(super) basis: Basis,
-    /// Statements that leave g(z) in a variable; none where only the core has it.
-    pub(super) statements: Option<(Vec<Statement>, Variable)>,
-}
-
-/// A constant of the core: its type and its fields.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Basis {
-    pub(super) name: &'static str,
-    /// Whether the type has that of numbers.
-    pub(super) generic: bool,
-    pub(super) fields: Vec<(&'static str, Field)>,
-}
-
-#[derive(Debug, Clone, PartialEq)]
-pub(super) enum Field {
-    /// A table, which Rust reads in groups of so many.
-    Table(Array),
-    Integers(Vec<usize>),
-    Count(usize),
-    Flag(bool),
-    /// A variant of an enumeration of the core.
-    Word(&'static str, &'static str),
-}
-
-impl Evaluated {
-    /// A map by its number, of regressors that stand in `z`.
-    pub(super) fn new(
-        program: &mut Program,
-        number: usize,
-        functions: &Map,
-        theta: Vec<f64>,
-        z: Array,
-    ) -> Self {
-        let named = |letter: &str| if number == 1 { letter.to_owned() } else { format!("{letter}{number}") };
-        let parameters = program.table(&named("THETA"), "The parameters.", theta.clone());
-        let regressors = program.length(z);
-        let maker = Maker { z, parameters, regressors };
-        let count = ("regressors", Field::Count(regressors));
-        let (basis, statements) = match functions {
-            Map::Polynomial { terms } => {
-                let ends = terms.iter().scan(0, |end, term| {
-                    *end += term.len();
-                    Some(*end)
-                });
-                let fields = vec![
-                    ("factors", Field::Integers(terms.concat())),
-                    ("ends", Field::Integers(ends.collect())),
-                ];
-                let basis = Basis { name: "Polynomial", generic: false, fields };
-                (basis, Some(maker.polynomial(program, terms)))
-            }
-            Map::Radial { centres, widths, linear } => {
-                let squares = widths.iter().map(|width| 1.0 / (width * width)).collect();
-                let centres = program.table(&named("CENTRES"), "The centres.", centres.concat());
-                let squares =
-                    program.table(&named("INVERSE_SQUARES"), "1 over the squares of the widths.", squares);
-                let fields = vec![
-                    count,
-                    ("centres", Field::Table(centres)),
-                    ("inverse_squares", Field::Table(squares)),
-                    ("linear", Field::Flag(*linear)),
-                ];
-                let basis = Basis { name: "Radial", generic: true, fields };
-                (basis, Some(maker.radial(program, [centres, squares], *linear)))
-            }
-            Map::Spline { regressors, knots } => {
-                let table =
-                    program.table(&named("KNOTS"), "The knots of the bends, three each.", knots.concat());
-                program.group(table, 3);
-                let fields = vec![
-                    count,
-                    ("bent", Field::Integers(regressors.clone())),
-                    ("knots", Field::Table(table)),
-                ];
-                let basis = Basis { name: "Spline", generic: true, fields };
-                (basis, Some(maker.spline(program, regressors, table)))
-            }
-            Map::Network { activation, weights, biases } => {
-                let weights = program.table(&named("WEIGHTS"), "The weights of the units.", weights.concat());
-                let biases = program.table(&named("BIASES"), "Their biases.", biases.clone());
-                let word = match activation {
-                    Activation::Tanh => "Tanh",
-                    Activation::Logistic => "Logistic",
-                    Activation::Relu => "Relu",
-                    Activation::Step => "Step",
-                };
-                let fields = vec![
-                    ("activation", Field::Word("Activation", word)),
-                    count,
-                    ("weights", Field::Table(weights)),
-                    ("biases", Field::Table(biases)),
-                ];
-                let basis = Basis { name: "Network", generic: true, fields };
-                (basis, Some(maker.network(program, [weights, biases], *activation)))
-            }
-            Map::Local { membership, planes, boxes, domain } => {
-                let sides = boxes.iter().flatten().flatten().copied().collect();
-                let sides = program.table(&named("SIDES"), "The sides of the boxes, two ends each.", sides);
-                let domain = program.table(&named("DOMAIN"), "The range of each regressor.", domain.concat());
-                program.group(sides, 2);
-                program.group(domain, 2);
-                let word = match membership {
-                    Membership::Rectangle => "Rectangle",
-                    Membership::Trapezoid => "Trapezoid",
-                    Membership::Gaussian => "Gaussian",
-                };
-                let fields = vec![
-                    ("membership", Field::Word("Membership", word)),
-                    ("planes", Field::Flag(*planes)),
-                    ("sides", Field::Table(sides)),
-                    ("domain", Field::Table(domain)),
-                ];
-                let basis = Basis { name: "Local", generic: true, fields };
-                (basis, Some(maker.local(program, [sides, domain], *membership, (boxes.len(), *planes))))
-            }
-            Map::Neighbours { count: asked, planes, points } => {
-                let points = program.table(&named("POINTS"), "The samples.", points.concat());
-                let fields = vec![
-                    count,
-                    ("points", Field::Table(points)),
-                    ("count", Field::Count(*asked)),
-                    ("planes", Field::Flag(*planes)),
-                ];
-                (Basis { name: "Neighbours", generic: true, fields }, None)
-            }
-        };
-        Self { functions: functions.clone(), theta, z, parameters, basis, statements }
-    }
+/// A map by its number, of regressors that stand in `z`.
+pub(super) fn evaluated(
+    program: &mut Program,
+    number: usize,
+    functions: &Map,
+    theta: Vec<f64>,
+    z: Array,
+) -> Evaluated {
+    let named = |letter: &str| if number == 1 { letter.to_owned() } else { format!("{letter}{number}") };
+    let parameters = program.table(&named("THETA"), "The parameters.", theta.clone());
+    let regressors = program.length(z);
+    let maker = Maker { z, parameters, regressors };
+    let count = ("regressors", Field::Count(regressors));
+    let (basis, statements) = match functions {
+        Map::Polynomial { terms } => {
+            let ends = terms.iter().scan(0, |end, term| {
+                *end += term.len();
+                Some(*end)
+            });
+            let fields =
+                vec![("factors", Field::Integers(terms.concat())), ("ends", Field::Integers(ends.collect()))];
+            let basis = Basis { name: "Polynomial", generic: false, fields };
+            (basis, Some(maker.polynomial(program, terms)))
+        }
+        Map::Radial { centres, widths, linear } => {
+            let squares = widths.iter().map(|width| 1.0 / (width * width)).collect();
+            let centres = program.table(&named("CENTRES"), "The centres.", centres.concat());
+            let squares =
+                program.table(&named("INVERSE_SQUARES"), "1 over the squares of the widths.", squares);
+            let fields = vec![
+                count,
+                ("centres", Field::Table(centres)),
+                ("inverse_squares", Field::Table(squares)),
+                ("linear", Field::Flag(*linear)),
+            ];
+            let basis = Basis { name: "Radial", generic: true, fields };
+            (basis, Some(maker.radial(program, [centres, squares], *linear)))
+        }
+        Map::Spline { regressors, knots } => {
+            let table = program.table(&named("KNOTS"), "The knots of the bends, three each.", knots.concat());
+            program.group(table, 3);
+            let fields =
+                vec![count, ("bent", Field::Integers(regressors.clone())), ("knots", Field::Table(table))];
+            let basis = Basis { name: "Spline", generic: true, fields };
+            (basis, Some(maker.spline(program, regressors, table)))
+        }
+        Map::Network { activation, weights, biases } => {
+            let weights = program.table(&named("WEIGHTS"), "The weights of the units.", weights.concat());
+            let biases = program.table(&named("BIASES"), "Their biases.", biases.clone());
+            let word = match activation {
+                Activation::Tanh => "Tanh",
+                Activation::Logistic => "Logistic",
+                Activation::Relu => "Relu",
+                Activation::Step => "Step",
+            };
+            let fields = vec![
+                ("activation", Field::Word("Activation", word)),
+                count,
+                ("weights", Field::Table(weights)),
+                ("biases", Field::Table(biases)),
+            ];
+            let basis = Basis { name: "Network", generic: true, fields };
+            (basis, Some(maker.network(program, [weights, biases], *activation)))
+        }
+        Map::Local { membership, planes, boxes, domain } => {
+            let sides = boxes.iter().flatten().flatten().copied().collect();
+            let sides = program.table(&named("SIDES"), "The sides of the boxes, two ends each.", sides);
+            let domain = program.table(&named("DOMAIN"), "The range of each regressor.", domain.concat());
+            program.group(sides, 2);
+            program.group(domain, 2);
+            let word = match membership {
+                Membership::Rectangle => "Rectangle",
+                Membership::Trapezoid => "Trapezoid",
+                Membership::Gaussian => "Gaussian",
+            };
+            let fields = vec![
+                ("membership", Field::Word("Membership", word)),
+                ("planes", Field::Flag(*planes)),
+                ("sides", Field::Table(sides)),
+                ("domain", Field::Table(domain)),
+            ];
+            let basis = Basis { name: "Local", generic: true, fields };
+            (basis, Some(maker.local(program, [sides, domain], *membership, (boxes.len(), *planes))))
+        }
+        Map::Neighbours { count: asked, planes, points } => {
+            let points = program.table(&named("POINTS"), "The samples.", points.concat());
+            let fields = vec![
+                count,
+                ("points", Field::Table(points)),
+                ("count", Field::Count(*asked)),
+                ("planes", Field::Flag(*planes)),
+            ];
+            (Basis { name: "Neighbours", generic: true, fields }, None)
+        }
+    };
+    Evaluated { functions: functions.clone(), theta, z, parameters, basis, statements }
 }
 
 /// What the statements of a map are made of.
@@ -193,7 +155,8 @@ impl Maker {
                     Statement::Set(distance, distance + from * from),
                 ]
             }));
-            let value = program.call(Function::Exponential, -Value::from(distance) * squares.at(j.clone()));
+            let value =
+                program.call(Function::Exponential, vec![-Value::from(distance) * squares.at(j.clone())]);
             body.push(Statement::Set(sum, sum + self.parameters.at(j.plus(first)) * value));
             body
         }));
@@ -241,11 +204,11 @@ impl Maker {
             let set = |value: f64| vec![Statement::Set(unit, value.into())];
             match activation {
                 Activation::Tanh => {
-                    let value = program.call(Function::HyperbolicTangent, inner.into());
+                    let value = program.call(Function::HyperbolicTangent, vec![inner.into()]);
                     body.push(Statement::Let(unit, value));
                 }
                 Activation::Logistic => {
-                    let half = program.call(Function::HyperbolicTangent, Value::from(0.5) * inner);
+                    let half = program.call(Function::HyperbolicTangent, vec![Value::from(0.5) * inner]);
                     body.push(Statement::Let(unit, Value::from(0.5) + Value::from(0.5) * half));
                 }
                 Activation::Relu => {
@@ -370,7 +333,7 @@ impl Member {
             body
         }));
         if gaussian {
-            let value = program.call(Function::Exponential, Value::from(-0.5) * member);
+            let value = program.call(Function::Exponential, vec![Value::from(-0.5) * member]);
             statements.push(Statement::Set(member, value));
         }
         statements

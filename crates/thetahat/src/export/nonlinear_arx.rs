@@ -6,7 +6,7 @@
 //!
 //! (Ljung, System Identification, 2nd ed. 1999, section 5.4), each signal divided by its scale once.
 
-use super::map::Evaluated;
+use super::map::evaluated;
 use super::program::{Array, Condition, Entry, Index, Program, Statement};
 use super::signals::Signals;
 use super::{Form, Purpose, refused};
@@ -49,10 +49,10 @@ pub(super) fn form(whole: &Model, model: &NonlinearArxModel, purpose: Purpose) -
     for (place, (map, own)) in model.maps.iter().zip(model.places()).enumerate() {
         let theta = model.parameters.get(own).unwrap_or_default();
         let theta = theta.iter().map(|parameter| parameter.value).collect();
-        let evaluated = Evaluated::new(&mut program, place + 1, &map.functions, theta, z);
+        let map = evaluated(&mut program, place + 1, &map.functions, theta, z);
         let value = program.variable("value");
         body.push(Statement::Evaluate { map: program.maps.len(), into: value });
-        program.maps.push(evaluated);
+        program.maps.push(map);
         body.push(Statement::Store(predicted, place.into(), scales.at(place) * value));
         body.push(signals.say(&place.into(), predicted.at(place)));
     }

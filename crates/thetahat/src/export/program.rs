@@ -2,7 +2,7 @@
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use super::map::Evaluated;
+use crate::model::Map;
 
 /// Numbers that never change, that the step remembers, that go in, or that come out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -88,6 +88,21 @@ pub(super) enum Operation {
 pub(super) enum Function {
     Exponential,
     HyperbolicTangent,
+    SquareRoot,
+    Logarithm,
+    Sine,
+    Cosine,
+    Tangent,
+    ArcSine,
+    ArcCosine,
+    ArcTangent,
+    HyperbolicSine,
+    HyperbolicCosine,
+    Absolute,
+    /// The angle of the point (second, first).
+    Angle,
+    /// The first to the power of the second.
+    Power,
 }
 
 /// A number as it is computed. No language may change the order of operations.
@@ -98,7 +113,7 @@ pub(super) enum Value {
     At(Array, Index),
     Negative(Box<Value>),
     Binary(Operation, Box<Value>, Box<Value>),
-    Call(Function, Box<Value>),
+    Call(Function, Vec<Value>),
 }
 
 impl From<f64> for Value {
@@ -184,6 +199,38 @@ pub(super) enum Statement {
     },
 }
 
+/// A map of a program.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Evaluated {
+    pub(super) functions: Map,
+    pub(super) theta: Vec<f64>,
+    pub(super) z: Array,
+    pub(super) parameters: Array,
+    pub(super) basis: Basis,
+    /// Statements that leave g(z) in a variable; none where only the core has it.
+    pub(super) statements: Option<(Vec<Statement>, Variable)>,
+}
+
+/// A constant of the core: its type and its fields.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Basis {
+    pub(super) name: &'static str,
+    /// Whether the type has that of numbers.
+    pub(super) generic: bool,
+    pub(super) fields: Vec<(&'static str, Field)>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Field {
+    /// A table, which Rust reads in groups of so many.
+    Table(Array),
+    Integers(Vec<usize>),
+    Count(usize),
+    Flag(bool),
+    /// A variant of an enumeration of the core.
+    Word(&'static str, &'static str),
+}
+
 /// A function of the program. It has at most one array for each kind of argument.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Entry {
@@ -248,9 +295,9 @@ impl Program {
     }
 
     /// A call of a function of the mathematical library.
-    pub(super) fn call(&mut self, function: Function, value: Value) -> Value {
+    pub(super) fn call(&mut self, function: Function, arguments: Vec<Value>) -> Value {
         self.calls = true;
-        Value::Call(function, Box::new(value))
+        Value::Call(function, arguments)
     }
 
     /// So many turns of what `body` makes of the counter; nothing for none, and no loop for one.

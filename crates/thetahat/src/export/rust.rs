@@ -1,8 +1,7 @@
 //! A program as a module of Rust that needs no heap.
 
 use super::head::Head;
-use super::map::{Basis, Field};
-use super::program::{Array, Declared, Entry, Kind, Program};
+use super::program::{Array, Basis, Declared, Entry, Field, Kind, Program};
 use super::vector::Vector;
 use super::writer::Writer;
 use super::{ExportedFile, Language, Precision};
@@ -13,6 +12,15 @@ pub(super) fn file(program: &Program, name: &str, precision: Precision, head: &H
     let real = writer.real();
     let mut text = head.comments();
     text += &uses(program);
+    let mut functions = String::new();
+    for entry in &program.entries {
+        functions += &function(program, entry, &mut writer);
+    }
+    let fields: Vec<&str> =
+        ["ComplexField", "RealField"].into_iter().filter(|name| functions.contains(name)).collect();
+    if !fields.is_empty() {
+        text += &format!("\nuse thetahat_core::nalgebra::{{{}}};\n", fields.join(", "));
+    }
     for Declared { name, values, group, doc, .. } in
         program.arrays.iter().filter(|array| array.kind == Kind::Table)
     {
@@ -51,26 +59,29 @@ pub(super) fn file(program: &Program, name: &str, precision: Precision, head: &H
         text += &format!("            {name}: {start},\n");
     }
     text += "        }\n    }\n";
-    for entry in &program.entries {
-        text += "\n";
-        entry.doc.iter().for_each(|line| text += &format!("    /// {line}\n"));
-        text += &format!("    {} {{\n", signature(program, entry, real));
-        let result = entry.result.and_then(|Array(array)| program.arrays.get(array));
-        if let Some(Declared { name, values, .. }) = result {
-            text +=
-                &format!("        let mut {name}: [{real}; {}] = [0.0; {}];\n", values.len(), values.len());
-        }
-        text += &writer.statements(&entry.body, "        ");
-        if let Some(Declared { name, .. }) = result {
-            text += &format!("        {name}\n");
-        }
-        text += "    }\n";
-    }
+    text += &functions;
     text += &format!(
         "}}\n\nimpl Default for {0} {{\n    fn default() -> Self {{\n        Self::new()\n    }}\n}}\n",
         type_name(name)
     );
     ExportedFile { name: format!("{name}.rs"), text }
+}
+
+/// A function of the type.
+fn function(program: &Program, entry: &Entry, writer: &mut Writer<'_>) -> String {
+    let real = writer.real();
+    let mut text = "\n".to_owned();
+    entry.doc.iter().for_each(|line| text += &format!("    /// {line}\n"));
+    text += &format!("    {} {{\n", signature(program, entry, real));
+    let result = entry.result.and_then(|Array(array)| program.arrays.get(array));
+    if let Some(Declared { name, values, .. }) = result {
+        text += &format!("        let mut {name}: [{real}; {}] = [0.0; {}];\n", values.len(), values.len());
+    }
+    text += &writer.statements(&entry.body, "        ");
+    if let Some(Declared { name, .. }) = result {
+        text += &format!("        {name}\n");
+    }
+    text + "    }\n"
 }
 
 /// What is used of the core.

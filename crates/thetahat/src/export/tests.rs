@@ -1,5 +1,6 @@
 //! Programs beside the library.
 
+mod equations;
 mod nonlinear;
 mod polynomials;
 mod processes;

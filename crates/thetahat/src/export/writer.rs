@@ -214,15 +214,14 @@ impl<'p> Writer<'p> {
                 };
                 format!("{} {sign} {}", self.nested(one), self.nested(other))
             }
-            Value::Call(function, value) => {
+            Value::Call(function, arguments) => {
                 let single = self.precision == Precision::F32;
-                let (c, rust) = match function {
-                    Function::Exponential => ("exp", "exponential"),
-                    Function::HyperbolicTangent => ("tanh", "hyperbolic_tangent"),
-                };
+                let (c, rust) = names(*function);
+                let arguments: Vec<String> = arguments.iter().map(|value| self.value(value)).collect();
+                let arguments = arguments.join(", ");
                 match self.language {
-                    Language::C => format!("{c}{}({})", if single { "f" } else { "" }, self.value(value)),
-                    Language::Rust => format!("Real::{rust}({})", self.value(value)),
+                    Language::C => format!("{c}{}({arguments})", if single { "f" } else { "" }),
+                    Language::Rust => format!("{rust}({arguments})"),
                 }
             }
         }
@@ -247,4 +246,25 @@ fn sets(statements: &[Statement], variable: Variable) -> bool {
         Statement::Choose { then, otherwise, .. } => sets(then, variable) || sets(otherwise, variable),
         Statement::Let(..) | Statement::Store(..) | Statement::Evaluate { .. } => false,
     })
+}
+
+/// What C and Rust call a function.
+fn names(function: Function) -> (&'static str, &'static str) {
+    match function {
+        Function::Exponential => ("exp", "ComplexField::exp"),
+        Function::HyperbolicTangent => ("tanh", "ComplexField::tanh"),
+        Function::SquareRoot => ("sqrt", "ComplexField::sqrt"),
+        Function::Logarithm => ("log", "ComplexField::ln"),
+        Function::Sine => ("sin", "ComplexField::sin"),
+        Function::Cosine => ("cos", "ComplexField::cos"),
+        Function::Tangent => ("tan", "ComplexField::tan"),
+        Function::ArcSine => ("asin", "ComplexField::asin"),
+        Function::ArcCosine => ("acos", "ComplexField::acos"),
+        Function::ArcTangent => ("atan", "ComplexField::atan"),
+        Function::HyperbolicSine => ("sinh", "ComplexField::sinh"),
+        Function::HyperbolicCosine => ("cosh", "ComplexField::cosh"),
+        Function::Absolute => ("fabs", "ComplexField::abs"),
+        Function::Angle => ("atan2", "RealField::atan2"),
+        Function::Power => ("pow", "ComplexField::powf"),
+    }
 }

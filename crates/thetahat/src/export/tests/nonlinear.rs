@@ -1,5 +1,5 @@
 use super::interpret::Machine;
-use super::map::Evaluated;
+use super::map::evaluated;
 use super::program::{Entry, Kind, Statement};
 use super::*;
 use crate::data::Offset;
@@ -55,7 +55,7 @@ fn statements_of_maps_say_the_bits_of_the_core() {
         let mut program = Program::default();
         let z = program.array(Kind::Argument, "z", "", vec![0.0; 3]);
         let y = program.array(Kind::Result, "y", "", vec![0.0]);
-        let map = Evaluated::new(&mut program, 1, &functions, theta.clone(), z);
+        let map = evaluated(&mut program, 1, &functions, theta.clone(), z);
         let Some((mut body, value)) = map.statements else { continue };
         body.push(Statement::Store(y, 0.into(), value.into()));
         let entry = Entry { name: "at", doc: Vec::new(), arguments: vec![z], result: Some(y), body };

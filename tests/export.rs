@@ -264,3 +264,47 @@ fn what_cannot_be_exported_is_refused_and_nothing_written() {
     let after: Vec<String> = folder.names().into_iter().filter(|name| name != "line.json").collect();
     assert_eq!(after, before);
 }
+
+#[test]
+fn controllers_control() {
+    use thetahat::export::{Controller, Language, Plan, Precision, Purpose, export_controller};
+    let folder = Folder::new();
+    let heater = Controller {
+        gain: 2.2,
+        r: vec![-1.0, 0.0],
+        s: vec![2.2, -2.0],
+        observer: vec![-2.0 / 2.2, 0.0],
+        limits: [40.0, 60.0],
+        offsets: [50.0, 20.0],
+    };
+    let write = |language| {
+        let (purpose, precision) = (Purpose::Controller, Precision::F32);
+        let plan = Plan { language, purpose, precision, name: "heater".into() };
+        let exported = export_controller(&heater, &["A heater.".into()], &plan).expect("a controller");
+        exported.files.iter().for_each(|file| folder.write(&file.name, &file.text));
+    };
+    // The plant is y - 20 = 0.9 (y - 20) + 0.2 (u - 50): the loop settles at the set point, within the limits on its way.
+    write(Language::C);
+    folder.write(
+        "heater_test.c",
+        "#include \"heater.h\"\nint main(void)\n{\n    heater_state state;\n    float y[1] = {20.0F};\n    float u[1];\n    \
+         const float wanted[1] = {25.0F};\n    heater_init(&state);\n    for (int k = 0; k < 300; k += 1) {\n        \
+         heater_control(&state, wanted, y, u);\n        if (!(u[0] >= 40.0F && u[0] <= 60.0F)) {\n            return 2;\n        }\n        \
+         y[0] = 20.0F + 0.9F * (y[0] - 20.0F) + 0.2F * (u[0] - 50.0F);\n    }\n    \
+         heater_applied(&state, u);\n    return !(y[0] > 24.99F && y[0] < 25.01F);\n}\n",
+    );
+    if has("gcc") {
+        let mut command = Command::new("gcc");
+        command.current_dir(folder.path(".")).args(STRICT);
+        run(command.args(["heater.c", "heater_test.c", "-o", "test_of_c", "-lm"]));
+        run(&mut Command::new(folder.path("test_of_c")));
+    }
+    write(Language::Rust);
+    folder.write(
+        "heater_test.rs",
+        "#[path = \"heater.rs\"]\nmod heater;\nfn main() {\n    let mut heater = heater::Heater::new().unwrap();\n    let mut y = 20.0;\n    \
+         for _ in 0..300 {\n        let u = heater.control(25.0, y);\n        assert!((40.0..=60.0).contains(&u));\n        \
+         y = 20.0 + 0.9 * (y - 20.0) + 0.2 * (u - 50.0);\n        heater.applied(u);\n    }\n    assert!((y - 25.0).abs() < 0.01);\n}\n",
+    );
+    rustc(&folder, "heater");
+}

@@ -27,6 +27,7 @@
 //! ```
 
 mod c;
+mod controller;
 mod equations;
 mod head;
 mod interpret;
@@ -50,6 +51,7 @@ use crate::Error;
 use crate::data::{Log, Rows};
 use crate::model::Model;
 use crate::report::Report;
+pub use controller::Controller;
 use head::Head;
 use program::Program;
 use vector::Vector;
@@ -236,6 +238,45 @@ pub fn export(report: &Report, plan: &Plan, log: Option<(&Log, &[Rows])>) -> Res
         warnings.extend(vector.warning());
     }
     Ok(Exported { files, warnings })
+}
+
+/// Writes a controller as source code: C, or Rust around [`RstController`](thetahat_core::RstController). `about` are lines for the comments:
+/// what it controls, and how it was designed.
+///
+/// # Errors
+/// [`Error::Argument`] for a name that is none, numbers that are no controller, and a plan for something else.
+///
+/// ```
+/// use thetahat::export::{Controller, Language, Plan, Precision, Purpose, export_controller};
+///
+/// // A PI controller, u = K (u_c - y) + I, here with K = 2 and h/T_i = 0.1, about an input of 50.
+/// let heater = Controller {
+///     gain: 2.2,
+///     r: vec![-1.0, 0.0],
+///     s: vec![2.2, -2.0],
+///     observer: vec![-2.0 / 2.2, 0.0],
+///     limits: [0.0, 100.0],
+///     offsets: [50.0, 20.0],
+/// };
+/// let plan =
+///     Plan { language: Language::C, purpose: Purpose::Controller, precision: Precision::F32, name: "heater".into() };
+/// let exported = export_controller(&heater, &["Heater in %, temperature in degrees.".to_owned()], &plan)?;
+/// let header = &exported.files[0].text;
+/// assert!(header.contains("void heater_control(heater_state *self, const float set_point[1], const float measured[1], float input[1]);"));
+/// # Ok::<(), thetahat::Error>(())
+/// ```
+pub fn export_controller(controller: &Controller, about: &[String], plan: &Plan) -> Result<Exported, Error> {
+    check_name(&plan.name)?;
+    if plan.purpose != Purpose::Controller {
+        return Err(refused(plan.purpose, "a controller", "controller"));
+    }
+    controller.check()?;
+    let head = Head::plain("controller", about);
+    let files = match plan.language {
+        Language::C => c::files(&controller::program(controller), &plan.name, plan.precision, &head),
+        Language::Rust => vec![controller::rust(controller, plan, &head)],
+    };
+    Ok(Exported { files, warnings: Vec::new() })
 }
 
 /// What an update does.

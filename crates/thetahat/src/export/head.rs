@@ -59,6 +59,16 @@ impl Head {
         Ok(Self { what, lines })
     }
 
+    /// What is no model of a report.
+    pub(super) fn plain(what: &str, about: &[String]) -> Self {
+        let version = env!("CARGO_PKG_VERSION");
+        let first = format!("{what}, written by thetahat {version}.");
+        Self {
+            what: what.to_owned(),
+            lines: [first].into_iter().chain(about.iter().map(|line| harmless(line))).collect(),
+        }
+    }
+
     /// Comments of both languages.
     pub(super) fn comments(&self) -> String {
         let line = |line: &String| if line.is_empty() { "//\n".to_owned() } else { format!("// {line}\n") };

@@ -1,5 +1,6 @@
 //! Programs beside the library.
 
+mod controllers;
 mod equations;
 mod nonlinear;
 mod polynomials;

@@ -42,6 +42,9 @@ impl<'p> Writer<'p> {
         match (self.language, self.precision) {
             (Language::C, _) if value.is_nan() => "NAN".to_owned(),
             (Language::Rust, _) if value.is_nan() => format!("{}::NAN", self.real()),
+            (Language::Rust, _) if value.is_infinite() => {
+                format!("{}::{}INFINITY", self.real(), if value < 0.0 { "NEG_" } else { "" })
+            }
             (_, Precision::F64) => format!("{value:?}"),
             (Language::C, Precision::F32) => format!("{:?}F", value as f32),
             (Language::Rust, Precision::F32) => format!("{:?}", value as f32),

@@ -267,24 +267,20 @@ fn what_cannot_be_exported_is_refused_and_nothing_written() {
 
 #[test]
 fn controllers_control() {
-    use thetahat::export::{Controller, Language, Plan, Precision, Purpose, export_controller};
-    let folder = Folder::new();
-    let heater = Controller {
-        gain: 2.2,
-        r: vec![-1.0, 0.0],
-        s: vec![2.2, -2.0],
-        observer: vec![-2.0 / 2.2, 0.0],
-        limits: [40.0, 60.0],
-        offsets: [50.0, 20.0],
-    };
-    let write = |language| {
-        let (purpose, precision) = (Purpose::Controller, Precision::F32);
-        let plan = Plan { language, purpose, precision, name: "heater".into() };
-        let exported = export_controller(&heater, &["A heater.".into()], &plan).expect("a controller");
-        exported.files.iter().for_each(|file| folder.write(&file.name, &file.text));
-    };
-    // The plant is y - 20 = 0.9 (y - 20) + 0.2 (u - 50): the loop settles at the set point, within the limits on its way.
-    write(Language::C);
+    // y(t) - 20 = 0.9 (y(t-1) - 20) + 0.2 (u(t-1) - 50), without noise but for a little.
+    let (mut text, mut y, mut u, mut random) = ("u,y\n".to_owned(), 20.0_f64, 50.0_f64, 1_u32);
+    for _ in 0..400 {
+        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        y = 20.0 + 0.9 * (y - 20.0) + 0.2 * (u - 50.0) + 0.001 * f64::from(random >> 16 & 0xff) / 256.0;
+        u = 50.0 + f64::from(random >> 28) - 7.5;
+        text += &format!("{u},{y}\n");
+    }
+    let folder = Folder::with_log(text);
+    folder.done("fit log.csv --sample-time 1 --na 1 --nb 1 --nk 1 --report r.json");
+    folder.done("control r.json --poles 0.6 --limits 40..60 --document c.json");
+    let run_of = folder.done("export c.json --to c --what controller --name heater");
+    assert!(run_of.stderr.contains("controller of ARX(1, 1, 1): heater.h, heater.c"), "{}", run_of.stderr);
+    // The loop settles at the set point, within the limits on its way.
     folder.write(
         "heater_test.c",
         "#include \"heater.h\"\nint main(void)\n{\n    heater_state state;\n    float y[1] = {20.0F};\n    float u[1];\n    \
@@ -299,12 +295,20 @@ fn controllers_control() {
         run(command.args(["heater.c", "heater_test.c", "-o", "test_of_c", "-lm"]));
         run(&mut Command::new(folder.path("test_of_c")));
     }
-    write(Language::Rust);
+    folder.done("export c.json --to rust --what controller --name heater");
     folder.write(
         "heater_test.rs",
         "#[path = \"heater.rs\"]\nmod heater;\nfn main() {\n    let mut heater = heater::Heater::new().unwrap();\n    let mut y = 20.0;\n    \
          for _ in 0..300 {\n        let u = heater.control(25.0, y);\n        assert!((40.0..=60.0).contains(&u));\n        \
-         y = 20.0 + 0.9 * (y - 20.0) + 0.2 * (u - 50.0);\n        heater.applied(u);\n    }\n    assert!((y - 25.0).abs() < 0.01);\n}\n",
+         y = 20.0 + 0.9 * (y - 20.0) + 0.2 * (u - 50.0);\n        heater.applied(u);\n    }\n    assert!((y - 25.0_f32).abs() < 0.01);\n}\n",
     );
     rustc(&folder, "heater");
+    for (line, words) in [
+        ("c.json --to c --what predictor", "a controller is exported as no predictor; take controller"),
+        ("r.json --to c --what controller", "a model is no controller"),
+        ("c.json log.csv --to c --what controller", "leave the log out"),
+    ] {
+        let message = folder.refused(&format!("export {line}"), 2);
+        assert!(message.contains(words), "{message}");
+    }
 }

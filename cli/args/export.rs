@@ -9,7 +9,7 @@ use super::{ClockArguments, LogArguments};
 
 #[derive(Debug, Args)]
 pub(crate) struct ExportArguments {
-    /// The report that fit wrote (- for standard input)
+    /// The report that fit wrote, or for a controller the document of control (- for standard input)
     #[arg(value_name = "REPORT")]
     pub(crate) report: PathBuf,
     /// A log for a test vector: a CSV file, gzip-compressed or not (- for standard input)

@@ -3,8 +3,10 @@
 use std::fs;
 use std::path::Path;
 
-use thetahat::export::{Exported, export as exported};
+use thetahat::control::Control;
+use thetahat::export::{Exported, ExportedFile, export as exported, export_controller};
 use thetahat::model::Model;
+use thetahat::{Document, is_document};
 
 use super::stored;
 use crate::args::ExportArguments;
@@ -23,7 +25,11 @@ pub(crate) fn export(arguments: &ExportArguments) -> Result<(), Failure> {
     if is_standard_input(path) && arguments.path.as_deref().is_some_and(is_standard_input) {
         return Err(Failure::usage("the report and the log cannot both come from standard input"));
     }
-    let report = stored::report(path)?;
+    let text = stored::text(path)?;
+    if is_document::<Control>(&text) {
+        return controller(arguments, &text);
+    }
+    let report = stored::report_of(path, &text)?;
     // What cannot be exported is refused before a log is read.
     let plain = exported(&report, &plan, None)
         .map_err(|error| Failure::about(&error, |_| path.display().to_string()))?;
@@ -35,15 +41,37 @@ pub(crate) fn export(arguments: &ExportArguments) -> Result<(), Failure> {
             exported(&report, &plan, Some((&log, &asked))).map_err(log::failure(&[source]))?
         }
     };
+    write(arguments, &files)?;
+    warnings.iter().for_each(|warning| warn(warning));
+    say(&format!("{} of {}", plan.purpose.word(), report.model.name()), &files);
+    Ok(())
+}
+
+/// The controller of a document.
+fn controller(arguments: &ExportArguments, text: &str) -> Result<(), Failure> {
+    let shown = arguments.report.display();
+    if arguments.path.is_some() {
+        return Err(Failure::usage("a controller has no test vector: leave the log out"));
+    }
+    let document = Control::from_json(text).map_err(|error| Failure::data(format!("{shown}: {error}")))?;
+    let exported = export_controller(&document, &arguments.plan());
+    let Exported { files, .. } = exported.map_err(|error| Failure::about(&error, |_| shown.to_string()))?;
+    write(arguments, &files)?;
+    say(&format!("controller of {}", document.model), &files);
+    Ok(())
+}
+
+fn write(arguments: &ExportArguments, files: &[ExportedFile]) -> Result<(), Failure> {
     let folder = &arguments.out;
     fs::create_dir_all(folder).map_err(|error| Failure::io(folder, "cannot be made", &error))?;
-    for file in &files {
-        output::write(&folder.join(&file.name), |out| out.write_all(file.text.as_bytes()))?;
-    }
-    warnings.iter().for_each(|warning| warn(warning));
+    files.iter().try_for_each(|file| {
+        output::write(&folder.join(&file.name), |out| out.write_all(file.text.as_bytes()))
+    })
+}
+
+fn say(what: &str, files: &[ExportedFile]) {
     let names: Vec<&str> = files.iter().map(|file| file.name.as_str()).collect();
-    tell(&format!("{} of {}: {}", plan.purpose.word(), report.model.name(), names.join(", ")));
-    Ok(())
+    tell(&format!("{what}: {}", names.join(", ")));
 }
 
 /// The channels of a model that a log has.

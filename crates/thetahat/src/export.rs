@@ -1,6 +1,7 @@
 //! Fitted models as source code for firmware: Rust and C99 that need no heap, with every number in it.
 //!
 //! [`export`] takes a [`Report`] and a [`Plan`] and gives [`Exported`]: files by their names, and what to warn of. It opens and writes none.
+//! [`export_controller`] does so with the document of a controller.
 //! What a step computes is one small program for each kind of model, in the order of operations of [`respond`](crate::respond); both languages are
 //! written from it, and so is the interpreter that makes the test vectors. So they say the same numbers, to the bit in double precision.
 //!
@@ -48,10 +49,11 @@ mod writer;
 use std::str::FromStr;
 
 use crate::Error;
+use crate::control::Control;
 use crate::data::{Log, Rows};
 use crate::model::Model;
 use crate::report::Report;
-pub use controller::Controller;
+use controller::Controller;
 use head::Head;
 use program::Program;
 use vector::Vector;
@@ -210,6 +212,12 @@ struct Form {
 pub fn export(report: &Report, plan: &Plan, log: Option<(&Log, &[Rows])>) -> Result<Exported, Error> {
     check_name(&plan.name)?;
     let model = &report.model;
+    if plan.purpose == Purpose::Controller {
+        return Err(Error::argument(
+            "what",
+            "a model is no controller: design one for it with thetahat control, and export its document",
+        ));
+    }
     if plan.purpose == Purpose::Recursive {
         return recursive::exported(report, plan, log);
     }
@@ -240,41 +248,21 @@ pub fn export(report: &Report, plan: &Plan, log: Option<(&Log, &[Rows])>) -> Res
     Ok(Exported { files, warnings })
 }
 
-/// Writes a controller as source code: C, or Rust around [`RstController`](thetahat_core::RstController). `about` are lines for the comments:
-/// what it controls, and how it was designed.
+/// Writes a controller as source code: C, or Rust around [`RstController`](thetahat_core::RstController).
 ///
 /// # Errors
-/// [`Error::Argument`] for a name that is none, numbers that are no controller, and a plan for something else.
-///
-/// ```
-/// use thetahat::export::{Controller, Language, Plan, Precision, Purpose, export_controller};
-///
-/// // A PI controller, u = K (u_c - y) + I, here with K = 2 and h/T_i = 0.1, about an input of 50.
-/// let heater = Controller {
-///     gain: 2.2,
-///     r: vec![-1.0, 0.0],
-///     s: vec![2.2, -2.0],
-///     observer: vec![-2.0 / 2.2, 0.0],
-///     limits: [0.0, 100.0],
-///     offsets: [50.0, 20.0],
-/// };
-/// let plan =
-///     Plan { language: Language::C, purpose: Purpose::Controller, precision: Precision::F32, name: "heater".into() };
-/// let exported = export_controller(&heater, &["Heater in %, temperature in degrees.".to_owned()], &plan)?;
-/// let header = &exported.files[0].text;
-/// assert!(header.contains("void heater_control(heater_state *self, const float set_point[1], const float measured[1], float input[1]);"));
-/// # Ok::<(), thetahat::Error>(())
-/// ```
-pub fn export_controller(controller: &Controller, about: &[String], plan: &Plan) -> Result<Exported, Error> {
+/// [`Error::Argument`] for a name that is none, and a plan for something else; [`Error::Report`] for coefficients that are none, and a working
+/// point that moves.
+pub fn export_controller(document: &Control, plan: &Plan) -> Result<Exported, Error> {
     check_name(&plan.name)?;
     if plan.purpose != Purpose::Controller {
         return Err(refused(plan.purpose, "a controller", "controller"));
     }
-    controller.check()?;
-    let head = Head::plain("controller", about);
+    let controller = Controller::new(document)?;
+    let head = Head::of_controller(document)?;
     let files = match plan.language {
-        Language::C => c::files(&controller::program(controller), &plan.name, plan.precision, &head),
-        Language::Rust => vec![controller::rust(controller, plan, &head)],
+        Language::C => c::files(&controller::program(&controller), &plan.name, plan.precision, &head),
+        Language::Rust => vec![controller::rust(&controller, plan, &head)],
     };
     Ok(Exported { files, warnings: Vec::new() })
 }

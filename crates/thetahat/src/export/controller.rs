@@ -7,58 +7,54 @@
 //! (Åström and Wittenmark, Computer-Controlled Systems, 3rd ed. 1997, section 9.4), in the order of operations of
 //! [`RstController`](thetahat_core::RstController).
 
+use thetahat_core::nalgebra::DVector;
+
 use super::head::Head;
 use super::program::{Condition, Entry, Index, Kind, Program, Statement, Value, Variable};
 use super::rust::type_name;
+use super::signals::levels;
 use super::writer::Writer;
 use super::{ExportedFile, Language, Plan};
 use crate::Error;
+use crate::control::Control;
 
 /// The numbers of a controller, in the letters of [`RstController`](thetahat_core::RstController): R and A_o without their leading 1, all
 /// as long as S, filled up with zeros.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Controller {
+pub(super) struct Controller {
     /// t_0.
-    pub gain: f64,
-    /// R without its leading 1.
-    pub r: Vec<f64>,
-    /// S.
-    pub s: Vec<f64>,
-    /// A_o without its leading 1.
-    pub observer: Vec<f64>,
+    gain: f64,
+    r: Vec<f64>,
+    s: Vec<f64>,
+    /// A_o.
+    observer: Vec<f64>,
     /// The lowest and the highest input, in its own unit: infinite where there is none.
-    pub limits: [f64; 2],
+    limits: [f64; 2],
     /// What the input, and what the measurement and the set point are measured from: the working point.
-    pub offsets: [f64; 2],
+    offsets: [f64; 2],
 }
 
 impl Controller {
-    /// That it is one.
+    /// That of a document.
     ///
     /// # Errors
-    /// [`Error::Argument`] for lengths that differ, numbers that are not finite, and limits that are not in order about the working point.
-    pub(super) fn check(&self) -> Result<(), Error> {
-        let Self { gain, r, s, observer, limits: [lowest, highest], offsets } = self;
-        if s.is_empty() || r.len() != s.len() || observer.len() != s.len() {
-            return Err(Error::argument(
-                "controller",
-                format!(
-                    "r, s and the observer polynomial have {}, {} and {} numbers; fill them up with zeros to one length",
-                    r.len(),
-                    s.len(),
-                    observer.len()
-                ),
-            ));
-        }
-        let numbers = r.iter().chain(s).chain(observer).chain(offsets).chain([gain]);
-        if !numbers.copied().all(f64::is_finite) {
-            return Err(Error::argument("controller", "one of its numbers is not finite"));
-        }
-        // Not so with a NaN either.
-        if !(*lowest <= *highest) {
-            return Err(Error::argument("controller", "its limits are not in order, the lower one first"));
-        }
-        Ok(())
+    /// [`Error::Report`] for coefficients that are none, and for a working point that moves.
+    pub(super) fn new(document: &Control) -> Result<Self, Error> {
+        let own = document.controller()?;
+        let offsets = levels(&[document.input.clone(), document.output.clone()])?;
+        let [level, working] = offsets[..] else {
+            return Err(Error::report("a controller has an input and an output"));
+        };
+        let (lowest, highest) = own.limits();
+        let values = |vector: &DVector<f64>| vector.as_slice().to_vec();
+        Ok(Self {
+            gain: own.gain(),
+            r: values(own.r()),
+            s: values(own.s()),
+            observer: values(own.observer()),
+            limits: [lowest + level, highest + level],
+            offsets: [level, working],
+        })
     }
 }
 

@@ -1,6 +1,7 @@
 //! What stands in the comments of an exported file.
 
 use super::{Plan, Precision};
+use crate::control::Control;
 use crate::data::text_digest;
 use crate::model::Signal;
 use crate::report::Report;
@@ -59,14 +60,33 @@ impl Head {
         Ok(Self { what, lines })
     }
 
-    /// What is no model of a report.
-    pub(super) fn plain(what: &str, about: &[String]) -> Self {
-        let version = env!("CARGO_PKG_VERSION");
-        let first = format!("{what}, written by thetahat {version}.");
-        Self {
-            what: what.to_owned(),
-            lines: [first].into_iter().chain(about.iter().map(|line| harmless(line))).collect(),
-        }
+    /// That of a controller.
+    ///
+    /// # Errors
+    /// [`Error::Report`] if the document cannot be written.
+    pub(super) fn of_controller(document: &Control) -> Result<Self, Error> {
+        let signal = |what: &str, signal: &Signal| {
+            format!(
+                "{what} '{}', in its own unit, with the working point {}.",
+                harmless(&signal.name),
+                signal.offset.level
+            )
+        };
+        let lines = vec![
+            format!(
+                "controller, written by thetahat {} of the document with the digest",
+                env!("CARGO_PKG_VERSION")
+            ),
+            format!("{}.", text_digest(&document.to_json()?)),
+            String::new(),
+            harmless(&document.design),
+            format!("of a model: {}", harmless(&document.model)),
+            String::new(),
+            format!("Sample time {} s. It starts at rest at the working point.", document.sample_time),
+            signal("It moves", &document.input),
+            signal("It holds", &document.output),
+        ];
+        Ok(Self { what: "controller".to_owned(), lines })
     }
 
     /// Comments of both languages.

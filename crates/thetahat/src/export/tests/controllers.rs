@@ -1,55 +1,58 @@
-use thetahat_core::RstController;
-use thetahat_core::nalgebra::{DVector, Dyn};
+use thetahat_core::nalgebra::Complex;
 
 use super::interpret::Machine;
 use super::*;
+use crate::control::{ControlPlan, Design, control};
+use crate::data::Offset;
+use crate::model::{Orders, PolynomialModel};
 
-fn controller() -> Controller {
-    Controller {
-        gain: 1.7,
-        r: vec![-1.3, 0.3, 0.0],
-        s: vec![2.1, -1.4, 0.2],
-        observer: vec![-0.8, 0.1, 0.05],
-        limits: [-1.5, 2.0],
-        offsets: [0.0, 0.0],
-    }
+/// A controller of 1/(s (s + 1)) every 0.5 s, about a working point.
+fn document() -> Control {
+    let e = (-0.5_f64).exp();
+    let orders = Orders::arx(2, &[2], &[1]).expect("orders");
+    let values = [-1.0 - e, e, -0.5 + e, 1.0 - 1.5 * e];
+    let mut model = PolynomialModel::from_parameters(&orders, &values, None, 0.01, 0.5).expect("a model");
+    model.output.offset = Offset { level: 20.0, slope: 0.0 };
+    model.inputs[0].offset = Offset { level: 0.5, slope: 0.0 };
+    let poles = vec![Complex::new(0.6, 0.2), Complex::new(0.6, -0.2)];
+    let plan = ControlPlan { limits: -1.5..=2.0, ..ControlPlan::new(Design::Poles(poles)) };
+    control(&model.into(), &plan).expect("a controller")
 }
 
 #[test]
 fn a_program_controls_as_the_core_does() {
-    let own = controller();
-    let vector = |values: &[f64]| DVector::from_column_slice(values);
-    let core =
-        RstController::<f64, Dyn>::new(own.gain, vector(&own.r), vector(&own.s), vector(&own.observer));
-    let mut core = core.and_then(|core| core.with_limits(-1.5..=2.0)).expect("a controller");
+    let document = document();
+    let mut core = document.controller().expect("a controller");
+    let own = Controller::new(&document).expect("a controller");
     let program = super::controller::program(&own);
     let mut machine = Machine::new(&program, Precision::F64);
     let (control, applied) = (&program.entries[0], &program.entries[1]);
-    for (k, (reference, mut y)) in signal(1, 400).into_iter().zip(signal(2, 400)).enumerate() {
-        y = if k % 37 == 5 { f64::NAN } else { y };
-        let input = core.control(reference, y);
+    let mut clipped = 0;
+    for (k, (reference, y)) in signal(1, 400).into_iter().zip(signal(2, 400)).enumerate() {
+        let (reference, y) = (20.0 + reference, if k % 37 == 5 { f64::NAN } else { 20.0 + y });
+        let input = (core.control(reference - 20.0, y - 20.0) + 0.5).clamp(-1.5, 2.0);
+        clipped += usize::from(input == 2.0);
         assert_eq!(machine.run(control, &[&[reference], &[y]])[0].to_bits(), input.to_bits(), "{k}");
         if k % 11 == 3 {
             let acted = 0.5 * input;
-            core.applied(acted);
+            core.applied(acted - 0.5);
             machine.run(applied, &[&[acted]]);
         }
     }
+    assert!(clipped > 20);
 }
 
 #[test]
 fn what_is_no_controller_is_refused() {
     let plan =
         |purpose| Plan { language: Language::C, purpose, precision: Precision::F32, name: "heater".into() };
-    for wrong in [
-        Controller { r: vec![1.0], ..controller() },
-        Controller { gain: f64::NAN, ..controller() },
-        Controller { limits: [1.0, 0.0], ..controller() },
-        Controller { limits: [f64::NAN, 0.0], ..controller() },
-        Controller { r: Vec::new(), s: Vec::new(), observer: Vec::new(), ..controller() },
-    ] {
-        let error = export_controller(&wrong, &[], &plan(Purpose::Controller)).expect_err("no controller");
-        assert!(error.to_string().starts_with("controller: "), "{error}");
-    }
-    assert!(export_controller(&controller(), &[], &plan(Purpose::Predictor)).is_err());
+    let mut wrong = document();
+    wrong.controller.r[0] = 2.0;
+    let error = export_controller(&wrong, &plan(Purpose::Controller)).expect_err("no controller");
+    assert!(error.to_string().contains("controller.r does not begin with 1"), "{error}");
+    let mut moving = document();
+    moving.output.offset.slope = 1.0;
+    let error = export_controller(&moving, &plan(Purpose::Controller)).expect_err("it moves");
+    assert!(error.to_string().contains("is a line in the time of its log"), "{error}");
+    assert!(export_controller(&document(), &plan(Purpose::Predictor)).is_err());
 }

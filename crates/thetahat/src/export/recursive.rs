@@ -221,7 +221,7 @@ pub(super) fn exported(
         };
         let errors = errors
             .map_err(|error| Error::data(format!("no test vector can be made along these rows: {error}")))?;
-        files.push(columns.csv(&plan.name, &[errors.clone()]));
+        files.push(columns.csv(&plan.name, std::slice::from_ref(&errors)));
         files.push(check(plan, &columns, &errors));
     }
     Ok(Exported { files, warnings: Vec::new() })

@@ -3,6 +3,7 @@
 mod control;
 mod convert;
 mod design;
+mod export;
 mod files;
 mod filter;
 mod fit;
@@ -24,6 +25,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 pub(crate) use control::{ControlArguments, IntegratorArgument};
 pub(crate) use convert::ConvertArguments;
 pub(crate) use design::DesignArguments;
+pub(crate) use export::ExportArguments;
 pub(crate) use filter::{EstimatorArgument, FilterArguments, FilterStartArgument};
 pub(crate) use fit::{
     ConstantArgument, CriterionArguments, FeedthroughArgument, FitArguments, InitialArgument, KernelArgument,
@@ -270,6 +272,16 @@ Examples:
   thetahat control model.json --lqr 0.1 --limits 0..100 --document controller.json
   thetahat control model.json --minimum-variance --integrator no")]
     Control(Box<ControlArguments>),
+    /// A fitted model as source code for firmware: Rust, or C99
+    ///
+    /// Without a heap, with every number in it: offsets and scales too, so that signals go in and come out in the units of the log. It starts at
+    /// rest at the offsets. With a log a test vector stands beside it: a CSV of inputs, outputs and expected results, and a program that steps
+    /// along it. What a model cannot be is refused, with what it can.
+    #[command(after_help = "\
+Examples:
+  thetahat export model.json log.csv --to c --what predictor -o firmware
+  thetahat export model.json --to rust --what simulator --precision f64 --name motor")]
+    Export(Box<ExportArguments>),
     /// Make a test signal for an experiment, or say which one a model needs, and for how long
     ///
     /// Writes CSV: time and the input, or the inputs u1, u2, …. What the signal is goes to standard error: its period, mean, crest factor,

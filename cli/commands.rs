@@ -7,6 +7,7 @@ mod convert;
 pub(crate) mod demo;
 mod design;
 mod experiments;
+mod export;
 mod filter;
 mod fit;
 mod grey_box;
@@ -58,6 +59,7 @@ pub(crate) fn dispatch(arguments: Arguments, line: &str) -> Result<(), Failure> 
         Command::Convert(arguments) => convert::convert(&arguments),
         Command::Tune(arguments) => tune::tune(&arguments, line),
         Command::Control(arguments) => control::control(&arguments),
+        Command::Export(arguments) => export::export(&arguments),
         Command::Design(arguments) => design::design(&arguments),
         Command::Demo(arguments) => demo::demo(&arguments),
         Command::Schema { document } => help::schema(document),

@@ -3,7 +3,7 @@
 //! The library names them between backticks, as `detrend`, wherever one is advised; here they are options.
 
 /// The arguments of the library that are options, by the name that both have.
-pub(crate) const OPTIONS: [&str; 78] = [
+pub(crate) const OPTIONS: [&str; 81] = [
     "alarm",
     "alpha",
     "alphas",
@@ -40,6 +40,7 @@ pub(crate) const OPTIONS: [&str; 78] = [
     "method",
     "minimum-variance",
     "most-terms",
+    "name",
     "nf",
     "nk",
     "noise-bound",
@@ -53,6 +54,7 @@ pub(crate) const OPTIONS: [&str; 78] = [
     "period",
     "points",
     "poles",
+    "precision",
     "prefilter",
     "range",
     "raw-terms",
@@ -80,6 +82,7 @@ pub(crate) const OPTIONS: [&str; 78] = [
     "validate",
     "want",
     "weighting",
+    "what",
     "width",
     "window",
 ];

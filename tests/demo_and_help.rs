@@ -3,7 +3,7 @@
 use crate::harness::Folder;
 use crate::signals::{Experiment, csv};
 
-const VERBS: [&str; 21] = [
+const VERBS: [&str; 22] = [
     "fit",
     "inspect",
     "spectrum",
@@ -19,6 +19,7 @@ const VERBS: [&str; 21] = [
     "convert",
     "tune",
     "control",
+    "export",
     "impulse",
     "design",
     "demo",

@@ -48,6 +48,7 @@ const LIBRARY: House = House {
         &["control", "design", "step_test", "tune"],
         &["report"],
         &["filter", "track"],
+        &["export"],
     ],
 };
 

@@ -17,6 +17,7 @@ mod demo_and_help;
 mod design;
 mod draws;
 mod equations;
+mod export;
 mod filter;
 mod fit_reference;
 mod floors;

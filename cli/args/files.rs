@@ -80,6 +80,11 @@ impl Command {
                 let more = control.document.iter().chain(&control.responses);
                 written.extend([&control.out].into_iter().chain(more).cloned());
             }
+            Self::Export(export) => {
+                read.extend([&export.report].into_iter().chain(&export.path).cloned());
+                let names = export.plan().files(export.path.is_some());
+                written.extend(names.iter().map(|name| export.out.join(name)));
+            }
             Self::Design(design) => {
                 read.extend(design.model.clone());
                 written.extend([&design.out].into_iter().chain(&design.spectrum).cloned());

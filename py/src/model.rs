@@ -9,6 +9,7 @@ use pyo3::prelude::*;
 use thetahat::Document;
 use thetahat::data::Channel;
 use thetahat::estimate::Procedure;
+use thetahat::export::{Plan, export};
 use thetahat::model::{LinearModel, PolynomialModel, Quantity, StateSpace};
 use thetahat::report::{PendingEvaluation, Report, apply, sample};
 use thetahat::respond::{Draws, Horizon, InitialCondition, TransientResponse, logarithmic_frequencies};
@@ -410,6 +411,27 @@ impl Model {
         let (to, hold) = found.map_err(|error| error::batch(py, error))?;
         let report = self.report(py)?.converted(to, hold).map_err(|error| error::batch(py, error))?;
         Ok(Self::of(report))
+    }
+
+    /// Source code for firmware: the names of files and what they hold, and what to warn of.
+    #[pyo3(signature = (words, log))]
+    fn exported(
+        &self,
+        py: Python<'_>,
+        words: [String; 4],
+        log: Option<&Bound<'_, Log>>,
+    ) -> PyResult<(Vec<(String, String)>, Vec<String>)> {
+        let [language, purpose, precision, name] = words;
+        let plan = || -> Result<Plan, thetahat::Error> {
+            let (language, purpose) = (language.parse()?, purpose.parse()?);
+            Ok(Plan { language, purpose, precision: precision.parse()?, name })
+        };
+        let plan = plan().map_err(|error| error::batch(py, error))?;
+        let (report, log) = (self.report(py)?, log.map(|log| Arc::clone(&log.get().log)));
+        let found =
+            interruptible(py, move |_| export(&report, &plan, log.as_deref().map(|log| (log, &[][..]))))?;
+        let files = found.files.into_iter().map(|file| (file.name, file.text)).collect();
+        Ok((files, found.warnings.iter().map(|warning| error::in_python(warning)).collect()))
     }
 
     /// F, G, H, D and K of the innovations form.

@@ -36,7 +36,7 @@ mod split;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use digest::{digest, digests, inside};
+pub(crate) use digest::{digest, digests, inside, text_digest};
 pub use joint_record::JointRecord;
 pub use log::{Channel, Interpolation, Log};
 pub(crate) use log::{GAP, JITTER, check, measured};

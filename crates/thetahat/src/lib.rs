@@ -74,6 +74,7 @@
 //! | [`report`] | the whole way from a log to a document and its page |
 //! | [`track`] | models that are estimated while the plant runs |
 //! | [`filter`] | states that are estimated while the plant runs |
+//! | [`export`](mod@export) | fitted models as source code for firmware |
 //! | [`figures`], [`text`] | how numbers and names are written for people |
 //!
 //! Every [`Document`] is written as JSON and read back. Every function that can fail gives an [`Error`] that says what is wrong, where,
@@ -92,6 +93,7 @@ mod distribution;
 mod document;
 mod error;
 pub mod estimate;
+pub mod export;
 pub mod figures;
 pub mod filter;
 mod fourier;

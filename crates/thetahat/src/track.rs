@@ -47,3 +47,4 @@ pub use run_length::change_detector;
 pub use score::TrackScore;
 pub use summary::{TrackSummary, TrackerSummary};
 pub use tracker::{Tracked, Tracker};
+pub(crate) use warm::{polynomials, relative, scales};

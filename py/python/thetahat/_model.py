@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import warnings
 from collections.abc import Mapping, Sequence
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,9 +17,6 @@ from thetahat._log import Log, handle
 from thetahat._options import Rows, ValidationOptions
 from thetahat._report import ReportedModel
 from thetahat._responses import Forecast, FrequencyResponse, StateSpace, TransientResponse
-
-if TYPE_CHECKING:
-    import os
 
 Array = npt.NDArray[np.float64]
 
@@ -562,6 +560,71 @@ class Model(ReportedModel):
         """
         word = to if isinstance(to, str) else repr(_options.seconds("to", to))
         return Model._of(self._model.converted(word, None if hold is None else _options.text("hold", hold)))
+
+    def export(
+        self,
+        to: str,
+        what: str,
+        log: Any = None,
+        *,
+        precision: str = "f32",
+        name: str | None = None,
+        folder: str | os.PathLike[str] | None = None,
+    ) -> dict[str, str]:
+        """Source code for firmware, in C99 or Rust: without a heap, and with every number in it.
+
+        Signals go in and come out in the units of their channels, as offsets and scales are in the files. It starts at rest at the offsets.
+
+        Parameters
+        ----------
+        to : {"c", "rust"}
+            The language.
+        what : {"predictor", "simulator", "observer", "recursive", "controller"}
+            What to make of the model.
+        log : Log, optional
+            Rows for a test vector: beside the source stand a CSV of inputs, outputs and expected results, and a program that steps along it.
+        precision : {"f32", "f64"}
+            That of all numbers. In double precision the results are the library's to the bit.
+        name : str, optional
+            What files, types and functions are called, ``"model_"`` and `what` unless said otherwise.
+        folder : path, optional
+            Where to write the files, beside returning them.
+
+        Returns
+        -------
+        dict of str to str
+            What each file holds, by its name.
+
+        Raises
+        ------
+        ValueError
+            If the model cannot be exported as such: the message says what it can be.
+
+        Warns
+        -----
+        EstimationWarning
+            If single precision is not enough along the rows of the log.
+
+        Examples
+        --------
+        >>> import thetahat as th
+        >>> files = th.arx(th.dc_motor(), na=2, nb=2, nk=3).export("c", "predictor", name="motor")
+        >>> list(files)
+        ['motor.h', 'motor.c']
+        """
+        from thetahat._fit import EstimationWarning
+
+        words = [_options.text("to", to), _options.text("what", what), _options.text("precision", precision)]
+        words.append(f"model_{what}" if name is None else _options.text("name", name))
+        files, found = self._model.exported(words, None if log is None else handle("log", log))
+        for warning in found:
+            warnings.warn(warning, EstimationWarning, stacklevel=2)
+        if folder is not None:
+            place = _files.name(folder)
+            os.makedirs(place, exist_ok=True)
+            for file, text in files:
+                _thetahat.write(os.path.join(place, file), text)
+        return dict(files)
 
     def to_scipy(self) -> Any:
         """The plant as a discrete transfer function of SciPy; of several inputs, a list of them.

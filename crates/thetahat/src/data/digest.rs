@@ -50,6 +50,11 @@ pub(crate) fn digest(values: &[f64], rows: &[Range<usize>]) -> String {
     format!("{:032x}", hasher.finish_128())
 }
 
+/// A digest of a text: 32 hexadecimal digits of XXH3.
+pub(crate) fn text_digest(text: &str) -> String {
+    format!("{:032x}", XxHash3_128::oneshot(text.as_bytes()))
+}
+
 /// The bits of some values; all that are not numbers are the same.
 fn write(hasher: &mut XxHash3_128, values: &[f64]) {
     let mut bytes = [0; 8 * BLOCK];

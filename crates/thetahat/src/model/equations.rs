@@ -17,6 +17,8 @@ pub(crate) use channels::{ChannelExpression, ExpressionBuffer};
 pub(crate) use document::{Document, Entry, Section, suggestion};
 use dynamics::{Functions, Step};
 pub use fitted::EquationsModel;
+pub(crate) use graph::{Function, Operation};
+pub(crate) use program::Program;
 pub(crate) use scale::Scale;
 
 use crate::Error;

@@ -17,8 +17,9 @@ pub(crate) fn add_filtered(
     let (head, tail) = target.split_at_mut(full - rows.start);
     for (row, value) in (rows.start..full).zip(head) {
         let known = (row + 1).saturating_sub(start).min(weights.len());
-        let past = x[row + 1 - known..=row].iter().rev();
-        *value += weights.iter().zip(past).map(|(weight, x)| weight * x).sum::<f64>();
+        // The largest lag comes first, as after the start: the bits are those of a recursion that begins with zeros.
+        let past = weights[..known].iter().rev().zip(&x[row + 1 - known..=row]);
+        past.for_each(|(weight, x)| *value += weight * x);
     }
     if full < rows.end && !weights.is_empty() {
         kernel::add_filtered(tail, weights, &x[full - lag..rows.end]);

@@ -5,7 +5,7 @@ use crate::data::Log;
 use crate::model::Model;
 
 /// The log must have the model's sample time, unless the model takes any.
-pub(super) fn check_sample_time(model: &Model, log: &Log) -> Result<(), Error> {
+pub(crate) fn check_sample_time(model: &Model, log: &Log) -> Result<(), Error> {
     // One in continuous time is sampled as the log is.
     let sampled = !matches!(model, Model::ContinuousStateSpace(_));
     if sampled && !model.takes_any_clock() && (log.sample_time() / model.sample_time() - 1.0).abs() > 0.01 {

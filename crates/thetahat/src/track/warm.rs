@@ -10,7 +10,7 @@ use super::estimator::Estimator;
 use super::plan::{PerChannel, TrackPlan};
 use super::tracker::{Stage, Tracker};
 use crate::Error;
-use crate::model::{Model, NonlinearArxModel, Orders, Parameter, Signal};
+use crate::model::{Model, NonlinearArxModel, Orders, Parameter, PolynomialModel, Signal};
 use crate::report::Report;
 
 /// What P_jj of a parameter that nothing is known of is times the square of its scale, as
@@ -34,21 +34,9 @@ impl Tracker {
         if let Model::NonlinearArx(model) = &report.model {
             return Self::from_nonlinear(model, report.estimation.samples, plan);
         }
-        let model = report.model.polynomials("a tracker")?;
-        if model.orders.nd > 0 || model.orders.nf.iter().any(|&nf| nf > 0) {
-            return Err(Error::report(format!(
-                "the report has {}: only AR, ARX, ARMA, ARMAX and nonlinear ARX can be tracked",
-                model.orders
-            )));
-        }
-        model.check()?;
+        let model = polynomials(report)?;
         check(&model.orders, plan)?;
-        let relative = relative_covariance(
-            model.covariance.as_deref(),
-            model.noise_variance,
-            model.parameters.len(),
-            model.orders.parameters(),
-        )?;
+        let relative = relative(model)?;
         let mut plan = plan.clone();
         plan.offsets = Some(match plan.offsets {
             Some(given) => given,
@@ -150,6 +138,31 @@ impl Tracker {
     }
 }
 
+/// A model that recursive least squares, or their extension by C, can go on with.
+///
+/// # Errors
+/// [`Error::Argument`] and [`Error::Report`] if it is of another structure or kind.
+pub(crate) fn polynomials(report: &Report) -> Result<&PolynomialModel, Error> {
+    let model = report.model.polynomials("a tracker")?;
+    if model.orders.nd > 0 || model.orders.nf.iter().any(|&nf| nf > 0) {
+        return Err(Error::report(format!(
+            "the report has {}: only AR, ARX, ARMA, ARMAX and nonlinear ARX can be tracked",
+            model.orders
+        )));
+    }
+    model.check()?;
+    Ok(model)
+}
+
+/// P of such a model.
+///
+/// # Errors
+/// [`Error::Report`] if it does not say how sure it is.
+pub(crate) fn relative(model: &PolynomialModel) -> Result<DMatrix<f64>, Error> {
+    let count = model.parameters.len();
+    relative_covariance(model.covariance.as_deref(), model.noise_variance, count, model.orders.parameters())
+}
+
 /// P: the covariance over the noise variance, symmetric to the bit.
 fn relative_covariance(
     rows: Option<&[Vec<f64>]>,
@@ -212,7 +225,7 @@ fn offset_level(signal: &Signal) -> Result<f64, Error> {
 }
 
 /// 1/sqrt(N P_jj), the largest of each channel. A channel without parameters has no say: 1.
-fn scales(orders: &Orders, relative: &DMatrix<f64>, samples: usize) -> PerChannel {
+pub(crate) fn scales(orders: &Orders, relative: &DMatrix<f64>, samples: usize) -> PerChannel {
     let variances = relative.diagonal();
     let mut magnitudes = variances.iter().map(|variance| 1.0 / (samples as f64 * variance).sqrt());
     let mut largest = |count: usize| match magnitudes.by_ref().take(count).fold(0.0, f64::max) {

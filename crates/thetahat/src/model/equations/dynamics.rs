@@ -125,6 +125,15 @@ impl GreyBox {
         }
     }
 
+    /// The equations of the next state, or of its derivative with the steps of the integration in a row; and those of the outputs.
+    pub(crate) fn compiled(&self) -> (&Program, Option<usize>, &Program) {
+        let steps = match self.step {
+            Step::Next => None,
+            Step::Integrated(count) => Some(count),
+        };
+        (&self.transition.by_state, steps, &self.observation.by_state)
+    }
+
     /// y and its Jacobian, of m rows.
     #[expect(clippy::too_many_arguments, reason = "the arguments of h, and where its answers go")]
     pub(crate) fn observe<S: Number<f64>>(

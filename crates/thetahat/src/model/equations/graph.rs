@@ -9,11 +9,11 @@ use std::collections::HashMap;
 use thetahat_core::Number;
 
 /// A node, by its place in the [`Graph`].
-pub(super) type Node = usize;
+pub(crate) type Node = usize;
 
 /// A function of one argument.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(super) enum Function {
+pub(crate) enum Function {
     /// -x.
     Negative,
     Sqrt,
@@ -35,7 +35,7 @@ pub(super) enum Function {
 
 /// What a node does. Floating-point numbers are kept as their bits, so that nodes can be compared and hashed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(super) enum Operation {
+pub(crate) enum Operation {
     Constant(u64),
     State(usize),
     /// An unknown parameter after its change of variable: z.
@@ -62,7 +62,7 @@ pub(super) enum Operation {
 
 impl Operation {
     /// The nodes that it takes, some of them perhaps twice.
-    pub(super) fn arguments(self) -> [Option<Node>; 4] {
+    pub(crate) fn arguments(self) -> [Option<Node>; 4] {
         match self {
             Self::Constant(_)
             | Self::State(_)

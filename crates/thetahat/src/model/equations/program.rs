@@ -6,7 +6,7 @@ use super::graph::{self, Graph, Leaves, Node, Operation};
 
 /// The operations that some nodes need, in order, and where their values end up.
 #[derive(Debug, Clone)]
-pub(super) struct Program {
+pub(crate) struct Program {
     operations: Vec<Operation>,
     results: Vec<usize>,
 }
@@ -22,6 +22,20 @@ impl Program {
             operations.push(operation.moved(|argument| places[argument]));
         }
         Self { operations, results: roots.iter().map(|&root| places[root]).collect() }
+    }
+
+    /// The operations that the first `count` nodes need, each with its place, and the places of these nodes.
+    pub(crate) fn first(&self, count: usize) -> (Vec<(usize, Operation)>, &[usize]) {
+        let results = self.results.get(..count).unwrap_or(&self.results);
+        let mut needed = vec![false; self.operations.len()];
+        results.iter().for_each(|place| needed[*place] = true);
+        for (place, operation) in self.operations.iter().enumerate().rev() {
+            if needed[place] {
+                operation.arguments().into_iter().flatten().for_each(|argument| needed[argument] = true);
+            }
+        }
+        let all = self.operations.iter().copied().enumerate();
+        (all.filter(|(place, _)| needed[*place]).collect(), results)
     }
 
     /// How many numbers [`run`](Program::run) needs to work in.

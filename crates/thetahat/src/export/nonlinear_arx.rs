@@ -1,0 +1,163 @@
+//! Nonlinear ARX models:
+//!
+//! ```text
+//! y^_i(t) = s_i g_i(z(t)),   z_r(t) = x_r(t - l_r)/s_r
+//! ```
+//!
+//! (Ljung, System Identification, 2nd ed. 1999, section 5.4), each signal divided by its scale once.
+
+use super::map::evaluated;
+use super::program::{Array, Condition, Entry, Index, Program, Statement};
+use super::signals::Signals;
+use super::{Form, Purpose, refused};
+use crate::Error;
+use crate::model::{Model, NonlinearArxModel};
+
+/// The program of a model.
+///
+/// # Errors
+/// [`Error::Report`] for an offset that moves; [`Error::Argument`] for what such a model has not.
+pub(super) fn form(whole: &Model, model: &NonlinearArxModel, purpose: Purpose) -> Result<Form, Error> {
+    if !matches!(purpose, Purpose::Predictor | Purpose::Simulator) {
+        return Err(refused(purpose, "a nonlinear ARX model", "predictor, simulator or recursive"));
+    }
+    if let Some(expression) = model.expressions.first() {
+        return Err(Error::argument(
+            "what",
+            format!(
+                "the model reads the expression {}, which is not exported; make it a channel of the log, and fit again",
+                crate::text::brief(&expression.name, 40)
+            ),
+        ));
+    }
+    let mut program = Program::default();
+    let signals = Signals::of(&mut program, whole)?;
+    let mut equations = vec![model.name(), "y_i(t) = s_i g_i(z(t)), with z of:".to_owned()];
+    equations.extend(model.regressors.iter().map(|regressor| {
+        format!("{}, divided by {}", crate::text::harmless(&regressor.name()), regressor.scale)
+    }));
+    let lines = Lines::new(&mut program, model);
+    let z = program.memory("z", "The regressors, scaled.", vec![0.0; model.regressors.len()]);
+    let outputs = model.outputs.len();
+    let predicted =
+        program.memory("predicted", "The outputs as predicted, as deviations.", vec![0.0; outputs]);
+    let scales = model.maps.iter().map(|map| map.scale).collect();
+    let scales = program.table("S", "The scales of the outputs.", scales);
+
+    let mut body = lines.take_inputs(&mut program, &signals, outputs);
+    body.extend(lines.regressors(z, outputs));
+    for (place, (map, own)) in model.maps.iter().zip(model.places()).enumerate() {
+        let theta = model.parameters.get(own).unwrap_or_default();
+        let theta = theta.iter().map(|parameter| parameter.value).collect();
+        let map = evaluated(&mut program, place + 1, &map.functions, theta, z);
+        let value = program.variable("value");
+        body.push(Statement::Evaluate { map: program.maps.len(), into: value });
+        program.maps.push(map);
+        body.push(Statement::Store(predicted, place.into(), scales.at(place) * value));
+        body.push(signals.say(&place.into(), predicted.at(place)));
+    }
+    let given = signals.inputs.into_iter().collect();
+    program.entries = if purpose == Purpose::Simulator {
+        body.extend(lines.take_outputs(&mut program, predicted));
+        let doc = vec!["The next sample: takes u(k), and gives y(k) of the free run.".to_owned()];
+        vec![Entry { name: "step", doc, arguments: given, result: Some(signals.outputs), body }]
+    } else {
+        let mut update: Vec<Statement> = (0..outputs)
+            .map(|output| Statement::Choose {
+                condition: Condition::Missing(signals.measured.at(output)),
+                then: Vec::new(),
+                otherwise: vec![Statement::Store(predicted, output.into(), signals.output(&output.into()))],
+            })
+            .collect();
+        update.extend(lines.take_outputs(&mut program, predicted));
+        let doc = "The next sample: takes u(k), and gives the prediction of y(k) from it and from what was measured before.";
+        vec![
+            Entry {
+                name: "predict",
+                doc: vec![doc.to_owned()],
+                arguments: given,
+                result: Some(signals.outputs),
+                body,
+            },
+            Entry {
+                name: "update",
+                doc: vec![super::UPDATE.to_owned()],
+                arguments: vec![signals.measured],
+                result: None,
+                body: update,
+            },
+        ]
+    };
+    Ok(Form { program, equations, start: "at rest at the offsets".to_owned() })
+}
+
+/// The past of the signals, each divided by its scale: twice where it is read with two.
+struct Lines {
+    /// The signal (outputs, then inputs), the scale, and the line.
+    each: Vec<(usize, f64, Array)>,
+    /// For each regressor its line and its lag.
+    read: Vec<(usize, usize)>,
+}
+
+impl Lines {
+    fn new(program: &mut Program, model: &NonlinearArxModel) -> Self {
+        let outputs = model.outputs.len();
+        let mut sorts: Vec<(usize, f64, usize)> = Vec::new();
+        let mut read = Vec::new();
+        for (source, regressor) in model.sources().into_iter().zip(&model.regressors) {
+            let found = sorts.iter().position(|(own, scale, _)| (*own, *scale) == (source, regressor.scale));
+            let place = found.unwrap_or_else(|| {
+                sorts.push((source, regressor.scale, 0));
+                sorts.len() - 1
+            });
+            sorts[place].2 = sorts[place].2.max(regressor.lag);
+            read.push((place, regressor.lag));
+        }
+        let mut line = |(source, scale, lag): (usize, f64, usize)| {
+            let input = source.checked_sub(outputs);
+            // Of an input the sample of now is there.
+            let length = lag + usize::from(input.is_some());
+            let name = input.map_or_else(|| format!("y{}", source + 1), |input| format!("u{}", input + 1));
+            let taken =
+                program.arrays.iter().filter(|array| array.name.starts_with(&format!("{name}_past"))).count();
+            let name = if taken == 0 { format!("{name}_past") } else { format!("{name}_past_{}", taken + 1) };
+            let doc = format!("Divided by {scale}, the oldest value first.");
+            (source, scale, program.memory(&name, &doc, vec![0.0; length]))
+        };
+        Self { each: sorts.into_iter().map(&mut line).collect(), read }
+    }
+
+    fn take_inputs(&self, program: &mut Program, signals: &Signals, outputs: usize) -> Vec<Statement> {
+        let inputs = self
+            .each
+            .iter()
+            .filter_map(|(source, scale, line)| Some((source.checked_sub(outputs)?, scale, line)));
+        inputs.flat_map(|(input, scale, line)| signals.take_scaled(program, input, *scale, *line)).collect()
+    }
+
+    /// z.
+    fn regressors(&self, z: Array, outputs: usize) -> Vec<Statement> {
+        let value = |(place, lag): &(usize, usize)| {
+            let (source, _, line) = self.each[*place];
+            let last = self.longest(*place, outputs);
+            line.at(if source < outputs { last - lag } else { last - 1 - lag })
+        };
+        self.read.iter().enumerate().map(|(r, read)| Statement::Store(z, r.into(), value(read))).collect()
+    }
+
+    /// How long a line is.
+    fn longest(&self, place: usize, outputs: usize) -> usize {
+        let lags = self.read.iter().filter(|(own, _)| *own == place).map(|(_, lag)| *lag);
+        lags.max().unwrap_or(0) + usize::from(self.each[place].0 >= outputs)
+    }
+
+    /// Puts deviations of the outputs into their lines.
+    fn take_outputs(&self, program: &mut Program, deviations: Array) -> Vec<Statement> {
+        let outputs = program.length(deviations);
+        let own = self.each.iter().filter(|(source, ..)| *source < outputs);
+        own.flat_map(|(source, scale, line)| {
+            program.push(*line, deviations.at(Index::from(*source)) / *scale)
+        })
+        .collect()
+    }
+}

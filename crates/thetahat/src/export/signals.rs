@@ -1,0 +1,133 @@
+//! What goes into a program and comes out of it, in the units of the channels.
+
+use super::program::{Array, Condition, Index, Kind, Program, Statement, Value};
+use crate::Error;
+use crate::model::{Model, Signal};
+
+/// The signals of a program.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Signals {
+    /// The inputs; none where there are none.
+    pub(super) inputs: Option<Array>,
+    /// What was measured of the outputs, which only some programs are given.
+    pub(super) measured: Array,
+    /// What is said of the outputs.
+    pub(super) outputs: Array,
+    input_offsets: Option<Array>,
+    output_offsets: Option<Array>,
+}
+
+/// The offsets of signals.
+///
+/// # Errors
+/// [`Error::Report`] for one that moves with time.
+pub(super) fn levels(signals: &[Signal]) -> Result<Vec<f64>, Error> {
+    let level = |signal: &Signal| match signal.offset.slope == 0.0 {
+        true => Ok(signal.offset.level),
+        false => Err(Error::report(format!(
+            "the offset of '{}' is a line in the time of its log, which has no meaning beyond it; fit with another way to remove offsets",
+            signal.name
+        ))),
+    };
+    signals.iter().map(level).collect()
+}
+
+impl Signals {
+    /// Those of a model.
+    ///
+    /// # Errors
+    /// As for [`levels`].
+    pub(super) fn of(program: &mut Program, model: &Model) -> Result<Self, Error> {
+        let (inputs, outputs) = (levels(model.inputs())?, levels(model.outputs())?);
+        let mut offsets = |name: &str, doc: &str, levels: &[f64]| {
+            let any = levels.iter().any(|level| *level != 0.0);
+            any.then(|| program.table(name, doc, levels.to_vec()))
+        };
+        let input_offsets = offsets("U_OFFSET", "What the inputs are measured from.", &inputs);
+        let output_offsets = offsets("Y_OFFSET", "What the outputs are measured from.", &outputs);
+        let some = !inputs.is_empty();
+        Ok(Self {
+            inputs: some.then(|| program.array(Kind::Argument, "u", "The inputs.", vec![0.0; inputs.len()])),
+            measured: program.array(Kind::Argument, "measured", "The outputs.", vec![0.0; outputs.len()]),
+            outputs: program.array(Kind::Result, "y", "The outputs.", vec![0.0; outputs.len()]),
+            input_offsets,
+            output_offsets,
+        })
+    }
+
+    /// An input as a deviation from its offset.
+    fn input(&self, input: Array, place: &Index) -> Value {
+        let value = input.at(place.clone());
+        match self.input_offsets {
+            Some(offsets) => value - offsets.at(place.clone()),
+            None => value,
+        }
+    }
+
+    /// Puts an input, as a deviation, into the last place of a line that moves on: where it is missing what stands there stays.
+    pub(super) fn take_input(&self, program: &mut Program, place: usize, line: Array) -> Vec<Statement> {
+        self.take(program, place, line, |deviation| deviation)
+    }
+
+    /// The same of an input divided by its scale.
+    pub(super) fn take_scaled(
+        &self,
+        program: &mut Program,
+        place: usize,
+        scale: f64,
+        line: Array,
+    ) -> Vec<Statement> {
+        self.take(program, place, line, |deviation| deviation / scale)
+    }
+
+    fn take(
+        &self,
+        program: &mut Program,
+        place: usize,
+        line: Array,
+        scaled: impl FnOnce(Value) -> Value,
+    ) -> Vec<Statement> {
+        let (Some(input), Some(last)) = (self.inputs, program.length(line).checked_sub(1)) else {
+            return Vec::new();
+        };
+        let mut statements = program.shift(line);
+        let place = Index::from(place);
+        statements.push(hold(input.at(place.clone()), line, last.into(), scaled(self.input(input, &place))));
+        statements
+    }
+
+    /// Puts an input, as a deviation, into its place among those that were held; where it is missing what stands there stays.
+    pub(super) fn hold_input(&self, held: Array, place: &Index) -> Vec<Statement> {
+        let hold =
+            |input: Array| hold(input.at(place.clone()), held, place.clone(), self.input(input, place));
+        self.inputs.map(hold).into_iter().collect()
+    }
+
+    /// What was measured of an output, as a deviation.
+    pub(super) fn output(&self, place: &Index) -> Value {
+        let value = self.measured.at(place.clone());
+        match self.output_offsets {
+            Some(offsets) => value - offsets.at(place.clone()),
+            None => value,
+        }
+    }
+
+    /// Says a deviation of an output in its own unit.
+    pub(super) fn say(&self, place: &Index, deviation: impl Into<Value>) -> Statement {
+        let deviation = deviation.into();
+        let value = match self.output_offsets {
+            Some(offsets) => deviation + offsets.at(place.clone()),
+            None => deviation,
+        };
+        Statement::Store(self.outputs, place.clone(), value)
+    }
+}
+
+/// Puts a value into its place, unless what it is made of is missing.
+fn hold(given: Value, into: Array, at: Index, value: Value) -> Statement {
+    Statement::Choose {
+        condition: Condition::Missing(given),
+        then: Vec::new(),
+        otherwise: vec![Statement::Store(into, at, value)],
+    }
+}

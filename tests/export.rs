@@ -1,0 +1,314 @@
+//! Models as source code: it compiles, and says what the library does.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+
+use crate::harness::Folder;
+
+/// What C has to be compiled with.
+const STRICT: [&str; 6] = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-O2"];
+
+/// Whether a program is there. Where the tests must not skip anything it has to be.
+fn has(program: &str) -> bool {
+    let there = Command::new(program).arg("--version").output().is_ok();
+    assert!(there || std::env::var_os("CI").is_none(), "{program} is missing");
+    if !there {
+        eprintln!("skipped: {program} is missing");
+    }
+    there
+}
+
+fn run(command: &mut Command) {
+    let output = command.output().expect("a program that starts");
+    assert!(
+        output.status.success(),
+        "{command:?}: {}{}",
+        String::from_utf8_lossy(&output.stdout),
+        String::from_utf8_lossy(&output.stderr)
+    );
+}
+
+/// The core as a library that a generated module is linked with, compiled once.
+fn core() -> &'static Path {
+    static CORE: OnceLock<PathBuf> = OnceLock::new();
+    CORE.get_or_init(|| {
+        // Beside the binary of this test.
+        let own = std::env::current_exe().expect("a test has a file");
+        own.parent().expect("a folder").to_owned()
+    })
+}
+
+/// Links a generated module of Rust with the core, and runs it.
+fn rustc(folder: &Folder, name: &str) {
+    let text = folder.read(&format!("{name}.rs"));
+    let mut command = Command::new("rustc");
+    command.current_dir(folder.path(".")).args(["--edition=2024", "-D", "warnings", "-C", "opt-level=1"]);
+    if text.contains("thetahat_core") {
+        let library = newest(core(), "libthetahat_core-").expect("the core was built for this test");
+        command.arg("--extern").arg(format!("thetahat_core={}", library.display()));
+        command.arg("-L").arg(format!("dependency={}", core().display()));
+    }
+    run(command.arg(format!("{name}_test.rs")).args(["-o", "test_of_rust"]));
+    run(&mut Command::new(folder.path("test_of_rust")));
+}
+
+/// The library that was built last.
+fn newest(folder: &Path, begins: &str) -> Option<PathBuf> {
+    let entries = fs::read_dir(folder).ok()?.filter_map(Result::ok);
+    let libraries = entries.filter(|entry| {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        name.starts_with(begins) && name.ends_with(".rlib")
+    });
+    libraries
+        .max_by_key(|entry| entry.metadata().and_then(|data| data.modified()).ok())
+        .map(|entry| entry.path())
+}
+
+/// Exports a model in every way, compiles it, and steps it along a log.
+fn goes_round(folder: &Folder, report: &str, log: &str, purposes: &[&str]) {
+    for (purpose, precision) in purposes.iter().flat_map(|purpose| [(purpose, "f64"), (purpose, "f32")]) {
+        let common = format!("export {report} {log} --what {purpose} --precision {precision} --name model");
+        let exported = folder.done(&format!("{common} --to rust"));
+        assert!(!exported.stderr.contains("warning"), "{}", exported.stderr);
+        rustc(folder, "model");
+        folder.done(&format!("{common} --to c"));
+        if has("gcc") {
+            let mut command = Command::new("gcc");
+            command.current_dir(folder.path(".")).args(STRICT).arg("-ffp-contract=off");
+            run(command.args(["model.c", "model_test.c", "-o", "test_of_c", "-lm"]));
+            run(&mut Command::new(folder.path("test_of_c")));
+        }
+    }
+}
+
+fn motor() -> Folder {
+    let folder = Folder::new();
+    folder.done("demo .");
+    folder
+}
+
+#[test]
+fn models_of_polynomials_say_what_the_library_does() {
+    let folder = motor();
+    for (orders, purposes) in [
+        ("--na 2 --nb 2 --nk 3", ["predictor", "simulator"]),
+        ("--model bj --nb 2 --nc 1 --nd 2 --nf 2", ["predictor", "simulator"]),
+    ] {
+        folder.done(&format!("fit dc_motor.csv --time t {orders} --report r.json"));
+        goes_round(&folder, "r.json", "dc_motor.csv --time t", &purposes);
+    }
+}
+
+#[test]
+fn models_of_other_kinds_say_what_the_library_does() {
+    let folder = motor();
+    let both = ["predictor", "simulator"];
+    folder.write("two.csv", include_str!("data/dc_motor.csv"));
+    folder.done("fit two.csv --time t -u u -y i,speed --order 2 --report r.json");
+    goes_round(&folder, "r.json", "two.csv --time t", &["predictor", "simulator", "observer"]);
+    folder.done("convert r.json --to continuous --out c.json");
+    goes_round(&folder, "c.json", "two.csv --time t", &both);
+    folder.write("heater.csv", include_str!("data/public/tclab_siso_step.csv"));
+    folder.done("fit heater.csv --time t -u q1 -y t1 --structure p2d --report r.json");
+    goes_round(&folder, "r.json", "heater.csv --time t", &both);
+}
+
+#[test]
+fn nonlinear_models_say_what_the_library_does() {
+    // y(t) = 0.6 y(t-1) + 0.3 u(t-1)^2 - 0.1 y(t-1) u(t-1), and a little of what looks like noise.
+    let (mut text, mut y, mut u, mut random) = ("t,u,y\n".to_owned(), 0.0_f64, 0.0_f64, 1_u32);
+    for t in 0..400 {
+        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        y = 0.6 * y + 0.3 * u * u - 0.1 * y * u + 0.01 * f64::from(random >> 16 & 0xff) / 256.0;
+        u = f64::from(random >> 8) / f64::from(1 << 23) - 1.0;
+        text += &format!("{t},{u},{y}\n");
+    }
+    let folder = Folder::with_log(text);
+    for map in
+        ["poly --degree 2", "rbf --centres kmeans:5", "spline", "local", "tanh --units 3", "relu --units 3"]
+    {
+        folder.done(&format!("fit log.csv --time t --narx {map} --ny 1 --nu 2 --report r.json"));
+        goes_round(&folder, "r.json", "log.csv --time t", &["predictor"]);
+    }
+}
+
+#[test]
+fn models_in_equations_say_what_the_library_does() {
+    let folder = Folder::with_log(include_str!("data/dc_motor.csv"));
+    folder.write(
+        "motor.toml",
+        "sample_time = 0.01
+         [states]
+         current = { start = 0, sd = 1 }
+         speed = { start = 0, sd = 1 }
+         [inputs]
+         voltage = 'u'
+         [parameters]
+         resistance = { start = 1, sd = 1, unknown = true, min = 0 }
+         inertia = { start = 0.02, sd = 0.02, unknown = true, min = 0 }
+         [derivative]
+         current = '(voltage - resistance * current - 0.1 * speed) / 0.05'
+         speed = '(0.1 * current - 0.001 * speed * abs(speed) - 0.001 * tanh(speed) + 0 * t) / inertia'
+         [outputs]
+         i = 'current'
+         speed = 'speed'
+         [noise]
+         process = { speed = 0.1 }
+         measurement = { i = 0.1, speed = 0.1 }",
+    );
+    folder.done("fit --grey motor.toml log.csv --time t --report r.json");
+    goes_round(&folder, "r.json", "log.csv --time t", &["simulator"]);
+}
+
+#[test]
+fn nearest_neighbours_are_for_rust_alone() {
+    let folder = motor();
+    folder.done("fit dc_motor.csv --time t --narx knn --ny 1 --nu 1 --estimate 1..100 --report r.json");
+    let export =
+        "export r.json dc_motor.csv --time t --rows 200..300 --what predictor --precision f64 --name model";
+    folder.done(&format!("{export} --to rust"));
+    rustc(&folder, "model");
+    assert!(folder.refused(&format!("{export} --to c"), 2).contains("nearest neighbours"));
+}
+
+#[test]
+fn estimators_go_on_from_the_fit() {
+    let folder = motor();
+    for orders in ["--na 2 --nb 2 --nk 3", "--model armax --na 2 --nb 2 --nc 1 --nk 3", "--model ar --na 2"] {
+        let input = if orders.contains(" ar ") { "-y y" } else { "-u u -y y" };
+        folder.done(&format!("fit dc_motor.csv --time t {input} {orders} --report r.json"));
+        for precision in ["f64", "f32"] {
+            let export = format!(
+                "export r.json dc_motor.csv --time t --what recursive --precision {precision} --name model"
+            );
+            folder.done(&format!("{export} --to rust"));
+            rustc(&folder, "model");
+            assert!(folder.refused(&format!("{export} --to c"), 2).contains("take rust"));
+        }
+    }
+    folder.done("fit dc_motor.csv --time t --model oe --nb 2 --nf 2 --report r.json");
+    assert!(folder.refused("export r.json --to rust --what recursive", 3).contains("can be tracked"));
+}
+
+/// The predictor of the motor on a Cortex-M4F.
+#[test]
+fn the_predictor_of_the_motor_is_small() {
+    if !has("arm-none-eabi-gcc") {
+        return;
+    }
+    let folder = motor();
+    folder.done("fit dc_motor.csv --time t --na 2 --nb 2 --nk 3 --report r.json");
+    for purpose in ["predictor", "simulator"] {
+        folder.done(&format!("export r.json --to c --what {purpose} --name motor"));
+        let processor =
+            ["-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16", "-c", "motor.c"];
+        run(Command::new("arm-none-eabi-gcc").current_dir(folder.path(".")).args(STRICT).args(processor));
+        let size = Command::new("arm-none-eabi-size").arg(folder.path("motor.o")).output().expect("binutils");
+        let text = String::from_utf8_lossy(&size.stdout).into_owned();
+        let row = text.lines().nth(1).unwrap_or_default().split_whitespace();
+        let row: Vec<usize> = row.map_while(|word| word.parse().ok()).collect();
+        assert!(matches!(row[..], [code, data, ..] if code + data < 1000), "{text}");
+    }
+}
+
+#[test]
+fn files_tell_where_they_are_from() {
+    let folder = motor();
+    folder.done("fit dc_motor.csv --time t --na 2 --nb 2 --nk 3 --report r.json");
+    let run = folder.done("export r.json --to c --what predictor --out firmware");
+    assert!(run.stderr.contains("predictor of ARX(2, 2, 3): r_predictor.h, r_predictor.c"), "{}", run.stderr);
+    let header = folder.read("firmware/r_predictor.h");
+    for words in [
+        "u[0] is 'u', in its own unit, with the offset",
+        "y[0] is 'y'",
+        "Sample time 0.01 s",
+        "'u' acts 3 samples later",
+    ] {
+        assert!(header.contains(words), "{words}: {header}");
+    }
+    // The same bytes each time, and another report has another digest.
+    folder.done("export r.json --to c --what predictor --out again");
+    assert_eq!(folder.read("again/r_predictor.h"), header);
+    folder.done("fit dc_motor.csv --time t --na 2 --nb 1 --nk 3 --report r.json");
+    folder.done("export r.json --to c --what predictor --out again");
+    assert_ne!(folder.read("again/r_predictor.h").lines().nth(1), header.lines().nth(1));
+}
+
+#[test]
+fn what_cannot_be_exported_is_refused_and_nothing_written() {
+    let folder = motor();
+    folder.done("fit dc_motor.csv --time t --na 2 --nb 2 --nk 3 --report r.json");
+    let before = folder.names();
+    for (line, code, words) in [
+        (
+            "r.json --to c --what observer",
+            2,
+            "--what: a model of polynomials is exported as no observer; take predictor, simulator",
+        ),
+        ("r.json --to c --what predictor --name Motor", 2, "--name: 'Motor' is no name"),
+        ("r.json --to c --what predictor --rows 1..5", 2, "LOG"),
+        ("r.json dc_motor.csv --time t --to c --what predictor --rows 1..5000", 3, "rows"),
+        ("r.json nowhere.csv --to c --what predictor", 5, "nowhere.csv"),
+        ("dc_motor.csv --to c --what predictor", 3, "not a thetahat report"),
+        ("r.json dc_motor.csv --sample-time 1 --to c --what predictor", 3, "sample time"),
+    ] {
+        let run = folder.run(&format!("export {line}"));
+        assert_eq!(run.code, code, "{line}: {}", run.stderr);
+        assert!(run.stderr.contains(words), "{line}: {}", run.stderr);
+    }
+    folder.done("fit dc_motor.csv --time t --na 2 --nb 2 --nk 3 --detrend linear --report line.json");
+    let message = folder.refused("export line.json --to rust --what simulator", 3);
+    assert!(message.contains("is a line in the time of its log"), "{message}");
+    let after: Vec<String> = folder.names().into_iter().filter(|name| name != "line.json").collect();
+    assert_eq!(after, before);
+}
+
+#[test]
+fn controllers_control() {
+    // y(t) - 20 = 0.9 (y(t-1) - 20) + 0.2 (u(t-1) - 50), without noise but for a little.
+    let (mut text, mut y, mut u, mut random) = ("u,y\n".to_owned(), 20.0_f64, 50.0_f64, 1_u32);
+    for _ in 0..400 {
+        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        y = 20.0 + 0.9 * (y - 20.0) + 0.2 * (u - 50.0) + 0.001 * f64::from(random >> 16 & 0xff) / 256.0;
+        u = 50.0 + f64::from(random >> 28) - 7.5;
+        text += &format!("{u},{y}\n");
+    }
+    let folder = Folder::with_log(text);
+    folder.done("fit log.csv --sample-time 1 --na 1 --nb 1 --nk 1 --report r.json");
+    folder.done("control r.json --poles 0.6 --limits 40..60 --document c.json");
+    let run_of = folder.done("export c.json --to c --what controller --name heater");
+    assert!(run_of.stderr.contains("controller of ARX(1, 1, 1): heater.h, heater.c"), "{}", run_of.stderr);
+    // The loop settles at the set point, within the limits on its way.
+    folder.write(
+        "heater_test.c",
+        "#include \"heater.h\"\nint main(void)\n{\n    heater_state state;\n    float y[1] = {20.0F};\n    float u[1];\n    \
+         const float wanted[1] = {25.0F};\n    heater_init(&state);\n    for (int k = 0; k < 300; k += 1) {\n        \
+         heater_control(&state, wanted, y, u);\n        if (!(u[0] >= 40.0F && u[0] <= 60.0F)) {\n            return 2;\n        }\n        \
+         y[0] = 20.0F + 0.9F * (y[0] - 20.0F) + 0.2F * (u[0] - 50.0F);\n    }\n    \
+         heater_applied(&state, u);\n    return !(y[0] > 24.99F && y[0] < 25.01F);\n}\n",
+    );
+    if has("gcc") {
+        let mut command = Command::new("gcc");
+        command.current_dir(folder.path(".")).args(STRICT);
+        run(command.args(["heater.c", "heater_test.c", "-o", "test_of_c", "-lm"]));
+        run(&mut Command::new(folder.path("test_of_c")));
+    }
+    folder.done("export c.json --to rust --what controller --name heater");
+    folder.write(
+        "heater_test.rs",
+        "#[path = \"heater.rs\"]\nmod heater;\nfn main() {\n    let mut heater = heater::Heater::new().unwrap();\n    let mut y = 20.0;\n    \
+         for _ in 0..300 {\n        let u = heater.control(25.0, y);\n        assert!((40.0..=60.0).contains(&u));\n        \
+         y = 20.0 + 0.9 * (y - 20.0) + 0.2 * (u - 50.0);\n        heater.applied(u);\n    }\n    assert!((y - 25.0_f32).abs() < 0.01);\n}\n",
+    );
+    rustc(&folder, "heater");
+    for (line, words) in [
+        ("c.json --to c --what predictor", "a controller is exported as no predictor; take controller"),
+        ("r.json --to c --what controller", "a model is no controller"),
+        ("c.json log.csv --to c --what controller", "leave the log out"),
+    ] {
+        let message = folder.refused(&format!("export {line}"), 2);
+        assert!(message.contains(words), "{message}");
+    }
+}

@@ -51,9 +51,12 @@ def test_python_control_sees_the_same_loop(motor: th.Model) -> None:
 
 
 def test_limits_hold(motor: th.Model) -> None:
-    found = th.pole_placement(motor, 0.5, limits=(-0.5, 0.5))
+    level = th.pole_placement(motor, 0.5).document["input"]["offset"]["level"]
+    found = th.pole_placement(motor, 0.5, limits=(level - 0.5, level + 0.5))
     run = th.closed_loop(found.controller(), motor, np.full(100, 3.0), noise=False)
     assert np.abs(run.u).max() <= 0.5 + 1e-12
+    outside = th.pole_placement(motor, 0.5, limits=(level + 1, level + 2))
+    assert any("outside of the limits" in warning for warning in outside.warnings)
 
 
 @pytest.mark.parametrize(

@@ -144,6 +144,15 @@ pub fn control(model: &Model, plan: &ControlPlan) -> Result<Control, Error> {
             short(closed.peak_sensitivity)
         ));
     }
+    if let (low, high) = controller.limits()
+        && !(low..=high).contains(&0.0)
+    {
+        warnings.push(format!(
+            "the working point of the model, {} = {}, is outside of the limits",
+            of_input.name,
+            short(working)
+        ));
+    }
     if (closed.static_gain - 1.0).abs() > 1e-6 {
         warnings.push(format!(
             "a set point that stays is followed with a gain of {}, as the controller does not integrate",

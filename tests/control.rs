@@ -98,8 +98,8 @@ fn what_cannot_be_designed_is_told_and_nothing_is_written() {
         ("control motor.json --lqr 1 --draws 0", 2, "outside"),
         ("control motor.json --lqr 1 -u v", 2, "none called 'v'"),
         ("control motor.json --lqr 1 --cancel-zeros", 2, "minimum variance cancels"),
-        ("control narx.json --lqr 1", 3, "linear"),
-        ("control continuous.json --lqr 1", 3, "continuous time"),
+        ("control narx.json --lqr 1", 2, "linear"),
+        ("control continuous.json --lqr 1", 2, "continuous time"),
         ("control log.csv --lqr 1", 3, "not a thetahat report"),
         ("control nowhere.json --lqr 1", 5, "cannot be read"),
     ] {

@@ -21,6 +21,9 @@ use crate::grey_box::GreyBox;
 use crate::log::{Log, copy};
 use crate::work::interruptible;
 
+/// Names of files, and what they hold.
+type Files = Vec<(String, String)>;
+
 /// A fitted model: the document that `thetahat fit` writes.
 ///
 /// Its figures are computed when somebody asks for the document: they take several times as long as least squares.
@@ -420,7 +423,7 @@ impl Model {
         py: Python<'_>,
         words: [String; 4],
         log: Option<&Bound<'_, Log>>,
-    ) -> PyResult<(Vec<(String, String)>, Vec<String>)> {
+    ) -> PyResult<(Files, Vec<String>)> {
         let [language, purpose, precision, name] = words;
         let plan = || -> Result<Plan, thetahat::Error> {
             let (language, purpose) = (language.parse()?, purpose.parse()?);

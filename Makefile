@@ -12,7 +12,7 @@ check: format lint unit
 test: format lint docs rust embedded python
 
 format:
-	@$(call with,rustfmt,fmt,cargo fmt --all --check && for d in benches/peers tests/embedded; do (cd $$d && cargo fmt --check) || exit 1; done)
+	@$(call with,rustfmt,fmt,cargo fmt --all --check && for d in benches/peers examples/self_tuning_heater tests/embedded; do (cd $$d && cargo fmt --check) || exit 1; done)
 
 # They read the Python module too, and need no Python for that.
 lint docs: export PYO3_NO_PYTHON = 1

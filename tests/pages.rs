@@ -296,6 +296,7 @@ fn links_lead_to_files_and_headings() {
         "benches/peers/README.md",
         "tests/data/public/README.md",
         "examples/battery_gauge/README.md",
+        "examples/self_tuning_heater/README.md",
     ];
     for page in pages().into_iter().chain(others.map(page)) {
         for link in page.links() {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -73,7 +74,9 @@ def test_limits_hold(motor: th.Model) -> None:
         (lambda model: th.closed_loop(th.lqr(model, 1).controller(), model, [math.nan]), "set_point"),
     ],
 )
-def test_what_cannot_be_designed_is_refused(motor: th.Model, call, words: str) -> None:
+def test_what_cannot_be_designed_is_refused(
+    motor: th.Model, call: Callable[[th.Model], object], words: str
+) -> None:
     with pytest.raises(ValueError, match=words):
         call(motor)
 
@@ -92,7 +95,7 @@ def tuner(**more: object) -> th.SelfTuner:
     return th.SelfTuner(2, 4, **settings)  # type: ignore[arg-type]
 
 
-def plant_of(a: list[float], b: list[float], deviation: float = 0.0):
+def plant_of(a: list[float], b: list[float], deviation: float = 0.0) -> Callable[[float], float]:
     y, u = np.zeros(len(a)), np.zeros(len(b))
     random = np.random.default_rng(0)
 

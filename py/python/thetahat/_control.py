@@ -90,8 +90,12 @@ class Control(_Document):
             If python-control is not installed.
         """
         moved = self.document["input"]["name"]
-        of = lambda numerator, name: to_control([numerator], [self.r], self.sample_time, [name], moved)  # noqa: E731
-        return of(self.t, "set_point"), of(self.s, self.document["output"]["name"])
+        names = ("set_point", self.document["output"]["name"])
+        forward, back = (
+            to_control([numerator], [self.r], self.sample_time, [name], moved)
+            for numerator, name in zip((self.t, self.s), names)
+        )
+        return forward, back
 
     def _polynomial(self, name: str) -> Array:
         return np.asarray(self.document["controller"][name], dtype=np.float64)
@@ -108,8 +112,8 @@ def _poles(name: str, given: complex | Sequence[complex]) -> str:
         raise TypeError(f"{name}: expected numbers, found {given!r}") from error
     if each.ndim != 1 or each.size == 0:
         raise ValueError(f"{name}: expected one or more poles")
-    word = lambda pole: repr(pole.real) if pole.imag == 0 else f"{pole.real!r}{pole.imag:+}i"  # noqa: E731
-    return ",".join(word(complex(pole)) for pole in each)
+    words = (repr(pole.real) if pole.imag == 0 else f"{pole.real!r}{pole.imag:+}i" for pole in map(complex, each))
+    return ",".join(words)
 
 
 def _designed(

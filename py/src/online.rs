@@ -101,6 +101,7 @@ fn _restore<'py>(py: Python<'py>, class_name: &str, kept: &Bound<'py, PyAny>) ->
         "OutOfSequenceFilter" => {
             any(Bound::new(py, out_of_sequence::OutOfSequenceFilter { filter: read(kept)? })?.into_any())
         }
+        "SelfTuner" => any(Bound::new(py, self_tuner::SelfTuner { tuner: read(kept)? })?.into_any()),
         "RstController" => any(Bound::new(py, controller::RstController::of(read(kept)?))?.into_any()),
         "RecursiveNarx" => {
             let model = RecursiveModel::restore(read(kept)?, class_name)?;

@@ -259,6 +259,29 @@ pub(crate) mod number {
     }
 }
 
+/// For `#[serde(with)]` on a range whose ends may be infinite.
+pub(crate) mod range {
+    use core::ops::RangeInclusive;
+
+    use serde::{Deserialize, Serialize};
+
+    use super::{Deserializer, Entry, Read, Serializer, Written};
+
+    pub(crate) fn serialize<E: Entry, S: Serializer>(
+        range: &RangeInclusive<E>,
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        (Written(range.start()), Written(range.end())).serialize(serializer)
+    }
+
+    pub(crate) fn deserialize<'de, E: Entry, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<RangeInclusive<E>, D::Error> {
+        let (Read(start), Read(end)) = Deserialize::deserialize(deserializer)?;
+        Ok(start..=end)
+    }
+}
+
 /// For `#[serde(with)]` on a vector.
 pub(crate) mod vector {
     use super::{Deserializer, Dimension, Entry, Matrix, OVector, Serializer, write};

@@ -1,5 +1,7 @@
 //! What is written and read back goes on as if nothing had happened: every estimator, in text and in binary.
 
+#[path = "snapshot/control.rs"]
+mod control;
 #[path = "snapshot/past.rs"]
 mod past;
 
@@ -16,7 +18,7 @@ use thetahat_core::{
     ExtendedKalmanFilter, Forgetting, GainSchedule, Innovation, InputOrders, KalmanFilter, Lags,
     LeastSquares, LinearObservation, LinearTransition, LuenbergerObserver, OutputErrorMethod, RecursiveArmax,
     RecursiveArx, RecursiveLeastSquares, RecursiveNarx, RecursiveOutputError, RecursiveVectorArx, RlsStart,
-    RstController, Scaling,
+    Scaling,
 };
 
 const INPUTS: &[InputOrders] = &[InputOrders { nb: 1, nk: 2 }];
@@ -102,25 +104,6 @@ fn recursive_least_squares() {
         let phi = DVector::from_column_slice(phi(k).as_slice());
         (estimator.update(&phi, output(k)), estimator.parameters().clone())
     });
-}
-
-#[test]
-fn controllers() {
-    let controller: RstController<f64, Const<2>> =
-        RstController::new(2.0, [-1.0, 0.1].into(), [2.2, -2.0].into(), [-0.9, 0.0].into()).unwrap();
-    for limited in [controller.clone(), controller.clone().with_limits(-1.0..=2.0).unwrap()] {
-        check(limited, |controller, k| controller.control(value(k), output(k)));
-    }
-    let numbers = &[json!("NaN"), json!("inf")][..];
-    refuses(
-        &controller,
-        &[
-            ("/state/2/0", numbers),
-            ("/gain", &[json!(null)]),
-            ("/r", &[json!([3, 1, [0.0, 0.0, 0.0]])]),
-            ("/version", &[json!(0)]),
-        ],
-    );
 }
 
 #[test]

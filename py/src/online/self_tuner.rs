@@ -11,6 +11,7 @@ use thetahat_core::{
 use super::argument::{self, Whole, count, failed};
 use super::controller::RstController;
 use super::forgetting::{Memory, STANDARD};
+use super::{Reduced, snapshot};
 
 type Stepper = IndirectSelfTuner<f64, Dyn, Dyn>;
 
@@ -75,9 +76,8 @@ type Stepper = IndirectSelfTuner<f64, Dyn, Dyn>;
 /// >>> tuner.state, round(temperature, 3)
 /// ('controlling', 60.0)
 #[pyclass(module = "thetahat")]
-#[derive(Clone)]
 pub(crate) struct SelfTuner {
-    tuner: Stepper,
+    pub(super) tuner: Stepper,
 }
 
 #[pymethods]
@@ -235,12 +235,8 @@ impl SelfTuner {
         self.tuner.controller().cloned().map(RstController::of)
     }
 
-    fn __copy__(&self) -> Self {
-        self.clone()
-    }
-
-    fn __deepcopy__(&self, _memo: &Bound<'_, PyAny>) -> Self {
-        self.clone()
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py>> {
+        snapshot(py, "SelfTuner", &self.tuner)
     }
 
     fn __repr__(&self) -> String {

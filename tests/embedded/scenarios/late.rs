@@ -36,7 +36,7 @@ impl Scenario for Late {
 
     fn input(case: Case, k: usize) -> Self::Input {
         let (now, missing) = (Vector2::new(sample(case, k, 0).y, sample(case, k, 1).y), f32::NAN);
-        let late = case == Case::Hard && k % 3 == 0;
+        let late = case == Case::Hard && k.is_multiple_of(3);
         let was_late = case == Case::Hard && k % 3 == 1 && k >= HISTORY.samples;
         let now = if late { Vector2::new(now.x, missing) } else { now };
         (now, Vector2::new(missing, if was_late { sample(case, k, 2).y } else { missing }))

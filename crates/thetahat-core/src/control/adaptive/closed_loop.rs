@@ -8,6 +8,8 @@ use crate::{Dimension, Error, Real, RstController};
 
 /// The sensor, the actuator, the controller with its past, and the probing input.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub(super) struct ClosedLoop<T: Real, N: Dimension> {
     pub(super) settings: TunerSettings<T>,
     watch: Watch<T>,
@@ -42,6 +44,24 @@ impl<T: Real, N: Dimension> ClosedLoop<T, N> {
             state: TunerState::Probing,
             settings: settings.clone(),
         })
+    }
+
+    /// Checks what was read: that it fits together, for controllers of this size.
+    #[cfg(feature = "serde")]
+    pub(super) fn check(&self, size: usize) -> Result<(), Error> {
+        self.settings.check()?;
+        self.past.check(size)?;
+        if let Some(controller) = &self.controller {
+            crate::error::check_length("controller", size, controller.s().len())?;
+        }
+        if !(self.input.is_finite() && (T::zero()..=T::one()).contains(&self.share) && self.signs.is_alive())
+        {
+            return Err(Error::OutOfRange {
+                argument: "input, share or signs",
+                range: "as they were written",
+            });
+        }
+        Ok(())
     }
 
     /// How many coefficients a controller has.

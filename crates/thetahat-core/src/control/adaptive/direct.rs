@@ -99,6 +99,9 @@ impl DirectOrders {
 /// # Ok::<(), Error>(())
 /// ```
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = "", into = "snapshot::Snapshot<T, P, N, D>"))]
+#[cfg_attr(feature = "serde", serde(try_from = "snapshot::Snapshot<T, P, N, D>"))]
 pub struct DirectSelfTuner<T: Real, P: Dimension + Dimension<Const<1>>, N: Dimension, D: Dimension> {
     lags: Lags<T, P, D>,
     adaptation: Adaptation<T, P>,
@@ -114,11 +117,15 @@ pub struct DirectSelfTuner<T: Real, P: Dimension + Dimension<Const<1>>, N: Dimen
 
 /// How the coefficients are found.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 enum Adaptation<T: Real, P: Dimension + Dimension<Const<1>>> {
     LeastSquares(RecursiveLeastSquares<T, P>),
     /// θ <- θ + γ W φ ε/(1 + φ'W φ), W the inverse squares of the scales.
     Gradient {
+        #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::vector"))]
         parameters: OVector<T, P>,
+        #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::vector"))]
         weights: OVector<T, P>,
         gain: T,
     },
@@ -401,3 +408,6 @@ impl<T: Real> Filter<T> {
         next
     }
 }
+
+#[cfg(feature = "serde")]
+mod snapshot;

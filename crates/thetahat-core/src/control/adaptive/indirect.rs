@@ -108,6 +108,9 @@ impl TunerOrders {
 /// # Ok::<(), Error>(())
 /// ```
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = "", into = "snapshot::Snapshot<T, P, N>"))]
+#[cfg_attr(feature = "serde", serde(try_from = "snapshot::Snapshot<T, P, N>"))]
 pub struct IndirectSelfTuner<T: Real, P: Dimension + Dimension<Const<1>>, N: Dimension> {
     plant: RecursiveArx<T, P>,
     closed: ClosedLoop<T, N>,
@@ -126,8 +129,11 @@ pub struct IndirectSelfTuner<T: Real, P: Dimension + Dimension<Const<1>>, N: Dim
 
 /// A search of the candidates, one in each sample: which is next, and the least peaks so far.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = "T: Real"))]
 struct Trial<T> {
     next: usize,
+    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::number"))]
     least: T,
     least_at: usize,
 }
@@ -415,3 +421,6 @@ impl<T: Real, P: Dimension + Dimension<Const<1>>, N: Dimension> IndirectSelfTune
         gain * gain > T::from_count(25) * variance
     }
 }
+
+#[cfg(feature = "serde")]
+mod snapshot;

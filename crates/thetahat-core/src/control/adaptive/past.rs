@@ -2,16 +2,24 @@
 
 use nalgebra::OVector;
 
+#[cfg(feature = "serde")]
+use crate::Error;
 use crate::lags::shift;
 use crate::{Dimension, Real, RstController};
 
 /// What a controller with other coefficients has to know, to go on as if it had been there: the latest N samples, the newest first.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub(super) struct Past<T: Real, N: Dimension> {
+    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::vector"))]
     set_points: OVector<T, N>,
+    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::vector"))]
     outputs: OVector<T, N>,
+    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::vector"))]
     inputs: OVector<T, N>,
     /// What was asked for, before the limits.
+    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::vector"))]
     wanted: OVector<T, N>,
 }
 
@@ -25,6 +33,15 @@ impl<T: Real, N: Dimension> Past<T, N> {
             inputs: still(input),
             wanted: still(input),
         }
+    }
+
+    /// Checks what was read.
+    #[cfg(feature = "serde")]
+    pub(super) fn check(&self, size: usize) -> Result<(), Error> {
+        for line in [&self.set_points, &self.outputs, &self.inputs, &self.wanted] {
+            crate::error::check_entries("past", line.as_slice(), size)?;
+        }
+        Ok(())
     }
 
     /// N.

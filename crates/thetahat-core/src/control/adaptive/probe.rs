@@ -7,6 +7,8 @@ use crate::{Error, Real};
 /// Until there is a first controller the input is the one it starts with plus or minus an amplitude, in an order as if by chance. The
 /// amplitude doubles time and again, so that a plant of unknown gain is not driven further than it takes to see it.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = "T: Real"))]
 pub struct Probing<T> {
     /// The first amplitude, in the unit of the input.
     pub amplitude: T,
@@ -50,11 +52,18 @@ impl<T: Real> Probing<T> {
 
 /// Signs as if by chance: xorshift (Marsaglia 2003).
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Signs(u32);
 
 impl Signs {
     pub(super) fn new() -> Self {
         Signs(0x9e37_79b9)
+    }
+
+    /// That it is not at 0, where it would stay.
+    #[cfg(feature = "serde")]
+    pub(super) fn is_alive(self) -> bool {
+        self.0 != 0
     }
 
     pub(super) fn next<T: Real>(&mut self) -> T {

@@ -8,6 +8,8 @@ use crate::{Error, Real};
 /// A_m = 1 - 2 e^(-ζω) cos(ω √(1 - ζ²)) q⁻¹ + e^(-2ζω) q⁻²,   A_o = 1 - p q⁻¹
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = "T: Real"))]
 pub struct ResponseWanted<T> {
     /// ω, the natural frequency of the response to the set point, in rad a sample; a response that settles within n samples has about
     /// 4/(ζ n).

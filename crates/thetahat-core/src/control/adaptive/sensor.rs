@@ -10,8 +10,11 @@ use crate::{Error, Real};
 /// still known to be far, and a controller that held its input then would hold it for ever with a plant that integrates. The
 /// model learns from neither, nor from the next samples, whose regressors contain them.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = "T: Real"))]
 pub struct Sensor<T> {
     /// What it can measure, in the unit of the output.
+    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::range"))]
     pub range: RangeInclusive<T>,
     /// So many equal measurements in a row are those of a sensor that is stuck: all but the first of them are missing from then
     /// on. 0 for a sensor with so few digits that a working one repeats itself.
@@ -51,8 +54,11 @@ pub(super) struct Reading<T> {
 
 /// A sensor, and its latest samples.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = "T: Real"))]
 pub(super) struct Watch<T> {
     sensor: Sensor<T>,
+    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::number"))]
     latest: T,
     equal: u16,
     missing: u16,

@@ -7,10 +7,13 @@ use crate::{Error, Real};
 
 /// What a self-tuner is asked for.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = "T: Real"))]
 pub struct TunerSettings<T> {
     /// The loop that is wanted.
     pub response: ResponseWanted<T>,
     /// The range of the actuator, in the unit of the input.
+    #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::range"))]
     pub limits: RangeInclusive<T>,
     /// The input that it starts with.
     pub input: T,
@@ -54,6 +57,7 @@ impl<T: Real> TunerSettings<T> {
 
 /// What a self-tuner does in a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum TunerState {
     /// There is no controller yet: the plant is excited.

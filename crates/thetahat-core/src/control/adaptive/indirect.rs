@@ -56,7 +56,7 @@ impl TunerOrders {
 /// # What keeps it safe
 ///
 /// - A new design is taken only where the largest sensitivities of its loop with the estimate are small, |1/(1 + L)| and |L/(1 + L)|
-///   below 2; slower responses are tried in turn, one in each sample; the last good controller goes on meanwhile, and if there is none.
+///   below 2; slower responses are tried in turn, one in each sample. The last good controller goes on until one is found.
 /// - A model whose gain has another sign than was given gets no controller. Where none is given, the first controller waits until the
 ///   static gain is known to five standard errors (or for [`Probing::at_most`] samples), and the sign is not changed by less either.
 /// - [`Forgetting`] keeps P bounded, in silence too. Exponential forgetting with a factor of 0.98, or 0.99 for slow changes, tracks well.
@@ -314,33 +314,49 @@ impl<T: Real, P: Dimension + Dimension<Const<1>>, N: Dimension> IndirectSelfTune
         let Some([a, b]) = self.polynomials() else { return };
         let (na, nb) = (self.plant.a().count(), self.plant.b(0).map_or(0, Iterator::count));
         let (a, b) = (a.as_slice().get(..na).unwrap_or_default(), b.as_slice().get(..nb).unwrap_or_default());
+        if self.has_its_sign(b) {
+            let is_good = self.renew(a, b);
+            self.search(a, b, is_good);
+        }
+    }
+
+    /// Whether the static gain has the sign that was given; where none is, that of a gain that was known.
+    fn has_its_sign(&mut self, b: &[T]) -> bool {
         let gain = b.iter().fold(T::zero(), |sum, value| sum + *value);
         let given = self.closed.settings.gain_sign;
-        if gain * given < T::zero() {
-            return;
+        if !given.is_zero() {
+            return gain * given >= T::zero();
         }
-        // Where no sign is given, that of a gain that was known is.
-        let has_its_sign = gain * self.known_sign > T::zero();
-        if given.is_zero() && !has_its_sign {
-            if self.knows_gain() {
-                self.known_sign = if gain > T::zero() { T::one() } else { -T::one() };
-            } else if !self.known_sign.is_zero() {
-                return;
-            }
+        if gain * self.known_sign > T::zero() {
+            return true;
         }
-        self.since_all = self.since_all.saturating_add(1);
-        let has_controller = self.closed.controller.is_some();
-        let current = if has_controller { self.design(a, b, self.candidate) } else { None };
-        let good = current.filter(|(_, peaks)| *peaks <= self.peaks.0);
-        let is_good = good.is_some();
-        if let Some((controller, _)) = good {
+        if self.knows_gain() {
+            self.known_sign = if gain > T::zero() { T::one() } else { -T::one() };
+            return true;
+        }
+        self.known_sign.is_zero()
+    }
+
+    /// The candidate in use, for the model as it is now. Whether its margins are good, and it was taken.
+    fn renew(&mut self, a: &[T], b: &[T]) -> bool {
+        if self.closed.controller.is_none() {
+            return false;
+        }
+        let renewed = self.design(a, b, self.candidate).filter(|(_, peaks)| *peaks <= self.peaks.0);
+        let is_good = renewed.is_some();
+        if let Some((controller, _)) = renewed {
             self.take(controller, self.candidate);
         }
+        is_good
+    }
+
+    /// Tries the next candidate: where the one in use is not good, and time and again whether a faster one is.
+    fn search(&mut self, a: &[T], b: &[T], is_good: bool) {
+        self.since_all = self.since_all.saturating_add(1);
         if self.trial.is_none() && (!is_good || self.since_all >= TRY_ALL_AFTER) {
             (self.trial, self.since_all) = (Some(Trial { next: 0, least: T::INFINITY, least_at: 0 }), 0);
         }
-        let Some(trial) = self.trial else { return };
-        self.trial = None;
+        let Some(trial) = self.trial.take() else { return };
         if is_good && trial.next == self.candidate {
             return;
         }

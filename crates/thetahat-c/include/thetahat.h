@@ -18,7 +18,7 @@
 #define THETAHAT_LUENBERGER_WORDS(n, m) THETAHAT_WORDS((n) * (3 * (n) + 2 * (m) + 5) + (m) * ((m) + 4), 48)
 #define THETAHAT_RST_WORDS(n) THETAHAT_WORDS(4 * (n) + 4, 16)
 #define THETAHAT_INDIRECT_WORDS(na, nb) \
-    THETAHAT_WORDS(((na) + (nb)) * ((na) + (nb) + 13) + 38, 6 * ((na) + (nb)) + 142)
+    THETAHAT_WORDS(((na) + (nb)) * ((na) + (nb) + 13) + 39, 6 * ((na) + (nb)) + 174)
 #define THETAHAT_DIRECT_WORDS(na, nb, delay) \
     THETAHAT_WORDS(((na) + (nb) + (delay)) * ((na) + (nb) + (delay) + 3) + 2 * (delay) + 42 + \
                    8 * ((nb) + (delay) - 2 > (na) ? (nb) + (delay) - 2 : (na)), 6 * ((na) + (nb) + (delay)) + 124)

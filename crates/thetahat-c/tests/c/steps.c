@@ -258,7 +258,8 @@ static void step_rst(void) {
 
 /* In a closed loop with a plant of first order; the noise is that of the record. */
 static void step_tuner(const char *name, const thetahat_tuner_size *size, int parameters) {
-    static thetahat_word memory[THETAHAT_DIRECT_WORDS(1, 1, 1)];
+    // Enough for either.
+    static thetahat_word memory[THETAHAT_INDIRECT_WORDS(1, 1) + THETAHAT_DIRECT_WORDS(1, 1, 1)];
     thetahat_number input = 0, output = 0, found[3];
     thetahat_tuner_wish wish;
     thetahat_tuner *tuner;

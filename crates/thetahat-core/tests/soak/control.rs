@@ -80,7 +80,8 @@ fn self_tuner() {
     let mut noise = Noise(7);
     let mut normal = move || (0..12).map(|_| f64::from(0.5 * noise.next())).sum::<f64>();
     let response = ResponseWanted { frequency: 0.3, damping: 0.8, observer: 0.3 };
-    let sensor = Sensor { range: -8.0..=8.0, stuck_after: 4, ..Sensor::default() };
+    // Wide enough that a plant which has begun to integrate is learnt before it leaves it.
+    let sensor = Sensor { range: -20.0..=20.0, stuck_after: 4, ..Sensor::default() };
     let settings = TunerSettings { sensor, ..TunerSettings::new(response, -3.0..=3.0, 1.0) };
     let mut tuner = Tuner::new(&ORDERS, &settings, 1.0, 1.0, Forgetting::Exponential { factor: 0.98 })
         .expect("the orders fit");
@@ -114,12 +115,18 @@ fn self_tuner() {
         if sample == BLOCK - 1 {
             let band = BAND.max(4.0 * squares.sqrt());
             judged += BACK.len();
+            for (farthest, back) in farthest.iter().zip(BACK).filter(|(farthest, _)| **farthest > band) {
+                println!(
+                    "plant {:?}: {farthest:.3} from the set point {back} samples on, where {band:.3} is allowed",
+                    plant.b
+                );
+            }
             late += farthest.iter().filter(|farthest| **farthest > band).count();
             changes_late += usize::from(farthest[0] > band);
         }
     }
     println!("self-tuner: {late} of {judged} late, {changes_late} of them after a change of the plant");
-    // Of loads on the plant that integrates, some take longer with a controller that was chosen slow.
+    // Some are out of the band by a little more than noise: loads on the plant that integrates, with a controller that was chosen slow.
     assert!(
         50 * late <= judged && 20 * changes_late <= judged / BACK.len(),
         "{late} {changes_late} of {judged}"

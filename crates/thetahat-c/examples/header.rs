@@ -12,26 +12,8 @@ const FOLDER: &str = env!("CARGO_MANIFEST_DIR");
 /// The header that the sources make.
 fn header() -> Result<String, Box<dyn Error>> {
     let configuration = cbindgen::Config::from_file(format!("{FOLDER}/cbindgen.toml"))?;
-    let mut builder = cbindgen::Builder::new().with_config(configuration);
-    // In the order in which they are read.
-    for source in [
-        "lib",
-        "memory",
-        "error",
-        "innovation",
-        "learning",
-        "rls",
-        "arx",
-        "kalman",
-        "ekf",
-        "luenberger",
-        "detector",
-        "rst",
-        "tuner",
-        "sizes",
-    ] {
-        builder = builder.with_src(format!("{FOLDER}/src/{source}.rs"));
-    }
+    let source = format!("{FOLDER}/src/lib.rs");
+    let builder = cbindgen::Builder::new().with_config(configuration).with_src(source);
     let mut text = Vec::new();
     builder.generate()?.write(&mut text);
     Ok(String::from_utf8(text)?)

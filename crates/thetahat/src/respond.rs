@@ -50,6 +50,7 @@ mod response;
 mod sensitivities;
 mod simulate;
 pub(crate) mod state_space;
+mod step_figures;
 #[cfg(test)]
 mod tests;
 mod transient;
@@ -72,4 +73,5 @@ pub use predict::{predict, prediction_deviation};
 pub use response::Response;
 pub use sensitivities::prediction_deviations;
 pub use simulate::simulate;
+pub(crate) use step_figures::StepFigures;
 pub use transient::{TransientResponse, impulse_response, step_response};

@@ -18,7 +18,7 @@ _STATES = ("state-space", "continuous-state-space")
 
 
 class ReportedModel:
-    """What the report of a fit says; `thetahat.Model` adds what can be computed with it."""
+    """What the report of a fit says."""
 
     _model: _thetahat.Model
 

@@ -11,6 +11,7 @@ use crate::Error;
 use crate::model::Root;
 use crate::model::polynomial::{is_stable, product, roots};
 use crate::regression::{add_filtered, divide};
+use crate::respond::StepFigures;
 
 /// Frequencies at which L is looked at.
 const FREQUENCIES: usize = 4000;
@@ -135,7 +136,8 @@ pub(super) fn closed_loop(
     let input_deviation = deviation(&closed.s);
     let (peak_sensitivity, peak_complementary_sensitivity) = closed.peaks();
     let (gain_margin, phase_margin) = closed.margins();
-    let figures = Steps::of(&setpoint_response, static_gain, sample_time, stable);
+    let ends = stable && static_gain.is_finite() && static_gain != 0.0;
+    let figures = ends.then(|| StepFigures::of(&setpoint_response, static_gain, sample_time));
     let root =
         |pole: &Complex<f64>| Root { polynomial: "loop".into(), re: pole.re, im: pole.im, covariance: None };
     Ok(Loop {
@@ -146,9 +148,9 @@ pub(super) fn closed_loop(
         gain_margin,
         phase_margin,
         static_gain,
-        rise_time: figures.rise_time,
-        overshoot: figures.overshoot,
-        settling_time: figures.settling_time,
+        rise_time: figures.and_then(|figures| figures.rise_time),
+        overshoot: figures.map(|figures| figures.overshoot),
+        settling_time: figures.and_then(|figures| figures.settling_time),
         output_deviation,
         input_deviation,
         time: (0..samples).map(|sample| sample as f64 * sample_time).collect(),
@@ -156,31 +158,6 @@ pub(super) fn closed_loop(
         controller_output,
         load_response,
     })
-}
-
-/// What a step looks like.
-struct Steps {
-    rise_time: Option<f64>,
-    overshoot: Option<f64>,
-    settling_time: Option<f64>,
-}
-
-impl Steps {
-    fn of(response: &[f64], end: f64, sample_time: f64, stable: bool) -> Self {
-        if !(stable && end.is_finite() && end != 0.0) {
-            return Self { rise_time: None, overshoot: None, settling_time: None };
-        }
-        let parts: Vec<f64> = response.iter().map(|value| value / end).collect();
-        let first = |level: f64| parts.iter().position(|part| *part >= level);
-        let largest = parts.iter().copied().fold(0.0, f64::max);
-        let outside = parts.iter().rposition(|part| (part - 1.0).abs() > 0.02);
-        let settled = outside.map_or(0, |last| last + 1);
-        Self {
-            rise_time: first(0.1).zip(first(0.9)).map(|(low, high)| (high - low) as f64 * sample_time),
-            overshoot: Some((largest - 1.0).max(0.0)),
-            settling_time: (settled < parts.len()).then_some(settled as f64 * sample_time),
-        }
-    }
 }
 
 /// numerator/denominator applied to a signal, the denominator monic.

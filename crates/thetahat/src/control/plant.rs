@@ -3,7 +3,7 @@
 use thetahat_core::nalgebra::{Complex, DMatrix};
 
 use crate::Error;
-use crate::model::polynomial::product;
+use crate::model::polynomial::{multiply_out, product};
 use crate::model::{LinearModel, PolynomialModel, StateSpace};
 
 /// A(q) y = B(q) u + C(q)/D(q) e, from what may have more polynomials.
@@ -74,13 +74,7 @@ pub(super) fn trimmed(mut polynomial: Vec<f64>) -> Vec<f64> {
 
 /// The monic polynomial in q^-1 of these roots, which come with their conjugates.
 pub(super) fn monic(roots: &[Complex<f64>]) -> Vec<f64> {
-    let mut found = vec![Complex::new(1.0, 0.0)];
-    for root in roots {
-        found.push(Complex::new(0.0, 0.0));
-        for place in (1..found.len()).rev() {
-            let before = found[place - 1];
-            found[place] -= root * before;
-        }
-    }
+    let mut found = Vec::new();
+    multiply_out(roots.iter().copied(), &mut found);
     found.iter().map(|value| value.re).collect()
 }

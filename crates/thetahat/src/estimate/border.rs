@@ -10,7 +10,7 @@ use thetahat_core::nalgebra::{Complex, ComplexField};
 use super::polynomials::Polynomials;
 use crate::model::{
     Orders,
-    polynomial::{Roots, is_stable},
+    polynomial::{Roots, is_stable, multiply_out},
 };
 
 /// The fraction of the distance from the circle.
@@ -69,19 +69,6 @@ impl Border {
         }
         after.write(trial);
         true
-    }
-}
-
-/// Writes the monic polynomial of some roots.
-pub(super) fn multiply_out(roots: impl Iterator<Item = Complex<f64>>, product: &mut Vec<Complex<f64>>) {
-    product.clear();
-    product.push(Complex::new(1.0, 0.0));
-    for root in roots {
-        product.push(Complex::new(0.0, 0.0));
-        for k in (1..product.len()).rev() {
-            let before = product[k - 1];
-            product[k] -= before * root;
-        }
     }
 }
 

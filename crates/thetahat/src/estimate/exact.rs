@@ -38,7 +38,6 @@ use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::{ComplexField, DVector};
 
 use super::arx::{out_of_range, rows, signals};
-use super::border::multiply_out;
 use super::outcome::{SearchOutcome, StartOutcome, search_outcome};
 use super::polynomials::Polynomials;
 use super::prediction_error::{flat, prediction_error};
@@ -48,7 +47,7 @@ use crate::Error;
 use crate::data::{Record, measured};
 use crate::model::{
     Orders, Structure,
-    polynomial::{is_stable, roots},
+    polynomial::{is_stable, multiply_out, roots},
 };
 use crate::optimize::{Deadline, Found, Monitor, Objective, Search, Stopped, best_free, search};
 use crate::respond::{NOTHING_LEFT, are_worth};

@@ -24,12 +24,11 @@ use std::ops::Range;
 use thetahat_core::nalgebra::{Complex, ComplexField};
 
 use super::arx::{enough, out_of_range, signals};
-use super::border::multiply_out;
 use crate::Error;
 use crate::data::Record;
 use crate::model::{
     Orders,
-    polynomial::{is_stable, roots},
+    polynomial::{is_stable, multiply_out, roots},
 };
 use crate::optimize::Deadline;
 use crate::regression::{Lagged, Presample, Taps, Unsolved};

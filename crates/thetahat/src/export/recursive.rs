@@ -234,7 +234,7 @@ fn check(plan: &Plan, columns: &Columns, errors: &[f64]) -> ExportedFile {
     let (real, name, rows, inputs) = (writer.real(), &plan.name, columns.rows(), columns.inputs.len());
     let mut text = format!(
         "// Steps {name}.rs along the rows of {name}.csv, where expected1 is the error of each, and panics if one is wrong.\n\n\
-         #[path = \"{name}.rs\"]\n#[allow(dead_code)]\nmod {name};\n\nuse thetahat_core::Forgetting;\n\n\
+         #[path = \"{name}.rs\"]\nmod {name};\n\nuse thetahat_core::{{Error, Forgetting}};\n\n\
          /// u(k), y(k) and the error.\nstatic ROWS: [([{real}; {inputs}], {real}, {real}); {rows}] = [\n"
     );
     for (row, error) in errors.iter().enumerate() {
@@ -248,9 +248,16 @@ fn check(plan: &Plan, columns: &Columns, errors: &[f64]) -> ExportedFile {
         );
     }
     text += &format!(
-        "];\n\nfn main() {{\n    let mut model = {name}::{}::new(Forgetting::None).unwrap();\n    for (row, (u, y, expected)) in ROWS.iter().enumerate() {{\n        \
-         let error = model.log_row(*y, u).unwrap().error;\n        \
-         assert!(error == *expected || error.is_nan() && expected.is_nan(), \"row {{}}: {{error}} is not {{expected}}\", row + 1);\n    }}\n}}\n",
+        "];\n\n/// Whether two errors are the same; none is known as long as the delay lines are not full.\n\
+         fn same(found: {real}, expected: {real}) -> bool {{\n    found == expected || found.is_nan() && expected.is_nan()\n}}\n\n\
+         fn main() -> Result<(), Error> {{\n    let mut model = {name}::{}::new(Forgetting::None)?;\n    let mut online = model.clone();\n    \
+         for (row, (u, y, expected)) in ROWS.iter().enumerate() {{\n        \
+         let found = model.log_row(*y, u)?.error;\n        \
+         assert!(same(found, *expected), \"row {{}}: {{found}} is not {{expected}}\", row + 1);\n        \
+         // As a controller calls it, where no input acts in its own sample.\n        \
+         if let Ok(innovation) = online.measured(*y) {{\n            \
+         assert!(same(innovation.error, *expected), \"row {{}}: measured, {{}}\", row + 1, innovation.error);\n            \
+         online.applied(u)?;\n        }}\n    }}\n    Ok(())\n}}\n",
         type_name(name)
     );
     ExportedFile { name: format!("{name}_test.rs"), text }

@@ -246,6 +246,19 @@ pub(crate) fn is_stable(monic: &[f64], scratch: &mut Vec<f64>) -> bool {
     true
 }
 
+/// Writes the monic polynomial of some roots.
+pub(crate) fn multiply_out(roots: impl Iterator<Item = Complex<f64>>, product: &mut Vec<Complex<f64>>) {
+    product.clear();
+    product.push(Complex::new(1.0, 0.0));
+    for root in roots {
+        product.push(Complex::new(0.0, 0.0));
+        for k in (1..product.len()).rev() {
+            let before = product[k - 1];
+            product[k] -= before * root;
+        }
+    }
+}
+
 /// The product of two polynomials.
 pub(crate) fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
     let mut product = vec![0.0; (a.len() + b.len()).saturating_sub(1)];

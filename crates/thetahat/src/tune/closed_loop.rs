@@ -11,6 +11,7 @@ use thetahat_core::nalgebra::{Complex, DMatrix};
 use super::document::ClosedLoop;
 use super::lags::{Lags, lags};
 use crate::model::ProcessStructure;
+use crate::respond::StepFigures;
 
 /// The filter of the derivative is so many times faster than Td.
 const FILTER: f64 = 10.0;
@@ -23,8 +24,6 @@ const KEPT: usize = 500;
 const FREQUENCIES: usize = 4000;
 /// Half of 95 % of the normal distribution.
 const QUANTILE: f64 = 1.959964;
-/// The settled band.
-const BAND: f64 = 0.02;
 
 /// The loop of a process with these parameters, of this covariance, and a controller Kc, Ti, Td.
 pub(super) fn closed_loop(
@@ -46,19 +45,15 @@ pub(super) fn closed_loop(
     let output = &setpoint.output;
     let step = setpoint.step;
     let stable = margins.stable() && output.iter().all(|value| value.is_finite());
-    let first = |level: f64| output.iter().position(|value| *value >= level).map(|at| at as f64 * step);
-    let rise_time = first(0.1).zip(first(0.9)).map(|(early, late)| late - early);
-    let last = output.iter().rposition(|value| (value - 1.0).abs() > BAND);
-    let settles = stable && last.is_none_or(|last| last + 1 < output.len());
-    let largest = output.iter().copied().fold(1.0, f64::max);
+    let figures = StepFigures::of(output, 1.0, step);
     let absolute: f64 = load.output.iter().map(|value| value.abs() * step).sum();
     let apart = output.len().div_ceil(KEPT).max(1);
     let kept = |values: &[f64]| -> Vec<f64> { values.iter().copied().step_by(apart).collect() };
     ClosedLoop {
         stable,
-        rise_time,
-        overshoot: stable.then_some(largest - 1.0),
-        settling_time: settles.then(|| last.map_or(0.0, |last| (last + 1) as f64 * step)),
+        rise_time: figures.rise_time,
+        overshoot: stable.then_some(figures.overshoot),
+        settling_time: figures.settling_time.filter(|_| stable),
         peak_sensitivity: margins.peak,
         gain_margin: margins.gain,
         phase_margin: margins.phase.map(f64::to_degrees),

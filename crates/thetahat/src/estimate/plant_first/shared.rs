@@ -9,7 +9,7 @@ use thetahat_core::LeastSquares;
 use thetahat_core::nalgebra::{Complex, ComplexField, DMatrix, DVector};
 
 use super::super::arx::{arx, rows};
-use super::super::border::{Border, multiply_out};
+use super::super::border::Border;
 use super::super::instrumental::instrumental_variables;
 use super::super::outcome::{StartOutcome, search_outcome};
 use super::super::polynomials::Unusable;
@@ -20,7 +20,10 @@ use super::super::uncertainty::{coloured, restricted};
 use super::super::{Estimate, Initial, Procedure, drop_is_not_for_f};
 use crate::Error;
 use crate::data::Record;
-use crate::model::{Orders, polynomial::roots};
+use crate::model::{
+    Orders,
+    polynomial::{multiply_out, roots},
+};
 use crate::optimize::{Deadline, Found, Monitor, Objective, Search, best_free, best_linear, search};
 use crate::respond::{NOTHING_LEFT, are_worth};
 

@@ -36,15 +36,9 @@ fn many_roots_on_a_circle_are_exact() {
 
 /// p0 (z - z1) (z - z2) …
 fn with_roots(lead: f64, roots: &[Complex<f64>]) -> Vec<f64> {
-    let mut polynomial = vec![Complex::new(lead, 0.0)];
-    for root in roots {
-        polynomial.push(Complex::new(0.0, 0.0));
-        for k in (1..polynomial.len()).rev() {
-            let before = polynomial[k - 1];
-            polynomial[k] -= before * root;
-        }
-    }
-    polynomial.iter().map(|coefficient| coefficient.re).collect()
+    let mut polynomial = Vec::new();
+    multiply_out(roots.iter().copied(), &mut polynomial);
+    polynomial.iter().map(|coefficient| lead * coefficient.re).collect()
 }
 
 fn real(values: &[f64]) -> Vec<Complex<f64>> {

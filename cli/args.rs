@@ -1,5 +1,6 @@
 //! The syntax of the command line, a file a verb, and nothing else. `job` says what it means.
 
+mod closed_loop;
 mod control;
 mod convert;
 mod design;
@@ -22,6 +23,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+pub(crate) use closed_loop::ClosedLoopArguments;
 pub(crate) use control::{ControlArguments, IntegratorArgument};
 pub(crate) use convert::ConvertArguments;
 pub(crate) use design::DesignArguments;

@@ -1,6 +1,7 @@
 //! One file a verb.
 
 mod bode;
+mod closed_loop;
 mod compare;
 mod control;
 mod convert;

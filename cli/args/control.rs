@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{ArgGroup, Args, ValueEnum};
 
-use super::FormatArgument;
+use super::ClosedLoopArguments;
 
 #[derive(Debug, Args)]
 #[command(group(ArgGroup::new("design").required(true).args(["poles", "lqr", "minimum_variance"])))]
@@ -62,18 +62,8 @@ pub(crate) struct ControlArguments {
     /// How many models are drawn from the covariance of the parameters
     #[arg(long, value_name = "N", default_value_t = 500, help_heading = "Design")]
     pub(crate) draws: usize,
-    /// What to print: a table for people, or the JSON document
-    #[arg(long, value_enum, default_value = "table")]
-    pub(crate) format: FormatArgument,
-    /// Write the JSON document to a file
-    #[arg(long, value_name = "FILE")]
-    pub(crate) document: Option<PathBuf>,
-    /// Write the closed-loop responses to a CSV file
-    #[arg(long, value_name = "FILE")]
-    pub(crate) responses: Option<PathBuf>,
-    /// Write the table, or the document, to a file instead of standard output
-    #[arg(short = 'o', long, value_name = "FILE", default_value = "-", hide_default_value = true)]
-    pub(crate) out: PathBuf,
+    #[command(flatten)]
+    pub(crate) outputs: ClosedLoopArguments,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -72,13 +72,11 @@ impl Command {
             }
             Self::Tune(tune) => {
                 read.push(tune.report.clone());
-                let more = tune.document.iter().chain(&tune.responses).chain(&tune.html);
-                written.extend([&tune.out].into_iter().chain(more).cloned());
+                written.extend(tune.outputs.written().chain(&tune.html).cloned());
             }
             Self::Control(control) => {
                 read.push(control.report.clone());
-                let more = control.document.iter().chain(&control.responses);
-                written.extend([&control.out].into_iter().chain(more).cloned());
+                written.extend(control.outputs.written().cloned());
             }
             Self::Export(export) => {
                 read.extend([&export.report].into_iter().chain(&export.path).cloned());

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::FormatArgument;
+use super::ClosedLoopArguments;
 
 #[derive(Debug, Args)]
 pub(crate) struct TuneArguments {
@@ -21,21 +21,11 @@ pub(crate) struct TuneArguments {
     /// Which controller [default: both]
     #[arg(long, value_enum, value_name = "pi|pid")]
     pub(crate) controller: Option<ControllerArgument>,
-    /// What to print: a table for people, or the JSON document
-    #[arg(long, value_enum, default_value = "table")]
-    pub(crate) format: FormatArgument,
-    /// Write the JSON document to a file
-    #[arg(long, value_name = "FILE")]
-    pub(crate) document: Option<PathBuf>,
-    /// Write the closed-loop responses to a CSV file
-    #[arg(long, value_name = "FILE")]
-    pub(crate) responses: Option<PathBuf>,
     /// Write a page with charts to a file: one file of HTML that needs nothing else (- for standard output)
     #[arg(long, value_name = "FILE")]
     pub(crate) html: Option<PathBuf>,
-    /// Write the table, or the document, to a file instead of standard output
-    #[arg(short = 'o', long, value_name = "FILE", default_value = "-", hide_default_value = true)]
-    pub(crate) out: PathBuf,
+    #[command(flatten)]
+    pub(crate) outputs: ClosedLoopArguments,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -2,40 +2,21 @@
 
 use std::path::Path;
 
-use thetahat::Document;
 use thetahat::model::Model;
 use thetahat::report::tuning_page;
 use thetahat::tune::{Controller, Tuning, TuningPlan, tune as tuned};
 
-use super::{stored, summary};
-use crate::args::{ControllerArgument, FormatArgument, TuneArguments};
+use super::{closed_loop, stored, summary};
+use crate::args::{ControllerArgument, TuneArguments};
 use crate::failure::Failure;
-use crate::messages::warn;
 use crate::output;
-use crate::wrap::{WIDTH, stdout_width};
 
 pub(crate) fn tune(arguments: &TuneArguments, line: &str) -> Result<(), Failure> {
     let found = settings(arguments, &stored::model(&arguments.report)?, &arguments.report)?;
-    let json = found.to_json().map_err(|error| Failure::data(error.to_string()))?;
     if let Some(path) = &arguments.html {
         output::page(path, &tuning_page(&found, line))?;
     }
-    if let Some(path) = &arguments.document {
-        output::write(path, |file| file.write_all(json.as_bytes()))?;
-    }
-    if let Some(path) = &arguments.responses {
-        responses(path, &found)?;
-    }
-    for warning in &found.warnings {
-        warn(warning);
-    }
-    // What goes into a file does not depend on the terminal.
-    let width = if arguments.out == Path::new("-") { stdout_width() } else { WIDTH };
-    let text = match arguments.format {
-        FormatArgument::Json => json,
-        FormatArgument::Table => summary::tuning(&found, width),
-    };
-    output::write(&arguments.out, |file| file.write_all(text.as_bytes()))
+    closed_loop::write(&arguments.outputs, &found, &found.warnings, responses, summary::tuning)
 }
 
 /// The settings for a model, which messages name by a path.

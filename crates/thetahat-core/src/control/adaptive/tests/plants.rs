@@ -40,36 +40,40 @@ fn random(noise: &mut Noise) -> (Simulated, usize) {
     (Simulated::new(a, &b), dead_time)
 }
 
-/// How far the output is from the set point at the ends of the last four halves of a square wave, and what the noise alone may do: 5 %,
-/// or four standard deviations of the output with a set point that stays.
-fn settles(
+/// Whether the output is at the set point at the ends of the last four halves of a square wave: within 5 %, or four standard deviations of
+/// the output with a set point that stays.
+fn settles<C: Clone>(
     plant: &mut Simulated,
     noise: &mut Noise,
-    mut control: impl FnMut(f32, f32) -> f32,
-    resting: impl FnOnce(&Simulated, &mut Noise) -> f64,
-) -> (f64, f64) {
-    const DEVIATION: f64 = 0.005;
+    tuner: &mut C,
+    control: impl Fn(&mut C, f32, f32) -> f32,
+) -> bool {
     let (mut farthest, samples) = (0.0_f64, 2400);
     for k in 0..samples {
         let y = plant.output(DEVIATION * normal(noise));
         let set_point = if k / 300 % 2 == 0 { 1.0 } else { -1.0 };
-        let input = f64::from(control(set_point as f32, y as f32));
+        let input = f64::from(control(tuner, set_point as f32, y as f32));
         assert!(input.abs() <= 10.0);
         plant.input(input);
         if k >= samples - 1200 && k % 300 > 260 {
             farthest = farthest.max((y - set_point).abs());
         }
     }
+    let mut resting = tuner.clone();
+    let deviation = deviation(plant, noise, |y| control(&mut resting, 1.0, y));
     // More than a fifth is no loop that stands still.
-    (farthest, (4.0 * resting(plant, noise).min(0.2)).max(0.05))
+    farthest < (4.0 * deviation.min(0.2)).max(0.05)
 }
+
+/// Of the noise in the equation.
+const DEVIATION: f64 = 0.005;
 
 /// The deviation of the output with a set point that stays.
 fn deviation(plant: &Simulated, noise: &mut Noise, mut control: impl FnMut(f32) -> f32) -> f64 {
     let mut plant = plant.clone();
     let (mut sum, mut squares) = (0.0, 0.0);
     for k in 0..2500 {
-        let y = plant.output(0.005 * normal(noise));
+        let y = plant.output(DEVIATION * normal(noise));
         plant.input(f64::from(control(y as f32)));
         if k >= 500 {
             sum += y / 2000.0;
@@ -82,21 +86,11 @@ fn deviation(plant: &Simulated, noise: &mut Noise, mut control: impl FnMut(f32) 
 #[test]
 fn of_a_hundred_random_plants_nearly_all_are_stabilised() -> Result<(), Error> {
     for seed in [1000, 2000, 3000] {
-        let mut noise = Noise(seed);
-        let mut settled = 0;
+        let (mut noise, mut settled) = (Noise(seed), 0);
         for _ in 0..100 {
             let (mut plant, _) = random(&mut noise);
-            let tuner = core::cell::RefCell::new(tuner(&settings(), 0.99)?);
-            let (farthest, allowed) = settles(
-                &mut plant,
-                &mut noise,
-                |set_point, y| tuner.borrow_mut().control(set_point, y),
-                |plant, noise| {
-                    let mut tuner = tuner.borrow().clone();
-                    deviation(plant, noise, |y| tuner.control(1.0, y))
-                },
-            );
-            settled += usize::from(farthest < allowed);
+            let mut tuner = tuner(&settings(), 0.99)?;
+            settled += usize::from(settles(&mut plant, &mut noise, &mut tuner, super::Tuner::control));
         }
         assert!(settled >= 98, "{seed}: {settled}");
     }
@@ -126,18 +120,8 @@ fn direct_adaptation_needs_a_stable_inverse_and_the_right_delay() -> Result<(), 
             plants += 1;
             plant = Simulated::new(plant.a, &[&vec![0.0; 2 + later][..], &[first, second]].concat());
             let forgetting = Forgetting::Exponential { factor: 0.99 };
-            let tuner = Direct::new(&DIRECT, &settings(), 1.0, 1.0, forgetting)?;
-            let tuner = core::cell::RefCell::new(tuner);
-            let (farthest, allowed) = settles(
-                &mut plant,
-                &mut noise,
-                |set_point, y| tuner.borrow_mut().control(set_point, y),
-                |plant, noise| {
-                    let mut tuner = tuner.borrow().clone();
-                    deviation(plant, noise, |y| tuner.control(1.0, y))
-                },
-            );
-            settled += usize::from(farthest < allowed);
+            let mut tuner = Direct::new(&DIRECT, &settings(), 1.0, 1.0, forgetting)?;
+            settled += usize::from(settles(&mut plant, &mut noise, &mut tuner, Direct::control));
         }
         assert!(expected.contains(&settled), "{minimum_phase} {later}: {settled}");
     }

@@ -284,7 +284,17 @@ Plant = Union[Model, Callable[[float], float]]
 
 @dataclass(frozen=True)
 class LoopRun:
-    """What happened in a loop, sample by sample."""
+    """What happened in a loop, sample by sample.
+
+    Attributes
+    ----------
+    set_point : ndarray, shape (samples,)
+        What the output should be, in the unit of the output.
+    y : ndarray, shape (samples,)
+        What was measured.
+    u : ndarray, shape (samples,)
+        What the controller asked for, in the unit of the input; the load is not in it.
+    """
 
     set_point: Array
     y: Array

@@ -33,6 +33,8 @@ pub(super) struct Compared {
     pub(super) guess: Option<Vec<f64>>,
     /// The largest modulus of a pole of the plant; infinite where that is not known.
     pub(super) radius: f64,
+    /// The same of C.
+    pub(super) noise_radius: f64,
     /// What its held-out figure is made of.
     pub(super) parts: Option<Vec<f64>>,
 }

@@ -106,7 +106,8 @@ pub struct Candidate {
 pub struct Best {
     /// The stable model with the least criterion.
     pub prediction: Candidate,
-    /// The stable model with the least error on held-out blocks, in free runs or as many steps ahead as the focus says.
+    /// The stable model with the least error on samples that it was not fitted to, in free runs or as many steps ahead as the
+    /// focus says.
     pub simulation: Candidate,
 }
 

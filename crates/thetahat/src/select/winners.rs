@@ -4,10 +4,11 @@
 //! far better: errors one step ahead hardly show slow dynamics (Ljung, System Identification, 2nd ed. 1999, section 8.5).
 //! Errors of free runs alone choose badly too: they have few degrees of freedom. So there is a gate:
 //!
-//! 1. P has the least criterion among stable models, S the least error on blocks that it was not fitted to (see `held_out`).
-//! 2. S is taken where the mean of two logarithms, of the mean square on all blocks and of that onward from the first row, is
-//!    lower by more than [`FAR`] than with P, or by more than [`GATE`] and the mean square on the blocks by more than
-//!    [`STANDARD_ERRORS`] of its difference's; else P.
+//! 1. P has the least criterion among stable models. S has the least error where it was not fitted to (see `held_out`): the
+//!    mean of two logarithms, of the mean square on blocks and of that onward from the first row. Where C ended on the unit
+//!    circle, a search has stopped for want of room, at a point that rounding decides: such a model is no S.
+//! 2. S is taken where that mean is lower by more than [`FAR`] than with P, or by more than [`GATE`] and the mean square on the
+//!    blocks by more than [`STANDARD_ERRORS`] of its difference's; else P.
 //! 3. An unstable model that has a lower criterion than P is taken where all its refits are unstable too and their errors
 //!    beat those of the choice by [`CLEARLY`] in the logarithm of the mean square: then the plant is unstable.
 
@@ -23,6 +24,8 @@ const STANDARD_ERRORS: f64 = 2.0;
 const CLEARLY: f64 = 0.1;
 /// A model that simulates has no time constant of more than this many times the samples.
 const SLOWEST: f64 = 2.0;
+/// A root of C that is nearer to the unit circle is on it.
+const ON_CIRCLE: f64 = 1e-4;
 /// Mean squares below this are rounding.
 const NOTHING: f64 = 1e-12;
 
@@ -58,10 +61,11 @@ pub(super) fn winners(focus: Focus, models: &[&Compared], samples: usize) -> Opt
     let stable = |k: &usize| models[*k].radius < 1.0;
     let fast = |k: &usize| models[*k].radius <= slowest(samples);
     let prediction = (0..models.len()).find(stable)?;
-    let figures = (0..models.len()).filter(fast).filter_map(|k| Some((held_out(k)?.blocks.max(NOTHING), k)));
+    let both = |k: usize| held_out(k).map(both);
+    let inside = |k: &usize| models[*k].noise_radius < 1.0 - ON_CIRCLE;
+    let figures = (0..models.len()).filter(fast).filter(inside).filter_map(|k| Some((both(k)?, k)));
     let least = figures.min_by(|(one, _), (other, _)| one.total_cmp(other));
     let simulation = least.map_or(prediction, |(_, k)| k);
-    let both = |k: usize| held_out(k).map(both);
     let fall = both(prediction).zip(both(simulation)).map_or(0.0, |(one, other)| one - other);
     let parts = models[prediction].parts.as_ref().zip(models[simulation].parts.as_ref());
     let certain = || parts.is_some_and(|(one, other)| standard_errors(one, other) > STANDARD_ERRORS);

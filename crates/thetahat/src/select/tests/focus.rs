@@ -18,6 +18,7 @@ fn compared(radius: f64, blocks: f64, onward: f64, unstable: usize) -> Compared 
         scored,
         guess: None,
         radius,
+        noise_radius: 0.0,
         parts: Some((0..30).map(|k| blocks * (1.0 + 0.01 * f64::from(k))).collect()),
     }
 }
@@ -47,8 +48,16 @@ fn the_gate_opens_for_a_clear_difference_only() {
     assert_eq!(taken(Focus::Auto, &uncertain(0.76)), Some([0, 1, 0]));
     assert_eq!(taken(Focus::Auto, &uncertain(0.73)), Some([0, 1, 1]));
     // What the blocks gain and the run onward loses is no gain.
-    let apart = [compared(0.9, 0.5, 0.5, 0), compared(0.9, 0.25, 1.0, 0)];
-    assert_eq!(taken(Focus::Auto, &apart), Some([0, 1, 0]));
+    let apart = [compared(0.9, 0.5, 0.5, 0), compared(0.9, 0.25, 1.01, 0)];
+    assert_eq!(taken(Focus::Auto, &apart), Some([0, 0, 0]));
+}
+
+#[test]
+fn a_model_whose_noise_zeros_ended_on_the_circle_does_not_simulate() {
+    let (inside, mut ended) = (compared(0.9, 0.5, 0.5, 0), compared(0.9, 0.1, 0.1, 0));
+    assert_eq!(taken(Focus::Auto, &[inside.clone(), ended.clone()]), Some([0, 1, 1]));
+    ended.noise_radius = 1.0 - 1e-7;
+    assert_eq!(taken(Focus::Auto, &[inside, ended]), Some([0, 0, 0]));
 }
 
 #[test]

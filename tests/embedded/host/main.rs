@@ -3,7 +3,7 @@
 //! `check FOLDER` reads, in Cargo's target folder, the images for each processor and level of optimisation and the output
 //! of the reporting one. It prints the tables of costs and sizes, and compares them with `budgets.md` and with
 //! `docs/firmware.md`. `--write` renews the tables of that page instead. `--bits` compares the bits alone: for this program
-//! in its other build. `--c` compares the bits that firmware in C printed.
+//! in its other build. `--c` is for what is written in C: the bits that it printed, and the costs of exported models.
 
 #[path = "../../../crates/thetahat-c/tests/interface/steps.rs"]
 mod c_steps;
@@ -18,7 +18,7 @@ use std::{env, fs};
 
 use crate::image::Image;
 use crate::log::Log;
-use crate::table::{Costs, IMAGES, Kind, STEPS, Table};
+use crate::table::{Costs, EXPORTS, IMAGES, Kind, STEPS, Table};
 
 /// The profiles the firmware was built with, and the levels of optimisation they stand for.
 const LEVELS: [(&str, &str); 2] = [("fast", "3"), ("small", "s")];
@@ -44,14 +44,15 @@ const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/firmware.md"
 const MARGIN_PERCENT: u64 = 10;
 
 fn main() -> ExitCode {
-    let mut arguments: Vec<String> = env::args().skip(1).collect();
-    let option = arguments.pop_if(|argument| argument.starts_with("--"));
-    let checked = match (&arguments[..], option.as_deref()) {
-        ([folder], None) => costs(Path::new(folder), false),
-        ([folder], Some("--write")) => costs(Path::new(folder), true),
-        ([folder], Some("--bits")) => bits(Path::new(folder)).map(|_| Vec::new()),
-        ([folder], Some("--c")) => c_bits(Path::new(folder)).map(|()| Vec::new()),
-        _ => Err("usage: check FOLDER [--bits | --c | --write]".into()),
+    let arguments: Vec<String> = env::args().skip(1).collect();
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let checked = match &arguments[..] {
+        [folder] => costs(Path::new(folder), false),
+        [folder, "--write"] => costs(Path::new(folder), true),
+        [folder, "--bits"] => bits(Path::new(folder)).map(|_| Vec::new()),
+        [folder, "--c"] => written_in_c(Path::new(folder), false),
+        [folder, "--c", "--write"] => written_in_c(Path::new(folder), true),
+        _ => Err("usage: check FOLDER [--bits | [--c] [--write]]".into()),
     };
     match checked {
         Ok(faults) if faults.is_empty() => ExitCode::SUCCESS,
@@ -78,6 +79,19 @@ fn bits(folder: &Path) -> Result<Vec<Log>, Box<dyn Error>> {
         logs.push(log);
     }
     Ok(logs)
+}
+
+/// Checks what is written in C. Returns what is wrong with the costs of exported models.
+fn written_in_c(folder: &Path, write: bool) -> Result<Vec<String>, Box<dyn Error>> {
+    c_bits(folder)?;
+    let mut measured = Table::new(&EXPORTS);
+    for line in fs::read_to_string(folder.join("exported/costs"))?.lines() {
+        let (name, figures) = line.split_once(": ").ok_or_else(|| format!("no costs: {line}"))?;
+        for figure in figures.split_whitespace() {
+            measured.add(name, figure.parse().map_err(|error| format!("{error}: {line}"))?);
+        }
+    }
+    check(&EXPORTS, &measured, write)
 }
 
 /// Compares what the firmware in C printed with what the same steps give here, in Rust.

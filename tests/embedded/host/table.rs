@@ -22,6 +22,12 @@ pub(crate) static IMAGES: Kind = Kind {
     columns: &["f32", "M4F, s", "M4F, z", "M0+, s", "M0+, z", "RV32IMC, s", "RV32IMC, z"],
 };
 
+/// What a sample costs in an exported model: the model, then its figures.
+pub(crate) static EXPORTS: Kind = Kind {
+    name: "exports",
+    columns: &["C, f32", "RAM", "O2 code", "typical", "worst", "Os code", "typical", "worst"],
+};
+
 /// What one step costs at one level of optimisation.
 pub(crate) struct Costs {
     /// Bytes of code: the step and all it calls.
@@ -107,14 +113,12 @@ impl Table {
             let Some((_, others)) = other.rows.iter().find(|(known, _)| known == name) else { continue };
             for (index, (&measured, &other)) in figures.iter().zip(others).enumerate() {
                 if !fine(measured, other) {
-                    let column = self.kind.columns.get(index + 1).unwrap_or(&"");
-                    let twice = self.kind.columns.iter().filter(|other| *other == column).count() > 1;
-                    let level = if !twice {
-                        ""
-                    } else if index < 5 {
-                        " (O3)"
-                    } else {
-                        " (Os)"
+                    let columns = self.kind.columns;
+                    let column = columns.get(index + 1).unwrap_or(&"");
+                    // Of two columns of one name the first one stands left of that of another level.
+                    let level = match columns.iter().filter(|other| *other == column).count() {
+                        0 | 1 => String::new(),
+                        _ => format!(" ({})", level(&columns[..=index])),
                     };
                     faults.push(format!("{name}: {column}{level} is {measured}, {other} in the {title}"));
                 }
@@ -149,6 +153,12 @@ impl fmt::Display for Table {
         }
         Ok(())
     }
+}
+
+/// The level of optimisation that the last of some columns belongs to: the last that names one says it.
+fn level(columns: &[&str]) -> String {
+    let mut named = columns.iter().rev().filter_map(|column| column.strip_suffix(" code"));
+    named.next().unwrap_or_default().to_owned()
 }
 
 /// What surrounds the table in the page.

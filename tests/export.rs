@@ -159,7 +159,7 @@ fn models_in_equations_say_what_the_library_does() {
          measurement = { i = 0.1, speed = 0.1 }",
     );
     folder.done("fit --grey motor.toml log.csv --time t --report r.json");
-    goes_round(&folder, "r.json", "log.csv --time t", &["simulator"]);
+    goes_round(&folder, "r.json", "log.csv --time t", &["simulator", "predictor", "observer"]);
 }
 
 #[test]

@@ -4,120 +4,45 @@
 //! y(k) = h(x(k), u(k), t),   x(k+1) = f(x(k), u(k), t, dt)      or dx/dt = f, in steps of the classical method of order four (Kutta 1901)
 //! ```
 //!
-//! with the operations that the equations were compiled into.
+//! with the operations that the equations were compiled into. Predictors and observers correct the state by an extended Kalman filter.
 
-use std::collections::HashMap;
+mod kalman;
+mod translation;
 
-use super::program::{
-    Array, Condition, Counter, Entry, Function, Index, Program, Statement, Value, Variable,
-};
+use super::program::{Array, Counter, Entry, Index, Program, Statement, Value};
 use super::signals::Signals;
 use super::{Form, Purpose, refused};
 use crate::Error;
-use crate::model::equations::{Function as Named, Operation, Program as Compiled};
+use crate::model::equations::{GreyBox, Operation, Program as Compiled};
 use crate::model::{EquationsModel, Model};
-
-/// Powers up to this one are products.
-const PRODUCTS: i32 = 8;
+use kalman::Kalman;
+use translation::{Leaves, translated};
 
 /// The program of a model.
 ///
 /// # Errors
 /// [`Error::Model`] and [`Error::Report`] for equations that are none any more; [`Error::Argument`] for what such a model has not.
 pub(super) fn form(whole: &Model, model: &EquationsModel, purpose: Purpose) -> Result<Form, Error> {
-    if purpose != Purpose::Simulator {
-        return Err(refused(purpose, "a model in equations", "simulator"));
-    }
+    let is_corrected = match purpose {
+        Purpose::Simulator => false,
+        Purpose::Predictor | Purpose::Observer => true,
+        _ => return Err(refused(purpose, "a model in equations", "simulator, predictor or observer")),
+    };
     let equations = model.with_values()?;
     let mut program = Program::default();
     let signals = Signals::of(&mut program, whole)?;
-    let (transition, steps, observation) = equations.compiled();
-    let n = equations.states().len();
-    let dt = model.sample_time;
-    let mut memory = |name: &str, doc: &str, values: Vec<f64>| program.memory(name, doc, values);
-    let x = memory("x", &format!("The state: {}.", model.states.join(", ")), equations.start().0.to_vec());
-    let inputs = model.inputs.len();
-    let u = (inputs > 0).then(|| memory("held_u", "The inputs.", vec![0.0; inputs]));
-    let rate = memory("rate", "The next state, or its derivative.", vec![0.0; n]);
-    let clock = (uses_time(transition, n) || uses_time(observation, model.outputs.len()))
-        .then(|| memory("samples", "How many samples have gone by.", vec![0.0]));
-    let time = |since: Option<Value>| {
-        clock.map(|clock| {
-            let now = clock.at(0) * dt;
-            since.map_or(now.clone(), |since| now + since)
-        })
-    };
-
-    let mut body = u.map_or_else(Vec::new, |u| program.repeat(inputs, |_, i| signals.hold_input(u, &i)));
-    let leaves = Leaves { states: x, inputs: u, time: time(None), step: 0.0 };
-    let (statements, outputs) = translated(&mut program, observation, model.outputs.len(), &leaves);
-    body.extend(statements);
-    body.extend(outputs.into_iter().enumerate().map(|(place, value)| signals.say(&place.into(), value)));
-    match steps {
-        None => {
-            let leaves = Leaves { states: x, inputs: u, time: time(None), step: dt };
-            let (statements, next) = translated(&mut program, transition, n, &leaves);
-            body.extend(statements);
-            body.extend(stored(rate, next));
-            body.extend(program.repeat(n, |_, i| vec![Statement::Store(x, i.clone(), rate.at(i))]));
-        }
-        Some(count) => {
-            let stage = program.memory("stage", "The state at a stage of a step.", vec![0.0; n]);
-            let sum = program.memory("sum", "The sum of the derivatives.", vec![0.0; n]);
-            let shares = program.table("A", "Where the stages stand in a step.", vec![0.0, 0.5, 0.5, 1.0]);
-            let weights =
-                program.table("B", "Their weights.", vec![1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0]);
-            let h = dt / count as f64;
-            let begun = clock.map(|_| program.variable("begun"));
-            if let Some(begun) = begun {
-                body.push(Statement::Let(begun, 0.0.into()));
+    let run = Run::new(&mut program, &equations, model, is_corrected);
+    program.entries = match purpose {
+        Purpose::Simulator => vec![run.simulator(&mut program, &signals)],
+        _ => {
+            let kalman = Kalman::new(&mut program, &equations, run);
+            match purpose {
+                Purpose::Predictor => kalman.predictor(&mut program, &signals),
+                _ => vec![kalman.observer(&mut program, &signals)],
             }
-            // The first stage takes nothing of the derivative before.
-            body.extend(program.repeat(n, |_, i| vec![Statement::Store(rate, i, 0.0.into())]));
-            body.extend(program.repeat(count, |program, _| {
-                let mut step = program.repeat(n, |_, i| vec![Statement::Store(sum, i, 0.0.into())]);
-                let s = Counter(program.counters);
-                program.counters += 1;
-                let at = Index::from(s);
-                let mut inner = program.repeat(n, |_, i| {
-                    let moved = x.at(i.clone()) + rate.at(i.clone()) * (shares.at(at.clone()) * h);
-                    vec![Statement::Store(stage, i, moved)]
-                });
-                let since = begun.map(|begun| (begun + shares.at(at.clone())) * h);
-                let leaves = Leaves { states: stage, inputs: u, time: time(since), step: h };
-                let (statements, rates) = translated(program, transition, n, &leaves);
-                inner.extend(statements);
-                inner.extend(stored(rate, rates));
-                inner.extend(program.repeat(n, |_, i| {
-                    vec![Statement::Store(
-                        sum,
-                        i.clone(),
-                        sum.at(i.clone()) + rate.at(i) * weights.at(at.clone()),
-                    )]
-                }));
-                step.push(Statement::Repeat { counter: s, times: 4, body: inner });
-                step.extend(
-                    program.repeat(n, |_, i| {
-                        vec![Statement::Store(x, i.clone(), x.at(i.clone()) + sum.at(i) * h)]
-                    }),
-                );
-                if let Some(begun) = begun {
-                    step.push(Statement::Set(begun, begun + 1.0));
-                }
-                step
-            }));
         }
-    }
-    if let Some(clock) = clock {
-        body.push(Statement::Store(clock, 0.into(), clock.at(0) + 1.0));
-    }
-    program.entries = vec![Entry {
-        name: "step",
-        doc: vec!["The next sample: takes u(k), and gives y(k) of the free run.".to_owned()],
-        arguments: signals.inputs.into_iter().collect(),
-        result: Some(signals.outputs),
-        body,
-    }];
+    };
+    let steps = equations.compiled().1;
     let each =
         model.parameters.iter().map(|own| format!("{} = {}", crate::text::harmless(&own.name), own.value));
     let mut lines = vec![model_name(model, steps), "The equations are:".to_owned()];
@@ -136,6 +61,220 @@ fn model_name(model: &EquationsModel, steps: Option<usize>) -> String {
     format!("Equations of {count} state{}, {how}.", if count == 1 { "" } else { "s" })
 }
 
+/// The state, and what leads it from one sample to the next.
+#[derive(Clone, Copy)]
+struct Run<'e> {
+    transition: &'e Compiled,
+    /// The steps of an integration in a sample; none where the equations are of the next state.
+    steps: Option<usize>,
+    observation: &'e Compiled,
+    states: usize,
+    inputs: usize,
+    outputs: usize,
+    sample_time: f64,
+    x: Array,
+    u: Option<Array>,
+    rate: Array,
+    /// How many samples have gone by, where the equations say t.
+    clock: Option<Array>,
+    derivatives: Option<Derivatives>,
+}
+
+/// M = dx(k+1)/dx(k), row by row, and what its integration takes: the Jacobian of the equations, M at a stage, its derivative, and the sum of
+/// these.
+#[derive(Clone, Copy)]
+struct Derivatives {
+    m: Array,
+    of_steps: Option<[Array; 4]>,
+}
+
+impl<'e> Run<'e> {
+    fn new(
+        program: &mut Program,
+        equations: &'e GreyBox,
+        model: &EquationsModel,
+        with_derivatives: bool,
+    ) -> Self {
+        let (transition, steps, observation) = equations.compiled();
+        let (states, inputs, outputs) = (equations.states().len(), model.inputs.len(), model.outputs.len());
+        let mut memory = |name: &str, doc: &str, values: Vec<f64>| program.memory(name, doc, values);
+        let x =
+            memory("x", &format!("The state: {}.", model.states.join(", ")), equations.start().0.to_vec());
+        let u = (inputs > 0).then(|| memory("held_u", "The inputs.", vec![0.0; inputs]));
+        let rate = memory("rate", "The next state, or its derivative.", vec![0.0; states]);
+        let columns = if with_derivatives { 1 + states } else { 1 };
+        let clock = (uses_time(transition, columns * states) || uses_time(observation, columns * outputs))
+            .then(|| memory("samples", "How many samples have gone by.", vec![0.0]));
+        let derivatives = with_derivatives.then(|| {
+            let mut square = |name: &str, doc: &str| memory(name, doc, vec![0.0; states * states]);
+            let m = square("m", "The derivative of the next state by the state, row by row.");
+            let of_steps = steps.map(|_| {
+                [
+                    square("jacobian", "That of the equations."),
+                    square("stage_m", "M at a stage of a step."),
+                    square("rate_m", "Its derivative."),
+                    square("sum_m", "The sum of these."),
+                ]
+            });
+            Derivatives { m, of_steps }
+        });
+        let sample_time = model.sample_time;
+        Self {
+            transition,
+            steps,
+            observation,
+            states,
+            inputs,
+            outputs,
+            sample_time,
+            x,
+            u,
+            rate,
+            clock,
+            derivatives,
+        }
+    }
+
+    /// t, so long after the start of the sample.
+    fn time(&self, since: Option<Value>) -> Option<Value> {
+        let now = self.clock?.at(0) * self.sample_time;
+        Some(since.map_or(now.clone(), |since| now + since))
+    }
+
+    /// Takes the inputs.
+    fn take_inputs(&self, program: &mut Program, signals: &Signals) -> Vec<Statement> {
+        let Some(u) = self.u else { return Vec::new() };
+        program.repeat(self.inputs, |_, i| signals.hold_input(u, &i))
+    }
+
+    /// So many results of the equations of the outputs: these, then their derivatives by the states, column after column.
+    fn observed(&self, program: &mut Program, count: usize) -> (Vec<Statement>, Vec<Value>) {
+        let leaves = Leaves { states: self.x, inputs: self.u, time: self.time(None), step: 0.0 };
+        translated(program, self.observation, count, &leaves)
+    }
+
+    /// What the equations of the states say, and where they are kept.
+    fn rates(&self, program: &mut Program, leaves: &Leaves, jacobian: Option<Array>) -> Vec<Statement> {
+        let n = self.states;
+        let count = if jacobian.is_some() { n + n * n } else { n };
+        let (mut statements, mut results) = translated(program, self.transition, count, leaves);
+        let columns = results.split_off(n);
+        statements.extend(stored(self.rate, results));
+        let places = (0..n * n).map(|place| place % n * n + place / n);
+        statements.extend(
+            places
+                .zip(columns)
+                .filter_map(|(place, value)| Some(Statement::Store(jacobian?, place.into(), value))),
+        );
+        statements
+    }
+
+    /// Goes on to the next state.
+    fn advance(&self, program: &mut Program) -> Vec<Statement> {
+        let (n, x, rate, dt) = (self.states, self.x, self.rate, self.sample_time);
+        let Some(count) = self.steps else {
+            let leaves = Leaves { states: x, inputs: self.u, time: self.time(None), step: dt };
+            let mut body = self.rates(program, &leaves, self.derivatives.map(|own| own.m));
+            body.extend(program.repeat(n, |_, i| vec![Statement::Store(x, i.clone(), rate.at(i))]));
+            return body;
+        };
+        let stage = program.memory("stage", "The state at a stage of a step.", vec![0.0; n]);
+        let sum = program.memory("sum", "The sum of the derivatives.", vec![0.0; n]);
+        let shares = program.table("A", "Where the stages stand in a step.", vec![0.0, 0.5, 0.5, 1.0]);
+        let weights = program.table("B", "Their weights.", vec![1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0]);
+        let h = dt / count as f64;
+        // What is added up in stages: the state, and with derivatives M, by the chain rule.
+        let mut added = vec![(n, x, rate, stage, sum)];
+        let derivatives = self.derivatives.and_then(|own| Some((own.m, own.of_steps?)));
+        added.extend(derivatives.map(|(m, [_, stage, rate, sum])| (n * n, m, rate, stage, sum)));
+        let mut body = Vec::new();
+        if let Some((m, _)) = derivatives {
+            body.extend(program.repeat(n * n, |_, i| vec![Statement::Store(m, i, 0.0.into())]));
+            body.extend(program.repeat(n, |_, i| vec![Statement::Store(m, i.entry(n, &i), 1.0.into())]));
+        }
+        let begun = self.clock.map(|_| program.variable("begun"));
+        body.extend(begun.map(|begun| Statement::Let(begun, 0.0.into())));
+        // The first stage takes nothing of the derivative before.
+        for (size, _, rate, ..) in &added {
+            body.extend(program.repeat(*size, |_, i| vec![Statement::Store(*rate, i, 0.0.into())]));
+        }
+        body.extend(program.repeat(count, |program, _| {
+            let mut step = Vec::new();
+            for (size, .., sum) in &added {
+                step.extend(program.repeat(*size, |_, i| vec![Statement::Store(*sum, i, 0.0.into())]));
+            }
+            let s = Counter(program.counters);
+            program.counters += 1;
+            let at = Index::from(s);
+            let mut inner = Vec::new();
+            for &(size, value, rate, stage, _) in &added {
+                inner.extend(program.repeat(size, |_, i| {
+                    let moved = value.at(i.clone()) + rate.at(i.clone()) * (shares.at(at.clone()) * h);
+                    vec![Statement::Store(stage, i, moved)]
+                }));
+            }
+            let since = begun.map(|begun| (begun + shares.at(at.clone())) * h);
+            let leaves = Leaves { states: stage, inputs: self.u, time: self.time(since), step: h };
+            inner.extend(self.rates(program, &leaves, derivatives.map(|(_, [jacobian, ..])| jacobian)));
+            if let Some((_, [jacobian, stage, rate, _])) = derivatives {
+                inner.extend(multiplied(program, n, [jacobian, stage, rate], false));
+            }
+            for &(size, _, rate, _, sum) in &added {
+                inner.extend(program.repeat(size, |_, i| {
+                    let more = sum.at(i.clone()) + rate.at(i.clone()) * weights.at(at.clone());
+                    vec![Statement::Store(sum, i, more)]
+                }));
+            }
+            step.push(Statement::Repeat { counter: s, times: 4, body: inner });
+            for &(size, value, .., sum) in &added {
+                step.extend(program.repeat(size, |_, i| {
+                    vec![Statement::Store(value, i.clone(), value.at(i.clone()) + sum.at(i) * h)]
+                }));
+            }
+            step.extend(begun.map(|begun| Statement::Set(begun, begun + 1.0)));
+            step
+        }));
+        body
+    }
+
+    /// The sample is over.
+    fn finish(&self) -> Option<Statement> {
+        self.clock.map(|clock| Statement::Store(clock, 0.into(), clock.at(0) + 1.0))
+    }
+
+    fn simulator(&self, program: &mut Program, signals: &Signals) -> Entry {
+        let mut body = self.take_inputs(program, signals);
+        let (statements, outputs) = self.observed(program, self.outputs);
+        body.extend(statements);
+        body.extend(outputs.into_iter().enumerate().map(|(place, value)| signals.say(&place.into(), value)));
+        body.extend(self.advance(program));
+        body.extend(self.finish());
+        Entry {
+            name: "step",
+            doc: vec!["The next sample: takes u(k), and gives y(k) of the free run.".to_owned()],
+            arguments: signals.inputs.into_iter().collect(),
+            result: Some(signals.outputs),
+            body,
+        }
+    }
+}
+
+/// `into = a b`, or `a b'`, of square matrices row by row.
+fn multiplied(program: &mut Program, n: usize, [a, b, into]: [Array; 3], transposed: bool) -> Vec<Statement> {
+    let sum = program.variable("product");
+    program.repeat(n, |program, i| {
+        program.repeat(n, |program, j| {
+            let mut body = vec![Statement::Let(sum, 0.0.into())];
+            body.extend(program.repeat(n, |_, k| {
+                let other = if transposed { j.entry(n, &k) } else { k.entry(n, &j) };
+                vec![Statement::Set(sum, sum + a.at(i.entry(n, &k)) * b.at(other))]
+            }));
+            body.push(Statement::Store(into, i.entry(n, &j), sum.into()));
+            body
+        })
+    })
+}
+
 fn uses_time(program: &Compiled, count: usize) -> bool {
     program.first(count).0.iter().any(|(_, operation)| *operation == Operation::Time)
 }
@@ -143,142 +282,4 @@ fn uses_time(program: &Compiled, count: usize) -> bool {
 /// Each value in its place, after all of them were computed.
 fn stored(array: Array, values: Vec<Value>) -> impl Iterator<Item = Statement> {
     values.into_iter().enumerate().map(move |(place, value)| Statement::Store(array, place.into(), value))
-}
-
-/// What the leaves of equations stand for.
-struct Leaves {
-    states: Array,
-    inputs: Option<Array>,
-    time: Option<Value>,
-    step: f64,
-}
-
-/// The statements that the first `count` results of a program need, and these results. What is used once stands where it is used.
-fn translated(
-    program: &mut Program,
-    compiled: &Compiled,
-    count: usize,
-    leaves: &Leaves,
-) -> (Vec<Statement>, Vec<Value>) {
-    let (operations, results) = compiled.first(count);
-    let mut uses: HashMap<usize, usize> = HashMap::new();
-    let arguments = operations.iter().flat_map(|(_, operation)| operation.arguments().into_iter().flatten());
-    arguments.chain(results.iter().copied()).for_each(|place| *uses.entry(place).or_default() += 1);
-    let mut translation = Translation { program, leaves, values: HashMap::new(), statements: Vec::new() };
-    for (place, operation) in &operations {
-        let value = translation.value(*operation);
-        let is_leaf = matches!(value, Value::Number(_) | Value::Variable(_) | Value::At(..));
-        let value = match uses.get(place) {
-            Some(1) => value,
-            _ if is_leaf => value,
-            _ => translation.named(value).into(),
-        };
-        translation.values.insert(*place, value);
-    }
-    let results = results.iter().map(|place| translation.at(*place)).collect();
-    (translation.statements, results)
-}
-
-struct Translation<'a> {
-    program: &'a mut Program,
-    leaves: &'a Leaves,
-    values: HashMap<usize, Value>,
-    statements: Vec<Statement>,
-}
-
-impl Translation<'_> {
-    fn at(&self, place: usize) -> Value {
-        self.values.get(&place).cloned().unwrap_or(Value::Number(f64::NAN))
-    }
-
-    /// A variable with this value.
-    fn named(&mut self, value: Value) -> Variable {
-        let variable = self.program.variable("v");
-        self.statements.push(Statement::Let(variable, value));
-        variable
-    }
-
-    fn choose(&mut self, variable: Variable, cases: [(Condition, Value); 2]) {
-        let mut otherwise = Vec::new();
-        for (condition, value) in cases.into_iter().rev() {
-            otherwise =
-                vec![Statement::Choose { condition, then: vec![Statement::Set(variable, value)], otherwise }];
-        }
-        self.statements.extend(otherwise);
-    }
-
-    fn value(&mut self, operation: Operation) -> Value {
-        match operation {
-            Operation::Constant(bits) => f64::from_bits(bits).into(),
-            Operation::State(state) => self.leaves.states.at(state),
-            Operation::Input(input) => self.leaves.inputs.map_or(f64::NAN.into(), |inputs| inputs.at(input)),
-            // The parameters of a fitted model are constants.
-            Operation::Parameter(_) => f64::NAN.into(),
-            Operation::Time => self.leaves.time.clone().unwrap_or(Value::Number(f64::NAN)),
-            Operation::Step => self.leaves.step.into(),
-            Operation::Add(a, b) => self.at(a) + self.at(b),
-            Operation::Subtract(a, b) => self.at(a) - self.at(b),
-            Operation::Multiply(a, b) => self.at(a) * self.at(b),
-            Operation::Divide(a, b) => self.at(a) / self.at(b),
-            Operation::Integer(x, power) if power != 0 && power.abs() <= PRODUCTS => {
-                let own = self.at(x);
-                let x = Value::from(self.named(own));
-                let product = (1..power.abs()).fold(x.clone(), |product, _| product * x.clone());
-                if power > 0 { product } else { Value::from(1.0) / product }
-            }
-            Operation::Integer(x, power) => {
-                let x = self.at(x);
-                self.program.call(Function::Power, vec![x, f64::from(power).into()])
-            }
-            Operation::Real(x, bits) => {
-                let x = self.at(x);
-                self.program.call(Function::Power, vec![x, f64::from_bits(bits).into()])
-            }
-            Operation::Atan2(y, x) => {
-                let arguments = vec![self.at(y), self.at(x)];
-                self.program.call(Function::Angle, arguments)
-            }
-            Operation::Choose([a, b, c, d]) => {
-                let [a, b, c, d] = [a, b, c, d].map(|place| self.at(place));
-                let chosen = self.named(f64::NAN.into());
-                self.choose(
-                    chosen,
-                    [(Condition::AtMost(a.clone(), b.clone()), c), (Condition::Less(b, a), d)],
-                );
-                chosen.into()
-            }
-            Operation::Apply(function, x) => {
-                let x = self.at(x);
-                self.applied(function, x)
-            }
-        }
-    }
-
-    fn applied(&mut self, function: Named, x: Value) -> Value {
-        let function = match function {
-            Named::Negative => return -x,
-            Named::Sign => {
-                let x = self.named(x);
-                let sign = self.named(x.into());
-                let (below, above) =
-                    (Condition::Less(x.into(), 0.0.into()), Condition::Less(0.0.into(), x.into()));
-                self.choose(sign, [(below, (-1.0).into()), (above, 1.0.into())]);
-                return sign.into();
-            }
-            Named::Sqrt => Function::SquareRoot,
-            Named::Exp => Function::Exponential,
-            Named::Ln => Function::Logarithm,
-            Named::Sin => Function::Sine,
-            Named::Cos => Function::Cosine,
-            Named::Tan => Function::Tangent,
-            Named::Asin => Function::ArcSine,
-            Named::Acos => Function::ArcCosine,
-            Named::Atan => Function::ArcTangent,
-            Named::Sinh => Function::HyperbolicSine,
-            Named::Cosh => Function::HyperbolicCosine,
-            Named::Tanh => Function::HyperbolicTangent,
-            Named::Abs => Function::Absolute,
-        };
-        self.program.call(function, vec![x])
-    }
 }

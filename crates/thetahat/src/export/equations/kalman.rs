@@ -1,0 +1,209 @@
+//! The extended Kalman filter of a model in equations (Jazwinski, Stochastic Processes and Filtering Theory, 1970, section 8.3):
+//!
+//! ```text
+//! S = H P H' + R_j,  K = P H'/S,  x <- x + K (y_j - h_j - H (x - x^-)),  P <- (I - K H) P (I - K H)' + K R_j K'      for each output
+//! x <- f(x, u),      P <- M P M' + Q
+//! ```
+//!
+//! around one linearisation a sample, with noises that are independent of one another. The covariance is in the form of Bucy and Joseph (Filtering for
+//! Stochastic Processes, 1968), which rounding leaves positive.
+
+use super::super::program::{Array, Condition, Entry, Index, Kind, Program, Statement, Value};
+use super::super::signals::Signals;
+use super::{Run, multiplied};
+use crate::model::equations::GreyBox;
+
+/// The filter, and its memory.
+pub(super) struct Kalman<'e> {
+    run: Run<'e>,
+    p: Array,
+    work: Array,
+    /// h(x) and its Jacobian, row by row.
+    said: Array,
+    h: Array,
+    /// P H', then K.
+    gain: Array,
+    /// How far the outputs of the sample have moved the state.
+    moved: Array,
+    q: Array,
+    r: Array,
+}
+
+impl<'e> Kalman<'e> {
+    pub(super) fn new(program: &mut Program, equations: &GreyBox, run: Run<'e>) -> Self {
+        let (n, m) = (run.states, run.outputs);
+        let (deviations, mut p) = (equations.start().1, vec![0.0; n * n]);
+        p.iter_mut().step_by(n + 1).zip(deviations).for_each(|(own, deviation)| *own = deviation * deviation);
+        let q = equations.process_variances(run.sample_time).collect();
+        let mut zeros = |name: &str, doc: &str, size: usize| program.memory(name, doc, vec![0.0; size]);
+        let work = zeros("work", "What is half of a product.", n * n);
+        let said = zeros("said", "The outputs as predicted.", m);
+        let h = zeros("h", "Their derivatives by the state, row by row.", m * n);
+        let gain = zeros("gain", "The gain of an output.", n);
+        let moved = zeros("moved", "How far the outputs have moved the state.", n);
+        Self {
+            p: program.memory("p", "The covariance of the state, row by row.", p),
+            work,
+            said,
+            h,
+            gain,
+            moved,
+            q: program.table("Q", "What noise adds to the variances of the states in a sample.", q),
+            r: program.table(
+                "R",
+                "The variances of the outputs.",
+                equations.measurement_variances().to_vec(),
+            ),
+            run,
+        }
+    }
+
+    /// Takes the inputs, and keeps what the outputs should be.
+    fn predicted(&self, program: &mut Program, signals: &Signals) -> Vec<Statement> {
+        let (n, m) = (self.run.states, self.run.outputs);
+        let mut body = self.run.take_inputs(program, signals);
+        let (statements, mut results) = self.run.observed(program, m + m * n);
+        let columns = results.split_off(m);
+        body.extend(statements);
+        let said = results.into_iter().enumerate();
+        body.extend(said.map(|(place, value)| Statement::Store(self.said, place.into(), value)));
+        let places = (0..m * n).map(|place| place % m * n + place / m);
+        body.extend(places.zip(columns).map(|(place, value)| Statement::Store(self.h, place.into(), value)));
+        body
+    }
+
+    /// Corrects the state by each output that was measured.
+    fn corrected(&self, program: &mut Program, signals: &Signals) -> Vec<Statement> {
+        let Self { run, p, work, said, h, gain, moved, r, .. } = *self;
+        let (n, x) = (run.states, run.x);
+        let mut body = program.repeat(n, |_, i| vec![Statement::Store(moved, i, 0.0.into())]);
+        let [error, variance, sum] = ["error", "variance", "total"].map(|name| program.variable(name));
+        body.extend(program.repeat(run.outputs, |program, j| {
+            let measured = signals.output(&j) - said.at(j.clone());
+            let of_h = |i: &Index| h.at(j.entry(n, i));
+            let mut own = vec![Statement::Let(error, measured)];
+            own.extend(program.repeat(n, |_, i| vec![Statement::Set(error, error - of_h(&i) * moved.at(i))]));
+            own.extend(program.repeat(n, |program, i| {
+                let mut row = vec![Statement::Let(sum, 0.0.into())];
+                row.extend(
+                    program
+                        .repeat(n, |_, k| vec![Statement::Set(sum, sum + p.at(i.entry(n, &k)) * of_h(&k))]),
+                );
+                row.push(Statement::Store(gain, i, sum.into()));
+                row
+            }));
+            own.push(Statement::Let(variance, r.at(j.clone())));
+            own.extend(
+                program.repeat(n, |_, i| vec![Statement::Set(variance, variance + of_h(&i) * gain.at(i))]),
+            );
+            // (I - K H) P
+            own.extend(program.repeat(n, |program, i| {
+                program.repeat(n, |_, k| {
+                    let entry = i.entry(n, &k);
+                    let less = gain.at(i.clone()) * gain.at(k) / variance;
+                    vec![Statement::Store(work, entry.clone(), p.at(entry) - less)]
+                })
+            }));
+            own.extend(program.repeat(n, |_, i| {
+                vec![
+                    Statement::Store(gain, i.clone(), gain.at(i.clone()) / variance),
+                    Statement::Store(moved, i.clone(), moved.at(i.clone()) + gain.at(i) * error),
+                ]
+            }));
+            own.extend(program.repeat(n, |program, i| {
+                let mut row = vec![Statement::Let(sum, -(gain.at(i.clone()) * r.at(j.clone())))];
+                row.extend(
+                    program.repeat(n, |_, k| {
+                        vec![Statement::Set(sum, sum + work.at(i.entry(n, &k)) * of_h(&k))]
+                    }),
+                );
+                row.extend(program.repeat(n, |_, k| {
+                    let entry = i.entry(n, &k);
+                    vec![Statement::Store(p, entry.clone(), work.at(entry) - Value::from(sum) * gain.at(k))]
+                }));
+                row
+            }));
+            vec![Statement::Choose {
+                condition: Condition::Missing(signals.measured.at(j.clone())),
+                then: Vec::new(),
+                otherwise: own,
+            }]
+        }));
+        body.extend(
+            program.repeat(n, |_, i| vec![Statement::Store(x, i.clone(), x.at(i.clone()) + moved.at(i))]),
+        );
+        body
+    }
+
+    /// Goes on to the next sample.
+    fn advanced(&self, program: &mut Program) -> Vec<Statement> {
+        let Self { run, p, work, q, .. } = self;
+        let n = run.states;
+        let mut body = run.advance(program);
+        if let Some(derivatives) = run.derivatives {
+            body.extend(multiplied(program, n, [derivatives.m, *p, *work], false));
+            body.extend(multiplied(program, n, [*work, derivatives.m, *p], true));
+        }
+        body.extend(program.repeat(n * n, |_, i| vec![Statement::Store(*work, i.clone(), p.at(i))]));
+        // Rounding leaves both triangles a little apart.
+        body.extend(program.repeat(n, |program, i| {
+            program.repeat(n, |_, k| {
+                let both = work.at(i.entry(n, &k)) + work.at(k.entry(n, &i));
+                vec![Statement::Store(*p, i.entry(n, &k), both * 0.5)]
+            })
+        }));
+        body.extend(program.repeat(n, |_, i| {
+            let own = i.entry(n, &i);
+            vec![Statement::Store(*p, own.clone(), p.at(own) + q.at(i))]
+        }));
+        body.extend(run.finish());
+        body
+    }
+
+    pub(super) fn predictor(&self, program: &mut Program, signals: &Signals) -> Vec<Entry> {
+        let mut predict = self.predicted(program, signals);
+        predict
+            .extend(program.repeat(self.run.outputs, |_, j| vec![signals.say(&j, self.said.at(j.clone()))]));
+        let mut update = self.corrected(program, signals);
+        update.extend(self.advanced(program));
+        let doc = "The next sample: takes u(k), and gives the prediction of y(k) from it and from what was measured before.";
+        vec![
+            Entry {
+                name: "predict",
+                doc: vec![doc.to_owned()],
+                arguments: signals.inputs.into_iter().collect(),
+                result: Some(signals.outputs),
+                body: predict,
+            },
+            Entry {
+                name: "update",
+                doc: vec![
+                    "What was measured in this sample, after its prediction. What is missing (NaN) corrects nothing."
+                        .to_owned(),
+                ],
+                arguments: vec![signals.measured],
+                result: None,
+                body: update,
+            },
+        ]
+    }
+
+    pub(super) fn observer(&self, program: &mut Program, signals: &Signals) -> Entry {
+        let (n, x) = (self.run.states, self.run.x);
+        let mut body = self.predicted(program, signals);
+        body.extend(self.corrected(program, signals));
+        let state = program.array(Kind::Result, "state", "The state.", vec![0.0; n]);
+        body.extend(program.repeat(n, |_, i| vec![Statement::Store(state, i.clone(), x.at(i))]));
+        body.extend(self.advanced(program));
+        Entry {
+            name: "observe",
+            doc: vec![
+                "A sample: takes u(k) and y(k), and gives the estimate of the state x(k) from all measurements up to them. What is missing (NaN) corrects nothing."
+                    .to_owned(),
+            ],
+            arguments: signals.inputs.into_iter().chain([signals.measured]).collect(),
+            result: Some(state),
+            body,
+        }
+    }
+}

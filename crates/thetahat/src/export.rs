@@ -267,9 +267,6 @@ pub fn export_controller(document: &Control, plan: &Plan) -> Result<Exported, Er
     Ok(Exported { files, warnings: Vec::new() })
 }
 
-/// What an update does.
-const UPDATE: &str = "What was measured in this sample, after its prediction. Where it is missing (NaN) the prediction stands for it.";
-
 /// The program of a model of any kind.
 fn form(model: &Model, purpose: Purpose) -> Result<Form, Error> {
     match model {

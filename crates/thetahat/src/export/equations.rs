@@ -10,7 +10,7 @@ mod kalman;
 mod translation;
 
 use super::program::{Array, Counter, Entry, Index, Program, Statement, Value};
-use super::signals::Signals;
+use super::signals::{FREE_RUN, Signals};
 use super::{Form, Purpose, refused};
 use crate::Error;
 use crate::model::equations::{GreyBox, Operation, Program as Compiled};
@@ -249,13 +249,7 @@ impl<'e> Run<'e> {
         body.extend(outputs.into_iter().enumerate().map(|(place, value)| signals.say(&place.into(), value)));
         body.extend(self.advance(program));
         body.extend(self.finish());
-        Entry {
-            name: "step",
-            doc: vec!["The next sample: takes u(k), and gives y(k) of the free run.".to_owned()],
-            arguments: signals.inputs.into_iter().collect(),
-            result: Some(signals.outputs),
-            body,
-        }
+        signals.responds("step", FREE_RUN, body)
     }
 }
 

@@ -7,8 +7,8 @@
 //! (Ljung, System Identification, 2nd ed. 1999, section 5.4), each signal divided by its scale once.
 
 use super::map::evaluated;
-use super::program::{Array, Condition, Entry, Index, Program, Statement};
-use super::signals::Signals;
+use super::program::{Array, Condition, Index, Program, Statement};
+use super::signals::{FREE_RUN, PREDICTION, Signals, UPDATE};
 use super::{Form, Purpose, refused};
 use crate::Error;
 use crate::model::{Model, NonlinearArxModel};
@@ -56,11 +56,9 @@ pub(super) fn form(whole: &Model, model: &NonlinearArxModel, purpose: Purpose) -
         body.push(Statement::Store(predicted, place.into(), scales.at(place) * value));
         body.push(signals.say(&place.into(), predicted.at(place)));
     }
-    let given = signals.inputs.into_iter().collect();
     program.entries = if purpose == Purpose::Simulator {
         body.extend(lines.take_outputs(&mut program, predicted));
-        let doc = vec!["The next sample: takes u(k), and gives y(k) of the free run.".to_owned()];
-        vec![Entry { name: "step", doc, arguments: given, result: Some(signals.outputs), body }]
+        vec![signals.responds("step", FREE_RUN, body)]
     } else {
         let mut update: Vec<Statement> = (0..outputs)
             .map(|output| Statement::Choose {
@@ -70,23 +68,7 @@ pub(super) fn form(whole: &Model, model: &NonlinearArxModel, purpose: Purpose) -
             })
             .collect();
         update.extend(lines.take_outputs(&mut program, predicted));
-        let doc = "The next sample: takes u(k), and gives the prediction of y(k) from it and from what was measured before.";
-        vec![
-            Entry {
-                name: "predict",
-                doc: vec![doc.to_owned()],
-                arguments: given,
-                result: Some(signals.outputs),
-                body,
-            },
-            Entry {
-                name: "update",
-                doc: vec![super::UPDATE.to_owned()],
-                arguments: vec![signals.measured],
-                result: None,
-                body: update,
-            },
-        ]
+        vec![signals.responds("predict", PREDICTION, body), signals.updates(UPDATE, update)]
     };
     Ok(Form { program, equations, start: "at rest at the offsets".to_owned() })
 }

@@ -10,7 +10,7 @@
 //! what e lacks of y(t), so that it is known before y(t) is.
 
 use super::program::{Array, Condition, Entry, Index, Program, Statement, Value, Variable};
-use super::signals::Signals;
+use super::signals::{FREE_RUN, PREDICTION, Signals, UPDATE};
 use super::{Form, Purpose, refused};
 use crate::Error;
 use crate::model::{Model, PolynomialModel};
@@ -161,13 +161,7 @@ fn simulator(program: &mut Program, signals: &Signals, model: &PolynomialModel, 
         body.extend(program.push(a.line, y));
     }
     body.push(signals.say(&0.into(), y));
-    Entry {
-        name: "step",
-        doc: vec!["The next sample: takes u(k), and gives y(k) of the free run.".to_owned()],
-        arguments: signals.inputs.into_iter().collect(),
-        result: Some(signals.outputs),
-        body,
-    }
+    signals.responds("step", FREE_RUN, body)
 }
 
 fn predictor(
@@ -184,13 +178,9 @@ fn predictor(
     let mut body = driven.statements(program, signals, x);
     if !learns {
         body.push(signals.say(&0.into(), x));
-        return vec![Entry {
-            name: "predict",
-            doc: vec!["The next sample: takes u(k), and gives the prediction of y(k). Past outputs say nothing of it.".to_owned()],
-            arguments: signals.inputs.into_iter().collect(),
-            result: Some(signals.outputs),
-            body,
-        }];
+        let doc =
+            "The next sample: takes u(k), and gives the prediction of y(k). Past outputs say nothing of it.";
+        return vec![signals.responds("predict", doc, body)];
     }
     let known = program.memory("known", "w(k) without y(k), and the prediction of y(k).", vec![0.0; 2]);
     body.push(Statement::Set(x, -Value::from(x)));
@@ -214,16 +204,7 @@ fn predictor(
     }
     body.push(Statement::Store(known, 1.into(), -Value::from(rest)));
     body.push(signals.say(&0.into(), known.at(1)));
-    let predict = Entry {
-        name: "predict",
-        doc: vec![
-            "The next sample: takes u(k), and gives the prediction of y(k) from it and from what was measured before."
-                .to_owned(),
-        ],
-        arguments: signals.inputs.into_iter().collect(),
-        result: Some(signals.outputs),
-        body,
-    };
+    let predict = signals.responds("predict", PREDICTION, body);
 
     let (y, w, e) = (program.variable("output"), program.variable("w"), program.variable("e"));
     let needs_e = c.is_some();
@@ -260,12 +241,5 @@ fn predictor(
     if let Some(a) = &a {
         body.extend(program.push(a.line, y));
     }
-    let update = Entry {
-        name: "update",
-        doc: vec![super::UPDATE.to_owned()],
-        arguments: vec![signals.measured],
-        result: None,
-        body,
-    };
-    vec![predict, update]
+    vec![predict, signals.updates(UPDATE, body)]
 }

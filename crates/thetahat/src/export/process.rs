@@ -9,7 +9,7 @@
 //! (Åström and Wittenmark, Computer-Controlled Systems, 3rd ed. 1997, section 2.3), exact at the samples. A process has been at rest with its
 //! first input before.
 
-use super::program::{Array, Condition, Entry, Program, Statement, Variable};
+use super::program::{Array, Condition, Program, Statement, Variable};
 use super::signals::Signals;
 use super::{Form, Purpose, refused};
 use crate::Error;
@@ -52,13 +52,8 @@ pub(super) fn form(whole: &Model, model: &ProcessModel, purpose: Purpose) -> Res
     }
     body.push(Statement::Store(started, 0.into(), 1.0.into()));
     body.push(signals.say(&0.into(), total));
-    program.entries = vec![Entry {
-        name,
-        doc: vec!["The next sample: takes u(k), and gives y(k). Past outputs say nothing of it.".to_owned()],
-        arguments: signals.inputs.into_iter().collect(),
-        result: Some(signals.outputs),
-        body,
-    }];
+    let doc = "The next sample: takes u(k), and gives y(k). Past outputs say nothing of it.";
+    program.entries = vec![signals.responds(name, doc, body)];
     Ok(Form { program, equations, start: "at rest with its first input".to_owned() })
 }
 

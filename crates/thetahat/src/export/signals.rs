@@ -1,8 +1,13 @@
 //! What goes into a program and comes out of it, in the units of the channels.
 
-use super::program::{Array, Condition, Index, Kind, Program, Statement, Value};
+use super::program::{Array, Condition, Entry, Index, Kind, Program, Statement, Value};
 use crate::Error;
 use crate::model::{Model, Signal};
+
+/// What functions of programs do.
+pub(super) const FREE_RUN: &str = "The next sample: takes u(k), and gives y(k) of the free run.";
+pub(super) const PREDICTION: &str = "The next sample: takes u(k), and gives the prediction of y(k) from it and from what was measured before.";
+pub(super) const UPDATE: &str = "What was measured in this sample, after its prediction. Where it is missing (NaN) the prediction stands for it.";
 
 /// The signals of a program.
 #[derive(Debug, Clone, Copy)]
@@ -120,6 +125,24 @@ impl Signals {
             None => deviation,
         };
         Statement::Store(self.outputs, place.clone(), value)
+    }
+
+    /// A function that takes the inputs and gives the outputs.
+    pub(super) fn responds(&self, name: &'static str, doc: &str, body: Vec<Statement>) -> Entry {
+        let arguments = self.inputs.into_iter().collect();
+        Entry { name, doc: vec![doc.to_owned()], arguments, result: Some(self.outputs), body }
+    }
+
+    /// A function that takes what was measured of the outputs.
+    pub(super) fn updates(&self, doc: &str, body: Vec<Statement>) -> Entry {
+        let arguments = vec![self.measured];
+        Entry { name: "update", doc: vec![doc.to_owned()], arguments, result: None, body }
+    }
+
+    /// A function that takes inputs and outputs and gives a state.
+    pub(super) fn observes(&self, doc: &str, state: Option<Array>, body: Vec<Statement>) -> Entry {
+        let arguments = self.inputs.into_iter().chain([self.measured]).collect();
+        Entry { name: "observe", doc: vec![doc.to_owned()], arguments, result: state, body }
     }
 }
 

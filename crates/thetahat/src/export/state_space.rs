@@ -11,7 +11,7 @@
 use thetahat_core::nalgebra::DMatrix;
 
 use super::program::{Array, Condition, Entry, Index, Kind, Program, Statement, Variable};
-use super::signals::Signals;
+use super::signals::{FREE_RUN, PREDICTION, Signals, UPDATE};
 use super::{Form, Purpose, refused};
 use crate::Error;
 use crate::model::{Model, StateSpace, StateSpaceModel};
@@ -166,13 +166,7 @@ impl System {
         let mut body = self.take_inputs(program, signals);
         body.extend(self.outputs(program, |sum, row| vec![signals.say(row, sum)]));
         body.extend(self.go_on(program));
-        Entry {
-            name: "step",
-            doc: vec!["The next sample: takes u(k), and gives y(k) of the free run.".to_owned()],
-            arguments: signals.inputs.into_iter().collect(),
-            result: Some(signals.outputs),
-            body,
-        }
+        signals.responds("step", FREE_RUN, body)
     }
 
     /// Takes what was measured; a prediction stays where it is missing.
@@ -195,50 +189,18 @@ impl System {
         }));
         let mut update = self.take_measured(program, signals);
         update.extend(self.go_on(program));
-        let doc = "The next sample: takes u(k), and gives the prediction of y(k) from it and from what was measured before.";
-        vec![
-            Entry {
-                name: "predict",
-                doc: vec![doc.to_owned()],
-                arguments: signals.inputs.into_iter().collect(),
-                result: Some(signals.outputs),
-                body: predict,
-            },
-            Entry {
-                name: "update",
-                doc: vec![super::UPDATE.to_owned()],
-                arguments: vec![signals.measured],
-                result: None,
-                body: update,
-            },
-        ]
+        vec![signals.responds("predict", PREDICTION, predict), signals.updates(UPDATE, update)]
     }
 
     fn observer(&self, program: &mut Program, signals: &Signals) -> Entry {
-        let (Some(y), Some(x)) = (self.y, self.x) else {
-            return Entry {
-                name: "observe",
-                doc: Vec::new(),
-                arguments: Vec::new(),
-                result: None,
-                body: Vec::new(),
-            };
-        };
+        let (Some(y), Some(x)) = (self.y, self.x) else { return signals.observes("", None, Vec::new()) };
         let mut body = self.take_inputs(program, signals);
         body.extend(self.outputs(program, |sum, row| vec![Statement::Store(y, row.clone(), sum.into())]));
         body.extend(self.take_measured(program, signals));
         body.extend(self.go_on(program));
         let state = program.array(Kind::Result, "state", "The state.", vec![0.0; self.states]);
         body.extend(program.repeat(self.states, |_, i| vec![Statement::Store(state, i.clone(), x.at(i))]));
-        Entry {
-            name: "observe",
-            doc: vec![
-                "A sample: takes u(k) and y(k), and gives the estimate of the state x(k+1). A missing output (NaN) corrects nothing."
-                    .to_owned(),
-            ],
-            arguments: signals.inputs.into_iter().chain([signals.measured]).collect(),
-            result: Some(state),
-            body,
-        }
+        let doc = "A sample: takes u(k) and y(k), and gives the estimate of the state x(k+1). A missing output (NaN) corrects nothing.";
+        signals.observes(doc, Some(state), body)
     }
 }

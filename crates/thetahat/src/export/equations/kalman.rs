@@ -9,7 +9,7 @@
 //! Stochastic Processes, 1968), which rounding leaves positive.
 
 use super::super::program::{Array, Condition, Entry, Index, Kind, Program, Statement, Value};
-use super::super::signals::Signals;
+use super::super::signals::{PREDICTION, Signals};
 use super::{Run, multiplied};
 use crate::model::equations::GreyBox;
 
@@ -166,26 +166,9 @@ impl<'e> Kalman<'e> {
             .extend(program.repeat(self.run.outputs, |_, j| vec![signals.say(&j, self.said.at(j.clone()))]));
         let mut update = self.corrected(program, signals);
         update.extend(self.advanced(program));
-        let doc = "The next sample: takes u(k), and gives the prediction of y(k) from it and from what was measured before.";
-        vec![
-            Entry {
-                name: "predict",
-                doc: vec![doc.to_owned()],
-                arguments: signals.inputs.into_iter().collect(),
-                result: Some(signals.outputs),
-                body: predict,
-            },
-            Entry {
-                name: "update",
-                doc: vec![
-                    "What was measured in this sample, after its prediction. What is missing (NaN) corrects nothing."
-                        .to_owned(),
-                ],
-                arguments: vec![signals.measured],
-                result: None,
-                body: update,
-            },
-        ]
+        let doc =
+            "What was measured in this sample, after its prediction. What is missing (NaN) corrects nothing.";
+        vec![signals.responds("predict", PREDICTION, predict), signals.updates(doc, update)]
     }
 
     pub(super) fn observer(&self, program: &mut Program, signals: &Signals) -> Entry {
@@ -195,15 +178,7 @@ impl<'e> Kalman<'e> {
         let state = program.array(Kind::Result, "state", "The state.", vec![0.0; n]);
         body.extend(program.repeat(n, |_, i| vec![Statement::Store(state, i.clone(), x.at(i))]));
         body.extend(self.advanced(program));
-        Entry {
-            name: "observe",
-            doc: vec![
-                "A sample: takes u(k) and y(k), and gives the estimate of the state x(k) from all measurements up to them. What is missing (NaN) corrects nothing."
-                    .to_owned(),
-            ],
-            arguments: signals.inputs.into_iter().chain([signals.measured]).collect(),
-            result: Some(state),
-            body,
-        }
+        let doc = "A sample: takes u(k) and y(k), and gives the estimate of the state x(k) from all measurements up to them. What is missing (NaN) corrects nothing.";
+        signals.observes(doc, Some(state), body)
     }
 }

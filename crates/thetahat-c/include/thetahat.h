@@ -811,6 +811,24 @@ thetahat_error thetahat_arx_covariance(const thetahat_arx *arx, thetahat_number 
 // Errors: NOT_FINITE; TOO_LARGE; OUT_OF_RANGE if C(q) is not stable.
 thetahat_error thetahat_arx_set_parameters(thetahat_arx *arx, const thetahat_number *parameters);
 
+// Sets all that a batch fit knows: its parameters, how sure they are, and the noise. The start is then the standard one. The
+// samples that were seen stay.
+//
+// - parameters: n numbers, in the order of `thetahat_arx_model`.
+// - factor: P, the covariance of the parameters over the noise variance, n x n, as P = U D U': D on the diagonal, the upper
+//   triangular U above it, without the ones of its diagonal, and 0 below. If P is diagonal so is the factor, and the same. In
+//   single precision a factor is always that of a covariance, where a rounded P may be none.
+// - noise_variance: the variance of e, at least 0, in the unit of y squared.
+// - samples: how many the fit had, more than n.
+//
+// Errors: NOT_FINITE; TOO_LARGE; NEGATIVE if a number of D is; OVERFLOW; OUT_OF_RANGE if C(q) is not stable, a number below the
+// diagonal is not 0, or the noise variance or the samples are out of range.
+thetahat_error thetahat_arx_set_fit(thetahat_arx *arx,
+                                    const thetahat_number *parameters,
+                                    const thetahat_number *factor,
+                                    thetahat_number noise_variance,
+                                    size_t samples);
+
 // Turns adaptation off (0), or on again (1). While it is off innovations are computed and nothing changes.
 thetahat_error thetahat_arx_set_adaptation(thetahat_arx *arx, uint32_t on);
 

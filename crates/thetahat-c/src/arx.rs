@@ -2,14 +2,14 @@
 
 use thetahat_core::nalgebra::Const;
 use thetahat_core::{
-    ArmaxMethod, ArmaxOrders, ArxOrders, InputOrders as CoreOrders, RecursiveArmax, RecursiveArx,
+    ArmaxMethod, ArmaxOrders, ArxOrders, Covariance, InputOrders as CoreOrders, RecursiveArmax, RecursiveArx,
 };
 
 use crate::error::code;
 use crate::innovation::Innovation;
 use crate::learning::{self, Estimate, Learning};
 use crate::memory::{self, Kind, Made, Place, View, Word};
-use crate::shapes::vector;
+use crate::shapes::{matrix, vector};
 use crate::{Error, Number};
 
 /// The most inputs of a model.
@@ -111,6 +111,15 @@ impl Kind for Arx {
 type ArxEstimator<const N: usize> = RecursiveArx<Number, Const<N>, Const<THETAHAT_MOST_DELAYS>>;
 type ArmaxEstimator<const N: usize> = RecursiveArmax<Number, Const<N>, Const<THETAHAT_MOST_DELAYS>>;
 
+/// What a batch fit knows.
+pub(crate) struct Fit<'a> {
+    parameters: &'a [Number],
+    /// P, row by row, as `Covariance::factor` has it.
+    factor: &'a [Number],
+    noise_variance: Number,
+    samples: usize,
+}
+
 /// What an estimator of any size and structure does.
 pub(crate) trait Plant {
     fn measured(&mut self, output: Number) -> Result<Innovation, Error>;
@@ -118,6 +127,7 @@ pub(crate) trait Plant {
     fn log_row(&mut self, output: Number, inputs: &[Number]) -> Result<Innovation, Error>;
     fn predict(&self, inputs: &[Number], outputs: &mut [Number]) -> Result<(), Error>;
     fn set_parameters(&mut self, parameters: &[Number]) -> Result<(), Error>;
+    fn set_fit(&mut self, fit: &Fit<'_>) -> Result<(), Error>;
     fn set_adaptation(&mut self, on: bool);
     fn estimate(&self) -> &dyn Estimate;
 }
@@ -141,6 +151,15 @@ impl<const N: usize> Plant for ArxEstimator<N> {
 
     fn set_parameters(&mut self, parameters: &[Number]) -> Result<(), Error> {
         *self = self.clone().with_parameters(vector(parameters))?;
+        Ok(())
+    }
+
+    fn set_fit(&mut self, fit: &Fit<'_>) -> Result<(), Error> {
+        *self = self
+            .clone()
+            .with_parameters(vector(fit.parameters))?
+            .with_covariance(Covariance::from_factor(matrix(fit.factor, N))?)?
+            .with_noise_variance(fit.noise_variance, fit.samples)?;
         Ok(())
     }
 
@@ -172,6 +191,15 @@ impl<const N: usize> Plant for ArmaxEstimator<N> {
 
     fn set_parameters(&mut self, parameters: &[Number]) -> Result<(), Error> {
         *self = self.clone().with_parameters(vector(parameters))?;
+        Ok(())
+    }
+
+    fn set_fit(&mut self, fit: &Fit<'_>) -> Result<(), Error> {
+        *self = self
+            .clone()
+            .with_parameters(vector(fit.parameters))?
+            .with_covariance(Covariance::from_factor(matrix(fit.factor, N))?)?
+            .with_noise_variance(fit.noise_variance, fit.samples)?;
         Ok(())
     }
 
@@ -367,6 +395,34 @@ pub unsafe extern "C" fn thetahat_arx_set_parameters(arx: *mut Arx, parameters: 
         let plant = memory::open(arx)?;
         let parameters = memory::array(parameters, plant.estimate().parameters().len())?;
         plant.set_parameters(parameters)
+    })
+}
+
+/// Sets all that a batch fit knows: its parameters, how sure they are, and the noise. The start is then the standard one. The
+/// samples that were seen stay.
+///
+/// - parameters: n numbers, in the order of `thetahat_arx_model`.
+/// - factor: P, the covariance of the parameters over the noise variance, n x n, as P = U D U': D on the diagonal, the upper
+///   triangular U above it, without the ones of its diagonal, and 0 below. If P is diagonal so is the factor, and the same. In
+///   single precision a factor is always that of a covariance, where a rounded P may be none.
+/// - noise_variance: the variance of e, at least 0, in the unit of y squared.
+/// - samples: how many the fit had, more than n.
+///
+/// Errors: NOT_FINITE; TOO_LARGE; NEGATIVE if a number of D is; OVERFLOW; OUT_OF_RANGE if C(q) is not stable, a number below the
+/// diagonal is not 0, or the noise variance or the samples are out of range.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn thetahat_arx_set_fit(
+    arx: *mut Arx,
+    parameters: *const Number,
+    factor: *const Number,
+    noise_variance: Number,
+    samples: usize,
+) -> Error {
+    code(|| {
+        let plant = memory::open(arx)?;
+        let n = plant.estimate().parameters().len();
+        let (parameters, factor) = (memory::array(parameters, n)?, memory::array(factor, n * n)?);
+        plant.set_fit(&Fit { parameters, factor, noise_variance, samples })
     })
 }
 

@@ -104,7 +104,9 @@ impl From<thetahat_core::Error> for Error {
             Core::InputFirst { .. } => Error::InputFirst,
             Core::NotSymmetric { .. } => Error::NotSymmetric,
             Core::NotPositive { .. } => Error::NotPositive,
-            Core::OutOfRange { .. } => Error::OutOfRange,
+            Core::OutOfRange { .. } | Core::NotTriangular { .. } | Core::TooFewRows { .. } => {
+                Error::OutOfRange
+            }
             Core::NoVariance { .. } => Error::NoVariance,
             Core::NotObservable { .. } => Error::NotObservable,
             Core::Overflow => Error::Overflow,

@@ -214,6 +214,68 @@ fn orders_and_learning_are_checked() {
 }
 
 #[test]
+fn a_fit_is_checked_and_taken_whole() {
+    let (mut memory, mut arx) = (Memory::new(), null_mut());
+    let model = ArxModel {
+        na: 1,
+        inputs: 0,
+        input: [InputOrders { nb: 0, nk: 0 }; 4],
+        nc: 1,
+        constant: 0,
+        output_scale: 1.0,
+        input_scales: [1.0; 4],
+        noise_scale: 1.0,
+        gradient: 0,
+    };
+    let start = memory.start();
+    // SAFETY: all pointers are valid.
+    let code =
+        unsafe { thetahat_arx_init(&raw mut arx, start, Memory::BYTES, &thetahat_armax_2, &model, null()) };
+    assert_eq!(code, Error::None);
+    let set = |parameters: [Number; 2], factor: [Number; 4], variance, samples| {
+        // SAFETY: all pointers are valid.
+        unsafe { thetahat_arx_set_fit(arx, parameters.as_ptr(), factor.as_ptr(), variance, samples) }
+    };
+    let (good, factor) = ([-0.5, 0.25], [2.0, 0.5, 0.0, 1.0]);
+    let before = memory.0;
+    // SAFETY: pointers are null or valid.
+    unsafe {
+        assert_eq!(
+            thetahat_arx_set_fit(null_mut(), ONES.as_ptr(), ONES.as_ptr(), 1.0, 3),
+            Error::NullPointer
+        );
+        assert_eq!(thetahat_arx_set_fit(arx, null(), ONES.as_ptr(), 1.0, 3), Error::NullPointer);
+        assert_eq!(thetahat_arx_set_fit(arx, ONES.as_ptr(), null(), 1.0, 3), Error::NullPointer);
+    }
+    assert_eq!(set([Number::NAN, 0.0], factor, 1.0, 3), Error::NotFinite);
+    assert_eq!(set([-0.5, 1.5], factor, 1.0, 3), Error::OutOfRange);
+    assert_eq!(set([Number::MAX, 0.0], factor, 1.0, 3), Error::TooLarge);
+    assert_eq!(set(good, [Number::INFINITY, 0.5, 0.0, 1.0], 1.0, 3), Error::NotFinite);
+    assert_eq!(set(good, [Number::MAX, 0.5, 0.0, 1.0], 1.0, 3), Error::TooLarge);
+    assert_eq!(set(good, [1.0, Number::MAX, 0.0, 1.0], 1.0, 3), Error::Overflow);
+    assert_eq!(set(good, [2.0, 0.5, 0.5, 1.0], 1.0, 3), Error::OutOfRange);
+    assert_eq!(set(good, [-2.0, 0.5, 0.0, 1.0], 1.0, 3), Error::Negative);
+    for variance in [-1.0, Number::NAN, Number::INFINITY] {
+        assert_eq!(set(good, factor, variance, 3), Error::OutOfRange);
+    }
+    assert_eq!(set(good, factor, 1.0, 2), Error::OutOfRange);
+    assert_eq!(set(good, factor, 1.0, 0), Error::OutOfRange);
+    assert!(memory.0 == before);
+    assert_eq!(set(good, factor, 0.5, 4), Error::None);
+    let (mut parameters, mut errors, mut variance, mut covariance) = ([0.0; 2], [0.0; 2], 0.0, [0.0; 4]);
+    // SAFETY: all pointers are valid.
+    unsafe {
+        let code =
+            thetahat_arx_parameters(arx, parameters.as_mut_ptr(), errors.as_mut_ptr(), &raw mut variance);
+        assert_eq!(code, Error::None);
+        assert_eq!(thetahat_arx_covariance(arx, covariance.as_mut_ptr()), Error::None);
+    }
+    // U D U' of U = (1 0.5; 0 1) and D = (2, 1).
+    assert_eq!((parameters, variance, covariance), (good, 0.5, [2.25, 0.5, 0.5, 1.0]));
+    assert_eq!(errors[1], Number::sqrt(0.5));
+}
+
+#[test]
 fn a_filter_asks_for_its_model_and_checks_it() {
     let (mut memory, mut kalman) = (Memory::new(), null_mut());
     let (start, bytes, ones) = (memory.start(), Memory::BYTES, ONES.as_ptr());

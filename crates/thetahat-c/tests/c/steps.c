@@ -84,8 +84,21 @@ static void step_rls(void) {
     }
 }
 
-/* The same model twice, as ARX and with one c more as ARMAX; a detector watches it. */
-static void step_arx(const char *name, const thetahat_arx_size *size, uint32_t nc) {
+/* What a fit of so many parameters, up to 5, knows. */
+static void set_fit(const char *name, thetahat_arx *arx, size_t count) {
+    const thetahat_number quarter = (thetahat_number)0.25;
+    const thetahat_number parameters[5] = {(thetahat_number)-0.5, -quarter / 2, quarter / 2, quarter, -quarter};
+    thetahat_number factor[25];
+    for (size_t row = 0; row < count; row++) {
+        for (size_t column = 0; column < count; column++) {
+            factor[row * count + column] = row == column ? quarter / 16 : row < column ? quarter : 0;
+        }
+    }
+    done(name, thetahat_arx_set_fit(arx, parameters, factor, quarter / 16, 50));
+}
+
+/* The same model twice, as ARX and with one c more as ARMAX, from nothing or from a fit; a detector watches it. */
+static void step_arx(const char *name, const thetahat_arx_size *size, uint32_t nc, int warm) {
     static thetahat_word memory[THETAHAT_ARMAX_WORDS(5)], detector_memory[THETAHAT_DETECTOR_WORDS];
     thetahat_arx_model model = {0};
     thetahat_arx *arx;
@@ -99,6 +112,9 @@ static void step_arx(const char *name, const thetahat_arx_size *size, uint32_t n
     model.input_scales[0] = 1;
     model.noise_scale = (thetahat_number)0.125;
     done(name, thetahat_arx_init(&arx, memory, sizeof memory, size, &model, NULL));
+    if (warm) {
+        set_fit(name, arx, 4 + nc);
+    }
     done(name, thetahat_detector_init(&detector, detector_memory, sizeof detector_memory, 2, 3));
     for (int k = 0; k < SAMPLES; k++) {
         thetahat_number parameters[5], ahead[3];
@@ -285,8 +301,10 @@ int main(void) {
     }
     make_record(record);
     step_rls();
-    step_arx("arx", &thetahat_arx_4, 0);
-    step_arx("armax", &thetahat_armax_5, 1);
+    step_arx("arx", &thetahat_arx_4, 0, 0);
+    step_arx("arx_warm", &thetahat_arx_4, 0, 1);
+    step_arx("armax", &thetahat_armax_5, 1, 0);
+    step_arx("armax_warm", &thetahat_armax_5, 1, 1);
     step_kalman();
     step_ekf();
     step_luenberger();

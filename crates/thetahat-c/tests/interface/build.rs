@@ -1,19 +1,13 @@
-//! Builds the library and programs in C.
+//! Builds programs in C.
 
 use std::env;
-use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
-use std::sync::{Mutex, OnceLock};
+use std::process::Command;
+
+use crate::library::{Precision, done, library};
 
 const FOLDER: &str = env!("CARGO_MANIFEST_DIR");
 const WARNINGS: [&str; 4] = ["-Wall", "-Wextra", "-Wpedantic", "-Werror"];
-
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Precision {
-    Single,
-    Double,
-}
 
 /// The root of the repository.
 fn root() -> PathBuf {
@@ -26,7 +20,7 @@ pub(crate) fn run(precision: Precision, name: &str, sources: &[&str]) -> Option<
     if !is_there("gcc") {
         return None;
     }
-    let library = library(precision);
+    let library = library(&root(), precision);
     let define: &[&str] = match precision {
         Precision::Single => &[],
         Precision::Double => &["-DTHETAHAT_DOUBLE"],
@@ -67,35 +61,4 @@ fn is_there(compiler: &str) -> bool {
         println!("skipped: {compiler} is not installed");
     }
     there
-}
-
-/// The static library, built once.
-fn library(precision: Precision) -> &'static Path {
-    static LIBRARIES: [OnceLock<PathBuf>; 2] = [OnceLock::new(), OnceLock::new()];
-    static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
-    let [single, double] = &LIBRARIES;
-    let (library, options): (_, &[&str]) = match precision {
-        Precision::Single => (single, &[]),
-        Precision::Double => (double, &["--features", "double"]),
-    };
-    library.get_or_init(|| {
-        // Both are built in one place, as they have all but one crate in common.
-        let _lock = ONE_AT_A_TIME.lock();
-        let target =
-            env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), PathBuf::from).join("c");
-        let mut build = Command::new(env!("CARGO"));
-        build.current_dir(root()).args(["build", "--locked", "--package", "thetahat-c", "--target-dir"]);
-        done(build.arg(&target).args(options));
-        let kept = target.join(format!("libthetahat_c-{precision:?}.a"));
-        fs::copy(target.join("debug/libthetahat_c.a"), &kept).expect("a library");
-        kept
-    })
-}
-
-/// Runs a command that must succeed.
-fn done(command: &mut Command) -> Output {
-    let output = command.output().expect("a command that starts");
-    let [printed, errors] = [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text));
-    assert!(output.status.success(), "{command:?}\n{printed}{errors}");
-    output
 }

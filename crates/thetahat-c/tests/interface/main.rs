@@ -1,9 +1,11 @@
 //! The interface as C sees it: programs in C are compiled and linked with the library, and run.
 
 mod build;
+mod library;
 mod steps;
 
-use build::{Precision, run};
+use build::run;
+use library::Precision;
 
 #[test]
 fn c_gets_the_bits_of_rust() {

@@ -1,5 +1,6 @@
 //! What `tests/c/steps.c` does, in Rust.
 
+use std::cmp::Ordering;
 use std::fmt::Write;
 
 use thetahat_core::nalgebra::{Complex, Const, Matrix2, SMatrix, SVector, Vector1, Vector2, Vector4};
@@ -90,8 +91,16 @@ impl<T: Number, const M: usize> From<Innovation<T, SVector<T, M>>> for Told<T> {
 pub(crate) fn lines<T: Number>() -> Result<String, Error> {
     let mut lines = Lines { text: String::new(), record: record::<T>() };
     step_rls(&mut lines)?;
-    step_arx(&mut lines)?;
-    step_armax(&mut lines)?;
+    step_arx(&mut lines, "arx", Ok)?;
+    step_arx(&mut lines, "arx_warm", |arx| {
+        let (parameters, covariance, variance) = fit()?;
+        arx.with_parameters(parameters)?.with_covariance(covariance)?.with_noise_variance(variance, 50)
+    })?;
+    step_armax(&mut lines, "armax", Ok)?;
+    step_armax(&mut lines, "armax_warm", |armax| {
+        let (parameters, covariance, variance) = fit()?;
+        armax.with_parameters(parameters)?.with_covariance(covariance)?.with_noise_variance(variance, 50)
+    })?;
     step_kalman(&mut lines)?;
     step_ekf(&mut lines)?;
     step_luenberger(&mut lines)?;
@@ -129,10 +138,30 @@ fn watched<T: Number>(detector: &mut ChangeDetector<T>, innovation: &Innovation<
 
 const INPUTS: &[InputOrders] = &[InputOrders { nb: 2, nk: 1 }];
 
-fn step_arx<T: Number>(lines: &mut Lines<T>) -> Result<(), Error> {
+/// What a fit knows: its parameters, P, and the noise variance.
+type Fit<T, const N: usize> = (SVector<T, N>, Covariance<T, Const<N>>, T);
+
+fn fit<T: Number, const N: usize>() -> Result<Fit<T, N>, Error> {
+    let parameters = SVector::from_fn(|index, _| T::from([-0.5, -0.125, 0.125, 0.25, -0.25][index]));
+    let factor = SMatrix::from_fn(|row, column| match row.cmp(&column) {
+        Ordering::Equal => T::from(0.015625),
+        Ordering::Less => T::from(0.25),
+        Ordering::Greater => T::zero(),
+    });
+    Ok((parameters, Covariance::from_factor(factor)?, T::from(0.015625)))
+}
+
+type Arx<T> = RecursiveArx<T, Const<4>>;
+type Armax<T> = RecursiveArmax<T, Const<5>>;
+
+fn step_arx<T: Number>(
+    lines: &mut Lines<T>,
+    name: &str,
+    start: impl FnOnce(Arx<T>) -> Result<Arx<T>, Error>,
+) -> Result<(), Error> {
     let orders = ArxOrders { na: 2, inputs: INPUTS, constant: false };
     let forgetting = Forgetting::default();
-    let mut arx: RecursiveArx<T, Const<4>> = RecursiveArx::new(&orders, T::one(), &[T::one()], forgetting)?;
+    let mut arx = start(RecursiveArx::new(&orders, T::one(), &[T::one()], forgetting)?)?;
     let mut detector = ChangeDetector::new(T::from(2.0), T::from(3.0))?;
     for k in 0..SAMPLES {
         let innovation = arx.measured(lines.record[k].1)?;
@@ -141,18 +170,22 @@ fn step_arx<T: Number>(lines: &mut Lines<T>) -> Result<(), Error> {
         arx.applied(&[lines.record[k].0])?;
         let (statistic, end) = watched(&mut detector, &innovation);
         let parameters = arx.estimator().parameters().as_slice();
-        lines.line("arx", k, Some(&innovation.into()), &[parameters, &ahead, &[statistic]]);
+        lines.line(name, k, Some(&innovation.into()), &[parameters, &ahead, &[statistic]]);
         lines.text.pop();
         lines.text += &end;
     }
     Ok(())
 }
 
-fn step_armax<T: Number>(lines: &mut Lines<T>) -> Result<(), Error> {
+fn step_armax<T: Number>(
+    lines: &mut Lines<T>,
+    name: &str,
+    start: impl FnOnce(Armax<T>) -> Result<Armax<T>, Error>,
+) -> Result<(), Error> {
     let orders = ArmaxOrders { na: 2, inputs: INPUTS, nc: 1, constant: false };
     let (method, noise) = (ArmaxMethod::PredictionError, T::from(0.125));
-    let mut armax: RecursiveArmax<T, Const<5>> =
-        RecursiveArmax::new(&orders, method, T::one(), &[T::one()], noise, Forgetting::default())?;
+    let forgetting = Forgetting::default();
+    let mut armax = start(RecursiveArmax::new(&orders, method, T::one(), &[T::one()], noise, forgetting)?)?;
     let mut detector = ChangeDetector::new(T::from(2.0), T::from(3.0))?;
     for k in 0..SAMPLES {
         let innovation = armax.measured(lines.record[k].1)?;
@@ -161,7 +194,7 @@ fn step_armax<T: Number>(lines: &mut Lines<T>) -> Result<(), Error> {
         armax.applied(&[lines.record[k].0])?;
         let (statistic, end) = watched(&mut detector, &innovation);
         let parameters = armax.estimator().parameters().as_slice();
-        lines.line("armax", k, Some(&innovation.into()), &[parameters, &ahead, &[statistic]]);
+        lines.line(name, k, Some(&innovation.into()), &[parameters, &ahead, &[statistic]]);
         lines.text.pop();
         lines.text += &end;
     }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
+use crate::c_library::{Precision, done, library};
 use crate::harness::Folder;
 
 /// What C has to be compiled with.
@@ -18,16 +19,6 @@ fn has(program: &str) -> bool {
         eprintln!("skipped: {program} is missing");
     }
     there
-}
-
-fn run(command: &mut Command) {
-    let output = command.output().expect("a program that starts");
-    assert!(
-        output.status.success(),
-        "{command:?}: {}{}",
-        String::from_utf8_lossy(&output.stdout),
-        String::from_utf8_lossy(&output.stderr)
-    );
 }
 
 /// The core as a library that a generated module is linked with, compiled once.
@@ -50,8 +41,8 @@ fn rustc(folder: &Folder, name: &str) {
         command.arg("--extern").arg(format!("thetahat_core={}", library.display()));
         command.arg("-L").arg(format!("dependency={}", core().display()));
     }
-    run(command.arg(format!("{name}_test.rs")).args(["-o", "test_of_rust"]));
-    run(&mut Command::new(folder.path("test_of_rust")));
+    done(command.arg(format!("{name}_test.rs")).args(["-o", "test_of_rust"]));
+    done(&mut Command::new(folder.path("test_of_rust")));
 }
 
 /// The library that was built last.
@@ -75,12 +66,29 @@ fn goes_round(folder: &Folder, report: &str, log: &str, purposes: &[&str]) {
         rustc(folder, "model");
         folder.done(&format!("{common} --to c"));
         if has("gcc") {
-            let mut command = Command::new("gcc");
-            command.current_dir(folder.path(".")).args(STRICT).arg("-ffp-contract=off");
-            run(command.args(["model.c", "model_test.c", "-o", "test_of_c", "-lm"]));
-            run(&mut Command::new(folder.path("test_of_c")));
+            gcc(folder, precision);
         }
     }
+}
+
+/// Links a generated source of C with its check, and with the core in C where it names it, and runs it.
+fn gcc(folder: &Folder, precision: &str) {
+    let mut command = Command::new("gcc");
+    command.current_dir(folder.path(".")).args(STRICT).arg("-ffp-contract=off");
+    command.args(["model.c", "model_test.c"]);
+    if folder.read("model.h").contains("thetahat.h") {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let of_c = if precision == "f64" {
+            command.arg("-DTHETAHAT_DOUBLE");
+            Precision::Double
+        } else {
+            Precision::Single
+        };
+        command.arg("-I").arg(root.join("crates/thetahat-c/include")).arg(library(root, of_c));
+        command.args(["-lpthread", "-ldl"]);
+    }
+    done(command.args(["-lm", "-o", "test_of_c"]));
+    done(&mut Command::new(folder.path("test_of_c")));
 }
 
 fn motor() -> Folder {
@@ -176,20 +184,54 @@ fn nearest_neighbours_are_for_rust_alone() {
 #[test]
 fn estimators_go_on_from_the_fit() {
     let folder = motor();
-    for orders in ["--na 2 --nb 2 --nk 3", "--model armax --na 2 --nb 2 --nc 1 --nk 3", "--model ar --na 2"] {
-        let input = if orders.contains(" ar ") { "-y y" } else { "-u u -y y" };
-        folder.done(&format!("fit dc_motor.csv --time t {input} {orders} --report r.json"));
-        for precision in ["f64", "f32"] {
-            let export = format!(
-                "export r.json dc_motor.csv --time t --what recursive --precision {precision} --name model"
-            );
-            folder.done(&format!("{export} --to rust"));
-            rustc(&folder, "model");
-            assert!(folder.refused(&format!("{export} --to c"), 2).contains("take rust"));
+    // Along rows of which some have no output, and some no input.
+    let whole = folder.read("dc_motor.csv");
+    let log = whole.lines().enumerate().map(|(row, line)| {
+        let mut cells: Vec<&str> = line.split(',').collect();
+        match row {
+            100 => cells[2] = "",
+            200 => cells[1] = "",
+            _ => {}
         }
+        cells.join(",") + "\n"
+    });
+    folder.write("holes.csv", log.collect::<String>());
+    for orders in [
+        "-u u -y y --na 2 --nb 2 --nk 3",
+        "-u u -y y --na 2 --nb 2 --nk 0",
+        "-u u -y y --model armax --na 2 --nb 2 --nc 1 --nk 3",
+        "-y y --model ar --na 2",
+    ] {
+        folder.done(&format!("fit dc_motor.csv --time t {orders} --report r.json"));
+        goes_round(&folder, "r.json", "holes.csv --time t", &["recursive"]);
     }
     folder.done("fit dc_motor.csv --time t --model oe --nb 2 --nf 2 --report r.json");
-    assert!(folder.refused("export r.json --to rust --what recursive", 3).contains("can be tracked"));
+    for language in ["rust", "c"] {
+        let message = folder.refused(&format!("export r.json --to {language} --what recursive"), 3);
+        assert!(message.contains("can be tracked"), "{message}");
+    }
+}
+
+#[test]
+fn estimators_in_c_have_the_sizes_of_its_header() {
+    let folder = motor();
+    for (orders, most) in [
+        ("--na 10 --nb 2 --nk 1", "--na 10 --nb 3 --nk 1"),
+        ("--na 1 --nb 1 --nk 16", "--na 1 --nb 1 --nk 17"),
+    ] {
+        folder.done(&format!("fit dc_motor.csv --time t {orders} --report r.json"));
+        folder.done("export r.json --to c --what recursive");
+        folder.done(&format!("fit dc_motor.csv --time t {most} --report r.json"));
+        let message = folder.refused("export r.json --to c --what recursive", 2);
+        let sizes = "--to: estimators in C have up to 12 parameters, 4 inputs, and delays that add up to 16";
+        assert!(message.contains(sizes) && message.contains("take rust"), "{message}");
+        folder.done("export r.json --to rust --what recursive");
+    }
+    let header = include_str!("../crates/thetahat-c/include/thetahat.h");
+    for words in ["thetahat_arx_12;", "thetahat_armax_12;", "_MOST_INPUTS 4\n", "_MOST_DELAYS 16\n"] {
+        assert!(header.contains(words), "{words}");
+    }
+    assert!(!header.contains("thetahat_arx_13;") && !header.contains("thetahat_armax_13;"));
 }
 
 /// The predictor of the motor on a Cortex-M4F.
@@ -204,7 +246,7 @@ fn the_predictor_of_the_motor_is_small() {
         folder.done(&format!("export r.json --to c --what {purpose} --name motor"));
         let processor =
             ["-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16", "-c", "motor.c"];
-        run(Command::new("arm-none-eabi-gcc").current_dir(folder.path(".")).args(STRICT).args(processor));
+        done(Command::new("arm-none-eabi-gcc").current_dir(folder.path(".")).args(STRICT).args(processor));
         let size = Command::new("arm-none-eabi-size").arg(folder.path("motor.o")).output().expect("binutils");
         let text = String::from_utf8_lossy(&size.stdout).into_owned();
         let row = text.lines().nth(1).unwrap_or_default().split_whitespace();
@@ -248,6 +290,7 @@ fn what_cannot_be_exported_is_refused_and_nothing_written() {
             "--what: a model of polynomials is exported as no observer; take predictor, simulator",
         ),
         ("r.json --to c --what predictor --name Motor", 2, "--name: 'Motor' is no name"),
+        ("r.json --to c --what recursive --name thetahat", 2, "--name: 'thetahat' is no name"),
         ("r.json --to c --what predictor --rows 1..5", 2, "LOG"),
         ("r.json dc_motor.csv --time t --to c --what predictor --rows 1..5000", 3, "rows"),
         ("r.json nowhere.csv --to c --what predictor", 5, "nowhere.csv"),
@@ -292,8 +335,8 @@ fn controllers_control() {
     if has("gcc") {
         let mut command = Command::new("gcc");
         command.current_dir(folder.path(".")).args(STRICT);
-        run(command.args(["heater.c", "heater_test.c", "-o", "test_of_c", "-lm"]));
-        run(&mut Command::new(folder.path("test_of_c")));
+        done(command.args(["heater.c", "heater_test.c", "-o", "test_of_c", "-lm"]));
+        done(&mut Command::new(folder.path("test_of_c")));
     }
     folder.done("export c.json --to rust --what controller --name heater");
     folder.write(

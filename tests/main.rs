@@ -5,6 +5,8 @@ mod bad_options;
 mod bad_report;
 mod bode;
 mod browser;
+#[path = "../crates/thetahat-c/tests/interface/library.rs"]
+mod c_library;
 mod choice;
 mod clock;
 mod compare;

@@ -111,13 +111,19 @@ impl Kind for Arx {
 type ArxEstimator<const N: usize> = RecursiveArx<Number, Const<N>, Const<THETAHAT_MOST_DELAYS>>;
 type ArmaxEstimator<const N: usize> = RecursiveArmax<Number, Const<N>, Const<THETAHAT_MOST_DELAYS>>;
 
-/// What a batch fit knows.
+/// What a batch fit knows beside its parameters.
 pub(crate) struct Fit<'a> {
-    parameters: &'a [Number],
     /// P, row by row, as `Covariance::factor` has it.
     factor: &'a [Number],
     noise_variance: Number,
     samples: usize,
+}
+
+impl Fit<'_> {
+    /// P.
+    fn covariance<const N: usize>(&self) -> Result<Covariance<Number, Const<N>>, Error> {
+        Ok(Covariance::from_factor(matrix(self.factor, N))?)
+    }
 }
 
 /// What an estimator of any size and structure does.
@@ -126,8 +132,7 @@ pub(crate) trait Plant {
     fn applied(&mut self, inputs: &[Number]) -> Result<(), Error>;
     fn log_row(&mut self, output: Number, inputs: &[Number]) -> Result<Innovation, Error>;
     fn predict(&self, inputs: &[Number], outputs: &mut [Number]) -> Result<(), Error>;
-    fn set_parameters(&mut self, parameters: &[Number]) -> Result<(), Error>;
-    fn set_fit(&mut self, fit: &Fit<'_>) -> Result<(), Error>;
+    fn set_parameters(&mut self, parameters: &[Number], fit: Option<&Fit<'_>>) -> Result<(), Error>;
     fn set_adaptation(&mut self, on: bool);
     fn estimate(&self) -> &dyn Estimate;
 }
@@ -149,17 +154,13 @@ impl<const N: usize> Plant for ArxEstimator<N> {
         Ok(self.predict(inputs, outputs)?)
     }
 
-    fn set_parameters(&mut self, parameters: &[Number]) -> Result<(), Error> {
-        *self = self.clone().with_parameters(vector(parameters))?;
-        Ok(())
-    }
-
-    fn set_fit(&mut self, fit: &Fit<'_>) -> Result<(), Error> {
-        *self = self
-            .clone()
-            .with_parameters(vector(fit.parameters))?
-            .with_covariance(Covariance::from_factor(matrix(fit.factor, N))?)?
-            .with_noise_variance(fit.noise_variance, fit.samples)?;
+    fn set_parameters(&mut self, parameters: &[Number], fit: Option<&Fit<'_>>) -> Result<(), Error> {
+        let mut changed = self.clone().with_parameters(vector(parameters))?;
+        if let Some(fit) = fit {
+            changed = changed.with_covariance(fit.covariance()?)?;
+            changed = changed.with_noise_variance(fit.noise_variance, fit.samples)?;
+        }
+        *self = changed;
         Ok(())
     }
 
@@ -189,17 +190,13 @@ impl<const N: usize> Plant for ArmaxEstimator<N> {
         Ok(self.predict(inputs, outputs)?)
     }
 
-    fn set_parameters(&mut self, parameters: &[Number]) -> Result<(), Error> {
-        *self = self.clone().with_parameters(vector(parameters))?;
-        Ok(())
-    }
-
-    fn set_fit(&mut self, fit: &Fit<'_>) -> Result<(), Error> {
-        *self = self
-            .clone()
-            .with_parameters(vector(fit.parameters))?
-            .with_covariance(Covariance::from_factor(matrix(fit.factor, N))?)?
-            .with_noise_variance(fit.noise_variance, fit.samples)?;
+    fn set_parameters(&mut self, parameters: &[Number], fit: Option<&Fit<'_>>) -> Result<(), Error> {
+        let mut changed = self.clone().with_parameters(vector(parameters))?;
+        if let Some(fit) = fit {
+            changed = changed.with_covariance(fit.covariance()?)?;
+            changed = changed.with_noise_variance(fit.noise_variance, fit.samples)?;
+        }
+        *self = changed;
         Ok(())
     }
 
@@ -394,7 +391,7 @@ pub unsafe extern "C" fn thetahat_arx_set_parameters(arx: *mut Arx, parameters: 
     code(|| {
         let plant = memory::open(arx)?;
         let parameters = memory::array(parameters, plant.estimate().parameters().len())?;
-        plant.set_parameters(parameters)
+        plant.set_parameters(parameters, None)
     })
 }
 
@@ -422,7 +419,7 @@ pub unsafe extern "C" fn thetahat_arx_set_fit(
         let plant = memory::open(arx)?;
         let n = plant.estimate().parameters().len();
         let (parameters, factor) = (memory::array(parameters, n)?, memory::array(factor, n * n)?);
-        plant.set_fit(&Fit { parameters, factor, noise_variance, samples })
+        plant.set_parameters(parameters, Some(&Fit { factor, noise_variance, samples }))
     })
 }
 

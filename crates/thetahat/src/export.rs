@@ -287,10 +287,10 @@ fn refused(purpose: Purpose, model: &str, instead: &str) -> Error {
     Error::argument("what", format!("{model} is exported as no {}; take {instead}", purpose.word()))
 }
 
-/// Words that are taken in C, C++ or Rust, and names that a file of the standard library has.
-const TAKEN: [&str; 24] = [
+/// Words that are taken in C, C++ or Rust, and names that a file of the standard library or of the core in C has.
+const TAKEN: [&str; 25] = [
     "auto", "break", "case", "char", "const", "crate", "double", "else", "enum", "float", "fn", "for", "if",
-    "int", "let", "loop", "main", "math", "mod", "self", "state", "struct", "type", "while",
+    "int", "let", "loop", "main", "math", "mod", "self", "state", "struct", "thetahat", "type", "while",
 ];
 
 fn check_name(name: &str) -> Result<(), Error> {

@@ -13,10 +13,7 @@ pub(super) fn files(program: &Program, name: &str, precision: Precision, head: &
     let mut writer = Writer::new(&program, Language::C, precision);
     let entries: Vec<&Entry> = std::iter::once(&init).chain(&program.entries).collect();
 
-    let guard = format!("{}_H", name.to_uppercase());
-    let mut header = head.comments();
-    header += &format!("#ifndef {guard}\n#define {guard}\n\n#ifdef __cplusplus\nextern \"C\" {{\n#endif\n\n");
-    header += "// What one step leaves to the next one.\ntypedef struct {\n";
+    let mut header = "// What one step leaves to the next one.\ntypedef struct {\n".to_owned();
     for Declared { name, values, doc, .. } in program.arrays.iter().filter(|array| array.kind == Kind::Memory)
     {
         header += &format!("    {} {name}[{}]; // {doc}\n", writer.real(), values.len());
@@ -27,7 +24,6 @@ pub(super) fn files(program: &Program, name: &str, precision: Precision, head: &
         entry.doc.iter().for_each(|line| header += &format!("// {line}\n"));
         header += &format!("{};\n", prototype(&program, entry, name, &writer));
     }
-    header += "\n#ifdef __cplusplus\n}\n#endif\n\n#endif\n";
 
     let mut functions = String::new();
     for entry in &entries {
@@ -50,10 +46,17 @@ pub(super) fn files(program: &Program, name: &str, precision: Precision, head: &
             &format!("\n// {doc}\nstatic const {} {name}[{}] = {numbers};\n", writer.real(), values.len());
     }
     source += &functions;
-    vec![
-        ExportedFile { name: format!("{name}.h"), text: header },
-        ExportedFile { name: format!("{name}.c"), text: source },
-    ]
+    vec![self::header(name, head, "", &header), ExportedFile { name: format!("{name}.c"), text: source }]
+}
+
+/// A header of declarations, and of what comes before them.
+pub(super) fn header(name: &str, head: &Head, before: &str, declarations: &str) -> ExportedFile {
+    let (comments, guard) = (head.comments(), format!("{}_H", name.to_uppercase()));
+    let text = format!(
+        "{comments}#ifndef {guard}\n#define {guard}\n\n{before}#ifdef __cplusplus\nextern \"C\" {{\n#endif\n\n\
+         {declarations}\n#ifdef __cplusplus\n}}\n#endif\n\n#endif\n"
+    );
+    ExportedFile { name: format!("{name}.h"), text }
 }
 
 /// The function that puts a state at its start.
@@ -98,6 +101,16 @@ fn prototype(program: &Program, entry: &Entry, name: &str, writer: &Writer<'_>) 
     format!("void {name}_{}({})", entry.name, arguments.join(", "))
 }
 
+/// Columns as a table of a program that checks.
+pub(super) fn table(writer: &Writer<'_>, label: &str, columns: &[Vec<f64>], rows: usize) -> String {
+    let mut text = format!("\nstatic const {} {label}[{rows}][{}] = {{\n", writer.real(), columns.len());
+    for row in 0..rows {
+        let values: Vec<String> = columns.iter().map(|column| writer.number(column[row])).collect();
+        text += &format!("    {{{}}},\n", values.join(", "));
+    }
+    text + "};\n"
+}
+
 /// A program that steps along a test vector, and says by its exit code whether the outputs are right.
 pub(super) fn check(program: &Program, name: &str, precision: Precision, vector: &Vector) -> ExportedFile {
     let writer = Writer::new(program, Language::C, precision);
@@ -110,12 +123,7 @@ pub(super) fn check(program: &Program, name: &str, precision: Precision, vector:
     text += &format!("// {}\n", vector.tolerance_note());
     text += &format!("static const {real} TOLERANCE = {};\n", writer.number(vector.tolerance));
     for (label, columns) in vector.tables() {
-        text += &format!("\nstatic const {real} {label}[{rows}][{}] = {{\n", columns.len());
-        for row in 0..rows {
-            let values: Vec<String> = columns.iter().map(|column| writer.number(column[row])).collect();
-            text += &format!("    {{{}}},\n", values.join(", "));
-        }
-        text += "};\n";
+        text += &table(&writer, label, columns, rows);
     }
     let outputs = vector.expected.len();
     text += &format!(

@@ -1,6 +1,6 @@
 //! What stands in the comments of an exported file.
 
-use super::{Plan, Precision};
+use super::{Plan, Precision, Purpose};
 use crate::control::Control;
 use crate::data::text_digest;
 use crate::model::Signal;
@@ -47,7 +47,12 @@ impl Head {
         };
         lines.extend(model.inputs().iter().enumerate().map(|(place, signal)| named(place, 'u', signal)));
         lines.extend(model.outputs().iter().enumerate().map(|(place, signal)| named(place, 'y', signal)));
-        if !model.inputs().is_empty() {
+        if plan.purpose == Purpose::Recursive {
+            lines.push(
+                "Where an output is missing (NaN), or a sample that predicts it, nothing is corrected."
+                    .to_owned(),
+            );
+        } else if !model.inputs().is_empty() {
             lines.push(
                 "An input that is missing (NaN) keeps its value before, the first ones their offset."
                     .to_owned(),

@@ -137,9 +137,32 @@ def test_a_copy_goes_on_alike_and_a_probe_excites() -> None:
     own.applied(0.0)
 
 
+def test_a_tuner_learns_noise_that_is_not_white() -> None:
+    random, found = np.random.default_rng(5), {}
+    e = 0.05 * random.standard_normal(4000)
+    for nc in (0, 1):
+        own, y, u = th.SelfTuner(2, 2, nc=nc, frequency=0.6, limits=(-10, 10), forgetting=0.998), np.zeros(4000), np.zeros(4000)
+        for k in range(2, 4000):
+            y[k] = 1.5 * y[k - 1] - 0.7 * y[k - 2] + 0.1 * u[k - 1] + 0.05 * u[k - 2] + e[k] - 0.9 * e[k - 1]
+            u[k] = own.control(1.0 if k // 50 % 2 else -1.0, y[k])
+        assert len(own.c) == nc + 1 and f"nc={nc}" in repr(own)
+        found[nc] = own
+    errors = found[1].standard_errors
+    assert errors is not None and len(errors) == 6
+    truth = np.array([-1.5, 0.7, 0.1, 0.05])
+    estimates = np.r_[found[1].a[1:], found[1].b[1:]]
+    assert (np.abs(estimates - truth) < 3 * errors[:4]).all() and abs(found[1].c[1] + 0.9) < 3 * errors[5]
+    assert abs(found[0].b[1] - 0.1) > 0.1
+    other = pickle.loads(pickle.dumps(found[1]))
+    assert [found[1].control(1.0, 0.9) for _ in range(20)] == [other.control(1.0, 0.9) for _ in range(20)]
+
+
 @pytest.mark.parametrize(
     "more",
     [
+        {"nc": -1},
+        {"nc": 65},
+        {"nc": 1, "start": "exact"},
         {"frequency": 0.0},
         {"damping": 2.0},
         {"observer": 1.0},

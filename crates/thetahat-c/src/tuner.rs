@@ -145,7 +145,7 @@ impl TunerSize {
 }
 
 const fn indirect_orders(na: usize, nb: usize) -> TunerOrders {
-    TunerOrders { na, nb, constant: true, integrator: true }
+    TunerOrders { na, nb, nc: 0, constant: true, integrator: true }
 }
 
 const fn direct_orders(na: usize, nb: usize, delay: usize) -> DirectOrders {

@@ -11,7 +11,7 @@ use crate::stability::{is_stable, move_stably};
 use crate::ud::{copy, dot};
 use crate::{
     Action, ArxOrders, Covariance, Dimension, Error, Forgetting, Innovation, InputOrders, Lags, Real,
-    RecursiveLeastSquares,
+    RecursiveLeastSquares, RlsStart,
 };
 
 /// The orders of an ARMAX model: those of an [ARX model](ArxOrders), and the order of its noise.
@@ -86,7 +86,7 @@ pub enum ArmaxMethod {
 /// ```
 ///
 /// [`ArmaxMethod`] says which ψ is for what. Everything said of forgetting and bounds at [`RecursiveLeastSquares`]
-/// holds here; the start is the standard one.
+/// holds here; the start is the standard one where nc is above 0.
 ///
 /// C stays stable, with its zeros inside the radius 1 - 1/1024, so that what 1/C(q) filters is forgotten after some
 /// thousand samples: a step that would lead out is halved until it does not, at most ten times, and else left out.
@@ -177,6 +177,16 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
             method,
             scratch: size.scratch::<T, 2, 0>(),
         })
+    }
+
+    /// The same with another start. See [`RecursiveLeastSquares::with_start`].
+    ///
+    /// Errors: [`Error::OutOfRange`] for any but the standard one with nc above 0: residuals are not known before parameters are.
+    pub fn with_start(self, start: RlsStart) -> Result<Self, Error> {
+        if self.nc > 0 && start != RlsStart::Standard {
+            return Err(Error::OutOfRange { argument: "start", range: "standard, as nc is above 0" });
+        }
+        Ok(RecursiveArmax { estimator: self.estimator.with_start(start)?, ..self })
     }
 
     /// The same with these parameters to start from. See [`RecursiveLeastSquares::with_parameters`], whose errors

@@ -164,7 +164,7 @@ pub use basis::{
 pub use control::{
     DirectOrders, DirectSelfTuner, IndirectSelfTuner, LinearQuadratic, MinimumVariance,
     MinimumVarianceOrders, PidSettings, PlacementOrders, Probing, ResponseWanted, RstController, Sensor,
-    TunerOrders, TunerSettings, TunerState, WantedPoles,
+    TunerModel, TunerOrders, TunerSettings, TunerState, WantedPoles,
 };
 pub use covariance::Covariance;
 pub use detect::{Alarm, ChangeDetector, Chart};

@@ -19,7 +19,7 @@ use thetahat_core::{Error, Forgetting, IndirectSelfTuner, ResponseWanted, TunerO
 use crate::heater::Heater;
 
 /// Second order with up to three samples of dead time, losses that are not known, and a controller that integrates.
-const ORDERS: TunerOrders = TunerOrders { na: 2, nb: 5, constant: true, integrator: true };
+const ORDERS: TunerOrders = TunerOrders { na: 2, nb: 5, nc: 0, constant: true, integrator: true };
 type Tuner = IndirectSelfTuner<f32, Const<{ ORDERS.parameters() }>, Const<{ ORDERS.size() }>>;
 
 const PERIOD: Duration = Duration::from_secs(2);

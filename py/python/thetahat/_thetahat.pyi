@@ -485,6 +485,7 @@ class SelfTuner:
         na: int,
         nb: int,
         *,
+        nc: int = 0,
         frequency: float,
         limits: tuple[float, float],
         damping: float = 0.8,
@@ -511,6 +512,8 @@ class SelfTuner:
     def a(self) -> _Array: ...
     @property
     def b(self) -> _Array: ...
+    @property
+    def c(self) -> _Array: ...
     @property
     def constant(self) -> float | None: ...
     @property

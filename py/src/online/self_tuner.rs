@@ -5,7 +5,8 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use thetahat_core::nalgebra::Dyn;
 use thetahat_core::{
-    IndirectSelfTuner, Probing, ResponseWanted, RlsStart, Sensor, TunerOrders, TunerSettings, TunerState,
+    IndirectSelfTuner, Probing, RecursiveArmax, ResponseWanted, RlsStart, Sensor, TunerOrders, TunerSettings,
+    TunerState,
 };
 
 use super::argument::{self, Whole, count, failed};
@@ -13,7 +14,8 @@ use super::controller::RstController;
 use super::forgetting::{Memory, STANDARD};
 use super::{Reduced, snapshot};
 
-type Stepper = IndirectSelfTuner<f64, Dyn, Dyn>;
+/// Without noise parameters that of an ARX model, to the bit.
+type Stepper = IndirectSelfTuner<f64, Dyn, Dyn, RecursiveArmax<f64, Dyn>>;
 
 /// A controller that estimates a model of its plant, and is designed anew for it while it runs.
 ///
@@ -21,6 +23,8 @@ type Stepper = IndirectSelfTuner<f64, Dyn, Dyn>;
 /// ----------
 /// na, nb : int
 ///     The orders of the model. 2 coefficients of B for a plant of second order, and one more for each sample of dead time that there may be.
+/// nc : int, default 0
+///     The order of C: above 0 where the noise is not white. Then C is a factor of the observer's polynomial.
 /// frequency : float
 ///     The natural frequency of the response that is wanted, in rad a sample: it settles in about 4 / (damping frequency) samples.
 /// damping : float, default 0.8
@@ -48,7 +52,7 @@ type Stepper = IndirectSelfTuner<f64, Dyn, Dyn>;
 /// stuck_after : int, default 0
 ///     So many equal measurements in a row are those of a sensor that is stuck; 0 if a working one repeats itself.
 /// start : {"standard", "exact"}, default "standard"
-///     As for `RecursiveLeastSquares`.
+///     As for `RecursiveLeastSquares`; only "standard" with `nc` above 0.
 ///
 /// Raises
 /// ------
@@ -57,6 +61,10 @@ type Stepper = IndirectSelfTuner<f64, Dyn, Dyn>;
 ///
 /// Notes
 /// -----
+/// The model is A y = B u + constant + C e, and the closed loop has the poles A_m A_o of the response that is wanted, with
+/// A_o = C (1 - observer q^-1). Noise that is not white biases the model with `nc` = 0; with it, the noise passes through the loop without the
+/// factor C. It takes more samples to know more parameters: where the noise is nearly white, `nc` = 0 is better.
+///
 /// A measurement that is NaN is missing: the controller goes on with what its model predicts, for 100 samples, and then holds the input. A design is taken
 /// only where the peaks of its sensitivities with the model are below 2; slower responses are tried in turn, and the last good controller
 /// stays otherwise. The margins are those with the model: where the plant is of a higher order, disturbances can make the loop burst up to the limits.
@@ -83,17 +91,18 @@ pub(crate) struct SelfTuner {
 #[pymethods]
 impl SelfTuner {
     #[new]
-    #[pyo3(signature = (na, nb, *, frequency, limits, damping = 0.8, observer = 0.3, input = None, output_scale = 1.0, input_scale = 1.0,
+    #[pyo3(signature = (na, nb, *, nc = Whole(0), frequency, limits, damping = 0.8, observer = 0.3, input = None, output_scale = 1.0, input_scale = 1.0,
         gain_sign = Whole(0), forgetting = STANDARD, constant = true, integrator = true, probing = None, sensor_range = None,
         stuck_after = Whole(0), start = "standard"))]
     #[pyo3(
-        text_signature = "(na, nb, *, frequency, limits, damping=0.8, observer=0.3, input=None, output_scale=1.0, input_scale=1.0, gain_sign=0, forgetting=0.99, constant=True, integrator=True, probing=None, sensor_range=None, stuck_after=0, start='standard')"
+        text_signature = "(na, nb, *, nc=0, frequency, limits, damping=0.8, observer=0.3, input=None, output_scale=1.0, input_scale=1.0, gain_sign=0, forgetting=0.99, constant=True, integrator=True, probing=None, sensor_range=None, stuck_after=0, start='standard')"
     )]
     #[expect(clippy::too_many_arguments, reason = "most are options, given by name")]
     fn new(
         py: Python<'_>,
         na: Whole,
         nb: Whole,
+        nc: Whole,
         frequency: f64,
         limits: (f64, f64),
         damping: f64,
@@ -110,7 +119,7 @@ impl SelfTuner {
         stuck_after: Whole,
         start: &str,
     ) -> PyResult<Self> {
-        let (na, nb) = (count("na", na, 0, 64)?, count("nb", nb, 1, 64)?);
+        let (na, nb, nc) = (count("na", na, 0, 64)?, count("nb", nb, 1, 64)?, count("nc", nc, 0, 64)?);
         let gain_sign = match gain_sign.0 {
             -1 => -1.0,
             0 => 0.0,
@@ -126,7 +135,7 @@ impl SelfTuner {
                 )));
             }
         };
-        let orders = TunerOrders { na, nb, constant, integrator };
+        let orders = TunerOrders { na, nb, nc, constant, integrator };
         let response = ResponseWanted { frequency, damping, observer };
         let usual = TunerSettings::new(response, limits.0..=limits.1, input_scale);
         let probing = probing.map_or(usual.probing, |(amplitude, largest)| Probing {
@@ -217,13 +226,19 @@ impl SelfTuner {
         PyArray1::from_iter(py, self.tuner.plant().b(0).into_iter().flatten())
     }
 
+    /// C of the model, from its 1 on.
+    #[getter]
+    fn c<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_iter(py, self.tuner.plant().c())
+    }
+
     /// The constant of the model; None if it has none.
     #[getter]
     fn constant(&self) -> Option<f64> {
         self.tuner.plant().constant()
     }
 
-    /// The standard errors of a_1 ... b_1 ... and the constant; None as long as they are not known.
+    /// The standard errors of a_1 ... b_1 ..., the constant and c_1 ...; None as long as they are not known.
     #[getter]
     fn standard_errors<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
         self.tuner.plant().estimator().standard_errors().map(|errors| argument::from_vector(py, &errors))
@@ -240,8 +255,8 @@ impl SelfTuner {
     }
 
     fn __repr__(&self) -> String {
-        let (a, b) =
-            (self.tuner.plant().a().count() - 1, self.tuner.plant().b(0).map_or(1, Iterator::count) - 1);
-        format!("SelfTuner(na={a}, nb={b}, {})", self.state())
+        let plant = self.tuner.plant();
+        let (a, b, c) = (plant.a().count(), plant.b(0).map_or(1, Iterator::count), plant.c().count());
+        format!("SelfTuner(na={}, nb={}, nc={}, {})", a - 1, b - 1, c - 1, self.state())
     }
 }

@@ -55,7 +55,7 @@ fn settings() -> TunerSettings<f32> {
 /// A tuner of a plant of second order with a design in each step, while a hand applies what was recorded.
 pub(crate) struct Tuned(IndirectSelfTuner<f32, Const<{ TUNED.parameters() }>, Const<{ TUNED.size() }>>);
 
-const TUNED: TunerOrders = TunerOrders { na: 2, nb: 2, constant: true, integrator: true };
+const TUNED: TunerOrders = TunerOrders { na: 2, nb: 2, nc: 0, constant: true, integrator: true };
 
 impl Scenario for Tuned {
     const NAME: &'static str = "IndirectSelfTuner, (2, 2)";

@@ -354,7 +354,7 @@ fn step_tuner<T: Number>(
 }
 
 fn step_indirect<T: Number>(lines: &mut Lines<T>) -> Result<(), Error> {
-    let orders = TunerOrders { na: 1, nb: 1, constant: true, integrator: true };
+    let orders = TunerOrders { na: 1, nb: 1, nc: 0, constant: true, integrator: true };
     let (settings, one) = (settings::<T>(), T::one());
     let mut tuner: IndirectSelfTuner<T, Const<3>, Const<2>> =
         IndirectSelfTuner::new(&orders, &settings, one, one, Forgetting::default())?;

@@ -3,6 +3,7 @@
 mod closed_loop;
 mod direct;
 mod indirect;
+mod model;
 mod past;
 mod probe;
 mod response;
@@ -11,6 +12,7 @@ mod settings;
 
 pub use direct::{DirectOrders, DirectSelfTuner};
 pub use indirect::{IndirectSelfTuner, TunerOrders};
+pub use model::TunerModel;
 pub use probe::Probing;
 pub use response::ResponseWanted;
 pub use sensor::Sensor;

@@ -79,6 +79,18 @@ impl<T: Real, N: Dimension> RstController<T, N> {
     /// # Ok::<(), Error>(())
     /// ```
     pub fn pole_placement(a: &[T], b: &[T], wanted: &WantedPoles<'_, T>) -> Result<Self, Error> {
+        let exactly = |needed| N::exactly(needed).map_err(|available| Error::Orders { needed, available });
+        Self::pole_placement_with(a, b, wanted, exactly)
+    }
+
+    /// The same with the `N` that is made of [`PlacementOrders::size`]. A larger one has more coefficients of R, for an A_m A_o of
+    /// a higher degree.
+    pub(super) fn pole_placement_with(
+        a: &[T],
+        b: &[T],
+        wanted: &WantedPoles<'_, T>,
+        size: impl FnOnce(usize) -> Result<N, Error>,
+    ) -> Result<Self, Error> {
         let WantedPoles { response, observer, integrator, cancel_zeros } = *wanted;
         for (argument, values) in [("a", a), ("b", b), ("response", response), ("observer", observer)] {
             if !values.iter().all(T::is_finite) {
@@ -99,7 +111,8 @@ impl<T: Real, N: Dimension> RstController<T, N> {
         }
         let (na, nb) = (a.len() - 1, b.len() - 1);
         let needed = PlacementOrders { na, nb, integrator }.size();
-        let size = N::exactly(needed).map_err(|available| Error::Orders { needed, available })?;
+        let size = size(needed)?;
+        let spare = size.value().saturating_sub(needed);
         let poles = response.len() + observer.len() - 2;
         // Zeros that are cancelled take no part in the equation.
         let gain = at(b, delay);
@@ -113,7 +126,7 @@ impl<T: Real, N: Dimension> RstController<T, N> {
             let before = power.checked_sub(1).map_or(T::zero(), |before| at(a, before));
             at(a, power) - if integrator { before } else { T::zero() }
         };
-        let (of_r, of_s) = (last - 1, na + usize::from(integrator));
+        let (of_r, of_s) = (last - 1 + spare, na + usize::from(integrator));
         let unknown = of_r + of_s;
         if poles > unknown {
             return Err(Error::Length {
@@ -133,7 +146,7 @@ impl<T: Real, N: Dimension> RstController<T, N> {
             });
         }
         let mut equations = LeastSquares::with_size(size);
-        for power in 1..=needed {
+        for power in 1..=size.value() {
             let mut row = size.vector(T::zero());
             let mut right = T::zero();
             if power <= unknown {

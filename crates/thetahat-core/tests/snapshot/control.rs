@@ -3,8 +3,8 @@
 use serde_json::json;
 use thetahat_core::nalgebra::Const;
 use thetahat_core::{
-    DirectOrders, DirectSelfTuner, Error, Forgetting, IndirectSelfTuner, Probing, ResponseWanted,
-    RstController, Sensor, TunerOrders, TunerSettings,
+    DirectOrders, DirectSelfTuner, Error, Forgetting, IndirectSelfTuner, Probing, RecursiveArmax,
+    ResponseWanted, RstController, Sensor, TunerOrders, TunerSettings,
 };
 
 use super::{check, output, refuses, value};
@@ -39,7 +39,7 @@ const FORGETTING: Forgetting<f64> = Forgetting::Exponential { factor: 0.98 };
 
 #[test]
 fn indirect_self_tuners() -> Result<(), Error> {
-    const ORDERS: TunerOrders = TunerOrders { na: 2, nb: 2, constant: true, integrator: true };
+    const ORDERS: TunerOrders = TunerOrders { na: 2, nb: 2, nc: 0, constant: true, integrator: true };
     type Tuner = IndirectSelfTuner<f64, Const<{ ORDERS.parameters() }>, Const<{ ORDERS.size() }>>;
     let tuner = Tuner::new(&ORDERS, &settings(), 3.0, 1.0, FORGETTING)?.with_peaks(1e6, 1e6)?;
     let step = |tuner: &mut Tuner, k: usize| {
@@ -68,6 +68,27 @@ fn indirect_self_tuners() -> Result<(), Error> {
             ("/version", &[json!(0)]),
         ],
     );
+    Ok(())
+}
+
+#[test]
+fn indirect_self_tuners_with_noise() -> Result<(), Error> {
+    const ORDERS: TunerOrders = TunerOrders { na: 1, nb: 2, nc: 2, constant: true, integrator: true };
+    const P: usize = ORDERS.parameters();
+    type Tuner = IndirectSelfTuner<f64, Const<P>, Const<{ ORDERS.size() }>, RecursiveArmax<f64, Const<P>>>;
+    let mut tuner = Tuner::new(&ORDERS, &settings(), 3.0, 1.0, FORGETTING)?.with_peaks(1e6, 1e6)?;
+    let step = |tuner: &mut Tuner, k: usize| {
+        let input = tuner.control(value(k / 8), output(k));
+        tuner.applied(value(3 * k));
+        (input, tuner.state(), tuner.plant().estimator().parameters().as_slice().to_vec())
+    };
+    check(tuner.clone(), step);
+    (0..60).for_each(|k| {
+        step(&mut tuner, k);
+    });
+    assert!(tuner.controller().is_some());
+    check(tuner.clone(), step);
+    refuses(&tuner, &[("/plant/nc", &[json!(1), json!(3)][..]), ("/known_sign", &[json!(null)])]);
     Ok(())
 }
 

@@ -5,7 +5,7 @@ use thetahat_core::{Forgetting, IndirectSelfTuner, ResponseWanted, Sensor, Tuner
 
 use super::{Noise, steps};
 
-const ORDERS: TunerOrders = TunerOrders { na: 2, nb: 5, constant: true, integrator: true };
+const ORDERS: TunerOrders = TunerOrders { na: 2, nb: 5, nc: 0, constant: true, integrator: true };
 type Tuner = IndirectSelfTuner<f32, Const<{ ORDERS.parameters() }>, Const<{ ORDERS.size() }>>;
 
 /// So many samples with one plant.

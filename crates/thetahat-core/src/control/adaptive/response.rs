@@ -1,5 +1,6 @@
 //! What the loop of an unknown plant shall be like.
 
+use crate::control::polynomial::product;
 use crate::{Error, Real};
 
 /// The response that is wanted of a plant that is not known yet.
@@ -56,7 +57,9 @@ impl<T: Real> ResponseWanted<T> {
     ///
     /// Last because the response to a set point is the plant's then. But where poles are faster than the response that is wanted,
     /// and hardly damped, it takes a model that is nearly right to damp them.
-    pub(super) fn candidate<'a>(&self, index: usize, a: &'a [T]) -> Option<Candidate<'a, T>> {
+    ///
+    /// Where the model has a C, each is tried with it as a factor of A_o, and then without.
+    pub(super) fn candidate<'a>(&self, index: usize, a: &'a [T], c: &'a [T]) -> Option<Candidate<'a, T>> {
         // In hundredths: of the frequency; the least damping and the least pole of A_o.
         const SLOWER: [(usize, usize, usize); 11] = [
             (100, 0, 0),
@@ -72,6 +75,11 @@ impl<T: Real> ResponseWanted<T> {
             (12, 100, 90),
         ];
         const INTEGRAL: [usize; 4] = [50, 75, 90, 97];
+        let (index, noise) = match c {
+            [first, _, ..] if !index.is_multiple_of(2) => (index / 2, core::slice::from_ref(first)),
+            [_, _, ..] => (index / 2, c),
+            _ => (index, c),
+        };
         let part = |hundredths| T::from_count(hundredths) / T::from_count(100);
         if let Some((slower, damping, observer)) = SLOWER.get(index) {
             let wanted = ResponseWanted {
@@ -79,10 +87,11 @@ impl<T: Real> ResponseWanted<T> {
                 damping: self.damping.max(part(*damping)),
                 observer: self.observer.max(part(*observer)),
             };
-            return Some(Candidate { own: None, response: wanted.response(), observer: wanted.observer() });
+            let (response, observer) = (wanted.response(), wanted.observer());
+            return Some(Candidate { own: None, response, observer, noise });
         }
         let observer = part(*INTEGRAL.get(index - SLOWER.len())?);
-        Some(Candidate { own: Some(a), response: [T::one(); 3], observer: [T::one(), -observer] })
+        Some(Candidate { own: Some(a), response: [T::one(); 3], observer: [T::one(), -observer], noise })
     }
 }
 
@@ -92,6 +101,8 @@ pub(super) struct Candidate<'a, T> {
     pub(super) own: Option<&'a [T]>,
     response: [T; 3],
     observer: [T; 2],
+    /// C of the model, or 1.
+    noise: &'a [T],
 }
 
 impl<T: Real> Candidate<'_, T> {
@@ -100,11 +111,17 @@ impl<T: Real> Candidate<'_, T> {
         self.own.unwrap_or(&self.response)
     }
 
-    /// A_o. A pole at 0 takes no coefficient.
-    pub(super) fn observer(&self) -> &[T] {
-        match &self.observer {
+    /// A_o, in a buffer. A pole at 0 takes no coefficient.
+    pub(super) fn observer<'b>(&self, buffer: &'b mut [T]) -> &'b [T] {
+        let observer = match &self.observer {
             [first, pole] if pole.is_zero() => core::slice::from_ref(first),
             both => both,
+        };
+        let powers = self.noise.len() + observer.len() - 1;
+        let whole = buffer.get_mut(..powers).unwrap_or_default();
+        for (power, entry) in whole.iter_mut().enumerate() {
+            *entry = product(self.noise, observer, power);
         }
+        whole
     }
 }

@@ -2,6 +2,7 @@ extern crate std;
 
 mod faults;
 mod motor;
+mod noise;
 mod plants;
 mod refusals;
 
@@ -55,7 +56,7 @@ fn normal(noise: &mut Noise) -> f64 {
 }
 
 /// A plant of second order with up to three samples of dead time.
-const ORDERS: TunerOrders = TunerOrders { na: 2, nb: 5, constant: true, integrator: true };
+const ORDERS: TunerOrders = TunerOrders { na: 2, nb: 5, nc: 0, constant: true, integrator: true };
 type Tuner = IndirectSelfTuner<f32, Const<{ ORDERS.parameters() }>, Const<{ ORDERS.size() }>>;
 
 const WANTED: ResponseWanted<f32> = ResponseWanted { frequency: 0.3, damping: 0.8, observer: 0.3 };

@@ -3,14 +3,14 @@
 use nalgebra::Const;
 use serde::{Deserialize, Serialize};
 
-use super::{ClosedLoop, IndirectSelfTuner, Trial};
-use crate::{Dimension, Error, PlacementOrders, Real, RecursiveArx, SnapshotVersion};
+use super::{ClosedLoop, IndirectSelfTuner, Trial, TunerModel};
+use crate::{Dimension, Error, Real, SnapshotVersion};
 
 #[derive(Serialize, Deserialize)]
-#[serde(bound = "")]
-pub(super) struct Snapshot<T: Real, P: Dimension + Dimension<Const<1>>, N: Dimension> {
+#[serde(bound = "M: serde::Serialize + serde::de::DeserializeOwned")]
+pub(super) struct Snapshot<T: Real, N: Dimension, M> {
     version: SnapshotVersion,
-    plant: RecursiveArx<T, P>,
+    plant: M,
     closed: ClosedLoop<T, N>,
     integrator: bool,
     cancel_zeros: bool,
@@ -23,10 +23,10 @@ pub(super) struct Snapshot<T: Real, P: Dimension + Dimension<Const<1>>, N: Dimen
     known_sign: T,
 }
 
-impl<T: Real, P: Dimension + Dimension<Const<1>>, N: Dimension> From<IndirectSelfTuner<T, P, N>>
-    for Snapshot<T, P, N>
+impl<T: Real, P: Dimension + Dimension<Const<1>>, N: Dimension, M: TunerModel<T, P>>
+    From<IndirectSelfTuner<T, P, N, M>> for Snapshot<T, N, M>
 {
-    fn from(tuner: IndirectSelfTuner<T, P, N>) -> Self {
+    fn from(tuner: IndirectSelfTuner<T, P, N, M>) -> Self {
         let IndirectSelfTuner { plant, closed, integrator, cancel_zeros, design_every, peaks, .. } = tuner;
         let IndirectSelfTuner { candidate, since_design, since_all, trial, known_sign, .. } = tuner;
         Snapshot {
@@ -46,21 +46,19 @@ impl<T: Real, P: Dimension + Dimension<Const<1>>, N: Dimension> From<IndirectSel
     }
 }
 
-impl<T: Real, P: Dimension + Dimension<Const<1>>, N: Dimension> TryFrom<Snapshot<T, P, N>>
-    for IndirectSelfTuner<T, P, N>
+impl<T: Real, P: Dimension + Dimension<Const<1>>, N: Dimension, M: TunerModel<T, P>>
+    TryFrom<Snapshot<T, N, M>> for IndirectSelfTuner<T, P, N, M>
 {
     type Error = Error;
 
-    fn try_from(read: Snapshot<T, P, N>) -> Result<Self, Error> {
+    fn try_from(read: Snapshot<T, N, M>) -> Result<Self, Error> {
         let Snapshot { plant, closed, integrator, cancel_zeros, design_every, peaks, .. } = read;
         let Snapshot { candidate, since_design, since_all, trial, known_sign, .. } = read;
-        // A of na + 1 coefficients, B of one input with a leading zero.
-        let (na, nb) = (plant.a().count(), plant.b(0).map_or(0, Iterator::count));
-        if nb < 2 || plant.b(1).is_some() || !known_sign.is_finite() {
-            return Err(Error::OutOfRange { argument: "plant", range: "a model with one input" });
-        }
-        closed.check(PlacementOrders { na: na.saturating_sub(1), nb: nb - 1, integrator }.size())?;
+        let orders = plant.orders(integrator).filter(|_| known_sign.is_finite());
+        let range = "a model with one input";
+        closed.check(orders.ok_or(Error::OutOfRange { argument: "plant", range })?.size())?;
         let whole = IndirectSelfTuner {
+            parameters: plant.estimator().covariance().size(),
             plant,
             closed,
             integrator,

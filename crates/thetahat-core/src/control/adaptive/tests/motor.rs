@@ -11,7 +11,7 @@ use crate::{
 /// Without and with the zero cancelled (figures of an independent program): r_1, s_0, s_1, t_0.
 const PLACED: [f64; 4] = [0.111105, 1.642216, -0.747070, 0.895146];
 const CANCELLED: [f64; 4] = [0.846742, 2.685158, -1.032054, 1.653104];
-const ORDERS: TunerOrders = TunerOrders { na: 2, nb: 2, constant: false, integrator: false };
+const ORDERS: TunerOrders = TunerOrders { na: 2, nb: 2, nc: 0, constant: false, integrator: false };
 const DIRECT: DirectOrders = DirectOrders { na: 2, nb: 2, delay: 1, constant: false };
 
 type Indirect = IndirectSelfTuner<f64, Const<{ ORDERS.parameters() }>, Const<{ ORDERS.size() }>>;

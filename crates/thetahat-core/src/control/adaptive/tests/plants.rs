@@ -151,8 +151,8 @@ fn what_the_model_leaves_out_lets_it_burst() -> Result<(), Error> {
         Ok(largest)
     };
     let response = crate::ResponseWanted { frequency: 0.12, damping: 1.0, observer: 0.5 };
-    let small = crate::TunerOrders { na: 1, nb: 1, constant: true, integrator: true };
-    let whole = crate::TunerOrders { na: 3, nb: 3, constant: true, integrator: true };
+    let small = crate::TunerOrders { na: 1, nb: 1, nc: 0, constant: true, integrator: true };
+    let whole = crate::TunerOrders { na: 3, nb: 3, nc: 0, constant: true, integrator: true };
     let (bursts, holds) = (largest(&small, response)?, largest(&whole, response)?);
     assert!(holds < 3.0 && (3.5..20.0).contains(&bursts), "{bursts} {holds}");
     Ok(())

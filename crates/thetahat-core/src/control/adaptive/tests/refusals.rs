@@ -2,8 +2,8 @@ use nalgebra::Const;
 
 use super::{Tuner, WANTED, settings, tuner};
 use crate::{
-    DirectOrders, DirectSelfTuner, Error, Forgetting, IndirectSelfTuner, Probing, ResponseWanted, Sensor,
-    TunerOrders, TunerSettings,
+    DirectOrders, DirectSelfTuner, Error, Forgetting, IndirectSelfTuner, Probing, RecursiveArmax,
+    ResponseWanted, Sensor, TunerOrders, TunerSettings,
 };
 
 fn refused<V>(result: Result<V, Error>, name: &str) -> bool {
@@ -39,7 +39,7 @@ fn settings_out_of_their_range_are_refused() {
 #[test]
 fn orders_and_numbers_out_of_their_range_are_refused() -> Result<(), Error> {
     let forgetting = || Forgetting::Exponential { factor: 0.98_f32 };
-    let orders = TunerOrders { na: 2, nb: 2, constant: true, integrator: true };
+    let orders = TunerOrders { na: 2, nb: 2, nc: 0, constant: true, integrator: true };
     let found = Tuner::new(&orders, &settings(), 1.0, 1.0, forgetting()).map(|_| ());
     assert_eq!(found, Err(Error::Orders { needed: 4, available: 7 }));
     let small: Result<IndirectSelfTuner<f32, Const<4>, Const<4>>, _> =
@@ -68,6 +68,14 @@ fn orders_and_numbers_out_of_their_range_are_refused() -> Result<(), Error> {
     Ok(())
 }
 
+const COLOURED: TunerOrders = TunerOrders { nc: 2, ..super::ORDERS };
+type Plant = RecursiveArmax<f32, Const<{ COLOURED.parameters() }>>;
+type Coloured = IndirectSelfTuner<f32, Const<{ COLOURED.parameters() }>, Const<{ COLOURED.size() }>, Plant>;
+
+fn coloured() -> Result<Coloured, Error> {
+    Coloured::new(&COLOURED, &settings(), 1.0, 1.0, Forgetting::Exponential { factor: 0.98 })
+}
+
 /// Whatever is measured, and whatever is wanted: a finite input within the limits, and never a panic.
 #[test]
 fn any_number_may_be_measured() -> Result<(), Error> {
@@ -79,21 +87,27 @@ fn any_number_may_be_measured() -> Result<(), Error> {
     let mut pick = || NUMBERS.get(((noise.next() + 1.0) * 4.5) as usize).copied().unwrap_or(0.5);
     let mut indirect = tuner(&settings(), 0.98)?;
     let mut direct = Direct::new(&orders, &settings(), 1.0, 1.0, Forgetting::Exponential { factor: 0.98 })?;
+    let mut coloured = coloured()?;
     for _ in 0..20_000 {
         let (set_point, measurement) = (pick(), pick());
-        for u in [indirect.control(set_point, measurement), direct.control(set_point, measurement)] {
+        let of_indirect =
+            [indirect.control(set_point, measurement), coloured.control(set_point, measurement)];
+        for u in [of_indirect[0], of_indirect[1], direct.control(set_point, measurement)] {
             assert!((-10.0..=10.0).contains(&u), "{set_point} {measurement}: {u}");
         }
         let told = pick();
         indirect.applied(told);
+        coloured.applied(told);
         direct.applied(told);
     }
-    // And both still work.
-    let (mut y, mut z) = (0.0, 0.0);
+    // And all still work.
+    let (mut x, mut y, mut z) = (0.0, 0.0, 0.0);
     for _ in 0..3000 {
+        x = 0.9 * x + 0.1 * coloured.control(1.0, x);
         y = 0.9 * y + 0.1 * indirect.control(1.0, y);
         z = 0.9 * z + 0.1 * direct.control(1.0, z);
     }
+    assert!((x - 1.0).abs() < 0.05, "{x}");
     assert!((y - 1.0).abs() < 0.05 && (z - 1.0).abs() < 0.05, "{y} {z}");
     Ok(())
 }

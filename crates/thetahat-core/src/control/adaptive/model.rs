@@ -1,0 +1,143 @@
+//! The models that an indirect self-tuner can estimate.
+
+use nalgebra::Const;
+
+#[cfg(doc)]
+use super::IndirectSelfTuner;
+use super::TunerOrders;
+use crate::{
+    ArmaxMethod, ArmaxOrders, ArxOrders, Dimension, Error, Forgetting, Innovation, InputOrders, Lags, Real,
+    RecursiveArmax, RecursiveArx, RecursiveLeastSquares, RlsStart,
+};
+
+/// A model that an [`IndirectSelfTuner`] can estimate: [`RecursiveArx`], or [`RecursiveArmax`] where the noise is not white. The
+/// trait is sealed.
+pub trait TunerModel<T: Real, P: Dimension + Dimension<Const<1>>>: Estimated<T, P> {}
+
+impl<T: Real, P: Dimension + Dimension<Const<1>>, M: Estimated<T, P>> TunerModel<T, P> for M {}
+
+/// What a tuner does with its model.
+pub trait Estimated<T: Real, P: Dimension + Dimension<Const<1>>>: Clone {
+    fn new(orders: &TunerOrders, scales: [T; 2], forgetting: Forgetting<T>) -> Result<Self, Error>;
+    fn with_start(self, start: RlsStart) -> Result<Self, Error>;
+    fn measured(&mut self, output: T) -> Result<Innovation<T>, Error>;
+    fn applied(&mut self, input: T) -> Result<(), Error>;
+    fn predict(&self, input: T, output: &mut [T]) -> Result<(), Error>;
+    fn set_adaptation(&mut self, on: bool);
+    fn lags(&self) -> &Lags<T, P>;
+    fn estimator(&self) -> &RecursiveLeastSquares<T, P>;
+    /// C, from its 1 on.
+    fn c(&self) -> impl Iterator<Item = T> + Clone;
+
+    /// A, from its 1 on.
+    fn a(&self) -> impl Iterator<Item = T> + Clone {
+        self.lags().output_coefficients(self.estimator().parameters().as_slice())
+    }
+
+    /// B of an input, from its zero on.
+    fn b(&self, input: usize) -> Option<impl Iterator<Item = T> + Clone> {
+        self.lags().input_coefficients(self.estimator().parameters().as_slice(), input)
+    }
+
+    fn has_constant(&self) -> bool {
+        self.lags().constant(self.estimator().parameters().as_slice()).is_some()
+    }
+
+    /// The orders that it has, in a loop that integrates or not; `None` if it is no model of one input that acts on the next sample.
+    fn orders(&self, integrator: bool) -> Option<TunerOrders> {
+        let count = |coefficients: usize| coefficients.checked_sub(1);
+        let (na, nb) = (count(self.a().count())?, count(self.b(0)?.count())?);
+        let orders =
+            TunerOrders { na, nb, nc: count(self.c().count())?, constant: self.has_constant(), integrator };
+        let is_whole =
+            nb > 0 && self.b(1).is_none() && self.estimator().parameters().len() == orders.parameters();
+        is_whole.then_some(orders)
+    }
+}
+
+impl<T: Real, P: Dimension + Dimension<Const<1>>> Estimated<T, P> for RecursiveArx<T, P> {
+    fn new(orders: &TunerOrders, scales: [T; 2], forgetting: Forgetting<T>) -> Result<Self, Error> {
+        let TunerOrders { na, nb, nc, constant, .. } = *orders;
+        if nc > 0 {
+            return Err(Error::OutOfRange { argument: "nc", range: "0 with a RecursiveArx" });
+        }
+        let orders = ArxOrders { na, inputs: &[InputOrders { nb, nk: 1 }], constant };
+        let [output, input] = scales;
+        RecursiveArx::new(&orders, output, &[input], forgetting)
+    }
+
+    fn with_start(self, start: RlsStart) -> Result<Self, Error> {
+        self.with_start(start)
+    }
+
+    fn measured(&mut self, output: T) -> Result<Innovation<T>, Error> {
+        self.measured(output)
+    }
+
+    fn applied(&mut self, input: T) -> Result<(), Error> {
+        self.applied(&[input])
+    }
+
+    fn predict(&self, input: T, output: &mut [T]) -> Result<(), Error> {
+        self.predict(&[input], output)
+    }
+
+    fn set_adaptation(&mut self, on: bool) {
+        self.set_adaptation(on);
+    }
+
+    fn lags(&self) -> &Lags<T, P> {
+        self.lags()
+    }
+
+    fn estimator(&self) -> &RecursiveLeastSquares<T, P> {
+        self.estimator()
+    }
+
+    fn c(&self) -> impl Iterator<Item = T> + Clone {
+        core::iter::once(T::one())
+    }
+}
+
+impl<T: Real, P: Dimension + Dimension<Const<1>>> Estimated<T, P> for RecursiveArmax<T, P> {
+    fn new(orders: &TunerOrders, scales: [T; 2], forgetting: Forgetting<T>) -> Result<Self, Error> {
+        let TunerOrders { na, nb, nc, constant, .. } = *orders;
+        let orders = ArmaxOrders { na, inputs: &[InputOrders { nb, nk: 1 }], nc, constant };
+        let [output, input] = scales;
+        // A guess that does not matter much: it bounds P of C.
+        let noise = output / T::from_count(10);
+        RecursiveArmax::new(&orders, ArmaxMethod::PredictionError, output, &[input], noise, forgetting)
+    }
+
+    fn with_start(self, start: RlsStart) -> Result<Self, Error> {
+        self.with_start(start)
+    }
+
+    fn measured(&mut self, output: T) -> Result<Innovation<T>, Error> {
+        self.measured(output)
+    }
+
+    fn applied(&mut self, input: T) -> Result<(), Error> {
+        self.applied(&[input])
+    }
+
+    fn predict(&self, input: T, output: &mut [T]) -> Result<(), Error> {
+        self.predict(&[input], output)
+    }
+
+    fn set_adaptation(&mut self, on: bool) {
+        self.set_adaptation(on);
+    }
+
+    fn lags(&self) -> &Lags<T, P> {
+        self.lags()
+    }
+
+    fn estimator(&self) -> &RecursiveLeastSquares<T, P> {
+        self.estimator()
+    }
+
+    fn c(&self) -> impl Iterator<Item = T> + Clone {
+        self.c()
+    }
+}

@@ -11,8 +11,8 @@ mod sensor;
 mod settings;
 
 pub use direct::{DirectOrders, DirectSelfTuner};
-pub use indirect::{IndirectSelfTuner, TunerOrders};
-pub use model::TunerModel;
+pub use indirect::IndirectSelfTuner;
+pub use model::{TunerModel, TunerOrders};
 pub use probe::Probing;
 pub use response::ResponseWanted;
 pub use sensor::Sensor;

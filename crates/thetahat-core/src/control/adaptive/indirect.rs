@@ -3,56 +3,14 @@
 use nalgebra::{Const, OVector};
 
 use super::closed_loop::ClosedLoop;
-use super::model::TunerModel;
+use super::model::{TunerModel, TunerOrders};
 #[cfg(doc)]
 use super::{Probing, Sensor};
 use super::{TunerSettings, TunerState};
 #[cfg(doc)]
 use crate::RecursiveArmax;
 use crate::stability::is_stable;
-use crate::{
-    Dimension, Error, Forgetting, PlacementOrders, Real, RecursiveArx, RlsStart, RstController, WantedPoles,
-};
-
-/// How large the model and the controller of an [`IndirectSelfTuner`] are.
-///
-/// ```
-/// use thetahat_core::TunerOrders;
-///
-/// // A plant of second order with up to two samples of dead time, loads, and a controller that integrates.
-/// const ORDERS: TunerOrders = TunerOrders { na: 2, nb: 4, nc: 0, constant: true, integrator: true };
-/// assert_eq!((ORDERS.parameters(), ORDERS.size()), (7, 6));
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct TunerOrders {
-    /// The order of A(q).
-    pub na: usize,
-    /// The coefficients of B(q) = b_1 q⁻¹ + …: 2 for a plant of second order, and one more for each sample of dead time that there may
-    /// be.
-    pub nb: usize,
-    /// The order of C(q): 0 with a [`RecursiveArx`], the noise of which is white.
-    pub nc: usize,
-    /// Whether the model has a constant: where the signals are not deviations from a working point, and where loads come.
-    pub constant: bool,
-    /// Whether the controller integrates.
-    pub integrator: bool,
-}
-
-impl TunerOrders {
-    /// `P` of [`IndirectSelfTuner`].
-    pub const fn parameters(&self) -> usize {
-        self.na + self.nb + self.nc + self.constant as usize
-    }
-
-    /// `N` of [`IndirectSelfTuner`].
-    pub const fn size(&self) -> usize {
-        let placed = PlacementOrders { na: self.na, nb: self.nb, integrator: self.integrator }.size();
-        // A_m is of degree 2, or A; A_o = C (1 - p q⁻¹).
-        let response = if self.na > 2 { self.na } else { 2 };
-        let poles = response + self.nc + 1;
-        if self.nc > 0 && poles > placed { poles } else { placed }
-    }
-}
+use crate::{Dimension, Error, Forgetting, Real, RecursiveArx, RlsStart, RstController, WantedPoles};
 
 /// A controller that estimates a model of its plant, and is designed anew for it while it runs.
 ///

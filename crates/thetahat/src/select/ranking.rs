@@ -116,11 +116,11 @@ fn both(winners: &Winners, order: &[&Candidate], task: &Task<'_>) -> Vec<String>
         vec![format!("For prediction: {}; {on_blocks}.", described(order[prediction], task.select))];
     match percent(simulation) {
         Some(_) if simulation == prediction => {
-            words.push(format!("No other model does better on held-out blocks, {how}."));
+            words.push(format!("No other model does better on held-out rows, {how}."));
         }
         Some(percent) => {
             let orders = &order[simulation].orders;
-            words.push(format!("Best on held-out blocks, {how}: {orders}, {percent} %."));
+            words.push(format!("Best on held-out rows, {how}: {orders}, {percent} % on blocks."));
         }
         None => {}
     }

@@ -2,14 +2,12 @@
 
 use nalgebra::Const;
 
-#[cfg(doc)]
-use super::IndirectSelfTuner;
 use crate::{
     ArmaxMethod, ArmaxOrders, ArxOrders, Dimension, Error, Forgetting, Innovation, InputOrders, Lags,
     PlacementOrders, Real, RecursiveArmax, RecursiveArx, RecursiveLeastSquares, RlsStart,
 };
 
-/// How large the model and the controller of an [`IndirectSelfTuner`] are.
+/// How large the model and the controller of an [`IndirectSelfTuner`](crate::IndirectSelfTuner) are.
 ///
 /// ```
 /// use thetahat_core::TunerOrders;
@@ -34,12 +32,12 @@ pub struct TunerOrders {
 }
 
 impl TunerOrders {
-    /// `P` of [`IndirectSelfTuner`].
+    /// `P` of [`IndirectSelfTuner`](crate::IndirectSelfTuner).
     pub const fn parameters(&self) -> usize {
         self.na + self.nb + self.nc + self.constant as usize
     }
 
-    /// `N` of [`IndirectSelfTuner`].
+    /// `N` of [`IndirectSelfTuner`](crate::IndirectSelfTuner).
     pub const fn size(&self) -> usize {
         let placed = PlacementOrders { na: self.na, nb: self.nb, integrator: self.integrator }.size();
         // A_m is of degree 2, or A; A_o = C (1 - p q⁻¹).
@@ -49,7 +47,7 @@ impl TunerOrders {
     }
 }
 
-/// A model that an [`IndirectSelfTuner`] can estimate: [`RecursiveArx`], or [`RecursiveArmax`] where the noise is not white. The
+/// A model that an [`IndirectSelfTuner`](crate::IndirectSelfTuner) can estimate: [`RecursiveArx`], or [`RecursiveArmax`] where the noise is not white. The
 /// trait is sealed.
 pub trait TunerModel<T: Real, P: Dimension + Dimension<Const<1>>>: Estimated<T, P> {}
 

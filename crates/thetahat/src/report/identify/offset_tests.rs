@@ -3,7 +3,7 @@
 use super::*;
 use crate::data::{Channel, Record};
 use crate::estimate::{ConvexFit, estimate};
-use crate::model::PolynomialModel;
+use crate::model::{Model, PolynomialModel};
 use crate::optimize::Search;
 use crate::regression::noise::Noise;
 use crate::report::Report;
@@ -199,8 +199,7 @@ fn choices_find_the_model_of_a_step_test() {
     };
     let (u, y) = step_test(20, 0.3);
     let automatic = Automatic { structure: Some(crate::model::Structure::Oe), nk: None };
-    for choice in [Choice::Grid(grid), Choice::Automatic(automatic), Choice::Automatic(Automatic::default())]
-    {
+    for choice in [Choice::Grid(grid), Choice::Automatic(automatic)] {
         let report = fitted(&u, &y, &Plan::new(&["u"], "y", choice));
         let gain = report.polynomials().dc_gain[0].unwrap();
         assert!((gain.value - 0.5).abs() < 4.0 * gain.standard_error.unwrap(), "{gain:?}");
@@ -209,6 +208,14 @@ fn choices_find_the_model_of_a_step_test() {
         assert!(selection.steps.iter().any(|step| step.contains("a constant")), "{:?}", selection.steps);
         assert!(selection.best.iter().all(|model| model.orders.inputs() == 1));
         assert_eq!(selection.chosen.orders, report.polynomials().orders);
+    }
+    // With nothing said, it is what the plant is: a gain of 0.5, a lag of -1/ln 0.9 samples, and no dead time.
+    let report = fitted(&u, &y, &Plan::new(&["u"], "y", Choice::Automatic(Automatic::default())));
+    let Model::Process(process) = &report.model else { panic!("{}", report.model.name()) };
+    for (name, truth) in [("K", 0.5), ("tau", -2.0 / 0.9_f64.ln()), ("theta", 0.0)] {
+        let parameter = process.parameters.iter().find(|parameter| parameter.name == name).unwrap();
+        let error = parameter.standard_error.unwrap();
+        assert!((parameter.value - truth).abs() < 4.0 * error, "{parameter:?}");
     }
 }
 
